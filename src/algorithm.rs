@@ -1,0 +1,176 @@
+//! How algorithms are named.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// A method and where it runs, written `method@backend`: `brute@cpu1`, `strips@cpu8`, `sweep@gpu0`, `strips@gpu0+1`.
+///
+/// The same text stands in JSON, on the command line and in logs.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct AlgorithmId {
+    method: String,
+    backend: Backend,
+}
+
+/// The processor that an algorithm runs on.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Backend {
+    /// That many threads of the CPU, at least one.
+    Cpu(u32),
+    /// These GPUs, numbered as in `sapwise devices`, ascending.
+    Gpu(Vec<u32>),
+}
+
+/// The text of an algorithm that can't be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ParseIdError(String);
+
+impl AlgorithmId {
+    /// The algorithm `method` on `backend`.
+    ///
+    /// # Errors
+    /// `method` must be 1 to 32 of `a-z`, `0-9`, `-` and `_`, beginning with a letter, so that the text can be read back.
+    pub fn new(method: &str, backend: Backend) -> Result<Self, ParseIdError> {
+        let letters = method.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_');
+        if method.len() > 32 || !letters || !method.starts_with(|c: char| c.is_ascii_lowercase()) {
+            return Err(ParseIdError(format!("{method:?} is no method name; use up to 32 of a-z, 0-9, - and _")));
+        }
+        Ok(Self { method: method.to_owned(), backend })
+    }
+
+    /// An id of our own, whose method name is known to be well-formed.
+    pub(crate) fn cpu(method: &'static str, threads: u32) -> Self {
+        Self { method: method.to_owned(), backend: Backend::Cpu(threads) }
+    }
+
+    /// The part before the `@`.
+    #[must_use]
+    pub fn method(&self) -> &str {
+        &self.method
+    }
+
+    /// The part after the `@`.
+    #[must_use]
+    pub fn backend(&self) -> &Backend {
+        &self.backend
+    }
+
+    /// CPU threads that the algorithm keeps busy; one for a GPU.
+    #[must_use]
+    pub fn threads(&self) -> u32 {
+        match self.backend {
+            Backend::Cpu(k) => k,
+            Backend::Gpu(_) => 1,
+        }
+    }
+}
+
+impl fmt::Display for AlgorithmId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}@{}", self.method, self.backend)
+    }
+}
+
+impl fmt::Display for Backend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Backend::Cpu(threads) => write!(f, "cpu{threads}"),
+            Backend::Gpu(devices) => {
+                let list: Vec<String> = devices.iter().map(u32::to_string).collect();
+                write!(f, "gpu{}", list.join("+"))
+            }
+        }
+    }
+}
+
+impl fmt::Display for ParseIdError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for ParseIdError {}
+
+impl FromStr for Backend {
+    type Err = ParseIdError;
+
+    fn from_str(text: &str) -> Result<Self, ParseIdError> {
+        let bad = || ParseIdError(format!("{text:?} is no backend; use cpu1, cpu4, gpu0 or gpu0+1"));
+        if let Some(threads) = text.strip_prefix("cpu") {
+            return number(threads).filter(|&k| (1..=4096).contains(&k)).map(Backend::Cpu).ok_or_else(bad);
+        }
+        let devices: Option<Vec<u32>> = text.strip_prefix("gpu").ok_or_else(bad)?.split('+').map(number).collect();
+        match devices {
+            Some(list) if list.is_sorted_by(|a, b| a < b) => Ok(Backend::Gpu(list)),
+            _ => Err(bad()),
+        }
+    }
+}
+
+impl FromStr for AlgorithmId {
+    type Err = ParseIdError;
+
+    fn from_str(text: &str) -> Result<Self, ParseIdError> {
+        let (method, backend) = text
+            .split_once('@')
+            .ok_or_else(|| ParseIdError(format!("{text:?} is no algorithm; write method@backend, such as strips@cpu1")))?;
+        Self::new(method, backend.parse()?)
+    }
+}
+
+/// A number in its one accepted spelling, so that an id has one text only.
+fn number(text: &str) -> Option<u32> {
+    text.parse().ok().filter(|n: &u32| n.to_string() == text)
+}
+
+#[cfg(feature = "model")]
+impl serde::Serialize for AlgorithmId {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+#[cfg(feature = "model")]
+impl<'de> serde::Deserialize<'de> for AlgorithmId {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        text.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+#[cfg(feature = "schema")]
+impl schemars::JsonSchema for AlgorithmId {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "AlgorithmId".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({
+            "type": "string",
+            "pattern": "^[a-z][a-z0-9_-]{0,31}@(cpu[1-9][0-9]*|gpu[0-9]+(\\+[0-9]+)*)$",
+            "description": "method@backend",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_read_back_what_they_write() {
+        for text in ["brute@cpu1", "strips@cpu16", "sweep@gpu0", "strips@gpu0+1", "my-tree_2@cpu2"] {
+            assert_eq!(text.parse::<AlgorithmId>().unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn malformed_ids_are_refused() {
+        for text in
+            ["", "brute", "brute@", "@cpu1", "brute@cpu0", "brute@cpu01", "brute@cpu-1", "b@gpu1+0", "b@gpu0+0", "Ä@cpu1"]
+        {
+            assert!(text.parse::<AlgorithmId>().is_err(), "{text}");
+        }
+    }
+}

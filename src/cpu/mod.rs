@@ -1,0 +1,5 @@
+//! Algorithms on the CPU, one file per method.
+
+mod level;
+
+pub use level::SimdLevel;
