@@ -3,15 +3,31 @@
 mod aabb;
 mod algorithm;
 mod broad_phase;
+mod cost;
 pub mod cpu;
 mod error;
+pub mod fields;
 pub mod hardware;
+#[cfg(feature = "model")]
+pub mod json;
+mod load;
+pub mod model;
 mod pairs;
+mod registry;
+pub mod report;
+mod sample;
+mod schema_tag;
 
 pub use aabb::Aabb;
 pub use algorithm::{AlgorithmId, Backend, ParseIdError};
 pub use broad_phase::BroadPhase;
+pub use cost::{CostCurve, CostTerm, Knot, Term};
 pub use cpu::SimdLevel;
 pub use error::{BoxDefect, Error};
+pub use fields::{AlgorithmCost, Border, Fields, Ranking, Source, Step};
 pub use hardware::{Hardware, How, Machine, Parameter};
+pub use load::Load;
+pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};
+pub use registry::{Entry, Registry, usable_cores};
+pub use report::Report;

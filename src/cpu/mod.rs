@@ -1,5 +1,30 @@
 //! Algorithms on the CPU, one file per method.
 
+mod brute;
 mod level;
+mod strips;
+mod threads;
 
 pub use level::SimdLevel;
+pub(crate) use strips::strip_cells;
+pub(crate) use threads::Threads;
+
+use crate::{BroadPhase, Error};
+
+/// A method of ours: one row here puts it into every test, probe, sweep and plot.
+pub(crate) struct Method {
+    /// The part of the id before the `@`.
+    pub(crate) name: &'static str,
+    /// Counts up when its speed changes.
+    pub(crate) revision: u32,
+    /// Makes an instance that runs on that many threads.
+    pub(crate) create: fn(u32, &Threads) -> Result<Box<dyn BroadPhase>, Error>,
+}
+
+/// Every method, the simplest first.
+pub(crate) const METHODS: &[Method] = &[Method { name: "brute", revision: 1, create: brute::create }];
+
+/// Why `threads` threads can't be used in this build, if they can't.
+pub(crate) fn unavailable(threads: u32) -> Option<String> {
+    (threads > 1 && !cfg!(feature = "parallel")).then(|| "built without the feature `parallel`".to_owned())
+}

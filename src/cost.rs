@@ -1,0 +1,171 @@
+//! What a frame costs: a sum of terms, each a count of operations times nanoseconds per operation.
+
+use crate::Load;
+
+/// A count of operations that grows with the load in its own way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum Term {
+    /// One call: dispatch, set-up, fork and join.
+    Call,
+    /// Boxes read, checked and copied: n.
+    Objects,
+    /// Comparisons of a sort: n log2 n.
+    Sort,
+    /// Boxes whose working set does not fit the last-level cache: n times the share of it that is outside.
+    ColdObjects,
+    /// All pairs: n (n - 1) / 2.
+    AllPairs,
+    /// Pairs that overlap on the sweep axis ([`Load::axis_candidates`]).
+    AxisCandidates,
+    /// Pairs that overlap on the sweep axis within a strip ([`Load::strip_candidates`]).
+    StripCandidates,
+    /// Pairs written ([`Load::pairs`]).
+    Pairs,
+}
+
+/// Bytes that an algorithm keeps in flight for each box: the box itself, its sorted copy and its key.
+const WORKING_SET_BYTES: f64 = 64.0;
+
+impl Term {
+    /// Every term.
+    pub const ALL: [Self; 8] = [
+        Self::Call,
+        Self::Objects,
+        Self::Sort,
+        Self::ColdObjects,
+        Self::AllPairs,
+        Self::AxisCandidates,
+        Self::StripCandidates,
+        Self::Pairs,
+    ];
+
+    /// The count of operations under a load, on a machine with a last-level cache of `cache_bytes`.
+    #[must_use]
+    pub fn count(self, load: &Load, cache_bytes: f64) -> f64 {
+        let n = f64::from(load.objects);
+        match self {
+            Self::Call => 1.0,
+            Self::Objects => n,
+            Self::Sort => n * n.max(1.0).log2(),
+            Self::ColdObjects => n * (1.0 - cache_bytes / (WORKING_SET_BYTES * n).max(1.0)).max(0.0),
+            Self::AllPairs => n * (n - 1.0).max(0.0) / 2.0,
+            Self::AxisCandidates => load.axis_candidates,
+            Self::StripCandidates => load.strip_candidates,
+            Self::Pairs => load.pairs,
+        }
+    }
+}
+
+/// The cost of one algorithm on one machine as a function of the load.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct CostCurve {
+    /// Terms of the sum; none is negative.
+    pub terms: Vec<CostTerm>,
+    /// Last-level cache of the machine, for [`Term::ColdObjects`].
+    pub cache_bytes: f64,
+    /// What the terms leave unexplained, ascending by `log2_objects`: the sum is multiplied by `exp(ln_factor)`,
+    /// linear between knots and constant beyond the outer ones. Empty: nothing is corrected.
+    pub correction: Vec<Knot>,
+}
+
+/// One term of a cost curve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct CostTerm {
+    /// What is counted.
+    pub term: Term,
+    /// Nanoseconds for each.
+    pub unit_ns: f64,
+}
+
+/// One point of a correction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Knot {
+    /// Base-2 logarithm of the number of objects.
+    pub log2_objects: f64,
+    /// Natural logarithm of measured over modelled time there.
+    pub ln_factor: f64,
+}
+
+impl CostCurve {
+    /// Predicted nanoseconds for a frame under `load`.
+    #[must_use]
+    pub fn cost_ns(&self, load: &Load) -> f64 {
+        let sum: f64 = self.terms.iter().map(|t| t.unit_ns * t.term.count(load, self.cache_bytes)).sum();
+        if self.correction.is_empty() { sum } else { sum * self.ln_correction(load.objects).exp() }
+    }
+
+    fn ln_correction(&self, objects: u32) -> f64 {
+        let x = f64::from(objects.max(1)).log2();
+        let after = self.correction.partition_point(|k| k.log2_objects <= x);
+        match (after.checked_sub(1).map(|k| self.correction[k]), self.correction.get(after)) {
+            (Some(a), Some(b)) => {
+                let share = (x - a.log2_objects) / (b.log2_objects - a.log2_objects);
+                a.ln_factor + share * (b.ln_factor - a.ln_factor)
+            }
+            (Some(outer), None) => outer.ln_factor,
+            (None, Some(outer)) => outer.ln_factor,
+            (None, None) => 0.0,
+        }
+    }
+
+    /// What makes this curve unusable, if anything: a negative or non-finite figure, or knots out of order.
+    #[must_use]
+    pub fn defect(&self) -> Option<String> {
+        if let Some(t) = self.terms.iter().find(|t| !(t.unit_ns.is_finite() && t.unit_ns >= 0.0)) {
+            return Some(format!("the term {:?} has {} ns a unit", t.term, t.unit_ns));
+        }
+        if !(self.cache_bytes.is_finite() && self.cache_bytes >= 0.0) {
+            return Some(format!("a cache of {} bytes", self.cache_bytes));
+        }
+        let finite = self.correction.iter().all(|k| k.log2_objects.is_finite() && k.ln_factor.is_finite());
+        if !finite || !self.correction.is_sorted_by(|a, b| a.log2_objects < b.log2_objects) {
+            return Some("knots of the correction that are not ascending and finite".to_owned());
+        }
+        if self.terms.iter().all(|t| t.unit_ns == 0.0) {
+            return Some("no term above zero, so the cost is always nothing".to_owned());
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_adds_its_terms_and_applies_its_correction_between_knots() {
+        let mut curve = CostCurve {
+            terms: vec![CostTerm { term: Term::Call, unit_ns: 100.0 }, CostTerm { term: Term::AllPairs, unit_ns: 2.0 }],
+            ..CostCurve::default()
+        };
+        let load = |objects| Load { objects, ..Load::default() };
+        assert_eq!(curve.cost_ns(&load(5)), 100.0 + 2.0 * 10.0);
+        curve.correction =
+            vec![Knot { log2_objects: 2.0, ln_factor: 0.0 }, Knot { log2_objects: 4.0, ln_factor: 2.0_f64.ln() }];
+        assert_eq!(curve.cost_ns(&load(4)), 112.0);
+        assert!((curve.cost_ns(&load(8)) - 156.0 * 2.0_f64.sqrt()).abs() < 1e-9);
+        assert!((curve.cost_ns(&load(1024)) / (100.0 + 1024.0 * 1023.0) - 2.0).abs() < 1e-9);
+        assert_eq!(curve.defect(), None);
+    }
+
+    #[test]
+    fn cold_objects_start_where_the_cache_ends() {
+        let load = |objects| Load { objects, ..Load::default() };
+        assert_eq!(Term::ColdObjects.count(&load(1000), 64_000.0), 0.0);
+        assert_eq!(Term::ColdObjects.count(&load(2000), 64_000.0), 1000.0);
+    }
+
+    #[test]
+    fn impossible_curves_are_told() {
+        let curve = |unit_ns| CostCurve { terms: vec![CostTerm { term: Term::Call, unit_ns }], ..CostCurve::default() };
+        assert!(curve(-1.0).defect().is_some() && curve(f64::NAN).defect().is_some() && curve(0.0).defect().is_some());
+    }
+}

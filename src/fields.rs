@@ -1,0 +1,351 @@
+//! The fields of optimal performance: for each load the cheapest algorithm.
+
+use crate::schema_tag::schema_tag;
+use crate::{AlgorithmId, CostCurve, Load};
+
+schema_tag!(
+    /// `fields/1`.
+    FieldsSchema = "fields/1"
+);
+
+/// Which algorithm to run under which load, and where that knowledge came from.
+///
+/// With cost curves the choice depends on the whole [`Load`]; without them on the number of objects alone, through
+/// `steps`, as the paper does it and as a hand-written list of thresholds does.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Fields {
+    /// Always `fields/1`.
+    pub schema: FieldsSchema,
+    /// Where the fields came from.
+    pub source: Source,
+    /// Name of the model that predicted them; `None` unless predicted.
+    pub model: Option<String>,
+    /// Whether the machine lies outside what the model was trained on.
+    pub extrapolated: bool,
+    /// In words, what was outside and what that means. Empty when nothing was.
+    pub warnings: Vec<String>,
+    /// Scenario of the slice that `steps` and `crossovers` show.
+    pub scenario: String,
+    /// The cheapest algorithm over the number of objects in that scenario, ascending: each holds until the next begins.
+    pub steps: Vec<Step>,
+    /// Where one step gives way to the next, in the order of `steps`.
+    pub crossovers: Vec<Border>,
+    /// What `low` and `high` of the crossovers are made of.
+    pub interval_basis: String,
+    /// The cost of each algorithm. Empty: `steps` decide.
+    pub costs: Vec<AlgorithmCost>,
+}
+
+/// Where fields came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum Source {
+    /// Written down by hand.
+    Default,
+    /// From hardware parameters, by a model trained on reports.
+    Predicted,
+    /// From timings of the algorithms on this machine.
+    Measured,
+    /// Corrected by the frames that were run.
+    Learned,
+}
+
+/// From this many objects up, this algorithm.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Step {
+    /// First number of objects.
+    pub from_objects: u32,
+    /// The algorithm.
+    pub algorithm: AlgorithmId,
+}
+
+/// A border between two neighbouring fields.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Border {
+    /// The cheaper algorithm with fewer objects.
+    pub below: AlgorithmId,
+    /// The cheaper algorithm with more objects.
+    pub above: AlgorithmId,
+    /// Number of objects at which both cost the same.
+    pub objects: f64,
+    /// Lower end of the interval.
+    pub low: f64,
+    /// Upper end of the interval.
+    pub high: f64,
+}
+
+/// The cost of one algorithm.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct AlgorithmCost {
+    /// The algorithm.
+    pub algorithm: AlgorithmId,
+    /// Revision of the algorithm that the curve was measured or predicted for.
+    pub revision: u32,
+    /// Its cost over the load.
+    pub curve: CostCurve,
+    /// Standard deviation of the natural logarithm of measured over modelled time.
+    pub spread_ln: f64,
+}
+
+/// The two cheapest algorithms under a load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ranking {
+    /// Position of the cheapest in the list that was ranked.
+    pub best: usize,
+    /// Its predicted cost, or NaN where only the number of objects decides.
+    pub best_ns: f64,
+    /// Position and predicted cost of the next.
+    pub runner_up: Option<(usize, f64)>,
+}
+
+impl Fields {
+    /// Fields from a hand-written list of thresholds: from `objects` up, that algorithm.
+    ///
+    /// # Errors
+    /// A sentence, when the list is empty, does not begin at 0 or is not ascending.
+    pub fn from_steps(steps: Vec<Step>) -> Result<Self, String> {
+        let fields = Self { steps, ..Self::empty(Source::Default) };
+        fields.defect().map_or(Ok(fields), Err)
+    }
+
+    /// Fields from cost curves, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
+    ///
+    /// The loads are interpolated between each other, so a handful per decade is enough. Intervals follow from the curves'
+    /// `spread_ln`: where the logarithms of two costs differ by less than 1.645 standard deviations of that difference.
+    #[must_use]
+    pub fn from_costs(source: Source, scenario: &str, costs: Vec<AlgorithmCost>, loads: &[Load]) -> Self {
+        let mut fields = Self { scenario: scenario.to_owned(), costs, ..Self::empty(source) };
+        fields.interval_basis =
+            "90 % of a normal distribution with the spread of measured over modelled time of the two algorithms".to_owned();
+        fields.cut(loads);
+        fields
+    }
+
+    fn empty(source: Source) -> Self {
+        Self {
+            schema: FieldsSchema,
+            source,
+            model: None,
+            extrapolated: false,
+            warnings: Vec::new(),
+            scenario: String::new(),
+            steps: Vec::new(),
+            crossovers: Vec::new(),
+            interval_basis: String::new(),
+            costs: Vec::new(),
+        }
+    }
+
+    /// The algorithms that these fields may choose, in the order that [`Fields::rank`] counts them.
+    #[must_use]
+    pub fn algorithms(&self) -> Vec<&AlgorithmId> {
+        if self.costs.is_empty() {
+            let mut list: Vec<&AlgorithmId> = Vec::new();
+            for step in &self.steps {
+                if !list.contains(&&step.algorithm) {
+                    list.push(&step.algorithm);
+                }
+            }
+            return list;
+        }
+        self.costs.iter().map(|c| &c.algorithm).collect()
+    }
+
+    /// The cheapest algorithms under `load` among those that `usable` admits, which is asked by position in [`Fields::costs`].
+    ///
+    /// `None` when there are no cost curves or none is usable.
+    #[must_use]
+    pub fn rank(&self, load: &Load, usable: impl Fn(usize) -> bool) -> Option<Ranking> {
+        let mut ranking: Option<Ranking> = None;
+        for (k, cost) in self.costs.iter().enumerate().filter(|&(k, _)| usable(k)) {
+            let ns = cost.curve.cost_ns(load);
+            ranking = Some(match ranking {
+                None => Ranking { best: k, best_ns: ns, runner_up: None },
+                Some(r) if ns < r.best_ns => Ranking { best: k, best_ns: ns, runner_up: Some((r.best, r.best_ns)) },
+                Some(r) if r.runner_up.is_none_or(|(_, second)| ns < second) => Ranking { runner_up: Some((k, ns)), ..r },
+                Some(r) => r,
+            });
+        }
+        ranking
+    }
+
+    /// The step that holds at a number of objects.
+    #[must_use]
+    pub fn step(&self, objects: u32) -> Option<&Step> {
+        self.steps[..self.steps.partition_point(|s| s.from_objects <= objects)].last()
+    }
+
+    /// What makes these fields unusable, if anything.
+    #[must_use]
+    pub fn defect(&self) -> Option<String> {
+        if self.steps.first().is_none_or(|s| s.from_objects != 0) {
+            return Some("the steps don't begin at 0 objects".to_owned());
+        }
+        if !self.steps.is_sorted_by(|a, b| a.from_objects < b.from_objects) {
+            return Some("the steps are not ascending".to_owned());
+        }
+        if let Some(b) = self.crossovers.iter().find(|b| !(0.0 <= b.low && b.low <= b.objects && b.objects <= b.high)) {
+            return Some(format!("the crossover from {} to {} does not lie within its interval", b.below, b.above));
+        }
+        for (k, cost) in self.costs.iter().enumerate() {
+            let id = &cost.algorithm;
+            if let Some(defect) = cost.curve.defect() {
+                return Some(format!("the cost of {id}: {defect}"));
+            }
+            if !(cost.spread_ln.is_finite() && cost.spread_ln >= 0.0) {
+                return Some(format!("the cost of {id}: a spread of {}", cost.spread_ln));
+            }
+            if self.costs[..k].iter().any(|c| c.algorithm == *id) {
+                return Some(format!("{id} stands there twice"));
+            }
+        }
+        None
+    }
+
+    /// Walks the slice on a fine grid and notes where the cheapest algorithm changes.
+    fn cut(&mut self, loads: &[Load]) {
+        let grid = fine_grid(loads);
+        let winner = |load: &Load| self.rank(load, |_| true).map(|r| r.best);
+        let mut steps: Vec<(Load, usize)> = Vec::new();
+        for load in &grid {
+            if let Some(best) = winner(load)
+                && steps.last().is_none_or(|s| s.1 != best)
+            {
+                steps.push((*load, best));
+            }
+        }
+        self.crossovers = steps.windows(2).map(|w| self.border(&grid, w[0].1, w[1].1, w[1].0.objects)).collect();
+        self.steps = steps
+            .iter()
+            .enumerate()
+            .map(|(k, (load, best))| Step {
+                from_objects: if k == 0 { 0 } else { load.objects },
+                algorithm: self.costs[*best].algorithm.clone(),
+            })
+            .collect();
+    }
+
+    fn border(&self, grid: &[Load], below: usize, above: usize, objects: u32) -> Border {
+        let (b, a) = (&self.costs[below], &self.costs[above]);
+        let doubt = 1.645 * b.spread_ln.hypot(a.spread_ln);
+        // Positive where the algorithm of the upper field is cheaper.
+        let gain = |load: &Load| (b.curve.cost_ns(load) / a.curve.cost_ns(load)).ln();
+        let split = grid.partition_point(|l| l.objects < objects);
+        let low = grid[..split].iter().rev().take_while(|l| gain(l) > -doubt).last().map_or(objects, |l| l.objects);
+        let high = grid[split..].iter().take_while(|l| gain(l) < doubt).last().map_or(objects, |l| l.objects);
+        Border {
+            below: b.algorithm.clone(),
+            above: a.algorithm.clone(),
+            objects: f64::from(objects),
+            low: f64::from(low),
+            high: f64::from(high),
+        }
+    }
+}
+
+/// Loads about 1.5 % apart in objects, interpolated between the given ones on logarithmic axes.
+fn fine_grid(loads: &[Load]) -> Vec<Load> {
+    let mut grid = Vec::new();
+    for pair in loads.windows(2) {
+        let (a, b) = (&pair[0], &pair[1]);
+        let ratio = f64::from(b.objects.max(1)) / f64::from(a.objects.max(1));
+        let parts = (ratio.ln() / 0.015).ceil().max(1.0) as u32;
+        grid.extend((0..parts).map(|k| between(a, b, f64::from(k) / f64::from(parts))));
+    }
+    grid.extend(loads.last());
+    grid.dedup_by_key(|l| l.objects);
+    grid
+}
+
+/// The load a share of the way from one to another.
+fn between(a: &Load, b: &Load, share: f64) -> Load {
+    // Shifted by one because a candidate count may be zero.
+    let mix = |x: f64, y: f64| ((x + 1.0).ln() * (1.0 - share) + (y + 1.0).ln() * share).exp() - 1.0;
+    Load {
+        objects: mix(f64::from(a.objects), f64::from(b.objects)).round() as u32,
+        axis_candidates: mix(a.axis_candidates, b.axis_candidates),
+        strip_candidates: mix(a.strip_candidates, b.strip_candidates),
+        pairs: mix(a.pairs, b.pairs),
+        moved: a.moved * (1.0 - share) + b.moved * share,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{CostTerm, Term};
+
+    fn cost(id: &str, terms: &[(Term, f64)], spread_ln: f64) -> AlgorithmCost {
+        let terms = terms.iter().map(|&(term, unit_ns)| CostTerm { term, unit_ns }).collect();
+        AlgorithmCost {
+            algorithm: id.parse().unwrap(),
+            revision: 1,
+            curve: CostCurve { terms, ..CostCurve::default() },
+            spread_ln,
+        }
+    }
+
+    fn loads() -> Vec<Load> {
+        (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect()
+    }
+
+    #[test]
+    fn crossovers_lie_where_the_curves_cross_and_intervals_around_them() {
+        // 0.5 n (n - 1) = 100 n at n = 201; 100 n = 20 n + 80 000 at n = 1000.
+        let costs = vec![
+            cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05),
+            cost("sweep@cpu1", &[(Term::Objects, 100.0)], 0.05),
+            cost("strips@cpu2", &[(Term::Call, 80_000.0), (Term::Objects, 20.0)], 0.05),
+        ];
+        let fields = Fields::from_costs(Source::Measured, "uniform", costs, &loads());
+        assert_eq!(fields.defect(), None);
+        let names: Vec<String> = fields.steps.iter().map(|s| s.algorithm.to_string()).collect();
+        assert_eq!(names, ["brute@cpu1", "sweep@cpu1", "strips@cpu2"]);
+        assert!((fields.crossovers[0].objects / 201.0 - 1.0).abs() < 0.02, "{:?}", fields.crossovers);
+        assert!((fields.crossovers[1].objects / 1000.0 - 1.0).abs() < 0.02, "{:?}", fields.crossovers);
+        let b = &fields.crossovers[0];
+        assert!(b.low < 195.0 && b.high > 208.0 && b.low > 150.0 && b.high < 260.0, "{b:?}");
+        assert_eq!(fields.step(5).unwrap().algorithm.method(), "brute");
+        assert_eq!(fields.step(u32::MAX).unwrap().algorithm.method(), "strips");
+    }
+
+    #[test]
+    fn an_algorithm_that_never_wins_has_no_step() {
+        let costs = vec![cost("brute@cpu1", &[(Term::Objects, 2.0)], 0.0), cost("sweep@cpu1", &[(Term::Objects, 1.0)], 0.0)];
+        let fields = Fields::from_costs(Source::Measured, "uniform", costs, &loads());
+        assert_eq!(fields.steps.len(), 1);
+        assert!(fields.crossovers.is_empty());
+    }
+
+    #[test]
+    fn rank_respects_what_is_usable() {
+        let costs = vec![
+            cost("a@cpu1", &[(Term::Call, 3.0)], 0.0),
+            cost("b@cpu1", &[(Term::Call, 1.0)], 0.0),
+            cost("c@cpu1", &[(Term::Call, 2.0)], 0.0),
+        ];
+        let fields = Fields::from_costs(Source::Measured, "uniform", costs, &loads());
+        let load = Load::default();
+        assert_eq!(fields.rank(&load, |_| true), Some(Ranking { best: 1, best_ns: 1.0, runner_up: Some((2, 2.0)) }));
+        assert_eq!(fields.rank(&load, |k| k != 1), Some(Ranking { best: 2, best_ns: 2.0, runner_up: Some((0, 3.0)) }));
+        assert_eq!(fields.rank(&load, |_| false), None);
+    }
+
+    #[test]
+    fn hand_written_steps_are_checked() {
+        let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
+        assert!(Fields::from_steps(vec![step(0, "brute@cpu1"), step(64, "strips@cpu1")]).is_ok());
+        assert!(Fields::from_steps(vec![]).is_err());
+        assert!(Fields::from_steps(vec![step(5, "brute@cpu1")]).is_err());
+        assert!(Fields::from_steps(vec![step(0, "brute@cpu1"), step(0, "strips@cpu1")]).is_err());
+    }
+}

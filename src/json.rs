@@ -1,0 +1,95 @@
+//! Reports, models and fields as JSON text.
+
+use crate::report::{Report, ReportSchema};
+use crate::{Fields, Model};
+use crate::{fields::FieldsSchema, model::ModelSchema};
+use std::fmt;
+
+/// A file of Sapwise, whatever its schema.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Document {
+    /// `report/1`.
+    Report(Box<Report>),
+    /// `model/1`.
+    Model(Box<Model>),
+    /// `fields/1`.
+    Fields(Box<Fields>),
+}
+
+/// Why a text is no sound file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JsonError(String);
+
+impl fmt::Display for JsonError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for JsonError {}
+
+impl From<serde_json::Error> for JsonError {
+    fn from(e: serde_json::Error) -> Self {
+        Self(e.to_string())
+    }
+}
+
+/// Reads any file of Sapwise by its `schema` key.
+///
+/// # Errors
+/// The line and column of the defect, the schema where it is none of ours, or the figure that can't be.
+pub fn read(text: &str) -> Result<Document, JsonError> {
+    /// Only the first key; the rest is skipped without being built, so hostile nesting costs nothing.
+    #[derive(serde::Deserialize)]
+    struct Tag {
+        schema: String,
+    }
+    let tag: Tag = serde_json::from_str(text)?;
+    match tag.schema.as_str() {
+        ReportSchema::TEXT => report(text).map(|r| Document::Report(Box::new(r))),
+        ModelSchema::TEXT => model(text).map(|m| Document::Model(Box::new(m))),
+        FieldsSchema::TEXT => fields(text).map(|f| Document::Fields(Box::new(f))),
+        other => Err(JsonError(format!(
+            "the schema is {other:?}; this version reads {:?}, {:?} and {:?}",
+            ReportSchema::TEXT,
+            ModelSchema::TEXT,
+            FieldsSchema::TEXT
+        ))),
+    }
+}
+
+/// Reads a report and checks its figures.
+///
+/// # Errors
+/// As [`read`].
+pub fn report(text: &str) -> Result<Report, JsonError> {
+    let report: Report = serde_json::from_str(text)?;
+    report.defect().map_or(Ok(report), |d| Err(JsonError(d)))
+}
+
+/// Reads a model and checks its figures.
+///
+/// # Errors
+/// As [`read`].
+pub fn model(text: &str) -> Result<Model, JsonError> {
+    let model: Model = serde_json::from_str(text)?;
+    model.defect().map_or(Ok(model), |d| Err(JsonError(d)))
+}
+
+/// Reads fields and checks their figures.
+///
+/// # Errors
+/// As [`read`].
+pub fn fields(text: &str) -> Result<Fields, JsonError> {
+    let fields: Fields = serde_json::from_str(text)?;
+    fields.defect().map_or(Ok(fields), |d| Err(JsonError(d)))
+}
+
+/// Writes a report, model or fields, one key a line.
+///
+/// # Errors
+/// When a figure can't be written.
+pub fn write(document: &impl serde::Serialize) -> Result<String, JsonError> {
+    Ok(serde_json::to_string_pretty(document)? + "\n")
+}

@@ -1,0 +1,174 @@
+//! The algorithms that this machine can run.
+
+use crate::cpu::{self, Threads};
+use crate::{AlgorithmId, Backend, BroadPhase, Error};
+use std::fmt;
+
+/// Makes an instance of an algorithm.
+type Factory = Box<dyn Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync>;
+
+/// All algorithms that are known, each with the reason when it can't run here.
+///
+/// Starts with ours and is open: what a user adds is swept, modelled and chosen like the rest.
+pub struct Registry {
+    entries: Vec<Entry>,
+    factories: Vec<Option<Factory>>,
+    threads: Threads,
+}
+
+/// One algorithm of a registry.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// The algorithm.
+    pub id: AlgorithmId,
+    /// Counts up when its speed changes; timings of other revisions are stale.
+    pub revision: u32,
+    /// Why it can't run here, if it can't.
+    pub unavailable: Option<String>,
+}
+
+impl Registry {
+    /// Our algorithms on 1, 2, 4, ... and all usable cores of this machine.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::with_cores(usable_cores())
+    }
+
+    /// Our algorithms on 1, 2, 4, ... and `cores` threads.
+    #[must_use]
+    pub fn with_cores(cores: u32) -> Self {
+        let mut registry = Self { entries: Vec::new(), factories: Vec::new(), threads: Threads::default() };
+        for method in cpu::METHODS {
+            for threads in thread_counts(cores) {
+                registry.entries.push(Entry {
+                    id: AlgorithmId::cpu(method.name, threads),
+                    revision: method.revision,
+                    unavailable: cpu::unavailable(threads),
+                });
+                registry.factories.push(None);
+            }
+        }
+        registry
+    }
+
+    /// Adds an algorithm of the user's, or replaces the one with the same id.
+    pub fn add(
+        &mut self,
+        id: AlgorithmId,
+        revision: u32,
+        factory: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
+    ) {
+        let entry = Entry { id, revision, unavailable: None };
+        let factory: Option<Factory> = Some(Box::new(factory));
+        match self.entries.iter().position(|e| e.id == entry.id) {
+            Some(at) => {
+                self.entries[at] = entry;
+                self.factories[at] = factory;
+            }
+            None => {
+                self.entries.push(entry);
+                self.factories.push(factory);
+            }
+        }
+    }
+
+    /// Every algorithm, ours first.
+    #[must_use]
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// The algorithms that can run here, with their revisions.
+    #[must_use]
+    pub fn available(&self) -> Vec<(AlgorithmId, u32)> {
+        self.entries.iter().filter(|e| e.unavailable.is_none()).map(|e| (e.id.clone(), e.revision)).collect()
+    }
+
+    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads.
+    ///
+    /// # Errors
+    /// [`Error::UnknownAlgorithm`] and [`Error::Unavailable`].
+    pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
+        if let Some(factory) = self.entries.iter().position(|e| e.id == *id).and_then(|at| self.factories[at].as_ref()) {
+            return factory();
+        }
+        let method = cpu::METHODS.iter().find(|m| m.name == id.method());
+        match (method, id.backend()) {
+            (Some(method), &Backend::Cpu(threads)) => match cpu::unavailable(threads) {
+                None => (method.create)(threads, &self.threads),
+                Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
+            },
+            _ => {
+                let known: Vec<String> = self.entries.iter().map(|e| e.id.to_string()).collect();
+                Err(Error::UnknownAlgorithm { text: id.to_string(), hint: format!("known here: {}", known.join(", ")) })
+            }
+        }
+    }
+}
+
+impl Default for Registry {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl fmt::Debug for Registry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Registry").field("entries", &self.entries).finish_non_exhaustive()
+    }
+}
+
+/// Threads that may run at once on this machine: affinity and cgroup quota respected; 1 when that can't be told.
+#[must_use]
+pub fn usable_cores() -> u32 {
+    std::thread::available_parallelism().map_or(1, |n| u32::try_from(n.get()).unwrap_or(u32::MAX))
+}
+
+/// 1, 2, 4, ... below `cores`, then `cores`.
+fn thread_counts(cores: u32) -> impl Iterator<Item = u32> {
+    let cores = cores.max(1);
+    std::iter::successors(Some(1_u32), |k| k.checked_mul(2)).take_while(move |&k| k < cores).chain([cores])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Aabb, Pairs};
+
+    #[test]
+    fn thread_counts_double_up_to_all() {
+        assert_eq!(thread_counts(1).collect::<Vec<_>>(), [1]);
+        assert_eq!(thread_counts(2).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!(thread_counts(6).collect::<Vec<_>>(), [1, 2, 4, 6]);
+        assert_eq!(thread_counts(0).collect::<Vec<_>>(), [1]);
+    }
+
+    struct Nothing;
+
+    impl BroadPhase for Nothing {
+        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+            pairs.clear();
+            pairs.finish()
+        }
+    }
+
+    #[test]
+    fn a_user_adds_and_replaces_algorithms() {
+        let mut registry = Registry::with_cores(1);
+        let ours = registry.entries().len();
+        let id: AlgorithmId = "my-tree@cpu1".parse().unwrap();
+        registry.add(id.clone(), 7, || Ok(Box::new(Nothing)));
+        registry.add(id.clone(), 8, || Ok(Box::new(Nothing)));
+        assert_eq!(registry.entries().len(), ours + 1);
+        assert_eq!(registry.entries()[ours].revision, 8);
+        assert!(registry.create(&id).is_ok());
+    }
+
+    #[test]
+    fn unknown_algorithms_are_refused_with_the_known_ones() {
+        let registry = Registry::with_cores(1);
+        let Err(error) = registry.create(&"octree@cpu1".parse().unwrap()) else { panic!("made an unknown algorithm") };
+        assert!(error.to_string().contains("brute@cpu1"), "{error}");
+        assert!(registry.create(&"brute@gpu0".parse().unwrap()).is_err());
+    }
+}

@@ -1,0 +1,150 @@
+//! One machine, one day: what was measured, and nothing that was concluded.
+
+use crate::schema_tag::schema_tag;
+use crate::{AlgorithmId, Hardware, Load};
+
+schema_tag!(
+    /// `report/1`.
+    ReportSchema = "report/1"
+);
+
+/// The hardware parameters of a machine and the raw timings of every algorithm on it.
+///
+/// Facts only: cost curves, crossovers and fields are derived from it and never stored in it.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Report {
+    /// Always `report/1`.
+    pub schema: ReportSchema,
+    /// What kind of evidence this is.
+    pub label: Label,
+    /// How the report was made.
+    pub provenance: Provenance,
+    /// The machine, restricted as the label says.
+    pub hardware: Hardware,
+    /// The algorithms that were timed.
+    pub algorithms: Vec<Timed>,
+    /// Where and what was timed, in the order of measurement. Empty for `--hardware-only`.
+    pub points: Vec<Point>,
+    /// Whether the measurement was cut short, and what went wrong on the way. Empty when all went well.
+    pub remarks: Vec<String>,
+}
+
+/// What kind of evidence a report is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum Label {
+    /// A whole machine, undisturbed.
+    RealFull,
+    /// A real machine with fewer threads or a lower SIMD level than it has.
+    RealRestricted,
+    /// A real machine while other programs load it.
+    RealContended,
+    /// A real machine whose GPU is a program on its CPU.
+    RealSoftwareGpu,
+    /// Made up from a specification. Never evidence of accuracy.
+    Simulated,
+}
+
+/// How a report was made.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Provenance {
+    /// Version of the command.
+    pub version: String,
+    /// Date of the measurement, UTC, as `yyyy-mm-dd`.
+    pub date: String,
+    /// The arguments of the command, paths left out.
+    pub command: String,
+    /// Seed of the scenarios.
+    pub seed: u64,
+    /// Threads that the profile allows; `None` when it allows all.
+    pub threads: Option<u32>,
+    /// SIMD level that was forced; `None` when it was not.
+    pub simd: Option<String>,
+    /// Whether the program was built with optimisation. Timings of a debug build are refused by `train`.
+    pub optimised: bool,
+    /// Seconds that the whole measurement took.
+    pub seconds: f64,
+}
+
+/// An algorithm that was timed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Timed {
+    /// The algorithm.
+    pub id: AlgorithmId,
+    /// Its revision at the time.
+    pub revision: u32,
+}
+
+/// One scenario at one size: every algorithm on the same frames, in random order within each frame.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Point {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Load of the last frame, as an in-line choice would have estimated it, with the pairs of the frame before.
+    pub load: Load,
+    /// Pairs in the last frame.
+    pub pairs: u64,
+    /// [`Pairs::fingerprint`](crate::Pairs::fingerprint) of the last frame, equal for every algorithm, as 16 hex digits.
+    pub fingerprint: String,
+    /// Highest share of the CPU, 0 to 1, that other programs took while these samples were taken. `None`: can't be told.
+    pub foreign_load: Option<f64>,
+    /// Frames that were thrown away because foreign load spoiled them.
+    pub spoiled: u32,
+    /// The timings, one entry for each algorithm that was still in the race.
+    pub timings: Vec<Timing>,
+}
+
+/// Raw timings of one algorithm at one point.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Timing {
+    /// The algorithm.
+    pub algorithm: AlgorithmId,
+    /// Wall clock of each frame from boxes in memory to pairs in memory. The k-th sample of every algorithm at a point is
+    /// the k-th frame, so samples can be compared in pairs.
+    pub samples_ns: Vec<u64>,
+    /// Why there are no samples, where there are none.
+    pub error: Option<String>,
+}
+
+impl Report {
+    /// What makes this report unusable, if anything.
+    #[must_use]
+    pub fn defect(&self) -> Option<String> {
+        for (k, p) in self.hardware.parameters.iter().enumerate() {
+            if p.value.is_some_and(|v| !v.is_finite() || v < 0.0) {
+                return Some(format!("the parameter {} is {:?}", p.name, p.value));
+            }
+            if self.hardware.parameters[..k].iter().any(|q| q.name == p.name) {
+                return Some(format!("the parameter {} stands there twice", p.name));
+            }
+        }
+        for (k, point) in self.points.iter().enumerate() {
+            let at = format!("point {k} ({} at {} objects)", point.scenario, point.load.objects);
+            let Load { axis_candidates, strip_candidates, pairs, moved, .. } = point.load;
+            if ![axis_candidates, strip_candidates, pairs, moved].iter().all(|v| v.is_finite() && *v >= 0.0) {
+                return Some(format!("{at}: a load that is negative or not finite"));
+            }
+            for timing in &point.timings {
+                let id = &timing.algorithm;
+                if !self.algorithms.iter().any(|t| t.id == *id) {
+                    return Some(format!("{at}: {id} is not among the report's algorithms"));
+                }
+                if timing.samples_ns.contains(&0) {
+                    return Some(format!("{at}: {id} has a sample of 0 ns"));
+                }
+            }
+        }
+        None
+    }
+}
