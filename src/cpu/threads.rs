@@ -24,7 +24,7 @@ impl Threads {
         if let Some(pool) = pools.get(&threads) {
             return Ok(Arc::clone(pool));
         }
-        let named = |k| format!("sapwise-{threads}-{k}");
+        let named = move |k| format!("sapwise-{threads}-{k}");
         let built = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).thread_name(named).build();
         let pool = Arc::new(built.map_err(|e| format!("{threads} threads can't be started: {e}"))?);
         pools.insert(threads, Arc::clone(&pool));
