@@ -7,6 +7,7 @@ pub mod cpu;
 mod error;
 pub mod hardware;
 mod pairs;
+mod scenario;
 
 pub use aabb::Aabb;
 pub use algorithm::{AlgorithmId, Backend, ParseIdError};
@@ -15,3 +16,4 @@ pub use cpu::SimdLevel;
 pub use error::{BoxDefect, Error};
 pub use hardware::{Hardware, How, Machine, Parameter};
 pub use pairs::{Pair, PairOrder, Pairs};
+pub use scenario::{Scenario, Scene};
