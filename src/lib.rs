@@ -17,6 +17,7 @@ mod registry;
 pub mod report;
 mod sample;
 mod schema_tag;
+mod scenario;
 
 pub use aabb::Aabb;
 pub use algorithm::{AlgorithmId, Backend, ParseIdError};
@@ -31,3 +32,4 @@ pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};
 pub use registry::{Entry, Registry, usable_cores};
 pub use report::Report;
+pub use scenario::{Scenario, Scene};
