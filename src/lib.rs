@@ -16,8 +16,8 @@ mod pairs;
 mod registry;
 pub mod report;
 mod sample;
-mod schema_tag;
 mod scenario;
+mod schema_tag;
 
 pub use aabb::Aabb;
 pub use algorithm::{AlgorithmId, Backend, ParseIdError};
