@@ -16,6 +16,7 @@ mod pairs;
 mod registry;
 pub mod report;
 mod sample;
+mod scenario;
 mod schema_tag;
 
 pub use aabb::Aabb;
@@ -31,3 +32,4 @@ pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};
 pub use registry::{Entry, Registry, usable_cores};
 pub use report::Report;
+pub use scenario::{Scenario, Scene};
