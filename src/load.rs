@@ -1,7 +1,7 @@
 //! What is known about a frame before it runs.
 
 use crate::Aabb;
-use crate::cpu::strip_cells;
+use crate::cpu::StripGrid;
 use crate::sample::Sample;
 
 /// The figures of a frame that decide what each algorithm costs, all known from a sample and the frame before.
@@ -41,16 +41,18 @@ impl Load {
         // Independence of the axes is wrong for clusters, but the frame before corrects it from the second frame on.
         let guess = sample.overlap.iter().product::<f64>() * all;
         let pairs = pairs.map_or(guess, |p| p as f64);
-        let strip_candidates =
-            strip_candidates(sample, objects, axis, pairs).min(axis_candidates).max(pairs.min(axis_candidates));
+        let strip_candidates = strip_candidates(sample, objects, pairs).min(axis_candidates).max(pairs.min(axis_candidates));
         Self { objects: objects as u32, axis_candidates, strip_candidates, pairs, moved: 1.0 }
     }
 }
 
-/// Two boxes meet in a strip when they overlap after each is widened to whole cells, so candidates exceed pairs by the
-/// ratio of a widened to a plain interval on each of the two grid axes. Widening by half a cell on either side on average.
-fn strip_candidates(sample: &Sample, objects: usize, axis: usize, pairs: f64) -> f64 {
-    let cells = strip_cells(sample, objects, axis);
-    let widening: f64 = cells.iter().map(|&(a, width)| 1.0 + width / (2.0 * sample.extent[a]).max(width * 1e-3)).product();
-    pairs * widening
+/// Two boxes meet in a strip when they overlap after each is widened to whole cells, by half a cell at either end on
+/// average. So candidates exceed pairs by the ratio of a widened to a plain interval on each of the two grid axes.
+fn strip_candidates(sample: &Sample, objects: usize, pairs: f64) -> f64 {
+    let widening = |(axis, width): (usize, f64)| {
+        // A single cell spans everything that overlaps on no axis too.
+        let width = width.min(sample.high[axis] - sample.low[axis] + sample.extent[axis]);
+        if width > 0.0 { 1.0 + width / (2.0 * sample.extent[axis]).max(width * 1e-3) } else { 1.0 }
+    };
+    pairs * StripGrid::plan(sample, objects).widths().map(widening).iter().product::<f64>()
 }

@@ -19,29 +19,42 @@ use walk::{Walk, reflect};
 /// A kind of scene.
 ///
 /// Lengths are in edges of the usual object, a unit cube. A *pair per object* is the number of overlapping pairs over the
-/// number of objects; the bands given are the least and the greatest seen with 2000 objects and hold from 1000 upwards.
+/// number of objects. The bands given hold every frame seen with 1000, 2000 and 60 000 objects over several seeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Scenario {
-    /// BANDS
+    /// Unit cubes spread evenly over a cube-shaped world of edge 2 n^(1/3), each moving by up to 5 % of its edge per axis and
+    /// frame. 0.4 to 0.55 pairs per object: each object touches one other.
     Uniform,
-    /// BANDS
+    /// As [`Scenario::Uniform`], each moving by up to two edges per axis and frame, so that no frame helps with the next. 0.4 to
+    /// 0.55 pairs per object.
     Fast,
-    /// BANDS
+    /// Gaussian blobs of about 1000 unit cubes and deviation 3 in the world of [`Scenario::Uniform`], moving as there while held
+    /// to their blob. 2.9 to 4.2 pairs per object. Fewer than 500 objects make one narrower blob of the same density.
     Clustered,
-    /// BANDS
+    /// As [`Scenario::Uniform`] and just as dense, in a flat world eight edges high on z. 0.4 to 0.55 pairs per object.
     Slab,
-    /// BANDS
+    /// Cubes with edges log-uniform from 0.1 to 10, each moving by up to 5 % of its own edge; and at the head of the list one
+    /// fixed cube as large as the world for every 100 objects, up to four. 0.8 to 1.3 pairs per object, and one more for
+    /// each of the large cubes.
     Mixed,
-    /// BANDS
+    /// As [`Scenario::Uniform`], but only every twentieth object moves: for 30 frames those whose index is 0 modulo 20, then
+    /// for 30 frames those whose index is 1, and so on. 0.4 to 0.55 pairs per object.
     Resting,
-    /// BANDS
+    /// After Broadmark's scene of that name: unit cubes in the world of [`Scenario::Uniform`] that fly straight on at up to 0.1
+    /// edges per axis and frame; one in 64 sets off anew in each frame. 0.38 to 0.55 pairs per object.
     Brownian,
-    /// BANDS
+    /// After Broadmark's scene of that name: unit cubes fall at 9.81 m/s^2 (edge 1 m, 60 frames a second) onto a pile of columns up
+    /// to 16 high, come to rest by frame 140, and are dropped again in frame 240. 0.05 to 0.15 pairs per object in the
+    /// air, 1.1 to 1.3 at rest. No contact is solved: each object has its own place of rest.
     FreeFall,
-    /// BANDS
+    /// After Broadmark's scene of that name: a swarm of unit cubes swirls about a point that moves; all objects move. 5 to 7 pairs
+    /// per object, and nearly three times that in the middle.
     Gravity,
-    /// BANDS
+    /// After Figure 1 of Avril, Gouranton and Arnaldi (ISVRI 2011): ten cubes shatter in bursts and are cleared away, so that their
+    /// number runs from ten to the peak and back in [`Scenario::FRAGMENTATION_FRAMES`], with plateaus and jumps, through most
+    /// of its range several times both ways; then all begins again. 0.15 to 2.6 pairs per object while there are
+    /// 100 or more, 0.6 to 1.1 on average. The cubes' volumes always add up to about the same.
     Fragmentation,
 }
 
@@ -105,7 +118,7 @@ impl Scenario {
     pub fn start(self, objects: usize, seed: u64) -> Scene {
         let mut rng = Rng::new(seed);
         let mut boxes = Vec::with_capacity(objects);
-        let motion = match self {
+        let mut motion = match self {
             Self::Uniform => Motion::Walk(Walk::uniform(objects, STEP, 1, &mut rng)),
             Self::Fast => Motion::Walk(Walk::uniform(objects, 2.0, 1, &mut rng)),
             Self::Clustered => Motion::Clusters(Clusters::new(objects, STEP, &mut rng)),
@@ -115,9 +128,8 @@ impl Scenario {
             Self::Brownian => Motion::Brownian(Brownian::new(objects, &mut rng)),
             Self::FreeFall => Motion::Fall(Fall::new(objects)),
             Self::Gravity => Motion::Gravity(Gravity::new(objects, &mut rng)),
-            Self::Fragmentation => Motion::Fragmentation(Fragmentation::new(objects)),
+            Self::Fragmentation => Motion::Fragmentation(Box::new(Fragmentation::new(objects))),
         };
-        let mut motion = motion;
         match &mut motion {
             Motion::Walk(m) => m.place(&mut boxes),
             Motion::Clusters(m) => m.place(&mut boxes),
@@ -170,7 +182,7 @@ enum Motion {
     Brownian(Brownian),
     Gravity(Gravity),
     Fall(Fall),
-    Fragmentation(Fragmentation),
+    Fragmentation(Box<Fragmentation>),
 }
 
 impl Scene {

@@ -44,6 +44,8 @@ const COURSE: [(u64, f32); 27] = [
     (Scenario::FRAGMENTATION_FRAMES, 0.0),
 ];
 
+/// Volume of the world over the sum of the cubes' volumes. Pieces at random places have 4 / 2.5 pairs each, less at the walls.
+const VOLUME: f64 = 2.5;
 /// Gap between the pieces of one cube as they fly apart, as a share of their edge.
 const GAP: f32 = 0.1;
 /// Greatest displacement of a piece from its octant on each axis, in half edges of the piece.
@@ -53,7 +55,7 @@ const SPEED: f32 = 0.1;
 /// Share of the velocity of a cube that its pieces keep.
 const INHERITED: f32 = 0.5;
 
-/// Cubes of any size whose volumes add up to about a quarter of the world's, however many there are.
+/// Cubes of any size whose volumes add up to about the same, however many there are.
 #[derive(Debug, Clone)]
 pub(super) struct Fragmentation {
     centres: Vec<[f32; 3]>,
@@ -78,7 +80,7 @@ impl Fragmentation {
             centres: Vec::with_capacity(peak),
             halves: Vec::with_capacity(peak),
             velocities: Vec::with_capacity(peak),
-            wall: (cube_root(4.0 * peak as f64) * 0.5) as f32,
+            wall: (cube_root(VOLUME * peak as f64) * 0.5) as f32,
             start,
             peak,
             growth: Powers::new(peak.max(1) as f64 / start.max(1) as f64),
