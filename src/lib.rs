@@ -1,6 +1,7 @@
 //! Broad-phase collision detection that knows which algorithm is fastest on this machine, for this frame.
 
 mod aabb;
+mod adaptive;
 mod algorithm;
 mod broad_phase;
 mod cost;
@@ -20,6 +21,7 @@ mod scenario;
 mod schema_tag;
 
 pub use aabb::Aabb;
+pub use adaptive::{Adaptive, Decision, Reason};
 pub use algorithm::{AlgorithmId, Backend, ParseIdError};
 pub use broad_phase::BroadPhase;
 pub use cost::{CostCurve, CostTerm, Knot, Term};

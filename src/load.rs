@@ -28,19 +28,29 @@ impl Load {
     ///
     /// `pairs` is the number of pairs of the frame before, if there was one.
     #[must_use]
-    pub fn estimate(boxes: &[Aabb], pairs: Option<u64>) -> Self {
+    pub fn estimate(boxes: &[Aabb], pairs: Option<f64>) -> Self {
         let sample = Sample::with_overlaps(boxes);
         Self::from_sample(&sample, boxes.len(), pairs)
     }
 
-    pub(crate) fn from_sample(sample: &Sample, objects: usize, pairs: Option<u64>) -> Self {
+    /// The load of a frame that looks like this one but has another number of objects and pairs.
+    #[must_use]
+    pub fn rescaled(&self, objects: u32, pairs: f64) -> Self {
+        let ratio = |now: f64, then: f64| if then > 0.0 { now / then } else { 1.0 };
+        let growth = ratio(f64::from(objects), f64::from(self.objects));
+        let axis_candidates = self.axis_candidates * growth * growth;
+        let strip_candidates = (self.strip_candidates * ratio(pairs, self.pairs)).min(axis_candidates);
+        Self { objects, axis_candidates, strip_candidates, pairs, moved: self.moved }
+    }
+
+    fn from_sample(sample: &Sample, objects: usize, pairs: Option<f64>) -> Self {
         let n = objects as f64;
         let all = n * (n - 1.0).max(0.0) / 2.0;
         let axis = sample.widest_axis();
         let axis_candidates = sample.overlap[axis] * all;
         // Independence of the axes is wrong for clusters, but the frame before corrects it from the second frame on.
         let guess = sample.overlap.iter().product::<f64>() * all;
-        let pairs = pairs.map_or(guess, |p| p as f64);
+        let pairs = pairs.unwrap_or(guess);
         let strip_candidates = strip_candidates(sample, objects, pairs).min(axis_candidates).max(pairs.min(axis_candidates));
         Self { objects: objects as u32, axis_candidates, strip_candidates, pairs, moved: 1.0 }
     }
