@@ -47,10 +47,10 @@ Examples:
   sapwise probe --threads 1 --out one-core.json    (as if the machine had one core)")]
 pub(crate) struct Probe {
     /// Only the hardware parameters, in seconds.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["quick", "scenarios", "max_objects"])]
     pub(crate) hardware_only: bool,
     /// Three scenarios up to 300 000 objects, under a minute in all.
-    #[arg(long, conflicts_with = "hardware_only")]
+    #[arg(long)]
     pub(crate) quick: bool,
     /// Use this many cores at most, as if the machine had no more.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=4096))]

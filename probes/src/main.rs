@@ -1,12 +1,20 @@
 //! The command `sapwise`.
 
 mod args;
+mod child;
+mod contention;
 mod date;
+mod destination;
 mod document;
 mod exit;
+mod files;
+mod hardware;
 mod interrupt;
 mod output;
 mod progress;
+mod provenance;
+mod summary;
+mod sweep;
 mod table;
 mod verbs;
 

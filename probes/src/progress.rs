@@ -36,6 +36,12 @@ impl Progress {
         self.show();
     }
 
+    /// That many steps are done in all.
+    pub(crate) fn position(&self, steps: u64) {
+        self.bar.set_position(steps);
+        self.show();
+    }
+
     fn show(&self) {
         if !self.shown.get() && self.began.elapsed() >= DELAY {
             self.shown.set(true);

@@ -1,8 +1,8 @@
 //! One point: every algorithm on the same frames, in random order within each.
 
-use super::statistics::relative_error;
 use super::verify::Answer;
-use crate::foreign::Window;
+use sapwise::measure::Watch;
+use sapwise::measure::statistics::relative_iqr;
 use sapwise::report::{Point, Timing};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Load, Pairs, Scene};
 use std::time::{Duration, Instant};
@@ -17,8 +17,6 @@ pub(super) const FEWEST_FRAMES: usize = 3;
 const GOOD_ERROR: f64 = 0.01;
 /// Share of a point's time in which spoiled frames are redone. After that they are kept, with the foreign load beside them.
 const REDO_SHARE: f64 = 2.0 / 3.0;
-/// Share of the CPU that other programs may take before frames count as spoiled.
-const SPOILING_LOAD: f64 = 0.05;
 
 /// An algorithm in the race.
 pub(crate) struct Runner {
@@ -78,20 +76,20 @@ impl Race {
         let mut last = Duration::ZERO;
         loop {
             // Samples are kept or thrown away by windows that are long enough to tell foreign load.
-            let window = Window::open();
+            let watch = Watch::begin();
             let mut fresh = 0;
-            while fresh == 0 || !window.is_long_enough() {
+            while fresh == 0 || !watch.is_long_enough() {
                 let started = Instant::now();
                 pairs_before = self.frame(runners, scene, &mut mismatches);
                 last = started.elapsed();
                 fresh += 1;
             }
-            let foreign = window.foreign_load();
+            let foreign = watch.foreign_load();
             // Thousands of small frames fit into a window; the last of them are enough.
             let kept = fresh.min(MOST_FRAMES - frames);
             let spent = began.elapsed();
             let redo = !self.contended
-                && foreign.is_some_and(|f| f > SPOILING_LOAD)
+                && foreign.is_some_and(|f| f > Watch::SPOILING)
                 && spent + last * fresh as u32 < time.mul_f64(REDO_SHARE);
             let dropped = if redo { fresh } else { fresh - kept };
             for runner in runners.iter_mut() {
@@ -189,6 +187,15 @@ impl Runner {
     }
 }
 
+/// Standard error of the median over the median, from the quartiles, so that single outliers don't count.
+///
+/// For a normal distribution the standard deviation is the interquartile range over 1.349, and the error of the median is
+/// 1.2533 standard deviations over the root of the number of samples. `None` below four samples, which have no quartiles.
+fn relative_error(samples: &[u64]) -> Option<f64> {
+    let samples: Vec<f64> = samples.iter().map(|&ns| ns as f64).collect();
+    relative_iqr(&samples).map(|iqr| 1.2533 / 1.349 * iqr / (samples.len() as f64).sqrt())
+}
+
 /// Random orders from a seed, so that no algorithm always follows the same one through the caches.
 struct Turns(u64);
 
@@ -208,5 +215,65 @@ impl Turns {
         x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         x ^ (x >> 31)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outliers_do_not_widen_the_error_and_spread_does() {
+        assert_eq!(relative_error(&[5, 5, 5]), None);
+        assert_eq!(relative_error(&[100, 100, 100, 100, 100, 100, 100, 9000]), Some(0.0));
+        let wide: Vec<u64> = (0..100).map(|k| 900 + 2 * k).collect();
+        assert!((relative_error(&wide).unwrap() - 0.0093).abs() < 0.001);
+    }
+
+    #[test]
+    fn every_turn_comes_once_and_orders_differ() {
+        let mut turns = Turns(1);
+        let orders: Vec<Vec<usize>> = (0..20).map(|_| turns.order(6)).collect();
+        for order in &orders {
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, [0, 1, 2, 3, 4, 5]);
+        }
+        assert!(orders.iter().any(|o| *o != orders[0]));
+    }
+
+    /// Gives one pair too many.
+    struct Wrong;
+
+    impl BroadPhase for Wrong {
+        fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), sapwise::Error> {
+            sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap())?.find_pairs(boxes, pairs)?;
+            pairs.push(0, 1);
+            pairs.push(0, 1);
+            pairs.finish()
+        }
+    }
+
+    #[test]
+    fn a_wrong_answer_is_found_and_costs_only_the_one_who_gave_it() {
+        let right = || sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
+        let mut runners =
+            vec![Runner::new("wrong@cpu1".parse().unwrap(), Box::new(Wrong)), Runner::new("brute@cpu1".parse().unwrap(), right())];
+        let mut scene = sapwise::Scenario::Uniform.start(50, 1);
+        let outcome = Race::new(1, 1000, false).run(&mut runners, &mut scene, Duration::from_millis(1));
+        assert_eq!(outcome.mismatches.len(), 1);
+        assert!(outcome.mismatches[0].starts_with("wrong@cpu1"), "{:?}", outcome.mismatches);
+        let timings = &outcome.point.timings;
+        assert!(timings[0].samples_ns.is_empty() && timings[0].error.is_some());
+        assert!(timings[1].samples_ns.len() >= FEWEST_FRAMES && timings[1].error.is_none());
+    }
+
+    #[test]
+    fn too_many_pairs_end_the_race_with_an_error() {
+        let brute = sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
+        let mut runners = vec![Runner::new("brute@cpu1".parse().unwrap(), brute)];
+        let mut scene = sapwise::Scenario::Uniform.start(500, 1);
+        let outcome = Race::new(1, 3, false).run(&mut runners, &mut scene, Duration::from_millis(1));
+        assert!(outcome.point.timings[0].error.as_ref().unwrap().contains("limit of 3"));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::dropout::Standing;
 use super::race::{FEWEST_FRAMES, Race, Runner};
-use super::{Event, Order, plan, statistics};
+use super::{Event, Order, median, plan};
 use sapwise::report::Point;
 use sapwise::{Registry, Scenario, Scene};
 use std::time::{Duration, Instant};
@@ -64,7 +64,7 @@ fn forecast(before: Option<(u32, Duration)>, objects: u32) -> Duration {
 }
 
 fn judge(standings: &mut [Standing], point: &Point, objects: u32) {
-    let medians: Vec<Option<f64>> = point.timings.iter().map(|t| statistics::median(&t.samples_ns)).collect();
+    let medians: Vec<Option<f64>> = point.timings.iter().map(|t| median(&t.samples_ns)).collect();
     let best = medians.iter().flatten().copied().fold(f64::INFINITY, f64::min);
     for ((standing, timing), median) in standings.iter_mut().zip(&point.timings).zip(medians) {
         match median {
