@@ -1,1 +1,6 @@
+//! The command `sapwise`.
+
+mod boxes;
+mod files;
+
 fn main() {}
