@@ -113,7 +113,7 @@ impl Scenario {
     /// The scene at frame 0 with `objects` objects; for [`Scenario::Fragmentation`] that is the peak and ten stand at first.
     ///
     /// The same scenario, number of objects and seed give the same bits in every frame and on every platform. All memory
-    /// that the scene will ever need is allocated here: up to about 80 bytes per object.
+    /// that the scene will ever need is allocated here: up to 52 bytes per object.
     #[must_use]
     pub fn start(self, objects: usize, seed: u64) -> Scene {
         let mut rng = Rng::new(seed);

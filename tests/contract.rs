@@ -1,6 +1,6 @@
 //! Every algorithm, on every SIMD level and several thread counts, against the naive oracle.
 
-use sapwise::{Aabb, AlgorithmId, BoxDefect, BroadPhase, Error, Pair, PairOrder, Pairs, Registry, SimdLevel};
+use sapwise::{Aabb, AlgorithmId, BoxDefect, BroadPhase, Error, Pair, PairOrder, Pairs, Registry, Scenario, SimdLevel};
 
 /// The oracle: the definition of overlap, in a double loop.
 fn naive(boxes: &[Aabb]) -> Vec<Pair> {
@@ -70,6 +70,32 @@ fn random_boxes_of_every_small_count() {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     for count in (0..70).chain([127, 128, 129, 255, 256, 257, 1000, 1023, 1024, 1025]) {
         assert_all_agree("a cube", &random.cubes(count, [8.0; 3], 0.7), &mut algorithms);
+    }
+}
+
+#[test]
+fn every_scenario_on_several_frames() {
+    let mut algorithms = every_algorithm();
+    for scenario in Scenario::ALL {
+        for objects in [10, 500, 4000] {
+            let mut scene = scenario.start(objects, 42);
+            for frame in 0..3 {
+                assert_all_agree(&format!("{scenario} frame {frame}"), scene.boxes(), &mut algorithms);
+                // Fragmentation begins with ten boxes: its frames are taken far apart.
+                (0..if scenario == Scenario::Fragmentation { 90 } else { 2 }).for_each(|_| scene.advance());
+            }
+        }
+    }
+}
+
+#[test]
+fn many_boxes_in_one_point_are_counted_when_they_may_not_be_stored() {
+    let boxes = vec![Aabb::cube([1.0; 3], 0.0); 1 << 15];
+    for (id, mut algorithm) in every_algorithm().into_iter().filter(|(id, _)| !id.contains("portable")) {
+        let mut pairs = Pairs::new();
+        pairs.set_limit(Some(100));
+        let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+        assert_eq!(error, Error::TooManyPairs { limit: 100, pairs: (1 << 14) * ((1 << 15) - 1) }, "{id}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! The command `sapwise`.
 
 mod args;
+mod boxes;
 mod child;
 mod contention;
 mod date;
@@ -16,6 +17,7 @@ mod provenance;
 mod summary;
 mod sweep;
 mod table;
+mod train;
 mod verbs;
 
 use clap::Parser;

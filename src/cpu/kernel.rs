@@ -8,8 +8,9 @@ use std::ops::Range;
 
 /// Tests every row of `rows` against the rows behind it until one begins beyond its end on the sweep axis.
 ///
-/// The columns must ascend by lower bound on the sweep axis. `emit` gets the two rows of each overlapping pair.
-pub(crate) fn sweep_rows(level: SimdLevel, columns: &Columns, rows: Range<usize>, emit: impl FnMut(usize, usize)) {
+/// The columns must ascend by lower bound on the sweep axis. `emit` gets a row, another row and a mask: bit k is set when
+/// the first overlaps the k-th row from the other on.
+pub(crate) fn sweep_rows(level: SimdLevel, columns: &Columns, rows: Range<usize>, emit: impl FnMut(usize, usize, u32)) {
     let view = View::new(columns);
     match level {
         // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
@@ -22,8 +23,8 @@ pub(crate) fn sweep_rows(level: SimdLevel, columns: &Columns, rows: Range<usize>
     }
 }
 
-/// Tests every row of `rows` against all rows behind it, on all three axes.
-pub(crate) fn brute_rows(level: SimdLevel, columns: &Columns, rows: Range<usize>, emit: impl FnMut(usize, usize)) {
+/// Tests every row of `rows` against all rows behind it, on all three axes. `emit` as in [`sweep_rows`].
+pub(crate) fn brute_rows(level: SimdLevel, columns: &Columns, rows: Range<usize>, emit: impl FnMut(usize, usize, u32)) {
     let view = View::new(columns);
     match level {
         // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
@@ -36,8 +37,9 @@ pub(crate) fn brute_rows(level: SimdLevel, columns: &Columns, rows: Range<usize>
     }
 }
 
-/// Tests one box against the rows from `start` on until one begins beyond its end on the sweep axis.
-pub(crate) fn query_rows(level: SimdLevel, columns: &Columns, start: usize, query: &Query, emit: impl FnMut(usize)) {
+/// Tests one box against the rows from `start` on until one begins beyond its end on the sweep axis. `emit`
+/// gets a row and a mask of the rows from there on.
+pub(crate) fn query_rows(level: SimdLevel, columns: &Columns, start: usize, query: &Query, emit: impl FnMut(usize, u32)) {
     let view = View::new(columns);
     match level {
         // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
@@ -100,7 +102,7 @@ trait Lanes: Copy {
 }
 
 #[inline(always)]
-fn sweep<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, mut emit: impl FnMut(usize, usize)) {
+fn sweep<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, mut emit: impl FnMut(usize, usize, u32)) {
     debug_assert!(rows.end <= view.len);
     for i in rows {
         let query = view.query(i);
@@ -108,7 +110,9 @@ fn sweep<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, mut emit: impl
         while at < view.len {
             // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
             let (reach, hits) = unsafe { lanes.reach_and_hits(view, at, &query) };
-            each_bit(hits, |bit| emit(i, at + bit));
+            if hits != 0 {
+                emit(i, at, hits);
+            }
             if reach != L::ALL {
                 break;
             }
@@ -118,7 +122,7 @@ fn sweep<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, mut emit: impl
 }
 
 #[inline(always)]
-fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, mut emit: impl FnMut(usize, usize)) {
+fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, mut emit: impl FnMut(usize, usize, u32)) {
     debug_assert!(rows.end <= view.len);
     for i in rows {
         let query = view.query(i);
@@ -126,21 +130,24 @@ fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, mut emit: impl
         while at < view.len {
             // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
             let hits = unsafe { lanes.reach_and_hits(view, at, &query).1 & lanes.ends_after(view, at, query.low[0]) };
-            each_bit(hits, |bit| emit(i, at + bit));
+            if hits != 0 {
+                emit(i, at, hits);
+            }
             at += L::COUNT;
         }
     }
 }
 
 #[inline(always)]
-fn query_from<L: Lanes>(lanes: L, view: &View<'_>, start: usize, query: &Query, mut emit: impl FnMut(usize)) {
+fn query_from<L: Lanes>(lanes: L, view: &View<'_>, start: usize, query: &Query, mut emit: impl FnMut(usize, u32)) {
     let mut at = start;
     while at < view.len {
         // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
         let (reach, hits) = unsafe { lanes.reach_and_hits(view, at, query) };
         if hits != 0 {
             // SAFETY: as above.
-            each_bit(hits & unsafe { lanes.ends_after(view, at, query.low[0]) }, |bit| emit(at + bit));
+            let hits = hits & unsafe { lanes.ends_after(view, at, query.low[0]) };
+            emit(at, hits);
         }
         if reach != L::ALL {
             break;
@@ -149,8 +156,9 @@ fn query_from<L: Lanes>(lanes: L, view: &View<'_>, start: usize, query: &Query, 
     }
 }
 
+/// The positions of the bits of a mask, ascending.
 #[inline(always)]
-fn each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
+pub(crate) fn each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
     while mask != 0 {
         f(mask.trailing_zeros() as usize);
         mask &= mask - 1;
@@ -267,32 +275,32 @@ mod x86 {
     }
 
     #[target_feature(enable = "avx2")]
-    pub(super) fn sweep_avx2(view: &View<'_>, rows: Range<usize>, emit: impl FnMut(usize, usize)) {
+    pub(super) fn sweep_avx2(view: &View<'_>, rows: Range<usize>, emit: impl FnMut(usize, usize, u32)) {
         sweep(Avx2, view, rows, emit);
     }
 
     #[target_feature(enable = "avx2")]
-    pub(super) fn brute_avx2(view: &View<'_>, rows: Range<usize>, emit: impl FnMut(usize, usize)) {
+    pub(super) fn brute_avx2(view: &View<'_>, rows: Range<usize>, emit: impl FnMut(usize, usize, u32)) {
         brute(Avx2, view, rows, emit);
     }
 
     #[target_feature(enable = "avx2")]
-    pub(super) fn query_avx2(view: &View<'_>, start: usize, query: &Query, emit: impl FnMut(usize)) {
+    pub(super) fn query_avx2(view: &View<'_>, start: usize, query: &Query, emit: impl FnMut(usize, u32)) {
         query_from(Avx2, view, start, query, emit);
     }
 
     #[target_feature(enable = "avx512f")]
-    pub(super) fn sweep_avx512(view: &View<'_>, rows: Range<usize>, emit: impl FnMut(usize, usize)) {
+    pub(super) fn sweep_avx512(view: &View<'_>, rows: Range<usize>, emit: impl FnMut(usize, usize, u32)) {
         sweep(Avx512, view, rows, emit);
     }
 
     #[target_feature(enable = "avx512f")]
-    pub(super) fn brute_avx512(view: &View<'_>, rows: Range<usize>, emit: impl FnMut(usize, usize)) {
+    pub(super) fn brute_avx512(view: &View<'_>, rows: Range<usize>, emit: impl FnMut(usize, usize, u32)) {
         brute(Avx512, view, rows, emit);
     }
 
     #[target_feature(enable = "avx512f")]
-    pub(super) fn query_avx512(view: &View<'_>, start: usize, query: &Query, emit: impl FnMut(usize)) {
+    pub(super) fn query_avx512(view: &View<'_>, start: usize, query: &Query, emit: impl FnMut(usize, u32)) {
         query_from(Avx512, view, start, query, emit);
     }
 }

@@ -10,6 +10,7 @@ mod sweep;
 mod threads;
 mod workers;
 
+pub(crate) use kernel::each_bit;
 pub use level::SimdLevel;
 pub(crate) use strip_grid::StripGrid;
 pub(crate) use threads::Threads;

@@ -6,7 +6,7 @@
 
 use crate::broad_phase::check_count;
 use crate::cpu::columns::{Columns, ensure, order_key, part};
-use crate::cpu::kernel::{Query, query_rows, sweep_rows};
+use crate::cpu::kernel::{Query, each_bit, query_rows, sweep_rows};
 use crate::cpu::strip_grid::{Cover, StripGrid};
 use crate::cpu::workers::Workers;
 use crate::cpu::{SimdLevel, Threads};
@@ -132,6 +132,17 @@ fn balanced(bins: &[Bins], strips: usize, k: usize, parts: usize) -> usize {
     low
 }
 
+/// The bits of `mask` whose box forms a pair with the one box that this strip has to report; see [`Cover::begins`].
+#[inline]
+fn owned(mask: u32, mine: u32, begins: &[u32]) -> u32 {
+    let mut owned = mask;
+    // With both bits set in the one box, as in most strips, the others don't matter.
+    if mine != 3 {
+        each_bit(mask, |bit| owned &= !(u32::from(mine | begins[bit] != 3) << bit));
+    }
+    owned
+}
+
 impl Bins {
     fn fill(&mut self, grid: &StripGrid, boxes: &[Aabb], share: std::ops::Range<usize>) -> Result<(), Error> {
         let first = share.start;
@@ -226,17 +237,15 @@ impl Task {
         for strip in strips {
             self.sort(bins, strip, grid.axis)?;
             let (ids, begins) = (self.columns.ids(), &self.begins);
-            sweep_rows(level, &self.columns, 0..ids.len(), |i, j| {
-                if begins[i] | begins[j] == 3 {
-                    pairs.push(ids[i], ids[j]);
-                }
+            sweep_rows(level, &self.columns, 0..ids.len(), |i, at, mask| {
+                pairs.push_mask(ids[i], &ids[at..], owned(mask, begins[i], &begins[at..]));
             });
             if !large.covers.is_empty() && !ids.is_empty() {
                 self.query_large(large, grid.cell(strip), level, pairs)?;
             }
         }
         let ids = large.columns.ids();
-        sweep_rows(level, &large.columns, large_rows, |i, j| pairs.push(ids[i], ids[j]));
+        sweep_rows(level, &large.columns, large_rows, |i, at, mask| pairs.push_mask(ids[i], &ids[at..], mask));
         Ok(())
     }
 
@@ -283,10 +292,9 @@ impl Task {
             let mine = cover.begins(cell);
             // No row before this one ends late enough to be hit.
             let start = ends.partition_point(|&end| end < query.low[0]);
-            query_rows(level, columns, start, &query, |j| {
-                if mine | begins[j] == 3 {
-                    pairs.push(large.columns.ids()[k], ids[j]);
-                }
+            let id = large.columns.ids()[k];
+            query_rows(level, columns, start, &query, |at, mask| {
+                pairs.push_mask(id, &ids[at..], owned(mask, mine, &begins[at..]));
             });
         }
         Ok(())

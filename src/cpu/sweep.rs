@@ -51,7 +51,7 @@ impl BroadPhase for Sweep {
             });
             let ids = columns.ids();
             outputs.find_rows(workers, ids.len(), pairs, |rows, list| {
-                sweep_rows(*level, columns, rows, |i, j| list.push(ids[i], ids[j]));
+                sweep_rows(*level, columns, rows, |i, at, mask| list.push_mask(ids[i], &ids[at..], mask));
             });
             Ok(())
         })?;
