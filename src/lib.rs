@@ -6,6 +6,8 @@ mod broad_phase;
 pub mod cpu;
 mod error;
 pub mod hardware;
+#[cfg(feature = "measure")]
+pub mod measure;
 mod pairs;
 
 pub use aabb::Aabb;
