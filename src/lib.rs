@@ -13,6 +13,8 @@ pub mod hardware;
 pub mod json;
 mod load;
 pub mod model;
+#[cfg(feature = "measure")]
+pub mod measure;
 mod pairs;
 mod registry;
 pub mod report;
