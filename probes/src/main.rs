@@ -1,1 +1,5 @@
+//! The command `sapwise`.
+
+mod train;
+
 fn main() {}
