@@ -1,7 +1,10 @@
 //! From reports to cost curves, fields and models.
 
+mod columns;
 mod curve;
+mod fit;
 mod nnls;
+mod residual;
 mod robust;
 mod rows;
 #[cfg(test)]

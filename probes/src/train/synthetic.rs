@@ -68,7 +68,7 @@ impl Machine {
         Hardware { machine, parameters: parameters.into() }
     }
 
-    /// A full sweep: 23 sizes of two scenarios, from 500 objects up whoever is eight times slower than
+    /// A full sweep: 23 sizes from 16 to 700 000 objects of two scenarios; from 500 objects up whoever is eight times slower than
     /// the best leaves the race.
     pub(crate) fn report(&self) -> Report {
         let hardware = self.hardware();
@@ -83,7 +83,7 @@ impl Machine {
         for scenario in ["uniform", "clustered"] {
             let mut racing = vec![true; ids.len()];
             for k in 0..23 {
-                let load = load(scenario, 2.0_f64.powf(4.0 + 0.5 * f64::from(k)).round());
+                let load = load(scenario, 2.0_f64.powf(4.0 + 0.7 * f64::from(k)).round());
                 let ns: Vec<f64> = curves.iter().map(|c| c.cost_ns(&load)).collect();
                 let best = ns.iter().copied().fold(f64::INFINITY, f64::min);
                 let timings = (0..ids.len()).filter(|&a| racing[a]).map(|a| Timing {
