@@ -6,15 +6,16 @@ mod algorithm;
 mod broad_phase;
 mod cost;
 pub mod cpu;
+pub mod crossover;
 mod error;
 pub mod fields;
 pub mod hardware;
 #[cfg(feature = "model")]
 pub mod json;
 mod load;
-pub mod model;
 #[cfg(feature = "measure")]
 pub mod measure;
+pub mod model;
 mod pairs;
 mod registry;
 pub mod report;
@@ -28,6 +29,7 @@ pub use algorithm::{AlgorithmId, Backend, ParseIdError};
 pub use broad_phase::BroadPhase;
 pub use cost::{CostCurve, CostTerm, Knot, Term};
 pub use cpu::SimdLevel;
+pub use crossover::{Crossover, Paired, Position};
 pub use error::{BoxDefect, Error};
 pub use fields::{AlgorithmCost, Border, Fields, Ranking, Source, Step};
 pub use hardware::{Hardware, How, Machine, Parameter};

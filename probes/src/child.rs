@@ -111,8 +111,16 @@ fn judge(status: ExitStatus, complaint: &str) -> Ended {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
         // The terminal sends these to the part as well, and it may be the first to go.
-        return if matches!(signal, 2 | 15) { Ended::Interrupted } else { Ended::Badly(format!("was ended by signal {signal}")) };
+        return if matches!(signal, 2 | 15) {
+            Ended::Interrupted
+        } else {
+            Ended::Badly(format!("was ended by signal {signal}"))
+        };
     }
     let status = status.code().map_or("no exit status".to_owned(), |c| format!("exit status {c}"));
-    Ended::Badly(if complaint.is_empty() { format!("ended with {status}") } else { format!("ended with {status}: {complaint}") })
+    Ended::Badly(if complaint.is_empty() {
+        format!("ended with {status}")
+    } else {
+        format!("ended with {status}: {complaint}")
+    })
 }

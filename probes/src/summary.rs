@@ -1,19 +1,19 @@
-//! What a person reads at the end of a probe.
+//! What a person reads at the end of a probe or a prediction.
 
-use crate::sweep::median;
 use crate::table::{bytes, columns, duration, grouped};
-use sapwise::report::{Label, Point};
-use sapwise::{How, Parameter, Report};
+use crate::train::measured_fields;
+use sapwise::report::Label;
+use sapwise::{Fields, Hardware, How, Report};
 use std::path::Path;
 
-/// The hardware, then where each algorithm was the fastest.
-pub(crate) fn text(report: &Report) -> String {
-    let machine = &report.hardware.machine;
-    let mut text = format!("{}, {}, vector instructions: {}\n\n", machine.cpu, machine.arch, machine.simd);
-    text.push_str(&hardware(&report.hardware.parameters));
-    for scenario in scenarios(&report.points) {
-        text.push_str(&format!("\n{scenario}: the fastest algorithm by number of objects\n"));
-        text.push_str(&fastest(&report.points, scenario));
+/// The hardware, then the fields of every scenario that was swept.
+pub(crate) fn report(report: &Report) -> String {
+    let mut text = hardware(&report.hardware);
+    for scenario in scenarios(report) {
+        match measured_fields(report, scenario) {
+            Ok(measured) => text.push_str(&format!("\n{}", fields(&measured))),
+            Err(why) => text.push_str(&format!("\n{scenario}: no fields: {why:#}\n")),
+        }
     }
     if report.label != Label::RealFull {
         text.push_str(&format!("\nThis report is labelled {}.\n", label(report.label)));
@@ -24,25 +24,52 @@ pub(crate) fn text(report: &Report) -> String {
     text
 }
 
-/// What to do with the report.
+/// What to do with a report that was written.
 pub(crate) fn next_step(report: &Report, path: &Path) -> String {
     let path = path.display();
-    let next = if report.points.is_empty() { "predict --report" } else { "train --out model.json" };
-    format!("\nThe report is in {path}. Next: sapwise {next} {path}")
+    let next = if report.points.is_empty() {
+        format!("sapwise predict --report {path}")
+    } else {
+        format!("sapwise run fragmentation --fields {path}, or sapwise train {path} --out model.json")
+    };
+    format!("\nThe report is in {path}. Next: {next}")
 }
 
-fn hardware(parameters: &[Parameter]) -> String {
+/// The parameters of a machine as a table.
+pub(crate) fn hardware(hardware: &Hardware) -> String {
+    let machine = &hardware.machine;
     let mut rows = vec![["parameter", "value", "spread", "how"].map(str::to_owned).to_vec()];
-    for p in parameters {
+    for p in &hardware.parameters {
         let spread = p.dispersion.map_or(String::new(), |d| format!("{:.1} %", d * 100.0));
+        let disturbed = p.foreign_load.filter(|&load| load > 0.05);
+        let disturbed = disturbed.map_or(String::new(), |load| format!(", foreign load {:.0} %", load * 100.0));
         let how = match p.how {
-            How::Measured => format!("measured, {} samples", p.samples),
+            How::Measured => format!("measured, {} samples{disturbed}", p.samples),
             How::Reported => "reported".to_owned(),
             How::Missing => format!("missing: {}", p.source),
         };
         rows.push(vec![p.name.clone(), p.value.map_or("-".to_owned(), |v| value(&p.name, v)), spread, how]);
     }
-    columns(&rows)
+    format!("{}, {}, vector instructions: {}\n\n{}", machine.cpu, machine.arch, machine.simd, columns(&rows))
+}
+
+/// The steps of a slice, with where each begins and how sure that is.
+pub(crate) fn fields(fields: &Fields) -> String {
+    let mut rows = Vec::new();
+    for step in &fields.steps {
+        // The first step begins at 0 without a border.
+        let border = fields.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
+        let interval = border
+            .map_or(String::new(), |b| format!("{} to {}", grouped(b.low.round() as u64), grouped(b.high.round() as u64)));
+        let from = format!("  from {}", grouped(u64::from(step.from_objects)));
+        rows.push(vec![from, step.algorithm.to_string(), interval]);
+    }
+    let mut text = format!("{}: the fastest algorithm by number of objects, with 90 % intervals\n", fields.scenario);
+    text.push_str(&columns(&rows));
+    for warning in &fields.warnings {
+        text.push_str(&format!("  warning: {warning}\n"));
+    }
+    text
 }
 
 /// A value with the unit that the end of its name says.
@@ -58,9 +85,9 @@ fn value(name: &str, value: f64) -> String {
     }
 }
 
-fn scenarios(points: &[Point]) -> Vec<&str> {
+fn scenarios(report: &Report) -> Vec<&str> {
     let mut names: Vec<&str> = Vec::new();
-    for point in points {
+    for point in &report.points {
         if !names.contains(&point.scenario.as_str()) {
             names.push(&point.scenario);
         }
@@ -68,30 +95,14 @@ fn scenarios(points: &[Point]) -> Vec<&str> {
     names
 }
 
-/// One row for each run of sizes with the same fastest algorithm.
-fn fastest(points: &[Point], scenario: &str) -> String {
-    let mut rows: Vec<Vec<String>> = Vec::new();
-    let mut before: Option<String> = None;
-    for point in points.iter().filter(|p| p.scenario == scenario) {
-        let timed = point.timings.iter().filter_map(|t| Some((&t.algorithm, median(&t.samples_ns)?)));
-        let Some((best, ns)) = timed.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
-        if before.as_deref() != Some(best.to_string().as_str()) {
-            before = Some(best.to_string());
-            let from = format!("  from {}", grouped(u64::from(point.load.objects)));
-            rows.push(vec![from, best.to_string(), format!("{} there", duration(ns))]);
-        }
-    }
-    columns(&rows)
-}
-
-/// The label as it stands in the file.
+/// The label as it stands in the file, and what it means.
 fn label(label: Label) -> &'static str {
     match label {
-        Label::RealFull => "real_full",
+        Label::RealFull => "real_full: a whole machine, undisturbed",
         Label::RealRestricted => "real_restricted: fewer cores or a lower level of vector instructions than the machine has",
         Label::RealContended => "real_contended: other programs took part of the machine",
         Label::RealSoftwareGpu => "real_software_gpu: the GPU is a program on the CPU",
-        Label::Simulated => "simulated",
+        Label::Simulated => "simulated: made up from a specification",
     }
 }
 
@@ -103,7 +114,7 @@ mod tests {
     fn values_have_the_unit_of_their_name() {
         assert_eq!(value("cache_l2_bytes", 2_097_152.0), "2 MiB");
         assert_eq!(value("bandwidth_one_thread_gb_per_s", 12.345), "12.3 GB/s");
-        assert_eq!(value("latency_16_kib_ns", 1.25), "1.2 ns");
+        assert_eq!(value("latency_16_kib_ns", 1.26), "1.3 ns");
         assert_eq!(value("fork_join_cold_ns", 12_500.0), "12.50 us");
         assert_eq!(value("scaling_two_threads_ratio", 1.9), "1.90 x");
         assert_eq!(value("usable_cores", 2.0), "2");

@@ -8,10 +8,10 @@ mod race;
 mod scenario;
 mod verify;
 
-pub(crate) use conduct::{Conditions, conduct};
+pub(crate) use conduct::{Conditions, Found, conduct};
 pub(crate) use order::{Event, Order};
 pub(crate) use plan::Plan;
-pub(crate) use scenario::sweep;
+pub(crate) use scenario::{next_frame, sweep};
 
 /// The median of samples in nanoseconds. `None` without samples.
 pub(crate) fn median(samples: &[u64]) -> Option<f64> {

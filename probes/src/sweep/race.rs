@@ -90,7 +90,7 @@ impl Race {
             let spent = began.elapsed();
             let redo = !self.contended
                 && foreign.is_some_and(|f| f > Watch::SPOILING)
-                && spent + last * fresh as u32 < time.mul_f64(REDO_SHARE);
+                && spent + last * (fresh as u32) < time.mul_f64(REDO_SHARE);
             let dropped = if redo { fresh } else { fresh - kept };
             for runner in runners.iter_mut() {
                 // A runner that failed on the way has none.
@@ -168,7 +168,7 @@ impl Race {
         });
         Point {
             scenario: scene.scenario().to_string(),
-            load: Load::estimate(scene.boxes(), before),
+            load: Load::estimate(scene.boxes(), before.map(|pairs| pairs as f64)),
             pairs: answer.pairs,
             fingerprint: format!("{:016x}", answer.fingerprint),
             foreign_load: foreign.0,
@@ -257,8 +257,10 @@ mod tests {
     #[test]
     fn a_wrong_answer_is_found_and_costs_only_the_one_who_gave_it() {
         let right = || sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
-        let mut runners =
-            vec![Runner::new("wrong@cpu1".parse().unwrap(), Box::new(Wrong)), Runner::new("brute@cpu1".parse().unwrap(), right())];
+        let mut runners = vec![
+            Runner::new("wrong@cpu1".parse().unwrap(), Box::new(Wrong)),
+            Runner::new("brute@cpu1".parse().unwrap(), right()),
+        ];
         let mut scene = sapwise::Scenario::Uniform.start(50, 1);
         let outcome = Race::new(1, 1000, false).run(&mut runners, &mut scene, Duration::from_millis(1));
         assert_eq!(outcome.mismatches.len(), 1);

@@ -83,7 +83,7 @@ fn keep_racing(runners: &mut Vec<Runner>, standings: &mut Vec<Standing>) {
 /// Goes on to the next frame that has as many objects as the size says.
 ///
 /// Only in `fragmentation` the number changes, and samples of different sizes can't be put together.
-pub(super) fn next_frame(scene: &mut Scene) {
+pub(crate) fn next_frame(scene: &mut Scene) {
     for _ in 0..Scenario::FRAGMENTATION_FRAMES {
         scene.advance();
         if scene.boxes().len() == scene.peak_objects() {
@@ -133,8 +133,7 @@ mod tests {
 
     #[test]
     fn unknown_scenarios_are_refused() {
-        let order =
-            Order { scenario: "x".into(), sizes: vec![10], cores: 1, seed: 0, seconds: 1.0, contended: false };
+        let order = Order { scenario: "x".into(), sizes: vec![10], cores: 1, seed: 0, seconds: 1.0, contended: false };
         assert!(sweep(&order, &mut |_| Ok(())).unwrap_err().to_string().contains("uniform"));
     }
 }

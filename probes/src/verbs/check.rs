@@ -93,8 +93,7 @@ impl Here {
 
     fn report(&self, report: &Report, finding: &mut Finding) {
         finding.schema = Some("report/1");
-        let used: Vec<(String, u32)> =
-            report.algorithms.iter().map(|t| (t.id.method().to_owned(), t.revision)).collect();
+        let used: Vec<(String, u32)> = report.algorithms.iter().map(|t| (t.id.method().to_owned(), t.revision)).collect();
         finding.set_current(self.stale(&used), "probe again");
         let same = report.hardware.machine.physical_id == self.machine.physical_id;
         finding.applicable = Some(same);
@@ -132,8 +131,7 @@ impl Here {
 
     fn fields(&self, fields: &Fields, finding: &mut Finding) {
         finding.schema = Some("fields/1");
-        let used: Vec<(String, u32)> =
-            fields.costs.iter().map(|c| (c.algorithm.method().to_owned(), c.revision)).collect();
+        let used: Vec<(String, u32)> = fields.costs.iter().map(|c| (c.algorithm.method().to_owned(), c.revision)).collect();
         finding.set_current(self.stale(&used), "predict again, or probe again where they were measured");
         let mut wanted = fields.algorithms();
         wanted.extend(fields.steps.iter().map(|s| &s.algorithm));

@@ -2,11 +2,10 @@
 
 mod check;
 mod devices;
-
+mod pairs;
 mod part;
 mod probe;
 mod schema;
-
 
 use crate::args::Verb;
 use crate::exit::{Outcome, WrongUsage};
@@ -23,8 +22,8 @@ pub(crate) fn run(verb: Verb) -> anyhow::Result<Outcome> {
     match verb {
         Verb::Devices(arguments) => devices::run(&arguments),
         Verb::Probe(arguments) => probe::run(&arguments),
-
-
+        Verb::Train(_) => Ok(Outcome::Failed),
+        Verb::Pairs(arguments) => pairs::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),
         Verb::Part(arguments) => part::run(arguments),

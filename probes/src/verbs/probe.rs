@@ -14,11 +14,8 @@ use std::time::Instant;
 pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     let began = Instant::now();
     let plan = plan(arguments)?;
-    let destination = if arguments.json && arguments.out.is_none() {
-        None
-    } else {
-        Some(Destination::new(arguments.out.as_deref())?)
-    };
+    let destination =
+        if arguments.json && arguments.out.is_none() { None } else { Some(Destination::new(arguments.out.as_deref())?) };
     interrupt::listen()?;
     let contention = arguments.contended.then(Contention::start).transpose();
     let contention = contention.context("the threads for --contended can't be started")?;
@@ -48,7 +45,7 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     if arguments.json {
         output::print(&sapwise::json::write_report(&report)?)?;
     } else {
-        output::print(&summary::text(&report))?;
+        output::print(&summary::report(&report))?;
         if let Ok(Some(path)) = &saved {
             output::print(&summary::next_step(&report, path))?;
         }
@@ -69,7 +66,9 @@ fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
         && threads > usable_cores()
     {
         let cores = usable_cores();
-        return Err(WrongUsage(format!("--threads {threads}: this process may use {cores} cores; use at most {cores}")).into());
+        return Err(
+            WrongUsage(format!("--threads {threads}: this process may use {cores} cores; use at most {cores}")).into()
+        );
     }
     let scenarios: Result<Vec<Scenario>, String> = arguments.scenarios.iter().map(|s| s.parse()).collect();
     let mut scenarios = scenarios.map_err(|e| WrongUsage(format!("--scenario: {e}")))?;
