@@ -37,6 +37,8 @@ pub mod hardware;
 #[cfg(feature = "model")]
 pub mod json;
 mod load;
+#[cfg(feature = "measure")]
+pub mod measure;
 pub mod model;
 mod pairs;
 mod registry;
