@@ -67,6 +67,10 @@ pub struct MethodModel {
     pub revision: u32,
     /// Most threads that were timed; more are extrapolated.
     pub max_threads: u32,
+    /// Fewest objects that were timed; the residual is held constant below.
+    pub min_objects: u32,
+    /// Most objects that were timed; the residual is held constant above, where its slopes would carry it anywhere.
+    pub max_objects: u32,
     /// The physical terms; no unit is negative.
     pub terms: Vec<ModelTerm>,
     /// Constant of the residual.
@@ -276,7 +280,8 @@ impl MethodModel {
         let mut correction = Vec::new();
         if !self.residual.is_empty() || self.residual_intercept != 0.0 {
             for octave in CORRECTION_OCTAVES {
-                let load = Load { objects: 1 << octave, ..Load::default() };
+                let objects = (1 << octave).min(self.max_objects).max(self.min_objects);
+                let load = Load { objects, ..Load::default() };
                 correction
                     .push(Knot { log2_objects: f64::from(octave), ln_factor: self.ln_residual(hardware, threads, &load)? });
             }

@@ -86,6 +86,36 @@ pub(super) fn collect(plan: Plan, mut sample: impl FnMut() -> Vec<f64>) -> Vec<F
     }
 }
 
+/// Watches what other programs take while the caller measures, for sampling that is not done by this module.
+#[derive(Debug)]
+pub struct Watch {
+    before: Option<Counters>,
+    began: Instant,
+}
+
+impl Watch {
+    /// Share of the CPU above which a measurement counts as spoiled.
+    pub const SPOILING: f64 = THRESHOLD;
+
+    /// Begins to watch.
+    #[must_use]
+    pub fn begin() -> Self {
+        Self { before: Counters::now(), began: Instant::now() }
+    }
+
+    /// Whether enough time has passed to tell foreign load from rounding; always where it can't be told at all.
+    #[must_use]
+    pub fn is_long_enough(&self) -> bool {
+        self.before.is_none_or(|before| self.began.elapsed() >= before.window())
+    }
+
+    /// Share of the CPU, 0 to 1, that other programs have taken since it began. `None` where that can't be told.
+    #[must_use]
+    pub fn foreign_load(&self) -> Option<f64> {
+        self.before.zip(Counters::now()).map(|(before, now)| before.foreign_share(now, self.began.elapsed()))
+    }
+}
+
 struct Window {
     /// One row per sample, one column per figure.
     rows: Vec<Vec<f64>>,

@@ -24,6 +24,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::hardware::{Hardware, Machine, Parameter, parameter};
 use foreign_load::Plan;
 
+pub use foreign_load::Watch;
+
 pub use memory::{Triad, triad};
 
 /// A group of parameters that are measured together.

@@ -1,0 +1,252 @@
+//! The measured cost curves of one machine, from its own report.
+
+use super::robust::{Problem, median, spread};
+use super::rows::{Row, rows};
+use anyhow::{Result, bail};
+use ndarray::Array2;
+use sapwise::crossover::{Paired, Position, crossover};
+use sapwise::hardware::parameter;
+use sapwise::report::{Label, Point, Report};
+use sapwise::{AlgorithmCost, AlgorithmId, Border, CostCurve, CostTerm, Fields, Knot, Load, Source, Term};
+
+/// Distance of the knots of a correction, in octaves of the number of objects.
+const KNOT_STEP: f64 = 0.5;
+/// Residuals within this many octaves of a knot enter it, with a weight that falls linearly to zero.
+const KNOT_REACH: f64 = 0.75;
+/// Points that a curve needs: below that its terms and its correction can't be told apart.
+const FEWEST_POINTS: usize = 3;
+
+/// The fields of the machine that `report` was measured on, with `steps` and `crossovers` for `scenario`.
+///
+/// The cost curves are fitted to the points of all scenarios of the report. Intervals of crossovers come from the paired
+/// samples of `scenario` where both neighbours were timed there.
+///
+/// # Errors
+/// When no point of `scenario`, or no algorithm, has enough timings; names the scenarios there are.
+pub(crate) fn measured_fields(report: &Report, scenario: &str) -> Result<Fields> {
+    let mut loads: Vec<Load> = report.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load).collect();
+    loads.sort_by_key(|l| l.objects);
+    loads.dedup_by_key(|l| l.objects);
+    if loads.len() < 2 {
+        let mut known: Vec<&str> = report.points.iter().map(|p| p.scenario.as_str()).collect();
+        known.sort_unstable();
+        known.dedup();
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        bail!("the report has {} sizes of the scenario {scenario:?}, two are needed; it holds: {known}", loads.len());
+    }
+    let (costs, mut warnings) = measured_costs(report);
+    if costs.is_empty() {
+        bail!("no algorithm of the report was timed at {FEWEST_POINTS} points; measure again with `sapwise probe`");
+    }
+    if report.label == Label::Simulated {
+        warnings.push("the report is simulated".to_owned());
+    }
+    if !report.provenance.optimised {
+        warnings.push("the report was timed by an unoptimised build".to_owned());
+    }
+    let mut fields = Fields::from_costs(Source::Measured, scenario, costs, &loads);
+    fields.warnings = warnings;
+    resample_borders(&mut fields, report);
+    Ok(fields)
+}
+
+/// The cost curve of each algorithm that was timed often enough, and a sentence for each other one.
+pub(crate) fn measured_costs(report: &Report) -> (Vec<AlgorithmCost>, Vec<String>) {
+    let rows = rows(report, 0);
+    let cache_bytes = report.hardware.value(parameter::CACHE_LLC_BYTES).unwrap_or(0.0);
+    let (mut costs, mut warnings) = (Vec::new(), Vec::new());
+    for timed in &report.algorithms {
+        let own: Vec<&Row> = rows.iter().filter(|r| r.algorithm == timed.id).collect();
+        let points = own.iter().filter(|r| !r.floor).count();
+        let fitted = (points >= FEWEST_POINTS).then(|| curve(&timed.id, &own, cache_bytes));
+        match fitted.filter(|(curve, _)| curve.defect().is_none()) {
+            Some((curve, spread_ln)) => {
+                costs.push(AlgorithmCost { algorithm: timed.id.clone(), revision: timed.revision, curve, spread_ln });
+            }
+            None => warnings.push(format!("{} has no cost curve: it was timed at {points} points only", timed.id)),
+        }
+    }
+    (costs, warnings)
+}
+
+/// The terms that a method's time may consist of. The tests of the other methods are left out: within one machine they
+/// correlate with its own, and would grow differently beyond the sizes that were measured.
+fn terms(method: &str) -> &'static [Term] {
+    match method {
+        "brute" => &[Term::Call, Term::Objects, Term::ColdObjects, Term::AllPairs, Term::Pairs],
+        "sweep" => &[Term::Call, Term::Objects, Term::Sort, Term::ColdObjects, Term::AxisCandidates, Term::Pairs],
+        "strips" => &[Term::Call, Term::Objects, Term::Sort, Term::ColdObjects, Term::StripCandidates, Term::Pairs],
+        _ => &Term::ALL,
+    }
+}
+
+/// The curve of one algorithm on one machine, and its spread.
+fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64) -> (CostCurve, f64) {
+    let terms = terms(id.method());
+    let problem = Problem {
+        terms: Array2::from_shape_fn((rows.len(), terms.len()), |(k, j)| terms[j].count(&rows[k].load, cache_bytes)),
+        ns: rows.iter().map(|r| r.ns).collect(),
+        weights: vec![1.0; rows.len()],
+        floors: rows.iter().map(|r| r.floor).collect(),
+    };
+    let units = problem.units();
+    let terms = terms.iter().zip(units).filter(|(_, u)| *u > 0.0).map(|(&term, unit_ns)| CostTerm { term, unit_ns });
+    let mut curve = CostCurve { terms: terms.collect(), cache_bytes, correction: Vec::new() };
+    if curve.defect().is_some() {
+        return (curve, 0.0);
+    }
+    curve.correction = correction(&residuals(&curve, rows, false), &residuals(&curve, rows, true));
+    let spread_ln = spread(residuals(&curve, rows, false).into_iter().map(|r| r.1).collect());
+    (curve, spread_ln)
+}
+
+/// Base-2 logarithm of the objects and natural logarithm of measured over modelled time, of the floors or of the others.
+fn residuals(curve: &CostCurve, rows: &[&Row], floors: bool) -> Vec<(f64, f64)> {
+    let of = |r: &&Row| (f64::from(r.load.objects).log2(), (r.ns / curve.cost_ns(&r.load)).ln());
+    rows.iter().filter(|r| r.floor == floors).map(of).collect()
+}
+
+/// Local means of the residuals, and beyond the largest measured size at least what keeps the cost above every floor.
+fn correction(measured: &[(f64, f64)], floors: &[(f64, f64)]) -> Vec<Knot> {
+    // An outlier among few residuals would bend the curve: bounded at three standard deviations from the median.
+    let centre = median(measured.iter().map(|r| r.1).collect());
+    let reach = 3.0 * spread(measured.iter().map(|r| r.1).collect()).max(0.05);
+    let low = measured.iter().map(|r| r.0).fold(f64::INFINITY, f64::min);
+    let high = measured.iter().map(|r| r.0).fold(0.0, f64::max);
+    let (first, last) = ((low / KNOT_STEP).floor() as u32, (high / KNOT_STEP).ceil() as u32);
+    let mut knots = Vec::new();
+    for k in first..=last {
+        let log2_objects = f64::from(k) * KNOT_STEP;
+        let weight = |x: f64| (1.0 - (x - log2_objects).abs() / KNOT_REACH).max(0.0);
+        let total: f64 = measured.iter().map(|r| weight(r.0)).sum();
+        if total > 0.0 {
+            let sum: f64 = measured.iter().map(|r| weight(r.0) * r.1.clamp(centre - reach, centre + reach)).sum();
+            knots.push(Knot { log2_objects, ln_factor: sum / total });
+        }
+    }
+    let mut beyond: Vec<(f64, f64)> = floors.iter().filter(|f| f.0 > f64::from(last) * KNOT_STEP).copied().collect();
+    beyond.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (log2_objects, needed) in beyond {
+        let Some(outer) = knots.last_mut() else { break };
+        if outer.log2_objects == log2_objects {
+            outer.ln_factor = outer.ln_factor.max(needed);
+        } else {
+            let ln_factor = outer.ln_factor.max(needed);
+            knots.push(Knot { log2_objects, ln_factor });
+        }
+    }
+    knots
+}
+
+/// Replaces the interval of each crossover by the one from paired samples, where there is one.
+fn resample_borders(fields: &mut Fields, report: &Report) {
+    let mut resampled = 0;
+    for border in &mut fields.crossovers {
+        let Some(p) = resampled_border(border, report, &fields.scenario) else { continue };
+        border.low = p.low.min(border.objects);
+        border.high = p.high.max(border.objects);
+        resampled += 1;
+    }
+    if resampled > 0 {
+        let all = fields.crossovers.len();
+        fields.interval_basis = format!(
+            "{resampled} of {all}: 90 % of bootstrap replicates over paired frames, widened to hold the border of the cost \
+             curves; the others: {}",
+            fields.interval_basis
+        );
+    }
+}
+
+/// The measured crossing of the same direction that is nearest to a border of the cost curves.
+fn resampled_border(border: &Border, report: &Report, scenario: &str) -> Option<Position> {
+    let timings = |point: &'_ Point, id: &AlgorithmId| point.timings.iter().position(|t| t.algorithm == *id);
+    let mut points = Vec::new();
+    for point in report.points.iter().filter(|p| p.scenario == scenario) {
+        let (Some(a), Some(b)) = (timings(point, &border.below), timings(point, &border.above)) else { continue };
+        points.push(Paired {
+            objects: point.load.objects,
+            first_ns: &point.timings[a].samples_ns,
+            second_ns: &point.timings[b].samples_ns,
+        });
+    }
+    let found = crossover(&points, report.provenance.seed)?;
+    let distance = |p: &Position| (p.objects / border.objects).ln().abs();
+    found.positions().iter().filter(|p| p.first_below).min_by(|a, b| distance(a).total_cmp(&distance(b))).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rows::{best, medians};
+    use super::super::synthetic::{Machine, load};
+    use super::*;
+
+    #[test]
+    fn choosing_by_the_curves_loses_little_and_never_what_left_the_race() {
+        for machine in Machine::family() {
+            let report = machine.report();
+            let fields = measured_fields(&report, "uniform").unwrap();
+            assert_eq!(fields.defect(), None);
+            let mut regret = 0.0;
+            for point in &report.points {
+                let chosen = &fields.costs[fields.rank(&point.load, |_| true).unwrap().best].algorithm;
+                let medians = medians(point);
+                let ns = medians.iter().find(|m| m.0 == chosen).expect("chose one that had left the race").1;
+                regret += ns / best(&medians).unwrap() - 1.0;
+            }
+            regret /= report.points.len() as f64;
+            assert!(regret < 0.02, "{}: {regret}", machine.name);
+        }
+    }
+
+    #[test]
+    fn whoever_left_the_race_stays_behind_beyond_all_sizes() {
+        for machine in Machine::family() {
+            let report = machine.report();
+            let fields = measured_fields(&report, "uniform").unwrap();
+            for objects in [200_000.0, 1e6, 8e6] {
+                for scenario in ["uniform", "clustered"] {
+                    let best = fields.rank(&load(scenario, objects), |_| true).unwrap().best;
+                    assert_ne!(fields.costs[best].algorithm.method(), "brute");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_flat_curve_that_left_the_race_is_lifted() {
+        // Only the call shows at small sizes: without floors this would be the cheapest of all large scenes.
+        let row = |objects: u32, ns: f64, floor: bool| Row {
+            profile: 0,
+            algorithm: "brute@cpu2".parse().unwrap(),
+            load: load("uniform", f64::from(objects)),
+            ns,
+            floor,
+        };
+        let mut rows: Vec<Row> = [16, 23, 32, 45].map(|n| row(n, 9000.0, false)).into();
+        rows.extend([64, 1024, 16_384, 262_144].map(|n| row(n, 100.0 * f64::from(n) * 2.0, true)));
+        let rows: Vec<&Row> = rows.iter().collect();
+        let (curve, _) = curve(&"brute@cpu2".parse().unwrap(), &rows, 1e6);
+        assert_eq!(curve.defect(), None);
+        for r in rows.iter().filter(|r| r.floor) {
+            assert!(curve.cost_ns(&r.load) > 0.99 * r.ns, "{curve:?}");
+        }
+        assert!(curve.cost_ns(&load("uniform", 4e6)) > 100.0 * 4e6);
+        assert!((curve.cost_ns(&rows[0].load) / 9000.0 - 1.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn borders_get_intervals_from_paired_frames() {
+        let report = Machine::family()[2].report();
+        let fields = measured_fields(&report, "uniform").unwrap();
+        assert!(!fields.crossovers.is_empty() && fields.interval_basis.contains("bootstrap"), "{}", fields.interval_basis);
+        for b in &fields.crossovers {
+            assert!(b.low <= b.objects && b.objects <= b.high && b.high / b.low < 8.0, "{b:?}");
+        }
+    }
+
+    #[test]
+    fn a_scenario_that_was_not_measured_is_told() {
+        let error = measured_fields(&Machine::family()[0].report(), "dunes").unwrap_err().to_string();
+        assert!(error.contains("clustered, uniform"), "{error}");
+    }
+}
