@@ -186,12 +186,8 @@ mod tests {
 
     #[test]
     fn figures_follow_from_the_frames() {
-        let frame = |adaptive_ns, a, b, chosen| Frame {
-            objects: 10,
-            adaptive_ns,
-            fixed_ns: vec![a, b],
-            chosen: Some(chosen),
-        };
+        let frame =
+            |adaptive_ns, a, b, chosen| Frame { objects: 10, adaptive_ns, fixed_ns: vec![a, b], chosen: Some(chosen) };
         let outcome = Outcome {
             fixed: vec!["brute@cpu1".parse().unwrap(), "strips@cpu1".parse().unwrap()],
             frames: vec![frame(1e6, 1e6, 4e6, 0), frame(3e6, 5e6, 2e6, 1), frame(2e6, 5e6, 2e6, 1)],

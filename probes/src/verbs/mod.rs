@@ -4,7 +4,9 @@ mod check;
 mod devices;
 mod pairs;
 mod part;
+mod predict;
 mod probe;
+mod run;
 mod schema;
 
 use crate::args::Verb;
@@ -20,8 +22,10 @@ pub(crate) fn run(verb: Verb) -> anyhow::Result<Outcome> {
     // level that it was not taken at.
     SimdLevel::requested().map_err(WrongUsage)?;
     match verb {
+        Verb::Predict(arguments) => predict::run(&arguments),
         Verb::Devices(arguments) => devices::run(&arguments),
         Verb::Probe(arguments) => probe::run(&arguments),
+        Verb::Run(arguments) => run::run(&arguments),
         Verb::Train(_) => Ok(Outcome::Failed),
         Verb::Pairs(arguments) => pairs::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments),
