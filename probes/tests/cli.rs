@@ -66,7 +66,11 @@ fn pairs_keeps_its_contract() {
     let out = folder.path().join("pairs.npy");
     for algorithm in ["brute@cpu1", "strips@cpu1"] {
         let text = success(
-            sapwise().arg("pairs").arg(&boxes).args(["--algorithm", algorithm, "--repeat", "3", "--json", "--out"]).arg(&out),
+            sapwise()
+                .arg("pairs")
+                .arg(&boxes)
+                .args(["--algorithm", algorithm, "--repeat", "3", "--json", "--out"])
+                .arg(&out),
         );
         let answer: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert_eq!(answer["algorithm"], algorithm);
@@ -152,11 +156,13 @@ fn a_full_disk_is_a_failure_and_a_closed_pipe_is_none() {
     let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--out", "/dev/full"]), 1);
     assert!(complaint.contains("/dev/full"), "{complaint}");
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let ended = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise")).arg("devices").stdout(full).output().unwrap();
+    let ended =
+        std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise")).arg("devices").stdout(full).output().unwrap();
     assert_eq!(ended.status.code(), Some(1));
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
-    let ended = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise")).arg("devices").stdout(writer).output().unwrap();
+    let ended =
+        std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise")).arg("devices").stdout(writer).output().unwrap();
     assert_eq!((ended.status.code(), ended.stderr.len()), (Some(0), 0));
 }
 
