@@ -1,7 +1,7 @@
 //! The fields of optimal performance: for each load the cheapest algorithm.
 
 use crate::schema_tag::schema_tag;
-use crate::{AlgorithmId, CostCurve, Load};
+use crate::{AlgorithmId, CostCurve, Load, Registry};
 
 schema_tag!(
     /// `fields/1`.
@@ -115,6 +115,21 @@ impl Fields {
     pub fn from_steps(steps: Vec<Step>) -> Result<Self, String> {
         let fields = Self { steps, ..Self::empty(Source::Default) };
         fields.defect().map_or(Ok(fields), Err)
+    }
+
+    /// Fields for when nothing is known about the machine: borders in objects, written down by hand.
+    ///
+    /// They are the rounded borders of `uniform` on one machine (two cores of an AMD EPYC 9005 under KVM, AVX-512), with
+    /// its two cores standing for all of them. Any other machine has others: predict or measure them.
+    #[must_use]
+    pub fn usual(registry: &Registry) -> Self {
+        let step = |from_objects, method, threads| Step { from_objects, algorithm: AlgorithmId::cpu(method, threads) };
+        let mut steps = vec![step(0, "brute", 1), step(200, "sweep", 1), step(1500, "strips", 1)];
+        let cores = registry.entries().iter().filter(|e| e.unavailable.is_none()).map(|e| e.id.threads()).max();
+        if let Some(cores) = cores.filter(|&k| k > 1) {
+            steps.push(step(3000, "strips", cores));
+        }
+        Self { steps, scenario: "uniform".to_owned(), ..Self::empty(Source::Default) }
     }
 
     /// Fields from cost curves, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
@@ -338,6 +353,15 @@ mod tests {
         assert_eq!(fields.rank(&load, |_| true), Some(Ranking { best: 1, best_ns: 1.0, runner_up: Some((2, 2.0)) }));
         assert_eq!(fields.rank(&load, |k| k != 1), Some(Ranking { best: 2, best_ns: 2.0, runner_up: Some((0, 3.0)) }));
         assert_eq!(fields.rank(&load, |_| false), None);
+    }
+
+    #[test]
+    fn the_usual_fields_are_sound_with_any_number_of_cores() {
+        for cores in [1, 2, 6] {
+            let fields = Fields::usual(&Registry::with_cores(cores));
+            assert_eq!(fields.defect(), None);
+            assert!(fields.steps.iter().all(|s| s.algorithm.threads() <= cores));
+        }
     }
 
     #[test]

@@ -93,3 +93,33 @@ pub fn fields(text: &str) -> Result<Fields, JsonError> {
 pub fn write(document: &impl serde::Serialize) -> Result<String, JsonError> {
     Ok(serde_json::to_string_pretty(document)? + "\n")
 }
+
+/// Writes a report: one key a line, and one point a line, so that a full sweep stays readable and under a megabyte.
+///
+/// # Errors
+/// When a figure can't be written.
+pub fn write_report(report: &Report) -> Result<String, JsonError> {
+    let points: Result<Vec<String>, _> = report.points.iter().map(serde_json::to_string).collect();
+    let points = points?;
+    let frame = write(&Report { points: Vec::new(), ..report.clone() })?;
+    if points.is_empty() {
+        return Ok(frame);
+    }
+    // A line break within a text is written as an escape, so this can only be the key of the report itself.
+    let key = "\n  \"points\": []";
+    let lines = format!("\n  \"points\": [\n    {}\n  ]", points.join(",\n    "));
+    Ok(frame.replacen(key, &lines, 1))
+}
+
+/// File names and texts of the JSON Schemas of everything that [`read`] accepts.
+///
+/// # Errors
+/// When a schema can't be written.
+#[cfg(feature = "schema")]
+pub fn schemas() -> Result<[(&'static str, String); 3], JsonError> {
+    Ok([
+        ("report-1.schema.json", write(&schemars::schema_for!(Report))?),
+        ("model-1.schema.json", write(&schemars::schema_for!(Model))?),
+        ("fields-1.schema.json", write(&schemars::schema_for!(Fields))?),
+    ])
+}

@@ -1,6 +1,32 @@
 //! Broad-phase collision detection that knows which algorithm is fastest on this machine, for this frame.
+//!
+//! An engine hands its [`Aabb`]s to [`Adaptive`] every frame and gets [`Pairs`] back. Which algorithm of the [`Registry`]
+//! ran was decided by [`Fields`]: the cheapest for the [`Load`] of the frame.
+//!
+//! ```
+//! use sapwise::{Aabb, Adaptive, BroadPhase, Fields, Pairs, Registry};
+//!
+//! let registry = Registry::new();
+//! let mut broad_phase = Adaptive::new(Fields::usual(&registry), &registry)?;
+//! let mut pairs = Pairs::new();
+//! broad_phase.find_pairs(&[Aabb::cube([0.0; 3], 0.5), Aabb::cube([1.0, 0.0, 0.0], 0.5)], &mut pairs)?;
+//! assert_eq!(pairs.as_slice(), [(0, 1)]);
+//! # Ok::<(), sapwise::Error>(())
+//! ```
+//!
+//! Where fields come from, in ascending order of trust: written by hand ([`Fields::usual`], [`Fields::from_steps`]),
+//! predicted by a [`Model`] from the parameters of the [`Hardware`], or measured, from the timings in a [`Report`]. Reports,
+//! models and fields are files of the feature `model`; the command `sapwise` makes them.
+//!
+//! # Features
+//!
+//! - `parallel` (default): the algorithms on several cores, through rayon. Without it only `@cpu1`.
+//! - `model`: reports, models and fields as JSON; prediction.
+//! - `measure`: measures the hardware parameters of this machine.
+//! - `schema`: the JSON Schemas of the files, for tools.
 
 mod aabb;
+mod adaptive;
 mod algorithm;
 mod broad_phase;
 mod cost;
@@ -12,14 +38,18 @@ pub mod hardware;
 #[cfg(feature = "model")]
 pub mod json;
 mod load;
+#[cfg(feature = "measure")]
+pub mod measure;
 pub mod model;
 mod pairs;
 mod registry;
 pub mod report;
 mod sample;
+mod scenario;
 mod schema_tag;
 
 pub use aabb::Aabb;
+pub use adaptive::{Adaptive, Decision, Reason};
 pub use algorithm::{AlgorithmId, Backend, ParseIdError};
 pub use broad_phase::BroadPhase;
 pub use cost::{CostCurve, CostTerm, Knot, Term};
@@ -33,3 +63,9 @@ pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};
 pub use registry::{Entry, Registry, usable_cores};
 pub use report::Report;
+pub use scenario::{Scenario, Scene};
+
+/// The example of the README, run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,7 +1,7 @@
 //! What is known about a frame before it runs.
 
 use crate::Aabb;
-use crate::cpu::strip_cells;
+use crate::cpu::StripGrid;
 use crate::sample::Sample;
 
 /// The figures of a frame that decide what each algorithm costs, all known from a sample and the frame before.
@@ -28,29 +28,41 @@ impl Load {
     ///
     /// `pairs` is the number of pairs of the frame before, if there was one.
     #[must_use]
-    pub fn estimate(boxes: &[Aabb], pairs: Option<u64>) -> Self {
+    pub fn estimate(boxes: &[Aabb], pairs: Option<f64>) -> Self {
         let sample = Sample::with_overlaps(boxes);
         Self::from_sample(&sample, boxes.len(), pairs)
     }
 
-    pub(crate) fn from_sample(sample: &Sample, objects: usize, pairs: Option<u64>) -> Self {
+    /// The load of a frame that looks like this one but has another number of objects and pairs.
+    #[must_use]
+    pub fn rescaled(&self, objects: u32, pairs: f64) -> Self {
+        let ratio = |now: f64, then: f64| if then > 0.0 { now / then } else { 1.0 };
+        let growth = ratio(f64::from(objects), f64::from(self.objects));
+        let axis_candidates = self.axis_candidates * growth * growth;
+        let strip_candidates = (self.strip_candidates * ratio(pairs, self.pairs)).min(axis_candidates);
+        Self { objects, axis_candidates, strip_candidates, pairs, moved: self.moved }
+    }
+
+    fn from_sample(sample: &Sample, objects: usize, pairs: Option<f64>) -> Self {
         let n = objects as f64;
         let all = n * (n - 1.0).max(0.0) / 2.0;
         let axis = sample.widest_axis();
         let axis_candidates = sample.overlap[axis] * all;
         // Independence of the axes is wrong for clusters, but the frame before corrects it from the second frame on.
         let guess = sample.overlap.iter().product::<f64>() * all;
-        let pairs = pairs.map_or(guess, |p| p as f64);
-        let strip_candidates =
-            strip_candidates(sample, objects, axis, pairs).min(axis_candidates).max(pairs.min(axis_candidates));
+        let pairs = pairs.unwrap_or(guess);
+        let strip_candidates = strip_candidates(sample, objects, pairs).min(axis_candidates).max(pairs.min(axis_candidates));
         Self { objects: objects as u32, axis_candidates, strip_candidates, pairs, moved: 1.0 }
     }
 }
 
-/// Two boxes meet in a strip when they overlap after each is widened to whole cells, so candidates exceed pairs by the
-/// ratio of a widened to a plain interval on each of the two grid axes. Widening by half a cell on either side on average.
-fn strip_candidates(sample: &Sample, objects: usize, axis: usize, pairs: f64) -> f64 {
-    let cells = strip_cells(sample, objects, axis);
-    let widening: f64 = cells.iter().map(|&(a, width)| 1.0 + width / (2.0 * sample.extent[a]).max(width * 1e-3)).product();
-    pairs * widening
+/// Two boxes meet in a strip when they overlap after each is widened to whole cells, by half a cell at either end on
+/// average. So candidates exceed pairs by the ratio of a widened to a plain interval on each of the two grid axes.
+fn strip_candidates(sample: &Sample, objects: usize, pairs: f64) -> f64 {
+    let widening = |(axis, width): (usize, f64)| {
+        // A single cell spans everything that overlaps on no axis too.
+        let width = width.min(sample.high[axis] - sample.low[axis] + sample.extent[axis]);
+        if width > 0.0 { 1.0 + width / (2.0 * sample.extent[axis]).max(width * 1e-3) } else { 1.0 }
+    };
+    pairs * StripGrid::plan(sample, objects).widths().map(widening).iter().product::<f64>()
 }

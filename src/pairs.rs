@@ -1,5 +1,6 @@
 //! The one output of every algorithm.
 
+use crate::cpu::each_bit;
 use crate::error::Error;
 
 /// Two positions in the input, the lower one first.
@@ -110,6 +111,23 @@ impl Pairs {
         self.buffer[self.len] = (a.min(b), a.max(b));
         self.len += 1;
         self.found += 1;
+    }
+
+    /// Adds `id` paired with each of `others` whose bit is set in `mask`.
+    #[inline]
+    pub(crate) fn push_mask(&mut self, id: u32, others: &[u32], mask: u32) {
+        if self.is_full() {
+            self.found += u64::from(mask.count_ones());
+        } else {
+            each_bit(mask, |bit| self.push(id, others[bit]));
+        }
+    }
+
+    /// Whether nothing more can be stored. From there on pairs are only counted, sixteen at a time: 2^20 boxes in one
+    /// point have 5 * 10^11.
+    #[inline]
+    pub(crate) fn is_full(&self) -> bool {
+        self.refused.is_some() || self.limit.is_some_and(|limit| self.len >= limit)
     }
 
     /// Sorts if the caller wants it, and reports what did not fit. Every [`BroadPhase`](crate::BroadPhase) ends with this.

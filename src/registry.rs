@@ -1,6 +1,6 @@
 //! The algorithms that this machine can run.
 
-use crate::cpu::{self, Threads};
+use crate::cpu::{self, SimdLevel, Threads};
 use crate::{AlgorithmId, Backend, BroadPhase, Error};
 use std::fmt;
 
@@ -14,6 +14,7 @@ pub struct Registry {
     entries: Vec<Entry>,
     factories: Vec<Option<Factory>>,
     threads: Threads,
+    simd: SimdLevel,
 }
 
 /// One algorithm of a registry.
@@ -37,7 +38,8 @@ impl Registry {
     /// Our algorithms on 1, 2, 4, ... and `cores` threads.
     #[must_use]
     pub fn with_cores(cores: u32) -> Self {
-        let mut registry = Self { entries: Vec::new(), factories: Vec::new(), threads: Threads::default() };
+        let mut registry =
+            Self { entries: Vec::new(), factories: Vec::new(), threads: Threads::default(), simd: SimdLevel::in_use() };
         for method in cpu::METHODS {
             for threads in thread_counts(cores) {
                 registry.entries.push(Entry {
@@ -72,6 +74,11 @@ impl Registry {
         }
     }
 
+    /// Makes our algorithms use no higher SIMD level than this from now on.
+    pub fn limit_simd(&mut self, level: SimdLevel) {
+        self.simd = self.simd.min(level);
+    }
+
     /// Every algorithm, ours first.
     #[must_use]
     pub fn entries(&self) -> &[Entry] {
@@ -95,7 +102,7 @@ impl Registry {
         let method = cpu::METHODS.iter().find(|m| m.name == id.method());
         match (method, id.backend()) {
             (Some(method), &Backend::Cpu(threads)) => match cpu::unavailable(threads) {
-                None => (method.create)(threads, &self.threads),
+                None => (method.create)(threads, &self.threads, self.simd),
                 Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
             },
             _ => {

@@ -6,6 +6,9 @@ use crate::Aabb;
 /// about 10 %, and the glance takes microseconds.
 const SAMPLE: usize = 256;
 
+/// Boxes looked at, at least: the quantile of the extents needs a few.
+const SMALLEST_SAMPLE: usize = 32;
+
 /// Statistics of an evenly spaced sample of boxes. Infinite bounds are clamped before they enter any sum.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sample {
@@ -99,7 +102,9 @@ impl Sample {
 fn choose(boxes: &[Aabb]) -> ([Aabb; SAMPLE], usize) {
     let mut chosen = [Aabb::default(); SAMPLE];
     let mut count = 0;
-    let wanted = boxes.len().min(SAMPLE);
+    // Twice the root of the count: the cost of the glance stays a small share of the frame's at every size, while the
+    // share of overlapping pairs, which falls with the count, stays countable.
+    let wanted = boxes.len().min((2 * boxes.len().isqrt()).clamp(SMALLEST_SAMPLE, SAMPLE));
     for k in 0..wanted {
         // One box from the middle of each of `wanted` equal parts; u64 because the product passes 32 bits.
         let at = ((2 * k as u64 + 1) * boxes.len() as u64 / (2 * wanted as u64)) as usize;
@@ -129,7 +134,7 @@ mod tests {
         assert_eq!(sample.extent, [1.0; 3]);
         assert_eq!(sample.overlap, [1.0, 0.0, 1.0]);
         // Evenly spaced over 10 000: deviation = length / sqrt(12).
-        assert!((sample.deviation[1] - 2886.75).abs() < 15.0, "{}", sample.deviation[1]);
+        assert!((sample.deviation[1] - 2886.75).abs() < 30.0, "{}", sample.deviation[1]);
     }
 
     #[test]

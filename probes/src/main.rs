@@ -1,5 +1,29 @@
 //! The command `sapwise`.
 
+mod args;
+mod boxes;
+mod child;
+mod contention;
+mod date;
+mod destination;
+mod document;
+mod exit;
+mod files;
+mod hardware;
+mod interrupt;
+mod output;
+mod progress;
+mod provenance;
+mod summary;
+mod sweep;
+mod table;
 mod train;
+mod verbs;
 
-fn main() {}
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = args::Arguments::parse();
+    exit::report(verbs::run(arguments.verb))
+}

@@ -1,12 +1,18 @@
 //! Algorithms on the CPU, one file per method.
 
 mod brute;
+mod columns;
+mod kernel;
 mod level;
+mod strip_grid;
 mod strips;
+mod sweep;
 mod threads;
+mod workers;
 
+pub(crate) use kernel::each_bit;
 pub use level::SimdLevel;
-pub(crate) use strips::strip_cells;
+pub(crate) use strip_grid::StripGrid;
 pub(crate) use threads::Threads;
 
 use crate::{BroadPhase, Error};
@@ -17,12 +23,18 @@ pub(crate) struct Method {
     pub(crate) name: &'static str,
     /// Counts up when its speed changes.
     pub(crate) revision: u32,
-    /// Makes an instance that runs on that many threads.
-    pub(crate) create: fn(u32, &Threads) -> Result<Box<dyn BroadPhase>, Error>,
+    /// Makes an instance that runs on that many threads at that SIMD level.
+    pub(crate) create: Create,
 }
 
+type Create = fn(u32, &Threads, SimdLevel) -> Result<Box<dyn BroadPhase>, Error>;
+
 /// Every method, the simplest first.
-pub(crate) const METHODS: &[Method] = &[Method { name: "brute", revision: 1, create: brute::create }];
+pub(crate) const METHODS: &[Method] = &[
+    Method { name: "brute", revision: 1, create: brute::create },
+    Method { name: "sweep", revision: 1, create: sweep::create },
+    Method { name: "strips", revision: 1, create: strips::create },
+];
 
 /// Why `threads` threads can't be used in this build, if they can't.
 pub(crate) fn unavailable(threads: u32) -> Option<String> {

@@ -1,9 +1,302 @@
-//! Strips.
-use crate::sample::Sample;
+//! A grid of strips over two axes, a sweep along the third inside each strip. From scratch every frame.
+//!
+//! Phase one, one task a thread: each thread sorts its share of the boxes into bins of its own, one for each strip that
+//! a box touches. Phase two, several tasks a thread: each strip gathers its bins from all threads, sorts them along the
+//! sweep axis and sweeps. Boxes much larger than a cell stand in no bin; each strip tests those that cross it.
 
-/// The two grid axes and the width of a cell on each, for a sweep along `axis`.
-pub(crate) fn strip_cells(sample: &Sample, objects: usize, axis: usize) -> [(usize, f64); 2] {
-    let axes = [(axis + 1) % 3, (axis + 2) % 3];
-    let _ = (sample, objects);
-    axes.map(|a| (a, 1.0))
+use crate::broad_phase::check_count;
+use crate::cpu::columns::{Columns, ensure, order_key, part};
+use crate::cpu::kernel::{Query, each_bit, query_rows, sweep_rows};
+use crate::cpu::strip_grid::{Cover, StripGrid};
+use crate::cpu::workers::Workers;
+use crate::cpu::{SimdLevel, Threads};
+use crate::sample::Sample;
+use crate::{Aabb, BroadPhase, Error, Pairs};
+
+/// The method; see the module.
+#[derive(Debug)]
+struct Strips {
+    workers: Workers,
+    bins: Vec<Bins>,
+    large: Large,
+    tasks: Vec<Task>,
+    level: SimdLevel,
+}
+
+/// What one thread makes of its share of the boxes.
+#[derive(Debug, Default)]
+struct Bins {
+    /// Where the bin of each strip begins in `entries`; one more than there are strips.
+    starts: Vec<u32>,
+    entries: Vec<Entry>,
+    /// Positions in the input of the boxes kept apart; only the first `large_count` are of this frame.
+    large: Vec<u32>,
+    large_count: usize,
+    /// What went wrong, to be reported after the phase.
+    error: Option<Error>,
+}
+
+/// A box in a bin.
+#[derive(Debug, Clone, Copy, Default)]
+struct Entry {
+    bounds: Aabb,
+    id: u32,
+    /// [`Cover::begins`] in this strip.
+    begins: u32,
+}
+
+/// The boxes kept apart, ascending on the sweep axis.
+#[derive(Debug, Default)]
+struct Large {
+    keys: Vec<u64>,
+    columns: Columns,
+    covers: Vec<Cover>,
+}
+
+/// Memory of one task of phase two.
+#[derive(Debug, Default)]
+struct Task {
+    entries: Vec<Entry>,
+    keys: Vec<u64>,
+    columns: Columns,
+    begins: Vec<u32>,
+    /// The furthest end on the sweep axis among all rows so far.
+    ends: Vec<f32>,
+    pairs: Pairs,
+    error: Option<Error>,
+}
+
+pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
+    let workers = Workers::new("strips", threads, pools)?;
+    let bins = (0..workers.threads()).map(|_| Bins::default()).collect();
+    let tasks = (0..workers.tasks()).map(|_| Task::default()).collect();
+    Ok(Box::new(Strips { workers, bins, large: Large::default(), tasks, level }))
+}
+
+impl BroadPhase for Strips {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        check_count(boxes.len())?;
+        let grid = StripGrid::plan(&Sample::of(boxes), boxes.len());
+        let Self { workers, bins, large, tasks, level } = self;
+        workers.run(|| {
+            let threads = bins.len();
+            workers.each(bins, |k, bin| {
+                let share = part(boxes.len(), k, threads);
+                bin.error = bin.fill(&grid, boxes, share).err();
+            });
+            bins.iter_mut().find_map(|b| b.error.take()).map_or(Ok(()), Err)?;
+            large.gather(&grid, boxes, bins)?;
+            let (bins, large, strips, count) = (&*bins, &*large, grid.strips(), tasks.len());
+            let limit = pairs.limit();
+            if let [task] = tasks.as_mut_slice() {
+                return task.find(bins, large, &grid, 0..strips, 0..large.covers.len(), *level, pairs);
+            }
+            workers.each(tasks, |k, task| {
+                let strips = balanced(bins, strips, k, count)..balanced(bins, strips, k + 1, count);
+                let mut found = std::mem::take(&mut task.pairs);
+                found.clear();
+                found.set_limit(limit);
+                let rows = part(large.covers.len(), k, count);
+                task.error = task.find(bins, large, &grid, strips, rows, *level, &mut found).err();
+                task.pairs = found;
+            });
+            tasks.iter_mut().find_map(|t| t.error.take()).map_or(Ok(()), Err)?;
+            tasks.iter().for_each(|t| pairs.append(&t.pairs));
+            Ok(())
+        })?;
+        pairs.finish()
+    }
+
+    fn prepare(&mut self, objects: usize) {
+        // A refused allocation is reported by the frame that needs it. Boxes stand in 1.6 strips on average.
+        let share = objects / self.bins.len();
+        for bin in &mut self.bins {
+            let _ = ensure(&mut bin.entries, share + share * 5 / 8, "boxes in strips");
+        }
+    }
+}
+
+/// The first strip of part `k` of `parts` parts that hold equally many entries.
+fn balanced(bins: &[Bins], strips: usize, k: usize, parts: usize) -> usize {
+    let before = |strip: usize| bins.iter().map(|b| u64::from(b.starts[strip])).sum::<u64>();
+    let wanted = before(strips) * k as u64 / parts as u64;
+    if k == parts {
+        return strips;
+    }
+    let (mut low, mut high) = (0, strips);
+    while low < high {
+        let middle = (low + high) / 2;
+        if before(middle) < wanted { low = middle + 1 } else { high = middle }
+    }
+    low
+}
+
+/// The bits of `mask` whose box forms a pair with the one box that this strip has to report; see [`Cover::begins`].
+#[inline]
+fn owned(mask: u32, mine: u32, begins: &[u32]) -> u32 {
+    let mut owned = mask;
+    // With both bits set in the one box, as in most strips, the others don't matter.
+    if mine != 3 {
+        each_bit(mask, |bit| owned &= !(u32::from(mine | begins[bit] != 3) << bit));
+    }
+    owned
+}
+
+impl Bins {
+    fn fill(&mut self, grid: &StripGrid, boxes: &[Aabb], share: std::ops::Range<usize>) -> Result<(), Error> {
+        let first = share.start;
+        let share = &boxes[share];
+        let strips = grid.strips();
+        ensure(&mut self.starts, strips + 1, "strips")?;
+        let starts = &mut self.starts[..=strips];
+        starts.fill(0);
+        self.large_count = 0;
+        for (k, b) in share.iter().enumerate() {
+            if let Some(defect) = b.defect() {
+                return Err(Error::InvalidBox { index: first + k, defect });
+            }
+            if grid.is_large(b) {
+                ensure(&mut self.large, self.large_count + 1, "large boxes")?;
+                self.large[self.large_count] = (first + k) as u32;
+                self.large_count += 1;
+                continue;
+            }
+            let cover = grid.cover(b);
+            for row in cover.rows() {
+                for column in cover.columns() {
+                    starts[grid.strip([column, row])] += 1;
+                }
+            }
+        }
+        let mut total = 0_u32;
+        for start in starts.iter_mut() {
+            total += std::mem::replace(start, total);
+        }
+        ensure(&mut self.entries, total as usize, "boxes in strips")?;
+        for (k, b) in share.iter().enumerate() {
+            if grid.is_large(b) {
+                continue;
+            }
+            let cover = grid.cover(b);
+            for row in cover.rows() {
+                for column in cover.columns() {
+                    let cell = [column, row];
+                    let at = &mut starts[grid.strip(cell)];
+                    self.entries[*at as usize] = Entry { bounds: *b, id: (first + k) as u32, begins: cover.begins(cell) };
+                    *at += 1;
+                }
+            }
+        }
+        // Every start has moved to its bin's end, which is the start of the next.
+        starts.copy_within(..strips, 1);
+        starts[0] = 0;
+        Ok(())
+    }
+
+    /// The bin of a strip.
+    fn bin(&self, strip: usize) -> &[Entry] {
+        &self.entries[self.starts[strip] as usize..self.starts[strip + 1] as usize]
+    }
+}
+
+impl Large {
+    fn gather(&mut self, grid: &StripGrid, boxes: &[Aabb], bins: &[Bins]) -> Result<(), Error> {
+        let ids = || bins.iter().flat_map(|b| &b.large[..b.large_count]);
+        let count = ids().count();
+        ensure(&mut self.keys, count, "large boxes")?;
+        let keys = &mut self.keys[..count];
+        for (key, &id) in keys.iter_mut().zip(ids()) {
+            *key = u64::from(order_key(boxes[id as usize].min[grid.axis])) << 32 | u64::from(id);
+        }
+        keys.sort_unstable();
+        self.columns.resize(count)?;
+        self.covers.clear();
+        let mut columns = self.columns.as_mut();
+        for (at, &key) in keys.iter().enumerate() {
+            let id = key as u32;
+            columns.set(at, &boxes[id as usize], grid.axis, id);
+            self.covers.push(grid.cover(&boxes[id as usize]));
+        }
+        Ok(())
+    }
+}
+
+impl Task {
+    #[expect(clippy::too_many_arguments, reason = "the frame's shared state, each part borrowed on its own")]
+    fn find(
+        &mut self,
+        bins: &[Bins],
+        large: &Large,
+        grid: &StripGrid,
+        strips: std::ops::Range<usize>,
+        large_rows: std::ops::Range<usize>,
+        level: SimdLevel,
+        pairs: &mut Pairs,
+    ) -> Result<(), Error> {
+        for strip in strips {
+            self.sort(bins, strip, grid.axis)?;
+            let (ids, begins) = (self.columns.ids(), &self.begins);
+            sweep_rows(level, &self.columns, 0..ids.len(), |i, at, mask| {
+                pairs.push_mask(ids[i], &ids[at..], owned(mask, begins[i], &begins[at..]));
+            });
+            if !large.covers.is_empty() && !ids.is_empty() {
+                self.query_large(large, grid.cell(strip), level, pairs)?;
+            }
+        }
+        let ids = large.columns.ids();
+        sweep_rows(level, &large.columns, large_rows, |i, at, mask| pairs.push_mask(ids[i], &ids[at..], mask));
+        Ok(())
+    }
+
+    /// Brings the boxes of a strip into columns that ascend on the sweep axis.
+    fn sort(&mut self, bins: &[Bins], strip: usize, axis: usize) -> Result<(), Error> {
+        let entries: &[Entry] = if let [only] = bins {
+            only.bin(strip)
+        } else {
+            self.entries.clear();
+            bins.iter().for_each(|b| self.entries.extend_from_slice(b.bin(strip)));
+            &self.entries
+        };
+        ensure(&mut self.keys, entries.len(), "sort keys")?;
+        ensure(&mut self.begins, entries.len(), "sort keys")?;
+        self.columns.resize(entries.len())?;
+        let keys = &mut self.keys[..entries.len()];
+        for (at, (key, entry)) in keys.iter_mut().zip(entries).enumerate() {
+            *key = u64::from(order_key(entry.bounds.min[axis])) << 32 | at as u64;
+        }
+        keys.sort_unstable();
+        let mut columns = self.columns.as_mut();
+        for (at, &key) in keys.iter().enumerate() {
+            let entry = &entries[key as u32 as usize];
+            columns.set(at, &entry.bounds, axis, entry.id);
+            self.begins[at] = entry.begins;
+        }
+        Ok(())
+    }
+
+    /// Tests the large boxes that cross a strip against the boxes in it.
+    fn query_large(&mut self, large: &Large, cell: [u32; 2], level: SimdLevel, pairs: &mut Pairs) -> Result<(), Error> {
+        let Self { columns, begins, ends, .. } = self;
+        ensure(ends, columns.len(), "ends of boxes")?;
+        let ends = &mut ends[..columns.len()];
+        let mut furthest = f32::NEG_INFINITY;
+        for (end, &high) in ends.iter_mut().zip(columns.high(0)) {
+            furthest = furthest.max(high);
+            *end = furthest;
+        }
+        let ids = columns.ids();
+        for (k, cover) in large.covers.iter().enumerate().filter(|(_, c)| c.contains(cell)) {
+            let query =
+                Query { low: [0, 1, 2].map(|a| large.columns.low(a)[k]), high: [0, 1, 2].map(|a| large.columns.high(a)[k]) };
+            let mine = cover.begins(cell);
+            // No row before this one ends late enough to be hit.
+            let start = ends.partition_point(|&end| end < query.low[0]);
+            let id = large.columns.ids()[k];
+            query_rows(level, columns, start, &query, |at, mask| {
+                pairs.push_mask(id, &ids[at..], owned(mask, mine, &begins[at..]));
+            });
+        }
+        Ok(())
+    }
 }

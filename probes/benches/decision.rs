@@ -1,0 +1,45 @@
+//! What one decision costs: the ranking alone, and the whole of `Adaptive::decide` with its sampled estimate.
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use sapwise::{
+    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Fields, Knot, Load, Pairs, Registry, Scenario, Source, Term,
+};
+use std::hint::black_box;
+
+/// As many algorithms, terms and knots as a predicted field of a 16-core machine has.
+fn fields() -> Fields {
+    let curve = |k: u32| CostCurve {
+        terms: Term::ALL.map(|term| CostTerm { term, unit_ns: 1.0 + f64::from(k) / 100.0 }).to_vec(),
+        cache_bytes: 3.2e7,
+        correction: (3..=24).map(|o| Knot { log2_objects: f64::from(o), ln_factor: 0.01 * f64::from(o % 5) }).collect(),
+    };
+    let ids = ["brute", "sweep", "strips"].iter().flat_map(|m| [1, 2, 4, 8, 16].map(|k| format!("{m}@cpu{k}")));
+    let costs = ids.zip(0..).map(|(id, k)| AlgorithmCost {
+        algorithm: id.parse().expect("an algorithm of ours"),
+        revision: 1,
+        curve: curve(k),
+        spread_ln: 0.05,
+    });
+    let loads: Vec<Load> = (3..20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    Fields::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
+}
+
+fn decision(c: &mut Criterion) {
+    let fields = fields();
+    let load = Load { objects: 12_345, axis_candidates: 1e6, strip_candidates: 1e5, pairs: 6e3, moved: 1.0 };
+    c.bench_function("rank 15 algorithms", |b| b.iter(|| fields.rank(black_box(&load), |_| true)));
+    let registry = Registry::new();
+    for objects in [100, 10_000, 1_000_000] {
+        let scene = Scenario::Uniform.start(objects, 1);
+        let mut adaptive = Adaptive::new(fields.clone(), &registry).expect("available");
+        adaptive.find_pairs(scene.boxes(), &mut Pairs::new()).expect("valid boxes");
+        let mut group = c.benchmark_group("decide, sampling every 16th frame");
+        group.bench_function(BenchmarkId::from_parameter(objects), |b| {
+            b.iter(|| adaptive.decide(black_box(scene.boxes())).is_some());
+        });
+        group.finish();
+    }
+}
+
+criterion_group!(benches, decision);
+criterion_main!(benches);

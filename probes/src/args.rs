@@ -1,0 +1,170 @@
+//! The command line.
+
+use clap::{Args, Parser, Subcommand};
+use sapwise::AlgorithmId;
+use std::path::PathBuf;
+
+/// Measures this machine, predicts which broad-phase algorithm is fastest on it, and runs it.
+#[derive(Debug, Parser)]
+#[command(name = "sapwise", version, max_term_width = 100, propagate_version = true)]
+#[command(after_help = "\
+Exit status: 0 done, 1 failed, 2 wrong usage.
+SAPWISE_SIMD=portable|avx2|avx512 makes every algorithm use a lower level of vector instructions than the CPU has.")]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Verb {
+    Devices(Devices),
+    Probe(Probe),
+    Train(Train),
+    Pairs(Pairs),
+    Check(Check),
+    Schema(Schema),
+    #[command(hide = true)]
+    Part(Part),
+}
+
+/// Lists the algorithms that this machine can run, and why it can't run the others.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  sapwise devices --json")]
+pub(crate) struct Devices {
+    /// One JSON object on standard output instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Measures this machine: its hardware parameters, then every algorithm over scenarios and sizes.
+///
+/// Takes under a minute with --quick and up to five minutes without it. Ctrl-C keeps what was measured.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sapwise probe --quick
+  sapwise probe --out this-machine.json
+  sapwise probe --threads 1 --out one-core.json    (as if the machine had one core)")]
+pub(crate) struct Probe {
+    /// Only the hardware parameters, in seconds.
+    #[arg(long, conflicts_with_all = ["quick", "scenarios", "max_objects"])]
+    pub(crate) hardware_only: bool,
+    /// Three scenarios up to 300 000 objects, under a minute in all.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Use this many cores at most, as if the machine had no more.
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) threads: Option<u32>,
+    /// Load half of the cores with threads that stream through memory while everything is measured.
+    #[arg(long)]
+    pub(crate) contended: bool,
+    /// Seed of the scenarios and of the order in which algorithms take turns.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// The largest size in the sweep.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(10..=10_000_000))]
+    pub(crate) max_objects: Option<u32>,
+    /// Sweep this scenario instead of the usual ones; may be given several times.
+    #[arg(long = "scenario", value_name = "NAME")]
+    pub(crate) scenarios: Vec<String>,
+    /// Where the report goes. Without this option it goes to report.json, or with --json nowhere else.
+    #[arg(long, value_name = "R.json")]
+    pub(crate) out: Option<PathBuf>,
+    /// The report on standard output instead of a summary.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Fits a model to reports and validates it by leaving machines out.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  sapwise train datasets/ --out models/mine.json --card models/mine.md")]
+pub(crate) struct Train {
+    /// Reports, or folders whose *.json files are reports.
+    #[arg(required = true, value_name = "R.json")]
+    pub(crate) reports: Vec<PathBuf>,
+    /// Where the model goes.
+    #[arg(long, value_name = "M.json")]
+    pub(crate) out: PathBuf,
+    /// Name of the model. Without this option that of the file.
+    #[arg(long)]
+    pub(crate) name: Option<String>,
+    /// Where a page goes that says what the model was trained on and how well it did.
+    #[arg(long, value_name = "CARD.md")]
+    pub(crate) card: Option<PathBuf>,
+    /// One JSON object on standard output instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Finds the overlapping pairs of your own boxes.
+///
+/// The file is NumPy's format, 32-bit floats of shape n x 6 or frames x n x 6, each box min x y z, max x y z.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  sapwise pairs boxes.npy --algorithm strips@cpu1 --repeat 10 --out pairs.npy")]
+pub(crate) struct Pairs {
+    /// The boxes.
+    #[arg(value_name = "BOXES.npy")]
+    pub(crate) boxes: PathBuf,
+    /// One of the algorithms that `sapwise devices` lists.
+    #[arg(long, value_name = "ID")]
+    pub(crate) algorithm: Option<AlgorithmId>,
+    /// Go through all frames that many times.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) repeat: u32,
+    /// Where the pairs of the last frame go, 32-bit unsigned integers of shape m x 2, sorted.
+    #[arg(long, value_name = "PAIRS.npy")]
+    pub(crate) out: Option<PathBuf>,
+    /// Fail when a frame has more pairs than this, instead of filling the memory.
+    #[arg(long, value_name = "N")]
+    pub(crate) limit: Option<usize>,
+    /// One JSON object on standard output instead of a summary.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Says whether reports, models and fields files are sound, current and applicable on this machine.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  sapwise check report.json models/*.json")]
+pub(crate) struct Check {
+    /// The files.
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// One JSON object on standard output instead of text.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Writes the JSON Schemas of reports, models and fields files.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  sapwise schema --out schemas")]
+pub(crate) struct Schema {
+    /// The folder that they go to; made when it is not there.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+/// One part of a measurement in a process of its own, so that a crash costs that part and not the run.
+#[derive(Debug, Args)]
+pub(crate) struct Part {
+    #[command(subcommand)]
+    pub(crate) part: PartKind,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum PartKind {
+    /// Prints the parameters of one family as JSON.
+    Hardware {
+        family: String,
+        #[arg(long)]
+        threads: Option<u32>,
+    },
+    /// Sweeps one scenario and prints one event as JSON a line.
+    Sweep {
+        /// The order, as JSON.
+        order: String,
+    },
+}

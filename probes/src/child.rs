@@ -1,0 +1,126 @@
+//! Parts of a measurement in processes of their own: a crash costs the part, not the run.
+
+use crate::interrupt;
+use anyhow::Context;
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// How long to wait for the next line before looking at the clock and for Ctrl-C.
+const POLL: Duration = Duration::from_millis(50);
+
+/// How a part ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Ended {
+    /// With exit status 0.
+    Well,
+    /// By Ctrl-C or SIGTERM.
+    Interrupted,
+    /// In any other way: "was ended by signal 11".
+    Badly(String),
+}
+
+/// Runs `sapwise part ARGUMENTS` and hands on each line that it prints, until it ends, `limit` is over or the user interrupts.
+///
+/// # Errors
+/// When the process can't be started, or `on_line` fails; the process is ended then.
+pub(crate) fn run_part(
+    arguments: &[&str],
+    limit: Duration,
+    on_line: &mut dyn FnMut(&str) -> anyhow::Result<()>,
+) -> anyhow::Result<Ended> {
+    let program = std::env::current_exe().context("the program can't find itself")?;
+    let child = Command::new(program)
+        .arg("part")
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .context("a part of the measurement can't be started as a process")?;
+    let mut child = EndedOnDrop(child);
+    // Kept open until the end: the part ends when this pipe closes, so it never outlives this process. `wait` would close
+    // it too early, were it still in the child.
+    let _leash = child.0.stdin.take();
+    let complaints = child.0.stderr.take().map(last_line);
+    let lines = child.0.stdout.take().map(lines);
+    let end = Instant::now() + limit;
+    while let Some(lines) = &lines {
+        match lines.recv_timeout(POLL) {
+            Ok(line) => on_line(&line)?,
+            Err(RecvTimeoutError::Disconnected) => break,
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        if interrupt::requested() {
+            return Ok(Ended::Interrupted);
+        }
+        if Instant::now() >= end {
+            return Ok(Ended::Badly(format!("was stopped after {} s, which is too long", limit.as_secs())));
+        }
+    }
+    let status = child.0.wait().context("a part of the measurement got lost")?;
+    let complaint = complaints.and_then(|c| c.join().ok()).unwrap_or_default();
+    Ok(judge(status, &complaint))
+}
+
+/// Ends this process when the pipe of the process that started it closes. For parts, as their first step.
+pub(crate) fn end_with_parent() {
+    std::thread::spawn(|| {
+        // The parent writes nothing, so this returns at the end only.
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        std::process::exit(1);
+    });
+}
+
+struct EndedOnDrop(Child);
+
+impl Drop for EndedOnDrop {
+    fn drop(&mut self) {
+        // Both fail when it has ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Lines as they come. A line that is not text ends them, since nothing after it can be trusted.
+fn lines(source: impl Read + Send + 'static) -> Receiver<String> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        for line in BufReader::new(source).lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
+/// The last line of what a part complains about. All is read, because a full pipe would stop the part.
+fn last_line(source: impl Read + Send + 'static) -> JoinHandle<String> {
+    std::thread::spawn(move || {
+        BufReader::new(source).lines().map_while(Result::ok).filter(|l| !l.trim().is_empty()).last().unwrap_or_default()
+    })
+}
+
+fn judge(status: ExitStatus, complaint: &str) -> Ended {
+    if status.success() {
+        return Ended::Well;
+    }
+    #[cfg(unix)]
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        // The terminal sends these to the part as well, and it may be the first to go.
+        return if matches!(signal, 2 | 15) {
+            Ended::Interrupted
+        } else {
+            Ended::Badly(format!("was ended by signal {signal}"))
+        };
+    }
+    let status = status.code().map_or("no exit status".to_owned(), |c| format!("exit status {c}"));
+    Ended::Badly(if complaint.is_empty() {
+        format!("ended with {status}")
+    } else {
+        format!("ended with {status}: {complaint}")
+    })
+}

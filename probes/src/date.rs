@@ -1,0 +1,42 @@
+//! Today's date in UTC.
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Today as `yyyy-mm-dd`. A clock that stands before 1970 gives 1970-01-01.
+pub(crate) fn today() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    civil(seconds / 86_400)
+}
+
+/// The date that many days after 1970-01-01 in the Gregorian calendar.
+///
+/// Years are counted from 1 March, so that the leap day is the last of its year.
+fn civil(days: u64) -> String {
+    // 719 468 days lie between 0000-03-01 and 1970-01-01; 146 097 days are 400 years.
+    let days = days + 719_468;
+    let (era, day_of_era) = (days / 146_097, days % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    // Months from March have 31, 30, 31, 30, 31 days over and over: 153 days in five months.
+    let month_from_march = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
+    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
+    let year = era * 400 + year_of_era + u64::from(month <= 2);
+    format!("{year:04}-{month:02}-{day:02}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_days() {
+        assert_eq!(civil(0), "1970-01-01");
+        assert_eq!(civil(11_016), "2000-02-29");
+        assert_eq!(civil(11_017), "2000-03-01");
+        assert_eq!(civil(20_453), "2025-12-31");
+        assert_eq!(civil(20_454), "2026-01-01");
+        assert_eq!(civil(47_540), "2100-02-28");
+        assert_eq!(civil(47_541), "2100-03-01");
+    }
+}

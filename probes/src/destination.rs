@@ -1,0 +1,54 @@
+//! Where a report goes, checked before the minutes of measuring, with a way out when it fails after them.
+
+use crate::output;
+use anyhow::{Context, bail};
+use sapwise::Report;
+use std::path::{Path, PathBuf};
+
+/// Where the report goes without `--out`.
+const DEFAULT: &str = "report.json";
+
+/// The file of a report.
+pub(crate) struct Destination(PathBuf);
+
+impl Destination {
+    /// The file that the user named, or the default, after a try whether its folder takes a file.
+    ///
+    /// # Errors
+    /// When the folder takes none, or the path is a folder itself.
+    pub(crate) fn new(path: Option<&Path>) -> anyhow::Result<Self> {
+        let path = path.unwrap_or(Path::new(DEFAULT)).to_path_buf();
+        if path.is_dir() {
+            bail!("{} is a folder; name a file with --out", path.display());
+        }
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        tempfile::tempfile_in(folder)
+            .with_context(|| format!("no file can be written in {}; name another with --out", folder.display()))?;
+        Ok(Self(path))
+    }
+
+    /// Writes the report as it is by now, so that even a power cut costs one scenario only.
+    pub(crate) fn save_unfinished(&self, report: &Report) {
+        if let Err(error) = write(&self.0, report) {
+            output::complain(&format!("warning: {error:#}; measuring goes on"));
+        }
+    }
+
+    /// Writes the finished report, in the folder for temporary files when its own path fails.
+    ///
+    /// # Errors
+    /// When it is not where it was wanted. The message says where it is.
+    pub(crate) fn save(&self, report: &Report) -> anyhow::Result<&Path> {
+        let Err(error) = write(&self.0, report) else { return Ok(&self.0) };
+        let other = std::env::temp_dir().join(format!("sapwise-report-{}.json", std::process::id()));
+        match write(&other, report) {
+            Ok(()) => Err(error.context(format!("the report is in {} instead", other.display()))),
+            Err(second) => Err(error.context(format!("the report is lost; {second:#}"))),
+        }
+    }
+}
+
+fn write(path: &Path, report: &Report) -> anyhow::Result<()> {
+    let text = sapwise::json::write_report(report)?;
+    crate::files::write_atomically(path, |w| Ok(w.write_all(text.as_bytes())?))
+}

@@ -1,0 +1,39 @@
+//! Reading the files of Sapwise.
+
+use anyhow::{Context, bail};
+use sapwise::json::Document;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// Files larger than this are refused before they fill the memory. A full report of a machine with 64 threads has 2 MB.
+const LARGEST_BYTES: u64 = 64 << 20;
+
+/// Reads a report, model or fields file.
+///
+/// # Errors
+/// Names the file, and the line and column or the figure that is wrong.
+pub(crate) fn read_document(path: &Path) -> anyhow::Result<Document> {
+    let text = read_text(path)?;
+    sapwise::json::read(&text).with_context(|| format!("{} is no sound file", path.display()))
+}
+
+fn read_text(path: &Path) -> anyhow::Result<String> {
+    let shown = path.display();
+    let file = File::open(path).with_context(|| format!("{shown} can't be opened"))?;
+    if file.metadata().with_context(|| format!("{shown} can't be read"))?.is_dir() {
+        bail!("{shown} is a folder; name the files in it");
+    }
+    let mut bytes = Vec::new();
+    // One byte beyond the limit tells a file that is too large from one that just fits; the length in the metadata can't
+    // be trusted for pipes and devices.
+    file.take(LARGEST_BYTES + 1).read_to_end(&mut bytes).with_context(|| format!("{shown} can't be read"))?;
+    if bytes.len() as u64 > LARGEST_BYTES {
+        bail!("{shown} is larger than {} MiB, which no file of ours is", LARGEST_BYTES >> 20);
+    }
+    String::from_utf8(bytes).map_err(|e| {
+        let at = e.utf8_error().valid_up_to();
+        let line = e.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;
+        anyhow::anyhow!("{shown} is no text: line {line} is not UTF-8 from byte {at} of the file on")
+    })
+}

@@ -1,0 +1,53 @@
+//! The hardware parameters of this machine, each family measured in a process of its own.
+
+use crate::child::{Ended, run_part};
+use crate::progress::Progress;
+use sapwise::measure::{self, Family};
+use sapwise::{Hardware, Parameter};
+use std::time::Duration;
+
+/// A family takes a second or less. One that takes this long hangs in a driver or has no processor to run on.
+const LIMIT: Duration = Duration::from_secs(15);
+
+/// Measures every family of parameters, on at most `threads` cores, in under five seconds.
+///
+/// A family that crashes, hangs or is interrupted leaves its parameters missing, with the reason.
+///
+/// # Errors
+/// When no process can be started.
+pub(crate) fn measure_hardware(threads: Option<u32>) -> anyhow::Result<Hardware> {
+    let progress = Progress::new(Family::ALL.len() as u64);
+    let mut found: Vec<Parameter> = Vec::new();
+    for family in Family::ALL {
+        let name = family.name();
+        progress.message(format!("hardware: {name}"));
+        match measure_family(name, threads)? {
+            Ok(parameters) => found.extend(parameters),
+            Err(why) => found.extend(family.parameters().iter().map(|p| Parameter::missing(p, &why))),
+        }
+        progress.advance(1);
+    }
+    Ok(measure::assemble(measure::machine(), found))
+}
+
+/// The parameters of a family, or why there are none.
+fn measure_family(name: &str, threads: Option<u32>) -> anyhow::Result<Result<Vec<Parameter>, String>> {
+    if crate::interrupt::requested() {
+        return Ok(Err("interrupted before it was measured".to_owned()));
+    }
+    let threads = threads.map(|k| k.to_string());
+    let mut arguments = vec!["hardware", name];
+    if let Some(threads) = &threads {
+        arguments.extend(["--threads", threads]);
+    }
+    let mut text = String::new();
+    let ended = run_part(&arguments, LIMIT, &mut |line| {
+        text.push_str(line);
+        Ok(())
+    })?;
+    Ok(match ended {
+        Ended::Well => serde_json::from_str(&text).map_err(|e| format!("the probe {name} gave an unreadable answer: {e}")),
+        Ended::Interrupted => Err("interrupted while it was measured".to_owned()),
+        Ended::Badly(how) => Err(format!("the probe {name} {how}")),
+    })
+}

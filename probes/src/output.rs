@@ -1,0 +1,32 @@
+//! Standard output and standard error, without the panics of `println!`.
+
+use anyhow::Context;
+use std::io::{ErrorKind, Write};
+
+/// Writes a text and a line end to standard output.
+///
+/// # Errors
+/// When the output is closed, which [`is_closed`] recognises, or its disk is full.
+pub(crate) fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    let written = out.write_all(text.trim_end_matches('\n').as_bytes()).and_then(|()| out.write_all(b"\n"));
+    written.and_then(|()| out.flush()).context("standard output can't be written")
+}
+
+/// Writes a value as one line of JSON to standard output.
+///
+/// # Errors
+/// As [`print`].
+pub(crate) fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+    print(&serde_json::to_string(value)?)
+}
+
+/// Writes a line to standard error. A closed standard error leaves nobody to tell, so that failure is dropped.
+pub(crate) fn complain(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// Whether a reader such as `head` has closed standard output: it has what it wanted, so this is no failure.
+pub(crate) fn is_closed(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe)
+}

@@ -1,0 +1,67 @@
+//! Fields of a machine from its hardware parameters.
+
+use anyhow::Context;
+use sapwise::hardware::parameter;
+use sapwise::{Fields, Hardware, Load, Model, Pairs, Registry, Scenario, Source};
+
+/// Objects of the slice that the fields show: four sizes a decade from ten to a million.
+const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
+
+/// Seed of the scenes that the slice goes through.
+const SEED: u64 = 1;
+
+/// Predicts the fields of a machine: every algorithm on 1, 2, 4, ... and all of its cores.
+///
+/// # Errors
+/// When the model predicts none of the algorithms.
+pub(crate) fn predict(model: &Model, hardware: &Hardware, scenario: Scenario) -> anyhow::Result<Fields> {
+    let cores = hardware.value(parameter::USABLE_CORES).map_or(1, |k| k as u32);
+    let algorithms = Registry::with_cores(cores).available();
+    let prediction = model.predict(hardware, &algorithms).map_err(anyhow::Error::msg)?;
+    let mut fields = Fields::from_costs(Source::Predicted, &scenario.to_string(), prediction.costs, &slice(scenario)?);
+    fields.model = Some(model.name.clone());
+    fields.extrapolated = prediction.extrapolated;
+    fields.warnings = prediction.warnings;
+    let v = &model.validation;
+    fields.interval_basis = format!(
+        "90 % of a normal distribution with the spread of measured over modelled time in training ({} profiles of {} \
+         physical machines); no claim about other machines",
+        v.profiles, v.physical_machines
+    );
+    Ok(fields)
+}
+
+/// The load of a scenario over the number of objects, with the pairs that it really has.
+///
+/// # Errors
+/// When the pairs can't be found, for want of memory.
+pub(crate) fn slice(scenario: Scenario) -> anyhow::Result<Vec<Load>> {
+    let registry = Registry::with_cores(1);
+    let mut counter = registry.create(&"strips@cpu1".parse()?)?;
+    let mut pairs = Pairs::new();
+    let mut loads = Vec::new();
+    for quarter in SLICE {
+        let objects = 10.0_f64.powf(f64::from(quarter) / 4.0).round() as usize;
+        let mut scene = scenario.start(objects, SEED);
+        crate::sweep::next_frame(&mut scene);
+        counter
+            .find_pairs(scene.boxes(), &mut pairs)
+            .with_context(|| format!("the pairs of {scenario} at {objects} objects"))?;
+        loads.push(Load::estimate(scene.boxes(), Some(pairs.len() as f64)));
+    }
+    Ok(loads)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slice_ascends_and_sees_the_density_of_its_scenario() {
+        let uniform = slice(Scenario::Uniform).unwrap();
+        let clustered = slice(Scenario::Clustered).unwrap();
+        assert_eq!(uniform.len(), 21);
+        assert!(uniform.is_sorted_by(|a, b| a.objects < b.objects && a.axis_candidates <= b.axis_candidates));
+        assert!(clustered[20].pairs > 3.0 * uniform[20].pairs);
+    }
+}

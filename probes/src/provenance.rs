@@ -1,0 +1,119 @@
+//! How a report was made, and what kind of evidence that makes it.
+
+use crate::args::Probe;
+use crate::date;
+use sapwise::report::{Label, Point, Provenance, Timed};
+use sapwise::{Registry, SimdLevel, usable_cores};
+use std::time::Duration;
+
+/// A machine whose other programs take more than this share of the CPU at half of the points is not undisturbed.
+const CONTENDED_LOAD: f64 = 0.2;
+
+/// The provenance of a report that these arguments led to.
+pub(crate) fn provenance(arguments: &Probe, took: Duration) -> Provenance {
+    Provenance {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        date: date::today(),
+        command: command(arguments),
+        seed: arguments.seed,
+        threads: arguments.threads,
+        simd: requested_level().map(|level| level.to_string()),
+        optimised: !cfg!(debug_assertions),
+        seconds: (took.as_secs_f64() * 10.0).round() / 10.0,
+    }
+}
+
+/// What kind of evidence these points are.
+pub(crate) fn label(arguments: &Probe, points: &[Point]) -> Label {
+    let fewer_cores = arguments.threads.is_some_and(|k| k < usable_cores());
+    let lower_level = requested_level().is_some_and(|level| level < SimdLevel::detected());
+    // Contention first: a restricted machine that is disturbed shows what no restriction explains.
+    if arguments.contended || median_foreign_load(points).is_some_and(|load| load > CONTENDED_LOAD) {
+        Label::RealContended
+    } else if fewer_cores || lower_level {
+        Label::RealRestricted
+    } else {
+        Label::RealFull
+    }
+}
+
+/// The algorithms that have timings at these points, in the order of the registry.
+pub(crate) fn timed(points: &[Point], threads: Option<u32>) -> Vec<Timed> {
+    let registry = Registry::with_cores(threads.unwrap_or_else(usable_cores));
+    let raced = |id| points.iter().any(|p| p.timings.iter().any(|t| t.algorithm == id));
+    let entries = registry.available().into_iter();
+    entries.filter(|(id, _)| raced(id.clone())).map(|(id, revision)| Timed { id, revision }).collect()
+}
+
+/// `None` for a wrong variable too: the program has refused it before it came here.
+fn requested_level() -> Option<SimdLevel> {
+    SimdLevel::requested().ok().flatten()
+}
+
+/// The upper median, over the points where foreign load could be told.
+fn median_foreign_load(points: &[Point]) -> Option<f64> {
+    let mut loads: Vec<f64> = points.iter().filter_map(|p| p.foreign_load).collect();
+    loads.sort_unstable_by(f64::total_cmp);
+    loads.get(loads.len() / 2).copied()
+}
+
+/// The arguments without `--out`: paths name users.
+fn command(arguments: &Probe) -> String {
+    let mut words = vec!["probe".to_owned()];
+    let flags =
+        [("--hardware-only", arguments.hardware_only), ("--quick", arguments.quick), ("--contended", arguments.contended)];
+    words.extend(flags.iter().filter(|f| f.1).map(|f| f.0.to_owned()));
+    words.extend(arguments.threads.map(|k| format!("--threads {k}")));
+    words.push(format!("--seed {}", arguments.seed));
+    words.extend(arguments.max_objects.map(|n| format!("--max-objects {n}")));
+    words.extend(arguments.scenarios.iter().map(|s| format!("--scenario {s}")));
+    words.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::{Arguments, Verb};
+    use clap::Parser;
+    use sapwise::Load;
+
+    fn probe(words: &[&str]) -> Probe {
+        let all = ["sapwise", "probe"].iter().chain(words);
+        match Arguments::try_parse_from(all).unwrap().verb {
+            Verb::Probe(probe) => probe,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn point(foreign_load: Option<f64>) -> Point {
+        Point {
+            scenario: "uniform".to_owned(),
+            load: Load::default(),
+            pairs: 0,
+            fingerprint: String::new(),
+            foreign_load,
+            spoiled: 0,
+            timings: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_command_holds_no_path() {
+        let arguments = probe(&["--quick", "--out", "/home/someone/r.json", "--threads", "1", "--scenario", "slab"]);
+        assert_eq!(command(&arguments), "probe --quick --threads 1 --seed 1 --scenario slab");
+    }
+
+    #[test]
+    fn contention_and_restriction_are_labelled() {
+        let quiet = [point(Some(0.01)), point(None), point(Some(0.9)), point(Some(0.0))];
+        let busy = [point(Some(0.3)), point(Some(0.4)), point(Some(0.0))];
+        assert_eq!(label(&probe(&["--contended"]), &quiet), Label::RealContended);
+        assert_eq!(label(&probe(&[]), &busy), Label::RealContended);
+        if requested_level().is_none() {
+            assert_eq!(label(&probe(&[]), &quiet), Label::RealFull);
+        }
+        if usable_cores() > 1 {
+            assert_eq!(label(&probe(&["--threads", "1"]), &quiet), Label::RealRestricted);
+        }
+    }
+}

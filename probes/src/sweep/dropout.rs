@@ -1,0 +1,53 @@
+//! Which algorithms leave the race before the largest size.
+
+/// An algorithm leaves when it takes more than this many times as long as the best.
+const HOPELESS: f64 = 8.0;
+
+/// The paper's method stays up to this size even when it is hopeless: its curve is what the paper's borders are made of.
+const BRUTE_STAYS_BELOW: u32 = 3000;
+
+/// The race of one algorithm through the sizes of a scenario.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Standing {
+    /// Its time over the best at the size before.
+    before: Option<f64>,
+    /// Whether it has left.
+    pub(crate) out: bool,
+}
+
+impl Standing {
+    /// Judges the algorithm after a size at which it took `ratio` times as long as the best.
+    ///
+    /// What is slow but gains on the others stays: parallel versions start far behind and win in the end.
+    pub(crate) fn judge(&mut self, ratio: f64, method: &str, objects: u32) {
+        let grows = self.before.is_some_and(|before| ratio > before);
+        let kept = method == "brute" && objects < BRUTE_STAYS_BELOW;
+        self.out |= ratio > HOPELESS && grows && !kept;
+        self.before = Some(ratio);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn out(method: &str, course: &[(f64, u32)]) -> bool {
+        let mut standing = Standing::default();
+        course.iter().for_each(|&(ratio, objects)| standing.judge(ratio, method, objects));
+        standing.out
+    }
+
+    #[test]
+    fn hopeless_and_falling_behind_leaves() {
+        assert!(out("sweep", &[(7.0, 1000), (9.0, 2000)]));
+        assert!(!out("sweep", &[(9.0, 1000)]));
+        assert!(!out("sweep", &[(50.0, 10), (20.0, 100), (9.0, 1000)]));
+        assert!(!out("sweep", &[(2.0, 1000), (7.9, 2000)]));
+    }
+
+    #[test]
+    fn brute_force_stays_to_three_thousand() {
+        assert!(!out("brute", &[(9.0, 562), (20.0, 1778)]));
+        assert!(out("brute", &[(9.0, 1778), (20.0, 3162)]));
+    }
+}

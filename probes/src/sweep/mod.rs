@@ -1,0 +1,20 @@
+//! The sweep: every algorithm on the same frames of seeded scenes, over sizes and scenarios.
+
+mod conduct;
+mod dropout;
+mod order;
+mod plan;
+mod race;
+mod scenario;
+mod verify;
+
+pub(crate) use conduct::{Conditions, Found, conduct};
+pub(crate) use order::{Event, Order};
+pub(crate) use plan::Plan;
+pub(crate) use scenario::{next_frame, sweep};
+
+/// The median of samples in nanoseconds. `None` without samples.
+pub(crate) fn median(samples: &[u64]) -> Option<f64> {
+    let samples: Vec<f64> = samples.iter().map(|&ns| ns as f64).collect();
+    sapwise::measure::statistics::median(&samples)
+}

@@ -1,0 +1,281 @@
+//! One point: every algorithm on the same frames, in random order within each.
+
+use super::verify::Answer;
+use sapwise::measure::Watch;
+use sapwise::measure::statistics::relative_iqr;
+use sapwise::report::{Point, Timing};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Load, Pairs, Scene};
+use std::time::{Duration, Instant};
+
+/// Frames at most: beyond this the error of a median falls too slowly to be worth the time.
+const MOST_FRAMES: usize = 40;
+/// Frames at least.
+const FEW_FRAMES: usize = 5;
+/// Frames at least where the point's time is over.
+pub(super) const FEWEST_FRAMES: usize = 3;
+/// A point is done when the standard error of every median is below this share of it.
+const GOOD_ERROR: f64 = 0.01;
+/// Share of a point's time in which spoiled frames are redone. After that they are kept, with the foreign load beside them.
+const REDO_SHARE: f64 = 2.0 / 3.0;
+
+/// An algorithm in the race.
+pub(crate) struct Runner {
+    pub(crate) id: AlgorithmId,
+    pub(crate) algorithm: Box<dyn BroadPhase>,
+    /// Samples of this point.
+    samples: Vec<u64>,
+    /// Why it can't go on, if it can't.
+    pub(crate) error: Option<String>,
+    /// Its last answer.
+    answer: Option<Answer>,
+}
+
+impl Runner {
+    pub(crate) fn new(id: AlgorithmId, algorithm: Box<dyn BroadPhase>) -> Self {
+        Self { id, algorithm, samples: Vec::new(), error: None, answer: None }
+    }
+}
+
+/// What the algorithms of a race share.
+pub(crate) struct Race {
+    /// One list for all, so that its memory is equally warm for each.
+    pairs: Pairs,
+    naive: Pairs,
+    turns: Turns,
+    contended: bool,
+}
+
+/// What a point cost beside what it found.
+pub(crate) struct Outcome {
+    pub(crate) point: Point,
+    /// Wall clock of the last frame, everything included.
+    pub(crate) frame: Duration,
+    /// Wrong answers.
+    pub(crate) mismatches: Vec<String>,
+}
+
+impl Race {
+    /// `pair_limit` bounds the memory: a scene with more pairs ends the race with an error instead of the process.
+    pub(crate) fn new(seed: u64, pair_limit: usize, contended: bool) -> Self {
+        let mut pairs = Pairs::new();
+        pairs.set_limit(Some(pair_limit));
+        Self { pairs, naive: Pairs::new(), turns: Turns(seed), contended }
+    }
+
+    /// Runs all `runners` on frame after frame of `scene` until their medians are stable or `time` is over.
+    pub(crate) fn run(&mut self, runners: &mut [Runner], scene: &mut Scene, time: Duration) -> Outcome {
+        let began = Instant::now();
+        let mut mismatches = Vec::new();
+        runners.iter_mut().for_each(|r| r.samples.clear());
+        // The first frame warms the buffers, the thread pools and the branch predictors, and is not counted.
+        self.frame(runners, scene, &mut mismatches);
+        runners.iter_mut().for_each(|r| r.samples.clear());
+        let mut frames = 0;
+        let (mut spoiled, mut highest) = (0, None);
+        let mut pairs_before = None;
+        let mut last = Duration::ZERO;
+        loop {
+            // Samples are kept or thrown away by windows that are long enough to tell foreign load.
+            let watch = Watch::begin();
+            let mut fresh = 0;
+            while fresh == 0 || !watch.is_long_enough() {
+                let started = Instant::now();
+                pairs_before = self.frame(runners, scene, &mut mismatches);
+                last = started.elapsed();
+                fresh += 1;
+            }
+            let foreign = watch.foreign_load();
+            // Thousands of small frames fit into a window; the last of them are enough.
+            let kept = fresh.min(MOST_FRAMES - frames);
+            let spent = began.elapsed();
+            let redo = !self.contended
+                && foreign.is_some_and(|f| f > Watch::SPOILING)
+                && spent + last * (fresh as u32) < time.mul_f64(REDO_SHARE);
+            let dropped = if redo { fresh } else { fresh - kept };
+            for runner in runners.iter_mut() {
+                // A runner that failed on the way has none.
+                let len = runner.samples.len();
+                runner.samples.drain(frames.min(len)..(frames + dropped).min(len));
+            }
+            if redo {
+                spoiled += kept as u32;
+                continue;
+            }
+            frames += kept;
+            highest = match (highest, foreign) {
+                (Some(a), Some(b)) => Some(f64::max(a, b)),
+                (a, b) => a.or(b),
+            };
+            let racing = || runners.iter().filter(|r| r.error.is_none());
+            let stable = racing().all(|r| relative_error(&r.samples).is_some_and(|e| e < GOOD_ERROR));
+            let over = began.elapsed() >= time;
+            let enough = frames >= FEW_FRAMES && stable || frames >= FEWEST_FRAMES && over;
+            if frames >= MOST_FRAMES || enough || racing().next().is_none() {
+                break;
+            }
+        }
+        let point = self.point(runners, scene, pairs_before, (highest, spoiled));
+        Outcome { point, frame: last, mismatches }
+    }
+
+    /// Advances the scene, times every runner on the new frame and compares their answers. Returns the pairs of the frame
+    /// before this one.
+    fn frame(&mut self, runners: &mut [Runner], scene: &mut Scene, mismatches: &mut Vec<String>) -> Option<u64> {
+        let before = runners.iter().find_map(|r| r.answer).map(|a| a.pairs);
+        super::scenario::next_frame(scene);
+        let boxes = scene.boxes();
+        for turn in self.turns.order(runners.len()) {
+            let runner = &mut runners[turn];
+            runner.answer = None;
+            if runner.error.is_some() {
+                continue;
+            }
+            let started = Instant::now();
+            let result = runner.algorithm.find_pairs(boxes, &mut self.pairs);
+            let elapsed = started.elapsed();
+            match result {
+                // A clock that ticks slower than the frame must not give 0, which no frame takes.
+                Ok(()) => {
+                    runner.samples.push((elapsed.as_nanos() as u64).max(1));
+                    runner.answer = Some(Answer::of(&self.pairs));
+                }
+                Err(error) => runner.fail(error.to_string()),
+            }
+        }
+        self.verify(runners, boxes, mismatches);
+        before
+    }
+
+    fn verify(&mut self, runners: &mut [Runner], boxes: &[Aabb], mismatches: &mut Vec<String>) {
+        // Without the double loop the first of the list is taken to be right: it is the simplest that is left.
+        let first = runners.iter().find_map(|r| r.answer);
+        let Some(right) = Answer::naive(boxes, &mut self.naive).or(first) else { return };
+        for runner in runners.iter_mut() {
+            if let Some(mismatch) = runner.answer.and_then(|a| a.mismatch(right)) {
+                mismatches.push(format!("{}: {mismatch}", runner.id));
+                runner.fail(mismatch);
+            }
+        }
+    }
+
+    fn point(&self, runners: &[Runner], scene: &Scene, before: Option<u64>, foreign: (Option<f64>, u32)) -> Point {
+        let answer = runners.iter().filter(|r| r.error.is_none()).find_map(|r| r.answer);
+        let answer = answer.unwrap_or(Answer { pairs: 0, fingerprint: 0 });
+        let timings = runners.iter().map(|r| Timing {
+            algorithm: r.id.clone(),
+            samples_ns: r.samples.clone(),
+            error: r.error.clone(),
+        });
+        Point {
+            scenario: scene.scenario().to_string(),
+            load: Load::estimate(scene.boxes(), before.map(|pairs| pairs as f64)),
+            pairs: answer.pairs,
+            fingerprint: format!("{:016x}", answer.fingerprint),
+            foreign_load: foreign.0,
+            spoiled: foreign.1,
+            timings: timings.collect(),
+        }
+    }
+}
+
+impl Runner {
+    /// Takes the algorithm out of the race. Its samples of this point go too: they may stand for wrong answers.
+    fn fail(&mut self, reason: String) {
+        self.samples.clear();
+        self.error = Some(reason);
+        self.answer = None;
+    }
+}
+
+/// Standard error of the median over the median, from the quartiles, so that single outliers don't count.
+///
+/// For a normal distribution the standard deviation is the interquartile range over 1.349, and the error of the median is
+/// 1.2533 standard deviations over the root of the number of samples. `None` below four samples, which have no quartiles.
+fn relative_error(samples: &[u64]) -> Option<f64> {
+    let samples: Vec<f64> = samples.iter().map(|&ns| ns as f64).collect();
+    relative_iqr(&samples).map(|iqr| 1.2533 / 1.349 * iqr / (samples.len() as f64).sqrt())
+}
+
+/// Random orders from a seed, so that no algorithm always follows the same one through the caches.
+struct Turns(u64);
+
+impl Turns {
+    fn order(&mut self, count: usize) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..count).collect();
+        for k in (1..count).rev() {
+            order.swap(k, (self.next() % (k as u64 + 1)) as usize);
+        }
+        order
+    }
+
+    /// splitmix64 (Steele, Lea, Flood 2014).
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut x = self.0;
+        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        x ^ (x >> 31)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outliers_do_not_widen_the_error_and_spread_does() {
+        assert_eq!(relative_error(&[5, 5, 5]), None);
+        assert_eq!(relative_error(&[100, 100, 100, 100, 100, 100, 100, 9000]), Some(0.0));
+        let wide: Vec<u64> = (0..100).map(|k| 900 + 2 * k).collect();
+        assert!((relative_error(&wide).unwrap() - 0.0093).abs() < 0.001);
+    }
+
+    #[test]
+    fn every_turn_comes_once_and_orders_differ() {
+        let mut turns = Turns(1);
+        let orders: Vec<Vec<usize>> = (0..20).map(|_| turns.order(6)).collect();
+        for order in &orders {
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, [0, 1, 2, 3, 4, 5]);
+        }
+        assert!(orders.iter().any(|o| *o != orders[0]));
+    }
+
+    /// Gives one pair too many.
+    struct Wrong;
+
+    impl BroadPhase for Wrong {
+        fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), sapwise::Error> {
+            sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap())?.find_pairs(boxes, pairs)?;
+            pairs.push(0, 1);
+            pairs.push(0, 1);
+            pairs.finish()
+        }
+    }
+
+    #[test]
+    fn a_wrong_answer_is_found_and_costs_only_the_one_who_gave_it() {
+        let right = || sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
+        let mut runners = vec![
+            Runner::new("wrong@cpu1".parse().unwrap(), Box::new(Wrong)),
+            Runner::new("brute@cpu1".parse().unwrap(), right()),
+        ];
+        let mut scene = sapwise::Scenario::Uniform.start(50, 1);
+        let outcome = Race::new(1, 1000, false).run(&mut runners, &mut scene, Duration::from_millis(1));
+        assert_eq!(outcome.mismatches.len(), 1);
+        assert!(outcome.mismatches[0].starts_with("wrong@cpu1"), "{:?}", outcome.mismatches);
+        let timings = &outcome.point.timings;
+        assert!(timings[0].samples_ns.is_empty() && timings[0].error.is_some());
+        assert!(timings[1].samples_ns.len() >= FEWEST_FRAMES && timings[1].error.is_none());
+    }
+
+    #[test]
+    fn too_many_pairs_end_the_race_with_an_error() {
+        let brute = sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
+        let mut runners = vec![Runner::new("brute@cpu1".parse().unwrap(), brute)];
+        let mut scene = sapwise::Scenario::Uniform.start(500, 1);
+        let outcome = Race::new(1, 3, false).run(&mut runners, &mut scene, Duration::from_millis(1));
+        assert!(outcome.point.timings[0].error.as_ref().unwrap().contains("limit of 3"));
+    }
+}

@@ -1,0 +1,139 @@
+//! One scenario through all sizes, within its time.
+
+use super::dropout::Standing;
+use super::race::{FEWEST_FRAMES, Race, Runner};
+use super::{Event, Order, median, plan};
+use sapwise::report::Point;
+use sapwise::{Registry, Scenario, Scene};
+use std::time::{Duration, Instant};
+
+/// Most pairs in a frame: 16 bytes for each pair of objects that a full sweep can hold, 256 MB in the shared list.
+const PAIR_LIMIT: usize = 32 << 20;
+
+/// Runs the algorithms of a registry through the sizes of an order and hands on what happens.
+///
+/// # Errors
+/// When the scenario is unknown or `emit` fails.
+pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result<()>) -> anyhow::Result<()> {
+    let scenario: Scenario = order.scenario.parse().map_err(anyhow::Error::msg)?;
+    let time = Duration::try_from_secs_f64(order.seconds).unwrap_or_default();
+    let end = Instant::now() + time;
+    let registry = Registry::with_cores(order.cores);
+    let mut runners = Vec::new();
+    for (id, _) in registry.available() {
+        match registry.create(&id) {
+            Ok(algorithm) => runners.push(Runner::new(id, algorithm)),
+            Err(error) => emit(Event::Remark(format!("{scenario}: {error}")))?,
+        }
+    }
+    let mut standings = vec![Standing::default(); runners.len()];
+    let mut race = Race::new(order.seed, PAIR_LIMIT, order.contended);
+    let mut before: Option<(u32, Duration)> = None;
+    for (k, &objects) in order.sizes.iter().enumerate() {
+        let left = end.saturating_duration_since(Instant::now());
+        if forecast(before, objects) > left {
+            let reached = before.map_or("before the first size".to_owned(), |(n, _)| format!("after {n} objects"));
+            let seconds = order.seconds;
+            return emit(Event::Remark(format!(
+                "{scenario} ends {reached}: {objects} don't fit into the {seconds:.0} s that it has"
+            )));
+        }
+        let mut scene = scenario.start(objects as usize, order.seed);
+        let outcome = race.run(&mut runners, &mut scene, left.mul_f64(plan::share(&order.sizes[k..])));
+        for mismatch in outcome.mismatches {
+            emit(Event::Mismatch(format!("{scenario} at {objects} objects: {mismatch}")))?;
+        }
+        judge(&mut standings, &outcome.point, objects);
+        emit(Event::Point(Box::new(outcome.point)))?;
+        keep_racing(&mut runners, &mut standings);
+        if runners.is_empty() {
+            return emit(Event::Remark(format!("{scenario} ends after {objects} objects: no algorithm is left")));
+        }
+        before = Some((objects, outcome.frame));
+    }
+    Ok(())
+}
+
+/// The time that a size takes at least, from the time of a frame at the size before.
+fn forecast(before: Option<(u32, Duration)>, objects: u32) -> Duration {
+    let Some((fewer, frame)) = before else { return Duration::ZERO };
+    // Between the exponents of the strips (1) and of a sweep on one axis (5/3). Too low a forecast costs some seconds
+    // beyond the time, too high a one costs the last size.
+    let growth = (f64::from(objects) / f64::from(fewer)).powf(1.25);
+    frame.mul_f64(growth) * (FEWEST_FRAMES as u32 + 1)
+}
+
+fn judge(standings: &mut [Standing], point: &Point, objects: u32) {
+    let medians: Vec<Option<f64>> = point.timings.iter().map(|t| median(&t.samples_ns)).collect();
+    let best = medians.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+    for ((standing, timing), median) in standings.iter_mut().zip(&point.timings).zip(medians) {
+        match median {
+            Some(median) => standing.judge(median / best, timing.algorithm.method(), objects),
+            None => standing.out = true,
+        }
+    }
+}
+
+fn keep_racing(runners: &mut Vec<Runner>, standings: &mut Vec<Standing>) {
+    let mut stays = standings.iter().map(|s| !s.out).collect::<Vec<_>>().into_iter();
+    runners.retain(|_| stays.next().unwrap_or(false));
+    standings.retain(|s| !s.out);
+}
+
+/// Goes on to the next frame that has as many objects as the size says.
+///
+/// Only in `fragmentation` the number changes, and samples of different sizes can't be put together.
+pub(crate) fn next_frame(scene: &mut Scene) {
+    for _ in 0..Scenario::FRAGMENTATION_FRAMES {
+        scene.advance();
+        if scene.boxes().len() == scene.peak_objects() {
+            return;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn events(scenario: &str, sizes: &[u32], seconds: f64) -> Vec<Event> {
+        let order =
+            Order { scenario: scenario.to_owned(), sizes: sizes.to_vec(), cores: 2, seed: 3, seconds, contended: false };
+        let mut events = Vec::new();
+        sweep(&order, &mut |event| {
+            events.push(event);
+            Ok(())
+        })
+        .unwrap();
+        events
+    }
+
+    #[test]
+    fn every_point_has_paired_samples_of_all_algorithms_and_the_size_asked_for() {
+        for scenario in ["uniform", "fragmentation"] {
+            let events = events(scenario, &[10, 300], 1.0);
+            let points: Vec<&Point> =
+                events.iter().filter_map(|e| if let Event::Point(p) = e { Some(&**p) } else { None }).collect();
+            assert_eq!(points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [10, 300], "{events:?}");
+            for point in points {
+                assert!(point.timings.len() >= 2);
+                let frames = point.timings[0].samples_ns.len();
+                assert!((FEWEST_FRAMES..=40).contains(&frames), "{frames}");
+                assert!(point.timings.iter().all(|t| t.samples_ns.len() == frames && t.error.is_none()));
+            }
+        }
+    }
+
+    #[test]
+    fn a_size_that_does_not_fit_is_told() {
+        let events = events("uniform", &[10, 1_000_000], 0.0);
+        assert_eq!(events.iter().filter(|e| matches!(e, Event::Point(_))).count(), 1);
+        assert!(matches!(events.last(), Some(Event::Remark(text)) if text.contains("1000000")), "{events:?}");
+    }
+
+    #[test]
+    fn unknown_scenarios_are_refused() {
+        let order = Order { scenario: "x".into(), sizes: vec![10], cores: 1, seed: 0, seconds: 1.0, contended: false };
+        assert!(sweep(&order, &mut |_| Ok(())).unwrap_err().to_string().contains("uniform"));
+    }
+}

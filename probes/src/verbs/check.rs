@@ -1,0 +1,186 @@
+//! `sapwise check`: whether files are sound, current and applicable here.
+
+use crate::args::Check;
+use crate::document::read_document;
+use crate::exit::Outcome;
+use crate::output;
+use sapwise::json::Document;
+use sapwise::report::Label;
+use sapwise::{AlgorithmId, Backend, Fields, Machine, Model, Registry, Report, usable_cores};
+use serde::Serialize;
+use std::path::Path;
+
+/// The answer for machines.
+#[derive(Serialize)]
+struct Answer {
+    files: Vec<Finding>,
+}
+
+/// What is known about one file.
+#[derive(Debug, Serialize)]
+struct Finding {
+    file: String,
+    /// `None` when it could not be read.
+    schema: Option<&'static str>,
+    /// Readable, complete, and no figure in it is impossible.
+    sound: bool,
+    /// The algorithms are those of this build. `None` when that could not be looked at.
+    current: Option<bool>,
+    /// It may be used on this machine. `None` when that could not be looked at.
+    applicable: Option<bool>,
+    /// What makes the file fail.
+    problems: Vec<String>,
+    /// What the user should know beside.
+    notes: Vec<String>,
+}
+
+/// What files are held against.
+struct Here {
+    registry: Registry,
+    machine: Machine,
+}
+
+pub(crate) fn run(arguments: &Check) -> anyhow::Result<Outcome> {
+    let here = Here { registry: Registry::new(), machine: sapwise::measure::machine() };
+    let files: Vec<Finding> = arguments.files.iter().map(|path| here.look_at(path)).collect();
+    let failed = files.iter().any(|f| !f.problems.is_empty());
+    if arguments.json {
+        output::print_json(&Answer { files })?;
+    } else {
+        files.iter().try_for_each(|f| output::print(&text(f)))?;
+    }
+    Ok(if failed { Outcome::Failed } else { Outcome::Done })
+}
+
+fn text(finding: &Finding) -> String {
+    let state = if finding.problems.is_empty() { "good" } else { "BAD" };
+    let schema = finding.schema.map_or(String::new(), |s| format!(" {s}"));
+    let mut text = format!("{}:{schema} {state}", finding.file);
+    for problem in &finding.problems {
+        text.push_str(&format!("\n  problem: {problem}"));
+    }
+    for note in &finding.notes {
+        text.push_str(&format!("\n  note: {note}"));
+    }
+    text
+}
+
+impl Here {
+    fn look_at(&self, path: &Path) -> Finding {
+        let mut finding = Finding {
+            file: path.display().to_string(),
+            schema: None,
+            sound: false,
+            current: None,
+            applicable: None,
+            problems: Vec::new(),
+            notes: Vec::new(),
+        };
+        match read_document(path) {
+            Err(error) => finding.problems.push(format!("{error:#}")),
+            Ok(document) => {
+                finding.sound = true;
+                match document {
+                    Document::Report(report) => self.report(&report, &mut finding),
+                    Document::Model(model) => self.model(&model, &mut finding),
+                    Document::Fields(fields) => self.fields(&fields, &mut finding),
+                    _ => finding.notes.push("a schema that this command does not know how to check".to_owned()),
+                }
+            }
+        }
+        finding
+    }
+
+    fn report(&self, report: &Report, finding: &mut Finding) {
+        finding.schema = Some("report/1");
+        let used: Vec<(String, u32)> = report.algorithms.iter().map(|t| (t.id.method().to_owned(), t.revision)).collect();
+        finding.set_current(self.stale(&used), "probe again");
+        let same = report.hardware.machine.physical_id == self.machine.physical_id;
+        finding.applicable = Some(same);
+        finding.notes.push(if same {
+            "measured on a machine like this one".to_owned()
+        } else {
+            format!("measured on another machine: {}", report.hardware.machine.cpu)
+        });
+        if report.label == Label::Simulated {
+            finding.notes.push("simulated: no evidence of accuracy".to_owned());
+        }
+        if !report.provenance.optimised {
+            finding.notes.push("measured by a build without optimisation: `train` refuses it".to_owned());
+        }
+        finding.notes.extend(report.remarks.iter().map(|r| format!("remark: {r}")));
+    }
+
+    fn model(&self, model: &Model, finding: &mut Finding) {
+        finding.schema = Some("model/1");
+        let used: Vec<(String, u32)> = model.methods.iter().map(|m| (m.method.clone(), m.revision)).collect();
+        finding.set_current(self.stale(&used), "train it again on new reports");
+        finding.applicable = Some(finding.current == Some(true));
+        let known = model.trained_on.iter().any(|t| t.physical_id == self.machine.physical_id);
+        finding.notes.push(if known {
+            "trained on a machine like this one".to_owned()
+        } else {
+            "not trained on a machine like this one; `sapwise predict` measures whether it extrapolates here".to_owned()
+        });
+        let cores = usable_cores();
+        let most = model.methods.iter().map(|m| m.max_threads).max().unwrap_or(0);
+        if cores > most {
+            finding.notes.push(format!("extrapolates: trained on up to {most} threads, this machine has {cores}"));
+        }
+    }
+
+    fn fields(&self, fields: &Fields, finding: &mut Finding) {
+        finding.schema = Some("fields/1");
+        let used: Vec<(String, u32)> = fields.costs.iter().map(|c| (c.algorithm.method().to_owned(), c.revision)).collect();
+        finding.set_current(self.stale(&used), "predict again, or probe again where they were measured");
+        let mut wanted = fields.algorithms();
+        wanted.extend(fields.steps.iter().map(|s| &s.algorithm));
+        let mut missing: Vec<String> = wanted.into_iter().filter_map(|id| self.unavailable(id)).collect();
+        missing.sort_unstable();
+        missing.dedup();
+        finding.applicable = Some(missing.is_empty());
+        finding.problems.extend(missing);
+        if fields.extrapolated {
+            finding.notes.push("predicted for a machine outside what the model was trained on".to_owned());
+        }
+    }
+
+    /// The methods whose revision is not that of this build.
+    fn stale(&self, used: &[(String, u32)]) -> Vec<String> {
+        let mut stale = Vec::new();
+        for (method, revision) in used {
+            // Every thread count of a method has the same revision, and a machine with other counts has other ids.
+            let ours = self.registry.entries().iter().find(|e| e.id.method() == method).map(|e| e.revision);
+            match ours {
+                Some(ours) if ours == *revision => {}
+                Some(ours) => stale.push(format!("{method} has revision {revision} there and {ours} in this build")),
+                None => stale.push(format!("{method} is not in this build")),
+            }
+        }
+        stale.sort_unstable();
+        stale.dedup();
+        stale
+    }
+
+    /// Why an algorithm can't run here, if it can't.
+    fn unavailable(&self, id: &AlgorithmId) -> Option<String> {
+        if let Some(entry) = self.registry.entries().iter().find(|e| e.id == *id) {
+            return entry.unavailable.as_ref().map(|why| format!("{id} can't run here: {why}"));
+        }
+        let ours = self.registry.entries().iter().any(|e| e.id.method() == id.method());
+        match id.backend() {
+            // The revision check has told already that the method is unknown; without costs nothing has.
+            _ if !ours => Some(format!("{id} is not in this build")),
+            Backend::Cpu(threads) if *threads <= usable_cores() => None,
+            Backend::Cpu(_) => Some(format!("{id} needs more than the {} cores of this machine", usable_cores())),
+            _ => Some(format!("{id} can't run here: this version has no GPU backend")),
+        }
+    }
+}
+
+impl Finding {
+    fn set_current(&mut self, stale: Vec<String>, remedy: &str) {
+        self.current = Some(stale.is_empty());
+        self.problems.extend(stale.into_iter().map(|s| format!("stale: {s}; {remedy}")));
+    }
+}

@@ -1,0 +1,112 @@
+//! `sapwise pairs`: the broad phase on the user's own boxes.
+
+use crate::args::Pairs as Arguments;
+use crate::boxes::{Frames, read_frames, write_pairs};
+use crate::exit::{Outcome, WrongUsage};
+use crate::progress::Progress;
+use crate::sweep::median;
+use crate::table::{duration, grouped};
+use crate::{interrupt, output};
+use anyhow::Context;
+use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry};
+use serde::Serialize;
+use std::time::Instant;
+
+/// What is run when the user names nothing.
+const DEFAULT: &str = "strips@cpu1";
+
+/// The answer for machines.
+#[derive(Serialize)]
+struct Answer {
+    algorithm: String,
+    objects: usize,
+    frames: usize,
+    /// Of each frame.
+    pairs: Vec<u64>,
+    median_ms: f64,
+    /// Of every frame, then of every frame of the next repetition.
+    samples_ms: Vec<f64>,
+    /// Of the last frame.
+    fingerprint: String,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let registry = Registry::new();
+    let id = algorithm(arguments, &registry)?;
+    interrupt::listen()?;
+    let frames = read_frames(&arguments.boxes)?;
+    let mut pairs = Pairs::new();
+    pairs.set_limit(arguments.limit);
+    let mut algorithm = registry.create(&id).map_err(|e| WrongUsage(e.to_string()))?;
+    let (counts, samples_ns) = measure(arguments, &frames, &mut *algorithm, &mut pairs)?;
+    let fingerprint = format!("{:016x}", pairs.fingerprint());
+    if let Some(path) = &arguments.out {
+        let mut sorted = pairs.as_slice().to_vec();
+        sorted.sort_unstable();
+        write_pairs(path, &sorted)?;
+    }
+    let median_ns = median(&samples_ns).unwrap_or(0.0);
+    let answer = Answer {
+        algorithm: id.to_string(),
+        objects: frames.objects(),
+        frames: frames.len(),
+        pairs: counts,
+        median_ms: median_ns / 1e6,
+        samples_ms: samples_ns.iter().map(|&ns| ns as f64 / 1e6).collect(),
+        fingerprint,
+    };
+    if arguments.json {
+        output::print_json(&answer)?;
+    } else {
+        output::print(&text(&answer, median_ns))?;
+    }
+    Ok(Outcome::Done)
+}
+
+fn algorithm(arguments: &Arguments, registry: &Registry) -> anyhow::Result<AlgorithmId> {
+    if let Some(id) = &arguments.algorithm {
+        return Ok(id.clone());
+    }
+    let available = registry.available();
+    let usual = available.iter().find(|(id, _)| id.to_string() == DEFAULT).or(available.last());
+    Ok(usual.context("this build has no algorithm that runs here")?.0.clone())
+}
+
+/// The pairs of every frame, and the samples in nanoseconds of all repetitions. The last frame stays in `pairs`.
+fn measure(
+    arguments: &Arguments,
+    frames: &Frames,
+    algorithm: &mut dyn BroadPhase,
+    pairs: &mut Pairs,
+) -> anyhow::Result<(Vec<u64>, Vec<u64>)> {
+    let progress = Progress::new(frames.len() as u64 * u64::from(arguments.repeat));
+    let (mut counts, mut samples) = (Vec::new(), Vec::new());
+    for repetition in 0..arguments.repeat {
+        for (k, boxes) in frames.iter().enumerate() {
+            interrupt::check()?;
+            let started = Instant::now();
+            let result = algorithm.find_pairs(boxes, pairs);
+            samples.push(started.elapsed().as_nanos() as u64);
+            result.with_context(|| format!("{}, frame {k}", arguments.boxes.display()))?;
+            if repetition == 0 {
+                counts.push(pairs.len() as u64);
+            }
+            progress.advance(1);
+        }
+    }
+    Ok((counts, samples))
+}
+
+fn text(answer: &Answer, median_ns: f64) -> String {
+    let Answer { algorithm, objects, frames, pairs, samples_ms, fingerprint, .. } = answer;
+    let last = grouped(pairs.last().copied().unwrap_or(0));
+    let plural = if *frames == 1 { "" } else { "s" };
+    format!(
+        "{algorithm}: {} boxes, {frames} frame{plural}\n\
+         pairs in the last frame: {last} (fingerprint {fingerprint})\n\
+         median of {} samples: {}",
+        grouped(*objects as u64),
+        samples_ms.len(),
+        duration(median_ns)
+    )
+}

@@ -1,0 +1,366 @@
+//! The in-line module: the cheapest algorithm for this frame, chosen before it runs.
+
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Load, Pairs, Registry, Source, Step};
+use std::fmt;
+
+/// A switch must promise to save at least this share of a frame. Without it the choice would flicker at a border, where
+/// two costs are equal and the estimate of the load moves by a few percent from frame to frame.
+const HYSTERESIS: f64 = 0.05;
+
+/// Frames after which the boxes are sampled anew even if their number has not changed.
+const SAMPLE_EVERY: u32 = 16;
+
+/// A runner-up that costs at most this much more than the choice gets its buffers ready: the next border may be near.
+const WARM_WITHIN: f64 = 1.5;
+
+/// A broad phase that runs whichever algorithm its [`Fields`] call cheapest for each frame.
+///
+/// Every algorithm takes the same boxes and gives the same pairs, so a switch is invisible but for its speed.
+pub struct Adaptive {
+    fields: Fields,
+    /// In the order of [`Fields::algorithms`].
+    candidates: Vec<Candidate>,
+    current: Option<usize>,
+    load: Load,
+    /// Frames since the load was sampled.
+    age: u32,
+    /// Objects and pairs of the frame before.
+    before: Option<(u32, u64)>,
+    choice: Option<Choice>,
+}
+
+struct Candidate {
+    id: AlgorithmId,
+    /// `None` once it failed, or where it can't run.
+    algorithm: Option<Box<dyn BroadPhase>>,
+    /// Objects that its buffers are ready for.
+    ready: u32,
+}
+
+/// A decision by position, without a copy of any name.
+#[derive(Clone, Copy)]
+struct Choice {
+    chosen: usize,
+    predicted_ns: Option<f64>,
+    runner_up: Option<(usize, f64)>,
+    reason: Reason,
+    load: Load,
+}
+
+/// Why an algorithm was chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The first frame: nothing ran before.
+    First,
+    /// It ran before and is still the cheapest.
+    Stayed,
+    /// Another would be cheaper, but by too little to switch.
+    Hysteresis,
+    /// It became cheaper than the one before.
+    Switched,
+    /// The one that was chosen failed in this frame.
+    FellBack,
+}
+
+/// The last decision and what it rested on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decision<'a> {
+    /// The algorithm that ran.
+    pub algorithm: &'a AlgorithmId,
+    /// Its predicted cost in nanoseconds; `None` where only the number of objects decides.
+    pub predicted_ns: Option<f64>,
+    /// The cheapest of the others and its predicted cost in nanoseconds.
+    pub runner_up: Option<(&'a AlgorithmId, f64)>,
+    /// Why it was chosen.
+    pub reason: Reason,
+    /// Where the costs came from.
+    pub source: Source,
+    /// The load that was estimated.
+    pub load: Load,
+}
+
+impl Adaptive {
+    /// An adaptive broad phase over those algorithms of `fields` that `registry` can make.
+    ///
+    /// # Errors
+    /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made.
+    pub fn new(fields: Fields, registry: &Registry) -> Result<Self, Error> {
+        let mut failure = None;
+        let mut candidates = Vec::new();
+        for id in fields.algorithms() {
+            let algorithm = registry.create(id).map_err(|e| failure = Some(e)).ok();
+            candidates.push(Candidate { id: id.clone(), algorithm, ready: 0 });
+        }
+        if candidates.iter().all(|c| c.algorithm.is_none()) {
+            let hint = || "these fields name no algorithm; make them with `sapwise predict`".to_owned();
+            return Err(failure.unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
+        }
+        Ok(Self { fields, candidates, current: None, load: Load::default(), age: 0, before: None, choice: None })
+    }
+
+    /// Runs one algorithm always.
+    ///
+    /// # Errors
+    /// As [`Registry::create`].
+    pub fn only(algorithm: AlgorithmId, registry: &Registry) -> Result<Self, Error> {
+        let steps = vec![Step { from_objects: 0, algorithm }];
+        let fields = Fields::from_steps(steps).map_err(|hint| Error::UnknownAlgorithm { text: String::new(), hint })?;
+        Self::new(fields, registry)
+    }
+
+    /// The fields that decide.
+    #[must_use]
+    pub fn fields(&self) -> &Fields {
+        &self.fields
+    }
+
+    /// What was decided for the last frame; `None` before the first.
+    #[must_use]
+    pub fn last_decision(&self) -> Option<Decision<'_>> {
+        self.choice.map(|c| Decision {
+            algorithm: &self.candidates[c.chosen].id,
+            predicted_ns: c.predicted_ns,
+            runner_up: c.runner_up.map(|(k, ns)| (&self.candidates[k].id, ns)),
+            reason: c.reason,
+            source: self.fields.source,
+            load: c.load,
+        })
+    }
+
+    /// Estimates the load of the next frame and decides, without running anything.
+    pub fn decide(&mut self, boxes: &[Aabb]) -> Option<Decision<'_>> {
+        self.observe(boxes);
+        self.choose();
+        self.last_decision()
+    }
+
+    /// Brings the load up to date: sampled when the scene has grown, shrunk or aged, else scaled from the last sample.
+    fn observe(&mut self, boxes: &[Aabb]) {
+        let objects = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
+        let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
+        let drift = objects.abs_diff(self.load.objects);
+        if self.before.is_none() || self.age >= SAMPLE_EVERY || drift > self.load.objects / 16 {
+            self.load = Load::estimate(boxes, pairs);
+            self.age = 0;
+            return;
+        }
+        self.age += 1;
+        let pairs = pairs.unwrap_or(self.load.pairs);
+        self.load = self.load.rescaled(objects, pairs);
+    }
+
+    fn choose(&mut self) {
+        let load = self.load;
+        let usable = |k: usize| self.candidates[k].algorithm.is_some();
+        let Some(ranking) = self.fields.rank(&load, usable) else {
+            self.choice = self.choose_by_count();
+            return;
+        };
+        let mut choice = Choice {
+            chosen: ranking.best,
+            predicted_ns: Some(ranking.best_ns),
+            runner_up: ranking.runner_up,
+            reason: Reason::Switched,
+            load,
+        };
+        match self.current {
+            None => choice.reason = Reason::First,
+            Some(current) if current == ranking.best => choice.reason = Reason::Stayed,
+            Some(current) if usable(current) => {
+                let now = self.fields.costs[current].curve.cost_ns(&load);
+                if ranking.best_ns > now * (1.0 - HYSTERESIS) {
+                    choice.chosen = current;
+                    choice.predicted_ns = Some(now);
+                    choice.runner_up = Some((ranking.best, ranking.best_ns));
+                    choice.reason = Reason::Hysteresis;
+                }
+            }
+            Some(_) => choice.reason = Reason::FellBack,
+        }
+        self.choice = Some(choice);
+    }
+
+    /// The step that holds at this number of objects, or the nearest below or above that can run.
+    fn choose_by_count(&self) -> Option<Choice> {
+        let objects = self.load.objects;
+        let position = |s: &Step| self.candidates.iter().position(|c| c.id == s.algorithm && c.algorithm.is_some());
+        let split = self.fields.steps.partition_point(|s| s.from_objects <= objects);
+        let (below, above) = self.fields.steps.split_at(split);
+        let chosen = below.iter().rev().chain(above).find_map(position)?;
+        let near = |s: &Step| f64::from(objects.abs_diff(s.from_objects)) <= HYSTERESIS * f64::from(objects);
+        let (chosen, reason) = match self.current {
+            None => (chosen, Reason::First),
+            Some(current) if current == chosen => (chosen, Reason::Stayed),
+            Some(current) if self.candidates[current].algorithm.is_none() => (chosen, Reason::FellBack),
+            Some(current) if self.fields.steps.iter().any(near) => (current, Reason::Hysteresis),
+            Some(_) => (chosen, Reason::Switched),
+        };
+        Some(Choice { chosen, predicted_ns: None, runner_up: None, reason, load: self.load })
+    }
+
+    /// Gets the runner-up ready when its turn may come soon.
+    fn warm_runner_up(&mut self) {
+        let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), load, .. }) = self.choice else { return };
+        let candidate = &mut self.candidates[next];
+        if ns > best * WARM_WITHIN || candidate.ready >= load.objects {
+            return;
+        }
+        if let Some(algorithm) = &mut candidate.algorithm {
+            // By powers of two, so that a growing scene pays for this a few times in all.
+            candidate.ready = load.objects.checked_next_power_of_two().unwrap_or(u32::MAX);
+            algorithm.prepare(candidate.ready as usize);
+        }
+    }
+}
+
+impl BroadPhase for Adaptive {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        self.observe(boxes);
+        self.choose();
+        loop {
+            let Some(choice) = self.choice else {
+                let reason = "every algorithm of the fields has failed".to_owned();
+                let algorithm = self.candidates[self.current.unwrap_or(0)].id.clone();
+                return Err(Error::Unavailable { algorithm, reason });
+            };
+            let candidate = &mut self.candidates[choice.chosen];
+            let result = candidate.algorithm.as_mut().map_or(Ok(()), |a| a.find_pairs(boxes, pairs));
+            self.current = Some(choice.chosen);
+            match result {
+                Ok(()) => {
+                    candidate.ready = candidate.ready.max(choice.load.objects);
+                    self.before = Some((choice.load.objects, pairs.len() as u64));
+                    self.warm_runner_up();
+                    return Ok(());
+                }
+                // The algorithm is at fault, not the boxes: the next cheapest runs in this same frame.
+                Err(Error::Unavailable { .. }) => {
+                    candidate.algorithm = None;
+                    self.choose();
+                }
+                Err(error) => {
+                    self.before = None;
+                    return Err(error);
+                }
+            }
+        }
+    }
+
+    fn prepare(&mut self, objects: usize) {
+        for candidate in &mut self.candidates {
+            if let Some(algorithm) = &mut candidate.algorithm {
+                algorithm.prepare(objects);
+                candidate.ready = candidate.ready.max(u32::try_from(objects).unwrap_or(u32::MAX));
+            }
+        }
+    }
+}
+
+impl fmt::Debug for Adaptive {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Adaptive").field("last_decision", &self.last_decision()).finish_non_exhaustive()
+    }
+}
+
+/// A count that grows in proportion to the objects.
+fn scaled(count: f64, objects: u32, before: u32) -> f64 {
+    if before == 0 { count } else { count * f64::from(objects) / f64::from(before) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{AlgorithmCost, CostCurve, CostTerm, Term};
+
+    fn fields(costs: &[(&str, f64, f64)]) -> Fields {
+        let curve = |call: f64, object: f64| CostCurve {
+            terms: vec![CostTerm { term: Term::Call, unit_ns: call }, CostTerm { term: Term::Objects, unit_ns: object }],
+            ..CostCurve::default()
+        };
+        let costs = costs.iter().map(|&(id, call, object)| AlgorithmCost {
+            algorithm: id.parse().unwrap(),
+            revision: 1,
+            curve: curve(call, object),
+            spread_ln: 0.0,
+        });
+        let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+        Fields::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
+    }
+
+    fn row(count: usize) -> Vec<Aabb> {
+        (0..count).map(|k| Aabb::cube([k as f32; 3], 0.5)).collect()
+    }
+
+    fn chosen(adaptive: &mut Adaptive, objects: usize) -> (String, Reason) {
+        adaptive.find_pairs(&row(objects), &mut Pairs::new()).unwrap();
+        let decision = adaptive.last_decision().unwrap();
+        (decision.algorithm.to_string(), decision.reason)
+    }
+
+    #[test]
+    fn it_switches_at_the_border_and_not_within_the_hysteresis() {
+        // 10 n = 1000 + 5 n at n = 200.
+        let fields = fields(&[("brute@cpu1", 0.0, 10.0), ("strips@cpu1", 1000.0, 5.0)]);
+        let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
+        let (brute, strips) = ("brute@cpu1".to_owned(), "strips@cpu1".to_owned());
+        assert_eq!(chosen(&mut adaptive, 100), (brute.clone(), Reason::First));
+        assert_eq!(chosen(&mut adaptive, 150), (brute.clone(), Reason::Stayed));
+        assert_eq!(chosen(&mut adaptive, 205), (brute.clone(), Reason::Hysteresis));
+        assert_eq!(chosen(&mut adaptive, 300), (strips.clone(), Reason::Switched));
+        assert_eq!(chosen(&mut adaptive, 195), (strips.clone(), Reason::Hysteresis));
+        assert_eq!(chosen(&mut adaptive, 50), (brute, Reason::Switched));
+        let decision = adaptive.last_decision().unwrap();
+        assert_eq!(decision.predicted_ns, Some(500.0));
+        assert_eq!(decision.runner_up.unwrap().1, 1250.0);
+        assert_eq!(decision.source, Source::Measured);
+    }
+
+    #[test]
+    fn hand_written_thresholds_decide_by_count() {
+        let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
+        let fields = Fields::from_steps(vec![step(0, "brute@cpu1"), step(64, "sweep@cpu1")]).unwrap();
+        let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
+        assert_eq!(chosen(&mut adaptive, 10).0, "brute@cpu1");
+        assert_eq!(chosen(&mut adaptive, 65), ("brute@cpu1".to_owned(), Reason::Hysteresis));
+        assert_eq!(chosen(&mut adaptive, 90), ("sweep@cpu1".to_owned(), Reason::Switched));
+    }
+
+    /// Works for a few frames, then is lost as a GPU can be.
+    struct Fragile(u32);
+
+    impl BroadPhase for Fragile {
+        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+            if self.0 == 0 {
+                let algorithm = "fragile@gpu0".parse().unwrap();
+                return Err(Error::Unavailable { algorithm, reason: "lost".to_owned() });
+            }
+            self.0 -= 1;
+            pairs.clear();
+            pairs.finish()
+        }
+    }
+
+    #[test]
+    fn a_lost_algorithm_is_replaced_within_the_frame() {
+        let mut registry = Registry::with_cores(1);
+        registry.add("fragile@gpu0".parse().unwrap(), 1, || Ok(Box::new(Fragile(2))));
+        let fields = fields(&[("fragile@gpu0", 1.0, 0.0), ("brute@cpu1", 2.0, 1.0)]);
+        let mut adaptive = Adaptive::new(fields, &registry).unwrap();
+        assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu0");
+        assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu0");
+        let mut pairs = Pairs::new();
+        adaptive.find_pairs(&row(30), &mut pairs).unwrap();
+        assert_eq!(pairs.len(), 29);
+        assert_eq!(adaptive.last_decision().unwrap().reason, Reason::FellBack);
+        assert_eq!(chosen(&mut adaptive, 30), ("brute@cpu1".to_owned(), Reason::Stayed));
+    }
+
+    #[test]
+    fn unknown_algorithms_are_skipped_and_none_at_all_is_an_error() {
+        let registry = Registry::with_cores(1);
+        let mixed = fields(&[("octree@cpu1", 0.0, 0.1), ("brute@cpu1", 0.0, 1.0)]);
+        assert_eq!(chosen(&mut Adaptive::new(mixed, &registry).unwrap(), 20).0, "brute@cpu1");
+        assert!(Adaptive::new(fields(&[("octree@cpu1", 0.0, 0.1)]), &registry).is_err());
+    }
+}

@@ -1,0 +1,187 @@
+//! The grid of strips: cells over the two axes across the sweep.
+
+use crate::Aabb;
+use crate::sample::Sample;
+use std::ops::RangeInclusive;
+
+/// Boxes that a strip holds on average. Their columns take 28 bytes each, so that a strip fits the first-level cache
+/// while there are enough strips to cut down the candidates.
+const BOXES_PER_STRIP: f64 = 256.0;
+
+/// Most cells on one axis: cell numbers stay below 2^16 and a histogram of all cells within the second-level cache.
+const MOST_CELLS: f64 = 256.0;
+
+/// A box longer than this many cells across the sweep is kept apart instead of standing in that many strips.
+const LARGE_CELLS: f64 = 4.0;
+
+/// A box longer on the sweep axis than this many times the usual length is kept apart: it would be a candidate for all
+/// the strip.
+const LARGE_LENGTHS: f64 = 16.0;
+
+/// Maps boxes to the strips they stand in. All choices come from a sample and cost speed at worst, never a pair.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct StripGrid {
+    /// The sweep axis.
+    pub(crate) axis: usize,
+    /// The two grid axes.
+    across: [usize; 2],
+    origin: [f32; 2],
+    inverse_width: [f32; 2],
+    cells: [u32; 2],
+    /// Extents above which a box is large: on the sweep axis, then on the grid axes.
+    large: [f32; 3],
+}
+
+/// The cells that a box covers, ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Cover {
+    pub(crate) first: [u32; 2],
+    pub(crate) last: [u32; 2],
+}
+
+impl StripGrid {
+    /// A grid for `objects` boxes that look like the sample.
+    pub(crate) fn plan(sample: &Sample, objects: usize) -> Self {
+        let axis = sample.widest_axis();
+        let across = [(axis + 1) % 3, (axis + 2) % 3];
+        let range = across.map(|a| {
+            // Three deviations hold all of a uniform scene and leave out far outliers, which the border cells take.
+            let low = sample.low[a].max(sample.mean[a] - 3.0 * sample.deviation[a]);
+            let high = sample.high[a].min(sample.mean[a] + 3.0 * sample.deviation[a]);
+            (low, (high - low).max(0.0))
+        });
+        let wanted = objects as f64 / BOXES_PER_STRIP;
+        // Square cells, unless the world is flatter than a cell: then all of them go to the other axis.
+        let square = (range[0].1 * range[1].1 / wanted.max(1.0)).sqrt();
+        let mut grid = Self { axis, across, ..Self::default() };
+        for d in 0..2 {
+            let (low, length) = range[d];
+            let other = range[1 - d].1;
+            let width = if other < square { length / wanted.max(1.0) } else { square };
+            let width = width.max(2.0 * sample.extent[across[d]]);
+            let cells = (length / width).floor().clamp(1.0, MOST_CELLS);
+            let cells = if cells.is_nan() { 1.0 } else { cells };
+            // One cell needs no width, and a flat axis has none.
+            grid.cells[d] = cells as u32;
+            grid.origin[d] = low as f32;
+            grid.inverse_width[d] = if cells > 1.0 { (cells / length) as f32 } else { 0.0 };
+            grid.large[1 + d] = if cells > 1.0 { (LARGE_CELLS * length / cells) as f32 } else { f32::INFINITY };
+        }
+        grid.large[0] = if grid.strips() > 1 { (LARGE_LENGTHS * sample.extent[axis]) as f32 } else { f32::INFINITY };
+        grid
+    }
+
+    /// How many strips there are.
+    pub(crate) fn strips(&self) -> usize {
+        (self.cells[0] * self.cells[1]) as usize
+    }
+
+    /// The grid axes, each with the mean width of a cell given the length that the grid spans.
+    pub(crate) fn widths(&self) -> [(usize, f64); 2] {
+        [0, 1].map(|d| {
+            let inverse = f64::from(self.inverse_width[d]);
+            (self.across[d], if inverse > 0.0 { 1.0 / inverse } else { f64::INFINITY })
+        })
+    }
+
+    /// The number of the strip in a cell.
+    pub(crate) fn strip(&self, cell: [u32; 2]) -> usize {
+        (cell[1] * self.cells[0] + cell[0]) as usize
+    }
+
+    /// The cell of a strip.
+    pub(crate) fn cell(&self, strip: usize) -> [u32; 2] {
+        [strip as u32 % self.cells[0], strip as u32 / self.cells[0]]
+    }
+
+    /// The cells that a box covers.
+    #[inline]
+    pub(crate) fn cover(&self, b: &Aabb) -> Cover {
+        Cover {
+            first: [self.cell_of(0, b.min[self.across[0]]), self.cell_of(1, b.min[self.across[1]])],
+            last: [self.cell_of(0, b.max[self.across[0]]), self.cell_of(1, b.max[self.across[1]])],
+        }
+    }
+
+    /// Whether a box is to be kept apart.
+    #[inline]
+    pub(crate) fn is_large(&self, b: &Aabb) -> bool {
+        let extent = |a: usize| b.max[a] - b.min[a];
+        (extent(self.axis) > self.large[0])
+            | (extent(self.across[0]) > self.large[1])
+            | (extent(self.across[1]) > self.large[2])
+    }
+
+    /// The cell of a bound, which never descends as the bound ascends: that alone makes the strips correct. Bounds outside
+    /// the grid go to the border cells. The cast saturates and sends NaN to 0.
+    #[inline]
+    fn cell_of(&self, d: usize, bound: f32) -> u32 {
+        (((bound - self.origin[d]) * self.inverse_width[d]) as u32).min(self.cells[d] - 1)
+    }
+}
+
+impl Cover {
+    /// All cells of one row of the grid.
+    pub(crate) fn columns(&self) -> RangeInclusive<u32> {
+        self.first[0]..=self.last[0]
+    }
+
+    /// The rows of the grid.
+    pub(crate) fn rows(&self) -> RangeInclusive<u32> {
+        self.first[1]..=self.last[1]
+    }
+
+    /// Whether a cell is covered.
+    pub(crate) fn contains(&self, cell: [u32; 2]) -> bool {
+        self.columns().contains(&cell[0]) && self.rows().contains(&cell[1])
+    }
+
+    /// Bit d is set when the cell is the first of this box on grid axis d.
+    ///
+    /// Two boxes that share several strips overlap first, on each axis, in the cell where the later of them begins. So
+    /// the one strip in which both bits are set in either box is the one that reports the pair.
+    #[inline]
+    pub(crate) fn begins(&self, cell: [u32; 2]) -> u32 {
+        u32::from(self.first[0] == cell[0]) | u32::from(self.first[1] == cell[1]) << 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(boxes: &[Aabb]) -> StripGrid {
+        StripGrid::plan(&Sample::of(boxes), boxes.len())
+    }
+
+    #[test]
+    fn cells_ascend_with_bounds_and_outliers_go_to_the_border() {
+        let boxes: Vec<Aabb> =
+            (0..10_000).map(|k| Aabb::cube([(k % 100) as f32 * 4.0, (k / 100) as f32, (k * 7 % 100) as f32], 0.5)).collect();
+        let grid = grid(&boxes);
+        assert_eq!(grid.axis, 0);
+        assert!(grid.strips() > 20, "{grid:?}");
+        let bounds = [f32::NEG_INFINITY, -1.0e30, -5.0, 0.0, 13.0, 50.0, 99.0, 1.0e30, f32::INFINITY];
+        let cells = bounds.map(|b| grid.cell_of(0, b));
+        assert!(cells.is_sorted(), "{cells:?}");
+        assert_eq!((cells[0], cells[8]), (0, grid.cells[0] - 1));
+    }
+
+    #[test]
+    fn degenerate_scenes_get_one_strip() {
+        for boxes in [vec![], vec![Aabb::default(); 5000], vec![Aabb::cube([f32::INFINITY; 3], 1.0); 5000]] {
+            assert_eq!(grid(&boxes).strips(), 1);
+        }
+    }
+
+    #[test]
+    fn a_pair_is_reported_by_the_strip_where_the_later_box_begins() {
+        let a = Cover { first: [1, 2], last: [3, 3] };
+        let b = Cover { first: [2, 1], last: [2, 3] };
+        let owners: Vec<[u32; 2]> = (0..5)
+            .flat_map(|x| (0..5).map(move |y| [x, y]))
+            .filter(|&c| a.contains(c) && b.contains(c) && a.begins(c) | b.begins(c) == 3)
+            .collect();
+        assert_eq!(owners, [[2, 2]]);
+    }
+}

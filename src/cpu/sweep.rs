@@ -1,0 +1,65 @@
+//! Sort on the axis of greatest variance, then sweep along it. From scratch every frame, as in the paper.
+
+use crate::broad_phase::check_count;
+use crate::cpu::columns::{Columns, ensure, order_key};
+use crate::cpu::kernel::sweep_rows;
+use crate::cpu::workers::{Outputs, Workers};
+use crate::cpu::{SimdLevel, Threads};
+use crate::sample::Sample;
+use crate::{Aabb, BroadPhase, Error, Pairs};
+
+/// The method; see the module.
+#[derive(Debug)]
+struct Sweep {
+    workers: Workers,
+    /// Lower bound on the sweep axis in the upper half, position in the input in the lower.
+    keys: Vec<u64>,
+    columns: Columns,
+    outputs: Outputs,
+    level: SimdLevel,
+}
+
+pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
+    let workers = Workers::new("sweep", threads, pools)?;
+    Ok(Box::new(Sweep { workers, keys: Vec::new(), columns: Columns::default(), outputs: Outputs::default(), level }))
+}
+
+impl Sweep {
+    fn resize(&mut self, objects: usize) -> Result<(), Error> {
+        ensure(&mut self.keys, objects, "sort keys")?;
+        self.columns.resize(objects)
+    }
+}
+
+impl BroadPhase for Sweep {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        check_count(boxes.len())?;
+        self.resize(boxes.len())?;
+        let axis = Sample::of(boxes).widest_axis();
+        let Self { workers, keys, columns, outputs, level } = self;
+        let keys = &mut keys[..boxes.len()];
+        workers.run(|| {
+            workers.check(boxes)?;
+            workers.map(boxes, keys, |id, b| u64::from(order_key(b.min[axis])) << 32 | id as u64);
+            workers.sort(keys);
+            workers.fill(columns.as_mut(), |first, mut part| {
+                for at in 0..part.len() {
+                    let id = keys[first + at] as u32;
+                    part.set(at, &boxes[id as usize], axis, id);
+                }
+            });
+            let ids = columns.ids();
+            outputs.find_rows(workers, ids.len(), pairs, |rows, list| {
+                sweep_rows(*level, columns, rows, |i, at, mask| list.push_mask(ids[i], &ids[at..], mask));
+            });
+            Ok(())
+        })?;
+        pairs.finish()
+    }
+
+    fn prepare(&mut self, objects: usize) {
+        // A refused allocation is reported by the frame that needs it.
+        let _ = self.resize(objects);
+    }
+}

@@ -1,0 +1,172 @@
+//! Measures the hardware parameters of this machine in process, in about three seconds on two cores.
+//!
+//! One file per family of parameters. Samples are taken in windows; a window in which other programs took more than 5 % of the
+//! CPU is thrown away and repeated while time is left (Linux; elsewhere foreign load is not known). Every loop has a
+//! time limit, so a slow or loaded machine gives fewer samples, not a longer run.
+
+mod caches;
+mod cgroup;
+mod clock;
+mod foreign_load;
+mod fork_join;
+mod identity;
+mod memory;
+mod scaling;
+pub mod statistics;
+mod topology;
+
+use std::fmt;
+use std::str::FromStr;
+use std::time::Duration;
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::hardware::{Hardware, Machine, Parameter, parameter};
+use foreign_load::Plan;
+
+pub use foreign_load::Watch;
+
+pub use memory::{Triad, triad};
+
+/// A group of parameters that are measured together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Family {
+    /// Usable cores, physical cores, SIMD lanes.
+    Topology,
+    /// The reported and the measured clock.
+    Clock,
+    /// Cache sizes, and load latencies over working sets.
+    Caches,
+    /// Memory size and triad bandwidths.
+    Memory,
+    /// Cost of a fork and join, warm and cold.
+    ForkJoin,
+    /// Work of several threads over work of one.
+    Scaling,
+}
+
+impl Family {
+    /// Every family, in the order of measurement.
+    pub const ALL: [Self; 6] = [Self::Topology, Self::Clock, Self::Caches, Self::Memory, Self::ForkJoin, Self::Scaling];
+
+    /// The name, as [`FromStr`] reads it: `topology`, `clock`, `caches`, `memory`, `fork_join` or `scaling`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Topology => "topology",
+            Self::Clock => "clock",
+            Self::Caches => "caches",
+            Self::Memory => "memory",
+            Self::ForkJoin => "fork_join",
+            Self::Scaling => "scaling",
+        }
+    }
+
+    /// Names of the parameters of this family, so that a caller whose child process died can say which are missing.
+    #[must_use]
+    pub fn parameters(self) -> Vec<String> {
+        use parameter as p;
+        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        match self {
+            Self::Topology => owned(&[p::USABLE_CORES, p::PHYSICAL_CORES, p::SIMD_LANES]),
+            Self::Clock => owned(&[p::CLOCK_REPORTED_GHZ, p::CLOCK_MEASURED_GHZ]),
+            Self::Caches => {
+                let mut names = owned(&[p::CACHE_L1D_BYTES, p::CACHE_L2_BYTES, p::CACHE_LLC_BYTES]);
+                names.extend(p::LATENCY_WORKING_SETS_KIB.map(p::latency_name));
+                names
+            }
+            Self::Memory => owned(&[p::MEMORY_BYTES, p::BANDWIDTH_ONE_THREAD_GB_PER_S, p::BANDWIDTH_ALL_THREADS_GB_PER_S]),
+            Self::ForkJoin => owned(&[p::FORK_JOIN_WARM_NS, p::FORK_JOIN_COLD_NS]),
+            Self::Scaling => owned(&[p::SCALING_TWO_THREADS_RATIO, p::SCALING_ALL_THREADS_RATIO]),
+        }
+    }
+}
+
+impl fmt::Display for Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Family {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|family| family.name() == text).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            format!("{text}: no such family of hardware parameters; use one of {names}")
+        })
+    }
+}
+
+/// What to measure with.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Use no more threads than this; `None` uses every core that affinity and quota leave. 0 is taken as 1.
+    pub threads: Option<u32>,
+    /// Stops after a few samples of small working sets. For tests: the figures are not fit for a report.
+    pub brief: bool,
+}
+
+impl Options {
+    fn plan(&self, samples: usize, limit_ms: u64) -> Plan {
+        if self.brief {
+            Plan { samples: 4, limit: Duration::from_millis(limit_ms / 20) }
+        } else {
+            Plan { samples, limit: Duration::from_millis(limit_ms) }
+        }
+    }
+
+    /// Threads that may run at once, at least 1.
+    fn usable_cores(&self) -> usize {
+        let available = std::thread::available_parallelism().map_or(1, usize::from);
+        let wanted = self.threads.map_or(available, |threads| threads as usize);
+        available.min(wanted).max(1)
+    }
+}
+
+/// Measures one family: each name of [`Family::parameters`] once, measured, reported or missing with a reason.
+///
+/// A caller that wants to survive a crash runs each family in a child process and puts the answers together with [`assemble`].
+#[must_use]
+pub fn family(family: Family, options: &Options) -> Vec<Parameter> {
+    match family {
+        Family::Topology => topology::measure(options),
+        Family::Clock => clock::measure(options),
+        Family::Caches => caches::measure(options),
+        Family::Memory => memory::measure(options),
+        Family::ForkJoin => fork_join::measure(options),
+        Family::Scaling => scaling::measure(options),
+    }
+}
+
+/// What this machine says of itself, with a hash of CPU vendor, family, model, stepping and last-level cache as its id.
+#[must_use]
+pub fn machine() -> Machine {
+    identity::machine()
+}
+
+/// Measures every family in this process.
+#[must_use]
+pub fn hardware(options: &Options) -> Hardware {
+    assemble(machine(), Family::ALL.into_iter().flat_map(|f| family(f, options)).collect())
+}
+
+/// Puts parameters, in any order, into the order of a report: every name of [`parameter::all_names`] once.
+///
+/// The first of several parameters with one name is kept. A name that is absent becomes missing, and an unknown name is dropped.
+#[must_use]
+pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
+    let find = |name: String| {
+        let found = measured.iter().find(|p| p.name == name).cloned();
+        found.unwrap_or_else(|| Parameter::missing(&name, "not measured"))
+    };
+    Hardware { machine, parameters: parameter::all_names().into_iter().map(find).collect() }
+}
+
+/// A pool of its own, so that the figures don't depend on what the caller's global pool does meanwhile.
+///
+/// The error is a sentence for [`Parameter::missing`]: a limit on processes can refuse the threads.
+fn pool(threads: usize) -> Result<ThreadPool, String> {
+    ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| format!("can't start {threads} threads: {error}"))
+}

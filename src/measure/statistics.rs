@@ -1,0 +1,81 @@
+//! Median, quantiles and dispersion of a handful of samples.
+//!
+//! Samples that are not a number are left out: a single failed division must not make a whole figure unknown.
+
+/// The `q`-quantile, `q` from 0 to 1, with linear interpolation between the two nearest samples (type 7 of Hyndman and Fan,
+/// which R and NumPy use by default). `None` for no samples. A `q` outside 0 to 1 is taken as the nearer end.
+#[must_use]
+pub fn quantile(samples: &[f64], q: f64) -> Option<f64> {
+    let mut sorted: Vec<f64> = samples.iter().copied().filter(|x| !x.is_nan()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let last = sorted.len().checked_sub(1)?;
+    // A NaN `q` becomes index 0 through the saturating cast below.
+    let position = q.clamp(0.0, 1.0) * last as f64;
+    let below = (position.floor() as usize).min(last);
+    let above = (below + 1).min(last);
+    let (low, high) = (sorted[below], sorted[above]);
+    let fraction = position - below as f64;
+    // Equal neighbours are returned as they are: infinity minus infinity would be no number.
+    Some(if fraction > 0.0 && low != high { low + (high - low) * fraction } else { low })
+}
+
+/// The median. `None` for no samples.
+#[must_use]
+pub fn median(samples: &[f64]) -> Option<f64> {
+    quantile(samples, 0.5)
+}
+
+/// Interquartile range over median, a dispersion without a unit.
+///
+/// `None` with fewer than four samples, where quartiles say nothing, and where the median is zero or infinite.
+#[must_use]
+pub fn relative_iqr(samples: &[f64]) -> Option<f64> {
+    if samples.iter().filter(|x| !x.is_nan()).count() < 4 {
+        return None;
+    }
+    let spread = quantile(samples, 0.75)? - quantile(samples, 0.25)?;
+    let relative = spread / median(samples)?.abs();
+    relative.is_finite().then_some(relative)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_for_no_samples() {
+        assert_eq!(median(&[]), None);
+        assert_eq!(quantile(&[], 0.25), None);
+        assert_eq!(relative_iqr(&[]), None);
+        assert_eq!(median(&[f64::NAN]), None);
+    }
+
+    #[test]
+    fn medians_by_hand() {
+        assert_eq!(median(&[7.0]), Some(7.0));
+        assert_eq!(median(&[3.0, 1.0]), Some(2.0));
+        assert_eq!(median(&[5.0, 1.0, 3.0]), Some(3.0));
+        assert_eq!(median(&[f64::NAN, 1.0, 3.0]), Some(2.0));
+        assert_eq!(median(&[f64::INFINITY, f64::INFINITY, f64::INFINITY, 1.0]), Some(f64::INFINITY));
+    }
+
+    #[test]
+    fn quantiles_by_hand() {
+        // numpy.quantile([1, 2, 3, 4], [0, 0.25, 0.5, 0.75, 1]) is 1, 1.75, 2.5, 3.25, 4.
+        let samples = [4.0, 2.0, 1.0, 3.0];
+        let got = [0.0, 0.25, 0.5, 0.75, 1.0].map(|q| quantile(&samples, q));
+        assert_eq!(got, [1.0, 1.75, 2.5, 3.25, 4.0].map(Some));
+        assert_eq!(quantile(&samples, -1.0), Some(1.0));
+        assert_eq!(quantile(&samples, 2.0), Some(4.0));
+        assert_eq!(quantile(&samples, f64::NAN), Some(1.0));
+    }
+
+    #[test]
+    fn dispersion_by_hand() {
+        assert_eq!(relative_iqr(&[1.0, 2.0, 3.0]), None);
+        // Quartiles 1.75 and 3.25, median 2.5.
+        assert_eq!(relative_iqr(&[1.0, 2.0, 3.0, 4.0]), Some(0.6));
+        assert_eq!(relative_iqr(&[0.0; 4]), None);
+        assert_eq!(relative_iqr(&[2.0; 9]), Some(0.0));
+    }
+}

@@ -1,0 +1,183 @@
+//! Cubes that shatter and are cleared away, so that their number runs from ten to the peak and back: `fragmentation`.
+//!
+//! After Figure 1 of Avril, Gouranton and Arnaldi, "Dynamic Adaptation of Broad Phase Collision Detection Algorithms",
+//! ISVRI 2011: few cubes, which a user splits or deletes at will, so that the number of objects runs from few to thousands.
+
+use super::Scenario;
+use super::reflect;
+use super::rng::{Powers, Rng, cube_root};
+use crate::Aabb;
+
+/// Cubes at the beginning of a cycle, or the peak where that is lower.
+const START: usize = 10;
+
+/// The number of objects through a cycle: a frame, and the logarithm of the number as a share of the way from start to peak.
+///
+/// Between two entries the share is a straight line. Entries in consecutive frames are bursts and mass deletions.
+const COURSE: [(u64, f32); 27] = [
+    (0, 0.0),
+    (20, 0.0),
+    (80, 0.35),
+    (110, 0.35),
+    (111, 0.6),
+    (140, 0.6),
+    (160, 0.0),
+    (180, 0.0),
+    (181, 0.45),
+    (210, 0.45),
+    (240, 0.8),
+    (260, 0.8),
+    (261, 1.0),
+    (290, 1.0),
+    (291, 0.5),
+    (320, 0.5),
+    (321, 1.0),
+    (350, 1.0),
+    (400, 0.65),
+    (401, 0.9),
+    (420, 0.9),
+    (450, 0.4),
+    (471, 0.75),
+    (500, 0.75),
+    (501, 0.25),
+    (570, 0.0),
+    (Scenario::FRAGMENTATION_FRAMES, 0.0),
+];
+
+/// Volume of the world over the sum of the cubes' volumes. Pieces at random places have 4 / 2.5 pairs each, less at the walls.
+const VOLUME: f64 = 2.5;
+/// Gap between the pieces of one cube as they fly apart, as a share of their edge.
+const GAP: f32 = 0.1;
+/// Greatest displacement of a piece from its octant on each axis, in half edges of the piece.
+const JITTER: f32 = 0.2;
+/// Speed of a piece away from the middle of its cube on each axis, in half edges per frame; up to twice this.
+const SPEED: f32 = 0.1;
+/// Share of the velocity of a cube that its pieces keep.
+const INHERITED: f32 = 0.5;
+
+/// Cubes of any size whose volumes add up to about the same, however many there are.
+#[derive(Debug, Clone)]
+pub(super) struct Fragmentation {
+    centres: Vec<[f32; 3]>,
+    halves: Vec<f32>,
+    velocities: Vec<[f32; 3]>,
+    wall: f32,
+    start: usize,
+    peak: usize,
+    /// Peak over start, to any power.
+    growth: Powers,
+    /// The cube that is split or grown next. It goes round, so that sizes stay alike.
+    cursor: usize,
+    /// One over the cube root of 0 to 8 pieces, which is their edge over that of their cube.
+    edges: [f32; 9],
+}
+
+impl Fragmentation {
+    /// A world for `peak` cubes of edge 1, and no cubes yet.
+    pub(super) fn new(peak: usize) -> Self {
+        let start = START.min(peak);
+        Self {
+            centres: Vec::with_capacity(peak),
+            halves: Vec::with_capacity(peak),
+            velocities: Vec::with_capacity(peak),
+            wall: (cube_root(VOLUME * peak as f64) * 0.5) as f32,
+            start,
+            peak,
+            growth: Powers::new(peak.max(1) as f64 / start.max(1) as f64),
+            cursor: 0,
+            edges: [1_u32, 1, 2, 3, 4, 5, 6, 7, 8].map(|pieces| (1.0 / cube_root(f64::from(pieces))) as f32),
+        }
+    }
+
+    /// Moves all cubes, or begins a cycle; splits or merges them until there are as many as `frame` asks for; writes the boxes.
+    pub(super) fn advance(&mut self, frame: u64, rng: &mut Rng, boxes: &mut Vec<Aabb>) {
+        let frame = frame % Scenario::FRAGMENTATION_FRAMES;
+        if frame == 0 {
+            self.begin(rng);
+        }
+        for (centre, velocity) in self.centres.iter_mut().zip(&mut self.velocities) {
+            for a in 0..3 {
+                let ahead = centre[a] + velocity[a];
+                if ahead.abs() > self.wall {
+                    velocity[a] = -velocity[a];
+                }
+                centre[a] = reflect(ahead, self.wall);
+            }
+        }
+        let target = self.target(frame);
+        while self.centres.len() < target {
+            self.split((target - self.centres.len() + 1).min(8), rng);
+        }
+        while self.centres.len() > target {
+            self.merge((self.centres.len() - target).min(7));
+        }
+        boxes.clear();
+        boxes.extend(self.centres.iter().zip(&self.halves).map(|(&centre, &half)| Aabb::cube(centre, half)));
+    }
+
+    /// How many cubes there are in a frame of the cycle.
+    fn target(&self, frame: u64) -> usize {
+        let at = COURSE.partition_point(|&(f, _)| f <= frame).clamp(1, COURSE.len() - 1);
+        let ((f0, u0), (f1, u1)) = (COURSE[at - 1], COURSE[at]);
+        let share = u0 + (u1 - u0) * ((frame - f0) as f32 / (f1 - f0) as f32);
+        let target = (self.start as f64 * self.growth.of(share) + 0.5) as usize;
+        target.clamp(self.start, self.peak)
+    }
+
+    /// Places the first cubes. Each cycle does so anew, so that rounding in volumes and velocities never adds up.
+    fn begin(&mut self, rng: &mut Rng) {
+        self.centres.clear();
+        self.halves.clear();
+        self.velocities.clear();
+        self.cursor = 0;
+        let half = (0.5 * cube_root(self.peak as f64 / self.start.max(1) as f64)) as f32;
+        for _ in 0..self.start {
+            self.centres.push(rng.signed3().map(|u| u * self.wall));
+            let half = half * (0.8 + 0.4 * rng.unit());
+            self.halves.push(half);
+            self.velocities.push(rng.signed3().map(|u| u * half * SPEED));
+        }
+    }
+
+    /// Shatters the next cube into `pieces`, 2 to 8, that have its volume and fly apart along its diagonals.
+    fn split(&mut self, pieces: usize, rng: &mut Rng) {
+        let at = self.next(self.centres.len());
+        let (centre, parent, velocity) = (self.centres[at], self.halves[at], self.velocities[at]);
+        let half = parent * self.edges[pieces];
+        for piece in 0..pieces {
+            let jitter = rng.signed3();
+            let (mut place, mut speed) = ([0.0; 3], [0.0; 3]);
+            for a in 0..3 {
+                let side = if piece >> a & 1 == 1 { 1.0 } else { -1.0 };
+                let away = centre[a] + side * parent * 0.5 * (1.0 + GAP) + jitter[a] * half * JITTER;
+                place[a] = reflect(away, self.wall);
+                speed[a] = INHERITED * velocity[a] + side * half * SPEED * (1.5 + 0.5 * jitter[a]);
+            }
+            if piece == 0 {
+                (self.centres[at], self.halves[at], self.velocities[at]) = (place, half, speed);
+            } else {
+                self.centres.push(place);
+                self.halves.push(half);
+                self.velocities.push(speed);
+            }
+        }
+    }
+
+    /// Deletes the last `pieces` cubes, 1 to 7, and grows the next one by their volume.
+    fn merge(&mut self, pieces: usize) {
+        let left = self.centres.len() - pieces;
+        let at = self.next(left);
+        let cube = |half: f32| f64::from(half) * f64::from(half) * f64::from(half);
+        let volume: f64 = self.halves.drain(left..).map(cube).sum();
+        self.halves[at] = cube_root(volume + cube(self.halves[at])) as f32;
+        self.centres.truncate(left);
+        self.velocities.truncate(left);
+    }
+
+    /// The index at the cursor, which goes round the first `objects`, and moves the cursor on.
+    fn next(&mut self, objects: usize) -> usize {
+        let at = if self.cursor < objects { self.cursor } else { 0 };
+        self.cursor = at + 1;
+        at
+    }
+}

@@ -1,0 +1,104 @@
+//! Objects that take a random step each frame: `uniform`, `fast`, `slab`, `mixed`, `resting`.
+
+use super::rng::{Powers, Rng, cube_root};
+use crate::Aabb;
+
+/// Frames for which the same objects of `resting` stay awake.
+const AWAKE_FRAMES: u64 = 30;
+
+/// Cubes that step by up to a share of their own edge on each axis, between walls that reflect their centres.
+#[derive(Debug, Clone)]
+pub(super) struct Walk {
+    centres: Vec<[f32; 3]>,
+    halves: Vec<f32>,
+    /// Greatest distance of a centre from the origin on each axis.
+    walls: [f32; 3],
+    /// Greatest step on each axis, in half edges.
+    step: f32,
+    /// Objects at the head of the list that never move.
+    fixed: usize,
+    /// One object in so many moves in a frame.
+    sparsity: usize,
+}
+
+impl Walk {
+    /// Unit cubes in a cube-shaped world of edge 2 n^(1/3), which step by up to `step` of their edge.
+    pub(super) fn uniform(objects: usize, step: f32, sparsity: usize, rng: &mut Rng) -> Self {
+        let wall = cube_root(objects as f64) as f32;
+        Self::unit_cubes(objects, [wall; 3], step, sparsity, rng)
+    }
+
+    /// Unit cubes with the density of [`Walk::uniform`], one in eight units of volume, in a world eight edges high.
+    pub(super) fn slab(objects: usize, step: f32, rng: &mut Rng) -> Self {
+        let wall = ((objects as f64).sqrt() * 0.5) as f32;
+        Self::unit_cubes(objects, [wall, wall, 4.0], step, 1, rng)
+    }
+
+    /// Cubes with edges log-uniform from 0.1 to 10, and at the head of the list up to four fixed ones as large as the world.
+    pub(super) fn mixed(objects: usize, step: f32, rng: &mut Rng) -> Self {
+        // Two such cubes overlap in a volume of 285 on average; 1.5 pairs per object need a world of 95 per object.
+        let wall = (cube_root(95.0 * objects as f64) * 0.5) as f32;
+        let fixed = (objects / 100).min(4);
+        let edges = Powers::new(100.0);
+        let mut walk = Self::with_halves(objects, [wall; 3], step, rng, |rng| (edges.of(rng.unit()) * 0.05) as f32);
+        for (centre, half) in walk.centres.iter_mut().zip(&mut walk.halves).take(fixed) {
+            // Off the middle by a tenth, so that no two share their bounds.
+            *centre = centre.map(|c| c * 0.1);
+            *half = wall;
+        }
+        walk.fixed = fixed;
+        walk
+    }
+
+    fn unit_cubes(objects: usize, walls: [f32; 3], step: f32, sparsity: usize, rng: &mut Rng) -> Self {
+        Self { sparsity, ..Self::with_halves(objects, walls, step, rng, |_| 0.5) }
+    }
+
+    fn with_halves(objects: usize, walls: [f32; 3], step: f32, rng: &mut Rng, half: impl Fn(&mut Rng) -> f32) -> Self {
+        let mut walk = Self {
+            centres: Vec::with_capacity(objects),
+            halves: Vec::with_capacity(objects),
+            walls,
+            step: step * 2.0,
+            fixed: 0,
+            sparsity: 1,
+        };
+        for _ in 0..objects {
+            let u = rng.signed3();
+            walk.centres.push([u[0] * walls[0], u[1] * walls[1], u[2] * walls[2]]);
+            walk.halves.push(half(rng));
+        }
+        walk
+    }
+
+    /// Writes the boxes of all objects.
+    pub(super) fn place(&self, boxes: &mut Vec<Aabb>) {
+        boxes.clear();
+        boxes.extend(self.centres.iter().zip(&self.halves).map(|(&centre, &half)| Aabb::cube(centre, half)));
+    }
+
+    /// Steps into `frame` and rewrites the boxes of the objects that moved.
+    pub(super) fn advance(&mut self, frame: u64, rng: &mut Rng, boxes: &mut [Aabb]) {
+        let phase = (frame / AWAKE_FRAMES % self.sparsity as u64) as usize;
+        let objects = self.centres.iter_mut().zip(&self.halves).zip(boxes);
+        for ((centre, &half), aabb) in objects.skip(self.fixed.max(phase)).step_by(self.sparsity) {
+            let step = rng.signed3();
+            for a in 0..3 {
+                centre[a] = reflect(centre[a] + step[a] * (self.step * half), self.walls[a]);
+            }
+            *aabb = Aabb::cube(*centre, half);
+        }
+    }
+}
+
+/// A coordinate thrown back by the walls at -`wall` and `wall`. One that lies beyond by more than the world ends at a wall.
+#[inline]
+pub(super) fn reflect(at: f32, wall: f32) -> f32 {
+    if at > wall {
+        (2.0 * wall - at).max(-wall)
+    } else if at < -wall {
+        (-2.0 * wall - at).min(wall)
+    } else {
+        at
+    }
+}

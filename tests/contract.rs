@@ -1,0 +1,217 @@
+//! Every algorithm, on every SIMD level and several thread counts, against the naive oracle.
+
+use sapwise::{Aabb, AlgorithmId, BoxDefect, BroadPhase, Error, Pair, PairOrder, Pairs, Registry, Scenario, SimdLevel};
+
+/// The oracle: the definition of overlap, in a double loop.
+fn naive(boxes: &[Aabb]) -> Vec<Pair> {
+    let mut pairs = Vec::new();
+    for i in 0..boxes.len() {
+        for j in i + 1..boxes.len() {
+            if boxes[i].overlaps(&boxes[j]) {
+                pairs.push((i as u32, j as u32));
+            }
+        }
+    }
+    pairs
+}
+
+/// Every method on 1, 2, 3 and 7 threads at every SIMD level of this machine.
+fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
+    let mut all = Vec::new();
+    for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
+        let mut registry = Registry::with_cores(1);
+        registry.limit_simd(level);
+        let methods: Vec<String> = registry.entries().iter().map(|e| e.id.method().to_owned()).collect();
+        for method in methods {
+            for threads in [1, 2, 3, 7] {
+                let id: AlgorithmId = format!("{method}@cpu{threads}").parse().unwrap();
+                match registry.create(&id) {
+                    Ok(algorithm) => all.push((format!("{id} at {level}"), algorithm)),
+                    Err(Error::Unavailable { .. }) if threads > 1 && !cfg!(feature = "parallel") => {}
+                    Err(error) => panic!("{id}: {error}"),
+                }
+            }
+        }
+    }
+    all
+}
+
+fn assert_all_agree(name: &str, boxes: &[Aabb], algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
+    let expected = naive(boxes);
+    for (id, algorithm) in algorithms {
+        let mut canonical = Pairs::with_order(PairOrder::Canonical);
+        algorithm.find_pairs(boxes, &mut canonical).unwrap();
+        assert!(canonical.as_slice() == expected, "{id} on {name}: {} pairs, not {}", canonical.len(), expected.len());
+        let mut any = Pairs::new();
+        algorithm.find_pairs(boxes, &mut any).unwrap();
+        assert_eq!(any.fingerprint(), canonical.fingerprint(), "{id} on {name} in any order");
+    }
+}
+
+/// A small generator of its own (Marsaglia's xorshift), so that the test does not rest on the library's.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 40) as f32 / (1_u64 << 24) as f32
+    }
+
+    fn cubes(&mut self, count: usize, world: [f32; 3], half: f32) -> Vec<Aabb> {
+        (0..count).map(|_| Aabb::cube(world.map(|side| self.next() * side), half * (0.1 + self.next()))).collect()
+    }
+}
+
+#[test]
+fn random_boxes_of_every_small_count() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    for count in (0..70).chain([127, 128, 129, 255, 256, 257, 1000, 1023, 1024, 1025]) {
+        assert_all_agree("a cube", &random.cubes(count, [8.0; 3], 0.7), &mut algorithms);
+    }
+}
+
+#[test]
+fn every_scenario_on_several_frames() {
+    let mut algorithms = every_algorithm();
+    for scenario in Scenario::ALL {
+        for objects in [10, 500, 4000] {
+            let mut scene = scenario.start(objects, 42);
+            for frame in 0..3 {
+                assert_all_agree(&format!("{scenario} frame {frame}"), scene.boxes(), &mut algorithms);
+                // Fragmentation begins with ten boxes: its frames are taken far apart.
+                (0..if scenario == Scenario::Fragmentation { 90 } else { 2 }).for_each(|_| scene.advance());
+            }
+        }
+    }
+}
+
+#[test]
+fn many_boxes_in_one_point_are_counted_when_they_may_not_be_stored() {
+    let boxes = vec![Aabb::cube([1.0; 3], 0.0); 1 << 15];
+    for (id, mut algorithm) in every_algorithm().into_iter().filter(|(id, _)| !id.contains("portable")) {
+        let mut pairs = Pairs::new();
+        pairs.set_limit(Some(100));
+        let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+        assert_eq!(error, Error::TooManyPairs { limit: 100, pairs: (1 << 14) * ((1 << 15) - 1) }, "{id}");
+    }
+}
+
+#[test]
+fn worlds_of_every_shape() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(7);
+    for world in [[400.0, 1.0, 1.0], [1.0, 300.0, 2.0], [60.0, 60.0, 0.0], [2.0, 50.0, 50.0], [0.0; 3], [16.0; 3]] {
+        assert_all_agree("a world", &random.cubes(3000, world, 0.5), &mut algorithms);
+    }
+}
+
+#[test]
+fn boxes_on_a_lattice_touch_exactly() {
+    let mut algorithms = every_algorithm();
+    let lattice: Vec<Aabb> =
+        (0..2744).map(|k| Aabb::cube([(k % 14) as f32, (k / 14 % 14) as f32, (k / 196) as f32], 0.5)).collect();
+    assert_all_agree("a lattice", &lattice, &mut algorithms);
+}
+
+#[test]
+fn large_boxes_among_small_ones() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(99);
+    let mut boxes = random.cubes(4000, [60.0, 50.0, 40.0], 0.3);
+    for k in 0..40 {
+        // Plates, rods and world-sized boxes, some reaching beyond the small ones.
+        let size = [[50.0, 50.0, 0.1], [0.1, 80.0, 0.1], [0.1, 0.1, 80.0], [100.0; 3], [90.0, 0.2, 0.2]][k % 5];
+        let at = [random.next() * 60.0 - 20.0, random.next() * 50.0 - 20.0, random.next() * 40.0 - 20.0];
+        boxes.insert(k * 97, Aabb::new(at, [at[0] + size[0], at[1] + size[1], at[2] + size[2]]));
+    }
+    assert_all_agree("large boxes", &boxes, &mut algorithms);
+}
+
+#[test]
+fn clusters_and_outliers() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(5);
+    let mut boxes = Vec::new();
+    for _ in 0..6 {
+        let at = [random.next() * 500.0, random.next() * 500.0, random.next() * 500.0];
+        boxes.extend(
+            random
+                .cubes(500, [8.0; 3], 0.5)
+                .iter()
+                .map(|b| Aabb::new([0, 1, 2].map(|a| b.min[a] + at[a]), [0, 1, 2].map(|a| b.max[a] + at[a]))),
+        );
+    }
+    for far in [1.0e6, -1.0e9, 3.0e38] {
+        boxes.push(Aabb::cube([far, 0.0, far], 0.5));
+        boxes.push(Aabb::cube([0.0, far, 0.0], 1.0));
+    }
+    assert_all_agree("clusters", &boxes, &mut algorithms);
+}
+
+#[test]
+fn infinite_and_empty_boxes_are_legal() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(3);
+    let inf = f32::INFINITY;
+    let mut boxes = random.cubes(1500, [20.0; 3], 0.5);
+    boxes.push(Aabb::new([-inf; 3], [inf; 3]));
+    boxes.insert(0, Aabb::new([-inf, 0.0, 0.0], [inf, 1.0, 1.0]));
+    boxes.push(Aabb::new([5.0, -inf, 5.0], [5.0, inf, inf]));
+    boxes.push(Aabb::new([inf; 3], [inf; 3]));
+    boxes.push(Aabb::new([-inf; 3], [-inf; 3]));
+    boxes.push(Aabb::new([f32::MIN; 3], [f32::MAX; 3]));
+    boxes.push(Aabb::new([-0.0; 3], [0.0; 3]));
+    boxes.push(Aabb::new([0.0; 3], [-0.0; 3]));
+    boxes.extend((0..50).map(|k| Aabb::cube([k as f32 * 0.25; 3], 0.0)));
+    assert_all_agree("infinite boxes", &boxes, &mut algorithms);
+    let lines: Vec<Aabb> = (0..600).map(|k| Aabb::new([-inf, k as f32, -inf], [inf, k as f32 + 1.0, inf])).collect();
+    assert_all_agree("infinite slabs", &lines, &mut algorithms);
+}
+
+#[test]
+fn identical_boxes_all_pair() {
+    let mut algorithms = every_algorithm();
+    assert_all_agree("identical boxes", &[Aabb::cube([3.0; 3], 1.0); 700], &mut algorithms);
+    assert_all_agree("identical points", &[Aabb::cube([3.0; 3], 0.0); 700], &mut algorithms);
+}
+
+#[test]
+fn the_first_invalid_box_is_named() {
+    let mut random = Random(11);
+    for (id, mut algorithm) in every_algorithm() {
+        let mut pairs = Pairs::new();
+        for at in [0, 1, 63, 64, 1000, 4999] {
+            for (defect, bad) in [
+                (BoxDefect::NotANumber, Aabb::new([0.0, 0.0, f32::NAN], [1.0; 3])),
+                (BoxDefect::NotANumber, Aabb::new([0.0; 3], [f32::NAN, 1.0, 1.0])),
+                (BoxDefect::Inverted, Aabb::new([0.0, 2.0, 0.0], [1.0; 3])),
+            ] {
+                let mut boxes = random.cubes(5000, [30.0; 3], 0.5);
+                boxes[at] = bad;
+                boxes[4999] = bad;
+                let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+                assert_eq!(error, Error::InvalidBox { index: at, defect }, "{id}");
+            }
+        }
+        let boxes = random.cubes(500, [10.0; 3], 0.5);
+        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+        assert_eq!(pairs.len(), naive(&boxes).len(), "{id} after errors");
+    }
+}
+
+#[test]
+fn a_limit_is_an_error_that_counts_all_pairs() {
+    let boxes = [Aabb::cube([3.0; 3], 1.0); 2000];
+    for (id, mut algorithm) in every_algorithm() {
+        let mut pairs = Pairs::new();
+        pairs.set_limit(Some(1000));
+        let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+        assert_eq!(error, Error::TooManyPairs { limit: 1000, pairs: 1_999_000 }, "{id}");
+        pairs.set_limit(Some(1_999_000));
+        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+        assert_eq!(pairs.len(), 1_999_000, "{id}");
+    }
+}

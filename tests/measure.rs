@@ -1,0 +1,100 @@
+//! What every measurement owes its reader, whatever the machine. No figure is held to a time: machines differ.
+
+use std::collections::HashSet;
+
+use sapwise::hardware::parameter;
+use sapwise::measure::{self, Family, Options};
+use sapwise::{How, Parameter};
+
+fn brief(threads: Option<u32>) -> Options {
+    Options { threads, brief: true }
+}
+
+/// The rules that hold for a parameter on any machine.
+fn check(p: &Parameter) {
+    assert!(!p.source.is_empty(), "{p:?}");
+    assert_eq!(p.value.is_none(), p.how == How::Missing, "{p:?}");
+    assert_eq!(p.samples == 0, p.how == How::Missing, "{p:?}");
+    assert!(p.value.is_none_or(|value| value.is_finite() && value >= 0.0), "{p:?}");
+    assert!(p.dispersion.is_none_or(|dispersion| dispersion.is_finite() && dispersion >= 0.0), "{p:?}");
+    assert!(p.dispersion.is_none() || p.samples >= 4, "{p:?}");
+    assert!(p.foreign_load.is_none_or(|share| (0.0..=1.0).contains(&share)), "{p:?}");
+    if p.how == How::Reported {
+        assert_eq!((p.dispersion, p.spoiled, p.foreign_load), (None, 0, None), "{p:?}");
+    }
+}
+
+#[test]
+fn every_parameter_once_and_in_order() {
+    let hardware = measure::hardware(&brief(None));
+    let names: Vec<String> = hardware.parameters.iter().map(|p| p.name.clone()).collect();
+    assert_eq!(names, parameter::all_names());
+    hardware.parameters.iter().for_each(check);
+    assert!(hardware.parameters.iter().all(|p| p.source != "not measured"));
+}
+
+#[test]
+fn families_share_the_parameters_out() {
+    let mut seen = HashSet::new();
+    for family in Family::ALL {
+        assert_eq!(family.name().parse(), Ok(family));
+        for name in family.parameters() {
+            assert!(seen.insert(name.clone()), "{name} is in two families");
+        }
+        let measured: Vec<String> = measure::family(family, &brief(Some(1))).into_iter().map(|p| p.name).collect();
+        assert_eq!(measured, family.parameters());
+    }
+    assert_eq!(seen, parameter::all_names().into_iter().collect());
+    assert!("nonsense".parse::<Family>().is_err());
+}
+
+#[test]
+fn one_thread_is_no_parallel_machine() {
+    for threads in [0, 1] {
+        let hardware = measure::hardware(&brief(Some(threads)));
+        hardware.parameters.iter().for_each(check);
+        assert_eq!(hardware.value(parameter::USABLE_CORES), Some(1.0));
+        assert_eq!(hardware.value(parameter::SCALING_TWO_THREADS_RATIO), None);
+        assert_eq!(hardware.value(parameter::SCALING_ALL_THREADS_RATIO), Some(1.0));
+        assert_eq!(hardware.value(parameter::FORK_JOIN_WARM_NS), None);
+        let [one, all] = [parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, parameter::BANDWIDTH_ALL_THREADS_GB_PER_S]
+            .map(|name| hardware.value(name));
+        assert_eq!(one, all);
+    }
+}
+
+#[test]
+fn the_clock_is_a_clock() {
+    for p in measure::family(Family::Clock, &brief(None)) {
+        assert!(p.value.is_none_or(|ghz| (0.1..10.0).contains(&ghz)), "{p:?}");
+    }
+}
+
+#[test]
+fn threads_can_be_lowered_but_not_raised() {
+    let cores = |threads| measure::family(Family::Topology, &brief(threads))[0].value;
+    assert_eq!(cores(Some(u32::MAX)), cores(None));
+}
+
+#[test]
+fn assembling_fills_gaps_and_drops_strangers() {
+    let measured = vec![
+        Parameter::reported("nonsense", 1.0, "nobody"),
+        Parameter::reported(parameter::MEMORY_BYTES, 2.0, "first"),
+        Parameter::reported(parameter::MEMORY_BYTES, 3.0, "second"),
+    ];
+    let hardware = measure::assemble(measure::machine(), measured);
+    let names: Vec<String> = hardware.parameters.iter().map(|p| p.name.clone()).collect();
+    assert_eq!(names, parameter::all_names());
+    assert_eq!(hardware.value(parameter::MEMORY_BYTES), Some(2.0));
+    assert!(hardware.parameters.iter().filter(|p| p.name != parameter::MEMORY_BYTES).all(|p| p.how == How::Missing));
+}
+
+#[test]
+fn the_machine_has_an_id_that_stays() {
+    let machine = measure::machine();
+    assert_eq!(machine, measure::machine());
+    assert_eq!(machine.physical_id.len(), 16);
+    assert!(machine.physical_id.bytes().all(|b| b.is_ascii_hexdigit()));
+    assert_eq!((machine.arch.as_str(), machine.os.as_str()), (std::env::consts::ARCH, std::env::consts::OS));
+}

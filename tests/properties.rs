@@ -1,0 +1,96 @@
+//! What must hold for any boxes at all.
+
+use proptest::prelude::*;
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Fields, Load, PairOrder, Pairs, Registry, Step};
+
+/// Bounds that meet often, with infinities, zeros of both signs and denormals among them.
+fn bound() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        8 => (-20_i32..20).prop_map(|v| v as f32 * 0.5),
+        4 => -10.0_f32..10.0,
+        1 => prop::sample::select(vec![f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1.0e-42, f32::MAX, f32::MIN]),
+    ]
+}
+
+fn valid_box() -> impl Strategy<Value = Aabb> {
+    (prop::array::uniform3(bound()), prop::array::uniform3(bound()))
+        .prop_map(|(a, b)| Aabb::new([0, 1, 2].map(|k| a[k].min(b[k])), [0, 1, 2].map(|k| a[k].max(b[k]))))
+}
+
+fn registry() -> (Registry, Vec<AlgorithmId>) {
+    let registry = Registry::with_cores(2);
+    let ids = registry.available().into_iter().map(|(id, _)| id).collect();
+    (registry, ids)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn every_algorithm_finds_exactly_the_overlapping_pairs(boxes in prop::collection::vec(valid_box(), 0..600)) {
+        let mut expected = Vec::new();
+        for j in 0..boxes.len() {
+            for i in 0..j {
+                if boxes[i].overlaps(&boxes[j]) {
+                    expected.push((i as u32, j as u32));
+                }
+            }
+        }
+        expected.sort_unstable();
+        let (registry, ids) = registry();
+        for id in ids {
+            let mut pairs = Pairs::with_order(PairOrder::Canonical);
+            registry.create(&id).unwrap().find_pairs(&boxes, &mut pairs).unwrap();
+            prop_assert_eq!(pairs.as_slice(), &expected[..], "{}", id);
+        }
+    }
+
+    #[test]
+    fn reused_instances_forget_the_frame_before(sizes in prop::collection::vec(0_usize..700, 1..6), seed in any::<u32>()) {
+        let (registry, ids) = registry();
+        for id in ids {
+            let mut kept = registry.create(&id).unwrap();
+            let mut pairs = Pairs::new();
+            for (frame, &size) in sizes.iter().enumerate() {
+                let boxes: Vec<Aabb> = (0..size as u32)
+                    .map(|k| {
+                        let mixed = (k ^ seed).wrapping_mul(2_654_435_761).wrapping_add(frame as u32 * 97);
+                        Aabb::cube([mixed % 31, mixed / 31 % 29, mixed / 900 % 23].map(|v| v as f32 * 0.5), 0.4)
+                    })
+                    .collect();
+                kept.find_pairs(&boxes, &mut pairs).unwrap();
+                let mut fresh = Pairs::new();
+                registry.create(&id).unwrap().find_pairs(&boxes, &mut fresh).unwrap();
+                prop_assert_eq!(pairs.fingerprint(), fresh.fingerprint(), "{} frame {}", id, frame);
+            }
+        }
+    }
+
+    #[test]
+    fn a_load_is_finite_whatever_the_boxes(boxes in prop::collection::vec((prop::array::uniform3(any::<f32>()), prop::array::uniform3(any::<f32>())), 0..300)) {
+        let boxes: Vec<Aabb> = boxes.into_iter().map(|(min, max)| Aabb::new(min, max)).collect();
+        for pairs in [None, Some(0.0), Some(1.0e6)] {
+            let load = Load::estimate(&boxes, pairs);
+            let all = [load.axis_candidates, load.strip_candidates, load.pairs, load.moved];
+            prop_assert!(all.iter().all(|v| v.is_finite() && *v >= 0.0), "{:?}", load);
+        }
+    }
+
+    #[test]
+    fn adaptive_gives_the_same_pairs_whatever_the_borders(
+        border in 1_u32..400,
+        frames in prop::collection::vec(prop::collection::vec(valid_box(), 0..400), 1..4),
+    ) {
+        let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
+        let fields = Fields::from_steps(vec![step(0, "brute@cpu1"), step(border, "strips@cpu1")]).unwrap();
+        let registry = Registry::with_cores(1);
+        let mut adaptive = Adaptive::new(fields, &registry).unwrap();
+        let mut brute = registry.create(&"brute@cpu1".parse().unwrap()).unwrap();
+        let (mut a, mut b) = (Pairs::new(), Pairs::new());
+        for boxes in frames {
+            adaptive.find_pairs(&boxes, &mut a).unwrap();
+            brute.find_pairs(&boxes, &mut b).unwrap();
+            prop_assert_eq!(a.fingerprint(), b.fingerprint());
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! In a steady state no algorithm allocates, and neither does the choice between them.
+//!
+//! One test only, because the counter sees every thread of the process.
+
+use sapwise::{
+    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Fields, Load, Pairs, Registry, Scenario, Source, Term,
+};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+/// The system's allocator, counting calls.
+struct Counting;
+
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call is passed on unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Relaxed);
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise.
+        unsafe { System.dealloc(at, layout) }
+    }
+
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Relaxed);
+        // SAFETY: the caller's promise.
+        unsafe { System.realloc(at, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// Allocations of `run` in each of `frames` further frames of a scene, after two rounds of the same frames.
+fn allocations(scenario: Scenario, objects: usize, frames: usize, run: &mut dyn BroadPhase) -> usize {
+    let mut pairs = Pairs::new();
+    let mut counted = 0;
+    for round in 0..3 {
+        let mut scene = scenario.start(objects, 1);
+        for _ in 0..frames {
+            scene.advance();
+            let before = ALLOCATIONS.load(Relaxed);
+            run.find_pairs(scene.boxes(), &mut pairs).unwrap();
+            if round == 2 {
+                counted += ALLOCATIONS.load(Relaxed) - before;
+            }
+        }
+    }
+    counted
+}
+
+/// Fields whose borders `fragmentation` crosses: 30 n = 5000 + 5 n at n = 200, 0.05 n^2 = 30 n at n = 600.
+fn fields() -> Fields {
+    let cost = |id: &str, call: f64, object: f64| AlgorithmCost {
+        algorithm: id.parse().unwrap(),
+        revision: 1,
+        curve: CostCurve {
+            terms: vec![CostTerm { term: Term::Call, unit_ns: call }, CostTerm { term: Term::Objects, unit_ns: object }],
+            ..CostCurve::default()
+        },
+        spread_ln: 0.0,
+    };
+    let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    let costs = vec![cost("brute@cpu1", 0.0, 60.0), cost("sweep@cpu1", 5_000.0, 30.0), cost("strips@cpu1", 30_000.0, 10.0)];
+    Fields::from_costs(Source::Measured, "uniform", costs, &loads)
+}
+
+#[test]
+fn a_steady_state_allocates_nothing() {
+    const FRAMES: usize = 40;
+    let registry = Registry::with_cores(4);
+    for (id, _) in registry.available() {
+        let mut algorithm = registry.create(&id).unwrap();
+        for scenario in [Scenario::Uniform, Scenario::Mixed, Scenario::Gravity, Scenario::Fragmentation] {
+            let counted = allocations(scenario, 3000, FRAMES, algorithm.as_mut());
+            // rayon hands frames to a pool through a queue whose blocks of 63 it allocates as it goes.
+            let queue_blocks = if id.threads() == 1 { 0 } else { 2 + FRAMES / 63 };
+            assert!(counted <= queue_blocks, "{id} on {scenario}: {counted} allocations in {FRAMES} frames");
+        }
+    }
+    let mut adaptive = Adaptive::new(fields(), &registry).unwrap();
+    let counted = allocations(Scenario::Fragmentation, 3000, 600, &mut adaptive);
+    assert_eq!(counted, 0, "adaptive, switches included");
+}
