@@ -33,7 +33,7 @@ impl Columns {
         for (k, column) in values.columns().into_iter().enumerate() {
             let centre = mean(column);
             let scale = mean(column.mapv(|v| (v - centre).powi(2)).view()).sqrt();
-            if !(scale > 1e-9 * centre.abs().max(1.0)) {
+            if scale <= 1e-9 * centre.abs().max(1.0) {
                 continue;
             }
             let unit = column.mapv(|v| (v - centre) / scale);

@@ -1,13 +1,104 @@
 //! From reports to cost curves, fields and models.
 
+mod baselines;
+pub(crate) mod card;
 mod columns;
 mod curve;
+mod direct;
 mod fit;
+mod model;
 mod nnls;
 mod residual;
 mod robust;
 mod rows;
 #[cfg(test)]
 mod synthetic;
+mod validate;
+
+use anyhow::{Result, bail};
+use sapwise::hardware::parameter;
+use sapwise::{Model, Report};
 
 pub(crate) use curve::measured_fields;
+
+/// Parameters by which a machine is compared with those of the training.
+const PARAMETERS: [&str; 8] = [
+    parameter::CLOCK_MEASURED_GHZ,
+    parameter::SIMD_LANES,
+    parameter::CACHE_LLC_BYTES,
+    parameter::BANDWIDTH_ONE_THREAD_GB_PER_S,
+    parameter::BANDWIDTH_ALL_THREADS_GB_PER_S,
+    parameter::FORK_JOIN_WARM_NS,
+    parameter::SCALING_ALL_THREADS_RATIO,
+    parameter::USABLE_CORES,
+];
+
+/// A model and what has to be said about it.
+#[derive(Debug, Clone)]
+pub(crate) struct Trained {
+    /// The model with its validation.
+    pub(crate) model: Model,
+    /// In sentences, what was left out and why, and what the validation does not say.
+    pub(crate) notes: Vec<String>,
+}
+
+/// Fits the model called `name` to reports, given with their file names without folders, and validates it.
+///
+/// Simulated reports, those of unoptimised builds and repeated ones are left out, and so are timings of revisions that are
+/// not the newest of their method. The file names stand in the model; the order of the reports matters for one baseline
+/// only, which takes the first one left in training for the default machine.
+///
+/// # Errors
+/// When no report can be used, with the reason for each and what to do; when no method can be fitted.
+pub(crate) fn train(reports: &[(String, Report)], name: &str) -> Result<Trained> {
+    let (profiles, mut notes) = rows::usable(reports);
+    if profiles.is_empty() {
+        let why = if notes.is_empty() { "none was given".to_owned() } else { notes.join("; ") };
+        bail!("no report can be trained on: {why}; measure one with `sapwise probe --out R.json` of a release build");
+    }
+    let (mut model, left_out) = model::model(&profiles.iter().collect::<Vec<_>>(), name)?;
+    notes.extend(left_out);
+    let (validation, limits) = validate::validate(&profiles)?;
+    model.validation = validation;
+    notes.extend(limits);
+    Ok(Trained { model, notes })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::synthetic::Machine;
+    use super::*;
+    use sapwise::json;
+
+    fn reports() -> Vec<(String, Report)> {
+        Machine::family().iter().map(|m| (format!("{}.json", m.name), m.report())).collect()
+    }
+
+    #[test]
+    fn a_model_is_the_same_after_json_and_knows_its_ranges() {
+        let trained = train(&reports(), "test").unwrap();
+        let text = json::write(&trained.model).unwrap();
+        assert_eq!(json::model(&text).unwrap(), trained.model);
+        assert_eq!(trained.model.ranges.len(), PARAMETERS.len());
+        let cores = trained.model.ranges.iter().find(|r| r.parameter == parameter::USABLE_CORES).unwrap();
+        assert_eq!((cores.min, cores.max), (2.0, 16.0));
+        println!("{}", card::text(&trained.model.validation));
+    }
+
+    #[test]
+    fn one_report_gives_a_model_without_scores() {
+        let trained = train(&reports()[..1], "test").unwrap();
+        assert_eq!(trained.model.methods.len(), 3);
+        assert!(trained.model.validation.methods.is_empty());
+    }
+
+    #[test]
+    fn nothing_usable_says_what_to_do() {
+        let mut report = reports().remove(0);
+        report.1.provenance.optimised = false;
+        for reports in [vec![], vec![report]] {
+            let error = train(&reports, "test").unwrap_err().to_string();
+            assert!(error.contains("sapwise probe --out"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Ways to choose an algorithm that a prediction has to beat.
+
+use super::PARAMETERS;
+use super::curve::{measured_costs, measured_fields};
+use super::rows::{Profile, best, medians};
+use anyhow::Result;
+use sapwise::{AlgorithmCost, AlgorithmId, Fields, Hardware, Load};
+
+/// Chooses an algorithm under a load among those that a machine has; `None` where it knows none of them.
+pub(crate) type Chooser<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
+
+/// The cost of an algorithm at a point where it was not timed, over the best: it had left the race as hopeless, so this is a
+/// cautious guess from below.
+pub(crate) const NOT_TIMED: f64 = 10.0;
+
+/// Regret of a choice at each point of a report.
+pub(crate) fn regrets(profile: &Profile, choose: &Chooser<'_>) -> Vec<f64> {
+    let mut regrets = Vec::new();
+    for point in &profile.report.points {
+        let medians = medians(point);
+        let Some(best) = best(&medians) else { continue };
+        let chosen = choose(&point.load);
+        let ns = medians.iter().find(|m| chosen.as_ref() == Some(m.0)).map_or(NOT_TIMED * best, |m| m.1);
+        regrets.push(ns / best - 1.0);
+    }
+    regrets
+}
+
+/// The algorithms of a profile that were timed anywhere in it.
+pub(crate) fn available(profile: &Profile) -> Vec<AlgorithmId> {
+    let timed = |id: &&AlgorithmId| profile.report.points.iter().any(|p| p.timings.iter().any(|t| t.algorithm == **id));
+    profile.report.algorithms.iter().map(|t| &t.id).filter(timed).cloned().collect()
+}
+
+/// Always the algorithm with the least mean regret over the points of the training profiles, each profile counting the same.
+pub(crate) fn single_best<'a>(training: &[&Profile], available: &[AlgorithmId]) -> Chooser<'a> {
+    let mean = |id: &AlgorithmId| {
+        let always: Chooser<'_> = Box::new(|_| Some(id.clone()));
+        training.iter().map(|p| average(&regrets(p, &always))).sum::<f64>()
+    };
+    let mut scored: Vec<(f64, &AlgorithmId)> = available.iter().map(|id| (mean(id), id)).collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let chosen = scored.first().map(|s| s.1.clone());
+    Box::new(move |_| chosen.clone())
+}
+
+/// Brute force on one thread up to and including `last` objects, `above` on all threads from there on.
+///
+/// With 64 and `strips` this is nexus, which has brute force for up to 64 colliders and a tree beyond; strips stand for the
+/// tree, being what is fastest in large scenes here. With 999 and `sweep` it is `mujoco_warp`, whose constant of 1000 bodies
+/// parts two kinds of sweep after a brute force that is chosen by a count of filtered pairs, which is not known here; the
+/// constant is taken for the border between brute force and sweep. Both run on a GPU there.
+pub(crate) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Chooser<'a> {
+    let small = available.iter().filter(|id| id.method() == "brute").min_by_key(|id| id.threads()).cloned();
+    let large = available.iter().filter(|id| id.method() == above).max_by_key(|id| id.threads()).cloned();
+    Box::new(move |load| if load.objects <= last { small.clone() } else { large.clone() })
+}
+
+/// The measured thresholds of the first training profile, by the number of objects alone, whatever the machine.
+///
+/// # Errors
+/// When that profile has too few timings for thresholds.
+pub(crate) fn default_machine<'a>(training: &[&Profile], available: &'a [AlgorithmId]) -> Result<Chooser<'a>> {
+    let Some(first) = training.first() else { return Ok(Box::new(|_| None)) };
+    let fields = measured_fields(&first.report, slice_scenario(first))?;
+    Ok(Box::new(move |load| fields.step(load.objects).and_then(|s| closest(&s.algorithm, available))))
+}
+
+/// The measured costs of the training profile whose hardware is nearest, under the whole load.
+pub(crate) fn nearest_machine<'a>(training: &[&Profile], hardware: &Hardware, available: &'a [AlgorithmId]) -> Chooser<'a> {
+    let known: Vec<&Hardware> = training.iter().map(|p| &p.report.hardware).collect();
+    match nearest(&known, hardware) {
+        Some(k) => by_costs(measured_costs(&training[k].report).0, available),
+        None => Box::new(|_| None),
+    }
+}
+
+/// The cheapest by cost curves; the nearest number of threads stands for one that the machine doesn't have.
+pub(crate) fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Chooser<'_> {
+    let fields = Fields::from_costs(sapwise::Source::Measured, "", costs, &[]);
+    Box::new(move |load| {
+        let best = fields.rank(load, |k| closest(&fields.costs[k].algorithm, available).is_some())?.best;
+        closest(&fields.costs[best].algorithm, available)
+    })
+}
+
+/// `uniform` where a profile has it, else its first scenario.
+pub(crate) fn slice_scenario(profile: &Profile) -> &str {
+    let names = || profile.report.points.iter().map(|p| p.scenario.as_str());
+    names().find(|n| *n == "uniform").or_else(|| names().next()).unwrap_or("uniform")
+}
+
+/// The available algorithm of the same method whose number of threads is nearest.
+fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
+    let distance = |other: &&AlgorithmId| (f64::from(other.threads()) / f64::from(id.threads())).ln().abs();
+    let same = available.iter().filter(|a| a.method() == id.method());
+    same.min_by(|a, b| distance(a).total_cmp(&distance(b))).cloned()
+}
+
+/// Position of the nearest hardware, by the logarithms of the parameters that both have, over their standard deviation.
+fn nearest(known: &[&Hardware], hardware: &Hardware) -> Option<usize> {
+    let logarithm = |h: &Hardware, name: &str| h.value(name).filter(|v| *v > 0.0).map(f64::ln);
+    let mut distances = vec![0.0; known.len()];
+    for name in PARAMETERS {
+        let Some(own) = logarithm(hardware, name) else { continue };
+        let values: Vec<Option<f64>> = known.iter().map(|h| logarithm(h, name)).collect();
+        let all: Vec<f64> = values.iter().flatten().copied().chain([own]).collect();
+        let mean = average(&all);
+        let variance = average(&all.iter().map(|v| (v - mean).powi(2)).collect::<Vec<f64>>());
+        for (distance, value) in distances.iter_mut().zip(values) {
+            // What is not known is taken to be as far as machines are from each other on average.
+            *distance += value.map_or(2.0, |v| if variance > 1e-12 { (v - own).powi(2) / variance } else { 0.0 });
+        }
+    }
+    (0..known.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b]))
+}
+
+/// The mean; 0 of nothing.
+pub(crate) fn average(values: &[f64]) -> f64 {
+    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::Machine;
+    use super::*;
+
+    fn ids(list: &[&str]) -> Vec<AlgorithmId> {
+        list.iter().map(|id| id.parse().unwrap()).collect()
+    }
+
+    #[test]
+    fn constants_and_substitutes_stay_within_what_is_available() {
+        let available = ids(&["brute@cpu1", "brute@cpu8", "strips@cpu1", "strips@cpu8"]);
+        let choose = frozen(64, "strips", &available);
+        let load = |objects| Load { objects, ..Load::default() };
+        assert_eq!(choose(&load(64)).unwrap().to_string(), "brute@cpu1");
+        assert_eq!(choose(&load(65)).unwrap().to_string(), "strips@cpu8");
+        assert_eq!(frozen(64, "sweep", &available)(&load(100)), None);
+        assert_eq!(closest(&"strips@cpu16".parse().unwrap(), &available).unwrap().to_string(), "strips@cpu8");
+        assert_eq!(closest(&"tree@cpu1".parse().unwrap(), &available), None);
+    }
+
+    #[test]
+    fn the_nearest_machine_is_itself_and_then_its_like() {
+        let family: Vec<Hardware> = Machine::family().iter().map(Machine::hardware).collect();
+        let known: Vec<&Hardware> = family.iter().collect();
+        for (k, hardware) in family.iter().enumerate() {
+            assert_eq!(nearest(&known, hardware), Some(k));
+        }
+        // Four cores and eight lanes are nearer to four cores and four lanes than to sixteen cores.
+        assert_eq!(nearest(&[known[4], known[1]], known[6]), Some(1));
+        assert_eq!(nearest(&[], known[0]), None);
+    }
+
+    #[test]
+    fn choosing_what_was_not_timed_costs_ten_times_the_best() {
+        let profile = Profile { file: String::new(), report: Machine::family()[0].report() };
+        let never: Chooser<'_> = Box::new(|_| None);
+        assert!(regrets(&profile, &never).iter().all(|r| (r - 9.0).abs() < 1e-9));
+        let available = available(&profile);
+        let sweep = regrets(&profile, &by_costs(measured_costs(&profile.report).0, &available));
+        assert!(average(&sweep) < 0.02, "{}", average(&sweep));
+    }
+}
