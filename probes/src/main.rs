@@ -2,6 +2,7 @@
 
 mod args;
 mod boxes;
+mod card;
 mod child;
 mod contention;
 mod date;

@@ -8,6 +8,7 @@ mod predict;
 mod probe;
 mod run;
 mod schema;
+mod train;
 
 use crate::args::Verb;
 use crate::exit::{Outcome, WrongUsage};
@@ -26,7 +27,7 @@ pub(crate) fn run(verb: Verb) -> anyhow::Result<Outcome> {
         Verb::Devices(arguments) => devices::run(&arguments),
         Verb::Probe(arguments) => probe::run(&arguments),
         Verb::Run(arguments) => run::run(&arguments),
-        Verb::Train(_) => Ok(Outcome::Failed),
+        Verb::Train(arguments) => train::run(&arguments),
         Verb::Pairs(arguments) => pairs::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),
