@@ -15,6 +15,8 @@ const FEW_FRAMES: usize = 5;
 pub(super) const FEWEST_FRAMES: usize = 3;
 /// A point is done when the standard error of every median is below this share of it.
 const GOOD_ERROR: f64 = 0.01;
+/// Windows that may be thrown away for each that is kept: on a machine that is always busy more would only cost time.
+const MOST_REDONE: u32 = 2;
 /// Share of a point's time in which spoiled frames are redone. After that they are kept, with the foreign load beside them.
 const REDO_SHARE: f64 = 2.0 / 3.0;
 
@@ -48,7 +50,7 @@ pub(crate) struct Race {
 /// What a point cost beside what it found.
 pub(crate) struct Outcome {
     pub(crate) point: Point,
-    /// Wall clock of the last frame, everything included.
+    /// Wall clock of the shortest frame, everything included: a single frame that was disturbed must not cost the next size.
     pub(crate) frame: Duration,
     /// Wrong answers.
     pub(crate) mismatches: Vec<String>,
@@ -72,8 +74,9 @@ impl Race {
         runners.iter_mut().for_each(|r| r.samples.clear());
         let mut frames = 0;
         let (mut spoiled, mut highest) = (0, None);
+        let (mut windows, mut thrown) = (0, 0);
         let mut pairs_before = None;
-        let mut last = Duration::ZERO;
+        let mut shortest = Duration::MAX;
         loop {
             // Samples are kept or thrown away by windows that are long enough to tell foreign load.
             let watch = Watch::begin();
@@ -81,7 +84,7 @@ impl Race {
             while fresh == 0 || !watch.is_long_enough() {
                 let started = Instant::now();
                 pairs_before = self.frame(runners, scene, &mut mismatches);
-                last = started.elapsed();
+                shortest = shortest.min(started.elapsed());
                 fresh += 1;
             }
             let foreign = watch.foreign_load();
@@ -89,8 +92,9 @@ impl Race {
             let kept = fresh.min(MOST_FRAMES - frames);
             let spent = began.elapsed();
             let redo = !self.contended
+                && thrown < MOST_REDONE * (windows + 1)
                 && foreign.is_some_and(|f| f > Watch::SPOILING)
-                && spent + last * (fresh as u32) < time.mul_f64(REDO_SHARE);
+                && spent + shortest * (fresh as u32) < time.mul_f64(REDO_SHARE);
             let dropped = if redo { fresh } else { fresh - kept };
             for runner in runners.iter_mut() {
                 // A runner that failed on the way has none.
@@ -99,8 +103,10 @@ impl Race {
             }
             if redo {
                 spoiled += kept as u32;
+                thrown += 1;
                 continue;
             }
+            windows += 1;
             frames += kept;
             highest = match (highest, foreign) {
                 (Some(a), Some(b)) => Some(f64::max(a, b)),
@@ -115,7 +121,7 @@ impl Race {
             }
         }
         let point = self.point(runners, scene, pairs_before, (highest, spoiled));
-        Outcome { point, frame: last, mismatches }
+        Outcome { point, frame: shortest, mismatches }
     }
 
     /// Advances the scene, times every runner on the new frame and compares their answers. Returns the pairs of the frame

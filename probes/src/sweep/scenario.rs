@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn every_point_has_paired_samples_of_all_algorithms_and_the_size_asked_for() {
         for scenario in ["uniform", "fragmentation"] {
-            let events = events(scenario, &[10, 300], 1.0);
+            let events = events(scenario, &[10, 300], 10.0);
             let points: Vec<&Point> =
                 events.iter().filter_map(|e| if let Event::Point(p) = e { Some(&**p) } else { None }).collect();
             assert_eq!(points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [10, 300], "{events:?}");
