@@ -22,6 +22,7 @@ mod summary;
 mod sweep;
 mod table;
 mod train;
+mod turns;
 mod verbs;
 
 use clap::Parser;
