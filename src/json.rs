@@ -123,3 +123,48 @@ pub fn schemas() -> Result<[(&'static str, String); 3], JsonError> {
         ("fields-1.schema.json", write(&schemars::schema_for!(Fields))?),
     ])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hardware::Parameter;
+    use crate::report::{Label, Point, Provenance};
+    use crate::{Hardware, Load, Machine};
+
+    #[test]
+    fn a_report_reads_back_whatever_its_texts_hold() {
+        let hostile = "\n  \"points\": []";
+        let point = Point {
+            scenario: hostile.to_owned(),
+            load: Load { objects: 3, pairs: 0.1, ..Load::default() },
+            pairs: 7,
+            fingerprint: String::new(),
+            foreign_load: Some(0.25),
+            spoiled: 0,
+            timings: Vec::new(),
+        };
+        let mut report = Report {
+            schema: ReportSchema,
+            label: Label::Simulated,
+            provenance: Provenance {
+                version: String::new(),
+                date: String::new(),
+                command: hostile.to_owned(),
+                seed: u64::MAX,
+                threads: None,
+                simd: None,
+                optimised: false,
+                seconds: 0.5,
+            },
+            hardware: Hardware { machine: Machine::default(), parameters: vec![Parameter::missing("x", hostile)] },
+            algorithms: Vec::new(),
+            points: vec![point.clone(), point],
+            remarks: vec![hostile.to_owned()],
+        };
+        let text = write_report(&report).unwrap();
+        assert_eq!(super::report(&text).unwrap(), report);
+        assert_eq!(text.lines().filter(|l| l.starts_with("    {\"scenario\"")).count(), 2);
+        report.points.clear();
+        assert_eq!(super::report(&write_report(&report).unwrap()).unwrap(), report);
+    }
+}

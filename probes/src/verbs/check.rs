@@ -5,8 +5,10 @@ use crate::document::read_document;
 use crate::exit::Outcome;
 use crate::output;
 use sapwise::json::Document;
+use sapwise::measure::{self, Family, Options};
+use sapwise::model::Range;
 use sapwise::report::Label;
-use sapwise::{AlgorithmId, Backend, Fields, Machine, Model, Registry, Report, usable_cores};
+use sapwise::{AlgorithmId, Backend, Fields, How, Machine, Model, Parameter, Registry, Report, usable_cores};
 use serde::Serialize;
 use std::path::Path;
 
@@ -41,7 +43,7 @@ struct Here {
 }
 
 pub(crate) fn run(arguments: &Check) -> anyhow::Result<Outcome> {
-    let here = Here { registry: Registry::new(), machine: sapwise::measure::machine() };
+    let here = Here { registry: Registry::new(), machine: measure::machine() };
     let files: Vec<Finding> = arguments.files.iter().map(|path| here.look_at(path)).collect();
     let failed = files.iter().any(|f| !f.problems.is_empty());
     if arguments.json {
@@ -127,6 +129,7 @@ impl Here {
         if cores > most {
             finding.notes.push(format!("extrapolates: trained on up to {most} threads, this machine has {cores}"));
         }
+        finding.notes.extend(outside(model));
     }
 
     fn fields(&self, fields: &Fields, finding: &mut Finding) {
@@ -176,6 +179,25 @@ impl Here {
             _ => Some(format!("{id} can't run here: this version has no GPU backend")),
         }
     }
+}
+
+/// In which parameters that the system reports this machine lies outside the training. Those that take seconds to measure
+/// are left to `predict`.
+fn outside(model: &Model) -> Vec<String> {
+    let quick = Options { brief: true, ..Options::default() };
+    let families = [Family::Topology, Family::Caches].into_iter();
+    let parameters: Vec<Parameter> = families.flat_map(|f| measure::family(f, &quick)).collect();
+    let mut notes = Vec::new();
+    for range in &model.ranges {
+        let reported = parameters.iter().find(|p| p.name == range.parameter && p.how == How::Reported);
+        let Some(value) = reported.and_then(|p| p.value) else { continue };
+        // The same tolerance as that of a prediction.
+        if value < range.min / 1.1 || value > range.max * 1.1 {
+            let Range { parameter, min, max } = range;
+            notes.push(format!("extrapolates: {parameter} is {value}, in training it was {min} to {max}"));
+        }
+    }
+    notes
 }
 
 impl Finding {

@@ -10,7 +10,7 @@ pub(crate) fn run(arguments: Part) -> anyhow::Result<Outcome> {
     child::end_with_parent();
     match arguments.part {
         PartKind::Hardware { family, threads } => {
-            let family: Family = family.parse().map_err(|e| WrongUsage(format!("{e}")))?;
+            let family: Family = family.parse().map_err(WrongUsage)?;
             let parameters = measure::family(family, &Options { threads, ..Options::default() });
             output::print_json(&parameters)?;
         }
