@@ -44,16 +44,35 @@ impl Term {
     /// The count of operations under a load, on a machine with a last-level cache of `cache_bytes`.
     #[must_use]
     pub fn count(self, load: &Load, cache_bytes: f64) -> f64 {
-        let n = f64::from(load.objects);
-        match self {
-            Self::Call => 1.0,
-            Self::Objects => n,
-            Self::Sort => n * n.max(1.0).log2(),
-            Self::ColdObjects => n * (1.0 - cache_bytes / (WORKING_SET_BYTES * n).max(1.0)).max(0.0),
-            Self::AllPairs => n * (n - 1.0).max(0.0) / 2.0,
-            Self::AxisCandidates => load.axis_candidates,
-            Self::StripCandidates => load.strip_candidates,
-            Self::Pairs => load.pairs,
+        Counts::new(load).of(self, cache_bytes)
+    }
+}
+
+/// What the terms of all algorithms share under one load, worked out once for each decision.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Counts<'a> {
+    load: &'a Load,
+    objects: f64,
+    log2_objects: f64,
+}
+
+impl<'a> Counts<'a> {
+    pub(crate) fn new(load: &'a Load) -> Self {
+        let objects = f64::from(load.objects);
+        Self { load, objects, log2_objects: objects.max(1.0).log2() }
+    }
+
+    fn of(&self, term: Term, cache_bytes: f64) -> f64 {
+        let n = self.objects;
+        match term {
+            Term::Call => 1.0,
+            Term::Objects => n,
+            Term::Sort => n * self.log2_objects,
+            Term::ColdObjects => n * (1.0 - cache_bytes / (WORKING_SET_BYTES * n).max(1.0)).max(0.0),
+            Term::AllPairs => n * (n - 1.0).max(0.0) / 2.0,
+            Term::AxisCandidates => self.load.axis_candidates,
+            Term::StripCandidates => self.load.strip_candidates,
+            Term::Pairs => self.load.pairs,
         }
     }
 }
@@ -98,12 +117,15 @@ impl CostCurve {
     /// Predicted nanoseconds for a frame under `load`.
     #[must_use]
     pub fn cost_ns(&self, load: &Load) -> f64 {
-        let sum: f64 = self.terms.iter().map(|t| t.unit_ns * t.term.count(load, self.cache_bytes)).sum();
-        if self.correction.is_empty() { sum } else { sum * self.ln_correction(load.objects).exp() }
+        self.cost_of(&Counts::new(load))
     }
 
-    fn ln_correction(&self, objects: u32) -> f64 {
-        let x = f64::from(objects.max(1)).log2();
+    pub(crate) fn cost_of(&self, counts: &Counts<'_>) -> f64 {
+        let sum: f64 = self.terms.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum();
+        if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects).exp() }
+    }
+
+    fn ln_correction(&self, x: f64) -> f64 {
         let after = self.correction.partition_point(|k| k.log2_objects <= x);
         match (after.checked_sub(1).map(|k| self.correction[k]), self.correction.get(after)) {
             (Some(a), Some(b)) => {

@@ -1,5 +1,6 @@
 //! The fields of optimal performance: for each load the cheapest algorithm.
 
+use crate::cost::Counts;
 use crate::schema_tag::schema_tag;
 use crate::{AlgorithmId, CostCurve, Load, Registry};
 
@@ -180,9 +181,10 @@ impl Fields {
     /// `None` when there are no cost curves or none is usable.
     #[must_use]
     pub fn rank(&self, load: &Load, usable: impl Fn(usize) -> bool) -> Option<Ranking> {
+        let counts = Counts::new(load);
         let mut ranking: Option<Ranking> = None;
         for (k, cost) in self.costs.iter().enumerate().filter(|&(k, _)| usable(k)) {
-            let ns = cost.curve.cost_ns(load);
+            let ns = cost.curve.cost_of(&counts);
             ranking = Some(match ranking {
                 None => Ranking { best: k, best_ns: ns, runner_up: None },
                 Some(r) if ns < r.best_ns => Ranking { best: k, best_ns: ns, runner_up: Some((r.best, r.best_ns)) },

@@ -187,6 +187,15 @@ pub struct Prediction {
 const CORRECTION_OCTAVES: std::ops::RangeInclusive<u32> = 3..=24;
 
 impl Model {
+    /// The model that comes with this library: `models/default.json`, whose card is `models/README.md`.
+    ///
+    /// # Errors
+    /// When the file that was built in is no sound model, which the tests rule out.
+    #[cfg(feature = "model")]
+    pub fn built_in() -> Result<Self, crate::json::JsonError> {
+        crate::json::model(include_str!("../models/default.json"))
+    }
+
     /// Predicts the cost curves of `algorithms`, given with the revisions that will run, on a machine.
     ///
     /// # Errors

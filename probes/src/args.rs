@@ -1,7 +1,7 @@
 //! The command line.
 
 use clap::{Args, Parser, Subcommand};
-use sapwise::AlgorithmId;
+use sapwise::{AlgorithmId, Scenario};
 use std::path::PathBuf;
 
 /// Measures this machine, predicts which broad-phase algorithm is fastest on it, and runs it.
@@ -17,8 +17,10 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Verb {
+    Predict(Predict),
     Devices(Devices),
     Probe(Probe),
+    Run(Run),
     Train(Train),
     Pairs(Pairs),
     Check(Check),
@@ -71,6 +73,72 @@ pub(crate) struct Probe {
     #[arg(long, value_name = "R.json")]
     pub(crate) out: Option<PathBuf>,
     /// The report on standard output instead of a summary.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Predicts which algorithm is fastest on this machine, for each number of objects, from its hardware parameters alone.
+///
+/// Measures the hardware in a few seconds and runs no sweep. With --report it predicts for the machine of that report.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sapwise predict
+  sapwise predict --scenario clustered --out fields.json
+  sapwise predict --report other-machine.json --model mine.json")]
+pub(crate) struct Predict {
+    /// Predict for the machine of this report instead of measuring this one.
+    #[arg(long, value_name = "R.json", conflicts_with = "threads")]
+    pub(crate) report: Option<PathBuf>,
+    /// Use this model instead of the built-in one.
+    #[arg(long, value_name = "M.json")]
+    pub(crate) model: Option<PathBuf>,
+    /// Scenario of the slice that is shown: the choice itself depends on the load of each frame.
+    #[arg(long, value_name = "NAME", default_value_t = Scenario::Uniform)]
+    pub(crate) scenario: Scenario,
+    /// Use this many cores at most, as if the machine had no more.
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) threads: Option<u32>,
+    /// Where the fields go.
+    #[arg(long, value_name = "T.json")]
+    pub(crate) out: Option<PathBuf>,
+    /// The fields on standard output instead of a summary.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Runs a scenario with the adaptive module and with every fixed algorithm, and says what the choice was worth.
+///
+/// All of them run on the same frames in turn, so that a machine that slows down slows all of them.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sapwise run fragmentation
+  sapwise run fragmentation --fields report.json --plot run.svg    (fields measured on this machine)
+  sapwise run clustered --objects 50000 --frames 100 --json")]
+pub(crate) struct Run {
+    /// The scenario.
+    #[arg(value_name = "SCENARIO")]
+    pub(crate) scenario: Scenario,
+    /// Fields, or a report to measure them from. Without this option they are predicted from this machine's hardware.
+    #[arg(long, value_name = "T.json")]
+    pub(crate) fields: Option<PathBuf>,
+    /// Objects; in fragmentation the largest number of them.
+    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub(crate) objects: u32,
+    /// Frames. Without this option 200, in fragmentation one cycle of 600.
+    #[arg(long, value_name = "F", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) frames: Option<u32>,
+    /// How often the whole simulation is run; times are medians over the repeats.
+    #[arg(long, value_name = "R", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) repeats: u32,
+    /// Seed of the scenario.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Where a picture of the costs and decisions goes.
+    #[arg(long, value_name = "P.svg")]
+    pub(crate) plot: Option<PathBuf>,
+    /// One JSON object on standard output instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
 }

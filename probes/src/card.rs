@@ -1,7 +1,7 @@
 //! The card of a model: what it was trained on and how well it did.
 
+use crate::train::card;
 use sapwise::Model;
-use sapwise::model::Validation;
 
 /// The card as a page of Markdown.
 pub(crate) fn page(model: &Model, notes: &[String]) -> String {
@@ -13,7 +13,7 @@ pub(crate) fn page(model: &Model, notes: &[String]) -> String {
         text.push_str(&format!("| {} | {} | {} |\n", report.file, report.physical_id, label.trim_matches('"')));
     }
     text.push_str("\n## Validation\n\n");
-    text.push_str(&scores(&model.validation, markdown));
+    text.push_str(&card::markdown(&model.validation));
     text.push_str("\n## Ranges\n\nA machine outside is extrapolated, and `predict` says so.\n\n");
     let mut rows = vec![["parameter", "lowest", "highest"].map(str::to_owned).to_vec()];
     for range in &model.ranges {
@@ -25,26 +25,6 @@ pub(crate) fn page(model: &Model, notes: &[String]) -> String {
         notes.iter().for_each(|note| text.push_str(&format!("- {note}\n")));
     }
     text
-}
-
-/// The scores with a sentence before them, as a table that `draw` draws.
-pub(crate) fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) -> String {
-    let Validation { held_out, physical_machines, profiles, methods } = validation;
-    let mut rows = vec![
-        ["way to choose", "mean regret", "95th percentile", "points over 10 %", "closed gap"].map(str::to_owned).to_vec(),
-    ];
-    let percent = |share: f64| format!("{:.1} %", share * 100.0);
-    for m in methods {
-        let gap = format!("{:.2}", m.closed_gap);
-        rows.push(vec![m.name.clone(), percent(m.mean_regret), percent(m.p95_regret), percent(m.share_over_10_percent), gap]);
-    }
-    let plural = |count: usize| if count == 1 { "" } else { "s" };
-    format!(
-        "{physical_machines} physical machine{}, {profiles} profile{}; held out in turn: {held_out}.\n\n{}",
-        plural(*physical_machines),
-        plural(*profiles),
-        draw(&rows)
-    )
 }
 
 /// Rows as a Markdown table, the first its head.

@@ -2,6 +2,7 @@
 
 mod args;
 mod boxes;
+mod card;
 mod child;
 mod contention;
 mod date;
@@ -12,12 +13,16 @@ mod files;
 mod hardware;
 mod interrupt;
 mod output;
+mod plot;
+mod prediction;
 mod progress;
 mod provenance;
+mod simulation;
 mod summary;
 mod sweep;
 mod table;
 mod train;
+mod turns;
 mod verbs;
 
 use clap::Parser;

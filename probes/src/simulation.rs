@@ -2,6 +2,7 @@
 
 use crate::interrupt;
 use crate::progress::Progress;
+use crate::turns::Turns;
 use anyhow::{Context, bail};
 use sapwise::{Adaptive, AlgorithmId, BroadPhase, Fields, Pairs, Registry, Scenario};
 use std::time::Instant;
@@ -94,7 +95,8 @@ impl Contestant {
     }
 }
 
-/// Runs the course: in each repeat the same frames again, and at each frame every contestant, in an order that rotates.
+/// Runs the course: in each repeat the same frames again, and at each frame every contestant, in random order: a
+/// parallel algorithm leaves threads and caches behind that the next one feels.
 ///
 /// The pairs of all contestants are compared in the first repeat, outside the timed part.
 ///
@@ -110,6 +112,7 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
     let mut adaptive_ns: Vec<Vec<u64>> = vec![Vec::new(); course.frames];
     let mut frames: Vec<Frame> = Vec::with_capacity(course.frames);
     let mut pairs = Pairs::new();
+    let mut turns = Turns::new(course.seed);
     let progress = Progress::new((course.repeats * course.frames) as u64);
     let mut done = 0;
     'repeats: for repeat in 0..course.repeats {
@@ -123,9 +126,8 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
             let boxes = scene.boxes();
             let mut fingerprint = None;
             let best = contestants.iter().map(|c| c.median(frame)).fold(f64::INFINITY, f64::min);
-            // The adaptive module takes the turn after the last of the fixed ones.
-            for turn in 0..=contestants.len() {
-                let k = (turn + frame + repeat) % (contestants.len() + 1);
+            // The turn behind the last of the fixed ones is the adaptive module's.
+            for k in turns.order(contestants.len() + 1) {
                 let started = Instant::now();
                 let (result, ns) = match contestants.get_mut(k) {
                     Some(c) if repeat > 0 && c.median(frame) > HOPELESS * best => continue,
@@ -186,12 +188,8 @@ mod tests {
 
     #[test]
     fn figures_follow_from_the_frames() {
-        let frame = |adaptive_ns, a, b, chosen| Frame {
-            objects: 10,
-            adaptive_ns,
-            fixed_ns: vec![a, b],
-            chosen: Some(chosen),
-        };
+        let frame =
+            |adaptive_ns, a, b, chosen| Frame { objects: 10, adaptive_ns, fixed_ns: vec![a, b], chosen: Some(chosen) };
         let outcome = Outcome {
             fixed: vec!["brute@cpu1".parse().unwrap(), "strips@cpu1".parse().unwrap()],
             frames: vec![frame(1e6, 1e6, 4e6, 0), frame(3e6, 5e6, 2e6, 1), frame(2e6, 5e6, 2e6, 1)],

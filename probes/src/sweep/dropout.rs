@@ -3,6 +3,9 @@
 /// An algorithm leaves when it takes more than this many times as long as the best.
 const HOPELESS: f64 = 8.0;
 
+/// Nobody leaves below this size: a frame costs microseconds there, and a ratio of two such times jumps from size to size.
+const JUDGED_FROM: u32 = 1000;
+
 /// The paper's method stays up to this size even when it is hopeless: its curve is what the paper's borders are made of.
 const BRUTE_STAYS_BELOW: u32 = 3000;
 
@@ -22,7 +25,7 @@ impl Standing {
     pub(crate) fn judge(&mut self, ratio: f64, method: &str, objects: u32) {
         let grows = self.before.is_some_and(|before| ratio > before);
         let kept = method == "brute" && objects < BRUTE_STAYS_BELOW;
-        self.out |= ratio > HOPELESS && grows && !kept;
+        self.out |= ratio > HOPELESS && grows && !kept && objects >= JUDGED_FROM;
         self.before = Some(ratio);
     }
 }
@@ -43,6 +46,7 @@ mod tests {
         assert!(!out("sweep", &[(9.0, 1000)]));
         assert!(!out("sweep", &[(50.0, 10), (20.0, 100), (9.0, 1000)]));
         assert!(!out("sweep", &[(2.0, 1000), (7.9, 2000)]));
+        assert!(!out("sweep", &[(20.0, 10), (30.0, 18), (9.0, 1000)]));
     }
 
     #[test]

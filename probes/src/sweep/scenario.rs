@@ -7,7 +7,7 @@ use sapwise::report::Point;
 use sapwise::{Registry, Scenario, Scene};
 use std::time::{Duration, Instant};
 
-/// Most pairs in a frame: 16 bytes for each pair of objects that a full sweep can hold, 256 MB in the shared list.
+/// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
 const PAIR_LIMIT: usize = 32 << 20;
 
 /// Runs the algorithms of a registry through the sizes of an order and hands on what happens.

@@ -4,8 +4,11 @@ mod check;
 mod devices;
 mod pairs;
 mod part;
+mod predict;
 mod probe;
+mod run;
 mod schema;
+mod train;
 
 use crate::args::Verb;
 use crate::exit::{Outcome, WrongUsage};
@@ -20,9 +23,11 @@ pub(crate) fn run(verb: Verb) -> anyhow::Result<Outcome> {
     // level that it was not taken at.
     SimdLevel::requested().map_err(WrongUsage)?;
     match verb {
+        Verb::Predict(arguments) => predict::run(&arguments),
         Verb::Devices(arguments) => devices::run(&arguments),
         Verb::Probe(arguments) => probe::run(&arguments),
-        Verb::Train(_) => Ok(Outcome::Failed),
+        Verb::Run(arguments) => run::run(&arguments),
+        Verb::Train(arguments) => train::run(&arguments),
         Verb::Pairs(arguments) => pairs::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),

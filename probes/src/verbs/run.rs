@@ -58,7 +58,8 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
     let fields = fields(arguments)?;
     interrupt::check()?;
     let source = fields.source;
-    let usual_frames = if arguments.scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as u32 } else { 200 };
+    let usual_frames =
+        if arguments.scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as u32 } else { 200 };
     let course = Course {
         scenario: arguments.scenario,
         objects: arguments.objects as usize,

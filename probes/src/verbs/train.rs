@@ -3,8 +3,8 @@
 use crate::args::Train;
 use crate::document::read_document;
 use crate::exit::{Outcome, WrongUsage};
-use crate::train::{Trained, train};
-use crate::{card, files, output, table};
+use crate::train::{self, Trained};
+use crate::{card, files, output};
 use anyhow::{Context, bail};
 use sapwise::json::Document;
 use sapwise::model::Validation;
@@ -24,7 +24,7 @@ struct Answer<'a> {
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
     let reports = reports(&arguments.reports)?;
-    let Trained { model, notes } = train(&reports, &name)?;
+    let Trained { model, notes } = train::train(&reports, &name)?;
     let text = sapwise::json::write(&model)?;
     files::write_atomically(&arguments.out, |w| Ok(w.write_all(text.as_bytes())?))?;
     if let Some(path) = &arguments.card {
@@ -90,7 +90,7 @@ fn file_name(path: &Path) -> String {
 }
 
 fn summary(model: &Model, notes: &[String], path: &Path) -> String {
-    let mut text = card::scores(&model.validation, table::columns);
+    let mut text = train::card::text(&model.validation);
     for note in notes {
         text.push_str(&format!("note: {note}\n"));
     }

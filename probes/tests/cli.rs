@@ -1,0 +1,178 @@
+//! The command as other programs and people meet it: usage, exit statuses, the JSON of each verb.
+
+mod common;
+
+use common::{failure, npy, sapwise, success};
+use std::fs;
+
+#[test]
+fn every_verb_has_help_with_an_example() {
+    let all = success(sapwise().arg("--help"));
+    for verb in ["devices", "probe", "train", "pairs", "check", "schema"] {
+        assert!(all.contains(verb), "{verb}");
+        let help = success(sapwise().args([verb, "--help"]));
+        assert!(help.contains("Example") && help.contains(&format!("sapwise {verb}")), "{verb}: {help}");
+    }
+    assert!(!all.contains("part"), "the hidden verb is shown: {all}");
+}
+
+#[test]
+fn wrong_usage_is_exit_status_two() {
+    let cases: [&[&str]; 9] = [
+        &[],
+        &["fly"],
+        &["devices", "--fast"],
+        &["pairs"],
+        &["pairs", "x.npy", "--repeat", "0"],
+        &["pairs", "x.npy", "--algorithm", "strips"],
+        &["probe", "--scenario", "nowhere"],
+        &["probe", "--threads", "4096"],
+        &["probe", "--hardware-only", "--quick"],
+    ];
+    for words in cases {
+        failure(sapwise().args(words), 2);
+    }
+    assert!(failure(sapwise().args(["probe", "--scenario", "nowhere"]), 2).contains("uniform"));
+}
+
+#[test]
+fn a_wrong_simd_level_is_refused_by_every_verb() {
+    for words in [&["devices"][..], &["check", "x.json"], &["probe"], &["pairs", "x.npy"], &["schema", "--out", "x"]] {
+        let complaint = failure(sapwise().env("SAPWISE_SIMD", "sse9").args(words), 2);
+        assert!(complaint.contains("SAPWISE_SIMD=sse9"), "{complaint}");
+    }
+    success(sapwise().env("SAPWISE_SIMD", "portable").arg("devices"));
+}
+
+#[test]
+fn devices_lists_algorithms_and_no_adapter() {
+    let answer: serde_json::Value = serde_json::from_str(&success(sapwise().args(["devices", "--json"]))).unwrap();
+    let algorithms = answer["algorithms"].as_array().unwrap();
+    assert!(answer["adapters"].as_array().unwrap().is_empty());
+    let brute = algorithms.iter().find(|a| a["id"] == "brute@cpu1").unwrap();
+    assert_eq!((&brute["available"], &brute["reason"]), (&true.into(), &serde_json::Value::Null));
+    assert!(brute["revision"].as_u64().unwrap() >= 1);
+    let text = success(sapwise().arg("devices"));
+    assert!(text.contains("brute@cpu1") && text.contains("no GPU backend"), "{text}");
+}
+
+#[test]
+fn pairs_keeps_its_contract() {
+    let folder = tempfile::tempdir().unwrap();
+    // Two frames of four boxes: in the first, 0 touches 1 and 1 overlaps 3; in the second, all overlap.
+    let first = [0.0_f32, 1.0, 9.0, 1.5].map(|x| [x, 0.0, 0.0, x + 1.0, 1.0, 1.0]);
+    let second = [[0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0]; 4];
+    let boxes = npy(folder.path(), "boxes.npy", "<f4", "2, 4, 6", &[first, second].concat().concat());
+    let out = folder.path().join("pairs.npy");
+    for algorithm in ["brute@cpu1", "strips@cpu1"] {
+        let text = success(
+            sapwise()
+                .arg("pairs")
+                .arg(&boxes)
+                .args(["--algorithm", algorithm, "--repeat", "3", "--json", "--out"])
+                .arg(&out),
+        );
+        let answer: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(answer["algorithm"], algorithm);
+        assert_eq!((&answer["objects"], &answer["frames"]), (&4.into(), &2.into()));
+        assert_eq!(answer["pairs"], serde_json::json!([2, 6]));
+        assert_eq!(answer["samples_ms"].as_array().unwrap().len(), 6);
+        assert!(answer["median_ms"].as_f64().unwrap() > 0.0);
+        let fingerprint = answer["fingerprint"].as_str().unwrap();
+        assert!(fingerprint.len() == 16 && u64::from_str_radix(fingerprint, 16).is_ok(), "{fingerprint}");
+        let bytes = fs::read(&out).unwrap();
+        let header = String::from_utf8_lossy(&bytes[..128]).into_owned();
+        assert!(header.contains("<u4") && header.contains("(6, 2)"), "{header}");
+        let members: Vec<u32> =
+            bytes[bytes.len() - 48..].chunks(4).map(|c| u32::from_le_bytes(c.try_into().unwrap())).collect();
+        assert_eq!(members, [0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 2, 3]);
+    }
+    assert!(success(sapwise().arg("pairs").arg(&boxes)).contains("pairs in the last frame: 6"));
+}
+
+#[test]
+fn pairs_takes_no_and_one_box() {
+    let folder = tempfile::tempdir().unwrap();
+    for (shape, floats) in [("0, 6", 0), ("1, 6", 6), ("3, 0, 6", 0)] {
+        let boxes = npy(folder.path(), "few.npy", "<f4", shape, &vec![0.0; floats]);
+        let text = success(sapwise().arg("pairs").arg(&boxes).arg("--json"));
+        let answer: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert!(answer["pairs"].as_array().unwrap().iter().all(|p| p == 0), "{shape}: {text}");
+    }
+}
+
+#[test]
+fn bad_boxes_are_told_with_file_frame_and_position() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = [0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0];
+    let mut nan = [good, good, good, good].concat();
+    nan[20] = f32::NAN;
+    let inverted = [[5.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0], good].concat();
+    let crowd = good.repeat(50);
+    let path = |name, dtype, shape, data: &[f32]| npy(folder.path(), name, dtype, shape, data);
+    let cases: [(_, &[&str], &[&str]); 7] = [
+        (path("nan.npy", "<f4", "2, 2, 6", &nan), &[], &["nan.npy", "frame 1", "box 1", "NaN"]),
+        (path("inverted.npy", "<f4", "2, 6", &inverted), &[], &["inverted.npy", "frame 0", "box 0", "inverted"]),
+        (path("big.npy", ">f4", "1, 6", &good), &[], &["big.npy", "big-endian"]),
+        (path("flat.npy", "<f4", "6,", &good), &[], &["flat.npy", "shape"]),
+        (path("short.npy", "<f4", "2, 6", &good), &[], &["short.npy", "truncated"]),
+        (path("crowd.npy", "<f4", "50, 6", &crowd), &["--limit", "100"], &["crowd.npy", "1225 pairs", "100"]),
+        (folder.path().join("absent.npy"), &[], &["absent.npy"]),
+    ];
+    for (file, options, expected) in cases {
+        let complaint = failure(sapwise().arg("pairs").arg(&file).args(options), 1);
+        assert!(complaint.starts_with("error: "), "{complaint}");
+        expected.iter().for_each(|text| assert!(complaint.contains(text), "{text} is missing: {complaint}"));
+    }
+}
+
+#[test]
+fn an_unknown_algorithm_is_wrong_usage_and_names_the_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0; 6]);
+    for id in ["octree@cpu1", "brute@gpu0"] {
+        let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--algorithm", id]), 2);
+        assert!(complaint.contains("brute@cpu1"), "{complaint}");
+    }
+}
+
+#[test]
+fn an_output_that_can_not_be_written_is_a_failure_that_names_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0; 6]);
+    // A folder below a file can't be made even by a superuser.
+    let out = boxes.join("pairs.npy");
+    let complaint = failure(sapwise().arg("pairs").arg(&boxes).arg("--out").arg(&out), 1);
+    assert!(complaint.contains("pairs.npy"), "{complaint}");
+    let complaint = failure(sapwise().args(["schema", "--out"]).arg(&out), 1);
+    assert!(complaint.contains("pairs.npy"), "{complaint}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_a_failure_and_a_closed_pipe_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0; 6]);
+    let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--out", "/dev/full"]), 1);
+    assert!(complaint.contains("/dev/full"), "{complaint}");
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let ended =
+        std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise")).arg("devices").stdout(full).output().unwrap();
+    assert_eq!(ended.status.code(), Some(1));
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let ended =
+        std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise")).arg("devices").stdout(writer).output().unwrap();
+    assert_eq!((ended.status.code(), ended.stderr.len()), (Some(0), 0));
+}
+
+#[test]
+fn schema_writes_three_files() {
+    let folder = tempfile::tempdir().unwrap();
+    success(sapwise().args(["schema", "--out"]).arg(folder.path().join("new")));
+    for name in ["report-1", "model-1", "fields-1"] {
+        let text = fs::read_to_string(folder.path().join("new").join(format!("{name}.schema.json"))).unwrap();
+        let schema: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert!(schema["properties"]["schema"].is_object() || schema["$defs"].is_object(), "{text}");
+    }
+}

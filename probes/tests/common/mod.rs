@@ -1,0 +1,46 @@
+//! What the tests of the command share.
+
+#![allow(dead_code, reason = "each test program uses a part of this")]
+
+use assert_cmd::Command;
+use std::path::{Path, PathBuf};
+
+/// The command, with no SIMD level from the environment of the tests.
+pub(crate) fn sapwise() -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+    command.env_remove("SAPWISE_SIMD");
+    command
+}
+
+/// Runs to exit status 0 and gives standard output.
+pub(crate) fn success(command: &mut Command) -> String {
+    let ended = command.output().unwrap();
+    let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(0), "{command:?}: {complaint}");
+    String::from_utf8(ended.stdout).unwrap()
+}
+
+/// Runs to this exit status and gives standard error, which must not be a panic.
+pub(crate) fn failure(command: &mut Command, status: i32) -> String {
+    let ended = command.output().unwrap();
+    let complaint = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(ended.status.code(), Some(status), "{command:?}: {complaint}");
+    assert!(!complaint.contains("panicked"), "{complaint}");
+    complaint
+}
+
+/// Writes a file in NumPy's format 1.0. `dtype` and `shape` stand as they are in the header; the data is little-endian.
+pub(crate) fn npy(folder: &Path, name: &str, dtype: &str, shape: &str, data: &[f32]) -> PathBuf {
+    let mut header = format!("{{'descr': '{dtype}', 'fortran_order': False, 'shape': ({shape}), }}");
+    while (10 + header.len() + 1) % 64 != 0 {
+        header.push(' ');
+    }
+    header.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(data.iter().flat_map(|x| x.to_le_bytes()));
+    let path = folder.join(name);
+    std::fs::write(&path, bytes).unwrap();
+    path
+}

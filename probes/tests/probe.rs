@@ -1,0 +1,105 @@
+//! `sapwise probe`: reports that read back, interruptions and disks that fail.
+
+mod common;
+
+use common::{failure, sapwise, success};
+use sapwise::report::{Label, Report};
+use std::fs;
+use std::path::Path;
+
+/// A sweep of one scenario with two sizes.
+const TINY: [&str; 5] = ["probe", "--scenario", "uniform", "--max-objects", "20"];
+
+fn read(path: &Path) -> Report {
+    sapwise::json::report(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+#[test]
+fn a_probe_writes_a_report_that_reads_back_with_every_parameter_and_point() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report.json");
+    let text = success(sapwise().args(TINY).args(["--seed", "9", "--out"]).arg(&out));
+    assert!(text.contains("usable_cores") && text.contains("uniform") && text.contains("Next:"), "{text}");
+    let report = read(&out);
+    let names: Vec<&str> = report.hardware.parameters.iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(names, sapwise::hardware::parameter::all_names());
+    assert_eq!(report.points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [10, 20]);
+    assert!(report.points.iter().all(|p| p.timings.iter().all(|t| t.samples_ns.len() >= 3)));
+    assert_eq!(report.provenance.command, "probe --seed 9 --max-objects 20 --scenario uniform");
+    assert_eq!((report.provenance.seed, report.remarks.len()), (9, 0), "{:?}", report.remarks);
+    assert_eq!(report.provenance.optimised, !cfg!(debug_assertions));
+    // One point a line, so that a report can be read and compared by people.
+    let lines = fs::read_to_string(&out).unwrap();
+    assert_eq!(lines.lines().filter(|l| l.trim_start().starts_with("{\"scenario\"")).count(), 2);
+    success(sapwise().arg("check").arg(&out));
+}
+
+#[test]
+fn fewer_threads_and_contention_are_labelled_and_json_alone_writes_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = sapwise();
+    command.current_dir(folder.path()).args(TINY).args(["--threads", "1", "--contended", "--json"]);
+    let report = sapwise::json::report(&success(&mut command)).unwrap();
+    assert_eq!((report.label, report.provenance.threads), (Label::RealContended, Some(1)));
+    assert!(report.algorithms.iter().all(|t| t.id.threads() == 1), "{:?}", report.algorithms);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn hardware_only_has_no_points_and_goes_to_report_json() {
+    let folder = tempfile::tempdir().unwrap();
+    success(sapwise().current_dir(folder.path()).args(["probe", "--hardware-only"]));
+    let report = read(&folder.path().join("report.json"));
+    assert!(report.points.is_empty() && report.algorithms.is_empty());
+}
+
+#[test]
+fn a_folder_that_takes_no_file_is_told_before_measuring() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    fs::write(&file, "").unwrap();
+    for out in [file.join("report.json"), folder.path().to_path_buf()] {
+        let complaint = failure(sapwise().args(TINY).arg("--out").arg(&out), 1);
+        assert!(complaint.contains("--out"), "{complaint}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_keeps_the_report_in_the_folder_for_temporary_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let complaint = failure(sapwise().env("TMPDIR", folder.path()).args(TINY).args(["--out", "/dev/full"]), 1);
+    assert!(complaint.contains("/dev/full"), "{complaint}");
+    let kept: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().path()).collect();
+    assert_eq!(kept.len(), 1, "{kept:?}");
+    assert!(complaint.contains(&*kept[0].to_string_lossy()), "{complaint}");
+    assert_eq!(read(&kept[0]).points.len(), 2);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_what_was_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report.json");
+    let mut probe = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+    probe.env_remove("SAPWISE_SIMD").args(["probe", "--max-objects", "30"]).arg("--out").arg(&out);
+    for scenario in sapwise::Scenario::ALL {
+        probe.args(["--scenario", scenario.name()]);
+    }
+    let probe = probe.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    // Written first when the first of ten scenarios is done.
+    while !out.exists() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let sent = std::process::Command::new("kill").args(["-INT", &probe.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let ended = probe.wait_with_output().unwrap();
+    let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(1), "{complaint}");
+    assert!(complaint.contains("error: interrupted"), "{complaint}");
+    let report = read(&out);
+    assert!(!report.points.is_empty());
+    assert!(report.remarks.iter().any(|r| r.starts_with("interrupted after ")), "{:?}", report.remarks);
+    assert!(!report.remarks.iter().any(|r| r.starts_with("unfinished")), "{:?}", report.remarks);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "a temporary file is left");
+}
