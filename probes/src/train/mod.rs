@@ -1,7 +1,6 @@
 //! From reports to cost curves, fields and models.
 
 mod baselines;
-pub(crate) mod card;
 mod columns;
 mod curve;
 mod direct;
@@ -82,7 +81,6 @@ mod tests {
         assert_eq!(trained.model.ranges.len(), PARAMETERS.len());
         let cores = trained.model.ranges.iter().find(|r| r.parameter == parameter::USABLE_CORES).unwrap();
         assert_eq!((cores.min, cores.max), (2.0, 16.0));
-        println!("{}", card::text(&trained.model.validation));
     }
 
     #[test]

@@ -120,9 +120,11 @@ fn weighted_ridge(x: &Array2<f64>, y: &Array1<f64>, weights: &[f64], penalty: f6
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::Random;
+    use super::super::synthetic::{Machine, Random, truth};
     use super::*;
     use linfa::traits::Predict;
+    use sapwise::model::{MethodModel, ModelTerm, Scale};
+    use sapwise::{Load, Term};
 
     fn residuals(rows: usize) -> Residuals {
         let mut random = Random::new(11);
@@ -146,6 +148,33 @@ mod tests {
         for k in 0..120 {
             let ours = ridge.at(&data.features.row(k).to_vec());
             assert!((ours - ridge.intercept - linfa[k]).abs() < 1e-9, "{ours} {}", linfa[k]);
+        }
+    }
+
+    #[test]
+    fn the_library_evaluates_a_stored_residual_as_linfa_does() {
+        let machine = &Machine::family()[3];
+        let mut features = Array2::zeros((52, FEATURES.len()));
+        for k in 0..52 {
+            let load = Load { objects: 1 << (4 + k % 13), ..Load::default() };
+            let values = FEATURES.map(|f| f.value(&machine.hardware(), 1 << (k % 4), &load).unwrap());
+            features.row_mut(k).assign(&Array1::from(values.to_vec()));
+        }
+        let ln_ratios = features.rows().into_iter().map(|f| 0.3 - 0.05 * f[0] + 0.004 * f[1] + 0.1 * f[3]).collect();
+        let data = Residuals { features, ln_ratios, weights: vec![1.0; 52], groups: vec![0; 52] };
+        let ridge = data.ridge().unwrap();
+        let columns = Columns::new(&data.features, &data.weights);
+        let centred = data.ln_ratios.iter().map(|y| y - ridge.intercept).collect();
+        let linfa = weighted_ridge(&columns.values, &centred, &data.weights, DEFAULT_PENALTY).unwrap();
+        let linfa = linfa.predict(&columns.values) + ridge.intercept;
+        let terms = vec![ModelTerm { term: Term::Objects, scale: Scale::Cycle, unit: 2.0 }];
+        let bare = MethodModel { terms, ..truth().remove(0) };
+        let full = MethodModel { residual_intercept: ridge.intercept, residual: ridge.terms, ..bare.clone() };
+        for k in 0..52 {
+            let load = Load { objects: 1 << (4 + k % 13), ..Load::default() };
+            let cost = |m: &MethodModel| m.curve(&machine.hardware(), 1 << (k % 4)).unwrap().cost_ns(&load);
+            let residual = (cost(&full) / cost(&bare)).ln();
+            assert!((residual - linfa[k]).abs() < 1e-9, "{residual} {}", linfa[k]);
         }
     }
 
