@@ -32,7 +32,7 @@ pub(crate) fn methods(profiles: &[&Profile]) -> Result<(Vec<MethodModel>, Vec<St
         match Shared::new(&method, rows, profiles, &mut notes).model()? {
             Some(model) => methods.push(model),
             None => {
-                notes.push(format!("{method} is left out: fewer than {FEWEST_POINTS} points, or no term explains its time"))
+                notes.push(format!("{method} is left out: fewer than {FEWEST_POINTS} points, or no term explains its time"));
             }
         }
     }
