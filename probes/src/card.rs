@@ -1,7 +1,7 @@
 //! The card of a model: what it was trained on and how well it did.
 
-use crate::train::card;
 use sapwise::Model;
+use sapwise::model::Validation;
 
 /// The card as a page of Markdown.
 pub(crate) fn page(model: &Model, notes: &[String]) -> String {
@@ -13,7 +13,7 @@ pub(crate) fn page(model: &Model, notes: &[String]) -> String {
         text.push_str(&format!("| {} | {} | {} |\n", report.file, report.physical_id, label.trim_matches('"')));
     }
     text.push_str("\n## Validation\n\n");
-    text.push_str(&card::markdown(&model.validation));
+    text.push_str(&scores(&model.validation, markdown));
     text.push_str("\n## Ranges\n\nA machine outside is extrapolated, and `predict` says so.\n\n");
     let mut rows = vec![["parameter", "lowest", "highest"].map(str::to_owned).to_vec()];
     for range in &model.ranges {
@@ -27,6 +27,25 @@ pub(crate) fn page(model: &Model, notes: &[String]) -> String {
     text
 }
 
+/// What was held out, and the scores as a table that `draw` draws.
+pub(crate) fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) -> String {
+    let Validation { held_out, physical_machines, profiles, methods } = validation;
+    let count = |number: usize, what: &str| format!("{number} {what}{}", if number == 1 { "" } else { "s" });
+    let data = format!("{} in {}", count(*physical_machines, "physical machine"), count(*profiles, "profile"));
+    if methods.is_empty() {
+        return format!("{data}; not validated.\n");
+    }
+    let doubt = if held_out == "profile" { " This says little about machines never seen." } else { "" };
+    let percent = |share: f64| format!("{:.1} %", share * 100.0);
+    let head = ["way to choose", "mean regret", "95th percentile", "points over 10 %", "gap closed"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    rows.extend(methods.iter().map(|m| {
+        let figures = [m.mean_regret, m.p95_regret, m.share_over_10_percent, m.closed_gap].map(percent);
+        [vec![m.name.clone()], figures.to_vec()].concat()
+    }));
+    format!("{data}; each {held_out} left out in turn.{doubt}\n\n{}", draw(&rows))
+}
+
 /// Rows as a Markdown table, the first its head.
 fn markdown(rows: &[Vec<String>]) -> String {
     let mut text = String::new();
@@ -37,4 +56,29 @@ fn markdown(rows: &[Vec<String>]) -> String {
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::columns;
+    use sapwise::model::MethodScore;
+
+    #[test]
+    fn scores_tell_what_they_do_not_say() {
+        let score = MethodScore {
+            name: "physics".to_owned(),
+            mean_regret: 0.05,
+            p95_regret: 0.125,
+            share_over_10_percent: 0.0,
+            closed_gap: 0.9,
+        };
+        let mut validation =
+            Validation { held_out: "profile".to_owned(), physical_machines: 1, profiles: 2, methods: vec![score] };
+        let text = scores(&validation, markdown);
+        assert!(text.contains("1 physical machine in 2 profiles") && text.contains("says little"), "{text}");
+        assert!(text.contains("|---|---|---|---|---|\n| physics | 5.0 % | 12.5 % | 0.0 % | 90.0 % |"), "{text}");
+        validation.methods.clear();
+        assert_eq!(scores(&validation, columns), "1 physical machine in 2 profiles; not validated.\n");
+    }
 }

@@ -3,6 +3,7 @@
 use crate::args::Train;
 use crate::document::read_document;
 use crate::exit::{Outcome, WrongUsage};
+use crate::table::columns;
 use crate::train::{self, Trained};
 use crate::{card, files, output};
 use anyhow::{Context, bail};
@@ -90,7 +91,7 @@ fn file_name(path: &Path) -> String {
 }
 
 fn summary(model: &Model, notes: &[String], path: &Path) -> String {
-    let mut text = train::card::text(&model.validation);
+    let mut text = card::scores(&model.validation, columns);
     for note in notes {
         text.push_str(&format!("note: {note}\n"));
     }
