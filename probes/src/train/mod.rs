@@ -1,7 +1,6 @@
 //! From reports to cost curves, fields and models.
 
 mod baselines;
-pub(crate) mod card;
 mod columns;
 mod curve;
 mod direct;
