@@ -3,9 +3,25 @@
 use sapwise::Model;
 use sapwise::model::Validation;
 
+/// What every model of this kind is, whatever it was trained on.
+const USE: &str = "
+Predicts, from the hardware parameters of a machine, what each broad-phase algorithm costs under a load; `predict` derives
+from that which algorithm is fastest where. The time of a frame is a sum of physical terms with non-negative units (calls,
+fork-joins, objects, comparisons of a sort, objects outside the cache, pairs and candidates tested), each scaled by the
+parameter that it depends on (clock, SIMD lanes, scaling over threads, memory bandwidth, fork-join latency), times the
+exponential of a ridge residual. The units are fitted on relative error, robustly, and are shared by all machines and
+thread counts.
+
+Regret is the time of the choice over the time of the best choice, less one, on reports that the fit did not see. A choice
+that was not timed there, because the algorithm had left the race as hopeless, is charged ten times the best.
+
+Not for timing promises: a cost may be off by more than the choice that follows from it. Not for GPUs.
+";
+
 /// The card as a page of Markdown.
 pub(crate) fn page(model: &Model, notes: &[String]) -> String {
     let mut text = format!("# The model {}\n\nMade by `sapwise train`; this page is generated with it.\n", model.name);
+    text.push_str(USE);
     text.push_str("\n## Trained on\n\n| report | physical machine | label |\n|---|---|---|\n");
     for report in &model.trained_on {
         // The label as it stands in the report.
