@@ -119,7 +119,7 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
         progress.message(format!("{}: repeat {} of {}", course.scenario, repeat + 1, course.repeats));
         let mut scene = course.scenario.start(course.objects, course.seed);
         let mut chosen = Vec::with_capacity(course.frames);
-        for frame in 0..course.frames {
+        for (frame, own_ns) in adaptive_ns.iter_mut().enumerate() {
             if interrupt::requested() {
                 break 'repeats;
             }
@@ -132,7 +132,7 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
                 let (result, ns) = match contestants.get_mut(k) {
                     Some(c) if repeat > 0 && c.median(frame) > HOPELESS * best => continue,
                     Some(c) => (c.algorithm.find_pairs(boxes, &mut pairs), &mut c.ns[frame]),
-                    None => (adaptive.find_pairs(boxes, &mut pairs), &mut adaptive_ns[frame]),
+                    None => (adaptive.find_pairs(boxes, &mut pairs), &mut *own_ns),
                 };
                 ns.push((started.elapsed().as_nanos() as u64).max(1));
                 let name = || fixed.get(k).map_or("the adaptive module".to_owned(), AlgorithmId::to_string);

@@ -95,7 +95,13 @@ fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64) -> (CostCurve, f64) 
     if curve.defect().is_some() {
         return (curve, 0.0);
     }
-    curve.correction = correction(&residuals(&curve, rows, false), &residuals(&curve, rows, true));
+    // A bound that the terms break is evidence like a measurement: whoever is hopeless in one scenario and timed on in
+    // another would pass for cheap in both.
+    let floors = residuals(&curve, rows, true);
+    let mut evidence = residuals(&curve, rows, false);
+    let largest = evidence.iter().map(|r| r.0).fold(0.0, f64::max);
+    evidence.extend(floors.iter().filter(|f| f.0 <= largest && f.1 > 0.0));
+    curve.correction = correction(&evidence, &floors);
     let spread_ln = spread(residuals(&curve, rows, false).into_iter().map(|r| r.1).collect());
     (curve, spread_ln)
 }
@@ -106,7 +112,7 @@ fn residuals(curve: &CostCurve, rows: &[&Row], floors: bool) -> Vec<(f64, f64)> 
     rows.iter().filter(|r| r.floor == floors).map(of).collect()
 }
 
-/// Local means of the residuals, and beyond the largest measured size at least what keeps the cost above every floor.
+/// Local means of the residuals, and beyond the largest of them at least what keeps the cost above every floor.
 fn correction(measured: &[(f64, f64)], floors: &[(f64, f64)]) -> Vec<Knot> {
     // An outlier among few residuals would bend the curve: bounded at three standard deviations from the median.
     let centre = median(measured.iter().map(|r| r.1).collect());
@@ -232,6 +238,27 @@ mod tests {
         }
         assert!(curve.cost_ns(&load("uniform", 4e6)) > 100.0 * 4e6);
         assert!((curve.cost_ns(&rows[0].load) / 9000.0 - 1.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn whoever_left_one_scenario_is_not_cheap_there_because_of_another() {
+        // On two threads as fast as on one in one scenario, and eight times slower when it left the other.
+        let mut report = Machine::family()[0].clone().exact().report();
+        let from = |p: &Point| p.scenario == "clustered" && p.load.objects > 5000;
+        for point in &mut report.points {
+            let one = point.timings.iter().find(|t| t.algorithm.to_string() == "strips@cpu1").unwrap().samples_ns.clone();
+            let two = point.timings.iter_mut().find(|t| t.algorithm.to_string() == "strips@cpu2").unwrap();
+            let slower = if point.scenario == "clustered" && point.load.objects > 3000 { 8 } else { 1 };
+            two.samples_ns = one.iter().map(|ns| ns * slower + ns / 50).collect();
+        }
+        for point in report.points.iter_mut().filter(|p| from(p)) {
+            point.timings.retain(|t| t.algorithm.to_string() != "strips@cpu2");
+        }
+        let fields = measured_fields(&report, "uniform").unwrap();
+        for point in report.points.iter().filter(|p| from(p)) {
+            let chosen = &fields.costs[fields.rank(&point.load, |_| true).unwrap().best].algorithm;
+            assert_ne!(chosen.to_string(), "strips@cpu2", "{:?}", point.load);
+        }
     }
 
     #[test]
