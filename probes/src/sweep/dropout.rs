@@ -3,6 +3,10 @@
 /// An algorithm leaves when it takes more than this many times as long as the best.
 const HOPELESS: f64 = 8.0;
 
+/// An algorithm leaves at this ratio where the next size would not fit into the time with it: the border between the fast ones
+/// is worth more than one more point of a slow one.
+const SLOW: f64 = 3.0;
+
 /// Nobody leaves below this size: a frame costs microseconds there, and a ratio of two such times jumps from size to size.
 const JUDGED_FROM: u32 = 1000;
 
@@ -19,6 +23,13 @@ pub(crate) struct Standing {
 }
 
 impl Standing {
+    /// Takes the algorithm out where time is short, if it took more than [`SLOW`] times as long as the best. Gives its ratio.
+    pub(crate) fn leave_if_slow(&mut self) -> Option<f64> {
+        let slow = self.before.filter(|&ratio| ratio > SLOW);
+        self.out |= slow.is_some();
+        slow
+    }
+
     /// Judges the algorithm after a size at which it took `ratio` times as long as the best.
     ///
     /// What is slow but gains on the others stays: parallel versions start far behind and win in the end.
@@ -47,6 +58,16 @@ mod tests {
         assert!(!out("sweep", &[(50.0, 10), (20.0, 100), (9.0, 1000)]));
         assert!(!out("sweep", &[(2.0, 1000), (7.9, 2000)]));
         assert!(!out("sweep", &[(20.0, 10), (30.0, 18), (9.0, 1000)]));
+    }
+
+    #[test]
+    fn where_time_is_short_the_slow_leave_at_once() {
+        let mut standing = Standing::default();
+        assert_eq!(standing.leave_if_slow(), None);
+        standing.judge(2.0, "sweep", 10);
+        assert_eq!(standing.leave_if_slow(), None);
+        standing.judge(4.0, "sweep", 18);
+        assert_eq!((standing.leave_if_slow(), standing.out), (Some(4.0), true));
     }
 
     #[test]

@@ -28,42 +28,69 @@ pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result
     }
     let mut standings = vec![Standing::default(); runners.len()];
     let mut race = Race::new(order.seed, PAIR_LIMIT, order.contended);
-    let mut before: Option<(u32, Duration)> = None;
+    let mut before: Option<Before> = None;
     for (k, &objects) in order.sizes.iter().enumerate() {
         let left = end.saturating_duration_since(Instant::now());
-        if forecast(before, objects) > left {
-            let reached = before.map_or("before the first size".to_owned(), |(n, _)| format!("after {n} objects"));
-            let seconds = order.seconds;
-            return emit(Event::Remark(format!(
-                "{scenario} ends {reached}: {objects} don't fit into the {seconds:.0} s that it has"
-            )));
+        if let Some(before) = &mut before
+            && before.forecast(objects) > left
+        {
+            let reached = before.objects;
+            if !before.leave_out_slow(&mut standings) || before.forecast(objects) > left {
+                let seconds = order.seconds;
+                return emit(Event::Remark(format!(
+                    "{scenario} ends after {reached} objects: {objects} don't fit into the {seconds:.0} s that it has"
+                )));
+            }
+            keep_racing(&mut runners, &mut standings);
+            emit(Event::Remark(format!("{scenario}: for want of time only the fast go on after {reached} objects")))?;
         }
         let mut scene = scenario.start(objects as usize, order.seed);
         let outcome = race.run(&mut runners, &mut scene, left.mul_f64(plan::share(&order.sizes[k..])));
         for mismatch in outcome.mismatches {
             emit(Event::Mismatch(format!("{scenario} at {objects} objects: {mismatch}")))?;
         }
-        judge(&mut standings, &outcome.point, objects);
+        let best_ns = judge(&mut standings, &outcome.point, objects);
         emit(Event::Point(Box::new(outcome.point)))?;
         keep_racing(&mut runners, &mut standings);
         if runners.is_empty() {
             return emit(Event::Remark(format!("{scenario} ends after {objects} objects: no algorithm is left")));
         }
-        before = Some((objects, outcome.frame));
+        before = Some(Before { objects, frame: outcome.frame, best_ns });
     }
     Ok(())
 }
 
-/// The time that a size takes at least, from the time of a frame at the size before.
-fn forecast(before: Option<(u32, Duration)>, objects: u32) -> Duration {
-    let Some((fewer, frame)) = before else { return Duration::ZERO };
-    // Between the exponents of the strips (1) and of a sweep on one axis (5/3). Too low a forecast costs some seconds
-    // beyond the time, too high a one costs the last size.
-    let growth = (f64::from(objects) / f64::from(fewer)).powf(1.25);
-    frame.mul_f64(growth) * (FEWEST_FRAMES as u32 + 1)
+/// The size before.
+struct Before {
+    objects: u32,
+    /// Wall clock of a frame with all algorithms.
+    frame: Duration,
+    /// Median of the best.
+    best_ns: f64,
 }
 
-fn judge(standings: &mut [Standing], point: &Point, objects: u32) {
+impl Before {
+    /// The time that a size takes at least.
+    fn forecast(&self, objects: u32) -> Duration {
+        // Between the exponents of the strips (1) and of a sweep on one axis (5/3). Too low a forecast costs some seconds
+        // beyond the time, too high a one costs the last size.
+        let growth = (f64::from(objects) / f64::from(self.objects)).powf(1.25);
+        self.frame.mul_f64(growth) * (FEWEST_FRAMES as u32 + 1)
+    }
+
+    /// Takes the slow out of the race and their time out of the frame. Whether there were any.
+    fn leave_out_slow(&mut self, standings: &mut [Standing]) -> bool {
+        let ratios: f64 = standings.iter_mut().filter_map(Standing::leave_if_slow).sum();
+        let of_best = |times: f64| Duration::try_from_secs_f64(times * self.best_ns / 1e9).unwrap_or_default();
+        // The medians that are taken off may add up to more than the shortest frame; those who stay take at least this.
+        let staying = standings.iter().filter(|s| !s.out).count();
+        self.frame = self.frame.saturating_sub(of_best(ratios)).max(of_best(staying as f64));
+        ratios > 0.0
+    }
+}
+
+/// Lets every standing know how its algorithm did, and gives the median of the best.
+fn judge(standings: &mut [Standing], point: &Point, objects: u32) -> f64 {
     let medians: Vec<Option<f64>> = point.timings.iter().map(|t| median(&t.samples_ns)).collect();
     let best = medians.iter().flatten().copied().fold(f64::INFINITY, f64::min);
     for ((standing, timing), median) in standings.iter_mut().zip(&point.timings).zip(medians) {
@@ -72,6 +99,7 @@ fn judge(standings: &mut [Standing], point: &Point, objects: u32) {
             None => standing.out = true,
         }
     }
+    best
 }
 
 fn keep_racing(runners: &mut Vec<Runner>, standings: &mut Vec<Standing>) {
