@@ -14,6 +14,8 @@ pub(crate) use kernel::each_bit;
 pub use level::SimdLevel;
 pub(crate) use strip_grid::StripGrid;
 pub(crate) use threads::Threads;
+#[cfg(feature = "measure")]
+pub(crate) use threads::build_pool;
 
 use crate::{BroadPhase, Error};
 

@@ -9,6 +9,8 @@ use std::{
 /// One rayon pool for each number of threads that was asked for, made on first use.
 #[derive(Debug, Default)]
 pub(crate) struct Threads {
+    /// Whether pools made from now on are pinned; see [`Registry::pin_threads`](crate::Registry::pin_threads).
+    pub(crate) pinned: bool,
     #[cfg(feature = "parallel")]
     pools: Mutex<BTreeMap<u32, Arc<rayon::ThreadPool>>>,
 }
@@ -24,10 +26,26 @@ impl Threads {
         if let Some(pool) = pools.get(&threads) {
             return Ok(Arc::clone(pool));
         }
-        let named = move |k| format!("sapwise-{threads}-{k}");
-        let built = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).thread_name(named).build();
-        let pool = Arc::new(built.map_err(|e| format!("{threads} threads can't be started: {e}"))?);
+        let pool = Arc::new(build_pool(threads, self.pinned)?);
         pools.insert(threads, Arc::clone(&pool));
         Ok(pool)
     }
+}
+
+/// A pool of `threads` threads, each bound to a core of its own where that is wanted and there are enough.
+///
+/// # Errors
+/// The reason, when the system refuses the threads.
+#[cfg(feature = "parallel")]
+pub(crate) fn build_pool(threads: u32, pinned: bool) -> Result<rayon::ThreadPool, String> {
+    let cores = if pinned { core_affinity::get_core_ids().unwrap_or_default() } else { Vec::new() };
+    let bind = move |k: usize| {
+        if let Some(&core) = cores.get(k).filter(|_| cores.len() >= threads as usize) {
+            // A refusal leaves the thread to the scheduler, as without pinning.
+            core_affinity::set_for_current(core);
+        }
+    };
+    let named = move |k| format!("sapwise-{threads}-{k}");
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).thread_name(named).start_handler(bind);
+    builder.build().map_err(|e| format!("{threads} threads can't be started: {e}"))
 }

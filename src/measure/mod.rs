@@ -19,7 +19,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
 
 use crate::hardware::{Hardware, Machine, Parameter, parameter};
 use foreign_load::Plan;
@@ -168,5 +168,5 @@ pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
 ///
 /// The error is a sentence for [`Parameter::missing`]: a limit on processes can refuse the threads.
 fn pool(threads: usize) -> Result<ThreadPool, String> {
-    ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| format!("can't start {threads} threads: {error}"))
+    crate::cpu::build_pool(u32::try_from(threads).unwrap_or(u32::MAX), true)
 }

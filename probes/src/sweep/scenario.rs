@@ -18,7 +18,8 @@ pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result
     let scenario: Scenario = order.scenario.parse().map_err(anyhow::Error::msg)?;
     let time = Duration::try_from_secs_f64(order.seconds).unwrap_or_default();
     let end = Instant::now() + time;
-    let registry = Registry::with_cores(order.cores);
+    let mut registry = Registry::with_cores(order.cores);
+    registry.pin_threads();
     let mut runners = Vec::new();
     for (id, _) in registry.available() {
         match registry.create(&id) {

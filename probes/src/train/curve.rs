@@ -1,6 +1,6 @@
 //! The measured cost curves of one machine, from its own report.
 
-use super::robust::{Problem, median, spread};
+use super::robust::{Problem, spread, weighted_median};
 use super::rows::{Row, rows};
 use anyhow::{Result, bail};
 use ndarray::Array2;
@@ -112,11 +112,11 @@ fn residuals(curve: &CostCurve, rows: &[&Row], floors: bool) -> Vec<(f64, f64)> 
     rows.iter().filter(|r| r.floor == floors).map(of).collect()
 }
 
-/// Local means of the residuals, and beyond the largest of them at least what keeps the cost above every floor.
+/// Local medians of the residuals, and beyond the largest of them at least what keeps the cost above every floor.
+///
+/// Medians, because a host that slows down spoils all samples of a point at once, and one such point among those of several
+/// scenarios must not bend the curve.
 fn correction(measured: &[(f64, f64)], floors: &[(f64, f64)]) -> Vec<Knot> {
-    // An outlier among few residuals would bend the curve: bounded at three standard deviations from the median.
-    let centre = median(measured.iter().map(|r| r.1).collect());
-    let reach = 3.0 * spread(measured.iter().map(|r| r.1).collect()).max(0.05);
     let low = measured.iter().map(|r| r.0).fold(f64::INFINITY, f64::min);
     let high = measured.iter().map(|r| r.0).fold(0.0, f64::max);
     let (first, last) = ((low / KNOT_STEP).floor() as u32, (high / KNOT_STEP).ceil() as u32);
@@ -124,10 +124,9 @@ fn correction(measured: &[(f64, f64)], floors: &[(f64, f64)]) -> Vec<Knot> {
     for k in first..=last {
         let log2_objects = f64::from(k) * KNOT_STEP;
         let weight = |x: f64| (1.0 - (x - log2_objects).abs() / KNOT_REACH).max(0.0);
-        let total: f64 = measured.iter().map(|r| weight(r.0)).sum();
-        if total > 0.0 {
-            let sum: f64 = measured.iter().map(|r| weight(r.0) * r.1.clamp(centre - reach, centre + reach)).sum();
-            knots.push(Knot { log2_objects, ln_factor: sum / total });
+        let near = measured.iter().map(|r| (r.1, weight(r.0))).filter(|r| r.1 > 0.0).collect();
+        if let Some(ln_factor) = weighted_median(near) {
+            knots.push(Knot { log2_objects, ln_factor });
         }
     }
     let mut beyond: Vec<(f64, f64)> = floors.iter().filter(|f| f.0 > f64::from(last) * KNOT_STEP).copied().collect();

@@ -77,6 +77,27 @@ pub(crate) fn spread(values: Vec<f64>) -> f64 {
     MAD_TO_SD * median(values.into_iter().map(|v| (v - centre).abs()).collect())
 }
 
+/// The value at which half of the weight is reached, interpolated between the middles of neighbouring weights, so that it
+/// moves without jumps as weights change. `None` of none.
+pub(crate) fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
+    values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let half = values.iter().map(|v| v.1).sum::<f64>() / 2.0;
+    let mut before: Option<(f64, f64)> = None;
+    let mut passed = 0.0;
+    for (value, weight) in values {
+        let middle = passed + weight / 2.0;
+        if middle >= half {
+            return Some(match before {
+                Some((lower, at)) => lower + (value - lower) * (half - at) / (middle - at),
+                None => value,
+            });
+        }
+        before = Some((value, middle));
+        passed += weight;
+    }
+    before.map(|b| b.0)
+}
+
 /// Median, the mean of the middle two for an even count; 0 for none.
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
@@ -90,6 +111,15 @@ pub(crate) fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn weighted_medians_ignore_far_values_and_follow_weights() {
+        assert_eq!(weighted_median(Vec::new()), None);
+        assert_eq!(weighted_median(vec![(3.0, 1.0)]), Some(3.0));
+        assert_eq!(weighted_median(vec![(1.0, 1.0), (9e9, 1.0), (2.0, 1.0)]), Some(2.0));
+        assert_eq!(weighted_median(vec![(1.0, 1.0), (2.0, 1.0)]), Some(1.5));
+        assert!(weighted_median(vec![(1.0, 9.0), (2.0, 1.0)]).unwrap() < 1.1);
+    }
     use crate::train::synthetic::Random;
 
     fn line(ns: impl Fn(f64) -> f64) -> Problem {

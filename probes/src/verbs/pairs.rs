@@ -31,7 +31,8 @@ struct Answer {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    let registry = Registry::new();
+    let mut registry = Registry::new();
+    registry.pin_threads();
     let id = algorithm(arguments, &registry)?;
     interrupt::listen()?;
     let frames = read_frames(&arguments.boxes)?;

@@ -67,7 +67,9 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
         repeats: arguments.repeats as usize,
         seed: arguments.seed,
     };
-    let outcome = simulate(&course, fields, &Registry::new())?;
+    let mut registry = Registry::new();
+    registry.pin_threads();
+    let outcome = simulate(&course, fields, &registry)?;
     if let Some(path) = &arguments.plot {
         let svg = plot::simulation(&course, &outcome)?;
         files::write_atomically(path, |w| Ok(w.write_all(svg.as_bytes())?))?;
