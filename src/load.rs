@@ -2,7 +2,7 @@
 
 use crate::Aabb;
 use crate::cpu::StripGrid;
-use crate::sample::Sample;
+use crate::sample::{Chosen, Sample};
 
 /// The figures of a frame that decide what each algorithm costs, all known from a sample and the frame before.
 ///
@@ -29,40 +29,56 @@ impl Load {
     /// `pairs` is the number of pairs of the frame before, if there was one.
     #[must_use]
     pub fn estimate(boxes: &[Aabb], pairs: Option<f64>) -> Self {
-        let sample = Sample::with_overlaps(boxes);
-        Self::from_sample(&sample, boxes.len(), pairs)
+        let chosen = Chosen::from(boxes);
+        let sample = Sample::statistics(&chosen);
+        let n = boxes.len() as f64;
+        let all = n * (n - 1.0).max(0.0) / 2.0;
+        let axis = sample.widest_axis();
+        let share_on = |a: usize| chosen.share_of_pairs(|b| [(b.min[a], b.max[a])]);
+        let shares = [share_on(0), share_on(1), share_on(2)];
+        let axis_candidates = shares[axis] * all;
+        // Independence of the axes is wrong for clusters, but the frame before corrects it from the second frame on.
+        let independent = shares.iter().product::<f64>() * all;
+        let pairs = pairs.unwrap_or(independent);
+        let grid = StripGrid::plan(&sample, boxes.len());
+        let strip_candidates = if grid.strips() == 1 {
+            axis_candidates
+        } else {
+            strip_share(&chosen, &grid, shares[axis], pairs / independent.max(1.0)) * all
+        };
+        let strip_candidates = strip_candidates.max(pairs).min(axis_candidates.max(pairs));
+        Self { objects: boxes.len() as u32, axis_candidates, strip_candidates, pairs, moved: 1.0 }
     }
 
     /// The load of a frame that looks like this one but has another number of objects and pairs.
     #[must_use]
     pub fn rescaled(&self, objects: u32, pairs: f64) -> Self {
-        let ratio = |now: f64, then: f64| if then > 0.0 { now / then } else { 1.0 };
-        let growth = ratio(f64::from(objects), f64::from(self.objects));
+        let growth = if self.objects > 0 { f64::from(objects) / f64::from(self.objects) } else { 1.0 };
         let axis_candidates = self.axis_candidates * growth * growth;
-        let strip_candidates = (self.strip_candidates * ratio(pairs, self.pairs)).min(axis_candidates);
+        let strip_candidates = (self.strip_candidates * growth).min(axis_candidates);
         Self { objects, axis_candidates, strip_candidates, pairs, moved: self.moved }
-    }
-
-    fn from_sample(sample: &Sample, objects: usize, pairs: Option<f64>) -> Self {
-        let n = objects as f64;
-        let all = n * (n - 1.0).max(0.0) / 2.0;
-        let axis = sample.widest_axis();
-        let axis_candidates = sample.overlap[axis] * all;
-        // Independence of the axes is wrong for clusters, but the frame before corrects it from the second frame on.
-        let guess = sample.overlap.iter().product::<f64>() * all;
-        let pairs = pairs.unwrap_or(guess);
-        let strip_candidates = strip_candidates(sample, objects, pairs).min(axis_candidates).max(pairs.min(axis_candidates));
-        Self { objects: objects as u32, axis_candidates, strip_candidates, pairs, moved: 1.0 }
     }
 }
 
-/// Two boxes meet in a strip when they overlap after each is widened to whole cells, by half a cell at either end on
-/// average. So candidates exceed pairs by the ratio of a widened to a plain interval on each of the two grid axes.
-fn strip_candidates(sample: &Sample, objects: usize, pairs: f64) -> f64 {
-    let widening = |(axis, width): (usize, f64)| {
-        // A single cell spans everything that overlaps on no axis too.
-        let width = width.min(sample.high[axis] - sample.low[axis] + sample.extent[axis]);
-        if width > 0.0 { 1.0 + width / (2.0 * sample.extent[axis]).max(width * 1e-3) } else { 1.0 }
+/// The share of all pairs that overlap on the sweep axis and share a strip.
+///
+/// Counted in the sample where it is large enough to be counted. In a large scene it is not; there the three axes are taken to
+/// be independent, and the clumping that the pairs of the frame before show is taken to hold at the width of a cell by half.
+/// The two are joined like a Poisson count with a gamma prior of shape 4.
+fn strip_share(chosen: &Chosen, grid: &StripGrid, axis_share: f64, clumping: f64) -> f64 {
+    const SHAPE: f64 = 4.0;
+    let cells = |b: &Aabb| {
+        let cover = grid.cover(b);
+        // Cell numbers stay below 2^16, which f32 holds, so that all three comparisons are of one type.
+        [0, 1].map(|d| (cover.first[d] as f32, cover.last[d] as f32))
     };
-    pairs * StripGrid::plan(sample, objects).widths().map(widening).iter().product::<f64>()
+    let across = [0, 1].map(|d| chosen.share_of_pairs(|b| [cells(b)[d]]));
+    let expected = axis_share * across[0] * across[1] * clumping.max(1.0).sqrt();
+    let counted = chosen.share_of_pairs(|b| {
+        let [y, z] = cells(b);
+        [(b.min[grid.axis], b.max[grid.axis]), y, z]
+    });
+    let count = chosen.as_slice().len() as f64;
+    let pairs = count * (count - 1.0) / 2.0;
+    if expected > 0.0 { (SHAPE + counted * pairs) / (SHAPE / expected + pairs) } else { counted }
 }

@@ -22,42 +22,15 @@ pub(crate) struct Sample {
     pub(crate) high: [f64; 3],
     /// The extent that nine boxes in ten do not exceed, on each axis.
     pub(crate) extent: [f64; 3],
-    /// Share of the pairs whose intervals overlap, on each axis.
-    pub(crate) overlap: [f64; 3],
 }
 
 /// Beyond this a bound counts as this: squares and sums of clamped values stay finite in `f64`.
 const CLAMP: f64 = 1.0e30;
 
 impl Sample {
-    /// Looks at up to 256 boxes without the pair counts of [`Sample::with_overlaps`].
+    /// Looks at up to 256 boxes.
     pub(crate) fn of(boxes: &[Aabb]) -> Self {
-        let (chosen, count) = choose(boxes);
-        Self::statistics(&chosen[..count])
-    }
-
-    /// Looks at up to 256 boxes and counts the pairs among them that overlap on each axis.
-    pub(crate) fn with_overlaps(boxes: &[Aabb]) -> Self {
-        let (chosen, count) = choose(boxes);
-        let chosen = &chosen[..count];
-        let mut sample = Self::statistics(chosen);
-        let pairs = (count * count.saturating_sub(1) / 2).max(1) as f64;
-        for axis in 0..3 {
-            let mut low = [0.0_f32; SAMPLE];
-            let mut high = [0.0_f32; SAMPLE];
-            for (k, b) in chosen.iter().enumerate() {
-                low[k] = b.min[axis];
-                high[k] = b.max[axis];
-            }
-            let mut hits = 0_u32;
-            for i in 1..count {
-                let (l, h) = (low[i], high[i]);
-                // A sum over two slices without a branch: the compiler turns it into vector comparisons.
-                hits += low[..i].iter().zip(&high[..i]).map(|(&a, &b)| u32::from(a <= h) & u32::from(l <= b)).sum::<u32>();
-            }
-            sample.overlap[axis] = f64::from(hits) / pairs;
-        }
-        sample
+        Self::statistics(&Chosen::from(boxes))
     }
 
     /// The axis on which the centres spread most.
@@ -65,7 +38,9 @@ impl Sample {
         (0..3).max_by(|&a, &b| self.deviation[a].total_cmp(&self.deviation[b])).unwrap_or(0)
     }
 
-    fn statistics(boxes: &[Aabb]) -> Self {
+    /// The statistics of boxes that were chosen already.
+    pub(crate) fn statistics(chosen: &Chosen) -> Self {
+        let boxes = chosen.as_slice();
         let mut sample = Self::default();
         if boxes.is_empty() {
             return sample;
@@ -98,22 +73,59 @@ impl Sample {
     }
 }
 
-/// Evenly spaced boxes, skipping invalid ones: this runs before the input is checked.
-fn choose(boxes: &[Aabb]) -> ([Aabb; SAMPLE], usize) {
-    let mut chosen = [Aabb::default(); SAMPLE];
-    let mut count = 0;
-    // Twice the root of the count: the cost of the glance stays a small share of the frame's at every size, while the
-    // share of overlapping pairs, which falls with the count, stays countable.
-    let wanted = boxes.len().min((2 * boxes.len().isqrt()).clamp(SMALLEST_SAMPLE, SAMPLE));
-    for k in 0..wanted {
-        // One box from the middle of each of `wanted` equal parts; u64 because the product passes 32 bits.
-        let at = ((2 * k as u64 + 1) * boxes.len() as u64 / (2 * wanted as u64)) as usize;
-        if boxes[at].defect().is_none() {
-            chosen[count] = boxes[at];
-            count += 1;
+/// Evenly spaced boxes of a frame, without the invalid ones: a glance is taken before the input is checked.
+pub(crate) struct Chosen {
+    boxes: [Aabb; SAMPLE],
+    count: usize,
+}
+
+impl Chosen {
+    pub(crate) fn from(boxes: &[Aabb]) -> Self {
+        let mut chosen = Self { boxes: [Aabb::default(); SAMPLE], count: 0 };
+        // Twice the root of the count: the cost of the glance stays a small share of the frame's at every size, while the
+        // share of overlapping pairs, which falls with the count, stays countable.
+        let wanted = boxes.len().min((2 * boxes.len().isqrt()).clamp(SMALLEST_SAMPLE, SAMPLE));
+        for k in 0..wanted {
+            // One box from the middle of each of `wanted` equal parts; u64 because the product passes 32 bits.
+            let at = ((2 * k as u64 + 1) * boxes.len() as u64 / (2 * wanted as u64)) as usize;
+            if boxes[at].defect().is_none() {
+                chosen.boxes[chosen.count] = boxes[at];
+                chosen.count += 1;
+            }
         }
+        chosen
     }
-    (chosen, count)
+
+    pub(crate) fn as_slice(&self) -> &[Aabb] {
+        &self.boxes[..self.count]
+    }
+
+    /// For each chosen box what `interval` says of it, then the share of all pairs whose intervals meet; the ends belong to
+    /// the intervals.
+    pub(crate) fn share_of_pairs<const N: usize, T: PartialOrd + Copy + Default>(
+        &self,
+        interval: impl Fn(&Aabb) -> [(T, T); N],
+    ) -> f64 {
+        let count = self.count;
+        let (mut low, mut high) = ([[T::default(); SAMPLE]; N], [[T::default(); SAMPLE]; N]);
+        for (k, b) in self.as_slice().iter().enumerate() {
+            for (axis, (l, h)) in interval(b).into_iter().enumerate() {
+                low[axis][k] = l;
+                high[axis][k] = h;
+            }
+        }
+        let mut hits = 0_u32;
+        for i in 1..count {
+            // A sum without a branch: compilers turn it into vector comparisons.
+            hits += (0..i)
+                .map(|j| {
+                    let meet = |a: usize| u32::from(low[a][j] <= high[a][i]) & u32::from(low[a][i] <= high[a][j]);
+                    (0..N).map(meet).fold(1, |all, one| all & one)
+                })
+                .sum::<u32>();
+        }
+        f64::from(hits) / (count * count.saturating_sub(1) / 2).max(1) as f64
+    }
 }
 
 #[cfg(test)]
@@ -123,16 +135,21 @@ mod tests {
     #[test]
     fn an_empty_frame_and_an_invalid_one_give_zeros() {
         assert_eq!(Sample::of(&[]).extent, [0.0; 3]);
-        assert_eq!(Sample::with_overlaps(&[Aabb::cube([f32::NAN; 3], 1.0)]).overlap, [0.0; 3]);
+        let invalid = [Aabb::cube([f32::NAN; 3], 1.0)];
+        assert_eq!(Sample::of(&invalid).extent, [0.0; 3]);
+        assert_eq!(Chosen::from(&invalid).share_of_pairs(|b| [(b.min[0], b.max[0])]), 0.0);
     }
 
     #[test]
     fn a_row_of_boxes_spreads_on_its_axis() {
         let boxes: Vec<Aabb> = (0..1000).map(|k| Aabb::cube([0.0, 10.0 * k as f32, 5.0], 0.5)).collect();
-        let sample = Sample::with_overlaps(&boxes);
+        let sample = Sample::of(&boxes);
         assert_eq!(sample.widest_axis(), 1);
         assert_eq!(sample.extent, [1.0; 3]);
-        assert_eq!(sample.overlap, [1.0, 0.0, 1.0]);
+        let chosen = Chosen::from(&boxes);
+        let share = |axis: usize| chosen.share_of_pairs(|b| [(b.min[axis], b.max[axis])]);
+        assert_eq!([share(0), share(1), share(2)], [1.0, 0.0, 1.0]);
+        assert_eq!(chosen.share_of_pairs(|b| [(b.min[0], b.max[0]), (b.min[2], b.max[2])]), 1.0);
         // Evenly spaced over 10 000: deviation = length / sqrt(12).
         assert!((sample.deviation[1] - 2886.75).abs() < 30.0, "{}", sample.deviation[1]);
     }
@@ -141,8 +158,8 @@ mod tests {
     fn infinite_boxes_leave_every_figure_finite() {
         let inf = f32::INFINITY;
         let boxes = [Aabb::new([-inf; 3], [inf; 3]), Aabb::new([inf; 3], [inf; 3]), Aabb::cube([0.0; 3], 1.0)];
-        let sample = Sample::with_overlaps(&boxes);
-        let all = [sample.mean, sample.deviation, sample.low, sample.high, sample.extent, sample.overlap];
+        let sample = Sample::of(&boxes);
+        let all = [sample.mean, sample.deviation, sample.low, sample.high, sample.extent];
         assert!(all.iter().flatten().all(|v| v.is_finite()), "{sample:?}");
     }
 }

@@ -76,14 +76,6 @@ impl StripGrid {
         (self.cells[0] * self.cells[1]) as usize
     }
 
-    /// The grid axes, each with the mean width of a cell given the length that the grid spans.
-    pub(crate) fn widths(&self) -> [(usize, f64); 2] {
-        [0, 1].map(|d| {
-            let inverse = f64::from(self.inverse_width[d]);
-            (self.across[d], if inverse > 0.0 { 1.0 / inverse } else { f64::INFINITY })
-        })
-    }
-
     /// The number of the strip in a cell.
     pub(crate) fn strip(&self, cell: [u32; 2]) -> usize {
         (cell[1] * self.cells[0] + cell[0]) as usize
