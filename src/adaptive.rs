@@ -10,6 +10,10 @@ const HYSTERESIS: f64 = 0.05;
 /// Frames after which the boxes are sampled anew even if their number has not changed.
 const SAMPLE_EVERY: u32 = 16;
 
+/// A change of the number of objects within a sixteenth, or within this many, needs no new sample. In a scene of a few boxes
+/// the sample costs as much as the frame.
+const SAMPLE_DRIFT: u32 = 16;
+
 /// A runner-up that costs at most this much more than the choice gets its buffers ready: the next border may be near.
 const WARM_WITHIN: f64 = 1.5;
 
@@ -140,7 +144,7 @@ impl Adaptive {
         let objects = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
         let drift = objects.abs_diff(self.load.objects);
-        if self.before.is_none() || self.age >= SAMPLE_EVERY || drift > self.load.objects / 16 {
+        if self.before.is_none() || self.age >= SAMPLE_EVERY || drift > (self.load.objects / 16).max(SAMPLE_DRIFT) {
             self.load = Load::estimate(boxes, pairs);
             self.age = 0;
             return;

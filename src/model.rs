@@ -107,7 +107,7 @@ pub enum Scale {
     SharedLane,
     /// One byte at the memory bandwidth of `k` threads.
     Byte,
-    /// One warm fork and join; nothing with one thread.
+    /// One fork and join of a pool that sleeps, as it does between frames; nothing with one thread.
     ForkJoin,
 }
 
@@ -339,7 +339,7 @@ impl Scale {
             Self::SharedLane => cycle()? / speed_up(hardware, threads)? / need(hardware, parameter::SIMD_LANES)?,
             Self::Byte => 1.0 / bandwidth(hardware, threads)?,
             Self::ForkJoin if threads == 1 => 0.0,
-            Self::ForkJoin => need(hardware, parameter::FORK_JOIN_WARM_NS)?,
+            Self::ForkJoin => need(hardware, parameter::FORK_JOIN_COLD_NS)?,
         })
     }
 }

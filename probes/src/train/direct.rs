@@ -19,7 +19,7 @@ const PARAMETERS: [&str; 4] = [
     parameter::CLOCK_MEASURED_GHZ,
     parameter::SIMD_LANES,
     parameter::SCALING_ALL_THREADS_RATIO,
-    parameter::FORK_JOIN_WARM_NS,
+    parameter::FORK_JOIN_COLD_NS,
 ];
 
 /// A method on one thread or on all threads of its machine: thread counts differ between machines, these do not.

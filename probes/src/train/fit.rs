@@ -241,9 +241,9 @@ mod tests {
     #[test]
     fn machines_that_lack_a_parameter_are_told() {
         let mut all = profiles(Machine::family().into_iter().take(2));
-        all[0].report.hardware.parameters.retain(|p| p.name != parameter::FORK_JOIN_WARM_NS);
+        all[0].report.hardware.parameters.retain(|p| p.name != parameter::FORK_JOIN_COLD_NS);
         let (fitted, notes) = methods(&all.iter().collect::<Vec<_>>()).unwrap();
         assert_eq!(fitted.len(), 3);
-        assert!(notes.iter().any(|n| n.contains(parameter::FORK_JOIN_WARM_NS)), "{notes:?}");
+        assert!(notes.iter().any(|n| n.contains(parameter::FORK_JOIN_COLD_NS)), "{notes:?}");
     }
 }

@@ -27,7 +27,7 @@ const PARAMETERS: [&str; 8] = [
     parameter::CACHE_LLC_BYTES,
     parameter::BANDWIDTH_ONE_THREAD_GB_PER_S,
     parameter::BANDWIDTH_ALL_THREADS_GB_PER_S,
-    parameter::FORK_JOIN_WARM_NS,
+    parameter::FORK_JOIN_COLD_NS,
     parameter::SCALING_ALL_THREADS_RATIO,
     parameter::USABLE_CORES,
 ];

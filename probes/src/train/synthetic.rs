@@ -58,7 +58,7 @@ impl Machine {
             (parameter::CACHE_LLC_BYTES, self.cache_bytes),
             (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, self.gb_per_s.0),
             (parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, self.gb_per_s.1),
-            (parameter::FORK_JOIN_WARM_NS, self.fork_join_ns),
+            (parameter::FORK_JOIN_COLD_NS, self.fork_join_ns),
             (parameter::SCALING_TWO_THREADS_RATIO, Self::scaling(2)),
             (parameter::SCALING_ALL_THREADS_RATIO, Self::scaling(self.cores)),
         ];

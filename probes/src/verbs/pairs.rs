@@ -15,6 +15,9 @@ use std::time::Instant;
 /// What is run when the user names nothing.
 const DEFAULT: &str = "strips@cpu1";
 
+/// The limit on the pairs where the free memory can't be told or is next to nothing: a small scene must pass all the same.
+const FEWEST_PAIRS: usize = 1 << 20;
+
 /// The answer for machines.
 #[derive(Serialize)]
 struct Answer {
@@ -37,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     interrupt::listen()?;
     let frames = read_frames(&arguments.boxes)?;
     let mut pairs = Pairs::new();
-    pairs.set_limit(arguments.limit);
+    pairs.set_limit(Some(arguments.limit.unwrap_or_else(|| memory_limit(id.threads()))));
     let mut algorithm = registry.create(&id).map_err(|e| WrongUsage(e.to_string()))?;
     let (counts, samples_ns) = measure(arguments, &frames, &mut *algorithm, &mut pairs)?;
     let fingerprint = format!("{:016x}", pairs.fingerprint());
@@ -62,6 +65,19 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         output::print(&text(&answer, median_ns))?;
     }
     Ok(Outcome::Done)
+}
+
+/// Pairs that fit into half of the memory that is free now: a scene in which all boxes overlap then ends with an error that
+/// counts them, and not with the process killed for want of memory.
+fn memory_limit(threads: u32) -> usize {
+    let Ok(mut system) = sysinfo::System::new() else { return FEWEST_PAIRS };
+    system.refresh_memory();
+    // The free memory of a cgroup does not count its page cache as free; what the processes don't hold is.
+    let ours = system.cgroup_limits().map_or(u64::MAX, |c| c.total_memory.saturating_sub(c.rss));
+    let free = system.available_memory().min(ours);
+    // Each thread has eight lists of its own beside the common one, and the written file is sorted in a copy.
+    let lists = 8 * u64::from(threads) + 2;
+    usize::try_from(free / 2 / 8 / lists).unwrap_or(usize::MAX).max(FEWEST_PAIRS)
 }
 
 fn algorithm(arguments: &Arguments, registry: &Registry) -> anyhow::Result<AlgorithmId> {

@@ -1,0 +1,86 @@
+//! Every report and model in the repository is sound, current and leads to a choice; damaged files are refused in words.
+
+use sapwise::hardware::parameter;
+use sapwise::json::{self, Document};
+use sapwise::report::Label;
+use sapwise::{Model, Registry, Report};
+use std::path::{Path, PathBuf};
+
+/// The reports in `datasets/`, which the packed library does not hold.
+fn reports() -> Vec<(PathBuf, Report)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets");
+    let Ok(entries) = std::fs::read_dir(&folder) else { return Vec::new() };
+    let files = entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "json"));
+    files.map(|p| (p.clone(), json::report(&std::fs::read_to_string(&p).unwrap()).unwrap())).collect()
+}
+
+#[test]
+fn every_report_is_complete_and_its_label_is_true() {
+    for (path, report) in reports() {
+        let path = path.display();
+        assert!(report.provenance.optimised, "{path}");
+        let names: Vec<&str> = report.hardware.parameters.iter().map(|p| p.name.as_str()).collect();
+        assert_eq!(names, parameter::all_names(), "{path}");
+        let restricted = report.provenance.threads.is_some() || report.provenance.simd.is_some();
+        assert_eq!(report.label == Label::RealRestricted, restricted && report.label != Label::RealContended, "{path}");
+        for point in &report.points {
+            let samples: Vec<usize> =
+                point.timings.iter().filter(|t| t.error.is_none()).map(|t| t.samples_ns.len()).collect();
+            assert!(samples.iter().all(|&n| n == samples[0] && n >= 3), "{path}: unpaired samples in {}", point.scenario);
+        }
+        // What was written is what is read, to the last digit.
+        let text = json::write_report(&report).unwrap();
+        assert!(json::report(&text).unwrap() == report, "{path}");
+    }
+}
+
+#[test]
+fn the_built_in_model_knows_every_method_of_this_build_and_predicts_for_every_report() {
+    let model = Model::built_in().unwrap();
+    for entry in Registry::with_cores(1).entries() {
+        let known = model.methods.iter().find(|m| m.method == entry.id.method());
+        assert_eq!(known.map(|m| m.revision), Some(entry.revision), "{}: train on new reports", entry.id);
+    }
+    for (path, report) in reports() {
+        let trained_on = model.trained_on.iter().any(|t| path.ends_with(&t.file));
+        assert!(trained_on, "{} is not in the built-in model; train it again", path.display());
+        let cores = report.hardware.value(parameter::USABLE_CORES).unwrap() as u32;
+        let algorithms = Registry::with_cores(cores).available();
+        let prediction = model.predict(&report.hardware, &algorithms).unwrap();
+        assert_eq!(prediction.costs.len(), algorithms.len(), "{}: {:?}", path.display(), prediction.warnings);
+        assert!(!prediction.extrapolated, "{}: {:?}", path.display(), prediction.warnings);
+    }
+}
+
+#[test]
+fn a_machine_outside_the_training_is_told_and_a_missing_parameter_leaves_out_what_needs_it() {
+    let model = Model::built_in().unwrap();
+    let Some((_, mut report)) = reports().into_iter().find(|(_, r)| r.label == Label::RealFull) else { return };
+    let algorithms = Registry::with_cores(2).available();
+    let set = |report: &mut Report, name: &str, value: Option<f64>| {
+        report.hardware.parameters.iter_mut().find(|p| p.name == name).unwrap().value = value;
+    };
+    set(&mut report, parameter::FORK_JOIN_COLD_NS, None);
+    let prediction = model.predict(&report.hardware, &algorithms).unwrap();
+    assert!(prediction.costs.iter().all(|c| c.algorithm.threads() == 1));
+    assert!(prediction.warnings.iter().any(|w| w.contains(parameter::FORK_JOIN_COLD_NS)), "{:?}", prediction.warnings);
+    set(&mut report, parameter::CLOCK_MEASURED_GHZ, Some(40.0));
+    assert!(model.predict(&report.hardware, &algorithms).unwrap().extrapolated);
+    let other_revision: Vec<_> = algorithms.iter().map(|(id, revision)| (id.clone(), revision + 1)).collect();
+    let error = model.predict(&report.hardware, &other_revision).unwrap_err();
+    assert!(error.contains("train on new reports"), "{error}");
+}
+
+#[test]
+fn damaged_files_are_refused_with_the_place() {
+    let whole = include_str!("../models/default.json");
+    assert!(matches!(json::read(whole), Ok(Document::Model(_))));
+    let refused = |text: &str| json::read(text).unwrap_err().to_string();
+    assert!(refused(&whole[..whole.len() / 2]).contains("line"));
+    assert!(refused("").contains("line"));
+    assert!(refused(&whole.replace("model/1", "model/9")).contains("model/9"));
+    assert!(refused(&whole.replacen("\"name\"", "\"nome\"", 1)).contains("nome"));
+    assert!(refused(&whole.replacen("\"unit\": ", "\"unit\": -", 1)).contains("unit"));
+    let nested = format!("{{\"schema\": \"model/1\", \"name\": {}{}}}", "[".repeat(10_000), "]".repeat(10_000));
+    assert!(!refused(&nested).is_empty());
+}
