@@ -88,6 +88,7 @@ fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64) -> (CostCurve, f64) 
         ns: rows.iter().map(|r| r.ns).collect(),
         weights: vec![1.0; rows.len()],
         floors: rows.iter().map(|r| r.floor).collect(),
+        groups: vec![0; rows.len()],
     };
     let units = problem.units();
     let terms = terms.iter().zip(units).filter(|(_, u)| *u > 0.0).map(|(&term, unit_ns)| CostTerm { term, unit_ns });

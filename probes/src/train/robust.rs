@@ -13,10 +13,16 @@ pub(crate) struct Problem {
     pub(crate) weights: Vec<f64>,
     /// Rows whose time is a lower bound and not a measurement: they count only while the sum stays below.
     pub(crate) floors: Vec<bool>,
+    /// The profile of each row.
+    pub(crate) groups: Vec<usize>,
 }
 
 /// Rounds of reweighting. The units stop moving in the fourth digit after about eight.
 const ROUNDS: usize = 15;
+/// Logarithmic error from which on it counts linearly where ends are compared: a factor of 1.65.
+const FAR: f64 = 0.5;
+/// Profiles that are left out of a start, at most: with many of them no single one takes the start with it.
+const MOST_STARTS: usize = 16;
 /// Residuals beyond this many standard deviations count linearly (Huber's constant for 95 % efficiency).
 const HUBER: f64 = 1.345;
 /// Makes the median absolute deviation of a normal distribution its standard deviation.
@@ -30,8 +36,32 @@ impl Problem {
     /// Rows are divided by their time, so that the error is relative. A relative error can't be below -1 and would pull every
     /// fit down; reweighting by `ln q / (q (q - 1))`, `q` being modelled over measured time, makes the fixed point that
     /// of least squares on `ln q`. Outliers get Huber's weight on top of it.
+    ///
+    /// Reweighting ends at the fixed point nearest to its start, and a profile whose fork and join was measured hundreds of
+    /// times too long, as under contention, can take the start with it. So it starts from all profiles and from all but each
+    /// one, and the end with the least error is taken.
     pub(crate) fn units(&self) -> Vec<f64> {
-        let mut weights: Vec<f64> = self.weights.iter().zip(&self.floors).map(|(w, f)| if *f { 0.0 } else { *w }).collect();
+        let profiles = self.groups.iter().copied().max().unwrap_or(0) + 1;
+        let without = (profiles > 1).then_some(0..profiles.min(MOST_STARTS)).into_iter().flatten();
+        let ends = std::iter::once(None).chain(without.map(Some)).map(|left_out| self.units_from(left_out));
+        let scored = ends.map(|units| (self.error(&units), units));
+        scored.min_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(Vec::new, |best| best.1)
+    }
+
+    /// Weighted error of the measured rows on logarithms, quadratic up to [`FAR`] and linear beyond.
+    fn error(&self, units: &[f64]) -> f64 {
+        let modelled = self.terms.dot(&Array1::from(units.to_vec()));
+        let row = |k: usize| {
+            let off = (modelled[k] / self.ns[k]).max(1e-9).ln().abs();
+            let off = if self.floors[k] && modelled[k] >= self.ns[k] { 0.0 } else { off };
+            self.weights[k] * if off < FAR { off * off } else { FAR * (2.0 * off - FAR) }
+        };
+        (0..self.ns.len()).map(row).sum()
+    }
+
+    fn units_from(&self, left_out: Option<usize>) -> Vec<f64> {
+        let start = |k: usize| if self.floors[k] || left_out == Some(self.groups[k]) { 0.0 } else { self.weights[k] };
+        let mut weights: Vec<f64> = (0..self.ns.len()).map(start).collect();
         let mut violated = vec![false; self.ns.len()];
         let mut units = Array1::zeros(self.terms.ncols());
         for _ in 0..ROUNDS {
@@ -67,8 +97,8 @@ fn to_logarithmic(q: f64) -> f64 {
     if (q - 1.0).abs() < 1e-6 {
         return 1.0;
     }
-    // Bounded, so that a row that is far off in an early round does not decide that round alone.
-    (q.ln() / (q * (q - 1.0))).clamp(0.1, 10.0)
+    // Bounded above, so that a row that is far too low in an early round does not decide that round alone.
+    (q.ln() / (q * (q - 1.0))).min(10.0)
 }
 
 /// Standard deviation of values around their median, estimated from the median absolute deviation; 0 for none.
