@@ -26,7 +26,8 @@ pub struct Adaptive {
     candidates: Vec<Candidate>,
     current: Option<usize>,
     load: Load,
-    /// Frames since the load was sampled.
+    /// Objects when the load was sampled, and frames since.
+    sampled: u32,
     age: u32,
     /// Objects and pairs of the frame before.
     before: Option<(u32, u64)>,
@@ -87,20 +88,25 @@ pub struct Decision<'a> {
 impl Adaptive {
     /// An adaptive broad phase over those algorithms of `fields` that `registry` can make.
     ///
+    /// An algorithm whose cost was found for another revision is left out, and so is one with more threads than the registry
+    /// lists: its cost says nothing about this build or this machine.
+    ///
     /// # Errors
     /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made.
     pub fn new(fields: Fields, registry: &Registry) -> Result<Self, Error> {
         let mut failure = None;
         let mut candidates = Vec::new();
         for id in fields.algorithms() {
-            let algorithm = registry.create(id).map_err(|e| failure = Some(e)).ok();
+            let stale = fields.costs.iter().find(|c| c.algorithm == *id).and_then(|c| registry.mismatch(id, c.revision));
+            let made = stale.map_or_else(|| registry.create(id), Err);
+            let algorithm = made.map_err(|e| failure = Some(e)).ok();
             candidates.push(Candidate { id: id.clone(), algorithm, ready: 0 });
         }
         if candidates.iter().all(|c| c.algorithm.is_none()) {
             let hint = || "these fields name no algorithm; make them with `sapwise predict`".to_owned();
             return Err(failure.unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
         }
-        Ok(Self { fields, candidates, current: None, load: Load::default(), age: 0, before: None, choice: None })
+        Ok(Self { fields, candidates, current: None, load: Load::default(), sampled: 0, age: 0, before: None, choice: None })
     }
 
     /// Runs one algorithm always.
@@ -143,9 +149,10 @@ impl Adaptive {
     fn observe(&mut self, boxes: &[Aabb]) {
         let objects = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
-        let drift = objects.abs_diff(self.load.objects);
-        if self.before.is_none() || self.age >= SAMPLE_EVERY || drift > (self.load.objects / 16).max(SAMPLE_DRIFT) {
+        let drift = objects.abs_diff(self.sampled);
+        if self.before.is_none() || self.age >= SAMPLE_EVERY || drift > (self.sampled / 16).max(SAMPLE_DRIFT) {
             self.load = Load::estimate(boxes, pairs);
+            self.sampled = objects;
             self.age = 0;
             return;
         }
@@ -192,12 +199,18 @@ impl Adaptive {
         let split = self.fields.steps.partition_point(|s| s.from_objects <= objects);
         let (below, above) = self.fields.steps.split_at(split);
         let chosen = below.iter().rev().chain(above).find_map(position)?;
-        let near = |s: &Step| f64::from(objects.abs_diff(s.from_objects)) <= HYSTERESIS * f64::from(objects);
+        // The present one stays where it would hold a little below or above: only its own borders count.
+        let holds = |current: usize, share: f64| {
+            let step = self.fields.step((f64::from(objects) * share) as u32);
+            step.is_some_and(|s| s.algorithm == self.candidates[current].id)
+        };
         let (chosen, reason) = match self.current {
             None => (chosen, Reason::First),
             Some(current) if current == chosen => (chosen, Reason::Stayed),
             Some(current) if self.candidates[current].algorithm.is_none() => (chosen, Reason::FellBack),
-            Some(current) if self.fields.steps.iter().any(near) => (current, Reason::Hysteresis),
+            Some(current) if holds(current, 1.0 - HYSTERESIS) || holds(current, 1.0 + HYSTERESIS) => {
+                (current, Reason::Hysteresis)
+            }
             Some(_) => (chosen, Reason::Switched),
         };
         Some(Choice { chosen, predicted_ns: None, runner_up: None, reason, load: self.load })
@@ -323,11 +336,15 @@ mod tests {
     #[test]
     fn hand_written_thresholds_decide_by_count() {
         let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
-        let fields = Fields::from_steps(vec![step(0, "brute@cpu1"), step(64, "sweep@cpu1")]).unwrap();
+        let steps = vec![step(0, "brute@cpu1"), step(64, "sweep@cpu1"), step(1000, "strips@cpu1")];
+        let fields = Fields::from_steps(steps).unwrap();
         let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
         assert_eq!(chosen(&mut adaptive, 10).0, "brute@cpu1");
         assert_eq!(chosen(&mut adaptive, 65), ("brute@cpu1".to_owned(), Reason::Hysteresis));
         assert_eq!(chosen(&mut adaptive, 90), ("sweep@cpu1".to_owned(), Reason::Switched));
+        assert_eq!(chosen(&mut adaptive, 10), ("brute@cpu1".to_owned(), Reason::Switched));
+        // Near a border, but not one of brute force's.
+        assert_eq!(chosen(&mut adaptive, 1000), ("strips@cpu1".to_owned(), Reason::Switched));
     }
 
     /// Works for a few frames, then is lost as a GPU can be.

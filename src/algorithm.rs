@@ -22,6 +22,9 @@ pub enum Backend {
     Gpu(Vec<u32>),
 }
 
+/// Threads that an algorithm may have, at most.
+pub(crate) const MOST_THREADS: u32 = 4096;
+
 /// The text of an algorithm that can't be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ParseIdError(String);
@@ -30,11 +33,15 @@ impl AlgorithmId {
     /// The algorithm `method` on `backend`.
     ///
     /// # Errors
-    /// `method` must be 1 to 32 of `a-z`, `0-9`, `-` and `_`, beginning with a letter, so that the text can be read back.
+    /// The backend must have 1 to 4096 threads, or devices in ascending order; `method` must be 1 to 32 of `a-z`, `0-9`, `-` and `_`, beginning with a letter, so that the text can be read back.
     pub fn new(method: &str, backend: Backend) -> Result<Self, ParseIdError> {
         let letters = method.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_');
         if method.len() > 32 || !letters || !method.starts_with(|c: char| c.is_ascii_lowercase()) {
             return Err(ParseIdError(format!("{method:?} is no method name; use up to 32 of a-z, 0-9, - and _")));
+        }
+        // Numbers too high, no thread at all, devices out of order: whatever could not be read back.
+        if backend.to_string().parse().as_ref() != Ok(&backend) {
+            return Err(ParseIdError(format!("{backend} is no backend; use cpu1 to cpu{MOST_THREADS}, gpu0 or gpu0+1")));
         }
         Ok(Self { method: method.to_owned(), backend })
     }
@@ -98,7 +105,7 @@ impl FromStr for Backend {
     fn from_str(text: &str) -> Result<Self, ParseIdError> {
         let bad = || ParseIdError(format!("{text:?} is no backend; use cpu1, cpu4, gpu0 or gpu0+1"));
         if let Some(threads) = text.strip_prefix("cpu") {
-            return number(threads).filter(|&k| (1..=4096).contains(&k)).map(Backend::Cpu).ok_or_else(bad);
+            return number(threads).filter(|&k| (1..=MOST_THREADS).contains(&k)).map(Backend::Cpu).ok_or_else(bad);
         }
         let devices: Option<Vec<u32>> = text.strip_prefix("gpu").ok_or_else(bad)?.split('+').map(number).collect();
         match devices {
@@ -148,7 +155,7 @@ impl schemars::JsonSchema for AlgorithmId {
     fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
         schemars::json_schema!({
             "type": "string",
-            "pattern": "^[a-z][a-z0-9_-]{0,31}@(cpu[1-9][0-9]*|gpu[0-9]+(\\+[0-9]+)*)$",
+            "pattern": "^[a-z][a-z0-9_-]{0,31}@(cpu[1-9][0-9]{0,3}|gpu[0-9]+(\\+[0-9]+)*)$",
             "description": "method@backend",
         })
     }
@@ -167,6 +174,9 @@ mod tests {
 
     #[test]
     fn malformed_ids_are_refused() {
+        for backend in [Backend::Cpu(0), Backend::Cpu(5000), Backend::Gpu(vec![]), Backend::Gpu(vec![1, 0])] {
+            assert!(AlgorithmId::new("brute", backend.clone()).is_err(), "{backend:?}");
+        }
         for text in
             ["", "brute", "brute@", "@cpu1", "brute@cpu0", "brute@cpu01", "brute@cpu-1", "b@gpu1+0", "b@gpu0+0", "Ä@cpu1"]
         {

@@ -6,7 +6,7 @@ use crate::{Aabb, Error, Pairs};
 ///
 /// Every implementation gives the same set of pairs for the same boxes: each overlapping pair once, the lower position
 /// first, touching boxes included. Implementations keep their buffers between calls and allocate nothing once they have
-/// seen a frame as large.
+/// seen a frame as large and as dense.
 pub trait BroadPhase: Send {
     /// Replaces the content of `pairs` with the overlapping pairs of `boxes`.
     ///

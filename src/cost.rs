@@ -25,6 +25,12 @@ pub enum Term {
     Pairs,
 }
 
+/// Bounds of what a file may hold: an hour for one object, 2^64 objects, a correction by e^50. Beyond them the arithmetic of a
+/// cost would end in infinities, and an infinity less an infinity is no cost.
+const MOST_UNIT_NS: f64 = 3.6e12;
+const MOST_LOG2_OBJECTS: f64 = 64.0;
+const MOST_LN_FACTOR: f64 = 50.0;
+
 /// Bytes that an algorithm keeps in flight for each box: the box itself, its sorted copy and its key.
 const WORKING_SET_BYTES: f64 = 64.0;
 
@@ -141,15 +147,15 @@ impl CostCurve {
     /// What makes this curve unusable, if anything: a negative or non-finite figure, or knots out of order.
     #[must_use]
     pub fn defect(&self) -> Option<String> {
-        if let Some(t) = self.terms.iter().find(|t| !(t.unit_ns.is_finite() && t.unit_ns >= 0.0)) {
+        if let Some(t) = self.terms.iter().find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
             return Some(format!("the term {:?} has {} ns a unit", t.term, t.unit_ns));
         }
         if !(self.cache_bytes.is_finite() && self.cache_bytes >= 0.0) {
             return Some(format!("a cache of {} bytes", self.cache_bytes));
         }
-        let finite = self.correction.iter().all(|k| k.log2_objects.is_finite() && k.ln_factor.is_finite());
-        if !finite || !self.correction.is_sorted_by(|a, b| a.log2_objects < b.log2_objects) {
-            return Some("knots of the correction that are not ascending and finite".to_owned());
+        let bounded = |k: &Knot| k.log2_objects.abs() <= MOST_LOG2_OBJECTS && k.ln_factor.abs() <= MOST_LN_FACTOR;
+        if !self.correction.iter().all(bounded) || !self.correction.is_sorted_by(|a, b| a.log2_objects < b.log2_objects) {
+            return Some("knots of the correction that are not ascending, or beyond every measurement".to_owned());
         }
         if self.terms.iter().all(|t| t.unit_ns == 0.0) {
             return Some("no term above zero, so the cost is always nothing".to_owned());
@@ -188,6 +194,9 @@ mod tests {
     #[test]
     fn impossible_curves_are_told() {
         let curve = |unit_ns| CostCurve { terms: vec![CostTerm { term: Term::Call, unit_ns }], ..CostCurve::default() };
+        let knot = |log2_objects| Knot { log2_objects, ln_factor: 0.0 };
+        let far = CostCurve { correction: vec![knot(-1e308), knot(1e308)], ..curve(1.0) };
+        assert!(far.defect().is_some() && curve(1.0).defect().is_none());
         assert!(curve(-1.0).defect().is_some() && curve(f64::NAN).defect().is_some() && curve(0.0).defect().is_some());
     }
 }

@@ -102,7 +102,7 @@ pub struct AlgorithmCost {
 pub struct Ranking {
     /// Position of the cheapest in the list that was ranked.
     pub best: usize,
-    /// Its predicted cost, or NaN where only the number of objects decides.
+    /// Its predicted cost in nanoseconds.
     pub best_ns: f64,
     /// Position and predicted cost of the next.
     pub runner_up: Option<(usize, f64)>,
@@ -121,12 +121,13 @@ impl Fields {
     /// Fields for when nothing is known about the machine: borders in objects, written down by hand.
     ///
     /// They are the rounded borders of `uniform` on one machine (two cores of an AMD EPYC 9005 under KVM, AVX-512), with
-    /// its two cores standing for all of them. Any other machine has others: predict or measure them.
+    /// pinned threads ([`Registry::pin_threads`]) and its two cores standing for all of them. Any other machine has others: predict or measure them.
     #[must_use]
     pub fn usual(registry: &Registry) -> Self {
         let step = |from_objects, method, threads| Step { from_objects, algorithm: AlgorithmId::cpu(method, threads) };
         let mut steps = vec![step(0, "brute", 1), step(200, "sweep", 1), step(1500, "strips", 1)];
-        let cores = registry.entries().iter().filter(|e| e.unavailable.is_none()).map(|e| e.id.threads()).max();
+        let parallel = registry.entries().iter().filter(|e| e.id.method() == "strips" && e.unavailable.is_none());
+        let cores = parallel.map(|e| e.id.threads()).max();
         if let Some(cores) = cores.filter(|&k| k > 1) {
             steps.push(step(3000, "strips", cores));
         }

@@ -40,7 +40,7 @@ impl From<serde_json::Error> for JsonError {
 /// # Errors
 /// The line and column of the defect, the schema where it is none of ours, or the figure that can't be.
 pub fn read(text: &str) -> Result<Document, JsonError> {
-    /// Only the first key; the rest is skipped without being built, so hostile nesting costs nothing.
+    /// Only this key; the rest is skipped without being built, so hostile nesting costs nothing.
     #[derive(serde::Deserialize)]
     struct Tag {
         schema: String,

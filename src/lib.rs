@@ -30,7 +30,7 @@ mod adaptive;
 mod algorithm;
 mod broad_phase;
 mod cost;
-pub mod cpu;
+mod cpu;
 pub mod crossover;
 mod error;
 pub mod fields;

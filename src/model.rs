@@ -202,6 +202,9 @@ impl Model {
     /// A sentence, when no algorithm can be predicted.
     pub fn predict(&self, hardware: &Hardware, algorithms: &[(AlgorithmId, u32)]) -> Result<Prediction, String> {
         let mut warnings: Vec<String> = self.ranges.iter().filter_map(|r| r.excess(hardware)).collect();
+        if self.ranges.is_empty() {
+            warnings.push(format!("the model {} does not say what it was trained on", self.name));
+        }
         let mut extrapolated = !warnings.is_empty();
         let mut costs = Vec::new();
         for (id, revision) in algorithms {
@@ -221,7 +224,8 @@ impl Model {
                 warnings.push(format!("{id}: the model has seen {} threads at most", method.max_threads));
                 extrapolated = true;
             }
-            match method.curve(hardware, threads) {
+            let sound = |curve: CostCurve| curve.defect().map_or(Ok(curve), Err);
+            match method.curve(hardware, threads).and_then(sound) {
                 Ok(curve) => costs.push(AlgorithmCost {
                     algorithm: id.clone(),
                     revision: *revision,

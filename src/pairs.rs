@@ -47,8 +47,8 @@ impl Pairs {
 
     /// Sets the most pairs that may be stored, 8 bytes each, or lifts that limit.
     ///
-    /// A frame with more pairs is [`Error::TooManyPairs`], which tells how many there are. An algorithm on `k` threads may
-    /// hold up to `k + 1` times the limit while it works.
+    /// A frame with more pairs is [`Error::TooManyPairs`], which tells how many there are. An algorithm on `k` threads, `k` above 1,
+    /// may hold up to `8 k + 1` times the limit while it works: each of its tasks has a list of its own.
     pub fn set_limit(&mut self, limit: Option<usize>) {
         self.limit = limit;
     }
@@ -104,7 +104,7 @@ impl Pairs {
     /// Adds one pair, in either order of its members. Beyond the limit it is counted and not stored.
     #[inline]
     pub fn push(&mut self, a: u32, b: u32) {
-        if self.len == self.buffer.len() && !self.grow(1) {
+        if self.is_full() || self.len == self.buffer.len() && !self.grow(1) {
             self.found += 1;
             return;
         }

@@ -1,5 +1,6 @@
 //! The algorithms that this machine can run.
 
+use crate::algorithm::MOST_THREADS;
 use crate::cpu::{self, SimdLevel, Threads};
 use crate::{AlgorithmId, Backend, BroadPhase, Error};
 use std::fmt;
@@ -101,6 +102,22 @@ impl Registry {
         self.entries.iter().filter(|e| e.unavailable.is_none()).map(|e| (e.id.clone(), e.revision)).collect()
     }
 
+    /// Why a cost of `revision` of an algorithm says nothing here, if it doesn't.
+    pub(crate) fn mismatch(&self, id: &AlgorithmId, revision: u32) -> Option<Error> {
+        let unavailable = |reason| Some(Error::Unavailable { algorithm: id.clone(), reason });
+        let same = self.entries.iter().filter(|e| e.id.method() == id.method());
+        let most = same.clone().map(|e| e.id.threads()).max();
+        match same.clone().find(|e| e.id == *id).or(same.clone().next()) {
+            Some(known) if known.revision != revision => {
+                unavailable(format!("its cost is of revision {revision}, this build has {}; predict again", known.revision))
+            }
+            Some(_) if most.is_some_and(|most| id.threads() > most) => {
+                unavailable(format!("it has {} threads, more than this machine has cores", id.threads()))
+            }
+            _ => None,
+        }
+    }
+
     /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads.
     ///
     /// # Errors
@@ -143,7 +160,7 @@ pub fn usable_cores() -> u32 {
 
 /// 1, 2, 4, ... below `cores`, then `cores`.
 fn thread_counts(cores: u32) -> impl Iterator<Item = u32> {
-    let cores = cores.max(1);
+    let cores = cores.clamp(1, MOST_THREADS);
     std::iter::successors(Some(1_u32), |k| k.checked_mul(2)).take_while(move |&k| k < cores).chain([cores])
 }
 

@@ -3,7 +3,7 @@
 use crate::Aabb;
 
 /// Boxes looked at, at most. 256 boxes give 32 640 pairs: an axis on which 1 % of the pairs overlap is then known to
-/// about 10 %, and the glance takes microseconds.
+/// about 10 %.
 const SAMPLE: usize = 256;
 
 /// Boxes looked at, at least: the quantile of the extents needs a few.

@@ -103,9 +103,15 @@ fn many_boxes_in_one_point_are_counted_when_they_may_not_be_stored() {
 fn worlds_of_every_shape() {
     let mut algorithms = every_algorithm();
     let mut random = Random(7);
-    for world in [[400.0, 1.0, 1.0], [1.0, 300.0, 2.0], [60.0, 60.0, 0.0], [2.0, 50.0, 50.0], [0.0; 3], [16.0; 3]] {
+    for world in
+        [[400.0, 1.0, 1.0], [1.0, 300.0, 2.0], [60.0, 60.0, 0.0], [2.0, 50.0, 50.0], [40.0, 40.0, 0.0], [0.0; 3], [16.0; 3]]
+    {
         assert_all_agree("a world", &random.cubes(3000, world, 0.5), &mut algorithms);
     }
+    let tiny: Vec<Aabb> = random.cubes(3000, [16.0; 3], 0.5);
+    let shrunk = |v: [f32; 3]| v.map(|x| (x - 8.0) * 1.0e-39);
+    let tiny: Vec<Aabb> = tiny.iter().map(|b| Aabb::new(shrunk(b.min), shrunk(b.max))).collect();
+    assert_all_agree("a world of denormals", &tiny, &mut algorithms);
 }
 
 #[test]

@@ -11,7 +11,10 @@ fn reports() -> Vec<(PathBuf, Report)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets");
     let Ok(entries) = std::fs::read_dir(&folder) else { return Vec::new() };
     let files = entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "json"));
-    files.map(|p| (p.clone(), json::report(&std::fs::read_to_string(&p).unwrap()).unwrap())).collect()
+    let reports: Vec<(PathBuf, Report)> =
+        files.map(|p| (p.clone(), json::report(&std::fs::read_to_string(&p).unwrap()).unwrap())).collect();
+    assert!(!reports.is_empty(), "no report in datasets/");
+    reports
 }
 
 #[test]

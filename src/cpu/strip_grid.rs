@@ -57,10 +57,11 @@ impl StripGrid {
         for d in 0..2 {
             let (low, length) = range[d];
             let other = range[1 - d].1;
-            let width = if other < square { length / wanted.max(1.0) } else { square };
+            let width = if other <= square { length / wanted.max(1.0) } else { square };
             let width = width.max(2.0 * sample.extent[across[d]]);
             let cells = (length / width).floor().clamp(1.0, MOST_CELLS);
-            let cells = if cells.is_nan() { 1.0 } else { cells };
+            // A world so small that the inverse of a cell overflows would put every box into every cell.
+            let cells = if ((cells / length) as f32).is_finite() { cells } else { 1.0 };
             // One cell needs no width, and a flat axis has none.
             grid.cells[d] = cells as u32;
             grid.origin[d] = low as f32;
@@ -161,9 +162,18 @@ mod tests {
 
     #[test]
     fn degenerate_scenes_get_one_strip() {
-        for boxes in [vec![], vec![Aabb::default(); 5000], vec![Aabb::cube([f32::INFINITY; 3], 1.0); 5000]] {
+        let tiny = (0..5000).map(|k| Aabb::cube([(k % 7) as f32 * 1e-39, (k % 11) as f32 * 1e-39, k as f32 * 1e-39], 0.0));
+        let point = vec![Aabb::default(); 5000];
+        for boxes in [vec![], point, vec![Aabb::cube([f32::INFINITY; 3], 1.0); 5000], tiny.collect()] {
             assert_eq!(grid(&boxes).strips(), 1);
         }
+    }
+
+    #[test]
+    fn a_flat_world_is_cut_on_its_other_axis() {
+        let flat: Vec<Aabb> =
+            (0..10_000).map(|k| Aabb::cube([(k % 1000) as f32, (k / 1000) as f32 * 9.0, 0.0], 0.1)).collect();
+        assert!((10..60).contains(&grid(&flat).strips()), "{:?}", grid(&flat));
     }
 
     #[test]

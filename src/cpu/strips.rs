@@ -169,6 +169,13 @@ impl Bins {
                 }
             }
         }
+        let entries: u64 = starts.iter().map(|&s| u64::from(s)).sum();
+        if u32::try_from(entries).is_err() {
+            return Err(Error::OutOfMemory {
+                what: "boxes in strips",
+                elements: usize::try_from(entries).unwrap_or(usize::MAX),
+            });
+        }
         let mut total = 0_u32;
         for start in starts.iter_mut() {
             total += std::mem::replace(start, total);
@@ -212,6 +219,7 @@ impl Large {
         keys.sort_unstable();
         self.columns.resize(count)?;
         self.covers.clear();
+        self.covers.try_reserve(count).map_err(|_| Error::OutOfMemory { what: "large boxes", elements: count })?;
         let mut columns = self.columns.as_mut();
         for (at, &key) in keys.iter().enumerate() {
             let id = key as u32;
@@ -255,6 +263,9 @@ impl Task {
             only.bin(strip)
         } else {
             self.entries.clear();
+            let elements = bins.iter().map(|b| b.bin(strip).len()).sum();
+            let refused = |_| Error::OutOfMemory { what: "boxes in strips", elements };
+            self.entries.try_reserve(elements).map_err(refused)?;
             bins.iter().for_each(|b| self.entries.extend_from_slice(b.bin(strip)));
             &self.entries
         };

@@ -27,7 +27,7 @@ impl Workers {
     /// `threads` threads for the algorithm `method`.
     pub(crate) fn new(method: &'static str, threads: u32, pools: &Threads) -> Result<Self, Error> {
         #[cfg(not(feature = "parallel"))]
-        let _ = (method, pools);
+        let _ = (method, pools.pinned);
         Ok(Self {
             threads: threads as usize,
             #[cfg(feature = "parallel")]
