@@ -125,12 +125,12 @@ impl Fields {
     #[must_use]
     pub fn usual(registry: &Registry) -> Self {
         let step = |from_objects, method, threads| Step { from_objects, algorithm: AlgorithmId::cpu(method, threads) };
-        let mut steps = vec![step(0, "brute", 1), step(200, "sweep", 1), step(1500, "strips", 1)];
+        let mut steps = vec![step(0, "brute", 1), step(150, "sweep", 1)];
         let parallel = registry.entries().iter().filter(|e| e.id.method() == "strips" && e.unavailable.is_none());
-        let cores = parallel.map(|e| e.id.threads()).max();
-        if let Some(cores) = cores.filter(|&k| k > 1) {
-            steps.push(step(3000, "strips", cores));
-        }
+        steps.push(match parallel.map(|e| e.id.threads()).max() {
+            Some(cores) if cores > 1 => step(1500, "strips", cores),
+            _ => step(4000, "strips", 1),
+        });
         Self { steps, scenario: "uniform".to_owned(), ..Self::empty(Source::Default) }
     }
 
