@@ -4,7 +4,7 @@ use super::PARAMETERS;
 use super::curve::{measured_costs, measured_fields};
 use super::rows::{Profile, best, medians};
 use anyhow::Result;
-use sapwise::{AlgorithmCost, AlgorithmId, Fields, Hardware, Load};
+use sapwise::{AlgorithmCost, AlgorithmId, Fields, Hardware, Load, Report};
 
 /// Chooses an algorithm under a load among those that a machine has; `None` where it knows none of them.
 pub(crate) type Chooser<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
@@ -62,7 +62,7 @@ pub(crate) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> C
 /// When that profile has too few timings for thresholds.
 pub(crate) fn default_machine<'a>(training: &[&Profile], available: &'a [AlgorithmId]) -> Result<Chooser<'a>> {
     let Some(first) = training.first() else { return Ok(Box::new(|_| None)) };
-    let fields = measured_fields(&first.report, slice_scenario(first))?;
+    let fields = measured_fields(&first.report, slice_scenario(&first.report))?;
     Ok(Box::new(move |load| fields.step(load.objects).and_then(|s| closest(&s.algorithm, available))))
 }
 
@@ -84,9 +84,9 @@ pub(crate) fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> 
     })
 }
 
-/// `uniform` where a profile has it, else its first scenario.
-pub(crate) fn slice_scenario(profile: &Profile) -> &str {
-    let names = || profile.report.points.iter().map(|p| p.scenario.as_str());
+/// `uniform` where a report has it, else its first scenario.
+pub(crate) fn slice_scenario(report: &Report) -> &str {
+    let names = || report.points.iter().map(|p| p.scenario.as_str());
     names().find(|n| *n == "uniform").or_else(|| names().next()).unwrap_or("uniform")
 }
 
