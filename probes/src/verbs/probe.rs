@@ -42,14 +42,14 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     let (failed, interrupted) = (found.failed, found.interrupted);
     let report = assemble(arguments, &hardware, found, began);
     let saved = destination.as_ref().map(|d| d.save(&report)).transpose();
-    if arguments.json {
-        output::print(&sapwise::json::write_report(&report)?)?;
+    let text = if arguments.json {
+        sapwise::json::write_report(&report)?
     } else {
-        output::print(&summary::report(&report))?;
-        if let Ok(Some(path)) = &saved {
-            output::print(&summary::next_step(&report, path))?;
-        }
-    }
+        let next = saved.as_ref().ok().and_then(|path| path.map(|path| summary::next_step(&report, path)));
+        summary::report(&report) + &next.unwrap_or_default()
+    };
+    // A standard output that is closed or full is told last: what went wrong with the report matters more.
+    let printed = output::print(&text);
     saved?;
     if interrupted {
         anyhow::bail!("interrupted: the report holds what was measured until then");
@@ -57,6 +57,7 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     if failed {
         anyhow::bail!("the sweep has gaps or wrong answers; the remarks of the report say which");
     }
+    printed?;
     Ok(Outcome::Done)
 }
 
