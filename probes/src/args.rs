@@ -218,6 +218,9 @@ pub(crate) struct Schema {
     /// The folder that they go to; made when it is not there.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+    /// One JSON object on standard output instead of text.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// One part of a measurement in a process of its own, so that a crash costs that part and not the run.

@@ -54,5 +54,5 @@ impl Destination {
 
 fn write(path: &Path, report: &Report) -> anyhow::Result<()> {
     let text = sapwise::json::write_report(report)?;
-    crate::files::write_atomically(path, |w| Ok(w.write_all(text.as_bytes())?))
+    crate::files::write_text(path, &text)
 }

@@ -46,3 +46,15 @@ pub(crate) fn complain(text: &str) {
 pub(crate) fn is_closed(error: &anyhow::Error) -> bool {
     error.is::<Closed>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_standard_output_is_closed_without_an_error() {
+        let pipe = anyhow::Error::from(std::io::Error::from(ErrorKind::BrokenPipe)).context("can't write out.json");
+        assert!(!is_closed(&pipe));
+        assert!(is_closed(&anyhow::Error::from(Closed).context("a table")));
+    }
+}

@@ -3,7 +3,7 @@
 use crate::args::Predict;
 use crate::document::read_document;
 use crate::exit::{Outcome, WrongUsage};
-use crate::hardware::measure_hardware;
+use crate::hardware::{self, measure_hardware};
 use crate::{files, interrupt, output, prediction, summary, train};
 use anyhow::{Context, bail};
 use sapwise::json::{self, Document};
@@ -11,6 +11,7 @@ use sapwise::{Model, Report, Scenario};
 use std::path::Path;
 
 pub(crate) fn run(arguments: &Predict) -> anyhow::Result<Outcome> {
+    hardware::check_threads(arguments.threads)?;
     let report = arguments.report.as_deref().map(read_report).transpose()?;
     let model = if arguments.measured { None } else { Some(model(arguments.model.as_deref())?) };
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
@@ -36,8 +37,7 @@ pub(crate) fn run(arguments: &Predict) -> anyhow::Result<Outcome> {
         }
     };
     if let Some(path) = &arguments.out {
-        let text = json::write(&fields)?;
-        files::write_atomically(path, |w| Ok(w.write_all(text.as_bytes())?))?;
+        files::write_text(path, &json::write(&fields)?)?;
     }
     if arguments.json {
         output::print_json(&fields)?;

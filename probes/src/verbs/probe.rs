@@ -4,7 +4,7 @@ use crate::args::Probe;
 use crate::contention::Contention;
 use crate::destination::Destination;
 use crate::exit::{Outcome, WrongUsage};
-use crate::hardware::measure_hardware;
+use crate::hardware::{self, measure_hardware};
 use crate::sweep::{self, Conditions, Found, Plan};
 use crate::{interrupt, output, provenance, summary};
 use anyhow::Context;
@@ -63,14 +63,7 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
 
 /// What to sweep; `None` with `--hardware-only`.
 fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
-    if let Some(threads) = arguments.threads
-        && threads > usable_cores()
-    {
-        let cores = usable_cores();
-        return Err(
-            WrongUsage(format!("--threads {threads}: this process may use {cores} cores; use at most {cores}")).into()
-        );
-    }
+    hardware::check_threads(arguments.threads)?;
     let scenarios: Result<Vec<Scenario>, String> = arguments.scenarios.iter().map(|s| s.parse()).collect();
     let mut scenarios = scenarios.map_err(|e| WrongUsage(format!("--scenario: {e}")))?;
     let mut seen = Vec::new();

@@ -98,7 +98,7 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
     let outcome = simulate(&course, fields, &registry)?;
     if let Some(path) = &arguments.plot {
         let svg = plot::simulation(&course, &outcome)?;
-        files::write_atomically(path, |w| Ok(w.write_all(svg.as_bytes())?))?;
+        files::write_text(path, &svg)?;
     }
     let answer = answer(&course, &outcome, origin);
     if arguments.json {
