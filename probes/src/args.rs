@@ -85,17 +85,22 @@ pub(crate) struct Probe {
 Examples:
   sapwise predict
   sapwise predict --scenario clustered --out fields.json
-  sapwise predict --report other-machine.json --model mine.json")]
+  sapwise predict --report other-machine.json --model mine.json
+  sapwise predict --report this-machine.json --measured --out fields.json    (measured, for an engine to ship)")]
 pub(crate) struct Predict {
     /// Predict for the machine of this report instead of measuring this one.
     #[arg(long, value_name = "R.json", conflicts_with = "threads")]
     pub(crate) report: Option<PathBuf>,
+    /// Take the fields from the report's own timings instead of a model: slower to get than a prediction, and surer.
+    #[arg(long, requires = "report", conflicts_with = "model")]
+    pub(crate) measured: bool,
     /// Use this model instead of the built-in one.
     #[arg(long, value_name = "M.json")]
     pub(crate) model: Option<PathBuf>,
-    /// Scenario of the slice that is shown: the choice itself depends on the load of each frame.
-    #[arg(long, value_name = "NAME", default_value_t = Scenario::Uniform)]
-    pub(crate) scenario: Scenario,
+    /// Scenario of the slice that is shown: the choice itself depends on the load of each frame. Without this option uniform,
+    /// with --measured the first of a report that lacks it.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) scenario: Option<Scenario>,
     /// Use this many cores at most, as if the machine had no more.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,
@@ -181,7 +186,7 @@ pub(crate) struct Pairs {
     #[arg(long, value_name = "ID")]
     pub(crate) algorithm: Option<AlgorithmId>,
     /// Go through all frames that many times.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) repeat: u32,
     /// Where the pairs of the last frame go, 32-bit unsigned integers of shape m x 2, sorted.
     #[arg(long, value_name = "PAIRS.npy")]
@@ -213,6 +218,9 @@ pub(crate) struct Schema {
     /// The folder that they go to; made when it is not there.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+    /// One JSON object on standard output instead of text.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// One part of a measurement in a process of its own, so that a crash costs that part and not the run.

@@ -16,6 +16,9 @@ use header::Header;
 /// Bounds of a box: lowest x, y, z, then highest x, y, z.
 const BOUNDS: u64 = 6;
 
+/// Frames without a box take no room in a file, but time and an entry of the answer each.
+const MOST_EMPTY_FRAMES: u64 = 1_000_000;
+
 /// Frames with the same number of boxes each.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Frames {
@@ -71,6 +74,7 @@ fn parse(file: &[u8]) -> Result<Frames> {
     // An axis beside one of length 0 takes no room in a file, so that only this bounds it.
     let most = u64::from(u32::MAX);
     ensure!(frames <= most && objects <= most, "its header claims a shape of {:?}, more than can be numbered", header.shape);
+    ensure!(objects > 0 || frames <= MOST_EMPTY_FRAMES, "its header claims {frames} frames without a box");
     let bytes = frames.checked_mul(objects).and_then(|boxes| boxes.checked_mul(4 * BOUNDS));
     let bytes =
         bytes.with_context(|| format!("its header claims a shape of {:?}, more than any file holds", header.shape))?;
@@ -193,7 +197,7 @@ mod tests {
     #[test]
     fn bad_files_are_errors_that_name_the_file_and_the_defect() {
         let folder = tempfile::tempdir().unwrap();
-        let cases: [(&[u8], &str); 21] = [
+        let cases: [(&[u8], &str); 22] = [
             (b"", "empty"),
             (b"PK\x03\x04 an archive", "no .npy file"),
             (b"\x93NUMPY\x01", "ends within its header"),
@@ -215,6 +219,7 @@ mod tests {
             (&npy(&dict("<f4", "False", "(4000000000, 4000000000, 6)"), &floats(6)), "more than any file holds"),
             (&npy(&dict("<f4", "True", "(0, 9223372036854775807, 6)"), &[]), "more than can be numbered"),
             (&npy(&dict("<f4", "False", "(1000000000000000000, 0, 6)"), &[]), "more than can be numbered"),
+            (&npy(&dict("<f4", "False", "(1000001, 0, 6)"), &[]), "1000001 frames without a box"),
         ];
         for (bytes, defect) in cases {
             let path = stored(&folder, bytes);

@@ -13,7 +13,8 @@ exponential of a ridge residual. The units are fitted on relative error, robustl
 thread counts.
 
 Regret is the time of the choice over the time of the best choice, less one, on reports that the fit did not see. A choice
-that was not timed there, because the algorithm had left the race as hopeless, is charged ten times the best.
+that was not timed there is charged what it cost, relative to the best, where the sweep went through the same scenario and
+size another time; where it was timed in neither, because the algorithm had left the race, ten times the best.
 
 Not for timing promises: a cost may be off by more than the choice that follows from it. Not for GPUs.
 ";

@@ -21,6 +21,10 @@ impl Destination {
         if path.is_dir() {
             bail!("{} is a folder; name a file with --out", path.display());
         }
+        // A device or a pipe is written as it is, whatever its folder takes.
+        if path.exists() && !path.is_file() {
+            return Ok(Self(path));
+        }
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         tempfile::tempfile_in(folder)
             .with_context(|| format!("no file can be written in {}; name another with --out", folder.display()))?;
@@ -50,5 +54,5 @@ impl Destination {
 
 fn write(path: &Path, report: &Report) -> anyhow::Result<()> {
     let text = sapwise::json::write_report(report)?;
-    crate::files::write_atomically(path, |w| Ok(w.write_all(text.as_bytes())?))
+    crate::files::write_text(path, &text)
 }

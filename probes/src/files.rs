@@ -23,6 +23,14 @@ pub(crate) fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -
     result.with_context(|| format!("can't write {}", path.display()))
 }
 
+/// Writes a text, through [`write_atomically`].
+///
+/// # Errors
+/// As there.
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<()> {
+    write_atomically(path, |out| Ok(out.write_all(text.as_bytes())?))
+}
+
 fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
     let folder = match path.parent() {
         Some(folder) if folder.as_os_str().is_empty() => PathBuf::from("."),

@@ -1,9 +1,10 @@
 //! The hardware parameters of this machine, each family measured in a process of its own.
 
 use crate::child::{Ended, run_part};
+use crate::exit::WrongUsage;
 use crate::progress::Progress;
 use sapwise::measure::{self, Family};
-use sapwise::{Hardware, Parameter};
+use sapwise::{Hardware, Parameter, usable_cores};
 use std::time::Duration;
 
 /// A family takes a second or less. One that takes this long hangs in a driver or has no processor to run on.
@@ -28,6 +29,20 @@ pub(crate) fn measure_hardware(threads: Option<u32>) -> anyhow::Result<Hardware>
         progress.advance(1);
     }
     Ok(measure::assemble(measure::machine(), found))
+}
+
+/// Refuses more threads than this process may use.
+///
+/// # Errors
+/// Says how many there are.
+pub(crate) fn check_threads(threads: Option<u32>) -> Result<(), WrongUsage> {
+    let cores = usable_cores();
+    match threads {
+        Some(threads) if threads > cores => {
+            Err(WrongUsage(format!("--threads {threads}: this process may use {cores} cores; use at most {cores}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The parameters of a family, or why there are none.

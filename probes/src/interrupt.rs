@@ -18,7 +18,7 @@ pub(crate) fn listen() -> anyhow::Result<()> {
             // Child processes notice the closed pipe and end too.
             std::process::exit(ENDED_BY_SIGINT);
         }
-        crate::output::complain("interrupted: keeping what there is; once more to end at once");
+        crate::output::complain("interrupted: about to stop; once more to end at once");
     })
     .context("Ctrl-C can't be caught")
 }

@@ -17,6 +17,7 @@ mod plot;
 mod prediction;
 mod progress;
 mod provenance;
+mod revisions;
 mod simulation;
 mod summary;
 mod sweep;

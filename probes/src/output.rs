@@ -1,7 +1,20 @@
 //! Standard output and standard error, without the panics of `println!`.
 
 use anyhow::Context;
+use std::fmt;
 use std::io::{ErrorKind, Write};
+
+/// Standard output is closed. A broken pipe elsewhere, such as one given to `--out`, is an error like any other.
+#[derive(Debug)]
+struct Closed;
+
+impl fmt::Display for Closed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("standard output is closed")
+    }
+}
+
+impl std::error::Error for Closed {}
 
 /// Writes a text and a line end to standard output.
 ///
@@ -10,7 +23,10 @@ use std::io::{ErrorKind, Write};
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     let written = out.write_all(text.trim_end_matches('\n').as_bytes()).and_then(|()| out.write_all(b"\n"));
-    written.and_then(|()| out.flush()).context("standard output can't be written")
+    match written.and_then(|()| out.flush()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Err(Closed.into()),
+        written => written.context("standard output can't be written"),
+    }
 }
 
 /// Writes a value as one line of JSON to standard output.
@@ -28,5 +44,17 @@ pub(crate) fn complain(text: &str) {
 
 /// Whether a reader such as `head` has closed standard output: it has what it wanted, so this is no failure.
 pub(crate) fn is_closed(error: &anyhow::Error) -> bool {
-    error.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe)
+    error.is::<Closed>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_standard_output_is_closed_without_an_error() {
+        let pipe = anyhow::Error::from(std::io::Error::from(ErrorKind::BrokenPipe)).context("can't write out.json");
+        assert!(!is_closed(&pipe));
+        assert!(is_closed(&anyhow::Error::from(Closed).context("a table")));
+    }
 }

@@ -45,7 +45,9 @@ where
     D: DrawingBackend,
     D::ErrorType: 'static,
 {
-    let times = || outcome.frames.iter().flat_map(|f| f.fixed_ns.iter().chain([&f.adaptive_ns])).map(|ns| ns / 1e3);
+    let times = || outcome.frames.iter().flat_map(|f| f.fixed_ns.iter().chain([&f.adaptive_ns]));
+    // Infinite where an algorithm had left the course.
+    let times = || times().filter(|ns| ns.is_finite()).map(|ns| ns / 1e3);
     let low = times().fold(f64::INFINITY, f64::min);
     let high = times().fold(0.0, f64::max);
     // Room for the band below the lowest curve.
@@ -71,6 +73,7 @@ where
         .draw()?;
     for (k, id) in outcome.fixed.iter().enumerate() {
         let line = outcome.frames.iter().enumerate().map(|(at, f)| (at, f.fixed_ns[k] / 1e3));
+        let line = line.filter(|(_, us)| us.is_finite());
         chart
             .draw_series(LineSeries::new(line, colour(k).stroke_width(2)))?
             .label(id.to_string())

@@ -34,13 +34,14 @@ pub(crate) fn predict(model: &Model, hardware: &Hardware, scenario: Scenario) ->
 /// The load of a scenario over the number of objects, with the pairs that it really has.
 ///
 /// # Errors
-/// When the pairs can't be found, for want of memory.
+/// When the pairs can't be found, for want of memory, and on Ctrl-C.
 pub(crate) fn slice(scenario: Scenario) -> anyhow::Result<Vec<Load>> {
     let registry = Registry::with_cores(1);
     let mut counter = registry.create(&"strips@cpu1".parse()?)?;
     let mut pairs = Pairs::new();
     let mut loads = Vec::new();
     for quarter in SLICE {
+        crate::interrupt::check()?;
         let objects = 10.0_f64.powf(f64::from(quarter) / 4.0).round() as usize;
         let mut scene = scenario.start(objects, SEED);
         crate::sweep::next_frame(&mut scene);

@@ -50,11 +50,10 @@ fn requested_level() -> Option<SimdLevel> {
     SimdLevel::requested().ok().flatten()
 }
 
-/// The upper median, over the points where foreign load could be told.
+/// Over the points where it could be told.
 fn median_foreign_load(points: &[Point]) -> Option<f64> {
-    let mut loads: Vec<f64> = points.iter().filter_map(|p| p.foreign_load).collect();
-    loads.sort_unstable_by(f64::total_cmp);
-    loads.get(loads.len() / 2).copied()
+    let loads: Vec<f64> = points.iter().filter_map(|p| p.foreign_load).collect();
+    sapwise::measure::statistics::median(&loads)
 }
 
 /// The arguments without `--out`: paths name users.

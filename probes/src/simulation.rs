@@ -7,9 +7,14 @@ use anyhow::{Context, bail};
 use sapwise::{Adaptive, AlgorithmId, BroadPhase, Fields, Pairs, Registry, Scenario};
 use std::time::Instant;
 
-/// A fixed algorithm that takes this many times as long as the best at a frame is timed there once and not again: its total
-/// is told, and it can't be the best at that frame.
+/// A fixed algorithm of which even the fastest of two samples at a frame takes this many times as long as the best there is
+/// not timed at that frame again: its total is told, and it can't be the best. One sample alone may have been a cold one.
 const HOPELESS: f64 = 10.0;
+
+/// A fixed algorithm leaves the course at the first frame that takes it longer than this ...
+const TOO_LONG_NS: f64 = 1e9;
+/// ... and this many times as long as the best: a total that takes hours tells no more than the frame does.
+const TOO_SLOW: f64 = 100.0;
 
 /// What to simulate.
 #[derive(Debug, Clone, Copy)]
@@ -27,7 +32,7 @@ pub(crate) struct Frame {
     pub(crate) objects: usize,
     /// Median over the repeats, nanoseconds, choice included.
     pub(crate) adaptive_ns: f64,
-    /// The same of each fixed algorithm.
+    /// The same of each fixed algorithm; infinite where it had left the course.
     pub(crate) fixed_ns: Vec<f64>,
     /// What the adaptive module ran in the last repeat: a position among the fixed ones.
     pub(crate) chosen: Option<usize>,
@@ -53,8 +58,16 @@ impl Outcome {
         total_ms(self.frames.iter().map(|f| f.fixed_ns.iter().copied().fold(f64::INFINITY, f64::min)))
     }
 
-    pub(crate) fn fixed_ms(&self, k: usize) -> f64 {
-        total_ms(self.frames.iter().map(|f| f.fixed_ns[k]))
+    /// The total of a fixed algorithm; `None` when it left the course.
+    pub(crate) fn fixed_ms(&self, k: usize) -> Option<f64> {
+        Some(total_ms(self.frames.iter().map(|f| f.fixed_ns[k]))).filter(|ms| ms.is_finite())
+    }
+
+    /// The last frame of a fixed algorithm that left the course, and its total until then.
+    pub(crate) fn left(&self, k: usize) -> Option<(usize, f64)> {
+        let run = self.frames.iter().take_while(|f| f.fixed_ns[k].is_finite()).count();
+        let until_then = || total_ms(self.frames[..run].iter().map(|f| f.fixed_ns[k]));
+        (run < self.frames.len()).then(|| (run.saturating_sub(1), until_then()))
     }
 
     /// Time of the adaptive module over that of the oracle, less one.
@@ -64,7 +77,7 @@ impl Outcome {
 
     /// Position and total of the fixed algorithm with the smallest total.
     pub(crate) fn best_fixed(&self) -> Option<(usize, f64)> {
-        (0..self.fixed.len()).map(|k| (k, self.fixed_ms(k))).min_by(|a, b| a.1.total_cmp(&b.1))
+        (0..self.fixed.len()).filter_map(|k| Some((k, self.fixed_ms(k)?))).min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     pub(crate) fn switches(&self) -> usize {
@@ -86,9 +99,25 @@ fn total_ms(ns: impl Iterator<Item = f64>) -> f64 {
 struct Contestant {
     algorithm: Box<dyn BroadPhase>,
     ns: Vec<Vec<u64>>,
+    /// It has left the course.
+    left: bool,
 }
 
 impl Contestant {
+    fn new(algorithm: Box<dyn BroadPhase>, frames: usize) -> Self {
+        Self { algorithm, ns: vec![Vec::new(); frames], left: false }
+    }
+
+    /// Infinite without samples.
+    fn fastest(&self, frame: usize) -> f64 {
+        self.ns[frame].iter().min().map_or(f64::INFINITY, |&ns| ns as f64)
+    }
+
+    /// Whether another sample at this frame would tell nothing.
+    fn is_hopeless(&self, frame: usize, best: f64) -> bool {
+        self.left || self.ns[frame].len() >= 2 && self.fastest(frame) > HOPELESS * best
+    }
+
     fn median(&self, frame: usize) -> f64 {
         let samples: Vec<f64> = self.ns[frame].iter().map(|&ns| ns as f64).collect();
         sapwise::measure::statistics::median(&samples).unwrap_or(f64::INFINITY)
@@ -103,38 +132,51 @@ impl Contestant {
 /// # Errors
 /// When no algorithm of the fields can run, when contestants disagree about the pairs, or on Ctrl-C before one repeat is done.
 pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> anyhow::Result<Outcome> {
-    let fixed: Vec<AlgorithmId> = registry.available().into_iter().map(|(id, _)| id).collect();
-    let mut adaptive = Adaptive::new(fields, registry)?;
+    let mut fixed: Vec<AlgorithmId> = registry.available().into_iter().map(|(id, _)| id).collect();
     let mut contestants: Vec<Contestant> = fixed
         .iter()
-        .map(|id| Ok(Contestant { algorithm: registry.create(id)?, ns: vec![Vec::new(); course.frames] }))
+        .map(|id| Ok(Contestant::new(registry.create(id)?, course.frames)))
         .collect::<Result<_, sapwise::Error>>()?;
+    // Fields may name a number of threads that the registry doesn't list but can make.
+    for id in fields.algorithms() {
+        if !fixed.contains(id)
+            && let Ok(algorithm) = registry.create(id)
+        {
+            fixed.push(id.clone());
+            contestants.push(Contestant::new(algorithm, course.frames));
+        }
+    }
+    let mut adaptive = Adaptive::new(fields, registry)?;
     let mut adaptive_ns: Vec<Vec<u64>> = vec![Vec::new(); course.frames];
     let mut frames: Vec<Frame> = Vec::with_capacity(course.frames);
     let mut pairs = Pairs::new();
     let mut turns = Turns::new(course.seed);
     let progress = Progress::new((course.repeats * course.frames) as u64);
     let mut done = 0;
+    // Turns and frames of the samples that the repeat under way has added.
+    let mut under_way: Vec<(usize, usize)> = Vec::new();
     'repeats: for repeat in 0..course.repeats {
         progress.message(format!("{}: repeat {} of {}", course.scenario, repeat + 1, course.repeats));
         let mut scene = course.scenario.start(course.objects, course.seed);
         let mut chosen = Vec::with_capacity(course.frames);
+        under_way.clear();
         for (frame, own_ns) in adaptive_ns.iter_mut().enumerate() {
             if interrupt::requested() {
                 break 'repeats;
             }
             let boxes = scene.boxes();
             let mut fingerprint = None;
-            let best = contestants.iter().map(|c| c.median(frame)).fold(f64::INFINITY, f64::min);
+            let best = best(&contestants, frame);
             // The turn behind the last of the fixed ones is the adaptive module's.
             for k in turns.order(contestants.len() + 1) {
                 let started = Instant::now();
                 let (result, ns) = match contestants.get_mut(k) {
-                    Some(c) if repeat > 0 && c.median(frame) > HOPELESS * best => continue,
+                    Some(c) if c.is_hopeless(frame, best) => continue,
                     Some(c) => (c.algorithm.find_pairs(boxes, &mut pairs), &mut c.ns[frame]),
                     None => (adaptive.find_pairs(boxes, &mut pairs), &mut *own_ns),
                 };
                 ns.push((started.elapsed().as_nanos() as u64).max(1));
+                under_way.push((k, frame));
                 let name = || fixed.get(k).map_or("the adaptive module".to_owned(), AlgorithmId::to_string);
                 result.with_context(|| format!("{} at frame {frame}", name()))?;
                 if repeat == 0 {
@@ -145,7 +187,9 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
                 }
             }
             chosen.push(adaptive.last_decision().and_then(|d| fixed.iter().position(|id| id == d.algorithm)));
+            // Later repeats go through the same frames, so that nobody leaves in them who did not in the first.
             if repeat == 0 {
+                leave(&mut contestants, frame);
                 frames.push(Frame { objects: boxes.len(), adaptive_ns: 0.0, fixed_ns: Vec::new(), chosen: None });
             }
             scene.advance();
@@ -157,12 +201,31 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
     if done == 0 {
         bail!("interrupted before every frame was run once; there is nothing to tell");
     }
+    if done < course.repeats {
+        for (k, frame) in under_way {
+            contestants.get_mut(k).map_or(&mut adaptive_ns, |c| &mut c.ns)[frame].pop();
+        }
+    }
     for (at, frame) in frames.iter_mut().enumerate() {
         let samples: Vec<f64> = adaptive_ns[at].iter().map(|&ns| ns as f64).collect();
         frame.adaptive_ns = sapwise::measure::statistics::median(&samples).unwrap_or(f64::INFINITY);
         frame.fixed_ns = contestants.iter().map(|c| c.median(at)).collect();
     }
-    Ok(Outcome { fixed, frames, repeats: done, interrupted: interrupt::requested() })
+    Ok(Outcome { fixed, frames, repeats: done, interrupted: done < course.repeats })
+}
+
+/// The fastest sample of any fixed algorithm at a frame.
+fn best(contestants: &[Contestant], frame: usize) -> f64 {
+    contestants.iter().map(|c| c.fastest(frame)).fold(f64::INFINITY, f64::min)
+}
+
+/// Lets those leave the course for whom this frame took too long.
+fn leave(contestants: &mut [Contestant], frame: usize) {
+    let best = best(contestants, frame);
+    for contestant in contestants.iter_mut().filter(|c| !c.left) {
+        let ns = contestant.fastest(frame);
+        contestant.left = ns > TOO_LONG_NS && ns > TOO_SLOW * best;
+    }
 }
 
 #[cfg(test)]
@@ -184,6 +247,51 @@ mod tests {
             assert!(frame.fixed_ns.iter().all(|ns| ns.is_finite()) && frame.adaptive_ns.is_finite());
             assert!(frame.chosen.is_some());
         }
+    }
+
+    #[test]
+    fn an_algorithm_that_only_the_fields_name_is_among_the_fixed() {
+        let registry = Registry::with_cores(4);
+        let id: AlgorithmId = "strips@cpu3".parse().unwrap();
+        if registry.create(&id).is_err() {
+            return;
+        }
+        let fields = Fields::from_steps(vec![Step { from_objects: 0, algorithm: id.clone() }]).unwrap();
+        let course = Course { scenario: Scenario::Uniform, objects: 50, frames: 2, repeats: 1, seed: 1 };
+        let outcome = simulate(&course, fields, &registry).unwrap();
+        assert_eq!(outcome.fixed.last(), Some(&id));
+        assert!(outcome.frames.iter().all(|f| f.chosen.is_some()));
+    }
+
+    #[test]
+    fn whoever_is_hopeless_leaves_the_course_and_one_cold_sample_is_no_proof() {
+        struct Nothing;
+        impl BroadPhase for Nothing {
+            fn find_pairs(&mut self, _: &[sapwise::Aabb], _: &mut Pairs) -> Result<(), sapwise::Error> {
+                Ok(())
+            }
+        }
+        let times = |ns: &[u64]| Contestant { algorithm: Box::new(Nothing), ns: vec![ns.to_vec()], left: false };
+        let mut all = [times(&[10_000_000]), times(&[900_000_000]), times(&[1_100_000_000])];
+        leave(&mut all, 0);
+        assert_eq!(all.map(|c| c.left), [false, false, true]);
+        assert!(!times(&[500]).is_hopeless(0, 10.0));
+        assert!(!times(&[500, 90]).is_hopeless(0, 10.0));
+        assert!(times(&[500, 110]).is_hopeless(0, 10.0));
+    }
+
+    #[test]
+    fn who_left_has_no_total_and_counts_nowhere() {
+        let frame = |a, b| Frame { objects: 10, adaptive_ns: 1e6, fixed_ns: vec![a, b], chosen: Some(0) };
+        let outcome = Outcome {
+            fixed: vec!["strips@cpu1".parse().unwrap(), "brute@cpu1".parse().unwrap()],
+            frames: vec![frame(1e6, 2e9), frame(1e6, f64::INFINITY)],
+            repeats: 1,
+            interrupted: false,
+        };
+        assert_eq!((outcome.fixed_ms(0), outcome.fixed_ms(1)), (Some(2.0), None));
+        assert_eq!((outcome.left(0), outcome.left(1)), (None, Some((0, 2000.0))));
+        assert_eq!((outcome.oracle_ms(), outcome.best_fixed()), (2.0, Some((0, 2.0))));
     }
 
     #[test]

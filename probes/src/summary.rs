@@ -1,7 +1,7 @@
 //! What a person reads at the end of a probe or a prediction.
 
 use crate::table::{bytes, columns, duration, grouped};
-use crate::train::measured_fields;
+use crate::train::{measured_fields, slice_scenario};
 use sapwise::report::Label;
 use sapwise::{Fields, Hardware, How, Report};
 use std::path::Path;
@@ -27,10 +27,11 @@ pub(crate) fn report(report: &Report) -> String {
 /// What to do with a report that was written.
 pub(crate) fn next_step(report: &Report, path: &Path) -> String {
     let path = path.display();
-    let next = if report.points.is_empty() {
-        format!("sapwise predict --report {path}")
-    } else {
+    // A report without a sweep, or one that was interrupted early, serves for its hardware only.
+    let next = if measured_fields(report, slice_scenario(report)).is_ok() {
         format!("sapwise run fragmentation --fields {path}, or sapwise train {path} --out model.json")
+    } else {
+        format!("sapwise predict --report {path}")
     };
     format!("\nThe report is in {path}. Next: {next}")
 }

@@ -8,7 +8,7 @@ use std::fs;
 #[test]
 fn every_verb_has_help_with_an_example() {
     let all = success(sapwise().arg("--help"));
-    for verb in ["devices", "probe", "train", "pairs", "check", "schema"] {
+    for verb in ["predict", "devices", "probe", "run", "train", "pairs", "check", "schema"] {
         assert!(all.contains(verb), "{verb}");
         let help = success(sapwise().args([verb, "--help"]));
         assert!(help.contains("Example") && help.contains(&format!("sapwise {verb}")), "{verb}: {help}");
@@ -18,7 +18,7 @@ fn every_verb_has_help_with_an_example() {
 
 #[test]
 fn wrong_usage_is_exit_status_two() {
-    let cases: [&[&str]; 9] = [
+    let cases: [&[&str]; 11] = [
         &[],
         &["fly"],
         &["devices", "--fast"],
@@ -27,6 +27,8 @@ fn wrong_usage_is_exit_status_two() {
         &["pairs", "x.npy", "--algorithm", "strips"],
         &["probe", "--scenario", "nowhere"],
         &["probe", "--threads", "4096"],
+        &["predict", "--threads", "4096"],
+        &["predict", "--measured"],
         &["probe", "--hardware-only", "--quick"],
     ];
     for words in cases {
@@ -169,7 +171,9 @@ fn a_full_disk_is_a_failure_and_a_closed_pipe_is_none() {
 #[test]
 fn schema_writes_three_files() {
     let folder = tempfile::tempdir().unwrap();
-    success(sapwise().args(["schema", "--out"]).arg(folder.path().join("new")));
+    let told = success(sapwise().args(["schema", "--json", "--out"]).arg(folder.path().join("new")));
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(told["files"].as_array().unwrap().len(), 3);
     for name in ["report-1", "model-1", "fields-1"] {
         let text = fs::read_to_string(folder.path().join("new").join(format!("{name}.schema.json"))).unwrap();
         let schema: serde_json::Value = serde_json::from_str(&text).unwrap();

@@ -86,9 +86,10 @@ fn ctrl_c_keeps_what_was_measured() {
     for scenario in sapwise::Scenario::ALL {
         probe.args(["--scenario", scenario.name()]);
     }
-    let probe = probe.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let mut probe = probe.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
     // Written first when the first of ten scenarios is done.
     while !out.exists() {
+        assert_eq!(probe.try_wait().unwrap(), None, "the probe ended before its first scenario did");
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
     let sent = std::process::Command::new("kill").args(["-INT", &probe.id().to_string()]).status().unwrap();

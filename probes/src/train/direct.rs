@@ -38,7 +38,7 @@ pub(crate) struct Crossings<'a> {
 impl<'a> Crossings<'a> {
     /// Finds the crossovers between the roles of a profile in its scenario `uniform`, or its first one.
     pub(crate) fn new(profile: &'a Profile) -> Self {
-        let scenario = slice_scenario(profile);
+        let scenario = slice_scenario(&profile.report);
         let points: Vec<&Point> = profile.report.points.iter().filter(|p| p.scenario == scenario).collect();
         let ids: Vec<AlgorithmId> = profile.report.algorithms.iter().map(|t| t.id.clone()).collect();
         let roles = roles(&ids);

@@ -18,6 +18,7 @@ use anyhow::{Result, bail};
 use sapwise::hardware::parameter;
 use sapwise::{Model, Report};
 
+pub(crate) use baselines::slice_scenario;
 pub(crate) use curve::measured_fields;
 
 /// Parameters by which a machine is compared with those of the training.

@@ -4,7 +4,7 @@ use sapwise::report::{Label, Point, Report, Timing};
 use sapwise::{AlgorithmId, Load};
 use std::collections::BTreeMap;
 
-use super::robust::median;
+use crate::sweep::median;
 
 /// A report of which only usable timings are left.
 #[derive(Debug, Clone)]
@@ -110,7 +110,7 @@ fn is_sound(timing: &Timing) -> bool {
 
 /// The medians of a point, for its algorithms with sound timings.
 pub(crate) fn medians(point: &Point) -> Vec<(&AlgorithmId, f64)> {
-    let of = |t: &Timing| median(t.samples_ns.iter().map(|&ns| ns as f64).collect());
+    let of = |t: &Timing| median(&t.samples_ns).unwrap_or(0.0);
     point.timings.iter().filter(|t| is_sound(t)).map(|t| (&t.algorithm, of(t))).collect()
 }
 

@@ -3,7 +3,7 @@
 use crate::args::Check;
 use crate::document::read_document;
 use crate::exit::Outcome;
-use crate::output;
+use crate::{output, revisions};
 use sapwise::json::Document;
 use sapwise::measure::{self, Family, Options};
 use sapwise::model::Range;
@@ -95,8 +95,7 @@ impl Here {
 
     fn report(&self, report: &Report, finding: &mut Finding) {
         finding.schema = Some("report/1");
-        let used: Vec<(String, u32)> = report.algorithms.iter().map(|t| (t.id.method().to_owned(), t.revision)).collect();
-        finding.set_current(self.stale(&used), "probe again");
+        finding.set_current(revisions::stale_in_report(report, &self.registry), "probe again");
         let same = report.hardware.machine.physical_id == self.machine.physical_id;
         finding.applicable = Some(same);
         finding.notes.push(if same {
@@ -115,8 +114,8 @@ impl Here {
 
     fn model(&self, model: &Model, finding: &mut Finding) {
         finding.schema = Some("model/1");
-        let used: Vec<(String, u32)> = model.methods.iter().map(|m| (m.method.clone(), m.revision)).collect();
-        finding.set_current(self.stale(&used), "train it again on new reports");
+        let used = model.methods.iter().map(|m| (m.method.as_str(), m.revision));
+        finding.set_current(revisions::stale(used, &self.registry), "train it again on new reports");
         finding.applicable = Some(finding.current == Some(true));
         let known = model.trained_on.iter().any(|t| t.physical_id == self.machine.physical_id);
         finding.notes.push(if known {
@@ -134,8 +133,10 @@ impl Here {
 
     fn fields(&self, fields: &Fields, finding: &mut Finding) {
         finding.schema = Some("fields/1");
-        let used: Vec<(String, u32)> = fields.costs.iter().map(|c| (c.algorithm.method().to_owned(), c.revision)).collect();
-        finding.set_current(self.stale(&used), "predict again, or probe again where they were measured");
+        finding.set_current(
+            revisions::stale_in_fields(fields, &self.registry),
+            "predict again, or probe again where they were measured",
+        );
         let mut wanted = fields.algorithms();
         wanted.extend(fields.steps.iter().map(|s| &s.algorithm));
         let mut missing: Vec<String> = wanted.into_iter().filter_map(|id| self.unavailable(id)).collect();
@@ -146,23 +147,6 @@ impl Here {
         if fields.extrapolated {
             finding.notes.push("predicted for a machine outside what the model was trained on".to_owned());
         }
-    }
-
-    /// The methods whose revision is not that of this build.
-    fn stale(&self, used: &[(String, u32)]) -> Vec<String> {
-        let mut stale = Vec::new();
-        for (method, revision) in used {
-            // Every thread count of a method has the same revision, and a machine with other counts has other ids.
-            let ours = self.registry.entries().iter().find(|e| e.id.method() == method).map(|e| e.revision);
-            match ours {
-                Some(ours) if ours == *revision => {}
-                Some(ours) => stale.push(format!("{method} has revision {revision} there and {ours} in this build")),
-                None => stale.push(format!("{method} is not in this build")),
-            }
-        }
-        stale.sort_unstable();
-        stale.dedup();
-        stale
     }
 
     /// Why an algorithm can't run here, if it can't.

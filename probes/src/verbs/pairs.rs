@@ -37,8 +37,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let mut registry = Registry::new();
     registry.pin_threads();
     let id = algorithm(arguments, &registry)?;
-    interrupt::listen()?;
     let frames = read_frames(&arguments.boxes)?;
+    interrupt::listen()?;
     let mut pairs = Pairs::new();
     pairs.set_limit(Some(arguments.limit.unwrap_or_else(|| memory_limit(id.threads()))));
     let mut algorithm = registry.create(&id).map_err(|e| WrongUsage(e.to_string()))?;
@@ -104,6 +104,10 @@ fn measure(
             let started = Instant::now();
             let result = algorithm.find_pairs(boxes, pairs);
             samples.push(started.elapsed().as_nanos() as u64);
+            let ours = arguments.limit.is_none() && matches!(result, Err(sapwise::Error::TooManyPairs { .. }));
+            let result = result.map_err(anyhow::Error::from);
+            let result =
+                if ours { result.context("the limit comes from the free memory; set another with --limit") } else { result };
             result.with_context(|| format!("{}, frame {k}", arguments.boxes.display()))?;
             if repetition == 0 {
                 counts.push(pairs.len() as u64);

@@ -1,42 +1,55 @@
-//! `sapwise predict`: the fields of a machine without a sweep.
+//! `sapwise predict`: the fields of a machine without a sweep, or from the one that its report holds.
 
 use crate::args::Predict;
 use crate::document::read_document;
-use crate::exit::Outcome;
-use crate::hardware::measure_hardware;
-use crate::{files, interrupt, output, prediction, summary};
+use crate::exit::{Outcome, WrongUsage};
+use crate::hardware::{self, measure_hardware};
+use crate::{files, interrupt, output, prediction, summary, train};
 use anyhow::{Context, bail};
 use sapwise::json::{self, Document};
-use sapwise::{Hardware, Model};
+use sapwise::{Model, Report, Scenario};
 use std::path::Path;
 
 pub(crate) fn run(arguments: &Predict) -> anyhow::Result<Outcome> {
+    hardware::check_threads(arguments.threads)?;
+    let report = arguments.report.as_deref().map(read_report).transpose()?;
+    let model = if arguments.measured { None } else { Some(model(arguments.model.as_deref())?) };
+    // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
-    let model = model(arguments.model.as_deref())?;
-    let hardware = match &arguments.report {
-        Some(path) => hardware_of(path)?,
-        None => measure_hardware(arguments.threads)?,
+    let mut text = String::new();
+    let fields = match (&model, &report) {
+        (None, Some(report)) => {
+            let scenario = arguments.scenario.map(|s| s.to_string());
+            train::measured_fields(report, scenario.as_deref().unwrap_or_else(|| train::slice_scenario(report)))?
+        }
+        (None, None) => return Err(WrongUsage("--measured needs --report".to_owned()).into()),
+        (Some(model), report) => {
+            let scenario = arguments.scenario.unwrap_or(Scenario::Uniform);
+            let hardware = match report {
+                Some(report) => report.hardware.clone(),
+                None => measure_hardware(arguments.threads)?,
+            };
+            if report.is_none() {
+                text = format!("{}\n", summary::hardware(&hardware));
+            }
+            interrupt::check()?;
+            prediction::predict(model, &hardware, scenario)?
+        }
     };
-    interrupt::check()?;
-    let fields = prediction::predict(&model, &hardware, arguments.scenario)?;
     if let Some(path) = &arguments.out {
-        let text = json::write(&fields)?;
-        files::write_atomically(path, |w| Ok(w.write_all(text.as_bytes())?))?;
+        files::write_text(path, &json::write(&fields)?)?;
     }
     if arguments.json {
         output::print_json(&fields)?;
         return Ok(Outcome::Done);
     }
-    let mut text = String::new();
-    if arguments.report.is_none() {
-        text += &summary::hardware(&hardware);
-        text.push('\n');
-    }
     text += &summary::fields(&fields);
-    text += "\nThis version has no GPU backend, so only algorithms on the CPU are predicted.\n";
+    if model.is_some() {
+        text += "\nThis version has no GPU backend, so only algorithms on the CPU are predicted.\n";
+    }
     text += &match &arguments.out {
         Some(path) => format!("Written to {}. Next: sapwise run fragmentation --fields {}", path.display(), path.display()),
-        None => "Next: sapwise predict --out fields.json, then sapwise run fragmentation --fields fields.json".to_owned(),
+        None => "Next: the same with --out fields.json, then sapwise run fragmentation --fields fields.json".to_owned(),
     };
     output::print(&text)?;
     Ok(Outcome::Done)
@@ -54,9 +67,9 @@ pub(super) fn model(path: Option<&Path>) -> anyhow::Result<Model> {
     }
 }
 
-fn hardware_of(path: &Path) -> anyhow::Result<Hardware> {
+fn read_report(path: &Path) -> anyhow::Result<Report> {
     match read_document(path).context("the report can't be used")? {
-        Document::Report(report) => Ok(report.hardware),
-        _ => bail!("{} is no report; make one with `sapwise probe --hardware-only --out R.json`", path.display()),
+        Document::Report(report) => Ok(*report),
+        _ => bail!("{} is no report; make one with `sapwise probe --out R.json`", path.display()),
     }
 }

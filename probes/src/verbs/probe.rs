@@ -4,7 +4,7 @@ use crate::args::Probe;
 use crate::contention::Contention;
 use crate::destination::Destination;
 use crate::exit::{Outcome, WrongUsage};
-use crate::hardware::measure_hardware;
+use crate::hardware::{self, measure_hardware};
 use crate::sweep::{self, Conditions, Found, Plan};
 use crate::{interrupt, output, provenance, summary};
 use anyhow::Context;
@@ -42,14 +42,14 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     let (failed, interrupted) = (found.failed, found.interrupted);
     let report = assemble(arguments, &hardware, found, began);
     let saved = destination.as_ref().map(|d| d.save(&report)).transpose();
-    if arguments.json {
-        output::print(&sapwise::json::write_report(&report)?)?;
+    let text = if arguments.json {
+        sapwise::json::write_report(&report)?
     } else {
-        output::print(&summary::report(&report))?;
-        if let Ok(Some(path)) = &saved {
-            output::print(&summary::next_step(&report, path))?;
-        }
-    }
+        let next = saved.as_ref().ok().and_then(|path| path.map(|path| summary::next_step(&report, path)));
+        summary::report(&report) + &next.unwrap_or_default()
+    };
+    // A standard output that is closed or full is told last: what went wrong with the report matters more.
+    let printed = output::print(&text);
     saved?;
     if interrupted {
         anyhow::bail!("interrupted: the report holds what was measured until then");
@@ -57,19 +57,13 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     if failed {
         anyhow::bail!("the sweep has gaps or wrong answers; the remarks of the report say which");
     }
+    printed?;
     Ok(Outcome::Done)
 }
 
 /// What to sweep; `None` with `--hardware-only`.
 fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
-    if let Some(threads) = arguments.threads
-        && threads > usable_cores()
-    {
-        let cores = usable_cores();
-        return Err(
-            WrongUsage(format!("--threads {threads}: this process may use {cores} cores; use at most {cores}")).into()
-        );
-    }
+    hardware::check_threads(arguments.threads)?;
     let scenarios: Result<Vec<Scenario>, String> = arguments.scenarios.iter().map(|s| s.parse()).collect();
     let mut scenarios = scenarios.map_err(|e| WrongUsage(format!("--scenario: {e}")))?;
     let mut seen = Vec::new();

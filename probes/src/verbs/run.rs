@@ -5,12 +5,13 @@ use crate::document::read_document;
 use crate::exit::Outcome;
 use crate::hardware::measure_hardware;
 use crate::simulation::{self, Course, simulate};
-use crate::{files, interrupt, output, plot, prediction, table, train};
-use anyhow::bail;
+use crate::{files, interrupt, output, plot, prediction, revisions, table, train};
+use anyhow::{Context, bail};
 use sapwise::json::Document;
-use sapwise::{Fields, Registry, Scenario, Source};
+use sapwise::{Fields, Registry, Scenario, Source, measure};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// The answer for machines.
 #[derive(Serialize)]
@@ -21,8 +22,14 @@ struct Answer<'a> {
     repeats: usize,
     seed: u64,
     interrupted: bool,
+    /// Where the fields came from.
     source: Source,
+    extrapolated: bool,
+    /// Of the fields.
+    warnings: Vec<String>,
     total_ms: Totals,
+    /// The fixed algorithms that left the course, by their ids.
+    left_out: BTreeMap<String, LeftOut>,
     regret: f64,
     /// The best fixed algorithm, and the time of the adaptive module over its time.
     best_fixed: String,
@@ -43,7 +50,17 @@ struct Range {
 struct Totals {
     adaptive: f64,
     oracle: f64,
+    /// Of those that ran every frame.
     fixed: BTreeMap<String, f64>,
+}
+
+/// A fixed algorithm that a frame took too long.
+#[derive(Serialize)]
+struct LeftOut {
+    /// Its last frame.
+    after_frame: usize,
+    /// Its total until then.
+    at_least_ms: f64,
 }
 
 #[derive(Serialize)]
@@ -54,10 +71,21 @@ struct Decision<'a> {
 }
 
 pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
+    let mut registry = Registry::new();
+    registry.pin_threads();
+    let read = arguments.fields.as_deref().map(|path| read_fields(path, &registry)).transpose()?;
+    // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
-    let fields = fields(arguments)?;
+    let mut fields = match read {
+        Some(fields) => fields,
+        None => {
+            let hardware = measure_hardware(None)?;
+            prediction::predict(&super::predict::model(None)?, &hardware, Scenario::Uniform)?
+        }
+    };
     interrupt::check()?;
-    let source = fields.source;
+    let origin =
+        Origin { source: fields.source, extrapolated: fields.extrapolated, warnings: std::mem::take(&mut fields.warnings) };
     let usual_frames =
         if arguments.scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as u32 } else { 200 };
     let course = Course {
@@ -67,14 +95,12 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
         repeats: arguments.repeats as usize,
         seed: arguments.seed,
     };
-    let mut registry = Registry::new();
-    registry.pin_threads();
     let outcome = simulate(&course, fields, &registry)?;
     if let Some(path) = &arguments.plot {
         let svg = plot::simulation(&course, &outcome)?;
-        files::write_atomically(path, |w| Ok(w.write_all(svg.as_bytes())?))?;
+        files::write_text(path, &svg)?;
     }
-    let answer = answer(&course, &outcome, source);
+    let answer = answer(&course, &outcome, origin);
     if arguments.json {
         output::print_json(&answer)?;
     } else {
@@ -84,22 +110,49 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
     Ok(if outcome.interrupted { Outcome::Failed } else { Outcome::Done })
 }
 
-/// The fields of the file, which may be a report whose timings they are measured from; else those predicted for this machine.
-fn fields(arguments: &Run) -> anyhow::Result<Fields> {
-    let Some(path) = &arguments.fields else {
-        let hardware = measure_hardware(None)?;
-        return prediction::predict(&super::predict::model(None)?, &hardware, Scenario::Uniform);
+/// What is told about the fields.
+struct Origin {
+    source: Source,
+    extrapolated: bool,
+    warnings: Vec<String>,
+}
+
+/// The fields of a file, which may be a report whose timings they are measured from.
+///
+/// # Errors
+/// When the file is neither, or tells of other revisions of the algorithms than those of this build.
+fn read_fields(path: &Path, registry: &Registry) -> anyhow::Result<Fields> {
+    let fresh = |stale: Vec<String>| match &stale[..] {
+        [] => Ok(()),
+        _ => bail!("{} is stale: {}; predict again or probe again", path.display(), stale.join("; ")),
     };
     match read_document(path)? {
-        Document::Fields(fields) => Ok(*fields),
-        Document::Report(report) => train::measured_fields(&report, "uniform"),
+        Document::Fields(fields) => {
+            fresh(revisions::stale_in_fields(&fields, registry))?;
+            Ok(*fields)
+        }
+        Document::Report(report) => {
+            fresh(revisions::stale_in_report(&report, registry))?;
+            let mut fields = train::measured_fields(&report, train::slice_scenario(&report))
+                .with_context(|| format!("{} gives no fields", path.display()))?;
+            let machine = &report.hardware.machine;
+            if machine.physical_id != measure::machine().physical_id {
+                fields.warnings.push(format!("the report was measured on another machine: {}", machine.cpu));
+            }
+            Ok(fields)
+        }
         _ => bail!("{} is a model; give fields or a report, or leave --fields out to have them predicted", path.display()),
     }
 }
 
-fn answer<'a>(course: &Course, outcome: &'a simulation::Outcome, source: Source) -> Answer<'a> {
+fn answer<'a>(course: &Course, outcome: &'a simulation::Outcome, origin: Origin) -> Answer<'a> {
     let objects = || outcome.frames.iter().map(|f| f.objects);
-    let fixed = outcome.fixed.iter().enumerate().map(|(k, id)| (id.to_string(), outcome.fixed_ms(k))).collect();
+    let named = || outcome.fixed.iter().map(ToString::to_string).enumerate();
+    let fixed = named().filter_map(|(k, id)| Some((id, outcome.fixed_ms(k)?))).collect();
+    let left_out = named().filter_map(|(k, id)| {
+        let (after_frame, at_least_ms) = outcome.left(k)?;
+        Some((id, LeftOut { after_frame, at_least_ms }))
+    });
     let best = outcome.best_fixed();
     let mut decisions: Vec<Decision<'_>> = Vec::new();
     let mut before = None;
@@ -116,8 +169,11 @@ fn answer<'a>(course: &Course, outcome: &'a simulation::Outcome, source: Source)
         repeats: outcome.repeats,
         seed: course.seed,
         interrupted: outcome.interrupted,
-        source,
+        source: origin.source,
+        extrapolated: origin.extrapolated,
+        warnings: origin.warnings,
         total_ms: Totals { adaptive: outcome.adaptive_ms(), oracle: outcome.oracle_ms(), fixed },
+        left_out: left_out.collect(),
         regret: outcome.regret(),
         best_fixed: best.map_or_else(String::new, |(k, _)| outcome.fixed[k].to_string()),
         over_best_fixed: best.map_or(1.0, |(_, ms)| outcome.adaptive_ms() / ms),
@@ -142,6 +198,10 @@ fn text(answer: &Answer<'_>) -> String {
     rows.push(row("adaptive", answer.total_ms.adaptive));
     rows.extend(fixed.iter().map(|(id, ms)| row(id, *ms)));
     text += &table::columns(&rows);
+    for (id, LeftOut { after_frame, at_least_ms }) in &answer.left_out {
+        text +=
+            &format!("{id} left the course after frame {after_frame}, hopeless: at least {at_least_ms:.2} ms until then\n");
+    }
     text += &format!(
         "\nRegret {:.2} %, {} switches, worst frame {:.2} times the oracle's, {:.3} of the best fixed ({}).",
         answer.regret * 100.0,
@@ -150,6 +210,9 @@ fn text(answer: &Answer<'_>) -> String {
         answer.over_best_fixed,
         answer.best_fixed
     );
+    for warning in &answer.warnings {
+        text += &format!("\nwarning: {warning}");
+    }
     if answer.interrupted {
         text += "\nInterrupted: the repeats that were complete are shown.";
     }

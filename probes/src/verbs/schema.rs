@@ -2,16 +2,31 @@
 
 use crate::args::Schema;
 use crate::exit::Outcome;
+use crate::files::write_text;
 use crate::output;
 use anyhow::Context;
+use serde::Serialize;
+
+/// The answer for machines.
+#[derive(Serialize)]
+struct Answer {
+    /// What was written.
+    files: Vec<String>,
+}
 
 pub(crate) fn run(arguments: &Schema) -> anyhow::Result<Outcome> {
     let folder = &arguments.out;
     std::fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made", folder.display()))?;
+    let mut files = Vec::new();
     for (name, text) in sapwise::json::schemas()? {
         let path = folder.join(name);
-        crate::files::write_atomically(&path, |w| Ok(w.write_all(text.as_bytes())?))?;
-        output::print(&format!("wrote {}", path.display()))?;
+        write_text(&path, &text)?;
+        files.push(path.display().to_string());
+    }
+    if arguments.json {
+        output::print_json(&Answer { files })?;
+    } else {
+        output::print(&files.iter().map(|f| format!("wrote {f}\n")).collect::<String>())?;
     }
     Ok(Outcome::Done)
 }

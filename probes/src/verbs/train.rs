@@ -27,10 +27,10 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let reports = reports(&arguments.reports)?;
     let Trained { model, notes } = train::train(&reports, &name)?;
     let text = sapwise::json::write(&model)?;
-    files::write_atomically(&arguments.out, |w| Ok(w.write_all(text.as_bytes())?))?;
+    files::write_text(&arguments.out, &text)?;
     if let Some(path) = &arguments.card {
         let page = card::page(&model, &notes);
-        files::write_atomically(path, |w| Ok(w.write_all(page.as_bytes())?))?;
+        files::write_text(path, &page)?;
     }
     if arguments.json {
         output::print_json(&Answer { validation: &model.validation, model: &model.name, notes: &notes })?;

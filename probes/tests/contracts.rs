@@ -1,0 +1,161 @@
+//! The JSON that other programs read, of the verbs that lead from a report to a simulation.
+
+mod common;
+
+use common::{failure, sapwise, success};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+/// A report of this machine with a few small sizes.
+static REPORT: LazyLock<Value> = LazyLock::new(|| {
+    let words = ["probe", "--scenario", "uniform", "--max-objects", "100", "--json"];
+    serde_json::from_str(&success(sapwise().args(words))).unwrap()
+});
+
+/// Stores the report with values at JSON pointers changed.
+fn report(folder: &Path, name: &str, changes: &[(&str, Value)]) -> PathBuf {
+    let mut report = REPORT.clone();
+    for (pointer, value) in changes {
+        *report.pointer_mut(pointer).unwrap() = value.clone();
+    }
+    let path = folder.join(name);
+    fs::write(&path, report.to_string()).unwrap();
+    path
+}
+
+fn answer(command: &mut assert_cmd::Command) -> Value {
+    serde_json::from_str(&success(command)).unwrap()
+}
+
+fn assert_keys(value: &Value, keys: &[&str]) {
+    for key in keys {
+        assert!(value.get(key).is_some_and(|v| !v.is_null()), "{key} is missing: {value}");
+    }
+}
+
+fn assert_fields(fields: &Value, source: &str) {
+    assert_keys(fields, &["schema", "source", "extrapolated", "warnings", "scenario", "steps", "crossovers", "costs"]);
+    assert!(fields.get("model").is_some());
+    assert_eq!((&fields["schema"], &fields["source"]), (&"fields/1".into(), &source.into()));
+    assert_eq!((&fields["scenario"], &fields["steps"][0]["from_objects"]), (&"uniform".into(), &0.into()));
+    fields["steps"].as_array().unwrap().iter().for_each(|step| assert_keys(step, &["from_objects", "algorithm"]));
+    let borders = fields["crossovers"].as_array().unwrap();
+    borders.iter().for_each(|border| assert_keys(border, &["below", "above", "objects", "low", "high"]));
+}
+
+/// Trains on the report under the names of two machines; the label of an optimised build is put on it for that.
+fn train(folder: &Path) -> (PathBuf, Value) {
+    let optimised = ("/provenance/optimised", true.into());
+    let a = report(folder, "a.json", std::slice::from_ref(&optimised));
+    // One sample differs, so that it isn't taken for the same measurement.
+    let slower = ("/points/0/timings/0/samples_ns/0", 123_456.into());
+    let b = report(folder, "b.json", &[optimised, slower, ("/hardware/machine/physical_id", "00000000000000bb".into())]);
+    let model = folder.join("model.json");
+    let trained = answer(sapwise().arg("train").args([a, b]).arg("--json").arg("--out").arg(&model));
+    (model, trained)
+}
+
+#[test]
+fn train_and_predict_keep_their_contracts() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, trained) = train(folder.path());
+    assert_keys(&trained, &["validation", "model", "notes"]);
+    let validation = &trained["validation"];
+    assert_eq!((&validation["physical_machines"], &validation["profiles"]), (&2.into(), &2.into()));
+    let methods = validation["methods"].as_array().unwrap();
+    assert_eq!(methods.len(), 9);
+    let figures = ["name", "mean_regret", "p95_regret", "share_over_10_percent", "closed_gap"];
+    methods.iter().for_each(|m| assert_keys(m, &figures));
+
+    let own = report(folder.path(), "own.json", &[]);
+    let out = folder.path().join("fields.json");
+    let mut predict = sapwise();
+    predict.arg("predict").arg("--report").arg(&own).arg("--model").arg(&model).arg("--json").arg("--out").arg(&out);
+    let fields = answer(&mut predict);
+    assert_fields(&fields, "predicted");
+    assert_eq!(fields["model"], "model");
+    assert_eq!(serde_json::from_str::<Value>(&fs::read_to_string(&out).unwrap()).unwrap(), fields);
+}
+
+#[test]
+fn measured_fields_come_from_the_report_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = report(folder.path(), "own.json", &[]);
+    let measured = |words: &[&str]| {
+        let mut predict = sapwise();
+        predict.args(["predict", "--measured", "--report"]).arg(&own).args(words);
+        predict
+    };
+    let fields = answer(&mut measured(&["--json"]));
+    assert_fields(&fields, "measured");
+    assert_eq!(fields["model"], Value::Null);
+    let complaint = failure(&mut measured(&["--scenario", "slab"]), 1);
+    assert!(complaint.contains("slab") && complaint.contains("it holds: uniform"), "{complaint}");
+    failure(sapwise().args(["predict", "--measured"]), 2);
+}
+
+#[test]
+fn train_refuses_timings_of_an_unoptimised_build() {
+    let folder = tempfile::tempdir().unwrap();
+    let debug = report(folder.path(), "debug.json", &[("/provenance/optimised", false.into())]);
+    let model = folder.path().join("model.json");
+    let complaint = failure(sapwise().arg("train").arg(debug).arg("--out").arg(&model), 1);
+    assert!(complaint.contains("debug.json") && complaint.contains("unoptimised"), "{complaint}");
+    assert!(!model.exists());
+}
+
+#[test]
+fn run_keeps_its_contract() {
+    let folder = tempfile::tempdir().unwrap();
+    let elsewhere = report(folder.path(), "other.json", &[("/hardware/machine/physical_id", "00000000000000cc".into())]);
+    let mut run = sapwise();
+    run.args(["run", "fragmentation", "--objects", "300", "--frames", "30", "--repeats", "2", "--json", "--fields"]);
+    let told = answer(run.arg(&elsewhere));
+    let keys = [
+        "scenario",
+        "frames",
+        "objects",
+        "repeats",
+        "seed",
+        "interrupted",
+        "source",
+        "extrapolated",
+        "warnings",
+        "total_ms",
+        "left_out",
+        "regret",
+        "best_fixed",
+        "over_best_fixed",
+        "worst_frame",
+        "switches",
+        "decisions",
+    ];
+    assert_keys(&told, &keys);
+    assert_eq!((&told["scenario"], &told["frames"], &told["repeats"]), (&"fragmentation".into(), &30.into(), &2.into()));
+    assert_eq!((&told["source"], &told["interrupted"]), (&"measured".into(), &false.into()));
+    assert_keys(&told["objects"], &["min", "max"]);
+    assert_keys(&told["total_ms"], &["adaptive", "oracle", "fixed"]);
+    assert!(told["total_ms"]["fixed"]["brute@cpu1"].as_f64().unwrap() > 0.0, "{told}");
+    assert_eq!(told["left_out"], json!({}));
+    assert!(told["warnings"].to_string().contains("another machine"), "{told}");
+}
+
+#[test]
+fn run_refuses_fields_and_reports_of_other_revisions() {
+    let folder = tempfile::tempdir().unwrap();
+    let method = REPORT["algorithms"][0]["id"].as_str().unwrap().split('@').next().unwrap().to_owned();
+    let old = report(folder.path(), "old.json", &[("/algorithms/0/revision", 999_999.into())]);
+    let own = report(folder.path(), "own.json", &[]);
+    let mut fields = answer(sapwise().args(["predict", "--measured", "--json", "--report"]).arg(own));
+    fields["costs"][0]["revision"] = 999_999.into();
+    let stale = folder.path().join("stale.json");
+    fs::write(&stale, fields.to_string()).unwrap();
+    for (file, name) in [(&old, "old.json"), (&stale, "stale.json")] {
+        let complaint = failure(sapwise().args(["run", "uniform", "--fields"]).arg(file), 1);
+        for text in [name, &method, "999999", "probe again"] {
+            assert!(complaint.contains(text), "{text} is missing: {complaint}");
+        }
+    }
+}
