@@ -154,6 +154,7 @@ mod tests {
             ns: (0..25).map(|k| ns(n(k))).collect(),
             weights: vec![1.0; 25],
             floors: vec![false; 25],
+            groups: vec![0; 25],
         }
     }
 
