@@ -74,6 +74,18 @@ fn a_machine_outside_the_training_is_told_and_a_missing_parameter_leaves_out_wha
     assert!(error.contains("train on new reports"), "{error}");
 }
 
+/// Files as each schema version was first written. They are never changed: what was once written stays readable.
+#[test]
+fn every_schema_version_stays_readable() {
+    assert!(matches!(json::read(include_str!("fixtures/report-1.json")), Ok(Document::Report(_))));
+    assert!(matches!(json::read(include_str!("fixtures/model-1.json")), Ok(Document::Model(_))));
+    let Ok(Document::Fields(fields)) = json::read(include_str!("fixtures/fields-1.json")) else { panic!("no fields") };
+    let text = json::write(&fields).unwrap();
+    assert_eq!(json::fields(&text).unwrap(), *fields);
+    let ranking = fields.rank(&sapwise::Load { objects: 10, ..Default::default() }, |_| true).unwrap();
+    assert_eq!(fields.costs[ranking.best].algorithm.to_string(), "brute@cpu1");
+}
+
 #[test]
 fn damaged_files_are_refused_with_the_place() {
     let whole = include_str!("../models/default.json");
