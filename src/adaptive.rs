@@ -7,8 +7,9 @@ use std::fmt;
 /// two costs are equal and the estimate of the load moves by a few percent from frame to frame.
 const HYSTERESIS: f64 = 0.05;
 
-/// Frames after which the boxes are sampled anew even if their number has not changed.
-const SAMPLE_EVERY: u32 = 16;
+/// Frames after which the boxes are sampled anew even if their number has not changed. A sample takes 16 us at 10 000 objects and
+/// 25 us at a million on the first machine; spread over 32 frames a decision among six stays below 1 us.
+const SAMPLE_EVERY: u32 = 32;
 
 /// A change of the number of objects within a sixteenth, or within this many, needs no new sample. In a scene of a few boxes
 /// the sample costs as much as the frame.

@@ -33,7 +33,7 @@ fn decision(c: &mut Criterion) {
         let scene = Scenario::Uniform.start(objects, 1);
         let mut adaptive = Adaptive::new(fields.clone(), &registry).expect("available");
         adaptive.find_pairs(scene.boxes(), &mut Pairs::new()).expect("valid boxes");
-        let mut group = c.benchmark_group("decide, sampling every 16th frame");
+        let mut group = c.benchmark_group("decide, the sample spread over its frames");
         group.bench_function(BenchmarkId::from_parameter(objects), |b| {
             b.iter(|| adaptive.decide(black_box(scene.boxes())).is_some());
         });
