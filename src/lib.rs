@@ -47,6 +47,7 @@ pub mod report;
 mod sample;
 mod scenario;
 mod schema_tag;
+mod splitmix;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};

@@ -2,6 +2,7 @@
 
 use crate::cpu::each_bit;
 use crate::error::Error;
+use crate::splitmix::mix;
 
 /// Two positions in the input, the lower one first.
 pub type Pair = (u32, u32);
@@ -202,13 +203,6 @@ impl<'a> IntoIterator for &'a Pairs {
     fn into_iter(self) -> Self::IntoIter {
         self.iter()
     }
-}
-
-/// The finaliser of splitmix64 (Steele, Lea, Flood 2014): every input bit reaches every output bit.
-fn mix(mut x: u64) -> u64 {
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
 }
 
 #[cfg(test)]
