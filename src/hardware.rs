@@ -1,5 +1,9 @@
 //! The parameters of a machine.
 
+pub mod gpu;
+
+pub use gpu::{GpuGroup, GpuHardware, GpuIdentity, GpuKind};
+
 /// What is known about a machine: who made it, and a list of parameters, each with where it came from.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
@@ -9,6 +13,12 @@ pub struct Hardware {
     pub machine: Machine,
     /// The parameters, in the order of [`parameter`]'s constants; a name stands at most once.
     pub parameters: Vec<Parameter>,
+    /// Its GPUs, by their number. Empty where there is none or none was looked at.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub gpus: Vec<GpuHardware>,
+    /// GPUs that work together.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub gpu_groups: Vec<GpuGroup>,
 }
 
 /// What a machine says of itself. Holds nothing that names a host, a user or a single piece of hardware.
@@ -144,6 +154,12 @@ impl Hardware {
     #[must_use]
     pub fn value(&self, name: &str) -> Option<f64> {
         self.parameters.iter().find(|p| p.name == name).and_then(|p| p.value)
+    }
+
+    /// The GPU of a number, where it was looked at.
+    #[must_use]
+    pub fn gpu(&self, index: u32) -> Option<&GpuHardware> {
+        self.gpus.iter().find(|g| g.gpu.index == index)
     }
 }
 

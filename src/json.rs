@@ -156,7 +156,12 @@ mod tests {
                 optimised: false,
                 seconds: 0.5,
             },
-            hardware: Hardware { machine: Machine::default(), parameters: vec![Parameter::missing("x", hostile)] },
+            hardware: Hardware {
+                machine: Machine::default(),
+                parameters: vec![Parameter::missing("x", hostile)],
+                gpus: Vec::new(),
+                gpu_groups: Vec::new(),
+            },
             algorithms: Vec::new(),
             points: vec![point.clone(), point],
             remarks: vec![hostile.to_owned()],

@@ -21,6 +21,7 @@
 //! # Features
 //!
 //! - `parallel` (default): the algorithms on several cores, through rayon. Without it only `@cpu1`.
+//! - `gpu`: the algorithms on GPUs, through wgpu; see [`gpu`](crate::gpu).
 //! - `model`: reports, models and fields as JSON; prediction.
 //! - `measure`: measures the hardware parameters of this machine.
 //! - `schema`: the JSON Schemas of the files, for tools.
@@ -34,6 +35,8 @@ mod cpu;
 pub mod crossover;
 mod error;
 pub mod fields;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod hardware;
 #[cfg(feature = "model")]
 pub mod json;

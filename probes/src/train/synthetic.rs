@@ -65,7 +65,7 @@ impl Machine {
         let parameters =
             figures.map(|(name, value)| Parameter { how: How::Measured, ..Parameter::reported(name, value, "test") });
         let machine = sapwise::Machine { physical_id: self.name.to_owned(), ..sapwise::Machine::default() };
-        Hardware { machine, parameters: parameters.into() }
+        Hardware { machine, parameters: parameters.into(), gpus: Vec::new(), gpu_groups: Vec::new() }
     }
 
     /// A full sweep: 23 sizes from 16 to 700 000 objects of two scenarios; from 500 objects up whoever is eight times slower than

@@ -1,0 +1,129 @@
+//! The GPUs of this machine: found, numbered, opened once and shared.
+
+use super::device::Gpu;
+use crate::hardware::{GpuIdentity, GpuKind};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The GPUs that were found, in the order of their numbers. Cheap to clone: a GPU is opened once for all clones.
+#[derive(Debug, Clone, Default)]
+pub struct Gpus {
+    found: Arc<Vec<Found>>,
+}
+
+#[derive(Debug)]
+struct Found {
+    identity: GpuIdentity,
+    adapter: wgpu::Adapter,
+    opened: Mutex<Option<Result<Gpu, String>>>,
+}
+
+impl Gpus {
+    /// Looks for GPUs. Loads the drivers of the system; takes tens of milliseconds.
+    ///
+    /// The usual variables of the drivers apply (`VK_DRIVER_FILES`, `WGPU_BACKEND`, ...).
+    #[must_use]
+    pub fn find() -> Self {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle().with_env();
+        descriptor.backends &= wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+        // Validation layers would check every call of a release build where they are installed.
+        descriptor.flags -= wgpu::InstanceFlags::VALIDATION | wgpu::InstanceFlags::DEBUG;
+        let backends = descriptor.backends;
+        let instance = wgpu::Instance::new(descriptor);
+        let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
+        adapters.retain(|a| a.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS));
+        let twins = |a: &wgpu::AdapterInfo, b: &wgpu::AdapterInfo| {
+            a.backend == wgpu::Backend::Dx12
+                && b.backend == wgpu::Backend::Vulkan
+                && (a.vendor, a.device) == (b.vendor, b.device)
+        };
+        let infos: Vec<wgpu::AdapterInfo> = adapters.iter().map(wgpu::Adapter::get_info).collect();
+        // Windows shows each card through DX12 and through Vulkan.
+        let mut adapters: Vec<(wgpu::AdapterInfo, wgpu::Adapter)> =
+            infos.iter().cloned().zip(adapters).filter(|(a, _)| !infos.iter().any(|b| twins(a, b))).collect();
+        adapters.sort_by_key(|(info, _)| kind(info.device_type));
+        let found = adapters.into_iter().enumerate().map(|(k, (info, adapter))| Found {
+            identity: identity(k as u32, &info),
+            adapter,
+            opened: Mutex::new(None),
+        });
+        Self { found: Arc::new(found.collect()) }
+    }
+
+    /// No GPU at all, without looking.
+    #[must_use]
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// What each of them says of itself.
+    pub fn identities(&self) -> impl ExactSizeIterator<Item = &GpuIdentity> {
+        self.found.iter().map(|f| &f.identity)
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.found.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.found.is_empty()
+    }
+
+    /// The adapter of a number, for queries beyond what [`GpuIdentity`] says.
+    #[must_use]
+    pub fn adapter(&self, index: u32) -> Option<&wgpu::Adapter> {
+        self.found.get(index as usize).map(|f| &f.adapter)
+    }
+
+    /// Opens a GPU, or gives the one that is open already.
+    ///
+    /// One that was lost or could not be opened stays so until GPUs are looked for anew.
+    ///
+    /// # Errors
+    /// A sentence, when there is no such GPU or its driver refuses.
+    pub fn open(&self, index: u32) -> Result<Gpu, String> {
+        let Some(found) = self.found.get(index as usize) else {
+            return Err(match self.len() {
+                0 => "no GPU was found; install a Vulkan driver, or leave GPUs out".to_owned(),
+                count => format!("there is no gpu{index}, only gpu0 to gpu{}; see `sapwise devices`", count - 1),
+            });
+        };
+        // A panic in a driver while the lock was held leaves the slot as it was.
+        let mut slot = found.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        slot.get_or_insert_with(|| Gpu::open(&found.adapter, found.identity.clone())).clone()
+    }
+
+    /// Opens a GPU a second time, with a queue and memory of its own.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_another(&self, index: u32) -> Result<Gpu, String> {
+        let found = self.found.get(index as usize).ok_or_else(|| format!("there is no gpu{index}"))?;
+        Gpu::open(&found.adapter, found.identity.clone())
+    }
+}
+
+fn kind(device_type: wgpu::DeviceType) -> GpuKind {
+    match device_type {
+        wgpu::DeviceType::DiscreteGpu => GpuKind::Discrete,
+        wgpu::DeviceType::IntegratedGpu => GpuKind::Integrated,
+        wgpu::DeviceType::VirtualGpu => GpuKind::Virtual,
+        wgpu::DeviceType::Cpu => GpuKind::Software,
+        wgpu::DeviceType::Other => GpuKind::Other,
+    }
+}
+
+fn identity(index: u32, info: &wgpu::AdapterInfo) -> GpuIdentity {
+    let driver = format!("{} {}", info.driver, info.driver_info);
+    GpuIdentity {
+        index,
+        name: info.name.clone(),
+        device: format!("{:04x}:{:04x}", info.vendor, info.device),
+        driver: driver.trim().to_owned(),
+        api: info.backend.to_str().to_owned(),
+        kind: kind(info.device_type),
+    }
+}

@@ -1,0 +1,143 @@
+//! An open GPU: device, queue, limits, and what went wrong with it.
+
+use crate::hardware::GpuIdentity;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// The longest that a submission may take before its GPU counts as lost. Drivers of desktops give up after 2 to 10 s; a
+/// program on the CPU that acts as a GPU may be a thousand times slower than a real one.
+const WAIT_LIMIT: Duration = Duration::from_secs(60);
+
+/// An open GPU. Clones share it.
+#[derive(Clone)]
+pub struct Gpu {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    identity: GpuIdentity,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    limits: wgpu::Limits,
+    /// Errors that no scope caught, and the loss of the device.
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    /// Opens an adapter with all of its limits.
+    pub(super) fn open(adapter: &wgpu::Adapter, identity: GpuIdentity) -> Result<Self, String> {
+        let limits = adapter.limits();
+        let wanted = wgpu::Features::TIMESTAMP_QUERY
+            | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS
+            | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS
+            | wgpu::Features::SUBGROUP;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("sapwise"),
+            required_features: adapter.features() & wanted,
+            required_limits: limits.clone(),
+            memory_hints: wgpu::MemoryHints::Performance,
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| format!("gpu{} can't be opened: {e}", identity.index))?;
+        Ok(Self::from_parts(device, queue, identity))
+    }
+
+    /// A device and queue that the caller has opened, so that a program that draws with wgpu shares them.
+    ///
+    /// Takes over the device's handlers of lost devices and uncaught errors.
+    #[must_use]
+    pub fn from_parts(device: wgpu::Device, queue: wgpu::Queue, identity: GpuIdentity) -> Self {
+        let fault: Arc<Mutex<Option<String>>> = Arc::default();
+        let note = |fault: &Arc<Mutex<Option<String>>>| {
+            let fault = Arc::clone(fault);
+            move |text: String| {
+                fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
+            }
+        };
+        let (lost, uncaught) = (note(&fault), note(&fault));
+        device.set_device_lost_callback(move |reason, message| lost(format!("the device was lost ({reason:?}): {message}")));
+        // The default handler panics.
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| uncaught(error.to_string())));
+        let limits = device.limits();
+        Self { shared: Arc::new(Shared { identity, device, queue, limits, fault }) }
+    }
+
+    /// What the GPU says of itself.
+    #[must_use]
+    pub fn identity(&self) -> &GpuIdentity {
+        &self.shared.identity
+    }
+
+    /// The device.
+    #[must_use]
+    pub fn device(&self) -> &wgpu::Device {
+        &self.shared.device
+    }
+
+    /// The queue.
+    #[must_use]
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.shared.queue
+    }
+
+    /// The limits that the device was opened with.
+    #[must_use]
+    pub fn limits(&self) -> &wgpu::Limits {
+        &self.shared.limits
+    }
+
+    /// Why the GPU can't be used any more, if it can't: it was lost, or an error came that nobody expected.
+    #[must_use]
+    pub fn fault(&self) -> Option<String> {
+        self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Waits for a submission, at most a minute, and calls back what was mapped before it.
+    ///
+    /// # Errors
+    /// A sentence, when the device was lost or takes too long. It counts as lost from then on.
+    pub fn wait(&self, submission: wgpu::SubmissionIndex) -> Result<(), String> {
+        let poll = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(WAIT_LIMIT) };
+        if let Err(error) = self.shared.device.poll(poll) {
+            let text = match error {
+                wgpu::PollError::Timeout => format!("it did not answer within {} s", WAIT_LIMIT.as_secs()),
+                other => other.to_string(),
+            };
+            self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
+        }
+        self.check()
+    }
+
+    /// `Err` once the GPU can't be used any more.
+    ///
+    /// # Errors
+    /// A sentence that says what happened.
+    pub fn check(&self) -> Result<(), String> {
+        self.fault().map_or(Ok(()), Err)
+    }
+
+    /// Runs `make` and gives what it made, or the error of the device: out of memory, invalid, internal.
+    ///
+    /// # Errors
+    /// The device's own words.
+    pub fn try_make<T>(&self, make: impl FnOnce(&wgpu::Device) -> T) -> Result<T, String> {
+        let device = &self.shared.device;
+        let filters = [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Validation];
+        let scopes = filters.map(|filter| device.push_error_scope(filter));
+        let made = make(device);
+        let mut error = None;
+        // Scopes end in the reverse of the order in which they began.
+        for scope in scopes.into_iter().rev() {
+            error = pollster::block_on(scope.pop()).or(error);
+        }
+        error.map_or(Ok(made), |e| Err(e.to_string()))
+    }
+}
+
+impl fmt::Debug for Gpu {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Gpu").field("identity", &self.shared.identity).field("fault", &self.fault()).finish_non_exhaustive()
+    }
+}
