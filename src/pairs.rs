@@ -166,6 +166,24 @@ impl Pairs {
         Ok(())
     }
 
+    /// Appends pairs that stand lower member first and are known to fit under the limit.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn extend(&mut self, pairs: &[[u32; 2]]) -> Result<(), Error> {
+        self.reserve(self.len + pairs.len())?;
+        for (to, &[a, b]) in self.buffer[self.len..].iter_mut().zip(pairs) {
+            *to = (a, b);
+        }
+        self.len += pairs.len();
+        self.found += pairs.len() as u64;
+        Ok(())
+    }
+
+    /// Counts pairs that are not stored.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn skip(&mut self, pairs: u64) {
+        self.found += pairs;
+    }
+
     /// Appends another list: its pairs, its count beyond the limit and its refused allocation.
     pub(crate) fn append(&mut self, part: &Pairs) {
         self.refused = self.refused.or(part.refused);

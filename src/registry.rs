@@ -80,7 +80,10 @@ impl Registry {
     /// Nothing is opened before an algorithm is created.
     #[cfg(feature = "gpu")]
     pub fn add_gpus(&mut self, gpus: &crate::gpu::Gpus) {
-        let _ = gpus;
+        for (id, revision) in crate::gpu::algorithms(gpus.identities()) {
+            let (gpus, own) = (gpus.clone(), id.clone());
+            self.add(id, revision, move || crate::gpu::OnGpus::create(&own, &gpus));
+        }
     }
 
     /// Makes our algorithms use no higher SIMD level than this from now on.

@@ -1,19 +1,9 @@
 //! Every algorithm, on every SIMD level and several thread counts, against the naive oracle.
 
-use sapwise::{Aabb, AlgorithmId, BoxDefect, BroadPhase, Error, Pair, PairOrder, Pairs, Registry, Scenario, SimdLevel};
+mod common;
 
-/// The oracle: the definition of overlap, in a double loop.
-fn naive(boxes: &[Aabb]) -> Vec<Pair> {
-    let mut pairs = Vec::new();
-    for i in 0..boxes.len() {
-        for j in i + 1..boxes.len() {
-            if boxes[i].overlaps(&boxes[j]) {
-                pairs.push((i as u32, j as u32));
-            }
-        }
-    }
-    pairs
-}
+use common::{Random, naive};
+use sapwise::{Aabb, AlgorithmId, BoxDefect, BroadPhase, Error, PairOrder, Pairs, Registry, Scenario, SimdLevel};
 
 /// Every method on 1, 2, 3 and 7 threads at every SIMD level of this machine.
 fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
@@ -45,22 +35,6 @@ fn assert_all_agree(name: &str, boxes: &[Aabb], algorithms: &mut [(String, Box<d
         let mut any = Pairs::new();
         algorithm.find_pairs(boxes, &mut any).unwrap();
         assert_eq!(any.fingerprint(), canonical.fingerprint(), "{id} on {name} in any order");
-    }
-}
-
-/// A small generator of its own (Marsaglia's xorshift), so that the test does not rest on the library's.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f32 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 40) as f32 / (1_u64 << 24) as f32
-    }
-
-    fn cubes(&mut self, count: usize, world: [f32; 3], half: f32) -> Vec<Aabb> {
-        (0..count).map(|_| Aabb::cube(world.map(|side| self.next() * side), half * (0.1 + self.next()))).collect()
     }
 }
 

@@ -16,6 +16,8 @@ pub(crate) use strip_grid::StripGrid;
 pub(crate) use threads::Threads;
 #[cfg(feature = "measure")]
 pub(crate) use threads::build_pool;
+#[cfg(feature = "gpu")]
+pub(crate) use workers::Workers;
 
 use crate::{BroadPhase, Error};
 

@@ -72,6 +72,12 @@ impl StripGrid {
         grid
     }
 
+    /// Cells, origins and inverse widths on the two grid axes, for those who work out cells elsewhere.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn across_sweep(&self) -> ([u32; 2], [f32; 2], [f32; 2]) {
+        (self.cells, self.origin, self.inverse_width)
+    }
+
     /// How many strips there are.
     pub(crate) fn strips(&self) -> usize {
         (self.cells[0] * self.cells[1]) as usize

@@ -99,7 +99,19 @@ impl Gpu {
     /// # Errors
     /// A sentence, when the device was lost or takes too long. It counts as lost from then on.
     pub fn wait(&self, submission: wgpu::SubmissionIndex) -> Result<(), String> {
-        let poll = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(WAIT_LIMIT) };
+        self.wait_for(Some(submission))
+    }
+
+    /// As [`wait`](Self::wait), for everything that was submitted.
+    ///
+    /// # Errors
+    /// As [`wait`](Self::wait).
+    pub fn wait_all(&self) -> Result<(), String> {
+        self.wait_for(None)
+    }
+
+    fn wait_for(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), String> {
+        let poll = wgpu::PollType::Wait { submission_index, timeout: Some(WAIT_LIMIT) };
         if let Err(error) = self.shared.device.poll(poll) {
             let text = match error {
                 wgpu::PollError::Timeout => format!("it did not answer within {} s", WAIT_LIMIT.as_secs()),

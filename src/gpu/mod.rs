@@ -4,11 +4,24 @@
 //! call no driver is loaded. The drivers are looked for at run time: a program built with this feature runs without any.
 
 mod adapters;
+mod brute;
 mod device;
+mod engine;
+mod kernel;
 mod methods;
+mod on_gpus;
+mod output;
+mod params;
+mod slabs;
+mod sort;
+mod sorted;
+mod storage;
+mod transfer;
 
 pub use adapters::Gpus;
 pub use device::Gpu;
 pub use methods::algorithms;
+pub(crate) use on_gpus::OnGpus;
+pub use on_gpus::broad_phase;
 /// The version of wgpu whose buffers and devices this library takes.
 pub use wgpu;

@@ -1,0 +1,414 @@
+//! One method on one GPU, frame by frame: boxes up, kernels, pairs down.
+
+use super::brute::Brute;
+use super::device::Gpu;
+use super::output::{Output, PAIR};
+use super::params::{Header, Params};
+use super::sorted::Sorted;
+use super::storage::{Failure, Storage, largest};
+use super::transfer::Transfer;
+use crate::{Aabb, BoxDefect, Error, Pairs};
+use std::mem::{offset_of, size_of};
+
+/// Bytes of a box.
+const BOX: u64 = size_of::<Aabb>() as u64;
+/// Where things stand in the upload: parameters, header, boxes and behind them their numbers. Copies begin at multiples of 8.
+const HEADER_AT: u64 = 256;
+const BOXES_AT: u64 = 512;
+/// Where pairs begin in the download, behind the header.
+const PAIRS_AT: u64 = 16;
+/// Bytes of pairs that one download takes. More pairs come in several.
+const MOST_DOWNLOAD: u64 = 64 << 20;
+/// Pairs beyond those of the frame before that come back with the header. If there are more, a second submission gets them.
+const SPARE_PAIRS: u64 = 256;
+
+/// The buffers that every method reads.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Inputs<'a> {
+    pub(super) params: &'a wgpu::Buffer,
+    pub(super) boxes: &'a wgpu::Buffer,
+    pub(super) ids: &'a wgpu::Buffer,
+    pub(super) header: &'a wgpu::Buffer,
+}
+
+/// A method on a GPU with all its buffers.
+#[derive(Debug)]
+pub(super) struct Engine {
+    pub(super) gpu: Gpu,
+    search: Search,
+    output: Output,
+    params: Storage,
+    header: Storage,
+    boxes: Storage,
+    ids: Storage,
+    upload: Transfer,
+    download: Transfer,
+    /// The buffer of boxes that the kernels are bound to; `None` when they are bound to nothing.
+    bound_to: Option<wgpu::Buffer>,
+    /// Pairs of the frame before.
+    expected: u64,
+    frame: Option<Frame>,
+}
+
+#[derive(Debug)]
+enum Search {
+    Brute(Brute),
+    Sorted(Box<Sorted>),
+}
+
+/// A frame that was submitted.
+#[derive(Debug)]
+struct Frame {
+    submission: wgpu::SubmissionIndex,
+    params: Params,
+    /// Pairs that come back with the header, where there are as many.
+    sent: u64,
+    /// Blocks that are not counted yet.
+    blocks_left: u64,
+}
+
+/// Boxes of a frame or a piece, in the memory of the host.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece<'a> {
+    pub(super) boxes: &'a [Aabb],
+    /// For each box its number in the frame, the highest bit set where this piece owns its pairs. `None`: the whole frame.
+    pub(super) ids: Option<&'a [u32]>,
+}
+
+impl Engine {
+    /// `method` is `brute`, `sweep` or `strips`.
+    pub(super) fn new(gpu: Gpu, method: &str) -> Result<Self, String> {
+        let search = match method {
+            "brute" => Search::Brute(Brute::new(&gpu)?),
+            "sweep" => Search::Sorted(Box::new(Sorted::new(&gpu, false)?)),
+            "strips" => Search::Sorted(Box::new(Sorted::new(&gpu, true)?)),
+            other => return Err(format!("no method {other} runs on GPUs")),
+        };
+        let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        Ok(Self {
+            output: Output::new(&gpu)?,
+            params: Storage::with_usage(&gpu, "parameters", uniform)?,
+            header: Storage::new(&gpu, "header")?,
+            boxes: Storage::new(&gpu, "boxes")?,
+            ids: Storage::new(&gpu, "numbers of boxes")?,
+            upload: Transfer::upload(&gpu)?,
+            download: Transfer::download(&gpu)?,
+            gpu,
+            search,
+            bound_to: None,
+            expected: 0,
+            frame: None,
+        })
+    }
+
+    /// Boxes that fit into the largest buffers of the GPU. More have to come in pieces.
+    pub(super) fn most_objects(&self) -> usize {
+        // A sorted box is the largest thing that there is one of for each box.
+        let most = largest(&self.gpu, wgpu::BufferUsages::STORAGE) / super::sorted::SORTED_BOX;
+        usize::try_from(most.min(1 << 27)).unwrap_or(usize::MAX)
+    }
+
+    /// The parameters of a frame of boxes that look like the sample.
+    pub(super) fn plan(&self, sample: &crate::sample::Sample, objects: u32) -> Params {
+        match &self.search {
+            Search::Brute(_) => Params { objects, ..Params::default() },
+            Search::Sorted(sorted) if sorted.is_strips() => Params::strips(sample, objects),
+            Search::Sorted(_) => Params::sweep(sample, objects),
+        }
+    }
+
+    /// Makes room for the frame, and binds the kernels anew where a buffer is another one now. `external`: boxes that are on
+    /// the GPU already.
+    pub(super) fn prepare(&mut self, params: &Params, ids: bool, external: Option<&wgpu::Buffer>) -> Result<(), String> {
+        self.gpu.check()?;
+        let gpu = &self.gpu;
+        let n = u64::from(params.objects);
+        let mut grown = false;
+        if external.is_none() {
+            grown |= self.boxes.ensure(gpu, n * BOX)?;
+            self.upload.ensure(gpu, BOXES_AT + n * (BOX + if ids { 4 } else { 0 }))?;
+        } else {
+            self.upload.ensure(gpu, BOXES_AT)?;
+        }
+        if ids {
+            grown |= self.ids.ensure(gpu, n * 4)?;
+        }
+        let blocks = match &mut self.search {
+            Search::Brute(brute) => Brute::blocks(params.objects).min(u64::from(brute.band())) as u32,
+            Search::Sorted(sorted) => {
+                grown |= sorted.ensure(gpu, params)?;
+                Sorted::blocks(params.objects)
+            }
+        };
+        grown |= self.output.ensure_blocks(gpu, blocks)?;
+        // Most scenes have fewer pairs than objects.
+        grown |= self.output.ensure_pairs(gpu, n.max(self.expected + self.expected / 4))?;
+        self.download.ensure(gpu, PAIRS_AT + self.sendable() * PAIR)?;
+        let boxes = external.unwrap_or_else(|| self.boxes.buffer());
+        if grown || self.bound_to.as_ref() != Some(boxes) {
+            let boxes = boxes.clone();
+            self.bind(&boxes)?;
+        }
+        Ok(())
+    }
+
+    fn bind(&mut self, boxes: &wgpu::Buffer) -> Result<(), String> {
+        self.bound_to = None;
+        let inputs = Inputs { params: self.params.buffer(), boxes, ids: self.ids.buffer(), header: self.header.buffer() };
+        self.output.bind(&self.gpu, inputs.params, inputs.header)?;
+        match &mut self.search {
+            Search::Brute(brute) => brute.bind(&self.gpu, &inputs, &self.output)?,
+            Search::Sorted(sorted) => sorted.bind(&self.gpu, &inputs, &self.output)?,
+        }
+        self.bound_to = Some(boxes.clone());
+        Ok(())
+    }
+
+    /// Pairs that are copied back with the header.
+    fn sendable(&self) -> u64 {
+        let wanted = self.expected + self.expected / 8 + SPARE_PAIRS;
+        wanted.min(u64::from(self.output.capacity())).min(MOST_DOWNLOAD / PAIR)
+    }
+
+    /// Submits a piece and does not wait for it: several GPUs work at once.
+    pub(super) fn start(&mut self, piece: Piece<'_>, params: Params) -> Result<(), String> {
+        self.prepare(&params, piece.ids.is_some(), None)?;
+        self.submit(params, Some(piece), true)
+    }
+
+    /// As [`start`](Self::start), with boxes that are on the GPU already, and pairs that stay there.
+    pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), String> {
+        self.prepare(&params, false, Some(boxes))?;
+        self.submit(params, None, false)
+    }
+
+    fn submit(&mut self, mut params: Params, piece: Option<Piece<'_>>, download: bool) -> Result<(), String> {
+        let all_blocks = match &self.search {
+            Search::Brute(_) => Brute::blocks(params.objects),
+            Search::Sorted(_) => u64::from(Sorted::blocks(params.objects)),
+        };
+        params.blocks = match &self.search {
+            Search::Brute(brute) => all_blocks.min(u64::from(brute.band())) as u32,
+            Search::Sorted(_) => all_blocks as u32,
+        };
+        params.capacity = self.output.capacity();
+        params.piece = u32::from(piece.is_some_and(|p| p.ids.is_some()));
+        let boxes: &[u8] = piece.map_or(&[], |p| bytemuck::cast_slice(p.boxes));
+        let ids: &[u8] = piece.and_then(|p| p.ids).map_or(&[], bytemuck::cast_slice);
+        let ids_at = BOXES_AT as usize + boxes.len();
+        let mut view = self.upload.writable(&self.gpu, (ids_at + ids.len()) as u64)?;
+        view.slice(..size_of::<Params>()).copy_from_slice(bytemuck::bytes_of(&params));
+        let header = HEADER_AT as usize;
+        view.slice(header..header + size_of::<Header>()).copy_from_slice(bytemuck::bytes_of(&Header::START));
+        view.slice(BOXES_AT as usize..ids_at).copy_from_slice(boxes);
+        view.slice(ids_at..).copy_from_slice(ids);
+        drop(view);
+        self.upload.unmap();
+
+        let mut encoder = self.encoder();
+        let upload = self.upload.buffer();
+        encoder.copy_buffer_to_buffer(upload, 0, self.params.buffer(), 0, size_of::<Params>() as u64);
+        encoder.copy_buffer_to_buffer(upload, HEADER_AT, self.header.buffer(), 0, size_of::<Header>() as u64);
+        if !boxes.is_empty() {
+            encoder.copy_buffer_to_buffer(upload, BOXES_AT, self.boxes.buffer(), 0, boxes.len() as u64);
+        }
+        if !ids.is_empty() {
+            encoder.copy_buffer_to_buffer(upload, ids_at as u64, self.ids.buffer(), 0, ids.len() as u64);
+        }
+        self.record(&mut encoder, &params, true);
+        let sent = if download { self.sendable() } else { 0 };
+        self.copy_back(&mut encoder, sent);
+        let submission = self.submit_mapped(encoder, PAIRS_AT + sent * PAIR);
+        self.upload.ask(self.upload.bytes());
+        self.frame = Some(Frame { submission, params, sent, blocks_left: all_blocks - u64::from(params.blocks) });
+        Ok(())
+    }
+
+    fn encoder(&self) -> wgpu::CommandEncoder {
+        self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sapwise") })
+    }
+
+    /// Counting, if asked for, and writing.
+    fn record(&self, encoder: &mut wgpu::CommandEncoder, params: &Params, count: bool) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        if count {
+            match &self.search {
+                Search::Brute(brute) => brute.record_count(&mut pass, params.blocks),
+                Search::Sorted(sorted) => sorted.record_count(&mut pass, params),
+            }
+            self.output.record(&mut pass);
+        }
+        match &self.search {
+            Search::Brute(brute) => brute.record_write(&mut pass, params.blocks),
+            Search::Sorted(sorted) => sorted.record_write(&mut pass, params),
+        }
+    }
+
+    fn copy_back(&self, encoder: &mut wgpu::CommandEncoder, pairs: u64) {
+        let download = self.download.buffer();
+        encoder.copy_buffer_to_buffer(self.header.buffer(), 0, download, 0, size_of::<Header>() as u64);
+        if pairs > 0 {
+            encoder.copy_buffer_to_buffer(self.output.pairs(), 0, download, PAIRS_AT, pairs * PAIR);
+        }
+    }
+
+    /// Submits, and asks for the first `bytes` of the download.
+    fn submit_mapped(&self, encoder: wgpu::CommandEncoder, bytes: u64) -> wgpu::SubmissionIndex {
+        self.download.unmap();
+        let submission = self.gpu.queue().submit([encoder.finish()]);
+        self.download.ask(bytes);
+        submission
+    }
+
+    /// Waits for what was started and adds its pairs to the list.
+    pub(super) fn finish(&mut self, pairs: &mut Pairs) -> Result<(), Failure> {
+        let mut all = 0;
+        let mut next = self.frame.take();
+        while let Some(mut frame) = next.take() {
+            let header = self.header_of(&frame)?;
+            let total = header.total();
+            all += total;
+            if pairs.limit().is_some_and(|limit| pairs.len() as u64 + total > limit as u64) {
+                // More than the caller wants: they are counted and stay where they are.
+                pairs.skip(total);
+            } else {
+                self.fetch(&mut frame, total, pairs)?;
+            }
+            if frame.blocks_left > 0 {
+                next = Some(self.next_band(frame)?);
+            }
+        }
+        self.expected = all;
+        Ok(())
+    }
+
+    /// Waits for what was started and gives the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer).
+    pub(super) fn finish_resident(&mut self) -> Result<u32, Failure> {
+        let Some(mut frame) = self.frame.take() else { return Ok(0) };
+        let total = self.header_of(&frame)?.total();
+        self.expected = total;
+        if frame.blocks_left > 0 {
+            let reason =
+                format!("{} boxes take brute force on gpu{} several submissions", frame.params.objects, self.index());
+            return Err(Failure::Gpu(format!("{reason}, and pairs that stay on it come from one; use strips")));
+        }
+        if total > u64::from(self.output.capacity()) {
+            self.grow(&mut frame, total)?;
+            if total > u64::from(self.output.capacity()) {
+                return Err(Failure::Gpu(format!("{total} pairs don't fit into one buffer of gpu{}", self.index())));
+            }
+            self.rewrite(&frame.params)?;
+        }
+        Ok(total as u32)
+    }
+
+    /// The list of pairs of the frame before.
+    pub(super) fn pairs_buffer(&self) -> &wgpu::Buffer {
+        self.output.pairs()
+    }
+
+    fn index(&self) -> u32 {
+        self.gpu.identity().index
+    }
+
+    /// Waits for a frame and reads its header.
+    fn header_of(&self, frame: &Frame) -> Result<Header, Failure> {
+        self.gpu.wait(frame.submission.clone())?;
+        let view = self.download.readable(0..PAIRS_AT)?;
+        let header: Header = bytemuck::pod_read_unaligned(&view);
+        if let Some((index, inverted)) = header.invalid() {
+            let defect = if inverted { BoxDefect::Inverted } else { BoxDefect::NotANumber };
+            return Err(Error::InvalidBox { index, defect }.into());
+        }
+        Ok(header)
+    }
+
+    /// Brings `total` pairs into the list: those that came with the header, then the rest in as many steps as it takes.
+    fn fetch(&mut self, frame: &mut Frame, total: u64, pairs: &mut Pairs) -> Result<(), Failure> {
+        let mut have = total.min(frame.sent).min(u64::from(frame.params.capacity));
+        self.append(have, pairs)?;
+        if have == total {
+            return Ok(());
+        }
+        if total > u64::from(u32::MAX) {
+            let reason = format!("{total} pairs are more than the 2^32 that gpu{} can number", self.index());
+            return Err(Failure::Gpu(format!("{reason}; set a limit on the pairs")));
+        }
+        self.download.ensure(&self.gpu, PAIRS_AT + (total * PAIR).min(MOST_DOWNLOAD))?;
+        if total > u64::from(self.output.capacity()) {
+            self.grow(frame, total)?;
+            self.rewrite(&frame.params)?;
+        }
+        while have < total {
+            let Params { window, capacity, .. } = frame.params;
+            let end = u64::from(window) + u64::from(capacity);
+            if have == end {
+                frame.params.window = have as u32;
+                frame.params.capacity = capacity.min(u32::MAX - frame.params.window);
+                self.rewrite(&frame.params)?;
+                continue;
+            }
+            let count = (total.min(end) - have).min((self.download.bytes() - PAIRS_AT) / PAIR);
+            let mut encoder = self.encoder();
+            let from = (have - u64::from(window)) * PAIR;
+            encoder.copy_buffer_to_buffer(self.output.pairs(), from, self.download.buffer(), PAIRS_AT, count * PAIR);
+            let submission = self.submit_mapped(encoder, PAIRS_AT + count * PAIR);
+            self.gpu.wait(submission)?;
+            self.append(count, pairs)?;
+            have += count;
+        }
+        Ok(())
+    }
+
+    /// A larger list of pairs, if the GPU has one.
+    fn grow(&mut self, frame: &mut Frame, total: u64) -> Result<(), String> {
+        let Some(boxes) = self.bound_to.clone() else { return Ok(()) };
+        if self.output.ensure_pairs(&self.gpu, total)? {
+            self.bind(&boxes)?;
+        }
+        frame.params.capacity = self.output.capacity();
+        Ok(())
+    }
+
+    /// Writes the window of `params` into the list of pairs. Nothing is counted again.
+    fn rewrite(&self, params: &Params) -> Result<(), String> {
+        self.set(params);
+        let mut encoder = self.encoder();
+        self.record(&mut encoder, params, false);
+        let submission = self.gpu.queue().submit([encoder.finish()]);
+        self.gpu.wait(submission)
+    }
+
+    /// Sets the parameters without the upload: this allocates, but frames that come here are rare.
+    fn set(&self, params: &Params) {
+        self.gpu.queue().write_buffer(self.params.buffer(), 0, bytemuck::bytes_of(params));
+    }
+
+    /// Goes on with the blocks that are left.
+    fn next_band(&mut self, frame: Frame) -> Result<Frame, String> {
+        let mut params = frame.params;
+        params.first_block += params.blocks;
+        params.blocks = frame.blocks_left.min(u64::from(params.blocks)) as u32;
+        params.window = 0;
+        params.capacity = self.output.capacity();
+        self.set(&params);
+        let totals = offset_of!(Header, total_low) as u64..offset_of!(Header, invalid) as u64;
+        let mut encoder = self.encoder();
+        encoder.clear_buffer(self.header.buffer(), totals.start, Some(totals.end - totals.start));
+        self.record(&mut encoder, &params, true);
+        let sent = self.sendable();
+        self.copy_back(&mut encoder, sent);
+        let submission = self.submit_mapped(encoder, PAIRS_AT + sent * PAIR);
+        Ok(Frame { submission, params, sent, blocks_left: frame.blocks_left - u64::from(params.blocks) })
+    }
+
+    /// Adds the first `count` pairs of the download to the list.
+    fn append(&self, count: u64, pairs: &mut Pairs) -> Result<(), Failure> {
+        if count > 0 {
+            let view = self.download.readable(PAIRS_AT..PAIRS_AT + count * PAIR)?;
+            let list: &[[u32; 2]] = bytemuck::cast_slice(&view);
+            pairs.extend(list)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,242 @@
+//! A method on one or several GPUs, from boxes in host memory to pairs in host memory.
+
+use super::adapters::Gpus;
+use super::engine::{Engine, Piece};
+use super::slabs::{Members, Slabs};
+use super::storage::Failure;
+use crate::broad_phase::check_count;
+use crate::cpu::{Threads, Workers};
+use crate::sample::Sample;
+use crate::{Aabb, AlgorithmId, Backend, BroadPhase, Error, Pairs};
+use std::time::Instant;
+
+/// Most boxes in a frame: the numbers of boxes have 31 bits on a GPU, and one more says who owns a pair.
+const MOST_OBJECTS: usize = 1 << 30;
+
+/// Slabs that a GPU takes one after the other, at most. Where the halo of a slab is most of the frame, more don't help.
+const MOST_ROUNDS: usize = 64;
+
+/// How fast the measured speed of a GPU follows its last frame.
+const SPEED_FOLLOWS: f64 = 0.25;
+
+/// The smallest share of the boxes that a GPU gets, so that its speed goes on being measured.
+const SMALLEST_SHARE: f64 = 0.02;
+
+/// See the module.
+#[derive(Debug)]
+pub(crate) struct OnGpus {
+    id: AlgorithmId,
+    parts: Vec<Part>,
+    slabs: Slabs,
+    workers: Workers,
+    /// By how much the work of a GPU grows with the logarithm of its boxes.
+    exponent: f64,
+}
+
+/// The method `brute`, `sweep` or `strips` on GPUs that are open already: from boxes in host memory to pairs in host memory.
+///
+/// For programs that have opened a device of their own ([`Gpu::from_parts`](super::Gpu::from_parts)). Several GPUs share each
+/// frame; they may be several devices of one adapter.
+///
+/// # Errors
+/// [`Error::UnknownAlgorithm`] without a GPU or for another method; [`Error::Unavailable`] when a kernel does not compile or
+/// memory is refused.
+pub fn broad_phase(method: &str, gpus: Vec<super::Gpu>) -> Result<Box<dyn BroadPhase>, Error> {
+    let mut indices: Vec<u32> = gpus.iter().map(|g| g.identity().index).collect();
+    indices.sort_unstable();
+    indices.dedup();
+    let unknown = |e: crate::ParseIdError| Error::UnknownAlgorithm { text: method.to_owned(), hint: e.to_string() };
+    let id = AlgorithmId::new(method, Backend::Gpu(indices)).map_err(unknown)?;
+    OnGpus::on(&id, gpus)
+}
+
+/// One GPU and what it works on.
+#[derive(Debug)]
+struct Part {
+    engine: Engine,
+    members: Members,
+    pairs: Pairs,
+    /// Work in a nanosecond; `None` before the first frame.
+    speed: Option<f64>,
+    work: f64,
+    began: Option<Instant>,
+    failure: Option<Failure>,
+    /// Whether its slab has more boxes than fit.
+    full: bool,
+}
+
+impl OnGpus {
+    /// The algorithm `id`, whose backend is a list of GPUs. Compiles its kernels.
+    pub(crate) fn create(id: &AlgorithmId, gpus: &Gpus) -> Result<Box<dyn BroadPhase>, Error> {
+        let unavailable = |reason| Error::Unavailable { algorithm: id.clone(), reason };
+        let Backend::Gpu(indices) = id.backend() else { return Err(unavailable("it is not on a GPU".to_owned())) };
+        let opened = indices.iter().map(|&k| gpus.open(k)).collect::<Result<Vec<_>, String>>();
+        Self::on(id, opened.map_err(unavailable)?)
+    }
+
+    /// The same on open GPUs, which may be the same one several times.
+    pub(crate) fn on(id: &AlgorithmId, gpus: Vec<super::Gpu>) -> Result<Box<dyn BroadPhase>, Error> {
+        let unavailable = |reason| Error::Unavailable { algorithm: id.clone(), reason };
+        let part = |gpu| {
+            let engine = Engine::new(gpu, id.method())?;
+            let (members, pairs) = (Members::default(), Pairs::new());
+            Ok(Part { engine, members, pairs, speed: None, work: 0.0, began: None, failure: None, full: false })
+        };
+        let parts = gpus.into_iter().map(part).collect::<Result<Vec<_>, String>>().map_err(unavailable)?;
+        // A pool of its own, without pinning: its threads wait for drivers, whose own threads must find a core.
+        let workers = Workers::new("gpu", parts.len() as u32, &Threads::default())?;
+        let exponent = match id.method() {
+            "brute" => 2.0,
+            "sweep" => 5.0 / 3.0,
+            _ => 1.0,
+        };
+        Ok(Box::new(Self { id: id.clone(), parts, slabs: Slabs::default(), workers, exponent }))
+    }
+
+    /// All boxes at once on the one GPU that there is.
+    fn whole(part: &mut Part, sample: &Sample, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Failure> {
+        let params = part.engine.plan(sample, boxes.len() as u32);
+        part.engine.start(Piece { boxes, ids: None }, params)?;
+        part.engine.finish(pairs)
+    }
+
+    /// In slabs: as many as there are GPUs, or that many times `rounds`. `false` when a slab is too large for its GPU.
+    fn slabs(&mut self, rounds: usize, sample: &Sample, boxes: &[Aabb], pairs: &mut Pairs) -> Result<bool, Failure> {
+        let Self { parts, slabs, workers, exponent, .. } = self;
+        let exponent = *exponent;
+        let shares: Vec<f64> = shares(parts.iter().map(|p| p.speed), exponent);
+        let each = shares.iter().flat_map(|s| std::iter::repeat_n(s / rounds as f64, rounds)).collect::<Vec<_>>();
+        slabs.plan(sample, boxes, each.into_iter());
+        debug_assert_eq!(slabs.count(), parts.len() * rounds);
+        let slabs = &*slabs;
+        let limit = pairs.limit();
+        for part in parts.iter_mut() {
+            part.pairs.clear();
+            part.pairs.set_limit(limit);
+            part.work = 0.0;
+            part.began = None;
+        }
+        for round in 0..rounds {
+            workers.run(|| {
+                workers.each(parts, |k, part| part.start(slabs, k * rounds + round, boxes, exponent));
+                workers.each(parts, |_, part| part.finish(rounds));
+            });
+            if parts.iter().any(|p| p.full) {
+                return Ok(false);
+            }
+            if let Some(failure) = worst(parts) {
+                return Err(failure);
+            }
+        }
+        parts.iter().for_each(|p| pairs.append(&p.pairs));
+        Ok(true)
+    }
+}
+
+impl Part {
+    fn start(&mut self, slabs: &Slabs, slab: usize, boxes: &[Aabb], exponent: f64) {
+        self.began.get_or_insert_with(Instant::now);
+        self.failure = None;
+        self.full = !slabs.gather(slab, boxes, self.engine.most_objects(), &mut self.members);
+        if self.full || self.members.boxes.is_empty() {
+            return;
+        }
+        let Members { boxes, ids } = &self.members;
+        self.work += (boxes.len() as f64).powf(exponent);
+        let params = self.engine.plan(&Sample::of(boxes), boxes.len() as u32);
+        self.failure = self.engine.start(Piece { boxes, ids: Some(ids) }, params).err().map(Failure::Gpu);
+    }
+
+    fn finish(&mut self, rounds: usize) {
+        if self.full || self.failure.is_some() {
+            return;
+        }
+        self.failure = self.engine.finish(&mut self.pairs).err();
+        if let Some(began) = self.began.filter(|_| self.failure.is_none() && rounds == 1 && self.work > 0.0) {
+            let speed = self.work / began.elapsed().as_nanos().max(1) as f64;
+            self.speed = Some(self.speed.map_or(speed, |before| before + SPEED_FOLLOWS * (speed - before)));
+        }
+    }
+}
+
+/// The share of the boxes that each GPU gets, so that all take the same time.
+fn shares(speeds: impl Iterator<Item = Option<f64>>, exponent: f64) -> Vec<f64> {
+    let speeds: Vec<Option<f64>> = speeds.collect();
+    let known: Option<Vec<f64>> = speeds.iter().map(|s| s.map(|v| v.powf(1.0 / exponent))).collect();
+    let weights = known.unwrap_or_else(|| vec![1.0; speeds.len()]);
+    let total: f64 = weights.iter().sum();
+    let bounded: Vec<f64> = weights.iter().map(|w| (w / total).max(SMALLEST_SHARE)).collect();
+    let total: f64 = bounded.iter().sum();
+    bounded.iter().map(|w| w / total).collect()
+}
+
+/// The failure to report: a fault of a GPU first, because the frame is then to be run elsewhere; else the first invalid box.
+fn worst(parts: &mut [Part]) -> Option<Failure> {
+    let mut worst: Option<Failure> = None;
+    for failure in parts.iter_mut().filter_map(|p| p.failure.take()) {
+        worst = Some(match (worst, failure) {
+            (Some(Failure::Gpu(text)), _) | (_, Failure::Gpu(text)) => Failure::Gpu(text),
+            (
+                Some(Failure::Frame(Error::InvalidBox { index: a, defect: x })),
+                Failure::Frame(Error::InvalidBox { index: b, defect: y }),
+            ) => {
+                let (index, defect) = if a < b { (a, x) } else { (b, y) };
+                Failure::Frame(Error::InvalidBox { index, defect })
+            }
+            (Some(earlier), _) => earlier,
+            (None, failure) => failure,
+        });
+    }
+    worst
+}
+
+impl BroadPhase for OnGpus {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        check_count(boxes.len())?;
+        if boxes.len() < 2 {
+            Aabb::check(boxes, 0)?;
+            return pairs.finish();
+        }
+        let algorithm = &self.id;
+        if boxes.len() > MOST_OBJECTS {
+            let reason = format!("{} boxes are more than the {MOST_OBJECTS} that a GPU can number", boxes.len());
+            return Err(Error::Unavailable { algorithm: algorithm.clone(), reason });
+        }
+        let sample = Sample::of(boxes);
+        let found = match self.parts.as_mut_slice() {
+            [part] if boxes.len() <= part.engine.most_objects() => Self::whole(part, &sample, boxes, pairs),
+            parts => {
+                let room: usize = parts.iter().map(|p| p.engine.most_objects()).sum();
+                let mut rounds = boxes.len().div_ceil(room.max(1)).max(1);
+                loop {
+                    pairs.clear();
+                    match self.slabs(rounds, &sample, boxes, pairs) {
+                        Ok(true) => break Ok(()),
+                        Ok(false) if rounds < MOST_ROUNDS => rounds *= 2,
+                        Ok(false) => {
+                            let reason = "too many boxes reach through too much of the scene to be cut into pieces";
+                            break Err(Failure::Gpu(reason.to_owned()));
+                        }
+                        Err(failure) => break Err(failure),
+                    }
+                }
+            }
+        };
+        match found {
+            Ok(()) => pairs.finish(),
+            Err(Failure::Frame(error)) => Err(error),
+            Err(Failure::Gpu(reason)) => Err(Error::Unavailable { algorithm: self.id.clone(), reason }),
+        }
+    }
+
+    fn prepare(&mut self, objects: usize) {
+        let parts = self.parts.len();
+        for part in &mut self.parts {
+            let share = (objects / parts).min(part.engine.most_objects()) as u32;
+            let params = part.engine.plan(&Sample::default(), share);
+            // A refused allocation is reported by the frame that needs it.
+            let _ = part.engine.prepare(&params, parts > 1, None);
+        }
+    }
+}

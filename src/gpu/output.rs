@@ -1,0 +1,64 @@
+//! Where pairs are counted, placed and written on a GPU.
+
+use super::device::Gpu;
+use super::kernel::{Bound, Kernel, source};
+use super::storage::{Storage, largest};
+
+/// Bytes of a pair.
+pub(super) const PAIR: u64 = 8;
+
+/// The counts of all blocks, and the list of pairs that they are turned into.
+#[derive(Debug)]
+pub(super) struct Output {
+    positions: Kernel,
+    sums: Storage,
+    pairs: Storage,
+    bound: Option<Bound>,
+}
+
+impl Output {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, String> {
+        Ok(Self {
+            positions: Kernel::new(gpu, source::SCAN, "positions")?,
+            sums: Storage::new(gpu, "counts of pairs")?,
+            pairs: Storage::new(gpu, "pairs")?,
+            bound: None,
+        })
+    }
+
+    /// Makes room for the counts of `blocks` blocks. Whether a buffer is another one now.
+    pub(super) fn ensure_blocks(&mut self, gpu: &Gpu, blocks: u32) -> Result<bool, String> {
+        self.sums.ensure(gpu, (u64::from(blocks) + 1) * 4)
+    }
+
+    /// Makes room for that many pairs, or for as many as the GPU allows in one buffer. Whether the buffer is another one now.
+    pub(super) fn ensure_pairs(&mut self, gpu: &Gpu, pairs: u64) -> Result<bool, String> {
+        let most = largest(gpu, wgpu::BufferUsages::STORAGE) / PAIR * PAIR;
+        self.pairs.ensure(gpu, (pairs * PAIR).min(most))
+    }
+
+    /// Pairs that there is room for.
+    pub(super) fn capacity(&self) -> u32 {
+        u32::try_from(self.pairs.bytes() / PAIR).unwrap_or(u32::MAX)
+    }
+
+    pub(super) fn sums(&self) -> &wgpu::Buffer {
+        self.sums.buffer()
+    }
+
+    pub(super) fn pairs(&self) -> &wgpu::Buffer {
+        self.pairs.buffer()
+    }
+
+    pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer, header: &wgpu::Buffer) -> Result<(), String> {
+        self.bound = Some(self.positions.bind(gpu, &[(0, params), (3, header), (4, self.sums.buffer())])?);
+        Ok(())
+    }
+
+    /// Turns counts into positions.
+    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>) {
+        if let Some(bound) = &self.bound {
+            bound.dispatch(pass, 1);
+        }
+    }
+}

@@ -1,0 +1,122 @@
+// All pairs, a tile of rows against a tile of columns in each workgroup. Tile pairs are numbered along the triangle: 0 is
+// tile 0 with itself, 1 and 2 are tile 1 with tiles 0 and 1, and so on.
+
+const TILE: u32 = 128u;
+const WORDS: u32 = 4u;
+
+@group(0) @binding(4) var<storage, read_write> sums: array<u32>;
+@group(0) @binding(5) var<storage, read_write> pairs: array<vec2<u32>>;
+
+var<workgroup> columns_lo: array<vec4<u32>, TILE>;
+var<workgroup> columns_hi: array<vec4<u32>, TILE>;
+var<workgroup> scan: array<u32, TILE>;
+
+// The tiles of a pair, the lower one first.
+fn tiles(k: u32) -> vec2<u32> {
+    // The root is exact to a few units; the two loops correct it.
+    var high = u32((sqrt(8.0 * f32(k) + 1.0) - 1.0) * 0.5);
+    while (high > 0u && high * (high + 1u) / 2u > k) {
+        high--;
+    }
+    while ((high + 1u) * (high + 2u) / 2u <= k) {
+        high++;
+    }
+    return vec2<u32>(k - high * (high + 1u) / 2u, high);
+}
+
+// Which columns overlap the row of this invocation, a bit each.
+fn hits(tile: vec2<u32>, t: u32) -> vec4<u32> {
+    let first = tile.y * TILE;
+    if (first + t < params.objects) {
+        let b = load_box(first + t);
+        columns_lo[t] = b.lo;
+        columns_hi[t] = b.hi;
+    }
+    workgroupBarrier();
+    let row = tile.x * TILE + t;
+    var found = vec4<u32>();
+    if (row >= params.objects) {
+        return found;
+    }
+    let a = load_box(row);
+    let count = min(TILE, params.objects - first);
+    // Within one tile each pair once: columns behind the row.
+    let begin = select(0u, t + 1u, tile.x == tile.y);
+    for (var w = 0u; w < WORDS; w++) {
+        var word = 0u;
+        let end = min(count, (w + 1u) * 32u);
+        for (var c = max(begin, w * 32u); c < end; c++) {
+            let lo = columns_lo[c];
+            let hi = columns_hi[c];
+            let apart = a.lo.x > hi.x || lo.x > a.hi.x || a.lo.y > hi.y || lo.y > a.hi.y || a.lo.z > hi.z || lo.z > a.hi.z;
+            word |= select(1u << (c & 31u), 0u, apart || !owned(a.lo.w, lo.w));
+        }
+        found[w] = word;
+    }
+    return found;
+}
+
+fn ones(found: vec4<u32>) -> u32 {
+    let c = countOneBits(found);
+    return c.x + c.y + c.z + c.w;
+}
+
+// Sums before this invocation, in `scan` the sums up to each.
+fn exclusive(t: u32, value: u32) -> u32 {
+    scan[t] = value;
+    workgroupBarrier();
+    for (var step = 1u; step < TILE; step <<= 1u) {
+        var left = 0u;
+        if (t >= step) {
+            left = scan[t - step];
+        }
+        workgroupBarrier();
+        scan[t] += left;
+        workgroupBarrier();
+    }
+    return scan[t] - value;
+}
+
+@compute @workgroup_size(128)
+fn count(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+    let block = w.y * n.x + w.x;
+    if (block >= params.blocks) {
+        return;
+    }
+    let tile = tiles(params.first_block + block);
+    if (tile.x == tile.y && tile.x * TILE + t < params.objects) {
+        check_box(tile.x * TILE + t);
+    }
+    _ = exclusive(t, ones(hits(tile, t)));
+    if (t == TILE - 1u) {
+        sums[block] = scan[t];
+    }
+}
+
+@compute @workgroup_size(128)
+fn write(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+    let block = w.y * n.x + w.x;
+    if (block >= params.blocks) {
+        return;
+    }
+    // Most tile pairs of a large sparse scene hold nothing.
+    if (sums[block] == sums[block + 1u]) {
+        return;
+    }
+    let tile = tiles(params.first_block + block);
+    var found = hits(tile, t);
+    // Unsigned wrap-around puts what lies before the window beyond every capacity.
+    var at = sums[block] + exclusive(t, ones(found)) - params.window;
+    let row = number(tile.x * TILE + t);
+    for (var k = 0u; k < WORDS; k++) {
+        var word = found[k];
+        while (word != 0u) {
+            let c = k * 32u + firstTrailingBit(word);
+            word &= word - 1u;
+            if (at < params.capacity) {
+                pairs[at] = pair_of(row, columns_lo[c].w);
+            }
+            at++;
+        }
+    }
+}

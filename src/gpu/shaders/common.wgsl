@@ -1,0 +1,66 @@
+// What every kernel shares: the parameters of a frame, and bounds as integers.
+//
+// Bounds are compared as integers in the order of the floats. Float comparisons would be shorter, but drivers may flush
+// denormals to zero and may take NaN and infinities to be absent, and each of the two loses pairs.
+
+struct Params {
+    // Boxes in this frame or piece.
+    objects: u32,
+    // 1 where `ids` holds a number and an owner bit for each box, 0 where a box's number is its position.
+    piece: u32,
+    // Sweep axis, 0 to 2; the other two follow it in a circle.
+    axis: u32,
+    // Pairs that `pairs` has room for.
+    capacity: u32,
+    // First block of rows (of tile pairs in brute force) of this pass, and how many there are.
+    first_block: u32,
+    blocks: u32,
+    // Position in the whole list of the first pair that `pairs` is to take.
+    window: u32,
+    // Slots of a strip along the sweep axis.
+    slots: u32,
+    // Cells of the grid across the sweep axis.
+    cells: vec2<u32>,
+    // Sort key of the boxes that are kept apart, behind all others.
+    large_key: u32,
+    // Slots that a box may cover beyond its first without being kept apart.
+    longest: u32,
+    // Where slots and cells begin, on the sweep axis and the two across.
+    origin: vec4<f32>,
+    // Slots or cells in a unit of length.
+    inverse: vec4<f32>,
+}
+
+// A box with its axes turned so that x is the sweep axis. lo.w is its number, the owner bit on top.
+struct Box {
+    lo: vec4<u32>,
+    hi: vec4<u32>,
+}
+
+// The bit of `Box.lo.w` that says that this piece reports the pairs of the box, whatever the other box says.
+const OWNER: u32 = 0x80000000u;
+
+// Bits of a float as an integer of the same order; both zeros are one.
+fn order_key(bits: u32) -> u32 {
+    let b = select(bits, 0u, bits == 0x80000000u);
+    return select(b | 0x80000000u, ~b, (b >> 31u) == 1u);
+}
+
+fn is_nan(bits: u32) -> bool {
+    return (bits & 0x7fffffffu) > 0x7f800000u;
+}
+
+// A pair with the lower number first, without owner bits.
+fn pair_of(a: u32, b: u32) -> vec2<u32> {
+    let i = a & ~OWNER;
+    let j = b & ~OWNER;
+    return vec2<u32>(min(i, j), max(i, j));
+}
+
+fn overlap_across(a: Box, b: Box) -> bool {
+    return a.lo.y <= b.hi.y && b.lo.y <= a.hi.y && a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
+}
+
+fn owned(a: u32, b: u32) -> bool {
+    return ((a | b) & OWNER) != 0u;
+}

@@ -1,0 +1,48 @@
+// Reads the boxes as the caller gave them.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> boxes: array<u32>;
+@group(0) @binding(2) var<storage, read> ids: array<u32>;
+@group(0) @binding(3) var<storage, read_write> header: Header;
+
+struct Header {
+    // Pairs found, 64 bits.
+    total_low: u32,
+    total_high: u32,
+    // Twice the position of the first invalid box, plus 1 if it is inverted; all ones when every box is valid.
+    invalid: atomic<u32>,
+    unused: u32,
+}
+
+fn bound(at: u32, corner: u32, axis: u32) -> u32 {
+    return boxes[at * 6u + corner * 3u + (params.axis + axis) % 3u];
+}
+
+fn number(at: u32) -> u32 {
+    if (params.piece == 1u) {
+        return ids[at];
+    }
+    return at | OWNER;
+}
+
+fn load_box(at: u32) -> Box {
+    var b: Box;
+    b.lo = vec4<u32>(order_key(bound(at, 0u, 0u)), order_key(bound(at, 0u, 1u)), order_key(bound(at, 0u, 2u)), number(at));
+    b.hi = vec4<u32>(order_key(bound(at, 1u, 0u)), order_key(bound(at, 1u, 1u)), order_key(bound(at, 1u, 2u)), 0u);
+    return b;
+}
+
+// Notes the box if it is invalid. In a piece the position is the number in the whole frame.
+fn check_box(at: u32) {
+    var nan = false;
+    var inverted = false;
+    for (var k = 0u; k < 3u; k++) {
+        let low = boxes[at * 6u + k];
+        let high = boxes[at * 6u + 3u + k];
+        nan = nan || is_nan(low) || is_nan(high);
+        inverted = inverted || order_key(low) > order_key(high);
+    }
+    if (nan || inverted) {
+        atomicMin(&header.invalid, ((number(at) & ~OWNER) << 1u) | select(1u, 0u, nan));
+    }
+}

@@ -1,0 +1,103 @@
+// Counting and writing the pairs of sorted boxes, one row an invocation. The file that follows says which boxes a row is
+// tested with: `search(row)` calls `hit` for each pair.
+
+const THREADS: u32 = 64u;
+// Pairs of a row that are kept while they are counted, so that most rows are searched once.
+const KEPT: u32 = 4u;
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> keys: array<u32>;
+@group(0) @binding(2) var<storage, read> boxes: array<Box>;
+@group(0) @binding(4) var<storage, read_write> sums: array<u32>;
+@group(0) @binding(5) var<storage, read_write> pairs: array<vec2<u32>>;
+@group(0) @binding(6) var<storage, read_write> counts: array<u32>;
+@group(0) @binding(7) var<storage, read_write> kept: array<u32>;
+
+var<workgroup> scan: array<u32, THREADS>;
+
+var<private> writing: bool;
+// Hits of this row so far.
+var<private> found: u32;
+// Position of the row's first pair in `pairs`.
+var<private> start: u32;
+
+fn store(at: u32, pair: vec2<u32>) {
+    // Unsigned wrap-around puts what lies before the window beyond every capacity.
+    if (at < params.capacity) {
+        pairs[at] = pair;
+    }
+}
+
+fn hit(row: u32, a: u32, b: u32) {
+    if (!owned(a, b)) {
+        return;
+    }
+    if (writing) {
+        store(start + found, pair_of(a, b));
+    } else if (found < KEPT) {
+        kept[row * KEPT + found] = b;
+    }
+    found++;
+}
+
+// Sums before this invocation, in `scan` the sums up to each.
+fn exclusive(t: u32, value: u32) -> u32 {
+    scan[t] = value;
+    workgroupBarrier();
+    for (var step = 1u; step < THREADS; step <<= 1u) {
+        var left = 0u;
+        if (t >= step) {
+            left = scan[t - step];
+        }
+        workgroupBarrier();
+        scan[t] += left;
+        workgroupBarrier();
+    }
+    return scan[t] - value;
+}
+
+@compute @workgroup_size(64)
+fn count(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+    let block = w.y * n.x + w.x;
+    if (block >= params.blocks) {
+        return;
+    }
+    let row = block * THREADS + t;
+    if (row < params.objects) {
+        search(row);
+        counts[row] = found;
+    }
+    _ = exclusive(t, found);
+    if (t == THREADS - 1u) {
+        sums[block] = scan[t];
+    }
+}
+
+@compute @workgroup_size(64)
+fn write(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+    let block = w.y * n.x + w.x;
+    if (block >= params.blocks) {
+        return;
+    }
+    if (sums[block] == sums[block + 1u]) {
+        return;
+    }
+    let row = block * THREADS + t;
+    var count = 0u;
+    if (row < params.objects) {
+        count = counts[row];
+    }
+    start = sums[block] + exclusive(t, count) - params.window;
+    if (count > KEPT) {
+        writing = true;
+        search(row);
+        return;
+    }
+    if (count == 0u) {
+        return;
+    }
+    let a = boxes[row].lo.w;
+    for (var k = 0u; k < count; k++) {
+        store(start + k, pair_of(a, kept[row * KEPT + k]));
+    }
+}

@@ -1,0 +1,62 @@
+// Turns the counts of blocks into the position of each block's first pair, in place, and adds up all pairs in 64 bits.
+// One workgroup goes through the list.
+
+const THREADS: u32 = 256u;
+const EACH: u32 = 16u;
+
+struct Header {
+    total_low: u32,
+    total_high: u32,
+    invalid: u32,
+    unused: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(3) var<storage, read_write> header: Header;
+@group(0) @binding(4) var<storage, read_write> sums: array<u32>;
+
+// Sums of the lower and of the upper 16 bits apart, so that no sum passes 32 bits.
+var<workgroup> scan: array<vec2<u32>, THREADS>;
+
+@compute @workgroup_size(256)
+fn positions(@builtin(local_invocation_index) t: u32) {
+    var before = vec2<u32>();
+    for (var first = 0u; first < params.blocks; first += THREADS * EACH) {
+        let begin = first + t * EACH;
+        var own = vec2<u32>();
+        for (var k = 0u; k < EACH; k++) {
+            if (begin + k < params.blocks) {
+                let value = sums[begin + k];
+                own += vec2<u32>(value & 0xffffu, value >> 16u);
+            }
+        }
+        scan[t] = own;
+        workgroupBarrier();
+        for (var step = 1u; step < THREADS; step <<= 1u) {
+            var left = vec2<u32>();
+            if (t >= step) {
+                left = scan[t - step];
+            }
+            workgroupBarrier();
+            scan[t] += left;
+            workgroupBarrier();
+        }
+        let mine = before + scan[t] - own;
+        var position = mine.x + (mine.y << 16u);
+        for (var k = 0u; k < EACH; k++) {
+            if (begin + k < params.blocks) {
+                let value = sums[begin + k];
+                sums[begin + k] = position;
+                position += value;
+            }
+        }
+        before += scan[THREADS - 1u];
+        before = vec2<u32>(before.x & 0xffffu, before.y + (before.x >> 16u));
+        workgroupBarrier();
+    }
+    if (t == 0u) {
+        sums[params.blocks] = before.x + (before.y << 16u);
+        header.total_low = before.x | (before.y << 16u);
+        header.total_high = before.y >> 16u;
+    }
+}

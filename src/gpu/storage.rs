@@ -1,0 +1,92 @@
+//! Buffers on a GPU that grow and stay.
+
+use super::device::Gpu;
+
+/// What a frame can fail with on a GPU, apart from what is wrong with the frame itself.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Failure {
+    /// The GPU can't do it: lost, out of memory, beyond its limits. In a sentence.
+    Gpu(String),
+    /// The frame is at fault, or the memory of the host.
+    Frame(crate::Error),
+}
+
+impl From<String> for Failure {
+    fn from(text: String) -> Self {
+        Self::Gpu(text)
+    }
+}
+
+impl From<crate::Error> for Failure {
+    fn from(error: crate::Error) -> Self {
+        Self::Frame(error)
+    }
+}
+
+/// A buffer that grows to the largest frame seen and stays.
+#[derive(Debug)]
+pub(super) struct Storage {
+    label: &'static str,
+    usage: wgpu::BufferUsages,
+    buffer: wgpu::Buffer,
+}
+
+/// Bytes of the smallest buffer: no binding may be empty.
+const SMALLEST: u64 = 256;
+
+impl Storage {
+    /// A buffer that kernels read and write, and that can be copied from and to.
+    pub(super) fn new(gpu: &Gpu, label: &'static str) -> Result<Self, String> {
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        Self::with_usage(gpu, label, usage)
+    }
+
+    pub(super) fn with_usage(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages) -> Result<Self, String> {
+        Ok(Self { label, usage, buffer: create(gpu, label, usage, SMALLEST)? })
+    }
+
+    pub(super) fn buffer(&self) -> &wgpu::Buffer {
+        &self.buffer
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        self.buffer.size()
+    }
+
+    /// Makes room for `bytes`. Whether the buffer is another one now; its content is gone then.
+    ///
+    /// # Errors
+    /// When the GPU has no such memory, or no buffer may be as large.
+    pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<bool, String> {
+        if bytes <= self.buffer.size() {
+            return Ok(false);
+        }
+        let most = largest(gpu, self.usage);
+        if bytes > most {
+            let index = gpu.identity().index;
+            return Err(format!("{bytes} bytes for {} are more than the {most} that gpu{index} allows", self.label));
+        }
+        // A quarter more than asked for, so that a growing scene grows the buffer a few times in all.
+        let wanted = (bytes + bytes / 4).next_multiple_of(256).min(most);
+        // The old one is given back first: there may be no room for both.
+        self.buffer.destroy();
+        self.buffer = create(gpu, self.label, self.usage, wanted).or_else(|_| create(gpu, self.label, self.usage, bytes))?;
+        Ok(true)
+    }
+}
+
+/// Bytes of the largest buffer of a usage.
+pub(super) fn largest(gpu: &Gpu, usage: wgpu::BufferUsages) -> u64 {
+    let limits = gpu.limits();
+    let binding =
+        if usage.contains(wgpu::BufferUsages::STORAGE) { limits.max_storage_buffer_binding_size } else { u64::MAX };
+    limits.max_buffer_size.min(binding) & !3
+}
+
+fn create(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, bytes: u64) -> Result<wgpu::Buffer, String> {
+    gpu.check()?;
+    let descriptor =
+        wgpu::BufferDescriptor { label: Some(label), size: bytes.next_multiple_of(4), usage, mapped_at_creation: false };
+    gpu.try_make(|device| device.create_buffer(&descriptor))
+        .map_err(|e| format!("gpu{} has no memory of {bytes} bytes for {label}: {e}", gpu.identity().index))
+}

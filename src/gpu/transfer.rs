@@ -1,0 +1,91 @@
+//! Memory that both the CPU and a GPU reach: mapped once, used every frame.
+
+use super::device::Gpu;
+use super::storage::Storage;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+/// A buffer that the CPU writes or reads while it is mapped, and the GPU copies while it is not.
+#[derive(Debug)]
+pub(super) struct Transfer {
+    storage: Storage,
+    mode: wgpu::MapMode,
+    /// One of the constants below; set by the device when a mapping is done.
+    state: Arc<AtomicU8>,
+}
+
+const UNMAPPED: u8 = 0;
+const ASKED: u8 = 1;
+const MAPPED: u8 = 2;
+
+impl Transfer {
+    /// Memory that the CPU writes.
+    pub(super) fn upload(gpu: &Gpu) -> Result<Self, String> {
+        Self::new(gpu, "upload", wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC, wgpu::MapMode::Write)
+    }
+
+    /// Memory that the CPU reads.
+    pub(super) fn download(gpu: &Gpu) -> Result<Self, String> {
+        Self::new(gpu, "download", wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, wgpu::MapMode::Read)
+    }
+
+    fn new(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, mode: wgpu::MapMode) -> Result<Self, String> {
+        Ok(Self { storage: Storage::with_usage(gpu, label, usage)?, mode, state: Arc::default() })
+    }
+
+    pub(super) fn buffer(&self) -> &wgpu::Buffer {
+        self.storage.buffer()
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        self.storage.bytes()
+    }
+
+    pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<(), String> {
+        if bytes > self.storage.bytes() {
+            self.unmap();
+            self.storage.ensure(gpu, bytes)?;
+            self.state = Arc::default();
+        }
+        Ok(())
+    }
+
+    /// Asks for the first `bytes` to be mapped as soon as the GPU is done with them.
+    pub(super) fn ask(&self, bytes: u64) {
+        if self.state.compare_exchange(UNMAPPED, ASKED, Ordering::AcqRel, Ordering::Acquire).is_ok() {
+            let state = Arc::clone(&self.state);
+            let done = move |result: Result<(), wgpu::BufferAsyncError>| {
+                state.store(if result.is_ok() { MAPPED } else { UNMAPPED }, Ordering::Release);
+            };
+            self.storage.buffer().map_async(self.mode, 0..bytes.next_multiple_of(8).min(self.bytes()), done);
+        }
+    }
+
+    /// The mapped memory, for the CPU to write. Waits for the mapping where it was not asked for ahead.
+    pub(super) fn writable(&self, gpu: &Gpu, bytes: u64) -> Result<wgpu::BufferViewMut, String> {
+        if self.state.load(Ordering::Acquire) != MAPPED {
+            self.ask(self.bytes());
+            gpu.wait_all()?;
+        }
+        self.mapped()?;
+        self.storage.buffer().get_mapped_range_mut(0..bytes).map_err(|e| e.to_string())
+    }
+
+    /// The mapped memory, for the CPU to read.
+    pub(super) fn readable(&self, bytes: std::ops::Range<u64>) -> Result<wgpu::BufferView, String> {
+        self.mapped()?;
+        self.storage.buffer().get_mapped_range(bytes).map_err(|e| e.to_string())
+    }
+
+    fn mapped(&self) -> Result<(), String> {
+        let mapped = self.state.load(Ordering::Acquire) == MAPPED;
+        mapped.then_some(()).ok_or_else(|| "the driver refuses to map memory".to_owned())
+    }
+
+    /// Hands the memory back to the GPU.
+    pub(super) fn unmap(&self) {
+        if self.state.swap(UNMAPPED, Ordering::AcqRel) != UNMAPPED {
+            self.storage.buffer().unmap();
+        }
+    }
+}
