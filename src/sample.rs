@@ -33,6 +33,17 @@ impl Sample {
         Self::statistics(&Chosen::from(boxes))
     }
 
+    /// The statistics of boxes that were chosen elsewhere, of up to 256 of them.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn of_all(boxes: &[Aabb]) -> Self {
+        let mut chosen = Chosen { boxes: [Aabb::default(); SAMPLE], count: 0 };
+        for b in boxes.iter().filter(|b| b.defect().is_none()).take(SAMPLE) {
+            chosen.boxes[chosen.count] = *b;
+            chosen.count += 1;
+        }
+        Self::statistics(&chosen)
+    }
+
     /// The axis on which the centres spread most.
     pub(crate) fn widest_axis(&self) -> usize {
         (0..3).max_by(|&a, &b| self.deviation[a].total_cmp(&self.deviation[b])).unwrap_or(0)

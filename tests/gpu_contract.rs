@@ -4,23 +4,9 @@
 
 mod common;
 
-use common::{Random, naive};
+use common::{Random, gpus, naive};
 use sapwise::gpu::{Gpus, broad_phase};
 use sapwise::{Aabb, BoxDefect, BroadPhase, Error, PairOrder, Pairs, Registry, Scenario};
-
-/// The GPUs of this machine; `None`, said aloud, where there is none and none is required.
-fn gpus() -> Option<Gpus> {
-    let gpus = Gpus::find();
-    if gpus.is_empty() {
-        assert!(
-            std::env::var_os("SAPWISE_REQUIRE_GPU").is_none_or(|v| v != "1"),
-            "SAPWISE_REQUIRE_GPU=1, and no GPU was found"
-        );
-        println!("skipped: no GPU was found");
-        return None;
-    }
-    Some(gpus)
-}
 
 /// Every algorithm of the registry on GPUs, and each method on two devices of the first GPU.
 fn every_algorithm(gpus: &Gpus) -> Vec<(String, Box<dyn BroadPhase>)> {
@@ -52,5 +38,169 @@ fn random_boxes_of_every_small_count() {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     for count in [0, 1, 2, 3, 31, 32, 33, 63, 64, 65, 127, 128, 129, 255, 256, 257, 1000, 1023, 1024, 1025, 2049] {
         assert_all_agree("a cube", &random.cubes(count, [8.0; 3], 0.7), &mut algorithms);
+    }
+}
+
+/// Every scenario at the sizes where blocks and tiles begin and end. Brute force on a program that acts as a GPU takes up to a
+/// minute at the large ones: those are left to [`every_algorithm_on_every_scenario_at_every_size`].
+#[test]
+fn every_scenario_at_the_edges_of_blocks() {
+    let Some(gpus) = gpus() else { return };
+    let mut algorithms = every_algorithm(&gpus);
+    for (k, scenario) in Scenario::ALL.into_iter().enumerate() {
+        for objects in [0, 1, 2, 31, 32, 33, 1000] {
+            assert_all_agree(&format!("{scenario} of {objects}"), &frame(scenario, objects), &mut algorithms);
+        }
+        let large = [65_535, 65_536, 65_537, 40_961 + 1009 * k][k % 4];
+        let fast = |id: &str| !id.contains("brute");
+        let (mut fast, rest): (Vec<_>, Vec<_>) = algorithms.into_iter().partition(|(id, _)| fast(id));
+        assert_all_agree(&format!("{scenario} of {large}"), &frame(scenario, large), &mut fast);
+        algorithms = fast.into_iter().chain(rest).collect();
+    }
+}
+
+#[test]
+#[ignore = "takes an hour on a program that acts as a GPU; tools/real-gpu.sh runs it on real ones"]
+fn every_algorithm_on_every_scenario_at_every_size() {
+    let Some(gpus) = gpus() else { return };
+    let mut algorithms = every_algorithm(&gpus);
+    for scenario in Scenario::ALL {
+        for objects in [0, 1, 2, 31, 32, 33, 1000, 65_535, 65_536, 65_537, 54_321] {
+            assert_all_agree(&format!("{scenario} of {objects}"), &frame(scenario, objects), &mut algorithms);
+        }
+        println!("{scenario}: {} algorithms agree with the oracle at 11 sizes", algorithms.len());
+    }
+}
+
+/// A frame with that many boxes.
+fn frame(scenario: Scenario, objects: usize) -> Vec<Aabb> {
+    let mut scene = scenario.start(objects, 42);
+    // Fragmentation alone changes its number, and reaches the largest within a cycle.
+    let frames = if scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES } else { 2 };
+    for _ in 0..frames {
+        scene.advance();
+        if scene.frame() > 1 && scene.boxes().len() == objects {
+            break;
+        }
+    }
+    scene.boxes().to_vec()
+}
+
+#[test]
+fn worlds_of_every_shape() {
+    let Some(gpus) = gpus() else { return };
+    let mut algorithms = every_algorithm(&gpus);
+    let mut random = Random(7);
+    for world in
+        [[400.0, 1.0, 1.0], [1.0, 300.0, 2.0], [60.0, 60.0, 0.0], [2.0, 50.0, 50.0], [40.0, 40.0, 0.0], [0.0; 3], [16.0; 3]]
+    {
+        assert_all_agree("a world", &random.cubes(3000, world, 0.5), &mut algorithms);
+    }
+    let shrunk = |v: [f32; 3]| v.map(|x| (x - 8.0) * 1.0e-39);
+    let tiny = random.cubes(3000, [16.0; 3], 0.5);
+    let tiny: Vec<Aabb> = tiny.iter().map(|b| Aabb::new(shrunk(b.min), shrunk(b.max))).collect();
+    assert_all_agree("a world of denormals", &tiny, &mut algorithms);
+    let lattice: Vec<Aabb> =
+        (0..2744).map(|k| Aabb::cube([(k % 14) as f32, (k / 14 % 14) as f32, (k / 196) as f32], 0.5)).collect();
+    assert_all_agree("a lattice", &lattice, &mut algorithms);
+}
+
+#[test]
+fn large_infinite_and_far_boxes() {
+    let Some(gpus) = gpus() else { return };
+    let mut algorithms = every_algorithm(&gpus);
+    let mut random = Random(99);
+    let mut boxes = random.cubes(4000, [60.0, 50.0, 40.0], 0.3);
+    for k in 0..40 {
+        let size = [[50.0, 50.0, 0.1], [0.1, 80.0, 0.1], [0.1, 0.1, 80.0], [100.0; 3], [90.0, 0.2, 0.2]][k % 5];
+        let at = [random.next() * 60.0 - 20.0, random.next() * 50.0 - 20.0, random.next() * 40.0 - 20.0];
+        boxes.insert(k * 97, Aabb::new(at, [at[0] + size[0], at[1] + size[1], at[2] + size[2]]));
+    }
+    assert_all_agree("large boxes", &boxes, &mut algorithms);
+    let inf = f32::INFINITY;
+    boxes.push(Aabb::new([-inf; 3], [inf; 3]));
+    boxes.insert(0, Aabb::new([-inf, 0.0, 0.0], [inf, 1.0, 1.0]));
+    boxes.push(Aabb::new([5.0, -inf, 5.0], [5.0, inf, inf]));
+    boxes.push(Aabb::new([inf; 3], [inf; 3]));
+    boxes.push(Aabb::new([-inf; 3], [-inf; 3]));
+    boxes.push(Aabb::new([f32::MIN; 3], [f32::MAX; 3]));
+    boxes.push(Aabb::new([-0.0; 3], [0.0; 3]));
+    boxes.push(Aabb::new([0.0; 3], [-0.0; 3]));
+    for far in [1.0e6, -1.0e9, 3.0e38] {
+        boxes.push(Aabb::cube([far, 0.0, far], 0.5));
+        boxes.push(Aabb::cube([0.0, far, 0.0], 1.0));
+    }
+    assert_all_agree("infinite boxes", &boxes, &mut algorithms);
+    let lines: Vec<Aabb> = (0..600).map(|k| Aabb::new([-inf, k as f32, -inf], [inf, k as f32 + 1.0, inf])).collect();
+    assert_all_agree("infinite slabs", &lines, &mut algorithms);
+    assert_all_agree("identical points", &[Aabb::cube([3.0; 3], 0.0); 700], &mut algorithms);
+}
+
+#[test]
+fn the_first_invalid_box_is_named() {
+    let Some(gpus) = gpus() else { return };
+    let mut random = Random(11);
+    for (id, mut algorithm) in every_algorithm(&gpus) {
+        let mut pairs = Pairs::new();
+        for at in [0, 1, 127, 1000, 1499] {
+            for (defect, bad) in [
+                (BoxDefect::NotANumber, Aabb::new([0.0, 0.0, f32::NAN], [1.0; 3])),
+                (BoxDefect::NotANumber, Aabb::new([f32::NAN; 3], [f32::NAN; 3])),
+                (BoxDefect::Inverted, Aabb::new([0.0, 2.0, 0.0], [1.0; 3])),
+                (BoxDefect::Inverted, Aabb::new([29.0; 3], [1.0; 3])),
+            ] {
+                let mut boxes = random.cubes(1500, [20.0; 3], 0.5);
+                boxes[at] = bad;
+                boxes[1499] = bad;
+                let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+                assert_eq!(error, Error::InvalidBox { index: at, defect }, "{id}");
+            }
+        }
+        let boxes = random.cubes(500, [10.0; 3], 0.5);
+        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+        assert_eq!(pairs.len(), naive(&boxes).len(), "{id} after errors");
+    }
+}
+
+#[test]
+fn ten_million_pairs_come_whole_and_a_limit_counts_them() {
+    let Some(gpus) = gpus() else { return };
+    let boxes: Vec<Aabb> = (0..5000).map(|k| Aabb::cube([k as f32 * 1e-4, 0.0, 0.0], 1.0)).collect();
+    let all = 5000 * 4999 / 2;
+    for (id, mut algorithm) in every_algorithm(&gpus) {
+        let mut pairs = Pairs::new();
+        pairs.set_limit(Some(1000));
+        let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+        assert_eq!(error, Error::TooManyPairs { limit: 1000, pairs: all }, "{id}");
+        pairs.set_limit(None);
+        for frame in 0..2 {
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+            assert_eq!(pairs.len() as u64, all, "{id} in frame {frame}");
+            let sum: u64 = pairs.iter().map(|&(i, j)| u64::from(j) * u64::from(j > i)).sum();
+            assert_eq!(sum, (0..5000_u64).map(|j| j * j).sum::<u64>(), "{id} in frame {frame}");
+        }
+    }
+}
+
+#[test]
+fn the_order_is_the_same_in_every_run() {
+    let Some(gpus) = gpus() else { return };
+    let boxes = frame(Scenario::Clustered, 3000);
+    let list = |algorithm: &mut dyn BroadPhase| {
+        let mut pairs = Pairs::new();
+        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+        pairs.as_slice().to_vec()
+    };
+    let mut registry = Registry::with_cores(1);
+    registry.add_gpus(&gpus);
+    // Where several GPUs share a frame the cuts follow their measured speeds, and the order follows the cuts.
+    for (id, _) in registry.available().into_iter().filter(|(id, _)| id.to_string().contains("@gpu")) {
+        if id.to_string().contains('+') {
+            continue;
+        }
+        let first = list(registry.create(&id).unwrap().as_mut());
+        for _ in 0..3 {
+            assert_eq!(list(registry.create(&id).unwrap().as_mut()), first, "{id}");
+        }
     }
 }

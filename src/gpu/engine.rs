@@ -4,9 +4,11 @@ use super::brute::Brute;
 use super::device::Gpu;
 use super::output::{Output, PAIR};
 use super::params::{Header, Params};
+use super::sampler::{self, Sampler};
 use super::sorted::Sorted;
 use super::storage::{Failure, Storage, largest};
 use super::transfer::Transfer;
+use crate::sample::Sample;
 use crate::{Aabb, BoxDefect, Error, Pairs};
 use std::mem::{offset_of, size_of};
 
@@ -36,6 +38,8 @@ pub(super) struct Inputs<'a> {
 pub(super) struct Engine {
     pub(super) gpu: Gpu,
     search: Search,
+    /// For boxes that the CPU does not see.
+    sampler: Option<Sampler>,
     output: Output,
     params: Storage,
     header: Storage,
@@ -95,10 +99,19 @@ impl Engine {
             download: Transfer::download(&gpu)?,
             gpu,
             search,
+            sampler: None,
             bound_to: None,
             expected: 0,
             frame: None,
         })
+    }
+
+    /// As [`new`](Self::new), for boxes that are on the GPU and pairs that stay there.
+    pub(super) fn resident(gpu: Gpu, method: &str) -> Result<Self, String> {
+        let mut engine = Self::new(gpu, method)?;
+        engine.sampler = Some(Sampler::new(&engine.gpu)?);
+        engine.download.ensure(&engine.gpu, PAIRS_AT + sampler::BYTES)?;
+        Ok(engine)
     }
 
     /// Boxes that fit into the largest buffers of the GPU. More have to come in pieces.
@@ -109,7 +122,7 @@ impl Engine {
     }
 
     /// The parameters of a frame of boxes that look like the sample.
-    pub(super) fn plan(&self, sample: &crate::sample::Sample, objects: u32) -> Params {
+    pub(super) fn plan(&self, sample: &Sample, objects: u32) -> Params {
         match &self.search {
             Search::Brute(_) => Params { objects, ..Params::default() },
             Search::Sorted(sorted) if sorted.is_strips() => Params::strips(sample, objects),
@@ -120,6 +133,15 @@ impl Engine {
     /// Makes room for the frame, and binds the kernels anew where a buffer is another one now. `external`: boxes that are on
     /// the GPU already.
     pub(super) fn prepare(&mut self, params: &Params, ids: bool, external: Option<&wgpu::Buffer>) -> Result<(), String> {
+        let prepared = self.make_room(params, ids, external);
+        if prepared.is_err() {
+            // Some buffers may be new, some given back: everything is bound anew before it is used again.
+            self.bound_to = None;
+        }
+        prepared
+    }
+
+    fn make_room(&mut self, params: &Params, ids: bool, external: Option<&wgpu::Buffer>) -> Result<(), String> {
         self.gpu.check()?;
         let gpu = &self.gpu;
         let n = u64::from(params.objects);
@@ -156,6 +178,9 @@ impl Engine {
         self.bound_to = None;
         let inputs = Inputs { params: self.params.buffer(), boxes, ids: self.ids.buffer(), header: self.header.buffer() };
         self.output.bind(&self.gpu, inputs.params, inputs.header)?;
+        if let Some(sampler) = &mut self.sampler {
+            sampler.bind(&self.gpu, inputs.params, boxes)?;
+        }
         match &mut self.search {
             Search::Brute(brute) => brute.bind(&self.gpu, &inputs, &self.output)?,
             Search::Sorted(sorted) => sorted.bind(&self.gpu, &inputs, &self.output)?,
@@ -167,22 +192,28 @@ impl Engine {
     /// Pairs that are copied back with the header.
     fn sendable(&self) -> u64 {
         let wanted = self.expected + self.expected / 8 + SPARE_PAIRS;
-        wanted.min(u64::from(self.output.capacity())).min(MOST_DOWNLOAD / PAIR)
+        wanted.min(u64::from(self.output.capacity())).min(self.downloadable())
+    }
+
+    /// Pairs that one download can take.
+    fn downloadable(&self) -> u64 {
+        (self.gpu.limits().max_buffer_size - PAIRS_AT).min(MOST_DOWNLOAD) / PAIR
     }
 
     /// Submits a piece and does not wait for it: several GPUs work at once.
     pub(super) fn start(&mut self, piece: Piece<'_>, params: Params) -> Result<(), String> {
         self.prepare(&params, piece.ids.is_some(), None)?;
-        self.submit(params, Some(piece), true)
+        self.submit(params, Some(piece))
     }
 
     /// As [`start`](Self::start), with boxes that are on the GPU already, and pairs that stay there.
     pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), String> {
         self.prepare(&params, false, Some(boxes))?;
-        self.submit(params, None, false)
+        self.submit(params, None)
     }
 
-    fn submit(&mut self, mut params: Params, piece: Option<Piece<'_>>, download: bool) -> Result<(), String> {
+    /// `None`: the boxes are on the GPU.
+    fn submit(&mut self, mut params: Params, piece: Option<Piece<'_>>) -> Result<(), String> {
         let all_blocks = match &self.search {
             Search::Brute(_) => Brute::blocks(params.objects),
             Search::Sorted(_) => u64::from(Sorted::blocks(params.objects)),
@@ -216,9 +247,9 @@ impl Engine {
             encoder.copy_buffer_to_buffer(upload, ids_at as u64, self.ids.buffer(), 0, ids.len() as u64);
         }
         self.record(&mut encoder, &params, true);
-        let sent = if download { self.sendable() } else { 0 };
+        let sent = if self.sampler.is_none() { self.sendable() } else { 0 };
         self.copy_back(&mut encoder, sent);
-        let submission = self.submit_mapped(encoder, PAIRS_AT + sent * PAIR);
+        let submission = self.submit_mapped(encoder, PAIRS_AT + (sent * PAIR).max(self.sample_bytes()));
         self.upload.ask(self.upload.bytes());
         self.frame = Some(Frame { submission, params, sent, blocks_left: all_blocks - u64::from(params.blocks) });
         Ok(())
@@ -247,9 +278,35 @@ impl Engine {
     fn copy_back(&self, encoder: &mut wgpu::CommandEncoder, pairs: u64) {
         let download = self.download.buffer();
         encoder.copy_buffer_to_buffer(self.header.buffer(), 0, download, 0, size_of::<Header>() as u64);
+        if let Some(sampler) = &self.sampler {
+            sampler.record(encoder, download, PAIRS_AT);
+        }
         if pairs > 0 {
             encoder.copy_buffer_to_buffer(self.output.pairs(), 0, download, PAIRS_AT, pairs * PAIR);
         }
+    }
+
+    /// Bytes of a glance at boxes that are on the GPU.
+    fn sample_bytes(&self) -> u64 {
+        if self.sampler.is_some() { sampler::BYTES } else { 0 }
+    }
+
+    /// Looks at boxes that are on the GPU, without a frame.
+    pub(super) fn look(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Sample, String> {
+        let params = Params { objects, ..Params::default() };
+        self.prepare(&params, false, Some(boxes))?;
+        self.set(&params);
+        let mut encoder = self.encoder();
+        self.copy_back(&mut encoder, 0);
+        let submission = self.submit_mapped(encoder, PAIRS_AT + sampler::BYTES);
+        self.gpu.wait(submission)?;
+        self.seen()
+    }
+
+    /// What the glance of the last submission saw.
+    fn seen(&self) -> Result<Sample, String> {
+        let view = self.download.readable(PAIRS_AT..PAIRS_AT + sampler::BYTES)?;
+        Ok(Sample::of_all(bytemuck::cast_slice(&view)))
     }
 
     /// Submits, and asks for the first `bytes` of the download.
@@ -282,10 +339,12 @@ impl Engine {
         Ok(())
     }
 
-    /// Waits for what was started and gives the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer).
-    pub(super) fn finish_resident(&mut self) -> Result<u32, Failure> {
-        let Some(mut frame) = self.frame.take() else { return Ok(0) };
+    /// Waits for what was started and gives the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer), and
+    /// what the boxes look like.
+    pub(super) fn finish_resident(&mut self) -> Result<(u32, Sample), Failure> {
+        let Some(mut frame) = self.frame.take() else { return Ok((0, Sample::default())) };
         let total = self.header_of(&frame)?.total();
+        let sample = self.seen()?;
         self.expected = total;
         if frame.blocks_left > 0 {
             let reason =
@@ -299,7 +358,7 @@ impl Engine {
             }
             self.rewrite(&frame.params)?;
         }
-        Ok(total as u32)
+        Ok((total as u32, sample))
     }
 
     /// The list of pairs of the frame before.
@@ -334,7 +393,7 @@ impl Engine {
             let reason = format!("{total} pairs are more than the 2^32 that gpu{} can number", self.index());
             return Err(Failure::Gpu(format!("{reason}; set a limit on the pairs")));
         }
-        self.download.ensure(&self.gpu, PAIRS_AT + (total * PAIR).min(MOST_DOWNLOAD))?;
+        self.download.ensure(&self.gpu, PAIRS_AT + total.min(self.downloadable()) * PAIR)?;
         if total > u64::from(self.output.capacity()) {
             self.grow(frame, total)?;
             self.rewrite(&frame.params)?;

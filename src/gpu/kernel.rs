@@ -29,6 +29,7 @@ pub(super) mod source {
 
     pub(in crate::gpu) const BRUTE: Source = &[COMMON, INPUT, include_str!("shaders/brute.wgsl")];
     pub(in crate::gpu) const KEYS: Source = &[COMMON, INPUT, include_str!("shaders/keys.wgsl")];
+    pub(in crate::gpu) const SAMPLE: Source = &[COMMON, INPUT, include_str!("shaders/sample.wgsl")];
     pub(in crate::gpu) const SCAN: Source = &[COMMON, include_str!("shaders/scan.wgsl")];
     pub(in crate::gpu) const SORT: Source = &[COMMON, include_str!("shaders/sort.wgsl")];
     pub(in crate::gpu) const STRIPS: Source = &[COMMON, ROWS, include_str!("shaders/strips.wgsl")];
@@ -105,7 +106,7 @@ mod tests {
     /// Parses and validates every shader without a driver.
     #[test]
     fn every_shader_is_valid() {
-        let sources = [BRUTE, KEYS, SCAN, SORT, STRIPS, SWEEP, TABLE];
+        let sources = [BRUTE, KEYS, SAMPLE, SCAN, SORT, STRIPS, SWEEP, TABLE];
         for source in sources {
             let text = source.concat();
             let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));

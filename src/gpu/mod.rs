@@ -12,6 +12,8 @@ mod methods;
 mod on_gpus;
 mod output;
 mod params;
+mod resident;
+mod sampler;
 mod slabs;
 mod sort;
 mod sorted;
@@ -23,5 +25,6 @@ pub use device::Gpu;
 pub use methods::algorithms;
 pub(crate) use on_gpus::OnGpus;
 pub use on_gpus::broad_phase;
+pub use resident::{Resident, ResidentPairs};
 /// The version of wgpu whose buffers and devices this library takes.
 pub use wgpu;

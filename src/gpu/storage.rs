@@ -29,6 +29,8 @@ pub(super) struct Storage {
     label: &'static str,
     usage: wgpu::BufferUsages,
     buffer: wgpu::Buffer,
+    /// 0 after a refusal, when there is no memory behind the buffer.
+    bytes: u64,
 }
 
 /// Bytes of the smallest buffer: no binding may be empty.
@@ -42,7 +44,7 @@ impl Storage {
     }
 
     pub(super) fn with_usage(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages) -> Result<Self, String> {
-        Ok(Self { label, usage, buffer: create(gpu, label, usage, SMALLEST)? })
+        Ok(Self { label, usage, buffer: create(gpu, label, usage, SMALLEST)?, bytes: SMALLEST })
     }
 
     pub(super) fn buffer(&self) -> &wgpu::Buffer {
@@ -50,7 +52,7 @@ impl Storage {
     }
 
     pub(super) fn bytes(&self) -> u64 {
-        self.buffer.size()
+        self.bytes
     }
 
     /// Makes room for `bytes`. Whether the buffer is another one now; its content is gone then.
@@ -58,7 +60,7 @@ impl Storage {
     /// # Errors
     /// When the GPU has no such memory, or no buffer may be as large.
     pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<bool, String> {
-        if bytes <= self.buffer.size() {
+        if bytes <= self.bytes {
             return Ok(false);
         }
         let most = largest(gpu, self.usage);
@@ -70,7 +72,9 @@ impl Storage {
         let wanted = (bytes + bytes / 4).next_multiple_of(256).min(most);
         // The old one is given back first: there may be no room for both.
         self.buffer.destroy();
+        self.bytes = 0;
         self.buffer = create(gpu, self.label, self.usage, wanted).or_else(|_| create(gpu, self.label, self.usage, bytes))?;
+        self.bytes = self.buffer.size();
         Ok(true)
     }
 }
@@ -89,4 +93,31 @@ fn create(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, bytes: u64)
         wgpu::BufferDescriptor { label: Some(label), size: bytes.next_multiple_of(4), usage, mapped_at_creation: false };
     gpu.try_make(|device| device.create_buffer(&descriptor))
         .map_err(|e| format!("gpu{} has no memory of {bytes} bytes for {label}: {e}", gpu.identity().index))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::Gpus;
+
+    #[test]
+    fn what_a_device_refuses_is_an_error_and_the_device_goes_on() {
+        let gpus = Gpus::find();
+        let Ok(gpu) = gpus.open(0) else {
+            assert!(std::env::var_os("SAPWISE_REQUIRE_GPU").is_none_or(|v| v != "1"), "no GPU was found");
+            return;
+        };
+        // A device makes buffers of this usage with a feature only that none is opened with. A refusal of memory comes the same
+        // way, and can't be had without filling the memory of the machine.
+        let mut storage = Storage::new(&gpu, "trial").unwrap();
+        let possible = storage.usage;
+        storage.usage |= wgpu::BufferUsages::BLAS_INPUT;
+        let error = storage.ensure(&gpu, 1 << 20).unwrap_err();
+        assert!(error.contains("trial") && error.contains("gpu0"), "{error}");
+        assert!(storage.ensure(&gpu, 1 << 62).unwrap_err().contains("more than"));
+        assert_eq!(gpu.fault(), None);
+        storage.usage = possible;
+        assert_eq!(storage.ensure(&gpu, 100), Ok(true), "the buffer before was given back");
+        assert_eq!(storage.ensure(&gpu, 100), Ok(false));
+    }
 }

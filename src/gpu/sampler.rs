@@ -1,0 +1,42 @@
+//! A glance at boxes that are on a GPU; see `shaders/sample.wgsl`.
+
+use super::device::Gpu;
+use super::kernel::{Bound, Kernel, source};
+use super::storage::Storage;
+use crate::Aabb;
+
+/// Boxes looked at.
+const BOXES: usize = 256;
+
+/// Bytes that a glance brings back.
+pub(super) const BYTES: u64 = (BOXES * size_of::<Aabb>()) as u64;
+
+/// The kernel and where it puts the boxes.
+#[derive(Debug)]
+pub(super) struct Sampler {
+    kernel: Kernel,
+    boxes: Storage,
+    bound: Option<Bound>,
+}
+
+impl Sampler {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, String> {
+        let mut boxes = Storage::new(gpu, "sample")?;
+        boxes.ensure(gpu, BYTES)?;
+        Ok(Self { kernel: Kernel::new(gpu, source::SAMPLE, "sample")?, boxes, bound: None })
+    }
+
+    pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer, boxes: &wgpu::Buffer) -> Result<(), String> {
+        self.bound = Some(self.kernel.bind(gpu, &[(0, params), (1, boxes), (4, self.boxes.buffer())])?);
+        Ok(())
+    }
+
+    /// Looks, and copies what was seen to `to`.
+    pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, at: u64) {
+        let Some(bound) = &self.bound else { return };
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        bound.dispatch(&mut pass, 1);
+        drop(pass);
+        encoder.copy_buffer_to_buffer(self.boxes.buffer(), 0, to, at, BYTES);
+    }
+}

@@ -1,0 +1,159 @@
+//! What goes wrong on GPUs: never a missing pair, never a hang, never a panic.
+
+mod common;
+
+use common::{Random, gpus, naive};
+use sapwise::gpu::{Gpu, Gpus, broad_phase, wgpu};
+use sapwise::{
+    Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Fields, Load, PairOrder, Pairs, Reason, Registry,
+    Scenario, Source, Term,
+};
+
+const METHODS: [&str; 3] = ["brute", "sweep", "strips"];
+
+/// The first GPU as a device whose buffers are that small.
+fn small(gpus: &Gpus, bytes: u64) -> Gpu {
+    let adapter = gpus.adapter(0).unwrap();
+    let limits = wgpu::Limits { max_buffer_size: bytes, max_storage_buffer_binding_size: bytes, ..adapter.limits() };
+    let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+    let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
+    Gpu::from_parts(device, queue, gpus.identities().next().unwrap().clone())
+}
+
+fn pairs_of(algorithm: &mut dyn BroadPhase, boxes: &[Aabb]) -> Result<Vec<(u32, u32)>, Error> {
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    algorithm.find_pairs(boxes, &mut pairs)?;
+    Ok(pairs.as_slice().to_vec())
+}
+
+/// Fields in which each algorithm costs that much a frame.
+fn fields(costs: &[(&str, f64)]) -> Fields {
+    let cost = |&(id, ns): &(&str, f64)| AlgorithmCost {
+        algorithm: id.parse().unwrap(),
+        revision: 1,
+        curve: CostCurve { terms: vec![CostTerm { term: Term::Call, unit_ns: ns }], ..CostCurve::default() },
+        spread_ln: 0.0,
+    };
+    let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    Fields::from_costs(Source::Measured, "uniform", costs.iter().map(cost).collect(), &loads)
+}
+
+#[test]
+fn a_lost_device_is_an_error_from_then_on() {
+    let Some(gpus) = gpus() else { return };
+    let boxes = Random(1).cubes(3000, [15.0; 3], 0.5);
+    for method in METHODS {
+        for devices in [1, 2] {
+            let opened: Vec<Gpu> = (0..devices).map(|_| gpus.open_another(0).unwrap()).collect();
+            let lost = opened[devices - 1].clone();
+            let mut algorithm = broad_phase(method, opened).unwrap();
+            assert!(pairs_of(algorithm.as_mut(), &boxes).unwrap() == naive(&boxes));
+            lost.device().destroy();
+            for _ in 0..2 {
+                let error = pairs_of(algorithm.as_mut(), &boxes).unwrap_err();
+                assert!(matches!(error, Error::Unavailable { .. }), "{method}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_adaptive_module_goes_on_without_a_lost_device_in_the_same_frame() {
+    let Some(gpus) = gpus() else { return };
+    let mut registry = Registry::with_cores(1);
+    registry.add_gpus(&gpus);
+    let fields = fields(&[("strips@gpu0", 1.0), ("sweep@gpu0", 2.0), ("strips@cpu1", 3.0), ("brute@cpu1", 9.0)]);
+    let mut adaptive = Adaptive::new(fields, &registry).unwrap();
+    let mut scene = Scenario::Uniform.start(2000, 3);
+    let mut chosen = Vec::new();
+    for frame in 0..6 {
+        if frame == 3 {
+            gpus.open(0).unwrap().device().destroy();
+        }
+        scene.advance();
+        assert!(pairs_of(&mut adaptive, scene.boxes()).unwrap() == naive(scene.boxes()), "frame {frame}");
+        let decision = adaptive.last_decision().unwrap();
+        chosen.push((decision.algorithm.to_string(), decision.reason));
+    }
+    assert_eq!(chosen[2].0, "strips@gpu0");
+    assert_eq!(chosen[3], ("strips@cpu1".to_owned(), Reason::FellBack));
+    assert_eq!(chosen[5], ("strips@cpu1".to_owned(), Reason::Stayed));
+}
+
+#[test]
+fn a_gpu_that_is_gone_leaves_the_cpu() {
+    let fields = fields(&[("strips@gpu0", 1.0), ("strips@gpu6+7", 2.0), ("strips@cpu1", 3.0)]);
+    let mut registry = Registry::with_cores(1);
+    registry.add_gpus(&Gpus::none());
+    let mut adaptive = Adaptive::new(fields, &registry).unwrap();
+    let boxes = Random(2).cubes(500, [9.0; 3], 0.5);
+    assert!(pairs_of(&mut adaptive, &boxes).unwrap() == naive(&boxes));
+    assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "strips@cpu1");
+    assert!(Gpus::none().open(0).unwrap_err().contains("no GPU was found"));
+}
+
+#[test]
+fn frames_beyond_the_limits_of_a_device_come_in_pieces() {
+    let Some(gpus) = gpus() else { return };
+    // 1 MiB holds 32 768 sorted boxes and 131 072 pairs.
+    let gpu = small(&gpus, 1 << 20);
+    let mut scene = Scenario::Uniform.start(100_000, 4);
+    scene.advance();
+    let oracle = pairs_of(Registry::with_cores(1).create(&"strips@cpu1".parse().unwrap()).unwrap().as_mut(), scene.boxes());
+    let oracle = oracle.unwrap();
+    for method in ["sweep", "strips"] {
+        let mut algorithm = broad_phase(method, vec![gpu.clone()]).unwrap();
+        assert!(pairs_of(algorithm.as_mut(), scene.boxes()).unwrap() == oracle, "{method}");
+    }
+    // Brute force in pieces, at a size that a program on the CPU gets through.
+    let gpu = small(&gpus, 64 << 10);
+    let boxes = Random(6).cubes(9000, [25.0; 3], 0.5);
+    assert!(pairs_of(broad_phase("brute", vec![gpu]).unwrap().as_mut(), &boxes).unwrap() == naive(&boxes));
+}
+
+#[test]
+fn more_pairs_than_a_buffer_holds_come_in_windows() {
+    let Some(gpus) = gpus() else { return };
+    let gpu = small(&gpus, 1 << 20);
+    let boxes: Vec<Aabb> = (0..1500).map(|k| Aabb::cube([k as f32 * 1e-4, 0.0, 0.0], 1.0)).collect();
+    let oracle = naive(&boxes);
+    assert!(oracle.len() > 8 * 131_072);
+    for method in METHODS {
+        let mut algorithm = broad_phase(method, vec![gpu.clone()]).unwrap();
+        for _ in 0..2 {
+            assert!(pairs_of(algorithm.as_mut(), &boxes).unwrap() == oracle, "{method}");
+        }
+    }
+}
+
+#[test]
+fn boxes_that_can_not_be_cut_into_pieces_are_an_error() {
+    let Some(gpus) = gpus() else { return };
+    let gpu = small(&gpus, 64 << 10);
+    let boxes = vec![Aabb::cube([0.0; 3], 1.0); 5000];
+    let mut pairs = Pairs::new();
+    pairs.set_limit(Some(10));
+    let error = broad_phase("strips", vec![gpu]).unwrap().find_pairs(&boxes, &mut pairs).unwrap_err();
+    assert!(error.to_string().contains("cut into pieces"), "{error}");
+}
+
+#[test]
+fn a_steady_state_creates_no_buffer() {
+    let Some(gpus) = gpus() else { return };
+    for index in 0..gpus.len() as u32 {
+        for method in METHODS {
+            let gpu = gpus.open_another(index).unwrap();
+            let mut algorithm = broad_phase(method, vec![gpu.clone()]).unwrap();
+            let mut scene = Scenario::Uniform.start(3000, 1);
+            let mut frames = |count: usize| {
+                for _ in 0..count {
+                    scene.advance();
+                    algorithm.find_pairs(scene.boxes(), &mut Pairs::new()).unwrap();
+                }
+                gpu.device().generate_allocator_report().map(|r| (r.allocations.len(), r.total_allocated_bytes))
+            };
+            let before = frames(5);
+            assert_eq!(frames(20), before, "{method} on gpu{index}");
+        }
+    }
+}
