@@ -1,16 +1,17 @@
 //! One method on one GPU, frame by frame: boxes up, kernels, pairs down.
 
+mod collect;
+
 use super::brute::Brute;
 use super::device::Gpu;
 use super::output::{Output, PAIR};
 use super::params::{Header, Params};
 use super::sampler::{self, Sampler};
 use super::sorted::Sorted;
-use super::storage::{Failure, Storage, largest};
+use super::storage::{Storage, largest};
 use super::transfer::Transfer;
+use crate::Aabb;
 use crate::sample::Sample;
-use crate::{Aabb, BoxDefect, Error, Pairs};
-use std::mem::{offset_of, size_of};
 
 /// Bytes of a box.
 const BOX: u64 = size_of::<Aabb>() as u64;
@@ -315,159 +316,5 @@ impl Engine {
         let submission = self.gpu.queue().submit([encoder.finish()]);
         self.download.ask(bytes);
         submission
-    }
-
-    /// Waits for what was started and adds its pairs to the list.
-    pub(super) fn finish(&mut self, pairs: &mut Pairs) -> Result<(), Failure> {
-        let mut all = 0;
-        let mut next = self.frame.take();
-        while let Some(mut frame) = next.take() {
-            let header = self.header_of(&frame)?;
-            let total = header.total();
-            all += total;
-            if pairs.limit().is_some_and(|limit| pairs.len() as u64 + total > limit as u64) {
-                // More than the caller wants: they are counted and stay where they are.
-                pairs.skip(total);
-            } else {
-                self.fetch(&mut frame, total, pairs)?;
-            }
-            if frame.blocks_left > 0 {
-                next = Some(self.next_band(frame)?);
-            }
-        }
-        self.expected = all;
-        Ok(())
-    }
-
-    /// Waits for what was started and gives the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer), and
-    /// what the boxes look like.
-    pub(super) fn finish_resident(&mut self) -> Result<(u32, Sample), Failure> {
-        let Some(mut frame) = self.frame.take() else { return Ok((0, Sample::default())) };
-        let total = self.header_of(&frame)?.total();
-        let sample = self.seen()?;
-        self.expected = total;
-        if frame.blocks_left > 0 {
-            let reason =
-                format!("{} boxes take brute force on gpu{} several submissions", frame.params.objects, self.index());
-            return Err(Failure::Gpu(format!("{reason}, and pairs that stay on it come from one; use strips")));
-        }
-        if total > u64::from(self.output.capacity()) {
-            self.grow(&mut frame, total)?;
-            if total > u64::from(self.output.capacity()) {
-                return Err(Failure::Gpu(format!("{total} pairs don't fit into one buffer of gpu{}", self.index())));
-            }
-            self.rewrite(&frame.params)?;
-        }
-        Ok((total as u32, sample))
-    }
-
-    /// The list of pairs of the frame before.
-    pub(super) fn pairs_buffer(&self) -> &wgpu::Buffer {
-        self.output.pairs()
-    }
-
-    fn index(&self) -> u32 {
-        self.gpu.identity().index
-    }
-
-    /// Waits for a frame and reads its header.
-    fn header_of(&self, frame: &Frame) -> Result<Header, Failure> {
-        self.gpu.wait(frame.submission.clone())?;
-        let view = self.download.readable(0..PAIRS_AT)?;
-        let header: Header = bytemuck::pod_read_unaligned(&view);
-        if let Some((index, inverted)) = header.invalid() {
-            let defect = if inverted { BoxDefect::Inverted } else { BoxDefect::NotANumber };
-            return Err(Error::InvalidBox { index, defect }.into());
-        }
-        Ok(header)
-    }
-
-    /// Brings `total` pairs into the list: those that came with the header, then the rest in as many steps as it takes.
-    fn fetch(&mut self, frame: &mut Frame, total: u64, pairs: &mut Pairs) -> Result<(), Failure> {
-        let mut have = total.min(frame.sent).min(u64::from(frame.params.capacity));
-        self.append(have, pairs)?;
-        if have == total {
-            return Ok(());
-        }
-        if total > u64::from(u32::MAX) {
-            let reason = format!("{total} pairs are more than the 2^32 that gpu{} can number", self.index());
-            return Err(Failure::Gpu(format!("{reason}; set a limit on the pairs")));
-        }
-        self.download.ensure(&self.gpu, PAIRS_AT + total.min(self.downloadable()) * PAIR)?;
-        if total > u64::from(self.output.capacity()) {
-            self.grow(frame, total)?;
-            self.rewrite(&frame.params)?;
-        }
-        while have < total {
-            let Params { window, capacity, .. } = frame.params;
-            let end = u64::from(window) + u64::from(capacity);
-            if have == end {
-                frame.params.window = have as u32;
-                frame.params.capacity = capacity.min(u32::MAX - frame.params.window);
-                self.rewrite(&frame.params)?;
-                continue;
-            }
-            let count = (total.min(end) - have).min((self.download.bytes() - PAIRS_AT) / PAIR);
-            let mut encoder = self.encoder();
-            let from = (have - u64::from(window)) * PAIR;
-            encoder.copy_buffer_to_buffer(self.output.pairs(), from, self.download.buffer(), PAIRS_AT, count * PAIR);
-            let submission = self.submit_mapped(encoder, PAIRS_AT + count * PAIR);
-            self.gpu.wait(submission)?;
-            self.append(count, pairs)?;
-            have += count;
-        }
-        Ok(())
-    }
-
-    /// A larger list of pairs, if the GPU has one.
-    fn grow(&mut self, frame: &mut Frame, total: u64) -> Result<(), String> {
-        let Some(boxes) = self.bound_to.clone() else { return Ok(()) };
-        if self.output.ensure_pairs(&self.gpu, total)? {
-            self.bind(&boxes)?;
-        }
-        frame.params.capacity = self.output.capacity();
-        Ok(())
-    }
-
-    /// Writes the window of `params` into the list of pairs. Nothing is counted again.
-    fn rewrite(&self, params: &Params) -> Result<(), String> {
-        self.set(params);
-        let mut encoder = self.encoder();
-        self.record(&mut encoder, params, false);
-        let submission = self.gpu.queue().submit([encoder.finish()]);
-        self.gpu.wait(submission)
-    }
-
-    /// Sets the parameters without the upload: this allocates, but frames that come here are rare.
-    fn set(&self, params: &Params) {
-        self.gpu.queue().write_buffer(self.params.buffer(), 0, bytemuck::bytes_of(params));
-    }
-
-    /// Goes on with the blocks that are left.
-    fn next_band(&mut self, frame: Frame) -> Result<Frame, String> {
-        let mut params = frame.params;
-        params.first_block += params.blocks;
-        params.blocks = frame.blocks_left.min(u64::from(params.blocks)) as u32;
-        params.window = 0;
-        params.capacity = self.output.capacity();
-        self.set(&params);
-        let totals = offset_of!(Header, total_low) as u64..offset_of!(Header, invalid) as u64;
-        let mut encoder = self.encoder();
-        encoder.clear_buffer(self.header.buffer(), totals.start, Some(totals.end - totals.start));
-        self.record(&mut encoder, &params, true);
-        let sent = self.sendable();
-        self.copy_back(&mut encoder, sent);
-        let submission = self.submit_mapped(encoder, PAIRS_AT + sent * PAIR);
-        Ok(Frame { submission, params, sent, blocks_left: frame.blocks_left - u64::from(params.blocks) })
-    }
-
-    /// Adds the first `count` pairs of the download to the list.
-    fn append(&self, count: u64, pairs: &mut Pairs) -> Result<(), Failure> {
-        if count > 0 {
-            let view = self.download.readable(PAIRS_AT..PAIRS_AT + count * PAIR)?;
-            let list: &[[u32; 2]] = bytemuck::cast_slice(&view);
-            pairs.extend(list)?;
-        }
-        Ok(())
     }
 }

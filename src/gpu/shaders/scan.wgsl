@@ -23,6 +23,8 @@ fn positions(@builtin(local_invocation_index) t: u32) {
     var before = vec2<u32>();
     for (var first = 0u; first < params.blocks; first += THREADS * EACH) {
         let begin = first + t * EACH;
+        // Invocations that have something to add.
+        let count = min((params.blocks - first + EACH - 1u) / EACH, THREADS);
         var own = vec2<u32>();
         for (var k = 0u; k < EACH; k++) {
             if (begin + k < params.blocks) {
@@ -32,7 +34,7 @@ fn positions(@builtin(local_invocation_index) t: u32) {
         }
         scan[t] = own;
         workgroupBarrier();
-        for (var step = 1u; step < THREADS; step <<= 1u) {
+        for (var step = 1u; step < count; step <<= 1u) {
             var left = vec2<u32>();
             if (t >= step) {
                 left = scan[t - step];
@@ -50,7 +52,7 @@ fn positions(@builtin(local_invocation_index) t: u32) {
                 position += value;
             }
         }
-        before += scan[THREADS - 1u];
+        before += scan[count - 1u];
         before = vec2<u32>(before.x & 0xffffu, before.y + (before.x >> 16u));
         workgroupBarrier();
     }

@@ -66,14 +66,15 @@ fn scan_digits(@builtin(workgroup_id) w: vec3<u32>, @builtin(local_invocation_in
     let base = w.x * blocks();
     var before = 0u;
     for (var first = 0u; first < blocks(); first += 256u) {
-        let inside = first + t < blocks();
+        let count = min(blocks() - first, 256u);
+        let inside = t < count;
         var value = 0u;
         if (inside) {
             value = counts[base + first + t];
         }
         row[t] = value;
         workgroupBarrier();
-        for (var step = 1u; step < 256u; step <<= 1u) {
+        for (var step = 1u; step < count; step <<= 1u) {
             var left = 0u;
             if (t >= step) {
                 left = row[t - step];
@@ -85,7 +86,7 @@ fn scan_digits(@builtin(workgroup_id) w: vec3<u32>, @builtin(local_invocation_in
         if (inside) {
             counts[base + first + t] = before + row[t] - value;
         }
-        before += row[255];
+        before += row[count - 1u];
         workgroupBarrier();
     }
     if (t == 0u) {
