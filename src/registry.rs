@@ -16,6 +16,8 @@ pub struct Registry {
     factories: Vec<Option<Factory>>,
     threads: Threads,
     simd: SimdLevel,
+    #[cfg(feature = "gpu")]
+    gpus: crate::gpu::Gpus,
 }
 
 /// One algorithm of a registry.
@@ -39,8 +41,14 @@ impl Registry {
     /// Our algorithms on 1, 2, 4, ... and `cores` threads.
     #[must_use]
     pub fn with_cores(cores: u32) -> Self {
-        let mut registry =
-            Self { entries: Vec::new(), factories: Vec::new(), threads: Threads::default(), simd: SimdLevel::in_use() };
+        let mut registry = Self {
+            entries: Vec::new(),
+            factories: Vec::new(),
+            threads: Threads::default(),
+            simd: SimdLevel::in_use(),
+            #[cfg(feature = "gpu")]
+            gpus: crate::gpu::Gpus::none(),
+        };
         for method in cpu::METHODS {
             for threads in thread_counts(cores) {
                 registry.entries.push(Entry {
@@ -80,9 +88,12 @@ impl Registry {
     /// Nothing is opened before an algorithm is created.
     #[cfg(feature = "gpu")]
     pub fn add_gpus(&mut self, gpus: &crate::gpu::Gpus) {
+        self.gpus = gpus.clone();
         for (id, revision) in crate::gpu::algorithms(gpus.identities()) {
-            let (gpus, own) = (gpus.clone(), id.clone());
-            self.add(id, revision, move || crate::gpu::OnGpus::create(&own, &gpus));
+            if !self.entries.iter().any(|e| e.id == id) {
+                self.entries.push(Entry { id, revision, unavailable: None });
+                self.factories.push(None);
+            }
         }
     }
 
@@ -129,7 +140,8 @@ impl Registry {
         }
     }
 
-    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads.
+    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads and on any of the GPUs
+    /// that were added.
     ///
     /// # Errors
     /// [`Error::UnknownAlgorithm`] and [`Error::Unavailable`].
@@ -143,6 +155,8 @@ impl Registry {
                 None => (method.create)(threads, &self.threads, self.simd),
                 Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
             },
+            #[cfg(feature = "gpu")]
+            (_, Backend::Gpu(_)) if crate::gpu::has_method(id.method()) => crate::gpu::OnGpus::create(id, &self.gpus),
             _ => {
                 let known: Vec<String> = self.entries.iter().map(|e| e.id.to_string()).collect();
                 Err(Error::UnknownAlgorithm { text: id.to_string(), hint: format!("known here: {}", known.join(", ")) })
@@ -215,5 +229,6 @@ mod tests {
         let Err(error) = registry.create(&"octree@cpu1".parse().unwrap()) else { panic!("made an unknown algorithm") };
         assert!(error.to_string().contains("brute@cpu1"), "{error}");
         assert!(registry.create(&"brute@gpu0".parse().unwrap()).is_err());
+        assert!(registry.create(&"octree@gpu0".parse().unwrap()).is_err());
     }
 }

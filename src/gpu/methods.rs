@@ -4,16 +4,21 @@ use crate::hardware::{GpuIdentity, GpuKind};
 use crate::{AlgorithmId, Backend};
 
 /// A method on GPUs: one row here puts it into every test, probe, sweep and plot.
-pub(crate) struct Method {
+struct Method {
     /// The part of the id before the `@`.
-    pub(crate) name: &'static str,
+    name: &'static str,
     /// Counts up when its speed changes.
-    pub(crate) revision: u32,
+    revision: u32,
 }
 
 /// Every method, the simplest first.
-pub(crate) const METHODS: &[Method] =
+const METHODS: &[Method] =
     &[Method { name: "brute", revision: 1 }, Method { name: "sweep", revision: 1 }, Method { name: "strips", revision: 1 }];
+
+/// Whether a method runs on GPUs.
+pub(crate) fn has_method(name: &str) -> bool {
+    METHODS.iter().any(|m| m.name == name)
+}
 
 /// Our algorithms on these GPUs with their revisions: each method on each GPU alone, and on the first two, three and so on
 /// together. Programs that act as GPUs work with each other only.
@@ -31,4 +36,27 @@ pub fn algorithms<'a>(gpus: impl IntoIterator<Item = &'a GpuIdentity>) -> Vec<(A
         METHODS.iter().filter_map(move |m| Some((AlgorithmId::new(m.name, Backend::Gpu(set.clone())).ok()?, m.revision)))
     };
     sets.iter().flat_map(on).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gpus_work_alone_and_with_their_like() {
+        let gpu = |index, kind| GpuIdentity {
+            index,
+            name: String::new(),
+            device: String::new(),
+            driver: String::new(),
+            api: String::new(),
+            kind,
+        };
+        let gpus =
+            [gpu(0, GpuKind::Discrete), gpu(1, GpuKind::Integrated), gpu(2, GpuKind::Software), gpu(3, GpuKind::Software)];
+        let ids = algorithms(&gpus).into_iter().map(|(id, _)| id.to_string());
+        let strips: Vec<String> = ids.filter(|id| id.starts_with("strips")).collect();
+        assert_eq!(strips, ["strips@gpu0", "strips@gpu1", "strips@gpu0+1", "strips@gpu2", "strips@gpu3", "strips@gpu2+3"]);
+        assert!(algorithms(&[]).is_empty());
+    }
 }

@@ -2,6 +2,33 @@
 //!
 //! [`Gpus::find`] looks for adapters, and [`Registry::add_gpus`](crate::Registry::add_gpus) adds the algorithms on them; without that
 //! call no driver is loaded. The drivers are looked for at run time: a program built with this feature runs without any.
+//!
+//! ```
+//! use sapwise::gpu::Gpus;
+//! use sapwise::{Aabb, Adaptive, BroadPhase, Fields, Pairs, Registry};
+//!
+//! let mut registry = Registry::new();
+//! registry.add_gpus(&Gpus::find());
+//! // Fields that name a GPU use it; what this machine lacks is left out.
+//! let mut broad_phase = Adaptive::new(Fields::usual(&registry), &registry)?;
+//! let mut pairs = Pairs::new();
+//! broad_phase.find_pairs(&[Aabb::cube([0.0; 3], 0.5), Aabb::cube([0.8, 0.0, 0.0], 0.5)], &mut pairs)?;
+//! # assert_eq!(pairs.as_slice(), [(0, 1)]);
+//! # Ok::<(), sapwise::Error>(())
+//! ```
+//!
+//! Two ways through a frame, and they are not to be compared with each other:
+//!
+//! - *host-resident*: boxes in the memory of the CPU, pairs in the memory of the CPU, both transfers included. Every
+//!   [`BroadPhase`](crate::BroadPhase), `strips@gpu0` as well as `strips@cpu1`, and every figure that is not labelled.
+//! - *device-resident*: boxes in a [`wgpu::Buffer`], pairs in another: [`Resident`].
+//!
+//! Pairs come out in an order that does not depend on timing, by counting, adding up and writing; where several GPUs share a frame
+//! it follows their shares, which follow their measured speeds. [`PairOrder::Canonical`](crate::PairOrder) is the same everywhere.
+//! What does not fit a buffer comes in several steps, and what does not fit a GPU in slabs.
+//!
+//! A GPU that is lost, refuses memory or does not answer within a minute is [`Error::Unavailable`](crate::Error);
+//! [`Adaptive`](crate::Adaptive) then runs the same frame on what is left.
 
 mod adapters;
 mod brute;
@@ -23,6 +50,7 @@ mod transfer;
 pub use adapters::Gpus;
 pub use device::Gpu;
 pub use methods::algorithms;
+pub(crate) use methods::has_method;
 pub(crate) use on_gpus::OnGpus;
 pub use on_gpus::broad_phase;
 pub use resident::{Resident, ResidentPairs};
