@@ -61,7 +61,7 @@ pub use cpu::SimdLevel;
 pub use crossover::{Crossover, Paired, Position};
 pub use error::{BoxDefect, Error};
 pub use fields::{AlgorithmCost, Border, Fields, Ranking, Source, Step};
-pub use hardware::{Hardware, How, Machine, Parameter};
+pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, Machine, Parameter};
 pub use load::Load;
 pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};

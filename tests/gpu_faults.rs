@@ -81,6 +81,27 @@ fn the_adaptive_module_goes_on_without_a_lost_device_in_the_same_frame() {
 }
 
 #[test]
+fn a_gpu_that_does_not_answer_is_lost_and_nobody_waits_for_it() {
+    let Some(gpus) = gpus() else { return };
+    let gpu = gpus.open_another(0).unwrap();
+    let mut algorithm = broad_phase("brute", vec![gpu.clone()]).unwrap();
+    // No GPU tests 8 * 10^9 pairs in a millisecond.
+    let boxes = vec![Aabb::cube([0.0; 3], 1.0); if is_software(&gpu) { 20_000 } else { 130_000 }];
+    gpu.set_wait_limit(std::time::Duration::from_millis(1));
+    let mut pairs = Pairs::new();
+    pairs.set_limit(Some(1));
+    let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err().to_string();
+    assert!(error.contains("did not answer within 1 ms"), "{error}");
+    assert!(algorithm.find_pairs(&boxes[..100], &mut pairs).unwrap_err().to_string().contains("did not answer"));
+    drop(algorithm);
+    drop(gpu);
+}
+
+fn is_software(gpu: &Gpu) -> bool {
+    gpu.identity().kind == sapwise::GpuKind::Software
+}
+
+#[test]
 fn a_gpu_that_is_gone_leaves_the_cpu() {
     let fields = fields(&[("strips@gpu0", 1.0), ("strips@gpu6+7", 2.0), ("strips@cpu1", 3.0)]);
     let mut registry = Registry::with_cores(1);

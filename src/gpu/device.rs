@@ -2,10 +2,11 @@
 
 use crate::hardware::GpuIdentity;
 use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// The longest that a submission may take before its GPU counts as lost. Drivers of desktops give up after 2 to 10 s; a
+/// The longest that a submission may take before its GPU counts as lost, unless it is set otherwise. Drivers of desktops give up after 2 to 10 s; a
 /// program on the CPU that acts as a GPU may be a thousand times slower than a real one.
 const WAIT_LIMIT: Duration = Duration::from_secs(60);
 
@@ -22,6 +23,7 @@ struct Shared {
     limits: wgpu::Limits,
     /// Errors that no scope caught, and the loss of the device.
     fault: Arc<Mutex<Option<String>>>,
+    wait_limit_ms: AtomicU64,
 }
 
 impl Gpu {
@@ -61,7 +63,15 @@ impl Gpu {
         // The default handler panics.
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| uncaught(error.to_string())));
         let limits = device.limits();
-        Self { shared: Arc::new(Shared { identity, device, queue, limits, fault }) }
+        let wait_limit_ms = AtomicU64::new(WAIT_LIMIT.as_millis() as u64);
+        Self { shared: Arc::new(Shared { identity, device, queue, limits, fault, wait_limit_ms }) }
+    }
+
+    /// Sets the longest that a submission may take before this GPU counts as lost: a minute unless it is set, which is long for a
+    /// game. Below a millisecond it is one.
+    pub fn set_wait_limit(&self, limit: Duration) {
+        let ms = u64::try_from(limit.as_millis()).unwrap_or(u64::MAX);
+        self.shared.wait_limit_ms.store(ms.max(1), Ordering::Relaxed);
     }
 
     /// What the GPU says of itself.
@@ -94,7 +104,7 @@ impl Gpu {
         self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Waits for a submission, at most a minute, and calls back what was mapped before it.
+    /// Waits for a submission, at most as long as the [limit](Self::set_wait_limit), and calls back what was mapped before it.
     ///
     /// # Errors
     /// A sentence, when the device was lost or takes too long. It counts as lost from then on.
@@ -111,10 +121,15 @@ impl Gpu {
     }
 
     fn wait_for(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), String> {
-        let poll = wgpu::PollType::Wait { submission_index, timeout: Some(WAIT_LIMIT) };
+        let limit = Duration::from_millis(self.shared.wait_limit_ms.load(Ordering::Relaxed));
+        let poll = wgpu::PollType::Wait { submission_index, timeout: Some(limit) };
         if let Err(error) = self.shared.device.poll(poll) {
             let text = match error {
-                wgpu::PollError::Timeout => format!("it did not answer within {} s", WAIT_LIMIT.as_secs()),
+                wgpu::PollError::Timeout => {
+                    // Dropping the queue waits for it without a limit. A GPU that hangs is therefore never dropped.
+                    std::mem::forget(self.clone());
+                    format!("it did not answer within {} ms", limit.as_millis())
+                }
                 other => other.to_string(),
             };
             self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
