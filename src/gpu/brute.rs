@@ -24,6 +24,9 @@ pub(super) struct Brute {
 }
 
 impl Brute {
+    /// The kernel numbers tile pairs in 32 bits.
+    pub(super) const MOST_OBJECTS: usize = 1 << 22;
+
     pub(super) fn new(gpu: &Gpu) -> Result<Self, String> {
         let software = gpu.identity().kind == GpuKind::Software;
         Ok(Self {

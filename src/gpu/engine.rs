@@ -119,7 +119,11 @@ impl Engine {
     pub(super) fn most_objects(&self) -> usize {
         // A sorted box is the largest thing that there is one of for each box.
         let most = largest(&self.gpu, wgpu::BufferUsages::STORAGE) / super::sorted::SORTED_BOX;
-        usize::try_from(most.min(1 << 27)).unwrap_or(usize::MAX)
+        let numbered = match &self.search {
+            Search::Brute(_) => Brute::MOST_OBJECTS,
+            Search::Sorted(_) => Sorted::MOST_OBJECTS,
+        };
+        usize::try_from(most).unwrap_or(usize::MAX).min(numbered)
     }
 
     /// The parameters of a frame of boxes that look like the sample.

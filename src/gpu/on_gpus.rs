@@ -31,6 +31,8 @@ pub(crate) struct OnGpus {
     workers: Workers,
     /// By how much the work of a GPU grows with the logarithm of its boxes.
     exponent: f64,
+    /// Whether its kernels have run: some drivers finish compiling when they first do.
+    warm: bool,
 }
 
 /// The method `brute`, `sweep` or `strips` on GPUs that are open already: from boxes in host memory to pairs in host memory.
@@ -90,7 +92,7 @@ impl OnGpus {
             "sweep" => 5.0 / 3.0,
             _ => 1.0,
         };
-        Ok(Box::new(Self { id: id.clone(), parts, slabs: Slabs::default(), workers, exponent }))
+        Ok(Box::new(Self { id: id.clone(), parts, slabs: Slabs::default(), workers, exponent, warm: false }))
     }
 
     /// All boxes at once on the one GPU that there is.
@@ -237,6 +239,10 @@ impl BroadPhase for OnGpus {
             let params = part.engine.plan(&Sample::default(), share);
             // A refused allocation is reported by the frame that needs it.
             let _ = part.engine.prepare(&params, parts > 1, None);
+        }
+        if !self.warm {
+            self.warm = true;
+            let _ = self.find_pairs(&[Aabb::default(); 2], &mut Pairs::new());
         }
     }
 }

@@ -52,6 +52,9 @@ struct Side {
 }
 
 impl Sorted {
+    /// The pairs of a block of rows are counted in 32 bits.
+    pub(super) const MOST_OBJECTS: usize = 1 << 26;
+
     pub(super) fn new(gpu: &Gpu, strips: bool) -> Result<Self, String> {
         let (rows, keys, gather) = if strips {
             (source::STRIPS, "strip_keys", "strip_gather")
@@ -92,7 +95,8 @@ impl Sorted {
         grown |= self.kept.ensure(gpu, n * KEPT * 4)?;
         if self.strips {
             grown |= self.reach.ensure(gpu, n * 4)?;
-            grown |= self.table.ensure(gpu, (u64::from(params.large_key) + 1) * 4)?;
+            // There are about as many slots as boxes. How many exactly changes with the scene, and must not cost a buffer each time.
+            grown |= self.table.ensure(gpu, (u64::from(params.large_key).max(n + n / 8) + 1) * 4)?;
         }
         Ok(grown)
     }
