@@ -126,7 +126,7 @@ fn units(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     let constants = [("workgroup_lanes", f64::from(lanes)), ("shared_words", f64::from(bytes / 4))];
     let stairs = Staircase { bench, kernel: bench.kernel(SOURCE, "one_unit", &constants)?, sink: bench.storage(16)? };
     // Long against a round trip, which every time contains.
-    let target = target(bench, 500, 2000);
+    let target = target(bench, 400, 700);
     let rounds = calibrate(target, MOST_ROUNDS, |rounds| bench.time_dispatches(&stairs.bind(rounds)?, 1, 1))?;
     let bound = stairs.bind(rounds)?;
     let time = |groups: u32| bench.time_dispatches(&bound, groups, 1).map(|t| t.as_nanos() as f64);
@@ -153,40 +153,41 @@ fn units(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     Ok(vec![samples.into_parameter_with(Some(f64::from(units)), p::PARALLEL_UNITS, &method)])
 }
 
-/// Numbers of workgroups to time: doubling until the time has risen fourfold, then those around the steps that this suggests.
+/// Numbers of workgroups to time: doubling until the time has risen fourfold, then halving down to the first step, then
+/// evenly over three steps, so that the fit can overrule a step that another program made.
 fn choose_counts(mut time: impl FnMut(u32) -> Result<f64, String>) -> Result<Vec<u32>, String> {
     // The quicker of two: a single spoiled time would end the search early.
     let mut best = |n: u32| Ok::<_, String>(time(n)?.min(time(n)?));
     let one = best(1)?;
-    let mut points = vec![(1, one)];
-    while let Some(&(n, t)) = points.last() {
-        if n >= MOST_GROUPS || t >= 4.0 * one {
+    let (mut counts, mut below, mut above) = (vec![1], 1, None);
+    let mut n = 1;
+    while n < MOST_GROUPS {
+        n *= 2;
+        counts.push(n);
+        let t = best(n)?;
+        // Half way between one step and two.
+        if t < 1.5 * one {
+            below = n;
+        } else if above.is_none() {
+            above = Some(n);
+        }
+        if t >= 4.0 * one {
             break;
         }
-        points.push((2 * n, best(2 * n)?));
     }
-    // Where no step was found, the doubled numbers are what there is to show.
-    let guess = fits::parallel_units(&points).map(|u| rough_units(&points).unwrap_or(u));
-    let Some(guess) = guess else { return Ok(points.iter().map(|(n, _)| *n).collect()) };
-    let last = 3 * guess.max(4);
-    // Evenly spread, so that a wrong guess shows, and then exact around a better one.
-    let spread: Vec<u32> = (1..=12).map(|k| (last * k).div_ceil(12)).collect();
-    for &n in &spread {
-        points.push((n, best(n)?));
+    // Where there is no step, the doubled numbers are what there is to show.
+    let Some(mut above) = above.filter(|&above| above > below) else { return Ok(counts) };
+    while above - below > 1 {
+        let middle = below.midpoint(above);
+        *(if best(middle)? < 1.5 * one { &mut below } else { &mut above }) = middle;
     }
-    let guess = fits::parallel_units(&points).unwrap_or(guess);
-    let near = (guess.saturating_sub(2)..=guess + 2).chain([2 * guess, 2 * guess + 1]);
-    let mut counts: Vec<u32> = spread.into_iter().chain(near).chain([1, 2]).filter(|&n| n > 0).collect();
+    let last = 3 * below.max(4);
+    let spread = (1..=12).map(|k| (last * k).div_ceil(12));
+    let near = [2, 1].map(|d| below.saturating_sub(d)).into_iter().chain(below..=below + 2);
+    let mut counts: Vec<u32> = spread.chain(near).chain([1, 2, 2 * below, 2 * below + 1]).filter(|&n| n > 0).collect();
     counts.sort_unstable();
     counts.dedup();
     Ok(counts)
-}
-
-/// About how many units a time that has risen by whole steps suggests.
-fn rough_units(points: &[(u32, f64)]) -> Option<u32> {
-    let (&(_, one), &(n, t)) = (points.first()?, points.last()?);
-    let units = (f64::from(n) * one / t).round();
-    (units >= 1.0 && units.is_finite()).then_some(units as u32)
 }
 
 #[cfg(test)]
@@ -207,6 +208,18 @@ mod tests {
             assert_eq!(fits::parallel_units(&points), Some(units), "{counts:?}");
             assert!(counts.len() <= 21 && counts.windows(2).all(|w| w[0] < w[1]), "{counts:?}");
         }
+    }
+
+    #[test]
+    fn a_spoiled_time_is_outvoted() {
+        // Every third time takes half as long again.
+        let (mut turn, mut time) = (0, stairs(24));
+        let counts = choose_counts(|n| {
+            turn += 1;
+            Ok(time(n)? * if turn % 3 == 0 { 1.5 } else { 1.0 })
+        });
+        let points: Vec<(u32, f64)> = counts.unwrap().iter().map(|&n| (n, time(n).unwrap())).collect();
+        assert_eq!(fits::parallel_units(&points), Some(24));
     }
 
     #[test]

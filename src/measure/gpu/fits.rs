@@ -11,9 +11,9 @@ pub(super) struct Line {
 
 /// The line with the least sum of relative deviations from `(volume, time)` points.
 ///
-/// Relative, because volumes span four orders of magnitude: the largest alone would decide else. Deviations and not their squares,
-/// so that one point that another program spoiled does not bend the line. Such a line goes through two of the points, or through
-/// one of them and the origin, so all of these are tried. `None` where no line rises.
+/// Relative, because volumes span four orders of magnitude: the largest alone would decide else. Deviations and not their
+/// squares, so that one point that another program spoiled does not bend the line. Such a line goes through two of the
+/// points, or through one of them and the origin, so all of these are tried. `None` where no line rises.
 pub(super) fn line(points: &[(f64, f64)]) -> Option<Line> {
     let usable = |&&(v, t): &&(f64, f64)| v > 0.0 && t > 0.0 && v.is_finite() && t.is_finite();
     let points: Vec<(f64, f64)> = points.iter().filter(usable).copied().collect();
@@ -38,11 +38,12 @@ pub(super) fn line(points: &[(f64, f64)]) -> Option<Line> {
     best.map(|(_, line)| line)
 }
 
-/// How many workgroups run at the same time, from `(workgroups, time)` points: the `U` for which `t = b * ceil(n / U)` errs least.
+/// How many workgroups run at the same time, from `(workgroups, time)` points: the `U` for which `t = b * ceil(n / U)` errs
+/// least.
 ///
-/// The line of steps goes through the origin: a free intercept was tried, and it made the answer worse. Relative squares, so
-/// that the first steps count as much as the later ones. `None` without two points, and where the times show no step: then every
-/// number up to the last could be the answer.
+/// The line of steps goes through the origin: a free intercept was tried, and it made the answer worse. Relative squares,
+/// so that the first steps count as much as the later ones. `None` without two points, and where the times show no step:
+/// then every number up to the last could be the answer.
 pub(super) fn parallel_units(points: &[(u32, f64)]) -> Option<u32> {
     let points: Vec<(u32, f64)> = points.iter().filter(|(n, t)| *n > 0 && *t > 0.0 && t.is_finite()).copied().collect();
     let most = points.iter().map(|(n, _)| *n).max()?;

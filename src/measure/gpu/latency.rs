@@ -1,4 +1,5 @@
-//! What it costs to ask a GPU for anything: four figures that differ by orders of magnitude, so that none stands for another.
+//! What it costs to ask a GPU for anything: four figures that differ by orders of magnitude, so that none stands for
+//! another.
 
 use std::time::Instant;
 

@@ -1,4 +1,5 @@
-//! Measures the parameters of GPUs, each in about two seconds, and in twice that where a program on the CPU acts as the GPU.
+//! Measures the parameters of GPUs, each in about two seconds, and in twice that where a program on the CPU acts as the
+//! GPU.
 //!
 //! One file per family. What fails on one family leaves the others standing: its parameters are missing and say why.
 
@@ -29,7 +30,8 @@ const WARM_UP: Duration = Duration::from_millis(50);
 
 /// Measures one GPU: each name of [`parameter::all_names`] once, measured, reported or missing with a reason.
 ///
-/// The GPU is opened anew, so that memory and submissions of the caller don't stand in the way. [`Options::threads`] has no effect.
+/// The GPU is opened anew, so that memory and submissions of the caller don't stand in the way. [`Options::threads`] has no
+/// effect.
 ///
 /// # Errors
 /// A sentence, when there is no such GPU or its driver refuses to open it.

@@ -1,4 +1,5 @@
-//! What NVIDIA's management library tells. It comes with the driver and is loaded at run time; without it nothing is known here.
+//! What NVIDIA's management library tells. It comes with the driver and is loaded at run time; without it nothing is known
+//! here.
 
 /// What the library told of one GPU; each `Err` is a reason for the report.
 #[derive(Debug, Clone)]
@@ -21,8 +22,8 @@ impl Nvml {
     }
 }
 
-/// Asks about the GPU at a PCI address such as `0000:01:00.0`. `load` is called just before the clock is read, and must give the GPU
-/// work and not wait for it: an idle GPU clocks down.
+/// Asks about the GPU at a PCI address such as `0000:01:00.0`. `load` is called just before the clock is read, and must
+/// give the GPU work and not wait for it: an idle GPU clocks down.
 #[cfg(not(target_vendor = "apple"))]
 pub(super) fn query(pci: &str, load: impl FnOnce()) -> Nvml {
     use nvml_wrapper::enum_wrappers::device::Clock;

@@ -52,7 +52,8 @@ pub(super) fn query(_adapter: &wgpu::Adapter) -> Raw {
 pub(super) fn query(adapter: &wgpu::Adapter) -> Raw {
     use ash::{amd, arm, ext, nv, vk};
 
-    // SAFETY: nothing is done with the adapter but to read its properties; it outlives this function, and nothing is destroyed.
+    // SAFETY: nothing is done with the adapter but to read its properties; it outlives this function, and nothing is
+    // destroyed.
     let Some(hal) = (unsafe { adapter.as_hal::<wgpu::hal::api::Vulkan>() }) else { return Raw::default() };
     let capabilities = hal.physical_device_capabilities();
     let shared = hal.shared_instance();
@@ -84,8 +85,8 @@ pub(super) fn query(adapter: &wgpu::Adapter) -> Raw {
     if has(arm::shader_core_properties::NAME) {
         properties = properties.push_next(&mut arm_rates);
     }
-    // SAFETY: the physical device belongs to the instance, both live as long as `hal`; every structure in the chain is a default one
-    // of the right type that outlives the call, and its extension is advertised.
+    // SAFETY: the physical device belongs to the instance, both live as long as `hal`; every structure in the chain is a
+    // default one of the right type that outlives the call, and its extension is advertised.
     unsafe { instance.get_physical_device_properties2(device, &mut properties) };
 
     let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
@@ -121,7 +122,8 @@ pub(super) fn query(adapter: &wgpu::Adapter) -> Raw {
             (arm.shader_core_count, "VK_ARM_shader_core_builtins"),
         ]),
         lanes: first(&[
-            // Four units of 16 lanes, or two of 32: 64 either way. Instructions that pair two multiply-adds are not counted.
+            // Four units of 16 lanes, or two of 32: 64 either way. Instructions that pair two multiply-adds are not
+            // counted.
             (amd_active.saturating_mul(64), "VK_AMD_shader_core_properties, 64 lanes for each compute unit"),
             (arm_lanes, "VK_ARM_shader_core_builtins and VK_ARM_shader_core_properties, multiply-adds a cycle"),
         ]),

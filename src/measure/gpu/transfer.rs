@@ -1,8 +1,8 @@
 //! Uploads and downloads: the paper's two transfers, and their line over sizes.
 //!
-//! Staging buffers are kept and stay mapped between uses. `Queue::write_buffer` allocates on every call and was five times slower. On a
-//! machine whose CPU sees all of the GPU's memory, the staging buffer of uploads may lie there: then the bus is crossed by the part
-//! of the CPU and not by that of the GPU, and the sum is still right.
+//! Staging buffers are kept and stay mapped between uses. `Queue::write_buffer` allocates on every call and was five times
+//! slower. On a machine whose CPU sees all of the GPU's memory, the staging buffer of uploads may lie there: then the bus
+//! is crossed by the part of the CPU and not by that of the GPU, and the sum is still right.
 
 use std::time::{Duration, Instant};
 
@@ -51,7 +51,7 @@ fn transfers(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     transfer.upload(TOTAL_BYTES)?;
     transfer.download(TOTAL_BYTES)?;
     transfer.verify(TOTAL_BYTES)?;
-    let plan = bench.plan(9, bench.pick(500, 1300));
+    let plan = bench.plan(9, bench.pick(500, 1000));
     let figures = bench.collect(plan, || {
         let mut row = Row::default();
         for &bytes in &sizes {
