@@ -146,8 +146,8 @@ fn units(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
         return Err(format!("the time shows no step up to {last} workgroups of {lanes} invocations"));
     };
     let method = format!(
-        "least-error fit of b * ceil(n / U) to the time of {} numbers of workgroups up to {last}, each of {lanes} invocations and \
-         {bytes} bytes of shared memory; several such workgroups may share a processor",
+        "least-error fit of b * ceil(n / U) to the time of {} numbers of workgroups up to {last}, each of {lanes} \
+         invocations and {bytes} bytes of shared memory; several such workgroups may share a processor",
         counts.len()
     );
     Ok(vec![samples.into_parameter_with(Some(f64::from(units)), p::PARALLEL_UNITS, &method)])

@@ -14,6 +14,7 @@ pub(super) struct Raw {
 }
 
 /// A heap of memory.
+#[cfg_attr(target_vendor = "apple", allow(dead_code, reason = "Metal has no heaps to list"))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Heap {
     pub(super) bytes: u64,
