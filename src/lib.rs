@@ -24,6 +24,7 @@
 //! - `gpu`: the algorithms on GPUs, through wgpu; see the module `gpu`.
 //! - `model`: reports, models and fields as JSON; prediction.
 //! - `measure`: measures the hardware parameters of this machine.
+//! - `measure-gpu`: those of its GPUs too.
 //! - `schema`: the JSON Schemas of the files, for tools.
 
 mod aabb;

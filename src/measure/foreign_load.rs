@@ -3,6 +3,7 @@
 //! On a machine whose second core was taken by another program, a fork-join measured 40 us instead of 22, and triad 8 GB/s
 //! instead of 22. Such a figure looks like a slower machine, so every window is judged before its samples count.
 
+use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
 use super::statistics;
@@ -63,6 +64,12 @@ impl Figure {
 ///
 /// Where too few clean samples were got in time, the least spoiled windows are kept too, and `foreign_load` says so.
 pub(super) fn collect(plan: Plan, mut sample: impl FnMut() -> Vec<f64>) -> Vec<Figure> {
+    let Ok(figures) = try_collect(plan, || Ok::<_, Infallible>(sample()));
+    figures
+}
+
+/// [`collect`] for samples that can fail: the first failure ends it.
+pub(super) fn try_collect<E>(plan: Plan, mut sample: impl FnMut() -> Result<Vec<f64>, E>) -> Result<Vec<Figure>, E> {
     let start = Instant::now();
     let mut windows: Vec<Window> = Vec::new();
     loop {
@@ -71,7 +78,7 @@ pub(super) fn collect(plan: Plan, mut sample: impl FnMut() -> Vec<f64>) -> Vec<F
         let began = Instant::now();
         let mut rows = Vec::new();
         loop {
-            rows.push(sample());
+            rows.push(sample()?);
             let enough = began.elapsed() >= length && (before.is_some() || rows.len() >= plan.samples);
             if enough || start.elapsed() >= plan.limit {
                 break;
@@ -81,7 +88,7 @@ pub(super) fn collect(plan: Plan, mut sample: impl FnMut() -> Vec<f64>) -> Vec<F
         windows.push(Window { rows, share });
         let clean: usize = windows.iter().filter(|w| w.is_clean()).map(|w| w.rows.len()).sum();
         if clean >= plan.samples || start.elapsed() + began.elapsed() > plan.limit {
-            return keep_the_cleanest(windows, plan.samples);
+            return Ok(keep_the_cleanest(windows, plan.samples));
         }
     }
 }
@@ -272,6 +279,16 @@ mod tests {
         let figures = keep_the_cleanest(vec![window(9.0, 0.4), window(5.0, 0.3)], 2);
         assert_eq!(figures[0].samples, [5.0; 3]);
         assert_eq!((figures[0].spoiled, figures[0].foreign_load), (3, Some(0.3)));
+    }
+
+    #[test]
+    fn a_failure_ends_the_sampling() {
+        let mut left = 2;
+        let result = try_collect(Plan { samples: 9, limit: Duration::from_secs(60) }, || {
+            left -= 1;
+            if left == 0 { Err("broken") } else { Ok(vec![1.0]) }
+        });
+        assert_eq!((result.err(), left), (Some("broken"), 0));
     }
 
     #[test]

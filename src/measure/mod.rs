@@ -9,6 +9,8 @@ mod cgroup;
 mod clock;
 mod foreign_load;
 mod fork_join;
+#[cfg(feature = "measure-gpu")]
+mod gpu;
 mod identity;
 mod memory;
 mod scaling;
@@ -25,6 +27,8 @@ use crate::hardware::{Hardware, Machine, Parameter, parameter};
 use foreign_load::Plan;
 
 pub use foreign_load::Watch;
+#[cfg(feature = "measure-gpu")]
+pub use gpu::{gpu, gpu_group};
 
 pub use memory::{Triad, triad};
 

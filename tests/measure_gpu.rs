@@ -1,0 +1,123 @@
+//! What every measurement of a GPU owes its reader, whatever the GPU. No figure is held to a time: GPUs differ.
+//!
+//! Without a GPU these tests say so and pass, unless `SAPWISE_REQUIRE_GPU=1`: then they fail.
+
+use sapwise::gpu::Gpus;
+use sapwise::hardware::GpuKind;
+use sapwise::hardware::gpu::parameter;
+use sapwise::measure::{self, Options};
+use sapwise::{How, Parameter};
+
+fn options(brief: bool) -> Options {
+    Options { brief, ..Options::default() }
+}
+
+/// The GPUs of this machine, or `None` where there is none and none is required.
+fn gpus() -> Option<Gpus> {
+    let gpus = Gpus::find();
+    if gpus.is_empty() {
+        assert!(
+            std::env::var("SAPWISE_REQUIRE_GPU").as_deref() != Ok("1"),
+            "SAPWISE_REQUIRE_GPU is set and there is no GPU"
+        );
+        println!("skipped: there is no GPU");
+        return None;
+    }
+    Some(gpus)
+}
+
+/// The rules that hold for a parameter on any machine.
+fn check(p: &Parameter) {
+    assert!(!p.source.is_empty() && p.source != "not measured", "{p:?}");
+    assert_eq!(p.value.is_none(), p.how == How::Missing, "{p:?}");
+    assert_eq!(p.samples == 0, p.how == How::Missing, "{p:?}");
+    assert!(p.value.is_none_or(|value| value.is_finite() && value >= 0.0), "{p:?}");
+    assert!(p.dispersion.is_none() || p.samples >= 4, "{p:?}");
+    assert!(p.foreign_load.is_none_or(|share| (0.0..=1.0).contains(&share)), "{p:?}");
+    if p.how == How::Reported {
+        assert_eq!((p.dispersion, p.spoiled, p.foreign_load), (None, 0, None), "{p:?}");
+    }
+}
+
+fn show(parameters: &[Parameter]) {
+    for p in parameters {
+        let (value, spread) = (p.value.unwrap_or(f64::NAN), p.dispersion.unwrap_or(f64::NAN));
+        let (name, foreign) = (&p.name, p.foreign_load.unwrap_or(0.0));
+        println!(
+            "{name:32} {value:>16.3}  +-{spread:.3}  n={:<4} foreign {foreign:.2}  {:?}: {}",
+            p.samples, p.how, p.source
+        );
+    }
+}
+
+#[test]
+fn every_parameter_once_and_in_order() {
+    let Some(gpus) = gpus() else { return };
+    for index in 0..gpus.len() as u32 {
+        let hardware = measure::gpu(&gpus, index, &options(true)).unwrap();
+        assert_eq!(Some(&hardware.gpu), gpus.identities().nth(index as usize));
+        let names: Vec<String> = hardware.parameters.iter().map(|p| p.name.clone()).collect();
+        assert_eq!(names, parameter::all_names());
+        hardware.parameters.iter().for_each(check);
+        show(&hardware.parameters);
+        // Nothing that any driver can do prevents these.
+        for name in [parameter::UPLOAD_GB_PER_S, parameter::ROUND_TRIP_NS, parameter::ARITHMETIC_GFLOP_PER_S] {
+            assert!(hardware.value(name).is_some_and(|value| value > 0.0), "{name}");
+        }
+        let [all, host, device] =
+            [parameter::UPLOAD_GB_PER_S, parameter::UPLOAD_HOST_COPY_GB_PER_S, parameter::UPLOAD_DEVICE_COPY_GB_PER_S]
+                .map(|name| hardware.value(name).unwrap());
+        assert!(all <= host && all <= device, "{all} {host} {device}");
+        if hardware.gpu.kind == GpuKind::Software {
+            for name in [parameter::CLOCK_GHZ, parameter::PROCESSORS, parameter::LANES] {
+                let p = hardware.parameters.iter().find(|p| p.name == name).unwrap();
+                assert!(p.value.is_none() && p.source.contains("program on the CPU"), "{p:?}");
+            }
+            assert_eq!(hardware.value(parameter::UNIFIED_MEMORY), Some(1.0));
+        }
+    }
+}
+
+#[test]
+fn groups_of_gpus() {
+    let Some(gpus) = gpus() else { return };
+    assert!(measure::gpu_group(&gpus, &[0], &options(true)).is_err());
+    assert!(measure::gpu_group(&gpus, &[0, 0], &options(true)).is_err());
+    if gpus.len() < 2 {
+        println!("skipped: there is one GPU");
+        return;
+    }
+    let group = measure::gpu_group(&gpus, &[1, 0, 1], &options(true)).unwrap();
+    assert_eq!(group.gpus, [0, 1]);
+    assert_eq!(group.parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), parameter::GROUP);
+    group.parameters.iter().for_each(check);
+    assert!(group.parameters.iter().all(|p| p.value.is_some_and(|value| value > 0.0)), "{group:?}");
+}
+
+#[test]
+fn a_gpu_that_is_not_there() {
+    assert!(measure::gpu(&Gpus::none(), 0, &options(true)).is_err());
+    assert!(measure::gpu_group(&Gpus::none(), &[0, 1], &options(true)).is_err());
+}
+
+/// The whole measurement: seconds, so only when asked for. `cargo test --features measure-gpu --test measure_gpu -- --ignored
+/// --nocapture` shows the figures of this machine.
+#[test]
+#[ignore = "takes seconds for each GPU"]
+fn the_whole_measurement() {
+    let Some(gpus) = gpus() else { return };
+    for index in 0..gpus.len() as u32 {
+        let start = std::time::Instant::now();
+        let hardware = measure::gpu(&gpus, index, &options(false)).unwrap();
+        println!("\n{:?}, {:.2} s", hardware.gpu, start.elapsed().as_secs_f64());
+        show(&hardware.parameters);
+        hardware.parameters.iter().for_each(check);
+    }
+    if gpus.len() > 1 {
+        let all: Vec<u32> = (0..gpus.len() as u32).collect();
+        let start = std::time::Instant::now();
+        let group = measure::gpu_group(&gpus, &all, &options(false)).unwrap();
+        println!("\n{all:?}, {:.2} s", start.elapsed().as_secs_f64());
+        show(&group.parameters);
+    }
+}
