@@ -4,16 +4,17 @@ use super::device::Gpu;
 
 /// An entry point of a shader, compiled for one GPU.
 #[derive(Debug)]
-pub(super) struct Kernel {
+pub(crate) struct Kernel {
     pipeline: wgpu::ComputePipeline,
     label: &'static str,
 }
 
 /// A kernel with the buffers that it works on.
 #[derive(Debug)]
-pub(super) struct Bound {
+pub(crate) struct Bound {
     pipeline: wgpu::ComputePipeline,
-    group: wgpu::BindGroup,
+    /// `None` where the kernel uses no buffer.
+    group: Option<wgpu::BindGroup>,
     /// Most workgroups on one axis of a dispatch.
     most: u32,
 }
@@ -43,7 +44,14 @@ impl Kernel {
     /// # Errors
     /// The compiler's words.
     pub(super) fn new(gpu: &Gpu, source: source::Source, entry: &'static str) -> Result<Self, String> {
-        let text = source.concat();
+        Self::compile(gpu, source.concat(), entry, &[])
+    }
+
+    /// As [`new`](Self::new), from any text, with constants for its overrides.
+    ///
+    /// # Errors
+    /// The compiler's words.
+    pub(crate) fn compile(gpu: &Gpu, text: String, entry: &'static str, constants: &[(&str, f64)]) -> Result<Self, String> {
         let pipeline = gpu.try_make(|device| {
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(entry),
@@ -57,7 +65,7 @@ impl Kernel {
                 compilation_options: wgpu::PipelineCompilationOptions {
                     // Every kernel writes its shared memory before it reads it.
                     zero_initialize_workgroup_memory: false,
-                    ..Default::default()
+                    constants,
                 },
                 cache: None,
             })
@@ -70,18 +78,19 @@ impl Kernel {
     ///
     /// # Errors
     /// When they are not those of the shader.
-    pub(super) fn bind(&self, gpu: &Gpu, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound, String> {
+    pub(crate) fn bind(&self, gpu: &Gpu, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound, String> {
         let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
             .iter()
             .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
-        let group = gpu.try_make(|device| {
+        let make = |device: &wgpu::Device| {
             device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some(self.label),
                 layout: &self.pipeline.get_bind_group_layout(0),
                 entries: &entries,
             })
-        })?;
+        };
+        let group = if entries.is_empty() { None } else { Some(gpu.try_make(make)?) };
         let most = gpu.limits().max_compute_workgroups_per_dimension;
         Ok(Bound { pipeline: self.pipeline.clone(), group, most })
     }
@@ -89,30 +98,55 @@ impl Kernel {
 
 impl Bound {
     /// Adds a dispatch of at least `workgroups`; the kernel leaves out those beyond.
-    pub(super) fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, workgroups: u32) {
+    pub(crate) fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, workgroups: u32) {
         let wide = workgroups.min(self.most);
         if wide > 0 {
             pass.set_pipeline(&self.pipeline);
-            pass.set_bind_group(0, &self.group, &[]);
+            if let Some(group) = &self.group {
+                pass.set_bind_group(0, group, &[]);
+            }
             pass.dispatch_workgroups(wide, workgroups.div_ceil(wide), 1);
         }
     }
 }
 
+/// Fails the test unless the text is a shader that wgpu takes. Needs no driver.
+#[cfg(test)]
+pub(crate) fn assert_valid(name: &str, text: &str) {
+    use wgpu::naga::{front, valid};
+    let module = front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(text)));
+    assert!(!module.entry_points.is_empty(), "{name}");
+    let mut validator = valid::Validator::new(valid::ValidationFlags::all(), valid::Capabilities::SUBGROUP);
+    validator.subgroup_stages(valid::ShaderStages::COMPUTE);
+    validator.subgroup_operations(valid::SubgroupOperationSet::all());
+    validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(text)));
+}
+
 #[cfg(test)]
 mod tests {
+    use super::assert_valid;
     use super::source::*;
 
     /// Parses and validates every shader without a driver.
     #[test]
     fn every_shader_is_valid() {
         let sources = [BRUTE, KEYS, SAMPLE, SCAN, SORT, STRIPS, SWEEP, TABLE];
-        for source in sources {
-            let text = source.concat();
-            let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
-            let flags = naga::valid::ValidationFlags::all();
-            let mut validator = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty());
-            validator.validate(&module).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
+        for (k, source) in sources.iter().enumerate() {
+            assert_valid(&format!("shader {k}"), &source.concat());
         }
+    }
+
+    #[test]
+    fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
+        let gpus = crate::gpu::Gpus::find();
+        let Ok(gpu) = gpus.open(0) else {
+            assert!(std::env::var_os("SAPWISE_REQUIRE_GPU").is_none_or(|v| v != "1"), "no GPU was found");
+            return;
+        };
+        for text in ["fn no(", "@compute @workgroup_size(1) fn other() {}"] {
+            let error = super::Kernel::compile(&gpu, text.to_owned(), "entry", &[]).unwrap_err();
+            assert!(error.contains("entry does not compile"), "{error}");
+        }
+        assert_eq!(gpu.fault(), None);
     }
 }

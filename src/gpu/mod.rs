@@ -34,7 +34,7 @@ mod adapters;
 mod brute;
 mod device;
 mod engine;
-mod kernel;
+pub(crate) mod kernel;
 mod methods;
 mod on_gpus;
 mod output;

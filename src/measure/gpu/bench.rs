@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 use crate::gpu::Gpu;
+pub(super) use crate::gpu::kernel::{Bound, Kernel};
 use crate::hardware::{GpuKind, Parameter};
 use crate::measure::Options;
 use crate::measure::foreign_load::{self, Figure, Plan};
@@ -13,17 +14,6 @@ use crate::measure::foreign_load::{self, Figure, Plan};
 pub(super) struct Bench<'a> {
     pub(super) gpu: &'a Gpu,
     pub(super) options: &'a Options,
-}
-
-/// A kernel and the layout of what it is bound to.
-pub(super) struct Kernel {
-    pipeline: wgpu::ComputePipeline,
-}
-
-/// A kernel with its buffers.
-pub(super) struct Bound<'a> {
-    kernel: &'a Kernel,
-    group: Option<wgpu::BindGroup>,
 }
 
 impl<'a> Bench<'a> {
@@ -78,38 +68,13 @@ impl<'a> Bench<'a> {
     }
 
     /// Compiles an entry point, with constants for its overrides.
-    pub(super) fn kernel(&self, source: &str, entry: &str, constants: &[(&str, f64)]) -> Result<Kernel, String> {
-        let pipeline = self.gpu.try_make(|device| {
-            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(entry),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
-            });
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(entry),
-                layout: None,
-                module: &module,
-                entry_point: Some(entry),
-                compilation_options: wgpu::PipelineCompilationOptions { constants, zero_initialize_workgroup_memory: false },
-                cache: None,
-            })
-        })?;
-        Ok(Kernel { pipeline })
+    pub(super) fn kernel(&self, source: &str, entry: &'static str, constants: &[(&str, f64)]) -> Result<Kernel, String> {
+        Kernel::compile(self.gpu, source.to_owned(), entry, constants)
     }
 
     /// A kernel with its buffers, each with its binding number. Only those that the entry point uses may be named.
-    pub(super) fn bind<'k>(&self, kernel: &'k Kernel, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound<'k>, String> {
-        if buffers.is_empty() {
-            return Ok(Bound { kernel, group: None });
-        }
-        let entries: Vec<_> = buffers
-            .iter()
-            .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
-        let group = self.gpu.try_make(|device| {
-            let layout = kernel.pipeline.get_bind_group_layout(0);
-            device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries })
-        })?;
-        Ok(Bound { kernel, group: Some(group) })
+    pub(super) fn bind(&self, kernel: &Kernel, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound, String> {
+        kernel.bind(self.gpu, buffers)
     }
 
     /// Records commands and submits them.
@@ -128,8 +93,8 @@ impl<'a> Bench<'a> {
     }
 
     /// Time of `count` dispatches of `groups` workgroups each, in one pass.
-    pub(super) fn time_dispatches(&self, bound: &Bound<'_>, groups: u32, count: u32) -> Result<Duration, String> {
-        self.time(|encoder| bound.record(encoder, groups, count))
+    pub(super) fn time_dispatches(&self, bound: &Bound, groups: u32, count: u32) -> Result<Duration, String> {
+        self.time(|encoder| record(bound, encoder, groups, count))
     }
 
     /// The first word of a buffer.
@@ -151,17 +116,11 @@ impl<'a> Bench<'a> {
     }
 }
 
-impl Bound<'_> {
-    /// Records a pass of `count` dispatches.
-    pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, groups: u32, count: u32) {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(&self.kernel.pipeline);
-        if let Some(group) = &self.group {
-            pass.set_bind_group(0, group, &[]);
-        }
-        for _ in 0..count {
-            pass.dispatch_workgroups(groups, 1, 1);
-        }
+/// Records a pass of `count` dispatches.
+pub(super) fn record(bound: &Bound, encoder: &mut wgpu::CommandEncoder, groups: u32, count: u32) {
+    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+    for _ in 0..count {
+        bound.dispatch(&mut pass, groups);
     }
 }
 

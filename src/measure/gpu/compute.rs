@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::bench::{Bench, Bound, Kernel, calibrate, or_missing, per_ns};
+use super::bench::{Bench, Bound, Kernel, calibrate, or_missing, per_ns, record};
 use super::fits;
 use crate::hardware::Parameter;
 use crate::hardware::gpu::parameter as p;
@@ -41,7 +41,7 @@ impl Arithmetic {
         Ok(Self { kernel, sink: bench.storage(16)?, groups: bench.pick(4096, 64) })
     }
 
-    pub(super) fn bind(&self, bench: &Bench<'_>, rounds: u32) -> Result<Bound<'_>, String> {
+    pub(super) fn bind(&self, bench: &Bench<'_>, rounds: u32) -> Result<Bound, String> {
         bench.bind(&self.kernel, &[(0, &shape(bench, rounds)?), (1, &self.sink)])
     }
 
@@ -51,14 +51,14 @@ impl Arithmetic {
     }
 
     /// Operations a nanosecond of `count` dispatches.
-    pub(super) fn rate(&self, bench: &Bench<'_>, bound: &Bound<'_>, rounds: u32, count: u32) -> Result<f64, String> {
+    pub(super) fn rate(&self, bench: &Bench<'_>, bound: &Bound, rounds: u32, count: u32) -> Result<f64, String> {
         let time = bench.time_dispatches(bound, self.groups, count)?;
         Ok(per_ns(OPERATIONS * 256.0 * f64::from(self.groups) * f64::from(rounds) * f64::from(count), time))
     }
 
     /// Submits `count` dispatches and does not wait.
-    pub(super) fn submit(&self, bench: &Bench<'_>, bound: &Bound<'_>, count: u32) -> wgpu::SubmissionIndex {
-        bench.submit(|encoder| bound.record(encoder, self.groups, count))
+    pub(super) fn submit(&self, bench: &Bench<'_>, bound: &Bound, count: u32) -> wgpu::SubmissionIndex {
+        bench.submit(|encoder| record(bound, encoder, self.groups, count))
     }
 }
 
@@ -87,7 +87,7 @@ fn atomics(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     let groups = words / 1024;
     let bind = |rounds: u32| bench.bind(&kernel, &[(0, &bench.uniform(&[rounds, words - 1])?), (1, &buffer)]);
     let mut added = 0_u32;
-    let mut run = |bound: &Bound<'_>, rounds: u32| {
+    let mut run = |bound: &Bound, rounds: u32| {
         added = added.wrapping_add(rounds);
         bench.time_dispatches(bound, groups, 1)
     };
@@ -114,7 +114,7 @@ struct Staircase<'b> {
 }
 
 impl Staircase<'_> {
-    fn bind(&self, rounds: u32) -> Result<Bound<'_>, String> {
+    fn bind(&self, rounds: u32) -> Result<Bound, String> {
         self.bench.bind(&self.kernel, &[(0, &shape(self.bench, rounds)?), (1, &self.sink)])
     }
 }

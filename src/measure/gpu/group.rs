@@ -3,7 +3,7 @@
 use std::sync::Barrier;
 use std::time::{Duration, Instant};
 
-use super::bench::{Bench, Bound, Kernel, or_missing};
+use super::bench::{Bench, Bound, Kernel, or_missing, record};
 use super::compute::Arithmetic;
 use super::transfer::Transfer;
 use crate::gpu::Gpu;
@@ -121,7 +121,7 @@ fn round_trips(benches: &[Bench<'_>]) -> Result<Vec<Parameter>, String> {
     let source = include_str!("shaders/latency.wgsl");
     let kernels = benches.iter().map(|b| b.kernel(source, "empty", &[])).collect::<Result<Vec<Kernel>, _>>()?;
     let bind = |(bench, kernel): (&Bench<'_>, _)| bench.bind(kernel, &[]);
-    let bound = benches.iter().zip(&kernels).map(bind).collect::<Result<Vec<Bound<'_>>, _>>()?;
+    let bound = benches.iter().zip(&kernels).map(bind).collect::<Result<Vec<Bound>, _>>()?;
     let figures = foreign_load::try_collect(plan(benches, 40), || {
         let mut slowest = Duration::ZERO;
         for (bench, bound) in benches.iter().zip(&bound) {
@@ -129,7 +129,7 @@ fn round_trips(benches: &[Bench<'_>]) -> Result<Vec<Parameter>, String> {
         }
         let start = Instant::now();
         let submissions: Vec<_> =
-            benches.iter().zip(&bound).map(|(bench, bound)| bench.submit(|encoder| bound.record(encoder, 1, 1))).collect();
+            benches.iter().zip(&bound).map(|(bench, bound)| bench.submit(|encoder| record(bound, encoder, 1, 1))).collect();
         for (bench, submission) in benches.iter().zip(submissions) {
             bench.gpu.wait(submission)?;
         }

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::bench::{Bench, or_missing};
+use super::bench::{Bench, or_missing, record};
 use crate::hardware::Parameter;
 use crate::hardware::gpu::parameter as p;
 
@@ -31,7 +31,7 @@ fn latencies(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     let mut figures = bench
         .collect(bench.plan(40, bench.pick(250, 400)), || {
             let start = Instant::now();
-            let submission = bench.submit(|encoder| empty.record(encoder, 1, 1));
+            let submission = bench.submit(|encoder| record(&empty, encoder, 1, 1));
             let submit = start.elapsed();
             bench.gpu.wait(submission)?;
             let round_trip = start.elapsed();

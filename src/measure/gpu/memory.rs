@@ -125,24 +125,24 @@ fn shape(bench: &Bench<'_>, bytes: u64) -> Result<wgpu::Buffer, String> {
     bench.uniform(&[u32::try_from(bytes / 16 - 1).unwrap_or(u32::MAX), 0x5bd1_e995])
 }
 
-fn reading<'k>(bench: &Bench<'_>, kernel: &'k Kernel, buffers: &Buffers, bytes: u64) -> Result<Bound<'k>, String> {
+fn reading(bench: &Bench<'_>, kernel: &Kernel, buffers: &Buffers, bytes: u64) -> Result<Bound, String> {
     bench.bind(kernel, &[(0, &shape(bench, bytes)?), (1, &buffers.data), (2, &buffers.sink)])
 }
 
-fn writing<'k>(bench: &Bench<'_>, kernel: &'k Kernel, buffer: &wgpu::Buffer, bytes: u64) -> Result<Bound<'k>, String> {
+fn writing(bench: &Bench<'_>, kernel: &Kernel, buffer: &wgpu::Buffer, bytes: u64) -> Result<Bound, String> {
     bench.bind(kernel, &[(0, &shape(bench, bytes)?), (3, buffer)])
 }
 
 /// A kernel over a set, and how many dispatches make up a sample.
-struct Job<'k> {
-    bound: Bound<'k>,
+struct Job {
+    bound: Bound,
     /// Bytes of one dispatch.
     bytes: u64,
     count: u32,
 }
 
-impl<'k> Job<'k> {
-    fn of(bench: &Bench<'_>, target: Duration, bytes: u64, bound: Bound<'k>) -> Result<Self, String> {
+impl Job {
+    fn of(bench: &Bench<'_>, target: Duration, bytes: u64, bound: Bound) -> Result<Self, String> {
         let count = calibrate(target, MOST_DISPATCHES, |count| bench.time_dispatches(&bound, groups(bytes), count))?;
         Ok(Self { bound, bytes, count })
     }
