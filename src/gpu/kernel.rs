@@ -102,6 +102,7 @@ impl Bound {
 #[cfg(test)]
 mod tests {
     use super::source::*;
+    use wgpu::naga;
 
     /// Parses and validates every shader without a driver.
     #[test]
