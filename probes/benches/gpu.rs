@@ -1,0 +1,304 @@
+//! Every method on every GPU of this machine, beside `strips` on one core and on all cores, on the same boxes in turn.
+//!
+//! ```sh
+//! cargo bench -p sapwise-cli --bench gpu                            # all GPUs
+//! SAPWISE_GPUS=gpu1,gpu0+1 cargo bench -p sapwise-cli --bench gpu   # these, numbered as in `sapwise devices`
+//! ```
+//!
+//! Prints a table in Markdown, a size as soon as it is measured: wall clock, median and quartiles over the frames. The
+//! memory `host` says from boxes in host memory to pairs in host memory, transfers included; `device` says from boxes on
+//! the GPU to pairs on the GPU whose number is known to the host, for engines whose data never leave it. The contestants
+//! take turns on each frame, so that a machine that slows down slows all of them, and the speed-up is the median of the
+//! ratios frame by frame. What each of them found is compared on every frame, outside the timed part. Bias: one scenario;
+//! four frames, there and back again; a GPU rests while the others have their turn.
+//!
+//! Criterion times its candidates one after the other, which is why it is not used here. Without `--bench`, which `cargo
+//! bench` passes, only the smallest size is run, to see that all is well. Exit status 1 when a contestant failed or found
+//! other pairs.
+
+use sapwise::gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu};
+use sapwise::{Aabb, AlgorithmId, Backend, BroadPhase, Pairs, Registry, Scenario, usable_cores};
+use std::hint::black_box;
+use std::io::Write;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+const SIZES: [usize; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];
+
+/// Distinct frames of a size.
+const FRAMES: usize = 4;
+
+/// Timed rounds of a size, unless its time is over.
+const ROUNDS: usize = 60;
+
+/// Rounds of a size before its time may be over, so that there are quartiles.
+const FEWEST_ROUNDS: usize = 5;
+
+/// The time of a size, for all contestants together.
+const TIME: Duration = Duration::from_secs(15);
+
+/// A contestant leaves before a size at which one frame is forecast to take longer.
+const LONGEST_FRAME: Duration = Duration::from_secs(3);
+
+/// A method, the largest size at which it is asked for, and the power of the number of objects with which its time grows in
+/// `uniform`.
+const METHODS: [(&str, usize, f64); 3] =
+    [("brute", 100_000, 2.0), ("sweep", 1_000_000, 5.0 / 3.0), ("strips", 10_000_000, 1.1)];
+
+/// Goes through one frame; the time it took and the fingerprint of the pairs.
+type Turn = Box<dyn FnMut(&[Aabb]) -> Result<(Duration, u64), String>>;
+
+struct Contestant {
+    id: AlgorithmId,
+    /// Where the boxes come from and the pairs go.
+    memory: &'static str,
+    turn: Turn,
+    /// Seconds of each round of the present size.
+    seconds: Vec<f64>,
+    /// Median of the last size that it went through, and that size.
+    last: Option<(f64, usize)>,
+    /// Whether it has left the race.
+    out: bool,
+}
+
+impl Contestant {
+    fn new(id: AlgorithmId, memory: &'static str, turn: Turn) -> Self {
+        Self { id, memory, turn, seconds: Vec::new(), last: None, out: false }
+    }
+
+    /// Whether it goes through frames of that many objects in reasonable time.
+    fn takes_part(&self, objects: usize) -> bool {
+        let Some(&(_, most, power)) = METHODS.iter().find(|m| m.0 == self.id.method()) else { return !self.out };
+        let forecast = self.last.map_or(0.0, |(seconds, at)| seconds * (objects as f64 / at as f64).powf(power));
+        !self.out && objects <= most && forecast <= LONGEST_FRAME.as_secs_f64()
+    }
+}
+
+/// From boxes in host memory to pairs in host memory.
+fn host_resident(mut algorithm: Box<dyn BroadPhase>) -> Turn {
+    let mut pairs = Pairs::new();
+    Box::new(move |boxes| {
+        let start = Instant::now();
+        algorithm.find_pairs(black_box(boxes), &mut pairs).map_err(|e| e.to_string())?;
+        let elapsed = start.elapsed();
+        Ok((elapsed, pairs.fingerprint()))
+    })
+}
+
+/// From boxes on a GPU to pairs on it, as many as the host then knows. The way there and back is not timed.
+fn device_resident(gpus: &Gpus, index: u32, method: &str) -> Result<Turn, String> {
+    let gpu = gpus.open(index)?;
+    let mut resident = Resident::new(&gpu, method).map_err(|e| e.to_string())?;
+    let mut on_gpu = None;
+    Ok(Box::new(move |boxes| {
+        let buffer = upload(&gpu, boxes, on_gpu.take())?;
+        let start = Instant::now();
+        let pairs = resident.find_pairs(&buffer, boxes.len() as u32).map_err(|e| e.to_string())?;
+        let elapsed = start.elapsed();
+        let fingerprint = download(&gpu, pairs)?;
+        on_gpu = Some(buffer);
+        Ok((elapsed, fingerprint))
+    }))
+}
+
+/// The boxes in a buffer of a GPU, the last one where they fit, once they are there.
+fn upload(gpu: &Gpu, boxes: &[Aabb], last: Option<wgpu::Buffer>) -> Result<wgpu::Buffer, String> {
+    let size = size_of_val(boxes) as u64;
+    let buffer = match last {
+        Some(buffer) if buffer.size() >= size => buffer,
+        _ => {
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+            let descriptor = wgpu::BufferDescriptor { label: Some("boxes"), size, usage, mapped_at_creation: false };
+            gpu.try_make(|device| device.create_buffer(&descriptor))?
+        }
+    };
+    for (piece, at) in boxes.chunks(1 << 20).zip(0_u64..) {
+        let bytes: Vec<u8> = piece.iter().flat_map(|b| [b.min, b.max]).flatten().flat_map(f32::to_ne_bytes).collect();
+        gpu.queue().write_buffer(&buffer, (at << 20) * size_of::<Aabb>() as u64, &bytes);
+    }
+    gpu.wait(gpu.queue().submit([]))?;
+    Ok(buffer)
+}
+
+/// The fingerprint of pairs that are on a GPU.
+fn download(gpu: &Gpu, found: ResidentPairs<'_>) -> Result<u64, String> {
+    let mut pairs = Pairs::new();
+    let size = u64::from(found.count) * 8;
+    if size > 0 {
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let descriptor = wgpu::BufferDescriptor { label: Some("pairs"), size, usage, mapped_at_creation: false };
+        let copy = gpu.try_make(|device| device.create_buffer(&descriptor))?;
+        let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(found.buffer, 0, &copy, 0, size);
+        let submission = gpu.queue().submit([encoder.finish()]);
+        copy.map_async(wgpu::MapMode::Read, .., |_| {});
+        gpu.wait(submission)?;
+        let bytes = copy.get_mapped_range(..).map_err(|e| e.to_string())?;
+        let number = |b: &[u8]| u32::from_ne_bytes([b[0], b[1], b[2], b[3]]);
+        bytes.chunks_exact(8).for_each(|pair| pairs.push(number(&pair[..4]), number(&pair[4..])));
+    }
+    pairs.finish().map_err(|e| e.to_string())?;
+    Ok(pairs.fingerprint())
+}
+
+/// The algorithms on GPUs that are wanted: those of `SAPWISE_GPUS`, or all that are known here.
+fn on_gpus(registry: &Registry) -> Result<Vec<AlgorithmId>, String> {
+    let entries = registry.entries().iter().filter(|e| matches!(e.id.backend(), Backend::Gpu(_)));
+    let known: Vec<AlgorithmId> = entries.map(|e| e.id.clone()).collect();
+    let Ok(named) = std::env::var("SAPWISE_GPUS") else { return Ok(known) };
+    let backends = named.split(',').map(|text| text.trim().parse::<Backend>().map_err(|e| format!("SAPWISE_GPUS: {e}")));
+    let mut wanted = Vec::new();
+    for backend in backends {
+        let backend = backend?;
+        let before = wanted.len();
+        wanted.extend(known.iter().filter(|id| *id.backend() == backend).cloned());
+        if wanted.len() == before {
+            return Err(format!("SAPWISE_GPUS: nothing runs on {backend} here; see `sapwise devices`"));
+        }
+    }
+    Ok(wanted)
+}
+
+/// First and third quartile and the median between them, interpolated.
+fn quartiles(samples: &[f64]) -> [f64; 3] {
+    let mut sorted = samples.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    [0.25, 0.5, 0.75].map(|share| {
+        let at = share * (sorted.len() - 1) as f64;
+        let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
+        low + (high - low) * at.fract()
+    })
+}
+
+/// Runs all contestants on frames of one size in turn, and prints their rows. The remarks say what went wrong.
+fn measure(objects: usize, rounds: usize, contestants: &mut [Contestant], remarks: &mut Vec<String>) {
+    let mut racing: Vec<&mut Contestant> = contestants.iter_mut().filter(|c| c.takes_part(objects)).collect();
+    if racing.is_empty() {
+        return;
+    }
+    let mut scene = Scenario::Uniform.start(objects, 1);
+    let mut frames = vec![scene.boxes().to_vec()];
+    while frames.len() < FRAMES {
+        scene.advance();
+        frames.push(scene.boxes().to_vec());
+    }
+    racing.iter_mut().for_each(|c| c.seconds.clear());
+    let mut expected = [None; FRAMES];
+    let start = Instant::now();
+    // Round 0 makes buffers and compiles, and is not counted.
+    for round in 0..=rounds {
+        if round > FEWEST_ROUNDS && start.elapsed() > TIME {
+            break;
+        }
+        // There and back again, so that consecutive frames are always neighbours.
+        let at = round % (2 * FRAMES - 2);
+        let at = if at < FRAMES { at } else { 2 * FRAMES - 2 - at };
+        let count = racing.len();
+        for place in 0..count {
+            // Each begins in turn, and every other round goes backwards, so that none always follows the same one.
+            let place = if round % 2 == 0 { place } else { count - 1 - place };
+            let contestant = &mut racing[(round / 2 + place) % count];
+            if contestant.out {
+                continue;
+            }
+            let problem = match (contestant.turn)(&frames[at]) {
+                Ok((_, found)) if *expected[at].get_or_insert(found) != found => "other pairs than the rest".to_owned(),
+                Ok((elapsed, _)) => {
+                    if round > 0 {
+                        contestant.seconds.push(elapsed.as_secs_f64());
+                    }
+                    continue;
+                }
+                Err(error) => error,
+            };
+            contestant.out = true;
+            remarks.push(format!("{} ({}) at {objects} objects: {problem}", contestant.id, contestant.memory));
+        }
+    }
+    racing.retain(|c| !c.out && !c.seconds.is_empty());
+    // The last of the CPU's contestants has the most cores.
+    let reference = racing.iter().rfind(|c| matches!(c.id.backend(), Backend::Cpu(_))).map(|c| c.seconds.clone());
+    for contestant in racing {
+        let [low, median, high] = quartiles(&contestant.seconds);
+        let speed_up = reference.as_ref().map_or("-".to_owned(), |reference| {
+            let ratios: Vec<f64> = reference.iter().zip(&contestant.seconds).map(|(r, s)| r / s).collect();
+            format!("{:.3}", quartiles(&ratios)[1])
+        });
+        let tests = if contestant.id.method() == "brute" {
+            format!("{:.3}", objects as f64 * (objects as f64 - 1.0) / 2.0 / median / 1e9)
+        } else {
+            "-".to_owned()
+        };
+        println!(
+            "| {objects} | {} | {} | {:.3} | {:.3} to {:.3} | {} | {speed_up} | {tests} |",
+            contestant.id,
+            contestant.memory,
+            median * 1e3,
+            low * 1e3,
+            high * 1e3,
+            contestant.seconds.len(),
+        );
+        contestant.last = Some((median, objects));
+    }
+    // A run that is cut short keeps the sizes that it measured. Whoever stopped listening gets no more.
+    let _ = std::io::stdout().flush();
+}
+
+fn bench() -> Result<Vec<String>, String> {
+    let gpus = Gpus::find();
+    let mut registry = Registry::new();
+    registry.pin_threads();
+    registry.add_gpus(&gpus);
+    if gpus.is_empty() {
+        println!("No GPU was found: the CPU alone.");
+    }
+    for gpu in gpus.identities() {
+        println!("- gpu{}: {}, {}, {}", gpu.index, gpu.name, gpu.api, gpu.driver);
+    }
+    let mut remarks = Vec::new();
+    let mut cpu = vec![1, usable_cores()];
+    cpu.dedup();
+    let cpu = cpu.into_iter().map(|k| AlgorithmId::new("strips", Backend::Cpu(k)).map_err(|e| e.to_string()));
+    let mut contestants = Vec::new();
+    for id in cpu.chain(on_gpus(&registry)?.into_iter().map(Ok)) {
+        let id = id?;
+        match registry.create(&id) {
+            Ok(algorithm) => contestants.push(Contestant::new(id.clone(), "host", host_resident(algorithm))),
+            Err(error) => remarks.push(error.to_string()),
+        }
+        if let Backend::Gpu(indices) = id.backend()
+            && let &[index] = indices.as_slice()
+        {
+            match device_resident(&gpus, index, id.method()) {
+                Ok(turn) => contestants.push(Contestant::new(id, "device", turn)),
+                Err(error) => remarks.push(format!("{id} (device): {error}")),
+            }
+        }
+    }
+    println!(
+        "\n| objects | algorithm | memory | median ms | quartiles ms | frames | times strips@cpu{} | G box tests/s |\n\
+         |---|---|---|---|---|---|---|---|",
+        usable_cores()
+    );
+    let full = std::env::args().any(|argument| argument == "--bench");
+    for &objects in if full { &SIZES[..] } else { &SIZES[..1] } {
+        eprintln!("{objects} objects");
+        measure(objects, if full { ROUNDS } else { FEWEST_ROUNDS }, &mut contestants, &mut remarks);
+    }
+    Ok(remarks)
+}
+
+fn main() -> ExitCode {
+    match bench() {
+        Ok(remarks) if remarks.is_empty() => ExitCode::SUCCESS,
+        Ok(remarks) => {
+            println!();
+            remarks.iter().for_each(|remark| println!("- {remark}"));
+            ExitCode::FAILURE
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
