@@ -126,7 +126,6 @@ pub(crate) fn assert_valid(name: &str, text: &str) {
 mod tests {
     use super::assert_valid;
     use super::source::*;
-    use wgpu::naga;
 
     /// Parses and validates every shader without a driver.
     #[test]
