@@ -1,0 +1,174 @@
+#!/usr/bin/env bash
+# All that is to be learnt on a machine with a real GPU, in one command and under ten minutes:
+#
+#     tools/real-gpu.sh OUT_DIR
+#
+# The algorithms on GPUs against the oracle, the benchmark of 1000 to 10 million objects with boxes in host and in device memory,
+# the full probe and sweep, fields, and a scenario that runs on them. OUT_DIR gets a log of each step, bench.md, the report
+# (for datasets/), fields and a picture. A step that fails does not stop the others; the exit status is 1 if any did.
+#
+# Builds with cargo. For a machine without a Rust toolchain or a network, build where there are both and carry one folder:
+#
+#     tools/real-gpu.sh --pack DIR                    # this script, the binaries, the Vulkan loader; under 64 MiB
+#     DIR/real-gpu.sh OUT_DIR                         # there
+#
+# BIN_DIR       folder of prebuilt sapwise, gpu_bench, gpu_contract and other gpu_* tests; beside this script if they are there
+# LOADER_DEBS   folder of the .deb files of the Vulkan loader, unpacked where the system has none; BIN_DIR if not given
+# LIMIT_FACTOR  multiplies every time limit, for software GPUs and slow machines
+# SKIP          names of steps to leave out, as they are printed; every_size takes an hour on a software GPU
+# SAPWISE_GPUS  the GPUs of the benchmark, as in gpu0,gpu0+1; all if not given
+set -euo pipefail
+
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+# Those that need a GPU; built as tests of the library.
+tests=(gpu_contract gpu_resident gpu_faults)
+
+usage() {
+    sed -n '2,/^set /{/^set /d; s/^# \{0,1\}//; p}' "${BASH_SOURCE[0]}" >&2
+    exit 2
+}
+say() { echo "real-gpu: $*" >&2; }
+fail() { say "$*"; exit 1; }
+
+# Builds everything with one selection of packages and features, so that wgpu is compiled once, and copies it into folder $1.
+build() {
+    local into=$1 name kind file
+    local -a wanted=()
+    for name in "${tests[@]}"; do wanted+=(--test "$name"); done
+    [ -e "$here/../Cargo.toml" ] || fail "there are no binaries in ${BIN_DIR:-$here}, and no source to build them from; see --pack"
+    command -v cargo >/dev/null || fail "there is no cargo here; carry the folder that --pack makes elsewhere, or set BIN_DIR"
+    say "building; the first time takes minutes"
+    # The benchmark is a reason for cargo to build the command as well.
+    (cd "$here/.." && cargo test --release --workspace --locked --no-run --bench gpu "${wanted[@]}" --message-format=json) >"$into/build.json"
+    while read -r kind name file; do
+        case $kind:$name in
+            bin:sapwise | test:*) cp "$file" "$into/$name" ;;
+            bench:gpu) cp "$file" "$into/gpu_bench" ;;
+        esac
+    done < <(sed -n 's/.*"kind":\["\([a-z]*\)"\].*"name":"\([a-z_]*\)","src_path".*"executable":"\([^"]*\)".*/\1 \2 \3/p' "$into/build.json")
+    rm "$into/build.json"
+    for name in sapwise gpu_bench "${tests[@]}"; do
+        [ -x "$into/$name" ] || fail "cargo built no $name"
+    done
+}
+
+pack() {
+    local into=$1 name bytes
+    mkdir -p "$into"
+    into=$(cd "$into" && pwd)
+    build "$into"
+    for name in sapwise gpu_bench "${tests[@]}"; do strip "$into/$name"; done
+    cp "${BASH_SOURCE[0]}" "$into/real-gpu.sh"
+    if command -v apt-get >/dev/null; then
+        # NVIDIA's driver asks for the libraries of GLVND as well.
+        (cd "$into" && rm -f ./*.deb && apt-get download -q libvulkan1 libglvnd0 libglx0 libegl1) >&2 \
+            || fail "the Vulkan loader could not be downloaded; if the lists of packages are old: apt-get update"
+    else
+        say "without apt-get the Vulkan loader is not packed; the other machine must have libvulkan.so.1"
+    fi
+    bytes=$(du -sb "$into" | cut -f1)
+    [ "$bytes" -lt $((64 << 20)) ] || fail "$into has $bytes bytes, more than 64 MiB"
+    say "$into has $bytes bytes; carry it and run real-gpu.sh OUT_DIR in it"
+}
+
+# Makes the Vulkan loader and a driver known to the programs, if the system does not.
+find_vulkan() {
+    local debs=${LOADER_DEBS:-$bin} deb folder lib
+    if PATH=$PATH:/sbin:/usr/sbin ldconfig -p | grep -F 'libvulkan.so.1 ' >/dev/null; then
+        :
+    elif compgen -G "$debs/*.deb" >/dev/null; then
+        for deb in "$debs"/*.deb; do dpkg -x "$deb" "$work/loader"; done
+        lib=$(find "$work/loader" -name 'libvulkan.so.1' -print -quit)
+        [ -n "$lib" ] || { say "the .deb files in $debs hold no libvulkan.so.1"; return; }
+        say "the Vulkan loader is that of $debs"
+        LD_LIBRARY_PATH=$(dirname "$lib")${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
+        export LD_LIBRARY_PATH
+    else
+        say "there is no Vulkan loader here, and no .deb of one in $debs"
+        return
+    fi
+    [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] || return 0
+    # The loader looks into the first two folders by itself, and not into the third, where containers have NVIDIA's driver.
+    for folder in /usr/share/vulkan/icd.d /etc/vulkan/icd.d /usr/local/nvidia/share/vulkan/icd.d; do
+        [ -e "$folder/nvidia_icd.json" ] || continue
+        [ "$folder" = /usr/local/nvidia/share/vulkan/icd.d ] || return 0
+        export VK_DRIVER_FILES=$folder/nvidia_icd.json VK_ICD_FILENAMES=$folder/nvidia_icd.json
+        say "the driver is that of $VK_DRIVER_FILES"
+    done
+}
+
+factor=${LIMIT_FACTOR:-1}
+[[ $factor =~ ^[1-9][0-9]*$ ]] || fail "LIMIT_FACTOR is $factor; it must be a whole number"
+failed=()
+total=$((590 * factor))
+# Seconds that a step must leave for those after it.
+reserve=0
+# step NAME SECONDS COMMAND...: runs it within that time, and within the total; what it prints goes to NAME.log.
+step() {
+    local name=$1 limit=$(($2 * factor)) left=$((total - reserve * factor - SECONDS)) status=0 began=$SECONDS
+    shift 2
+    printf '%-13s ' "$name"
+    case " ${SKIP:-} " in
+        *" $name "*) echo "left out"; return ;;
+    esac
+    [ "$limit" -le "$left" ] || limit=$((left > 0 ? left : 1))
+    # An interrupt lets a probe keep what it measured.
+    timeout --signal=INT --kill-after=5 "$limit" "$@" >"$out/$name.log" 2>&1 || status=$?
+    case $status in
+        0) echo "done, $((SECONDS - began)) s" ;;
+        124 | 137) echo "NOT DONE within $limit s; see $name.log" ;;
+        *) echo "FAILED with status $status after $((SECONDS - began)) s; see $name.log" ;;
+    esac
+    [ "$status" = 0 ] || failed+=("$name")
+}
+
+case ${1:-} in
+    --pack) [ $# = 2 ] || usage; pack "$2"; exit ;;
+    '' | -*) usage ;;
+esac
+[ $# = 1 ] || usage
+mkdir -p "$1"
+out=$(cd "$1" && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+if [ -n "${BIN_DIR:-}" ]; then
+    bin=$(cd "$BIN_DIR" && pwd)
+elif [ -x "$here/sapwise" ]; then
+    bin=$here
+else
+    bin=$work/bin
+    mkdir "$bin"
+    build "$bin"
+fi
+for name in sapwise gpu_bench gpu_contract; do
+    [ -x "$bin/$name" ] || fail "there is no program $name in $bin"
+done
+find_vulkan
+cd "$out"
+# A test that finds no GPU fails instead of passing with a remark.
+export SAPWISE_REQUIRE_GPU=1
+
+# Building does not count.
+SECONDS=0
+step devices 15 "$bin/sapwise" devices
+[ ! -e devices.log ] || cat devices.log
+for name in "${tests[@]}"; do
+    [ ! -x "$bin/$name" ] || step "$name" 60 "$bin/$name"
+done
+step every_size 180 "$bin/gpu_contract" --ignored --nocapture
+step gpu_bench 120 "$bin/gpu_bench" --bench
+[ ! -e gpu_bench.log ] || sed -n '/^[-|]/p' gpu_bench.log >bench.md
+reserve=80
+step probe 300 "$bin/sapwise" probe --out report.json
+reserve=0
+step check 5 "$bin/sapwise" check report.json
+step predict 25 "$bin/sapwise" predict --out predicted.json
+step measured 5 "$bin/sapwise" predict --report report.json --measured --out measured.json
+step run 45 "$bin/sapwise" run fragmentation --objects 200000 --repeats 1 --fields measured.json --plot run.svg
+
+if [ ${#failed[@]} = 0 ]; then
+    echo "all done in $SECONDS s; $out/report.json is the report, bench.md the benchmark"
+else
+    echo "${#failed[@]} failed: ${failed[*]}; the logs are in $out"
+    exit 1
+fi
