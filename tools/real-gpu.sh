@@ -97,13 +97,15 @@ find_vulkan() {
     done
 }
 
+factor=${LIMIT_FACTOR:-1}
+[[ $factor =~ ^[1-9][0-9]*$ ]] || fail "LIMIT_FACTOR is $factor; it must be a whole number"
 failed=()
-total=$((590 * ${LIMIT_FACTOR:-1}))
+total=$((590 * factor))
 # Seconds that a step must leave for those after it.
 reserve=0
 # step NAME SECONDS COMMAND...: runs it within that time, and within the total; what it prints goes to NAME.log.
 step() {
-    local name=$1 limit=$(($2 * ${LIMIT_FACTOR:-1})) left=$((total - reserve * ${LIMIT_FACTOR:-1} - SECONDS)) status=0 began=$SECONDS
+    local name=$1 limit=$(($2 * factor)) left=$((total - reserve * factor - SECONDS)) status=0 began=$SECONDS
     shift 2
     printf '%-13s ' "$name"
     case " ${SKIP:-} " in
@@ -125,7 +127,6 @@ case ${1:-} in
     '' | -*) usage ;;
 esac
 [ $# = 1 ] || usage
-[[ ${LIMIT_FACTOR:-1} =~ ^[1-9][0-9]*$ ]] || fail "LIMIT_FACTOR is ${LIMIT_FACTOR}; it must be a whole number"
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
 work=$(mktemp -d)
