@@ -54,14 +54,14 @@ mod splitmix;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
-pub use algorithm::{AlgorithmId, Backend, ParseIdError};
+pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
 pub use broad_phase::BroadPhase;
 pub use cost::{CostCurve, CostTerm, Knot, Term};
 pub use cpu::SimdLevel;
 pub use crossover::{Crossover, Paired, Position};
 pub use error::{BoxDefect, Error};
 pub use fields::{AlgorithmCost, Border, Fields, Ranking, Source, Step};
-pub use hardware::{Hardware, How, Machine, Parameter};
+pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, Machine, Parameter};
 pub use load::Load;
 pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};
