@@ -252,6 +252,8 @@ pub(crate) enum PartKind {
     },
     /// Prints the GPUs, one as JSON a line.
     Gpus,
+    /// Prints the algorithms on all GPUs, one as JSON a line.
+    GpuAlgorithms,
     /// Opens a GPU and prints its limits as JSON.
     GpuLimits { index: u32 },
     /// Prints a GPU with its parameters as JSON.

@@ -4,6 +4,7 @@
 //! or opens them; drivers are loaded in the process of a verb only after that went well.
 
 mod choice;
+mod entries;
 mod limits;
 mod look;
 mod measured;
@@ -11,6 +12,7 @@ mod register;
 mod shim;
 
 pub(crate) use choice::{GpuChoice, difference, uses};
+pub(crate) use entries::{OnGpus, entries, print_entries};
 pub(crate) use limits::{Limits, limits, limits_of};
 pub(crate) use look::{Seen, look};
 pub(crate) use measured::{Measured, measure};

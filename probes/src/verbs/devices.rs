@@ -2,7 +2,7 @@
 
 use crate::args::Devices;
 use crate::exit::Outcome;
-use crate::gpus::{self, Limits, Seen, look};
+use crate::gpus::{self, Limits, OnGpus, Seen, look};
 use crate::output;
 use crate::table::{bytes, columns};
 use sapwise::{AlgorithmId, GpuIdentity, Registry, SimdLevel, usable_cores};
@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Devices) -> anyhow::Result<Outcome> {
         let refused = limits.as_ref().err().cloned();
         adapters.push(Adapter { identity: identity.clone(), limits: limits.ok(), refused });
     }
-    let answer = Answer { algorithms: algorithms(&seen, &adapters), adapters, remark: seen.remark };
+    let answer = Answer { algorithms: algorithms(&seen, &adapters)?, adapters, remark: seen.remark };
     if arguments.json {
         output::print_json(&answer)?;
     } else {
@@ -54,34 +54,37 @@ pub(crate) fn run(arguments: &Devices) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Those of the CPU, then those of the GPUs that were seen.
-fn algorithms(seen: &Seen, adapters: &[Adapter]) -> Vec<Algorithm> {
-    let mut registry = Registry::new();
-    // Nothing is opened by this, so that a driver that ends the process that opens it does no harm here.
-    let unloaded = match seen.load() {
-        Ok(gpus) => {
-            registry.add_gpus(&gpus);
-            None
-        }
-        Err(why) => Some(why),
-    };
-    let entry = |id: &AlgorithmId| registry.entries().iter().find(|e| e.id == *id);
+/// Those of the CPU, then those of the GPUs that were seen. Drivers are loaded into processes of their own only.
+///
+/// # Errors
+/// When no process can be started.
+fn algorithms(seen: &Seen, adapters: &[Adapter]) -> anyhow::Result<Vec<Algorithm>> {
+    let on_gpus = if adapters.is_empty() { Ok(Vec::new()) } else { gpus::entries()? };
     let refused = |id: &AlgorithmId| {
-        let of =
-            |k: &u32| adapters.iter().find(|a| a.identity.index == *k)?.refused.clone().map(|why| format!("gpu{k}: {why}"));
-        gpus::uses(id).iter().find_map(of)
+        let refusal = |k: &u32| adapters.iter().find(|a| a.identity.index == *k)?.refused.clone();
+        gpus::uses(id).iter().find_map(|k| refusal(k).map(|why| format!("gpu{k}: {why}")))
     };
-    let cpu = registry.entries().iter().filter(|e| gpus::uses(&e.id).is_empty()).map(|e| (e.id.clone(), e.revision));
-    let gpu = sapwise::gpu::algorithms(&seen.identities);
-    let algorithm = |(id, revision): (AlgorithmId, u32)| {
-        let reason = refused(&id).or_else(|| match (entry(&id), &unloaded) {
-            (Some(entry), _) => entry.unavailable.clone(),
-            (None, Some(why)) => Some(why.clone()),
-            (None, None) => Some("it is not in this build".to_owned()),
-        });
-        Algorithm { id: id.to_string(), revision, available: reason.is_none(), reason }
+    let entry = |id: &AlgorithmId| match &on_gpus {
+        Ok(list) => list
+            .iter()
+            .find(|e| e.id == *id)
+            .cloned()
+            .map_or_else(|| Some("it is not in this build".to_owned()), |OnGpus { unavailable, .. }| unavailable),
+        Err(why) => Some(why.clone()),
     };
-    cpu.chain(gpu).map(algorithm).collect()
+    let algorithm = |id: &AlgorithmId, revision: u32, reason: Option<String>| Algorithm {
+        id: id.to_string(),
+        revision,
+        available: reason.is_none(),
+        reason,
+    };
+    let registry = Registry::new();
+    let mut list: Vec<Algorithm> =
+        registry.entries().iter().map(|e| algorithm(&e.id, e.revision, e.unavailable.clone())).collect();
+    for (id, revision) in sapwise::gpu::algorithms(&seen.identities) {
+        list.push(algorithm(&id, revision, refused(&id).or_else(|| entry(&id))));
+    }
+    Ok(list)
 }
 
 fn text(answer: &Answer, no_gpus: bool) -> String {

@@ -16,6 +16,7 @@ pub(crate) fn run(arguments: Part) -> anyhow::Result<Outcome> {
             output::print_json(&parameters)?;
         }
         PartKind::Gpus => gpus::print_identities()?,
+        PartKind::GpuAlgorithms => gpus::print_entries()?,
         PartKind::GpuLimits { index } => output::print_json(&gpus::limits_of(index)?)?,
         PartKind::Gpu { index, threads } => gpus::print_parameters(index, &Options { threads, ..Options::default() })?,
         PartKind::GpuGroup { gpus: Backend::Gpu(indices), threads } => {
