@@ -21,7 +21,7 @@
 //! # Features
 //!
 //! - `parallel` (default): the algorithms on several cores, through rayon. Without it only `@cpu1`.
-//! - `gpu`: the algorithms on GPUs, through wgpu; see [`gpu`](crate::gpu).
+//! - `gpu`: the algorithms on GPUs, through wgpu; see the module `gpu`.
 //! - `model`: reports, models and fields as JSON; prediction.
 //! - `measure`: measures the hardware parameters of this machine.
 //! - `schema`: the JSON Schemas of the files, for tools.

@@ -28,7 +28,7 @@ use sapwise::{GpuGroup, GpuHardware, GpuIdentity, Parameter};
 /// # Errors
 /// When standard output can't be written.
 pub(crate) fn print_identities() -> anyhow::Result<()> {
-    Gpus::find().identities().try_for_each(|identity| crate::output::print_json(identity))
+    Gpus::find().identities().try_for_each(crate::output::print_json)
 }
 
 /// What the process that measures a GPU prints. Parameters that can't be measured are missing, with the reason.
