@@ -47,16 +47,13 @@ impl<'a> GpuSet<'a> {
     /// several names for the same rate the first that a GPU has is taken.
     ///
     /// # Errors
-    /// Names the first parameter, when a GPU has none of them.
+    /// Names the last parameter, when a GPU has none of them.
     pub(super) fn rate(&self, names: &[&str], ratio: &str) -> Result<f64, String> {
         let (mut sum, mut fastest) = (0.0, 0.0_f64);
         for gpu in &self.gpus {
             let found = names.iter().find_map(|name| need(gpu, name).ok());
-            let rate = match (found, names.first()) {
-                (Some(rate), _) => rate,
-                (None, Some(first)) => need(gpu, first)?,
-                (None, None) => return Err("no parameter is named".to_owned()),
-            };
+            // Of those that are missing the last one is told.
+            let rate = found.map_or_else(|| names.last().map_or(Ok(0.0), |last| need(gpu, last)), Ok)?;
             sum += rate;
             fastest = fastest.max(rate);
         }

@@ -35,8 +35,9 @@ pub enum Scale {
     /// One byte back: 1 / `download_rate_gb_per_s`, else 1 / `download_gb_per_s`. Several GPUs are limited by
     /// `group_upload_ratio`: both ways go over the same bus.
     GpuDownloadByte,
-    /// One byte read or written in the GPU's memory: 1 / `copy_gb_per_s`, which counts both; else 1 / `read_gb_per_s`. Several
-    /// GPUs are limited by `group_arithmetic_ratio`, which tells how far they work at the same time.
+    /// One byte that a kernel moves in the GPU's memory: 1 / `read_gb_per_s`, where that is missing 1 / `copy_gb_per_s`, whose
+    /// copy command is many times faster than any kernel on programs that act as GPUs. Several GPUs are limited by
+    /// `group_arithmetic_ratio`, which tells how far they work at the same time.
     GpuMemoryByte,
     /// One 32-bit floating-point operation of all lanes at work: 1 / `arithmetic_gflop_per_s`. Several GPUs are limited by
     /// `group_arithmetic_ratio`.
@@ -93,7 +94,7 @@ impl Scale {
                 1.0 / set.rate(&[of_gpu::DOWNLOAD_RATE_GB_PER_S, of_gpu::DOWNLOAD_GB_PER_S], of_gpu::GROUP_UPLOAD_RATIO)?
             }
             Self::GpuMemoryByte => {
-                1.0 / set.rate(&[of_gpu::COPY_GB_PER_S, of_gpu::READ_GB_PER_S], of_gpu::GROUP_ARITHMETIC_RATIO)?
+                1.0 / set.rate(&[of_gpu::READ_GB_PER_S, of_gpu::COPY_GB_PER_S], of_gpu::GROUP_ARITHMETIC_RATIO)?
             }
             Self::GpuOperation => 1.0 / set.rate(&[of_gpu::ARITHMETIC_GFLOP_PER_S], of_gpu::GROUP_ARITHMETIC_RATIO)?,
             _ => cycle(hardware)?,

@@ -36,7 +36,7 @@ const PARAMETERS: [&str; 8] = [
 ];
 
 /// The same of a GPU.
-const GPU_PARAMETERS: [&str; 9] = [
+const GPU_PARAMETERS: [&str; 10] = [
     gpu::parameter::ROUND_TRIP_NS,
     gpu::parameter::READ_BACK_NS,
     gpu::parameter::DISPATCH_NS,
@@ -44,6 +44,7 @@ const GPU_PARAMETERS: [&str; 9] = [
     gpu::parameter::UPLOAD_RATE_GB_PER_S,
     gpu::parameter::DOWNLOAD_GB_PER_S,
     gpu::parameter::DOWNLOAD_RATE_GB_PER_S,
+    gpu::parameter::READ_GB_PER_S,
     gpu::parameter::COPY_GB_PER_S,
     gpu::parameter::ARITHMETIC_GFLOP_PER_S,
 ];
