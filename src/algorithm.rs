@@ -22,6 +22,18 @@ pub enum Backend {
     Gpu(Vec<u32>),
 }
 
+/// The class of a processor: cost models are shared within one, and revisions count in each by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum BackendClass {
+    /// Threads of the CPU.
+    #[default]
+    Cpu,
+    /// One or more GPUs.
+    Gpu,
+}
+
 /// Threads that an algorithm may have, at most.
 pub(crate) const MOST_THREADS: u32 = 4096;
 
@@ -70,6 +82,35 @@ impl AlgorithmId {
             Backend::Cpu(k) => k,
             Backend::Gpu(_) => 1,
         }
+    }
+}
+
+impl Backend {
+    /// Which class of processor it is.
+    #[must_use]
+    pub fn class(&self) -> BackendClass {
+        match self {
+            Self::Cpu(_) => BackendClass::Cpu,
+            Self::Gpu(_) => BackendClass::Gpu,
+        }
+    }
+
+    /// How many work at the same time: threads of the CPU, or GPUs.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        match self {
+            Self::Cpu(threads) => *threads,
+            Self::Gpu(gpus) => u32::try_from(gpus.len()).unwrap_or(u32::MAX),
+        }
+    }
+}
+
+impl fmt::Display for BackendClass {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Cpu => "CPU",
+            Self::Gpu => "GPU",
+        })
     }
 }
 

@@ -161,6 +161,51 @@ impl Hardware {
     pub fn gpu(&self, index: u32) -> Option<&GpuHardware> {
         self.gpus.iter().find(|g| g.gpu.index == index)
     }
+
+    /// How the GPUs of these numbers, ascending, work together, where that was looked at.
+    #[must_use]
+    pub fn gpu_group(&self, indices: &[u32]) -> Option<&GpuGroup> {
+        self.gpu_groups.iter().find(|g| g.gpus == indices)
+    }
+
+    /// What makes this unusable, if anything: a figure that can't be, or something that stands there twice.
+    #[must_use]
+    pub fn defect(&self) -> Option<String> {
+        let cpu = std::iter::once((String::new(), &self.parameters));
+        let gpus = self.gpus.iter().map(|g| (format!(" of gpu{}", g.gpu.index), &g.parameters));
+        let groups = self.gpu_groups.iter().map(|g| (format!(" of the GPUs {:?}", g.gpus), &g.parameters));
+        if let Some(defect) = cpu.chain(gpus).chain(groups).find_map(|(of, list)| defect(&of, list)) {
+            return Some(defect);
+        }
+        for (k, g) in self.gpus.iter().enumerate() {
+            if self.gpus[..k].iter().any(|h| h.gpu.index == g.gpu.index) {
+                return Some(format!("gpu{} stands there twice", g.gpu.index));
+            }
+        }
+        for (k, g) in self.gpu_groups.iter().enumerate() {
+            let known = g.gpus.iter().all(|&k| self.gpu(k).is_some());
+            if g.gpus.len() < 2 || !g.gpus.is_sorted_by(|a, b| a < b) || !known {
+                return Some(format!("the GPUs {:?} are no group of two or more of the GPUs that stand there", g.gpus));
+            }
+            if self.gpu_groups[..k].iter().any(|h| h.gpus == g.gpus) {
+                return Some(format!("the group of the GPUs {:?} stands there twice", g.gpus));
+            }
+        }
+        None
+    }
+}
+
+/// What is wrong with a list of parameters, if anything.
+fn defect(of: &str, parameters: &[Parameter]) -> Option<String> {
+    for (k, p) in parameters.iter().enumerate() {
+        if p.value.is_some_and(|v| !v.is_finite() || v < 0.0) {
+            return Some(format!("the parameter {}{of} is {:?}", p.name, p.value));
+        }
+        if parameters[..k].iter().any(|q| q.name == p.name) {
+            return Some(format!("the parameter {}{of} stands there twice", p.name));
+        }
+    }
+    None
 }
 
 impl Parameter {

@@ -55,7 +55,7 @@ mod splitmix;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
-pub use algorithm::{AlgorithmId, Backend, ParseIdError};
+pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
 pub use broad_phase::BroadPhase;
 pub use cost::{CostCurve, CostTerm, Knot, Term};
 pub use cpu::SimdLevel;

@@ -121,13 +121,8 @@ impl Report {
     /// What makes this report unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<String> {
-        for (k, p) in self.hardware.parameters.iter().enumerate() {
-            if p.value.is_some_and(|v| !v.is_finite() || v < 0.0) {
-                return Some(format!("the parameter {} is {:?}", p.name, p.value));
-            }
-            if self.hardware.parameters[..k].iter().any(|q| q.name == p.name) {
-                return Some(format!("the parameter {} stands there twice", p.name));
-            }
+        if let Some(defect) = self.hardware.defect() {
+            return Some(defect);
         }
         for (k, point) in self.points.iter().enumerate() {
             let at = format!("point {k} ({} at {} objects)", point.scenario, point.load.objects);

@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::gpus::GpuChoice;
 use clap::{Args, Parser, Subcommand};
 use sapwise::{AlgorithmId, Scenario};
 use std::path::PathBuf;
@@ -29,10 +30,13 @@ pub(crate) enum Verb {
     Part(Part),
 }
 
-/// Lists the algorithms that this machine can run, and why it can't run the others.
+/// Lists the GPUs of this machine and the algorithms that it can run, and why it can't run the others.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  sapwise devices --json")]
 pub(crate) struct Devices {
+    /// Look for no GPU, and load no driver.
+    #[arg(long)]
+    pub(crate) no_gpus: bool,
     /// One JSON object on standard output instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -40,7 +44,8 @@ pub(crate) struct Devices {
 
 /// Measures this machine: its hardware parameters, then every algorithm over scenarios and sizes.
 ///
-/// Takes under a minute with --quick and up to five minutes without it. Ctrl-C keeps what was measured.
+/// Takes under a minute with --quick and up to five minutes without it, and some seconds more for each GPU. Ctrl-C keeps what
+/// was measured.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -63,6 +68,8 @@ pub(crate) struct Probe {
     /// Seed of the scenarios and of the order in which algorithms take turns.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) gpus: GpuChoice,
     /// The largest size in the sweep.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(10..=10_000_000))]
     pub(crate) max_objects: Option<u32>,
@@ -79,7 +86,8 @@ pub(crate) struct Probe {
 
 /// Predicts which algorithm is fastest on this machine, for each number of objects, from its hardware parameters alone.
 ///
-/// Measures the hardware in a few seconds and runs no sweep. With --report it predicts for the machine of that report.
+/// Measures the hardware in a few seconds, some more for each GPU, and runs no sweep. With --report it predicts for the machine
+/// of that report.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -104,6 +112,8 @@ pub(crate) struct Predict {
     /// Use this many cores at most, as if the machine had no more.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,
+    #[command(flatten)]
+    pub(crate) gpus: GpuChoice,
     /// Where the fields go.
     #[arg(long, value_name = "T.json")]
     pub(crate) out: Option<PathBuf>,
@@ -140,6 +150,8 @@ pub(crate) struct Run {
     /// Seed of the scenario.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) gpus: GpuChoice,
     /// Where a picture of the costs and decisions goes.
     #[arg(long, value_name = "P.svg")]
     pub(crate) plot: Option<PathBuf>,
@@ -182,7 +194,7 @@ pub(crate) struct Pairs {
     /// The boxes.
     #[arg(value_name = "BOXES.npy")]
     pub(crate) boxes: PathBuf,
-    /// One of the algorithms that `sapwise devices` lists.
+    /// One of the algorithms that `sapwise devices` lists, such as strips@cpu1 or strips@gpu0.
     #[arg(long, value_name = "ID")]
     pub(crate) algorithm: Option<AlgorithmId>,
     /// Go through all frames that many times.
@@ -235,6 +247,25 @@ pub(crate) enum PartKind {
     /// Prints the parameters of one family as JSON.
     Hardware {
         family: String,
+        #[arg(long)]
+        threads: Option<u32>,
+    },
+    /// Prints the GPUs, one as JSON a line.
+    Gpus,
+    /// Prints the algorithms on all GPUs, one as JSON a line.
+    GpuAlgorithms,
+    /// Opens a GPU and prints its limits as JSON.
+    GpuLimits { index: u32 },
+    /// Prints a GPU with its parameters as JSON.
+    Gpu {
+        index: u32,
+        #[arg(long)]
+        threads: Option<u32>,
+    },
+    /// Prints the parameters of several GPUs together as JSON.
+    GpuGroup {
+        /// As in `gpu0+1`.
+        gpus: sapwise::Backend,
         #[arg(long)]
         threads: Option<u32>,
     },

@@ -1,7 +1,7 @@
 //! The card of a model: what it was trained on and how well it did.
 
-use sapwise::Model;
-use sapwise::model::Validation;
+use sapwise::model::{MethodModel, Validation};
+use sapwise::{BackendClass, Model};
 
 /// What every model of this kind is, whatever it was trained on.
 const USE: &str = "
@@ -16,13 +16,25 @@ Regret is the time of the choice over the time of the best choice, less one, on 
 that was not timed there is charged what it cost, relative to the best, where the sweep went through the same scenario and
 size another time; where it was timed in neither, because the algorithm had left the race, ten times the best.
 
-Not for timing promises: a cost may be off by more than the choice that follows from it. Not for GPUs.
+Not for timing promises: a cost may be off by more than the choice that follows from it.";
+
+/// Of a model without GPUs, after [`USE`].
+const NO_GPUS: &str = "Not for GPUs.\n";
+
+/// Of a model with GPUs, after [`USE`].
+const GPUS: &str = "
+On GPUs the terms are round trips, dependent dispatches, bytes up and down, bytes moved within the GPU's memory, operations for
+the candidates, and the cycles that the CPU spends on boxes and pairs; several GPUs count with the slowest latency and the sum of
+their rates, no more than what the group was measured to gain. Timings on programs that act as GPUs serve only where there is no
+real GPU in the training, and a prediction for a kind of GPU that was not in it says so.
 ";
 
 /// The card as a page of Markdown.
 pub(crate) fn page(model: &Model, notes: &[String]) -> String {
     let mut text = format!("# The model {}\n\nMade by `sapwise train`; this page is generated with it.\n", model.name);
     text.push_str(USE);
+    let on_gpus: Vec<&MethodModel> = model.methods.iter().filter(|m| m.backend == BackendClass::Gpu).collect();
+    text.push_str(&gpus(&on_gpus));
     text.push_str("\n## Trained on\n\n| report | physical machine | label |\n|---|---|---|\n");
     for report in &model.trained_on {
         // The label as it stands in the report.
@@ -42,6 +54,18 @@ pub(crate) fn page(model: &Model, notes: &[String]) -> String {
         notes.iter().for_each(|note| text.push_str(&format!("- {note}\n")));
     }
     text
+}
+
+/// What the model knows of GPUs.
+fn gpus(methods: &[&MethodModel]) -> String {
+    if methods.is_empty() {
+        return format!(" {NO_GPUS}");
+    }
+    let mut kinds: Vec<String> = methods.iter().flat_map(|m| &m.gpu_kinds).map(ToString::to_string).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    let most = methods.iter().map(|m| m.max_threads).max().unwrap_or(1);
+    format!("\n{GPUS}\nKinds of GPU in the training: {}; at most {most} together.\n", kinds.join(", "))
 }
 
 /// What was held out, and the scores as a table that `draw` draws.

@@ -2,6 +2,7 @@
 
 use crate::child::{Ended, run_part};
 use crate::exit::WrongUsage;
+use crate::gpus::{self, GpuChoice};
 use crate::progress::Progress;
 use sapwise::measure::{self, Family};
 use sapwise::{Hardware, Parameter, usable_cores};
@@ -10,13 +11,22 @@ use std::time::Duration;
 /// A family takes a second or less. One that takes this long hangs in a driver or has no processor to run on.
 const LIMIT: Duration = Duration::from_secs(15);
 
-/// Measures every family of parameters, on at most `threads` cores, in under five seconds.
+/// Measures every family of parameters, on at most `threads` cores, in under five seconds, then the GPUs that are taken.
 ///
-/// A family that crashes, hangs or is interrupted leaves its parameters missing, with the reason.
+/// A family that crashes, hangs or is interrupted leaves its parameters missing, with the reason. What is told of the GPUs
+/// beside their parameters, which move into the hardware, is the second part of the answer.
 ///
 /// # Errors
 /// When no process can be started.
-pub(crate) fn measure_hardware(threads: Option<u32>) -> anyhow::Result<Hardware> {
+pub(crate) fn measure_hardware(threads: Option<u32>, choice: GpuChoice) -> anyhow::Result<(Hardware, gpus::Measured)> {
+    let mut hardware = measure_cpu(threads)?;
+    let mut measured = gpus::measure(choice, threads)?;
+    hardware.gpus = std::mem::take(&mut measured.gpus);
+    hardware.gpu_groups = std::mem::take(&mut measured.groups);
+    Ok((hardware, measured))
+}
+
+fn measure_cpu(threads: Option<u32>) -> anyhow::Result<Hardware> {
     let progress = Progress::new(Family::ALL.len() as u64);
     let mut found: Vec<Parameter> = Vec::new();
     for family in Family::ALL {

@@ -10,6 +10,7 @@ mod destination;
 mod document;
 mod exit;
 mod files;
+mod gpus;
 mod hardware;
 mod interrupt;
 mod output;

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use sapwise::hardware::parameter;
-use sapwise::{Fields, Hardware, Load, Model, Pairs, Registry, Scenario, Source};
+use sapwise::{Fields, GpuIdentity, Hardware, Load, Model, Pairs, Registry, Scenario, Source};
 
 /// Objects of the slice that the fields show: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
@@ -10,13 +10,19 @@ const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 /// Seed of the scenes that the slice goes through.
 const SEED: u64 = 1;
 
-/// Predicts the fields of a machine: every algorithm on 1, 2, 4, ... and all of its cores.
+/// Predicts the fields of a machine: every algorithm on 1, 2, 4, ... and all of its cores, and on these of its GPUs.
 ///
 /// # Errors
 /// When the model predicts none of the algorithms.
-pub(crate) fn predict(model: &Model, hardware: &Hardware, scenario: Scenario) -> anyhow::Result<Fields> {
+pub(crate) fn predict(
+    model: &Model,
+    hardware: &Hardware,
+    gpus: &[GpuIdentity],
+    scenario: Scenario,
+) -> anyhow::Result<Fields> {
     let cores = hardware.value(parameter::USABLE_CORES).map_or(1, |k| k as u32);
-    let algorithms = Registry::with_cores(cores).available();
+    let mut algorithms = Registry::with_cores(cores).available();
+    algorithms.extend(sapwise::gpu::algorithms(gpus));
     let prediction = model.predict(hardware, &algorithms).map_err(anyhow::Error::msg)?;
     let mut fields = Fields::from_costs(Source::Predicted, &scenario.to_string(), prediction.costs, &slice(scenario)?);
     fields.model = Some(model.name.clone());

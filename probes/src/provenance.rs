@@ -2,8 +2,9 @@
 
 use crate::args::Probe;
 use crate::date;
+use crate::gpus::uses;
 use sapwise::report::{Label, Point, Provenance, Timed};
-use sapwise::{Registry, SimdLevel, usable_cores};
+use sapwise::{GpuKind, Hardware, Registry, SimdLevel, usable_cores};
 use std::time::Duration;
 
 /// A machine whose other programs take more than this share of the CPU at half of the points is not undisturbed.
@@ -24,12 +25,17 @@ pub(crate) fn provenance(arguments: &Probe, took: Duration) -> Provenance {
 }
 
 /// What kind of evidence these points are.
-pub(crate) fn label(arguments: &Probe, points: &[Point]) -> Label {
+pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) -> Label {
+    let software = |k: &u32| hardware.gpu(*k).is_some_and(|g| g.gpu.kind == GpuKind::Software);
+    let on_software_gpu =
+        points.iter().flat_map(|p| &p.timings).any(|t| !t.samples_ns.is_empty() && uses(&t.algorithm).iter().any(software));
     let fewer_cores = arguments.threads.is_some_and(|k| k < usable_cores());
     let lower_level = requested_level().is_some_and(|level| level < SimdLevel::detected());
     // Contention first: a restricted machine that is disturbed shows what no restriction explains.
     if arguments.contended || median_foreign_load(points).is_some_and(|load| load > CONTENDED_LOAD) {
         Label::RealContended
+    } else if on_software_gpu {
+        Label::RealSoftwareGpu
     } else if fewer_cores || lower_level {
         Label::RealRestricted
     } else {
@@ -37,11 +43,12 @@ pub(crate) fn label(arguments: &Probe, points: &[Point]) -> Label {
     }
 }
 
-/// The algorithms that have timings at these points, in the order of the registry.
-pub(crate) fn timed(points: &[Point], threads: Option<u32>) -> Vec<Timed> {
+/// The algorithms that have timings at these points, in the order of the registry, then those of the GPUs.
+pub(crate) fn timed(points: &[Point], threads: Option<u32>, hardware: &Hardware) -> Vec<Timed> {
     let registry = Registry::with_cores(threads.unwrap_or_else(usable_cores));
     let raced = |id| points.iter().any(|p| p.timings.iter().any(|t| t.algorithm == id));
-    let entries = registry.available().into_iter();
+    let on_gpus = sapwise::gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu));
+    let entries = registry.available().into_iter().chain(on_gpus);
     entries.filter(|(id, _)| raced(id.clone())).map(|(id, revision)| Timed { id, revision }).collect()
 }
 
@@ -59,8 +66,13 @@ fn median_foreign_load(points: &[Point]) -> Option<f64> {
 /// The arguments without `--out`: paths name users.
 fn command(arguments: &Probe) -> String {
     let mut words = vec!["probe".to_owned()];
-    let flags =
-        [("--hardware-only", arguments.hardware_only), ("--quick", arguments.quick), ("--contended", arguments.contended)];
+    let flags = [
+        ("--hardware-only", arguments.hardware_only),
+        ("--quick", arguments.quick),
+        ("--contended", arguments.contended),
+        ("--no-gpus", arguments.gpus.no_gpus),
+        ("--software-gpus", arguments.gpus.software_gpus),
+    ];
     words.extend(flags.iter().filter(|f| f.1).map(|f| f.0.to_owned()));
     words.extend(arguments.threads.map(|k| format!("--threads {k}")));
     words.push(format!("--seed {}", arguments.seed));
@@ -74,7 +86,8 @@ mod tests {
     use super::*;
     use crate::args::{Arguments, Verb};
     use clap::Parser;
-    use sapwise::Load;
+    use sapwise::report::Timing;
+    use sapwise::{GpuHardware, GpuIdentity, Load, Machine};
 
     fn probe(words: &[&str]) -> Probe {
         let all = ["sapwise", "probe"].iter().chain(words);
@@ -98,21 +111,42 @@ mod tests {
 
     #[test]
     fn the_command_holds_no_path() {
-        let arguments = probe(&["--quick", "--out", "/home/someone/r.json", "--threads", "1", "--scenario", "slab"]);
-        assert_eq!(command(&arguments), "probe --quick --threads 1 --seed 1 --scenario slab");
+        let arguments =
+            probe(&["--quick", "--out", "/home/someone/r.json", "--threads", "1", "--scenario", "slab", "--no-gpus"]);
+        assert_eq!(command(&arguments), "probe --quick --no-gpus --threads 1 --seed 1 --scenario slab");
     }
 
     #[test]
     fn contention_and_restriction_are_labelled() {
         let quiet = [point(Some(0.01)), point(None), point(Some(0.9)), point(Some(0.0))];
         let busy = [point(Some(0.3)), point(Some(0.4)), point(Some(0.0))];
-        assert_eq!(label(&probe(&["--contended"]), &quiet), Label::RealContended);
-        assert_eq!(label(&probe(&[]), &busy), Label::RealContended);
+        let label = |words: &[&str], points: &[Point]| label(&probe(words), points, &hardware(GpuKind::Discrete));
+        assert_eq!(label(&["--contended"], &quiet), Label::RealContended);
+        assert_eq!(label(&[], &busy), Label::RealContended);
         if requested_level().is_none() {
-            assert_eq!(label(&probe(&[]), &quiet), Label::RealFull);
+            assert_eq!(label(&[], &quiet), Label::RealFull);
         }
         if usable_cores() > 1 {
-            assert_eq!(label(&probe(&["--threads", "1"]), &quiet), Label::RealRestricted);
+            assert_eq!(label(&["--threads", "1"], &quiet), Label::RealRestricted);
         }
+    }
+
+    fn hardware(kind: GpuKind) -> Hardware {
+        let text = String::new;
+        let gpu = GpuIdentity { index: 0, name: text(), device: text(), driver: text(), api: text(), kind };
+        let gpus = vec![GpuHardware { gpu, parameters: Vec::new() }];
+        Hardware { machine: Machine::default(), parameters: Vec::new(), gpus, gpu_groups: Vec::new() }
+    }
+
+    #[test]
+    fn a_swept_program_that_acts_as_a_gpu_is_labelled() {
+        let timing = |samples_ns: Vec<u64>| Timing { algorithm: "brute@gpu0".parse().unwrap(), samples_ns, error: None };
+        let swept = [Point { timings: vec![timing(vec![1, 2, 3])], ..point(None) }];
+        let failed = [Point { timings: vec![timing(Vec::new())], ..point(None) }];
+        let software = hardware(GpuKind::Software);
+        assert_eq!(label(&probe(&[]), &swept, &software), Label::RealSoftwareGpu);
+        assert_ne!(label(&probe(&[]), &failed, &software), Label::RealSoftwareGpu);
+        assert_ne!(label(&probe(&[]), &swept, &hardware(GpuKind::Discrete)), Label::RealSoftwareGpu);
+        assert_eq!(timed(&swept, Some(1), &software)[0].id.to_string(), "brute@gpu0");
     }
 }

@@ -1,30 +1,70 @@
 //! Whether what a file tells about algorithms holds for those of this build.
 
-use sapwise::{Fields, Registry, Report};
+use sapwise::{AlgorithmId, BackendClass, Fields, GpuIdentity, GpuKind, Registry, Report};
 
 /// What keeps the timings of a report from holding for this build, one sentence for each method.
 pub(crate) fn stale_in_report(report: &Report, registry: &Registry) -> Vec<String> {
-    stale(report.algorithms.iter().map(|t| (t.id.method(), t.revision)), registry)
+    stale(report.algorithms.iter().map(|t| (of(&t.id), t.revision)), registry)
 }
 
 /// The same of fields. Those without costs hold no revisions.
 pub(crate) fn stale_in_fields(fields: &Fields, registry: &Registry) -> Vec<String> {
-    stale(fields.costs.iter().map(|c| (c.algorithm.method(), c.revision)), registry)
+    stale(fields.costs.iter().map(|c| (of(&c.algorithm), c.revision)), registry)
+}
+
+/// What has a revision: a method on one class of processor.
+pub(crate) type Key<'a> = (BackendClass, &'a str);
+
+fn of(id: &AlgorithmId) -> Key<'_> {
+    (id.backend().class(), id.method())
 }
 
 /// The methods whose revision is not that of this build.
-pub(crate) fn stale<'a>(used: impl Iterator<Item = (&'a str, u32)>, registry: &Registry) -> Vec<String> {
+pub(crate) fn stale<'a>(used: impl Iterator<Item = (Key<'a>, u32)>, registry: &Registry) -> Vec<String> {
+    // The revisions on GPUs are the same on every GPU, and hold on a machine without any.
+    let on_gpus = sapwise::gpu::algorithms(std::iter::once(&any_gpu()));
     let mut stale = Vec::new();
-    for (method, revision) in used {
+    for ((class, method), revision) in used {
+        let name = if class == BackendClass::Cpu { method.to_owned() } else { format!("{method} on a GPU") };
         // Every thread count of a method has the same revision, and a machine with other counts has other ids.
-        let ours = registry.entries().iter().find(|e| e.id.method() == method).map(|e| e.revision);
+        let own = registry.entries().iter().find(|e| of(&e.id) == (class, method)).map(|e| e.revision);
+        let ours = own.or_else(|| on_gpus.iter().find(|(id, _)| of(id) == (class, method)).map(|(_, revision)| *revision));
         match ours {
             Some(ours) if ours == revision => {}
-            Some(ours) => stale.push(format!("{method} has revision {revision} there and {ours} in this build")),
-            None => stale.push(format!("{method} is not in this build")),
+            Some(ours) => stale.push(format!("{name} has revision {revision} there and {ours} in this build")),
+            None => stale.push(format!("{name} is not in this build")),
         }
     }
     stale.sort_unstable();
     stale.dedup();
     stale
+}
+
+/// Whether this build has the method of an algorithm on that class of processor.
+pub(crate) fn is_known(id: &AlgorithmId, registry: &Registry) -> bool {
+    let on_gpus = sapwise::gpu::algorithms(std::iter::once(&any_gpu()));
+    registry.entries().iter().any(|e| of(&e.id) == of(id)) || on_gpus.iter().any(|(other, _)| of(other) == of(id))
+}
+
+/// A GPU that there need not be.
+fn any_gpu() -> GpuIdentity {
+    let text = String::new;
+    GpuIdentity { index: 0, name: text(), device: text(), driver: text(), api: text(), kind: GpuKind::Other }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn revisions_count_on_cpu_and_gpu_apart_and_without_any_gpu() {
+        let registry = Registry::with_cores(1);
+        let on_gpu = sapwise::gpu::algorithms(std::iter::once(&any_gpu()))[0].1;
+        let key = |class| (class, "brute");
+        assert_eq!(stale(std::iter::once((key(BackendClass::Gpu), on_gpu)), &registry), Vec::<String>::new());
+        let told = stale(std::iter::once((key(BackendClass::Gpu), 999)), &registry);
+        assert!(told[0].starts_with("brute on a GPU has revision 999"), "{told:?}");
+        let told = stale(std::iter::once((key(BackendClass::Cpu), 999)), &registry);
+        assert!(told[0].starts_with("brute has revision 999"), "{told:?}");
+    }
 }

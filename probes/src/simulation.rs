@@ -4,7 +4,7 @@ use crate::interrupt;
 use crate::progress::Progress;
 use crate::turns::Turns;
 use anyhow::{Context, bail};
-use sapwise::{Adaptive, AlgorithmId, BroadPhase, Fields, Pairs, Registry, Scenario};
+use sapwise::{Adaptive, AlgorithmId, BackendClass, BroadPhase, Fields, Pairs, Registry, Scenario};
 use std::time::Instant;
 
 /// A fixed algorithm of which even the fastest of two samples at a frame takes this many times as long as the best there is
@@ -46,6 +46,8 @@ pub(crate) struct Outcome {
     /// Repeats that all frames have; the last may have been cut short by Ctrl-C and is then left out.
     pub(crate) repeats: usize,
     pub(crate) interrupted: bool,
+    /// Fixed algorithms that could not run, or not to the end, and why.
+    pub(crate) notes: Vec<String>,
 }
 
 impl Outcome {
@@ -132,11 +134,20 @@ impl Contestant {
 /// # Errors
 /// When no algorithm of the fields can run, when contestants disagree about the pairs, or on Ctrl-C before one repeat is done.
 pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> anyhow::Result<Outcome> {
-    let mut fixed: Vec<AlgorithmId> = registry.available().into_iter().map(|(id, _)| id).collect();
-    let mut contestants: Vec<Contestant> = fixed
-        .iter()
-        .map(|id| Ok(Contestant::new(registry.create(id)?, course.frames)))
-        .collect::<Result<_, sapwise::Error>>()?;
+    let mut fixed: Vec<AlgorithmId> = Vec::new();
+    let mut contestants: Vec<Contestant> = Vec::new();
+    let mut notes: Vec<String> = Vec::new();
+    for (id, _) in registry.available() {
+        match registry.create(&id) {
+            Ok(algorithm) => {
+                contestants.push(Contestant::new(algorithm, course.frames));
+                fixed.push(id);
+            }
+            // A driver may refuse at any time; the course goes on without its GPU.
+            Err(error) if id.backend().class() == BackendClass::Gpu => notes.push(error.to_string()),
+            Err(error) => return Err(error.into()),
+        }
+    }
     // Fields may name a number of threads that the registry doesn't list but can make.
     for id in fields.algorithms() {
         if !fixed.contains(id)
@@ -178,7 +189,17 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
                 ns.push((started.elapsed().as_nanos() as u64).max(1));
                 under_way.push((k, frame));
                 let name = || fixed.get(k).map_or("the adaptive module".to_owned(), AlgorithmId::to_string);
-                result.with_context(|| format!("{} at frame {frame}", name()))?;
+                match (result, contestants.get_mut(k)) {
+                    (Err(error @ sapwise::Error::Unavailable { .. }), Some(contestant)) => {
+                        // It is at fault and not the boxes: a GPU that was lost. The adaptive module goes on without it too.
+                        notes.push(format!("{error}, at frame {frame}"));
+                        contestant.ns[frame].clear();
+                        contestant.left = true;
+                        under_way.pop();
+                        continue;
+                    }
+                    (result, _) => result.with_context(|| format!("{} at frame {frame}", name()))?,
+                }
                 if repeat == 0 {
                     let own = pairs.fingerprint();
                     if *fingerprint.get_or_insert(own) != own {
@@ -211,7 +232,7 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
         frame.adaptive_ns = sapwise::measure::statistics::median(&samples).unwrap_or(f64::INFINITY);
         frame.fixed_ns = contestants.iter().map(|c| c.median(at)).collect();
     }
-    Ok(Outcome { fixed, frames, repeats: done, interrupted: done < course.repeats })
+    Ok(Outcome { fixed, frames, repeats: done, interrupted: done < course.repeats, notes })
 }
 
 /// The fastest sample of any fixed algorithm at a frame.
@@ -288,6 +309,7 @@ mod tests {
             frames: vec![frame(1e6, 2e9), frame(1e6, f64::INFINITY)],
             repeats: 1,
             interrupted: false,
+            notes: Vec::new(),
         };
         assert_eq!((outcome.fixed_ms(0), outcome.fixed_ms(1)), (Some(2.0), None));
         assert_eq!((outcome.left(0), outcome.left(1)), (None, Some((0, 2000.0))));
@@ -303,6 +325,7 @@ mod tests {
             frames: vec![frame(1e6, 1e6, 4e6, 0), frame(3e6, 5e6, 2e6, 1), frame(2e6, 5e6, 2e6, 1)],
             repeats: 1,
             interrupted: false,
+            notes: Vec::new(),
         };
         assert_eq!((outcome.adaptive_ms(), outcome.oracle_ms()), (6.0, 5.0));
         assert!((outcome.regret() - 0.2).abs() < 1e-12);

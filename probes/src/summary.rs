@@ -1,9 +1,11 @@
 //! What a person reads at the end of a probe or a prediction.
 
+use crate::gpus::GpuChoice;
 use crate::table::{bytes, columns, duration, grouped};
 use crate::train::{measured_fields, slice_scenario};
+use sapwise::hardware::gpu::parameter::UNIFIED_MEMORY;
 use sapwise::report::Label;
-use sapwise::{Fields, Hardware, How, Report};
+use sapwise::{Backend, Fields, GpuHardware, GpuIdentity, Hardware, How, Parameter, Report};
 use std::path::Path;
 
 /// The hardware, then the fields of every scenario that was swept.
@@ -36,11 +38,53 @@ pub(crate) fn next_step(report: &Report, path: &Path) -> String {
     format!("\nThe report is in {path}. Next: {next}")
 }
 
-/// The parameters of a machine as a table.
+/// The parameters of a machine, of each of its GPUs and of their groups, as tables.
 pub(crate) fn hardware(hardware: &Hardware) -> String {
     let machine = &hardware.machine;
+    let mut text = format!(
+        "{}, {}, vector instructions: {}\n\n{}",
+        machine.cpu,
+        machine.arch,
+        machine.simd,
+        parameters(&hardware.parameters)
+    );
+    for GpuHardware { gpu, parameters: list } in &hardware.gpus {
+        let GpuIdentity { index, name, driver, api, kind, .. } = gpu;
+        text += &format!("\ngpu{index}: {name}, {kind}, {api}, {driver}\n\n{}", parameters(list));
+    }
+    for group in &hardware.gpu_groups {
+        let name = Backend::Gpu(group.gpus.clone());
+        text += &format!("\n{name}, all at the same time\n\n{}", parameters(&group.parameters));
+    }
+    text
+}
+
+/// What is told of GPUs after a measurement, if anything: that there is none, or which were not taken. What went wrong is
+/// told with the remarks.
+pub(crate) fn gpus_left_out(
+    choice: GpuChoice,
+    hardware: &Hardware,
+    left_out: &[GpuIdentity],
+    remarks: &[String],
+) -> Option<String> {
+    let none = !choice.no_gpus && hardware.gpus.is_empty() && left_out.is_empty() && remarks.is_empty();
+    none.then(|| "No GPU was found; everything else works on the CPU.".to_owned()).or_else(|| choice.tell(left_out))
+}
+
+/// Parameters as a table. Those that are missing for the same reason share a row.
+fn parameters(parameters: &[Parameter]) -> String {
     let mut rows = vec![["parameter", "value", "spread", "how"].map(str::to_owned).to_vec()];
-    for p in &hardware.parameters {
+    let missing = |p: &Parameter| p.how == How::Missing;
+    for (k, p) in parameters.iter().enumerate() {
+        let alike = |q: &&Parameter| missing(q) && q.source == p.source;
+        if missing(p) && parameters[..k].iter().any(|q| alike(&q)) {
+            continue;
+        }
+        let names: Vec<&str> = parameters[k..].iter().filter(alike).map(|q| q.name.as_str()).collect();
+        let name = match names.len() {
+            0 | 1 => p.name.clone(),
+            many => format!("{} and {} more", p.name, many - 1),
+        };
         let spread = p.dispersion.map_or(String::new(), |d| format!("{:.1} %", d * 100.0));
         let disturbed = p.foreign_load.filter(|&load| load > 0.05);
         let disturbed = disturbed.map_or(String::new(), |load| format!(", foreign load {:.0} %", load * 100.0));
@@ -49,9 +93,9 @@ pub(crate) fn hardware(hardware: &Hardware) -> String {
             How::Reported => "reported".to_owned(),
             How::Missing => format!("missing: {}", p.source),
         };
-        rows.push(vec![p.name.clone(), p.value.map_or("-".to_owned(), |v| value(&p.name, v)), spread, how]);
+        rows.push(vec![name, p.value.map_or("-".to_owned(), |v| value(&p.name, v)), spread, how]);
     }
-    format!("{}, {}, vector instructions: {}\n\n{}", machine.cpu, machine.arch, machine.simd, columns(&rows))
+    columns(&rows)
 }
 
 /// The steps of a slice, with where each begins and how sure that is.
@@ -77,6 +121,9 @@ pub(crate) fn fields(fields: &Fields) -> String {
 fn value(name: &str, value: f64) -> String {
     match name {
         _ if name.ends_with("_gb_per_s") => format!("{value:.1} GB/s"),
+        _ if name.ends_with("_gflop_per_s") => format!("{value:.0} GFLOP/s"),
+        _ if name.ends_with("_g_per_s") => format!("{value:.2} G/s"),
+        _ if name == UNIFIED_MEMORY => if value > 0.0 { "yes" } else { "no" }.to_owned(),
         _ if name.ends_with("_bytes") => bytes(value),
         _ if name.ends_with("_ghz") => format!("{value:.2} GHz"),
         _ if name.ends_with("_ns") && value < 1000.0 => format!("{value:.1} ns"),
@@ -119,5 +166,8 @@ mod tests {
         assert_eq!(value("fork_join_cold_ns", 12_500.0), "12.50 us");
         assert_eq!(value("scaling_two_threads_ratio", 1.9), "1.90 x");
         assert_eq!(value("usable_cores", 2.0), "2");
+        assert_eq!(value("arithmetic_gflop_per_s", 51_234.5), "51234 GFLOP/s");
+        assert_eq!(value("atomic_g_per_s", 0.25), "0.25 G/s");
+        assert_eq!(value("unified_memory", 1.0), "yes");
     }
 }

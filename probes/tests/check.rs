@@ -93,7 +93,7 @@ fn stale_and_inapplicable_files_fail_and_say_which_algorithm() {
     let old = write(folder.path(), "old.json", old.to_string());
     let steps = json!([
         {"from_objects": 0, "algorithm": "brute@cpu4096"}, {"from_objects": 9, "algorithm": "octree@cpu1"},
-        {"from_objects": 99, "algorithm": "strips@gpu0"}
+        {"from_objects": 99, "algorithm": "strips@gpu99"}
     ]);
     let elsewhere = write(folder.path(), "elsewhere.json", fields(&steps).to_string());
     let (status, findings) = check(&[old, elsewhere]);
@@ -101,7 +101,7 @@ fn stale_and_inapplicable_files_fail_and_say_which_algorithm() {
     assert_eq!((&findings[0]["sound"], &findings[0]["current"]), (&true.into(), &false.into()));
     assert!(findings[0]["problems"].to_string().contains("brute has revision 999999"), "{findings:?}");
     assert_eq!(findings[1]["applicable"], false);
-    for text in ["brute@cpu4096", "octree@cpu1", "strips@gpu0"] {
+    for text in ["brute@cpu4096", "octree@cpu1", "strips@gpu99"] {
         assert!(findings[1]["problems"].to_string().contains(text), "{findings:?}");
     }
 }

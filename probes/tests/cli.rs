@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{failure, npy, sapwise, success};
+use common::{failure, npy, sapwise, success, without_adapters};
 use std::fs;
 
 #[test]
@@ -18,7 +18,7 @@ fn every_verb_has_help_with_an_example() {
 
 #[test]
 fn wrong_usage_is_exit_status_two() {
-    let cases: [&[&str]; 11] = [
+    let cases: [&[&str]; 13] = [
         &[],
         &["fly"],
         &["devices", "--fast"],
@@ -29,6 +29,8 @@ fn wrong_usage_is_exit_status_two() {
         &["probe", "--threads", "4096"],
         &["predict", "--threads", "4096"],
         &["predict", "--measured"],
+        &["predict", "--no-gpus", "--software-gpus"],
+        &["pairs", "x.npy", "--no-gpus"],
         &["probe", "--hardware-only", "--quick"],
     ];
     for words in cases {
@@ -47,15 +49,18 @@ fn a_wrong_simd_level_is_refused_by_every_verb() {
 }
 
 #[test]
-fn devices_lists_algorithms_and_no_adapter() {
-    let answer: serde_json::Value = serde_json::from_str(&success(sapwise().args(["devices", "--json"]))).unwrap();
+fn devices_lists_algorithms_and_says_when_there_is_no_adapter() {
+    let json = success(without_adapters(&mut sapwise()).args(["devices", "--json"]));
+    let answer: serde_json::Value = serde_json::from_str(&json).unwrap();
     let algorithms = answer["algorithms"].as_array().unwrap();
     assert!(answer["adapters"].as_array().unwrap().is_empty());
     let brute = algorithms.iter().find(|a| a["id"] == "brute@cpu1").unwrap();
     assert_eq!((&brute["available"], &brute["reason"]), (&true.into(), &serde_json::Value::Null));
     assert!(brute["revision"].as_u64().unwrap() >= 1);
-    let text = success(sapwise().arg("devices"));
-    assert!(text.contains("brute@cpu1") && text.contains("no GPU backend"), "{text}");
+    let text = success(without_adapters(&mut sapwise()).arg("devices"));
+    assert!(text.contains("brute@cpu1") && text.contains("No GPU was found; everything else works on the CPU."), "{text}");
+    let text = success(sapwise().args(["devices", "--no-gpus"]));
+    assert!(text.contains("brute@cpu1") && !text.contains("GPU") && !text.contains("@gpu"), "{text}");
 }
 
 #[test]
@@ -132,9 +137,9 @@ fn bad_boxes_are_told_with_file_frame_and_position() {
 fn an_unknown_algorithm_is_wrong_usage_and_names_the_known() {
     let folder = tempfile::tempdir().unwrap();
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0; 6]);
-    for id in ["octree@cpu1", "brute@gpu0"] {
+    for (id, told) in [("octree@cpu1", "brute@cpu1"), ("brute@gpu99", "this machine has no gpu99")] {
         let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--algorithm", id]), 2);
-        assert!(complaint.contains("brute@cpu1"), "{complaint}");
+        assert!(complaint.contains(told), "{complaint}");
     }
 }
 

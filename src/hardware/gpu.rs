@@ -191,3 +191,23 @@ impl GpuHardware {
         self.parameters.iter().find(|p| p.name == name).and_then(|p| p.value)
     }
 }
+
+impl GpuGroup {
+    /// The value of a parameter, when it is there and not missing.
+    #[must_use]
+    pub fn value(&self, name: &str) -> Option<f64> {
+        self.parameters.iter().find(|p| p.name == name).and_then(|p| p.value)
+    }
+}
+
+impl std::fmt::Display for GpuKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Discrete => "discrete",
+            Self::Integrated => "integrated",
+            Self::Virtual => "virtual",
+            Self::Other => "other",
+            Self::Software => "software",
+        })
+    }
+}

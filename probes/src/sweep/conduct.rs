@@ -5,8 +5,8 @@ use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::Progress;
 use anyhow::Context;
-use sapwise::Scenario;
 use sapwise::report::Point;
+use sapwise::{GpuIdentity, Scenario};
 use std::time::Duration;
 
 /// What a scenario may take beyond its time: start-up, the first scene and a last frame that was forecast too short.
@@ -28,6 +28,8 @@ pub(crate) struct Conditions {
     pub(crate) cores: u32,
     pub(crate) seed: u64,
     pub(crate) contended: bool,
+    /// The GPUs to sweep.
+    pub(crate) gpus: Vec<GpuIdentity>,
 }
 
 /// Sweeps every scenario of a plan. `keep` is called after each of them, so that nothing measured is lost.
@@ -37,9 +39,10 @@ pub(crate) struct Conditions {
 pub(crate) fn conduct(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut(&Found)) -> anyhow::Result<Found> {
     let progress = Progress::new(plan.points());
     let mut found = Found::default();
+    let mut gpus = &conditions.gpus[..];
     for (k, scenario) in plan.scenarios.iter().enumerate() {
         progress.message(scenario.to_string());
-        let ended = one(plan, *scenario, conditions, &progress, &mut found)?;
+        let ended = one(plan, *scenario, conditions, gpus, &progress, &mut found)?;
         match ended {
             Ended::Well => {}
             Ended::Interrupted => {
@@ -53,6 +56,11 @@ pub(crate) fn conduct(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut
             Ended::Badly(how) => {
                 found.remarks.push(format!("{scenario} is incomplete: its process {how}"));
                 found.failed = true;
+                // Whatever it was, a driver is the first to be suspected.
+                if !gpus.is_empty() {
+                    found.remarks.push(format!("GPUs are left out after {scenario}, whose process did not end well"));
+                    gpus = &[];
+                }
             }
         }
         // Sizes that did not fit into the time count as done.
@@ -66,6 +74,7 @@ fn one(
     plan: &Plan,
     scenario: Scenario,
     conditions: &Conditions,
+    gpus: &[GpuIdentity],
     progress: &Progress,
     found: &mut Found,
 ) -> anyhow::Result<Ended> {
@@ -78,11 +87,17 @@ fn one(
         cores: conditions.cores,
         seed: conditions.seed,
         seconds: plan.each.as_secs_f64(),
+        gpus: gpus.to_vec(),
         contended: conditions.contended,
     };
     let text = serde_json::to_string(&order)?;
     run_part(&["sweep", &text], plan.each + GRACE, &mut |line| {
-        let event = serde_json::from_str(line).with_context(|| format!("{scenario}: its process printed {line:?}"))?;
+        let event = match serde_json::from_str(line) {
+            Ok(event) => event,
+            // Drivers print what they like on the standard output of whoever loads them.
+            Err(_) if !gpus.is_empty() => return Ok(()),
+            Err(error) => return Err(error).with_context(|| format!("{scenario}: its process printed {line:?}")),
+        };
         match event {
             Event::Point(point) => {
                 progress.message(format!("{scenario}: {} objects done", point.load.objects));

@@ -1,5 +1,6 @@
 //! What a sweeping process is told, and what it tells.
 
+use sapwise::GpuIdentity;
 use sapwise::report::Point;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +18,8 @@ pub(crate) struct Order {
     pub(crate) seed: u64,
     /// Time for all sizes.
     pub(crate) seconds: f64,
+    /// The GPUs that algorithms may use, as they were when the hardware was measured.
+    pub(crate) gpus: Vec<GpuIdentity>,
     /// Whether foreign load is wanted, so that it spoils nothing.
     pub(crate) contended: bool,
 }

@@ -3,8 +3,10 @@
 use super::dropout::Standing;
 use super::race::{FEWEST_FRAMES, Race, Runner};
 use super::{Event, Order, median, plan};
+use crate::gpus;
+use sapwise::gpu::Gpus;
 use sapwise::report::Point;
-use sapwise::{Registry, Scenario, Scene};
+use sapwise::{GpuIdentity, Registry, Scenario, Scene};
 use std::time::{Duration, Instant};
 
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
@@ -20,6 +22,9 @@ pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result
     let end = Instant::now() + time;
     let mut registry = Registry::with_cores(order.cores);
     registry.pin_threads();
+    for remark in add_gpus(&mut registry, &order.gpus) {
+        emit(Event::Remark(format!("{scenario}: {remark}")))?;
+    }
     let mut runners = Vec::new();
     for (id, _) in registry.available() {
         match registry.create(&id) {
@@ -59,6 +64,19 @@ pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result
         before = Some(Before { objects, frame: outcome.frame, best_ns });
     }
     Ok(())
+}
+
+/// Adds the algorithms on those of these GPUs that are still there, and gives what keeps others from running.
+fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<String> {
+    if wanted.is_empty() {
+        return Vec::new();
+    }
+    let gpus = Gpus::find();
+    let (there, gone): (Vec<_>, Vec<_>) = wanted.iter().cloned().partition(|g| gpus.identities().any(|h| h == g));
+    let gone = gone.into_iter().map(|g| {
+        format!("gpu{} ({}) was there when the hardware was measured and is gone; it is left out", g.index, g.name)
+    });
+    gone.chain(gpus::register(registry, &gpus, &there)).collect()
 }
 
 /// The size before.
@@ -125,9 +143,13 @@ pub(crate) fn next_frame(scene: &mut Scene) {
 mod tests {
     use super::*;
 
+    fn order(scenario: &str, sizes: &[u32], seconds: f64) -> Order {
+        let (scenario, sizes) = (scenario.to_owned(), sizes.to_vec());
+        Order { scenario, sizes, cores: 2, seed: 3, seconds, gpus: Vec::new(), contended: false }
+    }
+
     fn events(scenario: &str, sizes: &[u32], seconds: f64) -> Vec<Event> {
-        let order =
-            Order { scenario: scenario.to_owned(), sizes: sizes.to_vec(), cores: 2, seed: 3, seconds, contended: false };
+        let order = order(scenario, sizes, seconds);
         let mut events = Vec::new();
         sweep(&order, &mut |event| {
             events.push(event);
@@ -161,8 +183,27 @@ mod tests {
     }
 
     #[test]
+    fn a_gpu_that_is_gone_is_a_remark_and_the_sweep_goes_on() {
+        let text = || "none such".to_owned();
+        let kind = sapwise::GpuKind::Discrete;
+        let gone = GpuIdentity { index: 99, name: text(), device: text(), driver: text(), api: text(), kind };
+        let order = Order { gpus: vec![gone], ..order("uniform", &[10], 1.0) };
+        let (mut points, mut remarks) = (0, Vec::new());
+        sweep(&order, &mut |event| {
+            match event {
+                Event::Point(_) => points += 1,
+                Event::Remark(text) => remarks.push(text),
+                Event::Mismatch(text) => panic!("{text}"),
+            }
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!((points, remarks.len()), (1, 1), "{remarks:?}");
+        assert!(remarks[0].contains("gpu99 (none such) was there"), "{remarks:?}");
+    }
+
+    #[test]
     fn unknown_scenarios_are_refused() {
-        let order = Order { scenario: "x".into(), sizes: vec![10], cores: 1, seed: 0, seconds: 1.0, contended: false };
-        assert!(sweep(&order, &mut |_| Ok(())).unwrap_err().to_string().contains("uniform"));
+        assert!(sweep(&order("x", &[10], 1.0), &mut |_| Ok(())).unwrap_err().to_string().contains("uniform"));
     }
 }

@@ -1,11 +1,12 @@
 //! Ways to choose an algorithm that a prediction has to beat.
 
-use super::PARAMETERS;
 use super::curve::{measured_costs, measured_fields};
 use super::rows::{Profile, best, medians};
+use super::{GPU_PARAMETERS, PARAMETERS, figure};
 use anyhow::Result;
+use sapwise::model::GPU_PREFIX;
 use sapwise::report::Point;
-use sapwise::{AlgorithmCost, AlgorithmId, Fields, Hardware, Load, Report};
+use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Fields, Hardware, Load, Report};
 
 /// Chooses an algorithm under a load among those that a machine has; `None` where it knows none of them.
 pub(crate) type Chooser<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
@@ -63,21 +64,27 @@ pub(crate) fn single_best<'a>(training: &[&Profile], available: &[AlgorithmId]) 
 /// With 64 and `strips` this is nexus, which has brute force for up to 64 colliders and a tree beyond; strips stand for the
 /// tree, being what is fastest in large scenes here. With 999 and `sweep` it is `mujoco_warp`, whose constant of 1000 bodies
 /// parts two kinds of sweep after a brute force that is chosen by a count of filtered pairs, which is not known here; the
-/// constant is taken for the border between brute force and sweep. Both run on a GPU there.
+/// constant is taken for the border between brute force and sweep. Both run on a GPU there; here both run on the CPU, which
+/// every machine has.
 pub(crate) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Chooser<'a> {
-    let small = available.iter().filter(|id| id.method() == "brute").min_by_key(|id| id.threads()).cloned();
-    let large = available.iter().filter(|id| id.method() == above).max_by_key(|id| id.threads()).cloned();
+    let on_cpu = |method: &'_ str| {
+        let of = |id: &&AlgorithmId| id.method() == method && id.backend().class() == BackendClass::Cpu;
+        available.iter().filter(of).cloned().collect::<Vec<_>>()
+    };
+    let small = on_cpu("brute").into_iter().min_by_key(AlgorithmId::threads);
+    let large = on_cpu(above).into_iter().max_by_key(AlgorithmId::threads);
     Box::new(move |load| if load.objects <= last { small.clone() } else { large.clone() })
 }
 
-/// The measured thresholds of the first training profile, by the number of objects alone, whatever the machine.
+/// The measured thresholds of the first training profile, by the number of objects alone, whatever the machine. Where they name
+/// a GPU and the machine has none, the same method runs on all of its cores.
 ///
 /// # Errors
 /// When that profile has too few timings for thresholds.
 pub(crate) fn default_machine<'a>(training: &[&Profile], available: &'a [AlgorithmId]) -> Result<Chooser<'a>> {
     let Some(first) = training.first() else { return Ok(Box::new(|_| None)) };
     let fields = measured_fields(&first.report, slice_scenario(&first.report))?;
-    Ok(Box::new(move |load| fields.step(load.objects).and_then(|s| closest(&s.algorithm, available))))
+    Ok(Box::new(move |load| fields.step(load.objects).and_then(|s| stand_in(&s.algorithm, available))))
 }
 
 /// The measured costs of the training profile whose hardware is nearest, under the whole load.
@@ -104,18 +111,27 @@ pub(crate) fn slice_scenario(report: &Report) -> &str {
     names().find(|n| *n == "uniform").or_else(|| names().next()).unwrap_or("uniform")
 }
 
-/// The available algorithm of the same method whose number of threads is nearest.
+/// The available algorithm of the same method and class of processor whose number of threads or GPUs is nearest.
 fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
-    let distance = |other: &&AlgorithmId| (f64::from(other.threads()) / f64::from(id.threads())).ln().abs();
-    let same = available.iter().filter(|a| a.method() == id.method());
-    same.min_by(|a, b| distance(a).total_cmp(&distance(b))).cloned()
+    let distance = |other: &&AlgorithmId| (f64::from(other.backend().width()) / f64::from(id.backend().width())).ln().abs();
+    let alike = |a: &&AlgorithmId| a.method() == id.method() && a.backend().class() == id.backend().class();
+    // The same GPU first, where there are several of equal number.
+    let same = available.iter().find(|a| *a == id);
+    same.or_else(|| available.iter().filter(alike).min_by(|a, b| distance(a).total_cmp(&distance(b)))).cloned()
+}
+
+/// [`closest`], or the same method on the most threads that are available.
+fn stand_in(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
+    let of_method = || available.iter().filter(|a| a.method() == id.method()).max_by_key(|a| a.threads()).cloned();
+    closest(id, available).or_else(of_method)
 }
 
 /// Position of the nearest hardware, by the logarithms of the parameters that both have, over their standard deviation.
 fn nearest(known: &[&Hardware], hardware: &Hardware) -> Option<usize> {
-    let logarithm = |h: &Hardware, name: &str| h.value(name).filter(|v| *v > 0.0).map(f64::ln);
+    let logarithm = |h: &Hardware, name: &str| figure(h, name).filter(|v| *v > 0.0).map(f64::ln);
     let mut distances = vec![0.0; known.len()];
-    for name in PARAMETERS {
+    let of_gpu = GPU_PARAMETERS.map(|name| format!("{GPU_PREFIX}{name}"));
+    for name in PARAMETERS.into_iter().chain(of_gpu.iter().map(String::as_str)) {
         let Some(own) = logarithm(hardware, name) else { continue };
         let values: Vec<Option<f64>> = known.iter().map(|h| logarithm(h, name)).collect();
         let all: Vec<f64> = values.iter().flatten().copied().chain([own]).collect();

@@ -2,12 +2,13 @@
 
 use super::robust::{Problem, spread, weighted_median};
 use super::rows::{Row, rows};
+use super::terms::terms_of_one_machine;
 use anyhow::{Result, bail};
 use ndarray::Array2;
 use sapwise::crossover::{Paired, Position, crossover};
 use sapwise::hardware::parameter;
 use sapwise::report::{Label, Point, Report};
-use sapwise::{AlgorithmCost, AlgorithmId, Border, CostCurve, CostTerm, Fields, Knot, Load, Source, Term};
+use sapwise::{AlgorithmCost, AlgorithmId, Border, CostCurve, CostTerm, Fields, Knot, Load, Source};
 
 /// Distance of the knots of a correction, in octaves of the number of objects.
 const KNOT_STEP: f64 = 0.5;
@@ -69,20 +70,9 @@ pub(crate) fn measured_costs(report: &Report) -> (Vec<AlgorithmCost>, Vec<String
     (costs, warnings)
 }
 
-/// The terms that a method's time may consist of. The tests of the other methods are left out: within one machine they
-/// correlate with its own, and would grow differently beyond the sizes that were measured.
-fn terms(method: &str) -> &'static [Term] {
-    match method {
-        "brute" => &[Term::Call, Term::Objects, Term::ColdObjects, Term::AllPairs, Term::Pairs],
-        "sweep" => &[Term::Call, Term::Objects, Term::Sort, Term::ColdObjects, Term::AxisCandidates, Term::Pairs],
-        "strips" => &[Term::Call, Term::Objects, Term::Sort, Term::ColdObjects, Term::StripCandidates, Term::Pairs],
-        _ => &Term::ALL,
-    }
-}
-
 /// The curve of one algorithm on one machine, and its spread.
 fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64) -> (CostCurve, f64) {
-    let terms = terms(id.method());
+    let terms = terms_of_one_machine(id.method(), id.backend().class());
     let problem = Problem {
         terms: Array2::from_shape_fn((rows.len(), terms.len()), |(k, j)| terms[j].count(&rows[k].load, cache_bytes)),
         ns: rows.iter().map(|r| r.ns).collect(),
@@ -91,7 +81,7 @@ fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64) -> (CostCurve, f64) 
         groups: vec![0; rows.len()],
     };
     let units = problem.units();
-    let terms = terms.iter().zip(units).filter(|(_, u)| *u > 0.0).map(|(&term, unit_ns)| CostTerm { term, unit_ns });
+    let terms = terms.into_iter().zip(units).filter(|(_, u)| *u > 0.0).map(|(term, unit_ns)| CostTerm { term, unit_ns });
     let mut curve = CostCurve { terms: terms.collect(), cache_bytes, correction: Vec::new() };
     if curve.defect().is_some() {
         return (curve, 0.0);

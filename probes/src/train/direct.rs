@@ -3,6 +3,7 @@
 
 use super::baselines::{Chooser, average, slice_scenario};
 use super::columns::Columns;
+use super::figure;
 use super::rows::Profile;
 use anyhow::{Context, Result};
 use linfa::DatasetBase;
@@ -12,7 +13,7 @@ use ndarray::{Array1, Array2};
 use sapwise::crossover::{Crossover, Paired, crossover};
 use sapwise::hardware::parameter;
 use sapwise::report::Point;
-use sapwise::{AlgorithmId, Hardware};
+use sapwise::{AlgorithmId, BackendClass, Hardware};
 
 /// Parameters that a crossover is regressed on, as logarithms. Few, because there are as few rows as reports.
 const PARAMETERS: [&str; 4] = [
@@ -22,11 +23,17 @@ const PARAMETERS: [&str; 4] = [
     parameter::FORK_JOIN_COLD_NS,
 ];
 
-/// A method on one thread or on all threads of its machine: thread counts differ between machines, these do not.
+/// The same of a border between the CPU and a GPU, or between two methods on GPUs.
+const GPU_PARAMETERS: [&str; 4] =
+    [parameter::SCALING_ALL_THREADS_RATIO, "gpu/round_trip_ns", "gpu/upload_rate_gb_per_s", "gpu/arithmetic_gflop_per_s"];
+
+/// A method on one thread or on all threads of its machine, on one GPU or on all: counts differ between machines, these do not.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct Role {
+    class: BackendClass,
     method: String,
-    all_threads: bool,
+    /// All threads, or all GPUs; `false` where there is only one.
+    all: bool,
 }
 
 /// The measured crossovers of one profile.
@@ -63,13 +70,16 @@ fn common<'a>(points: &[&'a Point], first: &AlgorithmId, second: &AlgorithmId) -
     points.iter().filter_map(pair).collect()
 }
 
-/// The roles that algorithms play on a machine, in order.
+/// The roles that algorithms play on a machine, in order. Of several single GPUs the first plays.
 fn roles(ids: &[AlgorithmId]) -> Vec<(Role, AlgorithmId)> {
-    let mut roles = Vec::new();
+    let mut roles: Vec<(Role, AlgorithmId)> = Vec::new();
     for id in ids {
-        let most = ids.iter().filter(|o| o.method() == id.method()).map(AlgorithmId::threads).max();
-        if id.threads() == 1 || Some(id.threads()) == most {
-            roles.push((Role { method: id.method().to_owned(), all_threads: id.threads() > 1 }, id.clone()));
+        let (class, width) = (id.backend().class(), id.backend().width());
+        let alike = |o: &&AlgorithmId| o.method() == id.method() && o.backend().class() == class;
+        let most = ids.iter().filter(alike).map(|o| o.backend().width()).max();
+        let role = Role { class, method: id.method().to_owned(), all: width > 1 };
+        if (width == 1 || Some(width) == most) && roles.iter().all(|r| r.0 != role) {
+            roles.push((role, id.clone()));
         }
     }
     roles.sort();
@@ -153,16 +163,18 @@ fn border(training: &[&Crossings<'_>], hardware: &Hardware, a: &Role, b: &Role) 
     let rows: Vec<_> = crossed.into_iter().filter(|(_, p)| p.first_below == first_below).collect();
     let machines: Vec<&Hardware> = rows.iter().map(|r| r.0).collect();
     let ln_objects: Vec<f64> = rows.iter().map(|r| r.1.objects.ln()).collect();
-    let (ln_objects, mean) = regress(&machines, &ln_objects, hardware)?;
+    let on_gpu = [a, b].iter().any(|role| role.class == BackendClass::Gpu);
+    let names = if on_gpu { GPU_PARAMETERS } else { PARAMETERS };
+    let (ln_objects, mean) = regress(&names, &machines, &ln_objects, hardware)?;
     Ok(Some((Border::At { ln_objects, first_below }, mean)))
 }
 
 /// Ordinary least squares of values on the logarithms of the parameters, evaluated for a machine; the mean, and `true`, when
 /// there are not more rows than coefficients. Parameters that are missing anywhere or say nothing of their own are not used.
-fn regress(machines: &[&Hardware], values: &[f64], hardware: &Hardware) -> Result<(f64, bool)> {
-    let logarithm = |h: &Hardware, name: &str| h.value(name).filter(|v| *v > 0.0).map(f64::ln);
+fn regress(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &Hardware) -> Result<(f64, bool)> {
+    let logarithm = |h: &Hardware, name: &str| figure(h, name).filter(|v| *v > 0.0).map(f64::ln);
     let there = |name: &&str| machines.iter().chain([&hardware]).all(|h| logarithm(h, name).is_some());
-    let names: Vec<&str> = PARAMETERS.into_iter().filter(there).collect();
+    let names: Vec<&str> = names.iter().copied().filter(there).collect();
     let table =
         Array2::from_shape_fn((machines.len(), names.len()), |(k, j)| logarithm(machines[k], names[j]).unwrap_or_default());
     let columns = Columns::new(&table, &vec![1.0; machines.len()]);
@@ -191,9 +203,9 @@ mod tests {
         let border = |h: &Hardware| 5.0 - 0.7 * h.value(parameter::SIMD_LANES).unwrap().ln();
         let values: Vec<f64> = machines.iter().map(border).collect();
         let known: Vec<&Hardware> = machines[..6].iter().collect();
-        let (predicted, mean) = regress(&known, &values[..6], &machines[6]).unwrap();
+        let (predicted, mean) = regress(&PARAMETERS, &known, &values[..6], &machines[6]).unwrap();
         assert!((predicted - values[6]).abs() < 1e-6 && !mean, "{predicted}");
-        let (predicted, mean) = regress(&known[..3], &values[..3], &machines[6]).unwrap();
+        let (predicted, mean) = regress(&PARAMETERS, &known[..3], &values[..3], &machines[6]).unwrap();
         assert!((predicted - average(&values[..3])).abs() < 1e-12 && mean);
     }
 

@@ -12,16 +12,18 @@ mod robust;
 mod rows;
 #[cfg(test)]
 mod synthetic;
+mod terms;
 mod validate;
 
 use anyhow::{Result, bail};
-use sapwise::hardware::parameter;
-use sapwise::{Model, Report};
+use sapwise::hardware::{gpu, parameter};
+use sapwise::model::GPU_PREFIX;
+use sapwise::{GpuKind, Hardware, Model, Report};
 
 pub(crate) use baselines::slice_scenario;
 pub(crate) use curve::measured_fields;
 
-/// Parameters by which a machine is compared with those of the training.
+/// Parameters by which the CPU of a machine is compared with those of the training.
 const PARAMETERS: [&str; 8] = [
     parameter::CLOCK_MEASURED_GHZ,
     parameter::SIMD_LANES,
@@ -32,6 +34,29 @@ const PARAMETERS: [&str; 8] = [
     parameter::SCALING_ALL_THREADS_RATIO,
     parameter::USABLE_CORES,
 ];
+
+/// The same of a GPU.
+const GPU_PARAMETERS: [&str; 10] = [
+    gpu::parameter::ROUND_TRIP_NS,
+    gpu::parameter::READ_BACK_NS,
+    gpu::parameter::DISPATCH_NS,
+    gpu::parameter::UPLOAD_GB_PER_S,
+    gpu::parameter::UPLOAD_RATE_GB_PER_S,
+    gpu::parameter::DOWNLOAD_GB_PER_S,
+    gpu::parameter::DOWNLOAD_RATE_GB_PER_S,
+    gpu::parameter::READ_GB_PER_S,
+    gpu::parameter::COPY_GB_PER_S,
+    gpu::parameter::ARITHMETIC_GFLOP_PER_S,
+];
+
+/// A parameter of a machine by the name that it has in a model's ranges. That of a GPU is the one of the first GPU, which is a
+/// discrete one where there is any; programs that act as GPUs don't count.
+fn figure(hardware: &Hardware, name: &str) -> Option<f64> {
+    match name.strip_prefix(GPU_PREFIX) {
+        Some(name) => hardware.gpus.iter().find(|g| g.gpu.kind != GpuKind::Software)?.value(name),
+        None => hardware.value(name),
+    }
+}
 
 /// A model and what has to be said about it.
 #[derive(Debug, Clone)]
@@ -82,6 +107,23 @@ mod tests {
         assert_eq!(trained.model.ranges.len(), PARAMETERS.len());
         let cores = trained.model.ranges.iter().find(|r| r.parameter == parameter::USABLE_CORES).unwrap();
         assert_eq!((cores.min, cores.max), (2.0, 16.0));
+    }
+
+    #[test]
+    fn a_model_of_gpus_knows_their_ranges_and_predicts_them() {
+        let machines = Machine::family_with_gpus();
+        let reports: Vec<(String, Report)> =
+            machines[..3].iter().map(|m| (format!("{}.json", m.name), m.report())).collect();
+        let model = train(&reports, "test").unwrap().model;
+        assert_eq!(json::model(&json::write(&model).unwrap()).unwrap(), model);
+        let range = model.ranges.iter().find(|r| r.parameter == "gpu/upload_rate_gb_per_s").unwrap();
+        assert_eq!((range.min, range.max), (5.0, 24.0));
+        let all = |ids: &[&str]| ids.iter().map(|id| (id.parse().unwrap(), 1)).collect::<Vec<_>>();
+        let within = model.predict(&machines[1].hardware(), &all(&["strips@cpu1", "strips@gpu0", "strips@gpu0+1"])).unwrap();
+        assert!(within.costs.len() == 3 && !within.extrapolated, "{:?}", within.warnings);
+        let outside = model.predict(&machines[4].hardware(), &all(&["strips@gpu0"])).unwrap();
+        let told = |text: &str| outside.warnings.iter().any(|w| w.contains(text));
+        assert!(outside.extrapolated && told("upload_rate_gb_per_s of gpu0 is 50.0000"), "{:?}", outside.warnings);
     }
 
     #[test]

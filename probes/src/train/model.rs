@@ -1,11 +1,11 @@
 //! Puts a model together from the profiles that it is trained on.
 
-use super::PARAMETERS;
 use super::fit::methods;
 use super::rows::Profile;
+use super::{GPU_PARAMETERS, PARAMETERS};
 use anyhow::{Result, bail};
-use sapwise::Model;
-use sapwise::model::{ModelSchema, Range, TrainingReport, Validation};
+use sapwise::model::{GPU_PREFIX, ModelSchema, Range, TrainingReport, Validation};
+use sapwise::{Backend, GpuHardware, Model};
 
 /// A model of the profiles, without validation, and what was left out and why.
 ///
@@ -22,7 +22,7 @@ pub(crate) fn model(profiles: &[&Profile], name: &str) -> Result<(Model, Vec<Str
         schema: ModelSchema,
         name: name.to_owned(),
         trained_on: profiles.iter().map(training).collect(),
-        ranges: PARAMETERS.into_iter().filter_map(|p| range(profiles, p)).collect(),
+        ranges: ranges(profiles),
         methods,
         validation: Validation { held_out: String::new(), physical_machines: 0, profiles: 0, methods: Vec::new() },
     };
@@ -32,9 +32,29 @@ pub(crate) fn model(profiles: &[&Profile], name: &str) -> Result<(Model, Vec<Str
     Ok((model, notes))
 }
 
-/// Where a parameter lies in the profiles that have it.
-fn range(profiles: &[&Profile], parameter: &str) -> Option<Range> {
-    let values = || profiles.iter().filter_map(|p| p.report.hardware.value(parameter));
-    let (min, max) = (values().min_by(f64::total_cmp)?, values().max_by(f64::total_cmp)?);
-    Some(Range { parameter: parameter.to_owned(), min, max })
+/// Where the parameters lie in the profiles that have them: those of the machine, then those of the GPUs that were timed.
+fn ranges(profiles: &[&Profile]) -> Vec<Range> {
+    let machine = PARAMETERS
+        .into_iter()
+        .filter_map(|name| range(name.to_owned(), profiles.iter().filter_map(|p| p.report.hardware.value(name)).collect()));
+    let timed: Vec<&GpuHardware> = profiles.iter().flat_map(|p| timed_gpus(p)).collect();
+    let gpus = GPU_PARAMETERS
+        .into_iter()
+        .filter_map(|name| range(format!("{GPU_PREFIX}{name}"), timed.iter().filter_map(|g| g.value(name)).collect()));
+    machine.chain(gpus).collect()
+}
+
+fn range(parameter: String, values: Vec<f64>) -> Option<Range> {
+    let min = values.iter().copied().min_by(f64::total_cmp)?;
+    let max = values.iter().copied().max_by(f64::total_cmp)?;
+    Some(Range { parameter, min, max })
+}
+
+/// The GPUs of a profile that an algorithm was timed on.
+fn timed_gpus(profile: &Profile) -> impl Iterator<Item = &GpuHardware> {
+    let used = |k: u32| {
+        let on = |backend: &Backend| matches!(backend, Backend::Gpu(list) if list.contains(&k));
+        profile.report.algorithms.iter().any(|t| on(t.id.backend()))
+    };
+    profile.report.hardware.gpus.iter().filter(move |g| used(g.gpu.index))
 }

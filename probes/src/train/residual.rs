@@ -8,10 +8,6 @@ use linfa_elasticnet::ElasticNet;
 use ndarray::{Array1, Array2, Axis};
 use sapwise::model::{Feature, ResidualTerm};
 
-/// The features that a residual may depend on, in the order of the columns.
-pub(crate) const FEATURES: [Feature; 4] =
-    [Feature::Log2Objects, Feature::Log2ObjectsSquared, Feature::Log2Lanes, Feature::Log2Threads];
-
 /// Penalties to choose from, against standardised features: slopes shrink by about 1 / (1 + penalty).
 const PENALTIES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
 /// Rounds of coordinate descent. linfa never stops earlier without a lasso part, because its duality gap does not close
@@ -24,7 +20,9 @@ const FEWEST_GROUPS: usize = 3;
 
 /// Natural logarithms of measured over modelled time, and what they may depend on.
 pub(crate) struct Residuals {
-    /// Shape (rows, [`FEATURES`]).
+    /// What each column of `features` is.
+    pub(crate) names: &'static [Feature],
+    /// Shape (rows, names).
     pub(crate) features: Array2<f64>,
     /// One for each row.
     pub(crate) ln_ratios: Vec<f64>,
@@ -73,10 +71,7 @@ impl Residuals {
     fn error_without(&self, group: usize, penalty: f64) -> Result<f64> {
         let (held, rest): (Vec<usize>, Vec<usize>) = (0..self.ln_ratios.len()).partition(|&k| self.groups[k] == group);
         let ridge = self.fit(&rest, penalty)?;
-        Ok(held
-            .iter()
-            .map(|&k| self.weights[k] * (self.ln_ratios[k] - ridge.at(&self.features.row(k).to_vec())).powi(2))
-            .sum())
+        Ok(held.iter().map(|&k| self.weights[k] * (self.ln_ratios[k] - self.at(&ridge, k)).powi(2)).sum())
     }
 
     fn fit(&self, rows: &[usize], penalty: f64) -> Result<Ridge> {
@@ -91,20 +86,18 @@ impl Residuals {
         let centred = targets.iter().map(|y| y - intercept).collect();
         let slopes = weighted_ridge(&columns.values, &centred, &weights, penalty)?.hyperplane().clone();
         let term = |j: usize| ResidualTerm {
-            feature: FEATURES[columns.kept[j]],
+            feature: self.names[columns.kept[j]],
             centre: columns.centres[j],
             slope: slopes[j] / columns.scales[j],
         };
         Ok(Ridge { intercept, terms: (0..columns.kept.len()).map(term).collect() })
     }
-}
 
-impl Ridge {
-    /// The residual at values of all [`FEATURES`].
-    pub(crate) fn at(&self, features: &[f64]) -> f64 {
-        let value =
-            |t: &ResidualTerm| FEATURES.iter().zip(features).find(|(f, _)| **f == t.feature).map_or(0.0, |(_, v)| *v);
-        self.intercept + self.terms.iter().map(|t| t.slope * (value(t) - t.centre)).sum::<f64>()
+    /// A residual in one of the rows.
+    pub(crate) fn at(&self, ridge: &Ridge, row: usize) -> f64 {
+        let position = |t: &ResidualTerm| self.names.iter().position(|f| *f == t.feature);
+        let value = |t: &ResidualTerm| position(t).map_or(0.0, |j| self.features[[row, j]]);
+        ridge.intercept + ridge.terms.iter().map(|t| t.slope * (value(t) - t.centre)).sum::<f64>()
     }
 }
 
@@ -124,7 +117,7 @@ mod tests {
     use super::*;
     use linfa::traits::Predict;
     use sapwise::model::{MethodModel, ModelTerm, Scale};
-    use sapwise::{Load, Term};
+    use sapwise::{Backend, BackendClass, Load, Term};
 
     fn residuals(rows: usize) -> Residuals {
         let mut random = Random::new(11);
@@ -134,7 +127,13 @@ mod tests {
         });
         let ln_ratios =
             (0..rows).map(|k| 0.2 + 0.03 * features[[k, 0]] - 0.1 * features[[k, 2]] + 0.01 * random.normal()).collect();
-        Residuals { features, ln_ratios, weights: (0..rows).map(|k| 1.0 + (k % 2) as f64).collect(), groups: vec![0; rows] }
+        Residuals {
+            names: Feature::of(BackendClass::Cpu),
+            features,
+            ln_ratios,
+            weights: (0..rows).map(|k| 1.0 + (k % 2) as f64).collect(),
+            groups: vec![0; rows],
+        }
     }
 
     #[test]
@@ -146,7 +145,7 @@ mod tests {
         let centred = data.ln_ratios.iter().map(|y| y - ridge.intercept).collect();
         let linfa = weighted_ridge(&columns.values, &centred, &data.weights, 0.1).unwrap().predict(&columns.values);
         for k in 0..120 {
-            let ours = ridge.at(&data.features.row(k).to_vec());
+            let ours = data.at(&ridge, k);
             assert!((ours - ridge.intercept - linfa[k]).abs() < 1e-9, "{ours} {}", linfa[k]);
         }
     }
@@ -154,14 +153,22 @@ mod tests {
     #[test]
     fn the_library_evaluates_a_stored_residual_as_linfa_does() {
         let machine = &Machine::family()[3];
-        let mut features = Array2::zeros((52, FEATURES.len()));
+        let threads = |k: usize| Backend::Cpu(1 << (k % 4));
+        let mut features = Array2::zeros((52, 4));
         for k in 0..52 {
             let load = Load { objects: 1 << (4 + k % 13), ..Load::default() };
-            let values = FEATURES.map(|f| f.value(&machine.hardware(), 1 << (k % 4), &load).unwrap());
-            features.row_mut(k).assign(&Array1::from(values.to_vec()));
+            let values =
+                Feature::of(BackendClass::Cpu).iter().map(|f| f.value(&machine.hardware(), &threads(k), &load).unwrap());
+            features.row_mut(k).assign(&Array1::from_iter(values));
         }
         let ln_ratios = features.rows().into_iter().map(|f| 0.3 - 0.05 * f[0] + 0.004 * f[1] + 0.1 * f[3]).collect();
-        let data = Residuals { features, ln_ratios, weights: vec![1.0; 52], groups: vec![0; 52] };
+        let data = Residuals {
+            names: Feature::of(BackendClass::Cpu),
+            features,
+            ln_ratios,
+            weights: vec![1.0; 52],
+            groups: vec![0; 52],
+        };
         let ridge = data.ridge().unwrap();
         let columns = Columns::new(&data.features, &data.weights);
         let centred = data.ln_ratios.iter().map(|y| y - ridge.intercept).collect();
@@ -172,7 +179,7 @@ mod tests {
         let full = MethodModel { residual_intercept: ridge.intercept, residual: ridge.terms, ..bare.clone() };
         for k in 0..52 {
             let load = Load { objects: 1 << (4 + k % 13), ..Load::default() };
-            let cost = |m: &MethodModel| m.curve(&machine.hardware(), 1 << (k % 4)).unwrap().cost_ns(&load);
+            let cost = |m: &MethodModel| m.curve(&machine.hardware(), &threads(k)).unwrap().cost_ns(&load);
             let residual = (cost(&full) / cost(&bare)).ln();
             assert!((residual - linfa[k]).abs() < 1e-9, "{residual} {}", linfa[k]);
         }
@@ -183,7 +190,7 @@ mod tests {
         let mut data = residuals(240);
         data.groups = (0..240).map(|k| k / 60).collect();
         let ridge = data.ridge().unwrap();
-        let error: f64 = (0..240).map(|k| (ridge.at(&data.features.row(k).to_vec()) - data.ln_ratios[k]).powi(2)).sum();
+        let error: f64 = (0..240).map(|k| (data.at(&ridge, k) - data.ln_ratios[k]).powi(2)).sum();
         assert!((error / 240.0).sqrt() < 0.02, "{error} {ridge:?}");
     }
 

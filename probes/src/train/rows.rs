@@ -1,7 +1,7 @@
 //! From reports to what can be trained on: sound timings of the newest revisions.
 
 use sapwise::report::{Label, Point, Report, Timing};
-use sapwise::{AlgorithmId, Load};
+use sapwise::{AlgorithmId, BackendClass, Load};
 use std::collections::BTreeMap;
 
 use crate::sweep::median;
@@ -51,11 +51,12 @@ pub(crate) fn usable(reports: &[(String, Report)]) -> (Vec<Profile>, Vec<String>
         }
     }
     let newest = newest_revisions(&kept);
+    let newest_of = |id: &AlgorithmId| newest.get(&key(id)).copied().unwrap_or(0);
     let mut profiles = Vec::new();
     for (file, report) in kept {
         let sound = sound(report, &newest);
-        for stale in report.algorithms.iter().filter(|t| newest.get(t.id.method()).is_some_and(|&n| t.revision < n)) {
-            let newest = newest[stale.id.method()];
+        for stale in report.algorithms.iter().filter(|t| t.revision < newest_of(&t.id)) {
+            let newest = newest_of(&stale.id);
             notes.push(format!("{file}: {} is left out, its revision {} is older than {newest}", stale.id, stale.revision));
         }
         if sound.points.is_empty() {
@@ -82,20 +83,27 @@ fn refusal(report: &Report) -> Option<String> {
     None
 }
 
-/// The newest revision of each method.
-fn newest_revisions(reports: &[(&String, &Report)]) -> BTreeMap<String, u32> {
+/// What shares a revision: a method on one class of processor.
+type Key = (BackendClass, String);
+
+fn key(id: &AlgorithmId) -> Key {
+    (id.backend().class(), id.method().to_owned())
+}
+
+/// The newest revision of each method on each class of processor.
+fn newest_revisions(reports: &[(&String, &Report)]) -> BTreeMap<Key, u32> {
     let mut newest = BTreeMap::new();
     for timed in reports.iter().flat_map(|(_, r)| &r.algorithms) {
-        let known = newest.entry(timed.id.method().to_owned()).or_insert(timed.revision);
+        let known = newest.entry(key(&timed.id)).or_insert(timed.revision);
         *known = timed.revision.max(*known);
     }
     newest
 }
 
 /// The report without stale algorithms, timings with an error or too few samples, and points that are empty then.
-fn sound(report: &Report, newest: &BTreeMap<String, u32>) -> Report {
+fn sound(report: &Report, newest: &BTreeMap<Key, u32>) -> Report {
     let mut sound = report.clone();
-    sound.algorithms.retain(|t| newest.get(t.id.method()).is_none_or(|&n| t.revision == n));
+    sound.algorithms.retain(|t| newest.get(&key(&t.id)).is_none_or(|&n| t.revision == n));
     let known = |id: &AlgorithmId| sound.algorithms.iter().any(|t| t.id == *id);
     for point in &mut sound.points {
         point.timings.retain(|t| is_sound(t) && known(&t.algorithm));
@@ -125,19 +133,22 @@ pub(crate) fn rows(report: &Report, profile: usize) -> Vec<Row> {
     let mut rows = Vec::new();
     let timed: Vec<(&Point, Vec<(&AlgorithmId, f64)>)> = report.points.iter().map(|p| (p, medians(p))).collect();
     for algorithm in report.algorithms.iter().map(|t| &t.id) {
-        // For each scenario the largest size at which it was timed, and how many times slower than the best it was there.
-        let mut last: BTreeMap<&str, (u32, f64)> = BTreeMap::new();
+        // For each scenario the sizes at which it was timed, and how many times slower than the best it was there.
+        let mut ratios: BTreeMap<&str, BTreeMap<u32, f64>> = BTreeMap::new();
         let mut row = |load: Load, ns: f64, floor: bool| {
             rows.push(Row { profile, algorithm: algorithm.clone(), load, ns, floor });
         };
         for (point, medians) in &timed {
             let (Some(&(_, ns)), Some(best)) = (medians.iter().find(|m| m.0 == algorithm), best(medians)) else { continue };
             row(point.load, ns, false);
-            let entry = last.entry(&point.scenario).or_insert((0, 1.0));
-            if point.load.objects >= entry.0 {
-                *entry = (point.load.objects, ns / best);
-            }
+            ratios.entry(&point.scenario).or_default().insert(point.load.objects, ns / best);
         }
+        let on_gpu = algorithm.backend().class() == BackendClass::Gpu;
+        // A GPU has a large fixed cost: it starts far behind and gains. One that left the race while it gained, for want of
+        // time, may be ahead beyond.
+        ratios.retain(|_, course| !(on_gpu && gains(course)));
+        let last: BTreeMap<&str, (u32, f64)> =
+            ratios.iter().filter_map(|(s, course)| course.last_key_value().map(|(&n, &ratio)| (*s, (n, ratio)))).collect();
         for (point, medians) in &timed {
             let Some(&(objects, behind)) = last.get(point.scenario.as_str()) else { continue };
             if let Some(best) = best(medians).filter(|_| point.load.objects > objects) {
@@ -146,6 +157,12 @@ pub(crate) fn rows(report: &Report, profile: usize) -> Vec<Row> {
         }
     }
     rows
+}
+
+/// Whether an algorithm came nearer to the best from the last size but one to the last.
+fn gains(course: &BTreeMap<u32, f64>) -> bool {
+    let mut from_the_last = course.values().rev();
+    matches!((from_the_last.next(), from_the_last.next()), (Some(last), Some(before)) if last < before)
 }
 
 #[cfg(test)]
@@ -184,6 +201,25 @@ mod tests {
         let stale = profiles[1].report.algorithms.iter().filter(|t| t.id.method() == "strips").count();
         assert!(stale > 0 && notes.iter().all(|n| n.contains("revision")), "{notes:?}");
         assert_eq!(profiles[0].report.points[0].timings.len(), before - 2 - strips);
+    }
+
+    #[test]
+    fn a_gpu_that_gained_when_it_left_has_no_floor_beyond() {
+        let mut report = Machine::family_with_gpus()[1].report();
+        let on_gpu = |id: &AlgorithmId| id.to_string() == "strips@gpu0";
+        let left = |report: &Report| rows(report, 0).iter().any(|r| on_gpu(&r.algorithm) && r.floor);
+        assert!(!left(&report));
+        // For want of time it leaves at 500 objects.
+        for point in report.points.iter_mut().filter(|p| p.load.objects > 500) {
+            point.timings.retain(|t| !on_gpu(&t.algorithm));
+        }
+        assert!(!left(&report));
+        // And the same when it fell behind before.
+        for point in report.points.iter_mut().filter(|p| (300..=500).contains(&p.load.objects)) {
+            let own = point.timings.iter_mut().find(|t| on_gpu(&t.algorithm)).unwrap();
+            own.samples_ns.iter_mut().for_each(|ns| *ns *= 10);
+        }
+        assert!(left(&report));
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! Made-up machines whose costs are known exactly. TEST DATA: the reports carry a real label because training leaves
 //! simulated ones out, so none of them may leave this module's tests.
 
-use sapwise::hardware::{How, parameter};
+use sapwise::hardware::gpu::parameter as of_gpu;
+use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, parameter};
 use sapwise::model::{MethodModel, ModelTerm, Scale};
 use sapwise::report::{Label, Point, Provenance, Report, ReportSchema, Timed, Timing};
-use sapwise::{AlgorithmId, Hardware, Load, Parameter, Term};
+use sapwise::{AlgorithmId, BackendClass, Hardware, Load, Parameter, Term};
 
 /// A machine of the made-up family.
 #[derive(Debug, Clone)]
@@ -16,14 +17,43 @@ pub(crate) struct Machine {
     pub(crate) cache_bytes: f64,
     pub(crate) gb_per_s: (f64, f64),
     pub(crate) fork_join_ns: f64,
+    pub(crate) gpus: Vec<Gpu>,
     /// Standard deviation of the logarithm of a sample.
     pub(crate) noise: f64,
     pub(crate) frames: usize,
 }
 
-const fn machine(name: &'static str, ghz: f64, lanes: f64, cores: u32, mib: f64, gb: (f64, f64), join: f64) -> Machine {
+/// A made-up GPU: latencies in ns, rates in GB/s, and thousands of millions of operations a second.
+#[derive(Debug, Clone)]
+pub(crate) struct Gpu {
+    pub(crate) kind: GpuKind,
+    pub(crate) round_trip_ns: f64,
+    pub(crate) dispatch_ns: f64,
+    pub(crate) upload: f64,
+    pub(crate) download: f64,
+    pub(crate) copy: f64,
+    pub(crate) gflop: f64,
+}
+
+const fn gpu(kind: GpuKind, latencies: (f64, f64), transfers: (f64, f64), copy: f64, gflop: f64) -> Gpu {
+    let ((round_trip_ns, dispatch_ns), (upload, download)) = (latencies, transfers);
+    Gpu { kind, round_trip_ns, dispatch_ns, upload, download, copy, gflop }
+}
+
+fn machine(name: &'static str, ghz: f64, lanes: f64, cores: u32, mib: f64, gb: (f64, f64), join: f64) -> Machine {
     let cache_bytes = mib * 1_048_576.0;
-    Machine { name, ghz, lanes, cores, cache_bytes, gb_per_s: gb, fork_join_ns: join, noise: 0.02, frames: 5 }
+    Machine {
+        name,
+        ghz,
+        lanes,
+        cores,
+        cache_bytes,
+        gb_per_s: gb,
+        fork_join_ns: join,
+        gpus: Vec::new(),
+        noise: 0.02,
+        frames: 5,
+    }
 }
 
 impl Machine {
@@ -38,6 +68,28 @@ impl Machine {
             machine("0000000000000006", 3.3, 4.0, 6, 12.0, (20.0, 45.0), 3000.0),
             machine("0000000000000007", 2.8, 8.0, 4, 6.0, (14.0, 25.0), 9000.0),
         ]
+    }
+
+    /// Eight machines, all but the last of the family, each with one GPU and two of them with a second one; the eighth is the
+    /// first again with the GPU of a server.
+    pub(crate) fn family_with_gpus() -> Vec<Self> {
+        use GpuKind::{Discrete, Integrated};
+        let gpus = [
+            vec![gpu(Integrated, (60e3, 3e3), (9.0, 6.0), 40.0, 800.0)],
+            vec![gpu(Discrete, (30e3, 2e3), (12.0, 11.0), 400.0, 9e3), gpu(Discrete, (40e3, 1.5e3), (5.0, 9.0), 250.0, 6e3)],
+            vec![gpu(Discrete, (25e3, 4e3), (24.0, 15.0), 700.0, 3e4)],
+            vec![gpu(Integrated, (90e3, 9e3), (15.0, 22.0), 80.0, 2e3)],
+            vec![
+                gpu(Discrete, (15e3, 1e3), (50.0, 30.0), 2500.0, 5e4),
+                gpu(Discrete, (15e3, 1e3), (50.0, 30.0), 2500.0, 5e4),
+            ],
+            vec![gpu(Discrete, (45e3, 2.5e3), (6.0, 5.0), 200.0, 5e3)],
+            vec![gpu(Integrated, (35e3, 6e3), (20.0, 8.0), 60.0, 4e3)],
+            vec![gpu(Discrete, (20e3, 2e3), (30.0, 20.0), 900.0, 2e4)],
+        ];
+        let mut machines = Self::family();
+        machines.push(Self { name: "0000000000000008", ghz: 3.9, ..machines[3].clone() });
+        machines.into_iter().zip(gpus).map(|(m, gpus)| Self { gpus, ..m }).collect()
     }
 
     pub(crate) fn exact(mut self) -> Self {
@@ -62,26 +114,38 @@ impl Machine {
             (parameter::SCALING_TWO_THREADS_RATIO, Self::scaling(2)),
             (parameter::SCALING_ALL_THREADS_RATIO, Self::scaling(self.cores)),
         ];
-        let parameters =
-            figures.map(|(name, value)| Parameter { how: How::Measured, ..Parameter::reported(name, value, "test") });
+        let parameters = figures.map(measured);
         let machine = sapwise::Machine { physical_id: self.name.to_owned(), ..sapwise::Machine::default() };
-        Hardware { machine, parameters: parameters.into(), gpus: Vec::new(), gpu_groups: Vec::new() }
+        let gpus: Vec<GpuHardware> = self.gpus.iter().enumerate().map(|(k, gpu)| gpu.hardware(k as u32)).collect();
+        let group = GpuGroup {
+            gpus: (0..gpus.len() as u32).collect(),
+            parameters: [(of_gpu::GROUP_UPLOAD_RATIO, 1.4), (of_gpu::GROUP_ROUND_TRIP_RATIO, 1.2)].map(measured).into(),
+        };
+        let gpu_groups = if gpus.len() > 1 { vec![group] } else { Vec::new() };
+        Hardware { machine, parameters: parameters.into(), gpus, gpu_groups }
     }
 
     /// A full sweep: 23 sizes from 16 to 700 000 objects of two scenarios; from 500 objects up whoever is eight times slower than
-    /// the best leaves the race.
+    /// the best leaves the race, on a GPU only whoever doesn't gain.
     pub(crate) fn report(&self) -> Report {
         let hardware = self.hardware();
         let mut random = Random::new(u64::from(self.cores) * 1000 + self.ghz.to_bits() % 997);
         let threads = (0..).map(|k| 1 << k).take_while(|&k| k < self.cores).chain([self.cores]);
         let methods = truth();
-        let ids: Vec<(AlgorithmId, &MethodModel)> = threads
-            .flat_map(|k| methods.iter().map(move |m| (format!("{}@cpu{k}", m.method).parse().unwrap(), m)))
-            .collect();
-        let curves: Vec<_> = ids.iter().map(|(id, m)| m.curve(&hardware, id.threads()).unwrap()).collect();
+        let on_gpus = gpu_truth();
+        let of = |methods: &'_ [MethodModel], backend: String| -> Vec<(AlgorithmId, MethodModel)> {
+            methods.iter().map(|m| (format!("{}@{backend}", m.method).parse().unwrap(), m.clone())).collect()
+        };
+        let mut ids: Vec<_> = threads.flat_map(|k| of(&methods, format!("cpu{k}"))).collect();
+        ids.extend((0..self.gpus.len()).flat_map(|k| of(&on_gpus, format!("gpu{k}"))));
+        if self.gpus.len() == 2 {
+            ids.extend(of(&on_gpus, "gpu0+1".to_owned()));
+        }
+        let curves: Vec<_> = ids.iter().map(|(id, m)| m.curve(&hardware, id.backend()).unwrap()).collect();
         let mut points = Vec::new();
         for scenario in ["uniform", "clustered"] {
             let mut racing = vec![true; ids.len()];
+            let mut before = vec![0.0; ids.len()];
             for k in 0..23 {
                 let load = load(scenario, 2.0_f64.powf(4.0 + 0.7 * f64::from(k)).round());
                 let ns: Vec<f64> = curves.iter().map(|c| c.cost_ns(&load)).collect();
@@ -94,7 +158,13 @@ impl Machine {
                     error: None,
                 });
                 points.push(point(scenario, load, timings.collect()));
-                racing.iter_mut().zip(&ns).for_each(|(r, ns)| *r &= load.objects < 500 || *ns < 8.0 * best);
+                for (a, ns) in ns.iter().enumerate() {
+                    let ratio = ns / best;
+                    // A GPU starts far behind and gains.
+                    let gains = ratio < before[a] && ids[a].0.backend().class() == BackendClass::Gpu;
+                    racing[a] &= load.objects < 500 || ratio < 8.0 || gains;
+                    before[a] = ratio;
+                }
             }
         }
         let algorithms = ids.into_iter().map(|(id, m)| Timed { id, revision: m.revision }).collect();
@@ -108,6 +178,33 @@ impl Machine {
             remarks: Vec::new(),
         }
     }
+}
+
+impl Gpu {
+    fn hardware(&self, index: u32) -> GpuHardware {
+        let identity = GpuIdentity {
+            index,
+            name: format!("GPU of {} GFLOP/s", self.gflop),
+            device: "0000:0000".to_owned(),
+            driver: "test".to_owned(),
+            api: "vulkan".to_owned(),
+            kind: self.kind,
+        };
+        let figures = [
+            (of_gpu::UPLOAD_RATE_GB_PER_S, self.upload),
+            (of_gpu::DOWNLOAD_RATE_GB_PER_S, self.download),
+            (of_gpu::COPY_GB_PER_S, self.copy),
+            (of_gpu::ROUND_TRIP_NS, self.round_trip_ns),
+            (of_gpu::DISPATCH_NS, self.dispatch_ns),
+            (of_gpu::READ_BACK_NS, self.round_trip_ns / 3.0),
+            (of_gpu::ARITHMETIC_GFLOP_PER_S, self.gflop),
+        ];
+        GpuHardware { gpu: identity, parameters: figures.map(measured).into() }
+    }
+}
+
+fn measured((name, value): (&str, f64)) -> Parameter {
+    Parameter { how: How::Measured, ..Parameter::reported(name, value, "test") }
 }
 
 fn provenance() -> Provenance {
@@ -144,20 +241,49 @@ pub(crate) fn load(scenario: &str, n: f64) -> Load {
     Load { objects: n as u32, axis_candidates: axis, strip_candidates: strip, pairs, moved: 1.0 }
 }
 
-/// The costs that the reports are made from.
-pub(crate) fn truth() -> Vec<MethodModel> {
-    use {Scale::*, Term::*};
-    let method = |name: &str, terms: &[(Term, Scale, f64)]| MethodModel {
+fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> MethodModel {
+    MethodModel {
         method: name.to_owned(),
+        backend,
         revision: 1,
         max_threads: 16,
+        gpu_kinds: Vec::new(),
         min_objects: 1,
         max_objects: u32::MAX,
         terms: terms.iter().map(|&(term, scale, unit)| ModelTerm { term, scale, unit }).collect(),
         residual_intercept: 0.0,
         residual: Vec::new(),
         spread_ln: 0.0,
+    }
+}
+
+/// The costs on GPUs that the reports are made from.
+pub(crate) fn gpu_truth() -> Vec<MethodModel> {
+    use {Scale::*, Term::*};
+    let method = |name: &str, sort: Option<f64>, dispatches: f64, tests: (Term, Scale, f64)| {
+        let mut terms = vec![
+            (Call, GpuRoundTrip, 2.0),
+            (Call, GpuDispatch, dispatches),
+            (Objects, GpuUploadByte, 24.0),
+            (Objects, GpuMemoryByte, 60.0),
+            tests,
+            (Pairs, GpuDownloadByte, 8.0),
+            (Objects, Cycle, 6.0),
+        ];
+        terms.extend(sort.map(|unit| (Sort, GpuMemoryByte, unit)));
+        method(name, BackendClass::Gpu, &terms)
     };
+    vec![
+        method("brute", None, 4.0, (AllPairs, GpuOperation, 12.0)),
+        method("sweep", Some(20.0), 30.0, (AxisCandidates, GpuOperation, 15.0)),
+        method("strips", Some(25.0), 40.0, (StripCandidates, GpuOperation, 300.0)),
+    ]
+}
+
+/// The costs on the CPU that the reports are made from.
+pub(crate) fn truth() -> Vec<MethodModel> {
+    use {Scale::*, Term::*};
+    let method = |name: &str, terms: &[(Term, Scale, f64)]| method(name, BackendClass::Cpu, terms);
     let sorted = |call, join, tests| {
         [
             (Call, Cycle, call),

@@ -190,6 +190,18 @@ mod tests {
     }
 
     #[test]
+    fn machines_with_and_without_gpus_are_validated_together() {
+        let mut machines = Machine::family_with_gpus();
+        machines[6].gpus.clear();
+        let (validation, notes) = validate(&profiles(machines)).unwrap();
+        assert_eq!((validation.physical_machines, validation.methods.len()), (8, 9));
+        for name in ["physics", "physics + ridge", "full sweep"] {
+            assert!(mean(&validation, name) < 0.1, "{name}: {} {notes:?}", mean(&validation, name));
+        }
+        assert!(mean(&validation, "physics") < mean(&validation, SINGLE_BEST));
+    }
+
+    #[test]
     fn a_weak_profile_costs_its_folds_and_not_the_validation() {
         let mut two = profiles(Machine::family());
         two.truncate(2);

@@ -3,13 +3,17 @@
 use crate::args::Check;
 use crate::document::read_document;
 use crate::exit::Outcome;
+use crate::gpus::{Seen, difference, look, uses};
 use crate::{output, revisions};
 use sapwise::json::Document;
 use sapwise::measure::{self, Family, Options};
 use sapwise::model::Range;
 use sapwise::report::Label;
-use sapwise::{AlgorithmId, Backend, Fields, How, Machine, Model, Parameter, Registry, Report, usable_cores};
+use sapwise::{
+    AlgorithmId, Backend, BackendClass, Fields, GpuKind, How, Machine, Model, Parameter, Registry, Report, usable_cores,
+};
 use serde::Serialize;
+use std::cell::OnceCell;
 use std::path::Path;
 
 /// The answer for machines.
@@ -40,10 +44,12 @@ struct Finding {
 struct Here {
     registry: Registry,
     machine: Machine,
+    /// Looked for when the first file names one.
+    gpus: OnceCell<Seen>,
 }
 
 pub(crate) fn run(arguments: &Check) -> anyhow::Result<Outcome> {
-    let here = Here { registry: Registry::new(), machine: measure::machine() };
+    let here = Here { registry: Registry::new(), machine: measure::machine(), gpus: OnceCell::new() };
     let files: Vec<Finding> = arguments.files.iter().map(|path| here.look_at(path)).collect();
     let failed = files.iter().any(|f| !f.problems.is_empty());
     if arguments.json {
@@ -97,7 +103,9 @@ impl Here {
         finding.schema = Some("report/1");
         finding.set_current(revisions::stale_in_report(report, &self.registry), "probe again");
         let same = report.hardware.machine.physical_id == self.machine.physical_id;
-        finding.applicable = Some(same);
+        let other_gpus = if same { self.other_gpus(report) } else { Vec::new() };
+        finding.applicable = Some(same && other_gpus.is_empty());
+        finding.notes.extend(other_gpus);
         finding.notes.push(if same {
             "measured on a machine like this one".to_owned()
         } else {
@@ -114,7 +122,7 @@ impl Here {
 
     fn model(&self, model: &Model, finding: &mut Finding) {
         finding.schema = Some("model/1");
-        let used = model.methods.iter().map(|m| (m.method.as_str(), m.revision));
+        let used = model.methods.iter().map(|m| ((m.backend, m.method.as_str()), m.revision));
         finding.set_current(revisions::stale(used, &self.registry), "train it again on new reports");
         finding.applicable = Some(finding.current == Some(true));
         let known = model.trained_on.iter().any(|t| t.physical_id == self.machine.physical_id);
@@ -124,7 +132,8 @@ impl Here {
             "not trained on a machine like this one; `sapwise predict` measures whether it extrapolates here".to_owned()
         });
         let cores = usable_cores();
-        let most = model.methods.iter().map(|m| m.max_threads).max().unwrap_or(0);
+        let on_cpu = model.methods.iter().filter(|m| m.backend == BackendClass::Cpu);
+        let most = on_cpu.map(|m| m.max_threads).max().unwrap_or(0);
         if cores > most {
             finding.notes.push(format!("extrapolates: trained on up to {most} threads, this machine has {cores}"));
         }
@@ -144,6 +153,7 @@ impl Here {
         missing.dedup();
         finding.applicable = Some(missing.is_empty());
         finding.problems.extend(missing);
+        finding.notes.extend(self.programs(fields));
         if fields.extrapolated {
             finding.notes.push("predicted for a machine outside what the model was trained on".to_owned());
         }
@@ -154,14 +164,44 @@ impl Here {
         if let Some(entry) = self.registry.entries().iter().find(|e| e.id == *id) {
             return entry.unavailable.as_ref().map(|why| format!("{id} can't run here: {why}"));
         }
-        let ours = self.registry.entries().iter().any(|e| e.id.method() == id.method());
         match id.backend() {
             // The revision check has told already that the method is unknown; without costs nothing has.
-            _ if !ours => Some(format!("{id} is not in this build")),
+            _ if !revisions::is_known(id, &self.registry) => Some(format!("{id} is not in this build")),
             Backend::Cpu(threads) if *threads <= usable_cores() => None,
             Backend::Cpu(_) => Some(format!("{id} needs more than the {} cores of this machine", usable_cores())),
-            _ => Some(format!("{id} can't run here: this version has no GPU backend")),
+            Backend::Gpu(indices) => self.gpus().lacks(indices).map(|why| format!("{id} can't run here: {why}")),
+            _ => Some(format!("{id} can't run here: this version does not know its processor")),
         }
+    }
+
+    /// The GPUs of this machine.
+    fn gpus(&self) -> &Seen {
+        self.gpus.get_or_init(|| {
+            let remark = |error| format!("GPUs can't be looked for: {error:#}");
+            look().unwrap_or_else(|error| Seen { identities: Vec::new(), remark: Some(remark(error)) })
+        })
+    }
+
+    /// How the GPUs that a report has timings of differ from those of this machine.
+    fn other_gpus(&self, report: &Report) -> Vec<String> {
+        let mut timed: Vec<u32> = report.algorithms.iter().flat_map(|t| uses(&t.id)).copied().collect();
+        timed.sort_unstable();
+        timed.dedup();
+        let there = |k: u32| report.hardware.gpu(k).map(|g| &g.gpu);
+        let here = |k: u32| self.gpus().identities.iter().find(|g| g.index == k);
+        timed.into_iter().filter_map(|k| difference(there(k), here(k))).collect()
+    }
+
+    /// Which algorithms of fields run on programs that act as GPUs.
+    fn programs(&self, fields: &Fields) -> Vec<String> {
+        let mut notes = Vec::new();
+        for id in fields.algorithms().into_iter().filter(|id| !uses(id).is_empty()) {
+            let gpus = self.gpus().identities.iter().filter(|g| uses(id).contains(&g.index));
+            for gpu in gpus.filter(|g| g.kind == GpuKind::Software) {
+                notes.push(format!("{id}: gpu{} is a program on the CPU here: {}", gpu.index, gpu.name));
+            }
+        }
+        notes
     }
 }
 

@@ -2,16 +2,19 @@
 
 use crate::args::Devices;
 use crate::exit::Outcome;
-use crate::{output, table};
-use sapwise::{Registry, SimdLevel, usable_cores};
+use crate::gpus::{self, Limits, OnGpus, Seen, look};
+use crate::output;
+use crate::table::{bytes, columns};
+use sapwise::{AlgorithmId, GpuIdentity, Registry, SimdLevel, usable_cores};
 use serde::Serialize;
 
 /// The answer for machines.
 #[derive(Serialize)]
 struct Answer {
     algorithms: Vec<Algorithm>,
-    /// Always empty: this version has no GPU backend.
-    adapters: [(); 0],
+    adapters: Vec<Adapter>,
+    /// What went wrong while looking for GPUs.
+    remark: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -23,38 +26,113 @@ struct Algorithm {
     reason: Option<String>,
 }
 
+/// A GPU.
+#[derive(Serialize)]
+struct Adapter {
+    #[serde(flatten)]
+    identity: GpuIdentity,
+    /// `None` when it can't be opened.
+    limits: Option<Limits>,
+    /// Why it can't be opened.
+    refused: Option<String>,
+}
+
 pub(crate) fn run(arguments: &Devices) -> anyhow::Result<Outcome> {
-    let registry = Registry::new();
-    let algorithms: Vec<Algorithm> = registry
-        .entries()
-        .iter()
-        .map(|e| Algorithm {
-            id: e.id.to_string(),
-            revision: e.revision,
-            available: e.unavailable.is_none(),
-            reason: e.unavailable.clone(),
-        })
-        .collect();
+    let seen = if arguments.no_gpus { Seen::default() } else { look()? };
+    let mut adapters = Vec::new();
+    for identity in &seen.identities {
+        let limits = gpus::limits(identity.index)?;
+        let refused = limits.as_ref().err().cloned();
+        adapters.push(Adapter { identity: identity.clone(), limits: limits.ok(), refused });
+    }
+    let answer = Answer { algorithms: algorithms(&seen, &adapters)?, adapters, remark: seen.remark };
     if arguments.json {
-        output::print_json(&Answer { algorithms, adapters: [] })?;
+        output::print_json(&answer)?;
     } else {
-        output::print(&text(&algorithms))?;
+        output::print(&text(&answer, arguments.no_gpus))?;
     }
     Ok(Outcome::Done)
 }
 
-fn text(algorithms: &[Algorithm]) -> String {
+/// Those of the CPU, then those of the GPUs that were seen. Drivers are loaded into processes of their own only.
+///
+/// # Errors
+/// When no process can be started.
+fn algorithms(seen: &Seen, adapters: &[Adapter]) -> anyhow::Result<Vec<Algorithm>> {
+    let on_gpus = if adapters.is_empty() { Ok(Vec::new()) } else { gpus::entries()? };
+    let refused = |id: &AlgorithmId| {
+        let refusal = |k: &u32| adapters.iter().find(|a| a.identity.index == *k)?.refused.clone();
+        gpus::uses(id).iter().find_map(|k| refusal(k).map(|why| format!("gpu{k}: {why}")))
+    };
+    let entry = |id: &AlgorithmId| match &on_gpus {
+        Ok(list) => list
+            .iter()
+            .find(|e| e.id == *id)
+            .cloned()
+            .map_or_else(|| Some("it is not in this build".to_owned()), |OnGpus { unavailable, .. }| unavailable),
+        Err(why) => Some(why.clone()),
+    };
+    let algorithm = |id: &AlgorithmId, revision: u32, reason: Option<String>| Algorithm {
+        id: id.to_string(),
+        revision,
+        available: reason.is_none(),
+        reason,
+    };
+    let registry = Registry::new();
+    let mut list: Vec<Algorithm> =
+        registry.entries().iter().map(|e| algorithm(&e.id, e.revision, e.unavailable.clone())).collect();
+    for (id, revision) in sapwise::gpu::algorithms(&seen.identities) {
+        list.push(algorithm(&id, revision, refused(&id).or_else(|| entry(&id))));
+    }
+    Ok(list)
+}
+
+fn text(answer: &Answer, no_gpus: bool) -> String {
+    let mut text = gpu_table(&answer.adapters);
     let mut rows = vec![["algorithm", "revision", "runs here"].map(str::to_owned).to_vec()];
-    for a in algorithms {
+    for a in &answer.algorithms {
         let here = a.reason.as_ref().map_or_else(|| "yes".to_owned(), |reason| format!("no: {reason}"));
         rows.push(vec![a.id.clone(), a.revision.to_string(), here]);
     }
     let cores = usable_cores();
     let plural = if cores == 1 { "" } else { "s" };
-    format!(
-        "{}\n{cores} usable core{plural}, vector instructions: {}.\n\
-         This version has no GPU backend, so only algorithms on the CPU are listed.",
-        table::columns(&rows),
-        SimdLevel::in_use()
-    )
+    text += &format!("{}\n{cores} usable core{plural}, vector instructions: {}.", columns(&rows), SimdLevel::in_use());
+    if let Some(remark) = &answer.remark {
+        text += &format!("\n{remark}.");
+    } else if answer.adapters.is_empty() && !no_gpus {
+        text += "\nNo GPU was found; everything else works on the CPU.";
+    }
+    text
+}
+
+/// Nothing without GPUs.
+fn gpu_table(adapters: &[Adapter]) -> String {
+    if adapters.is_empty() {
+        return String::new();
+    }
+    let head = ["gpu", "kind", "api", "binding", "buffer", "workgroup", "shared", "subgroup", "name", "driver"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let mut refusals = String::new();
+    for Adapter { identity: g, limits, refused } in adapters {
+        let mut row = vec![format!("gpu{}", g.index), g.kind.to_string(), g.api.clone()];
+        row.extend(match limits {
+            Some(l) => [
+                bytes(l.binding_bytes as f64),
+                bytes(l.buffer_bytes as f64),
+                l.workgroup_invocations.to_string(),
+                bytes(f64::from(l.workgroup_memory_bytes)),
+                match l.subgroup_lanes {
+                    [low, high] if low == high => low.to_string(),
+                    [low, high] => format!("{low} to {high}"),
+                },
+            ],
+            None => ["-"; 5].map(str::to_owned),
+        });
+        row.extend([g.name.clone(), g.driver.clone()]);
+        rows.push(row);
+        if let Some(why) = refused {
+            refusals += &format!("gpu{} can't be used: {why}\n", g.index);
+        }
+    }
+    format!("{}{refusals}\n", columns(&rows))
 }

@@ -6,7 +6,7 @@ use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::sweep::median;
 use crate::table::{duration, grouped};
-use crate::{interrupt, output};
+use crate::{gpus, interrupt, output};
 use anyhow::Context;
 use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry};
 use serde::Serialize;
@@ -37,6 +37,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let mut registry = Registry::new();
     registry.pin_threads();
     let id = algorithm(arguments, &registry)?;
+    add_gpus(&mut registry, &id)?;
     let frames = read_frames(&arguments.boxes)?;
     interrupt::listen()?;
     let mut pairs = Pairs::new();
@@ -87,6 +88,23 @@ fn algorithm(arguments: &Arguments, registry: &Registry) -> anyhow::Result<Algor
     let available = registry.available();
     let usual = available.iter().find(|(id, _)| id.to_string() == DEFAULT).or(available.last());
     Ok(usual.context("this build has no algorithm that runs here")?.0.clone())
+}
+
+/// Adds the algorithms on GPUs where one is asked for.
+///
+/// # Errors
+/// When this machine lacks a GPU that is asked for, or its drivers can't be loaded.
+fn add_gpus(registry: &mut Registry, id: &AlgorithmId) -> anyhow::Result<()> {
+    let indices = gpus::uses(id);
+    if indices.is_empty() {
+        return Ok(());
+    }
+    let seen = gpus::look()?;
+    if let Some(why) = seen.lacks(indices) {
+        return Err(WrongUsage(format!("{id} can't run here: {why}; `sapwise devices` lists what can")).into());
+    }
+    registry.add_gpus(&seen.load().map_err(anyhow::Error::msg)?);
+    Ok(())
 }
 
 /// The pairs of every frame, and the samples in nanoseconds of all repetitions. The last frame stays in `pairs`.

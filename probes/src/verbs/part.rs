@@ -1,9 +1,10 @@
-//! `sapwise part`: one part of a measurement, in a process of its own. Hidden: `probe` and `predict` start it.
+//! `sapwise part`: one part of a measurement, in a process of its own. Hidden: other verbs start it.
 
 use crate::args::{Part, PartKind};
 use crate::exit::{Outcome, WrongUsage};
 use crate::sweep::{Order, sweep};
-use crate::{child, output};
+use crate::{child, gpus, output};
+use sapwise::Backend;
 use sapwise::measure::{self, Family, Options};
 
 pub(crate) fn run(arguments: Part) -> anyhow::Result<Outcome> {
@@ -14,6 +15,14 @@ pub(crate) fn run(arguments: Part) -> anyhow::Result<Outcome> {
             let parameters = measure::family(family, &Options { threads, ..Options::default() });
             output::print_json(&parameters)?;
         }
+        PartKind::Gpus => gpus::print_identities()?,
+        PartKind::GpuAlgorithms => gpus::print_entries()?,
+        PartKind::GpuLimits { index } => output::print_json(&gpus::limits_of(index)?)?,
+        PartKind::Gpu { index, threads } => gpus::print_parameters(index, &Options { threads, ..Options::default() })?,
+        PartKind::GpuGroup { gpus: Backend::Gpu(indices), threads } => {
+            gpus::print_group(&indices, &Options { threads, ..Options::default() })?;
+        }
+        PartKind::GpuGroup { gpus, .. } => return Err(WrongUsage(format!("{gpus} is no group of GPUs")).into()),
         PartKind::Sweep { order } => {
             let order: Order = serde_json::from_str(&order).map_err(|e| WrongUsage(format!("the order: {e}")))?;
             sweep(&order, &mut |event| output::print_json(&event))?;

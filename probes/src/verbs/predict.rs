@@ -17,25 +17,47 @@ pub(crate) fn run(arguments: &Predict) -> anyhow::Result<Outcome> {
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
     let mut text = String::new();
-    let fields = match (&model, &report) {
+    // A sentence on GPUs for people, and what went wrong with them for the file.
+    let (mut told, mut remarks) = (None, Vec::new());
+    let mut fields = match (&model, &report) {
         (None, Some(report)) => {
+            let mut report = report.clone();
+            arguments.gpus.restrict(&mut report);
+            let report = &report;
             let scenario = arguments.scenario.map(|s| s.to_string());
             train::measured_fields(report, scenario.as_deref().unwrap_or_else(|| train::slice_scenario(report)))?
         }
         (None, None) => return Err(WrongUsage("--measured needs --report".to_owned()).into()),
         (Some(model), report) => {
             let scenario = arguments.scenario.unwrap_or(Scenario::Uniform);
-            let hardware = match report {
-                Some(report) => report.hardware.clone(),
-                None => measure_hardware(arguments.threads)?,
+            let (hardware, measured) = match report {
+                Some(report) => (report.hardware.clone(), None),
+                None => {
+                    let (hardware, measured) = measure_hardware(arguments.threads, arguments.gpus)?;
+                    (hardware, Some(measured))
+                }
             };
             if report.is_none() {
                 text = format!("{}\n", summary::hardware(&hardware));
             }
             interrupt::check()?;
-            prediction::predict(model, &hardware, scenario)?
+            let gpus = match measured {
+                Some(measured) => {
+                    told = summary::gpus_left_out(arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
+                    remarks = measured.remarks;
+                    measured.usable
+                }
+                None => {
+                    let all = hardware.gpus.iter().map(|g| g.gpu.clone());
+                    let (taken, left_out): (Vec<_>, Vec<_>) = all.partition(|g| arguments.gpus.takes(g));
+                    told = arguments.gpus.tell(&left_out);
+                    taken
+                }
+            };
+            prediction::predict(model, &hardware, &gpus, scenario)?
         }
     };
+    fields.warnings.append(&mut remarks);
     if let Some(path) = &arguments.out {
         files::write_text(path, &json::write(&fields)?)?;
     }
@@ -44,8 +66,8 @@ pub(crate) fn run(arguments: &Predict) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Done);
     }
     text += &summary::fields(&fields);
-    if model.is_some() {
-        text += "\nThis version has no GPU backend, so only algorithms on the CPU are predicted.\n";
+    if let Some(told) = told {
+        text += &format!("\n{told}\n");
     }
     text += &match &arguments.out {
         Some(path) => format!("Written to {}. Next: sapwise run fragmentation --fields {}", path.display(), path.display()),

@@ -19,8 +19,10 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     interrupt::listen()?;
     let contention = arguments.contended.then(Contention::start).transpose();
     let contention = contention.context("the threads for --contended can't be started")?;
-    let hardware = measure_hardware(arguments.threads)?;
-    let mut found = Found::default();
+    let (hardware, measured) = measure_hardware(arguments.threads, arguments.gpus)?;
+    let told = summary::gpus_left_out(arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
+    let before = measured.remarks;
+    let mut found = Found { remarks: before.clone(), ..Found::default() };
     if interrupt::requested() {
         found.remarks.push("interrupted during the hardware parameters; what was to follow is missing".to_owned());
         found.interrupted = true;
@@ -29,14 +31,18 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
             cores: arguments.threads.unwrap_or_else(usable_cores),
             seed: arguments.seed,
             contended: arguments.contended,
+            gpus: measured.usable,
         };
         found = sweep::conduct(plan, &conditions, &mut |so_far| {
             if let Some(destination) = &destination {
-                let mut report = assemble(arguments, &hardware, so_far.clone(), began);
+                let mut so_far = so_far.clone();
+                so_far.remarks.splice(0..0, before.iter().cloned());
+                let mut report = assemble(arguments, &hardware, so_far, began);
                 report.remarks.push("unfinished: the measurement was going on when this was written".to_owned());
                 destination.save_unfinished(&report);
             }
         })?;
+        found.remarks.splice(0..0, before.iter().cloned());
     }
     drop(contention);
     let (failed, interrupted) = (found.failed, found.interrupted);
@@ -46,7 +52,8 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
         sapwise::json::write_report(&report)?
     } else {
         let next = saved.as_ref().ok().and_then(|path| path.map(|path| summary::next_step(&report, path)));
-        summary::report(&report) + &next.unwrap_or_default()
+        let told = told.map(|told| format!("\n{told}\n")).unwrap_or_default();
+        summary::report(&report) + &told + &next.unwrap_or_default()
     };
     // A standard output that is closed or full is told last: what went wrong with the report matters more.
     let printed = output::print(&text);
@@ -74,10 +81,10 @@ fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
 fn assemble(arguments: &Probe, hardware: &Hardware, found: Found, began: Instant) -> Report {
     Report {
         schema: sapwise::report::ReportSchema,
-        label: provenance::label(arguments, &found.points),
+        label: provenance::label(arguments, &found.points, hardware),
         provenance: provenance::provenance(arguments, began.elapsed()),
         hardware: hardware.clone(),
-        algorithms: provenance::timed(&found.points, arguments.threads),
+        algorithms: provenance::timed(&found.points, arguments.threads, hardware),
         points: found.points,
         remarks: found.remarks,
     }

@@ -3,12 +3,13 @@
 use crate::args::Run;
 use crate::document::read_document;
 use crate::exit::Outcome;
+use crate::gpus::{self, GpuChoice};
 use crate::hardware::measure_hardware;
 use crate::simulation::{self, Course, simulate};
 use crate::{files, interrupt, output, plot, prediction, revisions, table, train};
 use anyhow::{Context, bail};
 use sapwise::json::Document;
-use sapwise::{Fields, Registry, Scenario, Source, measure};
+use sapwise::{AlgorithmId, Fields, Registry, Scenario, Source, measure};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -67,24 +68,29 @@ struct LeftOut {
 struct Decision<'a> {
     from_frame: usize,
     objects: usize,
-    algorithm: &'a sapwise::AlgorithmId,
+    algorithm: &'a AlgorithmId,
 }
 
 pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
     let mut registry = Registry::new();
     registry.pin_threads();
-    let read = arguments.fields.as_deref().map(|path| read_fields(path, &registry)).transpose()?;
+    let read = arguments.fields.as_deref().map(|path| read_fields(path, &registry, arguments.gpus)).transpose()?;
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
     let mut fields = match read {
         Some(fields) => fields,
         None => {
-            let hardware = measure_hardware(None)?;
-            prediction::predict(&super::predict::model(None)?, &hardware, Scenario::Uniform)?
+            let (hardware, measured) = measure_hardware(None, arguments.gpus)?;
+            let model = super::predict::model(None)?;
+            let mut fields = prediction::predict(&model, &hardware, &measured.usable, Scenario::Uniform)?;
+            fields.warnings.extend(measured.remarks);
+            fields
         }
     };
     interrupt::check()?;
-    let origin =
+    let gpu_warnings = add_gpus(&mut registry, &fields, arguments.gpus)?;
+    fields.warnings.extend(gpu_warnings);
+    let mut origin =
         Origin { source: fields.source, extrapolated: fields.extrapolated, warnings: std::mem::take(&mut fields.warnings) };
     let usual_frames =
         if arguments.scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as u32 } else { 200 };
@@ -95,7 +101,8 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
         repeats: arguments.repeats as usize,
         seed: arguments.seed,
     };
-    let outcome = simulate(&course, fields, &registry)?;
+    let mut outcome = simulate(&course, fields, &registry)?;
+    origin.warnings.append(&mut outcome.notes);
     if let Some(path) = &arguments.plot {
         let svg = plot::simulation(&course, &outcome)?;
         files::write_text(path, &svg)?;
@@ -110,6 +117,35 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
     Ok(if outcome.interrupted { Outcome::Failed } else { Outcome::Done })
 }
 
+/// Adds the algorithms on the GPUs that are taken, where the fields name any, and gives what keeps some from running.
+///
+/// # Errors
+/// When no process can be started.
+fn add_gpus(registry: &mut Registry, fields: &Fields, choice: GpuChoice) -> anyhow::Result<Vec<String>> {
+    let mut named: Vec<&AlgorithmId> = fields.algorithms();
+    named.retain(|id| !gpus::uses(id).is_empty());
+    if named.is_empty() || choice.no_gpus {
+        return Ok(Vec::new());
+    }
+    let seen = gpus::look()?;
+    let mut warnings: Vec<String> = Vec::new();
+    let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.iter().cloned().partition(|g| choice.takes(g));
+    for id in named {
+        let program = left_out.iter().find(|g| gpus::uses(id).contains(&g.index));
+        warnings.extend(seen.lacks(gpus::uses(id)).map(|why| format!("{id} is left out: {why}")));
+        warnings.extend(program.map(|g| {
+            format!("{id} is left out: gpu{} ({}) is a program on the CPU; --software-gpus takes it in", g.index, g.name)
+        }));
+    }
+    if !taken.is_empty() {
+        match seen.load() {
+            Ok(gpus) => warnings.extend(gpus::register(registry, &gpus, &taken)),
+            Err(why) => warnings.push(why),
+        }
+    }
+    Ok(warnings)
+}
+
 /// What is told about the fields.
 struct Origin {
     source: Source,
@@ -121,7 +157,7 @@ struct Origin {
 ///
 /// # Errors
 /// When the file is neither, or tells of other revisions of the algorithms than those of this build.
-fn read_fields(path: &Path, registry: &Registry) -> anyhow::Result<Fields> {
+fn read_fields(path: &Path, registry: &Registry, choice: GpuChoice) -> anyhow::Result<Fields> {
     let fresh = |stale: Vec<String>| match &stale[..] {
         [] => Ok(()),
         _ => bail!("{} is stale: {}; predict again or probe again", path.display(), stale.join("; ")),
@@ -131,7 +167,8 @@ fn read_fields(path: &Path, registry: &Registry) -> anyhow::Result<Fields> {
             fresh(revisions::stale_in_fields(&fields, registry))?;
             Ok(*fields)
         }
-        Document::Report(report) => {
+        Document::Report(mut report) => {
+            choice.restrict(&mut report);
             fresh(revisions::stale_in_report(&report, registry))?;
             let mut fields = train::measured_fields(&report, train::slice_scenario(&report))
                 .with_context(|| format!("{} gives no fields", path.display()))?;

@@ -12,6 +12,24 @@ pub(crate) fn sapwise() -> Command {
     command
 }
 
+/// The command where no Vulkan driver is found. On other interfaces the adapters of the machine stay.
+pub(crate) fn without_adapters(command: &mut Command) -> &mut Command {
+    command.env("VK_ICD_FILENAMES", "/nonexistent").env("VK_DRIVER_FILES", "/nonexistent")
+}
+
+/// The answer of `sapwise devices --json` on a machine with an adapter. `None`, with a line that says so, without any; a failure
+/// then where the environment says `SAPWISE_REQUIRE_GPU=1`.
+pub(crate) fn devices_with_a_gpu(test: &str) -> Option<serde_json::Value> {
+    let answer: serde_json::Value = serde_json::from_str(&success(sapwise().args(["devices", "--json"]))).unwrap();
+    if answer["adapters"].as_array().unwrap().is_empty() {
+        let required = std::env::var("SAPWISE_REQUIRE_GPU").is_ok_and(|v| v == "1");
+        assert!(!required, "SAPWISE_REQUIRE_GPU=1, and no adapter was found: {}", answer["remark"]);
+        eprintln!("{test} is skipped: no adapter was found");
+        return None;
+    }
+    Some(answer)
+}
+
 /// Runs to exit status 0 and gives standard output.
 pub(crate) fn success(command: &mut Command) -> String {
     let ended = command.output().unwrap();

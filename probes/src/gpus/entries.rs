@@ -1,0 +1,50 @@
+//! What a registry with all GPUs says of each algorithm, without loading a driver into the process that asks.
+
+use super::uses;
+use crate::child::{Ended, run_part};
+use sapwise::gpu::Gpus;
+use sapwise::{AlgorithmId, Registry};
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// As that of looking for GPUs.
+const LIMIT: Duration = Duration::from_secs(30);
+
+/// An algorithm on GPUs.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct OnGpus {
+    pub(crate) id: AlgorithmId,
+    /// Why it can't run here, if it can't.
+    pub(crate) unavailable: Option<String>,
+}
+
+/// What the process prints: each algorithm in a line.
+///
+/// # Errors
+/// When standard output can't be written.
+pub(crate) fn print_entries() -> anyhow::Result<()> {
+    let mut registry = Registry::with_cores(1);
+    registry.add_gpus(&Gpus::find());
+    let on_gpus = registry.entries().iter().filter(|e| !uses(&e.id).is_empty());
+    on_gpus
+        .map(|e| OnGpus { id: e.id.clone(), unavailable: e.unavailable.clone() })
+        .try_for_each(|e| crate::output::print_json(&e))
+}
+
+/// Every algorithm on the GPUs of this machine, or why that can't be told.
+///
+/// # Errors
+/// When no process can be started.
+pub(crate) fn entries() -> anyhow::Result<Result<Vec<OnGpus>, String>> {
+    let mut entries: Vec<OnGpus> = Vec::new();
+    let ended = run_part(&["gpu-algorithms"], LIMIT, &mut |line| {
+        entries.extend(serde_json::from_str::<OnGpus>(line));
+        Ok(())
+    })?;
+    Ok(match ended {
+        Ended::Well => Ok(entries),
+        Ended::Interrupted => Err("interrupted while its drivers were loaded".to_owned()),
+        Ended::Badly(how) => Err(format!("the process that loaded its drivers {how}")),
+    })
+}

@@ -1,0 +1,69 @@
+//! Looking for GPUs.
+
+use crate::child::{Ended, run_part};
+use sapwise::GpuIdentity;
+use sapwise::gpu::Gpus;
+use std::time::Duration;
+
+/// Looking takes tens of milliseconds, and seconds where a driver compiles on its first start.
+const LIMIT: Duration = Duration::from_secs(30);
+
+/// The GPUs that a process of its own found.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Seen {
+    /// By their numbers.
+    pub(crate) identities: Vec<GpuIdentity>,
+    /// What went wrong. There are no GPUs then.
+    pub(crate) remark: Option<String>,
+}
+
+/// Looks for GPUs, without loading a driver into this process.
+///
+/// # Errors
+/// When no process can be started.
+pub(crate) fn look() -> anyhow::Result<Seen> {
+    let mut identities: Vec<GpuIdentity> = Vec::new();
+    let ended = run_part(&["gpus"], LIMIT, &mut |line| {
+        // Drivers print what they like on the standard output of whoever loads them.
+        identities.extend(serde_json::from_str::<GpuIdentity>(line));
+        Ok(())
+    })?;
+    let remark = match ended {
+        Ended::Well => return Ok(Seen { identities, remark: None }),
+        Ended::Interrupted => "GPUs are left out: interrupted while looking for them".to_owned(),
+        Ended::Badly(how) => format!(
+            "GPUs are left out: the process that looked for them {how}; update or remove the driver, or silence this with --no-gpus"
+        ),
+    };
+    Ok(Seen { identities: Vec::new(), remark: Some(remark) })
+}
+
+impl Seen {
+    /// Loads the drivers into this process, where there is any GPU. None, with the reason, when what is found now differs.
+    pub(crate) fn load(&self) -> Result<Gpus, String> {
+        if self.identities.is_empty() {
+            return Ok(Gpus::none());
+        }
+        let gpus = Gpus::find();
+        if gpus.identities().eq(&self.identities) {
+            return Ok(gpus);
+        }
+        let names = |list: &mut dyn Iterator<Item = &GpuIdentity>| {
+            list.map(|g| format!("gpu{} ({})", g.index, g.name)).collect::<Vec<_>>().join(", ")
+        };
+        let (before, now) = (names(&mut self.identities.iter()), names(&mut gpus.identities()));
+        let now = if now.is_empty() { "none".to_owned() } else { now };
+        Err(format!("GPUs are left out: {before} were seen first and {now} now"))
+    }
+
+    /// What keeps an algorithm from running here for want of its GPUs, if anything does.
+    pub(crate) fn lacks(&self, indices: &[u32]) -> Option<String> {
+        let absent = indices.iter().find(|k| self.identities.iter().all(|g| g.index != **k))?;
+        let there: Vec<String> = self.identities.iter().map(|g| format!("gpu{} ({})", g.index, g.name)).collect();
+        Some(match &self.remark {
+            Some(remark) => remark.clone(),
+            None if there.is_empty() => format!("this machine has no gpu{absent}: no GPU was found"),
+            None => format!("this machine has no gpu{absent}, only {}", there.join(", ")),
+        })
+    }
+}

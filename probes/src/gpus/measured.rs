@@ -1,0 +1,114 @@
+//! The parameters of GPUs, each GPU and each group measured in a process of its own.
+
+use super::{GpuChoice, group_without_parameters, look, uses, without_parameters};
+use crate::child::{Ended, run_part};
+use crate::progress::Progress;
+use sapwise::{GpuGroup, GpuHardware, GpuIdentity};
+use serde::de::DeserializeOwned;
+use std::time::Duration;
+
+/// A real GPU takes seconds; a program on the CPU that acts as one may be a hundred times slower.
+const LIMIT: Duration = Duration::from_secs(90);
+
+/// What was found out about the GPUs of this machine.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Measured {
+    /// The GPUs that were taken.
+    pub(crate) gpus: Vec<GpuHardware>,
+    /// Those that work together.
+    pub(crate) groups: Vec<GpuGroup>,
+    /// The taken GPUs that may be used from here on: all but those that ended their process.
+    pub(crate) usable: Vec<GpuIdentity>,
+    /// The GPUs that were not taken.
+    pub(crate) left_out: Vec<GpuIdentity>,
+    /// What went wrong.
+    pub(crate) remarks: Vec<String>,
+}
+
+/// Looks for GPUs and measures those that are taken, at most a minute and a half for each.
+///
+/// # Errors
+/// When no process can be started.
+pub(crate) fn measure(choice: GpuChoice, threads: Option<u32>) -> anyhow::Result<Measured> {
+    let mut measured = Measured::default();
+    if choice.no_gpus || crate::interrupt::requested() {
+        return Ok(measured);
+    }
+    let seen = look()?;
+    measured.remarks.extend(seen.remark);
+    let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.into_iter().partition(|g| choice.takes(g));
+    measured.left_out = left_out;
+    let progress = Progress::new(taken.len() as u64);
+    for identity in taken {
+        progress.message(format!("hardware: gpu{}", identity.index));
+        measured.gpu(identity, threads)?;
+        progress.advance(1);
+    }
+    measured.measure_groups(threads)?;
+    Ok(measured)
+}
+
+impl Measured {
+    fn gpu(&mut self, identity: GpuIdentity, threads: Option<u32>) -> anyhow::Result<()> {
+        let index = identity.index;
+        let hardware = match part::<GpuHardware>("gpu", &index.to_string(), threads)? {
+            Ok(hardware) if hardware.gpu == identity => {
+                self.usable.push(identity);
+                hardware
+            }
+            Ok(other) => {
+                let why = format!("{} has become gpu{index} while it was to be measured", other.gpu.name);
+                without_parameters(identity, &why)
+            }
+            Err(why) => {
+                self.remarks.push(format!("gpu{index} ({}) is left out: {why}", identity.name));
+                without_parameters(identity, &why)
+            }
+        };
+        self.gpus.push(hardware);
+        Ok(())
+    }
+
+    /// Every set of several GPUs that our algorithms run on.
+    fn measure_groups(&mut self, threads: Option<u32>) -> anyhow::Result<()> {
+        let mut sets: Vec<Vec<u32>> =
+            sapwise::gpu::algorithms(&self.usable).iter().map(|(id, _)| uses(id).to_vec()).filter(|s| s.len() > 1).collect();
+        sets.dedup();
+        for set in sets {
+            if self.groups.iter().any(|g| g.gpus == set) {
+                continue;
+            }
+            let text = sapwise::Backend::Gpu(set.clone()).to_string();
+            let group = part("gpu-group", &text, threads)?;
+            self.groups.push(group.unwrap_or_else(|why| {
+                self.remarks.push(format!("{text} could not be measured together: {why}"));
+                group_without_parameters(&set, &why)
+            }));
+        }
+        Ok(())
+    }
+}
+
+/// The answer of a part, or why there is none.
+fn part<T: DeserializeOwned>(kind: &str, which: &str, threads: Option<u32>) -> anyhow::Result<Result<T, String>> {
+    if crate::interrupt::requested() {
+        return Ok(Err("interrupted before it was measured".to_owned()));
+    }
+    let threads = threads.map(|k| k.to_string());
+    let mut arguments = vec![kind, which];
+    if let Some(threads) = &threads {
+        arguments.extend(["--threads", threads]);
+    }
+    let mut answer = None;
+    let ended = run_part(&arguments, LIMIT, &mut |line| {
+        // Drivers print what they like on the standard output of whoever loads them.
+        answer = serde_json::from_str(line).ok().or(answer.take());
+        Ok(())
+    })?;
+    Ok(match (ended, answer) {
+        (Ended::Well, Some(answer)) => Ok(answer),
+        (Ended::Well, None) => Err("the process that measured it gave no answer".to_owned()),
+        (Ended::Interrupted, _) => Err("interrupted while it was measured".to_owned()),
+        (Ended::Badly(how), _) => Err(format!("the process that measured it {how}")),
+    })
+}

@@ -1,0 +1,64 @@
+//! What the time of a method may consist of.
+
+use sapwise::model::Scale;
+use sapwise::{BackendClass, Term};
+
+/// What a method tests. The tests of the other methods are left out: within one machine they correlate with its own, and would
+/// grow differently beyond the sizes that were measured.
+fn tests(method: &str) -> &'static [Term] {
+    match method {
+        "brute" => &[Term::AllPairs],
+        "sweep" => &[Term::AxisCandidates],
+        "strips" => &[Term::StripCandidates],
+        _ => &[Term::AllPairs, Term::AxisCandidates, Term::StripCandidates],
+    }
+}
+
+/// The physical terms of a method over machines, for any number of threads or GPUs.
+///
+/// Of columns that can't be told apart the first one is used, so that the order matters where all machines are alike: work of
+/// the lanes before work of the cycles, divided work before serial work, the GPU's work before that of the CPU for it.
+pub(crate) fn terms(method: &str, class: BackendClass) -> Vec<(Term, Scale)> {
+    use {Scale::*, Term::*};
+    let sorts = method != "brute";
+    let tests = tests(method).iter();
+    let mut list;
+    match class {
+        BackendClass::Cpu => {
+            list = vec![(Call, Cycle), (Call, ForkJoin), (Objects, SharedCycle)];
+            if sorts {
+                list.extend([(Sort, SharedCycle), (ColdObjects, Byte)]);
+            }
+            list.extend(tests.flat_map(|&t| [(t, SharedLane), (t, SharedCycle)]));
+            list.extend([(Pairs, SharedCycle), (Objects, Cycle)]);
+            if sorts {
+                list.push((Sort, Cycle));
+            }
+        }
+        BackendClass::Gpu => {
+            list = vec![(Call, GpuRoundTrip), (Call, GpuDispatch), (Objects, GpuUploadByte), (Objects, GpuMemoryByte)];
+            if sorts {
+                list.push((Sort, GpuMemoryByte));
+            }
+            list.extend(tests.map(|&t| (t, GpuOperation)));
+            // The CPU checks every box before the upload and takes every pair out of mapped memory.
+            list.extend([(Pairs, GpuDownloadByte), (Objects, Cycle), (Pairs, Cycle)]);
+        }
+    }
+    list
+}
+
+/// The terms of a method within one machine, where everything but the load is constant.
+pub(crate) fn terms_of_one_machine(method: &str, class: BackendClass) -> Vec<Term> {
+    let mut list = vec![Term::Call, Term::Objects];
+    if method != "brute" {
+        list.push(Term::Sort);
+    }
+    // The caches of the CPU say nothing about a GPU.
+    if class == BackendClass::Cpu {
+        list.push(Term::ColdObjects);
+    }
+    list.extend(tests(method));
+    list.push(Term::Pairs);
+    list
+}

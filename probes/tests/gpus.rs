@@ -1,0 +1,230 @@
+//! The command on machines with GPUs, without any, and with drivers that crash.
+
+mod common;
+
+use common::{devices_with_a_gpu, failure, npy, sapwise, success, without_adapters};
+use sapwise::Report;
+use sapwise::hardware::gpu::parameter;
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A sweep of one scenario with two sizes.
+const TINY: [&str; 6] = ["probe", "--scenario", "uniform", "--max-objects", "20", "--json"];
+
+fn answer(command: &mut assert_cmd::Command) -> Value {
+    serde_json::from_str(&success(command)).unwrap()
+}
+
+fn report(command: &mut assert_cmd::Command) -> Report {
+    sapwise::json::report(&success(command)).unwrap()
+}
+
+/// A made-up report of a machine with two GPUs, with what `change` does to it. Enough points for a model.
+fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
+    let mut report: Value = serde_json::from_str(include_str!("../../tests/fixtures/report-1-gpu.json")).unwrap();
+    report["label"] = "real_full".into();
+    let points = report["points"].as_array().unwrap().clone();
+    let again = points.iter().cycle().take(12).enumerate().map(|(k, point)| {
+        let mut point = point.clone();
+        point["scenario"] = format!("scenario {}", k / points.len()).into();
+        point
+    });
+    report["points"] = again.collect();
+    change(&mut report);
+    let path = folder.join(name);
+    fs::write(&path, report.to_string()).unwrap();
+    path
+}
+
+fn ids(fields: &Value) -> Vec<&str> {
+    fields["costs"].as_array().unwrap().iter().map(|c| c["algorithm"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn adapters_are_listed_with_what_bounds_them_and_every_algorithm_on_them() {
+    let Some(answer) = devices_with_a_gpu("adapters_are_listed") else { return };
+    let text = success(sapwise().arg("devices"));
+    for adapter in answer["adapters"].as_array().unwrap() {
+        for key in ["index", "name", "device", "driver", "api", "kind"] {
+            assert!(!adapter[key].is_null(), "{key}: {adapter}");
+        }
+        assert!(adapter["refused"].is_string() || adapter["limits"]["binding_bytes"].as_u64() > Some(0), "{adapter}");
+        assert!(text.contains(adapter["name"].as_str().unwrap()), "{text}");
+        let id = format!("strips@gpu{}", adapter["index"]);
+        let algorithm = answer["algorithms"].as_array().unwrap().iter().find(|a| a["id"] == id.as_str()).unwrap();
+        assert_eq!(algorithm["available"], algorithm["reason"].is_null());
+    }
+}
+
+#[test]
+fn programs_that_act_as_gpus_are_measured_and_swept_only_when_asked_for() {
+    let Some(devices) = devices_with_a_gpu("programs_that_act_as_gpus") else { return };
+    let adapters = devices["adapters"].as_array().unwrap();
+    let real = adapters.iter().filter(|a| a["kind"] != "software").count();
+    if real == adapters.len() {
+        eprintln!("programs_that_act_as_gpus is skipped: all adapters are real");
+        return;
+    }
+    let usual = report(sapwise().args(TINY));
+    assert_eq!(usual.hardware.gpus.len(), real);
+    let asked = report(sapwise().args(TINY).arg("--software-gpus"));
+    assert_eq!(asked.hardware.gpus.len(), adapters.len(), "{:?}", asked.remarks);
+    assert!(asked.provenance.command.contains("--software-gpus"));
+    for gpu in &asked.hardware.gpus {
+        let names: Vec<&str> = gpu.parameters.iter().map(|p| p.name.as_str()).collect();
+        assert_eq!(names, parameter::all_names());
+    }
+    for group in &asked.hardware.gpu_groups {
+        let names: Vec<&str> = group.parameters.iter().map(|p| p.name.as_str()).collect();
+        assert_eq!(names, parameter::GROUP);
+    }
+    for algorithm in devices["algorithms"].as_array().unwrap().iter().filter(|a| a["available"] == true) {
+        let timed = asked.algorithms.iter().any(|t| t.id.to_string() == algorithm["id"].as_str().unwrap());
+        assert!(timed, "{} was not swept: {:?}", algorithm["id"], asked.remarks);
+    }
+    let none = report(sapwise().args(TINY).arg("--no-gpus"));
+    assert!(none.hardware.gpus.is_empty() && none.algorithms.iter().all(|t| t.id.to_string().contains("@cpu")));
+}
+
+#[test]
+fn without_an_adapter_one_sentence_says_so_and_everything_else_works() {
+    let text = success(without_adapters(&mut sapwise()).arg("predict"));
+    if text.contains("gpu0") {
+        eprintln!("skipped: this machine has adapters without Vulkan");
+        return;
+    }
+    assert_eq!(text.matches("GPU").count(), 1, "{text}");
+    assert!(text.contains("No GPU was found; everything else works on the CPU."), "{text}");
+    let report = report(without_adapters(&mut sapwise()).args(TINY));
+    assert!(report.hardware.gpus.is_empty() && report.remarks.is_empty(), "{:?}", report.remarks);
+}
+
+#[test]
+fn a_model_of_gpus_predicts_the_gpus_of_a_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = made_up(folder.path(), "own.json", |_| {});
+    let model = folder.path().join("model.json");
+    let card = folder.path().join("card.md");
+    success(sapwise().arg("train").arg(&own).arg("--out").arg(&model).arg("--card").arg(&card));
+    let page = fs::read_to_string(&card).unwrap();
+    assert!(page.contains("Kinds of GPU in the training: discrete; at most 2 together."), "{page}");
+    let trained: Value = serde_json::from_str(&fs::read_to_string(&model).unwrap()).unwrap();
+    let ranges = trained["ranges"].as_array().unwrap();
+    assert!(ranges.iter().any(|r| r["parameter"] == "gpu/round_trip_ns"), "{ranges:?}");
+    let predict = |report: &Path, words: &[&str]| {
+        let mut command = sapwise();
+        answer(command.args(["predict", "--json", "--model"]).arg(&model).arg("--report").arg(report).args(words))
+    };
+    let fields = predict(&own, &[]);
+    assert!(ids(&fields).contains(&"brute@gpu0") && ids(&fields).contains(&"brute@gpu1"), "{fields}");
+    assert!(ids(&predict(&own, &["--no-gpus"])).iter().all(|id| id.contains("@cpu")));
+    // The same machine with a program in place of its GPUs.
+    let programs = made_up(folder.path(), "programs.json", |report| {
+        for gpu in report["hardware"]["gpus"].as_array_mut().unwrap() {
+            gpu["gpu"]["kind"] = "software".into();
+        }
+    });
+    assert!(ids(&predict(&programs, &[])).iter().all(|id| id.contains("@cpu")));
+    let fields = predict(&programs, &["--software-gpus"]);
+    assert!(ids(&fields).contains(&"brute@gpu0"), "{fields}");
+    assert_eq!(fields["extrapolated"], true);
+    assert!(fields["warnings"].to_string().contains("trained on discrete GPUs only"), "{fields}");
+}
+
+#[test]
+fn measured_fields_leave_out_programs_that_act_as_gpus() {
+    let folder = tempfile::tempdir().unwrap();
+    let programs = made_up(folder.path(), "programs.json", |report| {
+        report["hardware"]["gpus"][0]["gpu"]["kind"] = "software".into();
+    });
+    let measured =
+        |words: &[&str]| answer(sapwise().args(["predict", "--measured", "--json", "--report"]).arg(&programs).args(words));
+    assert!(ids(&measured(&[])).iter().all(|id| !id.contains("gpu0")));
+    assert!(ids(&measured(&["--software-gpus"])).contains(&"brute@gpu0"));
+}
+
+#[test]
+fn fields_for_a_gpu_that_is_not_here_are_told_and_run_on_the_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
+    let fields = json!({
+        "schema": "fields/1", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
+        "steps": [step(0, "brute@cpu1"), step(100, "strips@gpu99")], "crossovers": [], "interval_basis": "", "costs": []
+    });
+    let path = folder.path().join("fields.json");
+    fs::write(&path, fields.to_string()).unwrap();
+    let complaint = String::from_utf8(sapwise().arg("check").arg(&path).output().unwrap().stdout).unwrap();
+    assert!(complaint.contains("strips@gpu99 can't run here: this machine has no gpu99"), "{complaint}");
+    let run = ["run", "uniform", "--objects", "200", "--frames", "3", "--repeats", "1", "--json", "--fields"];
+    let told = answer(sapwise().args(run).arg(&path));
+    assert!(told["warnings"].to_string().contains("this machine has no gpu99"), "{told}");
+    assert_eq!(told["decisions"][0]["algorithm"], "brute@cpu1");
+}
+
+#[test]
+fn pairs_on_a_gpu_are_those_of_the_cpu() {
+    let Some(devices) = devices_with_a_gpu("pairs_on_a_gpu") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let row: Vec<f32> = (0..500).flat_map(|k| [k as f32, 0.0, 0.0, k as f32 + 1.5, 1.0, 1.0]).collect();
+    let boxes = npy(folder.path(), "boxes.npy", "<f4", "500, 6", &row);
+    let on = |id: &str| answer(sapwise().arg("pairs").arg(&boxes).args(["--json", "--algorithm", id]));
+    let right = on("brute@cpu1");
+    let algorithms = devices["algorithms"].as_array().unwrap();
+    let on_gpus = algorithms.iter().filter(|a| a["id"].as_str().unwrap().contains("@gpu"));
+    for algorithm in on_gpus.filter(|a| a["available"] == true) {
+        let told = on(algorithm["id"].as_str().unwrap());
+        assert_eq!((&told["pairs"], &told["fingerprint"]), (&right["pairs"], &right["fingerprint"]), "{told}");
+    }
+}
+
+/// A Vulkan driver that ends the process that loads it.
+#[cfg(target_os = "linux")]
+fn crashing_driver(folder: &Path) -> Option<PathBuf> {
+    let source = folder.join("crash.rs");
+    let code = "#[used]\n#[unsafe(link_section = \".init_array\")]\n\
+                static CRASH: extern \"C\" fn() = { extern \"C\" fn crash() { std::process::abort() } crash };\n";
+    fs::write(&source, code).unwrap();
+    let library = folder.join("libcrash.so");
+    let mut rustc = std::process::Command::new(std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned()));
+    let built = rustc.args(["--edition", "2024", "--crate-type", "cdylib", "-o"]).arg(&library).arg(&source).output();
+    if !built.is_ok_and(|b| b.status.success()) {
+        eprintln!("skipped: no driver that crashes can be built here");
+        return None;
+    }
+    let icd = folder.join("crash.json");
+    let text = json!({"file_format_version": "1.0.0", "ICD": {"library_path": library, "api_version": "1.1.0"}});
+    fs::write(&icd, text.to_string()).unwrap();
+    Some(icd)
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_driver_that_crashes_costs_the_gpus_and_a_remark() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(icd) = crashing_driver(folder.path()) else { return };
+    let with_it = || {
+        let mut command = sapwise();
+        command.env("VK_ICD_FILENAMES", &icd).env("VK_DRIVER_FILES", &icd);
+        command
+    };
+    let devices = answer(with_it().args(["devices", "--json"]));
+    if devices["remark"].is_null() {
+        eprintln!("skipped: no Vulkan loader loads the driver that crashes");
+        return;
+    }
+    assert!(devices["remark"].as_str().unwrap().contains("ended by signal 6"), "{devices}");
+    let probed = report(with_it().args(TINY));
+    assert!(
+        probed.remarks.iter().any(|r| r.contains("ended by signal 6")) && probed.points.len() == 2,
+        "{:?}",
+        probed.remarks
+    );
+    let predicted = answer(with_it().args(["predict", "--json"]));
+    assert!(predicted["warnings"].to_string().contains("ended by signal 6"), "{predicted}");
+    // No driver is loaded, so nothing crashes and nothing is said.
+    assert!(report(with_it().args(TINY).arg("--no-gpus")).remarks.is_empty());
+    let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+    let complaint = failure(with_it().arg("pairs").arg(&boxes).args(["--algorithm", "strips@gpu0"]), 2);
+    assert!(complaint.contains("ended by signal 6"), "{complaint}");
+}

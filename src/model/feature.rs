@@ -1,0 +1,52 @@
+//! What the residual of a cost model may depend on.
+
+use super::scale::need;
+use crate::hardware::{Hardware, parameter};
+use crate::{Backend, BackendClass, Load};
+
+/// What a residual may depend on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum Feature {
+    /// Base-2 logarithm of the number of objects.
+    Log2Objects,
+    /// Its square.
+    Log2ObjectsSquared,
+    /// Base-2 logarithm of the SIMD lanes of the CPU. Not of a GPU, whose lanes are in its arithmetic rate.
+    Log2Lanes,
+    /// Base-2 logarithm of the threads of the algorithm, or of the number of its GPUs.
+    Log2Threads,
+}
+
+impl Feature {
+    /// Every feature of a class of processor.
+    #[must_use]
+    pub fn of(class: BackendClass) -> &'static [Self] {
+        match class {
+            BackendClass::Cpu => &[Self::Log2Objects, Self::Log2ObjectsSquared, Self::Log2Lanes, Self::Log2Threads],
+            BackendClass::Gpu => &[Self::Log2Objects, Self::Log2ObjectsSquared, Self::Log2Threads],
+        }
+    }
+
+    pub(super) fn is_of(self, class: BackendClass) -> bool {
+        Self::of(class).contains(&self)
+    }
+
+    /// The feature of an algorithm on a backend of a machine under a load.
+    ///
+    /// # Errors
+    /// Names the hardware parameter that is missing, or says that the feature is not one of that processor.
+    pub fn value(self, hardware: &Hardware, backend: &Backend, load: &Load) -> Result<f64, String> {
+        if !self.is_of(backend.class()) {
+            return Err(format!("{backend} has no feature {self:?}"));
+        }
+        let octaves = f64::from(load.objects.max(1)).log2();
+        Ok(match self {
+            Self::Log2Objects => octaves,
+            Self::Log2ObjectsSquared => octaves * octaves,
+            Self::Log2Lanes => need(hardware, parameter::SIMD_LANES)?.log2(),
+            Self::Log2Threads => f64::from(backend.width()).log2(),
+        })
+    }
+}

@@ -1,0 +1,144 @@
+//! What one unit of work takes on a machine.
+
+use super::gpu_set::GpuSet;
+use crate::hardware::gpu::parameter as of_gpu;
+use crate::hardware::{Hardware, parameter};
+use crate::{Backend, BackendClass};
+
+/// Nanoseconds that one unit of work takes on a machine, with `k` threads or on some of its GPUs.
+///
+/// Of several GPUs latencies are those of the slowest, because a frame is done when the last of them is. Rates are the sum of
+/// all, but no more than the rate of the fastest times the ratio that the group was measured to have; where it was not
+/// measured, the plain sum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum Scale {
+    /// One cycle of one core: 1 / clock. Work that is not divided among threads, and what the CPU does for a GPU.
+    Cycle,
+    /// One cycle of `k` cores: 1 / (clock * measured scaling of `k` threads).
+    SharedCycle,
+    /// One lane of one cycle of `k` cores: 1 / (clock * lanes * measured scaling of `k` threads).
+    SharedLane,
+    /// One byte at the memory bandwidth of `k` threads.
+    Byte,
+    /// One fork and join of a pool that sleeps, as it does between frames; nothing with one thread.
+    ForkJoin,
+    /// One submission that is waited for, and reading back a few bytes of its result: `round_trip_ns` + `read_back_ns`, times
+    /// `group_round_trip_ratio` of several GPUs.
+    GpuRoundTrip,
+    /// One dispatch that depends on the one before it, in the same submission: `dispatch_ns`.
+    GpuDispatch,
+    /// One byte from the CPU to the GPU: 1 / `upload_rate_gb_per_s`, the slope over sizes. Where that is missing
+    /// 1 / `upload_gb_per_s`, which has the latency of 32 MiB in it. Several GPUs are limited by `group_upload_ratio`.
+    GpuUploadByte,
+    /// One byte back: 1 / `download_rate_gb_per_s`, else 1 / `download_gb_per_s`. Several GPUs are limited by
+    /// `group_upload_ratio`: both ways go over the same bus.
+    GpuDownloadByte,
+    /// One byte that a kernel moves in the GPU's memory: 1 / `read_gb_per_s`, where that is missing 1 / `copy_gb_per_s`, whose
+    /// copy command is many times faster than any kernel on programs that act as GPUs. Several GPUs are limited by
+    /// `group_arithmetic_ratio`, which tells how far they work at the same time.
+    GpuMemoryByte,
+    /// One 32-bit floating-point operation of all lanes at work: 1 / `arithmetic_gflop_per_s`. Several GPUs are limited by
+    /// `group_arithmetic_ratio`.
+    GpuOperation,
+}
+
+impl Scale {
+    /// Whether a method on that class of processor may have it.
+    #[must_use]
+    pub fn is_of(self, class: BackendClass) -> bool {
+        match self {
+            // The CPU works for a GPU too: it checks boxes and copies pairs.
+            Self::Cycle => true,
+            Self::SharedCycle | Self::SharedLane | Self::Byte | Self::ForkJoin => class == BackendClass::Cpu,
+            _ => class == BackendClass::Gpu,
+        }
+    }
+
+    /// Nanoseconds that one unit takes on a backend of a machine.
+    ///
+    /// # Errors
+    /// Names the hardware parameter or the GPU that is missing, or says that the scale is not one of that processor.
+    pub fn nanoseconds(self, hardware: &Hardware, backend: &Backend) -> Result<f64, String> {
+        match backend {
+            _ if !self.is_of(backend.class()) => Err(format!("{backend} has no scale {self:?}")),
+            Backend::Cpu(threads) => self.on_cpu(hardware, *threads),
+            Backend::Gpu(gpus) => self.on_gpus(hardware, gpus),
+        }
+    }
+
+    fn on_cpu(self, hardware: &Hardware, threads: u32) -> Result<f64, String> {
+        Ok(match self {
+            Self::SharedCycle => cycle(hardware)? / speed_up(hardware, threads)?,
+            Self::SharedLane => cycle(hardware)? / speed_up(hardware, threads)? / need(hardware, parameter::SIMD_LANES)?,
+            Self::Byte => 1.0 / bandwidth(hardware, threads)?,
+            Self::ForkJoin if threads == 1 => 0.0,
+            Self::ForkJoin => need(hardware, parameter::FORK_JOIN_COLD_NS)?,
+            _ => cycle(hardware)?,
+        })
+    }
+
+    fn on_gpus(self, hardware: &Hardware, indices: &[u32]) -> Result<f64, String> {
+        let set = GpuSet::new(hardware, indices)?;
+        Ok(match self {
+            Self::GpuRoundTrip => {
+                let together = set.ratio(of_gpu::GROUP_ROUND_TRIP_RATIO).unwrap_or(1.0);
+                set.latency(&[of_gpu::ROUND_TRIP_NS, of_gpu::READ_BACK_NS])? * together
+            }
+            Self::GpuDispatch => set.latency(&[of_gpu::DISPATCH_NS])?,
+            Self::GpuUploadByte => {
+                1.0 / set.rate(&[of_gpu::UPLOAD_RATE_GB_PER_S, of_gpu::UPLOAD_GB_PER_S], of_gpu::GROUP_UPLOAD_RATIO)?
+            }
+            Self::GpuDownloadByte => {
+                1.0 / set.rate(&[of_gpu::DOWNLOAD_RATE_GB_PER_S, of_gpu::DOWNLOAD_GB_PER_S], of_gpu::GROUP_UPLOAD_RATIO)?
+            }
+            Self::GpuMemoryByte => {
+                1.0 / set.rate(&[of_gpu::READ_GB_PER_S, of_gpu::COPY_GB_PER_S], of_gpu::GROUP_ARITHMETIC_RATIO)?
+            }
+            Self::GpuOperation => 1.0 / set.rate(&[of_gpu::ARITHMETIC_GFLOP_PER_S], of_gpu::GROUP_ARITHMETIC_RATIO)?,
+            _ => cycle(hardware)?,
+        })
+    }
+}
+
+/// One cycle in ns, of the measured clock where there is one.
+fn cycle(hardware: &Hardware) -> Result<f64, String> {
+    let measured = need(hardware, parameter::CLOCK_MEASURED_GHZ);
+    measured.or_else(|e| need(hardware, parameter::CLOCK_REPORTED_GHZ).map_err(|_| e)).map(|ghz| 1.0 / ghz)
+}
+
+/// A parameter that must be there and above zero.
+pub(super) fn need(hardware: &Hardware, name: &str) -> Result<f64, String> {
+    match hardware.value(name) {
+        Some(value) if value > 0.0 && value.is_finite() => Ok(value),
+        Some(value) => Err(format!("the hardware parameter {name} is {value}")),
+        None => Err(format!("the hardware parameter {name} is missing; measure it with `sapwise probe --hardware-only`")),
+    }
+}
+
+/// Work of `threads` threads over work of one, interpolated on logarithmic axes between one, two and all.
+fn speed_up(hardware: &Hardware, threads: u32) -> Result<f64, String> {
+    if threads <= 1 {
+        return Ok(1.0);
+    }
+    let cores = need(hardware, parameter::USABLE_CORES)?;
+    let all = need(hardware, parameter::SCALING_ALL_THREADS_RATIO)?;
+    let k = f64::from(threads);
+    if k >= cores {
+        return Ok(all);
+    }
+    let two = need(hardware, parameter::SCALING_TWO_THREADS_RATIO)?;
+    let share = if cores > 2.0 { (k / 2.0).ln() / (cores / 2.0).ln() } else { 1.0 };
+    Ok((two.ln() * (1.0 - share) + all.ln() * share).exp())
+}
+
+/// Memory bandwidth of `threads` threads in GB/s, which is bytes per nanosecond.
+fn bandwidth(hardware: &Hardware, threads: u32) -> Result<f64, String> {
+    let one = need(hardware, parameter::BANDWIDTH_ONE_THREAD_GB_PER_S)?;
+    if threads <= 1 {
+        return Ok(one);
+    }
+    let all = need(hardware, parameter::BANDWIDTH_ALL_THREADS_GB_PER_S)?;
+    Ok((one * f64::from(threads)).min(all))
+}

@@ -1,0 +1,176 @@
+use super::*;
+use crate::hardware::gpu::parameter as of_gpu;
+use crate::hardware::parameter;
+use crate::{AlgorithmId, Backend, GpuGroup, GpuHardware, GpuIdentity, Hardware, Load, Machine, Parameter};
+
+fn parameters(figures: &[(&str, f64)]) -> Vec<Parameter> {
+    figures.iter().map(|&(name, value)| Parameter::reported(name, value, "test")).collect()
+}
+
+fn gpu(index: u32, kind: GpuKind, figures: &[(&str, f64)]) -> GpuHardware {
+    let text = || "test".to_owned();
+    let gpu = GpuIdentity { index, name: text(), device: text(), driver: text(), api: text(), kind };
+    GpuHardware { gpu, parameters: parameters(figures) }
+}
+
+/// A discrete GPU with all figures, and a slower one without the fitted slopes.
+fn hardware() -> Hardware {
+    let fast = [
+        (of_gpu::ROUND_TRIP_NS, 20_000.0),
+        (of_gpu::READ_BACK_NS, 5000.0),
+        (of_gpu::DISPATCH_NS, 2000.0),
+        (of_gpu::UPLOAD_GB_PER_S, 9.0),
+        (of_gpu::UPLOAD_RATE_GB_PER_S, 10.0),
+        (of_gpu::DOWNLOAD_RATE_GB_PER_S, 8.0),
+        (of_gpu::COPY_GB_PER_S, 500.0),
+        (of_gpu::ARITHMETIC_GFLOP_PER_S, 1000.0),
+    ];
+    let slow = [
+        (of_gpu::ROUND_TRIP_NS, 30_000.0),
+        (of_gpu::READ_BACK_NS, 1000.0),
+        (of_gpu::DISPATCH_NS, 1000.0),
+        (of_gpu::UPLOAD_GB_PER_S, 5.0),
+        (of_gpu::DOWNLOAD_GB_PER_S, 4.0),
+        (of_gpu::READ_GB_PER_S, 250.0),
+        (of_gpu::ARITHMETIC_GFLOP_PER_S, 500.0),
+    ];
+    Hardware {
+        machine: Machine::default(),
+        parameters: parameters(&[(parameter::CLOCK_MEASURED_GHZ, 4.0)]),
+        gpus: vec![gpu(0, GpuKind::Discrete, &fast), gpu(1, GpuKind::Discrete, &slow)],
+        gpu_groups: Vec::new(),
+    }
+}
+
+fn method(backend: BackendClass, scale: Scale) -> MethodModel {
+    MethodModel {
+        method: "brute".to_owned(),
+        backend,
+        revision: 1,
+        max_threads: 1,
+        gpu_kinds: if backend == BackendClass::Gpu { vec![GpuKind::Software] } else { Vec::new() },
+        min_objects: 1,
+        max_objects: 1000,
+        terms: vec![ModelTerm { term: Term::Call, scale, unit: 2.0 }],
+        residual_intercept: 0.0,
+        residual: Vec::new(),
+        spread_ln: 0.1,
+    }
+}
+
+fn model(methods: Vec<MethodModel>) -> Model {
+    let range = |parameter: &str| Range { parameter: parameter.to_owned(), min: 1.0, max: 100.0 };
+    Model {
+        schema: ModelSchema,
+        name: "test".to_owned(),
+        trained_on: Vec::new(),
+        ranges: vec![range(parameter::CLOCK_MEASURED_GHZ), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
+        methods,
+        validation: Validation { held_out: String::new(), physical_machines: 0, profiles: 0, methods: Vec::new() },
+    }
+}
+
+fn ns(scale: Scale, hardware: &Hardware, gpus: &[u32]) -> f64 {
+    scale.nanoseconds(hardware, &Backend::Gpu(gpus.to_vec())).unwrap()
+}
+
+fn ids(list: &[&str]) -> Vec<(AlgorithmId, u32)> {
+    list.iter().map(|id| (id.parse().unwrap(), 1)).collect()
+}
+
+#[test]
+fn a_gpu_has_the_slope_where_it_was_fitted_and_else_the_rate_of_all_bytes() {
+    let h = hardware();
+    assert_eq!((ns(Scale::GpuUploadByte, &h, &[0]), ns(Scale::GpuUploadByte, &h, &[1])), (0.1, 0.2));
+    assert_eq!((ns(Scale::GpuDownloadByte, &h, &[0]), ns(Scale::GpuDownloadByte, &h, &[1])), (0.125, 0.25));
+    assert_eq!((ns(Scale::GpuMemoryByte, &h, &[0]), ns(Scale::GpuMemoryByte, &h, &[1])), (0.002, 0.004));
+    assert_eq!((ns(Scale::GpuRoundTrip, &h, &[0]), ns(Scale::GpuDispatch, &h, &[0])), (25_000.0, 2000.0));
+    assert_eq!((ns(Scale::GpuOperation, &h, &[0]), ns(Scale::Cycle, &h, &[0])), (0.001, 0.25));
+}
+
+#[test]
+fn several_gpus_have_the_slowest_latency_and_added_rates_within_what_was_measured_together() {
+    let mut h = hardware();
+    let both = [0, 1];
+    assert_eq!((ns(Scale::GpuRoundTrip, &h, &both), ns(Scale::GpuDispatch, &h, &both)), (31_000.0, 2000.0));
+    assert_eq!((ns(Scale::GpuUploadByte, &h, &both), ns(Scale::GpuOperation, &h, &both)), (1.0 / 15.0, 1.0 / 1500.0));
+    let ratios =
+        [(of_gpu::GROUP_UPLOAD_RATIO, 1.2), (of_gpu::GROUP_ROUND_TRIP_RATIO, 2.0), (of_gpu::GROUP_ARITHMETIC_RATIO, 1.9)];
+    h.gpu_groups.push(GpuGroup { gpus: both.to_vec(), parameters: parameters(&ratios) });
+    assert_eq!((ns(Scale::GpuRoundTrip, &h, &both), ns(Scale::GpuDispatch, &h, &both)), (62_000.0, 2000.0));
+    // 1.2 times the fastest is less than the sum, 1.9 times the fastest is more.
+    assert_eq!((ns(Scale::GpuUploadByte, &h, &both), ns(Scale::GpuOperation, &h, &both)), (1.0 / 12.0, 1.0 / 1500.0));
+    assert_eq!(ns(Scale::GpuUploadByte, &h, &[0]), 0.1);
+}
+
+#[test]
+fn scales_and_features_of_the_other_processor_are_refused() {
+    let h = hardware();
+    assert!(Scale::SharedLane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().contains("gpu0 has no scale"));
+    assert!(Scale::GpuDispatch.nanoseconds(&h, &Backend::Cpu(2)).unwrap_err().contains("cpu2 has no scale"));
+    let load = Load { objects: 8, ..Load::default() };
+    let feature = |f: Feature, backend: Backend| f.value(&h, &backend, &load);
+    assert_eq!(feature(Feature::Log2Threads, Backend::Gpu(vec![0, 1])), Ok(1.0));
+    assert_eq!(feature(Feature::Log2Objects, Backend::Gpu(vec![0])), Ok(3.0));
+    assert!(feature(Feature::Log2Lanes, Backend::Gpu(vec![0])).is_err());
+    let wrong = model(vec![method(BackendClass::Cpu, Scale::GpuDispatch)]);
+    assert!(wrong.defect().unwrap().contains("GpuDispatch"));
+    let term = ResidualTerm { feature: Feature::Log2Lanes, centre: 0.0, slope: 1.0 };
+    let wrong = MethodModel { residual: vec![term], ..method(BackendClass::Gpu, Scale::GpuDispatch) };
+    assert!(model(vec![wrong]).defect().unwrap().contains("Log2Lanes"));
+}
+
+#[test]
+fn software_training_is_told_when_a_real_gpu_is_predicted() {
+    let model = model(vec![method(BackendClass::Gpu, Scale::GpuRoundTrip)]);
+    assert_eq!(model.defect(), None);
+    let mut h = hardware();
+    let p = model.predict(&h, &ids(&["brute@gpu1"])).unwrap();
+    assert!(p.extrapolated && p.warnings.len() == 1 && p.warnings[0].contains("no real GPU"), "{:?}", p.warnings);
+    assert_eq!(p.costs[0].curve.cost_ns(&Load::default()), 62_000.0);
+    h.gpus[1].gpu.kind = GpuKind::Software;
+    let p = model.predict(&h, &ids(&["brute@gpu1"])).unwrap();
+    assert!(!p.extrapolated && p.warnings.is_empty(), "{:?}", p.warnings);
+}
+
+#[test]
+fn what_a_gpu_lacks_is_told_and_costs_its_algorithms_only() {
+    let model = model(vec![method(BackendClass::Gpu, Scale::GpuMemoryByte)]);
+    let mut h = hardware();
+    let all = ids(&["brute@gpu0", "brute@gpu1", "brute@gpu0+1", "brute@gpu2", "sweep@gpu0", "brute@cpu1"]);
+    let p = model.predict(&h, &all).unwrap();
+    let told = |p: &Prediction, text: &str| p.warnings.iter().any(|w| w.contains(text));
+    assert_eq!(p.costs.len(), 3, "{:?}", p.warnings);
+    for text in [
+        "brute@gpu2 is left out: the hardware holds no gpu2",
+        "not trained on it: sweep@gpu0, brute@cpu1",
+        "copy_gb_per_s of gpu0 is 500.0000, outside",
+        "brute@gpu0+1: the model has seen 1 GPUs at most",
+        "gpu0+1: how these GPUs work together was not measured",
+    ] {
+        assert!(told(&p, text), "{text}: {:?}", p.warnings);
+    }
+    let missing = Parameter::missing(of_gpu::COPY_GB_PER_S, "the driver crashed");
+    h.gpus[0].parameters.retain(|p| p.name != of_gpu::COPY_GB_PER_S);
+    h.gpus[0].parameters.push(missing);
+    let p = model.predict(&h, &all).unwrap();
+    assert_eq!(p.costs.len(), 1);
+    assert!(told(&p, "brute@gpu0 is left out: the parameter copy_gb_per_s of gpu0 is missing: the driver crashed"));
+}
+
+#[test]
+fn hardware_with_impossible_gpus_is_told() {
+    assert_eq!(hardware().defect(), None);
+    let defect = |change: &dyn Fn(&mut Hardware)| {
+        let mut h = hardware();
+        change(&mut h);
+        h.defect().unwrap()
+    };
+    assert!(defect(&|h| h.gpus[1].parameters[0].value = Some(-1.0)).contains("gpu1"));
+    assert!(defect(&|h| h.gpus[1].gpu.index = 0).contains("twice"));
+    let group = |gpus: &[u32]| GpuGroup { gpus: gpus.to_vec(), parameters: Vec::new() };
+    for gpus in [&[0][..], &[1, 0], &[0, 7]] {
+        assert!(defect(&|h| h.gpu_groups.push(group(gpus))).contains("no group"));
+    }
+    assert!(defect(&|h| h.gpu_groups = vec![group(&[0, 1]), group(&[0, 1])]).contains("twice"));
+}
