@@ -4,10 +4,10 @@ use super::device::Gpu;
 use crate::hardware::{GpuIdentity, GpuKind};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The GPUs that were found, in the order of their numbers. Cheap to clone: a GPU is opened once for all clones.
+/// The GPUs that were found, in the order of their numbers. A GPU is opened once for all clones.
 #[derive(Debug, Clone, Default)]
 pub struct Gpus {
-    found: Arc<Vec<Found>>,
+    found: Vec<Arc<Found>>,
 }
 
 #[derive(Debug)]
@@ -41,18 +41,31 @@ impl Gpus {
         let mut adapters: Vec<(wgpu::AdapterInfo, wgpu::Adapter)> =
             infos.iter().cloned().zip(adapters).filter(|(a, _)| !infos.iter().any(|b| twins(a, b))).collect();
         adapters.sort_by_key(|(info, _)| kind(info.device_type));
-        let found = adapters.into_iter().enumerate().map(|(k, (info, adapter))| Found {
-            identity: identity(k as u32, &info),
-            adapter,
-            opened: Mutex::new(None),
+        let found = adapters.into_iter().enumerate().map(|(k, (info, adapter))| {
+            Arc::new(Found { identity: identity(k as u32, &info), adapter, opened: Mutex::new(None) })
         });
-        Self { found: Arc::new(found.collect()) }
+        Self { found: found.collect() }
     }
 
     /// No GPU at all, without looking.
     #[must_use]
     pub fn none() -> Self {
         Self::default()
+    }
+
+    /// Those of them that are wanted, under their numbers.
+    ///
+    /// ```
+    /// # use sapwise::{GpuKind, gpu::Gpus};
+    /// let real = Gpus::find().choose(|gpu| gpu.kind != GpuKind::Software);
+    /// ```
+    #[must_use]
+    pub fn choose(&self, wanted: impl Fn(&GpuIdentity) -> bool) -> Self {
+        Self { found: self.found.iter().filter(|f| wanted(&f.identity)).cloned().collect() }
+    }
+
+    fn found(&self, index: u32) -> Option<&Found> {
+        self.found.iter().map(|f| &**f).find(|f| f.identity.index == index)
     }
 
     /// What each of them says of itself.
@@ -75,7 +88,7 @@ impl Gpus {
     /// The adapter of a number, for queries beyond what [`GpuIdentity`] says.
     #[must_use]
     pub fn adapter(&self, index: u32) -> Option<&wgpu::Adapter> {
-        self.found.get(index as usize).map(|f| &f.adapter)
+        self.found(index).map(|f| &f.adapter)
     }
 
     /// Opens a GPU, or gives the one that is open already.
@@ -85,10 +98,13 @@ impl Gpus {
     /// # Errors
     /// A sentence, when there is no such GPU or its driver refuses.
     pub fn open(&self, index: u32) -> Result<Gpu, String> {
-        let Some(found) = self.found.get(index as usize) else {
+        let Some(found) = self.found(index) else {
             return Err(match self.len() {
                 0 => "no GPU was found; install a Vulkan driver, or leave GPUs out".to_owned(),
-                count => format!("there is no gpu{index}, only gpu0 to gpu{}; see `sapwise devices`", count - 1),
+                _ => {
+                    let there: Vec<String> = self.identities().map(|g| format!("gpu{}", g.index)).collect();
+                    format!("there is no gpu{index}, only {}; see `sapwise devices`", there.join(", "))
+                }
             });
         };
         // A panic in a driver while the lock was held leaves the slot as it was.
@@ -101,7 +117,7 @@ impl Gpus {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn open_another(&self, index: u32) -> Result<Gpu, String> {
-        let found = self.found.get(index as usize).ok_or_else(|| format!("there is no gpu{index}"))?;
+        let found = self.found(index).ok_or_else(|| format!("there is no gpu{index}"))?;
         Gpu::open(&found.adapter, found.identity.clone())
     }
 }

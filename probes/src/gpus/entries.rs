@@ -1,14 +1,13 @@
-//! What a registry with all GPUs says of each algorithm, without loading a driver into the process that asks.
+//! Which algorithms can be made on the GPUs of this machine, tried without loading a driver into the process that asks.
 
-use super::uses;
 use crate::child::{Ended, run_part};
 use sapwise::gpu::Gpus;
 use sapwise::{AlgorithmId, Registry};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// As that of looking for GPUs.
-const LIMIT: Duration = Duration::from_secs(30);
+/// Kernels compile in a fraction of a second; a driver may take much longer on its first start.
+const LIMIT: Duration = Duration::from_secs(60);
 
 /// An algorithm on GPUs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,12 +23,14 @@ pub(crate) struct OnGpus {
 /// # Errors
 /// When standard output can't be written.
 pub(crate) fn print_entries() -> anyhow::Result<()> {
+    let gpus = Gpus::find();
     let mut registry = Registry::with_cores(1);
-    registry.add_gpus(&Gpus::find());
-    let on_gpus = registry.entries().iter().filter(|e| !uses(&e.id).is_empty());
-    on_gpus
-        .map(|e| OnGpus { id: e.id.clone(), unavailable: e.unavailable.clone() })
-        .try_for_each(|e| crate::output::print_json(&e))
+    registry.add_gpus(&gpus);
+    for (id, _) in sapwise::gpu::algorithms(gpus.identities()) {
+        let unavailable = registry.create(&id).err().map(|e| e.to_string());
+        crate::output::print_json(&OnGpus { id, unavailable })?;
+    }
+    Ok(())
 }
 
 /// Every algorithm on the GPUs of this machine, or why that can't be told.

@@ -8,15 +8,12 @@ mod entries;
 mod limits;
 mod look;
 mod measured;
-mod register;
-mod shim;
 
 pub(crate) use choice::{GpuChoice, difference, uses};
 pub(crate) use entries::{OnGpus, entries, print_entries};
 pub(crate) use limits::{Limits, limits, limits_of};
 pub(crate) use look::{Seen, look};
 pub(crate) use measured::{Measured, measure};
-pub(crate) use register::register;
 
 use anyhow::anyhow;
 use sapwise::gpu::Gpus;
@@ -38,7 +35,8 @@ pub(crate) fn print_identities() -> anyhow::Result<()> {
 pub(crate) fn print_parameters(index: u32, options: &Options) -> anyhow::Result<()> {
     let gpus = Gpus::find();
     let identity = gpus.identities().find(|g| g.index == index).ok_or_else(|| anyhow!("there is no gpu{index} any more"))?;
-    let hardware = shim::gpu(&gpus, index, options).unwrap_or_else(|why| without_parameters(identity.clone(), &why));
+    let hardware =
+        sapwise::measure::gpu(&gpus, index, options).unwrap_or_else(|why| without_parameters(identity.clone(), &why));
     crate::output::print_json(&hardware)
 }
 
@@ -48,7 +46,8 @@ pub(crate) fn print_parameters(index: u32, options: &Options) -> anyhow::Result<
 /// When standard output can't be written.
 pub(crate) fn print_group(indices: &[u32], options: &Options) -> anyhow::Result<()> {
     let gpus = Gpus::find();
-    let group = shim::gpu_group(&gpus, indices, options).unwrap_or_else(|why| group_without_parameters(indices, &why));
+    let group =
+        sapwise::measure::gpu_group(&gpus, indices, options).unwrap_or_else(|why| group_without_parameters(indices, &why));
     crate::output::print_json(&group)
 }
 

@@ -3,7 +3,6 @@
 use super::dropout::Standing;
 use super::race::{FEWEST_FRAMES, Race, Runner};
 use super::{Event, Order, median, plan};
-use crate::gpus;
 use sapwise::gpu::Gpus;
 use sapwise::report::Point;
 use sapwise::{GpuIdentity, Registry, Scenario, Scene};
@@ -76,7 +75,8 @@ fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<String> {
     let gone = gone.into_iter().map(|g| {
         format!("gpu{} ({}) was there when the hardware was measured and is gone; it is left out", g.index, g.name)
     });
-    gone.chain(gpus::register(registry, &gpus, &there)).collect()
+    registry.add_gpus(&gpus.choose(|g| there.contains(g)));
+    gone.collect()
 }
 
 /// The size before.

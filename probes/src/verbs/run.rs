@@ -139,7 +139,7 @@ fn add_gpus(registry: &mut Registry, fields: &Fields, choice: GpuChoice) -> anyh
     }
     if !taken.is_empty() {
         match seen.load() {
-            Ok(gpus) => warnings.extend(gpus::register(registry, &gpus, &taken)),
+            Ok(gpus) => registry.add_gpus(&gpus.choose(|g| taken.contains(g))),
             Err(why) => warnings.push(why),
         }
     }
