@@ -124,8 +124,11 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
 fn add_gpus(registry: &mut Registry, fields: &Fields, choice: GpuChoice) -> anyhow::Result<Vec<String>> {
     let mut named: Vec<&AlgorithmId> = fields.algorithms();
     named.retain(|id| !gpus::uses(id).is_empty());
-    if named.is_empty() || choice.no_gpus {
+    if named.is_empty() {
         return Ok(Vec::new());
+    }
+    if choice.no_gpus {
+        return Ok(named.into_iter().map(|id| format!("{id} is left out by --no-gpus")).collect());
     }
     let seen = gpus::look()?;
     let mut warnings: Vec<String> = Vec::new();
