@@ -49,7 +49,7 @@ impl Scale {
     #[must_use]
     pub fn is_of(self, class: BackendClass) -> bool {
         match self {
-            // The CPU works for a GPU too: it checks boxes and copies pairs.
+            // The CPU works for a GPU too: it copies boxes and pairs.
             Self::Cycle => true,
             Self::SharedCycle | Self::SharedLane | Self::Byte | Self::ForkJoin => class == BackendClass::Cpu,
             _ => class == BackendClass::Gpu,

@@ -41,7 +41,7 @@ pub(crate) fn terms(method: &str, class: BackendClass) -> Vec<(Term, Scale)> {
                 list.push((Sort, GpuMemoryByte));
             }
             list.extend(tests.map(|&t| (t, GpuOperation)));
-            // The CPU checks every box before the upload and takes every pair out of mapped memory.
+            // The CPU takes boxes into mapped memory and pairs out of it, which the transfers hold only in part.
             list.extend([(Pairs, GpuDownloadByte), (Objects, Cycle), (Pairs, Cycle)]);
         }
     }
