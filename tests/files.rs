@@ -54,7 +54,12 @@ fn every_report_is_complete_and_its_label_is_true() {
 #[test]
 fn the_built_in_model_knows_every_method_of_this_build_and_predicts_for_every_report() {
     let model = Model::built_in().unwrap();
-    // Methods on GPUs stand in a model once reports of them do.
+    #[cfg(feature = "gpu")]
+    for (id, revision) in
+        reports().iter().flat_map(|(_, r)| sapwise::gpu::algorithms(r.hardware.gpus.iter().map(|g| &g.gpu)))
+    {
+        assert_eq!(model.method(&id).map(|m| m.revision), Some(revision), "{id}: train on new reports");
+    }
     for entry in Registry::with_cores(1).entries().iter().filter(|e| e.id.backend().class() == BackendClass::Cpu) {
         assert_eq!(model.method(&entry.id).map(|m| m.revision), Some(entry.revision), "{}: train on new reports", entry.id);
     }
