@@ -30,13 +30,10 @@ impl Gpu {
     /// Opens an adapter with all of its limits.
     pub(super) fn open(adapter: &wgpu::Adapter, identity: GpuIdentity) -> Result<Self, String> {
         let limits = adapter.limits();
-        let wanted = wgpu::Features::TIMESTAMP_QUERY
-            | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS
-            | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS
-            | wgpu::Features::SUBGROUP;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("sapwise"),
-            required_features: adapter.features() & wanted,
+            // Only to observe how many lanes run in lockstep: no algorithm depends on it.
+            required_features: adapter.features() & wgpu::Features::SUBGROUP,
             required_limits: limits.clone(),
             memory_hints: wgpu::MemoryHints::Performance,
             ..Default::default()

@@ -24,10 +24,10 @@ fn tiles(k: u32) -> vec2<u32> {
     return vec2<u32>(k - high * (high + 1u) / 2u, high);
 }
 
-// Which columns overlap the row of this invocation, a bit each.
-fn hits(tile: vec2<u32>, t: u32) -> vec4<u32> {
+// Which columns overlap the row of this invocation, a bit each; none where nothing is `wanted`.
+fn hits(tile: vec2<u32>, t: u32, wanted: bool) -> vec4<u32> {
     let first = tile.y * TILE;
-    if (first + t < params.objects) {
+    if (wanted && first + t < params.objects) {
         let b = load_box(first + t);
         columns_lo[t] = b.lo;
         columns_hi[t] = b.hi;
@@ -35,7 +35,7 @@ fn hits(tile: vec2<u32>, t: u32) -> vec4<u32> {
     workgroupBarrier();
     let row = tile.x * TILE + t;
     var found = vec4<u32>();
-    if (row >= params.objects) {
+    if (!wanted || row >= params.objects) {
         return found;
     }
     let a = load_box(row);
@@ -87,7 +87,7 @@ fn count(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     if (tile.x == tile.y && tile.x * TILE + t < params.objects) {
         check_box(tile.x * TILE + t);
     }
-    _ = exclusive(t, ones(hits(tile, t)));
+    _ = exclusive(t, ones(hits(tile, t, true)));
     if (t == TILE - 1u) {
         sums[block] = scan[t];
     }
@@ -99,12 +99,10 @@ fn write(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     if (block >= params.blocks) {
         return;
     }
-    // Most tile pairs of a large sparse scene hold nothing.
-    if (sums[block] == sums[block + 1u]) {
-        return;
-    }
     let tile = tiles(params.first_block + block);
-    var found = hits(tile, t);
+    // Most tile pairs of a large sparse scene hold nothing. They must not return here: some compilers take no barrier behind a
+    // branch on what a buffer holds.
+    let found = hits(tile, t, sums[block] != sums[block + 1u]);
     // Unsigned wrap-around puts what lies before the window beyond every capacity.
     var at = sums[block] + exclusive(t, ones(found)) - params.window;
     let row = number(tile.x * TILE + t);

@@ -79,9 +79,6 @@ fn write(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     if (block >= params.blocks) {
         return;
     }
-    if (sums[block] == sums[block + 1u]) {
-        return;
-    }
     let row = block * THREADS + t;
     var count = 0u;
     if (row < params.objects) {
