@@ -3,6 +3,9 @@
 //! Without a GPU these tests say so and pass, unless `SAPWISE_REQUIRE_GPU=1`: then they fail.
 
 use sapwise::gpu::Gpus;
+mod common;
+
+use common::gpus;
 use sapwise::hardware::GpuKind;
 use sapwise::hardware::gpu::parameter;
 use sapwise::measure::{self, Options};
@@ -10,20 +13,6 @@ use sapwise::{How, Parameter};
 
 fn options(brief: bool) -> Options {
     Options { brief, ..Options::default() }
-}
-
-/// The GPUs of this machine, or `None` where there is none and none is required.
-fn gpus() -> Option<Gpus> {
-    let gpus = Gpus::find();
-    if gpus.is_empty() {
-        assert!(
-            std::env::var("SAPWISE_REQUIRE_GPU").as_deref() != Ok("1"),
-            "SAPWISE_REQUIRE_GPU is set and there is no GPU"
-        );
-        println!("skipped: there is no GPU");
-        return None;
-    }
-    Some(gpus)
 }
 
 /// The rules that hold for a parameter on any machine.

@@ -143,3 +143,11 @@ fn identity(index: u32, info: &wgpu::AdapterInfo) -> GpuIdentity {
         kind: kind(info.device_type),
     }
 }
+
+/// The first GPU; `None` where there is none and `SAPWISE_REQUIRE_GPU` is not 1.
+#[cfg(test)]
+pub(crate) fn first_for_tests() -> Option<Gpu> {
+    let opened = Gpus::find().open(0);
+    assert!(opened.is_ok() || std::env::var_os("SAPWISE_REQUIRE_GPU").is_none_or(|v| v != "1"), "no GPU was found");
+    opened.ok()
+}

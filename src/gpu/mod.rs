@@ -48,6 +48,8 @@ mod storage;
 mod transfer;
 
 pub use adapters::Gpus;
+#[cfg(test)]
+pub(crate) use adapters::first_for_tests;
 pub use device::Gpu;
 pub use methods::algorithms;
 pub(crate) use methods::has_method;
