@@ -2,10 +2,10 @@
 //!
 //! Without a GPU these tests say so and pass, unless `SAPWISE_REQUIRE_GPU=1`: then they fail.
 
-use sapwise::gpu::Gpus;
 mod common;
 
 use common::gpus;
+use sapwise::gpu::Gpus;
 use sapwise::hardware::GpuKind;
 use sapwise::hardware::gpu::parameter;
 use sapwise::measure::{self, Options};
