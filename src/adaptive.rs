@@ -243,7 +243,11 @@ impl BroadPhase for Adaptive {
                 return Err(Error::Unavailable { algorithm, reason });
             };
             let candidate = &mut self.candidates[choice.chosen];
-            let result = candidate.algorithm.as_mut().map_or(Ok(()), |a| a.find_pairs(boxes, pairs));
+            let Some(algorithm) = candidate.algorithm.as_mut() else {
+                // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
+                return Err(Error::Unavailable { algorithm: candidate.id.clone(), reason: "it failed before".to_owned() });
+            };
+            let result = algorithm.find_pairs(boxes, pairs);
             self.current = Some(choice.chosen);
             match result {
                 Ok(()) => {

@@ -83,12 +83,19 @@ impl Registry {
         }
     }
 
-    /// Adds our algorithms on these GPUs: on each of them, and on the first two, three and so on together.
+    /// Adds our algorithms on these GPUs: on each of them, and on the first two, three and so on together. They take the place of
+    /// GPUs that were added before.
     ///
     /// Nothing is opened before an algorithm is created.
     #[cfg(feature = "gpu")]
     pub fn add_gpus(&mut self, gpus: &crate::gpu::Gpus) {
         self.gpus = gpus.clone();
+        // GPUs that were added before and are not among these go; what the user added stays.
+        let stays = |k: usize| self.factories[k].is_some() || !matches!(self.entries[k].id.backend(), Backend::Gpu(_));
+        let stays: Vec<bool> = (0..self.entries.len()).map(stays).collect();
+        let (mut entry, mut factory) = (stays.iter(), stays.iter());
+        self.entries.retain(|_| entry.next() == Some(&true));
+        self.factories.retain(|_| factory.next() == Some(&true));
         for (id, revision) in crate::gpu::algorithms(gpus.identities()) {
             if !self.entries.iter().any(|e| e.id == id) {
                 self.entries.push(Entry { id, revision, unavailable: None });
@@ -127,7 +134,8 @@ impl Registry {
     /// Why a cost of `revision` of an algorithm says nothing here, if it doesn't.
     pub(crate) fn mismatch(&self, id: &AlgorithmId, revision: u32) -> Option<Error> {
         let unavailable = |reason| Some(Error::Unavailable { algorithm: id.clone(), reason });
-        let same = self.entries.iter().filter(|e| e.id.method() == id.method());
+        let class = id.backend().class();
+        let same = self.entries.iter().filter(|e| e.id.method() == id.method() && e.id.backend().class() == class);
         let most = same.clone().map(|e| e.id.threads()).max();
         match same.clone().find(|e| e.id == *id).or(same.clone().next()) {
             Some(known) if known.revision != revision => {

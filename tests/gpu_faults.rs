@@ -133,6 +133,39 @@ fn frames_beyond_the_limits_of_a_device_come_in_pieces() {
 }
 
 #[test]
+fn the_first_invalid_box_is_named_across_pieces() {
+    let Some(gpus) = gpus() else { return };
+    let mut algorithm = broad_phase("strips", vec![small(&gpus, 64 << 10)]).unwrap();
+    let mut boxes: Vec<Aabb> = (0..9000).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.4)).collect();
+    boxes.reverse();
+    // The first in the list is the last along the axis, so that another piece comes upon the other one first.
+    boxes[3].max[1] = f32::NAN;
+    boxes[8990].min[2] = f32::NAN;
+    let error = pairs_of(algorithm.as_mut(), &boxes).unwrap_err();
+    assert_eq!(error, Error::InvalidBox { index: 3, defect: sapwise::BoxDefect::NotANumber });
+}
+
+#[test]
+fn several_threads_share_a_gpu() {
+    let Some(gpus) = gpus() else { return };
+    let gpu = gpus.open(0).unwrap();
+    let boxes = Random(12).cubes(300, [8.0; 3], 0.5);
+    let oracle = naive(&boxes);
+    std::thread::scope(|scope| {
+        for method in ["strips", "brute", "strips"] {
+            let (gpu, boxes, oracle) = (gpu.clone(), &boxes, &oracle);
+            scope.spawn(move || {
+                let mut algorithm = broad_phase(method, vec![gpu]).unwrap();
+                for frame in 0..150 {
+                    let pairs = pairs_of(algorithm.as_mut(), boxes);
+                    assert!(pairs.as_ref() == Ok(oracle), "{method}, frame {frame}: {pairs:?}");
+                }
+            });
+        }
+    });
+}
+
+#[test]
 fn more_pairs_than_a_buffer_holds_come_in_windows() {
     let Some(gpus) = gpus() else { return };
     let gpu = small(&gpus, 1 << 20);

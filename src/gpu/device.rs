@@ -64,6 +64,16 @@ impl Gpu {
         Self { shared: Arc::new(Shared { identity, device, queue, limits, fault, wait_limit_ms }) }
     }
 
+    pub(super) fn wait_limit(&self) -> Duration {
+        Duration::from_millis(self.shared.wait_limit_ms.load(Ordering::Relaxed))
+    }
+
+    /// Submits, and gives what the device has against it. Without the scope it would count as a fault of the GPU.
+    pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> Result<wgpu::SubmissionIndex, String> {
+        self.check()?;
+        self.try_make(|_| self.shared.queue.submit([encoder.finish()]))
+    }
+
     /// Sets the longest that a submission may take before this GPU counts as lost: a minute unless it is set, which is long for a
     /// game. Below a millisecond it is one.
     pub fn set_wait_limit(&self, limit: Duration) {
@@ -118,7 +128,7 @@ impl Gpu {
     }
 
     fn wait_for(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), String> {
-        let limit = Duration::from_millis(self.shared.wait_limit_ms.load(Ordering::Relaxed));
+        let limit = self.wait_limit();
         let poll = wgpu::PollType::Wait { submission_index, timeout: Some(limit) };
         if let Err(error) = self.shared.device.poll(poll) {
             let text = match error {

@@ -213,6 +213,12 @@ impl Engine {
 
     /// As [`start`](Self::start), with boxes that are on the GPU already, and pairs that stay there.
     pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), String> {
+        if let Search::Brute(brute) = &self.search
+            && Brute::blocks(params.objects) > u64::from(brute.band())
+        {
+            let reason = "pairs that stay on a GPU come from one submission, and brute force on so many boxes takes several";
+            return Err(format!("{} boxes are too many: {reason}; use strips", params.objects));
+        }
         self.prepare(&params, false, Some(boxes))?;
         self.submit(params, None)
     }
@@ -254,7 +260,7 @@ impl Engine {
         self.record(&mut encoder, &params, true);
         let sent = if self.sampler.is_none() { self.sendable() } else { 0 };
         self.copy_back(&mut encoder, sent);
-        let submission = self.submit_mapped(encoder, PAIRS_AT + (sent * PAIR).max(self.sample_bytes()));
+        let submission = self.submit_mapped(encoder, PAIRS_AT + (sent * PAIR).max(self.sample_bytes()))?;
         self.upload.ask(self.upload.bytes());
         self.frame = Some(Frame { submission, params, sent, blocks_left: all_blocks - u64::from(params.blocks) });
         Ok(())
@@ -303,22 +309,22 @@ impl Engine {
         self.set(&params);
         let mut encoder = self.encoder();
         self.copy_back(&mut encoder, 0);
-        let submission = self.submit_mapped(encoder, PAIRS_AT + sampler::BYTES);
+        let submission = self.submit_mapped(encoder, PAIRS_AT + sampler::BYTES)?;
         self.gpu.wait(submission)?;
         self.seen()
     }
 
     /// What the glance of the last submission saw.
     fn seen(&self) -> Result<Sample, String> {
-        let view = self.download.readable(PAIRS_AT..PAIRS_AT + sampler::BYTES)?;
+        let view = self.download.readable(&self.gpu, PAIRS_AT..PAIRS_AT + sampler::BYTES)?;
         Ok(Sample::of_all(bytemuck::cast_slice(&view)))
     }
 
     /// Submits, and asks for the first `bytes` of the download.
-    fn submit_mapped(&self, encoder: wgpu::CommandEncoder, bytes: u64) -> wgpu::SubmissionIndex {
+    fn submit_mapped(&self, encoder: wgpu::CommandEncoder, bytes: u64) -> Result<wgpu::SubmissionIndex, String> {
         self.download.unmap();
-        let submission = self.gpu.queue().submit([encoder.finish()]);
+        let submission = self.gpu.submit(encoder)?;
         self.download.ask(bytes);
-        submission
+        Ok(submission)
     }
 }

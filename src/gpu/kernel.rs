@@ -63,7 +63,7 @@ impl Kernel {
                 module: &module,
                 entry_point: Some(entry),
                 compilation_options: wgpu::PipelineCompilationOptions {
-                    // Every kernel writes its shared memory before it reads it.
+                    // No result depends on shared memory that was not written before.
                     zero_initialize_workgroup_memory: false,
                     constants,
                 },
@@ -79,9 +79,15 @@ impl Kernel {
     /// # Errors
     /// When they are not those of the shader.
     pub(crate) fn bind(&self, gpu: &Gpu, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound, String> {
+        let most_bound = gpu.limits().max_storage_buffer_binding_size & !3;
         let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
             .iter()
-            .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .map(|&(binding, buffer)| {
+                // A caller's buffer may be larger than a kernel can see, or not end on a word.
+                let size = std::num::NonZero::new((buffer.size() & !3).min(most_bound));
+                let resource = wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size });
+                wgpu::BindGroupEntry { binding, resource }
+            })
             .collect();
         let make = |device: &wgpu::Device| {
             device.create_bind_group(&wgpu::BindGroupDescriptor {

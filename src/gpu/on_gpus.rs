@@ -22,6 +22,10 @@ const SPEED_FOLLOWS: f64 = 0.25;
 /// The smallest share of the boxes that a GPU gets, so that its speed goes on being measured.
 const SMALLEST_SHARE: f64 = 0.02;
 
+/// Boxes to the power of the method's exponent: below, a frame takes as long as a GPU takes to answer, and its time says nothing
+/// about how the GPU works.
+const SMALLEST_WORK: f64 = 20_000.0;
+
 /// See the module.
 #[derive(Debug)]
 pub(crate) struct OnGpus {
@@ -139,8 +143,11 @@ impl Part {
     fn start(&mut self, slabs: &Slabs, slab: usize, boxes: &[Aabb], exponent: f64) {
         self.began.get_or_insert_with(Instant::now);
         self.failure = None;
-        self.full = !slabs.gather(slab, boxes, self.engine.most_objects(), &mut self.members);
-        if self.full || self.members.boxes.is_empty() {
+        match slabs.gather(slab, boxes, self.engine.most_objects(), &mut self.members) {
+            Ok(fits) => self.full = !fits,
+            Err(error) => self.failure = Some(Failure::Frame(error)),
+        }
+        if self.full || self.failure.is_some() || self.members.boxes.is_empty() {
             return;
         }
         let Members { boxes, ids } = &self.members;
@@ -154,7 +161,7 @@ impl Part {
             return;
         }
         self.failure = self.engine.finish(&mut self.pairs).err();
-        if let Some(began) = self.began.filter(|_| self.failure.is_none() && rounds == 1 && self.work > 0.0) {
+        if let Some(began) = self.began.filter(|_| self.failure.is_none() && rounds == 1 && self.work > SMALLEST_WORK) {
             let speed = self.work / began.elapsed().as_nanos().max(1) as f64;
             self.speed = Some(self.speed.map_or(speed, |before| before + SPEED_FOLLOWS * (speed - before)));
         }
@@ -172,30 +179,17 @@ fn shares(speeds: impl Iterator<Item = Option<f64>>, exponent: f64) -> Vec<f64> 
     bounded.iter().map(|w| w / total).collect()
 }
 
-/// The failure to report: a fault of a GPU first, because the frame is then to be run elsewhere; else the first invalid box.
+/// The failure to report: a fault of a GPU first, because the frame is then to be run elsewhere.
 fn worst(parts: &mut [Part]) -> Option<Failure> {
-    let mut worst: Option<Failure> = None;
-    for failure in parts.iter_mut().filter_map(|p| p.failure.take()) {
-        worst = Some(match (worst, failure) {
-            (Some(Failure::Gpu(text)), _) | (_, Failure::Gpu(text)) => Failure::Gpu(text),
-            (
-                Some(Failure::Frame(Error::InvalidBox { index: a, defect: x })),
-                Failure::Frame(Error::InvalidBox { index: b, defect: y }),
-            ) => {
-                let (index, defect) = if a < b { (a, x) } else { (b, y) };
-                Failure::Frame(Error::InvalidBox { index, defect })
-            }
-            (Some(earlier), _) => earlier,
-            (None, failure) => failure,
-        });
-    }
-    worst
+    let failures: Vec<Failure> = parts.iter_mut().filter_map(|p| p.failure.take()).collect();
+    failures.iter().find(|f| matches!(f, Failure::Gpu(_))).or(failures.first()).cloned()
 }
 
 impl BroadPhase for OnGpus {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;
+        self.warm |= boxes.len() > 1;
         if boxes.len() < 2 {
             Aabb::check(boxes, 0)?;
             return pairs.finish();
@@ -220,6 +214,10 @@ impl BroadPhase for OnGpus {
                             let reason = "too many boxes reach through too much of the scene to be cut into pieces";
                             break Err(Failure::Gpu(reason.to_owned()));
                         }
+                        // A slab knows its own first invalid box; which is the first of all only the whole frame tells.
+                        Err(Failure::Frame(error @ Error::InvalidBox { .. })) => {
+                            break Err(Failure::Frame(Aabb::check(boxes, 0).err().unwrap_or(error)));
+                        }
                         Err(failure) => break Err(failure),
                     }
                 }
@@ -241,7 +239,6 @@ impl BroadPhase for OnGpus {
             let _ = part.engine.prepare(&params, parts > 1, None);
         }
         if !self.warm {
-            self.warm = true;
             let _ = self.find_pairs(&[Aabb::default(); 2], &mut Pairs::new());
         }
     }

@@ -1,7 +1,7 @@
 //! The paper's spatial subdivision: slabs along one axis, each with a halo, each pair owned by one slab.
 
-use crate::Aabb;
 use crate::sample::Sample;
+use crate::{Aabb, Error};
 
 /// Boxes whose lower bounds place the cuts: with 4096 a slab is off by 2 % of all boxes at most, nearly always.
 const MOST_SAMPLED: usize = 4096;
@@ -55,7 +55,10 @@ impl Slabs {
     }
 
     /// Gathers a slab. `false` once it has more than `most` boxes.
-    pub(super) fn gather(&self, slab: usize, boxes: &[Aabb], most: usize, members: &mut Members) -> bool {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub(super) fn gather(&self, slab: usize, boxes: &[Aabb], most: usize, members: &mut Members) -> Result<bool, Error> {
         let low = slab.checked_sub(1).map(|k| self.cuts[k]);
         let high = self.cuts.get(slab).copied();
         members.boxes.clear();
@@ -66,13 +69,26 @@ impl Slabs {
             let begins = low.is_none_or(|low| min >= low) && !high.is_some_and(|high| min >= high);
             if begins || low.is_some_and(|low| min < low && max >= low) {
                 if members.boxes.len() == most {
-                    return false;
+                    return Ok(false);
                 }
+                members.grow()?;
                 members.boxes.push(*b);
                 members.ids.push(id as u32 | if begins { BEGINS } else { 0 });
             }
         }
-        true
+        Ok(true)
+    }
+}
+
+impl Members {
+    /// Room for one more.
+    fn grow(&mut self) -> Result<(), Error> {
+        if self.boxes.len() < self.boxes.capacity().min(self.ids.capacity()) {
+            return Ok(());
+        }
+        let (count, more) = (self.boxes.len(), self.boxes.len().max(1024));
+        let refused = |_| Error::OutOfMemory { what: "boxes of a slab", elements: count + more };
+        self.boxes.try_reserve(more).and_then(|()| self.ids.try_reserve(more)).map_err(refused)
     }
 }
 
@@ -92,7 +108,7 @@ mod tests {
         let mut owners = std::collections::BTreeMap::new();
         for (slab, share) in [0.5, 0.3, 0.2].into_iter().enumerate() {
             let mut m = Members::default();
-            assert!(slabs.gather(slab, boxes, 3000, &mut m));
+            assert_eq!(slabs.gather(slab, boxes, 3000, &mut m), Ok(true));
             let own = m.ids.iter().filter(|&&id| id & BEGINS != 0).count() as f64;
             assert!((own / 3000.0 - share).abs() < 0.03, "{own}");
             for j in 0..m.boxes.len() {
@@ -121,7 +137,7 @@ mod tests {
         let mut begun = 0;
         for slab in 0..4 {
             let mut m = Members::default();
-            slabs.gather(slab, &boxes, 100, &mut m);
+            slabs.gather(slab, &boxes, 100, &mut m).unwrap();
             begun += m.ids.iter().filter(|&&id| id & BEGINS != 0).count();
         }
         assert_eq!(begun, 53);

@@ -4,6 +4,7 @@ use super::device::Gpu;
 use super::storage::Storage;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
+use std::time::Instant;
 
 /// A buffer that the CPU writes or reads while it is mapped, and the GPU copies while it is not.
 #[derive(Debug)]
@@ -67,17 +68,24 @@ impl Transfer {
             self.ask(self.bytes());
             gpu.wait_all()?;
         }
-        self.mapped()?;
+        self.mapped(gpu)?;
         self.storage.buffer().get_mapped_range_mut(0..bytes).map_err(|e| e.to_string())
     }
 
     /// The mapped memory, for the CPU to read.
-    pub(super) fn readable(&self, bytes: std::ops::Range<u64>) -> Result<wgpu::BufferView, String> {
-        self.mapped()?;
+    pub(super) fn readable(&self, gpu: &Gpu, bytes: std::ops::Range<u64>) -> Result<wgpu::BufferView, String> {
+        self.mapped(gpu)?;
         self.storage.buffer().get_mapped_range(bytes).map_err(|e| e.to_string())
     }
 
-    fn mapped(&self) -> Result<(), String> {
+    /// After a wait for the GPU. Where several threads wait for one GPU, another one may have taken the news of this mapping and
+    /// be about to pass it on.
+    fn mapped(&self, gpu: &Gpu) -> Result<(), String> {
+        let start = Instant::now();
+        while self.state.load(Ordering::Acquire) == ASKED && start.elapsed() < gpu.wait_limit() {
+            gpu.device().poll(wgpu::PollType::Poll).map_err(|e| e.to_string())?;
+            std::thread::yield_now();
+        }
         let mapped = self.state.load(Ordering::Acquire) == MAPPED;
         mapped.then_some(()).ok_or_else(|| "the driver refuses to map memory".to_owned())
     }

@@ -38,11 +38,6 @@ impl Engine {
         let total = self.header_of(&frame)?.total();
         let sample = self.seen()?;
         self.expected = total;
-        if frame.blocks_left > 0 {
-            let reason =
-                format!("{} boxes take brute force on gpu{} several submissions", frame.params.objects, self.index());
-            return Err(Failure::Gpu(format!("{reason}, and pairs that stay on it come from one; use strips")));
-        }
         if total > u64::from(self.output.capacity()) {
             self.grow(&mut frame, total)?;
             if total > u64::from(self.output.capacity()) {
@@ -65,7 +60,7 @@ impl Engine {
     /// Waits for a frame and reads its header.
     fn header_of(&self, frame: &Frame) -> Result<Header, Failure> {
         self.gpu.wait(frame.submission.clone())?;
-        let view = self.download.readable(0..PAIRS_AT)?;
+        let view = self.download.readable(&self.gpu, 0..PAIRS_AT)?;
         let header: Header = bytemuck::pod_read_unaligned(&view);
         if let Some((index, inverted)) = header.invalid() {
             let defect = if inverted { BoxDefect::Inverted } else { BoxDefect::NotANumber };
@@ -103,7 +98,7 @@ impl Engine {
             let mut encoder = self.encoder();
             let from = (have - u64::from(window)) * PAIR;
             encoder.copy_buffer_to_buffer(self.output.pairs(), from, self.download.buffer(), PAIRS_AT, count * PAIR);
-            let submission = self.submit_mapped(encoder, PAIRS_AT + count * PAIR);
+            let submission = self.submit_mapped(encoder, PAIRS_AT + count * PAIR)?;
             self.gpu.wait(submission)?;
             self.append(count, pairs)?;
             have += count;
@@ -126,7 +121,7 @@ impl Engine {
         self.set(params);
         let mut encoder = self.encoder();
         self.record(&mut encoder, params, false);
-        let submission = self.gpu.queue().submit([encoder.finish()]);
+        let submission = self.gpu.submit(encoder)?;
         self.gpu.wait(submission)
     }
 
@@ -149,14 +144,14 @@ impl Engine {
         self.record(&mut encoder, &params, true);
         let sent = self.sendable();
         self.copy_back(&mut encoder, sent);
-        let submission = self.submit_mapped(encoder, PAIRS_AT + sent * PAIR);
+        let submission = self.submit_mapped(encoder, PAIRS_AT + sent * PAIR)?;
         Ok(Frame { submission, params, sent, blocks_left: frame.blocks_left - u64::from(params.blocks) })
     }
 
     /// Adds the first `count` pairs of the download to the list.
     fn append(&self, count: u64, pairs: &mut Pairs) -> Result<(), Failure> {
         if count > 0 {
-            let view = self.download.readable(PAIRS_AT..PAIRS_AT + count * PAIR)?;
+            let view = self.download.readable(&self.gpu, PAIRS_AT..PAIRS_AT + count * PAIR)?;
             let list: &[[u32; 2]] = bytemuck::cast_slice(&view);
             pairs.extend(list)?;
         }

@@ -12,7 +12,7 @@ struct Params {
     axis: u32,
     // Pairs that `pairs` has room for.
     capacity: u32,
-    // First block of rows (of tile pairs in brute force) of this pass, and how many there are.
+    // First tile pair of this submission, in brute force; and how many blocks of rows, or tile pairs, there are in it.
     first_block: u32,
     blocks: u32,
     // Position in the whole list of the first pair that `pairs` is to take.

@@ -4,8 +4,9 @@
 
 @compute @workgroup_size(256)
 fn sample(@builtin(local_invocation_index) t: u32) {
-    let step = max(params.objects / 256u, 1u);
-    let at = min(t * step + step / 2u, params.objects - 1u);
+    // t * objects / 256 in two parts, because the product passes 32 bits.
+    let step = params.objects / 256u;
+    let at = min(t * step + t * (params.objects % 256u) / 256u + step / 2u, params.objects - 1u);
     for (var k = 0u; k < 6u; k++) {
         sampled[t * 6u + k] = boxes[at * 6u + k];
     }
