@@ -144,7 +144,8 @@ impl FromStr for Backend {
     type Err = ParseIdError;
 
     fn from_str(text: &str) -> Result<Self, ParseIdError> {
-        let bad = || ParseIdError(format!("{text:?} is no backend; use cpu1, cpu4, gpu0 or gpu0+1"));
+        let bad =
+            || ParseIdError(format!("{text:?} is no backend; use cpu1, cpu4, gpu0, or gpu0+1 with the numbers ascending"));
         if let Some(threads) = text.strip_prefix("cpu") {
             return number(threads).filter(|&k| (1..=MOST_THREADS).contains(&k)).map(Backend::Cpu).ok_or_else(bad);
         }

@@ -182,6 +182,28 @@ fn ten_million_pairs_come_whole_and_a_limit_counts_them() {
     }
 }
 
+/// More candidates than one submission tests, and than the 65 535 turns after which one driver ends a loop silently.
+#[test]
+fn rows_of_very_many_candidates_lose_no_pair() {
+    let Some(gpus) = gpus() else { return };
+    let mut row: Vec<Aabb> = (0..70_000).map(|k| Aabb::cube([k as f32, (k % 7) as f32 * 3.0, 0.0], 0.4)).collect();
+    row.push(Aabb::new([-1.0, -1.0, -1.0], [80_000.0, 2.0, 1.0]));
+    let hits = (0..70_000_u32).filter(|k| k % 7 == 0).count();
+    let point = [Aabb::cube([1.0; 3], 0.5); 33_000];
+    let pairs_of_point = 33_000 * 32_999 / 2;
+    for (id, mut algorithm) in every_algorithm(&gpus).into_iter().filter(|(id, _)| !id.contains("brute")) {
+        let mut pairs = Pairs::with_order(PairOrder::Canonical);
+        algorithm.find_pairs(&row, &mut pairs).unwrap();
+        assert!(pairs.len() == hits && pairs.iter().all(|&(i, j)| i % 7 == 0 && j == 70_000), "{id}: {} pairs", pairs.len());
+        // Quadratic, so once for each method and GPU.
+        if !id.contains('+') && !id.contains("twice") {
+            pairs.set_limit(Some(1000));
+            let error = algorithm.find_pairs(&point, &mut pairs).unwrap_err();
+            assert_eq!(error, Error::TooManyPairs { limit: 1000, pairs: pairs_of_point }, "{id}");
+        }
+    }
+}
+
 #[test]
 fn the_order_is_the_same_in_every_run() {
     let Some(gpus) = gpus() else { return };

@@ -61,6 +61,14 @@ enum Search {
     Sorted(Box<Sorted>),
 }
 
+/// What a frame goes through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Step {
+    Sort,
+    Count,
+    Write,
+}
+
 /// A frame that was submitted.
 #[derive(Debug)]
 struct Frame {
@@ -68,8 +76,8 @@ struct Frame {
     params: Params,
     /// Pairs that come back with the header, where there are as many.
     sent: u64,
-    /// Blocks that are not counted yet.
-    blocks_left: u64,
+    /// Tile pairs of brute force that are not counted yet.
+    tile_pairs_left: u64,
 }
 
 /// Boxes of a frame or a piece, in the memory of the host.
@@ -257,12 +265,12 @@ impl Engine {
         if !ids.is_empty() {
             encoder.copy_buffer_to_buffer(upload, ids_at as u64, self.ids.buffer(), 0, ids.len() as u64);
         }
-        self.record(&mut encoder, &params, true);
+        self.record(&mut encoder, &params, Step::Sort);
         let sent = if self.sampler.is_none() { self.sendable() } else { 0 };
         self.copy_back(&mut encoder, sent);
         let submission = self.submit_mapped(encoder, PAIRS_AT + (sent * PAIR).max(self.sample_bytes()))?;
         self.upload.ask(self.upload.bytes());
-        self.frame = Some(Frame { submission, params, sent, blocks_left: all_blocks - u64::from(params.blocks) });
+        self.frame = Some(Frame { submission, params, sent, tile_pairs_left: all_blocks - u64::from(params.blocks) });
         Ok(())
     }
 
@@ -270,10 +278,13 @@ impl Engine {
         self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sapwise") })
     }
 
-    /// Counting, if asked for, and writing.
-    fn record(&self, encoder: &mut wgpu::CommandEncoder, params: &Params, count: bool) {
+    /// The steps of a frame from `first` on.
+    fn record(&self, encoder: &mut wgpu::CommandEncoder, params: &Params, first: Step) {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        if count {
+        if let (Step::Sort, Search::Sorted(sorted)) = (first, &self.search) {
+            sorted.record_sort(&mut pass, params);
+        }
+        if first != Step::Write {
             match &self.search {
                 Search::Brute(brute) => brute.record_count(&mut pass, params.blocks),
                 Search::Sorted(sorted) => sorted.record_count(&mut pass, params),

@@ -8,8 +8,9 @@
 //! use sapwise::{Aabb, Adaptive, BroadPhase, Fields, Pairs, Registry};
 //!
 //! let mut registry = Registry::new();
-//! registry.add_gpus(&Gpus::find());
-//! // Fields that name a GPU use it; what this machine lacks is left out.
+//! // Programs that act as GPUs, such as llvmpipe, are found too. They run on the CPU and can't beat it.
+//! registry.add_gpus(&Gpus::find().choose(|gpu| gpu.kind != sapwise::GpuKind::Software));
+//! // Fields that name a GPU use it, and what this machine lacks is left out. These name none: predict or measure some that do.
 //! let mut broad_phase = Adaptive::new(Fields::usual(&registry), &registry)?;
 //! let mut pairs = Pairs::new();
 //! broad_phase.find_pairs(&[Aabb::cube([0.0; 3], 0.5), Aabb::cube([0.8, 0.0, 0.0], 0.5)], &mut pairs)?;

@@ -11,7 +11,7 @@ pub(super) struct Params {
     pub(super) piece: u32,
     pub(super) axis: u32,
     pub(super) capacity: u32,
-    pub(super) first_block: u32,
+    pub(super) first: u32,
     pub(super) blocks: u32,
     pub(super) window: u32,
     pub(super) slots: u32,
@@ -29,12 +29,12 @@ pub(super) struct Header {
     pub(super) total_low: u32,
     pub(super) total_high: u32,
     pub(super) invalid: u32,
-    pub(super) unused: u32,
+    pub(super) more: u32,
 }
 
 impl Header {
     /// Before any kernel has run.
-    pub(super) const START: Self = Self { total_low: 0, total_high: 0, invalid: u32::MAX, unused: 0 };
+    pub(super) const START: Self = Self { total_low: 0, total_high: 0, invalid: u32::MAX, more: 0 };
 
     pub(super) fn total(&self) -> u64 {
         u64::from(self.total_high) << 32 | u64::from(self.total_low)

@@ -51,7 +51,8 @@ impl Resident {
     /// # Errors
     /// [`Error::InvalidBox`]; [`Error::Unavailable`] when the buffer is too small or not for storage, when boxes or pairs don't
     /// fit into the largest buffer of the GPU, when `brute` is asked for more boxes than one submission takes (131 000 on a GPU, 65 000
-    /// on a program that acts as one), and when the GPU was lost.
+    /// on a program that acts as one), when a box
+    /// has more than 32 768 candidates, and when the GPU was lost.
     pub fn find_pairs(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<ResidentPairs<'_>, Error> {
         let count = match self.run(boxes, objects) {
             Ok(count) => count,

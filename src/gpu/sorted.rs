@@ -11,6 +11,8 @@ use super::storage::Storage;
 /// Rows of one block, and boxes of one workgroup of the other kernels.
 const ROWS: u32 = 64;
 const BOXES: u32 = 256;
+/// Candidates that a row is tested with in one submission; see `shaders/rows.wgsl`.
+pub(super) const CANDIDATES: u32 = 32_768;
 /// Bytes of a sorted box.
 pub(super) const SORTED_BOX: u64 = 32;
 /// Pairs of a row that are kept from the counting to the writing.
@@ -127,8 +129,8 @@ impl Sorted {
             Ok(Side {
                 gather: self.gather.bind(gpu, &gather)?,
                 build_table: self.build_table.as_ref().map(table).transpose()?,
-                count: self.count.bind(gpu, &rows)?,
                 write: self.write.bind(gpu, &rows)?,
+                count: self.count.bind(gpu, &[rows.as_slice(), &[(3, header)]].concat())?,
             })
         };
         let sides = [side(0)?, side(1)?];
@@ -140,7 +142,8 @@ impl Sorted {
         if self.strips { params.key_bits() } else { u32::BITS }
     }
 
-    pub(super) fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
+    /// Sorts and gathers.
+    pub(super) fn record_sort(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
         let Some(bound) = &self.bound else { return };
         let (objects, bits) = (params.objects, self.key_bits(params));
         let side = &bound.sides[Sort::side(bits)];
@@ -150,7 +153,11 @@ impl Sorted {
         if let Some(build) = &side.build_table {
             build.dispatch(pass, (params.large_key + 1).div_ceil(BOXES));
         }
-        side.count.dispatch(pass, Self::blocks(objects));
+    }
+
+    pub(super) fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
+        let Some(bound) = &self.bound else { return };
+        bound.sides[Sort::side(self.key_bits(params))].count.dispatch(pass, Self::blocks(params.objects));
     }
 
     pub(super) fn record_write(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {

@@ -31,7 +31,11 @@ pub(crate) struct Measured {
 /// When no process can be started.
 pub(crate) fn measure(choice: GpuChoice, threads: Option<u32>) -> anyhow::Result<Measured> {
     let mut measured = Measured::default();
-    if choice.no_gpus || crate::interrupt::requested() {
+    if choice.no_gpus {
+        return Ok(measured);
+    }
+    if crate::interrupt::requested() {
+        measured.remarks.push("GPUs are left out: interrupted before they were looked for".to_owned());
         return Ok(measured);
     }
     let seen = look()?;

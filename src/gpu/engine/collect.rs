@@ -1,8 +1,9 @@
 //! What an engine does once a frame was submitted: waiting, bringing pairs home, going on where one submission was too few.
 
-use super::{Engine, Frame, PAIRS_AT};
+use super::{Engine, Frame, PAIRS_AT, Search, Step};
 use crate::gpu::output::PAIR;
 use crate::gpu::params::{Header, Params};
+use crate::gpu::sorted::CANDIDATES;
 use crate::gpu::storage::Failure;
 use crate::sample::Sample;
 use crate::{BoxDefect, Error, Pairs};
@@ -23,8 +24,8 @@ impl Engine {
             } else {
                 self.fetch(&mut frame, total, pairs)?;
             }
-            if frame.blocks_left > 0 {
-                next = Some(self.next_band(frame)?);
+            if frame.tile_pairs_left > 0 || header.more != 0 {
+                next = Some(self.go_on(frame)?);
             }
         }
         self.expected = all;
@@ -35,7 +36,12 @@ impl Engine {
     /// what the boxes look like.
     pub(in crate::gpu) fn finish_resident(&mut self) -> Result<(u32, Sample), Failure> {
         let Some(mut frame) = self.frame.take() else { return Ok((0, Sample::default())) };
-        let total = self.header_of(&frame)?.total();
+        let header = self.header_of(&frame)?;
+        if header.more != 0 {
+            let reason = format!("a box has more than {CANDIDATES} candidates, which takes several submissions");
+            return Err(Failure::Gpu(format!("{reason}, and pairs that stay on gpu{} come from one", self.index())));
+        }
+        let total = header.total();
         let sample = self.seen()?;
         self.expected = total;
         if total > u64::from(self.output.capacity()) {
@@ -120,7 +126,7 @@ impl Engine {
     fn rewrite(&self, params: &Params) -> Result<(), String> {
         self.set(params);
         let mut encoder = self.encoder();
-        self.record(&mut encoder, params, false);
+        self.record(&mut encoder, params, Step::Write);
         let submission = self.gpu.submit(encoder)?;
         self.gpu.wait(submission)
     }
@@ -130,22 +136,29 @@ impl Engine {
         self.gpu.queue().write_buffer(self.params.buffer(), 0, bytemuck::bytes_of(params));
     }
 
-    /// Goes on with the blocks that are left.
-    fn next_band(&mut self, frame: Frame) -> Result<Frame, String> {
+    /// Goes on with the tile pairs, or the candidates of rows, that are left.
+    fn go_on(&mut self, frame: Frame) -> Result<Frame, String> {
         let mut params = frame.params;
-        params.first_block += params.blocks;
-        params.blocks = frame.blocks_left.min(u64::from(params.blocks)) as u32;
+        match &self.search {
+            Search::Brute(_) => {
+                params.first += params.blocks;
+                params.blocks = frame.tile_pairs_left.min(u64::from(params.blocks)) as u32;
+            }
+            Search::Sorted(_) => params.first += CANDIDATES,
+        }
         params.window = 0;
         params.capacity = self.output.capacity();
         self.set(&params);
-        let totals = offset_of!(Header, total_low) as u64..offset_of!(Header, invalid) as u64;
         let mut encoder = self.encoder();
-        encoder.clear_buffer(self.header.buffer(), totals.start, Some(totals.end - totals.start));
-        self.record(&mut encoder, &params, true);
+        for field in [offset_of!(Header, total_low), offset_of!(Header, total_high), offset_of!(Header, more)] {
+            encoder.clear_buffer(self.header.buffer(), field as u64, Some(4));
+        }
+        self.record(&mut encoder, &params, Step::Count);
         let sent = self.sendable();
         self.copy_back(&mut encoder, sent);
         let submission = self.submit_mapped(encoder, PAIRS_AT + sent * PAIR)?;
-        Ok(Frame { submission, params, sent, blocks_left: frame.blocks_left - u64::from(params.blocks) })
+        let tile_pairs_left = frame.tile_pairs_left.saturating_sub(u64::from(params.blocks));
+        Ok(Frame { submission, params, sent, tile_pairs_left })
     }
 
     /// Adds the first `count` pairs of the download to the list.

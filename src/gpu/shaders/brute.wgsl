@@ -83,7 +83,7 @@ fn count(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     if (block >= params.blocks) {
         return;
     }
-    let tile = tiles(params.first_block + block);
+    let tile = tiles(params.first + block);
     if (tile.x == tile.y && tile.x * TILE + t < params.objects) {
         check_box(tile.x * TILE + t);
     }
@@ -99,7 +99,7 @@ fn write(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     if (block >= params.blocks) {
         return;
     }
-    let tile = tiles(params.first_block + block);
+    let tile = tiles(params.first + block);
     // Most tile pairs of a large sparse scene hold nothing. They must not return here: some compilers take no barrier behind a
     // branch on what a buffer holds.
     let found = hits(tile, t, sums[block] != sums[block + 1u]);

@@ -12,8 +12,9 @@ struct Params {
     axis: u32,
     // Pairs that `pairs` has room for.
     capacity: u32,
-    // First tile pair of this submission, in brute force; and how many blocks of rows, or tile pairs, there are in it.
-    first_block: u32,
+    // Where this submission goes on: in brute force the first tile pair, else the first candidate of every row.
+    first: u32,
+    // Blocks of rows, or tile pairs, in this submission.
     blocks: u32,
     // Position in the whole list of the first pair that `pairs` is to take.
     window: u32,

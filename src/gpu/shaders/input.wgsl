@@ -11,7 +11,8 @@ struct Header {
     total_high: u32,
     // Twice the position of the first invalid box, plus 1 if it is inverted; all ones when every box is valid.
     invalid: atomic<u32>,
-    unused: u32,
+    // 1 where a row has candidates beyond those of this submission.
+    more: u32,
 }
 
 fn bound(at: u32, corner: u32, axis: u32) -> u32 {

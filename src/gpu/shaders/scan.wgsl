@@ -8,7 +8,7 @@ struct Header {
     total_low: u32,
     total_high: u32,
     invalid: u32,
-    unused: u32,
+    more: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;

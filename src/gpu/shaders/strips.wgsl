@@ -8,9 +8,7 @@ fn search(row: u32) {
     let a = boxes[row];
     let key = keys[row];
     if (key >= params.large_key) {
-        for (var j = row + 1u; j < params.objects; j++) {
-            test_large(row, a, j);
-        }
+        test_large(row, a, row + 1u);
         return;
     }
     let slot = key % params.slots;
@@ -22,8 +20,8 @@ fn search(row: u32) {
     for (var y = max(first.y, 1u) - 1u; y <= last.y; y++) {
         for (var x = max(first.x, 1u) - 1u; x <= last.x; x++) {
             let base = (y * params.cells.x + x) * params.slots;
-            let end = table[base + last_slot + 1u];
-            for (var j = table[base + slot]; j < end; j++) {
+            let candidates = part(table[base + slot], table[base + last_slot + 1u]);
+            for (var j = candidates.x; j < candidates.y; j++) {
                 let b = boxes[j];
                 // Of two boxes the one that begins first reports the pair, of two that begin together the one that stands first.
                 let behind = b.lo.x > a.lo.x || (b.lo.x == a.lo.x && j > row);
@@ -33,14 +31,16 @@ fn search(row: u32) {
             }
         }
     }
-    for (var j = table[params.large_key]; j < params.objects; j++) {
-        test_large(row, a, j);
-    }
+    test_large(row, a, table[params.large_key]);
 }
 
-fn test_large(row: u32, a: Box, j: u32) {
-    let b = boxes[j];
-    if (a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && overlap_across(a, b)) {
-        hit(row, a.lo.w, b.lo.w);
+// The boxes kept apart from `begin` on.
+fn test_large(row: u32, a: Box, begin: u32) {
+    let candidates = part(begin, params.objects);
+    for (var j = candidates.x; j < candidates.y; j++) {
+        let b = boxes[j];
+        if (a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && overlap_across(a, b)) {
+            hit(row, a.lo.w, b.lo.w);
+        }
     }
 }

@@ -2,13 +2,16 @@
 
 fn search(row: u32) {
     let a = boxes[row];
-    for (var j = row + 1u; j < params.objects; j++) {
+    let begin = min(row + 1u + passed, params.objects);
+    let end = min(begin + left, params.objects);
+    for (var j = begin; j < end; j++) {
         let b = boxes[j];
         if (b.lo.x > a.hi.x) {
-            break;
+            return;
         }
         if (overlap_across(a, b)) {
             hit(row, a.lo.w, b.lo.w);
         }
     }
+    more = end < params.objects && boxes[end].lo.x <= a.hi.x;
 }
