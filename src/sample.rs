@@ -44,6 +44,14 @@ impl Sample {
         Self::statistics(&chosen)
     }
 
+    /// Where cells of a grid on this axis begin, and how much length they share.
+    pub(crate) fn range(&self, axis: usize) -> (f64, f64) {
+        // Three deviations hold all of a uniform scene and leave out far outliers, which the border cells take.
+        let low = self.low[axis].max(self.mean[axis] - 3.0 * self.deviation[axis]);
+        let high = self.high[axis].min(self.mean[axis] + 3.0 * self.deviation[axis]);
+        (low, (high - low).max(0.0))
+    }
+
     /// The axis on which the centres spread most.
     pub(crate) fn widest_axis(&self) -> usize {
         (0..3).max_by(|&a, &b| self.deviation[a].total_cmp(&self.deviation[b])).unwrap_or(0)

@@ -44,12 +44,7 @@ impl StripGrid {
     pub(crate) fn plan(sample: &Sample, objects: usize) -> Self {
         let axis = sample.widest_axis();
         let across = [(axis + 1) % 3, (axis + 2) % 3];
-        let range = across.map(|a| {
-            // Three deviations hold all of a uniform scene and leave out far outliers, which the border cells take.
-            let low = sample.low[a].max(sample.mean[a] - 3.0 * sample.deviation[a]);
-            let high = sample.high[a].min(sample.mean[a] + 3.0 * sample.deviation[a]);
-            (low, (high - low).max(0.0))
-        });
+        let range = across.map(|a| sample.range(a));
         let wanted = objects as f64 / BOXES_PER_STRIP;
         // Square cells, unless the world is flatter than a cell: then all of them go to the other axis.
         let square = (range[0].1 * range[1].1 / wanted.max(1.0)).sqrt();

@@ -61,6 +61,20 @@ enum Search {
     Sorted(Box<Sorted>),
 }
 
+impl Search {
+    /// Blocks of the first submission of a frame, and the tile pairs of brute force that are left to further ones.
+    fn blocks(&self, objects: u32) -> (u32, u64) {
+        match self {
+            Self::Brute(brute) => {
+                let all = Brute::blocks(objects);
+                let first = all.min(u64::from(brute.band()));
+                (first as u32, all - first)
+            }
+            Self::Sorted(_) => (Sorted::blocks(objects), 0),
+        }
+    }
+}
+
 /// What a frame goes through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Step {
@@ -134,12 +148,12 @@ impl Engine {
         usize::try_from(most).unwrap_or(usize::MAX).min(numbered)
     }
 
-    /// The parameters of a frame of boxes that look like the sample.
-    pub(super) fn plan(&self, sample: &Sample, objects: u32) -> Params {
+    /// The parameters of a frame of boxes that look like the sample, which is taken only where the method needs one.
+    pub(super) fn plan(&self, objects: u32, sample: impl FnOnce() -> Sample) -> Params {
         match &self.search {
             Search::Brute(_) => Params { objects, ..Params::default() },
-            Search::Sorted(sorted) if sorted.is_strips() => Params::strips(sample, objects),
-            Search::Sorted(_) => Params::sweep(sample, objects),
+            Search::Sorted(sorted) if sorted.is_strips() => Params::strips(&sample(), objects),
+            Search::Sorted(_) => Params::sweep(&sample(), objects),
         }
     }
 
@@ -168,13 +182,10 @@ impl Engine {
         if ids {
             grown |= self.ids.ensure(gpu, n * 4)?;
         }
-        let blocks = match &mut self.search {
-            Search::Brute(brute) => Brute::blocks(params.objects).min(u64::from(brute.band())) as u32,
-            Search::Sorted(sorted) => {
-                grown |= sorted.ensure(gpu, params)?;
-                Sorted::blocks(params.objects)
-            }
-        };
+        if let Search::Sorted(sorted) = &mut self.search {
+            grown |= sorted.ensure(gpu, params)?;
+        }
+        let (blocks, _) = self.search.blocks(params.objects);
         grown |= self.output.ensure_blocks(gpu, blocks)?;
         // Most scenes have fewer pairs than objects.
         grown |= self.output.ensure_pairs(gpu, n.max(self.expected + self.expected / 4))?;
@@ -221,9 +232,7 @@ impl Engine {
 
     /// As [`start`](Self::start), with boxes that are on the GPU already, and pairs that stay there.
     pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), String> {
-        if let Search::Brute(brute) = &self.search
-            && Brute::blocks(params.objects) > u64::from(brute.band())
-        {
+        if self.search.blocks(params.objects).1 > 0 {
             let reason = "pairs that stay on a GPU come from one submission, and brute force on so many boxes takes several";
             return Err(format!("{} boxes are too many: {reason}; use strips", params.objects));
         }
@@ -233,14 +242,8 @@ impl Engine {
 
     /// `None`: the boxes are on the GPU.
     fn submit(&mut self, mut params: Params, piece: Option<Piece<'_>>) -> Result<(), String> {
-        let all_blocks = match &self.search {
-            Search::Brute(_) => Brute::blocks(params.objects),
-            Search::Sorted(_) => u64::from(Sorted::blocks(params.objects)),
-        };
-        params.blocks = match &self.search {
-            Search::Brute(brute) => all_blocks.min(u64::from(brute.band())) as u32,
-            Search::Sorted(_) => all_blocks as u32,
-        };
+        let (blocks, tile_pairs_left) = self.search.blocks(params.objects);
+        params.blocks = blocks;
         params.capacity = self.output.capacity();
         params.piece = u32::from(piece.is_some_and(|p| p.ids.is_some()));
         let boxes: &[u8] = piece.map_or(&[], |p| bytemuck::cast_slice(p.boxes));
@@ -270,7 +273,7 @@ impl Engine {
         self.copy_back(&mut encoder, sent);
         let submission = self.submit_mapped(encoder, PAIRS_AT + (sent * PAIR).max(self.sample_bytes()))?;
         self.upload.ask(self.upload.bytes());
-        self.frame = Some(Frame { submission, params, sent, tile_pairs_left: all_blocks - u64::from(params.blocks) });
+        self.frame = Some(Frame { submission, params, sent, tile_pairs_left });
         Ok(())
     }
 

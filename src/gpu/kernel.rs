@@ -26,15 +26,16 @@ pub(super) mod source {
 
     const COMMON: &str = include_str!("shaders/common.wgsl");
     const INPUT: &str = include_str!("shaders/input.wgsl");
+    const PREFIX: &str = include_str!("shaders/prefix.wgsl");
     const ROWS: &str = include_str!("shaders/rows.wgsl");
 
-    pub(in crate::gpu) const BRUTE: Source = &[COMMON, INPUT, include_str!("shaders/brute.wgsl")];
+    pub(in crate::gpu) const BRUTE: Source = &[COMMON, INPUT, PREFIX, include_str!("shaders/brute.wgsl")];
     pub(in crate::gpu) const KEYS: Source = &[COMMON, INPUT, include_str!("shaders/keys.wgsl")];
     pub(in crate::gpu) const SAMPLE: Source = &[COMMON, INPUT, include_str!("shaders/sample.wgsl")];
     pub(in crate::gpu) const SCAN: Source = &[COMMON, include_str!("shaders/scan.wgsl")];
     pub(in crate::gpu) const SORT: Source = &[COMMON, include_str!("shaders/sort.wgsl")];
-    pub(in crate::gpu) const STRIPS: Source = &[COMMON, ROWS, include_str!("shaders/strips.wgsl")];
-    pub(in crate::gpu) const SWEEP: Source = &[COMMON, ROWS, include_str!("shaders/sweep.wgsl")];
+    pub(in crate::gpu) const STRIPS: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/strips.wgsl")];
+    pub(in crate::gpu) const SWEEP: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/sweep.wgsl")];
     pub(in crate::gpu) const TABLE: Source = &[COMMON, include_str!("shaders/table.wgsl")];
 }
 

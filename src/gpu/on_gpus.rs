@@ -100,8 +100,8 @@ impl OnGpus {
     }
 
     /// All boxes at once on the one GPU that there is.
-    fn whole(part: &mut Part, sample: &Sample, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Failure> {
-        let params = part.engine.plan(sample, boxes.len() as u32);
+    fn whole(part: &mut Part, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Failure> {
+        let params = part.engine.plan(boxes.len() as u32, || Sample::of(boxes));
         part.engine.start(Piece { boxes, ids: None }, params)?;
         part.engine.finish(pairs)
     }
@@ -152,7 +152,7 @@ impl Part {
         }
         let Members { boxes, ids } = &self.members;
         self.work += (boxes.len() as f64).powf(exponent);
-        let params = self.engine.plan(&Sample::of(boxes), boxes.len() as u32);
+        let params = self.engine.plan(boxes.len() as u32, || Sample::of(boxes));
         self.failure = self.engine.start(Piece { boxes, ids: Some(ids) }, params).err().map(Failure::Gpu);
     }
 
@@ -199,10 +199,10 @@ impl BroadPhase for OnGpus {
             let reason = format!("{} boxes are more than the {MOST_OBJECTS} that a GPU can number", boxes.len());
             return Err(Error::Unavailable { algorithm: algorithm.clone(), reason });
         }
-        let sample = Sample::of(boxes);
         let found = match self.parts.as_mut_slice() {
-            [part] if boxes.len() <= part.engine.most_objects() => Self::whole(part, &sample, boxes, pairs),
+            [part] if boxes.len() <= part.engine.most_objects() => Self::whole(part, boxes, pairs),
             parts => {
+                let sample = Sample::of(boxes);
                 let room: usize = parts.iter().map(|p| p.engine.most_objects()).sum();
                 let mut rounds = boxes.len().div_ceil(room.max(1)).max(1);
                 loop {
@@ -234,7 +234,7 @@ impl BroadPhase for OnGpus {
         let parts = self.parts.len();
         for part in &mut self.parts {
             let share = (objects / parts).min(part.engine.most_objects()) as u32;
-            let params = part.engine.plan(&Sample::default(), share);
+            let params = part.engine.plan(share, Sample::default);
             // A refused allocation is reported by the frame that needs it.
             let _ = part.engine.prepare(&params, parts > 1, None);
         }

@@ -22,7 +22,7 @@ pub(super) struct Params {
     pub(super) inverse: [f32; 4],
 }
 
-/// `Header` of `shaders/input.wgsl`.
+/// `Header` of `shaders/common.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(super) struct Header {
@@ -64,10 +64,7 @@ impl Params {
         let grid = StripGrid::plan(sample, objects as usize);
         let a = grid.axis;
         let strips = grid.strips() as f64;
-        // The range that the grid takes on its own axes: far outliers go to the border slots.
-        let low = sample.low[a].max(sample.mean[a] - 3.0 * sample.deviation[a]);
-        let high = sample.high[a].min(sample.mean[a] + 3.0 * sample.deviation[a]);
-        let length = (high - low).max(0.0);
+        let (low, length) = sample.range(a);
         let slots = (f64::from(objects) / strips).ceil().clamp(1.0, (MOST_SLOTS / strips).floor());
         // A world so small that the inverse of a slot overflows would put every box into every slot.
         let slots = if ((slots / length) as f32).is_finite() { slots } else { 1.0 };

@@ -79,7 +79,7 @@ impl Resident {
             Some(sample) => sample,
             None => self.sample.insert(self.engine.look(boxes, objects)?),
         };
-        let params = self.engine.plan(sample, objects);
+        let params = self.engine.plan(objects, || *sample);
         self.engine.start_resident(boxes, params)?;
         let (count, sample) = self.engine.finish_resident()?;
         self.sample = Some(sample);

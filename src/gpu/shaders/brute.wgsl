@@ -2,6 +2,7 @@
 // tile 0 with itself, 1 and 2 are tile 1 with tiles 0 and 1, and so on.
 
 const TILE: u32 = 128u;
+const THREADS: u32 = TILE;
 const WORDS: u32 = 4u;
 
 @group(0) @binding(4) var<storage, read_write> sums: array<u32>;
@@ -9,7 +10,6 @@ const WORDS: u32 = 4u;
 
 var<workgroup> columns_lo: array<vec4<u32>, TILE>;
 var<workgroup> columns_hi: array<vec4<u32>, TILE>;
-var<workgroup> scan: array<u32, TILE>;
 
 // The tiles of a pair, the lower one first.
 fn tiles(k: u32) -> vec2<u32> {
@@ -59,22 +59,6 @@ fn hits(tile: vec2<u32>, t: u32, wanted: bool) -> vec4<u32> {
 fn ones(found: vec4<u32>) -> u32 {
     let c = countOneBits(found);
     return c.x + c.y + c.z + c.w;
-}
-
-// Sums before this invocation, in `scan` the sums up to each.
-fn exclusive(t: u32, value: u32) -> u32 {
-    scan[t] = value;
-    workgroupBarrier();
-    for (var step = 1u; step < TILE; step <<= 1u) {
-        var left = 0u;
-        if (t >= step) {
-            left = scan[t - step];
-        }
-        workgroupBarrier();
-        scan[t] += left;
-        workgroupBarrier();
-    }
-    return scan[t] - value;
 }
 
 @compute @workgroup_size(128)

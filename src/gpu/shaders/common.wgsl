@@ -32,6 +32,17 @@ struct Params {
     inverse: vec4<f32>,
 }
 
+// What a submission found, for the CPU to read.
+struct Header {
+    // Pairs found, 64 bits.
+    total_low: u32,
+    total_high: u32,
+    // Twice the position of the first invalid box, plus 1 if it is inverted; all ones when every box is valid.
+    invalid: atomic<u32>,
+    // 1 where a row has candidates beyond those of this submission.
+    more: atomic<u32>,
+}
+
 // A box with its axes turned so that x is the sweep axis. lo.w is its number, the owner bit on top.
 struct Box {
     lo: vec4<u32>,

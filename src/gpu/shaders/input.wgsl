@@ -5,16 +5,6 @@
 @group(0) @binding(2) var<storage, read> ids: array<u32>;
 @group(0) @binding(3) var<storage, read_write> header: Header;
 
-struct Header {
-    // Pairs found, 64 bits.
-    total_low: u32,
-    total_high: u32,
-    // Twice the position of the first invalid box, plus 1 if it is inverted; all ones when every box is valid.
-    invalid: atomic<u32>,
-    // 1 where a row has candidates beyond those of this submission.
-    more: u32,
-}
-
 fn bound(at: u32, corner: u32, axis: u32) -> u32 {
     return boxes[at * 6u + corner * 3u + (params.axis + axis) % 3u];
 }

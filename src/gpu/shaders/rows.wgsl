@@ -8,13 +8,6 @@ const KEPT: u32 = 4u;
 // after 65 535 turns of all loops of an invocation together. Others give up on a dispatch that takes seconds.
 const CANDIDATES: u32 = 32768u;
 
-struct Header {
-    total_low: u32,
-    total_high: u32,
-    invalid: u32,
-    more: atomic<u32>,
-}
-
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> keys: array<u32>;
 @group(0) @binding(2) var<storage, read> boxes: array<Box>;
@@ -23,8 +16,6 @@ struct Header {
 @group(0) @binding(5) var<storage, read_write> pairs: array<vec2<u32>>;
 @group(0) @binding(6) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(7) var<storage, read_write> kept: array<u32>;
-
-var<workgroup> scan: array<u32, THREADS>;
 
 var<private> writing: bool;
 // Hits of this row so far.
@@ -70,22 +61,6 @@ fn hit(row: u32, a: u32, b: u32) {
         kept[row * KEPT + found] = b;
     }
     found++;
-}
-
-// Sums before this invocation, in `scan` the sums up to each.
-fn exclusive(t: u32, value: u32) -> u32 {
-    scan[t] = value;
-    workgroupBarrier();
-    for (var step = 1u; step < THREADS; step <<= 1u) {
-        var left = 0u;
-        if (t >= step) {
-            left = scan[t - step];
-        }
-        workgroupBarrier();
-        scan[t] += left;
-        workgroupBarrier();
-    }
-    return scan[t] - value;
 }
 
 @compute @workgroup_size(64)

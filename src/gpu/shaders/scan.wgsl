@@ -4,13 +4,6 @@
 const THREADS: u32 = 256u;
 const EACH: u32 = 16u;
 
-struct Header {
-    total_low: u32,
-    total_high: u32,
-    invalid: u32,
-    more: u32,
-}
-
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(3) var<storage, read_write> header: Header;
 @group(0) @binding(4) var<storage, read_write> sums: array<u32>;
