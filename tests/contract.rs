@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Random, naive};
+use common::{Random, WORLDS, denormals, large_boxes, lattice, naive};
 use sapwise::{Aabb, AlgorithmId, BoxDefect, BroadPhase, Error, PairOrder, Pairs, Registry, Scenario, SimdLevel};
 
 /// Every method on 1, 2, 3 and 7 threads at every SIMD level of this machine.
@@ -77,37 +77,22 @@ fn many_boxes_in_one_point_are_counted_when_they_may_not_be_stored() {
 fn worlds_of_every_shape() {
     let mut algorithms = every_algorithm();
     let mut random = Random(7);
-    for world in
-        [[400.0, 1.0, 1.0], [1.0, 300.0, 2.0], [60.0, 60.0, 0.0], [2.0, 50.0, 50.0], [40.0, 40.0, 0.0], [0.0; 3], [16.0; 3]]
-    {
+    for world in WORLDS {
         assert_all_agree("a world", &random.cubes(3000, world, 0.5), &mut algorithms);
     }
-    let tiny: Vec<Aabb> = random.cubes(3000, [16.0; 3], 0.5);
-    let shrunk = |v: [f32; 3]| v.map(|x| (x - 8.0) * 1.0e-39);
-    let tiny: Vec<Aabb> = tiny.iter().map(|b| Aabb::new(shrunk(b.min), shrunk(b.max))).collect();
-    assert_all_agree("a world of denormals", &tiny, &mut algorithms);
+    assert_all_agree("a world of denormals", &denormals(&mut random), &mut algorithms);
 }
 
 #[test]
 fn boxes_on_a_lattice_touch_exactly() {
     let mut algorithms = every_algorithm();
-    let lattice: Vec<Aabb> =
-        (0..2744).map(|k| Aabb::cube([(k % 14) as f32, (k / 14 % 14) as f32, (k / 196) as f32], 0.5)).collect();
-    assert_all_agree("a lattice", &lattice, &mut algorithms);
+    assert_all_agree("a lattice", &lattice(), &mut algorithms);
 }
 
 #[test]
 fn large_boxes_among_small_ones() {
     let mut algorithms = every_algorithm();
-    let mut random = Random(99);
-    let mut boxes = random.cubes(4000, [60.0, 50.0, 40.0], 0.3);
-    for k in 0..40 {
-        // Plates, rods and world-sized boxes, some reaching beyond the small ones.
-        let size = [[50.0, 50.0, 0.1], [0.1, 80.0, 0.1], [0.1, 0.1, 80.0], [100.0; 3], [90.0, 0.2, 0.2]][k % 5];
-        let at = [random.next() * 60.0 - 20.0, random.next() * 50.0 - 20.0, random.next() * 40.0 - 20.0];
-        boxes.insert(k * 97, Aabb::new(at, [at[0] + size[0], at[1] + size[1], at[2] + size[2]]));
-    }
-    assert_all_agree("large boxes", &boxes, &mut algorithms);
+    assert_all_agree("large boxes", &large_boxes(), &mut algorithms);
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Random, gpus, naive};
+use common::{Random, WORLDS, denormals, gpus, large_boxes, lattice, naive};
 use sapwise::gpu::{Gpus, broad_phase};
 use sapwise::{Aabb, BoxDefect, BroadPhase, Error, PairOrder, Pairs, Registry, Scenario};
 
@@ -91,31 +91,18 @@ fn worlds_of_every_shape() {
     let Some(gpus) = gpus() else { return };
     let mut algorithms = every_algorithm(&gpus);
     let mut random = Random(7);
-    for world in
-        [[400.0, 1.0, 1.0], [1.0, 300.0, 2.0], [60.0, 60.0, 0.0], [2.0, 50.0, 50.0], [40.0, 40.0, 0.0], [0.0; 3], [16.0; 3]]
-    {
+    for world in WORLDS {
         assert_all_agree("a world", &random.cubes(3000, world, 0.5), &mut algorithms);
     }
-    let shrunk = |v: [f32; 3]| v.map(|x| (x - 8.0) * 1.0e-39);
-    let tiny = random.cubes(3000, [16.0; 3], 0.5);
-    let tiny: Vec<Aabb> = tiny.iter().map(|b| Aabb::new(shrunk(b.min), shrunk(b.max))).collect();
-    assert_all_agree("a world of denormals", &tiny, &mut algorithms);
-    let lattice: Vec<Aabb> =
-        (0..2744).map(|k| Aabb::cube([(k % 14) as f32, (k / 14 % 14) as f32, (k / 196) as f32], 0.5)).collect();
-    assert_all_agree("a lattice", &lattice, &mut algorithms);
+    assert_all_agree("a world of denormals", &denormals(&mut random), &mut algorithms);
+    assert_all_agree("a lattice", &lattice(), &mut algorithms);
 }
 
 #[test]
 fn large_infinite_and_far_boxes() {
     let Some(gpus) = gpus() else { return };
     let mut algorithms = every_algorithm(&gpus);
-    let mut random = Random(99);
-    let mut boxes = random.cubes(4000, [60.0, 50.0, 40.0], 0.3);
-    for k in 0..40 {
-        let size = [[50.0, 50.0, 0.1], [0.1, 80.0, 0.1], [0.1, 0.1, 80.0], [100.0; 3], [90.0, 0.2, 0.2]][k % 5];
-        let at = [random.next() * 60.0 - 20.0, random.next() * 50.0 - 20.0, random.next() * 40.0 - 20.0];
-        boxes.insert(k * 97, Aabb::new(at, [at[0] + size[0], at[1] + size[1], at[2] + size[2]]));
-    }
+    let mut boxes = large_boxes();
     assert_all_agree("large boxes", &boxes, &mut algorithms);
     let inf = f32::INFINITY;
     boxes.push(Aabb::new([-inf; 3], [inf; 3]));

@@ -34,6 +34,34 @@ impl Random {
     }
 }
 
+/// Sizes of worlds that are flat, thin, deep, empty and plain.
+pub(crate) const WORLDS: [[f32; 3]; 7] =
+    [[400.0, 1.0, 1.0], [1.0, 300.0, 2.0], [60.0, 60.0, 0.0], [2.0, 50.0, 50.0], [40.0, 40.0, 0.0], [0.0; 3], [16.0; 3]];
+
+/// A world all of whose bounds are denormal.
+pub(crate) fn denormals(random: &mut Random) -> Vec<Aabb> {
+    let shrunk = |v: [f32; 3]| v.map(|x| (x - 8.0) * 1.0e-39);
+    let plain = random.cubes(3000, [16.0; 3], 0.5);
+    plain.iter().map(|b| Aabb::new(shrunk(b.min), shrunk(b.max))).collect()
+}
+
+/// Cubes that touch their neighbours exactly.
+pub(crate) fn lattice() -> Vec<Aabb> {
+    (0..2744).map(|k| Aabb::cube([(k % 14) as f32, (k / 14 % 14) as f32, (k / 196) as f32], 0.5)).collect()
+}
+
+/// Small boxes, and among them plates, rods and world-sized ones, some reaching beyond the small ones.
+pub(crate) fn large_boxes() -> Vec<Aabb> {
+    let mut random = Random(99);
+    let mut boxes = random.cubes(4000, [60.0, 50.0, 40.0], 0.3);
+    for k in 0..40 {
+        let size = [[50.0, 50.0, 0.1], [0.1, 80.0, 0.1], [0.1, 0.1, 80.0], [100.0; 3], [90.0, 0.2, 0.2]][k % 5];
+        let at = [random.next() * 60.0 - 20.0, random.next() * 50.0 - 20.0, random.next() * 40.0 - 20.0];
+        boxes.insert(k * 97, Aabb::new(at, [at[0] + size[0], at[1] + size[1], at[2] + size[2]]));
+    }
+    boxes
+}
+
 /// The GPUs of this machine; `None`, said aloud, where there is none and none is required.
 #[cfg(feature = "gpu")]
 pub(crate) fn gpus() -> Option<sapwise::gpu::Gpus> {
