@@ -8,7 +8,7 @@ use crate::broad_phase::check_count;
 use crate::cpu::columns::{Columns, ensure, order_key, part};
 use crate::cpu::kernel::{Query, each_bit, query_rows, sweep_rows};
 use crate::cpu::strip_grid::{Cover, StripGrid};
-use crate::cpu::workers::Workers;
+use crate::cpu::workers::{Outputs, Workers};
 use crate::cpu::{SimdLevel, Threads};
 use crate::sample::Sample;
 use crate::{Aabb, BroadPhase, Error, Pairs};
@@ -17,6 +17,13 @@ use crate::{Aabb, BroadPhase, Error, Pairs};
 #[derive(Debug)]
 struct Strips {
     workers: Workers,
+    finder: Finder,
+    outputs: Outputs,
+}
+
+/// The work without its output: pairs go into as many lists as the workers have tasks.
+#[derive(Debug)]
+pub(super) struct Finder {
     bins: Vec<Bins>,
     large: Large,
     tasks: Vec<Task>,
@@ -62,53 +69,57 @@ struct Task {
     begins: Vec<u32>,
     /// The furthest end on the sweep axis among all rows so far.
     ends: Vec<f32>,
-    pairs: Pairs,
     error: Option<Error>,
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
     let workers = Workers::new("strips", threads, pools)?;
-    let bins = (0..workers.threads()).map(|_| Bins::default()).collect();
-    let tasks = (0..workers.tasks()).map(|_| Task::default()).collect();
-    Ok(Box::new(Strips { workers, bins, large: Large::default(), tasks, level }))
+    let finder = Finder::new(&workers, level);
+    Ok(Box::new(Strips { workers, finder, outputs: Outputs::default() }))
 }
 
 impl BroadPhase for Strips {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;
-        let grid = StripGrid::plan(&Sample::of(boxes), boxes.len());
-        let Self { workers, bins, large, tasks, level } = self;
-        workers.run(|| {
-            let threads = bins.len();
-            workers.each(bins, |k, bin| {
-                let share = part(boxes.len(), k, threads);
-                bin.error = bin.fill(&grid, boxes, share).err();
-            });
-            bins.iter_mut().find_map(|b| b.error.take()).map_or(Ok(()), Err)?;
-            large.gather(&grid, boxes, bins)?;
-            let (bins, large, strips, count) = (&*bins, &*large, grid.strips(), tasks.len());
-            let limit = pairs.limit();
-            if let [task] = tasks.as_mut_slice() {
-                return task.find(bins, large, &grid, 0..strips, 0..large.covers.len(), *level, pairs);
-            }
-            workers.each(tasks, |k, task| {
-                let strips = balanced(bins, strips, k, count)..balanced(bins, strips, k + 1, count);
-                let mut found = std::mem::take(&mut task.pairs);
-                found.clear();
-                found.set_limit(limit);
-                let rows = part(large.covers.len(), k, count);
-                task.error = task.find(bins, large, &grid, strips, rows, *level, &mut found).err();
-                task.pairs = found;
-            });
-            tasks.iter_mut().find_map(|t| t.error.take()).map_or(Ok(()), Err)?;
-            tasks.iter().for_each(|t| pairs.append(&t.pairs));
-            Ok(())
-        })?;
+        let Self { workers, finder, outputs } = self;
+        workers.run(|| outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists)))?;
         pairs.finish()
     }
 
     fn prepare(&mut self, objects: usize) {
+        self.finder.prepare(objects);
+    }
+}
+
+impl Finder {
+    pub(super) fn new(workers: &Workers, level: SimdLevel) -> Self {
+        let bins = (0..workers.threads()).map(|_| Bins::default()).collect();
+        let tasks = (0..workers.tasks()).map(|_| Task::default()).collect();
+        Self { bins, large: Large::default(), tasks, level }
+    }
+
+    /// Adds the pairs to `lists`, one for each task of `workers`; in each of them those that are near in space are near.
+    pub(super) fn find(&mut self, workers: &Workers, boxes: &[Aabb], lists: &mut [Pairs]) -> Result<(), Error> {
+        let grid = StripGrid::plan(&Sample::of(boxes), boxes.len());
+        let Self { bins, large, tasks, level } = self;
+        let threads = bins.len();
+        workers.each(bins, |k, bin| {
+            let share = part(boxes.len(), k, threads);
+            bin.error = bin.fill(&grid, boxes, share).err();
+        });
+        bins.iter_mut().find_map(|b| b.error.take()).map_or(Ok(()), Err)?;
+        large.gather(&grid, boxes, bins)?;
+        let (bins, large, strips, count) = (&*bins, &*large, grid.strips(), tasks.len());
+        workers.each_with(tasks, lists, |k, task, list| {
+            let strips = balanced(bins, strips, k, count)..balanced(bins, strips, k + 1, count);
+            let rows = part(large.covers.len(), k, count);
+            task.error = task.find(bins, large, &grid, strips, rows, *level, list).err();
+        });
+        tasks.iter_mut().find_map(|t| t.error.take()).map_or(Ok(()), Err)
+    }
+
+    pub(super) fn prepare(&mut self, objects: usize) {
         // A refused allocation is reported by the frame that needs it. Boxes stand in 1.6 strips on average.
         let share = objects / self.bins.len();
         for bin in &mut self.bins {

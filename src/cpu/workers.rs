@@ -68,6 +68,22 @@ impl Workers {
         tasks.iter_mut().enumerate().for_each(|(k, task)| work(k, task));
     }
 
+    /// One phase: `work` on every task and what belongs to it, side by side.
+    pub(crate) fn each_with<T: Send, U: Send>(
+        &self,
+        tasks: &mut [T],
+        with: &mut [U],
+        work: impl Fn(usize, &mut T, &mut U) + Sync + Send,
+    ) {
+        #[cfg(feature = "parallel")]
+        if self.pool.is_some() {
+            use rayon::prelude::*;
+            let all = tasks.par_iter_mut().zip(with).with_max_len(1).enumerate();
+            return all.for_each(|(k, (task, with))| work(k, task, with));
+        }
+        tasks.iter_mut().zip(with).enumerate().for_each(|(k, (task, with))| work(k, task, with));
+    }
+
     /// One phase: `fill` on parts of the columns, with the position at which each part begins.
     pub(crate) fn fill(&self, columns: ColumnsMut<'_>, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
         #[cfg(feature = "parallel")]
@@ -136,25 +152,25 @@ impl Outputs {
         }
     }
 
-    /// One phase: `find` on the parts of `0..rows`, each into a list of its own, then all lists joined in order.
+    /// Lets `find` add to as many lists as `workers` has tasks, then joins them in order.
     ///
-    /// `bounds` says where part `k` of `parts` lies. With one thread the caller's list is written directly.
-    pub(crate) fn find(
+    /// With one thread the one list is the caller's.
+    pub(crate) fn collect(
         &mut self,
         workers: &Workers,
         pairs: &mut Pairs,
-        find: impl Fn(usize, usize, &mut Pairs) + Sync + Send,
-    ) {
+        find: impl FnOnce(&mut [Pairs]) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         if workers.threads() == 1 {
-            return find(0, 1, pairs);
+            return find(std::slice::from_mut(pairs));
         }
         self.ready(workers, pairs);
-        let parts = self.0.len();
-        workers.each(&mut self.0, |k, list| find(k, parts, list));
+        find(&mut self.0)?;
         self.0.iter().for_each(|list| pairs.append(list));
+        Ok(())
     }
 
-    /// As [`Outputs::find`] over equal parts of `0..rows`.
+    /// One phase: `find` on equal parts of `0..rows`, each into a list of its own, then all lists joined in order.
     pub(crate) fn find_rows(
         &mut self,
         workers: &Workers,
@@ -163,5 +179,20 @@ impl Outputs {
         find: impl Fn(std::ops::Range<usize>, &mut Pairs) + Sync + Send,
     ) {
         self.find(workers, pairs, |k, parts, list| find(part(rows, k, parts), list));
+    }
+
+    /// As [`Outputs::find_rows`] over parts that `find` works out itself: it gets the number of the part and of all parts.
+    pub(crate) fn find(
+        &mut self,
+        workers: &Workers,
+        pairs: &mut Pairs,
+        find: impl Fn(usize, usize, &mut Pairs) + Sync + Send,
+    ) {
+        let found = self.collect(workers, pairs, |lists| {
+            let parts = lists.len();
+            workers.each(lists, |k, list| find(k, parts, list));
+            Ok(())
+        });
+        debug_assert!(found.is_ok(), "nothing above fails");
     }
 }
