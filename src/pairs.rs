@@ -17,6 +17,9 @@ pub enum PairOrder {
     Canonical,
 }
 
+/// Pairs that are fetched together, then tested together: few enough for the first-level cache, enough for memory to answer.
+const SIFTED_TOGETHER: usize = 64;
+
 /// The overlapping pairs of one frame: each pair once, the lower position first.
 ///
 /// Owned by the caller and reused from frame to frame: its memory grows to the largest frame seen and stays.
@@ -122,6 +125,69 @@ impl Pairs {
         } else {
             each_bit(mask, |bit| self.push(id, others[bit]));
         }
+    }
+
+    /// Adds those of `pairs` for which `wanted` holds. They stand lower member first. `fetch` is told of each some time before
+    /// `wanted` is asked, so that memory can be on its way.
+    #[inline]
+    pub(crate) fn extend_where(&mut self, pairs: &[Pair], fetch: impl Fn(Pair), wanted: impl Fn(Pair) -> bool) {
+        let mut ahead = pairs.iter();
+        ahead.by_ref().take(SIFTED_TOGETHER).for_each(|&pair| fetch(pair));
+        for pairs in pairs.chunks(SIFTED_TOGETHER) {
+            ahead.by_ref().take(SIFTED_TOGETHER).for_each(|&pair| fetch(pair));
+            self.add_where(pairs, &wanted);
+        }
+    }
+
+    /// Drops those for which `dropped` holds, and adds to `out` those of the rest for which `wanted` holds. `fetch` as above.
+    #[inline]
+    pub(crate) fn sift(
+        &mut self,
+        out: &mut Pairs,
+        dropped: impl Fn(Pair) -> bool,
+        fetch: impl Fn(Pair),
+        wanted: impl Fn(Pair) -> bool,
+    ) {
+        let (mut kept, mut tested) = (0, 0);
+        for from in (0..self.len).step_by(SIFTED_TOGETHER) {
+            let first = kept;
+            for at in from..(from + SIFTED_TOGETHER).min(self.len) {
+                let pair = self.buffer[at];
+                fetch(pair);
+                self.buffer[kept] = pair;
+                kept += usize::from(!dropped(pair));
+            }
+            // Those that were fetched a round before.
+            out.add_where(&self.buffer[tested..first], &wanted);
+            tested = first;
+        }
+        out.add_where(&self.buffer[tested..kept], &wanted);
+        self.len = kept;
+        self.found = kept as u64;
+    }
+
+    #[inline]
+    fn add_where(&mut self, pairs: &[Pair], wanted: impl Fn(Pair) -> bool) {
+        if let Some(room) = self.room(pairs.len()) {
+            let mut added = 0;
+            for &pair in pairs {
+                // Written in any case and kept if wanted: no branch, which would often be guessed wrong.
+                room[added] = pair;
+                added += usize::from(wanted(pair));
+            }
+            self.len += added;
+            self.found += added as u64;
+        } else {
+            pairs.iter().filter(|&&pair| wanted(pair)).for_each(|&(i, j)| self.push(i, j));
+        }
+    }
+
+    /// Room for `more` pairs behind the present ones; `None` near the limit or when memory is refused.
+    fn room(&mut self, more: usize) -> Option<&mut [Pair]> {
+        if self.buffer.len() - self.len < more && !self.grow(more) || self.limit.is_some_and(|l| l - self.len < more) {
+            return None;
+        }
+        Some(&mut self.buffer[self.len..self.len + more])
     }
 
     /// Whether nothing more can be stored. From there on pairs are only counted, sixteen at a time: 2^20 boxes in one

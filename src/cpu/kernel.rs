@@ -2,6 +2,9 @@
 //!
 //! A loop is written once over [`Lanes`] and compiled for each level inside a function that enables its instructions.
 
+pub(crate) mod contain;
+pub(crate) mod node;
+
 use crate::cpu::SimdLevel;
 use crate::cpu::columns::Columns;
 use std::ops::Range;
@@ -163,6 +166,22 @@ pub(crate) fn each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
         f(mask.trailing_zeros() as usize);
         mask &= mask - 1;
     }
+}
+
+/// Asks for a value that is needed soon. Where there is no such instruction, nothing happens.
+#[inline(always)]
+pub(crate) fn prefetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let at = std::ptr::from_ref(value).cast::<i8>();
+        for byte in (0..size_of::<T>()).step_by(64) {
+            // SAFETY: SSE is part of x86-64, and the address lies within the value.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(at.add(byte)) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
 }
 
 mod portable {

@@ -8,6 +8,7 @@ mod strip_grid;
 mod strips;
 mod sweep;
 mod threads;
+mod verlet;
 mod workers;
 
 pub(crate) use kernel::each_bit;
@@ -38,6 +39,7 @@ pub(crate) const METHODS: &[Method] = &[
     Method { name: "brute", revision: 1, create: brute::create },
     Method { name: "sweep", revision: 1, create: sweep::create },
     Method { name: "strips", revision: 1, create: strips::create },
+    Method { name: "verlet", revision: 1, create: verlet::create },
 ];
 
 /// Why `threads` threads can't be used in this build, if they can't.

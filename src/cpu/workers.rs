@@ -84,6 +84,42 @@ impl Workers {
         tasks.iter_mut().zip(with).enumerate().for_each(|(k, (task, with))| work(k, task, with));
     }
 
+    /// One phase: `work` on every task and what belongs to it in two more lists, side by side.
+    pub(crate) fn each_three<T: Send, U: Send, V: Send>(
+        &self,
+        tasks: &mut [T],
+        with: &mut [U],
+        and: &mut [V],
+        work: impl Fn(&mut T, &mut U, &mut V) + Sync + Send,
+    ) {
+        #[cfg(feature = "parallel")]
+        if self.pool.is_some() {
+            use rayon::prelude::*;
+            let all = tasks.par_iter_mut().zip(with).zip(and).with_max_len(1);
+            return all.for_each(|((task, with), and)| work(task, with, and));
+        }
+        tasks.iter_mut().zip(with).zip(and).for_each(|((task, with), and)| work(task, with, and));
+    }
+
+    /// One phase: `work` on every task and its part of two lists, which are given with the length of a part.
+    pub(crate) fn each_share<T: Send, A: Send, B: Send>(
+        &self,
+        tasks: &mut [T],
+        (a, a_len): (&mut [A], usize),
+        (b, b_len): (&mut [B], usize),
+        work: impl Fn(usize, &mut T, &mut [A], &mut [B]) + Sync + Send,
+    ) {
+        #[cfg(feature = "parallel")]
+        if self.pool.is_some() {
+            use rayon::prelude::*;
+            let parts = a.par_chunks_mut(a_len).zip(b.par_chunks_mut(b_len));
+            let all = tasks.par_iter_mut().zip(parts).with_max_len(1).enumerate();
+            return all.for_each(|(k, (task, (a, b)))| work(k, task, a, b));
+        }
+        let parts = a.chunks_mut(a_len).zip(b.chunks_mut(b_len));
+        tasks.iter_mut().zip(parts).enumerate().for_each(|(k, (task, (a, b)))| work(k, task, a, b));
+    }
+
     /// One phase: `fill` on parts of the columns, with the position at which each part begins.
     pub(crate) fn fill(&self, columns: ColumnsMut<'_>, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
         #[cfg(feature = "parallel")]

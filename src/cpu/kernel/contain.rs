@@ -1,0 +1,154 @@
+//! Whether boxes are valid and lie within others: many at a time, at every SIMD level.
+
+use crate::Aabb;
+use crate::cpu::SimdLevel;
+
+/// Boxes that are looked at together. Eight have 48 bounds, which is three vectors of 16 and six of eight.
+pub(crate) const BLOCK: usize = 8;
+
+/// Calls `doubtful` for every block of up to [`BLOCK`] boxes one of which is invalid or reaches out of its outer box, with
+/// the position at which the block begins.
+///
+/// `outer` is as long as `boxes`.
+pub(crate) fn each_doubtful_block(
+    level: SimdLevel,
+    boxes: &[Aabb],
+    outer: &mut [Aabb],
+    doubtful: impl FnMut(usize, &mut [Aabb]),
+) {
+    match level {
+        // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
+        #[cfg(target_arch = "x86_64")]
+        SimdLevel::Avx512 => unsafe { x86::blocks_avx512(boxes, outer, doubtful) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        SimdLevel::Avx2 => unsafe { x86::blocks_avx2(boxes, outer, doubtful) },
+        _ => blocks(boxes, outer, all_within, doubtful),
+    }
+}
+
+/// Whether a box is valid and lies within another. False for NaN.
+#[inline(always)]
+pub(crate) fn within(b: &Aabb, outer: &Aabb) -> bool {
+    // Without short cuts: six boxes in seven pass all tests, and a branch for each would cost more than the tests.
+    let axis = |a: usize| (b.min[a] >= outer.min[a]) & (b.max[a] <= outer.max[a]) & (b.min[a] <= b.max[a]);
+    axis(0) & axis(1) & axis(2)
+}
+
+#[inline(always)]
+fn all_within(boxes: &[Aabb; BLOCK], outer: &[Aabb; BLOCK]) -> bool {
+    boxes.iter().zip(outer).fold(true, |all, (b, outer)| all & within(b, outer))
+}
+
+#[inline(always)]
+fn blocks(
+    boxes: &[Aabb],
+    outer: &mut [Aabb],
+    all_within: impl Fn(&[Aabb; BLOCK], &[Aabb; BLOCK]) -> bool,
+    mut doubtful: impl FnMut(usize, &mut [Aabb]),
+) {
+    let (mut at, whole) = (0, boxes.len() / BLOCK * BLOCK);
+    let (blocks, _) = boxes.as_chunks::<BLOCK>();
+    let (outer_blocks, last) = outer.as_chunks_mut::<BLOCK>();
+    for (block, outer) in blocks.iter().zip(outer_blocks) {
+        if !all_within(block, outer) {
+            doubtful(at, outer);
+        }
+        at += BLOCK;
+    }
+    if !boxes[whole..].iter().zip(&*last).all(|(b, outer)| within(b, outer)) {
+        doubtful(whole, last);
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::{BLOCK, blocks};
+    use crate::Aabb;
+    use std::arch::x86_64::*;
+
+    /// Of 48 bounds of eight boxes, bit k is set when bound k is a lower one.
+    const LOWER: u64 = {
+        let (mut bits, mut k) = (0, 0);
+        while k < 6 * BLOCK {
+            bits |= ((k % 6 < 3) as u64) << k;
+            k += 1;
+        }
+        bits
+    };
+
+    #[target_feature(enable = "avx512f")]
+    pub(super) fn blocks_avx512(boxes: &[Aabb], outer: &mut [Aabb], doubtful: impl FnMut(usize, &mut [Aabb])) {
+        // The closure is inlined here, where the instructions are enabled.
+        let all_within = |boxes: &[Aabb; BLOCK], outer: &[Aabb; BLOCK]| {
+            let (b, o) = (boxes.as_ptr().cast::<f32>(), outer.as_ptr().cast::<f32>());
+            let mut bad = 0;
+            for k in [0_usize, 16, 32] {
+                let lower = (LOWER >> k) as __mmask16;
+                // SAFETY: a block has 48 floats; `Aabb` is `repr(C)`. Behind a lower bound stands its upper bound three
+                // floats later, and the mask leaves out the lanes beyond the block.
+                unsafe {
+                    let (inner, bound) = (_mm512_loadu_ps(b.add(k)), _mm512_loadu_ps(o.add(k)));
+                    let upper = _mm512_maskz_loadu_ps(lower, b.add(k).wrapping_add(3));
+                    bad |= _mm512_mask_cmp_ps_mask::<_CMP_NGE_UQ>(lower, inner, bound);
+                    bad |= _mm512_mask_cmp_ps_mask::<_CMP_NLE_UQ>(!lower, inner, bound);
+                    bad |= _mm512_mask_cmp_ps_mask::<_CMP_NLE_UQ>(lower, inner, upper);
+                }
+            }
+            bad == 0
+        };
+        blocks(boxes, outer, all_within, doubtful);
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn blocks_avx2(boxes: &[Aabb], outer: &mut [Aabb], doubtful: impl FnMut(usize, &mut [Aabb])) {
+        let all_within = |boxes: &[Aabb; BLOCK], outer: &[Aabb; BLOCK]| {
+            let (b, o) = (boxes.as_ptr().cast::<f32>(), outer.as_ptr().cast::<f32>());
+            let mut good = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+            for k in [0_usize, 8, 16, 24, 32, 40] {
+                let bit = |lane: usize| if LOWER >> (k + lane) & 1 == 1 { -1 } else { 0 };
+                let lower = _mm256_setr_epi32(bit(0), bit(1), bit(2), bit(3), bit(4), bit(5), bit(6), bit(7));
+                // SAFETY: as above; a masked load reads no lane whose mask is clear.
+                unsafe {
+                    let (inner, bound) = (_mm256_loadu_ps(b.add(k)), _mm256_loadu_ps(o.add(k)));
+                    let upper = _mm256_maskload_ps(b.add(k).wrapping_add(3), lower);
+                    let lower = _mm256_castsi256_ps(lower);
+                    let from =
+                        _mm256_and_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(inner, bound), _mm256_cmp_ps::<_CMP_LE_OQ>(inner, upper));
+                    good = _mm256_and_ps(good, _mm256_blendv_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(inner, bound), from, lower));
+                }
+            }
+            _mm256_movemask_ps(good) == 0xff
+        };
+        blocks(boxes, outer, all_within, doubtful);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_level_finds_every_block_with_a_box_that_is_invalid_or_reaches_out() {
+        let outer = vec![Aabb::new([-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]); 21];
+        for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
+            let doubtful = |boxes: &[Aabb]| {
+                let mut found = Vec::new();
+                each_doubtful_block(level, boxes, &mut outer.clone(), |at, block| found.push((at, block.len())));
+                found
+            };
+            assert_eq!(doubtful(&outer), [], "{level}");
+            for at in 0..21 {
+                for bound in 0..6 {
+                    for wrong in [f32::NAN, 1.0e9, -1.0e9] {
+                        let mut boxes = outer.clone();
+                        let b = &mut boxes[at];
+                        *(if bound < 3 { &mut b.min[bound] } else { &mut b.max[bound - 3] }) = wrong;
+                        let expected = (at / 8 * 8, if at < 16 { 8 } else { 5 });
+                        assert_eq!(doubtful(&boxes), [expected], "{level}: box {at}, bound {bound}, {wrong}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! The grown boxes: who has left theirs, and a new one for whoever has.
+
+use super::tree::Tree;
+use crate::cpu::SimdLevel;
+use crate::cpu::columns::ensure;
+use crate::cpu::kernel::contain::{each_doubtful_block, within};
+use crate::cpu::workers::Workers;
+use crate::{Aabb, Error};
+use std::ops::Range;
+
+/// Every box grown by a margin, in the order of the input.
+#[derive(Debug)]
+pub(super) struct Grown {
+    boxes: Vec<Aabb>,
+    len: usize,
+    /// Bit k of word w is set when box 64 w + k got a new grown box in this frame, or is gone.
+    dirty: Vec<u64>,
+    margin: Margin,
+    level: SimdLevel,
+}
+
+/// How much a box is grown on each side: a share of its mean edge.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Margin {
+    pub(super) share: f32,
+    /// Mean edges count as no longer than this, so that a world-sized box is not grown by the size of the world.
+    pub(super) longest_edge: f32,
+}
+
+/// What one task finds in its share of the boxes.
+#[derive(Debug, Default)]
+pub(super) struct Share {
+    /// Boxes that left their grown box.
+    pub(super) left: Vec<u32>,
+    error: Option<Error>,
+}
+
+/// How a frame differs from the one before.
+#[derive(Debug)]
+pub(super) struct Changes {
+    /// Boxes that left their grown box, the new ones included.
+    pub(super) left: usize,
+    /// Boxes that the frame before did not have.
+    pub(super) new: Range<usize>,
+    /// Boxes that this frame does not have.
+    pub(super) gone: Range<usize>,
+}
+
+/// Contains no box, not even an infinite one: whatever has no grown box yet is seen to have left it.
+pub(super) const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+
+impl Grown {
+    pub(super) fn new(level: SimdLevel) -> Self {
+        Self { boxes: Vec::new(), len: 0, dirty: Vec::new(), margin: Margin::default(), level }
+    }
+
+    pub(super) fn as_slice(&self) -> &[Aabb] {
+        &self.boxes[..self.len]
+    }
+
+    pub(super) fn set_margin(&mut self, margin: Margin) {
+        self.margin = margin;
+    }
+
+    /// Forgets all grown boxes: the next frame makes every one anew.
+    pub(super) fn forget(&mut self) {
+        self.len = 0;
+    }
+
+    /// Makes room for `objects` boxes.
+    pub(super) fn reserve(&mut self, objects: usize) -> Result<(), Error> {
+        ensure(&mut self.boxes, objects, "grown boxes")?;
+        ensure(&mut self.dirty, objects.div_ceil(64) + 1, "grown boxes")
+    }
+
+    /// Boxes in the share of one task; a multiple of 64, so that no two tasks write to one word of `dirty`.
+    fn share_len(&self, tasks: usize) -> usize {
+        self.len.div_ceil(tasks).next_multiple_of(64).max(64)
+    }
+
+    /// One phase: gives a new grown box to every box that is not within its own.
+    ///
+    /// # Errors
+    /// [`Error::InvalidBox`]; what is known of the grown boxes is then of no use.
+    pub(super) fn check(&mut self, workers: &Workers, boxes: &[Aabb], shares: &mut [Share]) -> Result<Changes, Error> {
+        self.reserve(boxes.len().max(self.len))?;
+        let (new, gone) = (self.len..boxes.len(), boxes.len()..self.len);
+        if !new.is_empty() {
+            self.boxes[new.clone()].fill(NOTHING);
+        }
+        self.len = boxes.len();
+        let size = self.share_len(shares.len());
+        for share in shares.iter_mut() {
+            share.left.clear();
+        }
+        let (margin, level) = (self.margin, self.level);
+        let grown = (&mut self.boxes[..self.len], size);
+        let dirty = (&mut self.dirty[..self.len.div_ceil(64)], size / 64);
+        workers.each_share(shares, grown, dirty, |k, share, grown, dirty| {
+            let first = k * size;
+            share.error = share.check(&boxes[first..first + grown.len()], grown, dirty, first, margin, level).err();
+        });
+        shares.iter_mut().find_map(|s| s.error.take()).map_or(Ok(()), Err)?;
+        // Kept pairs of boxes that are gone go with the pairs of those that left.
+        for id in gone.clone() {
+            self.dirty[id / 64] |= 1 << (id % 64);
+        }
+        Ok(Changes { left: shares.iter().map(|s| s.left.len()).sum(), new, gone })
+    }
+
+    /// One phase: a new grown box for every box. They must be valid.
+    pub(super) fn grow_all(&mut self, workers: &Workers, boxes: &[Aabb], shares: &mut [Share]) {
+        let size = self.share_len(shares.len());
+        let margin = self.margin;
+        shares.iter_mut().for_each(|share| share.left.clear());
+        let (grown, dirty) = ((&mut self.boxes[..self.len], size), (&mut self.dirty[..self.len.div_ceil(64)], size / 64));
+        workers.each_share(shares, grown, dirty, |k, _, grown, dirty| {
+            dirty.fill(0);
+            for (grown, b) in grown.iter_mut().zip(&boxes[k * size..]) {
+                *grown = margin.grow(b);
+            }
+        });
+    }
+
+    /// Calls `found` for every box whose grown box overlaps the new one of box `i`. Of two boxes with new ones, the lower is
+    /// told of the higher.
+    #[inline]
+    pub(super) fn meet(&self, tree: &Tree, i: u32, mut found: impl FnMut(u32)) {
+        let bounds = &self.boxes[i as usize];
+        tree.overlapping(bounds, |j| {
+            if j > i || !self.is_new(j) {
+                found(j);
+            }
+        });
+    }
+
+    /// Whether a kept pair has a box that got a new grown box, or is gone.
+    #[inline(always)]
+    pub(super) fn is_dirty(&self, (i, j): (u32, u32)) -> bool {
+        // No short cut: a branch would cost more than the second look.
+        self.is_new(i) | self.is_new(j)
+    }
+
+    /// Whether a box got a new grown box, or is gone.
+    #[inline(always)]
+    pub(super) fn is_new(&self, id: u32) -> bool {
+        self.dirty[id as usize / 64] >> (id % 64) & 1 == 1
+    }
+}
+
+impl Share {
+    fn check(
+        &mut self,
+        boxes: &[Aabb],
+        grown: &mut [Aabb],
+        dirty: &mut [u64],
+        first: usize,
+        margin: Margin,
+        level: SimdLevel,
+    ) -> Result<(), Error> {
+        dirty.fill(0);
+        let mut invalid = None;
+        each_doubtful_block(level, boxes, grown, |at, block| {
+            for (k, grown) in block.iter_mut().enumerate() {
+                let b = &boxes[at + k];
+                if within(b, grown) {
+                    continue;
+                }
+                if let Some(defect) = b.defect() {
+                    invalid.get_or_insert(Error::InvalidBox { index: first + at + k, defect });
+                    return;
+                }
+                *grown = margin.grow(b);
+                dirty[(at + k) / 64] |= 1 << ((at + k) % 64);
+                self.left.push((first + at + k) as u32);
+            }
+        });
+        invalid.map_or(Ok(()), Err)
+    }
+}
+
+impl Margin {
+    /// The mean edge of a box, as far as it counts.
+    #[inline]
+    pub(super) fn edge(&self, b: &Aabb) -> f32 {
+        let mean = (0..3).map(|a| b.max[a] - b.min[a]).sum::<f32>() / 3.0;
+        // False for NaN too: an infinite box has such an edge.
+        if mean < self.longest_edge { mean } else { self.longest_edge }
+    }
+
+    /// A valid box grown on every side. It contains the box, because rounding never reverses an order.
+    #[inline]
+    fn grow(&self, b: &Aabb) -> Aabb {
+        let by = self.share * self.edge(b);
+        Aabb { min: b.min.map(|v| v - by), max: b.max.map(|v| v + by) }
+    }
+}

@@ -1,0 +1,209 @@
+//! Whether keeping pairs pays, and with which margin.
+
+use super::grown::Margin;
+use crate::Aabb;
+use crate::sample::Sample;
+
+/// Boxes watched while pairs are not kept.
+const WATCHED: usize = 64;
+
+/// Costs of the parts of a frame in nanoseconds, on the machine in `datasets/`. Only their ratios matter here, and only for
+/// the choice of a margin: they need not be those of the machine at hand.
+mod cost {
+    /// A box looked at.
+    pub(super) const BOX: f32 = 1.5;
+    /// A kept pair tested.
+    pub(super) const KEPT: f32 = 3.0;
+    /// A box looked at again in a frame in which some box left.
+    pub(super) const AGAIN: f32 = 1.0;
+    /// A box that left, and each of its kept pairs.
+    pub(super) const LEFT: [f32; 2] = [120.0, 20.0];
+    /// A box and a pair in the strips.
+    pub(super) const SCRATCH: [f32; 2] = [40.0, 12.0];
+}
+
+/// Margins that are compared, as shares of a mean edge.
+const MARGINS: [f32; 8] = [0.04, 0.07, 0.1, 0.15, 0.22, 0.33, 0.5, 0.75];
+
+/// Keeping must promise to cost at most this share of the strips before it begins: the promise rests on few boxes.
+const WORTH: f32 = 1.0;
+
+/// Frames from scratch after keeping did not pay, at first and at most.
+const PAUSE: [u32; 2] = [16, 512];
+
+/// What the next frame should do.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Advice {
+    /// Find the pairs from scratch.
+    Scratch,
+    /// Keep pairs, with this margin for boxes that get a new grown box.
+    Keep(Margin),
+}
+
+/// Watches how far boxes move, and what keeping costs.
+#[derive(Debug)]
+pub(super) struct Motion {
+    watched: [(u32, Aabb); WATCHED],
+    watching: usize,
+    /// Pairs for each box in the frame before.
+    density: f32,
+    keeping: Option<Keeping>,
+    /// Frames for which nothing is kept, and how many that were the last time.
+    pause: u32,
+    last_pause: u32,
+}
+
+/// What is known while pairs are kept.
+#[derive(Debug, Clone, Copy)]
+struct Keeping {
+    margin: Margin,
+    /// Cost for each box, averaged over the last frames.
+    cost: f32,
+    /// Share of the boxes that leave in a frame and kept pairs for each box, averaged over the last frames.
+    leaving: f32,
+    kept: f32,
+    /// Boxes that left since all were made anew, over all boxes.
+    left: f32,
+    /// Frames since then.
+    age: u32,
+}
+
+impl Default for Motion {
+    fn default() -> Self {
+        let watched = [(0, Aabb::default()); WATCHED];
+        Self { watched, watching: 0, density: 0.0, keeping: None, pause: 0, last_pause: PAUSE[0] }
+    }
+}
+
+impl Motion {
+    /// What to do about this frame.
+    pub(super) fn advise(&mut self, boxes: &[Aabb]) -> Advice {
+        if self.keeping.is_none() {
+            self.keeping = self.begin(boxes);
+            self.watch(boxes);
+        }
+        self.keeping.map_or(Advice::Scratch, |k| Advice::Keep(k.margin))
+    }
+
+    /// Takes note of the pairs of a frame.
+    pub(super) fn found(&mut self, objects: usize, pairs: usize) {
+        self.density = pairs as f32 / objects.max(1) as f32;
+    }
+
+    /// Keeping failed; it will not be tried for some frames.
+    pub(super) fn stop(&mut self) {
+        self.keeping = None;
+        self.watching = 0;
+        self.pause = self.last_pause;
+        self.last_pause = (self.last_pause * 2).min(PAUSE[1]);
+    }
+
+    /// Whether the kept pairs are to be found anew in this frame, in which `left` of `objects` boxes left.
+    pub(super) fn wants_anew(&self, objects: usize, left: usize) -> bool {
+        let Some(keeping) = self.keeping else { return false };
+        let left = left as f32 / objects.max(1) as f32;
+        // Pairs of boxes that left are found at a higher price and stand apart from their neighbours in space.
+        left > 0.2 || keeping.left + left > 1.5
+    }
+
+    /// Learns from a frame in which `left` of `objects` boxes left and `kept` pairs were tested. `false` when keeping does not
+    /// pay any more.
+    pub(super) fn learn(&mut self, objects: usize, left: usize, kept: usize, anew: bool) -> bool {
+        let scratch = scratch(self.density);
+        let Some(k) = &mut self.keeping else { return false };
+        let share = |count: usize| count as f32 / objects.max(1) as f32;
+        let (left, kept) = (share(left), share(kept));
+        let leaving = if left > 0.0 { cost::AGAIN + self::left(kept) * left } else { 0.0 };
+        let work = if anew { 1.5 * self::scratch(kept) } else { leaving };
+        let now = cost::BOX + cost::KEPT * kept + work;
+        k.cost += (now - k.cost) / 16.0;
+        k.kept += (kept - k.kept) / 16.0;
+        if anew {
+            k.left = 0.0;
+            k.age = 0;
+        } else {
+            k.left += left;
+            k.age += 1;
+            k.leaving += (left - k.leaving) / 16.0;
+        }
+        // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p with p
+        // between 1, for those that fly straight on, and 2, for those that wander.
+        let m = k.margin.share;
+        let (keep, leave) = (cost::KEPT * k.kept * 6.0 * m / (1.0 + 2.0 * m), 1.5 * self::left(k.kept) * k.leaving);
+        if leave > 1.2 * keep {
+            k.margin.share = (m * 1.02).min(MARGINS[MARGINS.len() - 1]);
+        } else if keep > 1.2 * leave {
+            k.margin.share = (m / 1.02).max(MARGINS[0]);
+        }
+        k.cost < scratch
+    }
+
+    /// Begins to keep pairs if that promises to pay.
+    fn begin(&mut self, boxes: &[Aabb]) -> Option<Keeping> {
+        if self.pause > 0 {
+            self.pause -= 1;
+            return None;
+        }
+        let sample = Sample::of(boxes);
+        let longest_edge = 4.0 * (sample.extent.iter().sum::<f64>() / 3.0) as f32;
+        let motion = self.motion(boxes, longest_edge)?;
+        let scratch = scratch(self.density);
+        let cost = |m: f32| {
+            let kept = self.density * (1.0 + 2.0 * m).powi(3);
+            cost::BOX + cost::KEPT * kept + cost::AGAIN + left(kept) * leaving(motion, m)
+        };
+        let best = MARGINS.into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
+        let margin = Margin { share: best, longest_edge };
+        let kept = self.density * (1.0 + 2.0 * best).powi(3);
+        (cost(best) < WORTH * scratch).then_some(Keeping {
+            margin,
+            cost: cost(best),
+            leaving: leaving(motion, best),
+            kept,
+            left: 0.0,
+            age: 0,
+        })
+    }
+
+    /// How far the watched boxes moved since the frame before, in mean edges; the mean over them. `None` when none is known.
+    fn motion(&self, boxes: &[Aabb], longest_edge: f32) -> Option<f32> {
+        let edges = Margin { share: 0.0, longest_edge };
+        let (mut sum, mut count) = (0.0, 0);
+        for &(id, before) in &self.watched[..self.watching] {
+            let Some(now) = boxes.get(id as usize) else { continue };
+            let by = (0..3)
+                .map(|a| (now.min[a] - before.min[a]).abs().max((now.max[a] - before.max[a]).abs()))
+                .fold(0.0, f32::max);
+            // An infinite bound that stays where it is gives NaN, which `max` passes over.
+            let share = if by == 0.0 { 0.0 } else { by / edges.edge(now) };
+            sum += share.min(1.0);
+            count += 1;
+        }
+        (count > 0).then(|| sum / count as f32)
+    }
+
+    /// Remembers where evenly spaced boxes are.
+    fn watch(&mut self, boxes: &[Aabb]) {
+        self.watching = boxes.len().min(WATCHED);
+        for (k, watched) in self.watched[..self.watching].iter_mut().enumerate() {
+            let id = (2 * k + 1) * boxes.len() / (2 * self.watching);
+            *watched = (id as u32, boxes[id]);
+        }
+    }
+}
+
+/// The cost of a box in the strips.
+fn scratch(density: f32) -> f32 {
+    cost::SCRATCH[0] + cost::SCRATCH[1] * density
+}
+
+/// The cost of a box that left when each box has so many kept pairs.
+fn left(kept: f32) -> f32 {
+    cost::LEFT[0] + cost::LEFT[1] * kept
+}
+
+/// The share of boxes that leave in a frame, when they move by `motion` and may by `margin`: between the motion over the margin,
+/// of those that fly straight on, and its square, of those that wander.
+fn leaving(motion: f32, margin: f32) -> f32 {
+    (motion / margin).powf(1.5).min(1.0)
+}

@@ -1,0 +1,192 @@
+//! A tree of the grown boxes with 16 children a node, for the boxes that get a new one.
+//!
+//! Sixteen boxes that are near in space share a leaf. A box that moves widens the nodes above its leaf and never changes
+//! its leaf, so the tree gets worse until it is made anew.
+
+use super::grown::NOTHING;
+use crate::cpu::SimdLevel;
+use crate::cpu::columns::ensure;
+use crate::cpu::kernel::node::{LANES, Node};
+use crate::cpu::kernel::{each_bit, prefetch};
+use crate::cpu::workers::Workers;
+use crate::sample::Sample;
+use crate::{Aabb, Error};
+
+/// See the module.
+#[derive(Debug)]
+pub(super) struct Tree {
+    /// The box in each lane of the leaves, leaf after leaf.
+    ids: Vec<u32>,
+    /// Places of `ids` in use.
+    places: usize,
+    /// The place of each box in `ids`.
+    place_of: Vec<u32>,
+    /// The leaves, which hold boxes; then nodes that hold bounds of the leaves, and so on. The last level has 16 nodes at first.
+    levels: Vec<Vec<Node>>,
+    /// Position along a Morton curve in the upper half, box in the lower.
+    keys: Vec<u64>,
+    level: SimdLevel,
+}
+
+impl Tree {
+    pub(super) fn new(level: SimdLevel) -> Self {
+        Self { ids: Vec::new(), places: 0, place_of: Vec::new(), levels: Vec::new(), keys: Vec::new(), level }
+    }
+
+    /// Makes the tree of these boxes.
+    pub(super) fn build(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<(), Error> {
+        ensure(&mut self.keys, boxes.len(), "sort keys")?;
+        let keys = &mut self.keys[..boxes.len()];
+        let curve = Curve::over(&Sample::of(boxes));
+        workers.map(boxes, keys, |id, b| u64::from(curve.key(b)) << 32 | id as u64);
+        workers.sort(keys);
+        ensure(&mut self.ids, boxes.len(), "boxes in a tree")?;
+        ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
+        self.places = boxes.len();
+        for (place, &key) in self.keys[..boxes.len()].iter().enumerate() {
+            self.ids[place] = key as u32;
+            self.place_of[key as u32 as usize] = place as u32;
+        }
+        self.levels.iter_mut().for_each(Vec::clear);
+        let mut children = boxes.len();
+        for level in 0.. {
+            let nodes = children.div_ceil(LANES);
+            if self.levels.len() == level {
+                self.levels.push(Vec::new());
+            }
+            grow(&mut self.levels[level], nodes)?;
+            let (below, here) = self.levels.split_at_mut(level);
+            if let Some(below) = below.last() {
+                for (at, node) in below.iter().enumerate() {
+                    here[0][at / LANES].set(at % LANES, &node.bounds());
+                }
+            } else {
+                for (place, &id) in self.ids[..self.places].iter().enumerate() {
+                    here[0][place / LANES].set(place % LANES, &boxes[id as usize]);
+                }
+            }
+            if nodes <= LANES {
+                break;
+            }
+            children = nodes;
+        }
+        Ok(())
+    }
+
+    /// Adds a box that is not in the tree.
+    pub(super) fn insert(&mut self, id: u32, bounds: &Aabb) -> Result<(), Error> {
+        ensure(&mut self.ids, self.places + 1, "boxes in a tree")?;
+        ensure(&mut self.place_of, id as usize + 1, "boxes in a tree")?;
+        self.ids[self.places] = id;
+        self.place_of[id as usize] = self.places as u32;
+        self.places += 1;
+        // The last level takes whatever is added, so that no new level has to be made of what is there.
+        let mut children = self.places;
+        for level in self.levels.iter_mut().take_while(|level| !level.is_empty()) {
+            children = children.div_ceil(LANES);
+            grow(level, children)?;
+        }
+        self.replace(id, bounds);
+        Ok(())
+    }
+
+    /// Takes out a box.
+    pub(super) fn remove(&mut self, id: u32) {
+        let place = self.place_of[id as usize] as usize;
+        self.levels[0][place / LANES].set(place % LANES, &NOTHING);
+    }
+
+    /// Gives a box in the tree new bounds.
+    pub(super) fn replace(&mut self, id: u32, bounds: &Aabb) {
+        let mut at = self.place_of[id as usize] as usize;
+        let Some((leaves, above)) = self.levels.split_first_mut() else { return };
+        leaves[at / LANES].set(at % LANES, bounds);
+        for level in above.iter_mut().take_while(|level| !level.is_empty()) {
+            at /= LANES;
+            if !level[at / LANES].widen(at % LANES, bounds) {
+                break;
+            }
+        }
+    }
+
+    /// Calls `found` for every box that overlaps these bounds.
+    #[inline]
+    pub(super) fn overlapping(&self, bounds: &Aabb, mut found: impl FnMut(u32)) {
+        let Some(top) = self.levels.iter().rposition(|level| !level.is_empty()) else { return };
+        for node in 0..self.levels[top].len() {
+            self.visit(top, node, bounds, &mut found);
+        }
+    }
+
+    fn visit(&self, level: usize, node: usize, bounds: &Aabb, found: &mut impl FnMut(u32)) {
+        let mask = self.levels[level][node].overlapping(self.level, bounds);
+        if level > 0 && self.places > 50_000 {
+            let children = &self.levels[level - 1][node * LANES..];
+            each_bit(mask, |lane| children.get(lane).into_iter().for_each(prefetch));
+        }
+        each_bit(mask, |lane| {
+            let child = node * LANES + lane;
+            // A lane without a child holds nothing, which still overlaps infinite bounds.
+            if level > 0 && child < self.levels[level - 1].len() {
+                self.visit(level - 1, child, bounds, found);
+            } else if level == 0 && child < self.places {
+                found(self.ids[child]);
+            }
+        });
+    }
+}
+
+/// Adds empty nodes to a level until it has so many.
+fn grow(level: &mut Vec<Node>, nodes: usize) -> Result<(), Error> {
+    if level.len() < nodes {
+        let refused = |_| Error::OutOfMemory { what: "nodes of a tree", elements: nodes };
+        level.try_reserve(nodes - level.len()).map_err(refused)?;
+        level.resize(nodes, Node::EMPTY);
+    }
+    Ok(())
+}
+
+/// Orders boxes so that those near in space, and of a size, are near in the order.
+struct Curve {
+    origin: [f32; 3],
+    inverse_edge: f32,
+    /// Edges from which on a box belongs to the next class of sizes.
+    classes: [f32; 3],
+}
+
+/// Cells of the curve on each axis: ten bits.
+const CELLS: f32 = 1024.0;
+
+impl Curve {
+    fn over(sample: &Sample) -> Self {
+        let range = [0, 1, 2].map(|a| sample.range(a));
+        let longest = range.iter().map(|r| r.1).fold(0.0, f64::max);
+        let inverse = (f64::from(CELLS) / longest) as f32;
+        // Boxes much larger than the others would widen the leaves that they share with them.
+        let edge = sample.extent.iter().copied().fold(0.0, f64::max) as f32;
+        Self {
+            origin: range.map(|r| r.0 as f32),
+            inverse_edge: if inverse.is_finite() { inverse } else { 0.0 },
+            classes: [2.0 * edge, 8.0 * edge, 32.0 * edge],
+        }
+    }
+
+    fn key(&self, b: &Aabb) -> u32 {
+        let cell = |a: usize| {
+            // NaN, of infinity less infinity, becomes 0.
+            let middle = b.min[a] * 0.5 + b.max[a] * 0.5;
+            ((middle - self.origin[a]) * self.inverse_edge).clamp(0.0, CELLS - 1.0) as u32
+        };
+        let edge = (0..3).map(|a| b.max[a] - b.min[a]).fold(0.0, f32::max);
+        let class = self.classes.iter().filter(|&&from| edge > from).count() as u32;
+        class << 30 | spread(cell(0)) | spread(cell(1)) << 1 | spread(cell(2)) << 2
+    }
+}
+
+/// Ten bits with two zeros between any two of them.
+fn spread(v: u32) -> u32 {
+    let v = (v | v << 16) & 0x0300_00ff;
+    let v = (v | v << 8) & 0x0300_f00f;
+    let v = (v | v << 4) & 0x030c_30c3;
+    (v | v << 2) & 0x0924_9249
+}
