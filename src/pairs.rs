@@ -175,15 +175,22 @@ impl Pairs {
                 room[added] = pair;
                 added += usize::from(wanted(pair));
             }
-            self.len += added;
-            self.found += added as u64;
+            self.extend_by(added);
         } else {
             pairs.iter().filter(|&&pair| wanted(pair)).for_each(|&(i, j)| self.push(i, j));
         }
     }
 
+    /// Takes in pairs that were written at the head of [`Pairs::room`], lower member first.
+    #[inline]
+    pub(crate) fn extend_by(&mut self, added: usize) {
+        self.len += added;
+        self.found += added as u64;
+    }
+
     /// Room for `more` pairs behind the present ones; `None` near the limit or when memory is refused.
-    fn room(&mut self, more: usize) -> Option<&mut [Pair]> {
+    #[inline]
+    pub(crate) fn room(&mut self, more: usize) -> Option<&mut [Pair]> {
         if self.buffer.len() - self.len < more && !self.grow(more) || self.limit.is_some_and(|l| l - self.len < more) {
             return None;
         }

@@ -36,7 +36,7 @@ impl BroadPhase for Brute {
             });
             outputs.find(workers, pairs, |k, parts, list| {
                 let rows = row(columns.len(), k, parts)..row(columns.len(), k + 1, parts);
-                brute_rows(*level, columns, rows, |i, at, mask| list.push_mask(i as u32, &columns.ids()[at..], mask));
+                brute_rows(*level, columns, rows, list);
             });
             Ok(())
         })?;

@@ -6,7 +6,8 @@ use std::ops::Range;
 /// Readable boxes behind the last one: the widest vector may start at any box and run past the end.
 const PADDING: usize = 16;
 
-/// Boxes as seven columns: three lower bounds, three upper bounds, positions in the input.
+/// Boxes as eight columns: three lower bounds, three upper bounds, positions in the input, and for a strip
+/// [`Cover::begins`](crate::cpu::strip_grid::Cover::begins).
 ///
 /// Axis 0 is the sweep axis, whichever axis of the input that is.
 #[derive(Debug, Default)]
@@ -14,7 +15,16 @@ pub(crate) struct Columns {
     low: [Vec<f32>; 3],
     high: [Vec<f32>; 3],
     ids: Vec<u32>,
+    begins: Vec<u32>,
     len: usize,
+}
+
+/// The columns with their padding: at least `len() + 16` values each.
+pub(crate) struct Padded<'a> {
+    pub(crate) low: [&'a [f32]; 3],
+    pub(crate) high: [&'a [f32]; 3],
+    pub(crate) ids: &'a [u32],
+    pub(crate) begins: &'a [u32],
 }
 
 /// A contiguous part of the columns, open for writing.
@@ -22,6 +32,7 @@ pub(crate) struct ColumnsMut<'a> {
     pub(crate) low: [&'a mut [f32]; 3],
     pub(crate) high: [&'a mut [f32]; 3],
     pub(crate) ids: &'a mut [u32],
+    pub(crate) begins: &'a mut [u32],
 }
 
 impl Columns {
@@ -31,6 +42,7 @@ impl Columns {
             ensure(column, len + PADDING, "columns of boxes")?;
         }
         ensure(&mut self.ids, len + PADDING, "columns of boxes")?;
+        ensure(&mut self.begins, len + PADDING, "columns of boxes")?;
         // NaN compares false with everything: the padding ends every sweep and is never a hit.
         self.low[0][len..len + PADDING].fill(f32::NAN);
         self.len = len;
@@ -53,10 +65,14 @@ impl Columns {
         &self.ids[..self.len]
     }
 
-    /// The columns of lower and upper bounds with their padding: at least `len() + 16` values each.
-    pub(crate) fn padded(&self) -> ([&[f32]; 3], [&[f32]; 3]) {
+    pub(crate) fn padded(&self) -> Padded<'_> {
         let end = self.len + PADDING;
-        (self.low.each_ref().map(|c| &c[..end]), self.high.each_ref().map(|c| &c[..end]))
+        Padded {
+            low: self.low.each_ref().map(|c| &c[..end]),
+            high: self.high.each_ref().map(|c| &c[..end]),
+            ids: &self.ids[..end],
+            begins: &self.begins[..end],
+        }
     }
 
     /// All boxes, open for writing.
@@ -68,6 +84,7 @@ impl Columns {
             low: [&mut a[..len], &mut b[..len], &mut c[..len]],
             high: [&mut d[..len], &mut e[..len], &mut f[..len]],
             ids: &mut self.ids[..len],
+            begins: &mut self.begins[..len],
         }
     }
 }
@@ -96,9 +113,10 @@ impl<'a> ColumnsMut<'a> {
         let ((a0, a1), (b0, b1), (c0, c1)) = (cut(a), cut(b), cut(c));
         let ((d0, d1), (e0, e1), (f0, f1)) = (cut(d), cut(e), cut(f));
         let (i0, i1) = self.ids.split_at_mut(middle);
+        let (g0, g1) = self.begins.split_at_mut(middle);
         (
-            ColumnsMut { low: [a0, b0, c0], high: [d0, e0, f0], ids: i0 },
-            ColumnsMut { low: [a1, b1, c1], high: [d1, e1, f1], ids: i1 },
+            ColumnsMut { low: [a0, b0, c0], high: [d0, e0, f0], ids: i0, begins: g0 },
+            ColumnsMut { low: [a1, b1, c1], high: [d1, e1, f1], ids: i1, begins: g1 },
         )
     }
 }

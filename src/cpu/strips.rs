@@ -6,7 +6,7 @@
 
 use crate::broad_phase::check_count;
 use crate::cpu::columns::{Columns, ensure, order_key, part};
-use crate::cpu::kernel::{Query, each_bit, query_rows, sweep_rows};
+use crate::cpu::kernel::{All, InStrip, Query, query_rows, sweep_rows};
 use crate::cpu::strip_grid::{Cover, StripGrid};
 use crate::cpu::workers::{Outputs, Workers};
 use crate::cpu::{SimdLevel, Threads};
@@ -66,7 +66,6 @@ struct Task {
     entries: Vec<Entry>,
     keys: Vec<u64>,
     columns: Columns,
-    begins: Vec<u32>,
     /// The furthest end on the sweep axis among all rows so far.
     ends: Vec<f32>,
     error: Option<Error>,
@@ -141,17 +140,6 @@ fn balanced(bins: &[Bins], strips: usize, k: usize, parts: usize) -> usize {
         if before(middle) < wanted { low = middle + 1 } else { high = middle }
     }
     low
-}
-
-/// The bits of `mask` whose box forms a pair with the one box that this strip has to report; see [`Cover::begins`].
-#[inline]
-fn owned(mask: u32, mine: u32, begins: &[u32]) -> u32 {
-    let mut owned = mask;
-    // With both bits set in the one box, as in most strips, the others don't matter.
-    if mine != 3 {
-        each_bit(mask, |bit| owned &= !(u32::from(mine | begins[bit] != 3) << bit));
-    }
-    owned
 }
 
 impl Bins {
@@ -255,16 +243,13 @@ impl Task {
     ) -> Result<(), Error> {
         for strip in strips {
             self.sort(bins, strip, grid.axis)?;
-            let (ids, begins) = (self.columns.ids(), &self.begins);
-            sweep_rows(level, &self.columns, 0..ids.len(), |i, at, mask| {
-                pairs.push_mask(ids[i], &ids[at..], owned(mask, begins[i], &begins[at..]));
-            });
-            if !large.covers.is_empty() && !ids.is_empty() {
+            let boxes = self.columns.len();
+            sweep_rows::<InStrip>(level, &self.columns, 0..boxes, pairs);
+            if !large.covers.is_empty() && boxes > 0 {
                 self.query_large(large, grid.cell(strip), level, pairs)?;
             }
         }
-        let ids = large.columns.ids();
-        sweep_rows(level, &large.columns, large_rows, |i, at, mask| pairs.push_mask(ids[i], &ids[at..], mask));
+        sweep_rows::<All>(level, &large.columns, large_rows, pairs);
         Ok(())
     }
 
@@ -281,7 +266,6 @@ impl Task {
             &self.entries
         };
         ensure(&mut self.keys, entries.len(), "sort keys")?;
-        ensure(&mut self.begins, entries.len(), "sort keys")?;
         self.columns.resize(entries.len())?;
         let keys = &mut self.keys[..entries.len()];
         for (at, (key, entry)) in keys.iter_mut().zip(entries).enumerate() {
@@ -292,14 +276,14 @@ impl Task {
         for (at, &key) in keys.iter().enumerate() {
             let entry = &entries[key as u32 as usize];
             columns.set(at, &entry.bounds, axis, entry.id);
-            self.begins[at] = entry.begins;
+            columns.begins[at] = entry.begins;
         }
         Ok(())
     }
 
     /// Tests the large boxes that cross a strip against the boxes in it.
     fn query_large(&mut self, large: &Large, cell: [u32; 2], level: SimdLevel, pairs: &mut Pairs) -> Result<(), Error> {
-        let Self { columns, begins, ends, .. } = self;
+        let Self { columns, ends, .. } = self;
         ensure(ends, columns.len(), "ends of boxes")?;
         let ends = &mut ends[..columns.len()];
         let mut furthest = f32::NEG_INFINITY;
@@ -307,17 +291,17 @@ impl Task {
             furthest = furthest.max(high);
             *end = furthest;
         }
-        let ids = columns.ids();
+        let of = &large.columns;
         for (k, cover) in large.covers.iter().enumerate().filter(|(_, c)| c.contains(cell)) {
-            let query =
-                Query { low: [0, 1, 2].map(|a| large.columns.low(a)[k]), high: [0, 1, 2].map(|a| large.columns.high(a)[k]) };
-            let mine = cover.begins(cell);
+            let query = Query {
+                low: [0, 1, 2].map(|a| of.low(a)[k]),
+                high: [0, 1, 2].map(|a| of.high(a)[k]),
+                id: of.ids()[k],
+                begins: cover.begins(cell),
+            };
             // No row before this one ends late enough to be hit.
             let start = ends.partition_point(|&end| end < query.low[0]);
-            let id = large.columns.ids()[k];
-            query_rows(level, columns, start, &query, |at, mask| {
-                pairs.push_mask(id, &ids[at..], owned(mask, mine, &begins[at..]));
-            });
+            query_rows(level, columns, start, &query, pairs);
         }
         Ok(())
     }

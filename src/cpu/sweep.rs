@@ -2,7 +2,7 @@
 
 use crate::broad_phase::check_count;
 use crate::cpu::columns::{Columns, ensure, order_key};
-use crate::cpu::kernel::sweep_rows;
+use crate::cpu::kernel::{All, sweep_rows};
 use crate::cpu::workers::{Outputs, Workers};
 use crate::cpu::{SimdLevel, Threads};
 use crate::sample::Sample;
@@ -49,10 +49,7 @@ impl BroadPhase for Sweep {
                     part.set(at, &boxes[id as usize], axis, id);
                 }
             });
-            let ids = columns.ids();
-            outputs.find_rows(workers, ids.len(), pairs, |rows, list| {
-                sweep_rows(*level, columns, rows, |i, at, mask| list.push_mask(ids[i], &ids[at..], mask));
-            });
+            outputs.find_rows(workers, columns.len(), pairs, |rows, list| sweep_rows::<All>(*level, columns, rows, list));
             Ok(())
         })?;
         pairs.finish()

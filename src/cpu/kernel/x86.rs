@@ -1,0 +1,139 @@
+//! AVX2 and AVX-512 of x86-64.
+
+use super::portable::{owned_one_by_one, write_one_by_one};
+use super::{Lanes, Query, Rows, View, brute, query_from, sweep};
+use crate::{Pair, Pairs};
+use std::arch::x86_64::*;
+use std::mem::offset_of;
+use std::ops::Range;
+
+#[derive(Clone, Copy)]
+struct Avx2;
+
+#[derive(Clone, Copy)]
+struct Avx512;
+
+impl Lanes for Avx2 {
+    const COUNT: usize = 8;
+
+    #[inline(always)]
+    unsafe fn reach_and_hits(self, view: &View<'_>, at: usize, query: &Query) -> (u32, u32) {
+        // SAFETY: every column has 16 values behind `view.len >= at`, and the caller has AVX2.
+        unsafe {
+            let load = |column: &[f32]| _mm256_loadu_ps(column.as_ptr().add(at));
+            let below = |column, bound| _mm256_cmp_ps::<_CMP_LE_OQ>(load(column), _mm256_set1_ps(bound));
+            let above = |column, bound| _mm256_cmp_ps::<_CMP_GE_OQ>(load(column), _mm256_set1_ps(bound));
+            let reach = below(view.low[0], query.high[0]);
+            let second = _mm256_and_ps(below(view.low[1], query.high[1]), above(view.high[1], query.low[1]));
+            let third = _mm256_and_ps(below(view.low[2], query.high[2]), above(view.high[2], query.low[2]));
+            let hits = _mm256_and_ps(reach, _mm256_and_ps(second, third));
+            (_mm256_movemask_ps(reach) as u32, _mm256_movemask_ps(hits) as u32)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn ends_after(self, view: &View<'_>, at: usize, low: f32) -> u32 {
+        // SAFETY: as above.
+        unsafe {
+            let high = _mm256_loadu_ps(view.high[0].as_ptr().add(at));
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(high, _mm256_set1_ps(low))) as u32
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
+        owned_one_by_one(view, at, begins, hits)
+    }
+
+    #[inline(always)]
+    unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
+        write_one_by_one(view, at, id, hits, room);
+    }
+}
+
+impl Lanes for Avx512 {
+    const COUNT: usize = 16;
+
+    #[inline(always)]
+    unsafe fn reach_and_hits(self, view: &View<'_>, at: usize, query: &Query) -> (u32, u32) {
+        // SAFETY: every column has 16 values behind `view.len >= at`, and the caller has AVX-512F.
+        unsafe {
+            let load = |column: &[f32]| _mm512_loadu_ps(column.as_ptr().add(at));
+            // Each comparison on its own: masked by the one before, they would wait for one another.
+            let below = |column, bound| _mm512_cmp_ps_mask::<_CMP_LE_OQ>(load(column), _mm512_set1_ps(bound));
+            let above = |column, bound| _mm512_cmp_ps_mask::<_CMP_GE_OQ>(load(column), _mm512_set1_ps(bound));
+            let reach = below(view.low[0], query.high[0]);
+            let second = below(view.low[1], query.high[1]) & above(view.high[1], query.low[1]);
+            let third = below(view.low[2], query.high[2]) & above(view.high[2], query.low[2]);
+            (u32::from(reach), u32::from(reach & second & third))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn ends_after(self, view: &View<'_>, at: usize, low: f32) -> u32 {
+        // SAFETY: as above.
+        unsafe {
+            let high = _mm512_loadu_ps(view.high[0].as_ptr().add(at));
+            u32::from(_mm512_cmp_ps_mask::<_CMP_GE_OQ>(high, _mm512_set1_ps(low)))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
+        // SAFETY: as above; a view that is asked for this has the column.
+        unsafe {
+            let all = _mm512_loadu_si512(view.begins.as_ptr().add(at).cast());
+            let both = _mm512_or_si512(all, _mm512_set1_epi32(begins as i32));
+            hits & u32::from(_mm512_cmpeq_epi32_mask(both, _mm512_set1_epi32(3)))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
+        // The layout of a tuple is not promised: this stops the build where it is another one.
+        const { assert!(size_of::<Pair>() == 8 && offset_of!(Pair, 0) == 0 && offset_of!(Pair, 1) == 4) };
+        assert!(room.len() >= Self::COUNT);
+        // SAFETY: as above for the column; the room takes 16 pairs, which are 32 integers.
+        unsafe {
+            let all = _mm512_loadu_si512(view.ids.as_ptr().add(at).cast());
+            let others = _mm512_maskz_compress_epi32(hits as __mmask16, all);
+            let one = _mm512_set1_epi32(id as i32);
+            let (low, high) = (_mm512_min_epu32(others, one), _mm512_max_epu32(others, one));
+            let first = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+            let second = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+            let to = room.as_mut_ptr().cast::<i32>();
+            _mm512_storeu_si512(to.cast(), _mm512_permutex2var_epi32(low, first, high));
+            _mm512_storeu_si512(to.add(16).cast(), _mm512_permutex2var_epi32(low, second, high));
+        }
+    }
+}
+
+#[target_feature(enable = "avx2")]
+pub(super) fn sweep_avx2<R: Rows>(view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+    sweep::<_, R>(Avx2, view, rows, pairs);
+}
+
+#[target_feature(enable = "avx2")]
+pub(super) fn brute_avx2(view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+    brute(Avx2, view, rows, pairs);
+}
+
+#[target_feature(enable = "avx2")]
+pub(super) fn query_avx2(view: &View<'_>, start: usize, query: &Query, pairs: &mut Pairs) {
+    query_from(Avx2, view, start, query, pairs);
+}
+
+#[target_feature(enable = "avx512f")]
+pub(super) fn sweep_avx512<R: Rows>(view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+    sweep::<_, R>(Avx512, view, rows, pairs);
+}
+
+#[target_feature(enable = "avx512f")]
+pub(super) fn brute_avx512(view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+    brute(Avx512, view, rows, pairs);
+}
+
+#[target_feature(enable = "avx512f")]
+pub(super) fn query_avx512(view: &View<'_>, start: usize, query: &Query, pairs: &mut Pairs) {
+    query_from(Avx512, view, start, query, pairs);
+}
