@@ -28,9 +28,23 @@ pub(crate) struct StripGrid {
     origin: [f32; 2],
     inverse_width: [f32; 2],
     cells: [u32; 2],
+    /// The number of the last cell on each grid axis.
+    last: [f32; 2],
     /// Extents above which a box is large: on the sweep axis, then on the grid axes.
     large: [f32; 3],
 }
+
+/// The strips in which a box stands, packed: the first of them, and how many more cells it covers on each grid axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Place(u32);
+
+impl Place {
+    /// In no strip: the box is large.
+    pub(crate) const APART: Self = Self(u32::MAX);
+}
+
+/// More cells than this beyond the first, on either axis, don't fit into a place.
+const MOST_MORE: u32 = 0x7f;
 
 /// The cells that a box covers, ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +73,7 @@ impl StripGrid {
             let cells = if ((cells / length) as f32).is_finite() { cells } else { 1.0 };
             // One cell needs no width, and a flat axis has none.
             grid.cells[d] = cells as u32;
+            grid.last[d] = cells as f32 - 1.0;
             grid.origin[d] = low as f32;
             grid.inverse_width[d] = if cells > 1.0 { (cells / length) as f32 } else { 0.0 };
             grid.large[1 + d] = if cells > 1.0 { (LARGE_CELLS * length / cells) as f32 } else { f32::INFINITY };
@@ -78,11 +93,6 @@ impl StripGrid {
         (self.cells[0] * self.cells[1]) as usize
     }
 
-    /// The number of the strip in a cell.
-    pub(crate) fn strip(&self, cell: [u32; 2]) -> usize {
-        (cell[1] * self.cells[0] + cell[0]) as usize
-    }
-
     /// The cell of a strip.
     pub(crate) fn cell(&self, strip: usize) -> [u32; 2] {
         [strip as u32 % self.cells[0], strip as u32 / self.cells[0]]
@@ -97,13 +107,50 @@ impl StripGrid {
         }
     }
 
-    /// Whether a box is to be kept apart.
-    #[inline]
-    pub(crate) fn is_large(&self, b: &Aabb) -> bool {
-        let extent = |a: usize| b.max[a] - b.min[a];
-        (extent(self.axis) > self.large[0])
-            | (extent(self.across[0]) > self.large[1])
-            | (extent(self.across[1]) > self.large[2])
+    /// The strips in which a box stands, on the sweep axis `AXIS`, which is the grid's.
+    #[inline(always)]
+    pub(crate) fn place<const AXIS: usize>(&self, b: &Aabb) -> Place {
+        let [u, v] = [(AXIS + 1) % 3, (AXIS + 2) % 3];
+        let large = (b.max[AXIS] - b.min[AXIS] > self.large[0])
+            | (b.max[u] - b.min[u] > self.large[1])
+            | (b.max[v] - b.min[v] > self.large[2]);
+        let bounds = [b.min[u], b.min[v], b.max[u], b.max[v]];
+        // Arrays of four, so that compilers use vectors.
+        let mut at = [0.0_f32; 4];
+        for k in 0..4 {
+            let cell = (bounds[k] - self.origin[k % 2]) * self.inverse_width[k % 2];
+            // Comparisons in this order send NaN to 0.
+            let cell = if cell > 0.0 { cell } else { 0.0 };
+            at[k] = if cell < self.last[k % 2] { cell } else { self.last[k % 2] };
+        }
+        // SAFETY: each lies between 0 and 255, and is no NaN.
+        let [x, y, x1, y1] = at.map(|cell| unsafe { cell.to_int_unchecked::<i32>() } as u32);
+        let (more_x, more_y) = (x1 - x, y1 - y);
+        // The sizes allow for few more cells; bounds so far out that their cells are rounded could give many.
+        if large | (more_x | more_y > MOST_MORE) {
+            return Place::APART;
+        }
+        Place(y * self.cells[0] + x | more_x << 16 | more_y << 24)
+    }
+
+    /// Calls `f` for each strip of a place, with [`Cover::begins`] there.
+    #[inline(always)]
+    pub(crate) fn each_strip(&self, place: Place, mut f: impl FnMut(usize, u32)) {
+        let Place(packed) = place;
+        let first = (packed & 0xffff) as usize;
+        if packed <= 0xffff {
+            // Most boxes stand in one strip.
+            return f(first, 3);
+        }
+        if place == Place::APART {
+            return;
+        }
+        let row = self.cells[0] as usize;
+        for y in 0..=(packed >> 24) as usize {
+            for x in 0..=(packed >> 16 & 0xff) as usize {
+                f(first + y * row + x, u32::from(x == 0) | u32::from(y == 0) << 1);
+            }
+        }
     }
 
     /// The cell of a bound, which never descends as the bound ascends: that alone makes the strips correct. Bounds outside

@@ -7,7 +7,7 @@
 use crate::broad_phase::check_count;
 use crate::cpu::columns::{Columns, ensure, order_key, part};
 use crate::cpu::kernel::{All, InStrip, Query, query_rows, sweep_rows};
-use crate::cpu::strip_grid::{Cover, StripGrid};
+use crate::cpu::strip_grid::{Cover, Place, StripGrid};
 use crate::cpu::workers::{Outputs, Workers};
 use crate::cpu::{SimdLevel, Threads};
 use crate::sample::Sample;
@@ -35,6 +35,8 @@ pub(super) struct Finder {
 struct Bins {
     /// Where the bin of each strip begins in `entries`; one more than there are strips.
     starts: Vec<u32>,
+    /// Where each box of the share goes.
+    places: Vec<Place>,
     entries: Vec<Entry>,
     /// Positions in the input of the boxes kept apart; only the first `large_count` are of this frame.
     large: Vec<u32>,
@@ -143,31 +145,20 @@ fn balanced(bins: &[Bins], strips: usize, k: usize, parts: usize) -> usize {
 }
 
 impl Bins {
+    /// Sorts a share of the boxes into bins. Where each goes is worked out once, in the pass that counts.
     fn fill(&mut self, grid: &StripGrid, boxes: &[Aabb], share: std::ops::Range<usize>) -> Result<(), Error> {
         let first = share.start;
         let share = &boxes[share];
         let strips = grid.strips();
         ensure(&mut self.starts, strips + 1, "strips")?;
-        let starts = &mut self.starts[..=strips];
-        starts.fill(0);
-        self.large_count = 0;
-        for (k, b) in share.iter().enumerate() {
-            if let Some(defect) = b.defect() {
-                return Err(Error::InvalidBox { index: first + k, defect });
-            }
-            if grid.is_large(b) {
-                ensure(&mut self.large, self.large_count + 1, "large boxes")?;
-                self.large[self.large_count] = (first + k) as u32;
-                self.large_count += 1;
-                continue;
-            }
-            let cover = grid.cover(b);
-            for row in cover.rows() {
-                for column in cover.columns() {
-                    starts[grid.strip([column, row])] += 1;
-                }
-            }
+        ensure(&mut self.places, share.len(), "boxes in strips")?;
+        // The axes are constants in each of the three, so that no index is computed.
+        match grid.axis {
+            0 => self.count::<0>(grid, share, first)?,
+            1 => self.count::<1>(grid, share, first)?,
+            _ => self.count::<2>(grid, share, first)?,
         }
+        let starts = &mut self.starts[..=strips];
         let entries: u64 = starts.iter().map(|&s| u64::from(s)).sum();
         if u32::try_from(entries).is_err() {
             return Err(Error::OutOfMemory {
@@ -180,23 +171,37 @@ impl Bins {
             total += std::mem::replace(start, total);
         }
         ensure(&mut self.entries, total as usize, "boxes in strips")?;
-        for (k, b) in share.iter().enumerate() {
-            if grid.is_large(b) {
-                continue;
-            }
-            let cover = grid.cover(b);
-            for row in cover.rows() {
-                for column in cover.columns() {
-                    let cell = [column, row];
-                    let at = &mut starts[grid.strip(cell)];
-                    self.entries[*at as usize] = Entry { bounds: *b, id: (first + k) as u32, begins: cover.begins(cell) };
-                    *at += 1;
-                }
-            }
+        let entries = &mut self.entries[..total as usize];
+        for ((&place, b), id) in self.places.iter().zip(share).zip(first as u32..) {
+            grid.each_strip(place, |strip, begins| {
+                let at = &mut starts[strip];
+                entries[*at as usize] = Entry { bounds: *b, id, begins };
+                *at += 1;
+            });
         }
         // Every start has moved to its bin's end, which is the start of the next.
         starts.copy_within(..strips, 1);
         starts[0] = 0;
+        Ok(())
+    }
+
+    /// Finds the place of each box and counts how many go into each bin.
+    fn count<const AXIS: usize>(&mut self, grid: &StripGrid, share: &[Aabb], first: usize) -> Result<(), Error> {
+        let starts = &mut self.starts[..=grid.strips()];
+        starts.fill(0);
+        self.large_count = 0;
+        for ((b, place), k) in share.iter().zip(&mut self.places).zip(first..) {
+            if let Some(defect) = b.defect() {
+                return Err(Error::InvalidBox { index: k, defect });
+            }
+            *place = grid.place::<AXIS>(b);
+            if *place == Place::APART {
+                ensure(&mut self.large, self.large_count + 1, "large boxes")?;
+                self.large[self.large_count] = k as u32;
+                self.large_count += 1;
+            }
+            grid.each_strip(*place, |strip, _| starts[strip] += 1);
+        }
         Ok(())
     }
 
