@@ -3,7 +3,7 @@
 use crate::naive::Naive;
 use crate::obvhs_tree::Obvhs;
 use crate::parry::{Margin, ParallelParry, Parry, Upkeep};
-use crate::rtree::{Packed, Search};
+use crate::rtree::Packed;
 use rayon::ThreadPool;
 use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Fields, Pairs, Registry, SimdLevel};
 use std::sync::Arc;
@@ -104,30 +104,28 @@ pub(crate) fn at_levels() -> Result<Vec<Contestant>, Error> {
     Ok(all)
 }
 
-/// The peers on one thread, and those that have a parallel form on a pool too.
+/// The peers on one thread; with a pool those of them that are fastest there, beside all that have a parallel form.
 pub(crate) fn peers(pool: Option<&Arc<ThreadPool>>) -> Vec<Contestant> {
-    let Some(pool) = pool else {
-        let refitting = |name, upkeep| Contestant::peer(name, true, usize::MAX, Parry::new(upkeep));
-        return vec![
-            refitting("parry3d refit", Upkeep::Refit),
-            refitting("parry3d optimise", Upkeep::Optimise),
-            Contestant::peer("parry3d margin", true, usize::MAX, Margin::new()),
-            Contestant::peer("parry3d rebuild", false, usize::MAX, Parry::new(Upkeep::Rebuild)),
+    let all = usize::MAX;
+    let mut peers = vec![
+        Contestant::peer("parry3d refit", true, all, Parry::new(Upkeep::Refit)),
+        Contestant::peer("parry3d optimise", true, all, Parry::new(Upkeep::Optimise)),
+        Contestant::peer("parry3d margin", true, all, Margin::new()),
+    ];
+    match pool {
+        None => peers.extend([
+            Contestant::peer("parry3d rebuild", false, all, Parry::new(Upkeep::Rebuild)),
             Contestant::peer("obvhs rebuild", false, 100_000, Obvhs::rebuilding(None)),
             Contestant::peer("obvhs refit", true, 100_000, Obvhs::refitting()),
-            Contestant::peer("rstar query", false, 100_000, Packed(Search::Query)),
-            Contestant::peer("rstar join", false, 100_000, Packed(Search::Join)),
+            Contestant::peer("rstar", false, 100_000, Packed),
             Contestant::peer("double loop", false, 3_000, Naive),
-        ];
-    };
-    let parallel = |name, keeps, upkeep| Contestant::peer(name, keeps, usize::MAX, ParallelParry::new(upkeep, pool));
-    vec![
-        Contestant::peer("parry3d refit", true, usize::MAX, Parry::new(Upkeep::Refit)),
-        Contestant::peer("parry3d optimise", true, usize::MAX, Parry::new(Upkeep::Optimise)),
-        Contestant::peer("parry3d margin", true, usize::MAX, Margin::new()),
-        parallel("parry3d refit, 2 threads", true, Upkeep::Refit),
-        parallel("parry3d optimise, 2 threads", true, Upkeep::Optimise),
-        parallel("parry3d rebuild, 2 threads", false, Upkeep::Rebuild),
-        Contestant::peer("obvhs rebuild, 2 threads", false, 100_000, Obvhs::rebuilding(Some(pool))),
-    ]
+        ]),
+        Some(pool) => peers.extend([
+            Contestant::peer("parry3d refit, 2 threads", true, all, ParallelParry::new(Upkeep::Refit, pool)),
+            Contestant::peer("parry3d optimise, 2 threads", true, all, ParallelParry::new(Upkeep::Optimise, pool)),
+            Contestant::peer("parry3d rebuild, 2 threads", false, all, ParallelParry::new(Upkeep::Rebuild, pool)),
+            Contestant::peer("obvhs rebuild, 2 threads", false, 100_000, Obvhs::rebuilding(Some(pool))),
+        ]),
+    }
+    peers
 }

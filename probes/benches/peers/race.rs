@@ -20,6 +20,11 @@ const WARM_UP_OF_ALL: u64 = 2;
 /// Who takes longer for a frame leaves.
 const LONGEST_FRAME: Duration = Duration::from_secs(3);
 
+/// So does who takes longer than this and [`HOPELESS`] times as long as the fastest: trees that are refitted and nothing else come to
+/// that where objects move far.
+const LONG_FRAME: Duration = Duration::from_millis(50);
+const HOPELESS: u32 = 20;
+
 /// Timed frames at least.
 const FEWEST_FRAMES: usize = 5;
 
@@ -59,7 +64,9 @@ impl Race {
 
     /// Takes those out who took too long, and gives their names.
     fn leave_out_slow(&mut self, taken: &[Option<Duration>]) -> Vec<String> {
-        let mut slow = taken.iter().map(|took| took.is_some_and(|took| took > LONGEST_FRAME));
+        let fastest = taken.iter().flatten().min().copied().unwrap_or_default();
+        let limit = LONGEST_FRAME.min(LONG_FRAME.max(fastest * HOPELESS));
+        let mut slow = taken.iter().map(|took| took.is_some_and(|took| took > limit));
         self.contestants.extract_if(.., |_| slow.next() == Some(true)).map(|c| c.name).collect()
     }
 }

@@ -11,9 +11,12 @@ fn best_on(point: &Point, threads: u32) -> Option<&Lane> {
     point.fastest(|lane| lane.side == Side::Fixed && on(lane))
 }
 
-/// A table of one row for each of these figures.
-fn rows(points: &[Point], figures: &[(&str, &dyn Fn(&Point) -> Option<String>)]) -> String {
-    let row = |(name, cell): &(&str, &dyn Fn(&Point) -> Option<String>)| {
+/// The name of a row, and what stands in it for a point.
+type Row<'a> = (&'a str, &'a dyn Fn(&Point) -> Option<String>);
+
+/// A table of these rows.
+fn rows(points: &[Point], figures: &[Row<'_>]) -> String {
+    let row = |(name, cell): &Row<'_>| {
         ((*name).to_owned(), points.iter().map(|p| cell(p).unwrap_or_else(|| "-".to_owned())).collect())
     };
     grid("", &sizes(points), &figures.iter().map(row).collect::<Vec<_>>())
