@@ -66,7 +66,7 @@ fn measured(
 
 /// All scenarios on one thread, or `uniform` on several.
 fn compare(threads: u32, settings: &Settings) -> Result<Vec<Point>, String> {
-    println!("\n{threads} threads:");
+    println!("\nthreads: {threads}");
     let mut registry = Registry::with_cores(threads);
     registry.pin_threads();
     let fields = machine::fields(&registry, threads, settings)?;
@@ -91,7 +91,7 @@ fn compare_levels(settings: &Settings) -> Result<Vec<Point>, String> {
     if !settings.scenarios.contains(&Scenario::Uniform) || !settings.threads.contains(&1) {
         return Ok(Vec::new());
     }
-    println!("\nSIMD levels:");
+    println!("\nSIMD levels, one thread:");
     let points = settings.sizes.iter().map(|&objects| {
         let all = at_levels().map_err(|e| e.to_string())?;
         measured(all, Scenario::Uniform, objects, settings)

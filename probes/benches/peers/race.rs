@@ -4,6 +4,7 @@ use crate::contestants::Contestant;
 use crate::point::{Lane, Point};
 use crate::settings::Settings;
 use crate::turns::Turns;
+use sapwise::measure::Watch;
 use sapwise::{Aabb, Pairs, Scenario, Scene};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -114,8 +115,9 @@ pub(crate) fn race(
         left.extend(race.leave_out_slow(&taken));
     }
     let lane = |c: &Contestant| Lane { name: c.name.clone(), side: c.side, seconds: Vec::new() };
-    let mut point =
-        Point { scenario, objects, lanes: race.contestants.iter().map(lane).collect(), choices: Vec::new(), left };
+    let lanes = race.contestants.iter().map(lane).collect();
+    let mut point = Point { scenario, objects, lanes, choices: Vec::new(), left, foreign_load: None };
+    let watch = Watch::begin();
     let most = if settings.full { MOST_FRAMES[usize::from(objects > 1_000)] } else { FEWEST_FRAMES };
     let (started, mut frames) = (Instant::now(), 0);
     while frames < most && (frames < FEWEST_FRAMES || started.elapsed() < settings.time) {
@@ -130,5 +132,6 @@ pub(crate) fn race(
             point.choices.extend(race.contestants.iter().find_map(Contestant::chosen).map(ToString::to_string));
         }
     }
+    point.foreign_load = watch.is_long_enough().then(|| watch.foreign_load()).flatten();
     Ok(point)
 }

@@ -6,6 +6,11 @@ use crate::point::{Point, Quartiles};
 use sapwise::Scenario;
 use std::fmt::Write;
 
+/// The goals in words.
+fn goals(threads: u32) -> &'static str {
+    if threads == 1 { "1.5 up to 1k objects, 2 up to 30k, 3 from 100k" } else { "2 up to 30k objects, 3 from 100k" }
+}
+
 /// The gain that is wanted on a number of threads at a number of objects, where there is a goal.
 fn goal(threads: u32, objects: usize) -> Option<f64> {
     match (threads, objects) {
@@ -70,6 +75,9 @@ pub(crate) fn line(point: &Point) -> String {
     }
     let frames = point.lanes.first().map_or(0, |lane| lane.seconds.len());
     let _ = write!(text, " {frames} frames");
+    if let Some(load) = point.foreign_load {
+        let _ = write!(text, ", foreign load {:.0} %", load * 100.0);
+    }
     if !point.left.is_empty() {
         let _ = write!(text, ", too slow: {}", point.left.join(" "));
     }
@@ -125,11 +133,12 @@ fn compared(threads: u32, points: &[Point]) -> String {
     };
     let mut text = format!(
         "### Adaptive over the fastest peer, {on}\n\n\
-         Time of the fastest peer over that of `adaptive`, frame by frame: median (quartiles). Bold: below the goal.\n\n{}\
+         Time of the fastest peer over that of `adaptive`, frame by frame: median (quartiles). Bold: below the goal of {}.\n\n{}\
          ### The fastest peer, and what `adaptive` chose, {on}\n\n{}\
          ### What the choice costs, {on}\n\n\
          Time of `adaptive` over that of our fastest fixed method, less one, in percent, frame by frame: median (quartiles), and \
          that method.\n\n{}",
+        goals(threads),
         by_scenario(points, gain),
         by_scenario(points, who),
         by_scenario(points, regret),
@@ -146,7 +155,16 @@ fn compared(threads: u32, points: &[Point]) -> String {
 
 /// All tables of the comparison with peers, by number of threads.
 pub(crate) fn all(results: &[(u32, Vec<Point>)]) -> String {
+    let mut loads: Vec<f64> = results.iter().flat_map(|r| &r.1).filter_map(|p| p.foreign_load).collect();
+    loads.sort_by(f64::total_cmp);
     let mut text = format!("{}\n\n", machine::describe());
+    if let Some(highest) = loads.last() {
+        text += &format!(
+            "Other programs took {:.1} % of the CPU at the median of the points at which that can be told, and {:.1} % at the worst.\n\n",
+            loads[loads.len() / 2] * 100.0,
+            highest * 100.0
+        );
+    }
     for (threads, points) in results.iter().filter(|r| !r.1.is_empty()) {
         text += &compared(*threads, points);
     }
