@@ -119,11 +119,12 @@ impl BroadPhase for ParallelParry {
     }
 }
 
-/// Leaves larger than their boxes by this share of the box's edge on each side. In `uniform` and `resting` 0.05, 0.1 and 0.3 are slower
-/// or as fast.
+/// Leaves larger than their boxes by this share of the box's edge on each side. In `uniform` and `resting` half of it is slower or as
+/// fast.
 const MARGIN: f32 = 0.2;
 
-/// Frames from one step of `optimize_incremental` to the next: the documents of parry ask for 5 to 10, and each frame is slower.
+/// Frames from one step of `optimize_incremental` to the next: parry's documentation asks for 5 to 10; in each frame is slower in
+/// `uniform` and `resting`.
 const OPTIMISE_EVERY: u32 = 5;
 
 /// The scheme of rapier's broad phase: leaves with a margin, a traversal only where a box left its leaf, and a list of near pairs
