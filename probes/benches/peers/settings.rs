@@ -2,7 +2,7 @@
 
 use sapwise::Scenario;
 use std::fmt::Display;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -49,8 +49,8 @@ impl Settings {
             sizes,
             threads: list("SAPWISE_THREADS")?.unwrap_or_else(|| vec![1, 2]),
             time: Duration::try_from_secs_f64(seconds).map_err(|e| format!("SAPWISE_BENCH_SECONDS: {e}"))?,
-            fields: std::env::var_os("SAPWISE_FIELDS").map(PathBuf::from),
-            document: std::env::var_os("SAPWISE_BENCHMARKS").map(PathBuf::from),
+            fields: path("SAPWISE_FIELDS"),
+            document: path("SAPWISE_BENCHMARKS"),
         })
     }
 }
@@ -60,4 +60,9 @@ fn list<T: FromStr<Err: Display>>(name: &str) -> Result<Option<Vec<T>>, String> 
     let Ok(text) = std::env::var(name) else { return Ok(None) };
     let values = text.split(',').map(|word| word.trim().parse().map_err(|e| format!("{name}={text}: {e}")));
     values.collect::<Result<_, _>>().map(Some)
+}
+
+/// The path in a variable, from the root of the workspace: cargo runs a benchmark in the folder of its package.
+fn path(name: &str) -> Option<PathBuf> {
+    std::env::var_os(name).map(|path| Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path))
 }
