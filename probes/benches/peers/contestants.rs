@@ -8,9 +8,6 @@ use rayon::ThreadPool;
 use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Fields, Pairs, Registry, SimdLevel};
 use std::sync::Arc;
 
-/// Name of the adaptive contestant.
-pub(crate) const ADAPTIVE: &str = "adaptive";
-
 /// A side of the comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Side {
@@ -35,13 +32,15 @@ pub(crate) struct Contestant {
     pub(crate) keeps: bool,
     /// The largest number of objects that it is asked for.
     pub(crate) most: usize,
+    /// Hopeless frames in a row, up to the last one.
+    pub(crate) hopeless_frames: u32,
     algorithm: Algorithm,
 }
 
 impl Contestant {
     fn peer(name: &str, keeps: bool, most: usize, algorithm: impl BroadPhase + 'static) -> Self {
         let algorithm = Algorithm::Other(Box::new(algorithm));
-        Self { name: name.to_owned(), side: Side::Peer, keeps, most, algorithm }
+        Self { name: name.to_owned(), side: Side::Peer, keeps, most, hopeless_frames: 0, algorithm }
     }
 
     /// A method of ours. Those whose time grows faster than the number of objects leave where they are far behind.
@@ -52,7 +51,7 @@ impl Contestant {
             _ => usize::MAX,
         };
         let algorithm = Algorithm::Other(registry.create(id)?);
-        Ok(Self { name, side: Side::Fixed, keeps: true, most, algorithm })
+        Ok(Self { name, side: Side::Fixed, keeps: true, most, hopeless_frames: 0, algorithm })
     }
 
     /// # Errors
@@ -79,9 +78,14 @@ impl Contestant {
 /// When one of them can't be made.
 pub(crate) fn ours(registry: &Registry, fields: &Fields) -> Result<Vec<Contestant>, Error> {
     let adaptive = Algorithm::Adaptive(Box::new(Adaptive::new(fields.clone(), registry)?));
-    let adaptive =
-        Contestant { name: ADAPTIVE.to_owned(), side: Side::Adaptive, keeps: true, most: usize::MAX, algorithm: adaptive };
-    let mut all = vec![adaptive];
+    let mut all = vec![Contestant {
+        name: "adaptive".to_owned(),
+        side: Side::Adaptive,
+        keeps: true,
+        most: usize::MAX,
+        hopeless_frames: 0,
+        algorithm: adaptive,
+    }];
     for (id, _) in registry.available() {
         all.push(Contestant::fixed(&id, id.to_string(), registry)?);
     }

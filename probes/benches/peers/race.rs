@@ -21,10 +21,13 @@ const WARM_UP_OF_ALL: u64 = 2;
 /// Who takes longer for a frame leaves.
 const LONGEST_FRAME: Duration = Duration::from_secs(3);
 
-/// So does who takes longer than this and [`HOPELESS`] times as long as the fastest: trees that are refitted and nothing else come to
-/// that where objects move far.
-const LONG_FRAME: Duration = Duration::from_millis(50);
-const HOPELESS: u32 = 20;
+/// A frame is hopeless that takes longer than this and [`HOPELESS_RATIO`] times as long as that of the fastest: trees that are refitted
+/// and nothing else come to that where objects move far.
+const HOPELESS_FRAME: Duration = Duration::from_millis(50);
+const HOPELESS_RATIO: u32 = 20;
+
+/// Who has so many hopeless frames in a row leaves. A single one may be the scheduler's fault.
+const HOPELESS_FRAMES: u32 = 3;
 
 /// Timed frames at least.
 const FEWEST_FRAMES: usize = 5;
@@ -63,12 +66,17 @@ impl Race {
         Ok(taken)
     }
 
-    /// Takes those out who took too long, and gives their names.
+    /// Takes those out who take too long, and gives their names.
     fn leave_out_slow(&mut self, taken: &[Option<Duration>]) -> Vec<String> {
         let fastest = taken.iter().flatten().min().copied().unwrap_or_default();
-        let limit = LONGEST_FRAME.min(LONG_FRAME.max(fastest * HOPELESS));
-        let mut slow = taken.iter().map(|took| took.is_some_and(|took| took > limit));
-        self.contestants.extract_if(.., |_| slow.next() == Some(true)).map(|c| c.name).collect()
+        let hopeless = HOPELESS_FRAME.max(fastest * HOPELESS_RATIO);
+        let mut taken = taken.iter().map(|took| took.unwrap_or_default());
+        let leaves = |c: &mut Contestant| {
+            let took = taken.next().unwrap_or_default();
+            c.hopeless_frames = if took > hopeless { c.hopeless_frames + 1 } else { 0 };
+            took > LONGEST_FRAME || c.hopeless_frames >= HOPELESS_FRAMES
+        };
+        self.contestants.extract_if(.., leaves).map(|c| c.name).collect()
     }
 }
 
