@@ -1,0 +1,135 @@
+//! Who takes part.
+
+use crate::naive::Naive;
+use crate::obvhs_tree::Obvhs;
+use crate::parry::{Margin, ParallelParry, Parry, Upkeep};
+use crate::rtree::Packed;
+use rayon::ThreadPool;
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Fields, Pairs, Registry, SimdLevel};
+use std::sync::Arc;
+
+/// A side of the comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// Our adaptive module.
+    Adaptive,
+    /// A method of ours that always runs.
+    Fixed,
+    /// Another crate, or the double loop.
+    Peer,
+}
+
+enum Algorithm {
+    Adaptive(Box<Adaptive>),
+    Other(Box<dyn BroadPhase>),
+}
+
+/// One that takes part.
+pub(crate) struct Contestant {
+    pub(crate) name: String,
+    pub(crate) side: Side,
+    /// Whether it keeps something from frame to frame, and so has to go through the frames before the timed ones.
+    pub(crate) keeps: bool,
+    /// The largest number of objects that it is asked for.
+    pub(crate) most: usize,
+    /// Hopeless frames in a row, up to the last one.
+    pub(crate) hopeless_frames: u32,
+    algorithm: Algorithm,
+}
+
+impl Contestant {
+    fn peer(name: &str, keeps: bool, most: usize, algorithm: impl BroadPhase + 'static) -> Self {
+        let algorithm = Algorithm::Other(Box::new(algorithm));
+        Self { name: name.to_owned(), side: Side::Peer, keeps, most, hopeless_frames: 0, algorithm }
+    }
+
+    /// A method of ours. Those whose time grows faster than the number of objects leave where they are far behind.
+    fn fixed(id: &AlgorithmId, name: String, registry: &Registry) -> Result<Self, Error> {
+        let most = match id.method() {
+            "brute" => 3_000,
+            "sweep" => 100_000,
+            _ => usize::MAX,
+        };
+        let algorithm = Algorithm::Other(registry.create(id)?);
+        Ok(Self { name, side: Side::Fixed, keeps: true, most, hopeless_frames: 0, algorithm })
+    }
+
+    /// # Errors
+    /// Whatever keeps it from finding the pairs.
+    pub(crate) fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        match &mut self.algorithm {
+            Algorithm::Adaptive(adaptive) => adaptive.find_pairs(boxes, pairs),
+            Algorithm::Other(algorithm) => algorithm.find_pairs(boxes, pairs),
+        }
+    }
+
+    /// What the adaptive one chose last.
+    pub(crate) fn chosen(&self) -> Option<&AlgorithmId> {
+        match &self.algorithm {
+            Algorithm::Adaptive(adaptive) => adaptive.last_decision().map(|d| d.algorithm),
+            Algorithm::Other(_) => None,
+        }
+    }
+}
+
+/// Ours: the adaptive one over these fields, and every method that the registry lists.
+///
+/// # Errors
+/// When one of them can't be made.
+pub(crate) fn ours(registry: &Registry, fields: &Fields) -> Result<Vec<Contestant>, Error> {
+    let adaptive = Algorithm::Adaptive(Box::new(Adaptive::new(fields.clone(), registry)?));
+    let mut all = vec![Contestant {
+        name: "adaptive".to_owned(),
+        side: Side::Adaptive,
+        keeps: true,
+        most: usize::MAX,
+        hopeless_frames: 0,
+        algorithm: adaptive,
+    }];
+    for (id, _) in registry.available() {
+        all.push(Contestant::fixed(&id, id.to_string(), registry)?);
+    }
+    Ok(all)
+}
+
+/// Every method of ours on one thread at every SIMD level of this CPU, named `method@cpu1 level`.
+///
+/// # Errors
+/// When one of them can't be made.
+pub(crate) fn at_levels() -> Result<Vec<Contestant>, Error> {
+    let mut all = Vec::new();
+    for level in SimdLevel::ALL.into_iter().filter(|level| *level <= SimdLevel::in_use()) {
+        let mut registry = Registry::with_cores(1);
+        registry.limit_simd(level);
+        for (id, _) in registry.available() {
+            all.push(Contestant::fixed(&id, format!("{id} {level}"), &registry)?);
+        }
+    }
+    Ok(all)
+}
+
+/// The peers on one thread; with a pool those of them that are fastest there, beside all that have a parallel form.
+pub(crate) fn peers(pool: Option<&Arc<ThreadPool>>) -> Vec<Contestant> {
+    let all = usize::MAX;
+    let mut peers = vec![
+        Contestant::peer("parry3d refit", true, all, Parry::new(Upkeep::Refit)),
+        Contestant::peer("parry3d optimise", true, all, Parry::new(Upkeep::Optimise)),
+        Contestant::peer("parry3d margin", true, all, Margin::new()),
+    ];
+    match pool {
+        None => peers.extend([
+            Contestant::peer("parry3d rebuild", false, all, Parry::new(Upkeep::Rebuild)),
+            Contestant::peer("obvhs rebuild", false, 100_000, Obvhs::rebuilding(None)),
+            Contestant::peer("obvhs refit", true, 100_000, Obvhs::refitting()),
+            Contestant::peer("rstar", false, 100_000, Packed),
+            Contestant::peer("double loop", false, 3_000, Naive),
+        ]),
+        Some(pool) => peers.extend([
+            Contestant::peer("parry3d refit, 2 threads", true, all, ParallelParry::new(Upkeep::Refit, pool)),
+            Contestant::peer("parry3d optimise, 2 threads", true, all, ParallelParry::new(Upkeep::Optimise, pool)),
+            Contestant::peer("parry3d rebuild, 2 threads", false, all, ParallelParry::new(Upkeep::Rebuild, pool)),
+            Contestant::peer("obvhs rebuild, 2 threads", false, 100_000, Obvhs::rebuilding(Some(pool))),
+        ]),
+    }
+    peers
+}

@@ -1,0 +1,65 @@
+//! What ours know of this machine, and what the document says of it.
+
+use crate::settings::Settings;
+use rayon::ThreadPool;
+use sapwise::hardware::parameter;
+use sapwise::measure::{self, Options};
+use sapwise::{Fields, Hardware, Model, Registry, Source, json};
+use std::process::Command;
+use std::sync::Arc;
+
+/// The fields for a number of threads: those of the file, or those that the built-in model predicts from hardware parameters
+/// that are measured now; written down by hand where nothing is timed.
+///
+/// # Errors
+/// When the file can't be read or nothing can be predicted.
+pub(crate) fn fields(registry: &Registry, threads: u32, settings: &Settings) -> Result<Fields, String> {
+    if let Some(path) = &settings.fields {
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        return json::fields(&text).map_err(|e| format!("{}: {e}", path.display()));
+    }
+    if !settings.full {
+        return Ok(Fields::usual(registry));
+    }
+    let hardware = measure::hardware(&Options { threads: Some(threads), ..Options::default() });
+    let model = Model::built_in().map_err(|e| e.to_string())?;
+    let prediction = model.predict(&hardware, &registry.available())?;
+    // Where there are costs, they decide; the slice through loads is for people.
+    Ok(Fields::from_costs(Source::Predicted, "uniform", prediction.costs, &[]))
+}
+
+/// A pool whose threads are bound to a core each, as those of a registry with `pin_threads`.
+///
+/// # Errors
+/// When the system refuses the threads.
+pub(crate) fn pinned_pool(threads: usize) -> Result<Arc<ThreadPool>, String> {
+    let cores = core_affinity::get_core_ids().unwrap_or_default();
+    let bind = move |k: usize| {
+        if let Some(&core) = cores.get(k).filter(|_| cores.len() >= threads) {
+            core_affinity::set_for_current(core);
+        }
+    };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).start_handler(bind).build();
+    pool.map(Arc::new).map_err(|e| e.to_string())
+}
+
+/// The machine and the build in one line of Markdown.
+pub(crate) fn describe() -> String {
+    let machine = measure::machine();
+    let topology = measure::family(measure::Family::Topology, &Options::default());
+    let hardware = Hardware { machine, parameters: topology, gpus: Vec::new(), gpu_groups: Vec::new() };
+    let m = &hardware.machine;
+    let cores = hardware.value(parameter::USABLE_CORES).unwrap_or(f64::NAN);
+    let compiler = Command::new("rustc").arg("--version").output().ok();
+    let compiler = compiler.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_else(|| "rustc unknown".to_owned());
+    format!(
+        "{}, {cores} usable cores, {} {}, hypervisor {}, SIMD level {}; {}; {}.",
+        m.cpu,
+        m.os,
+        m.arch,
+        m.hypervisor,
+        m.simd,
+        compiler.trim(),
+        crate::date::today()
+    )
+}

@@ -1,0 +1,127 @@
+//! Our algorithms on the CPU beside those of other crates, on the same boxes in turn.
+//!
+//! ```sh
+//! cargo bench -p sapwise-cli --bench peers
+//! SAPWISE_BENCHMARKS=BENCHMARKS.md cargo bench -p sapwise-cli --bench peers   # writes the tables into the document
+//! ```
+//!
+//! | variable | meaning |
+//! |---|---|
+//! | `SAPWISE_SCENARIOS` | scenarios, separated by commas |
+//! | `SAPWISE_SIZES` | numbers of objects |
+//! | `SAPWISE_THREADS` | `1`, `2` or `1,2` |
+//! | `SAPWISE_BENCH_SECONDS` | time for the timed frames of a scenario at a size |
+//! | `SAPWISE_FIELDS` | fields for ours; without, they are predicted from the hardware, which is measured first |
+//! | `SAPWISE_BENCHMARKS` | the document that takes the tables, between its two marks; else they are printed |
+//!
+//! Method and bias stand at the head of `BENCHMARKS.md`. Prints a line for each scenario and size as soon as it is measured.
+//! Criterion times its candidates one after the other, which is why it is not used here. Without `--bench`, which `cargo
+//! bench` passes, only the smallest size is run for a few frames, to see that all is well. Exit status 1 when a
+//! contestant failed or found other pairs than the rest.
+
+mod contestants;
+#[allow(unused_imports, reason = "its tests run with the command: without a harness there are none")]
+#[path = "../../src/date.rs"]
+mod date;
+mod document;
+mod machine;
+mod naive;
+mod obvhs_tree;
+mod parry;
+mod point;
+mod race;
+mod rtree;
+mod settings;
+mod table;
+#[allow(unused_imports, reason = "its tests run with the command: without a harness there are none")]
+#[path = "../../src/turns.rs"]
+mod turns;
+mod within;
+
+use contestants::{at_levels, ours, peers};
+use point::Point;
+use sapwise::{Registry, Scenario};
+use settings::Settings;
+use std::io::Write;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Fewest objects on two threads: below, no second thread gains anything.
+const FEWEST_FOR_TWO: usize = 1_000;
+
+/// Runs a race and says how it went.
+fn measured(
+    contestants: Vec<contestants::Contestant>,
+    scenario: Scenario,
+    objects: usize,
+    settings: &Settings,
+) -> Result<Point, String> {
+    let start = Instant::now();
+    let point = race::race(contestants, scenario, objects, settings)?;
+    println!("{}, {:.1} s", table::line(&point), start.elapsed().as_secs_f64());
+    // A run that is cut short keeps what it has printed. Whoever stopped listening gets no more.
+    let _ = std::io::stdout().flush();
+    Ok(point)
+}
+
+/// All scenarios on one thread, or `uniform` on several.
+fn compare(threads: u32, settings: &Settings) -> Result<Vec<Point>, String> {
+    println!("\nthreads: {threads}");
+    let mut registry = Registry::with_cores(threads);
+    registry.pin_threads();
+    let fields = machine::fields(&registry, threads, settings)?;
+    let pool = if threads > 1 { Some(machine::pinned_pool(threads as usize)?) } else { None };
+    let mut points = Vec::new();
+    for &scenario in settings.scenarios.iter().filter(|s| threads == 1 || **s == Scenario::Uniform) {
+        let mut gone: Vec<String> = Vec::new();
+        for &objects in settings.sizes.iter().filter(|n| threads == 1 || **n >= FEWEST_FOR_TWO || !settings.full) {
+            let mut all = ours(&registry, &fields).map_err(|e| e.to_string())?;
+            all.extend(peers(pool.as_ref()));
+            all.retain(|c| !gone.contains(&c.name));
+            let point = measured(all, scenario, objects, settings)?;
+            gone.extend(point.left.iter().cloned());
+            points.push(point);
+        }
+    }
+    Ok(points)
+}
+
+/// `uniform` on one thread at every SIMD level.
+fn compare_levels(settings: &Settings) -> Result<Vec<Point>, String> {
+    if !settings.scenarios.contains(&Scenario::Uniform) || !settings.threads.contains(&1) {
+        return Ok(Vec::new());
+    }
+    println!("\nSIMD levels, one thread:");
+    let points = settings.sizes.iter().map(|&objects| {
+        let all = at_levels().map_err(|e| e.to_string())?;
+        measured(all, Scenario::Uniform, objects, settings)
+    });
+    points.collect()
+}
+
+fn bench() -> Result<(), String> {
+    let settings = Settings::from_environment()?;
+    let mut compared = Vec::new();
+    for &threads in &settings.threads {
+        compared.push((threads, compare(threads, &settings)?));
+    }
+    let levels = compare_levels(&settings)?;
+    let text = table::all(&compared) + &within::all(&compared, &levels);
+    match &settings.document {
+        Some(path) => document::put(path, &text),
+        None => {
+            println!("\n{text}");
+            Ok(())
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    match bench() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

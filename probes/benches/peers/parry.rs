@@ -1,0 +1,178 @@
+//! parry3d's `Bvh`, which rapier builds on.
+
+use parry3d::bounding_volume::{Aabb as Bounds, BoundingVolume};
+use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhLeafUpdateStatus, BvhWorkspace};
+use rayon::ThreadPool;
+use rayon::prelude::*;
+use sapwise::{Aabb, BroadPhase, Error, Pairs};
+use std::sync::Arc;
+
+/// What is done to the tree before its pairs are found.
+#[derive(Clone, Copy)]
+pub(crate) enum Upkeep {
+    /// Refit alone.
+    Refit,
+    /// One step of `optimize_incremental`, then refit: what rapier does in each frame.
+    Optimise,
+    /// A new tree by binned splits, in the memory of the old one.
+    Rebuild,
+}
+
+/// The leaves updated, the tree kept up, then traversed against itself.
+pub(crate) struct Parry {
+    upkeep: Upkeep,
+    tree: Bvh,
+    workspace: BvhWorkspace,
+}
+
+fn bounds(b: &Aabb) -> Bounds {
+    Bounds::new(b.min.into(), b.max.into())
+}
+
+/// Makes the leaves as many as the boxes: a new tree where more than `few` come or go, since one by one they take longer; else those
+/// beyond the last box are removed, and new ones are inserted when they are updated.
+fn resize(tree: &mut Bvh, boxes: &[Aabb], few: usize) {
+    let (before, now) = (tree.leaf_count() as usize, boxes.len());
+    if before.abs_diff(now) > few {
+        *tree = Bvh::from_iter(BvhBuildStrategy::Binned, boxes.iter().map(bounds).enumerate());
+    } else {
+        (now..before).for_each(|k| tree.remove(k as u32));
+    }
+}
+
+impl Upkeep {
+    /// How many leaves of so many boxes may come or go one by one.
+    fn few(self, boxes: usize) -> usize {
+        match self {
+            Self::Refit | Self::Optimise => boxes / 4,
+            Self::Rebuild => 0,
+        }
+    }
+}
+
+impl Parry {
+    pub(crate) fn new(upkeep: Upkeep) -> Self {
+        Self { upkeep, tree: Bvh::new(), workspace: BvhWorkspace::default() }
+    }
+}
+
+impl BroadPhase for Parry {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        resize(&mut self.tree, boxes, self.upkeep.few(boxes.len()));
+        for (k, b) in (0..).zip(boxes) {
+            self.tree.insert_or_update_partially(bounds(b), k, 0.0);
+        }
+        match self.upkeep {
+            // The nodes stay where they are, so that there is nothing to gain from sorting them again.
+            Upkeep::Refit => self.tree.refit_without_opt(),
+            Upkeep::Optimise => {
+                self.tree.optimize_incremental(&mut self.workspace);
+                self.tree.refit(&mut self.workspace);
+            }
+            Upkeep::Rebuild => self.tree.rebuild(&mut self.workspace, BvhBuildStrategy::Binned),
+        }
+        self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| pairs.push(a, b));
+        pairs.finish()
+    }
+}
+
+/// [`Parry`] on a pool: updates, refit and traversal have a parallel form, `optimize_incremental` and `rebuild` have none.
+pub(crate) struct ParallelParry {
+    upkeep: Upkeep,
+    pool: Arc<ThreadPool>,
+    tree: Bvh,
+    workspace: BvhWorkspace,
+    updates: Vec<(Bounds, u32, f32)>,
+    statuses: Vec<BvhLeafUpdateStatus>,
+}
+
+impl ParallelParry {
+    pub(crate) fn new(upkeep: Upkeep, pool: &Arc<ThreadPool>) -> Self {
+        let (pool, tree, workspace) = (Arc::clone(pool), Bvh::new(), BvhWorkspace::default());
+        Self { upkeep, pool, tree, workspace, updates: Vec::new(), statuses: Vec::new() }
+    }
+
+    fn frame(&mut self, boxes: &[Aabb]) -> Vec<(u32, u32)> {
+        resize(&mut self.tree, boxes, self.upkeep.few(boxes.len()));
+        let updates = boxes.par_iter().enumerate().map(|(k, b)| (bounds(b), k as u32, 0.0));
+        updates.collect_into_vec(&mut self.updates);
+        self.tree.insert_or_update_batch_partially_parallel(&self.updates, &mut self.statuses);
+        match self.upkeep {
+            Upkeep::Refit => self.tree.refit_parallel(&mut self.workspace),
+            Upkeep::Optimise => {
+                self.tree.optimize_incremental(&mut self.workspace);
+                self.tree.refit_parallel(&mut self.workspace);
+            }
+            Upkeep::Rebuild => self.tree.rebuild(&mut self.workspace, BvhBuildStrategy::Binned),
+        }
+        self.tree.traverse_bvtt_single_tree_parallel::<false>()
+    }
+}
+
+impl BroadPhase for ParallelParry {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        let pool = Arc::clone(&self.pool);
+        pool.install(|| self.frame(boxes)).into_iter().for_each(|(a, b)| pairs.push(a, b));
+        pairs.finish()
+    }
+}
+
+/// Leaves larger than their boxes by this share of the box's edge on each side. In `uniform` and `resting` half of it is slower or as
+/// fast.
+const MARGIN: f32 = 0.2;
+
+/// Frames from one step of `optimize_incremental` to the next: parry's documentation asks for 5 to 10; in each frame is slower in
+/// `uniform` and `resting`.
+const OPTIMISE_EVERY: u32 = 5;
+
+/// The scheme of rapier's broad phase: leaves with a margin, a traversal only where a box left its leaf, and a list of near pairs
+/// that is kept from frame to frame; those of them that overlap are the pairs.
+pub(crate) struct Margin {
+    tree: Bvh,
+    workspace: BvhWorkspace,
+    changed: Vec<bool>,
+    near: Vec<(u32, u32)>,
+    frame: u32,
+}
+
+impl Margin {
+    pub(crate) fn new() -> Self {
+        let (tree, workspace) = (Bvh::new(), BvhWorkspace::default());
+        Self { tree, workspace, changed: Vec::new(), near: Vec::new(), frame: 0 }
+    }
+}
+
+impl BroadPhase for Margin {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        let margin = |b: &Aabb| (b.max[0] - b.min[0]) * MARGIN;
+        if self.changed.len() != boxes.len() {
+            let leaves = boxes.iter().map(|b| bounds(b).loosened(margin(b))).enumerate();
+            self.tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves);
+            self.changed.resize(boxes.len(), true);
+            self.near.clear();
+            self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| self.near.push((a, b)));
+        } else {
+            for ((k, b), changed) in (0..).zip(boxes).zip(&mut self.changed) {
+                let status = self.tree.insert_or_update_partially(bounds(b), k, margin(b));
+                *changed = status != BvhLeafUpdateStatus::Unchanged;
+            }
+            self.frame = self.frame.wrapping_add(1);
+            if self.frame.is_multiple_of(OPTIMISE_EVERY) {
+                self.tree.optimize_incremental(&mut self.workspace);
+            }
+            self.tree.refit(&mut self.workspace);
+            let changed = &self.changed;
+            self.near.retain(|&(a, b)| !changed[a as usize] && !changed[b as usize]);
+            self.tree.traverse_bvtt_single_tree::<true>(&mut self.workspace, &mut |a, b| self.near.push((a, b)));
+        }
+        for &(a, b) in &self.near {
+            if boxes[a as usize].overlaps(&boxes[b as usize]) {
+                pairs.push(a, b);
+            }
+        }
+        pairs.finish()
+    }
+}
