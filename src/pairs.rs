@@ -181,6 +181,15 @@ impl Pairs {
         }
     }
 
+    /// Makes room for half as many pairs again where there is room for less than an eighth more: a list that grows and
+    /// shrinks around a size then allocates once.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub(crate) fn reserve_some_more(&mut self) -> Result<(), Error> {
+        if self.buffer.len() < self.len + self.len / 8 { self.reserve(self.len + self.len / 2) } else { Ok(()) }
+    }
+
     /// Takes in pairs that were written at the head of [`Pairs::room`], lower member first.
     #[inline]
     pub(crate) fn extend_by(&mut self, added: usize) {
@@ -195,6 +204,11 @@ impl Pairs {
             return None;
         }
         Some(&mut self.buffer[self.len..self.len + more])
+    }
+
+    /// Whether every pair found is stored.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.found == self.len as u64 && self.refused.is_none()
     }
 
     /// Whether nothing more can be stored. From there on pairs are only counted, sixteen at a time: 2^20 boxes in one

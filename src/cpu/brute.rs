@@ -27,19 +27,15 @@ impl BroadPhase for Brute {
         check_count(boxes.len())?;
         self.columns.resize(boxes.len())?;
         let Self { workers, columns, outputs, level } = self;
-        workers.run(|| {
-            workers.check(boxes)?;
-            workers.fill(columns.as_mut(), |first, mut part| {
-                for at in 0..part.len() {
-                    part.set(at, &boxes[first + at], 0, (first + at) as u32);
-                }
-            });
-            outputs.find(workers, pairs, |k, parts, list| {
-                let rows = row(columns.len(), k, parts)..row(columns.len(), k + 1, parts);
-                brute_rows(*level, columns, rows, list);
-            });
-            Ok(())
-        })?;
+        workers.check(boxes)?;
+        workers.fill(columns.as_mut(), |first, mut part| {
+            for at in 0..part.len() {
+                part.set(at, &boxes[first + at], 0, (first + at) as u32);
+            }
+        });
+        outputs.find(workers, pairs, |k, parts, list| {
+            brute_rows(*level, columns, row(columns.len(), k, parts)..row(columns.len(), k + 1, parts), list);
+        });
         pairs.finish()
     }
 

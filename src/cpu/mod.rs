@@ -4,6 +4,7 @@ mod brute;
 mod columns;
 mod kernel;
 mod level;
+mod sort;
 mod strip_grid;
 mod strips;
 mod sweep;

@@ -130,7 +130,7 @@ impl StripGrid {
         if large | (more_x | more_y > MOST_MORE) {
             return Place::APART;
         }
-        Place(y * self.cells[0] + x | more_x << 16 | more_y << 24)
+        Place((y * self.cells[0] + x) | more_x << 16 | more_y << 24)
     }
 
     /// Calls `f` for each strip of a place, with [`Cover::begins`] there.

@@ -84,7 +84,7 @@ impl BroadPhase for Strips {
         pairs.clear();
         check_count(boxes.len())?;
         let Self { workers, finder, outputs } = self;
-        workers.run(|| outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists)))?;
+        outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists))?;
         pairs.finish()
     }
 

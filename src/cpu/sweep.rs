@@ -3,6 +3,7 @@
 use crate::broad_phase::check_count;
 use crate::cpu::columns::{Columns, ensure, order_key};
 use crate::cpu::kernel::{All, sweep_rows};
+use crate::cpu::sort::sort;
 use crate::cpu::workers::{Outputs, Workers};
 use crate::cpu::{SimdLevel, Threads};
 use crate::sample::Sample;
@@ -14,6 +15,7 @@ struct Sweep {
     workers: Workers,
     /// Lower bound on the sweep axis in the upper half, position in the input in the lower.
     keys: Vec<u64>,
+    scratch: Vec<u64>,
     columns: Columns,
     outputs: Outputs,
     level: SimdLevel,
@@ -21,7 +23,14 @@ struct Sweep {
 
 pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
     let workers = Workers::new("sweep", threads, pools)?;
-    Ok(Box::new(Sweep { workers, keys: Vec::new(), columns: Columns::default(), outputs: Outputs::default(), level }))
+    Ok(Box::new(Sweep {
+        workers,
+        keys: Vec::new(),
+        scratch: Vec::new(),
+        columns: Columns::default(),
+        outputs: Outputs::default(),
+        level,
+    }))
 }
 
 impl Sweep {
@@ -37,21 +46,17 @@ impl BroadPhase for Sweep {
         check_count(boxes.len())?;
         self.resize(boxes.len())?;
         let axis = Sample::of(boxes).widest_axis();
-        let Self { workers, keys, columns, outputs, level } = self;
-        let keys = &mut keys[..boxes.len()];
-        workers.run(|| {
-            workers.check(boxes)?;
-            workers.map(boxes, keys, |id, b| u64::from(order_key(b.min[axis])) << 32 | id as u64);
-            workers.sort(keys);
-            workers.fill(columns.as_mut(), |first, mut part| {
-                for at in 0..part.len() {
-                    let id = keys[first + at] as u32;
-                    part.set(at, &boxes[id as usize], axis, id);
-                }
-            });
-            outputs.find_rows(workers, columns.len(), pairs, |rows, list| sweep_rows::<All>(*level, columns, rows, list));
-            Ok(())
-        })?;
+        let Self { workers, keys, scratch, columns, outputs, level } = self;
+        workers.check(boxes)?;
+        workers.map(boxes, &mut keys[..boxes.len()], |id, b| u64::from(order_key(b.min[axis])) << 32 | id as u64);
+        sort(workers, keys, scratch, boxes.len())?;
+        workers.fill(columns.as_mut(), |first, mut part| {
+            for at in 0..part.len() {
+                let id = keys[first + at] as u32;
+                part.set(at, &boxes[id as usize], axis, id);
+            }
+        });
+        outputs.find_rows(workers, columns.len(), pairs, |rows, list| sweep_rows::<All>(*level, columns, rows, list));
         pairs.finish()
     }
 

@@ -6,7 +6,7 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-/// One rayon pool for each number of threads that was asked for, made on first use.
+/// One rayon pool for each number of helpers that was asked for, made on first use.
 #[derive(Debug, Default)]
 pub(crate) struct Threads {
     /// Whether pools made from now on are pinned; see [`Registry::pin_threads`](crate::Registry::pin_threads).
@@ -16,31 +16,32 @@ pub(crate) struct Threads {
 }
 
 impl Threads {
-    /// The pool of `threads` threads.
+    /// A pool of `count` threads that help a caller.
     ///
     /// # Errors
     /// The reason, when the system refuses the threads.
     #[cfg(feature = "parallel")]
-    pub(crate) fn pool(&self, threads: u32) -> Result<Arc<rayon::ThreadPool>, String> {
+    pub(crate) fn helpers(&self, count: u32) -> Result<Arc<rayon::ThreadPool>, String> {
         let mut pools = self.pools.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(pool) = pools.get(&threads) {
+        if let Some(pool) = pools.get(&count) {
             return Ok(Arc::clone(pool));
         }
-        let pool = Arc::new(build_pool(threads, self.pinned)?);
-        pools.insert(threads, Arc::clone(&pool));
+        let pool = Arc::new(build_pool(count, 1, self.pinned)?);
+        pools.insert(count, Arc::clone(&pool));
         Ok(pool)
     }
 }
 
-/// A pool of `threads` threads, each bound to a core of its own where that is wanted and there are enough.
+/// A pool of `threads` threads, each bound to a core of its own, from core number `first` on, where that is wanted and there
+/// are enough.
 ///
 /// # Errors
 /// The reason, when the system refuses the threads.
 #[cfg(feature = "parallel")]
-pub(crate) fn build_pool(threads: u32, pinned: bool) -> Result<rayon::ThreadPool, String> {
+pub(crate) fn build_pool(threads: u32, first: usize, pinned: bool) -> Result<rayon::ThreadPool, String> {
     let cores = if pinned { core_affinity::get_core_ids().unwrap_or_default() } else { Vec::new() };
     let bind = move |k: usize| {
-        if let Some(&core) = cores.get(k).filter(|_| cores.len() >= threads as usize) {
+        if let Some(&core) = cores.get(first + k).filter(|_| cores.len() >= first + threads as usize) {
             // A refusal leaves the thread to the scheduler, as without pinning.
             core_affinity::set_for_current(core);
         }

@@ -75,7 +75,7 @@ impl BroadPhase for Verlet {
         if !kept {
             pairs.clear();
             let Self { workers, finder, outputs, .. } = self;
-            workers.run(|| outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists)))?;
+            outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists))?;
         }
         self.motion.found(boxes.len(), pairs.len());
         pairs.finish()
@@ -92,53 +92,52 @@ impl Verlet {
     /// Finds the pairs among the kept ones; `false` when that does not pay or they are too many.
     fn keep(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<bool, Error> {
         let Self { workers, finder, outputs, motion, grown, tree, shares, kept } = self;
-        workers.run(|| {
-            let changes = grown.check(workers, boxes, shares)?;
-            let left = changes.left + changes.gone.len();
-            let anew = motion.wants_anew(boxes.len(), left);
-            if anew {
-                grown.grow_all(workers, boxes, shares);
-                tree.build(workers, grown.as_slice())?;
-                let most = MOST_KEPT * boxes.len() / kept.len() + 1024;
-                for list in kept.iter_mut() {
-                    list.clear();
-                    list.set_limit(Some(most));
-                }
-                finder.find(workers, grown.as_slice(), kept)?;
-            } else {
-                follow(tree, grown, &changes, shares)?;
+        let changes = grown.check(workers, boxes, shares)?;
+        let left = changes.left + changes.gone.len();
+        let anew = motion.wants_anew(boxes.len(), left);
+        if anew {
+            grown.grow_all(workers, boxes, shares);
+            tree.build(workers, grown.as_slice())?;
+            let most = MOST_KEPT * boxes.len() / kept.len() + 1024;
+            for list in kept.iter_mut() {
+                list.clear();
+                list.set_limit(Some(most));
             }
-            let (grown, tree) = (&*grown, &*tree);
-            let far = boxes.len() > 50_000;
-            outputs.collect(workers, pairs, |lists| {
-                workers.each_three(shares, kept, lists, |share, kept, list| {
-                    let overlap = |(i, j): (u32, u32)| overlap(&boxes[i as usize], &boxes[j as usize]);
-                    let fetch = |(i, j): (u32, u32)| {
-                        if far {
-                            prefetch(&boxes[i as usize].min);
-                            prefetch(&boxes[j as usize].min);
+            finder.find(workers, grown.as_slice(), kept)?;
+            kept.iter_mut().try_for_each(Pairs::reserve_some_more)?;
+        } else {
+            follow(tree, grown, &changes, shares)?;
+        }
+        let (grown, tree) = (&*grown, &*tree);
+        let far = boxes.len() > 50_000;
+        outputs.collect(workers, pairs, |lists| {
+            workers.each_three(shares, kept, lists, |share, kept, list| {
+                let overlap = |(i, j): (u32, u32)| overlap(&boxes[i as usize], &boxes[j as usize]);
+                let fetch = |(i, j): (u32, u32)| {
+                    if far {
+                        prefetch(&boxes[i as usize].min);
+                        prefetch(&boxes[j as usize].min);
+                    }
+                };
+                if left == 0 || anew {
+                    list.extend_where(kept.as_slice(), fetch, overlap);
+                    return;
+                }
+                kept.sift(list, |pair| grown.is_dirty(pair), fetch, overlap);
+                for &i in &share.left {
+                    grown.meet(tree, i, |j| {
+                        kept.push(i, j);
+                        if overlap((i, j)) {
+                            list.push(i, j);
                         }
-                    };
-                    if left == 0 || anew {
-                        list.extend_where(kept.as_slice(), fetch, overlap);
-                        return;
-                    }
-                    kept.sift(list, |pair| grown.is_dirty(pair), fetch, overlap);
-                    for &i in &share.left {
-                        grown.meet(tree, i, |j| {
-                            kept.push(i, j);
-                            if overlap((i, j)) {
-                                list.push(i, j);
-                            }
-                        });
-                    }
-                });
-                Ok(())
-            })?;
-            let total = kept.iter().map(Pairs::len).sum();
-            // A list that found more than it may hold has lost some.
-            Ok(motion.learn(boxes.len(), left, total, anew) && kept.iter_mut().all(|list| list.finish().is_ok()))
-        })
+                    });
+                }
+            });
+            Ok(())
+        })?;
+        let total = kept.iter().map(Pairs::len).sum();
+        // A list that found more than it may hold has lost some.
+        Ok(motion.learn(boxes.len(), left, total, anew) && kept.iter_mut().all(|list| list.finish().is_ok()))
     }
 }
 

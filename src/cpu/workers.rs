@@ -6,36 +6,46 @@ use crate::cpu::Threads;
 use crate::cpu::columns::{ColumnsMut, part};
 use crate::{Aabb, Error, Pairs};
 #[cfg(feature = "parallel")]
-use std::sync::Arc;
+use std::sync::{
+    Arc, Mutex, PoisonError,
+    atomic::{AtomicUsize, Ordering},
+};
 
-/// The threads of one algorithm: the caller's own, or a pool.
+/// The threads of one algorithm: the caller's own, and those of a pool that help it.
 #[derive(Debug)]
 pub(crate) struct Workers {
     threads: usize,
     #[cfg(feature = "parallel")]
-    pool: Option<Arc<rayon::ThreadPool>>,
+    helpers: Option<Arc<rayon::ThreadPool>>,
 }
 
 /// Tasks for each thread: enough to even out tasks of unequal length, few enough to cost nothing.
 const TASKS_PER_THREAD: usize = 8;
 
 /// Boxes that one task of a filling phase writes at the least; below, a task costs more than it saves.
-#[cfg(feature = "parallel")]
 const SMALLEST_FILL: usize = 1024;
+
+/// Pairs that are joined on all threads; fewer are copied in less time than a phase takes.
+const SMALLEST_JOIN: usize = 16_384;
+
+/// Rounds for which the caller looks whether its helpers are done before it goes to sleep: some 20 us. To be woken takes longer
+/// than most of what is left of a task by then.
+#[cfg(feature = "parallel")]
+const SPINS: u32 = 1000;
 
 impl Workers {
     /// `threads` threads for the algorithm `method`.
     pub(crate) fn new(method: &'static str, threads: u32, pools: &Threads) -> Result<Self, Error> {
         #[cfg(not(feature = "parallel"))]
-        let _ = (method, pools.pinned);
+        let _ = (method, pools);
         Ok(Self {
             threads: threads as usize,
             #[cfg(feature = "parallel")]
-            pool: if threads == 1 {
+            helpers: if threads == 1 {
                 None
             } else {
                 let unavailable = |reason| Error::Unavailable { algorithm: AlgorithmId::cpu(method, threads), reason };
-                Some(pools.pool(threads).map_err(unavailable)?)
+                Some(pools.helpers(threads - 1).map_err(unavailable)?)
             },
         })
     }
@@ -49,23 +59,38 @@ impl Workers {
         if self.threads == 1 { 1 } else { self.threads * TASKS_PER_THREAD }
     }
 
-    /// Runs a frame inside the pool. Phases outside of it would each pay for waking the pool from outside.
-    pub(crate) fn run<R: Send>(&self, frame: impl FnOnce() -> R + Send) -> R {
+    /// One phase: gives out the tasks one by one to the caller and to its helpers. Returns when all are done.
+    ///
+    /// The caller works too instead of sleeping: waking a thread takes tens of microseconds, which a frame would pay twice.
+    #[cfg_attr(not(feature = "parallel"), expect(clippy::unused_self, reason = "without threads nobody helps"))]
+    pub(crate) fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
         #[cfg(feature = "parallel")]
-        if let Some(pool) = &self.pool {
-            return pool.install(frame);
+        if let Some(helpers) = &self.helpers {
+            let queue = Mutex::new(tasks);
+            let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let drain = || std::iter::from_fn(next).for_each(&work);
+            let done = AtomicUsize::new(0);
+            return helpers.in_place_scope(|scope| {
+                for _ in 1..self.threads {
+                    scope.spawn(|_| {
+                        drain();
+                        done.fetch_add(1, Ordering::Release);
+                    });
+                }
+                drain();
+                let mut spins = 0;
+                while done.load(Ordering::Acquire) + 1 < self.threads && spins < SPINS {
+                    std::hint::spin_loop();
+                    spins += 1;
+                }
+            });
         }
-        frame()
+        tasks.for_each(work);
     }
 
-    /// One phase: `work` on every task, side by side. Returns when all are done.
-    pub(crate) fn each<T: Send>(&self, tasks: &mut [T], work: impl Fn(usize, &mut T) + Sync + Send) {
-        #[cfg(feature = "parallel")]
-        if self.pool.is_some() {
-            use rayon::prelude::*;
-            return tasks.par_iter_mut().with_max_len(1).enumerate().for_each(|(k, task)| work(k, task));
-        }
-        tasks.iter_mut().enumerate().for_each(|(k, task)| work(k, task));
+    /// One phase: `work` on every task, side by side.
+    pub(crate) fn each<T: Send>(&self, tasks: &mut [T], work: impl Fn(usize, &mut T) + Sync) {
+        self.each_of(tasks.iter_mut().enumerate(), |(k, task)| work(k, task));
     }
 
     /// One phase: `work` on every task and what belongs to it, side by side.
@@ -73,15 +98,9 @@ impl Workers {
         &self,
         tasks: &mut [T],
         with: &mut [U],
-        work: impl Fn(usize, &mut T, &mut U) + Sync + Send,
+        work: impl Fn(usize, &mut T, &mut U) + Sync,
     ) {
-        #[cfg(feature = "parallel")]
-        if self.pool.is_some() {
-            use rayon::prelude::*;
-            let all = tasks.par_iter_mut().zip(with).with_max_len(1).enumerate();
-            return all.for_each(|(k, (task, with))| work(k, task, with));
-        }
-        tasks.iter_mut().zip(with).enumerate().for_each(|(k, (task, with))| work(k, task, with));
+        self.each_of(tasks.iter_mut().zip(with).enumerate(), |(k, (task, with))| work(k, task, with));
     }
 
     /// One phase: `work` on every task and what belongs to it in two more lists, side by side.
@@ -90,15 +109,9 @@ impl Workers {
         tasks: &mut [T],
         with: &mut [U],
         and: &mut [V],
-        work: impl Fn(&mut T, &mut U, &mut V) + Sync + Send,
+        work: impl Fn(&mut T, &mut U, &mut V) + Sync,
     ) {
-        #[cfg(feature = "parallel")]
-        if self.pool.is_some() {
-            use rayon::prelude::*;
-            let all = tasks.par_iter_mut().zip(with).zip(and).with_max_len(1);
-            return all.for_each(|((task, with), and)| work(task, with, and));
-        }
-        tasks.iter_mut().zip(with).zip(and).for_each(|((task, with), and)| work(task, with, and));
+        self.each_of(tasks.iter_mut().zip(with).zip(and), |((task, with), and)| work(task, with, and));
     }
 
     /// One phase: `work` on every task and its part of two lists, which are given with the length of a part.
@@ -107,71 +120,63 @@ impl Workers {
         tasks: &mut [T],
         (a, a_len): (&mut [A], usize),
         (b, b_len): (&mut [B], usize),
-        work: impl Fn(usize, &mut T, &mut [A], &mut [B]) + Sync + Send,
+        work: impl Fn(usize, &mut T, &mut [A], &mut [B]) + Sync,
     ) {
-        #[cfg(feature = "parallel")]
-        if self.pool.is_some() {
-            use rayon::prelude::*;
-            let parts = a.par_chunks_mut(a_len).zip(b.par_chunks_mut(b_len));
-            let all = tasks.par_iter_mut().zip(parts).with_max_len(1).enumerate();
-            return all.for_each(|(k, (task, (a, b)))| work(k, task, a, b));
-        }
         let parts = a.chunks_mut(a_len).zip(b.chunks_mut(b_len));
-        tasks.iter_mut().zip(parts).enumerate().for_each(|(k, (task, (a, b)))| work(k, task, a, b));
+        self.each_of(tasks.iter_mut().zip(parts).enumerate(), |(k, (task, (a, b)))| work(k, task, a, b));
     }
 
     /// One phase: `fill` on parts of the columns, with the position at which each part begins.
     pub(crate) fn fill(&self, columns: ColumnsMut<'_>, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
         #[cfg(feature = "parallel")]
-        if self.pool.is_some() {
+        if self.helpers.is_some() {
             let size = (columns.len() / self.tasks()).max(SMALLEST_FILL);
-            return split_fill(columns, 0, size, &fill);
+            let (mut rest, mut first) = (Some(columns), 0);
+            let parts = std::iter::from_fn(|| {
+                let columns = rest.take().filter(|c| c.len() > 0)?;
+                let at = first;
+                let whole = columns.len();
+                let (part, behind) = columns.split(size.min(whole));
+                first += part.len();
+                rest = Some(behind);
+                Some((at, part))
+            });
+            return self.each_of(parts, |(first, part)| fill(first, part));
         }
         fill(0, columns);
     }
 
     /// One phase: `make` for every input, at its position.
-    pub(crate) fn map<I: Sync, T: Send>(&self, inputs: &[I], out: &mut [T], make: impl Fn(usize, &I) -> T + Sync + Send) {
-        #[cfg(feature = "parallel")]
-        if self.pool.is_some() {
-            use rayon::prelude::*;
-            let all = out.par_iter_mut().with_min_len(SMALLEST_FILL).zip(inputs).enumerate();
-            return all.for_each(|(k, (o, i))| *o = make(k, i));
-        }
-        out.iter_mut().zip(inputs).enumerate().for_each(|(k, (o, i))| *o = make(k, i));
+    pub(crate) fn map<I: Sync, T: Send>(&self, inputs: &[I], out: &mut [T], make: impl Fn(usize, &I) -> T + Sync) {
+        let size = self.part_of(inputs.len());
+        self.each_of(out.chunks_mut(size).zip(inputs.chunks(size)).enumerate(), |(k, (out, inputs))| {
+            out.iter_mut().zip(inputs).zip(k * size..).for_each(|((o, i), at)| *o = make(at, i));
+        });
+    }
+
+    /// Elements in a part of a list of so many.
+    fn part_of(&self, len: usize) -> usize {
+        if self.threads == 1 { len.max(1) } else { (len / self.tasks()).max(SMALLEST_FILL) }
     }
 
     /// One phase: the error for the first invalid box, if there is one.
     pub(crate) fn check(&self, boxes: &[Aabb]) -> Result<(), Error> {
         #[cfg(feature = "parallel")]
-        if self.pool.is_some() {
-            use rayon::prelude::*;
-            const CHUNK: usize = 16 * SMALLEST_FILL;
-            let chunks = boxes.par_chunks(CHUNK).enumerate();
-            return chunks.find_map_first(|(k, chunk)| Aabb::check(chunk, k * CHUNK).err()).map_or(Ok(()), Err);
+        if self.helpers.is_some() {
+            let size = self.part_of(boxes.len());
+            // Errors are rare and told by the lowest position: what the parts find is joined under a lock.
+            let first = Mutex::new(usize::MAX);
+            self.each_of(boxes.chunks(size).zip((0..).step_by(size)), |(part, at)| {
+                if let Some(k) = part.iter().position(|b| b.defect().is_some()) {
+                    let mut first = first.lock().unwrap_or_else(PoisonError::into_inner);
+                    *first = (*first).min(at + k);
+                }
+            });
+            let first = first.into_inner().unwrap_or_else(PoisonError::into_inner);
+            return boxes.get(first..).map_or(Ok(()), |rest| Aabb::check(rest, first));
         }
         Aabb::check(boxes, 0)
     }
-
-    /// One phase: sorts.
-    pub(crate) fn sort(&self, keys: &mut [u64]) {
-        #[cfg(feature = "parallel")]
-        if self.pool.is_some() {
-            use rayon::prelude::*;
-            return keys.par_sort_unstable();
-        }
-        keys.sort_unstable();
-    }
-}
-
-#[cfg(feature = "parallel")]
-fn split_fill(columns: ColumnsMut<'_>, first: usize, size: usize, fill: &(impl Fn(usize, ColumnsMut<'_>) + Sync)) {
-    if columns.len() <= size {
-        return fill(first, columns);
-    }
-    let middle = columns.len() / 2;
-    let (left, right) = columns.split(middle);
-    rayon::join(|| split_fill(left, first, size, fill), || split_fill(right, first + middle, size, fill));
 }
 
 /// The pairs that one task finds.
@@ -202,8 +207,25 @@ impl Outputs {
         }
         self.ready(workers, pairs);
         find(&mut self.0)?;
-        self.0.iter().for_each(|list| pairs.append(list));
+        self.join(workers, pairs);
         Ok(())
+    }
+
+    /// One phase where it pays: copies all lists behind one another.
+    fn join(&self, workers: &Workers, pairs: &mut Pairs) {
+        let total: usize = self.0.iter().map(Pairs::len).sum();
+        let complete = self.0.iter().all(Pairs::is_complete);
+        if let Some(mut room) = pairs.room(total).filter(|_| complete && total >= SMALLEST_JOIN) {
+            let parts = self.0.iter().map(|list| {
+                let (to, behind) = std::mem::take(&mut room).split_at_mut(list.len());
+                room = behind;
+                (to, list)
+            });
+            workers.each_of(parts, |(to, list)| to.copy_from_slice(list.as_slice()));
+            pairs.extend_by(total);
+        } else {
+            self.0.iter().for_each(|list| pairs.append(list));
+        }
     }
 
     /// One phase: `find` on equal parts of `0..rows`, each into a list of its own, then all lists joined in order.

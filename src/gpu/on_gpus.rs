@@ -123,10 +123,8 @@ impl OnGpus {
             part.began = None;
         }
         for round in 0..rounds {
-            workers.run(|| {
-                workers.each(parts, |k, part| part.start(slabs, k * rounds + round, boxes, exponent));
-                workers.each(parts, |_, part| part.finish(rounds));
-            });
+            workers.each(parts, |k, part| part.start(slabs, k * rounds + round, boxes, exponent));
+            workers.each(parts, |_, part| part.finish(rounds));
             if parts.iter().any(|p| p.full) {
                 return Ok(false);
             }

@@ -177,5 +177,5 @@ pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
 ///
 /// The error is a sentence for [`Parameter::missing`]: a limit on processes can refuse the threads.
 fn pool(threads: usize) -> Result<ThreadPool, String> {
-    crate::cpu::build_pool(u32::try_from(threads).unwrap_or(u32::MAX), true)
+    crate::cpu::build_pool(u32::try_from(threads).unwrap_or(u32::MAX), 0, true)
 }

@@ -8,6 +8,7 @@ use crate::cpu::SimdLevel;
 use crate::cpu::columns::ensure;
 use crate::cpu::kernel::node::{LANES, Node};
 use crate::cpu::kernel::{each_bit, prefetch};
+use crate::cpu::sort::sort;
 use crate::cpu::workers::Workers;
 use crate::sample::Sample;
 use crate::{Aabb, Error};
@@ -25,12 +26,21 @@ pub(super) struct Tree {
     levels: Vec<Vec<Node>>,
     /// Position along a Morton curve in the upper half, box in the lower.
     keys: Vec<u64>,
+    scratch: Vec<u64>,
     level: SimdLevel,
 }
 
 impl Tree {
     pub(super) fn new(level: SimdLevel) -> Self {
-        Self { ids: Vec::new(), places: 0, place_of: Vec::new(), levels: Vec::new(), keys: Vec::new(), level }
+        Self {
+            ids: Vec::new(),
+            places: 0,
+            place_of: Vec::new(),
+            levels: Vec::new(),
+            keys: Vec::new(),
+            scratch: Vec::new(),
+            level,
+        }
     }
 
     /// Makes the tree of these boxes.
@@ -39,7 +49,7 @@ impl Tree {
         let keys = &mut self.keys[..boxes.len()];
         let curve = Curve::over(&Sample::of(boxes));
         workers.map(boxes, keys, |id, b| u64::from(curve.key(b)) << 32 | id as u64);
-        workers.sort(keys);
+        sort(workers, &mut self.keys, &mut self.scratch, boxes.len())?;
         ensure(&mut self.ids, boxes.len(), "boxes in a tree")?;
         ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
         self.places = boxes.len();
