@@ -18,9 +18,9 @@ use crate::cpu::strips::Finder;
 use crate::cpu::workers::{Outputs, Workers};
 use crate::cpu::{SimdLevel, Threads};
 use crate::{Aabb, BroadPhase, Error, Pairs};
-use grown::{Changes, Grown, Share};
+use grown::{Grown, Share};
 use motion::{Advice, Motion};
-use tree::Tree;
+use tree::{FAR, Tree};
 
 /// The method; see the module.
 #[derive(Debug)]
@@ -106,12 +106,14 @@ impl Verlet {
             finder.find(workers, grown.as_slice(), kept)?;
             kept.iter_mut().try_for_each(Pairs::reserve_some_more)?;
         } else {
-            follow(tree, grown, &changes, shares)?;
+            changes.gone.for_each(|id| tree.remove(id as u32));
+            changes.new.into_iter().try_for_each(|id| tree.insert(id as u32))?;
+            tree.follow(workers, grown.as_slice(), shares.iter().flat_map(|s| s.left.iter().copied()))?;
         }
-        let (grown, tree) = (&*grown, &*tree);
-        let far = boxes.len() > 50_000;
+        let (grown, tree, tasks) = (&*grown, &*tree, kept.len());
+        let far = boxes.len() > FAR;
         outputs.collect(workers, pairs, |lists| {
-            workers.each_three(shares, kept, lists, |share, kept, list| {
+            workers.each_with(kept, lists, |k, kept, list| {
                 let overlap = |(i, j): (u32, u32)| overlap(&boxes[i as usize], &boxes[j as usize]);
                 let fetch = |(i, j): (u32, u32)| {
                     if far {
@@ -124,7 +126,7 @@ impl Verlet {
                     return;
                 }
                 kept.sift(list, |pair| grown.is_dirty(pair), fetch, overlap);
-                for &i in &share.left {
+                for i in tree.moved(k, tasks) {
                     grown.meet(tree, i, |j| {
                         kept.push(i, j);
                         if overlap((i, j)) {
@@ -139,20 +141,6 @@ impl Verlet {
         // A list that found more than it may hold has lost some.
         Ok(motion.learn(boxes.len(), left, total, anew) && kept.iter_mut().all(|list| list.finish().is_ok()))
     }
-}
-
-/// Brings the tree up to date with the boxes that left, came and went.
-fn follow(tree: &mut Tree, grown: &Grown, changes: &Changes, shares: &[Share]) -> Result<(), Error> {
-    changes.gone.clone().for_each(|id| tree.remove(id as u32));
-    for &id in shares.iter().flat_map(|s| &s.left) {
-        let bounds = &grown.as_slice()[id as usize];
-        if changes.new.contains(&(id as usize)) {
-            tree.insert(id, bounds)?;
-        } else {
-            tree.replace(id, bounds);
-        }
-    }
-    Ok(())
 }
 
 /// Whether two boxes overlap, without the branches of [`Aabb::overlaps`]: among kept pairs no branch can be guessed.

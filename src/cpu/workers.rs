@@ -103,17 +103,6 @@ impl Workers {
         self.each_of(tasks.iter_mut().zip(with).enumerate(), |(k, (task, with))| work(k, task, with));
     }
 
-    /// One phase: `work` on every task and what belongs to it in two more lists, side by side.
-    pub(crate) fn each_three<T: Send, U: Send, V: Send>(
-        &self,
-        tasks: &mut [T],
-        with: &mut [U],
-        and: &mut [V],
-        work: impl Fn(&mut T, &mut U, &mut V) + Sync,
-    ) {
-        self.each_of(tasks.iter_mut().zip(with).zip(and), |((task, with), and)| work(task, with, and));
-    }
-
     /// One phase: `work` on every task and its part of two lists, which are given with the length of a part.
     pub(crate) fn each_share<T: Send, A: Send, B: Send>(
         &self,

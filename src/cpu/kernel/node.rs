@@ -1,5 +1,6 @@
 //! Sixteen boxes as columns, tested together against one.
 
+use super::{each_bit, prefetch};
 use crate::Aabb;
 use crate::cpu::SimdLevel;
 
@@ -49,20 +50,8 @@ impl Node {
     }
 
     /// Bit k is set when lane k overlaps a box.
-    #[inline]
-    pub(crate) fn overlapping(&self, level: SimdLevel, b: &Aabb) -> u32 {
-        match level {
-            // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
-            #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx512 => unsafe { self.overlapping_avx512(b) },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx2 => unsafe { self.overlapping_avx2(b) },
-            _ => self.overlapping_portable(b),
-        }
-    }
-
-    fn overlapping_portable(&self, b: &Aabb) -> u32 {
+    #[inline(always)]
+    fn overlapping(&self, b: &Aabb) -> u32 {
         let mut apart = [false; LANES];
         for a in 0..3 {
             for (lane, apart) in apart.iter_mut().enumerate() {
@@ -71,38 +60,98 @@ impl Node {
         }
         apart.iter().enumerate().fold(0, |mask, (lane, &apart)| mask | u32::from(!apart) << lane)
     }
+}
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f")]
-    fn overlapping_avx512(&self, b: &Aabb) -> u32 {
-        use std::arch::x86_64::*;
-        let mut mask = u16::MAX;
-        for a in 0..3 {
-            // SAFETY: each column has 16 floats.
-            let (low, high) = unsafe { (_mm512_loadu_ps(self.low[a].as_ptr()), _mm512_loadu_ps(self.high[a].as_ptr())) };
-            mask &= _mm512_cmp_ps_mask::<_CMP_LE_OQ>(low, _mm512_set1_ps(b.max[a]));
-            mask &= _mm512_cmp_ps_mask::<_CMP_GE_OQ>(high, _mm512_set1_ps(b.min[a]));
+/// Calls `found` for every lane of the first of `levels` that overlaps a box; lane k of node n has the number 16 n + k.
+///
+/// Lane k of node n in a level above contains node 16 n + k of the level below. The last level that has nodes is the top.
+/// `far`: the nodes are likely not in the cache, and are asked for ahead.
+#[inline]
+pub(crate) fn each_overlapping(level: SimdLevel, levels: &[Vec<Node>], far: bool, b: &Aabb, found: impl FnMut(usize)) {
+    match level {
+        // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
+        #[cfg(target_arch = "x86_64")]
+        SimdLevel::Avx512 => unsafe { x86::walk_avx512(levels, far, b, found) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        SimdLevel::Avx2 => unsafe { x86::walk_avx2(levels, far, b, found) },
+        _ => walk(levels, far, b, Node::overlapping, found),
+    }
+}
+
+/// Levels of a tree of 2^32 boxes.
+const MOST_LEVELS: usize = 8;
+
+#[inline(always)]
+fn walk(levels: &[Vec<Node>], far: bool, b: &Aabb, overlapping: impl Fn(&Node, &Aabb) -> u32, mut found: impl FnMut(usize)) {
+    let Some(top) = levels.iter().rposition(|level| !level.is_empty()) else { return };
+    for root in 0..levels[top].len() {
+        // For each level below the top, the node whose children are being visited and which of them are left.
+        let mut open = [(0, 0); MOST_LEVELS];
+        let mut at = top;
+        open[at] = (root, overlapping(&levels[at][root], b));
+        loop {
+            let (node, left) = &mut open[at];
+            if *left == 0 || at == 0 {
+                let first = *node * LANES;
+                each_bit(*left, |lane| found(first + lane));
+                at += 1;
+                if at > top {
+                    break;
+                }
+                continue;
+            }
+            let child = *node * LANES + left.trailing_zeros() as usize;
+            *left &= *left - 1;
+            let below = &levels[at - 1];
+            // A lane without a child holds nothing, which still overlaps infinite bounds.
+            let Some(below_node) = below.get(child) else { continue };
+            if far && *left != 0 {
+                let next = *node * LANES + left.trailing_zeros() as usize;
+                below.get(next).into_iter().for_each(prefetch);
+            }
+            at -= 1;
+            open[at] = (child, overlapping(below_node, b));
         }
-        u32::from(mask)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::{Node, walk};
+    use crate::Aabb;
+    use std::arch::x86_64::*;
+
+    #[target_feature(enable = "avx512f")]
+    pub(super) fn walk_avx512(levels: &[Vec<Node>], far: bool, b: &Aabb, found: impl FnMut(usize)) {
+        let overlapping = |node: &Node, b: &Aabb| {
+            let mut mask = u16::MAX;
+            for a in 0..3 {
+                // SAFETY: each column has 16 floats.
+                let (low, high) = unsafe { (_mm512_loadu_ps(node.low[a].as_ptr()), _mm512_loadu_ps(node.high[a].as_ptr())) };
+                mask &= _mm512_cmp_ps_mask::<_CMP_LE_OQ>(low, _mm512_set1_ps(b.max[a]));
+                mask &= _mm512_cmp_ps_mask::<_CMP_GE_OQ>(high, _mm512_set1_ps(b.min[a]));
+            }
+            u32::from(mask)
+        };
+        walk(levels, far, b, overlapping, found);
     }
 
-    #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn overlapping_avx2(&self, b: &Aabb) -> u32 {
-        use std::arch::x86_64::*;
-        let half = |from: usize| {
+    pub(super) fn walk_avx2(levels: &[Vec<Node>], far: bool, b: &Aabb, found: impl FnMut(usize)) {
+        let half = |node: &Node, b: &Aabb, from: usize| {
             let mut all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
             for a in 0..3 {
                 // SAFETY: each column has 16 floats, and `from` is 0 or 8.
                 let (low, high) = unsafe {
-                    (_mm256_loadu_ps(self.low[a].as_ptr().add(from)), _mm256_loadu_ps(self.high[a].as_ptr().add(from)))
+                    (_mm256_loadu_ps(node.low[a].as_ptr().add(from)), _mm256_loadu_ps(node.high[a].as_ptr().add(from)))
                 };
                 let below = _mm256_cmp_ps::<_CMP_LE_OQ>(low, _mm256_set1_ps(b.max[a]));
                 all = _mm256_and_ps(all, _mm256_and_ps(below, _mm256_cmp_ps::<_CMP_GE_OQ>(high, _mm256_set1_ps(b.min[a]))));
             }
             _mm256_movemask_ps(all) as u32
         };
-        half(0) | half(8) << 8
+        walk(levels, far, b, |node, b| half(node, b, 0) | half(node, b, 8) << 8, found);
     }
 }
 
@@ -112,14 +161,23 @@ mod tests {
 
     #[test]
     fn every_level_finds_the_lanes_that_overlap() {
-        let lane = |k: usize| Aabb::cube([k as f32, (k * 7 % 16) as f32, (k * 3 % 16) as f32], 2.5);
-        let mut node = Node::EMPTY;
-        (0..LANES - 1).for_each(|k| assert!(node.widen(k, &lane(k)) && !node.widen(k, &lane(k))));
-        let queries = (0..60).map(|k| Aabb::cube([(k % 17) as f32, (k % 13) as f32, (k % 11) as f32], 0.1 * k as f32));
-        for query in queries {
-            let expected = (0..LANES - 1).filter(|&k| lane(k).overlaps(&query)).fold(0, |mask, k| mask | 1 << k);
+        let boxes: Vec<Aabb> =
+            (0..300).map(|k| Aabb::cube([k as f32 / 9.0, (k * 7 % 16) as f32, (k * 3 % 16) as f32], 2.5)).collect();
+        let mut levels = vec![vec![Node::EMPTY; 19], vec![Node::EMPTY; 2], vec![]];
+        for (k, b) in boxes.iter().enumerate() {
+            levels[0][k / LANES].set(k % LANES, b);
+            assert!(levels[1][k / LANES / LANES].widen(k / LANES % LANES, b) || k % LANES > 0);
+        }
+        let infinite = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
+        let queries = (0..60).map(|k| Aabb::cube([(k % 34) as f32, (k % 13) as f32, (k % 11) as f32], 0.1 * k as f32));
+        for query in queries.chain([infinite]) {
+            let expected: Vec<usize> = (0..boxes.len()).filter(|&k| boxes[k].overlaps(&query)).collect();
             for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
-                assert_eq!(node.overlapping(level, &query), expected, "{level}");
+                let mut found = Vec::new();
+                each_overlapping(level, &levels, true, &query, |k| found.push(k));
+                // Lanes that hold nothing overlap infinite bounds: the caller knows how many there are.
+                found.retain(|&k| k < boxes.len());
+                assert_eq!(found, expected, "{level}");
             }
         }
     }

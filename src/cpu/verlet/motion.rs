@@ -13,13 +13,13 @@ mod cost {
     /// A box looked at.
     pub(super) const BOX: f32 = 1.5;
     /// A kept pair tested.
-    pub(super) const KEPT: f32 = 3.0;
+    pub(super) const KEPT: f32 = 2.5;
     /// A box looked at again in a frame in which some box left.
     pub(super) const AGAIN: f32 = 1.0;
-    /// A box that left, and each of its kept pairs.
+    /// A box that left, and each of its kept pairs, while the tree is in the cache.
     pub(super) const LEFT: [f32; 2] = [120.0, 20.0];
     /// A box and a pair in the strips.
-    pub(super) const SCRATCH: [f32; 2] = [40.0, 12.0];
+    pub(super) const SCRATCH: [f32; 2] = [30.0, 7.0];
 }
 
 /// Margins that are compared, as shares of a mean edge.
@@ -30,6 +30,9 @@ const WORTH: f32 = 1.0;
 
 /// Frames from scratch after keeping did not pay, at first and at most.
 const PAUSE: [u32; 2] = [16, 512];
+
+/// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
+const PROVEN: u32 = 256;
 
 /// What the next frame should do.
 #[derive(Debug, Clone, Copy)]
@@ -64,8 +67,8 @@ struct Keeping {
     kept: f32,
     /// Boxes that left since all were made anew, over all boxes.
     left: f32,
-    /// Frames since then.
-    age: u32,
+    /// Frames since keeping began.
+    frames: u32,
 }
 
 impl Default for Motion {
@@ -109,31 +112,35 @@ impl Motion {
     /// Learns from a frame in which `left` of `objects` boxes left and `kept` pairs were tested. `false` when keeping does not
     /// pay any more.
     pub(super) fn learn(&mut self, objects: usize, left: usize, kept: usize, anew: bool) -> bool {
-        let scratch = scratch(self.density);
+        let far = far(objects);
+        let scratch = scratch(far, self.density);
         let Some(k) = &mut self.keeping else { return false };
         let share = |count: usize| count as f32 / objects.max(1) as f32;
         let (left, kept) = (share(left), share(kept));
-        let leaving = if left > 0.0 { cost::AGAIN + self::left(kept) * left } else { 0.0 };
-        let work = if anew { 1.5 * self::scratch(kept) } else { leaving };
-        let now = cost::BOX + cost::KEPT * kept + work;
+        let leaving = if left > 0.0 { cost::AGAIN + self::left(far, kept) * left } else { 0.0 };
+        let work = if anew { 1.5 * self::scratch(far, kept) } else { leaving };
+        let now = tests(far, kept) + work;
         k.cost += (now - k.cost) / 16.0;
         k.kept += (kept - k.kept) / 16.0;
         if anew {
             k.left = 0.0;
-            k.age = 0;
         } else {
             k.left += left;
-            k.age += 1;
             k.leaving += (left - k.leaving) / 16.0;
         }
         // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p with p
         // between 1, for those that fly straight on, and 2, for those that wander.
         let m = k.margin.share;
-        let (keep, leave) = (cost::KEPT * k.kept * 6.0 * m / (1.0 + 2.0 * m), 1.5 * self::left(k.kept) * k.leaving);
+        let (keep, leave) =
+            ((tests(far, k.kept) - cost::BOX) * 6.0 * m / (1.0 + 2.0 * m), 1.5 * self::left(far, k.kept) * k.leaving);
         if leave > 1.2 * keep {
             k.margin.share = (m * 1.02).min(MARGINS[MARGINS.len() - 1]);
         } else if keep > 1.2 * leave {
             k.margin.share = (m / 1.02).max(MARGINS[0]);
+        }
+        k.frames = k.frames.saturating_add(1);
+        if k.frames == PROVEN {
+            self.last_pause = PAUSE[0];
         }
         k.cost < scratch
     }
@@ -147,10 +154,11 @@ impl Motion {
         let sample = Sample::of(boxes);
         let longest_edge = 4.0 * (sample.extent.iter().sum::<f64>() / 3.0) as f32;
         let motion = self.motion(boxes, longest_edge)?;
-        let scratch = scratch(self.density);
+        let far = far(boxes.len());
+        let scratch = scratch(far, self.density);
         let cost = |m: f32| {
             let kept = self.density * (1.0 + 2.0 * m).powi(3);
-            cost::BOX + cost::KEPT * kept + cost::AGAIN + left(kept) * leaving(motion, m)
+            tests(far, kept) + cost::AGAIN + left(far, kept) * leaving(motion, m)
         };
         let best = MARGINS.into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
         let margin = Margin { share: best, longest_edge };
@@ -161,7 +169,7 @@ impl Motion {
             leaving: leaving(motion, best),
             kept,
             left: 0.0,
-            age: 0,
+            frames: 0,
         })
     }
 
@@ -193,17 +201,28 @@ impl Motion {
 }
 
 /// The cost of a box in the strips.
-fn scratch(density: f32) -> f32 {
-    cost::SCRATCH[0] + cost::SCRATCH[1] * density
+fn scratch(far: f32, density: f32) -> f32 {
+    far.sqrt() * (cost::SCRATCH[0] + cost::SCRATCH[1] * density)
+}
+
+/// The cost of a box whose kept pairs are tested.
+fn tests(far: f32, kept: f32) -> f32 {
+    cost::BOX + far.sqrt() * cost::KEPT * kept
 }
 
 /// The cost of a box that left when each box has so many kept pairs.
-fn left(kept: f32) -> f32 {
-    cost::LEFT[0] + cost::LEFT[1] * kept
+fn left(far: f32, kept: f32) -> f32 {
+    far * (cost::LEFT[0] + cost::LEFT[1] * kept)
 }
 
-/// The share of boxes that leave in a frame, when they move by `motion` and may by `margin`: between the motion over the margin,
-/// of those that fly straight on, and its square, of those that wander.
+/// How many times as much a look at a node of the tree costs than in a small scene: with the number of objects the tree
+/// moves out of the caches. What reads memory in order suffers less, by the root of this.
+fn far(objects: usize) -> f32 {
+    (1.0 + 0.8 * (objects as f32 / 30_000.0).log2()).clamp(1.0, 5.0)
+}
+
+/// The share of boxes that leave in a frame, when they move by `motion` and may by `margin`, as of those that wander. More
+/// leave of those that fly straight on, which shows in a few frames.
 fn leaving(motion: f32, margin: f32) -> f32 {
-    (motion / margin).powf(1.5).min(1.0)
+    (motion / margin).powi(2).min(1.0)
 }

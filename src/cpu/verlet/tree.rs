@@ -5,13 +5,18 @@
 
 use super::grown::NOTHING;
 use crate::cpu::SimdLevel;
-use crate::cpu::columns::ensure;
-use crate::cpu::kernel::node::{LANES, Node};
-use crate::cpu::kernel::{each_bit, prefetch};
+use crate::cpu::columns::{ensure, part};
+use crate::cpu::kernel::node::{LANES, Node, each_overlapping};
 use crate::cpu::sort::sort;
 use crate::cpu::workers::Workers;
 use crate::sample::Sample;
 use crate::{Aabb, Error};
+
+/// Boxes that move in one phase on all threads; fewer are moved in less time than a phase takes.
+const SMALLEST_SPLIT: usize = 1024;
+
+/// Boxes from which on what belongs to them is likely not in the second-level cache: 1.2 MB of boxes, and as much in the tree.
+pub(super) const FAR: usize = 50_000;
 
 /// See the module.
 #[derive(Debug)]
@@ -24,8 +29,11 @@ pub(super) struct Tree {
     place_of: Vec<u32>,
     /// The leaves, which hold boxes; then nodes that hold bounds of the leaves, and so on. The last level has 16 nodes at first.
     levels: Vec<Vec<Node>>,
-    /// Position along a Morton curve in the upper half, box in the lower.
+    /// Keys to sort: position along a Morton curve in the upper half, box in the lower; or the place and the box of those that
+    /// moved.
     keys: Vec<u64>,
+    /// How many moved; the keys are theirs.
+    moved: usize,
     scratch: Vec<u64>,
     level: SimdLevel,
 }
@@ -38,6 +46,7 @@ impl Tree {
             place_of: Vec::new(),
             levels: Vec::new(),
             keys: Vec::new(),
+            moved: 0,
             scratch: Vec::new(),
             level,
         }
@@ -83,8 +92,8 @@ impl Tree {
         Ok(())
     }
 
-    /// Adds a box that is not in the tree.
-    pub(super) fn insert(&mut self, id: u32, bounds: &Aabb) -> Result<(), Error> {
+    /// Adds a box that is not in the tree. It has no bounds there before [`Tree::follow`] gives it some.
+    pub(super) fn insert(&mut self, id: u32) -> Result<(), Error> {
         ensure(&mut self.ids, self.places + 1, "boxes in a tree")?;
         ensure(&mut self.place_of, id as usize + 1, "boxes in a tree")?;
         self.ids[self.places] = id;
@@ -96,7 +105,6 @@ impl Tree {
             children = children.div_ceil(LANES);
             grow(level, children)?;
         }
-        self.replace(id, bounds);
         Ok(())
     }
 
@@ -106,41 +114,62 @@ impl Tree {
         self.levels[0][place / LANES].set(place % LANES, &NOTHING);
     }
 
-    /// Gives a box in the tree new bounds.
-    pub(super) fn replace(&mut self, id: u32, bounds: &Aabb) {
-        let mut at = self.place_of[id as usize] as usize;
-        let Some((leaves, above)) = self.levels.split_first_mut() else { return };
-        leaves[at / LANES].set(at % LANES, bounds);
-        for level in above.iter_mut().take_while(|level| !level.is_empty()) {
-            at /= LANES;
-            if !level[at / LANES].widen(at % LANES, bounds) {
-                break;
+    /// Gives boxes in the tree the bounds that they have now, `boxes[id]`.
+    pub(super) fn follow(
+        &mut self,
+        workers: &Workers,
+        boxes: &[Aabb],
+        moved: impl Iterator<Item = u32> + Clone,
+    ) -> Result<(), Error> {
+        self.moved = moved.clone().count();
+        ensure(&mut self.keys, self.moved, "boxes that moved")?;
+        for (key, id) in self.keys.iter_mut().zip(moved) {
+            *key = u64::from(self.place_of[id as usize]) << 32 | u64::from(id);
+        }
+        // In the order of the tree, so that what one box needs of it is still in the cache for the next.
+        sort(workers, &mut self.keys, &mut self.scratch, self.moved)?;
+        let keys = &self.keys[..self.moved];
+        let Some((leaves, above)) = self.levels.split_first_mut() else { return Ok(()) };
+        // Each task has leaves of its own.
+        let size = leaves.len().div_ceil(if self.moved < SMALLEST_SPLIT { 1 } else { workers.tasks() }).max(1);
+        let mut rest = keys;
+        let parts = leaves.chunks_mut(size).zip((0..).step_by(size)).map(|(leaves, first)| {
+            let end = ((first + leaves.len()) * LANES) as u64;
+            let (part, behind) = rest.split_at(rest.partition_point(|key| key >> 32 < end));
+            rest = behind;
+            (leaves, first, part)
+        });
+        workers.each_of(parts, |(leaves, first, part)| {
+            for &key in part {
+                let place = (key >> 32) as usize;
+                leaves[place / LANES - first].set(place % LANES, &boxes[key as u32 as usize]);
+            }
+        });
+        for &key in keys {
+            let mut at = (key >> 32) as usize;
+            for level in above.iter_mut().take_while(|level| !level.is_empty()) {
+                at /= LANES;
+                if !level[at / LANES].widen(at % LANES, &boxes[key as u32 as usize]) {
+                    break;
+                }
             }
         }
+        Ok(())
+    }
+
+    /// Part `k` of `parts` of the boxes that moved, those near in space together.
+    pub(super) fn moved(&self, k: usize, parts: usize) -> impl Iterator<Item = u32> {
+        self.keys[part(self.moved, k, parts)].iter().map(|&key| key as u32)
     }
 
     /// Calls `found` for every box that overlaps these bounds.
     #[inline]
     pub(super) fn overlapping(&self, bounds: &Aabb, mut found: impl FnMut(u32)) {
-        let Some(top) = self.levels.iter().rposition(|level| !level.is_empty()) else { return };
-        for node in 0..self.levels[top].len() {
-            self.visit(top, node, bounds, &mut found);
-        }
-    }
-
-    fn visit(&self, level: usize, node: usize, bounds: &Aabb, found: &mut impl FnMut(u32)) {
-        let mask = self.levels[level][node].overlapping(self.level, bounds);
-        if level > 0 && self.places > 50_000 {
-            let children = &self.levels[level - 1][node * LANES..];
-            each_bit(mask, |lane| children.get(lane).into_iter().for_each(prefetch));
-        }
-        each_bit(mask, |lane| {
-            let child = node * LANES + lane;
-            // A lane without a child holds nothing, which still overlaps infinite bounds.
-            if level > 0 && child < self.levels[level - 1].len() {
-                self.visit(level - 1, child, bounds, found);
-            } else if level == 0 && child < self.places {
-                found(self.ids[child]);
+        let far = self.places > FAR;
+        each_overlapping(self.level, &self.levels, far, bounds, |place| {
+            // Lanes that hold nothing overlap infinite bounds.
+            if place < self.places {
+                found(self.ids[place]);
             }
         });
     }
