@@ -1,6 +1,6 @@
 //! The in-line module: the cheapest algorithm for this frame, chosen before it runs.
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Load, Pairs, Registry, Source, Step};
+use crate::{Aabb, AlgorithmId, BroadPhase, Displacement, Error, Fields, Load, Pairs, Registry, Source, Step};
 use std::fmt;
 
 /// A switch must promise to save at least this share of a frame. Without it the choice would flicker at a border, where
@@ -30,9 +30,22 @@ pub struct Adaptive {
     /// Objects when the load was sampled, and frames since.
     sampled: u32,
     age: u32,
+    displacement: Displacement,
+    watching: Watching,
     /// Objects and pairs of the frame before.
     before: Option<(u32, u64)>,
     choice: Option<Choice>,
+}
+
+/// How far the boxes move is found out in the frame after each sample.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Watching {
+    /// It is known.
+    Done,
+    /// It was sampled; this frame is to be watched when its pairs are found.
+    Due,
+    /// The next frame is to be compared with what was watched.
+    Begun,
 }
 
 struct Candidate {
@@ -107,7 +120,18 @@ impl Adaptive {
             let hint = || "these fields name no algorithm; make them with `sapwise predict`".to_owned();
             return Err(failure.unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
         }
-        Ok(Self { fields, candidates, current: None, load: Load::default(), sampled: 0, age: 0, before: None, choice: None })
+        Ok(Self {
+            fields,
+            candidates,
+            current: None,
+            load: Load::default(),
+            sampled: 0,
+            age: 0,
+            displacement: Displacement::default(),
+            watching: Watching::Done,
+            before: None,
+            choice: None,
+        })
     }
 
     /// Runs one algorithm always.
@@ -150,9 +174,14 @@ impl Adaptive {
     fn observe(&mut self, boxes: &[Aabb]) {
         let objects = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
+        if self.watching == Watching::Begun {
+            self.load.moved = self.displacement.moved(boxes).unwrap_or(1.0);
+            self.watching = Watching::Done;
+        }
         let drift = objects.abs_diff(self.sampled);
         if self.before.is_none() || self.age >= SAMPLE_EVERY || drift > (self.sampled / 16).max(SAMPLE_DRIFT) {
-            self.load = Load::estimate(boxes, pairs);
+            self.load = Load::estimate(boxes, pairs, self.before.map(|_| self.load.moved));
+            self.watching = Watching::Due;
             self.sampled = objects;
             self.age = 0;
             return;
@@ -253,6 +282,11 @@ impl BroadPhase for Adaptive {
                 Ok(()) => {
                     candidate.ready = candidate.ready.max(choice.load.objects);
                     self.before = Some((choice.load.objects, pairs.len() as u64));
+                    // Not while observing: `decide` and `find_pairs` may both observe one frame, and it has not moved in between.
+                    if self.watching == Watching::Due {
+                        self.displacement.watch(boxes);
+                        self.watching = Watching::Begun;
+                    }
                     self.warm_runner_up();
                     return Ok(());
                 }
@@ -277,6 +311,10 @@ impl BroadPhase for Adaptive {
             }
         }
     }
+
+    fn keeps_work(&self) -> bool {
+        self.candidates.iter().filter_map(|c| c.algorithm.as_ref()).any(|a| a.keeps_work())
+    }
 }
 
 impl fmt::Debug for Adaptive {
@@ -291,102 +329,4 @@ fn scaled(count: f64, objects: u32, before: u32) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{AlgorithmCost, CostCurve, CostTerm, Term};
-
-    fn fields(costs: &[(&str, f64, f64)]) -> Fields {
-        let curve = |call: f64, object: f64| CostCurve {
-            terms: vec![CostTerm { term: Term::Call, unit_ns: call }, CostTerm { term: Term::Objects, unit_ns: object }],
-            ..CostCurve::default()
-        };
-        let costs = costs.iter().map(|&(id, call, object)| AlgorithmCost {
-            algorithm: id.parse().unwrap(),
-            revision: 1,
-            curve: curve(call, object),
-            spread_ln: 0.0,
-        });
-        let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
-        Fields::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
-    }
-
-    fn row(count: usize) -> Vec<Aabb> {
-        (0..count).map(|k| Aabb::cube([k as f32; 3], 0.5)).collect()
-    }
-
-    fn chosen(adaptive: &mut Adaptive, objects: usize) -> (String, Reason) {
-        adaptive.find_pairs(&row(objects), &mut Pairs::new()).unwrap();
-        let decision = adaptive.last_decision().unwrap();
-        (decision.algorithm.to_string(), decision.reason)
-    }
-
-    #[test]
-    fn it_switches_at_the_border_and_not_within_the_hysteresis() {
-        // 10 n = 1000 + 5 n at n = 200.
-        let fields = fields(&[("brute@cpu1", 0.0, 10.0), ("strips@cpu1", 1000.0, 5.0)]);
-        let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
-        let (brute, strips) = ("brute@cpu1".to_owned(), "strips@cpu1".to_owned());
-        assert_eq!(chosen(&mut adaptive, 100), (brute.clone(), Reason::First));
-        assert_eq!(chosen(&mut adaptive, 150), (brute.clone(), Reason::Stayed));
-        assert_eq!(chosen(&mut adaptive, 205), (brute.clone(), Reason::Hysteresis));
-        assert_eq!(chosen(&mut adaptive, 300), (strips.clone(), Reason::Switched));
-        assert_eq!(chosen(&mut adaptive, 195), (strips.clone(), Reason::Hysteresis));
-        assert_eq!(chosen(&mut adaptive, 50), (brute, Reason::Switched));
-        let decision = adaptive.last_decision().unwrap();
-        assert_eq!(decision.predicted_ns, Some(500.0));
-        assert_eq!(decision.runner_up.unwrap().1, 1250.0);
-        assert_eq!(decision.source, Source::Measured);
-    }
-
-    #[test]
-    fn hand_written_thresholds_decide_by_count() {
-        let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
-        let steps = vec![step(0, "brute@cpu1"), step(64, "sweep@cpu1"), step(1000, "strips@cpu1")];
-        let fields = Fields::from_steps(steps).unwrap();
-        let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
-        assert_eq!(chosen(&mut adaptive, 10).0, "brute@cpu1");
-        assert_eq!(chosen(&mut adaptive, 65), ("brute@cpu1".to_owned(), Reason::Hysteresis));
-        assert_eq!(chosen(&mut adaptive, 90), ("sweep@cpu1".to_owned(), Reason::Switched));
-        assert_eq!(chosen(&mut adaptive, 10), ("brute@cpu1".to_owned(), Reason::Switched));
-        // Near a border, but not one of brute force's.
-        assert_eq!(chosen(&mut adaptive, 1000), ("strips@cpu1".to_owned(), Reason::Switched));
-    }
-
-    /// Works for a few frames, then is lost as a GPU can be.
-    struct Fragile(u32);
-
-    impl BroadPhase for Fragile {
-        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-            if self.0 == 0 {
-                let algorithm = "fragile@gpu0".parse().unwrap();
-                return Err(Error::Unavailable { algorithm, reason: "lost".to_owned() });
-            }
-            self.0 -= 1;
-            pairs.clear();
-            pairs.finish()
-        }
-    }
-
-    #[test]
-    fn a_lost_algorithm_is_replaced_within_the_frame() {
-        let mut registry = Registry::with_cores(1);
-        registry.add("fragile@gpu0".parse().unwrap(), 1, || Ok(Box::new(Fragile(2))));
-        let fields = fields(&[("fragile@gpu0", 1.0, 0.0), ("brute@cpu1", 2.0, 1.0)]);
-        let mut adaptive = Adaptive::new(fields, &registry).unwrap();
-        assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu0");
-        assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu0");
-        let mut pairs = Pairs::new();
-        adaptive.find_pairs(&row(30), &mut pairs).unwrap();
-        assert_eq!(pairs.len(), 29);
-        assert_eq!(adaptive.last_decision().unwrap().reason, Reason::FellBack);
-        assert_eq!(chosen(&mut adaptive, 30), ("brute@cpu1".to_owned(), Reason::Stayed));
-    }
-
-    #[test]
-    fn unknown_algorithms_are_skipped_and_none_at_all_is_an_error() {
-        let registry = Registry::with_cores(1);
-        let mixed = fields(&[("octree@cpu1", 0.0, 0.1), ("brute@cpu1", 0.0, 1.0)]);
-        assert_eq!(chosen(&mut Adaptive::new(mixed, &registry).unwrap(), 20).0, "brute@cpu1");
-        assert!(Adaptive::new(fields(&[("octree@cpu1", 0.0, 0.1)]), &registry).is_err());
-    }
-}
+mod tests;

@@ -23,6 +23,11 @@ pub trait BroadPhase: Send {
     fn prepare(&mut self, objects: usize) {
         let _ = objects;
     }
+
+    /// Whether a frame is cheaper after one that was alike. Whoever times it has to run some frames first.
+    fn keeps_work(&self) -> bool {
+        false
+    }
 }
 
 /// `Ok` when 32-bit pair members can name `objects` boxes.

@@ -23,6 +23,8 @@ pub enum Term {
     StripCandidates,
     /// Pairs written ([`Load::pairs`]).
     Pairs,
+    /// Boxes times how far they move ([`Load::moved`]): boxes that leave their grown boxes grow with it.
+    Moved,
 }
 
 /// Bounds of what a file may hold: an hour for one object, 2^64 objects, a correction by e^50. Beyond them the arithmetic of a
@@ -36,7 +38,7 @@ const WORKING_SET_BYTES: f64 = 64.0;
 
 impl Term {
     /// Every term.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Call,
         Self::Objects,
         Self::Sort,
@@ -45,6 +47,7 @@ impl Term {
         Self::AxisCandidates,
         Self::StripCandidates,
         Self::Pairs,
+        Self::Moved,
     ];
 
     /// The count of operations under a load, on a machine with a last-level cache of `cache_bytes`.
@@ -79,6 +82,7 @@ impl<'a> Counts<'a> {
             Term::AxisCandidates => self.load.axis_candidates,
             Term::StripCandidates => self.load.strip_candidates,
             Term::Pairs => self.load.pairs,
+            Term::Moved => n * self.load.moved,
         }
     }
 }
@@ -189,6 +193,12 @@ mod tests {
         let load = |objects| Load { objects, ..Load::default() };
         assert_eq!(Term::ColdObjects.count(&load(1000), 64_000.0), 0.0);
         assert_eq!(Term::ColdObjects.count(&load(2000), 64_000.0), 1000.0);
+    }
+
+    #[test]
+    fn a_scene_at_rest_has_no_moved_boxes() {
+        let load = |moved| Load { objects: 200, moved, ..Load::default() };
+        assert_eq!([0.0, 0.25, 1.0].map(|moved| Term::Moved.count(&load(moved), 0.0)), [0.0, 50.0, 200.0]);
     }
 
     #[test]

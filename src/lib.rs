@@ -34,6 +34,7 @@ mod broad_phase;
 mod cost;
 mod cpu;
 pub mod crossover;
+mod displacement;
 mod error;
 pub mod fields;
 #[cfg(feature = "gpu")]
@@ -60,6 +61,7 @@ pub use broad_phase::BroadPhase;
 pub use cost::{CostCurve, CostTerm, Knot, Term};
 pub use cpu::SimdLevel;
 pub use crossover::{Crossover, Paired, Position};
+pub use displacement::Displacement;
 pub use error::{BoxDefect, Error};
 pub use fields::{AlgorithmCost, Border, Fields, Ranking, Source, Step};
 pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, Machine, Parameter};

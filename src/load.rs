@@ -19,16 +19,18 @@ pub struct Load {
     pub strip_candidates: f64,
     /// Overlapping pairs: those of the frame before where there is one, else a guess from the sample.
     pub pairs: f64,
-    /// Share of the boxes that changed since the frame before, 0 to 1. Not estimated yet: always 1.
+    /// How far the boxes move in a frame ([`Displacement::moved`](crate::Displacement::moved)): the mean over a sample of the
+    /// greatest displacement of a bound since the frame before, in mean edges of the box and no more than 1 each. 0: nothing
+    /// moves. 1: no frame helps with the next, and so it is where no frame before is known.
     pub moved: f64,
 }
 
 impl Load {
     /// Estimates the load of a frame from up to 256 of its boxes, in a time that does not grow beyond 16 000 objects.
     ///
-    /// `pairs` is the number of pairs of the frame before, if there was one.
+    /// `pairs` is the number of pairs of the frame before and `moved` how far the boxes have moved since, if there was one.
     #[must_use]
-    pub fn estimate(boxes: &[Aabb], pairs: Option<f64>) -> Self {
+    pub fn estimate(boxes: &[Aabb], pairs: Option<f64>, moved: Option<f64>) -> Self {
         let chosen = Chosen::from(boxes);
         let sample = Sample::statistics(&chosen);
         let n = boxes.len() as f64;
@@ -47,10 +49,10 @@ impl Load {
             strip_share(&chosen, &grid, shares[axis], pairs / independent.max(1.0)) * all
         };
         let strip_candidates = strip_candidates.max(pairs).min(axis_candidates.max(pairs));
-        Self { objects: boxes.len() as u32, axis_candidates, strip_candidates, pairs, moved: 1.0 }
+        Self { objects: boxes.len() as u32, axis_candidates, strip_candidates, pairs, moved: moved.unwrap_or(1.0) }
     }
 
-    /// The load of a frame that looks like this one but has another number of objects and pairs.
+    /// The load of a frame that looks and moves like this one but has another number of objects and pairs.
     #[must_use]
     pub fn rescaled(&self, objects: u32, pairs: f64) -> Self {
         let growth = if self.objects > 0 { f64::from(objects) / f64::from(self.objects) } else { 1.0 };

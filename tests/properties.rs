@@ -1,7 +1,7 @@
 //! What must hold for any boxes at all.
 
 use proptest::prelude::*;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Fields, Load, PairOrder, Pairs, Registry, Step};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Displacement, Fields, Load, PairOrder, Pairs, Registry, Step};
 
 /// Bounds that meet often, with infinities, zeros of both signs and denormals among them.
 fn bound() -> impl Strategy<Value = f32> {
@@ -70,9 +70,16 @@ proptest! {
     fn a_load_is_finite_whatever_the_boxes(boxes in prop::collection::vec((prop::array::uniform3(any::<f32>()), prop::array::uniform3(any::<f32>())), 0..300)) {
         let boxes: Vec<Aabb> = boxes.into_iter().map(|(min, max)| Aabb::new(min, max)).collect();
         for pairs in [None, Some(0.0), Some(1.0e6)] {
-            let load = Load::estimate(&boxes, pairs);
-            let all = [load.axis_candidates, load.strip_candidates, load.pairs, load.moved];
-            prop_assert!(all.iter().all(|v| v.is_finite() && *v >= 0.0), "{:?}", load);
+            let load = Load::estimate(&boxes, pairs, None);
+            let all = [load.axis_candidates, load.strip_candidates, load.pairs];
+            prop_assert!(all.iter().all(|v| v.is_finite() && *v >= 0.0) && load.moved == 1.0, "{:?}", load);
+        }
+        let mut displacement = Displacement::default();
+        displacement.watch(&boxes);
+        let reversed: Vec<Aabb> = boxes.iter().rev().copied().collect();
+        for (now, most) in [(&boxes, 0.0), (&reversed, 1.0)] {
+            let moved = displacement.moved(now).unwrap_or(0.0);
+            prop_assert!((0.0..=most).contains(&moved), "{}", moved);
         }
     }
 

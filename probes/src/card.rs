@@ -7,9 +7,9 @@ use sapwise::{BackendClass, Model};
 const USE: &str = "
 Predicts, from the hardware parameters of a machine, what each broad-phase algorithm costs under a load; `predict` derives
 from that which algorithm is fastest where. The time of a frame is a sum of physical terms with non-negative units (calls,
-fork-joins, objects, comparisons of a sort, objects outside the cache, pairs and candidates tested), each scaled by the
-parameter that it depends on (clock, SIMD lanes, scaling over threads, memory bandwidth, fork-join latency), times the
-exponential of a ridge residual. The units are fitted on relative error, robustly, and are shared by all machines and
+fork-joins, objects and how far they move, comparisons of a sort, objects outside the cache, pairs and candidates tested), each
+scaled by the parameter that it depends on (clock, SIMD lanes, scaling over threads, memory bandwidth, fork-join latency), times
+the exponential of a ridge residual. The units are fitted on relative error, robustly, and are shared by all machines and
 thread counts.
 
 Regret is the time of the choice over the time of the best choice, less one, on reports that the fit did not see. A choice

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use sapwise::hardware::parameter;
-use sapwise::{Fields, GpuIdentity, Hardware, Load, Model, Pairs, Registry, Scenario, Source};
+use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Registry, Scenario, Source};
 
 /// Objects of the slice that the fields show: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
@@ -45,16 +45,19 @@ pub(crate) fn slice(scenario: Scenario) -> anyhow::Result<Vec<Load>> {
     let registry = Registry::with_cores(1);
     let mut counter = registry.create(&"strips@cpu1".parse()?)?;
     let mut pairs = Pairs::new();
+    let mut displacement = Displacement::default();
     let mut loads = Vec::new();
     for quarter in SLICE {
         crate::interrupt::check()?;
         let objects = 10.0_f64.powf(f64::from(quarter) / 4.0).round() as usize;
         let mut scene = scenario.start(objects, SEED);
+        displacement.watch(scene.boxes());
         crate::sweep::next_frame(&mut scene);
         counter
             .find_pairs(scene.boxes(), &mut pairs)
             .with_context(|| format!("the pairs of {scenario} at {objects} objects"))?;
-        loads.push(Load::estimate(scene.boxes(), Some(pairs.len() as f64)));
+        let moved = displacement.moved(scene.boxes());
+        loads.push(Load::estimate(scene.boxes(), Some(pairs.len() as f64), moved));
     }
     Ok(loads)
 }
@@ -70,5 +73,6 @@ mod tests {
         assert_eq!(uniform.len(), 21);
         assert!(uniform.is_sorted_by(|a, b| a.objects < b.objects && a.axis_candidates <= b.axis_candidates));
         assert!(clustered[20].pairs > 3.0 * uniform[20].pairs);
+        assert!(uniform.iter().all(|l| (0.02..=0.05).contains(&l.moved)), "{uniform:?}");
     }
 }

@@ -261,7 +261,7 @@ mod tests {
         let fields = Fields::from_steps(vec![step(0, "brute@cpu1"), step(100, "strips@cpu1")]).unwrap();
         let course = Course { scenario: Scenario::Fragmentation, objects: 800, frames: 300, repeats: 3, seed: 1 };
         let outcome = simulate(&course, fields, &registry).unwrap();
-        assert_eq!((outcome.frames.len(), outcome.repeats, outcome.fixed.len()), (300, 3, 3));
+        assert_eq!((outcome.frames.len(), outcome.repeats, outcome.fixed.len()), (300, 3, registry.available().len()));
         assert!(outcome.oracle_ms() > 0.0 && outcome.oracle_ms() <= outcome.best_fixed().unwrap().1);
         assert!(outcome.switches() >= 1);
         for frame in &outcome.frames {

@@ -86,6 +86,10 @@ impl BroadPhase for Verlet {
         self.finder.prepare(objects);
         let _ = self.grown.reserve(objects);
     }
+
+    fn keeps_work(&self) -> bool {
+        true
+    }
 }
 
 impl Verlet {

@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn one_report_gives_a_model_without_scores() {
         let trained = train(&reports()[..1], "test").unwrap();
-        assert_eq!(trained.model.methods.len(), 3);
+        assert_eq!(trained.model.methods.len(), 4);
         assert!(trained.model.validation.methods.is_empty());
     }
 

@@ -232,13 +232,13 @@ fn point(scenario: &str, load: Load, timings: Vec<Timing>) -> Point {
     }
 }
 
-/// Loads like those of a constant density, and of clusters of growing density.
+/// Loads like those of a constant density that moves little, and of clusters of growing density that move less and less.
 pub(crate) fn load(scenario: &str, n: f64) -> Load {
-    let (axis, strip, pairs) = match scenario {
-        "uniform" => (0.3 * n.powf(5.0 / 3.0), 4.0 * n, 1.0 * n),
-        _ => (0.8 * n.powf(1.7), 3.0 * n.powf(1.25), 1.2 * n.powf(1.2)),
+    let (axis, strip, pairs, moved) = match scenario {
+        "uniform" => (0.3 * n.powf(5.0 / 3.0), 4.0 * n, 1.0 * n, 0.04),
+        _ => (0.8 * n.powf(1.7), 3.0 * n.powf(1.25), 1.2 * n.powf(1.2), n.powf(-0.2)),
     };
-    Load { objects: n as u32, axis_candidates: axis, strip_candidates: strip, pairs, moved: 1.0 }
+    Load { objects: n as u32, axis_candidates: axis, strip_candidates: strip, pairs, moved }
 }
 
 fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> MethodModel {
@@ -309,6 +309,18 @@ pub(crate) fn truth() -> Vec<MethodModel> {
         ),
         method("sweep", &sorted(1500.0, 3.0, (AxisCandidates, SharedLane, 7.0))),
         method("strips", &sorted(6000.0, 4.0, (StripCandidates, SharedLane, 60.0))),
+        method(
+            "verlet",
+            &[
+                (Call, Cycle, 8000.0),
+                (Call, ForkJoin, 2.0),
+                (Objects, SharedCycle, 15.0),
+                (ColdObjects, Byte, 60.0),
+                (StripCandidates, SharedLane, 40.0),
+                (Pairs, SharedCycle, 20.0),
+                (Moved, SharedCycle, 150.0),
+            ],
+        ),
     ]
 }
 

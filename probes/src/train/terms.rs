@@ -9,9 +9,20 @@ fn tests(method: &str) -> &'static [Term] {
     match method {
         "brute" => &[Term::AllPairs],
         "sweep" => &[Term::AxisCandidates],
-        "strips" => &[Term::StripCandidates],
+        // Verlet lists are made by the strips, which also take over where boxes move too far.
+        "strips" | "verlet" => &[Term::StripCandidates],
         _ => &[Term::AllPairs, Term::AxisCandidates, Term::StripCandidates],
     }
+}
+
+/// Whether the boxes are sorted in every frame. Verlet lists sort them in few, or, where the strips take over, by their cells only.
+fn sorts(method: &str) -> bool {
+    !matches!(method, "brute" | "verlet")
+}
+
+/// Whether a frame may be cheaper where boxes move little.
+fn keeps_work(method: &str) -> bool {
+    !matches!(method, "brute" | "sweep" | "strips")
 }
 
 /// The physical terms of a method over machines, for any number of threads or GPUs.
@@ -20,17 +31,24 @@ fn tests(method: &str) -> &'static [Term] {
 /// the lanes before work of the cycles, divided work before serial work, the GPU's work before that of the CPU for it.
 pub(crate) fn terms(method: &str, class: BackendClass) -> Vec<(Term, Scale)> {
     use {Scale::*, Term::*};
-    let sorts = method != "brute";
+    let sorts = sorts(method);
     let tests = tests(method).iter();
     let mut list;
     match class {
         BackendClass::Cpu => {
             list = vec![(Call, Cycle), (Call, ForkJoin), (Objects, SharedCycle)];
             if sorts {
-                list.extend([(Sort, SharedCycle), (ColdObjects, Byte)]);
+                list.push((Sort, SharedCycle));
+            }
+            if method != "brute" {
+                list.push((ColdObjects, Byte));
             }
             list.extend(tests.flat_map(|&t| [(t, SharedLane), (t, SharedCycle)]));
-            list.extend([(Pairs, SharedCycle), (Objects, Cycle)]);
+            list.push((Pairs, SharedCycle));
+            if keeps_work(method) {
+                list.push((Moved, SharedCycle));
+            }
+            list.push((Objects, Cycle));
             if sorts {
                 list.push((Sort, Cycle));
             }
@@ -51,7 +69,7 @@ pub(crate) fn terms(method: &str, class: BackendClass) -> Vec<(Term, Scale)> {
 /// The terms of a method within one machine, where everything but the load is constant.
 pub(crate) fn terms_of_one_machine(method: &str, class: BackendClass) -> Vec<Term> {
     let mut list = vec![Term::Call, Term::Objects];
-    if method != "brute" {
+    if sorts(method) {
         list.push(Term::Sort);
     }
     // The caches of the CPU say nothing about a GPU.
@@ -60,5 +78,8 @@ pub(crate) fn terms_of_one_machine(method: &str, class: BackendClass) -> Vec<Ter
     }
     list.extend(tests(method));
     list.push(Term::Pairs);
+    if class == BackendClass::Cpu && keeps_work(method) {
+        list.push(Term::Moved);
+    }
     list
 }

@@ -1,11 +1,8 @@
 //! Whether keeping pairs pays, and with which margin.
 
 use super::grown::Margin;
-use crate::Aabb;
 use crate::sample::Sample;
-
-/// Boxes watched while pairs are not kept.
-const WATCHED: usize = 64;
+use crate::{Aabb, Displacement};
 
 /// Costs of the parts of a frame in nanoseconds, on the machine in `datasets/`. Only their ratios matter here, and only for
 /// the choice of a margin: they need not be those of the machine at hand.
@@ -46,8 +43,8 @@ pub(super) enum Advice {
 /// Watches how far boxes move, and what keeping costs.
 #[derive(Debug)]
 pub(super) struct Motion {
-    watched: [(u32, Aabb); WATCHED],
-    watching: usize,
+    /// Of the frame before, while pairs are not kept.
+    displacement: Displacement,
     /// Pairs for each box in the frame before.
     density: f32,
     keeping: Option<Keeping>,
@@ -73,8 +70,7 @@ struct Keeping {
 
 impl Default for Motion {
     fn default() -> Self {
-        let watched = [(0, Aabb::default()); WATCHED];
-        Self { watched, watching: 0, density: 0.0, keeping: None, pause: 0, last_pause: PAUSE[0] }
+        Self { displacement: Displacement::default(), density: 0.0, keeping: None, pause: 0, last_pause: PAUSE[0] }
     }
 }
 
@@ -83,7 +79,7 @@ impl Motion {
     pub(super) fn advise(&mut self, boxes: &[Aabb]) -> Advice {
         if self.keeping.is_none() {
             self.keeping = self.begin(boxes);
-            self.watch(boxes);
+            self.displacement.watch(boxes);
         }
         self.keeping.map_or(Advice::Scratch, |k| Advice::Keep(k.margin))
     }
@@ -96,7 +92,6 @@ impl Motion {
     /// Keeping failed; it will not be tried for some frames.
     pub(super) fn stop(&mut self) {
         self.keeping = None;
-        self.watching = 0;
         self.pause = self.last_pause;
         self.last_pause = (self.last_pause * 2).min(PAUSE[1]);
     }
@@ -153,7 +148,7 @@ impl Motion {
         }
         let sample = Sample::of(boxes);
         let longest_edge = 4.0 * (sample.extent.iter().sum::<f64>() / 3.0) as f32;
-        let motion = self.motion(boxes, longest_edge)?;
+let motion = self.displacement.moved(boxes)? as f32;
         let far = far(boxes.len());
         let scratch = scratch(far, self.density);
         let cost = |m: f32| {
@@ -171,32 +166,6 @@ impl Motion {
             left: 0.0,
             frames: 0,
         })
-    }
-
-    /// How far the watched boxes moved since the frame before, in mean edges; the mean over them. `None` when none is known.
-    fn motion(&self, boxes: &[Aabb], longest_edge: f32) -> Option<f32> {
-        let edges = Margin { share: 0.0, longest_edge };
-        let (mut sum, mut count) = (0.0, 0);
-        for &(id, before) in &self.watched[..self.watching] {
-            let Some(now) = boxes.get(id as usize) else { continue };
-            let by = (0..3)
-                .map(|a| (now.min[a] - before.min[a]).abs().max((now.max[a] - before.max[a]).abs()))
-                .fold(0.0, f32::max);
-            // An infinite bound that stays where it is gives NaN, which `max` passes over.
-            let share = if by == 0.0 { 0.0 } else { by / edges.edge(now) };
-            sum += share.min(1.0);
-            count += 1;
-        }
-        (count > 0).then(|| sum / count as f32)
-    }
-
-    /// Remembers where evenly spaced boxes are.
-    fn watch(&mut self, boxes: &[Aabb]) {
-        self.watching = boxes.len().min(WATCHED);
-        for (k, watched) in self.watched[..self.watching].iter_mut().enumerate() {
-            let id = (2 * k + 1) * boxes.len() / (2 * self.watching);
-            *watched = (id as u32, boxes[id]);
-        }
     }
 }
 

@@ -1,0 +1,164 @@
+use super::*;
+use crate::{AlgorithmCost, CostCurve, CostTerm, Scenario, Term};
+
+fn fields(costs: &[(&str, f64, f64)]) -> Fields {
+    fields_of([Term::Call, Term::Objects], costs)
+}
+
+fn fields_of(terms: [Term; 2], costs: &[(&str, f64, f64)]) -> Fields {
+    let costs = costs.iter().map(|&(id, first, second)| AlgorithmCost {
+        algorithm: id.parse().unwrap(),
+        revision: 1,
+        curve: CostCurve {
+            terms: terms.into_iter().zip([first, second]).map(|(term, unit_ns)| CostTerm { term, unit_ns }).collect(),
+            ..CostCurve::default()
+        },
+        spread_ln: 0.0,
+    });
+    let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    Fields::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
+}
+
+fn row(count: usize) -> Vec<Aabb> {
+    (0..count).map(|k| Aabb::cube([k as f32; 3], 0.5)).collect()
+}
+
+fn chosen(adaptive: &mut Adaptive, objects: usize) -> (String, Reason) {
+    adaptive.find_pairs(&row(objects), &mut Pairs::new()).unwrap();
+    let decision = adaptive.last_decision().unwrap();
+    (decision.algorithm.to_string(), decision.reason)
+}
+
+#[test]
+fn it_switches_at_the_border_and_not_within_the_hysteresis() {
+    // 10 n = 1000 + 5 n at n = 200.
+    let fields = fields(&[("brute@cpu1", 0.0, 10.0), ("strips@cpu1", 1000.0, 5.0)]);
+    let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
+    let (brute, strips) = ("brute@cpu1".to_owned(), "strips@cpu1".to_owned());
+    assert_eq!(chosen(&mut adaptive, 100), (brute.clone(), Reason::First));
+    assert_eq!(chosen(&mut adaptive, 150), (brute.clone(), Reason::Stayed));
+    assert_eq!(chosen(&mut adaptive, 205), (brute.clone(), Reason::Hysteresis));
+    assert_eq!(chosen(&mut adaptive, 300), (strips.clone(), Reason::Switched));
+    assert_eq!(chosen(&mut adaptive, 195), (strips.clone(), Reason::Hysteresis));
+    assert_eq!(chosen(&mut adaptive, 50), (brute, Reason::Switched));
+    let decision = adaptive.last_decision().unwrap();
+    assert_eq!(decision.predicted_ns, Some(500.0));
+    assert_eq!(decision.runner_up.unwrap().1, 1250.0);
+    assert_eq!(decision.source, Source::Measured);
+}
+
+#[test]
+fn hand_written_thresholds_decide_by_count() {
+    let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
+    let steps = vec![step(0, "brute@cpu1"), step(64, "sweep@cpu1"), step(1000, "strips@cpu1")];
+    let fields = Fields::from_steps(steps).unwrap();
+    let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
+    assert_eq!(chosen(&mut adaptive, 10).0, "brute@cpu1");
+    assert_eq!(chosen(&mut adaptive, 65), ("brute@cpu1".to_owned(), Reason::Hysteresis));
+    assert_eq!(chosen(&mut adaptive, 90), ("sweep@cpu1".to_owned(), Reason::Switched));
+    assert_eq!(chosen(&mut adaptive, 10), ("brute@cpu1".to_owned(), Reason::Switched));
+    // Near a border, but not one of brute force's.
+    assert_eq!(chosen(&mut adaptive, 1000), ("strips@cpu1".to_owned(), Reason::Switched));
+}
+
+/// Works for a few frames, then is lost as a GPU can be.
+struct Fragile(u32);
+
+impl BroadPhase for Fragile {
+    fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        if self.0 == 0 {
+            let algorithm = "fragile@gpu0".parse().unwrap();
+            return Err(Error::Unavailable { algorithm, reason: "lost".to_owned() });
+        }
+        self.0 -= 1;
+        pairs.clear();
+        pairs.finish()
+    }
+}
+
+#[test]
+fn a_lost_algorithm_is_replaced_within_the_frame() {
+    let mut registry = Registry::with_cores(1);
+    registry.add("fragile@gpu0".parse().unwrap(), 1, || Ok(Box::new(Fragile(2))));
+    let fields = fields(&[("fragile@gpu0", 1.0, 0.0), ("brute@cpu1", 2.0, 1.0)]);
+    let mut adaptive = Adaptive::new(fields, &registry).unwrap();
+    assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu0");
+    assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu0");
+    let mut pairs = Pairs::new();
+    adaptive.find_pairs(&row(30), &mut pairs).unwrap();
+    assert_eq!(pairs.len(), 29);
+    assert_eq!(adaptive.last_decision().unwrap().reason, Reason::FellBack);
+    assert_eq!(chosen(&mut adaptive, 30), ("brute@cpu1".to_owned(), Reason::Stayed));
+}
+
+#[test]
+fn unknown_algorithms_are_skipped_and_none_at_all_is_an_error() {
+    let registry = Registry::with_cores(1);
+    let mixed = fields(&[("octree@cpu1", 0.0, 0.1), ("brute@cpu1", 0.0, 1.0)]);
+    assert_eq!(chosen(&mut Adaptive::new(mixed, &registry).unwrap(), 20).0, "brute@cpu1");
+    assert!(Adaptive::new(fields(&[("octree@cpu1", 0.0, 0.1)]), &registry).is_err());
+}
+
+/// The algorithm and the estimate of `moved` in each of so many frames of a scene.
+fn course(adaptive: &mut Adaptive, scenario: Scenario, frames: usize) -> Vec<(String, f64)> {
+    let mut scene = scenario.start(2000, 1);
+    let mut pairs = Pairs::new();
+    let frame = |_| {
+        adaptive.find_pairs(scene.boxes(), &mut pairs).unwrap();
+        scene.advance();
+        let decision = adaptive.last_decision().unwrap();
+        (decision.algorithm.to_string(), decision.load.moved)
+    };
+    (0..frames).map(frame).collect()
+}
+
+/// 40 n, and 15 n + 100 n moved.
+fn strips_or_verlet() -> Adaptive {
+    let fields = fields_of([Term::Objects, Term::Moved], &[("strips@cpu1", 40.0, 0.0), ("verlet@cpu1", 15.0, 100.0)]);
+    Adaptive::new(fields, &Registry::with_cores(1)).unwrap()
+}
+
+#[test]
+fn from_the_second_frame_on_it_knows_how_far_boxes_move() {
+    for (scenario, algorithm, least, most) in [
+        (Scenario::Uniform, "verlet@cpu1", 0.03, 0.05),
+        (Scenario::Resting, "verlet@cpu1", 0.0, 0.01),
+        (Scenario::Fast, "strips@cpu1", 0.9, 1.0),
+    ] {
+        let course = course(&mut strips_or_verlet(), scenario, 70);
+        assert_eq!(course[0], ("strips@cpu1".to_owned(), 1.0), "{scenario}");
+        for (chosen, moved) in &course[1..] {
+            assert!(chosen == algorithm && (least..=most).contains(moved), "{scenario}: {chosen}, {moved}");
+        }
+    }
+}
+
+#[test]
+fn a_change_of_how_far_boxes_move_is_seen_within_two_samples() {
+    let mut adaptive = strips_or_verlet();
+    assert_eq!(course(&mut adaptive, Scenario::Uniform, 50)[49].0, "verlet@cpu1");
+    assert_eq!(course(&mut adaptive, Scenario::Fast, 50)[49].0, "strips@cpu1");
+    // Another number of boxes is sampled at once, and the frame after tells.
+    chosen(&mut adaptive, 500);
+    assert_eq!(chosen(&mut adaptive, 500).0, "verlet@cpu1");
+    assert_eq!(adaptive.last_decision().unwrap().load.moved, 0.0);
+}
+
+#[test]
+fn deciding_before_a_frame_does_not_make_it_look_at_rest() {
+    let mut adaptive = strips_or_verlet();
+    let mut scene = Scenario::Fast.start(2000, 1);
+    for _ in 0..70 {
+        adaptive.decide(scene.boxes());
+        adaptive.find_pairs(scene.boxes(), &mut Pairs::new()).unwrap();
+        assert!(adaptive.last_decision().unwrap().load.moved > 0.9);
+        scene.advance();
+    }
+}
+
+#[test]
+fn it_keeps_work_when_any_of_its_algorithms_does() {
+    assert!(strips_or_verlet().keeps_work());
+    let without = fields(&[("strips@cpu1", 1.0, 1.0), ("brute@cpu1", 1.0, 2.0)]);
+    assert!(!Adaptive::new(without, &Registry::with_cores(1)).unwrap().keeps_work());
+}
