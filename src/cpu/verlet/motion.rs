@@ -28,6 +28,11 @@ const WORTH: f32 = 1.0;
 /// Frames from scratch after keeping did not pay, at first and at most.
 const PAUSE: [u32; 2] = [16, 512];
 
+/// Frames over which the shares that decide the margin are averaged, and by how much it changes in a frame. After all boxes got new
+/// grown boxes none leaves for some frames: a margin that followed at once would swing.
+const LEARNING: f32 = 64.0;
+const MARGIN_STEP: f32 = 1.005;
+
 /// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
 const PROVEN: u32 = 256;
 
@@ -59,7 +64,7 @@ struct Keeping {
     margin: Margin,
     /// Cost for each box, averaged over the last frames.
     cost: f32,
-    /// Share of the boxes that leave in a frame and kept pairs for each box, averaged over the last frames.
+    /// Share of the boxes that leave in a frame and kept pairs for each box, averaged over the last [`LEARNING`] frames.
     leaving: f32,
     kept: f32,
     /// Boxes that left since all were made anew, over all boxes.
@@ -116,12 +121,12 @@ impl Motion {
         let work = if anew { 1.5 * self::scratch(far, kept) } else { leaving };
         let now = tests(far, kept) + work;
         k.cost += (now - k.cost) / 16.0;
-        k.kept += (kept - k.kept) / 16.0;
+        k.kept += (kept - k.kept) / LEARNING;
         if anew {
             k.left = 0.0;
         } else {
             k.left += left;
-            k.leaving += (left - k.leaving) / 16.0;
+            k.leaving += (left - k.leaving) / LEARNING;
         }
         // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p with p
         // between 1, for those that fly straight on, and 2, for those that wander.
@@ -129,9 +134,9 @@ impl Motion {
         let (keep, leave) =
             ((tests(far, k.kept) - cost::BOX) * 6.0 * m / (1.0 + 2.0 * m), 1.5 * self::left(far, k.kept) * k.leaving);
         if leave > 1.2 * keep {
-            k.margin.share = (m * 1.02).min(MARGINS[MARGINS.len() - 1]);
+            k.margin.share = (m * MARGIN_STEP).min(MARGINS[MARGINS.len() - 1]);
         } else if keep > 1.2 * leave {
-            k.margin.share = (m / 1.02).max(MARGINS[0]);
+            k.margin.share = (m / MARGIN_STEP).max(MARGINS[0]);
         }
         k.frames = k.frames.saturating_add(1);
         if k.frames == PROVEN {
@@ -148,7 +153,7 @@ impl Motion {
         }
         let sample = Sample::of(boxes);
         let longest_edge = 4.0 * (sample.extent.iter().sum::<f64>() / 3.0) as f32;
-let motion = self.displacement.moved(boxes)? as f32;
+        let motion = self.displacement.moved(boxes)? as f32;
         let far = far(boxes.len());
         let scratch = scratch(far, self.density);
         let cost = |m: f32| {
