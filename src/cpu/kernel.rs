@@ -4,6 +4,7 @@
 
 pub(crate) mod contain;
 pub(crate) mod node;
+#[cfg(any(test, not(target_arch = "x86_64")))]
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -11,8 +12,14 @@ mod x86;
 use crate::cpu::SimdLevel;
 use crate::cpu::columns::Columns;
 use crate::{Pair, Pairs};
-use portable::Portable;
 use std::ops::Range;
+
+/// What [`SimdLevel::Portable`] stands for: the vectors that every CPU of the target has.
+#[cfg(target_arch = "x86_64")]
+use x86::Sse2 as Baseline;
+
+#[cfg(not(target_arch = "x86_64"))]
+use portable::Portable as Baseline;
 
 /// Tests every row of `rows` against the rows behind it until one begins beyond its end on the sweep axis, and adds the pairs.
 ///
@@ -26,7 +33,7 @@ pub(crate) fn sweep_rows<R: Rows>(level: SimdLevel, columns: &Columns, rows: Ran
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
         SimdLevel::Avx2 => unsafe { x86::sweep_avx2::<R>(&view, rows, pairs) },
-        _ => sweep::<_, R>(Portable, &view, rows, pairs),
+        _ => sweep::<_, R>(Baseline, &view, rows, pairs),
     }
 }
 
@@ -40,7 +47,7 @@ pub(crate) fn brute_rows(level: SimdLevel, columns: &Columns, rows: Range<usize>
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
         SimdLevel::Avx2 => unsafe { x86::brute_avx2(&view, rows, pairs) },
-        _ => brute(Portable, &view, rows, pairs),
+        _ => brute(Baseline, &view, rows, pairs),
     }
 }
 
@@ -55,7 +62,7 @@ pub(crate) fn query_rows(level: SimdLevel, columns: &Columns, start: usize, quer
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
         SimdLevel::Avx2 => unsafe { x86::query_avx2(&view, start, query, pairs) },
-        _ => query_from(Portable, &view, start, query, pairs),
+        _ => query_from(Baseline, &view, start, query, pairs),
     }
 }
 
@@ -216,6 +223,29 @@ fn query_from<L: Lanes>(lanes: L, view: &View<'_>, start: usize, query: &Query, 
     }
 }
 
+/// [`Lanes::owned`] without vectors.
+#[inline(always)]
+fn owned_one_by_one(view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
+    let mut owned = hits;
+    // With both bits set in the one box, as in most strips, the others don't matter.
+    if begins != 3 {
+        each_bit(hits, |bit| owned &= !(u32::from(begins | view.begins[at + bit] != 3) << bit));
+    }
+    owned
+}
+
+/// [`Lanes::write`] without vectors.
+#[inline(always)]
+fn write_one_by_one(view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
+    let mut room = room.iter_mut();
+    each_bit(hits, |bit| {
+        let other = view.ids[at + bit];
+        if let Some(pair) = room.next() {
+            *pair = (id.min(other), id.max(other));
+        }
+    });
+}
+
 /// The positions of the bits of a mask, ascending.
 #[inline(always)]
 pub(crate) fn each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
@@ -239,4 +269,34 @@ pub(crate) fn prefetch<T>(value: &T) {
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = value;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Aabb;
+
+    /// On targets without kernels of their own; here it only has to be right.
+    #[test]
+    fn plain_rust_gives_the_pairs_of_the_double_loop() {
+        let boxes: Vec<Aabb> = (0..203)
+            .map(|k| Aabb::cube([k as f32 / 8.0, (k * 7 % 13) as f32, (k * 5 % 11) as f32], 0.5 + (k % 5) as f32))
+            .collect();
+        let mut columns = Columns::default();
+        columns.resize(boxes.len()).unwrap();
+        let mut at: Vec<usize> = (0..boxes.len()).collect();
+        at.sort_by(|&a, &b| boxes[a].min[0].total_cmp(&boxes[b].min[0]));
+        for (row, &id) in at.iter().enumerate() {
+            columns.as_mut().set(row, &boxes[id], 0, id as u32);
+        }
+        let mut expected = Pairs::new();
+        (0..boxes.len())
+            .for_each(|j| (0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).for_each(|i| expected.push(i as u32, j as u32)));
+        let view = View::new(&columns);
+        let (mut swept, mut tested) = (Pairs::new(), Pairs::new());
+        sweep::<_, All>(portable::Portable, &view, 0..boxes.len(), &mut swept);
+        brute(portable::Portable, &view, 0..boxes.len(), &mut tested);
+        assert_eq!(swept.fingerprint(), expected.fingerprint());
+        assert_eq!(tested.fingerprint(), expected.fingerprint());
+    }
 }

@@ -37,9 +37,9 @@ type Create = fn(u32, &Threads, SimdLevel) -> Result<Box<dyn BroadPhase>, Error>
 
 /// Every method, the simplest first.
 pub(crate) const METHODS: &[Method] = &[
-    Method { name: "brute", revision: 1, create: brute::create },
-    Method { name: "sweep", revision: 1, create: sweep::create },
-    Method { name: "strips", revision: 1, create: strips::create },
+    Method { name: "brute", revision: 2, create: brute::create },
+    Method { name: "sweep", revision: 2, create: sweep::create },
+    Method { name: "strips", revision: 2, create: strips::create },
     Method { name: "verlet", revision: 1, create: verlet::create },
 ];
 

@@ -121,8 +121,8 @@ impl Verlet {
                 let overlap = |(i, j): (u32, u32)| overlap(&boxes[i as usize], &boxes[j as usize]);
                 let fetch = |(i, j): (u32, u32)| {
                     if far {
-                        prefetch(&boxes[i as usize].min);
-                        prefetch(&boxes[j as usize].min);
+                        // Among those that will be dropped are pairs of boxes that are gone.
+                        [i, j].iter().filter_map(|&id| boxes.get(id as usize)).for_each(|b| prefetch(&b.min));
                     }
                 };
                 if left == 0 || anew {

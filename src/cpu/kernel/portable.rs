@@ -1,6 +1,6 @@
 //! Plain Rust, which compilers turn into the vectors of the target's baseline.
 
-use super::{Lanes, Query, View, each_bit};
+use super::{Lanes, Query, View, owned_one_by_one, write_one_by_one};
 use crate::Pair;
 
 /// Four rows at a time.
@@ -39,29 +39,6 @@ impl Lanes for Portable {
     unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
         write_one_by_one(view, at, id, hits, room);
     }
-}
-
-/// [`Lanes::owned`] without vectors.
-#[inline(always)]
-pub(super) fn owned_one_by_one(view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
-    let mut owned = hits;
-    // With both bits set in the one box, as in most strips, the others don't matter.
-    if begins != 3 {
-        each_bit(hits, |bit| owned &= !(u32::from(begins | view.begins[at + bit] != 3) << bit));
-    }
-    owned
-}
-
-/// [`Lanes::write`] without vectors.
-#[inline(always)]
-pub(super) fn write_one_by_one(view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
-    let mut room = room.iter_mut();
-    each_bit(hits, |bit| {
-        let other = view.ids[at + bit];
-        if let Some(pair) = room.next() {
-            *pair = (id.min(other), id.max(other));
-        }
-    });
 }
 
 #[inline(always)]

@@ -1,17 +1,64 @@
-//! AVX2 and AVX-512 of x86-64.
+//! SSE2, which every x86-64 CPU has, AVX2 and AVX-512.
 
-use super::portable::{owned_one_by_one, write_one_by_one};
-use super::{Lanes, Query, Rows, View, brute, query_from, sweep};
+use super::{Lanes, Query, Rows, View, brute, owned_one_by_one, query_from, sweep, write_one_by_one};
 use crate::{Pair, Pairs};
 use std::arch::x86_64::*;
 use std::mem::offset_of;
 use std::ops::Range;
+
+/// Eight rows in two vectors.
+#[derive(Clone, Copy)]
+pub(super) struct Sse2;
 
 #[derive(Clone, Copy)]
 struct Avx2;
 
 #[derive(Clone, Copy)]
 struct Avx512;
+
+impl Lanes for Sse2 {
+    const COUNT: usize = 8;
+
+    #[inline(always)]
+    unsafe fn reach_and_hits(self, view: &View<'_>, at: usize, query: &Query) -> (u32, u32) {
+        let half = |at: usize| {
+            // SAFETY: every column has 16 values behind `view.len >= at`.
+            unsafe {
+                let below = |column: &[f32], bound| _mm_cmple_ps(_mm_loadu_ps(column.as_ptr().add(at)), _mm_set1_ps(bound));
+                let above = |column: &[f32], bound| _mm_cmpge_ps(_mm_loadu_ps(column.as_ptr().add(at)), _mm_set1_ps(bound));
+                let reach = below(view.low[0], query.high[0]);
+                let second = _mm_and_ps(below(view.low[1], query.high[1]), above(view.high[1], query.low[1]));
+                let third = _mm_and_ps(below(view.low[2], query.high[2]), above(view.high[2], query.low[2]));
+                let hits = _mm_and_ps(reach, _mm_and_ps(second, third));
+                (_mm_movemask_ps(reach) as u32, _mm_movemask_ps(hits) as u32)
+            }
+        };
+        let ((reach, hits), (more_reach, more_hits)) = (half(at), half(at + 4));
+        (reach | more_reach << 4, hits | more_hits << 4)
+    }
+
+    #[inline(always)]
+    unsafe fn ends_after(self, view: &View<'_>, at: usize, low: f32) -> u32 {
+        let half = |at: usize| {
+            // SAFETY: as above.
+            unsafe {
+                let high = _mm_loadu_ps(view.high[0].as_ptr().add(at));
+                _mm_movemask_ps(_mm_cmpge_ps(high, _mm_set1_ps(low))) as u32
+            }
+        };
+        half(at) | half(at + 4) << 4
+    }
+
+    #[inline(always)]
+    unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
+        owned_one_by_one(view, at, begins, hits)
+    }
+
+    #[inline(always)]
+    unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
+        write_one_by_one(view, at, id, hits, room);
+    }
+}
 
 impl Lanes for Avx2 {
     const COUNT: usize = 8;

@@ -18,6 +18,9 @@ const SMALLEST_SPLIT: usize = 1024;
 /// Boxes from which on what belongs to them is likely not in the second-level cache: 1.2 MB of boxes, and as much in the tree.
 pub(super) const FAR: usize = 50_000;
 
+/// In place of a box that is gone. No box has this number: there are at most so many.
+const GONE: u32 = u32::MAX;
+
 /// See the module.
 #[derive(Debug)]
 pub(super) struct Tree {
@@ -112,6 +115,7 @@ impl Tree {
     pub(super) fn remove(&mut self, id: u32) {
         let place = self.place_of[id as usize] as usize;
         self.levels[0][place / LANES].set(place % LANES, &NOTHING);
+        self.ids[place] = GONE;
     }
 
     /// Gives boxes in the tree the bounds that they have now, `boxes[id]`.
@@ -167,8 +171,8 @@ impl Tree {
     pub(super) fn overlapping(&self, bounds: &Aabb, mut found: impl FnMut(u32)) {
         let far = self.places > FAR;
         each_overlapping(self.level, &self.levels, far, bounds, |place| {
-            // Lanes that hold nothing overlap infinite bounds.
-            if place < self.places {
+            // Lanes that hold nothing, and those of boxes that are gone, overlap infinite bounds.
+            if place < self.places && self.ids[place] != GONE {
                 found(self.ids[place]);
             }
         });

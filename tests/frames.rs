@@ -1,0 +1,139 @@
+//! Courses of frames that resemble one another, for the algorithms that keep work from frame to frame: every algorithm
+//! against the naive oracle in every frame, whatever happens between two of them.
+
+mod common;
+
+use common::{Random, naive};
+use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry, SimdLevel};
+
+/// Every method on one and on three threads at every SIMD level of this machine.
+fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
+    let mut all = Vec::new();
+    for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
+        let mut registry = Registry::with_cores(3);
+        registry.limit_simd(level);
+        for (id, _) in registry.available() {
+            if id.threads() != 2 {
+                all.push((format!("{id} at {level}"), registry.create(&id).unwrap()));
+            }
+        }
+    }
+    all
+}
+
+fn assert_all_agree(event: &str, boxes: &[Aabb], algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
+    let expected = naive(boxes);
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    for (id, algorithm) in algorithms {
+        algorithm.find_pairs(boxes, &mut pairs).unwrap();
+        assert!(pairs.as_slice() == expected, "{id}, {event}: {} pairs, not {}", pairs.len(), expected.len());
+    }
+}
+
+/// Moves each box by up to `step` on each axis.
+fn wander(boxes: &mut [Aabb], step: f32, random: &mut Random) {
+    for b in boxes {
+        for a in 0..3 {
+            let by = (random.next() * 2.0 - 1.0) * step;
+            b.min[a] += by;
+            b.max[a] += by;
+        }
+    }
+}
+
+#[test]
+fn whatever_happens_between_two_frames_no_pair_is_lost_or_doubled() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(0x5eed);
+    let mut boxes = random.cubes(600, [11.0; 3], 0.6);
+    for frame in 0..160 {
+        let event = format!("frame {frame}");
+        match frame % 16 {
+            // Long enough between events for pairs to be kept again.
+            3 => boxes.extend(random.cubes(25, [11.0; 3], 0.6)),
+            5 => boxes.truncate(boxes.len() - 40),
+            // Fewer and more again: the same numbers stand for other boxes.
+            6 => boxes.extend(random.cubes(30, [11.0; 3], 0.6)),
+            8 => {
+                let last = boxes.len() - 1;
+                boxes.swap(frame % 100, last);
+                boxes.swap_remove(frame % 200);
+            }
+            // One box jumps through the world, one swells to its size, one shrinks to a point.
+            10 => {
+                let at = [random.next() * 11.0, random.next() * 11.0, random.next() * 11.0];
+                boxes[frame % 50] = Aabb::cube(at, 0.4);
+                boxes[frame % 50 + 1] = Aabb::new([-1.0; 3], [12.0; 3]);
+                boxes[frame % 50 + 2] = Aabb::cube(at, 0.0);
+            }
+            11 => boxes[frame % 50 + 1] = Aabb::cube([5.0; 3], 0.5),
+            12 => boxes[77] = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]),
+            13 => boxes[77] = Aabb::new([f32::INFINITY; 3], [f32::INFINITY; 3]),
+            14 => boxes[77] = Aabb::cube([4.0; 3], 0.6),
+            15 if frame > 100 => boxes = random.cubes(500, [11.0; 3], 0.6),
+            _ => {}
+        }
+        // Some frames stand still.
+        if frame % 7 != 0 {
+            wander(&mut boxes, if frame % 40 == 39 { 3.0 } else { 0.04 }, &mut random);
+        }
+        assert_all_agree(&event, &boxes, &mut algorithms);
+    }
+    boxes.clear();
+    assert_all_agree("nothing is left", &boxes, &mut algorithms);
+}
+
+#[test]
+fn a_scene_far_from_the_origin_in_which_a_step_is_as_small_as_rounding() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(17);
+    let mut boxes = random.cubes(400, [9.0; 3], 0.6);
+    for b in &mut boxes {
+        *b = Aabb::new(b.min.map(|v| v + 1.0e7), b.max.map(|v| v + 1.0e7));
+    }
+    for frame in 0..40 {
+        wander(&mut boxes, 1.0, &mut random);
+        assert_all_agree(&format!("frame {frame}"), &boxes, &mut algorithms);
+    }
+}
+
+#[test]
+fn an_error_in_one_frame_does_no_harm_to_the_next() {
+    let mut random = Random(23);
+    for (id, mut algorithm) in every_algorithm() {
+        let mut boxes = random.cubes(500, [10.0; 3], 0.6);
+        let mut pairs = Pairs::with_order(PairOrder::Canonical);
+        for frame in 0..48 {
+            wander(&mut boxes, 0.04, &mut random);
+            if frame % 12 == 5 {
+                // The lowest of them is named, and most of the others have moved on by then.
+                let mut wrong = boxes.clone();
+                wrong[123].max[1] = f32::NAN;
+                wrong[124].min[0] = 1.0e9;
+                wrong[400].min[2] = f32::NAN;
+                let error = algorithm.find_pairs(&wrong, &mut pairs).unwrap_err();
+                assert!(matches!(error, Error::InvalidBox { index: 123, .. }), "{id}: {error}");
+            }
+            if frame % 12 == 9 {
+                let expected = naive(&boxes).len();
+                pairs.set_limit(Some(expected - 1));
+                let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+                assert_eq!(error, Error::TooManyPairs { limit: expected - 1, pairs: expected as u64 }, "{id}");
+                pairs.set_limit(None);
+            }
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+            assert!(pairs.as_slice() == naive(&boxes), "{id}, frame {frame}");
+        }
+    }
+}
+
+#[test]
+fn boxes_that_all_overlap_are_found_though_too_many_to_keep() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(29);
+    let mut boxes = random.cubes(700, [1.0; 3], 2.0);
+    for frame in 0..6 {
+        wander(&mut boxes, 0.01, &mut random);
+        assert_all_agree(&format!("frame {frame}"), &boxes, &mut algorithms);
+    }
+}
