@@ -26,11 +26,17 @@ fn pairs_of(algorithm: &mut dyn BroadPhase, boxes: &[Aabb]) -> Result<Vec<(u32, 
     Ok(pairs.as_slice().to_vec())
 }
 
+/// The revision that this build has of a method of the CPU; 1 of any other.
+fn revision(id: &str) -> u32 {
+    let registry = Registry::with_cores(1);
+    registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method()))).map_or(1, |e| e.revision)
+}
+
 /// Fields in which each algorithm costs that much a frame.
 fn fields(costs: &[(&str, f64)]) -> Fields {
     let cost = |&(id, ns): &(&str, f64)| AlgorithmCost {
         algorithm: id.parse().unwrap(),
-        revision: 1,
+        revision: revision(id),
         curve: CostCurve { terms: vec![CostTerm { term: Term::Call, unit_ns: ns }], ..CostCurve::default() },
         spread_ln: 0.0,
     };

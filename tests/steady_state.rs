@@ -66,10 +66,10 @@ fn allocations(scenario: Scenario, objects: usize, frames: usize, run: &mut dyn 
 }
 
 /// Fields whose borders `fragmentation` crosses: 30 n = 5000 + 5 n at n = 200, 0.05 n^2 = 30 n at n = 600.
-fn fields() -> Fields {
+fn fields(registry: &Registry) -> Fields {
     let cost = |id: &str, call: f64, object: f64| AlgorithmCost {
         algorithm: id.parse().unwrap(),
-        revision: 1,
+        revision: registry.entries().iter().find(|e| e.id.to_string() == id).unwrap().revision,
         curve: CostCurve {
             terms: vec![CostTerm { term: Term::Call, unit_ns: call }, CostTerm { term: Term::Objects, unit_ns: object }],
             ..CostCurve::default()
@@ -96,7 +96,7 @@ fn a_steady_state_allocates_nothing() {
             assert_eq!(large, 0, "{id} on {scenario}");
         }
     }
-    let mut adaptive = Adaptive::new(fields(), &registry).unwrap();
+    let mut adaptive = Adaptive::new(fields(&registry), &registry).unwrap();
     let (counted, _) = allocations(Scenario::Fragmentation, 3000, 600, &mut adaptive);
     assert_eq!(counted, 0, "adaptive, switches included");
 }

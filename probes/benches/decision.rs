@@ -7,16 +7,16 @@ use sapwise::{
 use std::hint::black_box;
 
 /// As many algorithms, terms and knots as a predicted field of a 16-core machine has.
-fn fields() -> Fields {
+fn fields(registry: &Registry) -> Fields {
     let curve = |k: u32| CostCurve {
         terms: Term::ALL.map(|term| CostTerm { term, unit_ns: 1.0 + f64::from(k) / 100.0 }).to_vec(),
         cache_bytes: 3.2e7,
         correction: (3..=24).map(|o| Knot { log2_objects: f64::from(o), ln_factor: 0.01 * f64::from(o % 5) }).collect(),
     };
-    let ids = ["brute", "sweep", "strips"].iter().flat_map(|m| [1, 2, 4, 8, 16].map(|k| format!("{m}@cpu{k}")));
-    let costs = ids.zip(0..).map(|(id, k)| AlgorithmCost {
-        algorithm: id.parse().expect("an algorithm of ours"),
-        revision: 1,
+    let ids = registry.entries().iter().map(|e| (e.id.clone(), e.revision));
+    let costs = ids.zip(0..).map(|((algorithm, revision), k)| AlgorithmCost {
+        algorithm,
+        revision,
         curve: curve(k),
         spread_ln: 0.05,
     });
@@ -25,10 +25,12 @@ fn fields() -> Fields {
 }
 
 fn decision(c: &mut Criterion) {
-    let fields = fields();
+    let registry = Registry::with_cores(16);
+    let fields = fields(&registry);
     let load = Load { objects: 12_345, axis_candidates: 1e6, strip_candidates: 1e5, pairs: 6e3, moved: 1.0 };
-    c.bench_function("rank 15 algorithms", |b| b.iter(|| fields.rank(black_box(&load), |_| true)));
-    let registry = Registry::new();
+    c.bench_function(&format!("rank {} algorithms", fields.costs.len()), |b| {
+        b.iter(|| fields.rank(black_box(&load), |_| true));
+    });
     for objects in [100, 10_000, 1_000_000] {
         let scene = Scenario::Uniform.start(objects, 1);
         let mut adaptive = Adaptive::new(fields.clone(), &registry).expect("available");

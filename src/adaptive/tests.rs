@@ -8,7 +8,7 @@ fn fields(costs: &[(&str, f64, f64)]) -> Fields {
 fn fields_of(terms: [Term; 2], costs: &[(&str, f64, f64)]) -> Fields {
     let costs = costs.iter().map(|&(id, first, second)| AlgorithmCost {
         algorithm: id.parse().unwrap(),
-        revision: 1,
+        revision: revision(id),
         curve: CostCurve {
             terms: terms.into_iter().zip([first, second]).map(|(term, unit_ns)| CostTerm { term, unit_ns }).collect(),
             ..CostCurve::default()
@@ -17,6 +17,12 @@ fn fields_of(terms: [Term; 2], costs: &[(&str, f64, f64)]) -> Fields {
     });
     let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
     Fields::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
+}
+
+/// The revision that this build has of a method of the CPU; 1 of any other.
+fn revision(id: &str) -> u32 {
+    let registry = Registry::with_cores(1);
+    registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method()))).map_or(1, |e| e.revision)
 }
 
 fn row(count: usize) -> Vec<Aabb> {
