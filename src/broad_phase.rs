@@ -6,7 +6,8 @@ use crate::{Aabb, Error, Pairs};
 ///
 /// Every implementation gives the same set of pairs for the same boxes: each overlapping pair once, the lower position
 /// first, touching boxes included. Implementations keep their buffers between calls and allocate nothing once they have
-/// seen a frame as large and as dense.
+/// seen a frame as large and as dense; but with more than one thread rayon allocates small jobs, and what `verlet` keeps follows
+/// its margin, so that it settles over some frames more.
 pub trait BroadPhase: Send {
     /// Replaces the content of `pairs` with the overlapping pairs of `boxes`.
     ///

@@ -50,7 +50,8 @@ impl Displacement {
         let mut count = 0;
         for (id, before) in &self.watched[..self.watching] {
             // Invalid boxes are told by whoever finds the pairs; here they would make a ratio negative.
-            if let Some(now) = boxes.get(*id as usize).filter(|b| b.defect().is_none()) {
+            let valid = |b: &&Aabb| b.defect().is_none() && before.defect().is_none();
+            if let Some(now) = boxes.get(*id as usize).filter(valid) {
                 edges[count] = mean_edge(now);
                 moves[count] = (greatest(before, now), edges[count]);
                 count += 1;

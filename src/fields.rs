@@ -122,14 +122,14 @@ impl Fields {
     ///
     /// They are the rounded borders of `uniform` on one machine (two cores of an AMD EPYC 9005 under KVM, AVX-512), with
     /// pinned threads ([`Registry::pin_threads`]) and its two cores standing for all of them. Any other machine has others: predict
-    /// or measure them. Where boxes move far `verlet` costs what `strips` costs, so that one list holds for both.
+    /// or measure them. Where boxes move far `verlet` runs the strips, so that one list holds for both.
     #[must_use]
     pub fn usual(registry: &Registry) -> Self {
         let step = |from_objects, method, threads| Step { from_objects, algorithm: AlgorithmId::cpu(method, threads) };
-        let mut steps = vec![step(0, "brute", 1), step(150, "verlet", 1)];
+        let mut steps = vec![step(0, "brute", 1), step(80, "verlet", 1)];
         let parallel = registry.entries().iter().filter(|e| e.id.method() == "verlet" && e.unavailable.is_none());
         if let Some(cores) = parallel.map(|e| e.id.threads()).max().filter(|&cores| cores > 1) {
-            steps.push(step(30_000, "verlet", cores));
+            steps.push(step(3000, "verlet", cores));
         }
         Self { steps, scenario: "uniform".to_owned(), ..Self::empty(Source::Default) }
     }
@@ -365,8 +365,8 @@ mod tests {
             assert_eq!(fields.defect(), None);
             let steps: Vec<_> = fields.steps.iter().map(|s| (s.from_objects, s.algorithm.to_string())).collect();
             let (most, parallel) = (format!("verlet@cpu{cores}"), cores > 1 && cfg!(feature = "parallel"));
-            let mut expected = vec![(0, "brute@cpu1".to_owned()), (150, "verlet@cpu1".to_owned())];
-            expected.extend(parallel.then_some((30_000, most)));
+            let mut expected = vec![(0, "brute@cpu1".to_owned()), (80, "verlet@cpu1".to_owned())];
+            expected.extend(parallel.then_some((3000, most)));
             assert_eq!(steps, expected);
         }
     }

@@ -52,7 +52,8 @@ impl Pairs {
     /// Sets the most pairs that may be stored, 8 bytes each, or lifts that limit.
     ///
     /// A frame with more pairs is [`Error::TooManyPairs`], which tells how many there are. An algorithm on `k` threads, `k` above 1,
-    /// may hold up to `8 k + 1` times the limit while it works: each of its tasks has a list of its own.
+    /// may hold up to `8 k + 1` times the limit while it works: each of its tasks has a list of its own. `verlet` keeps up to 32 pairs
+    /// for each box beside that, whatever the limit.
     pub fn set_limit(&mut self, limit: Option<usize>) {
         self.limit = limit;
     }
@@ -204,6 +205,11 @@ impl Pairs {
             return None;
         }
         Some(&mut self.buffer[self.len..self.len + more])
+    }
+
+    /// Pairs found, those that could not be stored included.
+    pub(crate) fn found(&self) -> u64 {
+        self.found
     }
 
     /// Whether every pair found is stored.

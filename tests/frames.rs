@@ -128,6 +128,64 @@ fn an_error_in_one_frame_does_no_harm_to_the_next() {
 }
 
 #[test]
+fn errors_in_several_parts_of_a_frame_are_forgotten_in_the_next() {
+    let mut random = Random(31);
+    for (id, mut algorithm) in every_algorithm() {
+        let mut boxes = random.cubes(1500, [15.0; 3], 0.6);
+        let mut pairs = Pairs::with_order(PairOrder::Canonical);
+        for frame in 0..60 {
+            wander(&mut boxes, 0.02, &mut random);
+            if frame % 20 == 9 {
+                let mut wrong = boxes.clone();
+                (70..wrong.len()).step_by(90).for_each(|k| wrong[k].min[0] = f32::NAN);
+                let error = algorithm.find_pairs(&wrong, &mut pairs).unwrap_err();
+                assert!(matches!(error, Error::InvalidBox { index: 70, .. }), "{id}: {error}");
+                boxes.truncate(boxes.len() / 3);
+            }
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+            assert!(pairs.as_slice() == naive(&boxes), "{id}, frame {frame}");
+        }
+    }
+}
+
+#[test]
+fn boxes_that_jump_in_every_frame_while_the_others_rest() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(37);
+    let mut boxes = random.cubes(900, [13.0; 3], 0.6);
+    for frame in 0..70 {
+        for k in 0..9 {
+            boxes[(frame * 9 + k) * 7 % 900] = random.cubes(1, [13.0; 3], 0.6)[0];
+        }
+        assert_all_agree(&format!("frame {frame}"), &boxes, &mut algorithms);
+    }
+}
+
+/// Too many boxes for the double loop: held against the strips, which start from scratch in each frame.
+#[test]
+fn many_boxes_of_which_many_leave_at_once() {
+    let registry = Registry::with_cores(3);
+    let create = |id: &str| registry.create(&id.parse().unwrap());
+    let mut strips = create("strips@cpu1").unwrap();
+    let (mut expected, mut pairs) = (Pairs::new(), Pairs::new());
+    for id in ["verlet@cpu1", "verlet@cpu3"] {
+        let Ok(mut algorithm) = create(id) else { continue };
+        let mut random = Random(41);
+        let mut boxes = random.cubes(60_000, [80.0; 3], 0.6);
+        for frame in 0..24 {
+            wander(&mut boxes, 0.02, &mut random);
+            if frame % 3 == 2 {
+                // A slab of the input: one share of it has all the work.
+                wander(&mut boxes[frame * 1000..frame * 1000 + 9000], 0.8, &mut random);
+            }
+            strips.find_pairs(&boxes, &mut expected).unwrap();
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+            assert_eq!(pairs.fingerprint(), expected.fingerprint(), "{id}, frame {frame}");
+        }
+    }
+}
+
+#[test]
 fn boxes_that_all_overlap_are_found_though_too_many_to_keep() {
     let mut algorithms = every_algorithm();
     let mut random = Random(29);

@@ -11,7 +11,7 @@ mod x86;
 
 use crate::cpu::SimdLevel;
 use crate::cpu::columns::Columns;
-use crate::{Pair, Pairs};
+use crate::{Aabb, Pair, Pairs};
 use std::ops::Range;
 
 /// What [`SimdLevel::Portable`] stands for: the vectors that every CPU of the target has.
@@ -246,12 +246,52 @@ fn write_one_by_one(view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [
     });
 }
 
+/// Four cell numbers along two axes, which take turns: `cells` held between 0 and `last`, NaN at 0, without their fractions.
+#[inline(always)]
+pub(crate) fn cell_numbers(cells: [f32; 4], last: [f32; 2]) -> [u32; 4] {
+    let mut at = [0.0_f32; 4];
+    for k in 0..4 {
+        // Comparisons in this order send NaN to 0, and compilers make vectors of them.
+        let last = if last[k % 2] < 65_535.0 { last[k % 2] } else { 65_535.0 };
+        let cell = if cells[k] > 0.0 { cells[k] } else { 0.0 };
+        at[k] = if cell < last { cell } else { last };
+    }
+    // SAFETY: each is no NaN and at most 65 535. One below 0 is not in `last`, which counts cells.
+    at.map(|cell| unsafe { cell.max(0.0).to_int_unchecked::<i32>() } as u32)
+}
+
 /// The positions of the bits of a mask, ascending.
 #[inline(always)]
 pub(crate) fn each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
     while mask != 0 {
         f(mask.trailing_zeros() as usize);
         mask &= mask - 1;
+    }
+}
+
+/// Whether two boxes overlap, without the branches of [`Aabb::overlaps`]: where every other pair is a hit no branch can be guessed.
+#[inline(always)]
+pub(crate) fn overlap(a: &Aabb, b: &Aabb) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::*;
+        // SAFETY: SSE is part of x86-64; floats 0 to 3 and 2 to 5 of an `Aabb`, which is `repr(C)`.
+        unsafe {
+            let halves = |b: &Aabb| {
+                let at = std::ptr::from_ref(b).cast::<f32>();
+                (_mm_loadu_ps(at), _mm_loadu_ps(at.add(2)))
+            };
+            let ((low_a, high_a), (low_b, high_b)) = (halves(a), halves(b));
+            // Lower bounds stand in lanes 0 to 2 of the first half, upper ones in lanes 1 to 3 of the second.
+            let upper = |high: __m128| _mm_castsi128_ps(_mm_srli_si128::<4>(_mm_castps_si128(high)));
+            let meet = _mm_and_ps(_mm_cmple_ps(low_a, upper(high_b)), _mm_cmple_ps(low_b, upper(high_a)));
+            _mm_movemask_ps(meet) & 7 == 7
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        let axis = |k: usize| (a.min[k] <= b.max[k]) & (b.min[k] <= a.max[k]);
+        axis(0) & axis(1) & axis(2)
     }
 }
 

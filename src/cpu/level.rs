@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 /// A set of vector instructions. A higher level needs everything that the lower ones need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SimdLevel {
-    /// What the compiler makes of plain Rust for the target: SSE2 on x86-64, NEON on AArch64.
+    /// What every CPU of the target has: SSE2 on x86-64, elsewhere what the compiler makes of plain Rust.
     Portable,
     /// 256-bit AVX2 of x86-64.
     Avx2,

@@ -1,6 +1,7 @@
 //! The grid of strips: cells over the two axes across the sweep.
 
 use crate::Aabb;
+use crate::cpu::kernel::cell_numbers;
 use crate::sample::Sample;
 use std::ops::RangeInclusive;
 
@@ -115,16 +116,8 @@ impl StripGrid {
             | (b.max[u] - b.min[u] > self.large[1])
             | (b.max[v] - b.min[v] > self.large[2]);
         let bounds = [b.min[u], b.min[v], b.max[u], b.max[v]];
-        // Arrays of four, so that compilers use vectors.
-        let mut at = [0.0_f32; 4];
-        for k in 0..4 {
-            let cell = (bounds[k] - self.origin[k % 2]) * self.inverse_width[k % 2];
-            // Comparisons in this order send NaN to 0.
-            let cell = if cell > 0.0 { cell } else { 0.0 };
-            at[k] = if cell < self.last[k % 2] { cell } else { self.last[k % 2] };
-        }
-        // SAFETY: each lies between 0 and 255, and is no NaN.
-        let [x, y, x1, y1] = at.map(|cell| unsafe { cell.to_int_unchecked::<i32>() } as u32);
+        let cell = |k: usize| (bounds[k] - self.origin[k % 2]) * self.inverse_width[k % 2];
+        let [x, y, x1, y1] = cell_numbers([cell(0), cell(1), cell(2), cell(3)], self.last);
         let (more_x, more_y) = (x1 - x, y1 - y);
         // The sizes allow for few more cells; bounds so far out that their cells are rounded could give many.
         if large | (more_x | more_y > MOST_MORE) {
@@ -205,6 +198,18 @@ mod tests {
         let bounds = [f32::NEG_INFINITY, -1.0e30, -5.0, 0.0, 13.0, 50.0, 99.0, 1.0e30, f32::INFINITY];
         let cells = bounds.map(|b| grid.cell_of(0, b));
         assert!(cells.is_sorted(), "{cells:?}");
+        // Boxes in strips and large ones, which are asked strip by strip, must agree on the cells.
+        for low in bounds {
+            for high in bounds.into_iter().filter(|&h| h >= low) {
+                let b = Aabb::new([1.0, low, low * 0.5], [2.0, high, high * 0.5]);
+                let (place, cover) = (grid.place::<0>(&b), grid.cover(&b));
+                let mut strips = Vec::new();
+                grid.each_strip(place, |strip, begins| strips.push((grid.cell(strip), begins)));
+                let expected = cover.rows().flat_map(|y| cover.columns().map(move |x| [x, y]));
+                let expected: Vec<_> = expected.map(|cell| (cell, cover.begins(cell))).collect();
+                assert!(place == Place::APART || strips == expected, "{b:?}: {strips:?}");
+            }
+        }
         assert_eq!((cells[0], cells[8]), (0, grid.cells[0] - 1));
     }
 

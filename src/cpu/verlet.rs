@@ -13,13 +13,13 @@ mod motion;
 mod tree;
 
 use crate::broad_phase::check_count;
-use crate::cpu::kernel::prefetch;
+use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::strips::Finder;
 use crate::cpu::workers::{Outputs, Workers};
 use crate::cpu::{SimdLevel, Threads};
 use crate::{Aabb, BroadPhase, Error, Pairs};
-use grown::{Grown, Share};
-use motion::{Advice, Motion};
+use grown::{Grown, Margin, Share};
+use motion::{Advice, MOST_KEPT, Motion};
 use tree::{FAR, Tree};
 
 /// The method; see the module.
@@ -37,8 +37,16 @@ struct Verlet {
     kept: Vec<Pairs>,
 }
 
-/// Kept pairs for each box, at most: beyond them, and in any case beyond memory, keeping them doesn't pay.
-const MOST_KEPT: usize = 32;
+/// What came of a frame in which pairs were kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kept {
+    /// The pairs are complete, and keeping pays.
+    Well,
+    /// The pairs are complete, but finding them from scratch would be cheaper.
+    Dearly,
+    /// There were too many to keep: the pairs are not complete.
+    TooMany,
+}
 
 pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
     let workers = Workers::new("verlet", threads, pools)?;
@@ -60,24 +68,23 @@ impl BroadPhase for Verlet {
         pairs.clear();
         check_count(boxes.len())?;
         let kept = match self.motion.advise(boxes) {
-            Advice::Scratch => false,
+            Advice::Scratch => Kept::TooMany,
             Advice::Keep(margin) => {
-                self.grown.set_margin(margin);
-                let kept = self.keep(boxes, pairs);
-                if kept != Ok(true) {
+                let kept = self.keep(boxes, margin, pairs);
+                if kept != Ok(Kept::Well) {
                     // What is known of the grown boxes may be half of this frame and half of the one before.
                     self.grown.forget();
-                    self.motion.stop();
+                    if kept.is_ok() { self.motion.stop() } else { self.motion.interrupt() }
                 }
                 kept?
             }
         };
-        if !kept {
+        if kept == Kept::TooMany {
             pairs.clear();
             let Self { workers, finder, outputs, .. } = self;
             outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists))?;
         }
-        self.motion.found(boxes.len(), pairs.len());
+        self.motion.found(boxes.len(), pairs.found());
         pairs.finish()
     }
 
@@ -93,25 +100,26 @@ impl BroadPhase for Verlet {
 }
 
 impl Verlet {
-    /// Finds the pairs among the kept ones; `false` when that does not pay or they are too many.
-    fn keep(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<bool, Error> {
+    /// Finds the pairs among the kept ones, as far as those can be kept.
+    fn keep(&mut self, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
         let Self { workers, finder, outputs, motion, grown, tree, shares, kept } = self;
-        let changes = grown.check(workers, boxes, shares)?;
-        let left = changes.left + changes.gone.len();
-        let anew = motion.wants_anew(boxes.len(), left);
+        let changes = grown.check(workers, boxes, margin, shares)?;
+        let anew = motion.wants_anew(boxes.len(), &changes);
         if anew {
-            grown.grow_all(workers, boxes, shares);
+            grown.grow_all(workers, boxes, motion.renew(boxes), shares);
             tree.build(workers, grown.as_slice())?;
-            let most = MOST_KEPT * boxes.len() / kept.len() + 1024;
+            let most = MOST_KEPT as usize * boxes.len() / kept.len() + 1024;
             for list in kept.iter_mut() {
                 list.clear();
                 list.set_limit(Some(most));
             }
             finder.find(workers, grown.as_slice(), kept)?;
-            kept.iter_mut().try_for_each(Pairs::reserve_some_more)?;
+            if !kept.iter_mut().all(|list| list.is_complete() && list.reserve_some_more().is_ok()) {
+                return Ok(Kept::TooMany);
+            }
         } else {
-            changes.gone.for_each(|id| tree.remove(id as u32));
-            changes.new.into_iter().try_for_each(|id| tree.insert(id as u32))?;
+            changes.gone.clone().for_each(|id| tree.remove(id as u32));
+            changes.new.clone().into_iter().try_for_each(|id| tree.insert(id as u32))?;
             tree.follow(workers, grown.as_slice(), shares.iter().flat_map(|s| s.left.iter().copied()))?;
         }
         let (grown, tree, tasks) = (&*grown, &*tree, kept.len());
@@ -125,7 +133,7 @@ impl Verlet {
                         [i, j].iter().filter_map(|&id| boxes.get(id as usize)).for_each(|b| prefetch(&b.min));
                     }
                 };
-                if left == 0 || anew {
+                if changes.left == 0 || anew {
                     list.extend_where(kept.as_slice(), fetch, overlap);
                     return;
                 }
@@ -142,33 +150,11 @@ impl Verlet {
             Ok(())
         })?;
         let total = kept.iter().map(Pairs::len).sum();
-        // A list that found more than it may hold has lost some.
-        Ok(motion.learn(boxes.len(), left, total, anew) && kept.iter_mut().all(|list| list.finish().is_ok()))
-    }
-}
-
-/// Whether two boxes overlap, without the branches of [`Aabb::overlaps`]: among kept pairs no branch can be guessed.
-#[inline(always)]
-fn overlap(a: &Aabb, b: &Aabb) -> bool {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use std::arch::x86_64::*;
-        // SAFETY: SSE is part of x86-64; floats 0 to 3 and 2 to 5 of an `Aabb`, which is `repr(C)`.
-        unsafe {
-            let halves = |b: &Aabb| {
-                let at = std::ptr::from_ref(b).cast::<f32>();
-                (_mm_loadu_ps(at), _mm_loadu_ps(at.add(2)))
-            };
-            let ((low_a, high_a), (low_b, high_b)) = (halves(a), halves(b));
-            // Lower bounds stand in lanes 0 to 2 of the first half, upper ones in lanes 1 to 3 of the second.
-            let upper = |high: __m128| _mm_castsi128_ps(_mm_srli_si128::<4>(_mm_castps_si128(high)));
-            let meet = _mm_and_ps(_mm_cmple_ps(low_a, upper(high_b)), _mm_cmple_ps(low_b, upper(high_a)));
-            _mm_movemask_ps(meet) & 7 == 7
-        }
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        let axis = |k: usize| (a.min[k] <= b.max[k]) & (b.min[k] <= a.max[k]);
-        axis(0) & axis(1) & axis(2)
+        let pays = motion.learn(boxes.len(), &changes, total, anew);
+        Ok(match (kept.iter().all(Pairs::is_complete), pays) {
+            (false, _) => Kept::TooMany,
+            (true, false) => Kept::Dearly,
+            (true, true) => Kept::Well,
+        })
     }
 }

@@ -28,7 +28,8 @@ const SMALLEST_FILL: usize = 1024;
 /// Pairs that are joined on all threads; fewer are copied in less time than a phase takes.
 const SMALLEST_JOIN: usize = 16_384;
 
-/// Rounds for which the caller looks whether its helpers are done before it goes to sleep: some 20 us. To be woken takes longer
+/// Rounds for which the caller looks whether its helpers are done before it goes to sleep: some 20 us on the machine of the
+/// first reports. To be woken takes longer
 /// than most of what is left of a task by then.
 #[cfg(feature = "parallel")]
 const SPINS: u32 = 1000;
@@ -65,7 +66,8 @@ impl Workers {
     #[cfg_attr(not(feature = "parallel"), expect(clippy::unused_self, reason = "without threads nobody helps"))]
     pub(crate) fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
         #[cfg(feature = "parallel")]
-        if let Some(helpers) = &self.helpers {
+        // A single task needs no help.
+        if let Some(helpers) = self.helpers.as_ref().filter(|_| tasks.size_hint().1.is_none_or(|most| most > 1)) {
             let queue = Mutex::new(tasks);
             let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
             let drain = || std::iter::from_fn(next).for_each(&work);

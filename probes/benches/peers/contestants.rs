@@ -50,8 +50,10 @@ impl Contestant {
             "sweep" => 100_000,
             _ => usize::MAX,
         };
-        let algorithm = Algorithm::Other(registry.create(id)?);
-        Ok(Self { name, side: Side::Fixed, keeps: true, most, hopeless_frames: 0, algorithm })
+        let algorithm = registry.create(id)?;
+        let keeps = algorithm.keeps_work();
+        let algorithm = Algorithm::Other(algorithm);
+        Ok(Self { name, side: Side::Fixed, keeps, most, hopeless_frames: 0, algorithm })
     }
 
     /// # Errors

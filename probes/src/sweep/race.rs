@@ -1,7 +1,8 @@
 //! One point: every algorithm on the same frames, in random order within each.
 //!
 //! An algorithm that keeps work from frame to frame has a bias in its favour here: now and then it finds everything anew, in one
-//! of 20 to 100 frames for about twice the time of the strips, and the median leaves those frames out.
+//! of 20 to 100 frames, and the median leaves those frames out. Nor does its margin settle in the frames there are: what is
+//! measured is the margin with which it begins.
 
 use super::verify::Answer;
 use crate::turns::Turns;
@@ -18,7 +19,7 @@ const FEW_FRAMES: usize = 5;
 /// Frames at least where the point's time is over.
 pub(super) const FEWEST_FRAMES: usize = 3;
 /// Frames before the samples, at most, for algorithms that keep work from frame to frame: how far boxes move is known in the
-/// second, and shares of them that leave their grown boxes settle over some tens.
+/// second, and the shares of them that leave their grown boxes follow over some tens.
 const MOST_WARM_UP: usize = 24;
 /// Share of a point's time in which the warm-up ends.
 const WARM_UP_SHARE: f64 = 0.25;

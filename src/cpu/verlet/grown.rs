@@ -15,7 +15,6 @@ pub(super) struct Grown {
     len: usize,
     /// Bit k of word w is set when box 64 w + k got a new grown box in this frame, or is gone.
     dirty: Vec<u64>,
-    margin: Margin,
     level: SimdLevel,
 }
 
@@ -32,14 +31,18 @@ pub(super) struct Margin {
 pub(super) struct Share {
     /// Boxes that left their grown box.
     pub(super) left: Vec<u32>,
+    /// Those of them whose new grown box does not meet the old one, new boxes included.
+    far_away: usize,
     error: Option<Error>,
 }
 
 /// How a frame differs from the one before.
 #[derive(Debug)]
 pub(super) struct Changes {
-    /// Boxes that left their grown box, the new ones included.
+    /// Boxes that left their grown box, the new ones and those that are gone included.
     pub(super) left: usize,
+    /// Those of them that went far away or are new.
+    pub(super) far_away: usize,
     /// Boxes that the frame before did not have.
     pub(super) new: Range<usize>,
     /// Boxes that this frame does not have.
@@ -51,15 +54,11 @@ pub(super) const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINIT
 
 impl Grown {
     pub(super) fn new(level: SimdLevel) -> Self {
-        Self { boxes: Vec::new(), len: 0, dirty: Vec::new(), margin: Margin::default(), level }
+        Self { boxes: Vec::new(), len: 0, dirty: Vec::new(), level }
     }
 
     pub(super) fn as_slice(&self) -> &[Aabb] {
         &self.boxes[..self.len]
-    }
-
-    pub(super) fn set_margin(&mut self, margin: Margin) {
-        self.margin = margin;
     }
 
     /// Forgets all grown boxes: the next frame makes every one anew.
@@ -82,7 +81,13 @@ impl Grown {
     ///
     /// # Errors
     /// [`Error::InvalidBox`]; what is known of the grown boxes is then of no use.
-    pub(super) fn check(&mut self, workers: &Workers, boxes: &[Aabb], shares: &mut [Share]) -> Result<Changes, Error> {
+    pub(super) fn check(
+        &mut self,
+        workers: &Workers,
+        boxes: &[Aabb],
+        margin: Margin,
+        shares: &mut [Share],
+    ) -> Result<Changes, Error> {
         self.reserve(boxes.len().max(self.len))?;
         let (new, gone) = (self.len..boxes.len(), boxes.len()..self.len);
         if !new.is_empty() {
@@ -91,9 +96,11 @@ impl Grown {
         self.len = boxes.len();
         let size = self.share_len(shares.len());
         for share in shares.iter_mut() {
+            // A task without a part in this frame must not tell of the one before.
+            (share.far_away, share.error) = (0, None);
             share.left.clear();
         }
-        let (margin, level) = (self.margin, self.level);
+        let level = self.level;
         let grown = (&mut self.boxes[..self.len], size);
         let dirty = (&mut self.dirty[..self.len.div_ceil(64)], size / 64);
         workers.each_share(shares, grown, dirty, |k, share, grown, dirty| {
@@ -105,13 +112,13 @@ impl Grown {
         for id in gone.clone() {
             self.dirty[id / 64] |= 1 << (id % 64);
         }
-        Ok(Changes { left: shares.iter().map(|s| s.left.len()).sum(), new, gone })
+        let left = shares.iter().map(|s| s.left.len()).sum::<usize>() + gone.len();
+        Ok(Changes { left, far_away: shares.iter().map(|s| s.far_away).sum(), new, gone })
     }
 
     /// One phase: a new grown box for every box. They must be valid.
-    pub(super) fn grow_all(&mut self, workers: &Workers, boxes: &[Aabb], shares: &mut [Share]) {
+    pub(super) fn grow_all(&mut self, workers: &Workers, boxes: &[Aabb], margin: Margin, shares: &mut [Share]) {
         let size = self.share_len(shares.len());
-        let margin = self.margin;
         shares.iter_mut().for_each(|share| share.left.clear());
         let (grown, dirty) = ((&mut self.boxes[..self.len], size), (&mut self.dirty[..self.len.div_ceil(64)], size / 64));
         workers.each_share(shares, grown, dirty, |k, _, grown, dirty| {
@@ -170,7 +177,8 @@ impl Share {
                     invalid.get_or_insert(Error::InvalidBox { index: first + at + k, defect });
                     return;
                 }
-                *grown = margin.grow(b);
+                let before = std::mem::replace(grown, margin.grow(b));
+                self.far_away += usize::from(!before.overlaps(grown));
                 dirty[(at + k) / 64] |= 1 << ((at + k) % 64);
                 self.left.push((first + at + k) as u32);
             }

@@ -1,6 +1,6 @@
 //! Whether keeping pairs pays, and with which margin.
 
-use super::grown::Margin;
+use super::grown::{Changes, Margin};
 use crate::sample::Sample;
 use crate::{Aabb, Displacement};
 
@@ -22,8 +22,8 @@ mod cost {
 /// Margins that are compared, as shares of a mean edge.
 const MARGINS: [f32; 8] = [0.04, 0.07, 0.1, 0.15, 0.22, 0.33, 0.5, 0.75];
 
-/// Keeping must promise to cost at most this share of the strips before it begins: the promise rests on few boxes.
-const WORTH: f32 = 1.0;
+/// Kept pairs for each box, at most: keeping more would not pay, and takes memory.
+pub(super) const MOST_KEPT: f32 = 32.0;
 
 /// Frames from scratch after keeping did not pay, at first and at most.
 const PAUSE: [u32; 2] = [16, 512];
@@ -53,9 +53,9 @@ pub(super) struct Motion {
     /// Pairs for each box in the frame before.
     density: f32,
     keeping: Option<Keeping>,
-    /// Frames for which nothing is kept, and how many that were the last time.
+    /// Frames for which nothing is kept, and how many that will be the next time.
     pause: u32,
-    last_pause: u32,
+    next_pause: u32,
 }
 
 /// What is known while pairs are kept.
@@ -75,7 +75,7 @@ struct Keeping {
 
 impl Default for Motion {
     fn default() -> Self {
-        Self { displacement: Displacement::default(), density: 0.0, keeping: None, pause: 0, last_pause: PAUSE[0] }
+        Self { displacement: Displacement::default(), density: 0.0, keeping: None, pause: 0, next_pause: PAUSE[0] }
     }
 }
 
@@ -90,33 +90,47 @@ impl Motion {
     }
 
     /// Takes note of the pairs of a frame.
-    pub(super) fn found(&mut self, objects: usize, pairs: usize) {
+    pub(super) fn found(&mut self, objects: usize, pairs: u64) {
         self.density = pairs as f32 / objects.max(1) as f32;
     }
 
     /// Keeping failed; it will not be tried for some frames.
     pub(super) fn stop(&mut self) {
         self.keeping = None;
-        self.pause = self.last_pause;
-        self.last_pause = (self.last_pause * 2).min(PAUSE[1]);
+        self.pause = self.next_pause;
+        self.next_pause = (self.next_pause * 2).min(PAUSE[1]);
     }
 
-    /// Whether the kept pairs are to be found anew in this frame, in which `left` of `objects` boxes left.
-    pub(super) fn wants_anew(&self, objects: usize, left: usize) -> bool {
+    /// A frame failed for no fault of keeping.
+    pub(super) fn interrupt(&mut self) {
+        self.keeping = None;
+    }
+
+    /// Whether the kept pairs are to be found anew in this frame, in which boxes left as `changes` says.
+    pub(super) fn wants_anew(&self, objects: usize, changes: &Changes) -> bool {
         let Some(keeping) = self.keeping else { return false };
-        let left = left as f32 / objects.max(1) as f32;
+        let left = changes.left as f32 / objects.max(1) as f32;
         // Pairs of boxes that left are found at a higher price and stand apart from their neighbours in space.
-        left > 0.2 || keeping.left + left > 1.5
+        left > 0.2 || keeping.left + worn(objects, changes) > 1.5
     }
 
-    /// Learns from a frame in which `left` of `objects` boxes left and `kept` pairs were tested. `false` when keeping does not
-    /// pay any more.
-    pub(super) fn learn(&mut self, objects: usize, left: usize, kept: usize, anew: bool) -> bool {
+    /// The margin with which all boxes are grown anew: the scene may have changed its sizes since the last time.
+    pub(super) fn renew(&mut self, boxes: &[Aabb]) -> Margin {
+        let longest_edge = longest_edge(boxes);
+        self.keeping.as_mut().map_or(Margin { share: MARGINS[0], longest_edge }, |keeping| {
+            keeping.margin.longest_edge = longest_edge;
+            keeping.margin
+        })
+    }
+
+    /// Learns from a frame in which boxes left as `changes` says and `kept` pairs were tested. `false` when keeping does not pay
+    /// any more.
+    pub(super) fn learn(&mut self, objects: usize, changes: &Changes, kept: usize, anew: bool) -> bool {
         let far = far(objects);
         let scratch = scratch(far, self.density);
         let Some(k) = &mut self.keeping else { return false };
         let share = |count: usize| count as f32 / objects.max(1) as f32;
-        let (left, kept) = (share(left), share(kept));
+        let (left, kept) = (share(changes.left), share(kept));
         let leaving = if left > 0.0 { cost::AGAIN + self::left(far, kept) * left } else { 0.0 };
         let work = if anew { 1.5 * self::scratch(far, kept) } else { leaving };
         let now = tests(far, kept) + work;
@@ -125,7 +139,7 @@ impl Motion {
         if anew {
             k.left = 0.0;
         } else {
-            k.left += left;
+            k.left += worn(objects, changes);
             k.leaving += (left - k.leaving) / LEARNING;
         }
         // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p with p
@@ -140,7 +154,7 @@ impl Motion {
         }
         k.frames = k.frames.saturating_add(1);
         if k.frames == PROVEN {
-            self.last_pause = PAUSE[0];
+            self.next_pause = PAUSE[0];
         }
         k.cost < scratch
     }
@@ -151,8 +165,6 @@ impl Motion {
             self.pause -= 1;
             return None;
         }
-        let sample = Sample::of(boxes);
-        let longest_edge = 4.0 * (sample.extent.iter().sum::<f64>() / 3.0) as f32;
         let motion = self.displacement.moved(boxes)? as f32;
         let far = far(boxes.len());
         let scratch = scratch(far, self.density);
@@ -161,10 +173,9 @@ impl Motion {
             tests(far, kept) + cost::AGAIN + left(far, kept) * leaving(motion, m)
         };
         let best = MARGINS.into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
-        let margin = Margin { share: best, longest_edge };
         let kept = self.density * (1.0 + 2.0 * best).powi(3);
-        (cost(best) < WORTH * scratch).then_some(Keeping {
-            margin,
+        (cost(best) < scratch && kept < MOST_KEPT).then(|| Keeping {
+            margin: Margin { share: best, longest_edge: longest_edge(boxes) },
             cost: cost(best),
             leaving: leaving(motion, best),
             kept,
@@ -172,6 +183,18 @@ impl Motion {
             frames: 0,
         })
     }
+}
+
+/// Mean edges count as no longer than four times that which nine boxes in ten don't exceed.
+fn longest_edge(boxes: &[Aabb]) -> f32 {
+    4.0 * (Sample::of(boxes).extent.iter().sum::<f64>() / 3.0) as f32
+}
+
+/// How much of the order in space is lost, as a share of the boxes that left. One that went far widens every node above its leaf,
+/// which then costs whoever asks for what is near there.
+fn worn(objects: usize, changes: &Changes) -> f32 {
+    const FAR_AWAY: f32 = 16.0;
+    (changes.left as f32 + FAR_AWAY * changes.far_away as f32) / objects.max(1) as f32
 }
 
 /// The cost of a box in the strips.
@@ -199,4 +222,58 @@ fn far(objects: usize) -> f32 {
 /// leave of those that fly straight on, which shows in a few frames.
 fn leaving(motion: f32, margin: f32) -> f32 {
     (motion / margin).powi(2).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scenario;
+
+    fn keeps(scenario: Scenario) -> bool {
+        let mut scene = scenario.start(2000, 1);
+        let mut motion = Motion::default();
+        motion.advise(scene.boxes());
+        motion.found(2000, 1000);
+        scene.advance();
+        matches!(motion.advise(scene.boxes()), Advice::Keep(_))
+    }
+
+    #[test]
+    fn pairs_are_kept_where_boxes_move_little_and_not_where_they_move_far() {
+        assert!(keeps(Scenario::Resting) && keeps(Scenario::Uniform));
+        assert!(!keeps(Scenario::Fast));
+    }
+
+    #[test]
+    fn too_many_pairs_are_not_kept_and_a_failure_is_not_tried_again_at_once() {
+        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 500];
+        let mut motion = Motion::default();
+        for pairs in [500 * 499 / 2, 1000] {
+            motion.found(500, pairs);
+            motion.advise(&boxes);
+            assert_eq!(matches!(motion.advise(&boxes), Advice::Keep(_)), pairs == 1000);
+        }
+        motion.stop();
+        assert!((0..PAUSE[0]).all(|_| matches!(motion.advise(&boxes), Advice::Scratch)));
+        assert!(matches!(motion.advise(&boxes), Advice::Keep(_)));
+    }
+
+    #[test]
+    fn boxes_that_go_far_wear_the_order_sooner_than_those_that_wander() {
+        let mut motion = Motion::default();
+        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
+        (0..2).for_each(|_| _ = motion.advise(&boxes));
+        let frames = |far_away: usize, motion: &mut Motion| {
+            let changes = Changes { left: 10, far_away, new: 0..0, gone: 0..0 };
+            motion.learn(1000, &changes, 1000, true);
+            (0..1000)
+                .take_while(|_| {
+                    motion.learn(1000, &changes, 1000, false);
+                    !motion.wants_anew(1000, &changes)
+                })
+                .count()
+        };
+        let (wandering, jumping) = (frames(0, &mut motion), frames(10, &mut motion));
+        assert!(wandering > 100 && jumping < 12, "{wandering} and {jumping} frames");
+    }
 }

@@ -126,6 +126,9 @@ impl Tree {
         moved: impl Iterator<Item = u32> + Clone,
     ) -> Result<(), Error> {
         self.moved = moved.clone().count();
+        if self.moved == 0 {
+            return Ok(());
+        }
         ensure(&mut self.keys, self.moved, "boxes that moved")?;
         for (key, id) in self.keys.iter_mut().zip(moved) {
             *key = u64::from(self.place_of[id as usize]) << 32 | u64::from(id);
