@@ -109,8 +109,9 @@ impl Registry {
         self.simd = self.simd.min(level);
     }
 
-    /// Binds each thread that helps the calling one, in the pools that are made from now on, to a core of its own, from the
-    /// second on. The calling thread is not bound, because what it starts would be bound with it.
+    /// Binds each thread that helps the calling one, in the pools that are made from now on, to a core of its own. The
+    /// calling thread is not bound, because what it starts would be bound with it; on Linux a helper moves to a free core when it
+    /// finds the caller on its own.
     ///
     /// Some schedulers, those of virtual machines above all, wake two threads of a pool on one core and leave the other
     /// idle for milliseconds: on the machine of the first reports nothing under 3 ms gained from a second thread. The

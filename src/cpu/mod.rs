@@ -2,6 +2,8 @@
 
 mod brute;
 mod columns;
+#[cfg(feature = "parallel")]
+mod helpers;
 mod kernel;
 mod level;
 mod sort;

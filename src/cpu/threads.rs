@@ -1,6 +1,8 @@
 //! Thread pools, shared by all algorithms of the same width.
 
 #[cfg(feature = "parallel")]
+use crate::cpu::helpers::Helpers;
+#[cfg(feature = "parallel")]
 use std::{
     collections::BTreeMap,
     sync::{Arc, Mutex, PoisonError},
@@ -12,7 +14,7 @@ pub(crate) struct Threads {
     /// Whether pools made from now on are pinned; see [`Registry::pin_threads`](crate::Registry::pin_threads).
     pub(crate) pinned: bool,
     #[cfg(feature = "parallel")]
-    pools: Mutex<BTreeMap<u32, Arc<rayon::ThreadPool>>>,
+    pools: Mutex<BTreeMap<u32, Arc<Helpers>>>,
 }
 
 impl Threads {
@@ -21,12 +23,12 @@ impl Threads {
     /// # Errors
     /// The reason, when the system refuses the threads.
     #[cfg(feature = "parallel")]
-    pub(crate) fn helpers(&self, count: u32) -> Result<Arc<rayon::ThreadPool>, String> {
+    pub(crate) fn helpers(&self, count: u32) -> Result<Arc<Helpers>, String> {
         let mut pools = self.pools.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pool) = pools.get(&count) {
             return Ok(Arc::clone(pool));
         }
-        let pool = Arc::new(build_pool(count, 1, self.pinned)?);
+        let pool = Arc::new(Helpers::new(count, self.pinned)?);
         pools.insert(count, Arc::clone(&pool));
         Ok(pool)
     }

@@ -4,6 +4,8 @@
 use crate::AlgorithmId;
 use crate::cpu::Threads;
 use crate::cpu::columns::{ColumnsMut, part};
+#[cfg(feature = "parallel")]
+use crate::cpu::helpers::Helpers;
 use crate::{Aabb, Error, Pairs};
 #[cfg(feature = "parallel")]
 use std::sync::{
@@ -16,7 +18,7 @@ use std::sync::{
 pub(crate) struct Workers {
     threads: usize,
     #[cfg(feature = "parallel")]
-    helpers: Option<Arc<rayon::ThreadPool>>,
+    helpers: Option<Arc<Helpers>>,
 }
 
 /// Tasks for each thread: enough to even out tasks of unequal length, few enough to cost nothing.
@@ -72,13 +74,11 @@ impl Workers {
             let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
             let drain = || std::iter::from_fn(next).for_each(&work);
             let done = AtomicUsize::new(0);
-            return helpers.in_place_scope(|scope| {
-                for _ in 1..self.threads {
-                    scope.spawn(|_| {
-                        drain();
-                        done.fetch_add(1, Ordering::Release);
-                    });
-                }
+            let helper = || {
+                drain();
+                done.fetch_add(1, Ordering::Release);
+            };
+            return helpers.run(self.threads - 1, helper, || {
                 drain();
                 let mut spins = 0;
                 while done.load(Ordering::Acquire) + 1 < self.threads && spins < SPINS {
