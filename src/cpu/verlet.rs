@@ -1,9 +1,9 @@
 //! A Verlet list: the pairs of boxes grown by a margin, kept from frame to frame.
 //!
 //! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes, so a frame costs
-//! one look at each box and one test of each kept pair. A box that leaves its grown box gets a new one, and one pass over
-//! all grown boxes finds its new neighbours. After many of those the list is made anew by the strips. Where the boxes
-//! move too far for that to pay, the strips find the pairs directly and a few boxes are watched for it to end.
+//! one look at each box and one test of each kept pair. A box that leaves its grown box gets a new one, and a tree of the
+//! grown boxes finds its new neighbours. After many of those the list is made anew by the strips. Where the boxes move too
+//! far for that to pay, the strips find the pairs directly and a few boxes are watched for it to end.
 //!
 //! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules; physics engines know the grown boxes as fat
 //! boxes.
@@ -37,15 +37,15 @@ struct Verlet {
     kept: Vec<Pairs>,
 }
 
-/// What came of a frame in which pairs were kept.
+/// What came of keeping pairs in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kept {
     /// The pairs are complete, and keeping pays.
     Well,
     /// The pairs are complete, but finding them from scratch would be cheaper.
     Dearly,
-    /// There were too many to keep: the pairs are not complete.
-    TooMany,
+    /// Nothing is kept, or there were too many to keep: the pairs are not complete.
+    Not,
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
@@ -68,7 +68,7 @@ impl BroadPhase for Verlet {
         pairs.clear();
         check_count(boxes.len())?;
         let kept = match self.motion.advise(boxes) {
-            Advice::Scratch => Kept::TooMany,
+            Advice::Scratch => Kept::Not,
             Advice::Keep(margin) => {
                 let kept = self.keep(boxes, margin, pairs);
                 if kept != Ok(Kept::Well) {
@@ -79,7 +79,7 @@ impl BroadPhase for Verlet {
                 kept?
             }
         };
-        if kept == Kept::TooMany {
+        if kept == Kept::Not {
             pairs.clear();
             let Self { workers, finder, outputs, .. } = self;
             outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists))?;
@@ -115,7 +115,7 @@ impl Verlet {
             }
             finder.find(workers, grown.as_slice(), kept)?;
             if !kept.iter_mut().all(|list| list.is_complete() && list.reserve_some_more().is_ok()) {
-                return Ok(Kept::TooMany);
+                return Ok(Kept::Not);
             }
         } else {
             changes.gone.clone().for_each(|id| tree.remove(id as u32));
@@ -152,7 +152,7 @@ impl Verlet {
         let total = kept.iter().map(Pairs::len).sum();
         let pays = motion.learn(boxes.len(), &changes, total, anew);
         Ok(match (kept.iter().all(Pairs::is_complete), pays) {
-            (false, _) => Kept::TooMany,
+            (false, _) => Kept::Not,
             (true, false) => Kept::Dearly,
             (true, true) => Kept::Well,
         })
