@@ -24,6 +24,14 @@ fn report(command: &mut assert_cmd::Command) -> Report {
 fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
     let mut report: Value = serde_json::from_str(include_str!("../../tests/fixtures/report-1-gpu.json")).unwrap();
     report["label"] = "real_full".into();
+    // The fixture is old; this is a report of this build.
+    let registry = sapwise::Registry::with_cores(1);
+    for algorithm in report["algorithms"].as_array_mut().unwrap() {
+        let of = |e: &&sapwise::Entry| algorithm["id"].as_str().unwrap().starts_with(&format!("{}@cpu", e.id.method()));
+        if let Some(revision) = registry.entries().iter().find(of).map(|e| e.revision) {
+            algorithm["revision"] = revision.into();
+        }
+    }
     let points = report["points"].as_array().unwrap().clone();
     let again = points.iter().cycle().take(12).enumerate().map(|(k, point)| {
         let mut point = point.clone();
