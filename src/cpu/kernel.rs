@@ -145,13 +145,30 @@ trait Lanes: Copy {
     ///
     /// # Safety
     /// As above.
-    unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32;
+    #[inline(always)]
+    unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
+        let mut owned = hits;
+        // With both bits set in the one box, as in most strips, the others don't matter.
+        if begins != 3 {
+            each_bit(hits, |bit| owned &= !(u32::from(begins | view.begins[at + bit] != 3) << bit));
+        }
+        owned
+    }
     /// Writes the pairs of `id` with the rows `at + k`, k the bits of `hits`, to the head of `room`, which has room for
     /// `COUNT` pairs; what follows them there is unspecified.
     ///
     /// # Safety
     /// As above.
-    unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]);
+    #[inline(always)]
+    unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
+        let mut room = room.iter_mut();
+        each_bit(hits, |bit| {
+            let other = view.ids[at + bit];
+            if let Some(pair) = room.next() {
+                *pair = (id.min(other), id.max(other));
+            }
+        });
+    }
 }
 
 /// Adds the pairs of a row with the rows that it hits.
@@ -221,29 +238,6 @@ fn query_from<L: Lanes>(lanes: L, view: &View<'_>, start: usize, query: &Query, 
         }
         at += L::COUNT;
     }
-}
-
-/// [`Lanes::owned`] without vectors.
-#[inline(always)]
-fn owned_one_by_one(view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
-    let mut owned = hits;
-    // With both bits set in the one box, as in most strips, the others don't matter.
-    if begins != 3 {
-        each_bit(hits, |bit| owned &= !(u32::from(begins | view.begins[at + bit] != 3) << bit));
-    }
-    owned
-}
-
-/// [`Lanes::write`] without vectors.
-#[inline(always)]
-fn write_one_by_one(view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
-    let mut room = room.iter_mut();
-    each_bit(hits, |bit| {
-        let other = view.ids[at + bit];
-        if let Some(pair) = room.next() {
-            *pair = (id.min(other), id.max(other));
-        }
-    });
 }
 
 /// Four cell numbers along two axes, which take turns: `cells` held between 0 and `last`, NaN at 0, without their fractions.

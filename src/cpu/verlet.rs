@@ -119,7 +119,7 @@ impl Verlet {
             }
         } else {
             changes.gone.clone().for_each(|id| tree.remove(id as u32));
-            changes.new.clone().into_iter().try_for_each(|id| tree.insert(id as u32))?;
+            changes.new.clone().try_for_each(|id| tree.insert(id as u32))?;
             tree.follow(workers, grown.as_slice(), shares.iter().flat_map(|s| s.left.iter().copied()))?;
         }
         let (grown, tree, tasks) = (&*grown, &*tree, kept.len());

@@ -31,8 +31,7 @@ const SMALLEST_FILL: usize = 1024;
 const SMALLEST_JOIN: usize = 16_384;
 
 /// Rounds for which the caller looks whether its helpers are done before it goes to sleep: some 20 us on the machine of the
-/// first reports. To be woken takes longer
-/// than most of what is left of a task by then.
+/// first reports. To be woken takes longer than most of what is left of a task by then.
 #[cfg(feature = "parallel")]
 const SPINS: u32 = 1000;
 
@@ -121,7 +120,7 @@ impl Workers {
     pub(crate) fn fill(&self, columns: ColumnsMut<'_>, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
         #[cfg(feature = "parallel")]
         if self.helpers.is_some() {
-            let size = (columns.len() / self.tasks()).max(SMALLEST_FILL);
+            let size = self.part_of(columns.len());
             let (mut rest, mut first) = (Some(columns), 0);
             let parts = std::iter::from_fn(|| {
                 let columns = rest.take().filter(|c| c.len() > 0)?;

@@ -1,7 +1,6 @@
 //! Plain Rust, which compilers turn into the vectors of the target's baseline.
 
-use super::{Lanes, Query, View, owned_one_by_one, write_one_by_one};
-use crate::Pair;
+use super::{Lanes, Query, View};
 
 /// Four rows at a time.
 #[derive(Clone, Copy)]
@@ -28,16 +27,6 @@ impl Lanes for Portable {
     #[inline(always)]
     unsafe fn ends_after(self, view: &View<'_>, at: usize, low: f32) -> u32 {
         mask([0, 1, 2, 3].map(|k| view.high[0][at + k] >= low))
-    }
-
-    #[inline(always)]
-    unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
-        owned_one_by_one(view, at, begins, hits)
-    }
-
-    #[inline(always)]
-    unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
-        write_one_by_one(view, at, id, hits, room);
     }
 }
 

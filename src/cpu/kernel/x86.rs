@@ -1,6 +1,6 @@
 //! SSE2, which every x86-64 CPU has, AVX2 and AVX-512.
 
-use super::{Lanes, Query, Rows, View, brute, owned_one_by_one, query_from, sweep, write_one_by_one};
+use super::{Lanes, Query, Rows, View, brute, query_from, sweep};
 use crate::{Pair, Pairs};
 use std::arch::x86_64::*;
 use std::mem::offset_of;
@@ -48,16 +48,6 @@ impl Lanes for Sse2 {
         };
         half(at) | half(at + 4) << 4
     }
-
-    #[inline(always)]
-    unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
-        owned_one_by_one(view, at, begins, hits)
-    }
-
-    #[inline(always)]
-    unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
-        write_one_by_one(view, at, id, hits, room);
-    }
 }
 
 impl Lanes for Avx2 {
@@ -85,16 +75,6 @@ impl Lanes for Avx2 {
             let high = _mm256_loadu_ps(view.high[0].as_ptr().add(at));
             _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(high, _mm256_set1_ps(low))) as u32
         }
-    }
-
-    #[inline(always)]
-    unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
-        owned_one_by_one(view, at, begins, hits)
-    }
-
-    #[inline(always)]
-    unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
-        write_one_by_one(view, at, id, hits, room);
     }
 }
 

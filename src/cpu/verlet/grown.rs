@@ -190,7 +190,7 @@ impl Share {
 impl Margin {
     /// The mean edge of a box, as far as it counts.
     #[inline]
-    pub(super) fn edge(&self, b: &Aabb) -> f32 {
+    fn edge(&self, b: &Aabb) -> f32 {
         let mean = (0..3).map(|a| b.max[a] - b.min[a]).sum::<f32>() / 3.0;
         // False for NaN too: an infinite box has such an edge.
         if mean < self.longest_edge { mean } else { self.longest_edge }
