@@ -111,7 +111,8 @@ pub struct Timing {
     /// The algorithm.
     pub algorithm: AlgorithmId,
     /// Wall clock of each frame from boxes in memory to pairs in memory. The k-th sample of every algorithm at a point is
-    /// the k-th frame, so samples can be compared in pairs.
+    /// the k-th frame, so samples can be compared in pairs. One that was surely beaten has fewer than the others: it rested from
+    /// then on.
     pub samples_ns: Vec<u64>,
     /// Why there are no samples, where there are none.
     pub error: Option<String>,

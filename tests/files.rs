@@ -43,7 +43,7 @@ fn every_report_is_complete_and_its_label_is_true() {
         for point in &report.points {
             let samples: Vec<usize> =
                 point.timings.iter().filter(|t| t.error.is_none()).map(|t| t.samples_ns.len()).collect();
-            assert!(samples.iter().all(|&n| n == samples[0] && n >= 3), "{path}: unpaired samples in {}", point.scenario);
+            assert!(samples.iter().all(|n| (3..=40).contains(n)), "{path}: {samples:?} samples in {}", point.scenario);
         }
         // What was written is what is read, to the last digit.
         let text = json::write_report(&report).unwrap();

@@ -25,6 +25,7 @@ pub(crate) enum Verb {
     Train(Train),
     Pairs(Pairs),
     Check(Check),
+    Compare(Compare),
     Schema(Schema),
     #[command(hide = true)]
     Part(Part),
@@ -219,6 +220,20 @@ pub(crate) struct Check {
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// One JSON object on standard output instead of text.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Says how well repeated reports of one machine agree: parameters, borders, and what the fields of one lose on another.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  for k in 1 2 3 4 5; do sapwise probe --quick --out again/$k.json; done; sapwise compare again/")]
+pub(crate) struct Compare {
+    /// Two or more reports made by the same command, or folders whose *.json files are such reports.
+    #[arg(required = true, value_name = "R.json")]
+    pub(crate) reports: Vec<PathBuf>,
+    /// One JSON object on standard output instead of tables.
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -1,10 +1,11 @@
 //! Reading the files of Sapwise.
 
 use anyhow::{Context, bail};
+use sapwise::Report;
 use sapwise::json::Document;
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Files larger than this are refused before they fill the memory. A full report of a machine with 64 threads has 2 MB.
 const LARGEST_BYTES: u64 = 64 << 20;
@@ -16,6 +17,49 @@ const LARGEST_BYTES: u64 = 64 << 20;
 pub(crate) fn read_document(path: &Path) -> anyhow::Result<Document> {
     let text = read_text(path)?;
     sapwise::json::read(&text).with_context(|| format!("{} is no sound file", path.display()))
+}
+
+/// The reports with their file names, of files and of the `*.json` files of folders, in the order of their names.
+///
+/// # Errors
+/// As [`read_document`]; when a folder can't be read or holds no such file, or a file is no report.
+pub(crate) fn read_reports(paths: &[PathBuf]) -> anyhow::Result<Vec<(String, Report)>> {
+    let mut files: Vec<PathBuf> = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            files.extend(json_files(path)?);
+        } else {
+            files.push(path.clone());
+        }
+    }
+    let mut reports = Vec::new();
+    for file in &files {
+        match read_document(file)? {
+            Document::Report(report) => reports.push((file_name(file), *report)),
+            _ => bail!("{} is no report; only what `sapwise probe` wrote is taken here", file.display()),
+        }
+    }
+    Ok(reports)
+}
+
+fn json_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let unreadable = || format!("the folder {} can't be read", folder.display());
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(unreadable)? {
+        let path = entry.with_context(unreadable)?.path();
+        if path.extension().is_some_and(|e| e == "json") && path.is_file() {
+            files.push(path);
+        }
+    }
+    if files.is_empty() {
+        bail!("the folder {} holds no *.json file; make one with `sapwise probe --out R.json`", folder.display());
+    }
+    files.sort_unstable();
+    Ok(files)
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
 fn read_text(path: &Path) -> anyhow::Result<String> {

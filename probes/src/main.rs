@@ -4,6 +4,7 @@ mod args;
 mod boxes;
 mod card;
 mod child;
+mod compare;
 mod contention;
 mod date;
 mod destination;

@@ -1,16 +1,20 @@
 //! The sweep as a whole: each scenario in a process of its own.
 
-use super::{Event, Order, Plan};
+use super::{Course, Event, Order, Plan, doubt};
 use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::Progress;
+use crate::turns::Turns;
 use anyhow::Context;
+use sapwise::GpuIdentity;
 use sapwise::report::Point;
-use sapwise::{GpuIdentity, Scenario};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What a scenario may take beyond its time: start-up, the first scene and a last frame that was forecast too short.
 const GRACE: Duration = Duration::from_secs(20);
+
+/// What the process of a scenario takes to start, threads included.
+const START: Duration = Duration::from_millis(150);
 
 /// What a sweep has found so far.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -37,80 +41,110 @@ pub(crate) struct Conditions {
 /// # Errors
 /// When no process can be started. A scenario that crashes is a remark, not an error.
 pub(crate) fn conduct(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut(&Found)) -> anyhow::Result<Found> {
-    let progress = Progress::new(plan.points());
-    let mut found = Found::default();
-    let mut gpus = &conditions.gpus[..];
-    for (k, scenario) in plan.scenarios.iter().enumerate() {
-        progress.message(scenario.to_string());
-        let ended = one(plan, *scenario, conditions, gpus, &progress, &mut found)?;
-        match ended {
+    let began = Instant::now();
+    let progress = Progress::new(plan.total.as_secs());
+    let gpus = conditions.gpus.clone();
+    let mut sweep = Sweep { plan, conditions, gpus, began, progress, found: Found::default() };
+    for scenario in &plan.scenarios {
+        if !sweep.go(&scenario.to_string(), Course::Ascent(plan.sizes.clone()), plan.ascent, 0)? {
+            return Ok(sweep.found);
+        }
+        keep(&sweep.found);
+    }
+    let mut turns = Turns::new(conditions.seed);
+    for round in 1..=plan.rounds {
+        let left = plan.total.saturating_sub(began.elapsed()) / (plan.rounds + 1 - round);
+        let starts = START * plan.scenarios.len() as u32;
+        for (scenario, mut visits) in doubt::visits(&sweep.found.points, left.saturating_sub(starts)) {
+            let time = START + Duration::from_secs_f64(visits.iter().map(|v| v.seconds).sum());
+            // In random order, so that a machine that slows down does not pass for a longer time at large sizes.
+            let order = turns.order(visits.len());
+            visits = order.into_iter().map(|k| visits[k].clone()).collect();
+            if !sweep.go(&scenario, Course::Visits(visits), time, u64::from(round))? {
+                return Ok(sweep.found);
+            }
+        }
+        keep(&sweep.found);
+    }
+    Ok(sweep.found)
+}
+
+/// A sweep on its way.
+struct Sweep<'a> {
+    plan: &'a Plan,
+    conditions: &'a Conditions,
+    /// The GPUs that are still trusted.
+    gpus: Vec<GpuIdentity>,
+    began: Instant,
+    progress: Progress,
+    found: Found,
+}
+
+impl Sweep<'_> {
+    /// Sweeps one scenario in a process of its own. Whether the sweep goes on.
+    fn go(&mut self, scenario: &str, course: Course, time: Duration, round: u64) -> anyhow::Result<bool> {
+        self.progress.message(scenario.to_owned());
+        match self.run(scenario, course, time, round)? {
             Ended::Well => {}
             Ended::Interrupted => {
-                let done = found.points.last().map_or("before the first point".to_owned(), |p| {
+                let done = self.found.points.last().map_or("before the first point".to_owned(), |p| {
                     format!("after {} at {} objects", p.scenario, p.load.objects)
                 });
-                found.remarks.push(format!("interrupted {done}; what was to follow is missing"));
-                found.interrupted = true;
-                return Ok(found);
+                self.found.remarks.push(format!("interrupted {done}; what was to follow is missing"));
+                self.found.interrupted = true;
+                return Ok(false);
             }
             Ended::Badly(how) => {
-                found.remarks.push(format!("{scenario} is incomplete: its process {how}"));
-                found.failed = true;
+                self.found.remarks.push(format!("{scenario} is incomplete: its process {how}"));
+                self.found.failed = true;
                 // Whatever it was, a driver is the first to be suspected.
-                if !gpus.is_empty() {
-                    found.remarks.push(format!("GPUs are left out after {scenario}, whose process did not end well"));
-                    gpus = &[];
+                if !self.gpus.is_empty() {
+                    let why = "whose process did not end well";
+                    self.found.remarks.push(format!("GPUs are left out after {scenario}, {why}"));
+                    self.gpus.clear();
                 }
             }
         }
-        // Sizes that did not fit into the time count as done.
-        progress.position((k as u64 + 1) * plan.sizes.len() as u64);
-        keep(&found);
+        Ok(true)
     }
-    Ok(found)
-}
 
-fn one(
-    plan: &Plan,
-    scenario: Scenario,
-    conditions: &Conditions,
-    gpus: &[GpuIdentity],
-    progress: &Progress,
-    found: &mut Found,
-) -> anyhow::Result<Ended> {
-    if interrupt::requested() {
-        return Ok(Ended::Interrupted);
-    }
-    let order = Order {
-        scenario: scenario.to_string(),
-        sizes: plan.sizes.clone(),
-        cores: conditions.cores,
-        seed: conditions.seed,
-        seconds: plan.each.as_secs_f64(),
-        gpus: gpus.to_vec(),
-        contended: conditions.contended,
-    };
-    let text = serde_json::to_string(&order)?;
-    run_part(&["sweep", &text], plan.each + GRACE, &mut |line| {
-        let event = match serde_json::from_str(line) {
-            Ok(event) => event,
-            // Drivers print what they like on the standard output of whoever loads them.
-            Err(_) if !gpus.is_empty() => return Ok(()),
-            Err(error) => return Err(error).with_context(|| format!("{scenario}: its process printed {line:?}")),
-        };
-        match event {
-            Event::Point(point) => {
-                progress.message(format!("{scenario}: {} objects done", point.load.objects));
-                progress.advance(1);
-                found.points.push(*point);
-            }
-            Event::Remark(text) => found.remarks.push(text),
-            Event::Mismatch(text) => {
-                crate::output::complain(&format!("WRONG ANSWER: {text}"));
-                found.remarks.push(format!("WRONG ANSWER: {text}"));
-                found.failed = true;
-            }
+    fn run(&mut self, scenario: &str, course: Course, time: Duration, round: u64) -> anyhow::Result<Ended> {
+        if interrupt::requested() {
+            return Ok(Ended::Interrupted);
         }
-        Ok(())
-    })
+        let order = Order {
+            scenario: scenario.to_owned(),
+            course,
+            cores: self.conditions.cores,
+            // Another scene of the same kind: what depends on one scene alone would pass for a property of the machine.
+            seed: self.conditions.seed.wrapping_add(round),
+            seconds: time.as_secs_f64(),
+            gpus: self.gpus.clone(),
+            contended: self.conditions.contended,
+        };
+        let text = serde_json::to_string(&order)?;
+        let Self { plan, gpus, began, progress, found, .. } = self;
+        run_part(&["sweep", &text], time + GRACE, &mut |line| {
+            let event = match serde_json::from_str(line) {
+                Ok(event) => event,
+                // Drivers print what they like on the standard output of whoever loads them.
+                Err(_) if !gpus.is_empty() => return Ok(()),
+                Err(error) => return Err(error).with_context(|| format!("{scenario}: its process printed {line:?}")),
+            };
+            match event {
+                Event::Point(point) => {
+                    progress.message(format!("{scenario}: {} objects done", point.load.objects));
+                    progress.position(began.elapsed().min(plan.total).as_secs());
+                    found.points.push(*point);
+                }
+                Event::Remark(text) => found.remarks.push(text),
+                Event::Mismatch(text) => {
+                    crate::output::complain(&format!("WRONG ANSWER: {text}"));
+                    found.remarks.push(format!("WRONG ANSWER: {text}"));
+                    found.failed = true;
+                }
+            }
+            Ok(())
+        })
+    }
 }

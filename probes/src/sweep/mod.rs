@@ -1,6 +1,8 @@
 //! The sweep: every algorithm on the same frames of seeded scenes, over sizes and scenarios.
 
 mod conduct;
+mod contest;
+mod doubt;
 mod dropout;
 mod order;
 mod plan;
@@ -9,7 +11,7 @@ mod scenario;
 mod verify;
 
 pub(crate) use conduct::{Conditions, Found, conduct};
-pub(crate) use order::{Event, Order};
+pub(crate) use order::{Course, Event, Order, Visit};
 pub(crate) use plan::Plan;
 pub(crate) use scenario::{next_frame, sweep};
 

@@ -1,7 +1,7 @@
 //! What a sweeping process is told, and what it tells.
 
-use sapwise::GpuIdentity;
 use sapwise::report::Point;
+use sapwise::{AlgorithmId, GpuIdentity};
 use serde::{Deserialize, Serialize};
 
 /// The sweep of one scenario, as it is handed to a process of its own.
@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Order {
     /// Name of the scenario.
     pub(crate) scenario: String,
-    /// Numbers of objects, ascending.
-    pub(crate) sizes: Vec<u32>,
+    /// The sizes.
+    pub(crate) course: Course,
     /// Cores that algorithms may use.
     pub(crate) cores: u32,
     /// Seed of the scenes and of the order of turns.
@@ -22,6 +22,38 @@ pub(crate) struct Order {
     pub(crate) gpus: Vec<GpuIdentity>,
     /// Whether foreign load is wanted, so that it spoils nothing.
     pub(crate) contended: bool,
+}
+
+/// Which sizes, and who takes part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Course {
+    /// Every algorithm through these numbers of objects, ascending, until it leaves the race.
+    Ascent(Vec<u32>),
+    /// Where the choice is in doubt, in this order.
+    Visits(Vec<Visit>),
+}
+
+impl Course {
+    /// Whether an algorithm takes part anywhere.
+    pub(super) fn admits(&self, id: &AlgorithmId) -> bool {
+        match self {
+            Self::Ascent(_) => true,
+            Self::Visits(visits) => visits.iter().any(|v| v.algorithms.contains(id)),
+        }
+    }
+}
+
+/// One more point, of those algorithms between which the choice lies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Visit {
+    /// Number of objects.
+    pub(crate) objects: u32,
+    /// Time for it.
+    pub(crate) seconds: f64,
+    /// Who takes part; two or more.
+    pub(crate) algorithms: Vec<AlgorithmId>,
 }
 
 /// What a sweeping process prints, one a line.

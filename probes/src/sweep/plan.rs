@@ -4,25 +4,32 @@ use sapwise::Scenario;
 use std::time::Duration;
 
 /// Scenarios, sizes and time of a sweep.
+///
+/// It begins with an ascent: every algorithm through all sizes, for the shape of the cost curves. Rounds of visits follow, to where
+/// the choice is in doubt after what was measured before.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plan {
-    /// In the order of measurement. A scenario may come twice, minutes apart: what the host does in the meantime differs, and
-    /// medians over both are worth more than twice the samples at once.
+    /// In the order of measurement.
     pub(crate) scenarios: Vec<Scenario>,
-    /// Numbers of objects, ascending.
+    /// Numbers of objects in the ascent, ascending.
     pub(crate) sizes: Vec<u32>,
-    /// Time for each scenario. A slower machine gets fewer sizes in that time, not more time.
-    pub(crate) each: Duration,
+    /// Time for the ascent of each scenario. A slower machine gets fewer sizes in that time, not more time.
+    pub(crate) ascent: Duration,
+    /// Rounds of visits. Several, minutes apart: what the host does in the meantime differs, and medians over all of them are
+    /// worth more than as many samples at once.
+    pub(crate) rounds: u32,
+    /// Time for everything. What the ascents leave is for the visits.
+    pub(crate) total: Duration,
 }
 
 /// Spread over the densities that shift the borders most: even, in blobs, and with sizes over two decades.
 const QUICK: [Scenario; 3] = [Scenario::Uniform, Scenario::Clustered, Scenario::Mixed];
 const QUICK_OBJECTS: u32 = 300_000;
-/// Of the 60 s that a quick probe may take, 4.5 s are for the hardware; the rest is for starting and writing.
-const QUICK_TOTAL: Duration = Duration::from_secs(48);
+const QUICK_PER_DECADE: u32 = 3;
+const QUICK_ROUNDS: u32 = 1;
+/// Of the 30 s that a quick probe may take, some are for the hardware; the rest is for starting and writing.
+const QUICK_TOTAL: Duration = Duration::from_secs(21);
 
-/// Times that a full probe goes through its scenarios.
-const FULL_ROUNDS: usize = 2;
 const FULL: [Scenario; 7] = [
     Scenario::Uniform,
     Scenario::Clustered,
@@ -33,33 +40,34 @@ const FULL: [Scenario; 7] = [
     Scenario::Fragmentation,
 ];
 const FULL_OBJECTS: u32 = 1_000_000;
-/// Of the 5 minutes that a probe may take.
-const FULL_TOTAL: Duration = Duration::from_secs(270);
+const FULL_PER_DECADE: u32 = 4;
+const FULL_ROUNDS: u32 = 3;
+/// Of the 3 minutes that a probe may take.
+const FULL_TOTAL: Duration = Duration::from_secs(160);
+
+/// Share of the time for the ascents.
+const ASCENT_SHARE: f64 = 0.6;
 
 impl Plan {
     /// The usual plan, with the user's scenarios and largest size where they are given.
     pub(crate) fn new(quick: bool, scenarios: &[Scenario], max_objects: Option<u32>) -> Self {
-        let (usual, objects, total) = if quick {
-            (QUICK.to_vec(), QUICK_OBJECTS, QUICK_TOTAL)
+        let (usual, objects, per_decade, rounds, total) = if quick {
+            (QUICK.to_vec(), QUICK_OBJECTS, QUICK_PER_DECADE, QUICK_ROUNDS, QUICK_TOTAL)
         } else {
-            (FULL.repeat(FULL_ROUNDS), FULL_OBJECTS, FULL_TOTAL)
+            (FULL.to_vec(), FULL_OBJECTS, FULL_PER_DECADE, FULL_ROUNDS, FULL_TOTAL)
         };
-        let each = total / usual.len() as u32;
-        let scenarios = if scenarios.is_empty() { usual } else { scenarios.to_vec() };
+        let scenarios = if scenarios.is_empty() { usual.clone() } else { scenarios.to_vec() };
         // More scenarios than usual share the time; fewer don't get more than usual each.
-        let each = each.min(total / scenarios.len() as u32);
-        Self { scenarios, sizes: sizes(max_objects.unwrap_or(objects)), each }
-    }
-
-    /// Points when every size fits into the time.
-    pub(crate) fn points(&self) -> u64 {
-        self.scenarios.len() as u64 * self.sizes.len() as u64
+        let total = total.min(total / usual.len() as u32 * scenarios.len() as u32);
+        let ascent = total.mul_f64(ASCENT_SHARE) / scenarios.len() as u32;
+        Self { scenarios, sizes: sizes(max_objects.unwrap_or(objects), per_decade), ascent, rounds, total }
     }
 }
 
-/// Four sizes a decade from 10 up, and `max` as the last.
-fn sizes(max: u32) -> Vec<u32> {
-    let grid = (4..).map(|k| 10.0_f64.powf(f64::from(k) / 4.0).round() as u32);
+/// So many sizes a decade from 10 up, and `max` as the last.
+fn sizes(max: u32, per_decade: u32) -> Vec<u32> {
+    let each = f64::from(per_decade);
+    let grid = (per_decade..).map(|k| 10.0_f64.powf(f64::from(k) / each).round() as u32);
     // A size just below the last would cost as much as the last and tell nothing new.
     let mut sizes: Vec<u32> = grid.take_while(|&n| f64::from(n) * 1.2 < f64::from(max)).collect();
     sizes.push(max);
@@ -80,23 +88,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_are_four_a_decade_and_end_at_the_largest() {
-        assert_eq!(sizes(100), [10, 18, 32, 56, 100]);
-        assert_eq!(sizes(10), [10]);
-        assert_eq!(sizes(1_000_000).len(), 21);
-        assert_eq!(&sizes(300_000)[16..], [100_000, 177_828, 300_000]);
+    fn sizes_are_even_in_the_logarithm_and_end_at_the_largest() {
+        assert_eq!(sizes(100, 4), [10, 18, 32, 56, 100]);
+        assert_eq!(sizes(10, 3), [10]);
+        assert_eq!(sizes(1_000_000, 4).len(), 21);
+        assert_eq!(&sizes(300_000, 3)[12..], [100_000, 215_443, 300_000]);
     }
 
     #[test]
-    fn the_plans_stay_within_their_minutes() {
+    fn the_plans_stay_within_their_time() {
         for quick in [true, false] {
             let plan = Plan::new(quick, &[], None);
-            let limit = if quick { 60 } else { 300 };
-            assert!(plan.each * plan.scenarios.len() as u32 + Duration::from_secs(6) < Duration::from_secs(limit));
+            let limit = if quick { 30 } else { 180 };
+            // Eight seconds for the hardware, starting and writing.
+            assert!(plan.total + Duration::from_secs(8) < Duration::from_secs(limit));
+            assert!(plan.ascent * (plan.scenarios.len() as u32) < plan.total);
         }
         let all = Plan::new(true, &Scenario::ALL, Some(100));
-        assert!(all.each * 10 <= QUICK_TOTAL);
-        assert_eq!(all.points(), 50);
+        assert_eq!((all.total, all.scenarios.len()), (QUICK_TOTAL, 10));
+        assert_eq!(Plan::new(true, &[Scenario::Slab], None).total, QUICK_TOTAL / 3);
     }
 
     #[test]

@@ -1,17 +1,17 @@
 //! One scenario through all sizes, within its time.
 
 use super::dropout::Standing;
-use super::race::{FEWEST_FRAMES, Race, Runner};
-use super::{Event, Order, median, plan};
+use super::race::{FEWEST_FRAMES, Outcome, Race, Runner};
+use super::{Course, Event, Order, Visit, median, plan};
 use sapwise::gpu::Gpus;
 use sapwise::report::Point;
-use sapwise::{GpuIdentity, Registry, Scenario, Scene};
+use sapwise::{AlgorithmId, GpuIdentity, Registry, Scenario, Scene};
 use std::time::{Duration, Instant};
 
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
 const PAIR_LIMIT: usize = 32 << 20;
 
-/// Runs the algorithms of a registry through the sizes of an order and hands on what happens.
+/// Runs the algorithms of a registry along the course of an order and hands on what happens.
 ///
 /// # Errors
 /// When the scenario is unknown or `emit` fails.
@@ -26,43 +26,98 @@ pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result
     }
     let mut runners = Vec::new();
     for (id, _) in registry.available() {
+        if !order.course.admits(&id) {
+            continue;
+        }
         match registry.create(&id) {
             Ok(algorithm) => runners.push(Runner::new(id, algorithm)),
             Err(error) => emit(Event::Remark(format!("{scenario}: {error}")))?,
         }
     }
-    let mut standings = vec![Standing::default(); runners.len()];
-    let mut race = Race::new(order.seed, PAIR_LIMIT, order.contended);
-    let mut before: Option<Before> = None;
-    for (k, &objects) in order.sizes.iter().enumerate() {
-        let left = end.saturating_duration_since(Instant::now());
-        if let Some(before) = &mut before
-            && before.forecast(objects) > left
-        {
-            let reached = before.objects;
-            if !before.leave_out_slow(&mut standings) || before.forecast(objects) > left {
-                let seconds = order.seconds;
-                return emit(Event::Remark(format!(
-                    "{scenario} ends after {reached} objects: {objects} don't fit into the {seconds:.0} s that it has"
-                )));
-            }
-            keep_racing(&mut runners, &mut standings);
-            emit(Event::Remark(format!("{scenario}: for want of time only the fast go on after {reached} objects")))?;
-        }
-        let mut scene = scenario.start(objects as usize, order.seed);
-        let outcome = race.run(&mut runners, &mut scene, left.mul_f64(plan::share(&order.sizes[k..])));
-        for mismatch in outcome.mismatches {
-            emit(Event::Mismatch(format!("{scenario} at {objects} objects: {mismatch}")))?;
-        }
-        let best_ns = judge(&mut standings, &outcome.point, objects);
-        emit(Event::Point(Box::new(outcome.point)))?;
-        keep_racing(&mut runners, &mut standings);
-        if runners.is_empty() {
-            return emit(Event::Remark(format!("{scenario} ends after {objects} objects: no algorithm is left")));
-        }
-        before = Some(Before { objects, frame: outcome.frame, best_ns });
+    let stage = Stage { scenario, seed: order.seed, end, race: Race::new(order.seed, PAIR_LIMIT, order.contended), emit };
+    match &order.course {
+        Course::Ascent(sizes) => stage.ascend(runners, sizes, order.seconds),
+        Course::Visits(visits) => stage.visit(runners, visits),
     }
-    Ok(())
+}
+
+/// What both courses share.
+struct Stage<'a> {
+    scenario: Scenario,
+    seed: u64,
+    end: Instant,
+    race: Race,
+    emit: &'a mut dyn FnMut(Event) -> anyhow::Result<()>,
+}
+
+impl Stage<'_> {
+    /// Everyone through all sizes, until they leave the race or the time is over.
+    fn ascend(mut self, mut runners: Vec<Runner>, sizes: &[u32], seconds: f64) -> anyhow::Result<()> {
+        let scenario = self.scenario;
+        let mut standings = vec![Standing::default(); runners.len()];
+        let mut before: Option<Before> = None;
+        for (k, &objects) in sizes.iter().enumerate() {
+            let left = self.end.saturating_duration_since(Instant::now());
+            if let Some(before) = &mut before
+                && before.forecast(objects) > left
+            {
+                let reached = before.objects;
+                if !before.leave_out_slow(&mut standings) || before.forecast(objects) > left {
+                    return self.remark(format!(
+                        "{scenario} ends after {reached} objects: {objects} don't fit into the {seconds:.0} s that it has"
+                    ));
+                }
+                keep_racing(&mut runners, &mut standings);
+                self.remark(format!("{scenario}: for want of time only the fast go on after {reached} objects"))?;
+            }
+            let outcome = self.point(&mut runners, objects, left.mul_f64(plan::share(&sizes[k..])))?;
+            let best_ns = judge(&mut standings, &outcome.point, objects);
+            (self.emit)(Event::Point(Box::new(outcome.point)))?;
+            keep_racing(&mut runners, &mut standings);
+            if runners.is_empty() {
+                return self.remark(format!("{scenario} ends after {objects} objects: no algorithm is left"));
+            }
+            before = Some(Before { objects, frame: outcome.frame, warm_up: outcome.warm_up, best_ns });
+        }
+        Ok(())
+    }
+
+    /// Single points, in the order given, until the time is over. What is left then was not promised, so nothing is said of it.
+    fn visit(mut self, mut runners: Vec<Runner>, visits: &[Visit]) -> anyhow::Result<()> {
+        let order: Vec<AlgorithmId> = runners.iter().map(|r| r.id.clone()).collect();
+        for visit in visits {
+            let left = self.end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                break;
+            }
+            let (mut racing, resting): (Vec<Runner>, Vec<Runner>) =
+                runners.into_iter().partition(|r| r.error.is_none() && visit.algorithms.contains(&r.id));
+            if racing.len() > 1 {
+                let time = Duration::try_from_secs_f64(visit.seconds).unwrap_or_default();
+                let outcome = self.point(&mut racing, visit.objects, time.min(left))?;
+                (self.emit)(Event::Point(Box::new(outcome.point)))?;
+            }
+            runners = resting;
+            runners.append(&mut racing);
+            // The first of the list is what the answers of large frames are held against.
+            runners.sort_by_key(|r| order.iter().position(|id| *id == r.id));
+        }
+        Ok(())
+    }
+
+    /// One size, with what was wrong told.
+    fn point(&mut self, runners: &mut [Runner], objects: u32, time: Duration) -> anyhow::Result<Outcome> {
+        let mut scene = self.scenario.start(objects as usize, self.seed);
+        let mut outcome = self.race.run(runners, &mut scene, time);
+        for mismatch in outcome.mismatches.drain(..) {
+            (self.emit)(Event::Mismatch(format!("{} at {objects} objects: {mismatch}", self.scenario)))?;
+        }
+        Ok(outcome)
+    }
+
+    fn remark(&mut self, text: String) -> anyhow::Result<()> {
+        (self.emit)(Event::Remark(text))
+    }
 }
 
 /// Adds the algorithms on those of these GPUs that are still there, and gives what keeps others from running.
@@ -84,6 +139,8 @@ struct Before {
     objects: u32,
     /// Wall clock of a frame with all algorithms.
     frame: Duration,
+    /// Wall clock of the frames before the samples.
+    warm_up: Duration,
     /// Median of the best.
     best_ns: f64,
 }
@@ -94,7 +151,7 @@ impl Before {
         // Between the exponents of the strips (1) and of a sweep on one axis (5/3). Too low a forecast costs some seconds
         // beyond the time, too high a one costs the last size.
         let growth = (f64::from(objects) / f64::from(self.objects)).powf(1.25);
-        self.frame.mul_f64(growth) * (FEWEST_FRAMES as u32 + 1)
+        (self.warm_up + self.frame * (FEWEST_FRAMES as u32)).mul_f64(growth)
     }
 
     /// Takes the slow out of the race and their time out of the frame. Whether there were any.
@@ -144,14 +201,13 @@ mod tests {
     use super::*;
 
     fn order(scenario: &str, sizes: &[u32], seconds: f64) -> Order {
-        let (scenario, sizes) = (scenario.to_owned(), sizes.to_vec());
-        Order { scenario, sizes, cores: 2, seed: 3, seconds, gpus: Vec::new(), contended: false }
+        let (scenario, course) = (scenario.to_owned(), Course::Ascent(sizes.to_vec()));
+        Order { scenario, course, cores: 2, seed: 3, seconds, gpus: Vec::new(), contended: false }
     }
 
-    fn events(scenario: &str, sizes: &[u32], seconds: f64) -> Vec<Event> {
-        let order = order(scenario, sizes, seconds);
+    fn events(order: &Order) -> Vec<Event> {
         let mut events = Vec::new();
-        sweep(&order, &mut |event| {
+        sweep(order, &mut |event| {
             events.push(event);
             Ok(())
         })
@@ -159,26 +215,45 @@ mod tests {
         events
     }
 
+    fn points(events: &[Event]) -> Vec<&Point> {
+        events.iter().filter_map(|e| if let Event::Point(p) = e { Some(&**p) } else { None }).collect()
+    }
+
     #[test]
-    fn every_point_has_paired_samples_of_all_algorithms_and_the_size_asked_for() {
+    fn every_point_has_samples_of_all_algorithms_and_the_size_asked_for() {
         for scenario in ["uniform", "fragmentation"] {
-            let events = events(scenario, &[10, 300], 10.0);
-            let points: Vec<&Point> =
-                events.iter().filter_map(|e| if let Event::Point(p) = e { Some(&**p) } else { None }).collect();
+            let events = events(&order(scenario, &[10, 300], 10.0));
+            let points = points(&events);
             assert_eq!(points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [10, 300], "{events:?}");
             for point in points {
                 assert!(point.timings.len() >= 2);
-                let frames = point.timings[0].samples_ns.len();
-                assert!((FEWEST_FRAMES..=40).contains(&frames), "{frames}");
-                assert!(point.timings.iter().all(|t| t.samples_ns.len() == frames && t.error.is_none()));
+                let frames = point.timings.iter().map(|t| t.samples_ns.len());
+                assert!(frames.clone().all(|n| (FEWEST_FRAMES..=40).contains(&n)), "{point:?}");
+                assert!(point.timings.iter().all(|t| t.error.is_none()));
             }
         }
     }
 
     #[test]
+    fn visits_race_only_those_who_were_asked() {
+        let algorithms: Vec<AlgorithmId> = ["brute@cpu1", "sweep@cpu1"].map(|id| id.parse().unwrap()).into();
+        let visit = |objects, algorithms: &[AlgorithmId]| Visit { objects, seconds: 0.0, algorithms: algorithms.into() };
+        // One alone gives no choice to be in doubt of.
+        let visits = vec![visit(300, &algorithms), visit(20, &algorithms), visit(50, &algorithms[..1])];
+        let order = Order { course: Course::Visits(visits), ..order("clustered", &[], 60.0) };
+        let events = events(&order);
+        let points = points(&events);
+        assert_eq!(points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [300, 20]);
+        for point in points {
+            let raced: Vec<_> = point.timings.iter().map(|t| t.algorithm.clone()).collect();
+            assert!(raced.len() == 2 && algorithms.iter().all(|id| raced.contains(id)), "{raced:?}");
+        }
+    }
+
+    #[test]
     fn a_size_that_does_not_fit_is_told() {
-        let events = events("uniform", &[10, 1_000_000], 0.0);
-        assert_eq!(events.iter().filter(|e| matches!(e, Event::Point(_))).count(), 1);
+        let events = events(&order("uniform", &[10, 1_000_000], 0.0));
+        assert_eq!(points(&events).len(), 1);
         assert!(matches!(events.last(), Some(Event::Remark(text)) if text.contains("1000000")), "{events:?}");
     }
 

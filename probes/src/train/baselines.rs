@@ -32,13 +32,19 @@ fn over_best(medians: &[(&AlgorithmId, f64)], best: f64, id: &AlgorithmId) -> Op
     Some(medians.iter().find(|m| m.0 == id)?.1 / best)
 }
 
-/// The cost of an algorithm over the best at another point like this one: sweeps go through a scenario twice.
+/// How far away another size may be from which it is taken how far behind an algorithm is.
+const LIKE: f64 = 2.0;
+
+/// The cost of an algorithm over the best at the nearest other size of the scenario: a sweep goes to some sizes more than once, and
+/// then only with those between which the choice lies.
 fn elsewhere(profile: &Profile, like: &Point, id: &AlgorithmId) -> Option<f64> {
-    let same = |p: &&Point| p.scenario == like.scenario && p.load.objects == like.load.objects;
-    profile.report.points.iter().filter(same).find_map(|p| {
+    let distance = |p: &Point| (f64::from(p.load.objects) / f64::from(like.load.objects)).ln().abs();
+    let near = profile.report.points.iter().filter(|p| p.scenario == like.scenario && distance(p) <= LIKE.ln());
+    let timed = near.filter_map(|p| {
         let medians = medians(p);
-        over_best(&medians, best(&medians)?, id)
-    })
+        Some((distance(p), over_best(&medians, best(&medians)?, id)?))
+    });
+    timed.min_by(|a, b| a.0.total_cmp(&b.0)).map(|nearest| nearest.1)
 }
 
 /// The algorithms of a profile that were timed anywhere in it.
@@ -184,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_timed_costs_what_it_did_in_the_other_round_or_ten_times_the_best() {
+    fn what_was_not_timed_costs_what_it_did_nearby_or_ten_times_the_best() {
         let profile = Profile { file: String::new(), report: Machine::family()[0].report() };
         let never: Chooser<'_> = Box::new(|_| None);
         assert!(regrets(&profile, &never).iter().all(|r| (r - 9.0).abs() < 1e-9));

@@ -11,7 +11,7 @@ mod residual;
 mod robust;
 mod rows;
 #[cfg(test)]
-mod synthetic;
+pub(crate) mod synthetic;
 mod terms;
 mod validate;
 
@@ -20,8 +20,9 @@ use sapwise::hardware::{gpu, parameter};
 use sapwise::model::GPU_PREFIX;
 use sapwise::{GpuKind, Hardware, Model, Report};
 
-pub(crate) use baselines::slice_scenario;
-pub(crate) use curve::measured_fields;
+pub(crate) use baselines::{Chooser, available, average, by_costs, regrets, slice_scenario};
+pub(crate) use curve::{measured_costs, measured_fields};
+pub(crate) use rows::{Profile, medians, usable};
 
 /// Parameters by which the CPU of a machine is compared with those of the training.
 const PARAMETERS: [&str; 8] = [
@@ -76,7 +77,7 @@ pub(crate) struct Trained {
 /// # Errors
 /// When no report can be used, with the reason for each and what to do; when no method can be fitted.
 pub(crate) fn train(reports: &[(String, Report)], name: &str) -> Result<Trained> {
-    let (profiles, mut notes) = rows::usable(reports);
+    let (profiles, mut notes) = usable(reports);
     if profiles.is_empty() {
         let why = if notes.is_empty() { "none was given".to_owned() } else { notes.join("; ") };
         bail!("no report can be trained on: {why}; measure one with `sapwise probe --out R.json` of a release build");

@@ -1,6 +1,7 @@
 //! The verbs, one file each.
 
 mod check;
+mod compare;
 mod devices;
 mod pairs;
 mod part;
@@ -29,6 +30,7 @@ pub(crate) fn run(verb: Verb) -> anyhow::Result<Outcome> {
         Verb::Run(arguments) => run::run(&arguments),
         Verb::Train(arguments) => train::run(&arguments),
         Verb::Pairs(arguments) => pairs::run(&arguments),
+        Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),
         Verb::Part(arguments) => part::run(arguments),

@@ -1,17 +1,15 @@
 //! `sapwise train`: a model from reports, validated by leaving machines out.
 
 use crate::args::Train;
-use crate::document::read_document;
+use crate::document::read_reports;
 use crate::exit::{Outcome, WrongUsage};
 use crate::table::columns;
 use crate::train::{self, Trained};
 use crate::{card, files, output};
-use anyhow::{Context, bail};
-use sapwise::json::Document;
+use sapwise::Model;
 use sapwise::model::Validation;
-use sapwise::{Model, Report};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The answer for machines.
 #[derive(Serialize)]
@@ -24,7 +22,7 @@ struct Answer<'a> {
 
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
-    let reports = reports(&arguments.reports)?;
+    let reports = read_reports(&arguments.reports)?;
     let Trained { model, notes } = train::train(&reports, &name)?;
     let text = sapwise::json::write(&model)?;
     files::write_text(&arguments.out, &text)?;
@@ -48,46 +46,6 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
         return Err(WrongUsage(format!("{} names no file", arguments.out.display())).into());
     }
     Ok(name)
-}
-
-/// The reports with their file names. The files of a folder come in the order of their names.
-fn reports(paths: &[PathBuf]) -> anyhow::Result<Vec<(String, Report)>> {
-    let mut files: Vec<PathBuf> = Vec::new();
-    for path in paths {
-        if path.is_dir() {
-            files.extend(json_files(path)?);
-        } else {
-            files.push(path.clone());
-        }
-    }
-    let mut reports = Vec::new();
-    for file in &files {
-        match read_document(file)? {
-            Document::Report(report) => reports.push((file_name(file), *report)),
-            _ => bail!("{} is no report; `train` takes what `sapwise probe` wrote", file.display()),
-        }
-    }
-    Ok(reports)
-}
-
-fn json_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let unreadable = || format!("the folder {} can't be read", folder.display());
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).with_context(unreadable)? {
-        let path = entry.with_context(unreadable)?.path();
-        if path.extension().is_some_and(|e| e == "json") && path.is_file() {
-            files.push(path);
-        }
-    }
-    if files.is_empty() {
-        bail!("the folder {} holds no *.json file; make one with `sapwise probe --out R.json`", folder.display());
-    }
-    files.sort_unstable();
-    Ok(files)
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
 fn summary(model: &Model, notes: &[String], path: &Path) -> String {

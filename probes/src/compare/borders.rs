@@ -1,0 +1,140 @@
+//! How far the borders between fields move from report to report.
+
+use crate::train;
+use sapwise::measure::statistics::{median, relative_iqr};
+use sapwise::report::{Point, Report};
+use sapwise::{AlgorithmId, Fields};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A border over several reports.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Border {
+    pub(crate) scenario: String,
+    pub(crate) below: AlgorithmId,
+    pub(crate) above: AlgorithmId,
+    /// Reports that have it.
+    pub(crate) reports: usize,
+    /// Median of its positions, in objects.
+    pub(crate) objects: f64,
+    /// Largest distance of a position from the median, over the median.
+    pub(crate) spread: f64,
+    /// Interquartile range over median; `None` below four reports.
+    pub(crate) dispersion: Option<f64>,
+    /// Share of the reports whose own interval holds the median.
+    pub(crate) within: f64,
+    /// Exponent by which the ratio of the two costs grows with the number of objects around the border. A wrong side costs less
+    /// the nearer to 0 it is.
+    pub(crate) slope: Option<f64>,
+}
+
+/// From this exponent on a border is steep: at twice its number of objects the one costs 1.4 times the other.
+pub(crate) const STEEP: f64 = 0.5;
+/// Points within this factor of a border tell its slope.
+const AROUND: f64 = 4.0;
+
+/// The borders of every scenario that all reports have, where at least half of the reports have them.
+pub(super) fn borders(reports: &[&Report]) -> Vec<Border> {
+    let mut found: Vec<Border> = Vec::new();
+    for scenario in scenarios(reports) {
+        let all: Vec<Fields> = reports.iter().filter_map(|r| train::measured_fields(r, scenario).ok()).collect();
+        // A pair can cross more than once; the k-th crossing of one report is held against the k-th of the others.
+        let mut groups: BTreeMap<(AlgorithmId, AlgorithmId, usize), Vec<&sapwise::Border>> = BTreeMap::new();
+        for fields in &all {
+            let mut counts: BTreeMap<(&AlgorithmId, &AlgorithmId), usize> = BTreeMap::new();
+            for border in &fields.crossovers {
+                let count = counts.entry((&border.below, &border.above)).or_default();
+                groups.entry((border.below.clone(), border.above.clone(), *count)).or_default().push(border);
+                *count += 1;
+            }
+        }
+        let mut of_scenario: Vec<Border> = groups
+            .into_iter()
+            .filter(|(_, group)| 2 * group.len() >= reports.len())
+            .filter_map(|((below, above, _), group)| border(reports, scenario, below, above, &group))
+            .collect();
+        of_scenario.sort_by(|a, b| a.objects.total_cmp(&b.objects));
+        found.append(&mut of_scenario);
+    }
+    found
+}
+
+fn scenarios<'a>(reports: &[&'a Report]) -> Vec<&'a str> {
+    let mut names: Vec<&str> = Vec::new();
+    for point in reports.iter().take(1).flat_map(|r| &r.points) {
+        let everywhere = reports.iter().all(|r| r.points.iter().any(|p| p.scenario == point.scenario));
+        if everywhere && !names.contains(&point.scenario.as_str()) {
+            names.push(&point.scenario);
+        }
+    }
+    names
+}
+
+fn border(
+    reports: &[&Report],
+    scenario: &str,
+    below: AlgorithmId,
+    above: AlgorithmId,
+    group: &[&sapwise::Border],
+) -> Option<Border> {
+    let positions: Vec<f64> = group.iter().map(|b| b.objects).collect();
+    let objects = median(&positions)?;
+    let holding = group.iter().filter(|b| (b.low..=b.high).contains(&objects)).count();
+    let points = reports.iter().flat_map(|r| &r.points).filter(|p| p.scenario == scenario);
+    Some(Border {
+        scenario: scenario.to_owned(),
+        reports: group.len(),
+        objects,
+        spread: positions.iter().map(|p| (p / objects - 1.0).abs()).fold(0.0, f64::max),
+        dispersion: relative_iqr(&positions),
+        within: holding as f64 / group.len() as f64,
+        slope: slope(points, objects, &below, &above),
+        below,
+        above,
+    })
+}
+
+/// The exponent of the ratio of two costs, by least squares over the medians of the points around a border.
+fn slope<'a>(
+    points: impl Iterator<Item = &'a Point>,
+    objects: f64,
+    below: &AlgorithmId,
+    above: &AlgorithmId,
+) -> Option<f64> {
+    let mut at: Vec<(f64, f64)> = Vec::new();
+    for point in points {
+        let x = (f64::from(point.load.objects) / objects).ln();
+        let medians = train::medians(point);
+        let of = |id: &AlgorithmId| medians.iter().find(|m| m.0 == id).map(|m| m.1);
+        if let (true, Some(first), Some(second)) = (x.abs() <= AROUND.ln(), of(below), of(above)) {
+            at.push((x, (first / second).ln()));
+        }
+    }
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| at.iter().map(of).sum::<f64>() / at.len() as f64;
+    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+    let variance: f64 = at.iter().map(|p| (p.0 - x).powi(2)).sum();
+    let covariance: f64 = at.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
+    (at.len() >= 3 && variance > 0.0).then(|| covariance / variance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::synthetic::Machine;
+
+    #[test]
+    fn the_slope_is_the_difference_of_the_exponents() {
+        let mut points = Machine::family()[0].clone().exact().report().points;
+        points.retain(|p| p.scenario == "uniform");
+        let [a, b] = ["brute@cpu1", "strips@cpu1"].map(|id| id.parse::<AlgorithmId>().unwrap());
+        for point in &mut points {
+            let n = f64::from(point.load.objects);
+            for timing in &mut point.timings {
+                let ns = if timing.algorithm == a { n.powf(1.9) } else { 100.0 * n };
+                timing.samples_ns.fill((1000.0 * ns) as u64);
+            }
+        }
+        let slope = slope(points.iter(), 166.0, &a, &b).unwrap();
+        assert!((slope - 0.9).abs() < 0.01, "{slope}");
+    }
+}

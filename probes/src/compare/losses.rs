@@ -1,0 +1,48 @@
+//! What is lost by using the fields that one report measured under the timings of another.
+
+use crate::train::{Chooser, Profile, available, average, by_costs, measured_costs, regrets, usable};
+use sapwise::Report;
+use serde::Serialize;
+
+/// Mean regrets over the points of reports, against the best at each point.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Losses {
+    /// Of the fields of a report on its own timings.
+    pub(crate) own: f64,
+    /// Of the fields of every other report on them.
+    pub(crate) others: f64,
+    /// What the fields of another report lose beyond a report's own: mean over all ordered pairs of reports.
+    pub(crate) beyond_own: f64,
+    /// The largest of these.
+    pub(crate) beyond_own_most: f64,
+}
+
+/// `None` with fewer than two reports that hold usable timings.
+pub(super) fn losses(reports: &[(String, Report)]) -> Option<Losses> {
+    // One by one: together, a repeated report would be left out.
+    let profiles: Vec<Profile> = reports.iter().flat_map(|r| usable(std::slice::from_ref(r)).0).collect();
+    if profiles.len() < 2 {
+        return None;
+    }
+    let (mut own, mut others, mut beyond) = (Vec::new(), Vec::new(), Vec::new());
+    for (k, judged) in profiles.iter().enumerate() {
+        let available = available(judged);
+        let loss = |of: &Profile| {
+            let choose: Chooser<'_> = by_costs(measured_costs(&of.report).0, &available);
+            average(&regrets(judged, &choose))
+        };
+        let by_own = loss(judged);
+        own.push(by_own);
+        for (_, other) in profiles.iter().enumerate().filter(|(j, _)| *j != k) {
+            let by_other = loss(other);
+            others.push(by_other);
+            beyond.push(by_other - by_own);
+        }
+    }
+    Some(Losses {
+        own: average(&own),
+        others: average(&others),
+        beyond_own: average(&beyond),
+        beyond_own_most: beyond.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+    })
+}

@@ -1,0 +1,76 @@
+//! `sapwise compare`: how well repeated reports of one machine agree.
+
+use crate::args::Compare;
+use crate::compare::{Border, Comparison, Losses, STEEP, Spread};
+use crate::document::read_reports;
+use crate::exit::Outcome;
+use crate::output;
+use crate::table::{columns, grouped};
+
+pub(crate) fn run(arguments: &Compare) -> anyhow::Result<Outcome> {
+    let reports = read_reports(&arguments.reports)?;
+    let comparison = Comparison::of(&reports)?;
+    if arguments.json {
+        output::print_json(&comparison)?;
+    } else {
+        output::print(&text(&comparison))?;
+    }
+    Ok(Outcome::Done)
+}
+
+fn text(comparison: &Comparison) -> String {
+    let mut text = format!("{} reports of one machine", comparison.reports);
+    if let Some(load) = comparison.foreign_load {
+        text.push_str(&format!(", foreign load at most {} at half of the points of each", percent(load)));
+    }
+    text.push_str("\n\n");
+    let head = ["parameter", "median", "IQR/median", "least to most"].map(str::to_owned).to_vec();
+    let rows = comparison.parameters.iter().map(spread);
+    text.push_str(&columns(&std::iter::once(head).chain(rows).collect::<Vec<_>>()));
+    if !comparison.borders.is_empty() {
+        text.push('\n');
+        let head = ["border", "", "objects", "farthest", "IQR/median", "in its interval", "slope", "reports"];
+        let rows = comparison.borders.iter().map(border);
+        text.push_str(&columns(&std::iter::once(head.map(str::to_owned).to_vec()).chain(rows).collect::<Vec<_>>()));
+    }
+    if let Some(Losses { own, others, beyond_own, beyond_own_most }) = &comparison.losses {
+        text.push_str(&format!(
+            "\nMean regret of the fields of a report: {} on its own timings, {} on those of the others; beyond its own {}, at most {}\n",
+            percent(*own),
+            percent(*others),
+            percent(*beyond_own),
+            percent(*beyond_own_most)
+        ));
+    }
+    text
+}
+
+fn spread(s: &Spread) -> Vec<String> {
+    let over = |v: f64| if s.median == 0.0 { "-".to_owned() } else { format!("{:.3}", v / s.median) };
+    vec![
+        s.name.clone(),
+        format!("{:.4}", s.median),
+        s.dispersion.map_or("-".to_owned(), percent),
+        format!("{} to {}", over(s.low), over(s.high)),
+    ]
+}
+
+fn border(b: &Border) -> Vec<String> {
+    let slope = b
+        .slope
+        .map_or("-".to_owned(), |slope| format!("{slope:.2} {}", if slope.abs() >= STEEP { "steep" } else { "shallow" }));
+    vec![
+        b.scenario.clone(),
+        format!("{} to {}", b.below, b.above),
+        grouped(b.objects.round() as u64),
+        percent(b.spread),
+        b.dispersion.map_or("-".to_owned(), percent),
+        percent(b.within),
+        slope,
+        b.reports.to_string(),
+    ]
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.2} %", share * 100.0)
+}
