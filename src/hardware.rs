@@ -107,6 +107,8 @@ pub mod parameter {
     pub const BANDWIDTH_ONE_THREAD_GB_PER_S: &str = "bandwidth_one_thread_gb_per_s";
     /// STREAM triad on all usable cores, 24 bytes an element.
     pub const BANDWIDTH_ALL_THREADS_GB_PER_S: &str = "bandwidth_all_threads_gb_per_s";
+    /// Time until one core sees what another one wrote.
+    pub const CORE_TO_CORE_NS: &str = "core_to_core_ns";
     /// Cost of one fork and join over all usable cores while the workers are awake.
     pub const FORK_JOIN_WARM_NS: &str = "fork_join_warm_ns";
     /// The same from outside the pool after the workers have slept for 2 ms.
@@ -139,6 +141,7 @@ pub mod parameter {
             MEMORY_BYTES,
             BANDWIDTH_ONE_THREAD_GB_PER_S,
             BANDWIDTH_ALL_THREADS_GB_PER_S,
+            CORE_TO_CORE_NS,
             FORK_JOIN_WARM_NS,
             FORK_JOIN_COLD_NS,
             SCALING_TWO_THREADS_RATIO,

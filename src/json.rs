@@ -141,6 +141,7 @@ mod tests {
             fingerprint: String::new(),
             foreign_load: Some(0.25),
             spoiled: 0,
+            core_to_core_ns: Some([23.5, 179.0]),
             timings: Vec::new(),
         };
         let mut report = Report {

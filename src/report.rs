@@ -99,6 +99,10 @@ pub struct Point {
     pub foreign_load: Option<f64>,
     /// Frames that were thrown away because foreign load spoiled them.
     pub spoiled: u32,
+    /// [`CORE_TO_CORE_NS`](crate::hardware::parameter::CORE_TO_CORE_NS) before and after the samples. A hypervisor that moves the
+    /// cores of a guest changes it, and with it what several threads gain. Absent on one core and in old reports.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub core_to_core_ns: Option<[f64; 2]>,
     /// The timings, one entry for each algorithm that was still in the race.
     pub timings: Vec<Timing>,
 }
@@ -130,6 +134,9 @@ impl Report {
             let Load { axis_candidates, strip_candidates, pairs, moved, .. } = point.load;
             if ![axis_candidates, strip_candidates, pairs, moved].iter().all(|v| v.is_finite() && *v >= 0.0) {
                 return Some(format!("{at}: a load that is negative or not finite"));
+            }
+            if !point.core_to_core_ns.iter().flatten().all(|ns| ns.is_finite() && *ns > 0.0) {
+                return Some(format!("{at}: a latency between cores that is not above 0"));
             }
             for timing in &point.timings {
                 let id = &timing.algorithm;

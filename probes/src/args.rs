@@ -233,6 +233,9 @@ pub(crate) struct Compare {
     /// Two or more reports made by the same command, or folders whose *.json files are such reports.
     #[arg(required = true, value_name = "R.json")]
     pub(crate) reports: Vec<PathBuf>,
+    /// Leave out reports during which a hypervisor moved the cores, or left them elsewhere than in most reports.
+    #[arg(long)]
+    pub(crate) steady: bool,
     /// One JSON object on standard output instead of tables.
     #[arg(long)]
     pub(crate) json: bool,

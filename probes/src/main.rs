@@ -21,6 +21,7 @@ mod progress;
 mod provenance;
 mod revisions;
 mod simulation;
+mod steadiness;
 mod summary;
 mod sweep;
 mod table;

@@ -105,6 +105,7 @@ mod tests {
             fingerprint: String::new(),
             foreign_load,
             spoiled: 0,
+            core_to_core_ns: None,
             timings: Vec::new(),
         }
     }

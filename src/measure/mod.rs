@@ -7,6 +7,7 @@
 mod caches;
 mod cgroup;
 mod clock;
+mod core_to_core;
 mod foreign_load;
 mod fork_join;
 #[cfg(feature = "measure-gpu")]
@@ -26,6 +27,7 @@ use rayon::ThreadPool;
 use crate::hardware::{Hardware, Machine, Parameter, parameter};
 use foreign_load::Plan;
 
+pub use core_to_core::core_to_core_ns;
 pub use foreign_load::Watch;
 #[cfg(feature = "measure-gpu")]
 pub use gpu::{gpu, gpu_group};
@@ -43,6 +45,8 @@ pub enum Family {
     Caches,
     /// Memory size and triad bandwidths.
     Memory,
+    /// Time until one core sees what another one wrote.
+    CoreToCore,
     /// Cost of a fork and join, warm and cold.
     ForkJoin,
     /// Work of several threads over work of one.
@@ -51,9 +55,10 @@ pub enum Family {
 
 impl Family {
     /// Every family, in the order of measurement.
-    pub const ALL: [Self; 6] = [Self::Topology, Self::Clock, Self::Caches, Self::Memory, Self::ForkJoin, Self::Scaling];
+    pub const ALL: [Self; 7] =
+        [Self::Topology, Self::Clock, Self::Caches, Self::Memory, Self::CoreToCore, Self::ForkJoin, Self::Scaling];
 
-    /// The name, as [`FromStr`] reads it: `topology`, `clock`, `caches`, `memory`, `fork_join` or `scaling`.
+    /// The name, as [`FromStr`] reads it: `topology`, `clock`, `caches`, `memory`, `core_to_core`, `fork_join` or `scaling`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -61,6 +66,7 @@ impl Family {
             Self::Clock => "clock",
             Self::Caches => "caches",
             Self::Memory => "memory",
+            Self::CoreToCore => "core_to_core",
             Self::ForkJoin => "fork_join",
             Self::Scaling => "scaling",
         }
@@ -80,6 +86,7 @@ impl Family {
                 names
             }
             Self::Memory => owned(&[p::MEMORY_BYTES, p::BANDWIDTH_ONE_THREAD_GB_PER_S, p::BANDWIDTH_ALL_THREADS_GB_PER_S]),
+            Self::CoreToCore => owned(&[p::CORE_TO_CORE_NS]),
             Self::ForkJoin => owned(&[p::FORK_JOIN_WARM_NS, p::FORK_JOIN_COLD_NS]),
             Self::Scaling => owned(&[p::SCALING_TWO_THREADS_RATIO, p::SCALING_ALL_THREADS_RATIO]),
         }
@@ -139,6 +146,7 @@ pub fn family(family: Family, options: &Options) -> Vec<Parameter> {
         Family::Clock => clock::measure(options),
         Family::Caches => caches::measure(options),
         Family::Memory => memory::measure(options),
+        Family::CoreToCore => core_to_core::measure(options),
         Family::ForkJoin => fork_join::measure(options),
         Family::Scaling => scaling::measure(options),
     }

@@ -4,6 +4,7 @@ mod borders;
 mod losses;
 mod parameters;
 
+use crate::steadiness::Steadiness;
 use anyhow::{Result, bail};
 use sapwise::Report;
 use serde::Serialize;
@@ -19,6 +20,8 @@ pub(crate) struct Comparison {
     pub(crate) reports: usize,
     /// Highest share of the CPU that other programs took at half of the points of a report; `None` where it can't be told.
     pub(crate) foreign_load: Option<f64>,
+    /// The latency between cores over the points of each report, where it is known.
+    pub(crate) steadiness: Vec<Option<Steadiness>>,
     /// Every measured parameter that all reports have.
     pub(crate) parameters: Vec<Spread>,
     /// Every border that lies in at least half of the reports.
@@ -48,11 +51,23 @@ impl Comparison {
         Ok(Self {
             reports: all.len(),
             foreign_load: all.iter().filter_map(|r| load(r)).max_by(f64::total_cmp),
+            steadiness: all.iter().map(|r| Steadiness::of(r)).collect(),
             parameters: parameters::spreads(&all),
             borders: borders::borders(&all),
             losses: losses::losses(reports),
         })
     }
+}
+
+/// Of reports those during which the cores of the machine stayed where they were, in the place where most of these found them, and the
+/// names of the others.
+pub(crate) fn steady(reports: Vec<(String, Report)>) -> (Vec<(String, Report)>, Vec<String>) {
+    let all: Vec<Steadiness> = reports.iter().filter_map(|(_, r)| Steadiness::of(r)).collect();
+    let alike = |s: &Steadiness| all.iter().filter(|other| other.is_like(*s)).count();
+    let Some(most) = all.iter().copied().max_by_key(|s| alike(s)) else { return (reports, Vec::new()) };
+    let (kept, others): (Vec<_>, Vec<_>) =
+        reports.into_iter().partition(|(_, r)| Steadiness::of(r).is_some_and(|s| s.is_like(most)));
+    (kept, others.into_iter().map(|(name, _)| name).collect())
 }
 
 /// In what two reports differ that no measurement changes.
@@ -106,6 +121,21 @@ mod tests {
         fewer.provenance.threads = Some(1);
         assert!(error(&a, &fewer).contains("the number of threads"));
         assert!(Comparison::of(&[named(a)]).unwrap_err().to_string().contains("two or more"));
+    }
+
+    #[test]
+    fn steady_reports_are_those_of_the_commonest_placement() {
+        let report = |latency: f64| {
+            let mut report = Machine::family()[2].report();
+            report.points.iter_mut().for_each(|p| p.core_to_core_ns = Some([latency, latency]));
+            report
+        };
+        let mut moved = report(23.0);
+        moved.points.iter_mut().step_by(2).for_each(|p| p.core_to_core_ns = Some([175.0, 175.0]));
+        let all = [("a", report(23.0)), ("b", report(170.0)), ("c", moved), ("d", report(25.0))];
+        let (kept, others) = steady(all.map(|(name, r)| (name.to_owned(), r)).into());
+        assert_eq!(kept.iter().map(|k| k.0.as_str()).collect::<Vec<_>>(), ["a", "d"]);
+        assert_eq!(others, ["b", "c"]);
     }
 
     #[test]

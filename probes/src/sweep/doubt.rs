@@ -176,6 +176,7 @@ mod tests {
             fingerprint: String::new(),
             foreign_load: None,
             spoiled: 0,
+            core_to_core_ns: None,
             timings: ns.iter().map(timing).collect(),
         }
     }

@@ -7,7 +7,7 @@
 use super::contest::{Contest, FEW_FRAMES};
 use super::verify::Answer;
 use crate::turns::Turns;
-use sapwise::measure::Watch;
+use sapwise::measure::{Options, Watch, core_to_core_ns};
 use sapwise::report::{Point, Timing};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Displacement, Load, Pairs, Scene};
 use std::time::{Duration, Instant};
@@ -53,6 +53,8 @@ pub(crate) struct Race {
     turns: Turns,
     /// Of the frame before.
     displacement: Displacement,
+    /// Cores that algorithms may use.
+    cores: Options,
     contended: bool,
 }
 
@@ -62,7 +64,7 @@ pub(crate) struct Outcome {
     /// Wall clock of the shortest frame in which nobody rested, everything included: a single frame that was disturbed must not
     /// cost the next size.
     pub(crate) frame: Duration,
-    /// Wall clock of the frames before the samples.
+    /// Wall clock of the frames before the samples, all taken to be as short as the shortest.
     pub(crate) warm_up: Duration,
     /// Wrong answers.
     pub(crate) mismatches: Vec<String>,
@@ -70,10 +72,17 @@ pub(crate) struct Outcome {
 
 impl Race {
     /// `pair_limit` bounds the memory: a scene with more pairs ends the race with an error instead of the process.
-    pub(crate) fn new(seed: u64, pair_limit: usize, contended: bool) -> Self {
+    pub(crate) fn new(seed: u64, pair_limit: usize, cores: u32, contended: bool) -> Self {
         let mut pairs = Pairs::new();
         pairs.set_limit(Some(pair_limit));
-        Self { pairs, naive: Pairs::new(), turns: Turns::new(seed), displacement: Displacement::default(), contended }
+        Self {
+            pairs,
+            naive: Pairs::new(),
+            turns: Turns::new(seed),
+            displacement: Displacement::default(),
+            cores: Options { threads: Some(cores), brief: false },
+            contended,
+        }
     }
 
     /// Runs `runners` on frame after frame of `scene` until it is clear which is the fastest or `time` is over. Those who are surely
@@ -82,13 +91,19 @@ impl Race {
         let began = Instant::now();
         let mut mismatches = Vec::new();
         runners.iter_mut().for_each(Runner::begin);
+        let core_to_core = core_to_core_ns(&self.cores);
         // The first frame warms the buffers, the thread pools and the branch predictors, and is not counted.
         self.frame(runners, scene, |_| true, &mut mismatches);
         let keeps_work = |r: &Runner| r.error.is_none() && r.algorithm.keeps_work();
-        for _ in 0..if runners.iter().any(keeps_work) { WARM_UP } else { 0 } {
-            self.frame(runners, scene, keeps_work, &mut mismatches);
+        let mut warm_up = Duration::ZERO;
+        if runners.iter().any(keeps_work) {
+            let frame = || {
+                let started = Instant::now();
+                self.frame(runners, scene, keeps_work, &mut mismatches);
+                started.elapsed()
+            };
+            warm_up = std::iter::repeat_with(frame).take(WARM_UP).min().unwrap_or_default() * WARM_UP as u32;
         }
-        let warm_up = began.elapsed();
         runners.iter_mut().for_each(|r| r.samples.clear());
         let mut frames = 0;
         let (mut spoiled, mut highest) = (0, None);
@@ -140,7 +155,10 @@ impl Race {
                 break;
             }
         }
-        let point = self.point(runners, scene, pairs_before, (highest, spoiled));
+        let mut point = self.point(runners, scene, pairs_before);
+        point.foreign_load = highest;
+        point.spoiled = spoiled;
+        point.core_to_core_ns = core_to_core.and_then(|before| Some([before, core_to_core_ns(&self.cores)?]));
         Outcome { point, frame: shortest, warm_up, mismatches }
     }
 
@@ -191,7 +209,8 @@ impl Race {
         }
     }
 
-    fn point(&self, runners: &[Runner], scene: &Scene, before: Option<u64>, foreign: (Option<f64>, u32)) -> Point {
+    /// What was found, without what the machine did meanwhile.
+    fn point(&self, runners: &[Runner], scene: &Scene, before: Option<u64>) -> Point {
         let answer = runners.iter().filter(|r| r.error.is_none()).find_map(|r| r.answer);
         let answer = answer.unwrap_or(Answer { pairs: 0, fingerprint: 0 });
         let timings = runners.iter().map(|r| Timing {
@@ -204,8 +223,9 @@ impl Race {
             load: Load::estimate(scene.boxes(), before.map(|pairs| pairs as f64), self.displacement.moved(scene.boxes())),
             pairs: answer.pairs,
             fingerprint: format!("{:016x}", answer.fingerprint),
-            foreign_load: foreign.0,
-            spoiled: foreign.1,
+            foreign_load: None,
+            spoiled: 0,
+            core_to_core_ns: None,
             timings: timings.collect(),
         }
     }
@@ -277,7 +297,7 @@ mod tests {
             Runner::new("brute@cpu1".parse().unwrap(), right()),
         ];
         let mut scene = sapwise::Scenario::Uniform.start(50, 1);
-        let outcome = Race::new(1, 1000, false).run(&mut runners, &mut scene, Duration::from_millis(1));
+        let outcome = Race::new(1, 1000, 1, false).run(&mut runners, &mut scene, Duration::from_millis(1));
         assert_eq!(outcome.mismatches.len(), 1);
         assert!(outcome.mismatches[0].starts_with("wrong@cpu1"), "{:?}", outcome.mismatches);
         let timings = &outcome.point.timings;
@@ -310,7 +330,7 @@ mod tests {
             };
             let mut runners = vec![runner(0), runner(1)];
             let mut scene = sapwise::Scenario::Resting.start(1, 1);
-            let outcome = Race::new(1, 1000, true).run(&mut runners, &mut scene, Duration::ZERO);
+            let outcome = Race::new(1, 1000, 1, true).run(&mut runners, &mut scene, Duration::ZERO);
             assert!(outcome.mismatches.is_empty(), "{:?}", outcome.mismatches);
             assert!((0.0..=0.06).contains(&outcome.point.load.moved));
             frames.map(|f| f.load(Relaxed))
@@ -323,7 +343,7 @@ mod tests {
         let brute = sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
         let mut runners = vec![Runner::new("brute@cpu1".parse().unwrap(), brute)];
         let mut scene = sapwise::Scenario::Uniform.start(500, 1);
-        let outcome = Race::new(1, 3, false).run(&mut runners, &mut scene, Duration::from_millis(1));
+        let outcome = Race::new(1, 3, 1, false).run(&mut runners, &mut scene, Duration::from_millis(1));
         assert!(outcome.point.timings[0].error.as_ref().unwrap().contains("limit of 3"));
     }
 }

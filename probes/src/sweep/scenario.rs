@@ -34,7 +34,13 @@ pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result
             Err(error) => emit(Event::Remark(format!("{scenario}: {error}")))?,
         }
     }
-    let stage = Stage { scenario, seed: order.seed, end, race: Race::new(order.seed, PAIR_LIMIT, order.contended), emit };
+    let stage = Stage {
+        scenario,
+        seed: order.seed,
+        end,
+        race: Race::new(order.seed, PAIR_LIMIT, order.cores, order.contended),
+        emit,
+    };
     match &order.course {
         Course::Ascent(sizes) => stage.ascend(runners, sizes, order.seconds),
         Course::Visits(visits) => stage.visit(runners, visits),

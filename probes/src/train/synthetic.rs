@@ -228,6 +228,7 @@ fn point(scenario: &str, load: Load, timings: Vec<Timing>) -> Point {
         fingerprint: "0".repeat(16),
         foreign_load: None,
         spoiled: 0,
+        core_to_core_ns: None,
         timings,
     }
 }

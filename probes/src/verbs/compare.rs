@@ -1,19 +1,25 @@
 //! `sapwise compare`: how well repeated reports of one machine agree.
 
 use crate::args::Compare;
-use crate::compare::{Border, Comparison, Losses, STEEP, Spread};
+use crate::compare::{Border, Comparison, Losses, STEEP, Spread, steady};
 use crate::document::read_reports;
 use crate::exit::Outcome;
 use crate::output;
+use crate::steadiness::Steadiness;
 use crate::table::{columns, grouped};
 
 pub(crate) fn run(arguments: &Compare) -> anyhow::Result<Outcome> {
-    let reports = read_reports(&arguments.reports)?;
+    let mut reports = read_reports(&arguments.reports)?;
+    let mut left_out = Vec::new();
+    if arguments.steady {
+        (reports, left_out) = steady(reports);
+    }
     let comparison = Comparison::of(&reports)?;
     if arguments.json {
         output::print_json(&comparison)?;
     } else {
-        output::print(&text(&comparison))?;
+        let told = left_out.iter().map(|name| format!("{name} is left out: the cores were elsewhere, or moved\n"));
+        output::print(&(told.collect::<String>() + &text(&comparison)))?;
     }
     Ok(Outcome::Done)
 }
@@ -22,6 +28,16 @@ fn text(comparison: &Comparison) -> String {
     let mut text = format!("{} reports of one machine", comparison.reports);
     if let Some(load) = comparison.foreign_load {
         text.push_str(&format!(", foreign load at most {} at half of the points of each", percent(load)));
+    }
+    let known: Vec<&Steadiness> = comparison.steadiness.iter().flatten().collect();
+    if let Some(first) = known.first() {
+        let of = |pick: fn(f64, f64) -> f64| known.iter().map(|s| s.core_to_core_ns).fold(first.core_to_core_ns, pick);
+        let moved = known.iter().filter(|s| !s.is_steady()).count();
+        text.push_str(&format!(
+            "\nlatency between cores {:.0} to {:.0} ns from report to report; it changed within {moved} of them",
+            of(f64::min),
+            of(f64::max)
+        ));
     }
     text.push_str("\n\n");
     let head = ["parameter", "median", "IQR/median", "least to most"].map(str::to_owned).to_vec();

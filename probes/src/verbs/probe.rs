@@ -5,6 +5,7 @@ use crate::contention::Contention;
 use crate::destination::Destination;
 use crate::exit::{Outcome, WrongUsage};
 use crate::hardware::{self, measure_hardware};
+use crate::steadiness::Steadiness;
 use crate::sweep::{self, Conditions, Found, Plan};
 use crate::{interrupt, output, provenance, summary};
 use anyhow::Context;
@@ -79,7 +80,7 @@ fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
 }
 
 fn assemble(arguments: &Probe, hardware: &Hardware, found: Found, began: Instant) -> Report {
-    Report {
+    let mut report = Report {
         schema: sapwise::report::ReportSchema,
         label: provenance::label(arguments, &found.points, hardware),
         provenance: provenance::provenance(arguments, began.elapsed()),
@@ -87,5 +88,7 @@ fn assemble(arguments: &Probe, hardware: &Hardware, found: Found, began: Instant
         algorithms: provenance::timed(&found.points, arguments.threads, hardware),
         points: found.points,
         remarks: found.remarks,
-    }
+    };
+    report.remarks.extend(Steadiness::of(&report).and_then(Steadiness::remark));
+    report
 }

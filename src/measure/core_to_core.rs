@@ -1,0 +1,139 @@
+//! How long it takes a core to see what another one wrote.
+//!
+//! The hypervisor of one machine moved its two virtual cores between one group of cores that shares a cache (23 ns) and two groups
+//! (175 ns), and let them stay for seconds or minutes. Nothing else in the guest shows it, and two threads that share small work gain
+//! 1.5 in the one state and lose a third in the other: without this figure the difference passes for noise.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use core_affinity::CoreId;
+
+use super::{Options, foreign_load, statistics};
+use crate::hardware::{Parameter, parameter};
+
+/// Exchanges before those that count: by then both threads run.
+const WARM_UP: u32 = 200;
+/// Exchanges behind one figure.
+const COUNTED: u32 = 1000;
+/// Pairs of cores, at most. Of more cores some are left out, evenly.
+const PAIRS: usize = 8;
+/// Ends an exchange whose partner does not run.
+const LIMIT: Duration = Duration::from_millis(30);
+
+pub(super) fn measure(options: &Options) -> Vec<Parameter> {
+    let name = parameter::CORE_TO_CORE_NS;
+    let pairs = pairs(options.usable_cores());
+    if pairs.is_empty() {
+        return vec![Parameter::missing(name, "one usable core, or threads can't be bound to cores here")];
+    }
+    let method = format!(
+        "one way of an exchange through one word between threads bound to two cores; median over {} pairs of the first core with others",
+        pairs.len()
+    );
+    let figures = foreign_load::collect(options.plan(15, 300), || vec![median_of(&pairs)]);
+    figures.into_iter().map(|figure| figure.into_parameter(name, &method)).collect()
+}
+
+/// One figure of [`parameter::CORE_TO_CORE_NS`] in about a millisecond: the best of three, so that a thread that was pushed aside does
+/// not count.
+///
+/// For whoever measures over minutes and wants to know whether the machine stayed the same. `None` on one core, and where threads can't
+/// be bound to cores.
+#[must_use]
+pub fn core_to_core_ns(options: &Options) -> Option<f64> {
+    let pairs = pairs(options.usable_cores());
+    let best = (0..3).map(|_| median_of(&pairs)).fold(f64::INFINITY, f64::min);
+    best.is_finite().then_some(best)
+}
+
+/// The first core with each of the others that are used.
+fn pairs(cores: usize) -> Vec<(CoreId, CoreId)> {
+    let mut ids = core_affinity::get_core_ids().unwrap_or_default();
+    ids.truncate(cores);
+    let [first, others @ ..] = &ids[..] else { return Vec::new() };
+    let count = others.len().min(PAIRS);
+    (1..=count).map(|k| (*first, others[k * others.len() / count - 1])).collect()
+}
+
+/// Infinite where no exchange came to its end.
+fn median_of(pairs: &[(CoreId, CoreId)]) -> f64 {
+    let times: Vec<f64> = pairs.iter().filter_map(|&(a, b)| exchange_ns(a, b)).collect();
+    statistics::median(&times).unwrap_or(f64::INFINITY)
+}
+
+/// Nanoseconds until one core sees the word that the other one wrote.
+fn exchange_ns(a: CoreId, b: CoreId) -> Option<f64> {
+    let word = AtomicU32::new(0);
+    let end = Instant::now() + LIMIT;
+    std::thread::scope(|scope| {
+        let answering = std::thread::Builder::new().spawn_scoped(scope, || {
+            let bound = core_affinity::set_for_current(b);
+            (0..WARM_UP + COUNTED).all(|k| bound && turn(&word, 2 * k + 1, end))
+        });
+        let asking = std::thread::Builder::new().spawn_scoped(scope, || {
+            let bound = core_affinity::set_for_current(a);
+            let mut began = Instant::now();
+            for k in 0..WARM_UP + COUNTED {
+                if k == WARM_UP {
+                    began = Instant::now();
+                }
+                word.store(2 * k + 1, Ordering::Release);
+                if !bound || !await_word(&word, 2 * k + 2, end) {
+                    return None;
+                }
+            }
+            Some(began.elapsed().as_nanos() as f64 / f64::from(2 * COUNTED))
+        });
+        // A thread that the system refuses leaves the other one waiting until the limit.
+        let (answering, asking) = (answering.ok()?, asking.ok()?);
+        let ns = asking.join().ok().flatten();
+        ns.filter(|_| answering.join().unwrap_or(false))
+    })
+}
+
+/// Waits for a value and answers with the next.
+fn turn(word: &AtomicU32, value: u32, end: Instant) -> bool {
+    let came = await_word(word, value, end);
+    word.store(value + 1, Ordering::Release);
+    came
+}
+
+fn await_word(word: &AtomicU32, value: u32, end: Instant) -> bool {
+    let mut spins = 0_u32;
+    while word.load(Ordering::Acquire) != value {
+        std::hint::spin_loop();
+        spins = spins.wrapping_add(1);
+        // Reading the clock each time would take longer than an exchange.
+        if spins.is_multiple_of(1024) && Instant::now() >= end {
+            return false;
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_core_has_no_pair() {
+        assert!(pairs(1).is_empty() && pairs(0).is_empty());
+        assert_eq!(core_to_core_ns(&Options { threads: Some(1), brief: true }), None);
+        let parameters = measure(&Options { threads: Some(1), brief: true });
+        assert_eq!((parameters.len(), parameters[0].value), (1, None));
+    }
+
+    #[test]
+    fn an_exchange_takes_longer_than_a_cycle_and_ends_without_a_partner() {
+        let ids = core_affinity::get_core_ids().unwrap_or_default();
+        if let [a, b, ..] = ids[..] {
+            // Among other tests a partner may not come to run in time; then there is no figure.
+            assert!(exchange_ns(a, b).is_none_or(|ns| ns > 0.2), "faster than a cycle");
+        }
+        let word = AtomicU32::new(0);
+        assert!(!await_word(&word, 1, Instant::now()));
+        assert!(turn(&word, 0, Instant::now()));
+        assert_eq!(word.load(Ordering::Relaxed), 1);
+    }
+}
