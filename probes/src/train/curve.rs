@@ -5,7 +5,7 @@ use super::rows::{Row, rows};
 use super::terms::terms_of_one_machine;
 use anyhow::{Result, bail};
 use ndarray::Array2;
-use sapwise::crossover::{Paired, Position, crossover};
+use sapwise::crossover::{Comparison, Paired};
 use sapwise::hardware::parameter;
 use sapwise::report::{Label, Point, Report};
 use sapwise::{AlgorithmCost, AlgorithmId, Border, CostCurve, CostTerm, Fields, Knot, Load, Source};
@@ -47,7 +47,7 @@ pub(crate) fn measured_fields(report: &Report, scenario: &str) -> Result<Fields>
     }
     let mut fields = Fields::from_costs(Source::Measured, scenario, costs, &loads);
     fields.warnings = warnings;
-    resample_borders(&mut fields, report);
+    measure_borders(&mut fields, report);
     Ok(fields)
 }
 
@@ -135,39 +135,40 @@ fn correction(measured: &[(f64, f64)], floors: &[(f64, f64)]) -> Vec<Knot> {
 }
 
 /// Replaces the interval of each crossover by the one from paired samples, where there is one.
-fn resample_borders(fields: &mut Fields, report: &Report) {
-    let mut resampled = 0;
+fn measure_borders(fields: &mut Fields, report: &Report) {
+    let mut measured = 0;
     for border in &mut fields.crossovers {
-        let Some(p) = resampled_border(border, report, &fields.scenario) else { continue };
-        border.low = p.low.min(border.objects);
-        border.high = p.high.max(border.objects);
-        resampled += 1;
+        let Some((low, high)) = measured_interval(border, report, &fields.scenario) else { continue };
+        (border.low, border.high) = (low, high);
+        measured += 1;
     }
-    if resampled > 0 {
+    if measured > 0 {
         let all = fields.crossovers.len();
         fields.interval_basis = format!(
-            "{resampled} of {all}: 90 % of bootstrap replicates over paired frames, widened to hold the border of the cost \
-             curves; the others: {}",
+            "{measured} of {all}: 90 % by the paired samples, from where they tell that the one below is cheaper to where they tell \
+             that the one above is, or to the last size at which both were timed; the others: {}",
             fields.interval_basis
         );
     }
 }
 
-/// The measured crossing of the same direction that is nearest to a border of the cost curves.
-fn resampled_border(border: &Border, report: &Report, scenario: &str) -> Option<Position> {
-    let timings = |point: &'_ Point, id: &AlgorithmId| point.timings.iter().position(|t| t.algorithm == *id);
+/// The interval of a border of the cost curves, from the points of its scenario at which both neighbours were timed.
+///
+/// The border itself stays: the curves know all scenarios, and a choice by them changes there. Where the samples cross
+/// elsewhere the interval reaches from the border over their crossing, and where they don't cross to the last size. `None` where
+/// fewer than three sizes have both, or the border lies beyond them.
+fn measured_interval(border: &Border, report: &Report, scenario: &str) -> Option<(f64, f64)> {
+    let samples = |point: &'_ Point, id: &AlgorithmId| point.timings.iter().position(|t| t.algorithm == *id);
     let mut points = Vec::new();
     for point in report.points.iter().filter(|p| p.scenario == scenario) {
-        let (Some(a), Some(b)) = (timings(point, &border.below), timings(point, &border.above)) else { continue };
+        let (Some(a), Some(b)) = (samples(point, &border.below), samples(point, &border.above)) else { continue };
         points.push(Paired {
             objects: point.load.objects,
             first_ns: &point.timings[a].samples_ns,
             second_ns: &point.timings[b].samples_ns,
         });
     }
-    let found = crossover(&points, report.provenance.seed)?;
-    let distance = |p: &Position| (p.objects / border.objects).ln().abs();
-    found.positions().iter().filter(|p| p.first_below).min_by(|a, b| distance(a).total_cmp(&distance(b))).copied()
+    Comparison::new(&points)?.interval(border.objects, true)
 }
 
 #[cfg(test)]
@@ -175,6 +176,7 @@ mod tests {
     use super::super::rows::{best, medians};
     use super::super::synthetic::{Machine, load};
     use super::*;
+    use sapwise::report::Timing;
 
     #[test]
     fn choosing_by_the_curves_loses_little_and_never_what_left_the_race() {
@@ -255,10 +257,60 @@ mod tests {
     fn borders_get_intervals_from_paired_frames() {
         let report = Machine::family()[2].report();
         let fields = measured_fields(&report, "uniform").unwrap();
-        assert!(!fields.crossovers.is_empty() && fields.interval_basis.contains("bootstrap"), "{}", fields.interval_basis);
+        assert!(
+            !fields.crossovers.is_empty() && fields.interval_basis.contains("paired samples"),
+            "{}",
+            fields.interval_basis
+        );
         for b in &fields.crossovers {
             assert!(b.low <= b.objects && b.objects <= b.high && b.high / b.low < 8.0, "{b:?}");
         }
+    }
+
+    /// A report of `brute@cpu1` and `strips@cpu1` whose ratio is `(n / crossing) ^ 0.5` in `uniform`, and a border at 1000.
+    fn crossed_at(crossing: f64) -> (Report, Border) {
+        let mut report = Machine::family()[0].clone().exact().report();
+        let [below, above] = ["brute@cpu1", "strips@cpu1"].map(|id| id.parse::<AlgorithmId>().unwrap());
+        for point in &mut report.points {
+            // In the other scenario they never cross.
+            let to = if point.scenario == "uniform" { crossing } else { 1e9 };
+            let n = f64::from(point.load.objects);
+            let timing = |id: &AlgorithmId, exponent: f64| Timing {
+                algorithm: id.clone(),
+                // Spread by 2 % to either side, and the other way round for the other.
+                samples_ns: (-2..=2).map(|k| (1e6 * n * ((n / to).powf(exponent) + 0.01 * f64::from(k))) as u64).collect(),
+                error: None,
+            };
+            point.timings = vec![timing(&above, 0.0), timing(&below, 0.5)];
+        }
+        (report, Border { below, above, objects: 1000.0, low: 900.0, high: 1100.0 })
+    }
+
+    #[test]
+    fn the_interval_holds_the_border_and_the_crossing_of_the_samples() {
+        for crossing in [300.0, 1000.0, 4000.0] {
+            let (report, border) = crossed_at(crossing);
+            let (low, high) = measured_interval(&border, &report, "uniform").unwrap();
+            let (least, most) = (f64::min(crossing, 1000.0), f64::max(crossing, 1000.0));
+            assert!(low <= least * 1.001 && most <= high * 1.001, "{crossing}: {low} to {high}");
+            assert!(low > 0.8 * least && high < 1.25 * most, "{crossing}: {low} to {high}");
+        }
+    }
+
+    #[test]
+    fn where_the_samples_do_not_cross_the_interval_goes_on_to_the_last_size_of_both() {
+        let (mut report, border) = crossed_at(1e9);
+        assert_eq!(measured_interval(&border, &report, "uniform").unwrap().0, 1000.0);
+        // Whoever left the race has no samples there.
+        report.points.iter_mut().filter(|p| p.load.objects > 20_000).for_each(|p| p.timings.truncate(1));
+        let last = report.points.iter().filter(|p| p.timings.len() == 2).map(|p| p.load.objects).max().unwrap();
+        let (low, high) = measured_interval(&border, &report, "uniform").unwrap();
+        assert!(low == 1000.0 && (high / f64::from(last) - 1.0).abs() < 1e-9, "{low} to {high}");
+        // And a border beyond keeps the interval of the curves.
+        let beyond = Border { objects: 50_000.0, ..border };
+        assert_eq!(measured_interval(&beyond, &report, "uniform"), None);
+        report.points.iter_mut().for_each(|p| p.timings.truncate(1));
+        assert_eq!(measured_interval(&Border { objects: 1000.0, ..beyond }, &report, "uniform"), None);
     }
 
     #[test]

@@ -52,7 +52,7 @@ impl<'a> Crossings<'a> {
         let mut pairs = Vec::new();
         for (k, (a, first)) in roles.iter().enumerate() {
             for (b, second) in &roles[k + 1..] {
-                if let Some(found) = crossover(&common(&points, first, second), profile.report.provenance.seed) {
+                if let Some(found) = crossover(&common(&points, first, second)) {
                     pairs.push((a.clone(), b.clone(), found));
                 }
             }
