@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::contention::Contended;
 use crate::gpus::GpuChoice;
 use clap::{Args, Parser, Subcommand};
 use sapwise::{AlgorithmId, Scenario};
@@ -62,9 +63,9 @@ pub(crate) struct Probe {
     /// Use this many cores at most, as if the machine had no more.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,
-    /// Load half of the cores with threads that stream through memory while everything is measured.
-    #[arg(long)]
-    pub(crate) contended: bool,
+    /// Load half of the cores with threads that take memory bandwidth or cache while everything is measured.
+    #[arg(long, value_name = "KIND", num_args = 0..=1, require_equals = true, default_missing_value = "memory")]
+    pub(crate) contended: Option<Contended>,
     /// Seed of the scenarios and of the order in which algorithms take turns.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,

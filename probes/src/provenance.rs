@@ -32,7 +32,7 @@ pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) ->
     let fewer_cores = arguments.threads.is_some_and(|k| k < usable_cores());
     let lower_level = requested_level().is_some_and(|level| level < SimdLevel::detected());
     // Contention first: a restricted machine that is disturbed shows what no restriction explains.
-    if arguments.contended || median_foreign_load(points).is_some_and(|load| load > CONTENDED_LOAD) {
+    if arguments.contended.is_some() || median_foreign_load(points).is_some_and(|load| load > CONTENDED_LOAD) {
         Label::RealContended
     } else if on_software_gpu {
         Label::RealSoftwareGpu
@@ -69,11 +69,11 @@ fn command(arguments: &Probe) -> String {
     let flags = [
         ("--hardware-only", arguments.hardware_only),
         ("--quick", arguments.quick),
-        ("--contended", arguments.contended),
         ("--no-gpus", arguments.gpus.no_gpus),
         ("--software-gpus", arguments.gpus.software_gpus),
     ];
     words.extend(flags.iter().filter(|f| f.1).map(|f| f.0.to_owned()));
+    words.extend(arguments.contended.map(|kind| format!("--contended={kind}")));
     words.extend(arguments.threads.map(|k| format!("--threads {k}")));
     words.push(format!("--seed {}", arguments.seed));
     words.extend(arguments.max_objects.map(|n| format!("--max-objects {n}")));
@@ -114,6 +114,11 @@ mod tests {
         let arguments =
             probe(&["--quick", "--out", "/home/someone/r.json", "--threads", "1", "--scenario", "slab", "--no-gpus"]);
         assert_eq!(command(&arguments), "probe --quick --no-gpus --threads 1 --seed 1 --scenario slab");
+        assert_eq!(command(&probe(&["--contended"])), "probe --contended=memory --seed 1");
+        assert_eq!(
+            command(&probe(&["--contended=cache", "--threads", "1"])),
+            "probe --contended=cache --threads 1 --seed 1"
+        );
     }
 
     #[test]
@@ -122,6 +127,7 @@ mod tests {
         let busy = [point(Some(0.3)), point(Some(0.4)), point(Some(0.0))];
         let label = |words: &[&str], points: &[Point]| label(&probe(words), points, &hardware(GpuKind::Discrete));
         assert_eq!(label(&["--contended"], &quiet), Label::RealContended);
+        assert_eq!(label(&["--contended=cache"], &quiet), Label::RealContended);
         assert_eq!(label(&[], &busy), Label::RealContended);
         if requested_level().is_none() {
             assert_eq!(label(&[], &quiet), Label::RealFull);

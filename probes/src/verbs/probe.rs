@@ -17,7 +17,7 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     let destination =
         if arguments.json && arguments.out.is_none() { None } else { Some(Destination::new(arguments.out.as_deref())?) };
     interrupt::listen()?;
-    let contention = arguments.contended.then(Contention::start).transpose();
+    let contention = arguments.contended.map(|kind| Contention::start(kind, arguments.threads)).transpose();
     let contention = contention.context("the threads for --contended can't be started")?;
     let (hardware, measured) = measure_hardware(arguments.threads, arguments.gpus)?;
     let told = summary::gpus_left_out(arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
         let conditions = Conditions {
             cores: arguments.threads.unwrap_or_else(usable_cores),
             seed: arguments.seed,
-            contended: arguments.contended,
+            contended: arguments.contended.is_some(),
             gpus: measured.usable,
         };
         found = sweep::conduct(plan, &conditions, &mut |so_far| {
