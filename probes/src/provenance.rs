@@ -73,6 +73,7 @@ fn command(arguments: &Probe) -> String {
         ("--software-gpus", arguments.gpus.software_gpus),
     ];
     words.extend(flags.iter().filter(|f| f.1).map(|f| f.0.to_owned()));
+    words.extend(arguments.gpus.only.iter().map(|k| format!("--gpu {k}")));
     words.extend(arguments.contended.map(|kind| format!("--contended={kind}")));
     words.extend(arguments.threads.map(|k| format!("--threads {k}")));
     words.push(format!("--seed {}", arguments.seed));
@@ -114,6 +115,7 @@ mod tests {
         let arguments =
             probe(&["--quick", "--out", "/home/someone/r.json", "--threads", "1", "--scenario", "slab", "--no-gpus"]);
         assert_eq!(command(&arguments), "probe --quick --no-gpus --threads 1 --seed 1 --scenario slab");
+        assert_eq!(command(&probe(&["--gpu", "0", "--gpu", "2"])), "probe --gpu 0 --gpu 2 --seed 1");
         assert_eq!(command(&probe(&["--contended"])), "probe --contended=memory --seed 1");
         assert_eq!(
             command(&probe(&["--contended=cache", "--threads", "1"])),

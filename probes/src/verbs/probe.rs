@@ -19,8 +19,8 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     interrupt::listen()?;
     let contention = arguments.contended.map(|kind| Contention::start(kind, arguments.threads)).transpose();
     let contention = contention.context("the threads for --contended can't be started")?;
-    let (hardware, measured) = measure_hardware(arguments.threads, arguments.gpus)?;
-    let told = summary::gpus_left_out(arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
+    let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
+    let told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
     let before = measured.remarks;
     let mut found = Found { remarks: before.clone(), ..Found::default() };
     if interrupt::requested() {
