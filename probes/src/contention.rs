@@ -24,7 +24,7 @@ pub(crate) enum Contended {
 const NUMBERS: usize = 8 << 20;
 
 /// The last-level cache where nobody tells.
-const ASSUMED_LLC_BYTES: f64 = 32.0 * 1024.0 * 1024.0;
+pub(crate) const ASSUMED_LLC_BYTES: f64 = 32.0 * 1024.0 * 1024.0;
 
 /// Share of the last-level cache that the buffer of the threads that take it has. The whole of it would not fit beside what
 /// the measured programs use, and the misses would take memory bandwidth as well.

@@ -3,7 +3,8 @@
 use crate::args::Probe;
 use crate::date;
 use crate::gpus::uses;
-use sapwise::report::{Label, Point, Provenance, Timed};
+use crate::restriction;
+use sapwise::report::{Label, Point, Provenance, Restriction, Timed};
 use sapwise::{GpuKind, Hardware, Registry, SimdLevel, usable_cores};
 use std::time::Duration;
 
@@ -11,7 +12,12 @@ use std::time::Duration;
 const CONTENDED_LOAD: f64 = 0.2;
 
 /// The provenance of a report that these arguments led to.
-pub(crate) fn provenance(arguments: &Probe, took: Duration) -> Provenance {
+pub(crate) fn provenance(
+    arguments: &Probe,
+    restriction: Option<Restriction>,
+    hardware: &Hardware,
+    took: Duration,
+) -> Provenance {
     Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         date: date::today(),
@@ -19,6 +25,8 @@ pub(crate) fn provenance(arguments: &Probe, took: Duration) -> Provenance {
         seed: arguments.seed,
         threads: arguments.threads,
         simd: requested_level().map(|level| level.to_string()),
+        gpu_threads: restriction::gpu_threads(hardware),
+        restriction,
         optimised: !cfg!(debug_assertions),
         seconds: (took.as_secs_f64() * 10.0).round() / 10.0,
     }
@@ -64,7 +72,7 @@ fn median_foreign_load(points: &[Point]) -> Option<f64> {
 }
 
 /// The arguments without `--out`: paths name users.
-fn command(arguments: &Probe) -> String {
+pub(crate) fn command(arguments: &Probe) -> String {
     let mut words = vec!["probe".to_owned()];
     let flags = [
         ("--hardware-only", arguments.hardware_only),
