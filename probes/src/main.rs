@@ -3,6 +3,7 @@
 mod args;
 mod boxes;
 mod card;
+mod check;
 mod child;
 mod contention;
 mod date;
