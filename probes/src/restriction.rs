@@ -134,7 +134,13 @@ fn prove(kind: Restricted, without: &Hardware, with: &Hardware) -> Vec<Proof> {
     };
     match kind {
         Restricted::Threads => {
-            vec![on_cpu(parameter::USABLE_CORES, Change::Fewer), on_cpu(parameter::SCALING_ALL_THREADS_RATIO, Change::Lower)]
+            vec![
+                on_cpu(parameter::USABLE_CORES, Change::Fewer),
+                first_shown([
+                    on_cpu(parameter::SCALING_ALL_THREADS_RATIO, Change::Lower),
+                    on_cpu(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, Change::Lower),
+                ]),
+            ]
         }
         Restricted::Simd => {
             let mut proofs = vec![on_cpu(parameter::SIMD_LANES, Change::Fewer)];
@@ -142,7 +148,11 @@ fn prove(kind: Restricted, without: &Hardware, with: &Hardware) -> Vec<Proof> {
             proofs.extend(Some(arithmetic).filter(|p| p.without.is_some() || p.with.is_some()));
             proofs
         }
-        Restricted::ContendedMemory => vec![on_cpu(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, Change::Lower)],
+        // Where one thread can't saturate the memory, others at work make it slower to answer at most.
+        Restricted::ContendedMemory => vec![first_shown([
+            on_cpu(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, Change::Lower),
+            on_cpu(&latency_of_memory(), Change::Higher),
+        ])],
         Restricted::ContendedCache => {
             let llc = with.value(parameter::CACHE_LLC_BYTES).unwrap_or(ASSUMED_LLC_BYTES);
             vec![on_cpu(&latency_below(llc), Change::Higher)]
@@ -151,12 +161,22 @@ fn prove(kind: Restricted, without: &Hardware, with: &Hardware) -> Vec<Proof> {
     }
 }
 
+/// The first that shows the restriction, or the first of all: each of them is enough.
+fn first_shown([first, second]: [Proof; 2]) -> Proof {
+    if !first.shows && second.shows { second } else { first }
+}
+
 fn on_gpu(with: &GpuHardware, without: &Hardware) -> Proof {
     let same = |g: &&GpuHardware| (&g.gpu.name, &g.gpu.driver) == (&with.gpu.name, &with.gpu.driver);
     let without = without.gpus.iter().find(same);
-    let name = gpu::parameter::ARITHMETIC_GFLOP_PER_S;
-    let values = (without.and_then(|g| g.value(name)), with.value(name));
-    proof(Restricted::GpuThreads, name, Some(with.gpu.index), Change::Lower, values)
+    let by = |name: &str, change: Change| {
+        let values = (without.and_then(|g| g.value(name)), with.value(name));
+        proof(Restricted::GpuThreads, name, Some(with.gpu.index), change, values)
+    };
+    first_shown([
+        by(gpu::parameter::ARITHMETIC_GFLOP_PER_S, Change::Lower),
+        by(gpu::parameter::PARALLEL_UNITS, Change::Fewer),
+    ])
 }
 
 fn proof(
@@ -168,6 +188,12 @@ fn proof(
 ) -> Proof {
     let shows = without.zip(with).is_some_and(|(without, with)| change.is_shown(without, with));
     Proof { kind, parameter: parameter.to_owned(), gpu, without, with, shows }
+}
+
+/// The latency over the largest working set there is.
+fn latency_of_memory() -> String {
+    let [.., largest] = parameter::LATENCY_WORKING_SETS_KIB;
+    parameter::latency_name(largest)
 }
 
 /// The latency over the largest working set that fits into a last-level cache; over the smallest there is where none does.
@@ -200,6 +226,9 @@ mod tests {
         let bandwidth = |v| [(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, v)];
         assert_eq!(shown(Restricted::ContendedMemory, &bandwidth(50.0), &bandwidth(44.9)), [true]);
         assert_eq!(shown(Restricted::ContendedMemory, &bandwidth(50.0), &bandwidth(45.1)), [false]);
+        let both = |v, ns| [(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, v), ("latency_262144_kib_ns", ns)];
+        assert_eq!(shown(Restricted::ContendedMemory, &both(50.0, 200.0), &both(50.0, 230.0)), [true]);
+        assert_eq!(shown(Restricted::ContendedMemory, &both(50.0, 200.0), &both(50.0, 210.0)), [false]);
     }
 
     #[test]

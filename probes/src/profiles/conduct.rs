@@ -9,6 +9,7 @@ use crate::progress::Progress;
 use crate::{gpus, interrupt, output, table};
 use anyhow::bail;
 use sapwise::json::Document;
+use sapwise::report::Label;
 use sapwise::{Report, Scenario};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -23,8 +24,8 @@ enum State {
     Waiting,
     /// Its report was there.
     Found(PathBuf),
-    /// It was measured, in this time.
-    Measured(PathBuf, Duration),
+    /// It was measured, in this time; other programs may have disturbed it.
+    Measured { path: PathBuf, time: Duration, disturbed: bool },
     /// It went wrong. A report that proves too little is there all the same.
     Failed(String, Option<PathBuf>),
 }
@@ -133,7 +134,10 @@ impl<'a> Conduct<'a> {
         }
         Ok(Some(match self.there.lack(&report, profile) {
             Some(lack) => State::Failed(lack, Some(path)),
-            None => State::Measured(path, began.elapsed()),
+            None => {
+                let disturbed = report.label == Label::RealContended && profile.contended.is_none();
+                State::Measured { path, time: began.elapsed(), disturbed }
+            }
         }))
     }
 
@@ -141,7 +145,7 @@ impl<'a> Conduct<'a> {
     fn report_of(&self, profile: &Profile) -> Option<&Path> {
         let k = self.family.iter().position(|p| p.is_alike(profile))?;
         match &self.states[k] {
-            State::Found(path) | State::Measured(path, _) | State::Failed(_, Some(path)) => Some(path),
+            State::Found(path) | State::Measured { path, .. } | State::Failed(_, Some(path)) => Some(path),
             State::Waiting | State::Failed(_, None) => None,
         }
     }
@@ -167,7 +171,10 @@ impl<'a> Conduct<'a> {
             let (report, remark) = match state {
                 State::Waiting => ("-".to_owned(), "not measured yet".to_owned()),
                 State::Found(path) => (shown(path), "was there".to_owned()),
-                State::Measured(path, time) => (shown(path), format!("measured in {}", minutes(*time))),
+                State::Measured { path, time, disturbed } => {
+                    let but = if *disturbed { ", disturbed by other programs: remove it and measure it again" } else { "" };
+                    (shown(path), format!("measured in {}{but}", minutes(*time)))
+                }
                 State::Failed(why, path) => (path.as_deref().map_or("-".to_owned(), shown), format!("FAILED: {why}")),
             };
             rows.push(vec![profile.name.clone(), report, remark]);

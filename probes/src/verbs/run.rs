@@ -23,6 +23,8 @@ struct Answer<'a> {
     repeats: usize,
     seed: u64,
     interrupted: bool,
+    /// Median over the frames of the share of the CPU that other programs took; null where that can't be told.
+    foreign_load: Option<f64>,
     /// Where the fields came from.
     source: Source,
     extrapolated: bool,
@@ -213,6 +215,7 @@ fn answer<'a>(course: &Course, outcome: &'a simulation::Outcome, origin: Origin)
         repeats: outcome.repeats,
         seed: course.seed,
         interrupted: outcome.interrupted,
+        foreign_load: outcome.foreign_load,
         source: origin.source,
         extrapolated: origin.extrapolated,
         warnings: origin.warnings,
@@ -254,6 +257,9 @@ fn text(answer: &Answer<'_>) -> String {
         answer.over_best_fixed,
         answer.best_fixed
     );
+    if let Some(load) = answer.foreign_load {
+        text += &format!("\nOther programs took {:.0} % of the CPU, median over the frames.", load * 100.0);
+    }
     for warning in &answer.warnings {
         text += &format!("\nwarning: {warning}");
     }
