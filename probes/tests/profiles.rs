@@ -6,7 +6,9 @@ use common::{failure, sapwise, success};
 use sapwise::Report;
 use sapwise::report::Restricted;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+#[cfg(unix)]
+use std::path::PathBuf;
 
 const TINY: [&str; 8] = ["probe", "--profiles", "--quick", "--no-gpus", "--scenario", "uniform", "--max-objects", "10"];
 
@@ -17,6 +19,7 @@ fn tiny(folder: &Path) -> assert_cmd::Command {
 }
 
 /// The reports in a folder whose names end with a profile's.
+#[cfg(unix)]
 fn reports(folder: &Path, profile: &str) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let of = |path: &PathBuf| {

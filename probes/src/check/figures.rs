@@ -132,7 +132,7 @@ fn impossible_point(report: &Report, point: &Point) -> Option<String> {
     if point.fingerprint.len() != 16 || !point.fingerprint.bytes().all(|b| b.is_ascii_hexdigit()) {
         return Some(format!("the fingerprint {:?} is not of 16 hex digits", point.fingerprint));
     }
-    let objects = point.load.objects as u128;
+    let objects = u128::from(point.load.objects);
     if u128::from(point.pairs) > objects * objects.saturating_sub(1) / 2 {
         return Some(format!("{} pairs, which is more than there are", point.pairs));
     }

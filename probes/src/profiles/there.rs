@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn gpus_are_found_under_new_numbers() {
         let (x, y) = (gpu(0, "X"), gpu(1, "Y"));
-        assert_eq!(numbers(&[y.clone()], &[gpu(0, "Y"), gpu(1, "X")]), Ok(vec![0]));
+        assert_eq!(numbers(std::slice::from_ref(&y), &[gpu(0, "Y"), gpu(1, "X")]), Ok(vec![0]));
         assert_eq!(numbers(&[gpu(1, "X")], &[x.clone(), gpu(1, "X")]), Ok(vec![1]));
         assert_eq!(numbers(&[x.clone(), gpu(1, "X")], &[gpu(2, "X"), gpu(1, "X")]), Ok(vec![2, 1]));
         assert!(numbers(&[x.clone(), x], &[gpu(0, "X")]).unwrap_err().contains("gpu0 (X) was there"));
