@@ -154,6 +154,8 @@ mod tests {
                 seed: u64::MAX,
                 threads: None,
                 simd: None,
+                gpu_threads: None,
+                restriction: None,
                 optimised: false,
                 seconds: 0.5,
             },

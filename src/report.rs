@@ -65,10 +65,64 @@ pub struct Provenance {
     pub threads: Option<u32>,
     /// SIMD level that was forced; `None` when it was not.
     pub simd: Option<String>,
+    /// Threads of lavapipe, a program that acts as a GPU, where `LP_NUM_THREADS` sets them and it is among the GPUs.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub gpu_threads: Option<u32>,
+    /// What was taken from the machine for this report; `None` where nothing was.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub restriction: Option<Restriction>,
     /// Whether the program was built with optimisation. Timings of a debug build are refused by `train`.
     pub optimised: bool,
     /// Seconds that the whole measurement took.
     pub seconds: f64,
+}
+
+/// What was taken from a machine, and whether its parameters show it.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Restriction {
+    /// Each thing that was taken, once.
+    pub kinds: Vec<Restricted>,
+    /// One entry for each parameter that must show one of them. Nothing for a kind without a report to compare with.
+    pub proof: Vec<Proof>,
+}
+
+/// What can be taken from a machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub enum Restricted {
+    /// Cores, by [`Provenance::threads`].
+    Threads,
+    /// Vector lanes, by [`Provenance::simd`].
+    Simd,
+    /// Memory bandwidth, by programs beside it.
+    ContendedMemory,
+    /// Last-level cache, by programs beside it.
+    ContendedCache,
+    /// Threads of a program that acts as a GPU, by [`Provenance::gpu_threads`].
+    GpuThreads,
+}
+
+/// One parameter with and without a restriction.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Proof {
+    /// The restriction.
+    pub kind: Restricted,
+    /// Name of the parameter that must show it.
+    pub parameter: String,
+    /// The GPU of this report whose parameter it is; `None` for one of the CPU.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub gpu: Option<u32>,
+    /// Its value where this thing was not taken and all else was the same. `None` when it is missing there.
+    pub without: Option<f64>,
+    /// Its value in this report. `None` when it is missing.
+    pub with: Option<f64>,
+    /// Whether that shows the restriction.
+    pub shows: bool,
 }
 
 /// An algorithm that was timed.
@@ -120,6 +174,18 @@ pub struct Timing {
     pub samples_ns: Vec<u64>,
     /// Why there are no samples, where there are none.
     pub error: Option<String>,
+}
+
+impl std::fmt::Display for Restricted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Threads => "threads",
+            Self::Simd => "simd",
+            Self::ContendedMemory => "contended_memory",
+            Self::ContendedCache => "contended_cache",
+            Self::GpuThreads => "gpu_threads",
+        })
+    }
 }
 
 impl Report {

@@ -12,6 +12,11 @@
 #     tools/real-gpu.sh --pack DIR                    # this script, the binaries, the Vulkan loader; under 64 MiB
 #     DIR/real-gpu.sh OUT_DIR                         # there
 #
+# The reports of every profile of the machine, for datasets/, take longer. In runs of under ten minutes, until it says that all are
+# there:
+#
+#     tools/real-gpu.sh --profiles OUT_DIR
+#
 # BIN_DIR       folder of prebuilt sapwise, gpu_bench, gpu_contract and other gpu_* tests; beside this script if they are there
 # LOADER_DEBS   folder of the .deb files of the Vulkan loader, unpacked where the system has none; BIN_DIR if not given
 # LIMIT_FACTOR  multiplies every time limit, for software GPUs and slow machines
@@ -122,11 +127,13 @@ step() {
     [ "$status" = 0 ] || failed+=("$name")
 }
 
+what=all
 case ${1:-} in
     --pack) [ $# = 2 ] || usage; pack "$2"; exit ;;
+    --profiles) what=profiles; shift ;;
     '' | -*) usage ;;
 esac
-[ $# = 1 ] || usage
+[ $# = 1 ] && [ -n "$1" ] || usage
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
 work=$(mktemp -d)
@@ -145,6 +152,17 @@ for name in sapwise gpu_bench gpu_contract; do
 done
 find_vulkan
 cd "$out"
+if [ $what = profiles ]; then
+    SECONDS=0
+    # Stopped by the time, it keeps the profiles that are done, and goes on with the next one in the next run.
+    step profiles 580 "$bin/sapwise" probe --profiles --quick --out profiles
+    [ ! -e profiles.log ] || tail -n 3 profiles.log
+    compgen -G "profiles/*.json" >/dev/null || fail "no profile is there yet; see $out/profiles.log"
+    step check 10 "$bin/sapwise" check profiles/*.json
+    [ ${#failed[@]} = 0 ] || fail "not done: ${failed[*]}; the same command goes on"
+    echo "all done; the reports are in $out/profiles"
+    exit
+fi
 # A test that finds no GPU fails instead of passing with a remark.
 export SAPWISE_REQUIRE_GPU=1
 

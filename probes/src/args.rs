@@ -1,6 +1,9 @@
 //! The command line.
 
+use crate::contention::Contended;
+use crate::exit::WrongUsage;
 use crate::gpus::GpuChoice;
+use crate::restriction::Lifted;
 use clap::{Args, Parser, Subcommand};
 use sapwise::{AlgorithmId, Scenario};
 use std::path::PathBuf;
@@ -52,20 +55,29 @@ pub(crate) struct Devices {
 Examples:
   sapwise probe --quick
   sapwise probe --out this-machine.json
-  sapwise probe --threads 1 --out one-core.json    (as if the machine had one core)")]
+  sapwise probe --threads 1 --out one-core.json    (as if the machine had one core)
+  sapwise probe --profiles --out reports           (every profile of this machine, for train and for datasets/)")]
 pub(crate) struct Probe {
+    /// Measure the whole family of reports of this machine, one after the other: fewer threads, lower SIMD levels, memory and
+    /// cache contended, each GPU. The same command goes on where it was stopped.
+    #[arg(long, conflicts_with_all = ["hardware_only", "threads", "contended", "json", "unrestricted", "leashed"])]
+    pub(crate) profiles: bool,
+    /// List the profiles and the time that they take, and measure nothing.
+    #[arg(long, requires = "profiles")]
+    pub(crate) dry_run: bool,
     /// Only the hardware parameters, in seconds.
     #[arg(long, conflicts_with_all = ["quick", "scenarios", "max_objects"])]
     pub(crate) hardware_only: bool,
-    /// Three scenarios up to 300 000 objects, under a minute in all.
+    /// Three scenarios up to 300 000 objects, under a minute in all. With --profiles this goes for all of them, else for those
+    /// with contention or GPUs.
     #[arg(long)]
     pub(crate) quick: bool,
     /// Use this many cores at most, as if the machine had no more.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,
-    /// Load half of the cores with threads that stream through memory while everything is measured.
-    #[arg(long)]
-    pub(crate) contended: bool,
+    /// Load half of the cores with threads that take memory bandwidth or cache while everything is measured.
+    #[arg(long, value_name = "KIND", num_args = 0..=1, require_equals = true, default_missing_value = "memory")]
+    pub(crate) contended: Option<Contended>,
     /// Seed of the scenarios and of the order in which algorithms take turns.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
@@ -77,12 +89,33 @@ pub(crate) struct Probe {
     /// Sweep this scenario instead of the usual ones; may be given several times.
     #[arg(long = "scenario", value_name = "NAME")]
     pub(crate) scenarios: Vec<String>,
-    /// Where the report goes. Without this option it goes to report.json, or with --json nowhere else.
+    /// A report from which one thing less was taken, to prove this restriction by.
+    #[arg(long, hide = true, value_name = "KIND=R.json")]
+    pub(crate) unrestricted: Vec<Lifted>,
+    /// Stop as at Ctrl-C when standard input ends. For a process that starts this one.
+    #[arg(long, hide = true)]
+    pub(crate) leashed: bool,
+    /// Where the report goes. Without this option it goes to report.json, or with --json nowhere else. With --profiles a folder,
+    /// without this option reports/.
     #[arg(long, value_name = "R.json")]
     pub(crate) out: Option<PathBuf>,
     /// The report on standard output instead of a summary.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+impl Probe {
+    /// The scenarios that are asked for, each once.
+    ///
+    /// # Errors
+    /// When one is unknown.
+    pub(crate) fn scenarios(&self) -> Result<Vec<Scenario>, WrongUsage> {
+        let scenarios: Result<Vec<Scenario>, String> = self.scenarios.iter().map(|s| s.parse()).collect();
+        let mut scenarios = scenarios.map_err(|e| WrongUsage(format!("--scenario: {e}")))?;
+        let mut seen = Vec::new();
+        scenarios.retain(|s| !seen.contains(s) && (seen.push(*s), true).1);
+        Ok(scenarios)
+    }
 }
 
 /// Predicts which algorithm is fastest on this machine, for each number of objects, from its hardware parameters alone.

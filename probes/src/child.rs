@@ -1,4 +1,4 @@
-//! Parts of a measurement in processes of their own: a crash costs the part, not the run.
+//! Parts of a measurement, and whole measurements, in processes of their own: a crash costs the part, not the run.
 
 use crate::interrupt;
 use anyhow::Context;
@@ -10,6 +10,9 @@ use std::time::{Duration, Instant};
 
 /// How long to wait for the next line before looking at the clock and for Ctrl-C.
 const POLL: Duration = Duration::from_millis(50);
+
+/// How long a process that stops with this one may take to write what it has. It ends its own parts at once.
+const SAVING: Duration = Duration::from_secs(20);
 
 /// How a part ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,10 +34,38 @@ pub(crate) fn run_part(
     limit: Duration,
     on_line: &mut dyn FnMut(&str) -> anyhow::Result<()>,
 ) -> anyhow::Result<Ended> {
-    let program = std::env::current_exe().context("the program can't find itself")?;
-    let child = Command::new(program)
-        .arg("part")
-        .args(arguments)
+    let mut command = own_program()?;
+    run(command.arg("part").args(arguments), limit, Duration::ZERO, on_line, &mut || {})
+}
+
+/// Runs another `sapwise` with these arguments, which must make it [`stop_with_parent`], and these variables. Calls `on_wait`
+/// over and over until it ends.
+///
+/// # Errors
+/// When the process can't be started.
+pub(crate) fn run_verb(
+    arguments: &[String],
+    variables: &[(&str, String)],
+    limit: Duration,
+    on_wait: &mut dyn FnMut(),
+) -> anyhow::Result<Ended> {
+    let mut command = own_program()?;
+    command.args(arguments).envs(variables.iter().map(|(name, value)| (name, value)));
+    run(&mut command, limit, SAVING, &mut |_| Ok(()), on_wait)
+}
+
+fn own_program() -> anyhow::Result<Command> {
+    Ok(Command::new(std::env::current_exe().context("the program can't find itself")?))
+}
+
+fn run(
+    command: &mut Command,
+    limit: Duration,
+    saving: Duration,
+    on_line: &mut dyn FnMut(&str) -> anyhow::Result<()>,
+    on_wait: &mut dyn FnMut(),
+) -> anyhow::Result<Ended> {
+    let child = command
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -43,7 +74,7 @@ pub(crate) fn run_part(
     let mut child = EndedOnDrop(child);
     // Kept open until the end: the part ends when this pipe closes, so it never outlives this process. `wait` would close
     // it too early, were it still in the child.
-    let _leash = child.0.stdin.take();
+    let leash = child.0.stdin.take();
     let complaints = child.0.stderr.take().map(last_line);
     let lines = child.0.stdout.take().map(lines);
     let end = Instant::now() + limit;
@@ -54,8 +85,13 @@ pub(crate) fn run_part(
             Err(RecvTimeoutError::Timeout) => {}
         }
         if interrupt::requested() {
+            // Lets go of a process that stops with this one, and gives it time to write what it has. Others are ended.
+            drop(leash);
+            let end = Instant::now() + saving;
+            while Instant::now() < end && !matches!(lines.recv_timeout(POLL), Err(RecvTimeoutError::Disconnected)) {}
             return Ok(Ended::Interrupted);
         }
+        on_wait();
         if Instant::now() >= end {
             return Ok(Ended::Badly(format!("was stopped after {} s, which is too long", limit.as_secs())));
         }
@@ -63,6 +99,14 @@ pub(crate) fn run_part(
     let status = child.0.wait().context("a part of the measurement got lost")?;
     let complaint = complaints.and_then(|c| c.join().ok()).unwrap_or_default();
     Ok(judge(status, &complaint))
+}
+
+/// Asks this process to stop, as Ctrl-C does, when the pipe of the process that started it closes.
+pub(crate) fn stop_with_parent() {
+    std::thread::spawn(|| {
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        interrupt::request();
+    });
 }
 
 /// Ends this process when the pipe of the process that started it closes. For parts, as their first step.

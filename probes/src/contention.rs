@@ -1,13 +1,37 @@
-//! Other programs at work, made by ourselves: threads that stream through memory.
+//! Other programs at work, made by ourselves: threads that take memory bandwidth or cache.
 
+use crate::turns::Turns;
+use core_affinity::CoreId;
+use sapwise::hardware::parameter::CACHE_LLC_BYTES;
+use sapwise::measure::{self, Family, Options};
 use sapwise::usable_cores;
+use std::fmt;
 use std::hint::black_box;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 
-/// Numbers in the buffer of a thread: 64 MB, beyond the last-level cache of most machines.
+/// What the other programs take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Contended {
+    /// Memory bandwidth: they stream through memory
+    Memory,
+    /// The last-level cache: they change lines in random order in a buffer that just fits into it
+    Cache,
+}
+
+/// Numbers in the buffer of a thread that streams: 64 MB, beyond the last-level cache of most machines.
 const NUMBERS: usize = 8 << 20;
+
+/// The last-level cache where nobody tells.
+pub(crate) const ASSUMED_LLC_BYTES: f64 = 32.0 * 1024.0 * 1024.0;
+
+/// Share of the last-level cache that the buffer of the threads that take it has. The whole of it would not fit beside what
+/// the measured programs use, and the misses would take memory bandwidth as well.
+const CACHE_SHARE: f64 = 0.75;
+
+/// 64-bit words in a line of 64 bytes.
+const LINE: usize = 8;
 
 /// Half of the usable cores, at least one, kept busy until this is dropped.
 pub(crate) struct Contention {
@@ -16,16 +40,27 @@ pub(crate) struct Contention {
 }
 
 impl Contention {
-    /// Starts the threads.
+    /// Starts the threads beside a measurement on at most `threads` cores.
     ///
     /// # Errors
     /// When the system refuses one.
-    pub(crate) fn start() -> std::io::Result<Self> {
+    pub(crate) fn start(kind: Contended, threads: Option<u32>) -> std::io::Result<Self> {
         let mut contention = Self { stop: Arc::new(AtomicBool::new(false)), threads: Vec::new() };
+        let words = if kind == Contended::Cache { words() } else { Arc::default() };
+        let mut cores = spare_cores(core_affinity::get_core_ids().unwrap_or_default(), threads).into_iter();
         for k in 0..usable_cores().div_ceil(2) {
-            let stop = Arc::clone(&contention.stop);
-            let name = format!("contention-{k}");
-            contention.threads.push(std::thread::Builder::new().name(name).spawn(move || stream(&stop))?);
+            let (stop, words, core) = (Arc::clone(&contention.stop), Arc::clone(&words), cores.next());
+            let body = move || {
+                if let Some(core) = core {
+                    // A refusal leaves the thread to the scheduler.
+                    core_affinity::set_for_current(core);
+                }
+                match kind {
+                    Contended::Memory => stream(&stop),
+                    Contended::Cache => evict(&stop, &words, u64::from(k)),
+                }
+            };
+            contention.threads.push(std::thread::Builder::new().name(format!("contention-{k}")).spawn(body)?);
         }
         Ok(contention)
     }
@@ -41,6 +76,30 @@ impl Drop for Contention {
     }
 }
 
+impl fmt::Display for Contended {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Memory => "memory",
+            Self::Cache => "cache",
+        })
+    }
+}
+
+/// The cores that a measurement on fewer than all leaves, from the last one on: a thread that shares its one core would lose
+/// half of its time, which says nothing about memory or cache. None where all are measured: there the scheduler decides.
+fn spare_cores(all: Vec<CoreId>, threads: Option<u32>) -> Vec<CoreId> {
+    threads.map_or(Vec::new(), |used| all.into_iter().skip(used as usize).rev().collect())
+}
+
+/// The buffer of all threads that take the cache. One for all of them: however many last-level caches the machine has and
+/// whichever cores share one, the lines of those who run there come to each.
+fn words() -> Arc<[AtomicU64]> {
+    let caches = measure::family(Family::Caches, &Options { brief: true, ..Options::default() });
+    let llc = caches.iter().find(|p| p.name == CACHE_LLC_BYTES).and_then(|p| p.value).unwrap_or(ASSUMED_LLC_BYTES);
+    let lines = (llc * CACHE_SHARE) as usize / (LINE * size_of::<AtomicU64>());
+    (0..lines.max(1) * LINE).map(|_| AtomicU64::new(0)).collect()
+}
+
 fn stream(stop: &AtomicBool) {
     let mut numbers = vec![1.0_f64; NUMBERS];
     while !stop.load(Ordering::Relaxed) {
@@ -51,5 +110,48 @@ fn stream(stop: &AtomicBool) {
             }
         }
         black_box(&mut numbers);
+    }
+}
+
+fn evict(stop: &AtomicBool, words: &[AtomicU64], seed: u64) {
+    let lines = (words.len() / LINE) as u128;
+    let mut turns = Turns::new(seed);
+    while !stop.load(Ordering::Relaxed) {
+        for _ in 0..1 << 12 {
+            // The upper half of the product is even over the lines, without a division.
+            let line = (u128::from(turns.draw()) * lines) >> 64;
+            let word = &words[line as usize * LINE];
+            // Not one atomic addition: that would wait for every line, and take fewer of them. A lost count is none.
+            word.store(word.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whoever_is_beside_fewer_threads_keeps_off_their_cores() {
+        let all = || (0..4).map(|id| CoreId { id }).collect::<Vec<_>>();
+        let ids = |threads| spare_cores(all(), threads).iter().map(|c| c.id).collect::<Vec<_>>();
+        assert_eq!((ids(None), ids(Some(4))), (vec![], vec![]));
+        assert_eq!((ids(Some(1)), ids(Some(3))), (vec![3, 2, 1], vec![3]));
+    }
+
+    #[test]
+    fn lines_all_over_the_cache_are_changed_until_it_is_dropped() {
+        let words = words();
+        let stop = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| evict(&stop, &words, 1));
+            let changed = |part: &[AtomicU64]| part.iter().any(|w| w.load(Ordering::Relaxed) > 0);
+            // In every eighth of the buffer; a walk that stays in one part would never end this.
+            while !words.chunks(words.len().div_ceil(8)).all(changed) {
+                std::thread::yield_now();
+            }
+            stop.store(true, Ordering::Relaxed);
+        });
+        assert!(words.iter().enumerate().all(|(k, w)| k % LINE == 0 || w.load(Ordering::Relaxed) == 0));
     }
 }

@@ -17,8 +17,8 @@ const LIMIT: Duration = Duration::from_secs(15);
 /// beside their parameters, which move into the hardware, is the second part of the answer.
 ///
 /// # Errors
-/// When no process can be started.
-pub(crate) fn measure_hardware(threads: Option<u32>, choice: GpuChoice) -> anyhow::Result<(Hardware, gpus::Measured)> {
+/// When no process can be started, or a GPU that was asked for by its number is not there.
+pub(crate) fn measure_hardware(threads: Option<u32>, choice: &GpuChoice) -> anyhow::Result<(Hardware, gpus::Measured)> {
     let mut hardware = measure_cpu(threads)?;
     let mut measured = gpus::measure(choice, threads)?;
     hardware.gpus = std::mem::take(&mut measured.gpus);

@@ -23,6 +23,11 @@ pub(crate) fn listen() -> anyhow::Result<()> {
     .context("Ctrl-C can't be caught")
 }
 
+/// Does what a first Ctrl-C does, however often.
+pub(crate) fn request() {
+    REQUESTED.store(true, Ordering::SeqCst);
+}
+
 /// Whether the user asked to stop.
 pub(crate) fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)

@@ -3,6 +3,7 @@
 mod args;
 mod boxes;
 mod card;
+mod check;
 mod child;
 mod compare;
 mod contention;
@@ -17,8 +18,10 @@ mod interrupt;
 mod output;
 mod plot;
 mod prediction;
+mod profiles;
 mod progress;
 mod provenance;
+mod restriction;
 mod revisions;
 mod simulation;
 mod steadiness;

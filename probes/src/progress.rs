@@ -42,6 +42,11 @@ impl Progress {
         self.show();
     }
 
+    /// Prints something while the bar is out of the way.
+    pub(crate) fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
+        self.bar.suspend(print)
+    }
+
     fn show(&self) {
         if !self.shown.get() && self.began.elapsed() >= DELAY {
             self.shown.set(true);

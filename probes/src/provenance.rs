@@ -3,7 +3,8 @@
 use crate::args::Probe;
 use crate::date;
 use crate::gpus::uses;
-use sapwise::report::{Label, Point, Provenance, Timed};
+use crate::restriction;
+use sapwise::report::{Label, Point, Provenance, Restriction, Timed};
 use sapwise::{GpuKind, Hardware, Registry, SimdLevel, usable_cores};
 use std::time::Duration;
 
@@ -11,7 +12,12 @@ use std::time::Duration;
 const CONTENDED_LOAD: f64 = 0.2;
 
 /// The provenance of a report that these arguments led to.
-pub(crate) fn provenance(arguments: &Probe, took: Duration) -> Provenance {
+pub(crate) fn provenance(
+    arguments: &Probe,
+    restriction: Option<Restriction>,
+    hardware: &Hardware,
+    took: Duration,
+) -> Provenance {
     Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         date: date::today(),
@@ -19,6 +25,8 @@ pub(crate) fn provenance(arguments: &Probe, took: Duration) -> Provenance {
         seed: arguments.seed,
         threads: arguments.threads,
         simd: requested_level().map(|level| level.to_string()),
+        gpu_threads: restriction::gpu_threads(hardware),
+        restriction,
         optimised: !cfg!(debug_assertions),
         seconds: (took.as_secs_f64() * 10.0).round() / 10.0,
     }
@@ -32,7 +40,7 @@ pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) ->
     let fewer_cores = arguments.threads.is_some_and(|k| k < usable_cores());
     let lower_level = requested_level().is_some_and(|level| level < SimdLevel::detected());
     // Contention first: a restricted machine that is disturbed shows what no restriction explains.
-    if arguments.contended || median_foreign_load(points).is_some_and(|load| load > CONTENDED_LOAD) {
+    if arguments.contended.is_some() || median_foreign_load(points).is_some_and(|load| load > CONTENDED_LOAD) {
         Label::RealContended
     } else if on_software_gpu {
         Label::RealSoftwareGpu
@@ -64,16 +72,17 @@ fn median_foreign_load(points: &[Point]) -> Option<f64> {
 }
 
 /// The arguments without `--out`: paths name users.
-fn command(arguments: &Probe) -> String {
+pub(crate) fn command(arguments: &Probe) -> String {
     let mut words = vec!["probe".to_owned()];
     let flags = [
         ("--hardware-only", arguments.hardware_only),
         ("--quick", arguments.quick),
-        ("--contended", arguments.contended),
         ("--no-gpus", arguments.gpus.no_gpus),
         ("--software-gpus", arguments.gpus.software_gpus),
     ];
     words.extend(flags.iter().filter(|f| f.1).map(|f| f.0.to_owned()));
+    words.extend(arguments.gpus.only.iter().map(|k| format!("--gpu {k}")));
+    words.extend(arguments.contended.map(|kind| format!("--contended={kind}")));
     words.extend(arguments.threads.map(|k| format!("--threads {k}")));
     words.push(format!("--seed {}", arguments.seed));
     words.extend(arguments.max_objects.map(|n| format!("--max-objects {n}")));
@@ -115,6 +124,12 @@ mod tests {
         let arguments =
             probe(&["--quick", "--out", "/home/someone/r.json", "--threads", "1", "--scenario", "slab", "--no-gpus"]);
         assert_eq!(command(&arguments), "probe --quick --no-gpus --threads 1 --seed 1 --scenario slab");
+        assert_eq!(command(&probe(&["--gpu", "0", "--gpu", "2"])), "probe --gpu 0 --gpu 2 --seed 1");
+        assert_eq!(command(&probe(&["--contended"])), "probe --contended=memory --seed 1");
+        assert_eq!(
+            command(&probe(&["--contended=cache", "--threads", "1"])),
+            "probe --contended=cache --threads 1 --seed 1"
+        );
     }
 
     #[test]
@@ -123,6 +138,7 @@ mod tests {
         let busy = [point(Some(0.3)), point(Some(0.4)), point(Some(0.0))];
         let label = |words: &[&str], points: &[Point]| label(&probe(words), points, &hardware(GpuKind::Discrete));
         assert_eq!(label(&["--contended"], &quiet), Label::RealContended);
+        assert_eq!(label(&["--contended=cache"], &quiet), Label::RealContended);
         assert_eq!(label(&[], &busy), Label::RealContended);
         if requested_level().is_none() {
             assert_eq!(label(&[], &quiet), Label::RealFull);

@@ -4,6 +4,7 @@ use crate::interrupt;
 use crate::progress::Progress;
 use crate::turns::Turns;
 use anyhow::{Context, bail};
+use sapwise::measure::Watch;
 use sapwise::{Adaptive, AlgorithmId, BackendClass, BroadPhase, Fields, Pairs, Registry, Scenario};
 use std::time::Instant;
 
@@ -46,6 +47,9 @@ pub(crate) struct Outcome {
     /// Repeats that all frames have; the last may have been cut short by Ctrl-C and is then left out.
     pub(crate) repeats: usize,
     pub(crate) interrupted: bool,
+    /// Median over the frames of the share of the CPU that other programs took. `None` where that can't be told, as in a course
+    /// of milliseconds.
+    pub(crate) foreign_load: Option<f64>,
     /// Fixed algorithms that could not run, or not to the end, and why.
     pub(crate) notes: Vec<String>,
 }
@@ -164,6 +168,9 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
     let mut turns = Turns::new(course.seed);
     let progress = Progress::new((course.repeats * course.frames) as u64);
     let mut done = 0;
+    // One for each frame of a window that was long enough to tell.
+    let mut loads: Vec<f64> = Vec::new();
+    let (mut watch, mut watched) = (Watch::begin(), 0);
     // Turns and frames of the samples that the repeat under way has added.
     let mut under_way: Vec<(usize, usize)> = Vec::new();
     'repeats: for repeat in 0..course.repeats {
@@ -213,6 +220,11 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
                 leave(&mut contestants, frame);
                 frames.push(Frame { objects: boxes.len(), adaptive_ns: 0.0, fixed_ns: Vec::new(), chosen: None });
             }
+            watched += 1;
+            if watch.is_long_enough() {
+                loads.extend(watch.foreign_load().into_iter().flat_map(|load| std::iter::repeat_n(load, watched)));
+                (watch, watched) = (Watch::begin(), 0);
+            }
             scene.advance();
             progress.advance(1);
         }
@@ -232,7 +244,8 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
         frame.adaptive_ns = sapwise::measure::statistics::median(&samples).unwrap_or(f64::INFINITY);
         frame.fixed_ns = contestants.iter().map(|c| c.median(at)).collect();
     }
-    Ok(Outcome { fixed, frames, repeats: done, interrupted: done < course.repeats, notes })
+    let foreign_load = sapwise::measure::statistics::median(&loads);
+    Ok(Outcome { fixed, frames, repeats: done, interrupted: done < course.repeats, foreign_load, notes })
 }
 
 /// The fastest sample of any fixed algorithm at a frame.
@@ -264,6 +277,7 @@ mod tests {
         assert_eq!((outcome.frames.len(), outcome.repeats, outcome.fixed.len()), (300, 3, registry.available().len()));
         assert!(outcome.oracle_ms() > 0.0 && outcome.oracle_ms() <= outcome.best_fixed().unwrap().1);
         assert!(outcome.switches() >= 1);
+        assert!(outcome.foreign_load.is_none_or(|load| (0.0..=1.0).contains(&load)));
         for frame in &outcome.frames {
             assert!(frame.fixed_ns.iter().all(|ns| ns.is_finite()) && frame.adaptive_ns.is_finite());
             assert!(frame.chosen.is_some());
@@ -309,6 +323,7 @@ mod tests {
             frames: vec![frame(1e6, 2e9), frame(1e6, f64::INFINITY)],
             repeats: 1,
             interrupted: false,
+            foreign_load: None,
             notes: Vec::new(),
         };
         assert_eq!((outcome.fixed_ms(0), outcome.fixed_ms(1)), (Some(2.0), None));
@@ -325,6 +340,7 @@ mod tests {
             frames: vec![frame(1e6, 1e6, 4e6, 0), frame(3e6, 5e6, 2e6, 1), frame(2e6, 5e6, 2e6, 1)],
             repeats: 1,
             interrupted: false,
+            foreign_load: None,
             notes: Vec::new(),
         };
         assert_eq!((outcome.adaptive_ms(), outcome.oracle_ms()), (6.0, 5.0));

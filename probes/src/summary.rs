@@ -62,7 +62,7 @@ pub(crate) fn hardware(hardware: &Hardware) -> String {
 /// What is told of GPUs after a measurement, if anything: that there is none, or which were not taken. What went wrong is
 /// told with the remarks.
 pub(crate) fn gpus_left_out(
-    choice: GpuChoice,
+    choice: &GpuChoice,
     hardware: &Hardware,
     left_out: &[GpuIdentity],
     remarks: &[String],

@@ -13,13 +13,13 @@ impl Turns {
     pub(crate) fn order(&mut self, count: usize) -> Vec<usize> {
         let mut order: Vec<usize> = (0..count).collect();
         for k in (1..count).rev() {
-            order.swap(k, (self.next() % (k as u64 + 1)) as usize);
+            order.swap(k, (self.draw() % (k as u64 + 1)) as usize);
         }
         order
     }
 
-    /// splitmix64 (Steele, Lea, Flood 2014).
-    fn next(&mut self) -> u64 {
+    /// A number of splitmix64 (Steele, Lea, Flood 2014).
+    pub(crate) fn draw(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;
         x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

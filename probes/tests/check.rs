@@ -164,3 +164,142 @@ fn train_refuses_what_is_no_report() {
     assert!(complaint.contains("no *.json"), "{complaint}");
     assert!(!out.exists());
 }
+
+/// What `damage` does to a report of this build that a machine was measured for, and what is told of it.
+type Case = (&'static str, Value, &'static str);
+
+/// The findings on a sound report, each with one thing changed.
+fn damaged(cases: &[Case]) -> Vec<Value> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |(k, (pointer, value, _)): (usize, &Case)| {
+        let mut report = measured();
+        let at = report.pointer_mut(pointer).unwrap_or_else(|| panic!("{pointer}"));
+        *at = value.clone();
+        write(folder.path(), &format!("{k}.json"), report.to_string())
+    };
+    let files: Vec<PathBuf> = cases.iter().enumerate().map(file).collect();
+    check(&files).1
+}
+
+/// A report that a machine was measured for: restricted, proven and undisturbed.
+fn measured() -> Value {
+    let mut report = report();
+    let parameter = |name: &str, value: f64| {
+        json!({
+            "name": name, "value": value, "dispersion": 0.01, "samples": 8, "spoiled": 0, "foreign_load": 0.01,
+            "how": "measured", "source": "test"
+        })
+    };
+    report["label"] = "real_restricted".into();
+    report["provenance"]["threads"] = 64.into();
+    report["provenance"]["restriction"] = json!({
+        "kinds": ["threads"],
+        "proof": [{"kind": "threads", "parameter": "usable_cores", "without": 128.0, "with": 64.0, "shows": true}]
+    });
+    let parameters = report["hardware"]["parameters"].as_array_mut().unwrap();
+    parameters.extend([
+        parameter("clock_measured_ghz", 4.0),
+        parameter("simd_lanes", 4.0),
+        parameter("cache_l1d_bytes", 32768.0),
+        parameter("cache_l2_bytes", 1_048_576.0),
+        parameter("bandwidth_one_thread_gb_per_s", 20.0),
+        parameter("scaling_all_threads_ratio", 60.0),
+    ]);
+    let point = report["points"][0].clone();
+    report["points"] = json!([point.clone(), point.clone(), point.clone(), point]);
+    report
+}
+
+#[test]
+fn impossible_figures_and_revealing_texts_are_problems_that_name_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let (status, sound) = check(&[write(folder.path(), "sound.json", measured().to_string())]);
+    assert_eq!((status, &sound[0]["problems"], &sound[0]["sound"]), (0, &json!([]), &true.into()), "{sound:?}");
+    let parameter = |k: usize, key: &str| -> &'static str { format!("/hardware/parameters/{k}/{key}").leak() };
+    let timings = json!([
+        {"algorithm": "brute@cpu1", "samples_ns": [100, 101], "error": null},
+        {"algorithm": "brute@cpu64", "samples_ns": [100, 101, 102], "error": null}
+    ]);
+    let twice = json!([timings[0], timings[0]]);
+    let silent = json!([{"algorithm": "brute@cpu1", "samples_ns": [], "error": null}]);
+    let cases: Vec<Case> = vec![
+        (parameter(0, "value"), 5000.0.into(), "usable_cores is 5000"),
+        (parameter(0, "value"), 1.5.into(), "usable_cores is 1.5"),
+        (parameter(0, "value"), 32.0.into(), "brute@cpu64 ran on more threads than the usable cores"),
+        (parameter(0, "value"), 128.0.into(), "the report is of 64 threads"),
+        (parameter(0, "foreign_load"), 1.5.into(), "no share"),
+        (parameter(1, "value"), 100.0.into(), "clock_measured_ghz is 100"),
+        (parameter(1, "dispersion"), (-0.5).into(), "dispersion"),
+        (parameter(2, "value"), 8.0.into(), "simd_lanes is 8"),
+        (parameter(5, "value"), 0.0.into(), "bandwidth_one_thread_gb_per_s is 0"),
+        (parameter(6, "value"), 71.0.into(), "64 threads can't do more"),
+        ("/provenance/date", "2026-02-30".into(), "no day"),
+        ("/provenance/date", "yesterday".into(), "no day"),
+        ("/provenance/simd", "avx2".into(), "avx2 was forced, and portable was in use"),
+        ("/provenance/seconds", (-3.0).into(), "it took -3 s"),
+        ("/provenance/threads", Value::Null, "the restriction threads is not in the rest"),
+        ("/provenance/restriction/proof/0/with", 32.0.into(), "the proof of threads has usable_cores as Some(32.0)"),
+        ("/points/1/foreign_load", 2.0.into(), "point 1 (uniform at 10 objects): a foreign load"),
+        ("/points/1/fingerprint", "ff".into(), "16 hex digits"),
+        ("/points/1/pairs", 46.into(), "46 pairs"),
+        ("/points/1/pairs", 3.into(), "2 and 3 pairs with one fingerprint"),
+        ("/points/1/timings", timings.clone(), "brute@cpu64 has 3 samples, and others have 2"),
+        ("/points/1/timings", twice, "stands there twice"),
+        ("/points/1/timings", silent, "0 samples and the error None"),
+        ("/points/1/timings/0/samples_ns", json!([1, 2, 9_000_000_000_u64]), "samples add up to 9.0 s"),
+        ("/provenance/command", "probe --out /home/me/r.json".into(), "provenance.command holds the folder of a user"),
+        ("/remarks", json!(["a remark", "see C:\\Users\\me"]), "remarks[1] holds the folder of a user"),
+        ("/hardware/machine/cpu", "ask me@example.org".into(), "hardware.machine.cpu holds an address of e-mail"),
+    ];
+    for ((pointer, value, text), finding) in cases.iter().zip(damaged(&cases)) {
+        let problems = finding["problems"].as_array().unwrap();
+        let told = problems.iter().any(|p| p.as_str().unwrap().contains(text));
+        assert!(told, "{pointer} as {value}: {text:?} is not in {problems:?}");
+    }
+}
+
+#[test]
+fn the_name_of_this_host_is_a_problem() {
+    let common = ["localhost", std::env::consts::OS, std::env::consts::ARCH];
+    let Some(host) = sysinfo::System::host_name().ok().filter(|h| h.len() > 3 && !common.contains(&h.as_str())) else {
+        eprintln!("skipped: this host has no name of its own");
+        return;
+    };
+    let cases: Vec<Case> = vec![("/remarks", json!([format!("made on {host}.")]), "the name of this host")];
+    let finding = &damaged(&cases)[0];
+    assert!(finding["problems"].to_string().contains("remarks[0] holds the name of this host"), "{finding}");
+}
+
+#[test]
+fn a_file_that_is_too_large_is_a_problem() {
+    let folder = tempfile::tempdir().unwrap();
+    let filled = |bytes: usize| measured().to_string() + &" ".repeat(bytes);
+    let small = write(folder.path(), "small.json", filled(900_000));
+    let large = write(folder.path(), "large.json", filled(1_000_000));
+    let (status, findings) = check(&[small, large]);
+    assert_eq!((status, &findings[0]["problems"]), (1, &json!([])));
+    assert!(findings[1]["problems"].to_string().contains("1000000 are the most"), "{findings:?}");
+}
+
+#[test]
+fn suspicious_figures_are_notes_and_the_file_stays_good() {
+    let point = |load: f64| {
+        let mut point = measured()["points"][0].clone();
+        point["foreign_load"] = load.into();
+        point
+    };
+    let loaded = json!([point(0.3), point(0.2), point(0.01), point(0.01)]);
+    let cases: Vec<Case> = vec![
+        ("/points", loaded, "over 5 % of the CPU at 2 of 4 points (50 %)"),
+        ("/hardware/parameters/5/dispersion", 0.5.into(), "dispersion over 20 %: bandwidth_one_thread_gb_per_s (50 %)"),
+        ("/hardware/parameters/3/value", 3e6.into(), "one of them may be in another unit"),
+        ("/provenance/restriction/proof/0/shows", false.into(), "the restriction threads does not show: usable_cores is 64"),
+        ("/provenance/date", "9999-01-01".into(), "its date is to come"),
+    ];
+    for ((pointer, value, text), finding) in cases.iter().zip(damaged(&cases)) {
+        assert_eq!(finding["problems"], json!([]), "{pointer} as {value}");
+        assert!(finding["notes"].to_string().contains(text), "{pointer} as {value}: {}", finding["notes"]);
+    }
+    let few: Vec<Case> = vec![("/points", json!([point(0.3), point(0.01), point(0.01), point(0.01)]), "")];
+    assert!(!damaged(&few)[0]["notes"].to_string().contains("other programs"));
+}

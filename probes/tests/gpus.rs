@@ -96,6 +96,19 @@ fn programs_that_act_as_gpus_are_measured_and_swept_only_when_asked_for() {
 }
 
 #[test]
+fn a_gpu_is_taken_by_its_number_and_one_that_is_not_there_is_wrong_usage() {
+    let complaint = failure(without_adapters(&mut sapwise()).args(TINY).args(["--gpu", "99"]), 2);
+    assert!(complaint.contains("--gpu: this machine has no gpu99"), "{complaint}");
+    let Some(devices) = devices_with_a_gpu("a_gpu_is_taken_by_its_number") else { return };
+    // The last one: a program, or a GPU that is not the first.
+    let last = devices["adapters"].as_array().unwrap().last().unwrap()["index"].as_u64().unwrap() as u32;
+    let one = report(sapwise().args(TINY).args(["--gpu", &last.to_string()]));
+    assert_eq!(one.hardware.gpus.iter().map(|g| g.gpu.index).collect::<Vec<_>>(), [last], "{:?}", one.remarks);
+    let others = |id: &sapwise::AlgorithmId| matches!(id.backend(), sapwise::Backend::Gpu(list) if list[..] != [last]);
+    assert!(!one.algorithms.iter().any(|t| others(&t.id)), "{:?}", one.algorithms);
+}
+
+#[test]
 fn without_an_adapter_one_sentence_says_so_and_everything_else_works() {
     let text = success(without_adapters(&mut sapwise()).arg("predict"));
     if text.contains("gpu0") {

@@ -20,7 +20,11 @@
 //! contestant failed or found other pairs than the rest.
 
 mod contestants;
-#[allow(unused_imports, reason = "its tests run with the command: without a harness there are none")]
+#[allow(
+    unused_imports,
+    dead_code,
+    reason = "its tests run with the command: without a harness there are none, and no checks of days"
+)]
 #[path = "../../src/date.rs"]
 mod date;
 mod document;

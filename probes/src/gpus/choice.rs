@@ -1,10 +1,12 @@
 //! Which GPUs a verb takes.
 
+use super::Seen;
+use crate::exit::WrongUsage;
 use sapwise::report::Report;
 use sapwise::{AlgorithmId, Backend, GpuIdentity, GpuKind};
 
 /// The options of verbs that take GPUs.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::Args)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, clap::Args)]
 pub(crate) struct GpuChoice {
     /// Leave out every GPU, and load no driver.
     #[arg(long, conflicts_with = "software_gpus")]
@@ -12,16 +14,34 @@ pub(crate) struct GpuChoice {
     /// Take programs that act as GPUs too, such as llvmpipe and SwiftShader. They run on the CPU and can't beat it.
     #[arg(long)]
     pub(crate) software_gpus: bool,
+    /// Take this GPU only, as `sapwise devices` numbers it, a program too; may be given several times.
+    #[arg(long = "gpu", value_name = "N", conflicts_with_all = ["no_gpus", "software_gpus"])]
+    pub(crate) only: Vec<u32>,
 }
 
 impl GpuChoice {
     /// Whether a GPU is taken.
-    pub(crate) fn takes(self, gpu: &GpuIdentity) -> bool {
-        !self.no_gpus && (self.software_gpus || gpu.kind != GpuKind::Software)
+    pub(crate) fn takes(&self, gpu: &GpuIdentity) -> bool {
+        if self.only.is_empty() {
+            !self.no_gpus && (self.software_gpus || gpu.kind != GpuKind::Software)
+        } else {
+            self.only.contains(&gpu.index)
+        }
+    }
+
+    /// Refuses GPUs that are asked for by number and not there.
+    ///
+    /// # Errors
+    /// Says which are there.
+    pub(crate) fn check(&self, seen: &Seen) -> Result<(), WrongUsage> {
+        match seen.lacks(&self.only) {
+            Some(why) => Err(WrongUsage(format!("--gpu: {why}"))),
+            None => Ok(()),
+        }
     }
 
     /// Takes what is not wanted out of the timings of a report; its hardware stays as it is.
-    pub(crate) fn restrict(self, report: &mut Report) {
+    pub(crate) fn restrict(&self, report: &mut Report) {
         let wanted: Vec<u32> = report.hardware.gpus.iter().filter(|g| self.takes(&g.gpu)).map(|g| g.gpu.index).collect();
         let stays = |id: &AlgorithmId| uses(id).iter().all(|k| wanted.contains(k));
         report.algorithms.retain(|t| stays(&t.id));
@@ -29,8 +49,8 @@ impl GpuChoice {
     }
 
     /// What the user should know about GPUs that were not taken, if anything.
-    pub(crate) fn tell(self, left_out: &[GpuIdentity]) -> Option<String> {
-        if self.no_gpus || left_out.is_empty() {
+    pub(crate) fn tell(&self, left_out: &[GpuIdentity]) -> Option<String> {
+        if self.no_gpus || !self.only.is_empty() || left_out.is_empty() {
             return None;
         }
         let names: Vec<String> = left_out.iter().map(|g| format!("gpu{} ({})", g.index, g.name)).collect();
@@ -81,6 +101,13 @@ mod tests {
         assert_eq!(takes(GpuChoice::default()), (true, false));
         assert_eq!(takes(GpuChoice { software_gpus: true, ..GpuChoice::default() }), (true, true));
         assert_eq!(takes(GpuChoice { no_gpus: true, ..GpuChoice::default() }), (false, false));
+        let second = GpuChoice { only: vec![1], ..GpuChoice::default() };
+        assert_eq!((takes(second.clone()), second.tell(std::slice::from_ref(&real))), ((false, true), None));
+        let seen = |identities| Seen { identities, remark: None };
+        assert!(second.check(&seen(vec![real.clone(), program.clone()])).is_ok());
+        let complaint = second.check(&seen(vec![real.clone()])).unwrap_err().to_string();
+        assert_eq!(complaint, "--gpu: this machine has no gpu1, only gpu0 (X)");
+        assert!(GpuChoice::default().check(&seen(Vec::new())).is_ok());
         assert!(GpuChoice::default().tell(&[program]).unwrap().contains("gpu1 (X) is a program"));
         assert_eq!(GpuChoice::default().tell(&[]), None);
     }

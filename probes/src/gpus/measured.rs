@@ -28,8 +28,8 @@ pub(crate) struct Measured {
 /// Looks for GPUs and measures those that are taken, at most a minute and a half for each.
 ///
 /// # Errors
-/// When no process can be started.
-pub(crate) fn measure(choice: GpuChoice, threads: Option<u32>) -> anyhow::Result<Measured> {
+/// When no process can be started, or a GPU that was asked for by its number is not there.
+pub(crate) fn measure(choice: &GpuChoice, threads: Option<u32>) -> anyhow::Result<Measured> {
     let mut measured = Measured::default();
     if choice.no_gpus {
         return Ok(measured);
@@ -39,6 +39,7 @@ pub(crate) fn measure(choice: GpuChoice, threads: Option<u32>) -> anyhow::Result
         return Ok(measured);
     }
     let seen = look()?;
+    choice.check(&seen)?;
     measured.remarks.extend(seen.remark);
     let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.into_iter().partition(|g| choice.takes(g));
     measured.left_out = left_out;

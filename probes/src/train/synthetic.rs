@@ -215,6 +215,8 @@ fn provenance() -> Provenance {
         seed: 1,
         threads: None,
         simd: None,
+        gpu_threads: None,
+        restriction: None,
         optimised: true,
         seconds: 0.0,
     }

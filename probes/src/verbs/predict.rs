@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &Predict) -> anyhow::Result<Outcome> {
             let (hardware, measured) = match report {
                 Some(report) => (report.hardware.clone(), None),
                 None => {
-                    let (hardware, measured) = measure_hardware(arguments.threads, arguments.gpus)?;
+                    let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
                     (hardware, Some(measured))
                 }
             };
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Predict) -> anyhow::Result<Outcome> {
             interrupt::check()?;
             let gpus = match measured {
                 Some(measured) => {
-                    told = summary::gpus_left_out(arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
+                    told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
                     remarks = measured.remarks;
                     measured.usable
                 }

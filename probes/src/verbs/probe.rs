@@ -3,26 +3,37 @@
 use crate::args::Probe;
 use crate::contention::Contention;
 use crate::destination::Destination;
-use crate::exit::{Outcome, WrongUsage};
+use crate::exit::Outcome;
 use crate::hardware::{self, measure_hardware};
 use crate::steadiness::Steadiness;
 use crate::sweep::{self, Conditions, Found, Plan};
-use crate::{interrupt, output, provenance, summary};
+use crate::{child, interrupt, output, profiles, provenance, restriction, summary};
 use anyhow::Context;
-use sapwise::{Hardware, Report, Scenario, usable_cores};
+use sapwise::report::Restriction;
+use sapwise::{Hardware, Report, usable_cores};
 use std::time::Instant;
 
 pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
+    if arguments.profiles {
+        return profiles::run(arguments);
+    }
     let began = Instant::now();
     let plan = plan(arguments)?;
+    let references = restriction::references(&arguments.unrestricted)?;
     let destination =
         if arguments.json && arguments.out.is_none() { None } else { Some(Destination::new(arguments.out.as_deref())?) };
     interrupt::listen()?;
-    let contention = arguments.contended.then(Contention::start).transpose();
+    if arguments.leashed {
+        child::stop_with_parent();
+    }
+    let contention = arguments.contended.map(|kind| Contention::start(kind, arguments.threads)).transpose();
     let contention = contention.context("the threads for --contended can't be started")?;
-    let (hardware, measured) = measure_hardware(arguments.threads, arguments.gpus)?;
-    let told = summary::gpus_left_out(arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
-    let before = measured.remarks;
+    let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
+    let told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
+    let restriction = restriction::restriction(arguments, &hardware, &references);
+    let mut before = measured.remarks;
+    before.extend(restriction.iter().flat_map(restriction::not_shown));
+    let assemble = |found| assemble(arguments, &hardware, restriction.clone(), found, began);
     let mut found = Found { remarks: before.clone(), ..Found::default() };
     if interrupt::requested() {
         found.remarks.push("interrupted during the hardware parameters; what was to follow is missing".to_owned());
@@ -31,14 +42,14 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
         let conditions = Conditions {
             cores: arguments.threads.unwrap_or_else(usable_cores),
             seed: arguments.seed,
-            contended: arguments.contended,
+            contended: arguments.contended.is_some(),
             gpus: measured.usable,
         };
         found = sweep::conduct(plan, &conditions, &mut |so_far| {
             if let Some(destination) = &destination {
                 let mut so_far = so_far.clone();
                 so_far.remarks.splice(0..0, before.iter().cloned());
-                let mut report = assemble(arguments, &hardware, so_far, began);
+                let mut report = assemble(so_far);
                 report.remarks.push("unfinished: the measurement was going on when this was written".to_owned());
                 destination.save_unfinished(&report);
             }
@@ -47,7 +58,7 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     }
     drop(contention);
     let (failed, interrupted) = (found.failed, found.interrupted);
-    let report = assemble(arguments, &hardware, found, began);
+    let report = assemble(found);
     let saved = destination.as_ref().map(|d| d.save(&report)).transpose();
     let text = if arguments.json {
         sapwise::json::write_report(&report)?
@@ -72,18 +83,21 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
 /// What to sweep; `None` with `--hardware-only`.
 fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
     hardware::check_threads(arguments.threads)?;
-    let scenarios: Result<Vec<Scenario>, String> = arguments.scenarios.iter().map(|s| s.parse()).collect();
-    let mut scenarios = scenarios.map_err(|e| WrongUsage(format!("--scenario: {e}")))?;
-    let mut seen = Vec::new();
-    scenarios.retain(|s| !seen.contains(s) && (seen.push(*s), true).1);
+    let scenarios = arguments.scenarios()?;
     Ok((!arguments.hardware_only).then(|| Plan::new(arguments.quick, &scenarios, arguments.max_objects)))
 }
 
-fn assemble(arguments: &Probe, hardware: &Hardware, found: Found, began: Instant) -> Report {
+fn assemble(
+    arguments: &Probe,
+    hardware: &Hardware,
+    restriction: Option<Restriction>,
+    found: Found,
+    began: Instant,
+) -> Report {
     let mut report = Report {
         schema: sapwise::report::ReportSchema,
         label: provenance::label(arguments, &found.points, hardware),
-        provenance: provenance::provenance(arguments, began.elapsed()),
+        provenance: provenance::provenance(arguments, restriction, hardware, began.elapsed()),
         hardware: hardware.clone(),
         algorithms: provenance::timed(&found.points, arguments.threads, hardware),
         points: found.points,

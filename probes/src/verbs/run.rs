@@ -23,6 +23,8 @@ struct Answer<'a> {
     repeats: usize,
     seed: u64,
     interrupted: bool,
+    /// Median over the frames of the share of the CPU that other programs took; null where that can't be told.
+    foreign_load: Option<f64>,
     /// Where the fields came from.
     source: Source,
     extrapolated: bool,
@@ -74,13 +76,13 @@ struct Decision<'a> {
 pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
     let mut registry = Registry::new();
     registry.pin_threads();
-    let read = arguments.fields.as_deref().map(|path| read_fields(path, &registry, arguments.gpus)).transpose()?;
+    let read = arguments.fields.as_deref().map(|path| read_fields(path, &registry, &arguments.gpus)).transpose()?;
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
     let mut fields = match read {
         Some(fields) => fields,
         None => {
-            let (hardware, measured) = measure_hardware(None, arguments.gpus)?;
+            let (hardware, measured) = measure_hardware(None, &arguments.gpus)?;
             let model = super::predict::model(None)?;
             let mut fields = prediction::predict(&model, &hardware, &measured.usable, Scenario::Uniform)?;
             fields.warnings.extend(measured.remarks);
@@ -88,7 +90,7 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
         }
     };
     interrupt::check()?;
-    let gpu_warnings = add_gpus(&mut registry, &fields, arguments.gpus)?;
+    let gpu_warnings = add_gpus(&mut registry, &fields, &arguments.gpus)?;
     fields.warnings.extend(gpu_warnings);
     let mut origin =
         Origin { source: fields.source, extrapolated: fields.extrapolated, warnings: std::mem::take(&mut fields.warnings) };
@@ -121,7 +123,7 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
 ///
 /// # Errors
 /// When no process can be started.
-fn add_gpus(registry: &mut Registry, fields: &Fields, choice: GpuChoice) -> anyhow::Result<Vec<String>> {
+fn add_gpus(registry: &mut Registry, fields: &Fields, choice: &GpuChoice) -> anyhow::Result<Vec<String>> {
     let mut named: Vec<&AlgorithmId> = fields.algorithms();
     named.retain(|id| !gpus::uses(id).is_empty());
     if named.is_empty() {
@@ -131,13 +133,17 @@ fn add_gpus(registry: &mut Registry, fields: &Fields, choice: GpuChoice) -> anyh
         return Ok(named.into_iter().map(|id| format!("{id} is left out by --no-gpus")).collect());
     }
     let seen = gpus::look()?;
+    choice.check(&seen)?;
     let mut warnings: Vec<String> = Vec::new();
     let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.iter().cloned().partition(|g| choice.takes(g));
     for id in named {
-        let program = left_out.iter().find(|g| gpus::uses(id).contains(&g.index));
+        let out = left_out.iter().find(|g| gpus::uses(id).contains(&g.index));
         warnings.extend(seen.lacks(gpus::uses(id)).map(|why| format!("{id} is left out: {why}")));
-        warnings.extend(program.map(|g| {
-            format!("{id} is left out: gpu{} ({}) is a program on the CPU; --software-gpus takes it in", g.index, g.name)
+        warnings.extend(out.map(|g| match choice.only[..] {
+            [] => {
+                format!("{id} is left out: gpu{} ({}) is a program on the CPU; --software-gpus takes it in", g.index, g.name)
+            }
+            _ => format!("{id} is left out: --gpu does not name gpu{}", g.index),
         }));
     }
     if !taken.is_empty() {
@@ -160,7 +166,7 @@ struct Origin {
 ///
 /// # Errors
 /// When the file is neither, or tells of other revisions of the algorithms than those of this build.
-fn read_fields(path: &Path, registry: &Registry, choice: GpuChoice) -> anyhow::Result<Fields> {
+fn read_fields(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyhow::Result<Fields> {
     let fresh = |stale: Vec<String>| match &stale[..] {
         [] => Ok(()),
         _ => bail!("{} is stale: {}; predict again or probe again", path.display(), stale.join("; ")),
@@ -209,6 +215,7 @@ fn answer<'a>(course: &Course, outcome: &'a simulation::Outcome, origin: Origin)
         repeats: outcome.repeats,
         seed: course.seed,
         interrupted: outcome.interrupted,
+        foreign_load: outcome.foreign_load,
         source: origin.source,
         extrapolated: origin.extrapolated,
         warnings: origin.warnings,
@@ -250,6 +257,9 @@ fn text(answer: &Answer<'_>) -> String {
         answer.over_best_fixed,
         answer.best_fixed
     );
+    if let Some(load) = answer.foreign_load {
+        text += &format!("\nOther programs took {:.0} % of the CPU, median over the frames.", load * 100.0);
+    }
     for warning in &answer.warnings {
         text += &format!("\nwarning: {warning}");
     }

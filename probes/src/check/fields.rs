@@ -1,0 +1,54 @@
+//! What is told of fields.
+
+use super::{Finding, Here};
+use crate::gpus::uses;
+use crate::revisions;
+use sapwise::{AlgorithmId, Backend, Fields, GpuKind, usable_cores};
+
+impl Here {
+    pub(super) fn fields(&self, fields: &Fields, finding: &mut Finding) {
+        finding.schema = Some("fields/1");
+        finding.set_current(
+            revisions::stale_in_fields(fields, &self.registry),
+            "predict again, or probe again where they were measured",
+        );
+        let mut wanted = fields.algorithms();
+        wanted.extend(fields.steps.iter().map(|s| &s.algorithm));
+        let mut missing: Vec<String> = wanted.into_iter().filter_map(|id| self.unavailable(id)).collect();
+        missing.sort_unstable();
+        missing.dedup();
+        finding.applicable = Some(missing.is_empty());
+        finding.problems.extend(missing);
+        finding.notes.extend(self.programs(fields));
+        if fields.extrapolated {
+            finding.notes.push("predicted for a machine outside what the model was trained on".to_owned());
+        }
+    }
+
+    /// Why an algorithm can't run here, if it can't.
+    fn unavailable(&self, id: &AlgorithmId) -> Option<String> {
+        if let Some(entry) = self.registry.entries().iter().find(|e| e.id == *id) {
+            return entry.unavailable.as_ref().map(|why| format!("{id} can't run here: {why}"));
+        }
+        match id.backend() {
+            // The revision check has told already that the method is unknown; without costs nothing has.
+            _ if !revisions::is_known(id, &self.registry) => Some(format!("{id} is not in this build")),
+            Backend::Cpu(threads) if *threads <= usable_cores() => None,
+            Backend::Cpu(_) => Some(format!("{id} needs more than the {} cores of this machine", usable_cores())),
+            Backend::Gpu(indices) => self.gpus().lacks(indices).map(|why| format!("{id} can't run here: {why}")),
+            _ => Some(format!("{id} can't run here: this version does not know its processor")),
+        }
+    }
+
+    /// Which algorithms of fields run on programs that act as GPUs.
+    fn programs(&self, fields: &Fields) -> Vec<String> {
+        let mut notes = Vec::new();
+        for id in fields.algorithms().into_iter().filter(|id| !uses(id).is_empty()) {
+            let gpus = self.gpus().identities.iter().filter(|g| uses(id).contains(&g.index));
+            for gpu in gpus.filter(|g| g.kind == GpuKind::Software) {
+                notes.push(format!("{id}: gpu{} is a program on the CPU here: {}", gpu.index, gpu.name));
+            }
+        }
+        notes
+    }
+}

@@ -1,0 +1,94 @@
+//! What can be told of a file: whether it is sound, current and applicable here, and what makes it suspicious.
+
+mod fields;
+mod figures;
+mod model;
+mod privacy;
+mod report;
+
+use crate::document::read_document;
+use crate::gpus::{Seen, look};
+use sapwise::json::Document;
+use sapwise::measure;
+use sapwise::{Machine, Registry};
+use serde::Serialize;
+use std::cell::OnceCell;
+use std::path::Path;
+
+/// What is known about one file.
+#[derive(Debug, Serialize)]
+pub(crate) struct Finding {
+    pub(crate) file: String,
+    /// `None` when it could not be read.
+    pub(crate) schema: Option<&'static str>,
+    /// Readable, complete, and no figure in it is impossible.
+    pub(crate) sound: bool,
+    /// The algorithms are those of this build. `None` when that could not be looked at.
+    pub(crate) current: Option<bool>,
+    /// It may be used on this machine. `None` when that could not be looked at.
+    pub(crate) applicable: Option<bool>,
+    /// What makes the file fail.
+    pub(crate) problems: Vec<String>,
+    /// What the user should know beside.
+    pub(crate) notes: Vec<String>,
+}
+
+/// What files are held against.
+pub(crate) struct Here {
+    registry: Registry,
+    machine: Machine,
+    /// Looked for when the first file names one.
+    gpus: OnceCell<Seen>,
+}
+
+impl Here {
+    /// This build on this machine.
+    pub(crate) fn new() -> Self {
+        Self { registry: Registry::new(), machine: measure::machine(), gpus: OnceCell::new() }
+    }
+
+    /// Reads a file and tells what is known about it.
+    pub(crate) fn look_at(&self, path: &Path) -> Finding {
+        let mut finding = Finding {
+            file: path.display().to_string(),
+            schema: None,
+            sound: false,
+            current: None,
+            applicable: None,
+            problems: Vec::new(),
+            notes: Vec::new(),
+        };
+        match read_document(path) {
+            Err(error) => finding.problems.push(format!("{error:#}")),
+            Ok(document) => {
+                finding.sound = true;
+                match document {
+                    Document::Report(report) => {
+                        // Pipes have no length, and are nobody's contribution.
+                        let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
+                        self.report(&report, bytes, &mut finding);
+                    }
+                    Document::Model(model) => self.model(&model, &mut finding),
+                    Document::Fields(fields) => self.fields(&fields, &mut finding),
+                    _ => finding.notes.push("a schema that this command does not know how to check".to_owned()),
+                }
+            }
+        }
+        finding
+    }
+
+    /// The GPUs of this machine.
+    fn gpus(&self) -> &Seen {
+        self.gpus.get_or_init(|| {
+            let remark = |error| format!("GPUs can't be looked for: {error:#}");
+            look().unwrap_or_else(|error| Seen { identities: Vec::new(), remark: Some(remark(error)) })
+        })
+    }
+}
+
+impl Finding {
+    fn set_current(&mut self, stale: Vec<String>, remedy: &str) {
+        self.current = Some(stale.is_empty());
+        self.problems.extend(stale.into_iter().map(|s| format!("stale: {s}; {remedy}")));
+    }
+}

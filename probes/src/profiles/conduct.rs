@@ -1,0 +1,208 @@
+//! The measurement of one profile after the other.
+
+use super::minutes;
+use super::profile::Profile;
+use super::there::{There, numbers};
+use crate::child::{Ended, run_verb};
+use crate::document::read_document;
+use crate::progress::Progress;
+use crate::{gpus, interrupt, output, table};
+use anyhow::bail;
+use sapwise::json::Document;
+use sapwise::report::Label;
+use sapwise::{Report, Scenario};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// A probe ends by itself long before this; a process that does not hangs in a driver.
+const LIMIT: Duration = Duration::from_secs(3600);
+
+/// What has become of a profile.
+#[derive(Debug, Clone, PartialEq)]
+enum State {
+    /// Its turn has not come.
+    Waiting,
+    /// Its report was there.
+    Found(PathBuf),
+    /// It was measured, in this time; other programs may have disturbed it.
+    Measured { path: PathBuf, time: Duration, disturbed: bool },
+    /// It went wrong. A report that proves too little is there all the same.
+    Failed(String, Option<PathBuf>),
+}
+
+/// How the conduct ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum End {
+    Complete,
+    Interrupted,
+}
+
+/// A family on its way.
+pub(super) struct Conduct<'a> {
+    family: &'a [Profile],
+    states: Vec<State>,
+    there: &'a There<'a>,
+    /// The most that each should take.
+    times: Vec<Duration>,
+    /// Time of those that were measured, and the most that they should have taken.
+    taken: (Duration, Duration),
+}
+
+impl<'a> Conduct<'a> {
+    /// `done` holds the reports that are there, in the order of the family.
+    pub(super) fn new(
+        family: &'a [Profile],
+        done: Vec<Option<PathBuf>>,
+        there: &'a There<'a>,
+        scenarios: &[Scenario],
+    ) -> Self {
+        let states = done.into_iter().map(|path| path.map_or(State::Waiting, State::Found)).collect();
+        let times = family.iter().map(|p| p.time(scenarios, there.family.max_objects)).collect();
+        Self { family, states, there, times, taken: (Duration::ZERO, Duration::ZERO) }
+    }
+
+    /// Measures whatever waits.
+    ///
+    /// # Errors
+    /// When no process can be started.
+    pub(super) fn run(&mut self) -> anyhow::Result<End> {
+        let progress = Progress::new(self.times.iter().map(Duration::as_secs).sum());
+        for k in 0..self.family.len() {
+            if self.states[k] == State::Waiting {
+                if interrupt::requested() {
+                    return Ok(End::Interrupted);
+                }
+                let began = Instant::now();
+                let Some(state) = self.measure(k, &progress)? else { return Ok(End::Interrupted) };
+                self.taken.0 += began.elapsed();
+                self.taken.1 += self.times[k];
+                if let State::Failed(why, _) = &state {
+                    progress.aside(|| output::complain(&format!("{}: FAILED: {why}", self.family[k].name)));
+                }
+                self.states[k] = state;
+            }
+            progress.position(self.times[..=k].iter().map(Duration::as_secs).sum());
+        }
+        Ok(End::Complete)
+    }
+
+    /// Measures a profile. `None` when the user interrupted it.
+    fn measure(&self, k: usize, progress: &Progress) -> anyhow::Result<Option<State>> {
+        let profile = &self.family[k];
+        let failed = |why: String| Ok(Some(State::Failed(why, None)));
+        let path = self.there.path(profile);
+        if let Some(why) = self.there.obstacle(&path) {
+            return failed(why);
+        }
+        let now = if profile.gpus.is_empty() { Vec::new() } else { gpus::look()?.identities };
+        let numbers = match numbers(&profile.gpus, &now) {
+            Ok(numbers) => numbers,
+            Err(why) => return failed(why),
+        };
+        // Under its own name it is not there before it is complete.
+        let unfinished = path.with_extension("json.unfinished");
+        let mut arguments = profile.arguments(self.there.family, &numbers);
+        arguments.push("--leashed".to_owned());
+        for kind in profile.kinds() {
+            if let Some(reference) = self.report_of(&profile.lifted(kind)) {
+                arguments.push(format!("--unrestricted={kind}={}", text(reference)?));
+            }
+        }
+        arguments.push(format!("--out={}", text(&unfinished)?));
+        let began = Instant::now();
+        let count = self.family.len();
+        let ended = run_verb(&arguments, &profile.variables(), LIMIT, &mut || {
+            let left = self.left(k).saturating_sub(began.elapsed());
+            progress.message(format!("{} of {count}: {}, about {} left", k + 1, profile.name, minutes(left)));
+        })?;
+        match ended {
+            Ended::Interrupted => return Ok(None),
+            Ended::Badly(how) => {
+                let kept =
+                    if unfinished.exists() { format!("; {} is what it left", unfinished.display()) } else { String::new() };
+                return failed(format!("its process {how}{kept}"));
+            }
+            // It ends well where Ctrl-C came too late for it.
+            Ended::Well => {}
+        }
+        let report = match read(&unfinished) {
+            Ok(report) => report,
+            Err(error) => return failed(format!("{error:#}")),
+        };
+        if let Err(error) = std::fs::rename(&unfinished, &path) {
+            return failed(format!("{} can't be renamed: {error}", unfinished.display()));
+        }
+        Ok(Some(match self.there.lack(&report, profile) {
+            Some(lack) => State::Failed(lack, Some(path)),
+            None => {
+                let disturbed = report.label == Label::RealContended && profile.contended.is_none();
+                State::Measured { path, time: began.elapsed(), disturbed }
+            }
+        }))
+    }
+
+    /// The report of whichever profile takes the same from the machine, where there is one.
+    fn report_of(&self, profile: &Profile) -> Option<&Path> {
+        let k = self.family.iter().position(|p| p.is_alike(profile))?;
+        match &self.states[k] {
+            State::Found(path) | State::Measured { path, .. } | State::Failed(_, Some(path)) => Some(path),
+            State::Waiting | State::Failed(_, None) => None,
+        }
+    }
+
+    /// The time for this profile and those that wait behind it, judged by those that were measured.
+    fn left(&self, from: usize) -> Duration {
+        let waiting = self.times[from..].iter().zip(&self.states[from..]).filter(|(_, s)| **s == State::Waiting);
+        let most: Duration = waiting.map(|(time, _)| *time).sum();
+        let (took, most_of_them) = self.taken;
+        if most_of_them.is_zero() { most } else { most.mul_f64(took.as_secs_f64() / most_of_them.as_secs_f64()) }
+    }
+
+    /// Whether any profile has failed.
+    pub(super) fn failed(&self) -> bool {
+        self.states.iter().any(|s| matches!(s, State::Failed(..)))
+    }
+
+    /// What has become of each profile.
+    pub(super) fn summary(&self) -> String {
+        let mut rows = vec![["profile", "report", ""].map(str::to_owned).to_vec()];
+        for (profile, state) in self.family.iter().zip(&self.states) {
+            let shown = |path: &Path| path.display().to_string();
+            let (report, remark) = match state {
+                State::Waiting => ("-".to_owned(), "not measured yet".to_owned()),
+                State::Found(path) => (shown(path), "was there".to_owned()),
+                State::Measured { path, time, disturbed } => {
+                    let but = if *disturbed { ", disturbed by other programs: remove it and measure it again" } else { "" };
+                    (shown(path), format!("measured in {}{but}", minutes(*time)))
+                }
+                State::Failed(why, path) => (path.as_deref().map_or("-".to_owned(), shown), format!("FAILED: {why}")),
+            };
+            rows.push(vec![profile.name.clone(), report, remark]);
+        }
+        let failed = self.states.iter().filter(|s| matches!(s, State::Failed(..))).count();
+        let waiting = self.states.iter().filter(|s| **s == State::Waiting).count();
+        let good = self.states.len() - failed - waiting;
+        let mut text = format!("{}\n{good} of {} profiles are there", table::columns(&rows), self.states.len());
+        if failed > 0 {
+            text += &format!(", {failed} failed; the same command measures those again");
+        }
+        if good == self.states.len() {
+            let folder = self.there.folder.display();
+            text += &format!(". Next: sapwise check {folder}/*.json, or sapwise train {folder} --out model.json");
+        }
+        text
+    }
+}
+
+fn read(path: &Path) -> anyhow::Result<Report> {
+    match read_document(path)? {
+        Document::Report(report) => Ok(*report),
+        _ => bail!("{} is no report", path.display()),
+    }
+}
+
+/// A path as an argument.
+fn text(path: &Path) -> anyhow::Result<&str> {
+    let shown = || format!("{} holds characters that can't be handed on; name another folder with --out", path.display());
+    path.to_str().ok_or_else(|| anyhow::anyhow!(shown()))
+}

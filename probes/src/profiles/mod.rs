@@ -1,0 +1,119 @@
+//! `sapwise probe --profiles`: the family of reports of one machine, each profile measured by a process of its own.
+
+mod conduct;
+mod family;
+mod profile;
+mod slug;
+mod there;
+
+use crate::args::Probe;
+use crate::exit::{Outcome, WrongUsage};
+use crate::restriction::LAVAPIPE_THREADS;
+use crate::{gpus, interrupt, output, table};
+use anyhow::Context;
+use conduct::{Conduct, End};
+use family::{Whole, family};
+use profile::Profile;
+use sapwise::{GpuIdentity, Registry, Scenario, SimdLevel, measure, usable_cores};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use there::There;
+
+/// Where the reports go without `--out`.
+const DEFAULT: &str = "reports";
+
+/// Measures every profile that the folder does not hold yet.
+///
+/// # Errors
+/// On wrong usage, when the folder takes no file or no process can be started. A profile that fails is told at the end.
+pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
+    // The family sets both; what comes from outside would restrict every profile, also the one that is called full.
+    for name in ["SAPWISE_SIMD", LAVAPIPE_THREADS] {
+        if std::env::var_os(name).is_some_and(|value| !value.is_empty()) {
+            return Err(WrongUsage(format!("--profiles sets {name} itself; unset it and run this again")).into());
+        }
+    }
+    let scenarios = arguments.scenarios()?;
+    let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT));
+    let machine = measure::machine();
+    let (cores, level) = (usable_cores(), SimdLevel::detected());
+    let family = family(&Whole { cores, level, gpus: taken(arguments)? }, arguments.quick);
+    let stem = profile::machine_stem(&machine.cpu, cores);
+    let registry = Registry::with_cores(cores);
+    let (folder, stem, physical_id) = (folder.as_path(), stem.as_str(), machine.physical_id.as_str());
+    let there = There { folder, stem, physical_id, registry: &registry, family: arguments };
+    let done: Vec<Option<PathBuf>> = family.iter().map(|p| there.find(p)).collect();
+    if arguments.dry_run {
+        output::print(&listing(&family, &done, arguments, &scenarios, stem))?;
+        return Ok(Outcome::Done);
+    }
+    take_files(folder)?;
+    interrupt::listen()?;
+    let mut conduct = Conduct::new(&family, done, &there, &scenarios);
+    let end = conduct.run()?;
+    let failed = conduct.failed();
+    output::print(&conduct.summary())?;
+    if end == End::Interrupted {
+        anyhow::bail!("interrupted: what was measured is in {}; the same command goes on from there", folder.display());
+    }
+    Ok(if failed { Outcome::Failed } else { Outcome::Done })
+}
+
+/// The GPUs to make profiles of.
+///
+/// # Errors
+/// When no process can be started, or a GPU that was asked for by its number is not there.
+fn taken(arguments: &Probe) -> anyhow::Result<Vec<GpuIdentity>> {
+    if arguments.gpus.no_gpus {
+        return Ok(Vec::new());
+    }
+    let seen = gpus::look()?;
+    arguments.gpus.check(&seen)?;
+    seen.remark.iter().for_each(|remark| output::complain(&format!("warning: {remark}")));
+    let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.into_iter().partition(|g| arguments.gpus.takes(g));
+    arguments.gpus.tell(&left_out).iter().for_each(|told| output::complain(told));
+    Ok(taken)
+}
+
+/// Makes the folder, and tries whether it takes a file, before hours of measuring.
+fn take_files(folder: &Path) -> anyhow::Result<()> {
+    let taken = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
+    taken.with_context(|| format!("no file can be written in {}; name another folder with --out", folder.display()))?;
+    Ok(())
+}
+
+/// The profiles, what each of them is and how long it takes.
+fn listing(family: &[Profile], done: &[Option<PathBuf>], arguments: &Probe, scenarios: &[Scenario], stem: &str) -> String {
+    let mut rows = vec![["profile", "at most", "command"].map(str::to_owned).to_vec()];
+    let mut left = Duration::ZERO;
+    for (profile, done) in family.iter().zip(done) {
+        let time = profile.time(scenarios, arguments.max_objects);
+        left += if done.is_some() { Duration::ZERO } else { time };
+        let numbers: Vec<u32> = profile.gpus.iter().map(|g| g.index).collect();
+        let variables = profile.variables().into_iter().map(|(name, value)| format!("{name}={value} ")).collect::<String>();
+        let command = format!("{variables}sapwise {}", profile.arguments(arguments, &numbers).join(" "));
+        let time = if done.is_some() { "is there".to_owned() } else { minutes(time) };
+        rows.push(vec![format!("{stem}-{}", profile.name), time, command]);
+    }
+    format!("{}\n{} profiles, about {} at most.", table::columns(&rows), family.len(), minutes(left))
+}
+
+/// A time for people who plan their day by it.
+fn minutes(time: Duration) -> String {
+    match time.as_secs() {
+        seconds @ 0..100 => format!("{seconds} s"),
+        seconds @ 100..6000 => format!("{} min", seconds.div_ceil(60)),
+        seconds => format!("{} h {:02} min", seconds / 3600, seconds % 3600 / 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_have_a_unit_that_suits_them() {
+        let told = [0, 99, 100, 5999, 6000, 7325].map(|s| minutes(Duration::from_secs(s)));
+        assert_eq!(told, ["0 s", "99 s", "2 min", "100 min", "1 h 40 min", "2 h 02 min"]);
+    }
+}

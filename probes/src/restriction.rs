@@ -1,0 +1,281 @@
+//! What is taken from a machine for a report, and the proof that its parameters show it.
+
+use crate::args::Probe;
+use crate::contention::{ASSUMED_LLC_BYTES, Contended};
+use crate::document::read_document;
+use anyhow::bail;
+use sapwise::hardware::{gpu, parameter};
+use sapwise::json::Document;
+use sapwise::report::{Proof, Restricted, Restriction};
+use sapwise::{GpuHardware, GpuIdentity, Hardware, SimdLevel, usable_cores};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// The variable that sets the threads of lavapipe.
+pub(crate) const LAVAPIPE_THREADS: &str = "LP_NUM_THREADS";
+
+/// A parameter shows a restriction when it differs by this share of its value without. Smaller differences come by themselves
+/// from one run to the next.
+const SHOWN: f64 = 0.1;
+
+/// Not every version of a report has it.
+const ARITHMETIC_ONE_THREAD: &str = "arithmetic_one_thread_gflop_per_s";
+
+/// A report of the machine from which one thing less was taken, as `KIND=R.json`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Lifted {
+    pub(crate) kind: Restricted,
+    pub(crate) report: PathBuf,
+}
+
+impl FromStr for Lifted {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (kind, path) = text.split_once('=').ok_or("give it as KIND=R.json")?;
+        let kind = serde_json::from_value(kind.into()).map_err(|e| e.to_string())?;
+        Ok(Self { kind, report: path.into() })
+    }
+}
+
+/// The hardware of a report from which one thing less was taken.
+pub(crate) type Reference = (Restricted, Hardware);
+
+/// Reads what [`restriction`] compares with.
+///
+/// # Errors
+/// When a file is no sound report.
+pub(crate) fn references(lifted: &[Lifted]) -> anyhow::Result<Vec<Reference>> {
+    let read = |l: &Lifted| match read_document(&l.report)? {
+        Document::Report(report) => Ok((l.kind, report.hardware)),
+        _ => bail!("{} is no report", l.report.display()),
+    };
+    lifted.iter().map(read).collect()
+}
+
+/// Whether a GPU is lavapipe, which calls itself llvmpipe.
+pub(crate) fn is_lavapipe(gpu: &GpuIdentity) -> bool {
+    gpu.name.to_ascii_lowercase().contains("llvmpipe")
+}
+
+/// The threads that lavapipe is told to use, where it is among these GPUs. What is no number it ignores as well.
+pub(crate) fn gpu_threads(hardware: &Hardware) -> Option<u32> {
+    let told = std::env::var(LAVAPIPE_THREADS).ok()?.trim().parse().ok()?;
+    hardware.gpus.iter().any(|g| is_lavapipe(&g.gpu)).then_some(told)
+}
+
+/// What these arguments and this environment take from the machine, if anything.
+pub(crate) fn restriction(arguments: &Probe, hardware: &Hardware, references: &[Reference]) -> Option<Restriction> {
+    let mut kinds = Vec::new();
+    if arguments.threads.is_some_and(|k| k < usable_cores()) {
+        kinds.push(Restricted::Threads);
+    }
+    if SimdLevel::in_use() < SimdLevel::detected() {
+        kinds.push(Restricted::Simd);
+    }
+    kinds.extend(arguments.contended.map(contention));
+    // One thread for each core is what it takes by itself.
+    if gpu_threads(hardware).is_some_and(|k| k < usable_cores()) {
+        kinds.push(Restricted::GpuThreads);
+    }
+    let proofs = |kind: &Restricted| {
+        let without = references.iter().find(|(of, _)| of == kind);
+        without.map_or(Vec::new(), |(_, without)| prove(*kind, without, hardware))
+    };
+    let proof = kinds.iter().flat_map(proofs).collect();
+    (!kinds.is_empty()).then_some(Restriction { kinds, proof })
+}
+
+/// What contention of a kind takes.
+pub(crate) fn contention(kind: Contended) -> Restricted {
+    match kind {
+        Contended::Memory => Restricted::ContendedMemory,
+        Contended::Cache => Restricted::ContendedCache,
+    }
+}
+
+/// One sentence for each parameter that does not show what it must.
+pub(crate) fn not_shown(restriction: &Restriction) -> Vec<String> {
+    let sentence = |p: &Proof| {
+        let of = p.gpu.map_or(String::new(), |k| format!(" of gpu{k}"));
+        let value = |v: Option<f64>| v.map_or("missing".to_owned(), |v| format!("{v:.4}"));
+        let (kind, parameter) = (p.kind, &p.parameter);
+        let (with, without) = (value(p.with), value(p.without));
+        format!("the restriction {kind} does not show: {parameter}{of} is {with} with it and {without} without")
+    };
+    restriction.proof.iter().filter(|p| !p.shows).map(sentence).collect()
+}
+
+/// How a parameter must differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Change {
+    /// Lower at all: a count that the restriction sets.
+    Fewer,
+    /// Lower by [`SHOWN`].
+    Lower,
+    /// Higher by [`SHOWN`].
+    Higher,
+}
+
+impl Change {
+    fn is_shown(self, without: f64, with: f64) -> bool {
+        match self {
+            Self::Fewer => with < without,
+            Self::Lower => with <= without * (1.0 - SHOWN),
+            Self::Higher => with >= without * (1.0 + SHOWN),
+        }
+    }
+}
+
+fn prove(kind: Restricted, without: &Hardware, with: &Hardware) -> Vec<Proof> {
+    let on_cpu = |parameter: &str, change: Change| {
+        let (without, with) = (without.value(parameter), with.value(parameter));
+        proof(kind, parameter, None, change, (without, with))
+    };
+    match kind {
+        Restricted::Threads => {
+            vec![
+                on_cpu(parameter::USABLE_CORES, Change::Fewer),
+                first_shown([
+                    on_cpu(parameter::SCALING_ALL_THREADS_RATIO, Change::Lower),
+                    on_cpu(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, Change::Lower),
+                ]),
+            ]
+        }
+        Restricted::Simd => {
+            let mut proofs = vec![on_cpu(parameter::SIMD_LANES, Change::Fewer)];
+            let arithmetic = on_cpu(ARITHMETIC_ONE_THREAD, Change::Lower);
+            proofs.extend(Some(arithmetic).filter(|p| p.without.is_some() || p.with.is_some()));
+            proofs
+        }
+        // Where one thread can't saturate the memory, others at work make it slower to answer at most.
+        Restricted::ContendedMemory => vec![first_shown([
+            on_cpu(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, Change::Lower),
+            on_cpu(&latency_of_memory(), Change::Higher),
+        ])],
+        Restricted::ContendedCache => {
+            let llc = with.value(parameter::CACHE_LLC_BYTES).unwrap_or(ASSUMED_LLC_BYTES);
+            vec![on_cpu(&latency_below(llc), Change::Higher)]
+        }
+        Restricted::GpuThreads => with.gpus.iter().filter(|g| is_lavapipe(&g.gpu)).map(|g| on_gpu(g, without)).collect(),
+    }
+}
+
+/// The first that shows the restriction, or the first of all: each of them is enough.
+fn first_shown([first, second]: [Proof; 2]) -> Proof {
+    if !first.shows && second.shows { second } else { first }
+}
+
+fn on_gpu(with: &GpuHardware, without: &Hardware) -> Proof {
+    let same = |g: &&GpuHardware| (&g.gpu.name, &g.gpu.driver) == (&with.gpu.name, &with.gpu.driver);
+    let without = without.gpus.iter().find(same);
+    let by = |name: &str, change: Change| {
+        let values = (without.and_then(|g| g.value(name)), with.value(name));
+        proof(Restricted::GpuThreads, name, Some(with.gpu.index), change, values)
+    };
+    first_shown([
+        by(gpu::parameter::ARITHMETIC_GFLOP_PER_S, Change::Lower),
+        by(gpu::parameter::PARALLEL_UNITS, Change::Fewer),
+    ])
+}
+
+fn proof(
+    kind: Restricted,
+    parameter: &str,
+    gpu: Option<u32>,
+    change: Change,
+    (without, with): (Option<f64>, Option<f64>),
+) -> Proof {
+    let shows = without.zip(with).is_some_and(|(without, with)| change.is_shown(without, with));
+    Proof { kind, parameter: parameter.to_owned(), gpu, without, with, shows }
+}
+
+/// The latency over the largest working set there is.
+fn latency_of_memory() -> String {
+    let [.., largest] = parameter::LATENCY_WORKING_SETS_KIB;
+    parameter::latency_name(largest)
+}
+
+/// The latency over the largest working set that fits into a last-level cache; over the smallest there is where none does.
+fn latency_below(llc_bytes: f64) -> String {
+    let sets = parameter::LATENCY_WORKING_SETS_KIB;
+    let fits = |kib: &&u32| f64::from(**kib) * 1024.0 < llc_bytes;
+    parameter::latency_name(*sets.iter().rev().find(fits).unwrap_or(&sets[0]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sapwise::{GpuKind, Machine, Parameter};
+
+    fn hardware(values: &[(&str, f64)]) -> Hardware {
+        let parameters = values.iter().map(|(name, value)| Parameter::reported(name, *value, "test")).collect();
+        Hardware { machine: Machine::default(), parameters, gpus: Vec::new(), gpu_groups: Vec::new() }
+    }
+
+    fn shown(kind: Restricted, without: &[(&str, f64)], with: &[(&str, f64)]) -> Vec<bool> {
+        prove(kind, &hardware(without), &hardware(with)).iter().map(|p| p.shows).collect()
+    }
+
+    #[test]
+    fn a_parameter_that_hardly_differs_shows_nothing() {
+        let threads = |cores, ratio| [(parameter::USABLE_CORES, cores), (parameter::SCALING_ALL_THREADS_RATIO, ratio)];
+        assert_eq!(shown(Restricted::Threads, &threads(4.0, 3.9), &threads(2.0, 2.0)), [true, true]);
+        assert_eq!(shown(Restricted::Threads, &threads(4.0, 3.9), &threads(4.0, 3.6)), [false, false]);
+        assert_eq!(shown(Restricted::Threads, &[], &threads(1.0, 1.0)), [false, false]);
+        let bandwidth = |v| [(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, v)];
+        assert_eq!(shown(Restricted::ContendedMemory, &bandwidth(50.0), &bandwidth(44.9)), [true]);
+        assert_eq!(shown(Restricted::ContendedMemory, &bandwidth(50.0), &bandwidth(45.1)), [false]);
+        let both = |v, ns| [(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, v), ("latency_262144_kib_ns", ns)];
+        assert_eq!(shown(Restricted::ContendedMemory, &both(50.0, 200.0), &both(50.0, 230.0)), [true]);
+        assert_eq!(shown(Restricted::ContendedMemory, &both(50.0, 200.0), &both(50.0, 210.0)), [false]);
+    }
+
+    #[test]
+    fn a_contended_cache_shows_in_the_latency_just_below_its_size() {
+        assert_eq!(latency_below(32.0 * 1024.0 * 1024.0), "latency_16384_kib_ns");
+        assert_eq!(latency_below(16.0 * 1024.0 * 1024.0), "latency_4096_kib_ns");
+        assert_eq!(latency_below(1.0), "latency_16_kib_ns");
+        let latency = |llc, ns| [(parameter::CACHE_LLC_BYTES, llc), ("latency_16384_kib_ns", ns)];
+        assert_eq!(shown(Restricted::ContendedCache, &latency(3.3e7, 20.0), &latency(3.3e7, 23.0)), [true]);
+        assert_eq!(shown(Restricted::ContendedCache, &latency(3.3e7, 20.0), &latency(3.3e7, 19.0)), [false]);
+    }
+
+    #[test]
+    fn arithmetic_shows_fewer_lanes_where_it_is_measured() {
+        let simd = |lanes| [(parameter::SIMD_LANES, lanes)];
+        assert_eq!(shown(Restricted::Simd, &simd(16.0), &simd(8.0)), [true]);
+        let both = |lanes, gflop| [(parameter::SIMD_LANES, lanes), (ARITHMETIC_ONE_THREAD, gflop)];
+        assert_eq!(shown(Restricted::Simd, &both(16.0, 120.0), &both(8.0, 119.0)), [true, false]);
+    }
+
+    #[test]
+    fn threads_of_lavapipe_show_in_its_arithmetic_whatever_its_number() {
+        let with_gpu = |index, gflop| {
+            let text = |t: &str| t.to_owned();
+            let (name, driver) = (text("llvmpipe (LLVM 15)"), text("llvmpipe Mesa 22"));
+            let gpu = GpuIdentity { index, name, device: text(""), driver, api: text(""), kind: GpuKind::Software };
+            let parameters = vec![Parameter::reported(gpu::parameter::ARITHMETIC_GFLOP_PER_S, gflop, "test")];
+            Hardware { gpus: vec![GpuHardware { gpu, parameters }], ..hardware(&[]) }
+        };
+        let proofs = prove(Restricted::GpuThreads, &with_gpu(0, 147.0), &with_gpu(1, 74.0));
+        assert_eq!((proofs[0].gpu, proofs[0].without, proofs[0].shows), (Some(1), Some(147.0), true));
+        let restriction = Restriction { kinds: vec![Restricted::GpuThreads], proof: proofs };
+        assert_eq!(not_shown(&restriction), Vec::<String>::new());
+        let proof = prove(Restricted::GpuThreads, &with_gpu(0, 147.0), &with_gpu(1, 146.0));
+        let told = not_shown(&Restriction { kinds: vec![Restricted::GpuThreads], proof });
+        assert_eq!(
+            told,
+            [
+                "the restriction gpu_threads does not show: arithmetic_gflop_per_s of gpu1 is 146.0000 with it and 147.0000 without"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_kind_and_a_file_are_read_from_one_word() {
+        let lifted: Lifted = "contended_cache=a=b.json".parse().unwrap();
+        assert_eq!(lifted, Lifted { kind: Restricted::ContendedCache, report: "a=b.json".into() });
+        assert!("threads".parse::<Lifted>().is_err() && "cores=a.json".parse::<Lifted>().is_err());
+    }
+}
