@@ -4,6 +4,7 @@
 //! CPU is thrown away and repeated while time is left (Linux; elsewhere foreign load is not known). Every loop has a
 //! time limit, so a slow or loaded machine gives fewer samples, not a longer run.
 
+mod arithmetic;
 mod caches;
 mod cgroup;
 mod clock;
@@ -14,7 +15,6 @@ mod gpu;
 mod identity;
 mod memory;
 mod scaling;
-pub mod statistics;
 mod topology;
 
 use std::fmt;
@@ -26,6 +26,7 @@ use rayon::ThreadPool;
 use crate::hardware::{Hardware, Machine, Parameter, parameter};
 use foreign_load::Plan;
 
+pub use crate::statistics;
 pub use foreign_load::Watch;
 #[cfg(feature = "measure-gpu")]
 pub use gpu::{gpu, gpu_group};
@@ -43,17 +44,20 @@ pub enum Family {
     Caches,
     /// Memory size and triad bandwidths.
     Memory,
-    /// Cost of a fork and join, warm and cold.
+    /// Cost of a fork and join, warm and cold; time from core to core.
     ForkJoin,
     /// Work of several threads over work of one.
     Scaling,
+    /// Multiply-adds of one thread and of all.
+    Arithmetic,
 }
 
 impl Family {
     /// Every family, in the order of measurement.
-    pub const ALL: [Self; 6] = [Self::Topology, Self::Clock, Self::Caches, Self::Memory, Self::ForkJoin, Self::Scaling];
+    pub const ALL: [Self; 7] =
+        [Self::Topology, Self::Clock, Self::Caches, Self::Memory, Self::ForkJoin, Self::Scaling, Self::Arithmetic];
 
-    /// The name, as [`FromStr`] reads it: `topology`, `clock`, `caches`, `memory`, `fork_join` or `scaling`.
+    /// The name, as [`FromStr`] reads it: `topology`, `clock`, `caches`, `memory`, `fork_join`, `scaling` or `arithmetic`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -63,6 +67,7 @@ impl Family {
             Self::Memory => "memory",
             Self::ForkJoin => "fork_join",
             Self::Scaling => "scaling",
+            Self::Arithmetic => "arithmetic",
         }
     }
 
@@ -80,8 +85,9 @@ impl Family {
                 names
             }
             Self::Memory => owned(&[p::MEMORY_BYTES, p::BANDWIDTH_ONE_THREAD_GB_PER_S, p::BANDWIDTH_ALL_THREADS_GB_PER_S]),
-            Self::ForkJoin => owned(&[p::FORK_JOIN_WARM_NS, p::FORK_JOIN_COLD_NS]),
+            Self::ForkJoin => owned(&[p::FORK_JOIN_WARM_NS, p::FORK_JOIN_COLD_NS, p::CORE_TO_CORE_NS]),
             Self::Scaling => owned(&[p::SCALING_TWO_THREADS_RATIO, p::SCALING_ALL_THREADS_RATIO]),
+            Self::Arithmetic => owned(&[p::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, p::ARITHMETIC_ALL_THREADS_GFLOP_PER_S]),
         }
     }
 }
@@ -141,6 +147,7 @@ pub fn family(family: Family, options: &Options) -> Vec<Parameter> {
         Family::Memory => memory::measure(options),
         Family::ForkJoin => fork_join::measure(options),
         Family::Scaling => scaling::measure(options),
+        Family::Arithmetic => arithmetic::measure(options),
     }
 }
 
@@ -178,4 +185,10 @@ pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
 /// The error is a sentence for [`Parameter::missing`]: a limit on processes can refuse the threads.
 fn pool(threads: usize) -> Result<ThreadPool, String> {
     crate::cpu::build_pool(u32::try_from(threads).unwrap_or(u32::MAX), 0, true)
+}
+
+/// What `threads` threads of the pool do together: the sum of their rates.
+fn together(pool: &ThreadPool, threads: usize, rate: impl Fn() -> f64 + Sync) -> f64 {
+    // Each thread divides by its own time: they don't wake at once.
+    pool.broadcast(|worker| if worker.index() < threads { rate() } else { 0.0 }).iter().sum()
 }

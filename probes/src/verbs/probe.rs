@@ -21,7 +21,7 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     let contention = contention.context("the threads for --contended can't be started")?;
     let (hardware, measured) = measure_hardware(arguments.threads, arguments.gpus)?;
     let told = summary::gpus_left_out(arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
-    let before = measured.remarks;
+    let before = [measured.remarks, hardware.disturbed()].concat();
     let mut found = Found { remarks: before.clone(), ..Found::default() };
     if interrupt::requested() {
         found.remarks.push("interrupted during the hardware parameters; what was to follow is missing".to_owned());
