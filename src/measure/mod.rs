@@ -31,8 +31,6 @@ pub use foreign_load::Watch;
 #[cfg(feature = "measure-gpu")]
 pub use gpu::{gpu, gpu_group};
 
-pub use memory::{Triad, triad};
-
 /// A group of parameters that are measured together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Family {
