@@ -1,8 +1,11 @@
 //! The parameters of a machine.
 
 pub mod gpu;
+mod raw;
 
 pub use gpu::{GpuGroup, GpuHardware, GpuIdentity, GpuKind};
+pub use raw::Statistic;
+pub(crate) use raw::six_digits;
 
 /// What is known about a machine: who made it, and a list of parameters, each with where it came from.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +55,7 @@ pub struct Machine {
 pub struct Parameter {
     /// Name with its unit as the last words, one of [`parameter`]'s constants.
     pub name: String,
-    /// The figure: the median of the samples when it was measured. `None` when it is missing.
+    /// The figure: when it was measured, what [`Parameter::statistic`] makes of the samples. `None` when it is missing.
     pub value: Option<f64>,
     /// Interquartile range over median of the samples. `None` when there are fewer than four.
     pub dispersion: Option<f64>,
@@ -66,6 +69,14 @@ pub struct Parameter {
     pub how: How,
     /// The method of a measurement, the interface of a report, or why the figure is missing.
     pub source: String,
+    /// How the value follows from the samples.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Statistic::is_median"))]
+    pub statistic: Statistic,
+    /// The samples kept, in the unit of the name, in the order of measurement, to six significant digits. Value, dispersion and
+    /// number of samples follow from them. Empty where nothing was measured, where the value is that of a fit, and in reports
+    /// made before they were kept.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub raw: Vec<f64>,
 }
 
 /// Where a figure came from.
@@ -109,14 +120,18 @@ pub mod parameter {
     pub const BANDWIDTH_ALL_THREADS_GB_PER_S: &str = "bandwidth_all_threads_gb_per_s";
     /// Time until one core sees what another one wrote.
     pub const CORE_TO_CORE_NS: &str = "core_to_core_ns";
-    /// Cost of one fork and join over all usable cores while the workers are awake.
+    /// Cost of spreading work over all usable cores and waiting for it, while the helpers are awake.
     pub const FORK_JOIN_WARM_NS: &str = "fork_join_warm_ns";
-    /// The same from outside the pool after the workers have slept for 2 ms.
+    /// The same after the helpers have been idle for 2 ms.
     pub const FORK_JOIN_COLD_NS: &str = "fork_join_cold_ns";
     /// Work done by two threads over work done by one in the same time.
     pub const SCALING_TWO_THREADS_RATIO: &str = "scaling_two_threads_ratio";
     /// Work done by all usable cores over work done by one in the same time.
     pub const SCALING_ALL_THREADS_RATIO: &str = "scaling_all_threads_ratio";
+    /// 32-bit multiply-adds in registers on one thread, each counted as two operations.
+    pub const ARITHMETIC_ONE_THREAD_GFLOP_PER_S: &str = "arithmetic_one_thread_gflop_per_s";
+    /// The same on all usable cores.
+    pub const ARITHMETIC_ALL_THREADS_GFLOP_PER_S: &str = "arithmetic_all_threads_gflop_per_s";
 
     /// Name of the load latency over a working set, one of [`LATENCY_WORKING_SETS_KIB`].
     #[must_use]
@@ -146,6 +161,8 @@ pub mod parameter {
             FORK_JOIN_COLD_NS,
             SCALING_TWO_THREADS_RATIO,
             SCALING_ALL_THREADS_RATIO,
+            ARITHMETIC_ONE_THREAD_GFLOP_PER_S,
+            ARITHMETIC_ALL_THREADS_GFLOP_PER_S,
         ];
         let latencies = LATENCY_WORKING_SETS_KIB.map(latency_name);
         before.iter().map(|s| (*s).to_owned()).chain(latencies).chain(after.iter().map(|s| (*s).to_owned())).collect()
@@ -171,13 +188,24 @@ impl Hardware {
         self.gpu_groups.iter().find(|g| g.gpus == indices)
     }
 
+    /// What a reader must know of the conditions under which this was measured: foreign load, and cores that came to lie elsewhere.
+    #[must_use]
+    pub fn disturbed(&self) -> Vec<String> {
+        self.lists().filter_map(|(of, list)| loaded(&of, list)).chain(moved(&self.parameters)).collect()
+    }
+
+    /// Every list of parameters, with whose it is.
+    fn lists(&self) -> impl Iterator<Item = (String, &[Parameter])> {
+        let cpu = std::iter::once((String::new(), &self.parameters[..]));
+        let gpus = self.gpus.iter().map(|g| (format!(" of gpu{}", g.gpu.index), &g.parameters[..]));
+        let groups = self.gpu_groups.iter().map(|g| (format!(" of the GPUs {:?}", g.gpus), &g.parameters[..]));
+        cpu.chain(gpus).chain(groups)
+    }
+
     /// What makes this unusable, if anything: a figure that can't be, or something that stands there twice.
     #[must_use]
     pub fn defect(&self) -> Option<String> {
-        let cpu = std::iter::once((String::new(), &self.parameters));
-        let gpus = self.gpus.iter().map(|g| (format!(" of gpu{}", g.gpu.index), &g.parameters));
-        let groups = self.gpu_groups.iter().map(|g| (format!(" of the GPUs {:?}", g.gpus), &g.parameters));
-        if let Some(defect) = cpu.chain(gpus).chain(groups).find_map(|(of, list)| defect(&of, list)) {
+        if let Some(defect) = self.lists().find_map(|(of, list)| defect(&of, list)) {
             return Some(defect);
         }
         for (k, g) in self.gpus.iter().enumerate() {
@@ -198,11 +226,40 @@ impl Hardware {
     }
 }
 
+/// Which parameters of a list were measured while other programs took too much of the CPU, if any.
+fn loaded(of: &str, parameters: &[Parameter]) -> Option<String> {
+    let loads = parameters.iter().filter_map(|p| Some((p.name.as_str(), p.foreign_load?)));
+    let spoiled: Vec<(&str, f64)> = loads.filter(|(_, load)| *load > Parameter::SPOILING).collect();
+    let most = spoiled.iter().map(|(_, load)| *load).reduce(f64::max)?;
+    let names: Vec<&str> = spoiled.iter().map(|(name, _)| *name).collect();
+    Some(format!(
+        "other programs or the host took up to {:.0} % of the CPU while these parameters{of} were measured: {}; where that is not \
+         meant, probe again when the machine is idle",
+        most * 100.0,
+        names.join(", ")
+    ))
+}
+
+/// Whether two cores lay near each other for some samples and far apart for others.
+fn moved(parameters: &[Parameter]) -> Option<String> {
+    let distance = parameters.iter().find(|p| p.name == parameter::CORE_TO_CORE_NS)?;
+    // A machine of several groups of cores differs by a factor of four; noise of the clock does not reach two.
+    let [low, high] = [0.1, 0.9].map(|q| crate::statistics::quantile(&distance.raw, q));
+    let (low, high) = low.zip(high).filter(|(low, high)| *high > 2.0 * low)?;
+    Some(format!(
+        "a cache line took {low:.0} ns from core to core in some samples and {high:.0} ns in others: the program or the virtual CPUs were \
+         moved to other cores meanwhile, and what is measured on several cores may be of either place; probe again"
+    ))
+}
+
 /// What is wrong with a list of parameters, if anything.
 fn defect(of: &str, parameters: &[Parameter]) -> Option<String> {
     for (k, p) in parameters.iter().enumerate() {
         if p.value.is_some_and(|v| !v.is_finite() || v < 0.0) {
             return Some(format!("the parameter {}{of} is {:?}", p.name, p.value));
+        }
+        if let Some(why) = p.disagreement() {
+            return Some(format!("the parameter {}{of}: {why}", p.name));
         }
         if parameters[..k].iter().any(|q| q.name == p.name) {
             return Some(format!("the parameter {}{of} stands there twice", p.name));
@@ -230,6 +287,41 @@ impl Parameter {
             foreign_load: None,
             how: How::Missing,
             source: why.to_owned(),
+            statistic: Statistic::Median,
+            raw: Vec::new(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hardware(parameters: Vec<Parameter>) -> Hardware {
+        Hardware { machine: Machine::default(), parameters, gpus: Vec::new(), gpu_groups: Vec::new() }
+    }
+
+    #[test]
+    fn a_figure_that_its_samples_contradict_is_a_defect() {
+        let p = Parameter { raw: vec![1.0], ..Parameter::reported("a_ns", 1.0, "test") };
+        assert_eq!(hardware(vec![p.clone()]).defect(), None);
+        let defect = hardware(vec![Parameter { value: Some(1.5), ..p }]).defect();
+        assert!(defect.is_some_and(|d| d.contains("a_ns") && d.contains("1.5")));
+    }
+
+    #[test]
+    fn disturbances_are_told() {
+        let loaded = |name: &str, load| Parameter { foreign_load: Some(load), ..Parameter::reported(name, 1.0, "test") };
+        let told = |parameters| hardware(parameters).disturbed();
+        assert!(told(vec![loaded("a", 0.05), Parameter::reported("b", 1.0, "test")]).is_empty());
+        let one = told(vec![loaded("a", 0.25), loaded("b", 0.06), loaded("c", 0.01)]);
+        assert!(one.len() == 1 && one[0].contains("25 %") && one[0].contains("measured: a, b;"), "{one:?}");
+        let distance =
+            |raw: &[f64]| Parameter { raw: raw.to_vec(), ..Parameter::reported(parameter::CORE_TO_CORE_NS, 1.0, "test") };
+        assert!(told(vec![distance(&[38.0, 37.0, 41.0, 60.0])]).is_empty());
+        // One sample of many that an interruption spoiled is no other place.
+        assert!(told(vec![distance(&[&[38.0; 30][..], &[900.0]].concat())]).is_empty());
+        let moved = told(vec![distance(&[&[38.0; 30][..], &[165.0; 10]].concat())]);
+        assert!(moved.len() == 1 && moved[0].contains("38 ns") && moved[0].contains("165 ns"), "{moved:?}");
     }
 }

@@ -94,14 +94,15 @@ pub fn write(document: &impl serde::Serialize) -> Result<String, JsonError> {
     Ok(serde_json::to_string_pretty(document)? + "\n")
 }
 
-/// Writes a report: one key a line, and one point a line, so that a full sweep stays readable and under a megabyte.
+/// Writes a report: one key a line, one point a line, and the raw samples of a parameter on one line, so that a full sweep stays
+/// readable and under a megabyte.
 ///
 /// # Errors
 /// When a figure can't be written.
 pub fn write_report(report: &Report) -> Result<String, JsonError> {
     let points: Result<Vec<String>, _> = report.points.iter().map(serde_json::to_string).collect();
     let points = points?;
-    let frame = write(&Report { points: Vec::new(), ..report.clone() })?;
+    let frame = one_line_samples(&write(&Report { points: Vec::new(), ..report.clone() })?);
     if points.is_empty() {
         return Ok(frame);
     }
@@ -109,6 +110,21 @@ pub fn write_report(report: &Report) -> Result<String, JsonError> {
     let key = "\n  \"points\": []";
     let lines = format!("\n  \"points\": [\n    {}\n  ]", points.join(",\n    "));
     Ok(frame.replacen(key, &lines, 1))
+}
+
+/// The same text with each list of raw samples on the line of its key.
+fn one_line_samples(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut inside = false;
+    for line in text.lines() {
+        out.push_str(if inside { line.trim_start() } else { line });
+        // A line break within a text is written as an escape, so this can only be the key. Numbers hold no bracket.
+        inside = if inside { !line.contains(']') } else { line.trim_start() == "\"raw\": [" };
+        if !inside {
+            out.push('\n');
+        }
+    }
+    out
 }
 
 /// File names and texts of the JSON Schemas of everything that [`read`] accepts.
@@ -161,7 +177,10 @@ mod tests {
             },
             hardware: Hardware {
                 machine: Machine::default(),
-                parameters: vec![Parameter::missing("x", hostile)],
+                parameters: vec![
+                    Parameter::missing("x", hostile),
+                    Parameter { samples: 3, raw: vec![1.0, 2.5, 1e-7], ..Parameter::reported("y", 1.0, "\"raw\": [") },
+                ],
                 gpus: Vec::new(),
                 gpu_groups: Vec::new(),
             },
@@ -172,6 +191,7 @@ mod tests {
         let text = write_report(&report).unwrap();
         assert_eq!(super::report(&text).unwrap(), report);
         assert_eq!(text.lines().filter(|l| l.starts_with("    {\"scenario\"")).count(), 2);
+        assert!(text.contains("\n        \"raw\": [1.0,2.5,1e-7]\n"), "{text}");
         report.points.clear();
         assert_eq!(super::report(&write_report(&report).unwrap()).unwrap(), report);
     }

@@ -53,6 +53,7 @@ mod sample;
 mod scenario;
 mod schema_tag;
 mod splitmix;
+pub mod statistics;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};

@@ -19,6 +19,10 @@ fn check(p: &Parameter) {
     assert!(p.dispersion.is_none_or(|dispersion| dispersion.is_finite() && dispersion >= 0.0), "{p:?}");
     assert!(p.dispersion.is_none() || p.samples >= 4, "{p:?}");
     assert!(p.foreign_load.is_none_or(|share| (0.0..=1.0).contains(&share)), "{p:?}");
+    // Whoever has the raw samples can work out the value, and they stay few enough for a file.
+    assert_eq!(p.raw.is_empty(), p.how != How::Measured, "{p:?}");
+    assert!(p.raw.len() <= 700, "{p:?}");
+    assert!(p.how != How::Measured || p.recomputed() == p.value, "{p:?}");
     if p.how == How::Reported {
         assert_eq!((p.dispersion, p.spoiled, p.foreign_load), (None, 0, None), "{p:?}");
     }
@@ -30,6 +34,7 @@ fn every_parameter_once_and_in_order() {
     let names: Vec<String> = hardware.parameters.iter().map(|p| p.name.clone()).collect();
     assert_eq!(names, parameter::all_names());
     hardware.parameters.iter().for_each(check);
+    assert_eq!(hardware.defect(), None);
     assert!(hardware.parameters.iter().all(|p| p.source != "not measured"));
 }
 
@@ -57,9 +62,13 @@ fn one_thread_is_no_parallel_machine() {
         assert_eq!(hardware.value(parameter::SCALING_TWO_THREADS_RATIO), None);
         assert_eq!(hardware.value(parameter::SCALING_ALL_THREADS_RATIO), Some(1.0));
         assert_eq!(hardware.value(parameter::FORK_JOIN_WARM_NS), None);
-        let [one, all] = [parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, parameter::BANDWIDTH_ALL_THREADS_GB_PER_S]
-            .map(|name| hardware.value(name));
-        assert_eq!(one, all);
+        assert_eq!(hardware.value(parameter::CORE_TO_CORE_NS), None);
+        for [one, all] in [
+            [parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, parameter::BANDWIDTH_ALL_THREADS_GB_PER_S],
+            [parameter::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, parameter::ARITHMETIC_ALL_THREADS_GFLOP_PER_S],
+        ] {
+            assert_eq!(hardware.value(one), hardware.value(all));
+        }
     }
 }
 

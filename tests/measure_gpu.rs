@@ -6,8 +6,8 @@ mod common;
 
 use common::gpus;
 use sapwise::gpu::Gpus;
-use sapwise::hardware::GpuKind;
 use sapwise::hardware::gpu::parameter;
+use sapwise::hardware::{GpuKind, Statistic};
 use sapwise::measure::{self, Options};
 use sapwise::{How, Parameter};
 
@@ -23,6 +23,11 @@ fn check(p: &Parameter) {
     assert!(p.value.is_none_or(|value| value.is_finite() && value >= 0.0), "{p:?}");
     assert!(p.dispersion.is_none() || p.samples >= 4, "{p:?}");
     assert!(p.foreign_load.is_none_or(|share| (0.0..=1.0).contains(&share)), "{p:?}");
+    // Whoever has the raw samples can work out the value, and they stay few enough for a file.
+    let kept = p.how == How::Measured && p.statistic != Statistic::Fit;
+    assert_eq!(p.raw.is_empty(), !kept, "{p:?}");
+    assert!(p.raw.len() <= 1000, "{p:?}");
+    assert!(!kept || p.recomputed() == p.value, "{p:?}");
     if p.how == How::Reported {
         assert_eq!((p.dispersion, p.spoiled, p.foreign_load), (None, 0, None), "{p:?}");
     }

@@ -20,7 +20,7 @@ pub(crate) use strip_grid::StripGrid;
 pub(crate) use threads::Threads;
 #[cfg(feature = "measure")]
 pub(crate) use threads::build_pool;
-#[cfg(feature = "gpu")]
+#[cfg(any(feature = "gpu", feature = "measure"))]
 pub(crate) use workers::Workers;
 
 use crate::{BroadPhase, Error};

@@ -18,6 +18,12 @@ pub(crate) struct Threads {
 }
 
 impl Threads {
+    /// Pools that are pinned.
+    #[cfg(feature = "measure")]
+    pub(crate) fn pinned() -> Self {
+        Self { pinned: true, ..Self::default() }
+    }
+
     /// A pool of `count` threads that help a caller.
     ///
     /// # Errors

@@ -6,11 +6,8 @@
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
-use super::statistics;
-use crate::hardware::{How, Parameter};
-
-/// Highest share of the CPU that other programs may take before a window counts as spoiled.
-const THRESHOLD: f64 = 0.05;
+use crate::hardware::{How, Parameter, Statistic, six_digits};
+use crate::statistics;
 
 /// Ticks a second of `/proc/stat`: `USER_HZ`, 100 on every Linux architecture that Rust's standard library runs on.
 const TICKS_PER_SECOND: f64 = 100.0;
@@ -38,24 +35,43 @@ pub(super) struct Figure {
 impl Figure {
     /// The median of the samples as a parameter.
     pub(super) fn into_parameter(self, name: &str, method: &str) -> Parameter {
-        let value = statistics::median(&self.samples);
-        self.into_parameter_with(value, name, method)
+        self.into_parameter_by(Statistic::Median, name, method)
     }
 
-    /// Another summary of the samples as a parameter.
-    pub(super) fn into_parameter_with(self, value: Option<f64>, name: &str, method: &str) -> Parameter {
-        let Some(value) = value.filter(|v| v.is_finite()) else {
-            return Parameter::missing(name, &format!("no usable sample: {method}"));
-        };
+    /// What a statistic makes of the samples, as a parameter.
+    pub(super) fn into_parameter_by(self, statistic: Statistic, name: &str, method: &str) -> Parameter {
+        let raw = self.usable();
+        // From the rounded samples, so that whoever reads them back gets this very value.
+        let value = statistic.of(&raw);
+        Parameter { statistic, raw: raw.clone(), ..self.parameter(value, &raw, name, method) }
+    }
+
+    /// A value that was fitted to more than these samples, which tell its dispersion only and are not kept.
+    #[cfg(feature = "measure-gpu")]
+    pub(super) fn into_fitted(self, value: f64, name: &str, method: &str) -> Parameter {
+        let raw = self.usable();
+        Parameter { statistic: Statistic::Fit, ..self.parameter(Some(value), &raw, name, method) }
+    }
+
+    /// What is a number, in as many digits as are kept. A failed division, or a clock that did not move, gives none.
+    fn usable(&self) -> Vec<f64> {
+        self.samples.iter().filter(|x| x.is_finite()).map(|&x| six_digits(x)).collect()
+    }
+
+    fn parameter(&self, value: Option<f64>, raw: &[f64], name: &str, method: &str) -> Parameter {
+        let none = Parameter::missing(name, &format!("no usable sample: {method}"));
+        if value.is_none() {
+            return none;
+        }
         Parameter {
-            name: name.to_owned(),
-            value: Some(value),
-            dispersion: statistics::relative_iqr(&self.samples),
-            samples: u32::try_from(self.samples.len()).unwrap_or(u32::MAX),
+            value,
+            dispersion: statistics::relative_iqr(raw),
+            samples: u32::try_from(raw.len()).unwrap_or(u32::MAX),
             spoiled: self.spoiled,
             foreign_load: self.foreign_load,
             how: How::Measured,
             source: method.to_owned(),
+            ..none
         }
     }
 }
@@ -102,7 +118,7 @@ pub struct Watch {
 
 impl Watch {
     /// Share of the CPU above which a measurement counts as spoiled.
-    pub const SPOILING: f64 = THRESHOLD;
+    pub const SPOILING: f64 = Parameter::SPOILING;
 
     /// Begins to watch.
     #[must_use]
@@ -131,21 +147,22 @@ struct Window {
 
 impl Window {
     fn is_clean(&self) -> bool {
-        self.share.is_none_or(|share| share <= THRESHOLD)
+        self.share.is_none_or(|share| share <= Parameter::SPOILING)
     }
 }
 
-/// Every clean window, and the least spoiled others while fewer than `wanted` samples are kept.
-fn keep_the_cleanest(mut windows: Vec<Window>, wanted: usize) -> Vec<Figure> {
-    windows.sort_by(|a, b| a.share.unwrap_or(0.0).total_cmp(&b.share.unwrap_or(0.0)));
+/// Every clean window, and the least spoiled others while fewer than `wanted` samples are kept; in the order they were taken.
+fn keep_the_cleanest(windows: Vec<Window>, wanted: usize) -> Vec<Figure> {
+    let mut cleanest: Vec<usize> = (0..windows.len()).collect();
+    cleanest.sort_by(|&a, &b| windows[a].share.unwrap_or(0.0).total_cmp(&windows[b].share.unwrap_or(0.0)));
+    let (mut keep, mut kept) = (vec![false; windows.len()], 0);
+    for k in cleanest {
+        keep[k] = windows[k].is_clean() || kept < wanted;
+        kept += if keep[k] { windows[k].rows.len() } else { 0 };
+    }
     let columns = windows.iter().flat_map(|w| &w.rows).map(Vec::len).max().unwrap_or(0);
     let mut figures = vec![Figure::default(); columns];
-    let mut kept = 0;
-    for window in windows {
-        let keep = window.is_clean() || kept < wanted;
-        if keep {
-            kept += window.rows.len();
-        }
+    for (window, keep) in windows.into_iter().zip(keep) {
         for row in window.rows {
             for (figure, value) in figures.iter_mut().zip(row) {
                 if keep {
@@ -272,6 +289,22 @@ mod tests {
         assert_eq!(figures.len(), 1);
         assert_eq!(figures[0].samples, [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
         assert_eq!((figures[0].spoiled, figures[0].foreign_load), (3, Some(0.02)));
+        // In the order they were taken, and not in that of their share.
+        let figures = keep_the_cleanest(vec![window(1.0, 0.03), window(9.0, 0.4), window(2.0, 0.0)], 4);
+        assert_eq!(figures[0].samples, [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
+    }
+
+    #[test]
+    fn a_parameter_follows_from_its_raw_samples() {
+        let samples = vec![3.000_000_4, f64::NAN, 1.0, 1_234.567_89, f64::INFINITY, 2.0];
+        let figure = Figure { samples, spoiled: 1, foreign_load: Some(0.01) };
+        let p = figure.clone().into_parameter("x_ns", "test");
+        assert_eq!(p.raw, [3.0, 1.0, 1234.57, 2.0]);
+        assert_eq!((p.value, p.samples, p.disagreement()), (Some(2.5), 4, None));
+        let p = figure.clone().into_parameter_by(Statistic::FastestQuarterMedian, "x_ghz", "test");
+        assert_eq!((p.value, p.recomputed(), p.disagreement()), (Some(1234.57), Some(1234.57), None));
+        let p = Figure { samples: vec![f64::NAN], ..figure }.into_parameter("x_ns", "test");
+        assert_eq!((p.how, p.samples, p.raw.len()), (How::Missing, 0, 0));
     }
 
     #[test]

@@ -6,8 +6,7 @@ use std::time::Instant;
 
 use rayon::ThreadPool;
 
-use super::foreign_load::{self, Figure};
-use super::{Options, caches, cgroup, pool};
+use super::{Options, caches, cgroup, foreign_load, pool};
 use crate::SimdLevel;
 use crate::hardware::{Parameter, parameter};
 
@@ -23,20 +22,16 @@ const CHUNK: usize = 65_536;
 /// Total of the last-level caches where the system reports none.
 const ASSUMED_LLC_BYTES: u64 = 64 << 20;
 
+const BANDWIDTHS: [&str; 2] = [parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, parameter::BANDWIDTH_ALL_THREADS_GB_PER_S];
+
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     let size = match total() {
         Some((bytes, source)) => Parameter::reported(parameter::MEMORY_BYTES, bytes as f64, source),
         None => Parameter::missing(parameter::MEMORY_BYTES, "neither /proc/meminfo nor sysinfo tells"),
     };
-    let mut parameters = vec![size];
-    match triad(options) {
-        Ok(triad) => parameters.extend(triad.into_parameters()),
-        Err(why) => {
-            let names = [parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, parameter::BANDWIDTH_ALL_THREADS_GB_PER_S];
-            parameters.extend(names.map(|name| Parameter::missing(name, &why)));
-        }
-    }
-    parameters
+    let missing = |why: String| BANDWIDTHS.map(|name| Parameter::missing(name, &why)).to_vec();
+    let bandwidths = triad(options).unwrap_or_else(missing);
+    std::iter::once(size).chain(bandwidths).collect()
 }
 
 /// Memory in bytes, or the control group's limit where that is lower, and who said so.
@@ -77,33 +72,11 @@ fn array_bytes(llc: Option<u64>, memory: Option<u64>) -> (u64, String) {
     }
 }
 
-/// Samples of the triad a = b + s * c of STREAM, in GB/s with 24 bytes an element.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Triad {
-    /// Bytes of each of the three arrays.
-    pub array_bytes: u64,
-    /// How the size was chosen.
-    pub array_choice: String,
-    /// Threads behind `all_threads`.
-    pub threads: usize,
-    /// Samples of one thread.
-    pub one_thread: Vec<f64>,
-    /// Samples of all usable cores, taken in turn with those of one thread.
-    pub all_threads: Vec<f64>,
-    /// Samples of each that were thrown away because foreign load spoiled them.
-    pub spoiled: u32,
-    /// Highest share of the CPU, 0 to 1, that other programs took during the samples kept. `None` when it can't be told.
-    pub foreign_load: Option<f64>,
-}
-
-/// Takes the samples behind both bandwidths: for comparison with STREAM, which quotes the best where a parameter is the median.
+/// Both bandwidths by the triad a = b + s * c of STREAM, or a sentence when the threads or the memory can't be had.
 ///
 /// Arrays are four times the last-level caches, at most 512 MiB each and an eighth of memory together. Each thread
 /// touches its part first, and the first sample of each kind is dropped.
-///
-/// # Errors
-/// A sentence, when the threads or the memory can't be had.
-pub fn triad(options: &Options) -> Result<Triad, String> {
+fn triad(options: &Options) -> Result<Vec<Parameter>, String> {
     let start = Instant::now();
     let threads = options.usable_cores();
     let llc = caches::reported().last_level.map(|level| level.bytes.saturating_mul(level.instances));
@@ -130,34 +103,12 @@ pub fn triad(options: &Options) -> Result<Triad, String> {
         };
         vec![one, all]
     });
-    let mut figures = figures.into_iter();
-    let (one, all) = (figures.next().unwrap_or_default(), figures.next().unwrap_or_default());
-    Ok(Triad {
-        array_bytes,
-        array_choice,
-        threads,
-        one_thread: one.samples,
-        all_threads: all.samples,
-        spoiled: all.spoiled,
-        foreign_load: all.foreign_load,
-    })
-}
-
-impl Triad {
-    fn into_parameters(self) -> [Parameter; 2] {
-        let figure = |samples| Figure { samples, spoiled: self.spoiled, foreign_load: self.foreign_load };
-        let method = |threads: usize| {
-            let plural = if threads == 1 { "" } else { "s" };
-            format!(
-                "STREAM triad on {threads} thread{plural}, {}; value is the median, STREAM quotes the best",
-                self.array_choice
-            )
-        };
-        [
-            figure(self.one_thread).into_parameter(parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, &method(1)),
-            figure(self.all_threads).into_parameter(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, &method(self.threads)),
-        ]
-    }
+    let method = |threads: usize| {
+        let plural = if threads == 1 { "" } else { "s" };
+        format!("STREAM triad on {threads} thread{plural}, {array_choice}; value is the median, STREAM quotes the best")
+    };
+    let named = BANDWIDTHS.into_iter().zip([1, threads]);
+    Ok(figures.into_iter().zip(named).map(|(f, (name, threads))| f.into_parameter(name, &method(threads))).collect())
 }
 
 /// The part of the three arrays that one thread touched first.

@@ -4,6 +4,7 @@
 //! CPU is thrown away and repeated while time is left (Linux; elsewhere foreign load is not known). Every loop has a
 //! time limit, so a slow or loaded machine gives fewer samples, not a longer run.
 
+mod arithmetic;
 mod caches;
 mod cgroup;
 mod clock;
@@ -15,7 +16,6 @@ mod gpu;
 mod identity;
 mod memory;
 mod scaling;
-pub mod statistics;
 mod topology;
 
 use std::fmt;
@@ -27,12 +27,11 @@ use rayon::ThreadPool;
 use crate::hardware::{Hardware, Machine, Parameter, parameter};
 use foreign_load::Plan;
 
+pub use crate::statistics;
 pub use core_to_core::core_to_core_ns;
 pub use foreign_load::Watch;
 #[cfg(feature = "measure-gpu")]
 pub use gpu::{gpu, gpu_group};
-
-pub use memory::{Triad, triad};
 
 /// A group of parameters that are measured together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -51,14 +50,25 @@ pub enum Family {
     ForkJoin,
     /// Work of several threads over work of one.
     Scaling,
+    /// Multiply-adds of one thread and of all.
+    Arithmetic,
 }
 
 impl Family {
     /// Every family, in the order of measurement.
-    pub const ALL: [Self; 7] =
-        [Self::Topology, Self::Clock, Self::Caches, Self::Memory, Self::CoreToCore, Self::ForkJoin, Self::Scaling];
+    pub const ALL: [Self; 8] = [
+        Self::Topology,
+        Self::Clock,
+        Self::Caches,
+        Self::Memory,
+        Self::CoreToCore,
+        Self::ForkJoin,
+        Self::Scaling,
+        Self::Arithmetic,
+    ];
 
-    /// The name, as [`FromStr`] reads it: `topology`, `clock`, `caches`, `memory`, `core_to_core`, `fork_join` or `scaling`.
+    /// The name, as [`FromStr`] reads it: `topology`, `clock`, `caches`, `memory`, `core_to_core`, `fork_join`, `scaling` or
+    /// `arithmetic`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -69,6 +79,7 @@ impl Family {
             Self::CoreToCore => "core_to_core",
             Self::ForkJoin => "fork_join",
             Self::Scaling => "scaling",
+            Self::Arithmetic => "arithmetic",
         }
     }
 
@@ -89,6 +100,7 @@ impl Family {
             Self::CoreToCore => owned(&[p::CORE_TO_CORE_NS]),
             Self::ForkJoin => owned(&[p::FORK_JOIN_WARM_NS, p::FORK_JOIN_COLD_NS]),
             Self::Scaling => owned(&[p::SCALING_TWO_THREADS_RATIO, p::SCALING_ALL_THREADS_RATIO]),
+            Self::Arithmetic => owned(&[p::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, p::ARITHMETIC_ALL_THREADS_GFLOP_PER_S]),
         }
     }
 }
@@ -149,6 +161,7 @@ pub fn family(family: Family, options: &Options) -> Vec<Parameter> {
         Family::CoreToCore => core_to_core::measure(options),
         Family::ForkJoin => fork_join::measure(options),
         Family::Scaling => scaling::measure(options),
+        Family::Arithmetic => arithmetic::measure(options),
     }
 }
 
@@ -186,4 +199,10 @@ pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
 /// The error is a sentence for [`Parameter::missing`]: a limit on processes can refuse the threads.
 fn pool(threads: usize) -> Result<ThreadPool, String> {
     crate::cpu::build_pool(u32::try_from(threads).unwrap_or(u32::MAX), 0, true)
+}
+
+/// What `threads` threads of the pool do together: the sum of their rates.
+fn together(pool: &ThreadPool, threads: usize, rate: impl Fn() -> f64 + Sync) -> f64 {
+    // Each thread divides by its own time: they don't wake at once.
+    pool.broadcast(|worker| if worker.index() < threads { rate() } else { 0.0 }).iter().sum()
 }

@@ -5,9 +5,7 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use rayon::ThreadPool;
-
-use super::{Options, foreign_load, pool};
+use super::{Options, foreign_load, pool, together};
 use crate::hardware::{Parameter, parameter};
 
 /// Floats that a thread works on: 8 KiB, within every first-level cache, so that only the cores are compared and not the memory.
@@ -28,22 +26,17 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     };
     let time = Duration::from_millis(if options.brief { 1 } else { 8 });
     // The clock rises and the pages of the workers' stacks are touched in a run that does not count.
-    work_rate(&pool, threads, time);
+    let work_rate = |threads| together(&pool, threads, || passes_per_ns(time));
+    work_rate(threads);
     let figures = foreign_load::collect(options.plan(8, 650), || {
-        let one = work_rate(&pool, 1, time);
-        let two = work_rate(&pool, 2, time);
-        let all = if threads == 2 { two } else { work_rate(&pool, threads, time) };
+        let one = work_rate(1);
+        let two = work_rate(2);
+        let all = if threads == 2 { two } else { work_rate(threads) };
         vec![two / one, all / one]
     });
     let method = |n: usize| format!("passes over 8 KiB a thread in the same time, {n} threads over one");
     let methods = [(two, method(2)), (all, method(threads))];
     figures.into_iter().zip(methods).map(|(figure, (name, method))| figure.into_parameter(name, &method)).collect()
-}
-
-/// Passes a nanosecond that `threads` threads of the pool do together.
-fn work_rate(pool: &ThreadPool, threads: usize, time: Duration) -> f64 {
-    // Each thread divides by its own time: they don't wake at once.
-    pool.broadcast(|worker| if worker.index() < threads { passes_per_ns(time) } else { 0.0 }).iter().sum()
 }
 
 fn passes_per_ns(time: Duration) -> f64 {
@@ -80,7 +73,9 @@ mod tests {
     #[test]
     fn every_thread_asked_for_works() {
         let pool = pool(3).unwrap();
-        assert!(work_rate(&pool, 3, Duration::from_micros(10)) > 0.0);
+        for threads in 1..=3 {
+            assert_eq!(together(&pool, threads, || 2.0), 2.0 * threads as f64);
+        }
         assert!(passes_per_ns(Duration::ZERO) > 0.0);
     }
 }

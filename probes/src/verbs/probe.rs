@@ -31,7 +31,7 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
     let told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
     let restriction = restriction::restriction(arguments, &hardware, &references);
-    let mut before = measured.remarks;
+    let mut before = [measured.remarks, hardware.disturbed()].concat();
     before.extend(restriction.iter().flat_map(restriction::not_shown));
     let assemble = |found| assemble(arguments, &hardware, restriction.clone(), found, began);
     let mut found = Found { remarks: before.clone(), ..Found::default() };

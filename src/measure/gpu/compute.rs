@@ -6,7 +6,7 @@ use super::bench::{Bench, Bound, Kernel, calibrate, or_missing, per_ns, record};
 use super::fits;
 use crate::hardware::Parameter;
 use crate::hardware::gpu::parameter as p;
-use crate::measure::statistics;
+use crate::statistics;
 
 const SOURCE: &str = include_str!("shaders/compute.wgsl");
 const ATOMIC_SOURCE: &str = include_str!("shaders/atomic.wgsl");
@@ -150,7 +150,7 @@ fn units(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
          invocations and {bytes} bytes of shared memory; several such workgroups may share a processor",
         counts.len()
     );
-    Ok(vec![samples.into_parameter_with(Some(f64::from(units)), p::PARALLEL_UNITS, &method)])
+    Ok(vec![samples.into_fitted(f64::from(units), p::PARALLEL_UNITS, &method)])
 }
 
 /// Numbers of workgroups to time: doubling until the time has risen fourfold, then halving down to the first step, then

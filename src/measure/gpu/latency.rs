@@ -9,8 +9,9 @@ use crate::hardware::gpu::parameter as p;
 
 const SOURCE: &str = include_str!("shaders/latency.wgsl");
 
-/// Dispatches in the long pass, beyond the first one.
-const CHAIN: u32 = 200;
+/// Dispatches in the long pass, beyond the first one. As many as make a sample last a millisecond, so that a few hundred samples at
+/// most stand in a report.
+const CHAIN: u32 = 500;
 
 /// The same on a program that acts as a GPU.
 const CHAIN_SOFTWARE: u32 = 50;
