@@ -300,6 +300,17 @@ fn suspicious_figures_are_notes_and_the_file_stays_good() {
         assert_eq!(finding["problems"], json!([]), "{pointer} as {value}");
         assert!(finding["notes"].to_string().contains(text), "{pointer} as {value}: {}", finding["notes"]);
     }
+    let labelled = |command: &str| {
+        let mut report = measured();
+        report["label"] = "real_contended".into();
+        report["provenance"]["command"] = command.into();
+        report["points"] = json!([point(0.3), point(0.3)]);
+        report
+    };
+    let by_whom: Vec<Case> =
+        vec![("", labelled("probe --seed 1"), ""), ("", labelled("probe --contended=cache --seed 1"), "")];
+    let told: Vec<bool> = damaged(&by_whom).iter().map(|f| f["notes"].to_string().contains("other programs")).collect();
+    assert_eq!(told, [true, false]);
     let few: Vec<Case> = vec![("/points", json!([point(0.3), point(0.01), point(0.01), point(0.01)]), "")];
     assert!(!damaged(&few)[0]["notes"].to_string().contains("other programs"));
 }

@@ -179,7 +179,9 @@ pub(super) fn suspicious(report: &Report) -> Vec<String> {
     let mut found = Vec::new();
     let loads: Vec<f64> = report.points.iter().filter_map(|p| p.foreign_load).collect();
     let disturbed = loads.iter().filter(|&&load| load > Watch::SPOILING).count();
-    if report.label != Label::RealContended && disturbed as f64 > DISTURBED_SHARE * loads.len() as f64 {
+    // What the user wanted is not foreign; what made the label all the same is.
+    let wanted = report.provenance.command.contains("--contended");
+    if !wanted && disturbed as f64 > DISTURBED_SHARE * loads.len() as f64 {
         let share = disturbed as f64 / loads.len() as f64 * 100.0;
         let over = Watch::SPOILING * 100.0;
         let label = if report.label == Label::RealFull { ", although it is labelled real_full" } else { "" };
