@@ -18,9 +18,6 @@ pub(crate) const LAVAPIPE_THREADS: &str = "LP_NUM_THREADS";
 /// from one run to the next.
 const SHOWN: f64 = 0.1;
 
-/// Not every version of a report has it.
-const ARITHMETIC_ONE_THREAD: &str = "arithmetic_one_thread_gflop_per_s";
-
 /// A report of the machine from which one thing less was taken, as `KIND=R.json`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Lifted {
@@ -144,7 +141,8 @@ fn prove(kind: Restricted, without: &Hardware, with: &Hardware) -> Vec<Proof> {
         }
         Restricted::Simd => {
             let mut proofs = vec![on_cpu(parameter::SIMD_LANES, Change::Fewer)];
-            let arithmetic = on_cpu(ARITHMETIC_ONE_THREAD, Change::Lower);
+            let arithmetic = on_cpu(parameter::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, Change::Lower);
+            // Old reports don't have it.
             proofs.extend(Some(arithmetic).filter(|p| p.without.is_some() || p.with.is_some()));
             proofs
         }
@@ -245,7 +243,7 @@ mod tests {
     fn arithmetic_shows_fewer_lanes_where_it_is_measured() {
         let simd = |lanes| [(parameter::SIMD_LANES, lanes)];
         assert_eq!(shown(Restricted::Simd, &simd(16.0), &simd(8.0)), [true]);
-        let both = |lanes, gflop| [(parameter::SIMD_LANES, lanes), (ARITHMETIC_ONE_THREAD, gflop)];
+        let both = |lanes, gflop| [(parameter::SIMD_LANES, lanes), (parameter::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, gflop)];
         assert_eq!(shown(Restricted::Simd, &both(16.0, 120.0), &both(8.0, 119.0)), [true, false]);
     }
 
