@@ -41,14 +41,18 @@ sapwise=${CARGO_TARGET_DIR:-target}/release/sapwise
 "$cc" -O2 -fopenmp tools/compare/reference.c -o "$work/reference"
 "$cc" -O3 -fopenmp -march=native tools/compare/triad.c -o "$work/triad" -lm
 
+# A part of a measurement ends when its standard input does, so it gets one that nobody writes to and nobody closes.
+mkfifo "$work/open"
+exec 9<>"$work/open"
+part() { "$sapwise" part "$@" <&9; }
 # ours FAMILY: our parameters of one family, in $work/ours.out.
-ours() { take ours "$sapwise" part hardware "$1"; }
+ours() { take ours part hardware "$1"; }
 value() { figure "$work/ours.out" "$1" value; }
 best() { figure "$work/ours.out" "$1" best; }
 theirs() { cat "$work/theirs.out"; }
 
 ours topology
-lanes=$(value simd_lanes)
+lanes=$(printf '%.0f' "$(value simd_lanes)")
 case $lanes in
     16) level=avx512 fused=avx512_fma ;;
     8) level=avx fused=avx_fma ;;

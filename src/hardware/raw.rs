@@ -74,17 +74,19 @@ impl Parameter {
         if self.statistic == Statistic::Fit {
             return Some("raw samples of a fit, which can't be checked".to_owned());
         }
+        let told = |x: Option<f64>| x.map_or("missing".to_owned(), |x| x.to_string());
         let differ = |a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => (a - b).abs() > TOLERANCE * a.abs().max(b.abs()),
             (a, b) => a != b,
         };
         let value = self.recomputed();
         if differ(self.value, value) {
-            return Some(format!("the value is {:?}, but its raw samples give {value:?}", self.value));
+            return Some(format!("the value is {}, but its raw samples give {}", told(self.value), told(value)));
         }
         let dispersion = statistics::relative_iqr(&self.raw);
         if differ(self.dispersion, dispersion) {
-            return Some(format!("the dispersion is {:?}, but its raw samples give {dispersion:?}", self.dispersion));
+            let (here, there) = (told(self.dispersion), told(dispersion));
+            return Some(format!("the dispersion is {here}, but its raw samples give {there}"));
         }
         None
     }
@@ -132,7 +134,7 @@ mod tests {
         assert_eq!(Parameter { raw: Vec::new(), value: Some(9.0), ..measured() }.disagreement(), None);
         let told = |p: Parameter, text: &str| assert!(p.disagreement().is_some_and(|d| d.contains(text)), "{p:?}");
         told(Parameter { value: Some(2.501), ..measured() }, "2.501");
-        told(Parameter { value: None, ..measured() }, "None");
+        told(Parameter { value: None, ..measured() }, "value is missing");
         told(Parameter { dispersion: Some(0.5), ..measured() }, "0.5");
         told(Parameter { dispersion: None, ..measured() }, "dispersion");
         told(Parameter { samples: 5, ..measured() }, "5 samples");
