@@ -5,7 +5,6 @@ mod raw;
 
 pub use gpu::{GpuGroup, GpuHardware, GpuIdentity, GpuKind};
 pub use raw::Statistic;
-pub(crate) use raw::six_digits;
 
 /// What is known about a machine: who made it, and a list of parameters, each with where it came from.
 #[derive(Debug, Clone, PartialEq)]

@@ -39,14 +39,6 @@ impl Statistic {
     }
 }
 
-/// A figure in six significant digits: as many as a file keeps of a sample.
-#[must_use]
-#[cfg_attr(not(feature = "measure"), expect(dead_code, reason = "only measurements make samples"))]
-pub(crate) fn six_digits(x: f64) -> f64 {
-    // What is no number is written as such and read back as the same.
-    format!("{x:.5e}").parse().unwrap_or(x)
-}
-
 /// Relative difference up to which a figure agrees with what its samples say.
 const TOLERANCE: f64 = 1e-5;
 
@@ -119,12 +111,6 @@ mod tests {
             assert_eq!(statistic.of(&[]), None);
             assert_eq!(statistic.of(&[7.0]), Some(7.0));
         }
-    }
-
-    #[test]
-    fn six_digits_of_any_size() {
-        assert_eq!([123_456_789.0, 0.000_123_456_78, 0.0, -2.0].map(six_digits), [123_457_000.0, 0.000_123_457, 0.0, -2.0]);
-        assert!(six_digits(f64::NAN).is_nan() && six_digits(f64::INFINITY).is_infinite());
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
-use crate::hardware::{How, Parameter, Statistic, six_digits};
+use crate::hardware::{How, Parameter, Statistic};
 use crate::statistics;
 
 /// Ticks a second of `/proc/stat`: `USER_HZ`, 100 on every Linux architecture that Rust's standard library runs on.
@@ -74,6 +74,12 @@ impl Figure {
             ..none
         }
     }
+}
+
+/// A figure in six significant digits: as many as a file keeps of a sample.
+fn six_digits(x: f64) -> f64 {
+    // What can't be read back stays as it is.
+    format!("{x:.5e}").parse().unwrap_or(x)
 }
 
 /// Calls `sample` in windows until enough clean samples are there or the time is over; each call gives one value per figure.
@@ -295,8 +301,13 @@ mod tests {
     }
 
     #[test]
+    fn six_digits_of_any_size() {
+        assert_eq!([123_456_789.0, 0.000_123_456_78, 0.0, -2.0].map(six_digits), [123_457_000.0, 0.000_123_457, 0.0, -2.0]);
+    }
+
+    #[test]
     fn a_parameter_follows_from_its_raw_samples() {
-        let samples = vec![3.000_000_4, f64::NAN, 1.0, 1234.567_89, f64::INFINITY, 2.0];
+        let samples = vec![3.000_000_4, f64::NAN, 1.0, 1_234.567_89, f64::INFINITY, 2.0];
         let figure = Figure { samples, spoiled: 1, foreign_load: Some(0.01) };
         let p = figure.clone().into_parameter("x_ns", "test");
         assert_eq!(p.raw, [3.0, 1.0, 1234.57, 2.0]);
