@@ -24,27 +24,18 @@ if [[ ${1:-} =~ ^[0-9]+$ ]]; then
 fi
 groups=("$@")
 [ "${#groups[@]}" -gt 0 ] || groups=(reported clock latency memory cores arithmetic opencl vulkan)
-cc=${CC:-cc}
 threads=$(nproc)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 : >"$work/pairs"
-: >"$work/loads"
-: >"$work/distances"
 # shellcheck source=tools/compare/lib.sh
 . tools/compare/lib.sh
 # shellcheck source=tools/compare/gpu.sh
 . tools/compare/gpu.sh
 
-cargo build --quiet --release -p sapwise-cli
-sapwise=${CARGO_TARGET_DIR:-target}/release/sapwise
-"$cc" -O2 -fopenmp tools/compare/reference.c -o "$work/reference"
+start_sapwise
 "$cc" -O3 -fopenmp -march=native tools/compare/triad.c -o "$work/triad" -lm
 
-# A part of a measurement ends when its standard input does, so it gets one that nobody writes to and nobody closes.
-mkfifo "$work/open"
-exec 9<>"$work/open"
-part() { "$sapwise" part "$@" <&9; }
 # ours FAMILY: our parameters of one family, in $work/ours.out.
 ours() { take ours part hardware "$1"; }
 value() { figure "$work/ours.out" "$1" value; }
