@@ -5,7 +5,6 @@ mod raw;
 
 pub use gpu::{GpuGroup, GpuHardware, GpuIdentity, GpuKind};
 pub use raw::Statistic;
-pub(crate) use raw::six_digits;
 
 /// What is known about a machine: who made it, and a list of parameters, each with where it came from.
 #[derive(Debug, Clone, PartialEq)]
@@ -230,13 +229,13 @@ impl Hardware {
 fn loaded(of: &str, parameters: &[Parameter]) -> Option<String> {
     let loads = parameters.iter().filter_map(|p| Some((p.name.as_str(), p.foreign_load?)));
     let spoiled: Vec<(&str, f64)> = loads.filter(|(_, load)| *load > Parameter::SPOILING).collect();
-    let most = spoiled.iter().map(|(_, load)| *load).reduce(f64::max)?;
-    let names: Vec<&str> = spoiled.iter().map(|(name, _)| *name).collect();
+    let (name, load) = spoiled.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
-        "other programs or the host took up to {:.0} % of the CPU while these parameters{of} were measured: {}; where that is not \
-         meant, probe again when the machine is idle",
-        most * 100.0,
-        names.join(", ")
+        "other programs or the host took more than {:.0} % of the CPU while {} of the parameters{of} were measured, {:.0} % with \
+         {name}; where that is not meant, probe again when the machine is idle",
+        Parameter::SPOILING * 100.0,
+        spoiled.len(),
+        load * 100.0
     ))
 }
 
@@ -315,7 +314,7 @@ mod tests {
         let told = |parameters| hardware(parameters).disturbed();
         assert!(told(vec![loaded("a", 0.05), Parameter::reported("b", 1.0, "test")]).is_empty());
         let one = told(vec![loaded("a", 0.25), loaded("b", 0.06), loaded("c", 0.01)]);
-        assert!(one.len() == 1 && one[0].contains("25 %") && one[0].contains("measured: a, b;"), "{one:?}");
+        assert!(one.len() == 1 && one[0].contains("while 2 of") && one[0].contains("25 % with a;"), "{one:?}");
         let distance =
             |raw: &[f64]| Parameter { raw: raw.to_vec(), ..Parameter::reported(parameter::CORE_TO_CORE_NS, 1.0, "test") };
         assert!(told(vec![distance(&[38.0, 37.0, 41.0, 60.0])]).is_empty());

@@ -24,31 +24,26 @@ if [[ ${1:-} =~ ^[0-9]+$ ]]; then
 fi
 groups=("$@")
 [ "${#groups[@]}" -gt 0 ] || groups=(reported clock latency memory cores arithmetic opencl vulkan)
-cc=${CC:-cc}
 threads=$(nproc)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 : >"$work/pairs"
-: >"$work/loads"
-: >"$work/distances"
 # shellcheck source=tools/compare/lib.sh
 . tools/compare/lib.sh
 # shellcheck source=tools/compare/gpu.sh
 . tools/compare/gpu.sh
 
-cargo build --quiet --release -p sapwise-cli
-sapwise=${CARGO_TARGET_DIR:-target}/release/sapwise
-"$cc" -O2 -fopenmp tools/compare/reference.c -o "$work/reference"
+start_sapwise
 "$cc" -O3 -fopenmp -march=native tools/compare/triad.c -o "$work/triad" -lm
 
 # ours FAMILY: our parameters of one family, in $work/ours.out.
-ours() { take ours "$sapwise" part hardware "$1"; }
+ours() { take ours part hardware "$1"; }
 value() { figure "$work/ours.out" "$1" value; }
 best() { figure "$work/ours.out" "$1" best; }
 theirs() { cat "$work/theirs.out"; }
 
 ours topology
-lanes=$(value simd_lanes)
+lanes=$(printf '%.0f' "$(value simd_lanes)")
 case $lanes in
     16) level=avx512 fused=avx512_fma ;;
     8) level=avx fused=avx_fma ;;

@@ -2,17 +2,15 @@
 //!
 //! The sizes can't be trusted alone: a virtual machine reported a last-level cache of 105 MB and showed no plateau for it.
 
+use std::cell::Cell;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use super::{Options, foreign_load, memory};
 use crate::hardware::{Parameter, parameter};
 
-/// `u32`s in a line of 64 bytes.
-const LINE: usize = 16;
-
-/// Bytes up to which a chase is walked once, untimed, before each sample. Larger sets would take longer than the sample.
-const WALKED_BYTES: usize = 16 << 20;
+/// Bytes up to which a set is walked once, untimed, before its samples. A lap of a larger one takes longer than its samples.
+const WALKED_BYTES: u64 = 64 << 20;
 
 /// The largest working set of a brief run.
 const BRIEF_KIB: u32 = 4096;
@@ -126,102 +124,84 @@ fn parse_size(text: &str) -> Option<u64> {
     digits.parse::<u64>().ok()?.checked_mul(unit).filter(|&bytes| bytes > 0)
 }
 
+/// Each set on its own, all its samples behind one another: what other sets push out of the caches would be missed again in every
+/// sample of a set that is larger than a first-level cache.
 fn latencies(options: &Options) -> Vec<Parameter> {
-    let start = Instant::now();
     let limit = memory::total().map_or(64 << 20, |(bytes, _)| bytes / 8);
-    let plan = options.plan(9, 1100);
-    // The largest first: building a set streams through the caches, so that the small ones are left in them.
-    let mut built: Vec<(String, Result<Chase, String>)> = Vec::new();
-    for kib in parameter::LATENCY_WORKING_SETS_KIB.into_iter().rev() {
-        let bytes = u64::from(kib) << 10;
-        let chase = if bytes > limit {
-            Err("the working set exceeds an eighth of memory".to_owned())
-        } else if options.brief && kib > BRIEF_KIB {
-            Err("left out of a brief run".to_owned())
-        } else {
-            Chase::new(bytes as usize / (LINE * 4)).ok_or_else(|| "no memory for the working set".to_owned())
-        };
-        built.push((parameter::latency_name(kib), chase));
-    }
-    built.reverse();
     let slice = if options.brief { Duration::from_micros(200) } else { Duration::from_millis(3) };
-    let sampling = foreign_load::Plan { limit: plan.limit.saturating_sub(start.elapsed()), ..plan };
-    let figures = foreign_load::collect(sampling, || {
-        built.iter_mut().filter_map(|(_, chase)| chase.as_mut().ok()).map(|chase| chase.sample_ns(slice)).collect()
-    });
-    let mut figures = figures.into_iter();
-    built
-        .into_iter()
-        .map(|(name, chase)| match chase {
-            Ok(chase) => figures.next().unwrap_or_default().into_parameter(&name, chase.method()),
-            Err(why) => Parameter::missing(&name, &why),
-        })
-        .collect()
+    let one = |kib: u32| {
+        let (name, bytes) = (parameter::latency_name(kib), u64::from(kib) << 10);
+        if bytes > limit {
+            return Parameter::missing(&name, "the working set exceeds an eighth of memory");
+        }
+        if options.brief && kib > BRIEF_KIB {
+            return Parameter::missing(&name, "left out of a brief run");
+        }
+        let Some(lines) = lines(bytes as usize / size_of::<Line<'_>>()) else {
+            return Parameter::missing(&name, "no memory for the working set");
+        };
+        if link(&lines).is_none() {
+            return Parameter::missing(&name, "no memory for the order of its lines");
+        }
+        let mut at = lines.first();
+        let walked = bytes <= WALKED_BYTES;
+        if walked {
+            at = walk(at, lines.len());
+        }
+        let figures = foreign_load::collect(options.plan(9, 450), || {
+            let (ns, end) = sample_ns(at, slice);
+            at = end;
+            vec![ns]
+        });
+        let warm = if walked { "walked once before the first sample" } else { "too large to be walked before" };
+        let method = format!("dependent loads around a random cycle of 64-byte lines, default pages; set {warm}");
+        figures.into_iter().next().unwrap_or_default().into_parameter(&name, &method)
+    };
+    parameter::LATENCY_WORKING_SETS_KIB.into_iter().map(one).collect()
 }
 
-/// A working set of lines, each holding where the next one is.
-struct Chase {
-    /// The first word of each line is the index of the first word of the next.
-    words: Vec<u32>,
-    at: u32,
+/// A cache line that says where the next one is. An address and not an index: that would cost a cycle to scale.
+#[repr(align(64))]
+struct Line<'a> {
+    next: Cell<Option<&'a Line<'a>>>,
 }
 
-impl Chase {
-    /// `None` when the memory can't be had, or indices would not fit.
-    fn new(lines: usize) -> Option<Self> {
-        let words_needed = lines.checked_mul(LINE).filter(|&n| u32::try_from(n).is_ok())?;
-        let cycle = sattolo(lines)?;
-        let mut words = Vec::new();
-        words.try_reserve_exact(words_needed).ok()?;
-        for next in cycle {
-            words.push(next * LINE as u32);
-            words.extend_from_slice(&[0; LINE - 1]);
-        }
-        Some(Self { words, at: 0 })
-    }
+/// Lines that lead nowhere yet. `None` when the memory can't be had.
+fn lines<'a>(count: usize) -> Option<Vec<Line<'a>>> {
+    let mut lines = Vec::new();
+    lines.try_reserve_exact(count).ok()?;
+    lines.resize_with(count, || Line { next: Cell::new(None) });
+    Some(lines)
+}
 
-    fn lines(&self) -> usize {
-        self.words.len() / LINE
+/// Links the lines to one cycle. `None` when the memory for their order can't be had.
+fn link<'a>(lines: &'a [Line<'a>]) -> Option<()> {
+    for (line, next) in lines.iter().zip(sattolo(lines.len())?) {
+        line.next.set(lines.get(next as usize));
     }
+    Some(())
+}
 
-    fn is_walked(&self) -> bool {
-        self.words.len() * 4 <= WALKED_BYTES
+/// Follows `steps` links. The next load's address is this load's result, so loads can't overlap.
+fn walk<'a>(mut at: Option<&'a Line<'a>>, steps: usize) -> Option<&'a Line<'a>> {
+    for _ in 0..steps {
+        // Every line has a next one; the look whether it has is beside the chain, not in it.
+        at = at?.next.get();
     }
+    black_box(at)
+}
 
-    fn method(&self) -> &'static str {
-        if self.is_walked() {
-            "dependent loads around a random cycle of 64-byte lines, default pages; set walked once before each sample"
-        } else {
-            "dependent loads around a random cycle of 64-byte lines, default pages; each sample goes on where the last one stopped"
-        }
-    }
-
-    /// Follows `steps` links. The next load's address is this load's result, so loads can't overlap.
-    fn walk(&mut self, steps: usize) {
-        let mut at = self.at;
-        for _ in 0..steps {
-            // Every word is an index into `words`; the bounds check is beside the chain, not in it.
-            at = self.words[at as usize];
-        }
-        self.at = black_box(at);
-    }
-
-    /// Nanoseconds a load, over at least `slice`.
-    fn sample_ns(&mut self, slice: Duration) -> f64 {
-        const STEPS: usize = 16_384;
-        // What the other sets have pushed out of the caches comes back first.
-        if self.is_walked() {
-            self.walk(self.lines());
-        }
-        let start = Instant::now();
-        let mut steps = 0_u64;
-        loop {
-            self.walk(STEPS);
-            steps += STEPS as u64;
-            let elapsed = start.elapsed();
-            if elapsed >= slice {
-                return elapsed.as_nanos() as f64 / steps as f64;
-            }
+/// Nanoseconds a load, over at least `slice`, and where the walk ended.
+fn sample_ns<'a>(mut at: Option<&'a Line<'a>>, slice: Duration) -> (f64, Option<&'a Line<'a>>) {
+    const STEPS: usize = 16_384;
+    let start = Instant::now();
+    let mut steps = 0_u64;
+    loop {
+        at = walk(at, STEPS);
+        steps += STEPS as u64;
+        let elapsed = start.elapsed();
+        if elapsed >= slice {
+            return (elapsed.as_nanos() as f64 / steps as f64, at);
         }
     }
 }
@@ -265,14 +245,16 @@ mod tests {
     }
 
     #[test]
-    fn chase_returns_after_one_lap_and_not_before() {
-        let mut chase = Chase::new(256).unwrap();
-        chase.walk(255);
-        assert_ne!(chase.at, 0);
-        chase.walk(1);
-        assert_eq!(chase.at, 0);
-        assert_eq!(chase.lines(), 256);
-        assert!(Chase::new(usize::MAX).is_none());
+    fn a_walk_returns_after_one_lap_and_not_before() {
+        let lines = lines(256).unwrap();
+        link(&lines).unwrap();
+        let first = lines.first().unwrap();
+        let end = walk(Some(first), 255).unwrap();
+        assert!(!std::ptr::eq(end, first));
+        assert!(std::ptr::eq(walk(Some(end), 1).unwrap(), first));
+        assert_eq!(size_of::<Line<'_>>(), 64);
+        assert!(super::lines(usize::MAX).is_none());
+        assert!(sample_ns(Some(first), Duration::ZERO).0 > 0.0);
     }
 
     #[test]

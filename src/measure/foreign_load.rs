@@ -6,7 +6,7 @@
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
-use crate::hardware::{How, Parameter, Statistic, six_digits};
+use crate::hardware::{How, Parameter, Statistic};
 use crate::statistics;
 
 /// Ticks a second of `/proc/stat`: `USER_HZ`, 100 on every Linux architecture that Rust's standard library runs on.
@@ -74,6 +74,12 @@ impl Figure {
             ..none
         }
     }
+}
+
+/// A figure in six significant digits: as many as a file keeps of a sample.
+fn six_digits(x: f64) -> f64 {
+    // What can't be read back stays as it is.
+    format!("{x:.5e}").parse().unwrap_or(x)
 }
 
 /// Calls `sample` in windows until enough clean samples are there or the time is over; each call gives one value per figure.
@@ -292,6 +298,11 @@ mod tests {
         // In the order they were taken, and not in that of their share.
         let figures = keep_the_cleanest(vec![window(1.0, 0.03), window(9.0, 0.4), window(2.0, 0.0)], 4);
         assert_eq!(figures[0].samples, [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
+    }
+
+    #[test]
+    fn six_digits_of_any_size() {
+        assert_eq!([123_456_789.0, 0.000_123_456_78, 0.0, -2.0].map(six_digits), [123_457_000.0, 0.000_123_457, 0.0, -2.0]);
     }
 
     #[test]

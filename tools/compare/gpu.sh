@@ -49,7 +49,7 @@ vulkan_heaps() {
 group_vulkan() {
     have vulkaninfo "Debian: vulkan-tools" || return
     take theirs vulkaninfo || return
-    take gpus "$sapwise" part gpus || return
+    take gpus part gpus || return
     local line index name gpu
     while read -r line; do
         index=$(grep -o '"index":[0-9]*' <<<"$line" | grep -o '[0-9]*$') || continue
@@ -59,7 +59,7 @@ group_vulkan() {
             say "left out: vulkaninfo knows no $name, which is $gpu"
             continue
         fi
-        take ours "$sapwise" part gpu "$index" || continue
+        take ours part gpu "$index" || continue
         pair "$gpu memory_bytes" vulkaninfo "$(value memory_bytes)" "$(vulkan_heaps "$name")" "NVML and amdgpu tell more exactly"
         pair "$gpu subgroup_lanes" vulkaninfo "$(value subgroup_lanes)" "$(vulkan_figure "$name" subgroupSize)" \
             "a kernel may run with another size than the one that the driver prefers"

@@ -1,10 +1,24 @@
 # shellcheck shell=bash disable=SC2154
-# What tools/compare-hardware.sh is made of: runs that are watched for foreign load, pairs of figures, and their table.
-# Needs $work, a folder that is thrown away, and $threads, the processors that this process may use.
+# What tools/compare-hardware.sh and tools/repeat-hardware.sh are made of: runs that are watched for foreign load, pairs of
+# figures, and their table. Needs $work, a folder that is thrown away, and $threads, the processors that this process may use.
 
 cpus=$(grep -c '^cpu[0-9]' /proc/stat)
 
-say() { echo "compare-hardware: $*" >&2; }
+say() { echo "$(basename "$0" .sh): $*" >&2; }
+
+# Builds our command and the programs in C beside it.
+cc=${CC:-cc}
+start_sapwise() {
+    cargo build --quiet --release -p sapwise-cli
+    sapwise=${CARGO_TARGET_DIR:-target}/release/sapwise
+    "$cc" -O2 -fopenmp tools/compare/reference.c -o "$work/reference"
+    # A part of a measurement ends when its standard input does, so it gets one that nobody writes to and nobody closes.
+    mkfifo "$work/open"
+    exec 9<>"$work/open"
+    : >"$work/loads"
+    : >"$work/distances"
+}
+part() { "$sapwise" part "$@" <&9; }
 
 # Whether a program is there; says once what is missing and how to get it, if not.
 have() {
