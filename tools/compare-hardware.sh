@@ -128,9 +128,10 @@ group_cores() {
         say "left out: this process may use one core"
         return
     fi
-    ours fork_join || return
+    ours core_to_core || return
     take theirs "$work/reference" distance || return
     pair core_to_core_ns "hand-over in C" "$(value core_to_core_ns)" "$(theirs)"
+    ours fork_join || return
     OMP_WAIT_POLICY=active take theirs "$work/reference" region || return
     pair fork_join_warm_ns "region of OpenMP in C" "$(value fork_join_warm_ns)" "$(theirs)" \
         "another run time: OpenMP's threads spin for their next region, helpers of rayon are handed one task each"

@@ -1,5 +1,5 @@
 # shellcheck shell=bash disable=SC2154
-# What tools/compare-hardware.sh and tools/repeat-hardware.sh are made of: runs that are watched for foreign load, pairs of
+# What tools/compare-hardware.sh is made of: runs that are watched for foreign load, pairs of
 # figures, and their table. Needs $work, a folder that is thrown away, and $threads, the processors that this process may use.
 
 cpus=$(grep -c '^cpu[0-9]' /proc/stat)
