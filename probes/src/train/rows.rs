@@ -72,6 +72,9 @@ fn refusal(report: &Report) -> Option<String> {
     if report.label == Label::Simulated {
         return Some("is simulated, which is no evidence of how fast a machine is".to_owned());
     }
+    if report.label == Label::Published {
+        return Some("holds published parameters, without timings".to_owned());
+    }
     if !report.provenance.optimised {
         return Some(
             "was timed by an unoptimised build; measure again with one built by `cargo build --release`".to_owned(),
@@ -175,16 +178,17 @@ mod tests {
     }
 
     #[test]
-    fn simulated_unoptimised_empty_and_repeated_reports_are_told() {
+    fn simulated_published_unoptimised_empty_and_repeated_reports_are_told() {
         let good = Machine::family()[0].report();
-        let (mut simulated, mut debug, mut empty) = (good.clone(), good.clone(), good.clone());
+        let [mut simulated, mut published, mut debug, mut empty] = [(); 4].map(|()| good.clone());
         simulated.label = Label::Simulated;
+        published.label = Label::Published;
         debug.provenance.optimised = false;
         empty.points.clear();
-        let (profiles, notes) = usable(&[simulated, debug, empty, good.clone(), good].map(named));
+        let (profiles, notes) = usable(&[simulated, published, debug, empty, good.clone(), good].map(named));
         assert_eq!(profiles.len(), 1);
-        let told = ["simulated", "unoptimised", "--hardware-only", "the same measurement"];
-        assert!(told.iter().all(|t| notes.iter().any(|n| n.contains(t))) && notes.len() == 4, "{notes:?}");
+        let told = ["simulated", "published", "unoptimised", "--hardware-only", "the same measurement"];
+        assert!(told.iter().all(|t| notes.iter().any(|n| n.contains(t))) && notes.len() == 5, "{notes:?}");
     }
 
     #[test]
