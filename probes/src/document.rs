@@ -18,7 +18,11 @@ pub(crate) fn read_document(path: &Path) -> anyhow::Result<Document> {
     sapwise::json::read(&text).with_context(|| format!("{} is no sound file", path.display()))
 }
 
-fn read_text(path: &Path) -> anyhow::Result<String> {
+/// Reads a text file of ours.
+///
+/// # Errors
+/// Names the file, and why it can't be read.
+pub(crate) fn read_text(path: &Path) -> anyhow::Result<String> {
     let shown = path.display();
     let file = File::open(path).with_context(|| format!("{shown} can't be opened"))?;
     if file.metadata().with_context(|| format!("{shown} can't be read"))?.is_dir() {

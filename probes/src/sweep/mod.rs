@@ -9,6 +9,7 @@ mod scenario;
 mod verify;
 
 pub(crate) use conduct::{Conditions, Found, conduct};
+pub(crate) use dropout::Standing;
 pub(crate) use order::{Event, Order};
 pub(crate) use plan::Plan;
 pub(crate) use scenario::{next_frame, sweep};

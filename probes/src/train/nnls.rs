@@ -118,7 +118,7 @@ fn length(v: ArrayView1<'_, f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::synthetic::Random;
+    use crate::random::Random;
     use ndarray::array;
 
     #[test]

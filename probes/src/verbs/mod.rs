@@ -8,6 +8,7 @@ mod predict;
 mod probe;
 mod run;
 mod schema;
+mod simulate;
 mod train;
 
 use crate::args::Verb;
@@ -30,6 +31,7 @@ pub(crate) fn run(verb: Verb) -> anyhow::Result<Outcome> {
         Verb::Train(arguments) => train::run(&arguments),
         Verb::Pairs(arguments) => pairs::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments),
+        Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),
         Verb::Part(arguments) => part::run(arguments),
     }
