@@ -6,10 +6,6 @@ use crate::turns::Turns;
 pub(crate) struct Random(Turns);
 
 impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(Turns::new(seed))
-    }
-
     /// The draws that belong to some words: the same wherever and in whatever order they are asked for.
     pub(crate) fn named(seed: u64, words: &[&str]) -> Self {
         let mut state = Turns::new(seed);
@@ -54,7 +50,7 @@ mod tests {
 
     #[test]
     fn deviates_have_their_mean_and_deviation() {
-        let mut random = Random::new(1);
+        let mut random = Random::named(1, &[]);
         let draws: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
         let mean = draws.iter().sum::<f64>() / draws.len() as f64;
         let variance = draws.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>() / draws.len() as f64;

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{failure, sapwise};
+use common::{failure, sapwise, success};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -163,4 +163,51 @@ fn train_refuses_what_is_no_report() {
     let complaint = failure(sapwise().arg("train").arg(&empty).arg("--out").arg(&out), 1);
     assert!(complaint.contains("no *.json"), "{complaint}");
     assert!(!out.exists());
+}
+
+#[test]
+fn the_published_cards_are_sound_and_told_to_be_published() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../datasets/published");
+    let cards: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    assert_eq!(cards.len(), 3);
+    let (status, findings) = check(&cards);
+    assert_eq!(status, 0, "{findings:?}");
+    for finding in findings {
+        assert_eq!((&finding["sound"], &finding["applicable"]), (&true.into(), &false.into()), "{finding}");
+        let notes = finding["notes"].as_array().unwrap();
+        assert!(notes.iter().any(|n| n.as_str().unwrap().starts_with("published parameters")), "{finding}");
+        assert!(!finding.to_string().contains("measured"), "{finding}");
+    }
+    let out = tempfile::tempdir().unwrap();
+    let complaint = failure(sapwise().args(["train", "--out"]).arg(out.path().join("m.json")).args(&cards), 1);
+    assert!(complaint.contains("published parameters, without timings"), "{complaint}");
+}
+
+#[test]
+fn simulated_machines_train_apart_and_are_told_to_be_simulated() {
+    let folder = tempfile::tempdir().unwrap();
+    let specifications = Path::new(env!("CARGO_MANIFEST_DIR")).join("../datasets/simulated/specifications.json");
+    let machines = folder.path().join("machines");
+    let mut simulate = sapwise();
+    simulate.arg("simulate").arg(specifications).args(["--machines", "2", "--json", "--out"]).arg(&machines);
+    let answer: Value = serde_json::from_str(&success(&mut simulate)).unwrap();
+    let files: Vec<PathBuf> = answer["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap().into()).collect();
+    assert_eq!(files.len(), 2);
+    let (status, findings) = check(&files);
+    let told =
+        |f: &Value| f["notes"].as_array().unwrap().iter().any(|n| n.as_str().unwrap().contains("no evidence of accuracy"));
+    assert!(status == 0 && findings.iter().all(told), "{findings:?}");
+    let model = folder.path().join("model.json");
+    let train = |words: &[&str]| {
+        let mut command = sapwise();
+        command.arg("train").arg(&machines).args(words).arg("--out").arg(&model);
+        command
+    };
+    let complaint = failure(&mut train(&[]), 1);
+    assert!(complaint.contains("--simulated") && !model.exists(), "{complaint}");
+    success(&mut train(&["--simulated"]));
+    let (status, findings) = check(std::slice::from_ref(&model));
+    assert!(status == 0 && told(&findings[0]), "{findings:?}");
+    let predicted = success(sapwise().args(["predict", "--json", "--report"]).arg(&files[0]).arg("--model").arg(&model));
+    assert!(predicted.contains("trained on simulated machines"), "{predicted}");
 }

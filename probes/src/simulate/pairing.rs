@@ -60,6 +60,8 @@ impl<'a> Build<'a> {
         let mut random = Random::named(seed, &[&cpu.name, "GPUs", &again.to_string()]);
         let many = match (random.uniform(), inside) {
             _ if cards.is_empty() => 0,
+            // A laptop has room for one card.
+            (draw, _) if cpu.form == Form::Laptop => usize::from(draw >= 0.5),
             (draw, Some(_)) => usize::from(draw >= 0.5),
             (draw, None) => (draw >= 0.25) as usize + (draw >= 0.75) as usize,
         };

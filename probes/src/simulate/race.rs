@@ -9,7 +9,7 @@ use sapwise::{AlgorithmId, Load, Scenario};
 
 /// Samples of a point in all, so that the report of a machine with many cores is no larger than that of others. As a real sweep
 /// has them: its time is shared by the algorithms.
-const SAMPLES: usize = 200;
+const SAMPLES: usize = 160;
 /// Bounds of the frames of a point: the fewest that a real point of a quick sweep has, and half of the most.
 const FRAMES: std::ops::RangeInclusive<usize> = 5..=20;
 /// A clock ticks in so many nanoseconds.

@@ -35,7 +35,8 @@ pub(crate) fn learning(profiles: &[Profile]) -> Result<Vec<Learning>> {
     let mut turns = Turns::new(SEED);
     let mut course = Vec::new();
     for count in MACHINES.into_iter().filter(|&k| k <= machines.len()) {
-        let subsets = LEFT_OUT.div_ceil(count);
+        // There is one subset of all.
+        let subsets = if count == machines.len() { 1 } else { LEFT_OUT.div_ceil(count) };
         let mut sums: Vec<(String, f64)> = Vec::new();
         for _ in 0..subsets {
             let chosen: Vec<&str> = turns.order(machines.len())[..count].iter().map(|&k| machines[k]).collect();

@@ -14,6 +14,7 @@ mod rows;
 #[cfg(test)]
 mod synthetic;
 mod terms;
+mod triangle;
 mod validate;
 
 use anyhow::{Result, bail};

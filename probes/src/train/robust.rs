@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn noise_does_not_pull_the_fit_down() {
-        let mut random = Random::new(3);
+        let mut random = Random::named(3, &[]);
         let mut noisy = line(|n| 3.0 * n);
         noisy.ns.iter_mut().for_each(|t| *t *= (0.3 * random.normal()).exp());
         let modelled = noisy.terms.dot(&Array1::from(noisy.units()));

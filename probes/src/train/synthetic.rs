@@ -130,7 +130,7 @@ impl Machine {
     /// the best leaves the race, on a GPU only whoever doesn't gain.
     pub(crate) fn report(&self) -> Report {
         let hardware = self.hardware();
-        let mut random = Random::new(u64::from(self.cores) * 1000 + self.ghz.to_bits() % 997);
+        let mut random = Random::named(u64::from(self.cores) * 1000 + self.ghz.to_bits() % 997, &[]);
         let threads = (0..).map(|k| 1 << k).take_while(|&k| k < self.cores).chain([self.cores]);
         let methods = truth();
         let on_gpus = gpu_truth();

@@ -108,7 +108,7 @@ impl Here {
         finding.notes.extend(other_gpus);
         let cpu = &report.hardware.machine.cpu;
         finding.notes.push(match report.label {
-            Label::Simulated => format!("simulated, no evidence of accuracy: {cpu}"),
+            Label::Simulated => format!("simulated: no evidence of accuracy; {cpu}"),
             Label::Published => format!("published parameters without timings, `train` refuses them: {cpu}"),
             _ if same => "measured on a machine like this one".to_owned(),
             _ => format!("measured on another machine: {cpu}"),
