@@ -63,7 +63,7 @@ impl<'a> Build<'a> {
             // A laptop has room for one card.
             (draw, _) if cpu.form == Form::Laptop => usize::from(draw >= 0.5),
             (draw, Some(_)) => usize::from(draw >= 0.5),
-            (draw, None) => (draw >= 0.25) as usize + (draw >= 0.75) as usize,
+            (draw, None) => usize::from(draw >= 0.25) + usize::from(draw >= 0.75),
         };
         let card = cards.get((random.uniform() * cards.len() as f64) as usize);
         let gpus = card.into_iter().cycle().take(many).copied().chain(inside).collect();
