@@ -99,7 +99,7 @@ fn the_cards_hold_the_figures_of_the_paper_and_nothing_else() {
                         assert!(p.source.contains("ISVRI 2011"), "{file}: {name}: {}", p.source);
                     }
                     None => {
-                        assert!(p.value.is_none() && p.how == How::Missing && !p.source.is_empty(), "{file}: {}", p.name)
+                        assert!(p.value.is_none() && p.how == How::Missing && !p.source.is_empty(), "{file}: {}", p.name);
                     }
                 }
             }
