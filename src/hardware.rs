@@ -64,7 +64,7 @@ pub struct Parameter {
     pub spoiled: u32,
     /// Highest share of the CPU, 0 to 1, that other programs took during the samples kept. `None` when it can't be told.
     pub foreign_load: Option<f64>,
-    /// Whether the figure was measured, reported by the system, or is missing.
+    /// Whether the figure was measured, reported by the system, printed somewhere, or is missing.
     pub how: How,
     /// The method of a measurement, the interface of a report, or why the figure is missing.
     pub source: String,
@@ -87,6 +87,8 @@ pub enum How {
     Measured,
     /// Told by the operating system, the CPU or a driver.
     Reported,
+    /// Printed in a paper or by a vendor; the source says where, and in which units.
+    Published,
     /// Not known; the source says why.
     Missing,
 }

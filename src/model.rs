@@ -169,6 +169,12 @@ impl Model {
         crate::json::model(include_str!("../models/default.json"))
     }
 
+    /// Whether a report behind it is simulated, which makes its predictions no evidence of anything.
+    #[must_use]
+    pub fn is_simulated(&self) -> bool {
+        self.trained_on.iter().any(|t| t.label == crate::report::Label::Simulated)
+    }
+
     /// What makes this model unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<String> {

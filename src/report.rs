@@ -46,6 +46,8 @@ pub enum Label {
     RealSoftwareGpu,
     /// Made up from a specification. Never evidence of accuracy.
     Simulated,
+    /// Parameters from a publication, without timings.
+    Published,
 }
 
 /// How a report was made.

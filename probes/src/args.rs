@@ -29,6 +29,7 @@ pub(crate) enum Verb {
     Pairs(Pairs),
     Check(Check),
     Compare(Compare),
+    Simulate(Simulate),
     Schema(Schema),
     #[command(hide = true)]
     Part(Part),
@@ -203,6 +204,10 @@ pub(crate) struct Train {
     /// Reports, or folders whose *.json files are reports.
     #[arg(required = true, value_name = "R.json")]
     pub(crate) reports: Vec<PathBuf>,
+    /// Train on simulated reports only. Real ones are left out, as simulated ones are without this option, so that the two are never
+    /// mixed. `predict` warns of a model that was made so.
+    #[arg(long)]
+    pub(crate) simulated: bool,
     /// Where the model goes.
     #[arg(long, value_name = "M.json")]
     pub(crate) out: PathBuf,
@@ -270,6 +275,32 @@ pub(crate) struct Compare {
     #[arg(long)]
     pub(crate) steady: bool,
     /// One JSON object on standard output instead of tables.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Makes reports of simulated machines from published specifications of CPUs and GPUs.
+///
+/// Their timings come from a cost model with factors that no report holds. They serve to test the training and to see how accuracy
+/// grows with the number of machines; they are no evidence of how fast any machine is.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  sapwise simulate datasets/simulated/specifications.json --out simulated --machines 24")]
+pub(crate) struct Simulate {
+    /// The specifications.
+    #[arg(value_name = "SPECIFICATIONS.json")]
+    pub(crate) specifications: PathBuf,
+    /// The folder that the reports go to; made when it is not there.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// How many machines. Without this option one for each CPU.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(crate) machines: Option<u32>,
+    /// Seed of the pairing, of the hidden factors, of the scenes and of the noise.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// One JSON object on standard output instead of text.
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -1,5 +1,6 @@
 //! The card of a model: what it was trained on and how well it did.
 
+use crate::train::Learning;
 use sapwise::model::{MethodModel, Validation};
 use sapwise::{BackendClass, Model};
 
@@ -29,9 +30,18 @@ their rates, no more than what the group was measured to gain. Timings on progra
 real GPU in the training, and a prediction for a kind of GPU that was not in it says so.
 ";
 
+/// Of a model that was trained on simulated machines, before [`USE`].
+const SIMULATED: &str = "
+**Trained on simulated machines**, whose timings a cost model made up: nothing here is evidence of how well a prediction does on a
+real machine, and `predict` warns of it.
+";
+
 /// The card as a page of Markdown.
-pub(crate) fn page(model: &Model, notes: &[String]) -> String {
+pub(crate) fn page(model: &Model, notes: &[String], learning: &[Learning]) -> String {
     let mut text = format!("# The model {}\n\nMade by `sapwise train`; this page is generated with it.\n", model.name);
+    if model.is_simulated() {
+        text.push_str(SIMULATED);
+    }
     text.push_str(USE);
     let on_gpus: Vec<&MethodModel> = model.methods.iter().filter(|m| m.backend == BackendClass::Gpu).collect();
     text.push_str(&gpus(&on_gpus));
@@ -43,6 +53,9 @@ pub(crate) fn page(model: &Model, notes: &[String]) -> String {
     }
     text.push_str("\n## Validation\n\n");
     text.push_str(&scores(&model.validation, markdown));
+    if !learning.is_empty() {
+        text.push_str(&format!("\n## Number of machines\n\n{}", course(learning, markdown)));
+    }
     text.push_str("\n## Ranges\n\nA machine outside is extrapolated, and `predict` says so.\n\n");
     let mut rows = vec![["parameter", "lowest", "highest"].map(str::to_owned).to_vec()];
     for range in &model.ranges {
@@ -85,6 +98,23 @@ pub(crate) fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> S
         [vec![m.name.clone()], figures.to_vec()].concat()
     }));
     format!("{data}; each {held_out} left out in turn.{doubt}\n\n{}", draw(&rows))
+}
+
+/// How accuracy grows with the number of simulated machines, as a table that `draw` draws.
+pub(crate) fn course(learning: &[Learning], draw: impl Fn(&[Vec<String>]) -> String) -> String {
+    let names = learning.first().map_or(&[][..], |l| &l.mean_regrets);
+    let head = ["way to choose".to_owned()].into_iter().chain(learning.iter().map(|l| format!("{} machines", l.machines)));
+    let mut rows = vec![head.collect::<Vec<_>>()];
+    rows.extend(names.iter().map(|(name, _)| {
+        let of = |l: &Learning| l.mean_regrets.iter().find(|r| r.0 == *name).map(|r| format!("{:.1} %", r.1 * 100.0));
+        [name.clone()].into_iter().chain(learning.iter().map(|l| of(l).unwrap_or_default())).collect()
+    }));
+    let subsets: Vec<String> = learning.iter().map(|l| l.subsets.to_string()).collect();
+    format!(
+        "Simulated: mean regret in random subsets of the machines ({} subsets), each machine left out in turn.\n\n{}",
+        subsets.join(", "),
+        draw(&rows)
+    )
 }
 
 /// Rows as a Markdown table, the first its head.

@@ -62,7 +62,11 @@ fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
-fn read_text(path: &Path) -> anyhow::Result<String> {
+/// Reads a text file of ours.
+///
+/// # Errors
+/// Names the file, and why it can't be read.
+pub(crate) fn read_text(path: &Path) -> anyhow::Result<String> {
     let shown = path.display();
     let file = File::open(path).with_context(|| format!("{shown} can't be opened"))?;
     if file.metadata().with_context(|| format!("{shown} can't be read"))?.is_dir() {

@@ -40,17 +40,25 @@ pub(crate) fn predict(
 /// The load of a scenario over the number of objects, with the pairs that it really has.
 ///
 /// # Errors
-/// When the pairs can't be found, for want of memory, and on Ctrl-C.
+/// As [`loads`].
 pub(crate) fn slice(scenario: Scenario) -> anyhow::Result<Vec<Load>> {
+    let sizes: Vec<u32> = SLICE.map(|quarter| 10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32).collect();
+    loads(scenario, &sizes, SEED)
+}
+
+/// The load of a scenario's second frame at each of some sizes, with the pairs that it really has.
+///
+/// # Errors
+/// When the pairs can't be found, for want of memory, and on Ctrl-C.
+pub(crate) fn loads(scenario: Scenario, sizes: &[u32], seed: u64) -> anyhow::Result<Vec<Load>> {
     let registry = Registry::with_cores(1);
     let mut counter = registry.create(&"strips@cpu1".parse()?)?;
     let mut pairs = Pairs::new();
     let mut displacement = Displacement::default();
     let mut loads = Vec::new();
-    for quarter in SLICE {
+    for &objects in sizes {
         crate::interrupt::check()?;
-        let objects = 10.0_f64.powf(f64::from(quarter) / 4.0).round() as usize;
-        let mut scene = scenario.start(objects, SEED);
+        let mut scene = scenario.start(objects as usize, seed);
         displacement.watch(scene.boxes());
         crate::sweep::next_frame(&mut scene);
         counter

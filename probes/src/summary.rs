@@ -91,6 +91,7 @@ fn parameters(parameters: &[Parameter]) -> String {
         let how = match p.how {
             How::Measured => format!("measured, {} samples{disturbed}", p.samples),
             How::Reported => "reported".to_owned(),
+            How::Published => "published".to_owned(),
             How::Missing => format!("missing: {}", p.source),
         };
         rows.push(vec![name, p.value.map_or("-".to_owned(), |v| value(&p.name, v)), spread, how]);
@@ -151,6 +152,7 @@ fn label(label: Label) -> &'static str {
         Label::RealContended => "real_contended: other programs took part of the machine",
         Label::RealSoftwareGpu => "real_software_gpu: the GPU is a program on the CPU",
         Label::Simulated => "simulated: made up from a specification",
+        Label::Published => "published: parameters from a publication, without timings",
     }
 }
 

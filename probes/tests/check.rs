@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{failure, sapwise};
+use common::{failure, sapwise, success};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -80,7 +80,7 @@ fn sound_files_pass() {
     assert!(findings.iter().all(|f| f["sound"] == true && f["current"] == true), "{findings:?}");
     assert_eq!((&findings[0]["schema"], &findings[0]["applicable"]), (&"report/1".into(), &false.into()));
     assert_eq!((&findings[1]["schema"], &findings[1]["applicable"]), (&"fields/1".into(), &true.into()));
-    assert!(findings[0]["notes"].to_string().contains("another machine"), "{findings:?}");
+    assert!(findings[0]["notes"].to_string().contains("no evidence of accuracy"), "{findings:?}");
 }
 
 #[test]
@@ -313,4 +313,51 @@ fn suspicious_figures_are_notes_and_the_file_stays_good() {
     assert_eq!(told, [true, false]);
     let few: Vec<Case> = vec![("/points", json!([point(0.3), point(0.01), point(0.01), point(0.01)]), "")];
     assert!(!damaged(&few)[0]["notes"].to_string().contains("other programs"));
+}
+
+#[test]
+fn the_published_cards_are_sound_and_told_to_be_published() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../datasets/published");
+    let cards: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    assert_eq!(cards.len(), 3);
+    let (status, findings) = check(&cards);
+    assert_eq!(status, 0, "{findings:?}");
+    for finding in findings {
+        assert_eq!((&finding["sound"], &finding["applicable"]), (&true.into(), &false.into()), "{finding}");
+        let notes = finding["notes"].as_array().unwrap();
+        assert!(notes.iter().any(|n| n.as_str().unwrap().starts_with("published parameters")), "{finding}");
+        assert!(!finding.to_string().contains("measured"), "{finding}");
+    }
+    let out = tempfile::tempdir().unwrap();
+    let complaint = failure(sapwise().args(["train", "--out"]).arg(out.path().join("m.json")).args(&cards), 1);
+    assert!(complaint.contains("published parameters, without timings"), "{complaint}");
+}
+
+#[test]
+fn simulated_machines_train_apart_and_are_told_to_be_simulated() {
+    let folder = tempfile::tempdir().unwrap();
+    let specifications = Path::new(env!("CARGO_MANIFEST_DIR")).join("../datasets/simulated/specifications.json");
+    let machines = folder.path().join("machines");
+    let mut simulate = sapwise();
+    simulate.arg("simulate").arg(specifications).args(["--machines", "2", "--json", "--out"]).arg(&machines);
+    let answer: Value = serde_json::from_str(&success(&mut simulate)).unwrap();
+    let files: Vec<PathBuf> = answer["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap().into()).collect();
+    assert_eq!(files.len(), 2);
+    let (status, findings) = check(&files);
+    let told =
+        |f: &Value| f["notes"].as_array().unwrap().iter().any(|n| n.as_str().unwrap().contains("no evidence of accuracy"));
+    assert!(status == 0 && findings.iter().all(told), "{findings:?}");
+    let model = folder.path().join("model.json");
+    let train = |words: &[&str]| {
+        let mut command = sapwise();
+        command.arg("train").arg(&machines).args(words).arg("--out").arg(&model);
+        command
+    };
+    let complaint = failure(&mut train(&[]), 1);
+    assert!(complaint.contains("--simulated") && !model.exists(), "{complaint}");
+    success(&mut train(&["--simulated"]));
+    let (status, findings) = check(std::slice::from_ref(&model));
+    assert!(status == 0 && told(&findings[0]), "{findings:?}");
+    let predicted = success(sapwise().args(["predict", "--json", "--report"]).arg(&files[0]).arg("--model").arg(&model));
+    assert!(predicted.contains("trained on simulated machines"), "{predicted}");
 }

@@ -30,6 +30,12 @@ impl Model {
     /// A sentence, when no algorithm can be predicted.
     pub fn predict(&self, hardware: &Hardware, algorithms: &[(AlgorithmId, u32)]) -> Result<Prediction, String> {
         let mut p = Prediction { costs: Vec::new(), extrapolated: false, warnings: Vec::new() };
+        if self.is_simulated() {
+            p.warnings.push(format!(
+                "the model {} was trained on simulated machines: what it predicts is no evidence; train on real reports",
+                self.name
+            ));
+        }
         p.outside(self.ranges.iter().filter_map(|r| r.excess(&r.parameter, "", hardware.value(&r.parameter))));
         if self.ranges.is_empty() {
             p.outside([format!("the model {} does not say what it was trained on", self.name)]);

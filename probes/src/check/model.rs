@@ -18,6 +18,9 @@ impl Here {
         } else {
             "not trained on a machine like this one; `sapwise predict` measures whether it extrapolates here".to_owned()
         });
+        if model.is_simulated() {
+            finding.notes.push("trained on simulated machines: no evidence of accuracy".to_owned());
+        }
         let cores = usable_cores();
         let on_cpu = model.methods.iter().filter(|m| m.backend == BackendClass::Cpu);
         let most = on_cpu.map(|m| m.max_threads).max().unwrap_or(0);

@@ -30,15 +30,14 @@ impl Here {
         let other_gpus = if same { self.other_gpus(report) } else { Vec::new() };
         finding.applicable = Some(same && other_gpus.is_empty());
         finding.notes.extend(other_gpus);
-        finding.notes.push(if same {
-            "measured on a machine like this one".to_owned()
-        } else {
-            format!("measured on another machine: {}", report.hardware.machine.cpu)
+        let cpu = &report.hardware.machine.cpu;
+        finding.notes.push(match report.label {
+            Label::Simulated => format!("simulated: no evidence of accuracy; {cpu}"),
+            Label::Published => format!("published parameters without timings, `train` refuses them: {cpu}"),
+            _ if same => "measured on a machine like this one".to_owned(),
+            _ => format!("measured on another machine: {cpu}"),
         });
-        if report.label == Label::Simulated {
-            finding.notes.push("simulated: no evidence of accuracy".to_owned());
-        }
-        if !report.provenance.optimised {
+        if !report.provenance.optimised && report.label != Label::Published {
             finding.notes.push("measured by a build without optimisation: `train` refuses it".to_owned());
         }
         // Days as text are in the order of the calendar. A clock may be wrong, so this is no problem.

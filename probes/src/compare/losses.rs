@@ -1,7 +1,8 @@
 //! What is lost by using the fields that one report measured under the timings of another.
 
-use crate::train::{Chooser, Profile, available, average, by_costs, measured_costs, regrets, usable};
+use crate::train::{Chooser, Evidence, Profile, available, average, by_costs, measured_costs, regrets, usable};
 use sapwise::Report;
+use sapwise::report::Label;
 use serde::Serialize;
 
 /// Mean regrets over the points of reports, against the best at each point.
@@ -17,10 +18,15 @@ pub(crate) struct Losses {
     pub(crate) beyond_own_most: f64,
 }
 
+/// A simulated report is compared like a real one.
+fn evidence(report: &Report) -> Evidence {
+    if report.label == Label::Simulated { Evidence::Simulated } else { Evidence::Real }
+}
+
 /// `None` with fewer than two reports that hold usable timings.
 pub(super) fn losses(reports: &[(String, Report)]) -> Option<Losses> {
     // One by one: together, a repeated report would be left out.
-    let profiles: Vec<Profile> = reports.iter().flat_map(|r| usable(std::slice::from_ref(r)).0).collect();
+    let profiles: Vec<Profile> = reports.iter().flat_map(|r| usable(std::slice::from_ref(r), evidence(&r.1)).0).collect();
     if profiles.len() < 2 {
         return None;
     }

@@ -11,6 +11,7 @@ mod scenario;
 mod verify;
 
 pub(crate) use conduct::{Conditions, Found, conduct};
+pub(crate) use dropout::Standing;
 pub(crate) use order::{Course, Event, Order, Visit};
 pub(crate) use plan::Plan;
 pub(crate) use scenario::{next_frame, sweep};

@@ -5,6 +5,7 @@ mod columns;
 mod curve;
 mod direct;
 mod fit;
+mod learning;
 mod model;
 mod nnls;
 mod residual;
@@ -13,6 +14,7 @@ mod rows;
 #[cfg(test)]
 pub(crate) mod synthetic;
 mod terms;
+mod triangle;
 mod validate;
 
 use anyhow::{Result, bail};
@@ -22,6 +24,7 @@ use sapwise::{GpuKind, Hardware, Model, Report};
 
 pub(crate) use baselines::{Chooser, available, average, by_costs, regrets, slice_scenario};
 pub(crate) use curve::{measured_costs, measured_fields};
+pub(crate) use learning::Learning;
 pub(crate) use rows::{Profile, medians, usable};
 
 /// Parameters by which the CPU of a machine is compared with those of the training.
@@ -59,6 +62,15 @@ fn figure(hardware: &Hardware, name: &str) -> Option<f64> {
     }
 }
 
+/// Which reports are trained on. The two kinds are never mixed: a simulated machine shows what the cost model that made it says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Evidence {
+    /// Those of real machines.
+    Real,
+    /// Those of simulated ones.
+    Simulated,
+}
+
 /// A model and what has to be said about it.
 #[derive(Debug, Clone)]
 pub(crate) struct Trained {
@@ -66,28 +78,38 @@ pub(crate) struct Trained {
     pub(crate) model: Model,
     /// In sentences, what was left out and why, and what the validation does not say.
     pub(crate) notes: Vec<String>,
+    /// How well subsets of the machines did, of simulated ones only.
+    pub(crate) learning: Vec<Learning>,
 }
 
 /// Fits the model called `name` to reports, given with their file names without folders, and validates it.
 ///
-/// Simulated reports, those of unoptimised builds and repeated ones are left out, and so are timings of revisions that are
-/// not the newest of their method. The file names stand in the model; the order of the reports matters for one baseline
+/// Reports of the other evidence, those without timings, of unoptimised builds and repeated ones are left out, and so are timings of
+/// revisions that are not the newest of their method. The file names stand in the model; the order of the reports matters for one baseline
 /// only, which takes the first one left in training for the default machine.
 ///
 /// # Errors
 /// When no report can be used, with the reason for each and what to do; when no method can be fitted.
-pub(crate) fn train(reports: &[(String, Report)], name: &str) -> Result<Trained> {
-    let (profiles, mut notes) = usable(reports);
+pub(crate) fn train(reports: &[(String, Report)], name: &str, evidence: Evidence) -> Result<Trained> {
+    let (profiles, mut notes) = usable(reports, evidence);
     if profiles.is_empty() {
         let why = if notes.is_empty() { "none was given".to_owned() } else { notes.join("; ") };
-        bail!("no report can be trained on: {why}; measure one with `sapwise probe --out R.json` of a release build");
+        let next = match evidence {
+            Evidence::Real => "measure one with `sapwise probe --out R.json` of a release build",
+            Evidence::Simulated => "make some with `sapwise simulate`",
+        };
+        bail!("no report can be trained on: {why}; {next}");
     }
     let (mut model, left_out) = model::model(&profiles.iter().collect::<Vec<_>>(), name)?;
     notes.extend(left_out);
     let (validation, limits) = validate::validate(&profiles)?;
     model.validation = validation;
     notes.extend(limits);
-    Ok(Trained { model, notes })
+    let learning = match evidence {
+        Evidence::Real => Vec::new(),
+        Evidence::Simulated => learning::learning(&profiles)?,
+    };
+    Ok(Trained { model, notes, learning })
 }
 
 #[cfg(test)]
@@ -102,7 +124,7 @@ mod tests {
 
     #[test]
     fn a_model_is_the_same_after_json_and_knows_its_ranges() {
-        let trained = train(&reports(), "test").unwrap();
+        let trained = train(&reports(), "test", Evidence::Real).unwrap();
         let text = json::write(&trained.model).unwrap();
         assert_eq!(json::model(&text).unwrap(), trained.model);
         assert_eq!(trained.model.ranges.len(), PARAMETERS.len());
@@ -115,7 +137,7 @@ mod tests {
         let machines = Machine::family_with_gpus();
         let reports: Vec<(String, Report)> =
             machines[..3].iter().map(|m| (format!("{}.json", m.name), m.report())).collect();
-        let model = train(&reports, "test").unwrap().model;
+        let model = train(&reports, "test", Evidence::Real).unwrap().model;
         assert_eq!(json::model(&json::write(&model).unwrap()).unwrap(), model);
         let range = model.ranges.iter().find(|r| r.parameter == "gpu/upload_rate_gb_per_s").unwrap();
         assert_eq!((range.min, range.max), (5.0, 24.0));
@@ -129,7 +151,7 @@ mod tests {
 
     #[test]
     fn one_report_gives_a_model_without_scores() {
-        let trained = train(&reports()[..1], "test").unwrap();
+        let trained = train(&reports()[..1], "test", Evidence::Real).unwrap();
         assert_eq!(trained.model.methods.len(), 4);
         assert!(trained.model.validation.methods.is_empty());
     }
@@ -139,7 +161,7 @@ mod tests {
         let mut report = reports().remove(0);
         report.1.provenance.optimised = false;
         for reports in [vec![], vec![report]] {
-            let error = train(&reports, "test").unwrap_err().to_string();
+            let error = train(&reports, "test", Evidence::Real).unwrap_err().to_string();
             assert!(error.contains("sapwise probe --out"), "{error}");
         }
     }

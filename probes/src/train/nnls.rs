@@ -1,5 +1,6 @@
 //! Least squares with coefficients that are not negative.
 
+use super::triangle::triangle;
 use ndarray::{Array1, Array2, ArrayView1};
 
 /// The share of a column that must not lie in the span of the others before it may join them.
@@ -20,6 +21,7 @@ pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
             column /= length;
         }
     }
+    let (scaled, b) = &triangle(scaled, b);
     let tolerance = 1e-12 * b.dot(b).sqrt();
     let mut x = Array1::<f64>::zeros(columns);
     let mut active: Vec<usize> = Vec::new();
@@ -29,12 +31,12 @@ pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
         let gradient = scaled.t().dot(&(b - &scaled.dot(&x)));
         let Some(best) = steepest(&gradient, &active, &barred, tolerance) else { break };
         active.push(best);
-        let Some(solution) = solve(&scaled, b, &active).filter(|z| z[z.len() - 1] > 0.0) else {
+        let Some(solution) = solve(scaled, b, &active).filter(|z| z[z.len() - 1] > 0.0) else {
             active.pop();
             barred[best] = true;
             continue;
         };
-        if retreat(&scaled, b, solution, &mut active, &mut x) {
+        if retreat(scaled, b, solution, &mut active, &mut x) {
             barred = lengths.iter().map(|&l| l == 0.0).collect();
         }
     }
@@ -118,7 +120,7 @@ fn length(v: ArrayView1<'_, f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::synthetic::Random;
+    use crate::random::Random;
     use ndarray::array;
 
     #[test]
@@ -142,7 +144,7 @@ mod tests {
 
     #[test]
     fn random_problems_meet_the_conditions_of_optimality() {
-        let mut random = Random::new(7);
+        let mut random = Random::named(7, &[]);
         for _ in 0..200 {
             let a = Array2::from_shape_fn((12, 5), |_| random.normal());
             let b = Array1::from_shape_fn(12, |_| random.normal());

@@ -1,6 +1,7 @@
 //! What the physical terms leave unexplained: a ridge regression on a few features.
 
 use super::columns::Columns;
+use super::triangle::triangle;
 use anyhow::{Context, Result};
 use linfa::DatasetBase;
 use linfa::traits::Fit;
@@ -106,21 +107,25 @@ impl Residuals {
 fn weighted_ridge(x: &Array2<f64>, y: &Array1<f64>, weights: &[f64], penalty: f64) -> Result<ElasticNet<f64>> {
     let mean = weights.iter().sum::<f64>() / weights.len() as f64;
     let roots = Array1::from_iter(weights.iter().map(|w| (w / mean).sqrt()));
-    let data = DatasetBase::new(x * &roots.view().insert_axis(Axis(1)), y * &roots);
+    let (x, y) = triangle(x * &roots.view().insert_axis(Axis(1)), &(y * &roots));
+    // linfa takes the mean over the rows, of which there are fewer now.
+    let fewer = (y.len() as f64 / weights.len() as f64).sqrt();
+    let data = DatasetBase::new(x * fewer, y * fewer);
     let ridge = ElasticNet::<f64>::params().l1_ratio(0.0).penalty(penalty).with_intercept(false);
     ridge.tolerance(1e-10).max_iterations(ITERATIONS).fit(&data).context("the ridge regression of the residual failed")
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Machine, Random, truth};
+    use super::super::synthetic::{Machine, truth};
     use super::*;
+    use crate::random::Random;
     use linfa::traits::Predict;
     use sapwise::model::{MethodModel, ModelTerm, Scale};
     use sapwise::{Backend, BackendClass, Load, Term};
 
     fn residuals(rows: usize) -> Residuals {
-        let mut random = Random::new(11);
+        let mut random = Random::named(11, &[]);
         let features = Array2::from_shape_fn((rows, 4), |(k, j)| {
             let octaves = 4.0 + (k % 13) as f64;
             [octaves, octaves * octaves, [2.0, 3.0, 4.0][k % 3], (k % 4) as f64][j]

@@ -145,7 +145,7 @@ mod tests {
         assert_eq!(weighted_median(vec![(1.0, 1.0), (2.0, 1.0)]), Some(1.5));
         assert!(weighted_median(vec![(1.0, 9.0), (2.0, 1.0)]).unwrap() <= 1.1);
     }
-    use crate::train::synthetic::Random;
+    use crate::random::Random;
 
     fn line(ns: impl Fn(f64) -> f64) -> Problem {
         let n = |k: usize| 2.0_f64.powf(4.0 + 0.5 * k as f64);
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn noise_does_not_pull_the_fit_down() {
-        let mut random = Random::new(3);
+        let mut random = Random::named(3, &[]);
         let mut noisy = line(|n| 3.0 * n);
         noisy.ns.iter_mut().for_each(|t| *t *= (0.3 * random.normal()).exp());
         let modelled = noisy.terms.dot(&Array1::from(noisy.units()));

@@ -4,6 +4,7 @@ use sapwise::report::{Label, Point, Report, Timing};
 use sapwise::{AlgorithmId, BackendClass, Load};
 use std::collections::BTreeMap;
 
+use super::Evidence;
 use crate::sweep::median;
 
 /// A report of which only usable timings are left.
@@ -37,11 +38,11 @@ const FEWEST_SAMPLES: usize = 3;
 const LEFT_BEHIND: f64 = 2.0;
 
 /// The reports that can be trained on, and what was left out and why.
-pub(crate) fn usable(reports: &[(String, Report)]) -> (Vec<Profile>, Vec<String>) {
+pub(crate) fn usable(reports: &[(String, Report)], evidence: Evidence) -> (Vec<Profile>, Vec<String>) {
     let mut notes = Vec::new();
     let mut kept: Vec<(&String, &Report)> = Vec::new();
     for (file, report) in reports {
-        let refusal = refusal(report).or_else(|| {
+        let refusal = refusal(report, evidence).or_else(|| {
             let twin = kept.iter().find(|(_, r)| r.hardware == report.hardware && r.points == report.points)?;
             Some(format!("holds the same measurement as {}", twin.0))
         });
@@ -68,9 +69,19 @@ pub(crate) fn usable(reports: &[(String, Report)]) -> (Vec<Profile>, Vec<String>
     (profiles, notes)
 }
 
-fn refusal(report: &Report) -> Option<String> {
-    if report.label == Label::Simulated {
-        return Some("is simulated, which is no evidence of how fast a machine is".to_owned());
+fn refusal(report: &Report, evidence: Evidence) -> Option<String> {
+    match (report.label, evidence) {
+        (Label::Published, _) => return Some("holds published parameters, without timings".to_owned()),
+        (Label::Simulated, Evidence::Real) => {
+            let why =
+                "is simulated, which is no evidence of how fast a machine is; `train --simulated` takes such reports alone";
+            return Some(why.to_owned());
+        }
+        (Label::Simulated, Evidence::Simulated) => {}
+        (_, Evidence::Simulated) => {
+            return Some("is of a real machine, and with --simulated only simulated ones are trained on".to_owned());
+        }
+        (_, Evidence::Real) => {}
     }
     if !report.provenance.optimised {
         return Some(
@@ -175,16 +186,29 @@ mod tests {
     }
 
     #[test]
-    fn simulated_unoptimised_empty_and_repeated_reports_are_told() {
+    fn simulated_published_unoptimised_empty_and_repeated_reports_are_told() {
         let good = Machine::family()[0].report();
-        let (mut simulated, mut debug, mut empty) = (good.clone(), good.clone(), good.clone());
+        let [mut simulated, mut published, mut debug, mut empty] = [(); 4].map(|()| good.clone());
         simulated.label = Label::Simulated;
+        published.label = Label::Published;
         debug.provenance.optimised = false;
         empty.points.clear();
-        let (profiles, notes) = usable(&[simulated, debug, empty, good.clone(), good].map(named));
+        let (profiles, notes) = usable(&[simulated, published, debug, empty, good.clone(), good].map(named), Evidence::Real);
         assert_eq!(profiles.len(), 1);
-        let told = ["simulated", "unoptimised", "--hardware-only", "the same measurement"];
-        assert!(told.iter().all(|t| notes.iter().any(|n| n.contains(t))) && notes.len() == 4, "{notes:?}");
+        let told = ["simulated", "published", "unoptimised", "--hardware-only", "the same measurement"];
+        assert!(told.iter().all(|t| notes.iter().any(|n| n.contains(t))) && notes.len() == 5, "{notes:?}");
+    }
+
+    #[test]
+    fn real_and_simulated_reports_are_never_mixed() {
+        let [real, mut simulated] = [0, 1].map(|k| Machine::family()[k].report());
+        simulated.label = Label::Simulated;
+        let both = [named(real), ("b.json".to_owned(), simulated)];
+        for (evidence, kept, told) in [(Evidence::Real, 0, "b.json"), (Evidence::Simulated, 1, "a.json")] {
+            let (profiles, notes) = usable(&both, evidence);
+            assert!(profiles.len() == 1 && profiles[0].file == both[kept].0, "{evidence:?}");
+            assert!(notes.len() == 1 && notes[0].starts_with(told) && notes[0].contains("--simulated"), "{notes:?}");
+        }
     }
 
     #[test]
@@ -196,7 +220,7 @@ mod tests {
         old.points[0].timings[1].samples_ns.truncate(2);
         let before = old.points[0].timings.len();
         let strips = old.points[0].timings.iter().filter(|t| t.algorithm.method() == "strips").count();
-        let (profiles, notes) = usable(&[named(old), named(newer)]);
+        let (profiles, notes) = usable(&[named(old), named(newer)], Evidence::Real);
         assert!(profiles[0].report.algorithms.iter().all(|t| t.id.method() != "strips"));
         let stale = profiles[1].report.algorithms.iter().filter(|t| t.id.method() == "strips").count();
         assert!(stale > 0 && notes.iter().all(|n| n.contains("revision")), "{notes:?}");

@@ -1,6 +1,7 @@
 //! Made-up machines whose costs are known exactly. TEST DATA: the reports carry a real label because training leaves
 //! simulated ones out, so none of them may leave this module's tests.
 
+use crate::random::Random;
 use sapwise::hardware::gpu::parameter as of_gpu;
 use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, parameter};
 use sapwise::model::{MethodModel, ModelTerm, Scale};
@@ -129,7 +130,7 @@ impl Machine {
     /// the best leaves the race, on a GPU only whoever doesn't gain.
     pub(crate) fn report(&self) -> Report {
         let hardware = self.hardware();
-        let mut random = Random::new(u64::from(self.cores) * 1000 + self.ghz.to_bits() % 997);
+        let mut random = Random::named(u64::from(self.cores) * 1000 + self.ghz.to_bits() % 997, &[]);
         let threads = (0..).map(|k| 1 << k).take_while(|&k| k < self.cores).chain([self.cores]);
         let methods = truth();
         let on_gpus = gpu_truth();
@@ -325,25 +326,4 @@ pub(crate) fn truth() -> Vec<MethodModel> {
             ],
         ),
     ]
-}
-
-/// SplitMix64, with normal deviates from twelve uniform ones.
-pub(crate) struct Random(u64);
-
-impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    pub(crate) fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
 }

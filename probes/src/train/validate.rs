@@ -164,6 +164,7 @@ fn scores(all: &[Regrets]) -> Vec<MethodScore> {
 mod tests {
     use super::super::synthetic::Machine;
     use super::*;
+    use crate::simulate;
 
     fn profiles(machines: Vec<Machine>) -> Vec<Profile> {
         machines.into_iter().map(|m| Profile { file: format!("{}.json", m.name), report: m.report() }).collect()
@@ -187,6 +188,21 @@ mod tests {
         for m in &validation.methods {
             assert!(m.mean_regret >= 0.0 && m.p95_regret >= m.mean_regret && m.closed_gap <= 1.0, "{m:?}");
         }
+    }
+
+    #[test]
+    fn a_dozen_simulated_machines_predict_those_left_out_better_than_the_nearest_one_does() {
+        let loads = simulate::Loads::of_a_sweep(1, Some(30_000)).unwrap();
+        let reports = simulate::simulate(&simulate::of_the_repository(), 12, &loads, 1).unwrap();
+        let profiles: Vec<Profile> = reports.into_iter().map(|(file, report)| Profile { file, report }).collect();
+        let (validation, notes) = validate(&profiles).unwrap();
+        assert_eq!((validation.physical_machines, validation.held_out.as_str()), (12, "physical machine"));
+        assert!(validation.methods.iter().all(|m| m.mean_regret.is_finite() && m.mean_regret >= 0.0), "{validation:?}");
+        for other in ["nearest machine", SINGLE_BEST, "default machine"] {
+            assert!(mean(&validation, "physics + ridge") < mean(&validation, other), "{other} {validation:#?} {notes:?}");
+        }
+        // Their truth is no sum of the predictor's terms: one that is always right has seen it.
+        assert!(mean(&validation, "physics + ridge") > 0.005, "{validation:#?}");
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod predict;
 mod probe;
 mod run;
 mod schema;
+mod simulate;
 mod train;
 
 use crate::args::Verb;
@@ -32,6 +33,7 @@ pub(crate) fn run(verb: Verb) -> anyhow::Result<Outcome> {
         Verb::Pairs(arguments) => pairs::run(&arguments),
         Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments),
+        Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),
         Verb::Part(arguments) => part::run(arguments),
     }

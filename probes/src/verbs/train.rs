@@ -4,7 +4,7 @@ use crate::args::Train;
 use crate::document::read_reports;
 use crate::exit::{Outcome, WrongUsage};
 use crate::table::columns;
-use crate::train::{self, Trained};
+use crate::train::{self, Evidence, Learning, Trained};
 use crate::{card, files, output};
 use sapwise::Model;
 use sapwise::model::Validation;
@@ -18,22 +18,27 @@ struct Answer<'a> {
     /// Name of the model.
     model: &'a str,
     notes: &'a [String],
+    /// Mean regrets by the number of machines; of simulated ones only.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    simulated_learning: &'a [Learning],
 }
 
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
     let reports = read_reports(&arguments.reports)?;
-    let Trained { model, notes } = train::train(&reports, &name)?;
+    let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
+    let Trained { model, notes, learning } = train::train(&reports, &name, evidence)?;
     let text = sapwise::json::write(&model)?;
     files::write_text(&arguments.out, &text)?;
     if let Some(path) = &arguments.card {
-        let page = card::page(&model, &notes);
+        let page = card::page(&model, &notes, &learning);
         files::write_text(path, &page)?;
     }
     if arguments.json {
-        output::print_json(&Answer { validation: &model.validation, model: &model.name, notes: &notes })?;
+        let Model { validation, name, .. } = &model;
+        output::print_json(&Answer { validation, model: name, notes: &notes, simulated_learning: &learning })?;
     } else {
-        output::print(&summary(&model, &notes, &arguments.out))?;
+        output::print(&summary(&model, &notes, &learning, &arguments.out))?;
     }
     Ok(Outcome::Done)
 }
@@ -48,8 +53,11 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
     Ok(name)
 }
 
-fn summary(model: &Model, notes: &[String], path: &Path) -> String {
+fn summary(model: &Model, notes: &[String], learning: &[Learning], path: &Path) -> String {
     let mut text = card::scores(&model.validation, columns);
+    if !learning.is_empty() {
+        text.push_str(&format!("\n{}", card::course(learning, columns)));
+    }
     for note in notes {
         text.push_str(&format!("note: {note}\n"));
     }

@@ -1,0 +1,43 @@
+//! `sapwise simulate`: reports of machines that there are not, from published specifications.
+
+use crate::args::Simulate;
+use crate::document::read_text;
+use crate::exit::Outcome;
+use crate::simulate::{Loads, read, simulate};
+use crate::{files, output};
+use anyhow::Context;
+use serde::Serialize;
+
+/// The answer for machines.
+#[derive(Serialize)]
+struct Answer {
+    /// What was written.
+    files: Vec<String>,
+}
+
+pub(crate) fn run(arguments: &Simulate) -> anyhow::Result<Outcome> {
+    let path = &arguments.specifications;
+    let specifications = read(&read_text(path)?).with_context(|| format!("{} can't be used", path.display()))?;
+    let machines = arguments.machines.map_or(specifications.cpus.len(), |n| n as usize);
+    let loads = Loads::of_a_sweep(arguments.seed, None)?;
+    let reports = simulate(&specifications, machines, &loads, arguments.seed)?;
+    let folder = &arguments.out;
+    std::fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made", folder.display()))?;
+    let mut written = Vec::new();
+    for (name, report) in &reports {
+        let path = folder.join(format!("{name}.json"));
+        files::write_text(&path, &sapwise::json::write_report(report)?)?;
+        written.push(path.display().to_string());
+    }
+    if arguments.json {
+        output::print_json(&Answer { files: written })?;
+    } else {
+        let shown = folder.display();
+        output::print(&format!(
+            "{} simulated machines are in {shown}. They are no evidence of accuracy.\nNext: sapwise train --simulated {shown} --out \
+             simulated-model.json",
+            written.len()
+        ))?;
+    }
+    Ok(Outcome::Done)
+}
