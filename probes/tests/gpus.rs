@@ -118,7 +118,7 @@ fn without_an_adapter_one_sentence_says_so_and_everything_else_works() {
     assert_eq!(text.matches("GPU").count(), 1, "{text}");
     assert!(text.contains("No GPU was found; everything else works on the CPU."), "{text}");
     let report = report(without_adapters(&mut sapwise()).args(TINY));
-    assert!(report.hardware.gpus.is_empty() && report.remarks.is_empty(), "{:?}", report.remarks);
+    assert!(report.hardware.gpus.is_empty() && report.remarks == report.hardware.disturbed(), "{:?}", report.remarks);
 }
 
 #[test]
@@ -244,7 +244,8 @@ fn a_driver_that_crashes_costs_the_gpus_and_a_remark() {
     let predicted = answer(with_it().args(["predict", "--json"]));
     assert!(predicted["warnings"].to_string().contains("ended by signal 6"), "{predicted}");
     // No driver is loaded, so nothing crashes and nothing is said.
-    assert!(report(with_it().args(TINY).arg("--no-gpus")).remarks.is_empty());
+    let without = report(with_it().args(TINY).arg("--no-gpus"));
+    assert_eq!(without.remarks, without.hardware.disturbed());
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
     let complaint = failure(with_it().arg("pairs").arg(&boxes).args(["--algorithm", "strips@gpu0"]), 2);
     assert!(complaint.contains("ended by signal 6"), "{complaint}");
