@@ -103,7 +103,7 @@ struct Line(AtomicU32);
 /// Nanoseconds that a cache line takes from one core to another; not a number where both threads share one.
 ///
 /// It tells apart what nothing else does: on one host the two cores of a guest lay in one group that shares a cache (38 ns) or in
-/// two (165 ns), for some seconds each. The bandwidth of both was 52 GB/s or 88, accordingly, and a warm phase took 350 ns or 1500.
+/// two (165 ns), for some seconds each. The bandwidth of both was 53 GB/s or 90, accordingly, and a warm phase took 425 ns or 1900.
 fn core_to_core_ns(workers: &Workers) -> f64 {
     let line = Line::default();
     let mut times = [Vec::new(), Vec::new()];
