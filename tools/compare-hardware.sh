@@ -162,7 +162,7 @@ for group in "${groups[@]}"; do
         exit 2
     fi
     case $group in
-        # What is told, and not measured, does not change from one round to the next; an OpenCL run takes ten seconds.
+        # What is told, and not measured, does not change from one round to the next.
         reported | vulkan) rounds "$group" 1 ;;
         *) rounds "$group" "$count" ;;
     esac
