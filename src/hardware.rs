@@ -227,15 +227,18 @@ impl Hardware {
     }
 }
 
+/// Foreign load that is told. In a single window rounding alone may show [`Parameter::SPOILING`].
+const TOLD: f64 = 2.0 * Parameter::SPOILING;
+
 /// Which parameters of a list were measured while other programs took too much of the CPU, if any.
 fn loaded(of: &str, parameters: &[Parameter]) -> Option<String> {
     let loads = parameters.iter().filter_map(|p| Some((p.name.as_str(), p.foreign_load?)));
-    let spoiled: Vec<(&str, f64)> = loads.filter(|(_, load)| *load > Parameter::SPOILING).collect();
+    let spoiled: Vec<(&str, f64)> = loads.filter(|(_, load)| *load > TOLD).collect();
     let (name, load) = spoiled.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
         "other programs or the host took more than {:.0} % of the CPU while {} of the parameters{of} were measured, {:.0} % with \
          {name}; where that is not meant, probe again when the machine is idle",
-        Parameter::SPOILING * 100.0,
+        TOLD * 100.0,
         spoiled.len(),
         load * 100.0
     ))
@@ -314,8 +317,8 @@ mod tests {
     fn disturbances_are_told() {
         let loaded = |name: &str, load| Parameter { foreign_load: Some(load), ..Parameter::reported(name, 1.0, "test") };
         let told = |parameters| hardware(parameters).disturbed();
-        assert!(told(vec![loaded("a", 0.05), Parameter::reported("b", 1.0, "test")]).is_empty());
-        let one = told(vec![loaded("a", 0.25), loaded("b", 0.06), loaded("c", 0.01)]);
+        assert!(told(vec![loaded("a", 0.1), Parameter::reported("b", 1.0, "test")]).is_empty());
+        let one = told(vec![loaded("a", 0.25), loaded("b", 0.16), loaded("c", 0.01)]);
         assert!(one.len() == 1 && one[0].contains("while 2 of") && one[0].contains("25 % with a;"), "{one:?}");
         let distance =
             |raw: &[f64]| Parameter { raw: raw.to_vec(), ..Parameter::reported(parameter::CORE_TO_CORE_NS, 1.0, "test") };

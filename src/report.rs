@@ -25,7 +25,8 @@ pub struct Report {
     pub hardware: Hardware,
     /// The algorithms that were timed.
     pub algorithms: Vec<Timed>,
-    /// Where and what was timed, in the order of measurement. Empty for `--hardware-only`.
+    /// Where and what was timed, round after round of each scenario; within a round the sizes ascend. Empty for
+    /// `--hardware-only`.
     pub points: Vec<Point>,
     /// Whether the measurement was cut short, and what went wrong on the way. Empty when all went well.
     pub remarks: Vec<String>,

@@ -82,11 +82,16 @@ group_clock() {
 }
 
 group_latency() {
-    local kib
+    local kib llc reason
     ours caches || return
+    llc=$(awk -v bytes="$(value cache_llc_bytes)" 'BEGIN { printf "%.0f\n", bytes / 1024 }')
     for kib in 16 256 1024 4096 16384 65536 262144; do
         take theirs "$work/reference" latency "$kib" || return
-        pair "latency_${kib}_kib_ns" "random cycle in C" "$(value "latency_${kib}_kib_ns")" "$(theirs)"
+        reason=
+        if [ "$kib" -ge $((llc / 2)) ] && [ "$kib" -le $((4 * llc)) ]; then
+            reason="about as large as the last-level cache: what others leave of it changes from second to second"
+        fi
+        pair "latency_${kib}_kib_ns" "random cycle in C" "$(value "latency_${kib}_kib_ns")" "$(theirs)" "$reason"
     done
 }
 
@@ -106,7 +111,7 @@ memory_on() {
         take theirs likwid-bench -t "stream_$level" -W "N:$((3 * mebibytes * 1048576 / 1000000))MB:$of" || return
         # 24 bytes an element, as STREAM counts.
         pair "$name" "likwid-bench stream_$level" "$(value "$name")" "$(theirs | awk '/^MByte\/s:/ { print $2 / 1000 }')" \
-            "likwid-bench tells the mean of a second, page by page as its loop of assembly gets it"
+            "likwid-bench runs unrolled assembly for a second; ours is a compiled loop, as that of STREAM is"
     fi
     if have sysbench "Debian: sysbench"; then
         take theirs sysbench memory --memory-block-size="${mebibytes}M" --memory-total-size=100T --memory-oper=read --time=1 \
@@ -130,7 +135,8 @@ group_cores() {
     fi
     ours core_to_core || return
     take theirs "$work/reference" distance || return
-    pair core_to_core_ns "hand-over in C" "$(value core_to_core_ns)" "$(theirs)"
+    pair core_to_core_ns "hand-over in C" "$(value core_to_core_ns)" "$(theirs)" \
+        "the way depends on which memory the line belongs to, and so differs by a fifth from one run to the next"
     ours fork_join || return
     OMP_WAIT_POLICY=active take theirs "$work/reference" region || return
     pair fork_join_warm_ns "region of OpenMP in C" "$(value fork_join_warm_ns)" "$(theirs)" \

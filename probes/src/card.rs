@@ -13,9 +13,10 @@ scaled by the parameter that it depends on (clock, SIMD lanes, scaling over thre
 the exponential of a ridge residual. The units are fitted on relative error, robustly, and are shared by all machines and
 thread counts.
 
-Regret is the time of the choice over the time of the best choice, less one, on reports that the fit did not see. A choice
-that was not timed there is charged what it cost, relative to the best, where the sweep went through the same scenario and
-size another time; where it was timed in neither, because the algorithm had left the race, ten times the best.
+Regret is the time of the choice over the time of the best choice, less one, on reports that the fit did not see: the mean in
+each quarter of a decade of each scenario, and the mean over these. A choice that was not timed at a point is charged what it cost,
+relative to the best, at the nearest size of the scenario at which it was timed, up to twice as many objects or half as many;
+beyond that, because the algorithm had left the race, ten times the best.
 
 Not for timing promises: a cost may be off by more than the choice that follows from it.";
 

@@ -132,10 +132,16 @@ impl Watch {
         Self { before: Counters::now(), began: Instant::now() }
     }
 
+    /// How long it must go on to tell foreign load from rounding; zero where it can't be told at all.
+    #[must_use]
+    pub fn shortest(&self) -> Duration {
+        self.before.map_or(Duration::ZERO, Counters::window)
+    }
+
     /// Whether enough time has passed to tell foreign load from rounding; always where it can't be told at all.
     #[must_use]
     pub fn is_long_enough(&self) -> bool {
-        self.before.is_none_or(|before| self.began.elapsed() >= before.window())
+        self.began.elapsed() >= self.shortest()
     }
 
     /// Share of the CPU, 0 to 1, that other programs have taken since it began. `None` where that can't be told.

@@ -34,8 +34,8 @@ idle_ticks() { awk '/^cpu / { print $5 + $6; exit }' /proc/stat; }
 # How far apart two cores lie, in ns; nothing where there is one.
 distance() { if [ "$threads" -gt 1 ]; then "$work/reference" distance; fi; }
 
-# take NAME COMMAND...: runs a command, its output in $work/NAME.out. Notes the share of the CPU that others took meanwhile
-# in $work/loads, and how far apart two cores lay before and after in $work/distances.
+# take NAME COMMAND...: runs a command, its output in $work/NAME.out. Notes the seconds of CPU that others took meanwhile and
+# that there were in $work/loads, and how far apart two cores lay before and after in $work/distances.
 take() {
     local out=$work/$1.out before after
     shift
@@ -46,7 +46,7 @@ take() {
     after=$(idle_ticks)
     distance >>"$work/distances"
     tail -n 1 "$work/time" | awk -v idle=$((after - before)) -v cpus="$cpus" \
-        '{ all = $1 * cpus; share = all > 0 ? (all - idle / 100 - $2 - $3) / all : 1; printf "%.3f\n", share < 0 ? 0 : share }' \
+        '{ all = $1 * cpus; print all - idle / 100 - $2 - $3, all }' \
         >>"$work/loads"
 }
 
@@ -67,14 +67,17 @@ pair() {
     printf '%s\t%s\t%s\t%s\t%s\n' "$1" "$2" "$3" "$4" "${5:-}" >>"$work/staged"
 }
 
-# Whether what was taken since the last call is of a quiet machine whose cores stayed where they were. Says why not.
+# quiet GROUP: whether what was taken since the last call is of a quiet machine whose cores, where the group uses several,
+# stayed where they were. Says why not.
 quiet() {
     local load moved
-    load=$(sort -g "$work/loads" | tail -n 1)
+    # Over all runs of the round: one of 50 ms holds too few ticks of the system's clock to judge it.
+    load=$(awk '{ foreign += $1; all += $2 } END { printf "%.3f\n", all > 0 ? foreign / all : 1 }' "$work/loads")
     moved=$(sort -g "$work/distances" | awk 'NF { if (!low) low = $1; high = $1 } END { if (high > 2 * low) print low " and " high }')
     : >"$work/loads"
     : >"$work/distances"
-    if awk -v load="${load:-1}" 'BEGIN { exit !(load > 0.05) }'; then
+    case $1 in clock | latency | reported | vulkan) moved= ;; esac
+    if awk -v load="$load" 'BEGIN { exit !(load > 0.05) }'; then
         say "thrown away: others took $load of the CPU"
         return 1
     fi
@@ -96,7 +99,7 @@ rounds() {
             say "the group $group is left out"
             return
         fi
-        if quiet; then
+        if quiet "$group"; then
             cat "$work/staged" >>"$work/pairs"
             kept=$((kept + 1))
         else

@@ -136,7 +136,6 @@ fn impossible_point(report: &Report, point: &Point) -> Option<String> {
     if u128::from(point.pairs) > objects * objects.saturating_sub(1) / 2 {
         return Some(format!("{} pairs, which is more than there are", point.pairs));
     }
-    let mut frames: Option<usize> = None;
     for (k, timing) in point.timings.iter().enumerate() {
         let id = &timing.algorithm;
         if point.timings[..k].iter().any(|t| t.algorithm == *id) {
@@ -145,9 +144,6 @@ fn impossible_point(report: &Report, point: &Point) -> Option<String> {
         let count = timing.samples_ns.len();
         if (count == 0) != timing.error.is_some() {
             return Some(format!("{id} has {count} samples and the error {:?}", timing.error));
-        }
-        if count > 0 && *frames.get_or_insert(count) != count {
-            return Some(format!("{id} has {count} samples, and others have {}", frames.unwrap_or(0)));
         }
         let cores = report.hardware.value(parameter::USABLE_CORES).filter(|_| is_measured(report));
         if cores.is_some_and(|cores| f64::from(id.threads()) > cores) {

@@ -47,6 +47,9 @@ impl Comparison {
                 );
             }
         }
+        if let Some((name, _)) = reports.iter().find(|(_, r)| is_unfinished(r)) {
+            bail!("{name} was not finished; remove it and measure it again");
+        }
         let all: Vec<&Report> = reports.iter().map(|(_, report)| report).collect();
         Ok(Self {
             reports: all.len(),
@@ -77,10 +80,24 @@ fn difference(a: &Report, b: &Report) -> Option<&'static str> {
         (x.physical_id == y.physical_id, "the physical machine"),
         (x.simd == y.simd, "the SIMD level"),
         (a.provenance.threads == b.provenance.threads, "the number of threads"),
-        (a.label == b.label, "the label"),
+        (a.provenance.gpu_threads == b.provenance.gpu_threads, "the threads of a GPU that is a program"),
+        (without_seed(a) == without_seed(b), "the command"),
         (a.hardware.gpus.iter().map(|g| &g.gpu).eq(b.hardware.gpus.iter().map(|g| &g.gpu)), "the GPUs"),
     ];
     same.into_iter().find(|(same, _)| !same).map(|(_, what)| what)
+}
+
+/// The words of the command; another seed is another measurement of the same.
+fn without_seed(report: &Report) -> Vec<&str> {
+    let words: Vec<&str> = report.provenance.command.split_whitespace().collect();
+    let seed = words.iter().position(|w| *w == "--seed");
+    let kept = |k: &usize| seed.is_none_or(|seed| *k != seed && *k != seed + 1);
+    (0..words.len()).filter(kept).map(|k| words[k]).collect()
+}
+
+/// Whether a report was cut short, as its remarks say.
+fn is_unfinished(report: &Report) -> bool {
+    report.remarks.iter().any(|r| r.starts_with("unfinished") || r.starts_with("interrupted"))
 }
 
 /// The foreign load at half of the points, or that of the parameters where there are none.
@@ -120,6 +137,14 @@ mod tests {
         let mut fewer = a.clone();
         fewer.provenance.threads = Some(1);
         assert!(error(&a, &fewer).contains("the number of threads"));
+        let (mut seeded, mut quick, mut cut) = (a.clone(), a.clone(), a.clone());
+        seeded.provenance.command = "probe --seed 7".to_owned();
+        quick.provenance.command = "probe --quick --seed 7".to_owned();
+        cut.remarks.push("interrupted before the first point".to_owned());
+        assert!(error(&seeded, &quick).contains("the command"));
+        assert!(error(&a, &cut).contains("not finished"));
+        quick.provenance.command = "probe --seed 8".to_owned();
+        assert!(Comparison::of(&[named(seeded), named(quick)]).is_ok());
         assert!(Comparison::of(&[named(a)]).unwrap_err().to_string().contains("two or more"));
     }
 

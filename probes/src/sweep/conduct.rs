@@ -60,7 +60,11 @@ pub(crate) fn conduct(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut
             // In random order, so that a machine that slows down does not pass for a longer time at large sizes.
             let order = turns.order(visits.len());
             visits = order.into_iter().map(|k| visits[k].clone()).collect();
-            if !sweep.go(&scenario, Course::Visits(visits), time, u64::from(round))? {
+            let before = sweep.found.points.len();
+            let goes_on = sweep.go(&scenario, Course::Visits(visits), time, u64::from(round))?;
+            // A round is told from the next by its sizes, which ascend in each.
+            sweep.found.points[before..].sort_by_key(|p| p.load.objects);
+            if !goes_on {
                 return Ok(sweep.found);
             }
         }

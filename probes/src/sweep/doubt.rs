@@ -8,6 +8,7 @@
 use super::race::WARM_UP;
 use super::{Visit, median};
 use sapwise::AlgorithmId;
+use sapwise::measure::Watch;
 use sapwise::report::Point;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -22,8 +23,8 @@ const NARROW: f64 = 1.2;
 const CONTENDER: f64 = 1.25;
 /// So does everyone whose lead over the fastest may be one of errors: within this many standard errors.
 const POSSIBLE: f64 = 3.0;
-/// Shortest visit: a window that tells foreign load, and the start of a scene.
-const SHORTEST: Duration = Duration::from_millis(250);
+/// The start of a scene, beside the window that tells foreign load.
+const START: Duration = Duration::from_millis(50);
 /// Frames with samples for which a visit to a large scene has time.
 const FRAMES: f64 = 12.0;
 /// Time to move and check one object in one frame, all that is not an algorithm.
@@ -146,7 +147,7 @@ fn place<'a>(scenario: &'a str, objects: u32, rivals: &[Rival]) -> Option<Place<
             place.worth = f64::max(place.worth, expected_loss(gap, error(0.0)) - expected_loss(gap, error(1.0)));
         }
     }
-    place.seconds = SHORTEST.as_secs_f64().max(ns / 1e9);
+    place.seconds = (Watch::begin().shortest() + START).as_secs_f64().max(ns / 1e9);
     Some(place)
 }
 

@@ -17,8 +17,6 @@ const PAIR_LIMIT: usize = 32 << 20;
 /// When the scenario is unknown or `emit` fails.
 pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result<()>) -> anyhow::Result<()> {
     let scenario: Scenario = order.scenario.parse().map_err(anyhow::Error::msg)?;
-    let time = Duration::try_from_secs_f64(order.seconds).unwrap_or_default();
-    let end = Instant::now() + time;
     let mut registry = Registry::with_cores(order.cores);
     registry.pin_threads();
     for remark in add_gpus(&mut registry, &order.gpus) {
@@ -34,6 +32,8 @@ pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result
             Err(error) => emit(Event::Remark(format!("{scenario}: {error}")))?,
         }
     }
+    // From here on: opening a GPU takes seconds, and is not the time of any size.
+    let end = Instant::now() + Duration::try_from_secs_f64(order.seconds).unwrap_or_default();
     let stage = Stage {
         scenario,
         seed: order.seed,

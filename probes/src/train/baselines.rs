@@ -7,6 +7,7 @@ use anyhow::Result;
 use sapwise::model::GPU_PREFIX;
 use sapwise::report::Point;
 use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Fields, Hardware, Load, Report};
+use std::collections::BTreeMap;
 
 /// Chooses an algorithm under a load among those that a machine has; `None` where it knows none of them.
 pub(crate) type Chooser<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
@@ -15,17 +16,24 @@ pub(crate) type Chooser<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
 /// than this, but where time is short an algorithm leaves at three times the best already.
 pub(crate) const NOT_TIMED: f64 = 10.0;
 
-/// Regret of a choice at each point of a report.
+/// Sizes a decade that count as one when regrets are averaged.
+const PER_DECADE: f64 = 4.0;
+
+/// Regret of a choice in each quarter of a decade of each scenario of a report: the mean over the points there.
+///
+/// A sweep goes most often to the sizes at which two algorithms lie close, where every choice costs little. Counted one by one these
+/// points would pass off any way to choose as better than it is.
 pub(crate) fn regrets(profile: &Profile, choose: &Chooser<'_>) -> Vec<f64> {
-    let mut regrets = Vec::new();
+    let mut regrets: BTreeMap<(&str, i64), Vec<f64>> = BTreeMap::new();
     for point in &profile.report.points {
         let medians = medians(point);
         let Some(best) = best(&medians) else { continue };
         let chosen = choose(&point.load);
         let timed = chosen.as_ref().and_then(|id| over_best(&medians, best, id).or_else(|| elsewhere(profile, point, id)));
-        regrets.push(timed.unwrap_or(NOT_TIMED) - 1.0);
+        let quarter = (PER_DECADE * f64::from(point.load.objects.max(1)).log10()).round() as i64;
+        regrets.entry((&point.scenario, quarter)).or_default().push(timed.unwrap_or(NOT_TIMED) - 1.0);
     }
-    regrets
+    regrets.values().map(|here| average(here)).collect()
 }
 
 fn over_best(medians: &[(&AlgorithmId, f64)], best: f64, id: &AlgorithmId) -> Option<f64> {
@@ -200,8 +208,8 @@ mod tests {
         again.timings.remove(0);
         twice.report.points.push(again);
         let always: Chooser<'_> = Box::new(|_| Some(id.clone()));
-        let regrets_of_both = regrets(&twice, &always);
-        assert_eq!(regrets_of_both.last(), regrets_of_both.first());
+        // And a size that was visited again counts once.
+        assert_eq!(regrets(&twice, &always), regrets(&profile, &always));
         let available = available(&profile);
         let sweep = regrets(&profile, &by_costs(measured_costs(&profile.report).0, &available));
         assert!(average(&sweep) < 0.02, "{}", average(&sweep));

@@ -12,13 +12,22 @@ pub(crate) fn run(arguments: &Compare) -> anyhow::Result<Outcome> {
     let mut reports = read_reports(&arguments.reports)?;
     let mut left_out = Vec::new();
     if arguments.steady {
+        let all = reports.len();
         (reports, left_out) = steady(reports);
+        if reports.len() < 2 {
+            anyhow::bail!(
+                "of {all} reports {} are steady and alike; measure more of them, or leave out --steady",
+                reports.len()
+            );
+        }
     }
     let comparison = Comparison::of(&reports)?;
     if arguments.json {
         output::print_json(&comparison)?;
     } else {
-        let told = left_out.iter().map(|name| format!("{name} is left out: the cores were elsewhere, or moved\n"));
+        let told = left_out
+            .iter()
+            .map(|name| format!("{name} is left out: the cores were elsewhere, moved, or where they were is not known\n"));
         output::print(&(told.collect::<String>() + &text(&comparison)))?;
     }
     Ok(Outcome::Done)
