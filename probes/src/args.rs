@@ -49,7 +49,7 @@ pub(crate) struct Devices {
 
 /// Measures this machine: its hardware parameters, then every algorithm over scenarios and sizes.
 ///
-/// Takes under a minute with --quick and up to five minutes without it, and some seconds more for each GPU. Ctrl-C keeps what
+/// Takes half a minute with --quick and at most three minutes without it, and some seconds more for each GPU. Ctrl-C keeps what
 /// was measured.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -69,7 +69,7 @@ pub(crate) struct Probe {
     /// Only the hardware parameters, in seconds.
     #[arg(long, conflicts_with_all = ["quick", "scenarios", "max_objects"])]
     pub(crate) hardware_only: bool,
-    /// Three scenarios up to 300 000 objects, under a minute in all. With --profiles this goes for all of them, else for those
+    /// Three scenarios up to 300 000 objects, half a minute in all. With --profiles this goes for all of them, else for those
     /// with contention or GPUs.
     #[arg(long)]
     pub(crate) quick: bool,

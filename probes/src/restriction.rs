@@ -91,6 +91,16 @@ pub(crate) fn contention(kind: Contended) -> Restricted {
     }
 }
 
+/// Whether a parameter must show its restriction. Beside a count that the restriction sets, a rate is evidence only: a second
+/// thread of one core, or a CPU with a single 512-bit port, may gain less than [`SHOWN`] from what is taken.
+fn is_required(proof: &Proof) -> bool {
+    match proof.kind {
+        Restricted::Threads => proof.parameter == parameter::USABLE_CORES,
+        Restricted::Simd => proof.parameter == parameter::SIMD_LANES,
+        Restricted::ContendedMemory | Restricted::ContendedCache | Restricted::GpuThreads => true,
+    }
+}
+
 /// One sentence for each parameter that does not show what it must.
 pub(crate) fn not_shown(restriction: &Restriction) -> Vec<String> {
     let sentence = |p: &Proof| {
@@ -100,7 +110,7 @@ pub(crate) fn not_shown(restriction: &Restriction) -> Vec<String> {
         let (with, without) = (value(p.with), value(p.without));
         format!("the restriction {kind} does not show: {parameter}{of} is {with} with it and {without} without")
     };
-    restriction.proof.iter().filter(|p| !p.shows).map(sentence).collect()
+    restriction.proof.iter().filter(|p| is_required(p) && !p.shows).map(sentence).collect()
 }
 
 /// How a parameter must differ.
@@ -173,7 +183,7 @@ fn on_gpu(with: &GpuHardware, without: &Hardware) -> Proof {
     };
     first_shown([
         by(gpu::parameter::ARITHMETIC_GFLOP_PER_S, Change::Lower),
-        by(gpu::parameter::PARALLEL_UNITS, Change::Fewer),
+        by(gpu::parameter::PARALLEL_UNITS, Change::Lower),
     ])
 }
 
@@ -245,6 +255,37 @@ mod tests {
         assert_eq!(shown(Restricted::Simd, &simd(16.0), &simd(8.0)), [true]);
         let both = |lanes, gflop| [(parameter::SIMD_LANES, lanes), (parameter::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, gflop)];
         assert_eq!(shown(Restricted::Simd, &both(16.0, 120.0), &both(8.0, 119.0)), [true, false]);
+    }
+
+    #[test]
+    fn a_rate_that_hardly_differs_beside_a_lower_count_is_no_failure() {
+        let told = |kind, without: &[(&str, f64)], with: &[(&str, f64)]| {
+            let proof = prove(kind, &hardware(without), &hardware(with));
+            assert_eq!(proof.len(), 2);
+            not_shown(&Restriction { kinds: vec![kind], proof })
+        };
+        let threads = |cores| [(parameter::USABLE_CORES, cores), (parameter::SCALING_ALL_THREADS_RATIO, 1.0)];
+        assert_eq!(told(Restricted::Threads, &threads(2.0), &threads(1.0)), Vec::<String>::new());
+        let same = told(Restricted::Threads, &threads(2.0), &threads(2.0));
+        assert!(same.len() == 1 && same[0].contains("usable_cores is 2.0000 with it"), "{same:?}");
+        let simd = |lanes| [(parameter::SIMD_LANES, lanes), (parameter::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, 100.0)];
+        assert_eq!(told(Restricted::Simd, &simd(16.0), &simd(8.0)), Vec::<String>::new());
+        let same = told(Restricted::Simd, &simd(8.0), &simd(8.0));
+        assert!(same.len() == 1 && same[0].contains("simd_lanes is 8.0000 with it"), "{same:?}");
+    }
+
+    #[test]
+    fn parallel_units_of_a_gpu_must_be_lower_by_more_than_they_vary() {
+        let with_gpu = |units| {
+            let name = "llvmpipe".to_owned();
+            let text = String::new;
+            let gpu = GpuIdentity { index: 0, name, device: text(), driver: text(), api: text(), kind: GpuKind::Software };
+            let parameters = [(gpu::parameter::ARITHMETIC_GFLOP_PER_S, 100.0), (gpu::parameter::PARALLEL_UNITS, units)];
+            let parameters = parameters.iter().map(|(name, v)| Parameter::reported(name, *v, "test")).collect();
+            Hardware { gpus: vec![GpuHardware { gpu, parameters }], ..hardware(&[]) }
+        };
+        let shows = |units| prove(Restricted::GpuThreads, &with_gpu(10.0), &with_gpu(units))[0].shows;
+        assert!(shows(8.9) && !shows(9.5));
     }
 
     #[test]

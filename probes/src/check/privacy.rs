@@ -4,7 +4,10 @@ use sapwise::Report;
 use serde_json::Value;
 
 /// The beginnings of folders that are named after whoever works in them.
-const FOLDERS: [&str; 4] = ["/home/", "/root", "/users/", "\\users\\"];
+const FOLDERS: [&str; 3] = ["/home/", "/root/", "/users/"];
+
+/// The same on Windows, behind whatever drive.
+const WINDOWS_FOLDER: &str = "\\users\\";
 
 /// Shorter names of hosts are words that stand anywhere.
 const SHORTEST_HOST: usize = 4;
@@ -13,8 +16,17 @@ const SHORTEST_HOST: usize = 4;
 pub(super) fn revealing(report: &Report) -> Vec<String> {
     let Ok(value) = serde_json::to_value(report) else { return Vec::new() };
     let mut found = Vec::new();
-    walk(&value, "", host().as_deref(), &mut found);
+    walk(&value, "", host().filter(|host| !is_told_anyway(report, host)).as_deref(), &mut found);
     found
+}
+
+/// Whether the name of a host is a word of what the CPU, the GPUs or the scenarios of a report are called, such as `intel`. It
+/// stands in every report of such a machine, whatever its host is called.
+fn is_told_anyway(report: &Report, host: &str) -> bool {
+    let machine = &report.hardware.machine;
+    let gpus = report.hardware.gpus.iter().flat_map(|g| [&g.gpu.name, &g.gpu.device, &g.gpu.driver, &g.gpu.api]);
+    let names = [&machine.cpu, &machine.vendor].into_iter().chain(gpus).chain(report.points.iter().map(|p| &p.scenario));
+    names.into_iter().any(|name| holds_host(name, host))
 }
 
 /// The name of this host, where it is not a word that every report may hold.
@@ -42,14 +54,22 @@ fn walk(value: &Value, field: &str, host: Option<&str>, found: &mut Vec<String>)
 
 fn reveals(text: &str, host: Option<&str>) -> Option<&'static str> {
     let lower = text.to_ascii_lowercase();
-    if FOLDERS.iter().any(|folder| lower.contains(folder)) {
+    // Behind something else, as in https://example.org/home/, it is no folder of this machine.
+    let paths = lower.split(|c: char| c.is_whitespace() || "\"'`=:,;<>()[]{}|@".contains(c));
+    // What is left of file:///home/ has two slashes more.
+    let mut paths = paths.map(|path| path.strip_prefix("//").unwrap_or(path));
+    if paths.any(|path| FOLDERS.iter().any(|folder| path.starts_with(folder))) || lower.contains(WINDOWS_FOLDER) {
         return Some("the folder of a user");
     }
     if lower.split_ascii_whitespace().any(is_address) {
         return Some("an address of e-mail");
     }
-    let is_host = |word: &str| host.is_some_and(|host| word.eq_ignore_ascii_case(host));
-    text.split(|c: char| !c.is_alphanumeric() && !"-._".contains(c)).any(is_host).then_some("the name of this host")
+    host.is_some_and(|host| holds_host(text, host)).then_some("the name of this host")
+}
+
+/// Whether the name of a host is a word of a text.
+fn holds_host(text: &str, host: &str) -> bool {
+    text.split(|c: char| !c.is_alphanumeric() && !"-._".contains(c)).any(|word| word.eq_ignore_ascii_case(host))
 }
 
 /// Whether a word is `someone@somewhere.top`. The ids of algorithms have no point behind the sign.
@@ -67,7 +87,9 @@ mod tests {
     #[test]
     fn folders_addresses_and_this_host_are_found_and_nothing_else() {
         let told = |text| reveals(text, Some("Build-Box7"));
-        for text in ["--out /home/x/r.json", "C:\\Users\\x", "/Users/x", "/root/r.json"] {
+        let folders =
+            ["--out=/home/x/r.json", "C:\\Users\\x", "c:/users/x", "see '/Users/x'", "/root/r.json", "file:///home/x"];
+        for text in folders {
             assert_eq!(told(text), Some("the folder of a user"), "{text}");
         }
         for text in ["ask x.y@example.org.", "<x@y.de>"] {
@@ -80,9 +102,21 @@ mod tests {
             "Intel(R) Core(TM) i7 CPU @ 3.70GHz",
             "/sys/devices/system/cpu/cpu0/cache",
             "build-box70",
+            "https://example.org/home/x",
+            "example.org/users/x",
+            "/rootless",
             "",
         ] {
             assert_eq!(told(text), None, "{text}");
         }
+    }
+
+    #[test]
+    fn a_host_that_is_called_like_its_cpu_or_a_scenario_reveals_nothing() {
+        let mut report = crate::train::synthetic::Machine::family()[0].report();
+        report.hardware.machine.cpu = "Intel(R) Core(TM) i7".to_owned();
+        report.points[0].scenario = "uniform".to_owned();
+        assert!(is_told_anyway(&report, "intel") && is_told_anyway(&report, "Uniform"));
+        assert!(!is_told_anyway(&report, "build-box7") && !is_told_anyway(&report, "inte"));
     }
 }

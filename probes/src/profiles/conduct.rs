@@ -9,7 +9,6 @@ use crate::progress::Progress;
 use crate::{gpus, interrupt, output, table};
 use anyhow::bail;
 use sapwise::json::Document;
-use sapwise::report::Label;
 use sapwise::{Report, Scenario};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -24,9 +23,9 @@ enum State {
     Waiting,
     /// Its report was there.
     Found(PathBuf),
-    /// It was measured, in this time; other programs may have disturbed it.
-    Measured { path: PathBuf, time: Duration, disturbed: bool },
-    /// It went wrong. A report that proves too little is there all the same.
+    /// It was measured, in this time.
+    Measured { path: PathBuf, time: Duration },
+    /// It went wrong. A report that proves too little or was disturbed is there all the same.
     Failed(String, Option<PathBuf>),
 }
 
@@ -91,7 +90,7 @@ impl<'a> Conduct<'a> {
         let profile = &self.family[k];
         let failed = |why: String| Ok(Some(State::Failed(why, None)));
         let path = self.there.path(profile);
-        if let Some(why) = self.there.obstacle(&path) {
+        if let Some(why) = self.there.obstacle(&path, profile) {
             return failed(why);
         }
         let now = if profile.gpus.is_empty() { Vec::new() } else { gpus::look()?.identities };
@@ -134,10 +133,7 @@ impl<'a> Conduct<'a> {
         }
         Ok(Some(match self.there.lack(&report, profile) {
             Some(lack) => State::Failed(lack, Some(path)),
-            None => {
-                let disturbed = report.label == Label::RealContended && profile.contended.is_none();
-                State::Measured { path, time: began.elapsed(), disturbed }
-            }
+            None => State::Measured { path, time: began.elapsed() },
         }))
     }
 
@@ -171,10 +167,7 @@ impl<'a> Conduct<'a> {
             let (report, remark) = match state {
                 State::Waiting => ("-".to_owned(), "not measured yet".to_owned()),
                 State::Found(path) => (shown(path), "was there".to_owned()),
-                State::Measured { path, time, disturbed } => {
-                    let but = if *disturbed { ", disturbed by other programs: remove it and measure it again" } else { "" };
-                    (shown(path), format!("measured in {}{but}", minutes(*time)))
-                }
+                State::Measured { path, time } => (shown(path), format!("measured in {}", minutes(*time))),
                 State::Failed(why, path) => (path.as_deref().map_or("-".to_owned(), shown), format!("FAILED: {why}")),
             };
             rows.push(vec![profile.name.clone(), report, remark]);

@@ -6,6 +6,7 @@ use crate::document::read_document;
 use crate::{provenance, restriction, revisions};
 use clap::Parser;
 use sapwise::json::Document;
+use sapwise::report::Label;
 use sapwise::{GpuIdentity, Registry, Report};
 use std::path::{Path, PathBuf};
 
@@ -39,34 +40,68 @@ impl There<'_> {
     }
 
     /// Why a file must not be replaced by this profile's report, if so.
-    pub(super) fn obstacle(&self, path: &Path) -> Option<String> {
+    pub(super) fn obstacle(&self, path: &Path, profile: &Profile) -> Option<String> {
         if !path.exists() {
             return None;
         }
         match read_document(path) {
-            Ok(Document::Report(report)) if report.hardware.machine.physical_id == self.physical_id => None,
+            Ok(Document::Report(report)) if report.hardware.machine.physical_id == self.physical_id => {
+                self.keeps(&report, profile).map(|why| format!("{}: {why}; name another folder with --out", path.display()))
+            }
             _ => {
                 Some(format!("{} is no report of this machine; move it, or name another folder with --out", path.display()))
             }
         }
     }
 
+    /// Why a report of this machine stays where this profile's would go, if so: what the same command would measure again is
+    /// lost to nobody, a good report of another command is.
+    fn keeps(&self, report: &Report, profile: &Profile) -> Option<String> {
+        if self.flaw(report).is_some() { None } else { self.foreign(report, profile) }
+    }
+
     /// What a report lacks to be that of a profile, complete and current, if anything.
     pub(super) fn lack(&self, report: &Report, profile: &Profile) -> Option<String> {
-        let provenance = &report.provenance;
         if report.hardware.machine.physical_id != self.physical_id {
             return Some("it is of another machine".to_owned());
         }
+        if let Some(why) = self.flaw(report).or_else(|| self.foreign(report, profile)) {
+            return Some(why);
+        }
+        let restriction = report.provenance.restriction.as_ref();
+        let proven = |kind| restriction.is_some_and(|r| r.proof.iter().any(|p| p.kind == kind));
+        let unproven = profile.kinds().into_iter().find(|&kind| !proven(kind));
+        unproven.map(|kind| format!("nothing was there to prove the restriction {kind} by"))
+    }
+
+    /// Why a report is not worth keeping, whatever command it was measured by.
+    fn flaw(&self, report: &Report) -> Option<String> {
+        let provenance = &report.provenance;
         if !provenance.optimised && !cfg!(debug_assertions) {
             return Some("it was measured by a build without optimisation".to_owned());
         }
         if let Some(stale) = revisions::stale_in_report(report, self.registry).first() {
             return Some(format!("it is stale: {stale}"));
         }
+        if report.points.is_empty()
+            || report.remarks.iter().any(|r| r.starts_with("unfinished") || r.starts_with("interrupted"))
+        {
+            return Some("it is incomplete".to_owned());
+        }
+        let asked = provenance.command.split(' ').any(|word| word.starts_with("--contended"));
+        if report.label == Label::RealContended && !asked {
+            return Some("other programs disturbed it".to_owned());
+        }
+        restriction::not_shown(provenance.restriction.as_ref()?).into_iter().next()
+    }
+
+    /// Why a report is not one that this profile's command measures, if so.
+    fn foreign(&self, report: &Report, profile: &Profile) -> Option<String> {
+        let provenance = &report.provenance;
         let gpus: Vec<&GpuIdentity> = report.hardware.gpus.iter().map(|g| &g.gpu).collect();
         let alike = gpus.len() == profile.gpus.len() && gpus.iter().zip(&profile.gpus).all(|(a, b)| same(a, b));
         if !alike {
-            return Some("its GPUs are others".to_owned());
+            return Some("it was measured by another command, with other GPUs".to_owned());
         }
         let numbers: Vec<u32> = gpus.iter().map(|g| g.index).collect();
         if self.command(profile, &numbers).as_ref() != Some(&provenance.command)
@@ -75,18 +110,7 @@ impl There<'_> {
         {
             return Some("it was measured by another command".to_owned());
         }
-        if report.points.is_empty()
-            || report.remarks.iter().any(|r| r.starts_with("unfinished") || r.starts_with("interrupted"))
-        {
-            return Some("it is incomplete".to_owned());
-        }
-        let restriction = provenance.restriction.as_ref();
-        if let Some(told) = restriction.and_then(|r| restriction::not_shown(r).into_iter().next()) {
-            return Some(told);
-        }
-        let proven = |kind| restriction.is_some_and(|r| r.proof.iter().any(|p| p.kind == kind));
-        let unproven = profile.kinds().into_iter().find(|&kind| !proven(kind));
-        unproven.map(|kind| format!("nothing was there to prove the restriction {kind} by"))
+        None
     }
 
     /// The command that stands in the report of a profile.
@@ -123,11 +147,94 @@ pub(super) fn numbers(wanted: &[GpuIdentity], now: &[GpuIdentity]) -> Result<Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sapwise::GpuKind;
+    use crate::profiles::family::{Whole, family};
+    use sapwise::report::{Proof, Restricted, Restriction, Timed};
+    use sapwise::{GpuKind, SimdLevel};
 
     fn gpu(index: u32, name: &str) -> GpuIdentity {
         let text = String::new;
         GpuIdentity { index, name: name.to_owned(), device: text(), driver: text(), api: text(), kind: GpuKind::Discrete }
+    }
+
+    fn probe(words: &[&str]) -> Probe {
+        match Arguments::try_parse_from(["sapwise", "probe", "--profiles"].iter().chain(words)).unwrap().verb {
+            Verb::Probe(probe) => probe,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// A report of another command in the place of the profile `1t`, and one of the same.
+    fn with_one_thread(check: impl Fn(&There, &Profile, Report, Report)) {
+        let family_of = probe(&["--no-gpus"]);
+        let registry = Registry::with_cores(2);
+        let mut report = crate::train::synthetic::Machine::family()[0].report();
+        report.label = Label::RealRestricted;
+        // Their revisions would be stale with each that changes.
+        report.algorithms.clear();
+        report.points.iter_mut().for_each(|p| p.timings.clear());
+        report.hardware.gpus.clear();
+        report.provenance.optimised = true;
+        let proof = |without| Proof {
+            kind: Restricted::Threads,
+            parameter: "usable_cores".to_owned(),
+            gpu: None,
+            without: Some(without),
+            with: Some(1.0),
+            shows: without > 1.0,
+        };
+        report.provenance.restriction = Some(Restriction { kinds: vec![Restricted::Threads], proof: vec![proof(2.0)] });
+        report.provenance.simd = None;
+        report.provenance.gpu_threads = None;
+        let physical_id = report.hardware.machine.physical_id.clone();
+        let folder = Path::new("reports");
+        let there = There { folder, stem: "x-2c", physical_id: &physical_id, registry: &registry, family: &family_of };
+        let whole = Whole { cores: 2, level: SimdLevel::Portable, gpus: Vec::new() };
+        let profile = family(&whole, false).into_iter().find(|p| p.name == "1t").unwrap();
+        let mut own = report.clone();
+        own.provenance.command = there.command(&profile, &[]).unwrap();
+        report.provenance.command = "probe --quick --no-gpus --threads 1 --seed 1".to_owned();
+        check(&there, &profile, report, own);
+    }
+
+    #[test]
+    fn a_good_report_of_another_command_stays_and_one_with_a_flaw_does_not() {
+        with_one_thread(|there, profile, other, own| {
+            let keeps = |change: &dyn Fn(&mut Report)| {
+                let mut report = other.clone();
+                change(&mut report);
+                there.keeps(&report, profile)
+            };
+            assert_eq!(keeps(&|_| {}).as_deref(), Some("it was measured by another command"));
+            assert_eq!(keeps(&|r| r.remarks.push("unfinished: going on".to_owned())), None);
+            assert_eq!(keeps(&|r| r.label = Label::RealContended), None);
+            let proof = |r: &mut Report| r.provenance.restriction.as_mut().unwrap().proof[0].shows = false;
+            assert_eq!(keeps(&proof), None);
+            let stale = Timed { id: "brute@cpu1".parse().unwrap(), revision: u32::MAX };
+            assert_eq!(keeps(&|r| r.algorithms.push(stale.clone())), None);
+            let contended = |r: &mut Report| {
+                r.label = Label::RealContended;
+                r.provenance.command += " --contended=memory";
+            };
+            assert!(keeps(&contended).is_some());
+            assert_eq!(there.keeps(&own, profile), None);
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("x-2c-1t--2026-11-21.json");
+            assert_eq!(there.obstacle(&path, profile), None);
+            std::fs::write(&path, sapwise::json::write_report(&other).unwrap()).unwrap();
+            let told = there.obstacle(&path, profile).unwrap();
+            assert!(told.contains("another command; name another folder with --out"), "{told}");
+            std::fs::write(&path, "{}").unwrap();
+            assert!(there.obstacle(&path, profile).unwrap().contains("is no report of this machine"));
+        });
+    }
+
+    #[test]
+    fn a_report_that_other_programs_disturbed_is_measured_again() {
+        with_one_thread(|there, profile, _, mut own| {
+            assert_eq!(there.lack(&own, profile), None);
+            own.label = Label::RealContended;
+            assert_eq!(there.lack(&own, profile).as_deref(), Some("other programs disturbed it"));
+        });
     }
 
     #[test]
