@@ -53,7 +53,9 @@ mod sample;
 mod scenario;
 mod schema_tag;
 mod splitmix;
-pub mod statistics;
+// Public as `measure::statistics`; the figures of parameters in files follow from it without that feature too.
+#[cfg_attr(not(feature = "measure"), allow(unreachable_pub, reason = "public through `measure` only"))]
+mod statistics;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
@@ -61,7 +63,7 @@ pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
 pub use broad_phase::BroadPhase;
 pub use cost::{CostCurve, CostTerm, Knot, Term};
 pub use cpu::SimdLevel;
-pub use crossover::{Crossover, Paired, Position};
+pub use crossover::{Comparison, Crossover, Paired, Position};
 pub use displacement::Displacement;
 pub use error::{BoxDefect, Error};
 pub use fields::{AlgorithmCost, Border, Fields, Ranking, Source, Step};

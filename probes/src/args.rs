@@ -286,12 +286,13 @@ pub(crate) struct Compare {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  sapwise simulate datasets/simulated/specifications.json --out simulated --machines 24")]
+  sapwise simulate --out simulated --machines 24
+  sapwise train --simulated simulated --out simulated-model.json")]
 pub(crate) struct Simulate {
-    /// The specifications.
+    /// The specifications. Without this file those that come with the command.
     #[arg(value_name = "SPECIFICATIONS.json")]
-    pub(crate) specifications: PathBuf,
-    /// The folder that the reports go to; made when it is not there.
+    pub(crate) specifications: Option<PathBuf>,
+    /// The folder that the reports go to; made when it is not there. It must hold no *.json file.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// How many machines. Without this option one for each CPU.

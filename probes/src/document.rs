@@ -27,7 +27,11 @@ pub(crate) fn read_reports(paths: &[PathBuf]) -> anyhow::Result<Vec<(String, Rep
     let mut files: Vec<PathBuf> = Vec::new();
     for path in paths {
         if path.is_dir() {
-            files.extend(json_files(path)?);
+            let found = json_files(path)?;
+            if found.is_empty() {
+                bail!("the folder {} holds no *.json file; make one with `sapwise probe --out R.json`", path.display());
+            }
+            files.extend(found);
         } else {
             files.push(path.clone());
         }
@@ -42,7 +46,11 @@ pub(crate) fn read_reports(paths: &[PathBuf]) -> anyhow::Result<Vec<(String, Rep
     Ok(reports)
 }
 
-fn json_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+/// The `*.json` files of a folder, in the order of their names.
+///
+/// # Errors
+/// When the folder can't be read.
+pub(crate) fn json_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let unreadable = || format!("the folder {} can't be read", folder.display());
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(unreadable)? {
@@ -50,9 +58,6 @@ fn json_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
         if path.extension().is_some_and(|e| e == "json") && path.is_file() {
             files.push(path);
         }
-    }
-    if files.is_empty() {
-        bail!("the folder {} holds no *.json file; make one with `sapwise probe --out R.json`", folder.display());
     }
     files.sort_unstable();
     Ok(files)

@@ -342,13 +342,14 @@ fn the_published_cards_are_sound_and_told_to_be_published() {
 #[test]
 fn simulated_machines_train_apart_and_are_told_to_be_simulated() {
     let folder = tempfile::tempdir().unwrap();
-    let specifications = Path::new(env!("CARGO_MANIFEST_DIR")).join("../datasets/simulated/specifications.json");
     let machines = folder.path().join("machines");
     let mut simulate = sapwise();
-    simulate.arg("simulate").arg(specifications).args(["--machines", "2", "--json", "--out"]).arg(&machines);
+    simulate.args(["simulate", "--machines", "2", "--json", "--out"]).arg(&machines);
     let answer: Value = serde_json::from_str(&success(&mut simulate)).unwrap();
     let files: Vec<PathBuf> = answer["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap().into()).collect();
     assert_eq!(files.len(), 2);
+    let complaint = failure(&mut simulate, 1);
+    assert!(complaint.contains("machines holds *.json files already; name another with --out"), "{complaint}");
     let (status, findings) = check(&files);
     let told =
         |f: &Value| f["notes"].as_array().unwrap().iter().any(|n| n.as_str().unwrap().contains("no evidence of accuracy"));

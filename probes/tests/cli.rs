@@ -8,7 +8,7 @@ use std::fs;
 #[test]
 fn every_verb_has_help_with_an_example() {
     let all = success(sapwise().arg("--help"));
-    for verb in ["predict", "devices", "probe", "run", "train", "pairs", "check", "simulate", "schema"] {
+    for verb in ["predict", "devices", "probe", "run", "train", "pairs", "check", "compare", "simulate", "schema"] {
         assert!(all.contains(verb), "{verb}");
         let help = success(sapwise().args([verb, "--help"]));
         assert!(help.contains("Example") && help.contains(&format!("sapwise {verb}")), "{verb}: {help}");

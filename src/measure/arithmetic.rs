@@ -48,8 +48,10 @@ struct Kernel {
     what: &'static str,
 }
 
-/// One instruction for both, or one for each.
+/// One instruction for both.
 const FUSED: &str = "fused multiply-adds";
+/// One instruction for each.
+#[cfg(target_arch = "x86_64")]
 const SEPARATE: &str = "multiplications and additions";
 
 impl Kernel {

@@ -27,11 +27,15 @@ use rayon::ThreadPool;
 use crate::hardware::{Hardware, Machine, Parameter, parameter};
 use foreign_load::Plan;
 
-pub use crate::statistics;
 pub use core_to_core::core_to_core_ns;
 pub use foreign_load::Watch;
 #[cfg(feature = "measure-gpu")]
 pub use gpu::{gpu, gpu_group};
+
+/// Median, quantiles and dispersion, as the figures of a parameter follow from its samples.
+pub mod statistics {
+    pub use crate::statistics::{median, quantile, relative_iqr};
+}
 
 /// A group of parameters that are measured together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -149,7 +149,7 @@ impl<'a> Costs<'a> {
         let all = n * (n - 1.0).max(0.0) / 2.0;
         let sort = n * n.max(1.0).log2();
         let (dispatches, operations, bytes) = match method {
-            "brute" => (5.0, 20.0 * all * share, 60.0 * n),
+            "brute" => (5.0, 20.0 * all, 60.0 * n),
             "sweep" => (40.0, 25.0 * load.axis_candidates, 60.0 * n + 25.0 * sort),
             "strips" => (50.0, 300.0 * load.strip_candidates, 60.0 * n + 25.0 * sort),
             _ => return None,
@@ -175,7 +175,7 @@ impl<'a> Costs<'a> {
 #[cfg(test)]
 mod tests {
     use super::super::pairing::{Build, builds};
-    use super::super::specification::of_the_repository;
+    use super::super::specification::built_in;
     use super::*;
 
     fn load(objects: u32, moved: f64) -> Load {
@@ -184,7 +184,7 @@ mod tests {
     }
 
     fn machines() -> Vec<TrueMachine> {
-        let specifications = of_the_repository();
+        let specifications = built_in().unwrap();
         let builds: Vec<Build<'_>> = builds(&specifications, specifications.cpus.len(), 1).unwrap();
         builds.iter().map(|b| TrueMachine::new(b, 1)).collect()
     }
@@ -217,6 +217,21 @@ mod tests {
                 assert!(ns(&machine, "verlet@cpu1", &still) < ns(&machine, "strips@cpu1", &still), "{n} on {machine:?}");
             }
         }
+    }
+
+    #[test]
+    fn two_equal_gpus_halve_the_work_of_one_at_best_and_do_pay_for_large_scenes() {
+        let (mut pairs_of_gpus, mut paid) = (0, 0);
+        for machine in machines().iter().filter(|m| m.gpus.len() >= 2 && m.gpus[0].name == m.gpus[1].name) {
+            pairs_of_gpus += 1;
+            for method in ["brute", "sweep", "strips"] {
+                let cost = |gpus: &str| ns(machine, &format!("{method}@{gpus}"), &load(10_000_000, 1.0));
+                let (one, two) = (cost("gpu0"), cost("gpu0+1"));
+                assert!(two >= 0.5 * one, "{method}: {two} with two GPUs and {one} with one of {machine:?}");
+                paid += usize::from(two < one);
+            }
+        }
+        assert!(pairs_of_gpus >= 3 && paid >= pairs_of_gpus, "{paid} of {pairs_of_gpus} machines");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The frames that simulated machines are timed on: those of real scenes.
 
 use crate::prediction;
+use crate::progress::Progress;
 use crate::sweep::Plan;
 use anyhow::Result;
 use sapwise::{Load, Scenario};
@@ -20,7 +21,13 @@ impl Loads {
     /// When the pairs of a scene can't be found.
     pub(crate) fn of_a_sweep(seed: u64, max_objects: Option<u32>) -> Result<Self> {
         let plan = Plan::new(true, &SCENARIOS, max_objects);
-        let of = |&scenario: &Scenario| Ok((scenario, prediction::loads(scenario, &plan.sizes, seed)?));
+        let progress = Progress::new(plan.scenarios.len() as u64);
+        let of = |&scenario: &Scenario| {
+            progress.message(format!("pairs of the scenario {scenario}"));
+            let loads = prediction::loads(scenario, &plan.sizes, seed)?;
+            progress.advance(1);
+            Ok((scenario, loads))
+        };
         Ok(Self(plan.scenarios.iter().map(of).collect::<Result<_>>()?))
     }
 }

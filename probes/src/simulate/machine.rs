@@ -188,7 +188,7 @@ fn pcie_gb_per_s(card: &Card) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::pairing::builds;
-    use super::super::specification::of_the_repository;
+    use super::super::specification::built_in;
     use super::*;
 
     #[test]
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn no_machine_is_better_than_its_specification() {
-        let specifications = of_the_repository();
+        let specifications = built_in().unwrap();
         for build in builds(&specifications, 51, 1).unwrap() {
             let machine = TrueMachine::new(&build, 1);
             let (cpu, spec) = (&machine.cpu, build.cpu);
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn latency_grows_from_that_of_the_first_cache_to_that_of_the_memory() {
-        let specifications = of_the_repository();
+        let specifications = built_in().unwrap();
         let cpu = TrueMachine::new(&builds(&specifications, 1, 1).unwrap()[0], 1).cpu;
         let sets = [1e3, 1e5, 1e6, 1e7, 1e8, 1e10];
         assert!(sets.map(|bytes| cpu.latency_of(bytes)).is_sorted(), "{cpu:?}");

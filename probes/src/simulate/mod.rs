@@ -11,6 +11,7 @@ mod pairing;
 mod race;
 mod specification;
 
+use crate::progress::Progress;
 use anyhow::Result;
 use cost::Costs;
 use machine::TrueMachine;
@@ -18,9 +19,7 @@ use sapwise::report::{Label, Provenance, Report, ReportSchema, Timed};
 use sapwise::{AlgorithmId, Registry};
 
 pub(crate) use loads::Loads;
-#[cfg(test)]
-pub(crate) use specification::of_the_repository;
-pub(crate) use specification::{Specifications, read};
+pub(crate) use specification::{Specifications, built_in, read};
 
 /// So many machines made from specifications, each with the name of its file less the ending. The same arguments give the same
 /// reports.
@@ -34,9 +33,11 @@ pub(crate) fn simulate(
     seed: u64,
 ) -> Result<Vec<(String, Report)>> {
     let builds = pairing::builds(specifications, machines, seed)?;
+    let progress = Progress::new(builds.len() as u64);
     let report = |build: pairing::Build<'_>| {
         let machine = TrueMachine::new(&build, seed);
         let name = build.name();
+        progress.message(format!("sweep: {name}"));
         let hardware = hardware::hardware(&build, &machine);
         let mut algorithms = Registry::with_cores(build.cpu.threads).available();
         algorithms.extend(sapwise::gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu)));
@@ -51,6 +52,7 @@ pub(crate) fn simulate(
             points,
             remarks: vec!["simulated: no machine was measured, and no algorithm has run".to_owned()],
         };
+        progress.advance(1);
         (name, report)
     };
     Ok(builds.into_iter().map(report).collect())

@@ -97,12 +97,12 @@ fn slug(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::specification::of_the_repository;
+    use super::super::specification::built_in;
     use super::*;
 
     #[test]
     fn machines_differ_and_each_cpu_comes_once_before_any_comes_twice() {
-        let specifications = of_the_repository();
+        let specifications = built_in().unwrap();
         let many = specifications.cpus.len();
         let builds = builds(&specifications, many + 5, 1).unwrap();
         let unique = |texts: Vec<String>| texts.iter().collect::<std::collections::BTreeSet<_>>().len();
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn parts_of_one_machine_fit_together() {
-        let specifications = of_the_repository();
+        let specifications = built_in().unwrap();
         for build in builds(&specifications, 60, 7).unwrap() {
             for gpu in &build.gpus {
                 match &gpu.inside {
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn more_machines_than_there_can_be_are_refused() {
-        let mut specifications = of_the_repository();
+        let mut specifications = built_in().unwrap();
         specifications.cpus.truncate(2);
         specifications.gpus.clear();
         let error = builds(&specifications, 3, 1).unwrap_err().to_string();

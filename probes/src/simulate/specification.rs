@@ -126,6 +126,17 @@ impl Simd {
 /// Most entries of either list: each costs a machine.
 const MOST: usize = 10_000;
 
+/// The file beside this one. It lies in the package and not in `datasets/`, so that an installed command has it.
+const BUILT_IN: &str = include_str!("specifications.json");
+
+/// The specifications that come with this command, `specifications.json`, whose card is `datasets/simulated/README.md`.
+///
+/// # Errors
+/// As [`read`], which a test rules out.
+pub(crate) fn built_in() -> Result<Specifications> {
+    read(BUILT_IN).context("the built-in specifications can't be used; please report this")
+}
+
 /// Reads a file of specifications.
 ///
 /// # Errors
@@ -196,19 +207,13 @@ fn common_defect(name: &str, source: &str, year: u32, figures: &[f64]) -> Option
     (!sound).then(|| format!("the year {year} or one of the figures {figures:?} can't be"))
 }
 
-/// The specifications of the repository.
-#[cfg(test)]
-pub(crate) fn of_the_repository() -> Specifications {
-    read(include_str!("../../../datasets/simulated/specifications.json")).unwrap()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn the_file_of_the_repository_is_sound_and_names_its_sources() {
-        let specifications = of_the_repository();
+    fn the_built_in_file_is_sound_and_names_its_sources() {
+        let specifications = built_in().unwrap();
         let cards = specifications.gpus.iter().filter(|g| g.card.is_some()).count();
         assert!(specifications.cpus.len() >= 28 && cards >= 20, "{} {cards}", specifications.cpus.len());
         let sources = specifications.cpus.iter().map(|c| &c.source).chain(specifications.gpus.iter().map(|g| &g.source));
@@ -223,8 +228,7 @@ mod tests {
 
     #[test]
     fn damaged_specifications_are_refused_with_the_entry() {
-        let whole = include_str!("../../../datasets/simulated/specifications.json");
-        let refused = |from: &str, to: &str| format!("{:#}", read(&whole.replacen(from, to, 1)).unwrap_err());
+        let refused = |from: &str, to: &str| format!("{:#}", read(&BUILT_IN.replacen(from, to, 1)).unwrap_err());
         assert!(refused("specifications/1", "specifications/9").contains("specifications/9"));
         assert!(refused("\"cores\"", "\"kernels\"").contains("kernels"));
         assert!(refused("\"base_ghz\": 2.8", "\"base_ghz\": -2.8").contains("X7900"));

@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 
 fn some(machines: usize) -> Vec<(String, Report)> {
     let loads = Loads::of_a_sweep(1, Some(30_000)).unwrap();
-    simulate(&of_the_repository(), machines, &loads, 1).unwrap()
+    simulate(&built_in().unwrap(), machines, &loads, 1).unwrap()
 }
 
 #[test]
 fn the_same_seed_makes_the_same_bytes_and_another_does_not() {
     let text = |seed: u64| {
         let loads = Loads::of_a_sweep(seed, Some(1000)).unwrap();
-        let reports = simulate(&of_the_repository(), 4, &loads, seed).unwrap();
+        let reports = simulate(&built_in().unwrap(), 4, &loads, seed).unwrap();
         reports.iter().map(|(name, r)| format!("{name}\n{}", sapwise::json::write_report(r).unwrap())).collect::<String>()
     };
     assert!(text(3) == text(3) && text(3) != text(4));
@@ -20,7 +20,7 @@ fn the_same_seed_makes_the_same_bytes_and_another_does_not() {
 #[test]
 fn every_report_is_sound_complete_and_labelled() {
     let loads = Loads::of_a_sweep(1, None).unwrap();
-    let specifications = of_the_repository();
+    let specifications = built_in().unwrap();
     let reports = simulate(&specifications, specifications.cpus.len(), &loads, 1).unwrap();
     let mut ids = BTreeSet::new();
     for (name, report) in &reports {

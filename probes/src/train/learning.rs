@@ -2,6 +2,7 @@
 
 use super::rows::Profile;
 use super::validate::validate;
+use crate::progress::Progress;
 use crate::turns::Turns;
 use anyhow::Result;
 use serde::Serialize;
@@ -24,33 +25,52 @@ pub(crate) struct Learning {
     pub(crate) mean_regrets: Vec<(String, f64)>,
 }
 
-/// Validates random subsets of the machines, each with all of its profiles.
-///
-/// # Errors
-/// When a regression fails.
-pub(crate) fn learning(profiles: &[Profile]) -> Result<Vec<Learning>> {
+/// Some of the machines, each with all of its profiles.
+pub(super) struct Subset<'a> {
+    machines: usize,
+    pub(super) profiles: Vec<&'a Profile>,
+}
+
+/// Random subsets of the machines, those of the same size one behind the other.
+pub(super) fn subsets(profiles: &[Profile]) -> Vec<Subset<'_>> {
     let mut machines: Vec<&str> = profiles.iter().map(|p| p.report.hardware.machine.physical_id.as_str()).collect();
     machines.sort_unstable();
     machines.dedup();
     let mut turns = Turns::new(SEED);
-    let mut course = Vec::new();
+    let mut all = Vec::new();
     for count in MACHINES.into_iter().filter(|&k| k <= machines.len()) {
         // There is one subset of all.
         let subsets = if count == machines.len() { 1 } else { LEFT_OUT.div_ceil(count) };
-        let mut sums: Vec<(String, f64)> = Vec::new();
         for _ in 0..subsets {
             let chosen: Vec<&str> = turns.order(machines.len())[..count].iter().map(|&k| machines[k]).collect();
             let within = |p: &&Profile| chosen.contains(&p.report.hardware.machine.physical_id.as_str());
-            let subset: Vec<Profile> = profiles.iter().filter(within).cloned().collect();
-            for score in validate(&subset)?.0.methods {
+            all.push(Subset { machines: count, profiles: profiles.iter().filter(within).collect() });
+        }
+    }
+    all
+}
+
+/// Validates each subset. Each profile of each is a step of `progress`.
+///
+/// # Errors
+/// When a regression fails.
+pub(super) fn learning(subsets: &[Subset<'_>], progress: &Progress) -> Result<Vec<Learning>> {
+    let mut course = Vec::new();
+    for alike in subsets.chunk_by(|a, b| a.machines == b.machines) {
+        let machines = alike[0].machines;
+        let mut sums: Vec<(String, f64)> = Vec::new();
+        for subset in alike {
+            progress.message(format!("validating subsets of {machines} machines"));
+            let profiles: Vec<Profile> = subset.profiles.iter().map(|&p| p.clone()).collect();
+            for score in validate(&profiles, progress)?.0.methods {
                 match sums.iter_mut().find(|s| s.0 == score.name) {
                     Some(sum) => sum.1 += score.mean_regret,
                     None => sums.push((score.name, score.mean_regret)),
                 }
             }
         }
-        let mean_regrets = sums.into_iter().map(|(name, sum)| (name, sum / subsets as f64)).collect();
-        course.push(Learning { machines: count, subsets, mean_regrets });
+        let mean_regrets = sums.into_iter().map(|(name, sum)| (name, sum / alike.len() as f64)).collect();
+        course.push(Learning { machines, subsets: alike.len(), mean_regrets });
     }
     Ok(course)
 }
@@ -64,10 +84,11 @@ mod tests {
     fn sizes_go_as_far_as_there_are_machines() {
         let of = |m: Machine| Profile { file: m.name.to_owned(), report: m.report() };
         let profiles: Vec<Profile> = Machine::family().into_iter().map(of).collect();
-        let course = learning(&profiles).unwrap();
+        let chosen = subsets(&profiles);
+        let course = learning(&chosen, &Progress::new(0)).unwrap();
         assert_eq!(course.iter().map(|l| (l.machines, l.subsets)).collect::<Vec<_>>(), [(3, 8), (6, 4)]);
         let regret = |k: usize, name: &str| course[k].mean_regrets.iter().find(|r| r.0 == name).unwrap().1;
         assert!(regret(1, "physics") < 0.1 && regret(1, "physics") < regret(1, "single best"), "{course:?}");
-        assert!(learning(&profiles[..2]).unwrap().is_empty());
+        assert!(subsets(&profiles[..2]).is_empty());
     }
 }

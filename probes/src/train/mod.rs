@@ -17,6 +17,7 @@ mod terms;
 mod triangle;
 mod validate;
 
+use crate::progress::Progress;
 use anyhow::{Result, bail};
 use sapwise::hardware::{gpu, parameter};
 use sapwise::model::GPU_PREFIX;
@@ -102,13 +103,16 @@ pub(crate) fn train(reports: &[(String, Report)], name: &str, evidence: Evidence
     }
     let (mut model, left_out) = model::model(&profiles.iter().collect::<Vec<_>>(), name)?;
     notes.extend(left_out);
-    let (validation, limits) = validate::validate(&profiles)?;
+    let subsets = match evidence {
+        Evidence::Real => Vec::new(),
+        Evidence::Simulated => learning::subsets(&profiles),
+    };
+    let progress = Progress::new((profiles.len() + subsets.iter().map(|s| s.profiles.len()).sum::<usize>()) as u64);
+    progress.message("validating");
+    let (validation, limits) = validate::validate(&profiles, &progress)?;
     model.validation = validation;
     notes.extend(limits);
-    let learning = match evidence {
-        Evidence::Real => Vec::new(),
-        Evidence::Simulated => learning::learning(&profiles)?,
-    };
+    let learning = learning::learning(&subsets, &progress)?;
     Ok(Trained { model, notes, learning })
 }
 

@@ -5,6 +5,7 @@ use super::curve::measured_costs;
 use super::direct::{Crossings, direct};
 use super::model::model;
 use super::rows::Profile;
+use crate::progress::Progress;
 use anyhow::Result;
 use sapwise::model::{MethodModel, MethodScore, Validation};
 use sapwise::{AlgorithmId, Model};
@@ -21,11 +22,11 @@ struct Regrets {
 /// Leaves out each physical machine with all its profiles, or each profile where there is one machine only, fits to the others
 /// and lets every way choose on what was left out. Also sentences on what the scores do not say.
 ///
-/// With one profile no method is scored.
+/// With one profile no method is scored. Each held-out profile is a step of `progress`.
 ///
 /// # Errors
 /// When a regression fails.
-pub(crate) fn validate(profiles: &[Profile]) -> Result<(Validation, Vec<String>)> {
+pub(crate) fn validate(profiles: &[Profile], progress: &Progress) -> Result<(Validation, Vec<String>)> {
     let machine = |p: &Profile| p.report.hardware.machine.physical_id.clone();
     let mut machines: Vec<String> = Vec::new();
     for profile in profiles {
@@ -53,6 +54,7 @@ pub(crate) fn validate(profiles: &[Profile]) -> Result<(Validation, Vec<String>)
                 .filter(|&o| if by_machine { machine(&profiles[o]) != machine(&profiles[k]) } else { o != k })
                 .collect();
             held_out(profiles, &crossings, k, &training, &mut all, &mut notes)?;
+            progress.advance(1);
         }
     }
     let mut unique: Vec<String> = Vec::new();
@@ -176,7 +178,7 @@ mod tests {
 
     #[test]
     fn physics_beats_every_constant_on_machines_left_out() {
-        let (validation, _) = validate(&profiles(Machine::family())).unwrap();
+        let (validation, _) = validate(&profiles(Machine::family()), &Progress::new(0)).unwrap();
         assert_eq!((validation.physical_machines, validation.profiles, validation.methods.len()), (7, 7, 9));
         assert_eq!(validation.held_out, "physical machine");
         for name in ["physics", "physics + ridge", "full sweep"] {
@@ -193,9 +195,9 @@ mod tests {
     #[test]
     fn a_dozen_simulated_machines_predict_those_left_out_better_than_the_nearest_one_does() {
         let loads = simulate::Loads::of_a_sweep(1, Some(30_000)).unwrap();
-        let reports = simulate::simulate(&simulate::of_the_repository(), 12, &loads, 1).unwrap();
+        let reports = simulate::simulate(&simulate::built_in().unwrap(), 12, &loads, 1).unwrap();
         let profiles: Vec<Profile> = reports.into_iter().map(|(file, report)| Profile { file, report }).collect();
-        let (validation, notes) = validate(&profiles).unwrap();
+        let (validation, notes) = validate(&profiles, &Progress::new(0)).unwrap();
         assert_eq!((validation.physical_machines, validation.held_out.as_str()), (12, "physical machine"));
         assert!(validation.methods.iter().all(|m| m.mean_regret.is_finite() && m.mean_regret >= 0.0), "{validation:?}");
         for other in ["nearest machine", SINGLE_BEST, "default machine"] {
@@ -209,7 +211,7 @@ mod tests {
     fn machines_with_and_without_gpus_are_validated_together() {
         let mut machines = Machine::family_with_gpus();
         machines[6].gpus.clear();
-        let (validation, notes) = validate(&profiles(machines)).unwrap();
+        let (validation, notes) = validate(&profiles(machines), &Progress::new(0)).unwrap();
         assert_eq!((validation.physical_machines, validation.methods.len()), (8, 9));
         for name in ["physics", "physics + ridge", "full sweep"] {
             assert!(mean(&validation, name) < 0.1, "{name}: {} {notes:?}", mean(&validation, name));
@@ -222,7 +224,7 @@ mod tests {
         let mut two = profiles(Machine::family());
         two.truncate(2);
         two[0].report.points.truncate(1);
-        let (validation, notes) = validate(&two).unwrap();
+        let (validation, notes) = validate(&two, &Progress::new(0)).unwrap();
         assert_eq!(validation.methods.len(), 9);
         assert!(notes.iter().any(|n| n.starts_with("there is no default machine when")), "{notes:?}");
     }
@@ -232,7 +234,7 @@ mod tests {
         let mut twins = Machine::family();
         twins.truncate(3);
         twins[1].name = twins[0].name;
-        let (validation, _) = validate(&profiles(twins)).unwrap();
+        let (validation, _) = validate(&profiles(twins), &Progress::new(0)).unwrap();
         assert_eq!((validation.physical_machines, validation.profiles), (2, 3));
     }
 
@@ -241,10 +243,10 @@ mod tests {
         let mut twins = Machine::family();
         twins.truncate(2);
         twins[1].name = twins[0].name;
-        let (validation, notes) = validate(&profiles(twins.clone())).unwrap();
+        let (validation, notes) = validate(&profiles(twins.clone()), &Progress::new(0)).unwrap();
         assert!(validation.held_out == "profile" && notes.iter().any(|n| n.contains("little about machines never seen")));
         twins.truncate(1);
-        let (validation, notes) = validate(&profiles(twins)).unwrap();
+        let (validation, notes) = validate(&profiles(twins), &Progress::new(0)).unwrap();
         assert!(validation.methods.is_empty() && notes[0].contains("one report only"));
     }
 }

@@ -1,11 +1,11 @@
 //! `sapwise simulate`: reports of machines that there are not, from published specifications.
 
 use crate::args::Simulate;
-use crate::document::read_text;
+use crate::document::{json_files, read_text};
 use crate::exit::Outcome;
-use crate::simulate::{Loads, read, simulate};
+use crate::simulate::{Loads, built_in, read, simulate};
 use crate::{files, output};
-use anyhow::Context;
+use anyhow::{Context, bail};
 use serde::Serialize;
 
 /// The answer for machines.
@@ -16,12 +16,18 @@ struct Answer {
 }
 
 pub(crate) fn run(arguments: &Simulate) -> anyhow::Result<Outcome> {
-    let path = &arguments.specifications;
-    let specifications = read(&read_text(path)?).with_context(|| format!("{} can't be used", path.display()))?;
+    let folder = &arguments.out;
+    // Reports of another seed or another file would stay among the new ones, and `train` takes all of a folder.
+    if folder.is_dir() && !json_files(folder)?.is_empty() {
+        bail!("the folder {} holds *.json files already; name another with --out, or empty it", folder.display());
+    }
+    let specifications = match &arguments.specifications {
+        Some(path) => read(&read_text(path)?).with_context(|| format!("{} can't be used", path.display()))?,
+        None => built_in()?,
+    };
     let machines = arguments.machines.map_or(specifications.cpus.len(), |n| n as usize);
     let loads = Loads::of_a_sweep(arguments.seed, None)?;
     let reports = simulate(&specifications, machines, &loads, arguments.seed)?;
-    let folder = &arguments.out;
     std::fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made", folder.display()))?;
     let mut written = Vec::new();
     for (name, report) in &reports {
