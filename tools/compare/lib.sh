@@ -72,7 +72,7 @@ pair() {
 quiet() {
     local load moved
     # Over all runs of the round: one of 50 ms holds too few ticks of the system's clock to judge it.
-    load=$(awk '{ foreign += $1; all += $2 } END { printf "%.3f\n", all > 0 ? foreign / all : 1 }' "$work/loads")
+    load=$(awk '{ foreign += $1; all += $2 } END { printf "%.3f\n", (all > 0 ? foreign / all : 1) }' "$work/loads")
     moved=$(sort -g "$work/distances" | awk 'NF { if (!low) low = $1; high = $1 } END { if (high > 2 * low) print low " and " high }')
     : >"$work/loads"
     : >"$work/distances"
