@@ -45,13 +45,19 @@ fn assert_fields(fields: &Value, source: &str) {
     borders.iter().for_each(|border| assert_keys(border, &["below", "above", "objects", "low", "high"]));
 }
 
-/// Trains on the report under the names of two machines; the label of an optimised build is put on it for that.
+/// Trains on the report under the names of two machines. The label of an optimised build is put on it for that, and that of an
+/// undisturbed machine, which one that runs tests is not.
 fn train(folder: &Path) -> (PathBuf, Value) {
     let optimised = ("/provenance/optimised", true.into());
-    let a = report(folder, "a.json", std::slice::from_ref(&optimised));
+    let undisturbed = ("/label", "real_full".into());
+    let a = report(folder, "a.json", &[optimised.clone(), undisturbed.clone()]);
     // One sample differs, so that it isn't taken for the same measurement.
     let slower = ("/points/0/timings/0/samples_ns/0", 123_456.into());
-    let b = report(folder, "b.json", &[optimised, slower, ("/hardware/machine/physical_id", "00000000000000bb".into())]);
+    let b = report(
+        folder,
+        "b.json",
+        &[optimised, undisturbed, slower, ("/hardware/machine/physical_id", "00000000000000bb".into())],
+    );
     let model = folder.join("model.json");
     let trained = answer(sapwise().arg("train").args([a, b]).arg("--json").arg("--out").arg(&model));
     (model, trained)
