@@ -3,7 +3,6 @@
 //! A hypervisor moves the cores of a guest from one group of cores to another. What several threads gain changes with it by half, so
 //! timings from before and after are those of two machines.
 
-use sapwise::measure::statistics::median;
 use sapwise::report::{Point, Report};
 use serde::Serialize;
 
@@ -15,8 +14,10 @@ const FEW: f64 = 0.1;
 /// The latency between cores over the points of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Steadiness {
-    /// Median over the points, in nanoseconds.
+    /// The usual latency in nanoseconds: the lower median, which is one that was measured where there are two places.
     pub(crate) core_to_core_ns: f64,
+    /// The least and the most.
+    pub(crate) range_ns: [f64; 2],
     /// Share of the points before or after which it was more than half as much again, or that much less.
     pub(crate) elsewhere: f64,
 }
@@ -25,10 +26,14 @@ impl Steadiness {
     /// `None` for one core, and for reports that don't tell.
     pub(crate) fn of(report: &Report) -> Option<Self> {
         let all: Vec<[f64; 2]> = report.points.iter().filter_map(|p: &Point| p.core_to_core_ns).collect();
-        let usual = median(all.as_flattened())?;
+        let mut sorted = all.as_flattened().to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let (&least, &most) = (sorted.first()?, sorted.last()?);
+        let usual = sorted[(sorted.len() - 1) / 2];
         let near = |ns: &f64| alike(*ns, usual);
         let elsewhere = all.iter().filter(|both| !both.iter().all(near)).count();
-        Some(Self { core_to_core_ns: usual, elsewhere: elsewhere as f64 / all.len() as f64 })
+        let elsewhere = elsewhere as f64 / all.len() as f64;
+        Some(Self { core_to_core_ns: usual, range_ns: [least, most], elsewhere })
     }
 
     /// Whether the cores stayed where they were.
@@ -43,11 +48,11 @@ impl Steadiness {
 
     /// What the reader of a report should know, if anything.
     pub(crate) fn remark(self) -> Option<String> {
-        let Self { core_to_core_ns, elsewhere } = self;
+        let Self { core_to_core_ns, range_ns: [least, most], elsewhere } = self;
         (!self.is_steady()).then(|| {
             format!(
-                "the machine changed: the latency between cores was {core_to_core_ns:.0} ns at the median and another one at {:.0} % \
-                 of the points; what several threads gain changes with it",
+                "the machine changed: the latency between cores went from {least:.0} to {most:.0} ns, and was not near its usual \
+                 {core_to_core_ns:.0} ns at {:.0} % of the points; what several threads gain changes with it",
                 elsewhere * 100.0
             )
         })

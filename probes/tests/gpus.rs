@@ -237,7 +237,7 @@ fn a_driver_that_crashes_costs_the_gpus_and_a_remark() {
     assert!(devices["remark"].as_str().unwrap().contains("ended by signal 6"), "{devices}");
     let probed = report(with_it().args(TINY));
     assert!(
-        probed.remarks.iter().any(|r| r.contains("ended by signal 6")) && probed.points.len() == 2,
+        probed.remarks.iter().any(|r| r.contains("ended by signal 6")) && probed.points.len() >= 2,
         "{:?}",
         probed.remarks
     );

@@ -23,7 +23,9 @@ fn a_probe_writes_a_report_that_reads_back_with_every_parameter_and_point() {
     let report = read(&out);
     let names: Vec<&str> = report.hardware.parameters.iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, sapwise::hardware::parameter::all_names());
-    assert_eq!(report.points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [10, 20]);
+    // What lies close is visited again after the ascent, and between the two.
+    let sizes: Vec<u32> = report.points.iter().map(|p| p.load.objects).collect();
+    assert!(sizes[..2] == [10, 20] && sizes.iter().all(|n| (10..=20).contains(n)), "{sizes:?}");
     assert!(report.points.iter().all(|p| p.timings.iter().all(|t| t.samples_ns.len() >= 3)));
     assert_eq!(report.provenance.command, "probe --seed 9 --max-objects 20 --scenario uniform");
     assert_eq!(report.provenance.seed, 9);
@@ -75,7 +77,7 @@ fn a_full_disk_keeps_the_report_in_the_folder_for_temporary_files() {
     let kept: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().path()).collect();
     assert_eq!(kept.len(), 1, "{kept:?}");
     assert!(complaint.contains(&*kept[0].to_string_lossy()), "{complaint}");
-    assert_eq!(read(&kept[0]).points.len(), 2);
+    assert!(read(&kept[0]).points.len() >= 2);
 }
 
 #[cfg(unix)]

@@ -54,7 +54,10 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     let failed = conduct.failed();
     output::print(&conduct.summary())?;
     if end == End::Interrupted {
-        anyhow::bail!("interrupted: what was measured is in {}; the same command goes on from there", folder.display());
+        anyhow::bail!(
+            "interrupted: the complete profiles are in {}; the same command goes on from there, and measures the one that was stopped anew",
+            folder.display()
+        );
     }
     Ok(if failed { Outcome::Failed } else { Outcome::Done })
 }
