@@ -31,12 +31,7 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
         vec![one, if threads == 1 { one } else { rate(threads) }]
     });
     let methods = [1, threads].map(|threads| kernel.method(threads));
-    figures
-        .into_iter()
-        .zip(NAMES)
-        .zip(methods)
-        .map(|((figure, name), method)| figure.into_parameter(name, &method))
-        .collect()
+    foreign_load::into_parameters(figures, NAMES.into_iter().zip(methods))
 }
 
 /// Multiply-adds at one SIMD level.

@@ -82,6 +82,14 @@ fn six_digits(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }
 
+/// Figures as parameters, each with its name and method.
+pub(super) fn into_parameters(
+    figures: Vec<Figure>,
+    named: impl IntoIterator<Item = (&'static str, String)>,
+) -> Vec<Parameter> {
+    figures.into_iter().zip(named).map(|(figure, (name, method))| figure.into_parameter(name, &method)).collect()
+}
+
 /// Calls `sample` in windows until enough clean samples are there or the time is over; each call gives one value per figure.
 ///
 /// Where too few clean samples were got in time, the least spoiled windows are kept too, and `foreign_load` says so.

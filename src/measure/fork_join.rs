@@ -54,12 +54,7 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
         ),
         "the same with bodies of 300 us, after the helpers were idle for 2 ms while the calling thread worked".to_owned(),
     ];
-    figures
-        .into_iter()
-        .zip(NAMES)
-        .zip(methods)
-        .map(|((figure, name), method)| figure.into_parameter(name, &method))
-        .collect()
+    foreign_load::into_parameters(figures, NAMES.into_iter().zip(methods))
 }
 
 /// A caller and helpers as the algorithms have them, with the helpers bound as in a sweep.

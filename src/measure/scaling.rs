@@ -36,7 +36,7 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     });
     let method = |n: usize| format!("passes over 8 KiB a thread in the same time, {n} threads over one");
     let methods = [(two, method(2)), (all, method(threads))];
-    figures.into_iter().zip(methods).map(|(figure, (name, method))| figure.into_parameter(name, &method)).collect()
+    foreign_load::into_parameters(figures, methods)
 }
 
 fn passes_per_ns(time: Duration) -> f64 {
