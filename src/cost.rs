@@ -94,6 +94,10 @@ impl<'a> Counts<'a> {
 pub struct CostCurve {
     /// Terms of the sum; none is negative.
     pub terms: Vec<CostTerm>,
+    /// Terms of another way to do the same, which the algorithm goes where this sum is the smaller one: Verlet lists leave a frame to
+    /// the strips where boxes move too far. Empty where there is one way only.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub otherwise: Vec<CostTerm>,
     /// Last-level cache of the machine, for [`Term::ColdObjects`].
     pub cache_bytes: f64,
     /// What the terms leave unexplained, ascending by `log2_objects`: the sum is multiplied by `exp(ln_factor)`,
@@ -131,7 +135,10 @@ impl CostCurve {
     }
 
     pub(crate) fn cost_of(&self, counts: &Counts<'_>) -> f64 {
-        let sum: f64 = self.terms.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum();
+        let summed =
+            |terms: &[CostTerm]| -> f64 { terms.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum() };
+        let first = summed(&self.terms);
+        let sum = if self.otherwise.is_empty() { first } else { first.min(summed(&self.otherwise)) };
         if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects).exp() }
     }
 
@@ -151,7 +158,7 @@ impl CostCurve {
     /// What makes this curve unusable, if anything: a negative or non-finite figure, or knots out of order.
     #[must_use]
     pub fn defect(&self) -> Option<String> {
-        if let Some(t) = self.terms.iter().find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
+        if let Some(t) = self.terms.iter().chain(&self.otherwise).find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
             return Some(format!("the term {:?} has {} ns a unit", t.term, t.unit_ns));
         }
         if !(self.cache_bytes.is_finite() && self.cache_bytes >= 0.0) {
@@ -161,7 +168,8 @@ impl CostCurve {
         if !self.correction.iter().all(bounded) || !self.correction.is_sorted_by(|a, b| a.log2_objects < b.log2_objects) {
             return Some("knots of the correction that are not ascending, or beyond every measurement".to_owned());
         }
-        if self.terms.iter().all(|t| t.unit_ns == 0.0) {
+        let nothing = |terms: &[CostTerm]| terms.iter().all(|t| t.unit_ns == 0.0);
+        if nothing(&self.terms) || !self.otherwise.is_empty() && nothing(&self.otherwise) {
             return Some("no term above zero, so the cost is always nothing".to_owned());
         }
         None
@@ -186,6 +194,20 @@ mod tests {
         assert!((curve.cost_ns(&load(8)) - 156.0 * 2.0_f64.sqrt()).abs() < 1e-9);
         assert!((curve.cost_ns(&load(1024)) / (100.0 + 1024.0 * 1023.0) - 2.0).abs() < 1e-9);
         assert_eq!(curve.defect(), None);
+    }
+
+    #[test]
+    fn an_algorithm_with_two_ways_goes_the_cheaper_one() {
+        let term = |term, unit_ns| CostTerm { term, unit_ns };
+        let mut curve = CostCurve {
+            terms: vec![term(Term::Objects, 2.0), term(Term::Moved, 100.0)],
+            otherwise: vec![term(Term::Objects, 30.0)],
+            ..CostCurve::default()
+        };
+        let load = |moved| Load { objects: 10, moved, ..Load::default() };
+        assert_eq!([0.0, 0.25, 1.0].map(|moved| curve.cost_ns(&load(moved))), [20.0, 270.0, 300.0]);
+        curve.otherwise = vec![term(Term::Objects, 0.0)];
+        assert!(curve.defect().is_some());
     }
 
     #[test]

@@ -92,6 +92,9 @@ pub struct MethodModel {
     pub max_objects: u32,
     /// The physical terms; no unit is negative.
     pub terms: Vec<ModelTerm>,
+    /// Terms of another way to do the same, where the algorithm has one: [`CostCurve::otherwise`](crate::CostCurve::otherwise).
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub otherwise: Vec<ModelTerm>,
     /// Constant of the residual.
     pub residual_intercept: f64,
     /// Slopes of the residual on the natural logarithm of measured over modelled time.
@@ -190,13 +193,13 @@ impl Model {
         }
         for m in &self.methods {
             let name = format!("{} on the {}", m.method, m.backend);
-            if let Some(t) = m.terms.iter().find(|t| !t.scale.is_of(m.backend)) {
+            if let Some(t) = m.terms.iter().chain(&m.otherwise).find(|t| !t.scale.is_of(m.backend)) {
                 return Some(format!("{name}: the scale {:?} is of another processor", t.scale));
             }
             if let Some(r) = m.residual.iter().find(|r| !r.feature.is_of(m.backend)) {
                 return Some(format!("{name}: the feature {:?} is of another processor", r.feature));
             }
-            if let Some(t) = m.terms.iter().find(|t| !(t.unit.is_finite() && t.unit >= 0.0)) {
+            if let Some(t) = m.terms.iter().chain(&m.otherwise).find(|t| !(t.unit.is_finite() && t.unit >= 0.0)) {
                 return Some(format!("{name}: the term {:?} has the unit {}", t.term, t.unit));
             }
             if m.terms.iter().all(|t| t.unit == 0.0) {

@@ -2,7 +2,7 @@
 
 use super::gpu_set::GpuSet;
 use super::scale::need;
-use super::{GPU_PREFIX, MethodModel, Model, Range};
+use super::{GPU_PREFIX, MethodModel, Model, ModelTerm, Range};
 use crate::hardware::{GpuKind, Hardware, parameter};
 use crate::{AlgorithmCost, AlgorithmId, Backend, BackendClass, CostCurve, CostTerm, Knot, Load};
 
@@ -135,20 +135,27 @@ impl Range {
     }
 }
 
+/// The terms with what a unit of each takes, those of the same count together.
+fn in_nanoseconds(terms: &[ModelTerm], hardware: &Hardware, backend: &Backend) -> Result<Vec<CostTerm>, String> {
+    let mut sum: Vec<CostTerm> = Vec::new();
+    for t in terms.iter().filter(|t| t.unit > 0.0) {
+        let unit_ns = t.unit * t.scale.nanoseconds(hardware, backend)?;
+        match sum.iter_mut().find(|c| c.term == t.term) {
+            Some(same) => same.unit_ns += unit_ns,
+            None => sum.push(CostTerm { term: t.term, unit_ns }),
+        }
+    }
+    Ok(sum)
+}
+
 impl MethodModel {
     /// The cost curve of this method on a backend of a machine.
     ///
     /// # Errors
     /// Names the hardware parameter or the GPU that is missing.
     pub fn curve(&self, hardware: &Hardware, backend: &Backend) -> Result<CostCurve, String> {
-        let mut terms: Vec<CostTerm> = Vec::new();
-        for t in self.terms.iter().filter(|t| t.unit > 0.0) {
-            let unit_ns = t.unit * t.scale.nanoseconds(hardware, backend)?;
-            match terms.iter_mut().find(|c| c.term == t.term) {
-                Some(same) => same.unit_ns += unit_ns,
-                None => terms.push(CostTerm { term: t.term, unit_ns }),
-            }
-        }
+        let [terms, otherwise] = [&self.terms, &self.otherwise].map(|terms| in_nanoseconds(terms, hardware, backend));
+        let (terms, otherwise) = (terms?, otherwise?);
         let mut correction = Vec::new();
         if !self.residual.is_empty() || self.residual_intercept != 0.0 {
             for octave in CORRECTION_OCTAVES {
@@ -163,7 +170,7 @@ impl MethodModel {
             // No term of a GPU depends on the caches of the CPU.
             BackendClass::Gpu => 0.0,
         };
-        Ok(CostCurve { terms, cache_bytes, correction })
+        Ok(CostCurve { terms, otherwise, cache_bytes, correction })
     }
 
     fn ln_residual(&self, hardware: &Hardware, backend: &Backend, load: &Load) -> Result<f64, String> {

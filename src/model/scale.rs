@@ -24,6 +24,9 @@ pub enum Scale {
     Byte,
     /// One fork and join of a pool that sleeps, as it does between frames; nothing with one thread.
     ForkJoin,
+    /// One cache line of a frame, read by one of `k` cores that read at the same time: of `k` lines `k - 1` come from another core,
+    /// `core_to_core_ns` * (k - 1) / k^2. Nothing with one thread.
+    SharedLine,
     /// One submission that is waited for, and reading back a few bytes of its result: `round_trip_ns` + `read_back_ns`, times
     /// `group_round_trip_ratio` of several GPUs.
     GpuRoundTrip,
@@ -51,7 +54,9 @@ impl Scale {
         match self {
             // The CPU works for a GPU too: it copies boxes and pairs.
             Self::Cycle => true,
-            Self::SharedCycle | Self::SharedLane | Self::Byte | Self::ForkJoin => class == BackendClass::Cpu,
+            Self::SharedCycle | Self::SharedLane | Self::Byte | Self::ForkJoin | Self::SharedLine => {
+                class == BackendClass::Cpu
+            }
             _ => class == BackendClass::Gpu,
         }
     }
@@ -73,7 +78,11 @@ impl Scale {
             Self::SharedCycle => cycle(hardware)? / speed_up(hardware, threads)?,
             Self::SharedLane => cycle(hardware)? / speed_up(hardware, threads)? / need(hardware, parameter::SIMD_LANES)?,
             Self::Byte => 1.0 / bandwidth(hardware, threads)?,
-            Self::ForkJoin if threads == 1 => 0.0,
+            Self::ForkJoin | Self::SharedLine if threads == 1 => 0.0,
+            Self::SharedLine => {
+                let k = f64::from(threads);
+                core_to_core(hardware)? * (k - 1.0) / (k * k)
+            }
             Self::ForkJoin => need(hardware, parameter::FORK_JOIN_COLD_NS)?,
             _ => cycle(hardware)?,
         })
@@ -106,6 +115,16 @@ impl Scale {
 fn cycle(hardware: &Hardware) -> Result<f64, String> {
     let measured = need(hardware, parameter::CLOCK_MEASURED_GHZ);
     measured.or_else(|e| need(hardware, parameter::CLOCK_REPORTED_GHZ).map_err(|_| e)).map(|ghz| 1.0 / ghz)
+}
+
+/// Cache lines that go from core to core in a warm fork and join: of twelve reports of one machine it took 15 times the latency where
+/// its two cores lay near each other, and 9.6 times where they lay apart.
+const LINES_OF_A_FORK_JOIN: f64 = 12.0;
+
+/// Latency between cores in ns; what the warm fork and join implies where it was not measured, as in reports of old versions.
+fn core_to_core(hardware: &Hardware) -> Result<f64, String> {
+    need(hardware, parameter::CORE_TO_CORE_NS)
+        .or_else(|e| need(hardware, parameter::FORK_JOIN_WARM_NS).map(|ns| ns / LINES_OF_A_FORK_JOIN).map_err(|_| e))
 }
 
 /// A parameter that must be there and above zero.

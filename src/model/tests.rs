@@ -52,6 +52,7 @@ fn method(backend: BackendClass, scale: Scale) -> MethodModel {
         min_objects: 1,
         max_objects: 1000,
         terms: vec![ModelTerm { term: Term::Call, scale, unit: 2.0 }],
+        otherwise: Vec::new(),
         residual_intercept: 0.0,
         residual: Vec::new(),
         spread_ln: 0.1,

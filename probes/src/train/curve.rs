@@ -3,12 +3,13 @@
 use super::profile::Profile;
 use super::robust::{Problem, spread, weighted_median};
 use super::rows::{Row, rows};
-use super::terms::terms_of_one_machine;
+use super::terms::{other_way, terms_of_one_machine};
+use super::two_ways::TwoWays;
 use anyhow::{Result, bail};
 use ndarray::Array2;
 use sapwise::crossover::{Comparison, Paired};
 use sapwise::hardware::parameter;
-use sapwise::report::{Label, Point, Report};
+use sapwise::report::{Label, Point, Report, Timed};
 use sapwise::{AlgorithmCost, AlgorithmId, Border, CostCurve, CostTerm, Fields, Knot, Load, Source};
 
 /// Distance of the knots of a correction, in octaves of the number of objects.
@@ -63,10 +64,17 @@ pub(crate) fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<Stri
     let rows = rows(profile, 0);
     let cache_bytes = profile.hardware.value(parameter::CACHE_LLC_BYTES).unwrap_or(0.0);
     let (mut costs, mut warnings) = (Vec::new(), Vec::new());
-    for (k, timed) in profile.algorithms.iter().enumerate() {
+    let mut order: Vec<(usize, &Timed)> = profile.algorithms.iter().enumerate().collect();
+    // Whoever goes over to another method comes after that.
+    order.sort_by_key(|(_, timed)| other_way(timed.id.method()).is_some());
+    for (k, timed) in order {
         let own: Vec<&Row> = rows.iter().filter(|r| usize::from(r.algorithm) == k).collect();
         let points = own.iter().filter(|r| !r.floor).count();
-        let fitted = (points >= FEWEST_POINTS).then(|| curve(&timed.id, &own, cache_bytes));
+        let other = other_way(timed.id.method()).and_then(|other| {
+            let same = |c: &&AlgorithmCost| c.algorithm.method() == other && c.algorithm.backend() == timed.id.backend();
+            costs.iter().find(same).map(|c: &AlgorithmCost| c.curve.clone())
+        });
+        let fitted = (points >= FEWEST_POINTS).then(|| curve(&timed.id, &own, cache_bytes, other.as_ref()));
         match fitted.filter(|(curve, _)| curve.defect().is_none()) {
             Some((curve, spread_ln)) => {
                 costs.push(AlgorithmCost { algorithm: timed.id.clone(), revision: timed.revision, curve, spread_ln });
@@ -74,11 +82,12 @@ pub(crate) fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<Stri
             None => warnings.push(format!("{} has no cost curve: it was timed at {points} points only", timed.id)),
         }
     }
+    costs.sort_by_key(|c: &AlgorithmCost| profile.position(&c.algorithm));
     (costs, warnings)
 }
 
-/// The curve of one algorithm on one machine, and its spread.
-fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64) -> (CostCurve, f64) {
+/// The curve of one algorithm on one machine, and its spread. `other` is that of the algorithm that it goes over to, if it does.
+fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64, other: Option<&CostCurve>) -> (CostCurve, f64) {
     let terms = terms_of_one_machine(id.method(), id.backend().class());
     let problem = Problem {
         terms: Array2::from_shape_fn((rows.len(), terms.len()), |(k, j)| terms[j].count(&rows[k].load, cache_bytes)),
@@ -87,9 +96,17 @@ fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64) -> (CostCurve, f64) 
         floors: rows.iter().map(|r| r.floor).collect(),
         groups: vec![0; rows.len()],
     };
-    let units = problem.units();
+    let (units, otherwise) = match other {
+        None => (problem.units(), Vec::new()),
+        Some(other) => {
+            let ns: Vec<f64> = rows.iter().map(|r| other.cost_ns(&r.load)).collect();
+            let found = TwoWays::fit(&problem, &ns);
+            let otherwise = other.terms.iter().map(|t| CostTerm { unit_ns: t.unit_ns * found.factor, ..*t }).collect();
+            (found.units, otherwise)
+        }
+    };
     let terms = terms.into_iter().zip(units).filter(|(_, u)| *u > 0.0).map(|(term, unit_ns)| CostTerm { term, unit_ns });
-    let mut curve = CostCurve { terms: terms.collect(), cache_bytes, correction: Vec::new() };
+    let mut curve = CostCurve { terms: terms.collect(), otherwise, cache_bytes, correction: Vec::new() };
     if curve.defect().is_some() {
         return (curve, 0.0);
     }
@@ -225,12 +242,13 @@ mod tests {
             load: load("uniform", f64::from(objects)),
             core_to_core_ns: None,
             ns,
+            behind: 1.0,
             floor,
         };
         let mut rows: Vec<Row> = [16, 23, 32, 45].map(|n| row(n, 9000.0, false)).into();
         rows.extend([64, 1024, 16_384, 262_144].map(|n| row(n, 100.0 * f64::from(n) * 2.0, true)));
         let rows: Vec<&Row> = rows.iter().collect();
-        let (curve, _) = curve(&"brute@cpu2".parse().unwrap(), &rows, 1e6);
+        let (curve, _) = curve(&"brute@cpu2".parse().unwrap(), &rows, 1e6, None);
         assert_eq!(curve.defect(), None);
         for r in rows.iter().filter(|r| r.floor) {
             assert!(curve.cost_ns(&r.load) > 0.99 * r.ns, "{curve:?}");

@@ -18,6 +18,7 @@ mod selection;
 pub(crate) mod synthetic;
 mod terms;
 mod triangle;
+mod two_ways;
 mod validate;
 mod yardstick;
 

@@ -1,6 +1,7 @@
 //! What training keeps of a report: the hardware, and the median of each algorithm at each point.
 
 use super::direct::{Crossing, crossings};
+use sapwise::measure::statistics::median as median_of;
 use sapwise::report::{Label, Point, Report, Timed, Timing};
 use sapwise::{AlgorithmId, Hardware, Load};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -50,7 +51,7 @@ impl Profile {
         Self {
             file: file.to_owned(),
             label: report.label,
-            hardware,
+            hardware: as_at_the_points(hardware, report),
             algorithms: report.algorithms.clone(),
             points: points.filter(|s| !s.medians.is_empty() && s.load.objects > 0).collect(),
             crossings: crossings(report),
@@ -110,6 +111,18 @@ impl Profile {
     }
 }
 
+/// The hardware with its cores as far apart as they were at half of the points. Where a host moves them, the seconds in which the
+/// parameters were measured may have been unlike the minutes after.
+fn as_at_the_points(hardware: Hardware, report: &Report) -> Hardware {
+    let apart: Vec<f64> = report.points.iter().filter_map(between_cores).collect();
+    median_of(&apart).map_or_else(|| hardware.clone(), |ns| hardware.with_cores_apart(ns))
+}
+
+/// The latency between cores at a point: the geometric mean of before and after.
+fn between_cores(point: &Point) -> Option<f64> {
+    point.core_to_core_ns.map(|[before, after]| (before * after).sqrt())
+}
+
 impl Spot {
     fn of(point: &Point, algorithms: &[Timed]) -> Self {
         let known = |t: &&Timing| t.error.is_none() && t.samples_ns.len() >= FEWEST_SAMPLES;
@@ -120,7 +133,7 @@ impl Spot {
         Self {
             scenario: point.scenario.clone(),
             load: point.load,
-            core_to_core_ns: point.core_to_core_ns.map(|[before, after]| (before * after).sqrt()),
+            core_to_core_ns: between_cores(point),
             medians: point.timings.iter().filter(known).filter_map(median).collect(),
         }
     }

@@ -4,6 +4,7 @@ use super::nnls::nnls;
 use ndarray::{Array1, Array2, Axis};
 
 /// Times and the terms that should add up to them.
+#[derive(Debug, Clone)]
 pub(crate) struct Problem {
     /// Nanoseconds for one unit of each term, shape (rows, terms).
     pub(crate) terms: Array2<f64>,
@@ -20,7 +21,7 @@ pub(crate) struct Problem {
 /// Rounds of reweighting, at most. The units stop moving in the fourth digit after about eight.
 const ROUNDS: usize = 15;
 /// The units stand still when no row is modelled differently by more than this share.
-const STILL: f64 = 1e-5;
+const STILL: f64 = 1e-9;
 /// Rows that the search for a start looks at: which of the ends is nearest to the truth shows in few.
 const START_ROWS: usize = 600;
 /// Logarithmic error from which on it counts linearly where ends are compared: a factor of 1.65.

@@ -17,6 +17,8 @@ pub(crate) struct Row {
     pub(crate) core_to_core_ns: Option<f64>,
     /// Median over the frames.
     pub(crate) ns: f64,
+    /// Time over the best of the point, of a lower bound that bound over it.
+    pub(crate) behind: f64,
     /// The time is a lower bound: the algorithm had left the race before this point.
     pub(crate) floor: bool,
 }
@@ -33,17 +35,18 @@ pub(crate) fn rows(profile: &Profile, position: usize) -> Vec<Row> {
         let algorithm = algorithm as u16;
         // For each scenario the sizes at which it was timed, and how many times slower than the best it was there.
         let mut ratios: BTreeMap<&str, BTreeMap<u32, f64>> = BTreeMap::new();
-        let row = |spot: &Spot, ns: f64, floor: bool| Row {
+        let row = |spot: &Spot, best: f64, behind: f64, floor: bool| Row {
             profile: position,
             algorithm,
             load: spot.load,
             core_to_core_ns: spot.core_to_core_ns,
-            ns,
+            ns: best * behind,
+            behind,
             floor,
         };
         for spot in &profile.points {
             let (Some(ns), Some(best)) = (spot.of_position(algorithm), spot.best()) else { continue };
-            rows.push(row(spot, ns, false));
+            rows.push(row(spot, best, ns / best, false));
             ratios.entry(&spot.scenario).or_default().insert(spot.load.objects, ns / best);
         }
         let on_gpu = timed.id.backend().class() == BackendClass::Gpu;
@@ -55,7 +58,7 @@ pub(crate) fn rows(profile: &Profile, position: usize) -> Vec<Row> {
         for spot in &profile.points {
             let Some(&(objects, behind)) = last.get(spot.scenario.as_str()) else { continue };
             if let Some(best) = spot.best().filter(|_| spot.load.objects > objects) {
-                rows.push(row(spot, best * behind.max(LEFT_BEHIND), true));
+                rows.push(row(spot, best, behind.max(LEFT_BEHIND), true));
             }
         }
     }

@@ -111,6 +111,7 @@ impl Machine {
             (parameter::CACHE_LLC_BYTES, self.cache_bytes),
             (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, self.gb_per_s.0),
             (parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, self.gb_per_s.1),
+            (parameter::CORE_TO_CORE_NS, self.fork_join_ns / 80.0),
             (parameter::FORK_JOIN_COLD_NS, self.fork_join_ns),
             (parameter::SCALING_TWO_THREADS_RATIO, Self::scaling(2)),
             (parameter::SCALING_ALL_THREADS_RATIO, Self::scaling(self.cores)),
@@ -255,6 +256,7 @@ fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> Me
         min_objects: 1,
         max_objects: u32::MAX,
         terms: terms.iter().map(|&(term, scale, unit)| ModelTerm { term, scale, unit }).collect(),
+        otherwise: Vec::new(),
         residual_intercept: 0.0,
         residual: Vec::new(),
         spread_ln: 0.0,
@@ -313,17 +315,21 @@ pub(crate) fn truth() -> Vec<MethodModel> {
         ),
         method("sweep", &sorted(1500.0, 3.0, (AxisCandidates, SharedLane, 7.0))),
         method("strips", &sorted(6000.0, 4.0, (StripCandidates, SharedLane, 60.0))),
-        method(
-            "verlet",
-            &[
-                (Call, Cycle, 8000.0),
-                (Call, ForkJoin, 2.0),
-                (Objects, SharedCycle, 15.0),
-                (ColdObjects, Byte, 60.0),
-                (StripCandidates, SharedLane, 40.0),
-                (Pairs, SharedCycle, 20.0),
-                (Moved, SharedCycle, 150.0),
-            ],
-        ),
+        MethodModel {
+            otherwise: sorted(7000.0, 4.4, (StripCandidates, SharedLane, 66.0))
+                .map(|(term, scale, unit)| ModelTerm { term, scale, unit })
+                .into(),
+            ..method(
+                "verlet",
+                &[
+                    (Call, Cycle, 800.0),
+                    (Call, ForkJoin, 2.0),
+                    (Objects, SharedCycle, 15.0),
+                    (ColdObjects, Byte, 60.0),
+                    (Pairs, SharedCycle, 20.0),
+                    (Moved, SharedCycle, 150.0),
+                ],
+            )
+        },
     ]
 }

@@ -9,10 +9,16 @@ fn tests(method: &str) -> &'static [Term] {
     match method {
         "brute" => &[Term::AllPairs],
         "sweep" => &[Term::AxisCandidates],
-        // Verlet lists are made by the strips, which also take over where boxes move too far.
-        "strips" | "verlet" => &[Term::StripCandidates],
+        "strips" => &[Term::StripCandidates],
+        // Verlet lists are tested pair by pair, and made anew in few frames.
+        "verlet" => &[],
         _ => &[Term::AllPairs, Term::AxisCandidates, Term::StripCandidates],
     }
+}
+
+/// The method that another one goes over to where that is cheaper: the strips take over where boxes move too far for Verlet lists.
+pub(crate) fn other_way(method: &str) -> Option<&'static str> {
+    (method == "verlet").then_some("strips")
 }
 
 /// Whether the boxes are sorted in every frame. Verlet lists sort them in few, or, where the strips take over, by their cells only.
@@ -48,7 +54,7 @@ pub(crate) fn terms(method: &str, class: BackendClass) -> Vec<(Term, Scale)> {
             if keeps_work(method) {
                 list.push((Moved, SharedCycle));
             }
-            list.push((Objects, Cycle));
+            list.extend([(Objects, SharedLine), (Objects, Cycle)]);
             if sorts {
                 list.push((Sort, Cycle));
             }
