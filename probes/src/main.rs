@@ -1,5 +1,5 @@
 //! The command `sapwise`.
 
 fn main() -> std::process::ExitCode {
-    sapwise_cli::run()
+    sapwise_cli::Command::new().run()
 }
