@@ -9,6 +9,7 @@ mod common;
 
 use assert_cmd::Command;
 use common::{failure, npy, sapwise, success};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -18,10 +19,11 @@ use std::{env, fs};
 const AS_COMMAND: &str = "SAPWISE_TEST_AS_COMMAND";
 
 /// Every test by its name.
-const TESTS: [(&str, fn()); 4] = [
+const TESTS: [(&str, fn()); 5] = [
     ("from_the_probe_to_the_run_as_one_of_ours", from_the_probe_to_the_run_as_one_of_ours),
     ("the_pairs_are_those_of_ours", the_pairs_are_those_of_ours),
     ("boxes_that_ours_refuse_are_refused", boxes_that_ours_refuse_are_refused),
+    ("one_on_several_threads_gets_their_number", one_on_several_threads_gets_their_number),
     ("names_that_clash_are_refused_before_anything_is_done", names_that_clash_are_refused_before_anything_is_done),
 ];
 
@@ -29,12 +31,13 @@ fn main() -> ExitCode {
     match env::var(AS_COMMAND).as_deref() {
         Ok("bvh") => return bvh::main(),
         Ok("clash") => return clash(),
+        Ok("threads") => return on_threads(),
         _ => {}
     }
-    // What cargo hands on of its own begins with a dash.
-    let wanted: Vec<String> = env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    // Cargo puts the name that it was given first. Behind it are words for the usual harness, which say nothing here.
+    let wanted = env::args().nth(1).filter(|word| !word.starts_with('-')).unwrap_or_default();
     for (name, test) in TESTS {
-        if wanted.is_empty() || wanted.iter().any(|word| name.contains(word.as_str())) {
+        if name.contains(&wanted) {
             // A test that fails panics, which ends the program with a status above 0.
             test();
             println!("test {name} ... ok");
@@ -46,6 +49,19 @@ fn main() -> ExitCode {
 /// A program whose algorithm has the name of one of ours.
 fn clash() -> ExitCode {
     sapwise_cli::Command::new().with("strips", 1, || unreachable!("it was refused")).run()
+}
+
+/// A program whose algorithm finds as many pairs as it has threads, whatever the boxes.
+fn on_threads() -> ExitCode {
+    struct Threads(u32);
+    impl BroadPhase for Threads {
+        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+            pairs.clear();
+            (1..=self.0).for_each(|k| pairs.push(0, k));
+            pairs.finish()
+        }
+    }
+    sapwise_cli::Command::new().with_threads("threads", 1, |threads| Ok(Box::new(Threads(threads)))).run()
 }
 
 fn program(name: &str) -> Command {
@@ -167,6 +183,23 @@ fn boxes_that_ours_refuse_are_refused() {
     assert!(complaints[0].contains("box 1") && complaints[0] == complaints[1], "{complaints:?}");
     let unknown = failure(sapwise().arg("pairs").arg(&path).args(["--algorithm", "bvh@cpu1"]), 2);
     assert!(unknown.contains("no algorithm is called \"bvh@cpu1\""), "{unknown}");
+}
+
+fn one_on_several_threads_gets_their_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let boxes = npy(folder.path(), "one.npy", "<f4", "1, 6", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+    let told: Value = serde_json::from_str(&success(program("threads").args(["devices", "--no-gpus", "--json"]))).unwrap();
+    let ids = told["algorithms"].as_array().unwrap().iter().map(|a| a["id"].as_str().unwrap());
+    let on = |method: &str| -> Vec<u32> {
+        let id = |text: &str| text.parse::<AlgorithmId>().unwrap();
+        ids.clone().map(id).filter(|id| id.method() == method).map(|id| id.threads()).collect()
+    };
+    assert!(!on("threads").is_empty() && on("threads") == on("brute"), "{told}");
+    for threads in on("threads") {
+        let words = ["--json", "--algorithm", &format!("threads@cpu{threads}")];
+        let told: Value = serde_json::from_str(&success(program("threads").arg("pairs").arg(&boxes).args(words))).unwrap();
+        assert_eq!(told["pairs"][0], threads);
+    }
 }
 
 fn names_that_clash_are_refused_before_anything_is_done() {
