@@ -30,7 +30,8 @@ impl Command {
     ///
     /// `method` is 1 to 32 of `a-z`, `0-9`, `-` and `_`, beginning with a letter, and no name of ours; else [`run`](Self::run) says so and
     /// fails. Count `revision` up whenever its speed changes: reports and models of other revisions are stale then. `make` is called in
-    /// each process that runs the algorithm, and its error leaves the algorithm out with a remark.
+    /// each process that runs the algorithm, and its error leaves the algorithm out with a remark. One with kernels of several vector
+    /// widths asks [`SimdLevel::in_use`](sapwise::SimdLevel::in_use), so that a probe with `SAPWISE_SIMD` restricts it as well.
     #[must_use]
     pub fn with(
         self,
@@ -42,7 +43,8 @@ impl Command {
     }
 
     /// The same of an algorithm that runs on several threads: `make` gets their number, the calling one included. It is listed, as
-    /// ours are, on 1, 2, 4, ... threads and on all that the machine has or `--threads` allows.
+    /// ours are, on 1, 2, 4, ... threads and on all that the machine has or `--threads` allows. The command pins our threads to cores;
+    /// those of a user's algorithm it leaves alone.
     #[must_use]
     pub fn with_threads(
         self,

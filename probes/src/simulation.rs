@@ -5,7 +5,7 @@ use crate::progress::Progress;
 use crate::turns::Turns;
 use anyhow::{Context, bail};
 use sapwise::measure::Watch;
-use sapwise::{Adaptive, AlgorithmId, BackendClass, BroadPhase, Fields, Pairs, Registry, Scenario};
+use sapwise::{Adaptive, AlgorithmId, BroadPhase, Fields, Pairs, Registry, Scenario};
 use std::time::Instant;
 
 /// A fixed algorithm of which even the fastest of two samples at a frame takes this many times as long as the best there is
@@ -147,9 +147,8 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
                 contestants.push(Contestant::new(algorithm, course.frames));
                 fixed.push(id);
             }
-            // A driver may refuse at any time; the course goes on without its GPU.
-            Err(error) if id.backend().class() == BackendClass::Gpu => notes.push(error.to_string()),
-            Err(error) => return Err(error.into()),
+            // A driver may refuse at any time, and so may what a user added; the course goes on without it.
+            Err(error) => notes.push(format!("{id} is left out: {error}")),
         }
     }
     // Fields may name a number of threads that the registry doesn't list but can make.

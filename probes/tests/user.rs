@@ -139,12 +139,21 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let complaint = failure(sapwise().args(run).arg(&fields), 1);
     assert!(complaint.contains("is stale: bvh is not in this build"), "{complaint}");
 
+    check_names_a_number_of_threads_that_it_can_not_be_made_on(&fields);
     for path in [&report, &model, &fields] {
         success(user().arg("check").arg(path));
         let told = sapwise().arg("check").arg(path).output().unwrap();
         let text = String::from_utf8(told.stdout).unwrap();
         assert!(told.status.code() == Some(1) && text.contains("stale: bvh is not in this build"), "{text}");
     }
+}
+
+fn check_names_a_number_of_threads_that_it_can_not_be_made_on(fields: &Path) {
+    let other = fields.with_file_name("two-threads.json");
+    fs::write(&other, fs::read_to_string(fields).unwrap().replace("bvh@cpu1", "bvh@cpu2")).unwrap();
+    let told = user().arg("check").arg(&other).output().unwrap();
+    let text = String::from_utf8(told.stdout).unwrap();
+    assert!(told.status.code() == Some(1) && text.contains("bvh@cpu2") && !text.contains("stale"), "{text}");
 }
 
 fn the_pairs_are_those_of_ours() {

@@ -34,7 +34,7 @@ pub(crate) fn sweep(
         }
         match registry.create(&id) {
             Ok(algorithm) => runners.push(Runner::new(id, algorithm)),
-            Err(error) => emit(Event::Remark(format!("{scenario}: {error}")))?,
+            Err(error) => emit(Event::Remark(format!("{scenario}: {id} is left out: {error}")))?,
         }
     }
     // From here on: opening a GPU takes seconds, and is not the time of any size.
@@ -286,6 +286,28 @@ mod tests {
         .unwrap();
         assert_eq!((points, remarks.len()), (1, 1), "{remarks:?}");
         assert!(remarks[0].contains("gpu99 (none such) was there"), "{remarks:?}");
+    }
+
+    #[test]
+    fn a_users_algorithm_is_timed_like_ours_and_one_that_can_not_be_made_is_named() {
+        let mut algorithms = Algorithms::default();
+        let brute = || Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap());
+        algorithms.add("mine", 1, false, move |_| brute()).unwrap();
+        let refused = |_| Err(sapwise::Error::OutOfMemory { what: "nodes", elements: 3 });
+        algorithms.add("huge", 1, false, refused).unwrap();
+        let (mut raced, mut remarks) = (Vec::new(), Vec::new());
+        sweep(&order("uniform", &[10], 1.0), &algorithms, &mut |event| {
+            match event {
+                Event::Point(point) => raced.extend(point.timings.into_iter().map(|t| t.algorithm.to_string())),
+                Event::Remark(text) => remarks.push(text),
+                Event::Mismatch(text) => panic!("{text}"),
+            }
+            Ok(())
+        })
+        .unwrap();
+        assert!(raced.contains(&"mine@cpu1".to_owned()) && !raced.contains(&"huge@cpu1".to_owned()), "{raced:?}");
+        assert_eq!(remarks.len(), 1, "{remarks:?}");
+        assert!(remarks[0].starts_with("uniform: huge@cpu1 is left out: no memory for 3 nodes"), "{remarks:?}");
     }
 
     #[test]
