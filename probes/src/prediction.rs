@@ -1,5 +1,7 @@
 //! Fields of a machine from its hardware parameters.
 
+use crate::algorithms::Algorithms;
+use crate::revisions;
 use anyhow::Context;
 use sapwise::hardware::parameter;
 use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Registry, Scenario, Source};
@@ -19,15 +21,18 @@ pub(crate) fn predict(
     hardware: &Hardware,
     gpus: &[GpuIdentity],
     scenario: Scenario,
+    algorithms: &Algorithms,
 ) -> anyhow::Result<Fields> {
     let cores = hardware.value(parameter::USABLE_CORES).map_or(1, |k| k as u32);
-    let mut algorithms = Registry::with_cores(cores).available();
-    algorithms.extend(sapwise::gpu::algorithms(gpus));
-    let prediction = model.predict(hardware, &algorithms).map_err(anyhow::Error::msg)?;
+    let registry = algorithms.registry(cores);
+    let mut known = registry.available();
+    known.extend(sapwise::gpu::algorithms(gpus));
+    let prediction = model.predict(hardware, &known).map_err(anyhow::Error::msg)?;
     let mut fields = Fields::from_costs(Source::Predicted, &scenario.to_string(), prediction.costs, &slice(scenario)?);
     fields.model = Some(model.name.clone());
     fields.extrapolated = prediction.extrapolated;
     fields.warnings = prediction.warnings;
+    fields.warnings.extend(revisions::unknown_to(&registry, model));
     let v = &model.validation;
     fields.interval_basis = format!(
         "90 % of a normal distribution with the spread of measured over modelled time in training ({} profiles of {} \

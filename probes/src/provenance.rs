@@ -1,11 +1,12 @@
 //! How a report was made, and what kind of evidence that makes it.
 
+use crate::algorithms::Algorithms;
 use crate::args::Probe;
 use crate::date;
 use crate::gpus::uses;
 use crate::restriction;
 use sapwise::report::{Label, Point, Provenance, Restriction, Timed};
-use sapwise::{GpuKind, Hardware, Registry, SimdLevel, usable_cores};
+use sapwise::{GpuKind, Hardware, SimdLevel, usable_cores};
 use std::time::Duration;
 
 /// A machine whose other programs take more than this share of the CPU at half of the points is not undisturbed.
@@ -52,8 +53,8 @@ pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) ->
 }
 
 /// The algorithms that have timings at these points, in the order of the registry, then those of the GPUs.
-pub(crate) fn timed(points: &[Point], threads: Option<u32>, hardware: &Hardware) -> Vec<Timed> {
-    let registry = Registry::with_cores(threads.unwrap_or_else(usable_cores));
+pub(crate) fn timed(points: &[Point], threads: Option<u32>, hardware: &Hardware, algorithms: &Algorithms) -> Vec<Timed> {
+    let registry = algorithms.registry(threads.unwrap_or_else(usable_cores));
     let raced = |id| points.iter().any(|p| p.timings.iter().any(|t| t.algorithm == id));
     let on_gpus = sapwise::gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu));
     let entries = registry.available().into_iter().chain(on_gpus);
@@ -164,6 +165,6 @@ mod tests {
         assert_eq!(label(&probe(&[]), &swept, &software), Label::RealSoftwareGpu);
         assert_ne!(label(&probe(&[]), &failed, &software), Label::RealSoftwareGpu);
         assert_ne!(label(&probe(&[]), &swept, &hardware(GpuKind::Discrete)), Label::RealSoftwareGpu);
-        assert_eq!(timed(&swept, Some(1), &software)[0].id.to_string(), "brute@gpu0");
+        assert_eq!(timed(&swept, Some(1), &software, &Algorithms::default())[0].id.to_string(), "brute@gpu0");
     }
 }

@@ -1,6 +1,6 @@
 //! Whether what a file tells about algorithms holds for those of this build.
 
-use sapwise::{AlgorithmId, BackendClass, Fields, GpuIdentity, GpuKind, Registry, Report};
+use sapwise::{AlgorithmId, BackendClass, Fields, GpuIdentity, GpuKind, Model, Registry, Report};
 
 /// What keeps the timings of a report from holding for this build, one sentence for each method.
 pub(crate) fn stale_in_report(report: &Report, registry: &Registry) -> Vec<String> {
@@ -15,8 +15,22 @@ pub(crate) fn stale_in_fields(fields: &Fields, registry: &Registry) -> Vec<Strin
 /// What has a revision: a method on one class of processor.
 pub(crate) type Key<'a> = (BackendClass, &'a str);
 
-fn of(id: &AlgorithmId) -> Key<'_> {
+pub(crate) fn of(id: &AlgorithmId) -> Key<'_> {
     (id.backend().class(), id.method())
+}
+
+/// What is said after the name of a method that this build lacks.
+const ELSEWHERE: &str = "is not in this build: it is of another version, or of a program that adds it";
+
+/// The methods of a model that this build lacks, one sentence for each.
+pub(crate) fn unknown_to(registry: &Registry, model: &Model) -> Vec<String> {
+    let keys = model.methods.iter().map(|m| (m.backend, m.method.as_str()));
+    let unknown = keys.filter(|&key| !is_known(key, registry));
+    unknown.map(|key| format!("the model {} knows {}, which {ELSEWHERE}", model.name, name(key))).collect()
+}
+
+fn name((class, method): Key<'_>) -> String {
+    if class == BackendClass::Cpu { method.to_owned() } else { format!("{method} on a GPU") }
 }
 
 /// The methods whose revision is not that of this build.
@@ -25,14 +39,14 @@ pub(crate) fn stale<'a>(used: impl Iterator<Item = (Key<'a>, u32)>, registry: &R
     let on_gpus = sapwise::gpu::algorithms(std::iter::once(&any_gpu()));
     let mut stale = Vec::new();
     for ((class, method), revision) in used {
-        let name = if class == BackendClass::Cpu { method.to_owned() } else { format!("{method} on a GPU") };
+        let name = name((class, method));
         // Every thread count of a method has the same revision, and a machine with other counts has other ids.
         let own = registry.entries().iter().find(|e| of(&e.id) == (class, method)).map(|e| e.revision);
         let ours = own.or_else(|| on_gpus.iter().find(|(id, _)| of(id) == (class, method)).map(|(_, revision)| *revision));
         match ours {
             Some(ours) if ours == revision => {}
             Some(ours) => stale.push(format!("{name} has revision {revision} there and {ours} in this build")),
-            None => stale.push(format!("{name} is not in this build")),
+            None => stale.push(format!("{name} {ELSEWHERE}")),
         }
     }
     stale.sort_unstable();
@@ -40,10 +54,10 @@ pub(crate) fn stale<'a>(used: impl Iterator<Item = (Key<'a>, u32)>, registry: &R
     stale
 }
 
-/// Whether this build has the method of an algorithm on that class of processor.
-pub(crate) fn is_known(id: &AlgorithmId, registry: &Registry) -> bool {
+/// Whether this build has a method on that class of processor.
+pub(crate) fn is_known(key: Key<'_>, registry: &Registry) -> bool {
     let on_gpus = sapwise::gpu::algorithms(std::iter::once(&any_gpu()));
-    registry.entries().iter().any(|e| of(&e.id) == of(id)) || on_gpus.iter().any(|(other, _)| of(other) == of(id))
+    registry.entries().iter().any(|e| of(&e.id) == key) || on_gpus.iter().any(|(id, _)| of(id) == key)
 }
 
 /// A GPU that there need not be.

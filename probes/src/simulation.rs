@@ -5,7 +5,7 @@ use crate::progress::Progress;
 use crate::turns::Turns;
 use anyhow::{Context, bail};
 use sapwise::measure::Watch;
-use sapwise::{Adaptive, AlgorithmId, BackendClass, BroadPhase, Fields, Pairs, Registry, Scenario};
+use sapwise::{Adaptive, AlgorithmId, BroadPhase, Fields, Pairs, Registry, Scenario};
 use std::time::Instant;
 
 /// A fixed algorithm of which even the fastest of two samples at a frame takes this many times as long as the best there is
@@ -147,9 +147,8 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
                 contestants.push(Contestant::new(algorithm, course.frames));
                 fixed.push(id);
             }
-            // A driver may refuse at any time; the course goes on without its GPU.
-            Err(error) if id.backend().class() == BackendClass::Gpu => notes.push(error.to_string()),
-            Err(error) => return Err(error.into()),
+            // A driver may refuse at any time, and so may what a user added; the course goes on without it.
+            Err(error) => notes.push(format!("{id} is left out: {error}")),
         }
     }
     // Fields may name a number of threads that the registry doesn't list but can make.
@@ -183,7 +182,7 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
                 break 'repeats;
             }
             let boxes = scene.boxes();
-            let mut fingerprint = None;
+            let mut answers: Vec<(usize, u64)> = Vec::new();
             let best = best(&contestants, frame);
             // The turn behind the last of the fixed ones is the adaptive module's.
             for k in turns.order(contestants.len() + 1) {
@@ -195,7 +194,6 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
                 };
                 ns.push((started.elapsed().as_nanos() as u64).max(1));
                 under_way.push((k, frame));
-                let name = || fixed.get(k).map_or("the adaptive module".to_owned(), AlgorithmId::to_string);
                 match (result, contestants.get_mut(k)) {
                     (Err(error @ sapwise::Error::Unavailable { .. }), Some(contestant)) => {
                         // It is at fault and not the boxes: a GPU that was lost. The adaptive module goes on without it too.
@@ -205,14 +203,22 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
                         under_way.pop();
                         continue;
                     }
-                    (result, _) => result.with_context(|| format!("{} at frame {frame}", name()))?,
+                    (result, _) => result.with_context(|| format!("{} at frame {frame}", name(&fixed, k)))?,
                 }
                 if repeat == 0 {
-                    let own = pairs.fingerprint();
-                    if *fingerprint.get_or_insert(own) != own {
-                        bail!("{} gives other pairs than the rest at frame {frame}; please report this", name());
-                    }
+                    answers.push((k, pairs.fingerprint()));
                 }
+            }
+            // Whose turn came first says nothing about who is right; ours come first in the list, a user's after them.
+            answers.sort_unstable();
+            if let Some(&(first, right)) = answers.first()
+                && let Some(&(other, _)) = answers.iter().find(|answer| answer.1 != right)
+            {
+                bail!(
+                    "{} gives other pairs than {} at frame {frame}; correct it if it is yours, else please report this",
+                    name(&fixed, other),
+                    name(&fixed, first)
+                );
             }
             chosen.push(adaptive.last_decision().and_then(|d| fixed.iter().position(|id| id == d.algorithm)));
             // Later repeats go through the same frames, so that nobody leaves in them who did not in the first.
@@ -248,6 +254,11 @@ pub(crate) fn simulate(course: &Course, fields: Fields, registry: &Registry) -> 
     Ok(Outcome { fixed, frames, repeats: done, interrupted: done < course.repeats, foreign_load, notes })
 }
 
+/// Who has a turn: one of the fixed algorithms, or the adaptive module behind the last of them.
+fn name(fixed: &[AlgorithmId], turn: usize) -> String {
+    fixed.get(turn).map_or("the adaptive module".to_owned(), AlgorithmId::to_string)
+}
+
 /// The fastest sample of any fixed algorithm at a frame.
 fn best(contestants: &[Contestant], frame: usize) -> f64 {
     contestants.iter().map(|c| c.fastest(frame)).fold(f64::INFINITY, f64::min)
@@ -281,6 +292,27 @@ mod tests {
         for frame in &outcome.frames {
             assert!(frame.fixed_ns.iter().all(|ns| ns.is_finite()) && frame.adaptive_ns.is_finite());
             assert!(frame.chosen.is_some());
+        }
+    }
+
+    #[test]
+    fn of_two_that_disagree_the_one_that_a_user_added_is_named() {
+        struct NoPairs;
+        impl BroadPhase for NoPairs {
+            fn find_pairs(&mut self, _: &[sapwise::Aabb], pairs: &mut Pairs) -> Result<(), sapwise::Error> {
+                pairs.clear();
+                pairs.finish()
+            }
+        }
+        let mut registry = Registry::with_cores(1);
+        registry.add("mine@cpu1".parse().unwrap(), 1, || Ok(Box::new(NoPairs)));
+        // Each seed has another order of turns.
+        for seed in 1..=8 {
+            let fields =
+                Fields::from_steps(vec![Step { from_objects: 0, algorithm: "brute@cpu1".parse().unwrap() }]).unwrap();
+            let course = Course { scenario: Scenario::Uniform, objects: 2000, frames: 1, repeats: 1, seed };
+            let Err(error) = simulate(&course, fields, &registry) else { panic!("took no pairs for an answer") };
+            assert!(error.to_string().starts_with("mine@cpu1 gives other pairs than brute@cpu1"), "{error}");
         }
     }
 

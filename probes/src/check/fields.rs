@@ -32,8 +32,9 @@ impl Here {
         }
         match id.backend() {
             // The revision check has told already that the method is unknown; without costs nothing has.
-            _ if !revisions::is_known(id, &self.registry) => Some(format!("{id} is not in this build")),
-            Backend::Cpu(threads) if *threads <= usable_cores() => None,
+            _ if !revisions::is_known(revisions::of(id), &self.registry) => Some(format!("{id} is not in this build")),
+            // Ours can be made on any number of threads, a user's only on those that are listed.
+            Backend::Cpu(threads) if *threads <= usable_cores() => self.registry.create(id).err().map(|e| e.to_string()),
             Backend::Cpu(_) => Some(format!("{id} needs more than the {} cores of this machine", usable_cores())),
             Backend::Gpu(indices) => self.gpus().lacks(indices).map(|why| format!("{id} can't run here: {why}")),
             _ => Some(format!("{id} can't run here: this version does not know its processor")),

@@ -6,11 +6,12 @@ mod model;
 mod privacy;
 mod report;
 
+use crate::algorithms::Algorithms;
 use crate::document::read_document;
 use crate::gpus::{Seen, look};
 use sapwise::json::Document;
 use sapwise::measure;
-use sapwise::{Machine, Registry};
+use sapwise::{Machine, Registry, usable_cores};
 use serde::Serialize;
 use std::cell::OnceCell;
 use std::path::Path;
@@ -43,8 +44,8 @@ pub(crate) struct Here {
 
 impl Here {
     /// This build on this machine.
-    pub(crate) fn new() -> Self {
-        Self { registry: Registry::new(), machine: measure::machine(), gpus: OnceCell::new() }
+    pub(crate) fn new(algorithms: &Algorithms) -> Self {
+        Self { registry: algorithms.registry(usable_cores()), machine: measure::machine(), gpus: OnceCell::new() }
     }
 
     /// Reads a file and tells what is known about it.

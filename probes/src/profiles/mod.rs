@@ -6,6 +6,7 @@ mod profile;
 mod slug;
 mod there;
 
+use crate::algorithms::Algorithms;
 use crate::args::Probe;
 use crate::exit::{Outcome, WrongUsage};
 use crate::restriction::LAVAPIPE_THREADS;
@@ -14,7 +15,7 @@ use anyhow::Context;
 use conduct::{Conduct, End};
 use family::{Whole, family};
 use profile::Profile;
-use sapwise::{GpuIdentity, Registry, Scenario, SimdLevel, measure, usable_cores};
+use sapwise::{GpuIdentity, Scenario, SimdLevel, measure, usable_cores};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use there::There;
@@ -26,7 +27,7 @@ const DEFAULT: &str = "reports";
 ///
 /// # Errors
 /// On wrong usage, when the folder takes no file or no process can be started. A profile that fails is told at the end.
-pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
+pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     // The family sets both; what comes from outside would restrict every profile, also the one that is called full.
     for name in ["SAPWISE_SIMD", LAVAPIPE_THREADS] {
         if std::env::var_os(name).is_some_and(|value| !value.is_empty()) {
@@ -39,7 +40,7 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     let (cores, level) = (usable_cores(), SimdLevel::detected());
     let family = family(&Whole { cores, level, gpus: taken(arguments)? }, arguments.quick);
     let stem = profile::machine_stem(&machine.cpu, cores);
-    let registry = Registry::with_cores(cores);
+    let registry = algorithms.registry(cores);
     let (folder, stem, physical_id) = (folder.as_path(), stem.as_str(), machine.physical_id.as_str());
     let there = There { folder, stem, physical_id, registry: &registry, family: arguments };
     let done: Vec<Option<PathBuf>> = family.iter().map(|p| there.find(p)).collect();

@@ -3,6 +3,7 @@
 use super::dropout::Standing;
 use super::race::{FEWEST_FRAMES, Outcome, Race, Runner};
 use super::{Course, Event, Order, Visit, median, plan};
+use crate::algorithms::Algorithms;
 use sapwise::gpu::Gpus;
 use sapwise::report::Point;
 use sapwise::{AlgorithmId, GpuIdentity, Registry, Scenario, Scene};
@@ -15,9 +16,13 @@ const PAIR_LIMIT: usize = 32 << 20;
 ///
 /// # Errors
 /// When the scenario is unknown or `emit` fails.
-pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result<()>) -> anyhow::Result<()> {
+pub(crate) fn sweep(
+    order: &Order,
+    algorithms: &Algorithms,
+    emit: &mut dyn FnMut(Event) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
     let scenario: Scenario = order.scenario.parse().map_err(anyhow::Error::msg)?;
-    let mut registry = Registry::with_cores(order.cores);
+    let mut registry = algorithms.registry(order.cores);
     registry.pin_threads();
     for remark in add_gpus(&mut registry, &order.gpus) {
         emit(Event::Remark(format!("{scenario}: {remark}")))?;
@@ -29,7 +34,7 @@ pub(crate) fn sweep(order: &Order, emit: &mut dyn FnMut(Event) -> anyhow::Result
         }
         match registry.create(&id) {
             Ok(algorithm) => runners.push(Runner::new(id, algorithm)),
-            Err(error) => emit(Event::Remark(format!("{scenario}: {error}")))?,
+            Err(error) => emit(Event::Remark(format!("{scenario}: {id} is left out: {error}")))?,
         }
     }
     // From here on: opening a GPU takes seconds, and is not the time of any size.
@@ -213,7 +218,7 @@ mod tests {
 
     fn events(order: &Order) -> Vec<Event> {
         let mut events = Vec::new();
-        sweep(order, &mut |event| {
+        sweep(order, &Algorithms::default(), &mut |event| {
             events.push(event);
             Ok(())
         })
@@ -270,7 +275,7 @@ mod tests {
         let gone = GpuIdentity { index: 99, name: text(), device: text(), driver: text(), api: text(), kind };
         let order = Order { gpus: vec![gone], ..order("uniform", &[10], 1.0) };
         let (mut points, mut remarks) = (0, Vec::new());
-        sweep(&order, &mut |event| {
+        sweep(&order, &Algorithms::default(), &mut |event| {
             match event {
                 Event::Point(_) => points += 1,
                 Event::Remark(text) => remarks.push(text),
@@ -284,7 +289,34 @@ mod tests {
     }
 
     #[test]
+    fn a_users_algorithm_is_timed_like_ours_and_one_that_can_not_be_made_is_named() {
+        let mut algorithms = Algorithms::default();
+        let brute = || Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap());
+        algorithms.add("mine", 1, false, move |_| brute()).unwrap();
+        let refused = |_| Err(sapwise::Error::OutOfMemory { what: "nodes", elements: 3 });
+        algorithms.add("huge", 1, false, refused).unwrap();
+        let (mut raced, mut remarks) = (Vec::new(), Vec::new());
+        sweep(&order("uniform", &[10], 1.0), &algorithms, &mut |event| {
+            match event {
+                Event::Point(point) => raced.extend(point.timings.into_iter().map(|t| t.algorithm.to_string())),
+                Event::Remark(text) => remarks.push(text),
+                Event::Mismatch(text) => panic!("{text}"),
+            }
+            Ok(())
+        })
+        .unwrap();
+        assert!(raced.contains(&"mine@cpu1".to_owned()) && !raced.contains(&"huge@cpu1".to_owned()), "{raced:?}");
+        assert_eq!(remarks.len(), 1, "{remarks:?}");
+        assert!(remarks[0].starts_with("uniform: huge@cpu1 is left out: no memory for 3 nodes"), "{remarks:?}");
+    }
+
+    #[test]
     fn unknown_scenarios_are_refused() {
-        assert!(sweep(&order("x", &[10], 1.0), &mut |_| Ok(())).unwrap_err().to_string().contains("uniform"));
+        assert!(
+            sweep(&order("x", &[10], 1.0), &Algorithms::default(), &mut |_| Ok(()))
+                .unwrap_err()
+                .to_string()
+                .contains("uniform")
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! `sapwise check`: whether files are sound, current and applicable here.
 
+use crate::algorithms::Algorithms;
 use crate::args::Check;
 use crate::check::{Finding, Here};
 use crate::exit::Outcome;
@@ -12,8 +13,8 @@ struct Answer {
     files: Vec<Finding>,
 }
 
-pub(crate) fn run(arguments: &Check) -> anyhow::Result<Outcome> {
-    let here = Here::new();
+pub(crate) fn run(arguments: &Check, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
+    let here = Here::new(algorithms);
     let files: Vec<Finding> = arguments.files.iter().map(|path| here.look_at(path)).collect();
     let failed = files.iter().any(|f| !f.problems.is_empty());
     if arguments.json {

@@ -1,11 +1,12 @@
 //! `sapwise devices`: what this machine can run.
 
+use crate::algorithms::Algorithms;
 use crate::args::Devices;
 use crate::exit::Outcome;
 use crate::gpus::{self, Limits, OnGpus, Seen, look};
 use crate::output;
 use crate::table::{bytes, columns};
-use sapwise::{AlgorithmId, GpuIdentity, Registry, SimdLevel, usable_cores};
+use sapwise::{AlgorithmId, GpuIdentity, SimdLevel, usable_cores};
 use serde::Serialize;
 
 /// The answer for machines.
@@ -37,7 +38,7 @@ struct Adapter {
     refused: Option<String>,
 }
 
-pub(crate) fn run(arguments: &Devices) -> anyhow::Result<Outcome> {
+pub(crate) fn run(arguments: &Devices, known: &Algorithms) -> anyhow::Result<Outcome> {
     let seen = if arguments.no_gpus { Seen::default() } else { look()? };
     let mut adapters = Vec::new();
     for identity in &seen.identities {
@@ -45,7 +46,7 @@ pub(crate) fn run(arguments: &Devices) -> anyhow::Result<Outcome> {
         let refused = limits.as_ref().err().cloned();
         adapters.push(Adapter { identity: identity.clone(), limits: limits.ok(), refused });
     }
-    let answer = Answer { algorithms: algorithms(&seen, &adapters)?, adapters, remark: seen.remark };
+    let answer = Answer { algorithms: algorithms(&seen, &adapters, known)?, adapters, remark: seen.remark };
     if arguments.json {
         output::print_json(&answer)?;
     } else {
@@ -58,7 +59,7 @@ pub(crate) fn run(arguments: &Devices) -> anyhow::Result<Outcome> {
 ///
 /// # Errors
 /// When no process can be started.
-fn algorithms(seen: &Seen, adapters: &[Adapter]) -> anyhow::Result<Vec<Algorithm>> {
+fn algorithms(seen: &Seen, adapters: &[Adapter], known: &Algorithms) -> anyhow::Result<Vec<Algorithm>> {
     let on_gpus = if adapters.is_empty() { Ok(Vec::new()) } else { gpus::entries()? };
     let refused = |id: &AlgorithmId| {
         let refusal = |k: &u32| adapters.iter().find(|a| a.identity.index == *k)?.refused.clone();
@@ -78,7 +79,7 @@ fn algorithms(seen: &Seen, adapters: &[Adapter]) -> anyhow::Result<Vec<Algorithm
         available: reason.is_none(),
         reason,
     };
-    let registry = Registry::new();
+    let registry = known.registry(usable_cores());
     let mut list: Vec<Algorithm> =
         registry.entries().iter().map(|e| algorithm(&e.id, e.revision, e.unavailable.clone())).collect();
     for (id, revision) in sapwise::gpu::algorithms(&seen.identities) {

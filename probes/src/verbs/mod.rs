@@ -12,6 +12,7 @@ mod schema;
 mod simulate;
 mod train;
 
+use crate::algorithms::Algorithms;
 use crate::args::Verb;
 use crate::exit::{Outcome, WrongUsage};
 use sapwise::SimdLevel;
@@ -20,21 +21,21 @@ use sapwise::SimdLevel;
 ///
 /// # Errors
 /// Whatever keeps the verb from doing what it was asked for.
-pub(crate) fn run(verb: Verb) -> anyhow::Result<Outcome> {
+pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     // The library falls back to the detected level where the variable is wrong. Here that would label a measurement with a
     // level that it was not taken at.
     SimdLevel::requested().map_err(WrongUsage)?;
     match verb {
-        Verb::Predict(arguments) => predict::run(&arguments),
-        Verb::Devices(arguments) => devices::run(&arguments),
-        Verb::Probe(arguments) => probe::run(&arguments),
-        Verb::Run(arguments) => run::run(&arguments),
+        Verb::Predict(arguments) => predict::run(&arguments, algorithms),
+        Verb::Devices(arguments) => devices::run(&arguments, algorithms),
+        Verb::Probe(arguments) => probe::run(&arguments, algorithms),
+        Verb::Run(arguments) => run::run(&arguments, algorithms),
         Verb::Train(arguments) => train::run(&arguments),
-        Verb::Pairs(arguments) => pairs::run(&arguments),
+        Verb::Pairs(arguments) => pairs::run(&arguments, algorithms),
         Verb::Compare(arguments) => compare::run(&arguments),
-        Verb::Check(arguments) => check::run(&arguments),
+        Verb::Check(arguments) => check::run(&arguments, algorithms),
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),
-        Verb::Part(arguments) => part::run(arguments),
+        Verb::Part(arguments) => part::run(arguments, algorithms),
     }
 }

@@ -1,5 +1,6 @@
 //! `sapwise pairs`: the broad phase on the user's own boxes.
 
+use crate::algorithms::Algorithms;
 use crate::args::Pairs as Arguments;
 use crate::boxes::{Frames, read_frames, write_pairs};
 use crate::exit::{Outcome, WrongUsage};
@@ -8,7 +9,7 @@ use crate::sweep::median;
 use crate::table::{duration, grouped};
 use crate::{gpus, interrupt, output};
 use anyhow::Context;
-use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry};
+use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry, usable_cores};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -33,8 +34,8 @@ struct Answer {
     fingerprint: String,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    let mut registry = Registry::new();
+pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
+    let mut registry = algorithms.registry(usable_cores());
     registry.pin_threads();
     let id = algorithm(arguments, &registry)?;
     add_gpus(&mut registry, &id)?;

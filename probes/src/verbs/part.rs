@@ -1,5 +1,6 @@
 //! `sapwise part`: one part of a measurement, in a process of its own. Hidden: other verbs start it.
 
+use crate::algorithms::Algorithms;
 use crate::args::{Part, PartKind};
 use crate::exit::{Outcome, WrongUsage};
 use crate::sweep::{Order, sweep};
@@ -7,7 +8,7 @@ use crate::{child, gpus, output};
 use sapwise::Backend;
 use sapwise::measure::{self, Family, Options};
 
-pub(crate) fn run(arguments: Part) -> anyhow::Result<Outcome> {
+pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     child::end_with_parent();
     match arguments.part {
         PartKind::Hardware { family, threads } => {
@@ -25,7 +26,7 @@ pub(crate) fn run(arguments: Part) -> anyhow::Result<Outcome> {
         PartKind::GpuGroup { gpus, .. } => return Err(WrongUsage(format!("{gpus} is no group of GPUs")).into()),
         PartKind::Sweep { order } => {
             let order: Order = serde_json::from_str(&order).map_err(|e| WrongUsage(format!("the order: {e}")))?;
-            sweep(&order, &mut |event| output::print_json(&event))?;
+            sweep(&order, algorithms, &mut |event| output::print_json(&event))?;
         }
     }
     Ok(Outcome::Done)

@@ -1,5 +1,6 @@
 //! `sapwise predict`: the fields of a machine without a sweep, or from the one that its report holds.
 
+use crate::algorithms::Algorithms;
 use crate::args::Predict;
 use crate::document::read_document;
 use crate::exit::{Outcome, WrongUsage};
@@ -10,7 +11,7 @@ use sapwise::json::{self, Document};
 use sapwise::{Model, Report, Scenario};
 use std::path::Path;
 
-pub(crate) fn run(arguments: &Predict) -> anyhow::Result<Outcome> {
+pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     hardware::check_threads(arguments.threads)?;
     let report = arguments.report.as_deref().map(read_report).transpose()?;
     let model = if arguments.measured { None } else { Some(model(arguments.model.as_deref())?) };
@@ -54,7 +55,7 @@ pub(crate) fn run(arguments: &Predict) -> anyhow::Result<Outcome> {
                     taken
                 }
             };
-            prediction::predict(model, &hardware, &gpus, scenario)?
+            prediction::predict(model, &hardware, &gpus, scenario, algorithms)?
         }
     };
     fields.warnings.append(&mut remarks);

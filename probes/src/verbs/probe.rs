@@ -1,5 +1,6 @@
 //! `sapwise probe`: the hardware parameters of this machine, then the sweep.
 
+use crate::algorithms::Algorithms;
 use crate::args::Probe;
 use crate::contention::Contention;
 use crate::destination::Destination;
@@ -13,9 +14,9 @@ use sapwise::report::Restriction;
 use sapwise::{Hardware, Report, usable_cores};
 use std::time::Instant;
 
-pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
+pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     if arguments.profiles {
-        return profiles::run(arguments);
+        return profiles::run(arguments, algorithms);
     }
     let began = Instant::now();
     let plan = plan(arguments)?;
@@ -33,7 +34,7 @@ pub(crate) fn run(arguments: &Probe) -> anyhow::Result<Outcome> {
     let restriction = restriction::restriction(arguments, &hardware, &references);
     let mut before = [measured.remarks, hardware.disturbed()].concat();
     before.extend(restriction.iter().flat_map(restriction::not_shown));
-    let assemble = |found| assemble(arguments, &hardware, restriction.clone(), found, began);
+    let assemble = |found| assemble(arguments, algorithms, &hardware, restriction.clone(), found, began);
     let mut found = Found { remarks: before.clone(), ..Found::default() };
     if interrupt::requested() {
         found.remarks.push("interrupted during the hardware parameters; what was to follow is missing".to_owned());
@@ -89,6 +90,7 @@ fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
 
 fn assemble(
     arguments: &Probe,
+    algorithms: &Algorithms,
     hardware: &Hardware,
     restriction: Option<Restriction>,
     found: Found,
@@ -99,7 +101,7 @@ fn assemble(
         label: provenance::label(arguments, &found.points, hardware),
         provenance: provenance::provenance(arguments, restriction, hardware, began.elapsed()),
         hardware: hardware.clone(),
-        algorithms: provenance::timed(&found.points, arguments.threads, hardware),
+        algorithms: provenance::timed(&found.points, arguments.threads, hardware, algorithms),
         points: found.points,
         remarks: found.remarks,
     };

@@ -1,5 +1,6 @@
 //! `sapwise run`: the in-line simulation.
 
+use crate::algorithms::Algorithms;
 use crate::args::Run;
 use crate::document::read_document;
 use crate::exit::Outcome;
@@ -9,7 +10,7 @@ use crate::simulation::{self, Course, simulate};
 use crate::{files, interrupt, output, plot, prediction, revisions, table, train};
 use anyhow::{Context, bail};
 use sapwise::json::Document;
-use sapwise::{AlgorithmId, Fields, Registry, Scenario, Source, measure};
+use sapwise::{AlgorithmId, Fields, Registry, Scenario, Source, measure, usable_cores};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -73,8 +74,8 @@ struct Decision<'a> {
     algorithm: &'a AlgorithmId,
 }
 
-pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
-    let mut registry = Registry::new();
+pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
+    let mut registry = algorithms.registry(usable_cores());
     registry.pin_threads();
     let read = arguments.fields.as_deref().map(|path| read_fields(path, &registry, &arguments.gpus)).transpose()?;
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
@@ -84,7 +85,7 @@ pub(crate) fn run(arguments: &Run) -> anyhow::Result<Outcome> {
         None => {
             let (hardware, measured) = measure_hardware(None, &arguments.gpus)?;
             let model = super::predict::model(None)?;
-            let mut fields = prediction::predict(&model, &hardware, &measured.usable, Scenario::Uniform)?;
+            let mut fields = prediction::predict(&model, &hardware, &measured.usable, Scenario::Uniform, algorithms)?;
             fields.warnings.extend(measured.remarks);
             fields
         }

@@ -1,0 +1,83 @@
+//! A command of your own: all of `sapwise`, with parry3d's bounding volume hierarchy as one more algorithm.
+//!
+//! ```sh
+//! bvh() { cargo run --release -p sapwise-cli --example bvh -- "$@"; }
+//! bvh probe --no-gpus --out bvh.json                      # times it beside ours, and verifies every answer
+//! bvh train bvh.json --out with-bvh.json                  # fits its cost beside those of ours
+//! bvh predict --model with-bvh.json --out fields.json     # where it pays on this machine
+//! bvh run fragmentation --fields fields.json              # what choosing it is worth
+//! ```
+//!
+//! The manifest of a program outside of this repository needs `sapwise` and `sapwise-cli`.
+
+use parry3d::bounding_volume::Aabb as Bounds;
+use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
+use sapwise::{Aabb, BroadPhase, Error, Pairs};
+use std::process::ExitCode;
+
+/// Visible to the test of this example, which is a command with the same `main`.
+pub(crate) fn main() -> ExitCode {
+    // The name stands in reports, models and fields. The 1 is the revision: count it up whenever `find_pairs` gets faster or slower, so
+    // that what was measured before is told to be stale. An algorithm on several threads is added by `with_threads`.
+    sapwise_cli::Command::new().with("bvh", 1, || Ok(Box::new(Tree::default()))).run()
+}
+
+/// A tree that is kept from frame to frame, as rapier keeps it.
+#[derive(Default)]
+struct Tree {
+    tree: Bvh,
+    workspace: BvhWorkspace,
+    /// The boxes of the frame before.
+    before: Vec<Aabb>,
+}
+
+impl BroadPhase for Tree {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        // A box that can't be ordered would go missing in the tree without a word.
+        if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| Some((k, b.defect()?))) {
+            return Err(Error::InvalidBox { index, defect });
+        }
+        self.update(boxes);
+        // Boxes that touch overlap in parry as well.
+        self.tree.traverse_bvtt_single_tree::<false>(&mut self.workspace, &mut |a, b| pairs.push(a, b));
+        pairs.finish()
+    }
+
+    /// The tree of the frame before makes this frame cheaper, so a probe lets some frames pass before it takes samples.
+    fn keeps_work(&self) -> bool {
+        true
+    }
+}
+
+impl Tree {
+    /// Brings the tree from the boxes of the frame before to these.
+    fn update(&mut self, boxes: &[Aabb]) {
+        let (now, before) = (boxes.len(), self.before.len());
+        let few = now / 4;
+        // Frames need not be neighbours: between two of them another algorithm may have had its turn for a minute, and a probe goes on
+        // to another scene. A tree over boxes that are all elsewhere now is slower than none.
+        let jumped = boxes.iter().zip(&self.before).filter(|(b, old)| !b.overlaps(old)).count();
+        if now.abs_diff(before) > few {
+            // One by one takes longer than all at once.
+            self.tree = Bvh::from_iter(BvhBuildStrategy::Binned, boxes.iter().map(bounds).enumerate());
+        } else {
+            (now..before).for_each(|k| self.tree.remove(k as u32));
+            for (k, b) in (0..).zip(boxes) {
+                self.tree.insert_or_update_partially(bounds(b), k, 0.0);
+            }
+            if jumped > few {
+                self.tree.rebuild(&mut self.workspace, BvhBuildStrategy::Binned);
+            } else {
+                self.tree.optimize_incremental(&mut self.workspace);
+                self.tree.refit(&mut self.workspace);
+            }
+        }
+        self.before.clear();
+        self.before.extend_from_slice(boxes);
+    }
+}
+
+fn bounds(b: &Aabb) -> Bounds {
+    Bounds::new(b.min.into(), b.max.into())
+}

@@ -1,0 +1,65 @@
+//! The command `sapwise` as a library, so that a program of a few lines is the whole command with algorithms of its own.
+//!
+//! ```no_run
+//! use sapwise::{Aabb, BroadPhase, Error, Pairs};
+//!
+//! struct DoubleLoop;
+//!
+//! impl BroadPhase for DoubleLoop {
+//!     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+//!         pairs.clear();
+//!         for (j, b) in boxes.iter().enumerate() {
+//!             if let Some(defect) = b.defect() {
+//!                 return Err(Error::InvalidBox { index: j, defect });
+//!             }
+//!             for (i, _) in boxes[..j].iter().enumerate().filter(|(_, a)| a.overlaps(b)) {
+//!                 pairs.push(i as u32, j as u32);
+//!             }
+//!         }
+//!         pairs.finish()
+//!     }
+//! }
+//!
+//! // The last step of `main`.
+//! let status = sapwise_cli::Command::new().with("double-loop", 1, || Ok(Box::new(DoubleLoop))).run();
+//! ```
+//!
+//! `examples/bvh.rs` is such a program with the tree of parry3d.
+
+mod algorithms;
+mod args;
+mod boxes;
+mod card;
+mod check;
+mod child;
+mod command;
+mod compare;
+mod contention;
+mod date;
+mod destination;
+mod document;
+mod exit;
+mod files;
+mod gpus;
+mod hardware;
+mod interrupt;
+mod output;
+mod plot;
+mod prediction;
+mod profiles;
+mod progress;
+mod provenance;
+mod random;
+mod restriction;
+mod revisions;
+mod simulate;
+mod simulation;
+mod steadiness;
+mod summary;
+mod sweep;
+mod table;
+mod train;
+mod turns;
+mod verbs;
+
+pub use command::Command;

@@ -1,0 +1,219 @@
+//! A user's program with an algorithm of its own: the example `bvh` from the probe to the run, beside the plain command.
+//!
+//! This program has a `main` of its own (`harness = false`): verbs start parts of a measurement as processes of the program that
+//! they are in, and one made by the usual harness would run tests there. Started with [`AS_COMMAND`] it is the example.
+
+#[path = "../examples/bvh.rs"]
+mod bvh;
+mod common;
+
+use assert_cmd::Command;
+use common::{failure, npy, sapwise, success};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::{env, fs};
+
+/// The variable that makes this program the example. Its parts inherit it.
+const AS_COMMAND: &str = "SAPWISE_TEST_AS_COMMAND";
+
+/// Every test by its name.
+const TESTS: [(&str, fn()); 5] = [
+    ("from_the_probe_to_the_run_as_one_of_ours", from_the_probe_to_the_run_as_one_of_ours),
+    ("the_pairs_are_those_of_ours", the_pairs_are_those_of_ours),
+    ("boxes_that_ours_refuse_are_refused", boxes_that_ours_refuse_are_refused),
+    ("one_on_several_threads_gets_their_number", one_on_several_threads_gets_their_number),
+    ("names_that_clash_are_refused_before_anything_is_done", names_that_clash_are_refused_before_anything_is_done),
+];
+
+fn main() -> ExitCode {
+    match env::var(AS_COMMAND).as_deref() {
+        Ok("bvh") => return bvh::main(),
+        Ok("clash") => return clash(),
+        Ok("threads") => return on_threads(),
+        _ => {}
+    }
+    // Cargo puts the name that it was given first. Behind it are words for the usual harness, which say nothing here.
+    let wanted = env::args().nth(1).filter(|word| !word.starts_with('-')).unwrap_or_default();
+    for (name, test) in TESTS {
+        if name.contains(&wanted) {
+            // A test that fails panics, which ends the program with a status above 0.
+            test();
+            println!("test {name} ... ok");
+        }
+    }
+    ExitCode::SUCCESS
+}
+
+/// A program whose algorithm has the name of one of ours.
+fn clash() -> ExitCode {
+    sapwise_cli::Command::new().with("strips", 1, || unreachable!("it was refused")).run()
+}
+
+/// A program whose algorithm finds as many pairs as it has threads, whatever the boxes.
+fn on_threads() -> ExitCode {
+    struct Threads(u32);
+    impl BroadPhase for Threads {
+        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+            pairs.clear();
+            (1..=self.0).for_each(|k| pairs.push(0, k));
+            pairs.finish()
+        }
+    }
+    sapwise_cli::Command::new().with_threads("threads", 1, |threads| Ok(Box::new(Threads(threads)))).run()
+}
+
+fn program(name: &str) -> Command {
+    let mut command = Command::new(env::current_exe().unwrap());
+    command.env(AS_COMMAND, name).env_remove("SAPWISE_SIMD");
+    command
+}
+
+fn user() -> Command {
+    program("bvh")
+}
+
+fn read(path: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn names(list: &Value) -> Vec<&str> {
+    list.as_array().unwrap().iter().map(|entry| entry.as_str().unwrap()).collect()
+}
+
+/// The report of a small probe. The label of an optimised build is put on it, and that of an undisturbed machine, which one that
+/// runs tests is not.
+fn probed(folder: &Path) -> PathBuf {
+    let path = folder.join("report.json");
+    let words = ["probe", "--no-gpus", "--scenario", "uniform", "--max-objects", "1000", "--out"];
+    success(user().args(words).arg(&path));
+    let mut report = read(&path);
+    report["provenance"]["optimised"] = true.into();
+    report["label"] = "real_full".into();
+    fs::write(&path, report.to_string()).unwrap();
+    path
+}
+
+fn from_the_probe_to_the_run_as_one_of_ours() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+
+    let report = probed(folder.path());
+    let told = read(&report);
+    let swept: Vec<(&str, u64)> = told["algorithms"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|t| (t["id"].as_str().unwrap(), t["revision"].as_u64().unwrap()))
+        .collect();
+    assert!(swept.contains(&("bvh@cpu1", 1)) && swept.iter().any(|t| t.0 == "brute@cpu1"), "{swept:?}");
+    let points = told["points"].as_array().unwrap();
+    let timings = points.iter().flat_map(|p| p["timings"].as_array().unwrap());
+    let own: Vec<&Value> = timings.filter(|t| t["algorithm"] == "bvh@cpu1").collect();
+    assert!(own.len() >= 8 && own.iter().all(|t| t["error"].is_null()), "{own:?}");
+
+    let model = file("model.json");
+    success(user().arg("train").arg(&report).arg("--out").arg(&model));
+    let fitted = read(&model);
+    let of_user = fitted["methods"].as_array().unwrap().iter().find(|m| m["method"] == "bvh").expect("a cost of bvh");
+    assert_eq!((&of_user["revision"], &of_user["backend"]), (&1.into(), &"cpu".into()));
+
+    let fields = file("fields.json");
+    let predict = |mut command: Command| {
+        let words = ["predict", "--json", "--report"];
+        success(command.args(words).arg(&report).arg("--model").arg(&model).arg("--out").arg(&fields))
+    };
+    // The plain command predicts ours, and says what it can't choose.
+    let plain: Value = serde_json::from_str(&predict(sapwise())).unwrap();
+    assert!(!plain["costs"].to_string().contains("bvh"), "{plain}");
+    let warned = names(&plain["warnings"]).iter().any(|w| w.contains("knows bvh, which is not in this build"));
+    assert!(warned, "{}", plain["warnings"]);
+    let own: Value = serde_json::from_str(&predict(user())).unwrap();
+    assert!(own["costs"].as_array().unwrap().iter().any(|c| c["algorithm"] == "bvh@cpu1"), "{own}");
+    assert!(!own["warnings"].to_string().contains("bvh"), "{}", own["warnings"]);
+
+    let run = ["run", "uniform", "--json", "--objects", "200", "--frames", "20", "--repeats", "1", "--fields"];
+    let told: Value = serde_json::from_str(&success(user().args(run).arg(&fields))).unwrap();
+    assert!(told["total_ms"]["fixed"]["bvh@cpu1"].as_f64().unwrap() > 0.0, "{told}");
+    let complaint = failure(sapwise().args(run).arg(&fields), 1);
+    assert!(complaint.contains("is stale: bvh is not in this build"), "{complaint}");
+
+    check_names_a_number_of_threads_that_it_can_not_be_made_on(&fields);
+    for path in [&report, &model, &fields] {
+        success(user().arg("check").arg(path));
+        let told = sapwise().arg("check").arg(path).output().unwrap();
+        let text = String::from_utf8(told.stdout).unwrap();
+        assert!(told.status.code() == Some(1) && text.contains("stale: bvh is not in this build"), "{text}");
+    }
+}
+
+fn check_names_a_number_of_threads_that_it_can_not_be_made_on(fields: &Path) {
+    let other = fields.with_file_name("two-threads.json");
+    fs::write(&other, fs::read_to_string(fields).unwrap().replace("bvh@cpu1", "bvh@cpu2")).unwrap();
+    let told = user().arg("check").arg(&other).output().unwrap();
+    let text = String::from_utf8(told.stdout).unwrap();
+    assert!(told.status.code() == Some(1) && text.contains("bvh@cpu2") && !text.contains("stale"), "{text}");
+}
+
+fn the_pairs_are_those_of_ours() {
+    let folder = tempfile::tempdir().unwrap();
+    let inf = f32::INFINITY;
+    // Touching boxes in a row, one without a volume, one without an end, two far out that lie beyond each other, two that meet there.
+    let mut boxes: Vec<[f32; 6]> = (0..9).map(|k| k as f32).map(|x| [x, 0.0, 0.0, x + 1.0, 1.0, 1.0]).collect();
+    boxes.extend([[3.0; 6], [-inf, -inf, -inf, inf, inf, inf], [-inf, 0.0, 0.0, 4.5, inf, inf]]);
+    boxes.extend([[1e30, 0.0, 0.0, 2e30, 1.0, 1.0], [3e30, 0.0, 0.0, 4e30, 1.0, 1.0], [4e30, 1.0, 0.0, inf, 1.0, 1.0]]);
+    // The same elsewhere, in another order, then where they were.
+    let away: Vec<[f32; 6]> = boxes.iter().rev().map(|b| b.map(|x| x + 50.0)).collect();
+    let near: Vec<[f32; 6]> = boxes.iter().map(|b| b.map(|x| x + 0.25)).collect();
+    let frames = [boxes.concat(), near.concat(), away.concat(), boxes.concat()];
+    let shape = format!("4, {}, 6", boxes.len());
+    let many = npy(folder.path(), "many.npy", "<f4", &shape, &frames.concat());
+    let few: Vec<(PathBuf, usize)> = (0..3_usize)
+        .map(|n| (npy(folder.path(), &format!("{n}.npy"), "<f4", &format!("{n}, 6"), &boxes[..n].concat()), 1))
+        .collect();
+    for (path, frames) in few.into_iter().chain([(many, 4)]) {
+        let pairs = |id: &str| -> Value {
+            let words = ["--json", "--repeat", "3", "--algorithm", id];
+            serde_json::from_str(&success(user().arg("pairs").arg(&path).args(words))).unwrap()
+        };
+        let (ours, own) = (pairs("brute@cpu1"), pairs("bvh@cpu1"));
+        assert_eq!(ours["pairs"].as_array().unwrap().len(), frames);
+        assert_eq!((&own["pairs"], &own["fingerprint"]), (&ours["pairs"], &ours["fingerprint"]), "{}", path.display());
+    }
+}
+
+fn boxes_that_ours_refuse_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let boxes = [[0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0], [0.0, f32::NAN, 0.0, 1.0, 1.0, 1.0]];
+    let path = npy(folder.path(), "nan.npy", "<f4", "2, 6", &boxes.concat());
+    let complaints =
+        ["brute@cpu1", "bvh@cpu1"].map(|id| failure(user().arg("pairs").arg(&path).args(["--algorithm", id]), 1));
+    assert!(complaints[0].contains("box 1") && complaints[0] == complaints[1], "{complaints:?}");
+    let unknown = failure(sapwise().arg("pairs").arg(&path).args(["--algorithm", "bvh@cpu1"]), 2);
+    assert!(unknown.contains("no algorithm is called \"bvh@cpu1\""), "{unknown}");
+}
+
+fn one_on_several_threads_gets_their_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let boxes = npy(folder.path(), "one.npy", "<f4", "1, 6", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+    let told: Value = serde_json::from_str(&success(program("threads").args(["devices", "--no-gpus", "--json"]))).unwrap();
+    let ids = told["algorithms"].as_array().unwrap().iter().map(|a| a["id"].as_str().unwrap());
+    let on = |method: &str| -> Vec<u32> {
+        let id = |text: &str| text.parse::<AlgorithmId>().unwrap();
+        ids.clone().map(id).filter(|id| id.method() == method).map(|id| id.threads()).collect()
+    };
+    assert!(!on("threads").is_empty() && on("threads") == on("brute"), "{told}");
+    for threads in on("threads") {
+        let words = ["--json", "--algorithm", &format!("threads@cpu{threads}")];
+        let told: Value = serde_json::from_str(&success(program("threads").arg("pairs").arg(&boxes).args(words))).unwrap();
+        assert_eq!(told["pairs"][0], threads);
+    }
+}
+
+fn names_that_clash_are_refused_before_anything_is_done() {
+    for words in [&["devices"][..], &["--help"], &["part", "gpus"]] {
+        let complaint = failure(program("clash").args(words), 1);
+        assert!(complaint.contains("\"strips\" is the name of a method of Sapwise"), "{words:?}: {complaint}");
+    }
+}
