@@ -8,6 +8,8 @@ mod fit;
 mod learning;
 mod model;
 mod nnls;
+#[cfg(test)]
+mod reference;
 mod residual;
 mod robust;
 mod rows;
