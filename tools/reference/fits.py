@@ -63,7 +63,7 @@ def standardised(x, weights):
 
 
 def weighted_ridge(random, penalty):
-    """Ours is the mean of squares under the weights, plus the penalty times the squares of the slopes; scikit-learn takes sums."""
+    """Ours is the mean of squares under the weights plus the penalty times the squares of the slopes; scikit-learn takes sums."""
     octaves = few_digits(4 + 13 * random.uniform(size=40))
     x = numpy.stack([octaves, octaves**2, random.integers(2, 5, 40), random.integers(0, 4, 40)], axis=1)
     x = few_digits(x)
@@ -90,7 +90,8 @@ def ordinary(random, rows):
     at = few_digits(random.normal(size=4) + [1, 2, 1.5, 8])
     line = LinearRegression().fit(x, y)
     leverages = numpy.diag(design(x) @ numpy.linalg.pinv(design(x)))
-    return dict(x=x.tolist(), y=y.tolist(), at=at.tolist(), prediction=float(line.predict([at])[0]), leverages=leverages.tolist())
+    prediction = float(line.predict([at])[0])
+    return dict(x=x.tolist(), y=y.tolist(), at=at.tolist(), prediction=prediction, leverages=leverages.tolist())
 
 
 def design(x):
@@ -127,8 +128,8 @@ def robust(name, terms, ns, weights, groups):
         sys.exit(f"{name}: the spread does not settle")
     starts = [units] + [random.uniform(0.1, 1.5, size=len(units)) for _ in range(5)]
     end = min((solve(start, bend) for start in starts), key=lambda end: end.cost)
-    return dict(name=name, terms=terms.tolist(), ns=ns.tolist(), weights=list(map(int, weights)), groups=list(map(int, groups)),
-                bend=float(bend), units=(end.x * scales).tolist(), cost=float(end.cost))
+    problem = dict(terms=terms.tolist(), ns=ns.tolist(), weights=weights.tolist(), groups=groups.tolist())
+    return dict(name=name, **problem, bend=float(bend), units=(end.x * scales).tolist(), cost=float(end.cost))
 
 
 def robust_problems(random):

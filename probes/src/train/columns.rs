@@ -5,8 +5,9 @@ use ndarray::{Array1, Array2, ArrayView1, Axis};
 /// Share of its variation that a column must have for itself, beside the columns before it.
 const OWN_SHARE: f64 = 0.02;
 
-/// Leverage from which on a row decides a coefficient alone: its error without it in the fit is its error in the fit over one
-/// less its leverage (Hoaglin and Welsch, The Hat Matrix in Regression and ANOVA, 1978), so here at least a hundred times.
+/// Leverage from which on a row decides a coefficient alone. The error of a row in a fit without it is its error in the fit
+/// with it over one less its leverage (Hoaglin and Welsch, The Hat Matrix in Regression and ANOVA, 1978), so here at least a
+/// hundred times that.
 const ALONE: f64 = 0.99;
 
 /// Standardised columns. linfa answers without a warning when columns depend on each other or when one row decides a
@@ -61,7 +62,8 @@ impl Columns {
         Self { kept, centres, scales, values, shares }
     }
 
-    /// Drops, one after the other, the column that owes most to a row which decides a coefficient alone, until there is no such row.
+    /// Drops, one after the other, the column that owes most to a row which decides a coefficient alone, until there is no
+    /// such row.
     pub(crate) fn without_lone_rows(mut self) -> Self {
         loop {
             let base = self.base();
@@ -74,15 +76,15 @@ impl Columns {
         }
     }
 
-    /// How many rows have a leverage of more than twice the mean, 2 p / M with p coefficients, that of the mean included, and M
-    /// rows. Such rows deserve a look (Hoaglin and Welsch 1978; Belsley, Kuh and Welsch, Regression Diagnostics, 1980, section 2.1).
+    /// How many rows have a leverage above 2 p / M, twice the mean, with p coefficients, that of the mean included, and M rows.
+    /// Such rows deserve a look (Hoaglin and Welsch 1978; Belsley, Kuh and Welsch, Regression Diagnostics, 1980, section 2.1).
     pub(crate) fn far_rows(&self) -> usize {
         let limit = 2.0 * (self.kept.len() + 1) as f64 / self.values.nrows() as f64;
         self.leverages().into_iter().filter(|&h| h > limit).count()
     }
 
-    /// What share of the fitted value of each row comes from its own target, in a fit with a mean: the diagonal of the hat matrix.
-    /// For columns of full rank.
+    /// What share of the fitted value of each row comes from its own target, in a fit with a mean: the diagonal of the hat
+    /// matrix. For columns of full rank.
     pub(crate) fn leverages(&self) -> Vec<f64> {
         let base = self.base();
         let row = |k: usize| self.shares[k] + base.iter().map(|(_, q)| q[k] * q[k]).sum::<f64>();

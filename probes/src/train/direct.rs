@@ -101,9 +101,9 @@ impl Border {
     }
 }
 
-/// The direct regression by least squares, applied to a machine: whoever wins most comparisons in pairs is chosen. Adds to `notes`
-/// how many of its borders are means because there were too few crossings for a regression, and how many rest on machines of
-/// high leverage.
+/// The direct regression by least squares, applied to a machine: whoever wins most comparisons in pairs is chosen. Adds to
+/// `notes` how many of its borders are means because there were too few crossings for a regression, and how many rest on
+/// profiles of high leverage.
 ///
 /// # Errors
 /// When linfa refuses a fit.
@@ -116,7 +116,8 @@ pub(crate) fn direct<'a>(
     chooser(Regression::LeastSquares, training, hardware, available, notes)
 }
 
-/// [`direct`] by an elastic net on all parameters by which machines are compared, those of the GPU where a GPU takes part.
+/// [`direct`] by an elastic net on all parameters by which machines are compared, those of GPUs where a GPU takes part. Its
+/// penalty is chosen by leaving out physical machines of the training.
 ///
 /// # Errors
 /// When linfa refuses a fit.
@@ -151,7 +152,7 @@ fn chooser<'a>(
     }
     let (name, too_few) = match regression {
         Regression::LeastSquares => ("direct regression", "there being no more crossings than parameters"),
-        Regression::ElasticNet => ("direct elastic net", "fewer than three machines having a crossing"),
+        Regression::ElasticNet => ("direct elastic net", "there being fewer than three crossings"),
     };
     if means > 0 {
         notes.push(format!("{name}: {means} of {} borders are means, {too_few}", borders.len()));

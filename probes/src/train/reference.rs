@@ -13,15 +13,16 @@ use sapwise::model::Feature;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// Of numbers that both sides compute in double precision by a direct method on columns of length one, with a condition below 1e4.
+/// Of numbers that both sides compute in double precision by a direct method on columns of length one, with a condition
+/// below 1e4.
 const DIRECT: f64 = 1e-9;
-/// Of slopes that come from rounds of coordinate descent, which stop at a step of 1e-10 of the largest slope: the steps that are
-/// left add up to a thousand times as much where neighbouring columns correlate by 0.999.
+/// Of slopes that come from rounds of coordinate descent, which stop at a step of 1e-10 of the largest slope: the steps that
+/// are left add up to a thousand times as much where neighbouring columns correlate by 0.999.
 const DESCENT: f64 = 1e-7;
 /// Of the bend of Huber's loss, as a share. SciPy's side ends when it moves by less than 1e-6, ours after fifteen rounds.
 const BEND: f64 = 1e-5;
-/// How much larger our error may be than the least that SciPy finds, as a share. Around a minimum it grows with the square of what
-/// the units are off, times ten to a thousand in these problems, so this holds them to about 1e-5.
+/// How much larger our error may be than the least that SciPy finds, as a share. Around a minimum it grows with the square
+/// of what the units are off, times ten to a thousand in these problems, so this holds them to about 1e-5.
 const MINIMUM: f64 = 1e-8;
 
 #[derive(Deserialize)]

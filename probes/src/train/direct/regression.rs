@@ -11,11 +11,17 @@ use linfa_linear::LinearRegression;
 use ndarray::{Array1, Array2, Axis};
 use sapwise::Hardware;
 
-/// Penalties of the elastic net to choose from. Values are logarithms of numbers of objects and columns are standardised, so with
-/// the largest a parameter alone must move the border 4.5-fold (e^1.5) in one standard deviation to count.
+/// Penalties of the elastic net to choose from. Values are logarithms of numbers of objects and columns are standardised, so
+/// with the largest a parameter alone must move the border 4.5-fold (e^1.5) in one standard deviation to count.
 const PENALTIES: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
 /// The share of the lasso in the penalty: half, so that it selects, and keeps parameters together that go together.
 const L1_RATIO: f64 = 0.5;
+/// The penalty where there are too few machines to choose one by leaving them out.
+const DEFAULT_PENALTY: f64 = 0.1;
+/// The share of the largest slope by which the last round of coordinate descent may still move one.
+const TOLERANCE: f64 = 1e-10;
+/// The same while a penalty is chosen: the penalties are a factor of three apart, and this takes a fraction of the rounds.
+const COARSE: f64 = 1e-5;
 /// Physical machines that it takes to choose the penalty.
 const FEWEST_MACHINES: usize = 3;
 
@@ -39,11 +45,11 @@ pub(super) struct Estimate {
 }
 
 impl Regression {
-    /// Values on the logarithms of the parameters, evaluated for a machine. Parameters that are missing anywhere or say nothing of
-    /// their own are not used.
+    /// Values on the logarithms of the parameters, evaluated for a machine. Parameters that are missing anywhere or say
+    /// nothing of their own are not used.
     ///
-    /// Least squares give the mean when there are not more rows than coefficients, and use fewer parameters when one row alone would
-    /// decide a coefficient. An elastic net gives the mean when there are fewer than three physical machines.
+    /// Least squares give the mean when there are not more rows than coefficients, and use fewer parameters when one row alone
+    /// would decide a coefficient. An elastic net gives the mean when there are two rows or fewer.
     ///
     /// # Errors
     /// When linfa refuses a fit.
@@ -83,8 +89,8 @@ pub(in super::super) struct Line {
 }
 
 impl Line {
-    /// Ordinary least squares over a table of shape (rows, figures), and how many rows have a high leverage; the mean when there are
-    /// not more rows than coefficients.
+    /// Ordinary least squares over a table of shape (rows, figures), and how many rows have a high leverage; the mean when
+    /// there are not more rows than coefficients.
     pub(in super::super) fn least_squares(table: &Array2<f64>, values: &[f64]) -> Result<(Self, usize)> {
         let columns = Columns::new(table, &vec![1.0; values.len()]);
         if values.len() <= columns.kept.len() + 1 {
@@ -100,14 +106,14 @@ impl Line {
         Ok((Self { columns, intercept: fitted.intercept(), slopes: fitted.params().to_vec() }, far_rows))
     }
 
-    /// The elastic net with the penalty that does best on groups that were left out of it, one after the other; of equals the
-    /// largest. The mean when there are fewer than three groups.
+    /// The elastic net with the penalty that does best on groups that were left out of it, one after the other, of equals the
+    /// largest; with 0.1 where there are fewer than three groups.
     fn best_elastic_net(table: &Array2<f64>, values: &[f64], groups: &[&str]) -> Result<Self> {
         let mut held = groups.to_vec();
         held.sort_unstable();
         held.dedup();
         if held.len() < FEWEST_MACHINES {
-            return Ok(Self::mean(table, values));
+            return Self::elastic_net(table, values, DEFAULT_PENALTY);
         }
         let mut best = (f64::INFINITY, 0.0);
         for penalty in PENALTIES.into_iter().rev() {
@@ -115,7 +121,7 @@ impl Line {
             for group in &held {
                 let rest: Vec<usize> = (0..values.len()).filter(|&k| groups[k] != *group).collect();
                 let known: Vec<f64> = rest.iter().map(|&k| values[k]).collect();
-                let line = Self::elastic_net(&table.select(Axis(0), &rest), &known, penalty)?;
+                let line = Self::descend(&table.select(Axis(0), &rest), &known, penalty, COARSE)?;
                 let out = (0..values.len()).filter(|&k| groups[k] == *group);
                 error += out.map(|k| (values[k] - line.at(&table.row(k).to_vec())).powi(2)).sum::<f64>();
             }
@@ -126,10 +132,14 @@ impl Line {
         Self::elastic_net(table, values, best.1)
     }
 
-    /// The elastic net of one penalty: half the mean of the squared errors, plus half of the penalty times the slopes, plus a
-    /// quarter of it times their squares. The squares give columns that depend on each other one answer, so that there is no test
-    /// of rank.
+    /// The elastic net of one penalty. What is least is half the mean of the squared errors, plus half of the penalty times the
+    /// sum of the slopes without their signs, plus a quarter of it times that of their squares. The squares give columns that
+    /// depend on each other one answer, so that there is no test of rank.
     pub(in super::super) fn elastic_net(table: &Array2<f64>, values: &[f64], penalty: f64) -> Result<Self> {
+        Self::descend(table, values, penalty, TOLERANCE)
+    }
+
+    fn descend(table: &Array2<f64>, values: &[f64], penalty: f64, tolerance: f64) -> Result<Self> {
         let columns = Columns::varying(table, &vec![1.0; values.len()]);
         if columns.kept.is_empty() {
             return Ok(Self::mean(table, values));
@@ -138,7 +148,7 @@ impl Line {
         let intercept = average(values);
         let centred: Array1<f64> = values.iter().map(|v| v - intercept).collect();
         let data = DatasetBase::new(columns.values.clone(), centred);
-        let net = ElasticNet::<f64>::params().penalty(penalty).l1_ratio(L1_RATIO).with_intercept(false).tolerance(1e-10);
+        let net = ElasticNet::<f64>::params().penalty(penalty).l1_ratio(L1_RATIO).with_intercept(false).tolerance(tolerance);
         let fitted = net.fit(&data).context("the elastic net of crossovers failed")?;
         Ok(Self { columns, intercept, slopes: fitted.hyperplane().to_vec() })
     }
@@ -186,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn an_elastic_net_finds_a_power_law_among_all_parameters_and_two_machines_give_the_mean() {
+    fn an_elastic_net_finds_a_power_law_among_all_parameters_and_two_rows_give_the_mean() {
         let (machines, values) = power_law();
         let known: Vec<&Hardware> = machines[..6].iter().collect();
         let estimate = |count: usize| {
@@ -199,12 +209,17 @@ mod tests {
     }
 
     #[test]
-    fn profiles_of_one_machine_choose_no_penalty() {
-        let (machines, values) = power_law();
-        let mut twins = machines[..4].to_vec();
-        twins.iter_mut().for_each(|h| h.machine.physical_id = "0000000000000001".to_owned());
-        let known: Vec<&Hardware> = twins.iter().collect();
-        assert!(Regression::ElasticNet.estimate(&ALL_OF_CPU, &known, &values[..4], &machines[6]).unwrap().mean);
+    fn machines_left_out_choose_the_penalty_where_there_are_three() {
+        let mut random = Random::named(31, &[]);
+        let table = Array2::from_shape_fn((24, 3), |_| random.normal());
+        let law: Vec<f64> = table.rows().into_iter().map(|r| 9.0 + r[0] - 0.5 * r[2]).collect();
+        let noise: Vec<f64> = (0..24).map(|_| random.normal()).collect();
+        let groups: Vec<&str> = (0..24).map(|k| ["a", "b", "c", "d"][k / 6]).collect();
+        let slopes = |values: &[f64], groups: &[&str]| Line::best_elastic_net(&table, values, groups).unwrap().slopes;
+        let with = |penalty: f64| Line::elastic_net(&table, &law, penalty).unwrap().slopes;
+        assert_eq!(slopes(&law, &groups), with(PENALTIES[0]));
+        assert_eq!(slopes(&noise, &groups), [0.0; 3]);
+        assert_eq!(slopes(&law, &["a"; 24]), with(DEFAULT_PENALTY));
     }
 
     #[test]
