@@ -1,22 +1,21 @@
 //! The regression that the paper of Avril, Gouranton and Arnaldi (2011) asks for: positions of crossovers, directly from
 //! hardware parameters, and a choice by the number of objects alone. Kept as a baseline.
 
+pub(super) mod regression;
+
 use super::baselines::slice_scenario;
-use super::columns::Columns;
-use super::figure;
 use super::profile::Profile;
-use super::yardstick::{Chooser, average};
-use anyhow::{Context, Result};
-use linfa::DatasetBase;
-use linfa::traits::Fit;
-use linfa_linear::LinearRegression;
-use ndarray::{Array1, Array2};
+use super::yardstick::Chooser;
+use super::{GPU_PARAMETERS as ALL_OF_GPU, PARAMETERS as ALL_OF_CPU};
+use anyhow::Result;
+use regression::{Estimate, Regression};
 use sapwise::crossover::{Crossover, Paired, crossover};
 use sapwise::hardware::parameter;
+use sapwise::model::GPU_PREFIX;
 use sapwise::report::{Point, Report};
 use sapwise::{AlgorithmId, BackendClass, Hardware};
 
-/// Parameters that a crossover is regressed on, as logarithms. Few, because there are as few rows as reports.
+/// Parameters that a crossover is regressed on by least squares, as logarithms. Few, because there are as few rows as reports.
 const PARAMETERS: [&str; 4] = [
     parameter::CLOCK_MEASURED_GHZ,
     parameter::SIMD_LANES,
@@ -103,8 +102,9 @@ impl Border {
     }
 }
 
-/// The direct regression, applied to a machine: whoever wins most comparisons in pairs is chosen. Adds to `notes` how many
-/// of its borders are means because there were too few crossings for a regression.
+/// The direct regression by least squares, applied to a machine: whoever wins most comparisons in pairs is chosen. Adds to
+/// `notes` how many of its borders are means because there were too few crossings for a regression, and how many rest on
+/// profiles of high leverage.
 ///
 /// # Errors
 /// When linfa refuses a fit.
@@ -114,22 +114,52 @@ pub(crate) fn direct<'a>(
     available: &[AlgorithmId],
     notes: &mut Vec<String>,
 ) -> Result<Chooser<'a>> {
+    chooser(Regression::LeastSquares, training, hardware, available, notes)
+}
+
+/// [`direct`] by an elastic net on all parameters by which machines are compared, those of GPUs where a GPU takes part. Its
+/// penalty is chosen by leaving out physical machines of the training.
+///
+/// # Errors
+/// When linfa refuses a fit.
+pub(crate) fn direct_elastic_net<'a>(
+    training: &[&Profile],
+    hardware: &Hardware,
+    available: &[AlgorithmId],
+    notes: &mut Vec<String>,
+) -> Result<Chooser<'a>> {
+    chooser(Regression::ElasticNet, training, hardware, available, notes)
+}
+
+fn chooser<'a>(
+    regression: Regression,
+    training: &[&Profile],
+    hardware: &Hardware,
+    available: &[AlgorithmId],
+    notes: &mut Vec<String>,
+) -> Result<Chooser<'a>> {
     let roles = roles(available);
     let mut borders = Vec::new();
-    let mut means = 0;
+    let (mut means, mut far) = (0, 0);
     for a in 0..roles.len() {
         for b in a + 1..roles.len() {
-            if let Some((border, mean)) = border(training, hardware, &roles[a].0, &roles[b].0)? {
-                means += usize::from(mean);
+            if let Some((border, estimate)) = border(regression, training, hardware, &roles[a].0, &roles[b].0)? {
+                means += usize::from(estimate.is_some_and(|e| e.mean));
+                far += usize::from(estimate.is_some_and(|e| e.far_rows > 0));
                 borders.push((a, b, border));
             }
         }
     }
+    let (name, too_few) = match regression {
+        Regression::LeastSquares => ("direct regression", "there being no more crossings than parameters"),
+        Regression::ElasticNet => ("direct elastic net", "there being fewer than three crossings"),
+    };
     if means > 0 {
-        notes.push(format!(
-            "direct regression: {means} of {} borders are means, there being no more crossings than parameters",
-            borders.len()
-        ));
+        notes.push(format!("{name}: {means} of {} borders are means, {too_few}", borders.len()));
+    }
+    if far > 0 {
+        let count = borders.len();
+        notes.push(format!("{name}: {far} of {count} borders rest on a profile with over twice the mean leverage"));
     }
     Ok(Box::new(move |load| {
         let ln_objects = f64::from(load.objects.max(1)).ln();
@@ -142,11 +172,17 @@ pub(crate) fn direct<'a>(
     }))
 }
 
-/// The border of a pair, and whether it is a mean only. `None` where no machine of the training has both.
+/// The border of a pair, and its estimate where it is regressed. `None` where no machine of the training has both.
 ///
 /// Where most machines have a crossing it is regressed over those, the last of several; the others are not used, which is
 /// the weakness of this method. Where most have none, the more frequent winner always wins.
-fn border(training: &[&Profile], hardware: &Hardware, a: &Role, b: &Role) -> Result<Option<(Border, bool)>> {
+fn border(
+    regression: Regression,
+    training: &[&Profile],
+    hardware: &Hardware,
+    a: &Role,
+    b: &Role,
+) -> Result<Option<(Border, Option<Estimate>)>> {
     let found: Vec<(&Hardware, &Crossover)> = training
         .iter()
         .filter_map(|t| t.crossings.iter().find(|c| c.first == *a && c.second == *b).map(|c| (&t.hardware, &c.found)))
@@ -158,38 +194,27 @@ fn border(training: &[&Profile], hardware: &Hardware, a: &Role, b: &Role) -> Res
     if 2 * crossed.len() <= found.len() {
         let firsts = found.iter().filter(|(_, c)| **c == Crossover::AlwaysFirst).count();
         let seconds = found.iter().filter(|(_, c)| **c == Crossover::AlwaysSecond).count();
-        return Ok(Some((Border::Always { first: firsts >= seconds }, false)));
+        return Ok(Some((Border::Always { first: firsts >= seconds }, None)));
     }
     let first_below = 2 * crossed.iter().filter(|(_, p)| p.first_below).count() >= crossed.len();
     let rows: Vec<_> = crossed.into_iter().filter(|(_, p)| p.first_below == first_below).collect();
     let machines: Vec<&Hardware> = rows.iter().map(|r| r.0).collect();
     let ln_objects: Vec<f64> = rows.iter().map(|r| r.1.objects.ln()).collect();
-    let on_gpu = [a, b].iter().any(|role| role.class == BackendClass::Gpu);
-    let names = if on_gpu { GPU_PARAMETERS } else { PARAMETERS };
-    let (ln_objects, mean) = regress(&names, &machines, &ln_objects, hardware)?;
-    Ok(Some((Border::At { ln_objects, first_below }, mean)))
+    let names = names(regression, [a, b].iter().any(|role| role.class == BackendClass::Gpu));
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let estimate = regression.estimate(&names, &machines, &ln_objects, hardware)?;
+    Ok(Some((Border::At { ln_objects: estimate.value, first_below }, Some(estimate))))
 }
 
-/// Ordinary least squares of values on the logarithms of the parameters, evaluated for a machine; the mean, and `true`, when
-/// there are not more rows than coefficients. Parameters that are missing anywhere or say nothing of their own are not used.
-fn regress(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &Hardware) -> Result<(f64, bool)> {
-    let logarithm = |h: &Hardware, name: &str| figure(h, name).filter(|v| *v > 0.0).map(f64::ln);
-    let there = |name: &&str| machines.iter().chain([&hardware]).all(|h| logarithm(h, name).is_some());
-    let names: Vec<&str> = names.iter().copied().filter(there).collect();
-    let table =
-        Array2::from_shape_fn((machines.len(), names.len()), |(k, j)| logarithm(machines[k], names[j]).unwrap_or_default());
-    let columns = Columns::new(&table, &vec![1.0; machines.len()]);
-    if machines.len() <= columns.kept.len() + 1 {
-        return Ok((average(values), true));
+/// The parameters that a border is regressed on.
+fn names(regression: Regression, on_gpu: bool) -> Vec<String> {
+    let of_gpu = ALL_OF_GPU.map(|name| format!("{GPU_PREFIX}{name}"));
+    match regression {
+        Regression::LeastSquares => if on_gpu { GPU_PARAMETERS } else { PARAMETERS }.map(str::to_owned).to_vec(),
+        Regression::ElasticNet => {
+            ALL_OF_CPU.map(str::to_owned).into_iter().chain(of_gpu.into_iter().filter(|_| on_gpu)).collect()
+        }
     }
-    let data = DatasetBase::new(columns.values.clone(), Array1::from(values.to_vec()));
-    let fitted = LinearRegression::new().fit(&data).context("the direct regression of crossovers failed")?;
-    let mut prediction = fitted.intercept();
-    for (j, slope) in fitted.params().iter().enumerate() {
-        let own = logarithm(hardware, names[columns.kept[j]]).unwrap_or_default();
-        prediction += slope * (own - columns.centres[j]) / columns.scales[j];
-    }
-    Ok((prediction, false))
 }
 
 #[cfg(test)]
@@ -200,25 +225,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_power_law_is_found_and_too_few_rows_give_the_mean() {
-        let machines: Vec<Hardware> = Machine::family().iter().map(Machine::hardware).collect();
-        let border = |h: &Hardware| 5.0 - 0.7 * h.value(parameter::SIMD_LANES).unwrap().ln();
-        let values: Vec<f64> = machines.iter().map(border).collect();
-        let known: Vec<&Hardware> = machines[..6].iter().collect();
-        let (predicted, mean) = regress(&PARAMETERS, &known, &values[..6], &machines[6]).unwrap();
-        assert!((predicted - values[6]).abs() < 1e-6 && !mean, "{predicted}");
-        let (predicted, mean) = regress(&PARAMETERS, &known[..3], &values[..3], &machines[6]).unwrap();
-        assert!((predicted - average(&values[..3])).abs() < 1e-12 && mean);
+    fn both_choose_better_than_nothing_on_a_machine_they_have_not_seen() {
+        for machines in [Machine::family(), Machine::family_with_gpus()] {
+            let profiles: Vec<Profile> = machines.into_iter().map(|m| Profile::of("", &m.report())).collect();
+            let training: Vec<&Profile> = profiles[..6].iter().collect();
+            let available = available(&profiles[6]);
+            let hardware = &profiles[6].hardware;
+            let mut notes = Vec::new();
+            let ways = [
+                direct(&training, hardware, &available, &mut notes).unwrap(),
+                direct_elastic_net(&training, hardware, &available, &mut notes).unwrap(),
+            ];
+            for choose in &ways {
+                let regret = Yardstick::new(&profiles[6]).regret(&profiles[6], choose).mean;
+                assert!(regret < 1.0, "{regret} {notes:?}");
+            }
+        }
     }
 
     #[test]
-    fn it_chooses_better_than_nothing_on_a_machine_it_has_not_seen() {
-        let profiles: Vec<Profile> = Machine::family().into_iter().map(|m| Profile::of("", &m.report())).collect();
-        let training: Vec<&Profile> = profiles[..6].iter().collect();
-        let mut notes = Vec::new();
-        let available = available(&profiles[6]);
-        let choose = direct(&training, &profiles[6].hardware, &available, &mut notes).unwrap();
-        let regret = Yardstick::new(&profiles[6]).regret(&profiles[6], &choose).mean;
-        assert!(regret < 1.0, "{regret} {notes:?}");
+    fn the_elastic_net_takes_the_parameters_of_gpus_where_one_takes_part() {
+        assert_eq!(names(Regression::ElasticNet, false).len(), ALL_OF_CPU.len());
+        let all = names(Regression::ElasticNet, true);
+        assert_eq!(all.len(), ALL_OF_CPU.len() + ALL_OF_GPU.len());
+        let gpu = &Machine::family_with_gpus()[0].hardware();
+        assert!(all.iter().filter(|n| n.starts_with(GPU_PREFIX)).any(|n| super::super::figure(gpu, n).is_some()));
     }
 }

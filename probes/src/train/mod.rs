@@ -10,6 +10,8 @@ mod model;
 mod nnls;
 mod partition;
 mod profile;
+#[cfg(test)]
+mod reference;
 mod residual;
 mod robust;
 mod rows;

@@ -75,9 +75,10 @@ impl Residuals {
         Ok(held.iter().map(|&k| self.weights[k] * (self.ln_ratios[k] - self.at(&ridge, k)).powi(2)).sum())
     }
 
-    fn fit(&self, rows: &[usize], penalty: f64) -> Result<Ridge> {
+    /// The ridge of one penalty over some rows.
+    pub(super) fn fit(&self, rows: &[usize], penalty: f64) -> Result<Ridge> {
         let weights: Vec<f64> = rows.iter().map(|&k| self.weights[k]).collect();
-        let columns = Columns::new(&self.features.select(Axis(0), rows), &weights);
+        let columns = Columns::new(&self.features.select(Axis(0), rows), &weights).without_lone_rows();
         let targets: Vec<f64> = rows.iter().map(|&k| self.ln_ratios[k]).collect();
         let total: f64 = weights.iter().sum();
         let intercept = targets.iter().zip(&weights).map(|(y, w)| y * w).sum::<f64>() / total;

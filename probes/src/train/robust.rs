@@ -29,7 +29,7 @@ const FAR: f64 = 0.5;
 /// Profiles that are left out of a start, at most: with many of them no single one takes the start with it.
 const MOST_STARTS: usize = 16;
 /// Residuals beyond this many standard deviations count linearly (Huber's constant for 95 % efficiency).
-const HUBER: f64 = 1.345;
+pub(crate) const HUBER: f64 = 1.345;
 /// Makes the median absolute deviation of a normal distribution its standard deviation.
 const MAD_TO_SD: f64 = 1.4826;
 /// A spread below this is taken for this, so that a perfect fit does not turn rounding errors into outliers.

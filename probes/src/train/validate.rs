@@ -2,7 +2,7 @@
 
 use super::baselines::{self, available, by_costs};
 use super::curve::measured_costs;
-use super::direct::direct;
+use super::direct::{direct, direct_elastic_net};
 use super::fit::Designs;
 use super::model::model;
 use super::partition::Partition;
@@ -140,6 +140,7 @@ impl Data<'_> {
             ("physics + ridge", ridge),
             ("physics", physics),
             ("direct regression", direct(&training, &profile.hardware, &available, notes)?),
+            ("direct elastic net", direct_elastic_net(&training, &profile.hardware, &available, notes)?),
             (SINGLE_BEST, baselines::single_best(&always, &available)),
             ("frozen constants (64)", baselines::frozen(64, "strips", &available)),
             ("frozen constants (1000)", baselines::frozen(999, "sweep", &available)),
@@ -222,7 +223,7 @@ mod tests {
     #[test]
     fn physics_beats_every_constant_on_machines_left_out() {
         let (validation, _) = validated(&profiles(Machine::family()));
-        assert_eq!((validation.physical_machines, validation.profiles, validation.methods.len()), (7, 7, 9));
+        assert_eq!((validation.physical_machines, validation.profiles, validation.methods.len()), (7, 7, 10));
         assert_eq!(validation.held_out, "physical machine");
         for name in ["physics", "physics + ridge", "full sweep"] {
             assert!(mean(&validation, name) < 0.05, "{name}: {}", mean(&validation, name));
@@ -255,7 +256,7 @@ mod tests {
         let mut machines = Machine::family_with_gpus();
         machines[6].gpus.clear();
         let (validation, notes) = validated(&profiles(machines));
-        assert_eq!((validation.physical_machines, validation.methods.len()), (8, 9));
+        assert_eq!((validation.physical_machines, validation.methods.len()), (8, 10));
         for name in ["physics", "physics + ridge", "full sweep"] {
             assert!(mean(&validation, name) < 0.1, "{name}: {} {notes:?}", mean(&validation, name));
         }
@@ -268,7 +269,7 @@ mod tests {
         two.truncate(2);
         two[0].points.truncate(1);
         let (validation, notes) = validated(&two);
-        assert_eq!(validation.methods.len(), 9);
+        assert_eq!(validation.methods.len(), 10);
         assert!(notes.iter().any(|n| n.starts_with("there is no default machine when")), "{notes:?}");
     }
 
