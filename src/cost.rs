@@ -135,6 +135,25 @@ impl CostCurve {
         if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects).exp() }
     }
 
+    /// What the cost is at least and at most under the loads of which no count is below `least` nor above `most`.
+    pub(crate) fn bounds(&self, least: &Counts<'_>, most: &Counts<'_>) -> (f64, f64) {
+        let (mut low, mut high) = (0.0, 0.0);
+        for t in &self.terms {
+            low += t.unit_ns * least.of(t.term, self.cache_bytes);
+            high += t.unit_ns * most.of(t.term, self.cache_bytes);
+        }
+        if self.correction.is_empty() {
+            return (low, high);
+        }
+        // It is linear between knots, so that its extremes lie at the ends or at the knots between them.
+        let (from, to) = (least.log2_objects, most.log2_objects);
+        let (a, b) = (self.ln_correction(from), self.ln_correction(to));
+        let first = self.correction.partition_point(|k| k.log2_objects <= from);
+        let inner = self.correction[first..].iter().take_while(|k| k.log2_objects < to).map(|k| k.ln_factor);
+        let (lowest, highest) = inner.fold((a.min(b), a.max(b)), |(l, h), k| (l.min(k), h.max(k)));
+        (low * lowest.exp(), high * highest.exp())
+    }
+
     fn ln_correction(&self, x: f64) -> f64 {
         let after = self.correction.partition_point(|k| k.log2_objects <= x);
         match (after.checked_sub(1).map(|k| self.correction[k]), self.correction.get(after)) {
