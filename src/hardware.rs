@@ -1,6 +1,7 @@
 //! The parameters of a machine.
 
 pub mod gpu;
+mod plausible;
 mod raw;
 
 pub use gpu::{GpuGroup, GpuHardware, GpuIdentity, GpuKind};

@@ -88,11 +88,14 @@ fn a_machine_outside_the_training_is_told_and_a_missing_parameter_leaves_out_wha
     let prediction = model.predict(&report.hardware, &algorithms).unwrap();
     assert!(prediction.costs.iter().all(|c| c.algorithm.threads() == 1));
     assert!(prediction.warnings.iter().any(|w| w.contains(parameter::FORK_JOIN_COLD_NS)), "{:?}", prediction.warnings);
-    set(&mut report, parameter::CLOCK_MEASURED_GHZ, Some(40.0));
+    set(&mut report, parameter::CLOCK_MEASURED_GHZ, Some(9.0));
     assert!(model.predict(&report.hardware, &algorithms).unwrap().extrapolated);
     let other_revision: Vec<_> = algorithms.iter().map(|(id, revision)| (id.clone(), revision + 1)).collect();
     let error = model.predict(&report.hardware, &other_revision).unwrap_err();
     assert!(error.contains("train on new reports"), "{error}");
+    set(&mut report, parameter::CLOCK_MEASURED_GHZ, Some(4500.0));
+    let error = model.predict(&report.hardware, &algorithms).unwrap_err();
+    assert!(error.contains("clock_measured_ghz is 4500"), "{error}");
 }
 
 /// Files as each schema version was first written. They are never changed: what was once written stays readable.

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use sapwise::hardware::parameter;
-use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Registry, Scenario, Source};
+use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Registry, Scenario};
 
 /// Objects of the slice that the fields show: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
@@ -24,17 +24,7 @@ pub(crate) fn predict(
     let mut algorithms = Registry::with_cores(cores).available();
     algorithms.extend(sapwise::gpu::algorithms(gpus));
     let prediction = model.predict(hardware, &algorithms).map_err(anyhow::Error::msg)?;
-    let mut fields = Fields::from_costs(Source::Predicted, &scenario.to_string(), prediction.costs, &slice(scenario)?);
-    fields.model = Some(model.name.clone());
-    fields.extrapolated = prediction.extrapolated;
-    fields.warnings = prediction.warnings;
-    let v = &model.validation;
-    fields.interval_basis = format!(
-        "90 % of a normal distribution with the spread of measured over modelled time in training ({} profiles of {} \
-         physical machines); no claim about other machines",
-        v.profiles, v.physical_machines
-    );
-    Ok(fields)
+    Ok(prediction.fields(&scenario.to_string(), &slice(scenario)?))
 }
 
 /// The load of a scenario over the number of objects, with the pairs that it really has.

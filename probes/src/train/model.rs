@@ -25,6 +25,8 @@ pub(crate) fn model(profiles: &[&Profile], name: &str) -> Result<(Model, Vec<Str
         ranges: ranges(profiles),
         methods,
         validation: Validation { held_out: String::new(), physical_machines: 0, profiles: 0, methods: Vec::new() },
+        clouds: Vec::new(),
+        folds: Vec::new(),
     };
     if let Some(defect) = model.defect() {
         bail!("no model could be fitted: {defect}; {}", notes.join("; "));

@@ -28,7 +28,7 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let reports = read_reports(&arguments.reports)?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let Trained { model, notes, learning } = train::train(&reports, &name, evidence)?;
-    let text = sapwise::json::write(&model)?;
+    let text = sapwise::json::write_model(&model)?;
     files::write_text(&arguments.out, &text)?;
     if let Some(path) = &arguments.card {
         let page = card::page(&model, &notes, &learning);
