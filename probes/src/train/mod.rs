@@ -1,10 +1,14 @@
 //! From reports to cost curves, fields and models.
 
 mod baselines;
+#[cfg_attr(not(test), expect(dead_code, reason = "the validation fits its folds by itself and does not hand them over"))]
+mod clouds;
 mod columns;
 mod curve;
 mod direct;
 mod fit;
+#[cfg_attr(not(test), expect(dead_code, reason = "the validation fits its folds by itself and does not hand them over"))]
+mod folds;
 mod learning;
 mod model;
 mod nnls;

@@ -1,0 +1,393 @@
+//! What intervals are made of: fits without some of the machines, and their errors on those.
+
+use sapwise::model::{Fold, FoldMethod, LnErrors, MethodModel, QUANTILES, Role, RoleErrors};
+use sapwise::{AlgorithmId, Hardware, Load};
+use std::collections::BTreeMap;
+
+/// Folds at most. With as many machines or fewer each fold is one machine, which is the jackknife+; with more it is CV+.
+const MOST_FOLDS: usize = 10;
+
+/// A profile of a machine that was left out: for each of its points the load and the median times in nanoseconds.
+pub(crate) struct HeldOut<'a> {
+    pub(crate) hardware: &'a Hardware,
+    pub(crate) points: Vec<(Load, Vec<(&'a AlgorithmId, f64)>)>,
+}
+
+/// A fit, and all profiles of the machines that were left out of it.
+pub(crate) struct Fit<'a> {
+    pub(crate) methods: Vec<MethodModel>,
+    pub(crate) held_out: Vec<HeldOut<'a>>,
+}
+
+/// Errors by physical machine.
+type ByMachine = BTreeMap<usize, Vec<f64>>;
+
+/// Deals machines into folds, by their positions in a list: in turn, so that the folds differ by one machine at most.
+pub(crate) fn deal(machines: usize) -> Vec<Vec<usize>> {
+    let folds = machines.min(MOST_FOLDS);
+    (0..folds).map(|k| (k..machines).step_by(folds).collect()).collect()
+}
+
+/// The folds of a model.
+pub(crate) fn folds(fits: &[Fit<'_>]) -> Vec<Fold> {
+    fits.iter().map(fold).collect()
+}
+
+fn fold(fit: &Fit<'_>) -> Fold {
+    let mut machines: Vec<&str> = Vec::new();
+    let mut own: BTreeMap<Role, ByMachine> = BTreeMap::new();
+    let mut between: BTreeMap<(Role, Role), ByMachine> = BTreeMap::new();
+    for profile in &fit.held_out {
+        let id = profile.hardware.machine.physical_id.as_str();
+        let machine = machines.iter().position(|m| *m == id).unwrap_or_else(|| {
+            machines.push(id);
+            machines.len() - 1
+        });
+        let errors = Errors::of(&fit.methods, profile);
+        for point in &errors.points {
+            for (k, &(first, error)) in point.iter().enumerate() {
+                let first = &errors.roles[first];
+                own.entry(first.clone()).or_default().entry(machine).or_default().push(error.abs());
+                for &(second, other) in &point[k + 1..] {
+                    let second = &errors.roles[second];
+                    let pair =
+                        if first <= second { (first.clone(), second.clone()) } else { (second.clone(), first.clone()) };
+                    between.entry(pair).or_default().entry(machine).or_default().push((error - other).abs());
+                }
+            }
+        }
+    }
+    let roles: Vec<Role> = own.keys().cloned().collect();
+    let errors = own.into_iter().map(|(role, by_machine)| {
+        let beside = between.iter().filter(|((first, _), _)| *first == role);
+        let against = beside.filter_map(|((_, second), by_machine)| {
+            let position = roles.iter().position(|r| r == second)?;
+            Some((position as u32, by_machine.len() as u32, quantiles(by_machine)))
+        });
+        let against = against.collect();
+        RoleErrors { machines: by_machine.len() as u32, ln_errors: quantiles(&by_machine), against, role }
+    });
+    Fold { machines: machines.len() as u32, errors: errors.collect(), methods: fit.methods.iter().map(method).collect() }
+}
+
+/// Logarithms of measured over predicted time.
+struct Errors {
+    /// The role of each algorithm.
+    roles: Vec<Role>,
+    /// For each point the position of each algorithm's role, and its error.
+    points: Vec<Vec<(usize, f64)>>,
+}
+
+impl Errors {
+    /// Of what the methods predict of a profile; an algorithm that they don't predict is left out.
+    fn of(methods: &[MethodModel], profile: &HeldOut<'_>) -> Self {
+        let mut algorithms: Vec<&AlgorithmId> = Vec::new();
+        for (_, medians) in &profile.points {
+            for (id, _) in medians {
+                if !algorithms.contains(id) {
+                    algorithms.push(id);
+                }
+            }
+        }
+        let curve = |id: &&AlgorithmId| {
+            let of = |m: &&MethodModel| m.method == id.method() && m.backend == id.backend().class();
+            methods.iter().find(of)?.curve(profile.hardware, id.backend()).ok()
+        };
+        let curves: Vec<_> = algorithms.iter().map(curve).collect();
+        let points = profile.points.iter().map(|(load, medians)| {
+            let error = |(id, ns): &(&AlgorithmId, f64)| {
+                let k = algorithms.iter().position(|a| a == id)?;
+                let error = (ns / curves[k].as_ref()?.cost_ns(load)).ln();
+                error.is_finite().then_some((k, error))
+            };
+            medians.iter().filter_map(error).collect()
+        });
+        Self { points: points.collect(), roles: algorithms.iter().map(|id| Role::of(id)).collect() }
+    }
+}
+
+/// The quantiles of the errors of all machines, each of which weighs the same, rounded up to a thousandth.
+fn quantiles(by_machine: &ByMachine) -> LnErrors {
+    let mut all: Vec<(f64, f64)> =
+        by_machine.values().flat_map(|e| e.iter().map(|x| (*x, 1.0 / (e.len() * by_machine.len()) as f64))).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut sum = 0.0;
+    let reached: Vec<(f64, f64)> = all
+        .iter()
+        .map(|(error, weight)| {
+            sum += weight;
+            (sum, *error)
+        })
+        .collect();
+    // The weights add up to one but for rounding.
+    QUANTILES.map(|share| {
+        let k = reached.partition_point(|r| r.0 < share - 1e-9).min(reached.len() - 1);
+        (reached[k].1 * 1000.0).ceil() / 1000.0
+    })
+}
+
+/// What the curve of a method is made of, to six digits.
+fn method(m: &MethodModel) -> FoldMethod {
+    let six = |x: f64| format!("{x:.5e}").parse().unwrap_or(x);
+    let centred: f64 = m.residual.iter().map(|r| r.slope * r.centre).sum();
+    FoldMethod {
+        method: m.method.clone(),
+        backend: m.backend,
+        objects: (m.min_objects, m.max_objects),
+        terms: m.terms.iter().map(|t| (t.term, t.scale, six(t.unit))).collect(),
+        intercept: six(m.residual_intercept - centred),
+        slopes: m.residual.iter().map(|r| (r.feature, six(r.slope))).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rows::medians;
+    use super::super::synthetic::{Machine, gpu_truth, truth};
+    use super::*;
+    use crate::random::Random;
+    use sapwise::hardware::parameter;
+    use sapwise::model::{Feature, ModelSchema, ModelTerm, Range, ResidualTerm, Scale, Validation};
+    use sapwise::{BackendClass, Model, Parameter, Report, Term, json};
+
+    /// A machine whose costs are off from any model's: both algorithms together by 30 %, each by 25 %, and one by up to 10 %
+    /// more that changes with the size.
+    struct MadeUp {
+        hardware: Hardware,
+        factors: [f64; 2],
+        phase: f64,
+    }
+
+    impl MadeUp {
+        fn new(seed: u64, k: usize) -> Self {
+            let mut random = Random::named(seed, &["machine", &k.to_string()]);
+            let figures = [
+                (parameter::USABLE_CORES, 1.0),
+                (parameter::CLOCK_MEASURED_GHZ, 3.0 * random.log_normal(0.2)),
+                (parameter::CACHE_LLC_BYTES, 3e7),
+            ];
+            let parameters = figures.map(|(name, value)| Parameter::reported(name, value, "test")).into();
+            let machine = sapwise::Machine { physical_id: format!("{k:016x}"), ..sapwise::Machine::default() };
+            let both = random.log_normal(0.3);
+            let factors = [(); 2].map(|()| both * random.log_normal(0.25));
+            Self {
+                hardware: Hardware { machine, parameters, gpus: Vec::new(), gpu_groups: Vec::new() },
+                factors,
+                phase: std::f64::consts::TAU * random.uniform(),
+            }
+        }
+
+        /// Nanoseconds of brute and of sweep, which cross at about 160 objects.
+        fn ns(&self, load: &Load) -> [f64; 2] {
+            let bend = (0.1 * (f64::from(load.objects).ln() + self.phase).sin()).exp();
+            let ghz = self.hardware.value(parameter::CLOCK_MEASURED_GHZ).unwrap();
+            let exact = [0.5 * Term::AllPairs.count(load, 0.0), 40.0 * f64::from(load.objects) * bend];
+            [0, 1].map(|k| self.factors[k] * exact[k] / ghz)
+        }
+
+        fn crossing(&self) -> f64 {
+            let above = |n: &u32| self.ns(&at(*n))[0] > self.ns(&at(*n))[1];
+            f64::from((1..100_000).find(above).unwrap())
+        }
+    }
+
+    fn at(objects: u32) -> Load {
+        Load { objects, ..Load::default() }
+    }
+
+    fn algorithms() -> [AlgorithmId; 2] {
+        ["brute@cpu1", "sweep@cpu1"].map(|id| id.parse().unwrap())
+    }
+
+    fn one_term(name: &str, term: Term, unit: f64) -> MethodModel {
+        MethodModel {
+            method: name.to_owned(),
+            max_threads: 1,
+            terms: vec![ModelTerm { term, scale: Scale::Cycle, unit }],
+            ..truth().remove(0)
+        }
+    }
+
+    /// One unit for each of the two methods: the geometric mean over the machines.
+    fn fitted(machines: &[&MadeUp]) -> Vec<MethodModel> {
+        let terms = [("brute", Term::AllPairs), ("sweep", Term::Objects)];
+        let unit = |k: usize| {
+            let ratios = machines.iter().flat_map(|m| {
+                let ghz = m.hardware.value(parameter::CLOCK_MEASURED_GHZ).unwrap();
+                sizes().map(move |n| (m.ns(&at(n))[k] * ghz / terms[k].1.count(&at(n), 0.0)).ln())
+            });
+            let ratios: Vec<f64> = ratios.collect();
+            (ratios.iter().sum::<f64>() / ratios.len() as f64).exp()
+        };
+        [0, 1].map(|k| one_term(terms[k].0, terms[k].1, unit(k))).into()
+    }
+
+    fn sizes() -> impl Iterator<Item = u32> {
+        (0..14).map(|k| 10 << k)
+    }
+
+    fn model(methods: Vec<MethodModel>, folds: Vec<Fold>, machines: usize) -> Model {
+        let range = Range { parameter: parameter::CLOCK_MEASURED_GHZ.to_owned(), min: 1.0, max: 9.0 };
+        Model {
+            schema: ModelSchema,
+            name: "test".to_owned(),
+            trained_on: Vec::new(),
+            ranges: vec![range],
+            methods,
+            validation: Validation {
+                held_out: "physical machine".to_owned(),
+                physical_machines: machines,
+                profiles: machines,
+                methods: Vec::new(),
+            },
+            clouds: Vec::new(),
+            folds,
+        }
+    }
+
+    fn trained(machines: &[MadeUp]) -> Model {
+        let ids = algorithms();
+        let fit = |held: Vec<usize>| {
+            let of = |m: &&MadeUp| !held.iter().any(|&k| machines[k].hardware == m.hardware);
+            let held_out = held.iter().map(|&k| HeldOut {
+                hardware: &machines[k].hardware,
+                points: sizes().map(|n| (at(n), ids.iter().zip(machines[k].ns(&at(n))).collect())).collect(),
+            });
+            Fit { methods: fitted(&machines.iter().filter(of).collect::<Vec<_>>()), held_out: held_out.collect() }
+        };
+        let fits: Vec<Fit<'_>> = deal(machines.len()).into_iter().map(fit).collect();
+        model(fitted(&machines.iter().collect::<Vec<_>>()), folds(&fits), machines.len())
+    }
+
+    #[test]
+    fn machines_are_dealt_once_each_into_ten_folds_at_most() {
+        for machines in [1, 9, 10, 12, 30] {
+            let dealt = deal(machines);
+            assert_eq!(dealt.len(), machines.min(10));
+            let sizes: Vec<usize> = dealt.iter().map(Vec::len).collect();
+            assert!(sizes.iter().max().unwrap() - sizes.iter().min().unwrap() <= 1);
+            let mut all = dealt.concat();
+            all.sort_unstable();
+            assert_eq!(all, (0..machines).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn intervals_hold_the_times_and_the_crossings_of_nine_new_machines_in_ten() {
+        let slice: Vec<Load> = sizes().map(at).collect();
+        let ids = algorithms();
+        let wanted: Vec<(AlgorithmId, u32)> = ids.iter().map(|id| (id.clone(), 1)).collect();
+        for count in [12, 30] {
+            let (mut times, mut crossings, mut widths) = (0, 0, Vec::new());
+            let (trainings, tests) = (12, 40);
+            for training in 0..trainings {
+                let machines: Vec<MadeUp> = (0..count).map(|k| MadeUp::new(training, k)).collect();
+                let model = trained(&machines);
+                assert_eq!((model.defect(), model.folds.len()), (None, 10));
+                for k in 1000..1000 + tests {
+                    let new = MadeUp::new(training, k);
+                    let prediction = model.predict(&new.hardware, &wanted).unwrap();
+                    let load = at(10 << (k % 14));
+                    let (low, high) = prediction.interval_ns(&ids[1], &load).unwrap();
+                    times += usize::from((low..=high).contains(&new.ns(&load)[1]));
+                    let fields = prediction.fields("uniform", &slice);
+                    assert_eq!((fields.defect(), fields.crossovers.len()), (None, 1));
+                    let (low, high) = fields.crossovers[0].interval().unwrap();
+                    crossings += usize::from((low..=high).contains(&new.crossing()));
+                    widths.push((high / low).ln() / 2.0);
+                }
+            }
+            let all = (trainings as usize * tests) as f64;
+            let (times, crossings) = (times as f64 / all, crossings as f64 / all);
+            widths.sort_by(f64::total_cmp);
+            let width = widths[widths.len() / 2];
+            // The logarithm of a crossing has a deviation of about 0.36, of which 90 % are 0.6 to either side.
+            assert!((0.8..=1.0).contains(&times) && (0.8..=1.0).contains(&crossings), "{count}: {times} {crossings}");
+            assert!((0.4..1.4).contains(&width), "{count}: {width}");
+        }
+    }
+
+    #[test]
+    fn errors_that_two_algorithms_share_leave_their_ratio_alone_and_folds_repeat() {
+        let machines: Vec<MadeUp> = (0..20).map(|k| MadeUp::new(5, k)).collect();
+        let model = trained(&machines);
+        assert!(model.folds.iter().all(|f| f.machines == 2 && f.errors.len() == 2 && f.errors[0].against.len() == 1));
+        let alike: Vec<MadeUp> = (0..20)
+            .map(|k| {
+                let m = MadeUp::new(5, k);
+                MadeUp { factors: [m.factors[0]; 2], ..m }
+            })
+            .collect();
+        let of = trained(&alike);
+        let worst = of.folds.iter().map(|f| f.errors[0].against[0].2[QUANTILES.len() - 1]).fold(0.0, f64::max);
+        let apart = of.folds.iter().map(|f| f.errors[0].ln_errors[QUANTILES.len() - 1]).fold(0.0, f64::max);
+        assert!(worst < 0.35 && apart > 0.5, "{worst} {apart}");
+        assert_eq!(trained(&machines), model);
+    }
+
+    #[test]
+    fn every_machine_weighs_the_same_and_quantiles_are_rounded_up() {
+        let errors = ByMachine::from([(0, vec![0.1001; 99]), (1, vec![1.0])]);
+        assert_eq!(quantiles(&errors), [0.101, 0.101, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
+        let errors = ByMachine::from([(0, (1..=100).map(|k| f64::from(k) / 100.0).collect())]);
+        assert_eq!(quantiles(&errors), QUANTILES);
+    }
+
+    #[test]
+    fn a_fold_is_what_its_fit_is() {
+        let machine = Machine::family_with_gpus().remove(1);
+        let hardware = machine.hardware();
+        let slope = |feature, centre| ResidualTerm { feature, centre, slope: 0.012_345_678 };
+        let residual = vec![slope(Feature::Log2Objects, 10.0), slope(Feature::Log2ObjectsSquared, 120.0)];
+        let methods: Vec<MethodModel> =
+            truth().into_iter().map(|m| MethodModel { residual: residual.clone(), residual_intercept: 0.1, ..m }).collect();
+        let report = machine.report();
+        let folds = folds(&[Fit { methods: methods.clone(), held_out: vec![held_out(&hardware, &report)] }]);
+        // Without GPU methods there are no errors of GPU algorithms.
+        assert!(folds[0].errors.iter().all(|e| e.role.backend == BackendClass::Cpu) && folds[0].errors.len() == 8);
+        let mine = model(methods, Vec::new(), 1);
+        // The same curves from a model whose methods are those of the fold.
+        let of_fold = |m: &FoldMethod| MethodModel {
+            residual: m.slopes.iter().map(|&(feature, slope)| ResidualTerm { feature, centre: 0.0, slope }).collect(),
+            residual_intercept: m.intercept,
+            terms: m.terms.iter().map(|&(term, scale, unit)| ModelTerm { term, scale, unit }).collect(),
+            ..mine.methods.iter().find(|o| o.method == m.method).unwrap().clone()
+        };
+        for m in &folds[0].methods {
+            let id: AlgorithmId = format!("{}@cpu2", m.method).parse().unwrap();
+            let of_model = mine.method(&id).unwrap().curve(&hardware, id.backend()).unwrap();
+            let of_fold = of_fold(m).curve(&hardware, id.backend()).unwrap();
+            for n in sizes() {
+                assert!((of_fold.cost_ns(&at(n)) / of_model.cost_ns(&at(n)) - 1.0).abs() < 1e-4, "{} {n}", m.method);
+            }
+        }
+    }
+
+    fn held_out<'a>(hardware: &'a Hardware, report: &'a Report) -> HeldOut<'a> {
+        HeldOut { hardware, points: report.points.iter().map(|p| (p.load, medians(p))).collect() }
+    }
+
+    #[test]
+    fn a_model_of_ten_folds_and_all_roles_stays_under_200_kb() {
+        let mut machine = Machine::family_with_gpus().remove(1);
+        machine.noise = 0.3;
+        let (hardware, report) = (machine.hardware(), machine.report());
+        let slope = |&feature: &Feature| ResidualTerm { feature, centre: 11.234_567_89, slope: -0.012_345_678 };
+        let methods: Vec<MethodModel> = truth()
+            .into_iter()
+            .chain(gpu_truth())
+            .map(|m| {
+                let terms = m.terms.iter().map(|t| ModelTerm { unit: t.unit * 1.234_567_89, ..*t }).collect();
+                MethodModel { residual: Feature::of(m.backend).iter().map(slope).collect(), terms, ..m }
+            })
+            .collect();
+        let fit = |_| Fit { methods: methods.clone(), held_out: vec![held_out(&hardware, &report)] };
+        let folds = folds(&(0..10).map(fit).collect::<Vec<_>>());
+        // Eight roles on the CPU and six on GPUs; with four threads and two GPUs all but one GPU meet others of their role.
+        assert_eq!(folds[0].errors.len(), 14);
+        assert!(folds[0].errors.iter().map(|e| e.against.len()).sum::<usize>() > 91);
+        let text = json::write_model(&model(methods.clone(), folds, 10)).unwrap();
+        assert!(text.len() < 200_000, "{} bytes", text.len());
+        assert!(json::model(&text).is_ok());
+    }
+}
