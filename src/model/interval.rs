@@ -135,7 +135,8 @@ impl<'a> Band<'a> {
 
     /// How many of the machines an end of the interval must have on its inner side, the new machine counted among those outside.
     fn needed(&self) -> f64 {
-        CONFIDENCE * (self.machines + 1.0)
+        // The shares of the machines add up but for rounding.
+        CONFIDENCE * (self.machines + 1.0) - 1e-9
     }
 
     /// Whether the ratio is certain to be above 1, with `sign` -1 below it: for that many machines no error as large as theirs
@@ -166,8 +167,7 @@ impl<'a> Band<'a> {
             let mut sum = 0.0;
             let reached = values.iter().find(|v| {
                 sum += v.1;
-                // The shares add up to the machines but for rounding.
-                sum >= self.needed() - 1e-9
+                sum >= self.needed()
             });
             sign * reached.or(values.last()).map_or(f64::INFINITY, |v| v.0)
         };
