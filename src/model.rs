@@ -173,6 +173,10 @@ pub struct MethodScore {
     pub share_over_10_percent: f64,
     /// How much of the gap between the best single algorithm (0) and the oracle (1) it closes.
     pub closed_gap: f64,
+    /// Regret, mean over reports as seen by games: each number of objects counts as often as games have it, which is an assumption
+    /// (log-normal around 800, two thirds of the frames within 220 to 2800). `None` in files from before this was told.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub mean_regret_in_games: Option<f64>,
 }
 
 impl Model {

@@ -115,7 +115,7 @@ pub(crate) fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> S
     if methods.is_empty() {
         return format!("{data}; not validated.\n");
     }
-    let doubt = if held_out == "profile" { " This says little about machines never seen." } else { "" };
+    let doubt = if *physical_machines < 2 { " This says little about machines never seen." } else { "" };
     let percent = |share: f64| format!("{:.1} %", share * 100.0);
     let head = ["way to choose", "mean regret", "95th percentile", "points over 10 %", "gap closed"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
@@ -182,6 +182,7 @@ mod tests {
             p95_regret: 0.125,
             share_over_10_percent: 0.0,
             closed_gap: 0.9,
+            mean_regret_in_games: Some(0.04),
         };
         let mut validation =
             Validation { held_out: "profile".to_owned(), physical_machines: 1, profiles: 2, methods: vec![score] };

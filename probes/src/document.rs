@@ -22,8 +22,16 @@ pub(crate) fn read_document(path: &Path) -> anyhow::Result<Document> {
 /// The reports with their file names, of files and of the `*.json` files of folders, in the order of their names.
 ///
 /// # Errors
-/// As [`read_document`]; when a folder can't be read or holds no such file, or a file is no report.
+/// As [`report_files`] and [`read_report`].
 pub(crate) fn read_reports(paths: &[PathBuf]) -> anyhow::Result<Vec<(String, Report)>> {
+    report_files(paths)?.iter().map(|file| read_report(file)).collect()
+}
+
+/// Files, and the `*.json` files of folders, in the order of their names.
+///
+/// # Errors
+/// When a folder can't be read or holds no such file.
+pub(crate) fn report_files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
     for path in paths {
         if path.is_dir() {
@@ -36,14 +44,18 @@ pub(crate) fn read_reports(paths: &[PathBuf]) -> anyhow::Result<Vec<(String, Rep
             files.push(path.clone());
         }
     }
-    let mut reports = Vec::new();
-    for file in &files {
-        match read_document(file)? {
-            Document::Report(report) => reports.push((file_name(file), *report)),
-            _ => bail!("{} is no report; only what `sapwise probe` wrote is taken here", file.display()),
-        }
+    Ok(files)
+}
+
+/// A report with the name of its file.
+///
+/// # Errors
+/// As [`read_document`]; when the file is no report.
+pub(crate) fn read_report(file: &Path) -> anyhow::Result<(String, Report)> {
+    match read_document(file)? {
+        Document::Report(report) => Ok((file_name(file), *report)),
+        _ => bail!("{} is no report; only what `sapwise probe` wrote is taken here", file.display()),
     }
-    Ok(reports)
 }
 
 /// The `*.json` files of a folder, in the order of their names.

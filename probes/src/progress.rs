@@ -1,7 +1,7 @@
 //! A progress bar on standard error for whatever takes over a second.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 /// Nothing is drawn before this: work that is done by then needs no bar.
@@ -11,7 +11,7 @@ const DELAY: Duration = Duration::from_secs(1);
 pub(crate) struct Progress {
     bar: ProgressBar,
     began: Instant,
-    shown: Cell<bool>,
+    shown: AtomicBool,
 }
 
 impl Progress {
@@ -21,7 +21,7 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template("{bar:32} {pos}/{len} {elapsed} {wide_msg}") {
             bar.set_style(style);
         }
-        Self { bar, began: Instant::now(), shown: Cell::new(false) }
+        Self { bar, began: Instant::now(), shown: AtomicBool::new(false) }
     }
 
     /// Says what is being done.
@@ -48,8 +48,7 @@ impl Progress {
     }
 
     fn show(&self) {
-        if !self.shown.get() && self.began.elapsed() >= DELAY {
-            self.shown.set(true);
+        if self.began.elapsed() >= DELAY && !self.shown.swap(true, Relaxed) {
             // A draw target that is no terminal draws nothing by itself.
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }

@@ -1,6 +1,6 @@
 //! How far the borders between fields move from report to report.
 
-use crate::train;
+use crate::{sweep, train};
 use sapwise::measure::statistics::{median, relative_iqr};
 use sapwise::report::{Point, Report};
 use sapwise::{AlgorithmId, Fields};
@@ -104,8 +104,7 @@ fn slope<'a>(
     let mut at: Vec<(f64, f64)> = Vec::new();
     for point in points {
         let x = (f64::from(point.load.objects) / objects).ln();
-        let medians = train::medians(point);
-        let of = |id: &AlgorithmId| medians.iter().find(|m| m.0 == id).map(|m| m.1);
+        let of = |id: &AlgorithmId| sweep::median(&point.timings.iter().find(|t| t.algorithm == *id)?.samples_ns);
         if let (true, Some(first), Some(second)) = (x.abs() <= AROUND.ln(), of(below), of(above)) {
             at.push((x, (first / second).ln()));
         }

@@ -1,6 +1,6 @@
 //! What is lost by using the fields that one report measured under the timings of another.
 
-use crate::train::{Chooser, Evidence, Profile, available, average, by_costs, measured_costs, regrets, usable};
+use crate::train::{Chooser, Evidence, Profile, Yardstick, available, average, by_costs, measured_costs, usable};
 use sapwise::Report;
 use sapwise::report::Label;
 use serde::Serialize;
@@ -33,9 +33,10 @@ pub(super) fn losses(reports: &[(String, Report)]) -> Option<Losses> {
     let (mut own, mut others, mut beyond) = (Vec::new(), Vec::new(), Vec::new());
     for (k, judged) in profiles.iter().enumerate() {
         let available = available(judged);
+        let yardstick = Yardstick::new(judged);
         let loss = |of: &Profile| {
-            let choose: Chooser<'_> = by_costs(measured_costs(&of.report).0, &available);
-            average(&regrets(judged, &choose))
+            let choose: Chooser<'_> = by_costs(measured_costs(of).0, &available);
+            yardstick.regret(judged, &choose).mean
         };
         let by_own = loss(judged);
         own.push(by_own);

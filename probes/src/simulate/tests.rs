@@ -1,5 +1,5 @@
 use super::*;
-use crate::train::{self, Evidence, Trained};
+use crate::train::{self, Evidence, Selection, Trained};
 use std::collections::BTreeSet;
 
 fn some(machines: usize) -> Vec<(String, Report)> {
@@ -44,7 +44,7 @@ fn every_report_is_sound_complete_and_labelled() {
 #[test]
 fn a_model_of_simulated_machines_has_a_course_and_a_card_that_say_so() {
     let reports: Vec<(String, Report)> = some(3);
-    let Trained { model, learning, .. } = train::train(&reports, "test", Evidence::Simulated).unwrap();
+    let Trained { model, learning, .. } = train::train(Selection::of(&reports, Evidence::Simulated), "test").unwrap();
     assert!(model.is_simulated() && model.trained_on.len() == 3);
     // All subsets of three of three are the same one.
     assert_eq!(learning.iter().map(|l| (l.machines, l.subsets)).collect::<Vec<_>>(), [(3, 1)]);
@@ -59,7 +59,7 @@ fn a_model_of_simulated_machines_has_a_course_and_a_card_that_say_so() {
 #[test]
 fn a_prediction_by_simulated_machines_says_so() {
     let reports = some(4);
-    let model = train::train(&reports[..3], "test", Evidence::Simulated).unwrap().model;
+    let model = train::train(Selection::of(&reports[..3], Evidence::Simulated), "test").unwrap().model;
     let held_out = &reports[3].1;
     let algorithms: Vec<_> = held_out.algorithms.iter().map(|t| (t.id.clone(), t.revision)).collect();
     let prediction = model.predict(&held_out.hardware, &algorithms).unwrap();
@@ -73,7 +73,9 @@ fn a_prediction_by_simulated_machines_says_so() {
 #[test]
 fn simulated_reports_alone_are_refused_without_the_option_and_real_ones_with_it() {
     let mut reports = some(1);
-    let refused = |reports: &[(String, Report)], evidence| train::train(reports, "test", evidence).unwrap_err().to_string();
+    let refused = |reports: &[(String, Report)], evidence| {
+        train::train(Selection::of(reports, evidence), "test").unwrap_err().to_string()
+    };
     assert!(refused(&reports, Evidence::Real).contains("is simulated"));
     reports[0].1.label = Label::RealFull;
     assert!(refused(&reports, Evidence::Simulated).contains("sapwise simulate"));

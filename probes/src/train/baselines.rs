@@ -1,71 +1,28 @@
 //! Ways to choose an algorithm that a prediction has to beat.
 
-use super::curve::{measured_costs, measured_fields};
-use super::rows::{Profile, best, medians};
+use super::curve::{measured_costs, profile_fields};
+use super::profile::Profile;
+use super::yardstick::{Chooser, NOT_TIMED, average};
 use super::{GPU_PARAMETERS, PARAMETERS, figure};
 use anyhow::Result;
 use sapwise::model::GPU_PREFIX;
-use sapwise::report::Point;
-use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Fields, Hardware, Load, Report};
-use std::collections::BTreeMap;
-
-/// Chooses an algorithm under a load among those that a machine has; `None` where it knows none of them.
-pub(crate) type Chooser<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
-
-/// The cost of an algorithm over the best, where nothing is known of it: a guess. Who leaves the race as hopeless is slower
-/// than this, but where time is short an algorithm leaves at three times the best already.
-pub(crate) const NOT_TIMED: f64 = 10.0;
-
-/// Sizes a decade that count as one when regrets are averaged.
-const PER_DECADE: f64 = 4.0;
-
-/// Regret of a choice in each quarter of a decade of each scenario of a report: the mean over the points there.
-///
-/// A sweep goes most often to the sizes at which two algorithms lie close, where every choice costs little. Counted one by one these
-/// points would pass off any way to choose as better than it is.
-pub(crate) fn regrets(profile: &Profile, choose: &Chooser<'_>) -> Vec<f64> {
-    let mut regrets: BTreeMap<(&str, i64), Vec<f64>> = BTreeMap::new();
-    for point in &profile.report.points {
-        let medians = medians(point);
-        let Some(best) = best(&medians) else { continue };
-        let chosen = choose(&point.load);
-        let timed = chosen.as_ref().and_then(|id| over_best(&medians, best, id).or_else(|| elsewhere(profile, point, id)));
-        let quarter = (PER_DECADE * f64::from(point.load.objects.max(1)).log10()).round() as i64;
-        regrets.entry((&point.scenario, quarter)).or_default().push(timed.unwrap_or(NOT_TIMED) - 1.0);
-    }
-    regrets.values().map(|here| average(here)).collect()
-}
-
-fn over_best(medians: &[(&AlgorithmId, f64)], best: f64, id: &AlgorithmId) -> Option<f64> {
-    Some(medians.iter().find(|m| m.0 == id)?.1 / best)
-}
-
-/// How far away another size may be from which it is taken how far behind an algorithm is.
-const LIKE: f64 = 2.0;
-
-/// The cost of an algorithm over the best at the nearest other size of the scenario: a sweep goes to some sizes more than once, and
-/// then only with those between which the choice lies.
-fn elsewhere(profile: &Profile, like: &Point, id: &AlgorithmId) -> Option<f64> {
-    let distance = |p: &Point| (f64::from(p.load.objects) / f64::from(like.load.objects)).ln().abs();
-    let near = profile.report.points.iter().filter(|p| p.scenario == like.scenario && distance(p) <= LIKE.ln());
-    let timed = near.filter_map(|p| {
-        let medians = medians(p);
-        Some((distance(p), over_best(&medians, best(&medians)?, id)?))
-    });
-    timed.min_by(|a, b| a.0.total_cmp(&b.0)).map(|nearest| nearest.1)
-}
+use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Fields, Hardware, Report};
 
 /// The algorithms of a profile that were timed anywhere in it.
 pub(crate) fn available(profile: &Profile) -> Vec<AlgorithmId> {
-    let timed = |id: &&AlgorithmId| profile.report.points.iter().any(|p| p.timings.iter().any(|t| t.algorithm == **id));
-    profile.report.algorithms.iter().map(|t| &t.id).filter(timed).cloned().collect()
+    let mut timed = vec![false; profile.algorithms.len()];
+    profile.points.iter().flat_map(|s| &s.medians).for_each(|m| timed[usize::from(m.0)] = true);
+    profile.algorithms.iter().zip(timed).filter(|(_, timed)| *timed).map(|(t, _)| t.id.clone()).collect()
 }
 
-/// Always the algorithm with the least mean regret over the points of the training profiles, each profile counting the same.
-pub(crate) fn single_best<'a>(training: &[&Profile], available: &[AlgorithmId]) -> Chooser<'a> {
+/// Always the algorithm with the least mean regret over the training profiles, given with that of each of their algorithms when it is
+/// chosen always; each profile counts the same.
+pub(crate) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId]) -> Chooser<'a> {
     let mean = |id: &AlgorithmId| {
-        let always: Chooser<'_> = Box::new(|_| Some(id.clone()));
-        training.iter().map(|p| average(&regrets(p, &always))).sum::<f64>()
+        let of = |(profile, always): &(&Profile, &[f64])| {
+            profile.position(id).map_or(NOT_TIMED - 1.0, |k| always[usize::from(k)])
+        };
+        training.iter().map(of).sum::<f64>()
     };
     let mut scored: Vec<(f64, &AlgorithmId)> = available.iter().map(|id| (mean(id), id)).collect();
     scored.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -97,15 +54,15 @@ pub(crate) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> C
 /// When that profile has too few timings for thresholds.
 pub(crate) fn default_machine<'a>(training: &[&Profile], available: &'a [AlgorithmId]) -> Result<Chooser<'a>> {
     let Some(first) = training.first() else { return Ok(Box::new(|_| None)) };
-    let fields = measured_fields(&first.report, slice_scenario(&first.report))?;
+    let fields = profile_fields(first, usual(first.points.iter().map(|s| s.scenario.as_str())))?;
     Ok(Box::new(move |load| fields.step(load.objects).and_then(|s| stand_in(&s.algorithm, available))))
 }
 
 /// The measured costs of the training profile whose hardware is nearest, under the whole load.
 pub(crate) fn nearest_machine<'a>(training: &[&Profile], hardware: &Hardware, available: &'a [AlgorithmId]) -> Chooser<'a> {
-    let known: Vec<&Hardware> = training.iter().map(|p| &p.report.hardware).collect();
+    let known: Vec<&Hardware> = training.iter().map(|p| &p.hardware).collect();
     match nearest(&known, hardware) {
-        Some(k) => by_costs(measured_costs(&training[k].report).0, available),
+        Some(k) => by_costs(measured_costs(training[k]).0, available),
         None => Box::new(|_| None),
     }
 }
@@ -121,8 +78,13 @@ pub(crate) fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> 
 
 /// `uniform` where a report has it, else its first scenario.
 pub(crate) fn slice_scenario(report: &Report) -> &str {
-    let names = || report.points.iter().map(|p| p.scenario.as_str());
-    names().find(|n| *n == "uniform").or_else(|| names().next()).unwrap_or("uniform")
+    usual(report.points.iter().map(|p| p.scenario.as_str()))
+}
+
+/// `uniform` where it is among the names, else the first of them.
+fn usual<'a>(mut names: impl Iterator<Item = &'a str> + Clone) -> &'a str {
+    let first = names.clone().next();
+    names.find(|n| *n == "uniform").or(first).unwrap_or("uniform")
 }
 
 /// The available algorithm of the same method and class of processor whose number of threads or GPUs is nearest.
@@ -159,15 +121,11 @@ fn nearest(known: &[&Hardware], hardware: &Hardware) -> Option<usize> {
     (0..known.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b]))
 }
 
-/// The mean; 0 of nothing.
-pub(crate) fn average(values: &[f64]) -> f64 {
-    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::synthetic::Machine;
     use super::*;
+    use sapwise::Load;
 
     fn ids(list: &[&str]) -> Vec<AlgorithmId> {
         list.iter().map(|id| id.parse().unwrap()).collect()
@@ -195,23 +153,5 @@ mod tests {
         // Four cores and eight lanes are nearer to four cores and four lanes than to sixteen cores.
         assert_eq!(nearest(&[known[4], known[1]], known[6]), Some(1));
         assert_eq!(nearest(&[], known[0]), None);
-    }
-
-    #[test]
-    fn what_was_not_timed_costs_what_it_did_nearby_or_ten_times_the_best() {
-        let profile = Profile { file: String::new(), report: Machine::family()[0].report() };
-        let never: Chooser<'_> = Box::new(|_| None);
-        assert!(regrets(&profile, &never).iter().all(|r| (r - 9.0).abs() < 1e-9));
-        let mut twice = profile.clone();
-        let id = twice.report.points[0].timings[0].algorithm.clone();
-        let mut again = twice.report.points[0].clone();
-        again.timings.remove(0);
-        twice.report.points.push(again);
-        let always: Chooser<'_> = Box::new(|_| Some(id.clone()));
-        // And a size that was visited again counts once.
-        assert_eq!(regrets(&twice, &always), regrets(&profile, &always));
-        let available = available(&profile);
-        let sweep = regrets(&profile, &by_costs(measured_costs(&profile.report).0, &available));
-        assert!(average(&sweep) < 0.02, "{}", average(&sweep));
     }
 }

@@ -3,7 +3,7 @@
 use super::{GPU_PARAMETERS, PARAMETERS};
 use ndarray::{Array1, Array2, s};
 use sapwise::model::{Cloud, CloudParameter};
-use sapwise::{BackendClass, GpuHardware, Hardware};
+use sapwise::{BackendClass, GpuHardware, GpuKind, Hardware};
 
 /// Least standard deviation of a parameter's logarithm: a tenth, as the ranges allow it. Parameters that all machines share would
 /// else put every other machine beyond the training by any difference.
@@ -13,12 +13,12 @@ const LEAST_DEVIATION: f64 = 0.1;
 /// Below that the correlations say more of who happened to be measured than of machines.
 ///
 /// A physical machine is one point, the mean of its profiles; so is a GPU, by its name and numbers. One that lacks a parameter is
-/// left out.
+/// left out, and so are programs that act as GPUs.
 pub(crate) fn clouds<'a>(profiles: impl Iterator<Item = (&'a Hardware, Vec<&'a GpuHardware>)>) -> Vec<Cloud> {
     let (mut machines, mut gpus) = (Points::new(&PARAMETERS), Points::new(&GPU_PARAMETERS));
     for (hardware, timed) in profiles {
         machines.add(&hardware.machine.physical_id, |name| hardware.value(name));
-        for gpu in timed {
+        for gpu in timed.into_iter().filter(|g| g.gpu.kind != GpuKind::Software) {
             gpus.add(&format!("{} {}", gpu.gpu.device, gpu.gpu.name), |name| gpu.value(name));
         }
     }

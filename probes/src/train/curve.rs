@@ -1,5 +1,6 @@
 //! The measured cost curves of one machine, from its own report.
 
+use super::profile::Profile;
 use super::robust::{Problem, spread, weighted_median};
 use super::rows::{Row, rows};
 use super::terms::terms_of_one_machine;
@@ -25,39 +26,45 @@ const FEWEST_POINTS: usize = 3;
 /// # Errors
 /// When no point of `scenario`, or no algorithm, has enough timings; names the scenarios there are.
 pub(crate) fn measured_fields(report: &Report, scenario: &str) -> Result<Fields> {
-    let mut loads: Vec<Load> = report.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load).collect();
+    let mut fields = profile_fields(&Profile::of("", report), scenario)?;
+    if report.label == Label::Simulated {
+        fields.warnings.push("the report is simulated".to_owned());
+    }
+    if !report.provenance.optimised {
+        fields.warnings.push("the report was timed by an unoptimised build".to_owned());
+    }
+    measure_borders(&mut fields, report);
+    Ok(fields)
+}
+
+/// The same without intervals from paired samples, which a profile does not hold.
+pub(super) fn profile_fields(profile: &Profile, scenario: &str) -> Result<Fields> {
+    let mut loads: Vec<Load> = profile.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load).collect();
     loads.sort_by_key(|l| l.objects);
     loads.dedup_by_key(|l| l.objects);
     if loads.len() < 2 {
-        let mut known: Vec<&str> = report.points.iter().map(|p| p.scenario.as_str()).collect();
+        let mut known: Vec<&str> = profile.points.iter().map(|p| p.scenario.as_str()).collect();
         known.sort_unstable();
         known.dedup();
         let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
         bail!("the report has {} sizes of the scenario {scenario:?}, two are needed; it holds: {known}", loads.len());
     }
-    let (costs, mut warnings) = measured_costs(report);
+    let (costs, warnings) = measured_costs(profile);
     if costs.is_empty() {
         bail!("no algorithm of the report was timed at {FEWEST_POINTS} points; measure again with `sapwise probe`");
     }
-    if report.label == Label::Simulated {
-        warnings.push("the report is simulated".to_owned());
-    }
-    if !report.provenance.optimised {
-        warnings.push("the report was timed by an unoptimised build".to_owned());
-    }
     let mut fields = Fields::from_costs(Source::Measured, scenario, costs, &loads);
     fields.warnings = warnings;
-    measure_borders(&mut fields, report);
     Ok(fields)
 }
 
 /// The cost curve of each algorithm that was timed often enough, and a sentence for each other one.
-pub(crate) fn measured_costs(report: &Report) -> (Vec<AlgorithmCost>, Vec<String>) {
-    let rows = rows(report, 0);
-    let cache_bytes = report.hardware.value(parameter::CACHE_LLC_BYTES).unwrap_or(0.0);
+pub(crate) fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<String>) {
+    let rows = rows(profile, 0);
+    let cache_bytes = profile.hardware.value(parameter::CACHE_LLC_BYTES).unwrap_or(0.0);
     let (mut costs, mut warnings) = (Vec::new(), Vec::new());
-    for timed in &report.algorithms {
-        let own: Vec<&Row> = rows.iter().filter(|r| r.algorithm == timed.id).collect();
+    for (k, timed) in profile.algorithms.iter().enumerate() {
+        let own: Vec<&Row> = rows.iter().filter(|r| usize::from(r.algorithm) == k).collect();
         let points = own.iter().filter(|r| !r.floor).count();
         let fitted = (points >= FEWEST_POINTS).then(|| curve(&timed.id, &own, cache_bytes));
         match fitted.filter(|(curve, _)| curve.defect().is_none()) {
@@ -173,7 +180,6 @@ fn measured_interval(border: &Border, report: &Report, scenario: &str) -> Option
 
 #[cfg(test)]
 mod tests {
-    use super::super::rows::{best, medians};
     use super::super::synthetic::{Machine, load};
     use super::*;
     use sapwise::report::Timing;
@@ -184,14 +190,14 @@ mod tests {
             let report = machine.report();
             let fields = measured_fields(&report, "uniform").unwrap();
             assert_eq!(fields.defect(), None);
+            let profile = Profile::of("", &report);
             let mut regret = 0.0;
-            for point in &report.points {
-                let chosen = &fields.costs[fields.rank(&point.load, |_| true).unwrap().best].algorithm;
-                let medians = medians(point);
-                let ns = medians.iter().find(|m| m.0 == chosen).expect("chose one that had left the race").1;
-                regret += ns / best(&medians).unwrap() - 1.0;
+            for spot in &profile.points {
+                let chosen = &fields.costs[fields.rank(&spot.load, |_| true).unwrap().best].algorithm;
+                let ns = profile.medians(spot).find(|m| m.0 == chosen).expect("chose one that had left the race").1;
+                regret += ns / spot.best().unwrap() - 1.0;
             }
-            regret /= report.points.len() as f64;
+            regret /= profile.points.len() as f64;
             assert!(regret < 0.02, "{}: {regret}", machine.name);
         }
     }
@@ -215,8 +221,9 @@ mod tests {
         // Only the call shows at small sizes: without floors this would be the cheapest of all large scenes.
         let row = |objects: u32, ns: f64, floor: bool| Row {
             profile: 0,
-            algorithm: "brute@cpu2".parse().unwrap(),
+            algorithm: 0,
             load: load("uniform", f64::from(objects)),
+            core_to_core_ns: None,
             ns,
             floor,
         };

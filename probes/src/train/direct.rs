@@ -1,10 +1,11 @@
 //! The regression that the paper of Avril, Gouranton and Arnaldi (2011) asks for: positions of crossovers, directly from
 //! hardware parameters, and a choice by the number of objects alone. Kept as a baseline.
 
-use super::baselines::{Chooser, average, slice_scenario};
+use super::baselines::slice_scenario;
 use super::columns::Columns;
 use super::figure;
-use super::rows::Profile;
+use super::profile::Profile;
+use super::yardstick::{Chooser, average};
 use anyhow::{Context, Result};
 use linfa::DatasetBase;
 use linfa::traits::Fit;
@@ -12,7 +13,7 @@ use linfa_linear::LinearRegression;
 use ndarray::{Array1, Array2};
 use sapwise::crossover::{Crossover, Paired, crossover};
 use sapwise::hardware::parameter;
-use sapwise::report::Point;
+use sapwise::report::{Point, Report};
 use sapwise::{AlgorithmId, BackendClass, Hardware};
 
 /// Parameters that a crossover is regressed on, as logarithms. Few, because there are as few rows as reports.
@@ -36,29 +37,29 @@ struct Role {
     all: bool,
 }
 
-/// The measured crossovers of one profile.
-pub(crate) struct Crossings<'a> {
-    hardware: &'a Hardware,
-    pairs: Vec<(Role, Role, Crossover)>,
+/// A measured crossover of two roles.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Crossing {
+    first: Role,
+    second: Role,
+    found: Crossover,
 }
 
-impl<'a> Crossings<'a> {
-    /// Finds the crossovers between the roles of a profile in its scenario `uniform`, or its first one.
-    pub(crate) fn new(profile: &'a Profile) -> Self {
-        let scenario = slice_scenario(&profile.report);
-        let points: Vec<&Point> = profile.report.points.iter().filter(|p| p.scenario == scenario).collect();
-        let ids: Vec<AlgorithmId> = profile.report.algorithms.iter().map(|t| t.id.clone()).collect();
-        let roles = roles(&ids);
-        let mut pairs = Vec::new();
-        for (k, (a, first)) in roles.iter().enumerate() {
-            for (b, second) in &roles[k + 1..] {
-                if let Some(found) = crossover(&common(&points, first, second)) {
-                    pairs.push((a.clone(), b.clone(), found));
-                }
+/// The crossovers between the roles of a report in its scenario `uniform`, or its first one.
+pub(super) fn crossings(report: &Report) -> Vec<Crossing> {
+    let scenario = slice_scenario(report);
+    let points: Vec<&Point> = report.points.iter().filter(|p| p.scenario == scenario).collect();
+    let ids: Vec<AlgorithmId> = report.algorithms.iter().map(|t| t.id.clone()).collect();
+    let roles = roles(&ids);
+    let mut crossings = Vec::new();
+    for (k, (a, first)) in roles.iter().enumerate() {
+        for (b, second) in &roles[k + 1..] {
+            if let Some(found) = crossover(&common(&points, first, second)) {
+                crossings.push(Crossing { first: a.clone(), second: b.clone(), found });
             }
         }
-        Self { hardware: &profile.report.hardware, pairs }
     }
+    crossings
 }
 
 /// Points at which both were timed.
@@ -108,7 +109,7 @@ impl Border {
 /// # Errors
 /// When linfa refuses a fit.
 pub(crate) fn direct<'a>(
-    training: &[&Crossings<'_>],
+    training: &[&Profile],
     hardware: &Hardware,
     available: &[AlgorithmId],
     notes: &mut Vec<String>,
@@ -145,10 +146,10 @@ pub(crate) fn direct<'a>(
 ///
 /// Where most machines have a crossing it is regressed over those, the last of several; the others are not used, which is
 /// the weakness of this method. Where most have none, the more frequent winner always wins.
-fn border(training: &[&Crossings<'_>], hardware: &Hardware, a: &Role, b: &Role) -> Result<Option<(Border, bool)>> {
+fn border(training: &[&Profile], hardware: &Hardware, a: &Role, b: &Role) -> Result<Option<(Border, bool)>> {
     let found: Vec<(&Hardware, &Crossover)> = training
         .iter()
-        .filter_map(|t| t.pairs.iter().find(|(x, y, _)| x == a && y == b).map(|(_, _, c)| (t.hardware, c)))
+        .filter_map(|t| t.crossings.iter().find(|c| c.first == *a && c.second == *b).map(|c| (&t.hardware, &c.found)))
         .collect();
     let crossed: Vec<_> = found.iter().filter_map(|(h, c)| c.positions().last().map(|p| (*h, p))).collect();
     if found.is_empty() {
@@ -193,8 +194,9 @@ fn regress(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &Ha
 
 #[cfg(test)]
 mod tests {
-    use super::super::baselines::{available, regrets};
+    use super::super::baselines::available;
     use super::super::synthetic::Machine;
+    use super::super::yardstick::Yardstick;
     use super::*;
 
     #[test]
@@ -211,14 +213,12 @@ mod tests {
 
     #[test]
     fn it_chooses_better_than_nothing_on_a_machine_it_has_not_seen() {
-        let profile = |m: Machine| Profile { file: String::new(), report: m.report() };
-        let profiles: Vec<Profile> = Machine::family().into_iter().map(profile).collect();
-        let crossings: Vec<Crossings<'_>> = profiles.iter().map(Crossings::new).collect();
-        let training: Vec<&Crossings<'_>> = crossings[..6].iter().collect();
+        let profiles: Vec<Profile> = Machine::family().into_iter().map(|m| Profile::of("", &m.report())).collect();
+        let training: Vec<&Profile> = profiles[..6].iter().collect();
         let mut notes = Vec::new();
         let available = available(&profiles[6]);
-        let choose = direct(&training, &profiles[6].report.hardware, &available, &mut notes).unwrap();
-        let regret = average(&regrets(&profiles[6], &choose));
+        let choose = direct(&training, &profiles[6].hardware, &available, &mut notes).unwrap();
+        let regret = Yardstick::new(&profiles[6]).regret(&profiles[6], &choose).mean;
         assert!(regret < 1.0, "{regret} {notes:?}");
     }
 }

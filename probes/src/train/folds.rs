@@ -1,36 +1,60 @@
 //! What intervals are made of: fits without some of the machines, and their errors on those.
 
-use sapwise::model::{Fold, FoldMethod, LnErrors, MethodModel, QUANTILES, Role, RoleErrors};
+use super::fit::Designs;
+use super::partition::Partition;
+use super::profile::{Profile, Spot};
+use anyhow::Result;
+use rayon::prelude::*;
+use sapwise::model::{FEWEST_MACHINES, Fold, FoldMethod, LnErrors, MethodModel, QUANTILES, Role, RoleErrors};
 use sapwise::{AlgorithmId, Hardware, Load};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Folds at most. With as many machines or fewer each fold is one machine, which is the jackknife+; with more it is CV+.
 const MOST_FOLDS: usize = 10;
 
+/// Profiles of a fold whose errors are kept at most: of thousands, others would only repeat them.
+const MOST_HELD_OUT: usize = 40;
+
 /// A profile of a machine that was left out: for each of its points the load and the median times in nanoseconds.
-pub(crate) struct HeldOut<'a> {
-    pub(crate) hardware: &'a Hardware,
-    pub(crate) points: Vec<(Load, Vec<(&'a AlgorithmId, f64)>)>,
+struct HeldOut<'a> {
+    hardware: &'a Hardware,
+    points: Vec<(Load, Vec<(&'a AlgorithmId, f64)>)>,
 }
 
-/// A fit, and all profiles of the machines that were left out of it.
-pub(crate) struct Fit<'a> {
-    pub(crate) methods: Vec<MethodModel>,
-    pub(crate) held_out: Vec<HeldOut<'a>>,
+/// A fit, and profiles of the machines that were left out of it.
+struct Fit<'a> {
+    methods: Vec<MethodModel>,
+    held_out: Vec<HeldOut<'a>>,
 }
 
 /// Errors by physical machine.
 type ByMachine = BTreeMap<usize, Vec<f64>>;
 
-/// Deals machines into folds, by their positions in a list: in turn, so that the folds differ by one machine at most.
-pub(crate) fn deal(machines: usize) -> Vec<Vec<usize>> {
-    let folds = machines.min(MOST_FOLDS);
-    (0..folds).map(|k| (k..machines).step_by(folds).collect()).collect()
+/// The folds of a model of these profiles, each without some of the physical machines. None with fewer machines than an interval
+/// needs.
+///
+/// # Errors
+/// When the regression of a residual fails.
+pub(crate) fn folds(profiles: &[Profile], designs: &Designs<'_>) -> Result<Vec<Fold>> {
+    let machines: BTreeSet<&str> = profiles.iter().map(Profile::machine).collect();
+    let enough = machines.len() >= FEWEST_MACHINES as usize;
+    let partition = Partition::of_machines(profiles, MOST_FOLDS).filter(|_| enough);
+    let without = |left_out: &Vec<usize>| {
+        let mut chosen = vec![true; profiles.len()];
+        left_out.iter().for_each(|&k| chosen[k] = false);
+        let (methods, _) = designs.fit(&chosen)?;
+        let every = left_out.len().div_ceil(MOST_HELD_OUT);
+        let held_out = left_out.iter().step_by(every).map(|&k| HeldOut::of(&profiles[k])).collect();
+        Ok(fold(&Fit { methods, held_out }))
+    };
+    partition.map_or_else(|| Ok(Vec::new()), |p| p.folds.par_iter().map(without).collect())
 }
 
-/// The folds of a model.
-pub(crate) fn folds(fits: &[Fit<'_>]) -> Vec<Fold> {
-    fits.iter().map(fold).collect()
+impl<'a> HeldOut<'a> {
+    fn of(profile: &'a Profile) -> Self {
+        let medians = |s: &'a Spot| s.medians.iter().map(|&(k, ns)| (profile.id(k), ns)).collect();
+        Self { hardware: &profile.hardware, points: profile.points.iter().map(|s| (s.load, medians(s))).collect() }
+    }
 }
 
 fn fold(fit: &Fit<'_>) -> Fold {
@@ -142,13 +166,12 @@ fn method(m: &MethodModel) -> FoldMethod {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rows::medians;
     use super::super::synthetic::{Machine, gpu_truth, truth};
     use super::*;
     use crate::random::Random;
     use sapwise::hardware::parameter;
     use sapwise::model::{Feature, ModelSchema, ModelTerm, Range, ResidualTerm, Scale, Validation};
-    use sapwise::{BackendClass, Model, Parameter, Report, Term, json};
+    use sapwise::{BackendClass, Model, Parameter, Source, Term, json};
 
     /// A machine whose costs are off from any model's: both algorithms together by 30 %, each by 25 %, and one by up to 10 %
     /// more that changes with the size.
@@ -255,21 +278,9 @@ mod tests {
             });
             Fit { methods: fitted(&machines.iter().filter(of).collect::<Vec<_>>()), held_out: held_out.collect() }
         };
-        let fits: Vec<Fit<'_>> = deal(machines.len()).into_iter().map(fit).collect();
-        model(fitted(&machines.iter().collect::<Vec<_>>()), folds(&fits), machines.len())
-    }
-
-    #[test]
-    fn machines_are_dealt_once_each_into_ten_folds_at_most() {
-        for machines in [1, 9, 10, 12, 30] {
-            let dealt = deal(machines);
-            assert_eq!(dealt.len(), machines.min(10));
-            let sizes: Vec<usize> = dealt.iter().map(Vec::len).collect();
-            assert!(sizes.iter().max().unwrap() - sizes.iter().min().unwrap() <= 1);
-            let mut all = dealt.concat();
-            all.sort_unstable();
-            assert_eq!(all, (0..machines).collect::<Vec<_>>());
-        }
+        let dealt = (0..MOST_FOLDS).map(|k| (k..machines.len()).step_by(MOST_FOLDS).collect());
+        let folds = dealt.map(|held| fold(&fit(held))).collect();
+        model(fitted(&machines.iter().collect::<Vec<_>>()), folds, machines.len())
     }
 
     #[test]
@@ -341,8 +352,8 @@ mod tests {
         let residual = vec![slope(Feature::Log2Objects, 10.0), slope(Feature::Log2ObjectsSquared, 120.0)];
         let methods: Vec<MethodModel> =
             truth().into_iter().map(|m| MethodModel { residual: residual.clone(), residual_intercept: 0.1, ..m }).collect();
-        let report = machine.report();
-        let folds = folds(&[Fit { methods: methods.clone(), held_out: vec![held_out(&hardware, &report)] }]);
+        let profile = Profile::of("", &machine.report());
+        let folds = [fold(&Fit { methods: methods.clone(), held_out: vec![HeldOut::of(&profile)] })];
         // Without GPU methods there are no errors of GPU algorithms.
         assert!(folds[0].errors.iter().all(|e| e.role.backend == BackendClass::Cpu) && folds[0].errors.len() == 8);
         let mine = model(methods, Vec::new(), 1);
@@ -363,15 +374,11 @@ mod tests {
         }
     }
 
-    fn held_out<'a>(hardware: &'a Hardware, report: &'a Report) -> HeldOut<'a> {
-        HeldOut { hardware, points: report.points.iter().map(|p| (p.load, medians(p))).collect() }
-    }
-
     #[test]
     fn a_model_of_ten_folds_and_all_roles_stays_under_200_kb() {
         let mut machine = Machine::family_with_gpus().remove(1);
         machine.noise = 0.3;
-        let (hardware, report) = (machine.hardware(), machine.report());
+        let profile = Profile::of("", &machine.report());
         let slope = |&feature: &Feature| ResidualTerm { feature, centre: 11.234_567_89, slope: -0.012_345_678 };
         let methods: Vec<MethodModel> = truth()
             .into_iter()
@@ -381,13 +388,43 @@ mod tests {
                 MethodModel { residual: Feature::of(m.backend).iter().map(slope).collect(), terms, ..m }
             })
             .collect();
-        let fit = |_| Fit { methods: methods.clone(), held_out: vec![held_out(&hardware, &report)] };
-        let folds = folds(&(0..10).map(fit).collect::<Vec<_>>());
+        let one = fold(&Fit { methods: methods.clone(), held_out: vec![HeldOut::of(&profile)] });
+        let folds = vec![one; MOST_FOLDS];
         // Eight roles on the CPU and six on GPUs; with four threads and two GPUs all but one GPU meet others of their role.
         assert_eq!(folds[0].errors.len(), 14);
         assert!(folds[0].errors.iter().map(|e| e.against.len()).sum::<usize>() > 91);
         let text = json::write_model(&model(methods.clone(), folds, 10)).unwrap();
         assert!(text.len() < 200_000, "{} bytes", text.len());
         assert!(json::model(&text).is_ok());
+    }
+
+    /// Ten machines: the family, and three of it with another clock.
+    fn ten() -> Vec<Profile> {
+        let mut machines = Machine::family();
+        for (k, name) in ["0000000000000011", "0000000000000012", "0000000000000013"].into_iter().enumerate() {
+            machines.push(Machine { name, ghz: 0.8 * machines[k].ghz, ..machines[k].clone() });
+        }
+        machines.iter().map(|m| Profile::of(&format!("{}.json", m.name), &m.report())).collect()
+    }
+
+    #[test]
+    fn ten_machines_give_ten_folds_and_nine_none() {
+        let profiles = ten();
+        let of = |profiles: &[Profile]| folds(profiles, &Designs::new(profiles)).unwrap();
+        assert!(of(&profiles[..9]).is_empty());
+        let folds = of(&profiles);
+        assert!(folds.len() == 10 && folds.iter().all(|f| f.machines == 1 && f.methods.len() == 4), "{folds:?}");
+        let (methods, _) = Designs::new(&profiles).fit(&[true; 10]).unwrap();
+        let model = model(methods, folds, 10);
+        assert_eq!(model.defect(), None);
+        let wanted: Vec<(AlgorithmId, u32)> = profiles[2].algorithms.iter().map(|t| (t.id.clone(), t.revision)).collect();
+        let slice: Vec<Load> = profiles[2].points.iter().filter(|s| s.scenario == "uniform").map(|s| s.load).collect();
+        let fields = model.predict(&profiles[2].hardware, &wanted).unwrap().fields("uniform", &slice);
+        assert!(fields.source == Source::Predicted && !fields.crossovers.is_empty());
+        let intervals: Option<Vec<(f64, f64)>> = fields.crossovers.iter().map(|b| b.interval()).collect();
+        let intervals = intervals.expect(&fields.interval_basis);
+        // The machines are what the model says up to 2 % of noise. Where two costs run along each other the interval is wide all the
+        // same.
+        assert!(intervals.iter().any(|(low, high)| high / low < 1.5), "{:?}", fields.crossovers);
     }
 }

@@ -1,6 +1,7 @@
 //! How accuracy grows with the number of machines.
 
-use super::rows::Profile;
+use super::fit::Designs;
+use super::profile::Profile;
 use super::validate::validate;
 use crate::progress::Progress;
 use crate::turns::Turns;
@@ -33,7 +34,7 @@ pub(super) struct Subset<'a> {
 
 /// Random subsets of the machines, those of the same size one behind the other.
 pub(super) fn subsets(profiles: &[Profile]) -> Vec<Subset<'_>> {
-    let mut machines: Vec<&str> = profiles.iter().map(|p| p.report.hardware.machine.physical_id.as_str()).collect();
+    let mut machines: Vec<&str> = profiles.iter().map(|p| p.machine()).collect();
     machines.sort_unstable();
     machines.dedup();
     let mut turns = Turns::new(SEED);
@@ -43,7 +44,7 @@ pub(super) fn subsets(profiles: &[Profile]) -> Vec<Subset<'_>> {
         let subsets = if count == machines.len() { 1 } else { LEFT_OUT.div_ceil(count) };
         for _ in 0..subsets {
             let chosen: Vec<&str> = turns.order(machines.len())[..count].iter().map(|&k| machines[k]).collect();
-            let within = |p: &&Profile| chosen.contains(&p.report.hardware.machine.physical_id.as_str());
+            let within = |p: &&Profile| chosen.contains(&p.machine());
             all.push(Subset { machines: count, profiles: profiles.iter().filter(within).collect() });
         }
     }
@@ -62,7 +63,7 @@ pub(super) fn learning(subsets: &[Subset<'_>], progress: &Progress) -> Result<Ve
         for subset in alike {
             progress.message(format!("validating subsets of {machines} machines"));
             let profiles: Vec<Profile> = subset.profiles.iter().map(|&p| p.clone()).collect();
-            for score in validate(&profiles, progress)?.0.methods {
+            for score in validate(&profiles, &Designs::new(&profiles), progress)?.0.methods {
                 match sums.iter_mut().find(|s| s.0 == score.name) {
                     Some(sum) => sum.1 += score.mean_regret,
                     None => sums.push((score.name, score.mean_regret)),
@@ -82,7 +83,7 @@ mod tests {
 
     #[test]
     fn sizes_go_as_far_as_there_are_machines() {
-        let of = |m: Machine| Profile { file: m.name.to_owned(), report: m.report() };
+        let of = |m: Machine| Profile::of(m.name, &m.report());
         let profiles: Vec<Profile> = Machine::family().into_iter().map(of).collect();
         let chosen = subsets(&profiles);
         let course = learning(&chosen, &Progress::new(0)).unwrap();

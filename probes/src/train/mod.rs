@@ -1,36 +1,41 @@
 //! From reports to cost curves, fields and models.
 
 mod baselines;
-#[cfg_attr(not(test), expect(dead_code, reason = "the validation fits its folds by itself and does not hand them over"))]
 mod clouds;
 mod columns;
 mod curve;
 mod direct;
 mod fit;
-#[cfg_attr(not(test), expect(dead_code, reason = "the validation fits its folds by itself and does not hand them over"))]
 mod folds;
 mod learning;
 mod model;
 mod nnls;
+mod partition;
+mod profile;
 mod residual;
 mod robust;
 mod rows;
+mod selection;
 #[cfg(test)]
 pub(crate) mod synthetic;
 mod terms;
 mod triangle;
 mod validate;
+mod yardstick;
 
 use crate::progress::Progress;
 use anyhow::{Result, bail};
+use fit::Designs;
 use sapwise::hardware::{gpu, parameter};
 use sapwise::model::GPU_PREFIX;
-use sapwise::{GpuKind, Hardware, Model, Report};
+use sapwise::{GpuKind, Hardware, Model};
 
-pub(crate) use baselines::{Chooser, available, average, by_costs, regrets, slice_scenario};
+pub(crate) use baselines::{available, by_costs, slice_scenario};
 pub(crate) use curve::{measured_costs, measured_fields};
 pub(crate) use learning::Learning;
-pub(crate) use rows::{Profile, medians, usable};
+pub(crate) use profile::Profile;
+pub(crate) use selection::{Selection, usable};
+pub(crate) use yardstick::{Chooser, Yardstick, average};
 
 /// Parameters by which the CPU of a machine is compared with those of the training.
 const PARAMETERS: [&str; 8] = [
@@ -87,16 +92,17 @@ pub(crate) struct Trained {
     pub(crate) learning: Vec<Learning>,
 }
 
-/// Fits the model called `name` to reports, given with their file names without folders, and validates it.
+/// Fits the model called `name` to what was selected of reports, and validates it.
 ///
-/// Reports of the other evidence, those without timings, of unoptimised builds and repeated ones are left out, and so are timings of
-/// revisions that are not the newest of their method. The file names stand in the model; the order of the reports matters for one baseline
-/// only, which takes the first one left in training for the default machine.
+/// Reports of the other evidence, those without timings, of unoptimised builds and repeated ones are left out by the selection, and so are
+/// timings of revisions that are not the newest of their method. The file names stand in the model; the order of the reports matters for one
+/// baseline only, which takes the first one left in training for the default machine.
 ///
 /// # Errors
 /// When no report can be used, with the reason for each and what to do; when no method can be fitted.
-pub(crate) fn train(reports: &[(String, Report)], name: &str, evidence: Evidence) -> Result<Trained> {
-    let (profiles, mut notes) = usable(reports, evidence);
+pub(crate) fn train(selection: Selection, name: &str) -> Result<Trained> {
+    let evidence = selection.evidence();
+    let (profiles, mut notes) = selection.finish();
     if profiles.is_empty() {
         let why = if notes.is_empty() { "none was given".to_owned() } else { notes.join("; ") };
         let next = match evidence {
@@ -105,7 +111,11 @@ pub(crate) fn train(reports: &[(String, Report)], name: &str, evidence: Evidence
         };
         bail!("no report can be trained on: {why}; {next}");
     }
-    let (mut model, left_out) = model::model(&profiles.iter().collect::<Vec<_>>(), name)?;
+    let designs = Designs::new(&profiles);
+    let (mut model, left_out) = model::model(&profiles, &designs, &vec![true; profiles.len()], name)?;
+    model.clouds = clouds::clouds(profiles.iter().map(|p| (&p.hardware, model::timed_gpus(p).collect())));
+    model.folds = folds::folds(&profiles, &designs)?;
+    notes.extend(designs.notes.iter().cloned());
     notes.extend(left_out);
     let subsets = match evidence {
         Evidence::Real => Vec::new(),
@@ -113,7 +123,7 @@ pub(crate) fn train(reports: &[(String, Report)], name: &str, evidence: Evidence
     };
     let progress = Progress::new((profiles.len() + subsets.iter().map(|s| s.profiles.len()).sum::<usize>()) as u64);
     progress.message("validating");
-    let (validation, limits) = validate::validate(&profiles, &progress)?;
+    let (validation, limits) = validate::validate(&profiles, &designs, &progress)?;
     model.validation = validation;
     notes.extend(limits);
     let learning = learning::learning(&subsets, &progress)?;
@@ -124,15 +134,19 @@ pub(crate) fn train(reports: &[(String, Report)], name: &str, evidence: Evidence
 mod tests {
     use super::synthetic::Machine;
     use super::*;
-    use sapwise::json;
+    use sapwise::{Report, json};
 
     fn reports() -> Vec<(String, Report)> {
         Machine::family().iter().map(|m| (format!("{}.json", m.name), m.report())).collect()
     }
 
+    fn of(reports: &[(String, Report)]) -> Selection {
+        Selection::of(reports, Evidence::Real)
+    }
+
     #[test]
     fn a_model_is_the_same_after_json_and_knows_its_ranges() {
-        let trained = train(&reports(), "test", Evidence::Real).unwrap();
+        let trained = train(of(&reports()), "test").unwrap();
         let text = json::write(&trained.model).unwrap();
         assert_eq!(json::model(&text).unwrap(), trained.model);
         assert_eq!(trained.model.ranges.len(), PARAMETERS.len());
@@ -145,7 +159,7 @@ mod tests {
         let machines = Machine::family_with_gpus();
         let reports: Vec<(String, Report)> =
             machines[..3].iter().map(|m| (format!("{}.json", m.name), m.report())).collect();
-        let model = train(&reports, "test", Evidence::Real).unwrap().model;
+        let model = train(of(&reports), "test").unwrap().model;
         assert_eq!(json::model(&json::write(&model).unwrap()).unwrap(), model);
         let range = model.ranges.iter().find(|r| r.parameter == "gpu/upload_rate_gb_per_s").unwrap();
         assert_eq!((range.min, range.max), (5.0, 24.0));
@@ -159,7 +173,7 @@ mod tests {
 
     #[test]
     fn one_report_gives_a_model_without_scores() {
-        let trained = train(&reports()[..1], "test", Evidence::Real).unwrap();
+        let trained = train(of(&reports()[..1]), "test").unwrap();
         assert_eq!(trained.model.methods.len(), 4);
         assert!(trained.model.validation.methods.is_empty());
     }
@@ -169,7 +183,7 @@ mod tests {
         let mut report = reports().remove(0);
         report.1.provenance.optimised = false;
         for reports in [vec![], vec![report]] {
-            let error = train(&reports, "test", Evidence::Real).unwrap_err().to_string();
+            let error = train(of(&reports), "test").unwrap_err().to_string();
             assert!(error.contains("sapwise probe --out"), "{error}");
         }
     }

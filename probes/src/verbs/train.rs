@@ -1,15 +1,20 @@
 //! `sapwise train`: a model from reports, validated by leaving machines out.
 
 use crate::args::Train;
-use crate::document::read_reports;
+use crate::document::{read_report, report_files};
 use crate::exit::{Outcome, WrongUsage};
+use crate::progress::Progress;
 use crate::table::columns;
-use crate::train::{self, Evidence, Learning, Trained};
-use crate::{card, files, output};
+use crate::train::{self, Evidence, Learning, Selection, Trained};
+use crate::{card, files, interrupt, output};
+use rayon::prelude::*;
 use sapwise::Model;
 use sapwise::model::Validation;
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Reports that are in memory at the same time: a full one has a megabyte, ten thousand have ten gigabytes.
+const AT_A_TIME: usize = 64;
 
 /// The answer for machines.
 #[derive(Serialize)]
@@ -25,9 +30,9 @@ struct Answer<'a> {
 
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
-    let reports = read_reports(&arguments.reports)?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
-    let Trained { model, notes, learning } = train::train(&reports, &name, evidence)?;
+    let selection = select(&report_files(&arguments.reports)?, evidence)?;
+    let Trained { model, notes, learning } = train::train(selection, &name)?;
     let text = sapwise::json::write_model(&model)?;
     files::write_text(&arguments.out, &text)?;
     if let Some(path) = &arguments.card {
@@ -41,6 +46,24 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
         output::print(&summary(&model, &notes, &learning, &arguments.out))?;
     }
     Ok(Outcome::Done)
+}
+
+/// Reads the reports on all cores, some at a time, and keeps of each what is trained on.
+fn select(files: &[PathBuf], evidence: Evidence) -> anyhow::Result<Selection> {
+    let progress = Progress::new(files.len() as u64);
+    progress.message("reading");
+    let mut selection = Selection::new(evidence);
+    for some in files.chunks(AT_A_TIME) {
+        interrupt::check()?;
+        let read = |file: &PathBuf| {
+            let (name, report) = read_report(file)?;
+            Ok(selection.reduce(&name, &report))
+        };
+        let reduced: Vec<_> = some.par_iter().map(read).collect::<anyhow::Result<_>>()?;
+        reduced.into_iter().for_each(|r| selection.add(r));
+        progress.advance(some.len() as u64);
+    }
+    Ok(selection)
 }
 
 /// The name that the user gave, or that of the file.

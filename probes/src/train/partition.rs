@@ -1,0 +1,102 @@
+//! What is left out together when a way to choose is judged.
+
+use super::profile::Profile;
+use sapwise::hardware::parameter;
+use std::collections::BTreeMap;
+
+/// Machines that are left out one by one; of more, as many groups are made of them. Each costs a fit of everything.
+const MOST_FOLDS: usize = 24;
+
+/// The profiles of each fold: they are judged by what was fitted to all others.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Partition {
+    /// What a fold is, in words.
+    pub(crate) held_out: String,
+    /// Whether folds are of whole physical machines.
+    pub(crate) by_machine: bool,
+    /// Positions of profiles. Where one machine was restricted in several ways a profile is in one fold for each of them.
+    pub(crate) folds: Vec<Vec<usize>>,
+}
+
+impl Partition {
+    /// Each physical machine with all its profiles; of one machine alone each of its SIMD levels and each of its thread counts; of one
+    /// without such restrictions each profile.
+    pub(crate) fn new(profiles: &[Profile]) -> Self {
+        Self::of_machines(profiles, MOST_FOLDS).unwrap_or_else(|| Self::of_restrictions(profiles))
+    }
+
+    /// At most so many folds of whole machines; `None` with fewer than two machines.
+    pub(crate) fn of_machines(profiles: &[Profile], most: usize) -> Option<Self> {
+        let machines = grouped(profiles, |p| p.machine().to_owned());
+        let count = machines.len();
+        if count < 2 {
+            return None;
+        }
+        let mut folds = vec![Vec::new(); count.min(most)];
+        for (k, machine) in machines.into_iter().enumerate() {
+            folds[k % most].extend(machine);
+        }
+        let held_out =
+            if count > most { format!("one of {most} groups of physical machines") } else { "physical machine".to_owned() };
+        Some(Self { held_out, by_machine: true, folds })
+    }
+
+    fn of_restrictions(profiles: &[Profile]) -> Self {
+        let level = |p: &Profile, name: &str| p.hardware.value(name).map_or(0, |v| v as u64);
+        let by = |name: &str| {
+            let folds = grouped(profiles, |p| format!("{:020}", level(p, name)));
+            if folds.len() > 1 { folds } else { Vec::new() }
+        };
+        let folds = [by(parameter::SIMD_LANES), by(parameter::USABLE_CORES)].concat();
+        if folds.is_empty() {
+            let folds = (0..profiles.len()).map(|k| vec![k]).collect();
+            return Self { held_out: "profile".to_owned(), by_machine: false, folds };
+        }
+        Self { held_out: "SIMD level and thread count".to_owned(), by_machine: false, folds }
+    }
+}
+
+/// Positions of the profiles that share a key, in the order of their keys.
+fn grouped(profiles: &[Profile], key: impl Fn(&Profile) -> String) -> Vec<Vec<usize>> {
+    let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (k, profile) in profiles.iter().enumerate() {
+        groups.entry(key(profile)).or_default().push(k);
+    }
+    groups.into_values().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::Machine;
+    use super::*;
+
+    fn profiles(machines: &[Machine]) -> Vec<Profile> {
+        machines.iter().map(|m| Profile::of("", &m.report())).collect()
+    }
+
+    #[test]
+    fn machines_are_left_out_with_all_their_profiles() {
+        let mut machines = Machine::family();
+        machines[1].name = machines[0].name;
+        let partition = Partition::new(&profiles(&machines));
+        assert_eq!(partition.folds, [vec![0, 1], vec![2], vec![3], vec![4], vec![5], vec![6]]);
+        assert!(partition.by_machine && partition.held_out == "physical machine");
+        let dealt = Partition::of_machines(&profiles(&machines), 4).unwrap();
+        assert_eq!(dealt.folds, [vec![0, 1, 5], vec![2, 6], vec![3], vec![4]]);
+        assert!(dealt.held_out.contains("4 groups"));
+    }
+
+    #[test]
+    fn of_one_machine_each_level_and_each_thread_count_is_left_out() {
+        let mut machines = Machine::family();
+        machines.truncate(4);
+        machines.iter_mut().for_each(|m| m.name = "0000000000000001");
+        let all = profiles(&machines);
+        // Lanes 8, 4, 8, 16 and threads 2, 4, 8, 8.
+        let partition = Partition::new(&all);
+        assert_eq!(partition.folds, [vec![1], vec![0, 2], vec![3], vec![0], vec![1], vec![2, 3]]);
+        assert!(!partition.by_machine && partition.held_out.contains("SIMD level"));
+        let alike = vec![all[0].clone(), all[0].clone()];
+        assert_eq!(Partition::new(&alike).folds, [vec![0], vec![1]]);
+    }
+}

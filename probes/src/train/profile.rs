@@ -1,0 +1,137 @@
+//! What training keeps of a report: the hardware, and the median of each algorithm at each point.
+
+use super::direct::{Crossing, crossings};
+use sapwise::report::{Label, Point, Report, Timed, Timing};
+use sapwise::{AlgorithmId, Hardware, Load};
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use crate::sweep::median;
+
+/// A report without its samples, of which thousands fit into memory.
+#[derive(Debug, Clone)]
+pub(crate) struct Profile {
+    /// File name without folders.
+    pub(crate) file: String,
+    /// What kind of evidence it is.
+    pub(crate) label: Label,
+    /// Without the raw samples of its parameters.
+    pub(crate) hardware: Hardware,
+    /// The algorithms that were timed.
+    pub(crate) algorithms: Vec<Timed>,
+    /// Where they were timed, in the order of the report.
+    pub(crate) points: Vec<Spot>,
+    /// Where two algorithms cross in the scenario of the slice.
+    pub(crate) crossings: Vec<Crossing>,
+}
+
+/// One point of a report.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Spot {
+    /// Name of the scenario.
+    pub(crate) scenario: String,
+    /// The load that an in-line choice would have estimated.
+    pub(crate) load: Load,
+    /// Latency between cores before and after the samples, their geometric mean; `None` where it is not known.
+    pub(crate) core_to_core_ns: Option<f64>,
+    /// Position in [`Profile::algorithms`], and the median over the frames in ns.
+    pub(crate) medians: Vec<(u16, f64)>,
+}
+
+/// A median of fewer samples says nothing about disturbed frames.
+pub(super) const FEWEST_SAMPLES: usize = 3;
+
+impl Profile {
+    /// Keeps of a report what is sound. Timings with an error or too few samples go, and with them points that are empty then.
+    pub(crate) fn of(file: &str, report: &Report) -> Self {
+        let mut hardware = report.hardware.clone();
+        let of_gpus = hardware.gpus.iter_mut().flat_map(|g| &mut g.parameters);
+        hardware.parameters.iter_mut().chain(of_gpus).for_each(|p| p.raw = Vec::new());
+        let points = report.points.iter().map(|p| Spot::of(p, &report.algorithms));
+        Self {
+            file: file.to_owned(),
+            label: report.label,
+            hardware,
+            algorithms: report.algorithms.clone(),
+            points: points.filter(|s| !s.medians.is_empty() && s.load.objects > 0).collect(),
+            crossings: crossings(report),
+        }
+    }
+
+    /// The physical machine.
+    pub(crate) fn machine(&self) -> &str {
+        &self.hardware.machine.physical_id
+    }
+
+    /// An algorithm by its position.
+    pub(crate) fn id(&self, position: u16) -> &AlgorithmId {
+        &self.algorithms[usize::from(position)].id
+    }
+
+    /// The medians of a point, in ns.
+    #[cfg(test)]
+    pub(crate) fn medians<'a>(&'a self, spot: &'a Spot) -> impl Iterator<Item = (&'a AlgorithmId, f64)> {
+        spot.medians.iter().map(|&(k, ns)| (self.id(k), ns))
+    }
+
+    /// Position of an algorithm among those of the report.
+    pub(crate) fn position(&self, id: &AlgorithmId) -> Option<u16> {
+        self.algorithms.iter().position(|t| t.id == *id).map(|k| k as u16)
+    }
+
+    /// Leaves out the algorithms that `stays` does not admit, with their timings, and the points that are empty then.
+    pub(crate) fn retain(&mut self, stays: impl Fn(&Timed) -> bool) {
+        let kept: Vec<bool> = self.algorithms.iter().map(stays).collect();
+        if kept.iter().all(|k| *k) {
+            return;
+        }
+        let place = |k: u16| kept[..usize::from(k)].iter().filter(|k| **k).count() as u16;
+        for spot in &mut self.points {
+            spot.medians.retain(|m| kept[usize::from(m.0)]);
+            spot.medians.iter_mut().for_each(|m| m.0 = place(m.0));
+        }
+        self.points.retain(|s| !s.medians.is_empty());
+        let mut kept = kept.into_iter();
+        self.algorithms.retain(|_| kept.next() == Some(true));
+    }
+
+    /// The same for two copies of one measurement, whatever their file names and labels; in all likelihood for no two others.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.machine().hash(&mut hasher);
+        for p in &self.hardware.parameters {
+            p.value.map(f64::to_bits).hash(&mut hasher);
+        }
+        for spot in &self.points {
+            spot.scenario.hash(&mut hasher);
+            spot.load.objects.hash(&mut hasher);
+            spot.medians.iter().for_each(|m| (m.0, m.1.to_bits()).hash(&mut hasher));
+        }
+        hasher.finish()
+    }
+}
+
+impl Spot {
+    fn of(point: &Point, algorithms: &[Timed]) -> Self {
+        let known = |t: &&Timing| t.error.is_none() && t.samples_ns.len() >= FEWEST_SAMPLES;
+        let median = |t: &Timing| {
+            let k = algorithms.iter().position(|a| a.id == t.algorithm)?;
+            Some((k as u16, median(&t.samples_ns)?))
+        };
+        Self {
+            scenario: point.scenario.clone(),
+            load: point.load,
+            core_to_core_ns: point.core_to_core_ns.map(|[before, after]| (before * after).sqrt()),
+            medians: point.timings.iter().filter(known).filter_map(median).collect(),
+        }
+    }
+
+    /// The least median in ns; `None` of none.
+    pub(crate) fn best(&self) -> Option<f64> {
+        self.medians.iter().map(|m| m.1).min_by(f64::total_cmp)
+    }
+
+    /// The median of an algorithm by its position.
+    pub(crate) fn of_position(&self, algorithm: u16) -> Option<f64> {
+        self.medians.iter().find(|m| m.0 == algorithm).map(|m| m.1)
+    }
+}
