@@ -142,6 +142,29 @@ impl CostCurve {
         if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects).exp() }
     }
 
+    /// The sum of the terms, of the cheaper way where there are two.
+    fn uncorrected(&self, counts: &Counts<'_>) -> f64 {
+        let sum =
+            |terms: &[CostTerm]| -> f64 { terms.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum() };
+        let first = sum(&self.terms);
+        if self.otherwise.is_empty() { first } else { first.min(sum(&self.otherwise)) }
+    }
+
+    /// What the cost is at least and at most under the loads of which no count is below `least` nor above `most`.
+    pub(crate) fn bounds(&self, least: &Counts<'_>, most: &Counts<'_>) -> (f64, f64) {
+        let (low, high) = (self.uncorrected(least), self.uncorrected(most));
+        if self.correction.is_empty() {
+            return (low, high);
+        }
+        // It is linear between knots, so that its extremes lie at the ends or at the knots between them.
+        let (from, to) = (least.log2_objects, most.log2_objects);
+        let (a, b) = (self.ln_correction(from), self.ln_correction(to));
+        let first = self.correction.partition_point(|k| k.log2_objects <= from);
+        let inner = self.correction[first..].iter().take_while(|k| k.log2_objects < to).map(|k| k.ln_factor);
+        let (lowest, highest) = inner.fold((a.min(b), a.max(b)), |(l, h), k| (l.min(k), h.max(k)));
+        (low * lowest.exp(), high * highest.exp())
+    }
+
     fn ln_correction(&self, x: f64) -> f64 {
         let after = self.correction.partition_point(|k| k.log2_objects <= x);
         match (after.checked_sub(1).map(|k| self.correction[k]), self.correction.get(after)) {

@@ -1,8 +1,12 @@
 //! The fields of optimal performance: for each load the cheapest algorithm.
 
+mod slice;
+
 use crate::cost::Counts;
 use crate::schema_tag::schema_tag;
 use crate::{AlgorithmId, CostCurve, Load, Registry};
+
+pub(crate) use slice::Slice;
 
 schema_tag!(
     /// `fields/1`.
@@ -33,7 +37,7 @@ pub struct Fields {
     pub steps: Vec<Step>,
     /// Where one step gives way to the next, in the order of `steps`.
     pub crossovers: Vec<Border>,
-    /// What `low` and `high` of the crossovers are made of.
+    /// What `low` and `high` of the crossovers are made of, and why some have none.
     pub interval_basis: String,
     /// The cost of each algorithm. Empty: `steps` decide.
     pub costs: Vec<AlgorithmCost>,
@@ -76,10 +80,11 @@ pub struct Border {
     pub above: AlgorithmId,
     /// Number of objects at which both cost the same.
     pub objects: f64,
-    /// Lower end of the interval.
-    pub low: f64,
-    /// Upper end of the interval.
-    pub high: f64,
+    /// Lower end of the interval; where it may lie lower still, the least objects of the slice. `None`, like `high`, where no
+    /// interval can be claimed: [`Fields::interval_basis`] says why.
+    pub low: Option<f64>,
+    /// Upper end of the interval; where it may lie higher still, the most objects of the slice.
+    pub high: Option<f64>,
 }
 
 /// The cost of one algorithm.
@@ -106,6 +111,22 @@ pub struct Ranking {
     pub best_ns: f64,
     /// Position and predicted cost of the next.
     pub runner_up: Option<(usize, f64)>,
+}
+
+impl Border {
+    /// Both ends of the interval, where one is claimed.
+    #[must_use]
+    pub fn interval(&self) -> Option<(f64, f64)> {
+        self.low.zip(self.high)
+    }
+
+    fn is_sound(&self) -> bool {
+        match (self.low, self.high) {
+            (Some(low), Some(high)) => 0.0 <= low && low <= self.objects && self.objects <= high,
+            (None, None) => self.objects >= 0.0,
+            _ => false,
+        }
+    }
 }
 
 impl Fields {
@@ -136,7 +157,8 @@ impl Fields {
 
     /// Fields from cost curves, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
     ///
-    /// The loads are interpolated between each other, so a handful per decade is enough. Intervals follow from the curves'
+    /// The loads are interpolated between each other, so a handful per decade is enough. A field narrower than 3 % in objects may
+    /// be missed. Intervals follow from the curves'
     /// `spread_ln`: where the logarithms of two costs differ by less than 1.645 standard deviations of that difference.
     #[must_use]
     pub fn from_costs(source: Source, scenario: &str, costs: Vec<AlgorithmCost>, loads: &[Load]) -> Self {
@@ -211,7 +233,7 @@ impl Fields {
         if !self.steps.is_sorted_by(|a, b| a.from_objects < b.from_objects) {
             return Some("the steps are not ascending".to_owned());
         }
-        if let Some(b) = self.crossovers.iter().find(|b| !(0.0 <= b.low && b.low <= b.objects && b.objects <= b.high)) {
+        if let Some(b) = self.crossovers.iter().find(|b| !b.is_sound()) {
             return Some(format!("the crossover from {} to {} does not lie within its interval", b.below, b.above));
         }
         for (k, cost) in self.costs.iter().enumerate() {
@@ -229,19 +251,11 @@ impl Fields {
         None
     }
 
-    /// Walks the slice on a fine grid and notes where the cheapest algorithm changes.
+    /// Notes where along the slice the cheapest algorithm changes.
     fn cut(&mut self, loads: &[Load]) {
-        let grid = fine_grid(loads);
-        let winner = |load: &Load| self.rank(load, |_| true).map(|r| r.best);
-        let mut steps: Vec<(Load, usize)> = Vec::new();
-        for load in &grid {
-            if let Some(best) = winner(load)
-                && steps.last().is_none_or(|s| s.1 != best)
-            {
-                steps.push((*load, best));
-            }
-        }
-        self.crossovers = steps.windows(2).map(|w| self.border(&grid, w[0].1, w[1].1, w[1].0.objects)).collect();
+        let slice = Slice::new(loads);
+        let steps = slice.steps(&self.costs);
+        self.crossovers = steps.windows(2).map(|w| self.border(&slice, w[0].1, w[1].1, w[1].0.objects)).collect();
         self.steps = steps
             .iter()
             .enumerate()
@@ -252,50 +266,24 @@ impl Fields {
             .collect();
     }
 
-    fn border(&self, grid: &[Load], below: usize, above: usize, objects: u32) -> Border {
+    fn border(&self, slice: &Slice<'_>, below: usize, above: usize, objects: u32) -> Border {
         let (b, a) = (&self.costs[below], &self.costs[above]);
-        let doubt = 1.645 * b.spread_ln.hypot(a.spread_ln);
+        let doubt = NORMAL_90 * b.spread_ln.hypot(a.spread_ln);
         // Positive where the algorithm of the upper field is cheaper.
         let gain = |load: &Load| (b.curve.cost_ns(load) / a.curve.cost_ns(load)).ln();
-        let split = grid.partition_point(|l| l.objects < objects);
-        let low = grid[..split].iter().rev().take_while(|l| gain(l) > -doubt).last().map_or(objects, |l| l.objects);
-        let high = grid[split..].iter().take_while(|l| gain(l) < doubt).last().map_or(objects, |l| l.objects);
+        let objects = f64::from(objects);
         Border {
             below: b.algorithm.clone(),
             above: a.algorithm.clone(),
-            objects: f64::from(objects),
-            low: f64::from(low),
-            high: f64::from(high),
+            objects,
+            low: Some(slice.reach(objects, false, |l| gain(l) <= -doubt)),
+            high: Some(slice.reach(objects, true, |l| gain(l) >= doubt)),
         }
     }
 }
 
-/// Loads about 1.5 % apart in objects, interpolated between the given ones on logarithmic axes.
-fn fine_grid(loads: &[Load]) -> Vec<Load> {
-    let mut grid = Vec::new();
-    for pair in loads.windows(2) {
-        let (a, b) = (&pair[0], &pair[1]);
-        let ratio = f64::from(b.objects.max(1)) / f64::from(a.objects.max(1));
-        let parts = (ratio.ln() / 0.015).ceil().max(1.0) as u32;
-        grid.extend((0..parts).map(|k| between(a, b, f64::from(k) / f64::from(parts))));
-    }
-    grid.extend(loads.last());
-    grid.dedup_by_key(|l| l.objects);
-    grid
-}
-
-/// The load a share of the way from one to another.
-fn between(a: &Load, b: &Load, share: f64) -> Load {
-    // Shifted by one because a candidate count may be zero.
-    let mix = |x: f64, y: f64| ((x + 1.0).ln() * (1.0 - share) + (y + 1.0).ln() * share).exp() - 1.0;
-    Load {
-        objects: mix(f64::from(a.objects), f64::from(b.objects)).round() as u32,
-        axis_candidates: mix(a.axis_candidates, b.axis_candidates),
-        strip_candidates: mix(a.strip_candidates, b.strip_candidates),
-        pairs: mix(a.pairs, b.pairs),
-        moved: a.moved * (1.0 - share) + b.moved * share,
-    }
-}
+/// Deviations of a normal distribution to either side that hold 90 % of it.
+const NORMAL_90: f64 = 1.645;
 
 #[cfg(test)]
 mod tests {
@@ -331,9 +319,26 @@ mod tests {
         assert!((fields.crossovers[0].objects / 201.0 - 1.0).abs() < 0.02, "{:?}", fields.crossovers);
         assert!((fields.crossovers[1].objects / 1000.0 - 1.0).abs() < 0.02, "{:?}", fields.crossovers);
         let b = &fields.crossovers[0];
-        assert!(b.low < 195.0 && b.high > 208.0 && b.low > 150.0 && b.high < 260.0, "{b:?}");
+        let (low, high) = b.interval().unwrap();
+        assert!(low < 195.0 && high > 208.0 && low > 150.0 && high < 260.0, "{b:?}");
         assert_eq!(fields.step(5).unwrap().algorithm.method(), "brute");
         assert_eq!(fields.step(u32::MAX).unwrap().algorithm.method(), "strips");
+    }
+
+    #[test]
+    fn an_interval_has_both_ends_or_none_and_holds_its_border() {
+        let costs =
+            vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sweep@cpu1", &[(Term::Objects, 100.0)], 0.05)];
+        let fields = Fields::from_costs(Source::Measured, "uniform", costs, &loads());
+        let defect = |low, high| {
+            let mut fields = fields.clone();
+            (fields.crossovers[0].low, fields.crossovers[0].high) = (low, high);
+            fields.defect()
+        };
+        assert_eq!((defect(None, None), defect(Some(0.0), Some(1e6))), (None, None));
+        for (low, high) in [(Some(1.0), None), (None, Some(1e6)), (Some(300.0), Some(400.0)), (Some(-1.0), Some(1e6))] {
+            assert!(defect(low, high).is_some(), "{low:?} {high:?}");
+        }
     }
 
     #[test]

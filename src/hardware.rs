@@ -2,6 +2,7 @@
 
 pub mod gpu;
 mod placement;
+mod plausible;
 mod raw;
 
 pub use gpu::{GpuGroup, GpuHardware, GpuIdentity, GpuKind};

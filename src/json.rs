@@ -100,16 +100,34 @@ pub fn write(document: &impl serde::Serialize) -> Result<String, JsonError> {
 /// # Errors
 /// When a figure can't be written.
 pub fn write_report(report: &Report) -> Result<String, JsonError> {
-    let points: Result<Vec<String>, _> = report.points.iter().map(serde_json::to_string).collect();
-    let points = points?;
     let frame = one_line_samples(&write(&Report { points: Vec::new(), ..report.clone() })?);
-    if points.is_empty() {
-        return Ok(frame);
-    }
     // A line break within a text is written as an escape, so this can only be the key of the report itself.
     let key = "\n  \"points\": []";
-    let lines = format!("\n  \"points\": [\n    {}\n  ]", points.join(",\n    "));
-    Ok(frame.replacen(key, &lines, 1))
+    Ok(match one_a_line("points", &report.points)? {
+        Some(points) => frame.replacen(key, &points, 1),
+        None => frame,
+    })
+}
+
+/// Writes a model: one key a line, one cloud or fold a line, so that ten folds stay under 200 kB.
+///
+/// # Errors
+/// When a figure can't be written.
+pub fn write_model(model: &Model) -> Result<String, JsonError> {
+    let mut text = write(&Model { clouds: Vec::new(), folds: Vec::new(), ..model.clone() })?;
+    let lists = [one_a_line("clouds", &model.clouds)?, one_a_line("folds", &model.folds)?];
+    // Empty lists are not written, so that what is there goes before the bracket that ends the model.
+    for list in lists.into_iter().flatten() {
+        text.truncate(text.trim_end_matches("\n}\n").len());
+        text += &format!(",{list}\n}}\n");
+    }
+    Ok(text)
+}
+
+/// A key of the outermost level with a list, one item a line. `None` for an empty one.
+fn one_a_line(key: &str, items: &[impl serde::Serialize]) -> Result<Option<String>, JsonError> {
+    let items: Vec<String> = items.iter().map(serde_json::to_string).collect::<Result<_, _>>()?;
+    Ok((!items.is_empty()).then(|| format!("\n  \"{key}\": [\n    {}\n  ]", items.join(",\n    "))))
 }
 
 /// The same text with each list of raw samples on the line of its key.

@@ -1,7 +1,11 @@
 //! Coefficients that turn hardware parameters into cost curves.
 
+mod cloud;
+mod curve;
 mod feature;
+mod fold;
 mod gpu_set;
+mod interval;
 mod predict;
 mod scale;
 
@@ -9,7 +13,11 @@ use crate::hardware::GpuKind;
 use crate::schema_tag::schema_tag;
 use crate::{BackendClass, Term};
 
+pub use cloud::{Cloud, CloudParameter, Place};
+use curve::Formula;
 pub use feature::Feature;
+pub use fold::{Fold, FoldMethod, LnErrors, QUANTILES, Role, RoleErrors};
+pub use interval::FEWEST_MACHINES;
 pub use predict::Prediction;
 pub use scale::Scale;
 
@@ -41,6 +49,14 @@ pub struct Model {
     pub methods: Vec<MethodModel>,
     /// How well it did on what it had not seen.
     pub validation: Validation,
+    /// The training's machines, and its GPUs, by all parameters together. None of those of which there are fewer than parameters
+    /// and two.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub clouds: Vec<Cloud>,
+    /// The fits without some of the physical machines, and their errors on them, which intervals are made of. Each physical machine
+    /// is left out of one. Empty in files from before there were intervals.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub folds: Vec<Fold>,
 }
 
 /// One report that a model was trained on.
@@ -210,7 +226,7 @@ impl Model {
                 return Some(format!("{name}: a residual or spread that is not finite"));
             }
         }
-        None
+        self.clouds.iter().find_map(Cloud::defect).or_else(|| self.folds.iter().find_map(Fold::defect))
     }
 }
 

@@ -88,11 +88,14 @@ fn a_machine_outside_the_training_is_told_and_a_missing_parameter_leaves_out_wha
     let prediction = model.predict(&report.hardware, &algorithms).unwrap();
     assert!(prediction.costs.iter().all(|c| c.algorithm.threads() == 1));
     assert!(prediction.warnings.iter().any(|w| w.contains(parameter::FORK_JOIN_COLD_NS)), "{:?}", prediction.warnings);
-    set(&mut report, parameter::CLOCK_MEASURED_GHZ, Some(40.0));
+    set(&mut report, parameter::CLOCK_MEASURED_GHZ, Some(9.0));
     assert!(model.predict(&report.hardware, &algorithms).unwrap().extrapolated);
     let other_revision: Vec<_> = algorithms.iter().map(|(id, revision)| (id.clone(), revision + 1)).collect();
     let error = model.predict(&report.hardware, &other_revision).unwrap_err();
     assert!(error.contains("train on new reports"), "{error}");
+    set(&mut report, parameter::CLOCK_MEASURED_GHZ, Some(4500.0));
+    let error = model.predict(&report.hardware, &algorithms).unwrap_err();
+    assert!(error.contains("clock_measured_ghz is 4500"), "{error}");
 }
 
 /// Files as each schema version was first written. They are never changed: what was once written stays readable.
@@ -108,6 +111,11 @@ fn every_schema_version_stays_readable() {
     assert!(
         matches!(json::read(include_str!("fixtures/model-1.json")), Ok(Document::Model(m)) if m.methods.iter().all(|m| m.backend == BackendClass::Cpu))
     );
+    let folds = include_str!("fixtures/model-1-folds.json");
+    let Ok(Document::Model(model)) = json::read(folds) else { panic!("no model") };
+    assert_eq!((model.folds.len(), model.clouds.len()), (2, 1));
+    assert!(json::model(&json::write_model(&model).unwrap()).unwrap() == *model);
+    assert!(json::read(&folds.replacen("[0.012,", "[0.9,", 1)).unwrap_err().to_string().contains("a fold: errors of"));
     let Ok(Document::Fields(fields)) = json::read(include_str!("fixtures/fields-1.json")) else { panic!("no fields") };
     let text = json::write(&fields).unwrap();
     assert_eq!(json::fields(&text).unwrap(), *fields);

@@ -1,7 +1,7 @@
 //! The card of a model: what it was trained on and how well it did.
 
 use crate::train::Learning;
-use sapwise::model::{MethodModel, Validation};
+use sapwise::model::{FEWEST_MACHINES, MethodModel, Validation};
 use sapwise::{BackendClass, Model};
 
 /// What every model of this kind is, whatever it was trained on.
@@ -63,11 +63,36 @@ pub(crate) fn page(model: &Model, notes: &[String], learning: &[Learning]) -> St
         rows.push(vec![range.parameter.clone(), format!("{:.4}", range.min), format!("{:.4}", range.max)]);
     }
     text.push_str(&markdown(&rows));
+    text.push_str(&format!("\n## Intervals\n\n{}\n", intervals(model)));
     if !notes.is_empty() {
         text.push_str("\n## Notes\n\n");
         notes.iter().for_each(|note| text.push_str(&format!("- {note}\n")));
     }
     text
+}
+
+/// How sure its predictions can be, and by what it tells a machine unlike those of training.
+fn intervals(model: &Model) -> String {
+    let machines = model.validation.physical_machines;
+    let claimed = match model.folds.len() {
+        _ if machines < FEWEST_MACHINES as usize => format!(
+            "None can be claimed: the training holds {machines} physical machine{}, and a 90 % interval takes {FEWEST_MACHINES}.",
+            if machines == 1 { "" } else { "s" }
+        ),
+        0 => "None can be claimed: no fold was kept.".to_owned(),
+        folds => format!(
+            "90 % by jackknife+ from {machines} physical machines, left out of the fit in {folds} parts; guaranteed for a machine \
+             like them are 80 %."
+        ),
+    };
+    let clouds: Vec<String> = model.clouds.iter().map(|c| format!("{} {}s", c.points, c.processor)).collect();
+    let together = match clouds.len() {
+        0 => {
+            "by the range of each parameter alone; all parameters together take two more machines than parameters".to_owned()
+        }
+        _ => format!("by the range of each parameter, and by all of them together against {}", clouds.join(" and ")),
+    };
+    format!("{claimed}\n\nA machine unlike those of training is told {together}.")
 }
 
 /// What the model knows of GPUs.
@@ -135,6 +160,19 @@ mod tests {
     use super::*;
     use crate::table::columns;
     use sapwise::model::MethodScore;
+
+    #[test]
+    fn a_card_says_whether_intervals_can_be_claimed() {
+        let mut model = Model::built_in().unwrap();
+        (model.folds, model.clouds) = (Vec::new(), Vec::new());
+        for (machines, text) in [(3, "holds 3 physical machines, and a 90 % interval takes 10"), (12, "no fold was kept")] {
+            model.validation.physical_machines = machines;
+            assert!(page(&model, &[], &[]).contains(text), "{}", intervals(&model));
+        }
+        model.folds = vec![sapwise::model::Fold { machines: 12, methods: Vec::new(), errors: Vec::new() }];
+        assert!(intervals(&model).contains("12 physical machines, left out of the fit in 1 parts"));
+        assert!(intervals(&model).contains("each parameter alone"));
+    }
 
     #[test]
     fn scores_tell_what_they_do_not_say() {

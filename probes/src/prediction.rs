@@ -4,7 +4,7 @@ use crate::algorithms::Algorithms;
 use crate::revisions;
 use anyhow::Context;
 use sapwise::hardware::parameter;
-use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Registry, Scenario, Source};
+use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Registry, Scenario};
 
 /// Objects of the slice that the fields show: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
@@ -28,17 +28,8 @@ pub(crate) fn predict(
     let mut known = registry.available();
     known.extend(sapwise::gpu::algorithms(gpus));
     let prediction = model.predict(hardware, &known).map_err(anyhow::Error::msg)?;
-    let mut fields = Fields::from_costs(Source::Predicted, &scenario.to_string(), prediction.costs, &slice(scenario)?);
-    fields.model = Some(model.name.clone());
-    fields.extrapolated = prediction.extrapolated;
-    fields.warnings = prediction.warnings;
+    let mut fields = prediction.fields(&scenario.to_string(), &slice(scenario)?);
     fields.warnings.extend(revisions::unknown_to(&registry, model));
-    let v = &model.validation;
-    fields.interval_basis = format!(
-        "90 % of a normal distribution with the spread of measured over modelled time in training ({} profiles of {} \
-         physical machines); no claim about other machines",
-        v.profiles, v.physical_machines
-    );
     Ok(fields)
 }
 

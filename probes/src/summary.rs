@@ -5,7 +5,7 @@ use crate::table::{bytes, columns, duration, grouped};
 use crate::train::{measured_fields, slice_scenario};
 use sapwise::hardware::gpu::parameter::UNIFIED_MEMORY;
 use sapwise::report::Label;
-use sapwise::{Backend, Fields, GpuHardware, GpuIdentity, Hardware, How, Parameter, Report};
+use sapwise::{Backend, Border, Fields, GpuHardware, GpuIdentity, Hardware, How, Parameter, Report};
 use std::path::Path;
 
 /// The hardware, then the fields of every scenario that was swept.
@@ -105,13 +105,19 @@ pub(crate) fn fields(fields: &Fields) -> String {
     for step in &fields.steps {
         // The first step begins at 0 without a border.
         let border = fields.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
-        let interval = border
-            .map_or(String::new(), |b| format!("{} to {}", grouped(b.low.round() as u64), grouped(b.high.round() as u64)));
+        let interval = border.and_then(Border::interval).map_or(String::new(), |(low, high)| {
+            format!("{} to {}", grouped(low.round() as u64), grouped(high.round() as u64))
+        });
         let from = format!("  from {}", grouped(u64::from(step.from_objects)));
         rows.push(vec![from, step.algorithm.to_string(), interval]);
     }
-    let mut text = format!("{}: the fastest algorithm by number of objects, with 90 % intervals\n", fields.scenario);
+    let told = |b: &Border| b.interval().is_some();
+    let with = if fields.crossovers.iter().any(told) { ", with 90 % intervals" } else { "" };
+    let mut text = format!("{}: the fastest algorithm by number of objects{with}\n", fields.scenario);
     text.push_str(&columns(&rows));
+    if !fields.crossovers.iter().all(told) {
+        text.push_str(&format!("  {}\n", fields.interval_basis));
+    }
     for warning in &fields.warnings {
         text.push_str(&format!("  warning: {warning}\n"));
     }

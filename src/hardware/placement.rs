@@ -54,8 +54,8 @@ mod tests {
         assert_eq!(far.with_cores_apart(25.0).value(parameter::FORK_JOIN_COLD_NS), Some(7000.0));
         // The system's part stays.
         let low = of(&[figure(parameter::CORE_TO_CORE_NS, 165.0), figure(parameter::FORK_JOIN_COLD_NS, 5000.0)]);
-        let near = low.with_cores_apart(25.0).value(parameter::FORK_JOIN_COLD_NS).unwrap();
-        assert!((near - 0.56 * 5000.0).abs() < 1e-9, "{near}");
+        let kept = low.with_cores_apart(25.0).value(parameter::FORK_JOIN_COLD_NS).unwrap();
+        assert!((kept - 0.56 * 5000.0).abs() < 1e-9, "{kept}");
         let unknown = of(&near.parameters[1..]);
         assert_eq!(unknown.with_cores_apart(165.0), unknown);
     }

@@ -38,15 +38,30 @@ impl Feature {
     /// # Errors
     /// Names the hardware parameter that is missing, or says that the feature is not one of that processor.
     pub fn value(self, hardware: &Hardware, backend: &Backend, load: &Load) -> Result<f64, String> {
-        if !self.is_of(backend.class()) {
-            return Err(format!("{backend} has no feature {self:?}"));
+        match self.of_octaves(f64::from(load.objects.max(1)).log2()) {
+            Some(value) => Ok(value),
+            None => self.of_machine(hardware, backend),
         }
-        let octaves = f64::from(load.objects.max(1)).log2();
-        Ok(match self {
-            Self::Log2Objects => octaves,
-            Self::Log2ObjectsSquared => octaves * octaves,
-            Self::Log2Lanes => need(hardware, parameter::SIMD_LANES)?.log2(),
-            Self::Log2Threads => f64::from(backend.width()).log2(),
-        })
+    }
+
+    /// The feature at a base-2 logarithm of the number of objects, where it depends on that alone.
+    pub(super) fn of_octaves(self, octaves: f64) -> Option<f64> {
+        match self {
+            Self::Log2Objects => Some(octaves),
+            Self::Log2ObjectsSquared => Some(octaves * octaves),
+            Self::Log2Lanes | Self::Log2Threads => None,
+        }
+    }
+
+    /// The feature of a backend of a machine, where it does not depend on the load.
+    ///
+    /// # Errors
+    /// Names the hardware parameter that is missing, or says that the feature is not one of that processor.
+    pub(super) fn of_machine(self, hardware: &Hardware, backend: &Backend) -> Result<f64, String> {
+        match self {
+            Self::Log2Threads => Ok(f64::from(backend.width()).log2()),
+            Self::Log2Lanes if self.is_of(backend.class()) => Ok(need(hardware, parameter::SIMD_LANES)?.log2()),
+            _ => Err(format!("{backend} has no feature {self:?}")),
+        }
     }
 }

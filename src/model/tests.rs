@@ -1,3 +1,8 @@
+mod extrapolation;
+// They read and write files.
+#[cfg(feature = "model")]
+mod intervals;
+
 use super::*;
 use crate::hardware::gpu::parameter as of_gpu;
 use crate::hardware::parameter;
@@ -68,6 +73,8 @@ fn model(methods: Vec<MethodModel>) -> Model {
         ranges: vec![range(parameter::CLOCK_MEASURED_GHZ), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
         methods,
         validation: Validation { held_out: String::new(), physical_machines: 0, profiles: 0, methods: Vec::new() },
+        clouds: Vec::new(),
+        folds: Vec::new(),
     }
 }
 

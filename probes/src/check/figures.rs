@@ -4,14 +4,8 @@ use crate::date;
 use sapwise::hardware::parameter;
 use sapwise::measure::Watch;
 use sapwise::report::{Label, Point, Restricted};
-use sapwise::{Hardware, How, Parameter, Report, SimdLevel};
+use sapwise::{GpuHardware, Hardware, How, Parameter, Report, SimdLevel};
 use std::collections::BTreeMap;
-
-/// No system runs more processors than this.
-const MOST_CORES: f64 = 4096.0;
-
-/// Twice what any processor has been cooled for.
-const FASTEST_GHZ: f64 = 20.0;
 
 /// What several threads may seem to gain over their number, by a clock that rises in between.
 const SCALING_TOLERANCE: f64 = 1.1;
@@ -28,6 +22,8 @@ pub(super) fn impossible(report: &Report) -> Vec<String> {
     for (of, parameter) in parameters(&report.hardware) {
         found.extend(impossible_parameter(report, &of, parameter));
     }
+    found.extend(report.hardware.implausible());
+    found.extend(report.hardware.gpus.iter().filter_map(GpuHardware::implausible));
     found.extend(impossible_provenance(report));
     for (k, point) in report.points.iter().enumerate() {
         let at = format!("point {k} ({} at {} objects)", point.scenario, point.load.objects);
@@ -59,10 +55,7 @@ fn impossible_parameter(report: &Report, of: &str, p: &Parameter) -> Option<Stri
     if is_rate && value == 0.0 && p.how == How::Measured {
         return Some(format!("{name} is 0"));
     }
-    if p.name.ends_with("_ghz") && value >= FASTEST_GHZ {
-        return Some(format!("{name} is {value}"));
-    }
-    if p.name == parameter::USABLE_CORES && (!(1.0..=MOST_CORES).contains(&value) || value.fract() != 0.0) {
+    if p.name == parameter::USABLE_CORES && value.fract() != 0.0 {
         return Some(format!("{name} is {value}"));
     }
     // A disturbed thread alone makes several look better than they are.

@@ -1,10 +1,12 @@
 //! From reports to cost curves, fields and models.
 
 mod baselines;
+mod clouds;
 mod columns;
 mod curve;
 mod direct;
 mod fit;
+mod folds;
 mod learning;
 mod model;
 mod nnls;
@@ -114,6 +116,8 @@ pub(crate) fn train(selection: Selection, name: &str) -> Result<Trained> {
     }
     let designs = Designs::new(&profiles);
     let (mut model, left_out) = model::model(&profiles, &designs, &vec![true; profiles.len()], name)?;
+    model.clouds = clouds::clouds(profiles.iter().map(|p| (&p.hardware, model::timed_gpus(p).collect())));
+    model.folds = folds::folds(&profiles, &designs)?;
     notes.extend(designs.notes.iter().cloned());
     notes.extend(left_out);
     let subsets = match evidence {

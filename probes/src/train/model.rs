@@ -28,6 +28,8 @@ pub(crate) fn model(
         ranges: ranges(&profiles),
         methods,
         validation: Validation { held_out: String::new(), physical_machines: 0, profiles: 0, methods: Vec::new() },
+        clouds: Vec::new(),
+        folds: Vec::new(),
     };
     if let Some(defect) = model.defect() {
         bail!("no model could be fitted: {defect}; {}", notes.join("; "));
@@ -54,7 +56,7 @@ fn range(parameter: String, values: Vec<f64>) -> Option<Range> {
 }
 
 /// The GPUs of a profile that an algorithm was timed on.
-fn timed_gpus(profile: &Profile) -> impl Iterator<Item = &GpuHardware> {
+pub(super) fn timed_gpus(profile: &Profile) -> impl Iterator<Item = &GpuHardware> {
     let used = |k: u32| {
         let on = |backend: &Backend| matches!(backend, Backend::Gpu(list) if list.contains(&k));
         profile.algorithms.iter().any(|t| on(t.id.backend()))

@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let selection = select(&report_files(&arguments.reports)?, evidence)?;
     let Trained { model, notes, learning } = train::train(selection, &name)?;
-    let text = sapwise::json::write(&model)?;
+    let text = sapwise::json::write_model(&model)?;
     files::write_text(&arguments.out, &text)?;
     if let Some(path) = &arguments.card {
         let page = card::page(&model, &notes, &learning);

@@ -1,0 +1,149 @@
+//! Machines unlike those of training, and figures that no machine has.
+
+use super::*;
+
+/// A model of a method on both processors whose ranges hold the machine below.
+fn both() -> Model {
+    let mut model = model(vec![
+        method(BackendClass::Cpu, Scale::SharedCycle),
+        MethodModel { gpu_kinds: vec![GpuKind::Discrete], ..method(BackendClass::Gpu, Scale::GpuDispatch) },
+    ]);
+    let ranges = [
+        (parameter::CLOCK_MEASURED_GHZ, 2.0, 5.0),
+        (parameter::USABLE_CORES, 2.0, 64.0),
+        (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, 8.0, 50.0),
+    ];
+    model.ranges = ranges.map(|(name, min, max)| Range { parameter: name.to_owned(), min, max }).to_vec();
+    model
+}
+
+/// A machine of eight cores with one GPU.
+fn machine(changes: &[(&str, f64)]) -> Hardware {
+    let mut figures = vec![
+        (parameter::USABLE_CORES, 8.0),
+        (parameter::CLOCK_MEASURED_GHZ, 4.0),
+        (parameter::CACHE_LLC_BYTES, 3e7),
+        (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, 20.0),
+        (parameter::SCALING_TWO_THREADS_RATIO, 1.9),
+        (parameter::SCALING_ALL_THREADS_RATIO, 7.0),
+    ];
+    for (name, value) in changes {
+        if let Some(figure) = figures.iter_mut().find(|f| f.0 == *name) {
+            figure.1 = *value;
+        }
+    }
+    let mut machine = hardware();
+    machine.gpus.truncate(1);
+    machine.parameters = parameters(&figures);
+    machine
+}
+
+fn told(p: &Prediction, text: &str) -> bool {
+    p.warnings.iter().any(|w| w.contains(text))
+}
+
+#[test]
+fn a_thousand_cores_are_predicted_and_told_to_be_outside() {
+    let all = ids(&["brute@cpu1", "brute@cpu1024"]);
+    let of_a_thousand = [(parameter::USABLE_CORES, 1024.0), (parameter::SCALING_ALL_THREADS_RATIO, 700.0)];
+    let p = both().predict(&machine(&of_a_thousand), &all).unwrap();
+    assert!(p.extrapolated && p.costs.len() == 2, "{:?}", p.warnings);
+    assert!(told(&p, "usable_cores is 1024") && told(&p, "has seen 1 threads at most"), "{:?}", p.warnings);
+    assert!(told(&p, "--samples 8") && told(&p, "sapwise probe"), "{:?}", p.warnings);
+    let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    assert_eq!(p.fields("uniform", &loads).defect(), None);
+    let p = both().predict(&machine(&[]), &ids(&["brute@cpu1"])).unwrap();
+    assert!(!p.extrapolated && p.warnings.is_empty(), "{:?}", p.warnings);
+}
+
+#[test]
+fn figures_that_no_machine_has_are_refused_by_name() {
+    for (name, values) in [
+        // MHz for GHz, and what a failed measurement may leave.
+        (parameter::CLOCK_MEASURED_GHZ, &[4000.0, 0.0, -4.0, f64::NAN, f64::INFINITY][..]),
+        // TB/s for GB/s, MB/s for GB/s, and a tenth of what memory did in 1998.
+        (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, &[0.02, 20_000.0, 0.1]),
+        (parameter::CACHE_LLC_BYTES, &[3e4, 0.0]),
+        (parameter::USABLE_CORES, &[0.0, 5000.0]),
+        (parameter::SCALING_TWO_THREADS_RATIO, &[190.0]),
+    ] {
+        for &value in values {
+            let error = both().predict(&machine(&[(name, value)]), &ids(&["brute@cpu1", "brute@gpu0"])).unwrap_err();
+            assert!(error.contains(name) && error.contains("check its unit"), "{value}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_gpu_without_a_figure_or_with_one_that_no_gpu_has_costs_its_own_algorithms_only() {
+    let all = ids(&["brute@cpu1", "brute@gpu0"]);
+    let mut machine = machine(&[]);
+    assert_eq!(both().predict(&machine, &all).unwrap().costs.len(), 2);
+    let dispatch = machine.gpus[0].parameters.iter().position(|p| p.name == of_gpu::DISPATCH_NS).unwrap();
+    for (value, text) in [(None, "dispatch_ns of gpu0 is missing"), (Some(2.0), "dispatch_ns of gpu0 is 2, and no machine")]
+    {
+        machine.gpus[0].parameters[dispatch].value = value;
+        let p = both().predict(&machine, &all).unwrap();
+        assert!(told(&p, "brute@gpu0 is left out") && told(&p, text), "{:?}", p.warnings);
+        let left: Vec<String> = p.costs.iter().map(|c| c.algorithm.to_string()).collect();
+        assert_eq!(left, ["brute@cpu1"]);
+    }
+}
+
+/// Two parameters that rise together in training, with a correlation of 0.8; the farthest machine at a distance of 2.
+pub(super) fn cloud() -> Cloud {
+    let one = |name: &str, mean: f64| CloudParameter { name: name.to_owned(), mean_ln: mean.ln(), deviation_ln: 0.5 };
+    Cloud {
+        processor: BackendClass::Cpu,
+        points: 12,
+        parameters: vec![one(parameter::USABLE_CORES, 8.0), one(parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, 20.0)],
+        inverse: vec![vec![1.0 / 0.36, -0.8 / 0.36], vec![-0.8 / 0.36, 1.0 / 0.36]],
+        farthest_squared: 4.0,
+    }
+}
+
+#[test]
+fn a_combination_that_no_machine_of_the_training_has_is_told_with_the_parameters() {
+    let model = Model { clouds: vec![cloud()], ..both() };
+    assert_eq!(model.defect(), None);
+    let place = |cores: f64, bandwidth: f64| {
+        let changes = [(parameter::USABLE_CORES, cores), (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, bandwidth)];
+        model.predict(&machine(&changes), &ids(&["brute@cpu1"])).unwrap()
+    };
+    // 1.8 deviations to the same side are like the training, to opposite sides they are not, and both are within the ranges.
+    let (same, opposite) =
+        (place(8.0 * 0.9_f64.exp(), 20.0 * 0.9_f64.exp()), place(8.0 * 0.9_f64.exp(), 20.0 * (-0.9_f64).exp()));
+    assert!(!same.extrapolated && same.warnings.is_empty(), "{:?}", same.warnings);
+    assert!(opposite.extrapolated && !told(&opposite, "outside the"), "{:?}", opposite.warnings);
+    // Scores of 1.8 and -1.8: (2 + 2 * 0.8) * 3.24 / 0.36 = 32.4, over 4 is 8.1, of which the root is 2.85.
+    assert!(
+        told(&opposite, "2.8 times as far") && told(&opposite, "by usable_cores and bandwidth_one"),
+        "{:?}",
+        opposite.warnings
+    );
+    assert!(told(&opposite, "--samples 8"), "{:?}", opposite.warnings);
+}
+
+#[test]
+fn without_a_cloud_the_fields_say_that_the_joint_test_is_left_out() {
+    let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    let basis = |model: &Model, id: &str| {
+        model.predict(&machine(&[]), &ids(&[id])).unwrap().fields("uniform", &loads).interval_basis
+    };
+    assert!(basis(&both(), "brute@cpu1").contains("told by each parameter alone"));
+    let with = Model { clouds: vec![cloud()], ..both() };
+    assert!(!basis(&with, "brute@cpu1").contains("alone") && basis(&with, "brute@gpu0").contains("GPUs are like"));
+}
+
+#[test]
+fn clouds_that_can_not_be_are_refused() {
+    let defect = |change: &dyn Fn(&mut Cloud)| {
+        let mut cloud = cloud();
+        change(&mut cloud);
+        Model { clouds: vec![cloud], ..both() }.defect()
+    };
+    assert_eq!(defect(&|_| {}), None);
+    assert!(defect(&|c| c.inverse[1].truncate(1)).is_some());
+    assert!(defect(&|c| c.farthest_squared = 0.0).is_some());
+    assert!(defect(&|c| c.parameters[0].deviation_ln = 0.0).is_some());
+}
