@@ -119,7 +119,7 @@ fn machines(profiles: &[Profile]) -> Vec<usize> {
 }
 
 /// At most so many of the rows, evenly spaced, from a place that differs with `turn`.
-fn thinned(rows: Vec<Row>, most: usize, turn: usize) -> Vec<Row> {
+pub(super) fn thinned(rows: Vec<Row>, most: usize, turn: usize) -> Vec<Row> {
     let all = rows.len();
     if all <= most {
         return rows;
