@@ -135,10 +135,7 @@ impl CostCurve {
     }
 
     pub(crate) fn cost_of(&self, counts: &Counts<'_>) -> f64 {
-        let summed =
-            |terms: &[CostTerm]| -> f64 { terms.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum() };
-        let first = summed(&self.terms);
-        let sum = if self.otherwise.is_empty() { first } else { first.min(summed(&self.otherwise)) };
+        let sum = self.uncorrected(counts);
         if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects).exp() }
     }
 

@@ -8,6 +8,7 @@ mod gpu_set;
 mod interval;
 mod predict;
 mod scale;
+mod validation;
 
 use crate::hardware::GpuKind;
 use crate::schema_tag::schema_tag;
@@ -20,6 +21,7 @@ pub use fold::{Fold, FoldMethod, LnErrors, QUANTILES, Role, RoleErrors};
 pub use interval::FEWEST_MACHINES;
 pub use predict::Prediction;
 pub use scale::Scale;
+pub use validation::{Coverage, Learning, LearningScore, MethodScore, Validation};
 
 schema_tag!(
     /// `model/1`.
@@ -41,8 +43,11 @@ pub struct Model {
     pub schema: ModelSchema,
     /// Name by which fields refer to it.
     pub name: String,
-    /// The reports behind it.
+    /// The reports behind it, one by one. Empty where there are too many to list: then `trained_on_counts` tells them.
     pub trained_on: Vec<TrainingReport>,
+    /// Reports of each kind, where they are too many to list.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub trained_on_counts: Vec<TrainingCount>,
     /// Lowest and highest value of each hardware parameter in training; a machine outside is extrapolated.
     pub ranges: Vec<Range>,
     /// One cost model for each method on each class of processor.
@@ -70,6 +75,19 @@ pub struct TrainingReport {
     pub physical_id: String,
     /// What kind of evidence it is.
     pub label: crate::report::Label,
+}
+
+/// How many reports of one kind a model was trained on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct TrainingCount {
+    /// What kind of evidence they are.
+    pub label: crate::report::Label,
+    /// Reports.
+    pub reports: usize,
+    /// Physical machines that they are of.
+    pub physical_machines: usize,
 }
 
 /// Where a hardware parameter lay in training.
@@ -145,43 +163,6 @@ pub struct ResidualTerm {
     pub slope: f64,
 }
 
-/// How a model did on machines, or profiles, that were left out of its training.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct Validation {
-    /// What was left out in turn: `physical machine`, or `profile` where there is one physical machine only. The latter
-    /// says little about machines never seen.
-    pub held_out: String,
-    /// Physical machines in the data.
-    pub physical_machines: usize,
-    /// Profiles, that is reports, in the data.
-    pub profiles: usize,
-    /// The methods that were compared.
-    pub methods: Vec<MethodScore>,
-}
-
-/// The score of one way to choose an algorithm. Regret is the time of its choice over the time of the best, less one.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct MethodScore {
-    /// Name of the way to choose.
-    pub name: String,
-    /// Regret, mean over the points of a held-out report, then over the reports.
-    pub mean_regret: f64,
-    /// 95th percentile over held-out reports of their mean regret.
-    pub p95_regret: f64,
-    /// Share of all points with a regret over 10 %.
-    pub share_over_10_percent: f64,
-    /// How much of the gap between the best single algorithm (0) and the oracle (1) it closes.
-    pub closed_gap: f64,
-    /// Regret, mean over reports as seen by games: each number of objects counts as often as games have it, which is an assumption
-    /// (log-normal around 800, two thirds of the frames within 220 to 2800). `None` in files from before this was told.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
-    pub mean_regret_in_games: Option<f64>,
-}
-
 impl Model {
     /// The model that comes with this library: `models/default.json`, whose card is `models/README.md`.
     ///
@@ -195,7 +176,8 @@ impl Model {
     /// Whether a report behind it is simulated, which makes its predictions no evidence of anything.
     #[must_use]
     pub fn is_simulated(&self) -> bool {
-        self.trained_on.iter().any(|t| t.label == crate::report::Label::Simulated)
+        let mut labels = self.trained_on.iter().map(|t| t.label).chain(self.trained_on_counts.iter().map(|c| c.label));
+        labels.any(|label| label == crate::report::Label::Simulated)
     }
 
     /// What makes this model unusable, if anything.

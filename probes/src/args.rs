@@ -217,6 +217,10 @@ pub(crate) struct Train {
     /// Where a page goes that says what the model was trained on and how well it did.
     #[arg(long, value_name = "CARD.md")]
     pub(crate) card: Option<PathBuf>,
+    /// Where a picture goes: predicted against measured times on what was left out, the regret on each machine, and how the regret
+    /// falls with the number of machines. SVG.
+    #[arg(long, value_name = "P.svg")]
+    pub(crate) plot: Option<PathBuf>,
     /// One JSON object on standard output instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,8 +1,13 @@
 //! Pictures, as SVG.
 
+mod mark;
+mod training;
+
 use crate::simulation::{Course, Outcome};
 use plotters::coord::Shift;
 use plotters::prelude::*;
+
+pub(crate) use training::training;
 
 /// Width and height of a picture in pixels.
 const SIZE: (u32, u32) = (1000, 720);

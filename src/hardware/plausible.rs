@@ -7,7 +7,7 @@ type Bounds = (&'static str, f64, f64, &'static str);
 
 /// Of a machine. Wide on purpose: a machine that is merely unlike those of the training is told by the model's ranges. A unit
 /// that is off by a thousand lies outside for most machines, and for the others the ranges are left.
-const OF_MACHINE: [Bounds; 10] = [
+const OF_MACHINE: [Bounds; 11] = [
     (parameter::USABLE_CORES, 1.0, 4096.0, "no system runs more processors"),
     (parameter::CLOCK_REPORTED_GHZ, 0.05, 20.0, "from microcontrollers to twice what any processor has been cooled for"),
     (parameter::CLOCK_MEASURED_GHZ, 0.05, 20.0, "from microcontrollers to twice what any processor has been cooled for"),

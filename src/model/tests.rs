@@ -70,9 +70,10 @@ fn model(methods: Vec<MethodModel>) -> Model {
         schema: ModelSchema,
         name: "test".to_owned(),
         trained_on: Vec::new(),
+        trained_on_counts: Vec::new(),
         ranges: vec![range(parameter::CLOCK_MEASURED_GHZ), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
         methods,
-        validation: Validation { held_out: String::new(), physical_machines: 0, profiles: 0, methods: Vec::new() },
+        validation: Validation::default(),
         clouds: Vec::new(),
         folds: Vec::new(),
     }

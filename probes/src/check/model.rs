@@ -15,6 +15,8 @@ impl Here {
         let known = model.trained_on.iter().any(|t| t.physical_id == self.machine.physical_id);
         finding.notes.push(if known {
             "trained on a machine like this one".to_owned()
+        } else if model.trained_on.is_empty() && !model.trained_on_counts.is_empty() {
+            "trained on too many reports to tell whether a machine like this one is among them".to_owned()
         } else {
             "not trained on a machine like this one; `sapwise predict` measures whether it extrapolates here".to_owned()
         });

@@ -1,6 +1,6 @@
 //! Ways to choose an algorithm that a prediction has to beat.
 
-use super::curve::{measured_costs, profile_fields};
+use super::curve::{slice, slice_fields};
 use super::profile::Profile;
 use super::yardstick::{Chooser, NOT_TIMED, average};
 use super::{GPU_PARAMETERS, PARAMETERS, figure};
@@ -47,24 +47,19 @@ pub(crate) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> C
     Box::new(move |load| if load.objects <= last { small.clone() } else { large.clone() })
 }
 
-/// The measured thresholds of the first training profile, by the number of objects alone, whatever the machine. Where they name
-/// a GPU and the machine has none, the same method runs on all of its cores.
+/// The measured thresholds of a profile, by the number of objects alone, whatever the machine. Where they name a GPU and the machine
+/// has none, the same method runs on all of its cores.
 ///
 /// # Errors
 /// When that profile has too few timings for thresholds.
-pub(crate) fn default_machine<'a>(training: &[&Profile], available: &'a [AlgorithmId]) -> Result<Chooser<'a>> {
-    let Some(first) = training.first() else { return Ok(Box::new(|_| None)) };
-    let fields = profile_fields(first, usual(first.points.iter().map(|s| s.scenario.as_str())))?;
+pub(crate) fn default_machine<'a>(
+    first: &Profile,
+    costs: &[AlgorithmCost],
+    available: &'a [AlgorithmId],
+) -> Result<Chooser<'a>> {
+    let scenario = usual(first.points.iter().map(|s| s.scenario.as_str()));
+    let fields = slice_fields(costs.to_vec(), scenario, &slice(first, scenario)?)?;
     Ok(Box::new(move |load| fields.step(load.objects).and_then(|s| stand_in(&s.algorithm, available))))
-}
-
-/// The measured costs of the training profile whose hardware is nearest, under the whole load.
-pub(crate) fn nearest_machine<'a>(training: &[&Profile], hardware: &Hardware, available: &'a [AlgorithmId]) -> Chooser<'a> {
-    let known: Vec<&Hardware> = training.iter().map(|p| &p.hardware).collect();
-    match nearest(&known, hardware) {
-        Some(k) => by_costs(measured_costs(training[k]).0, available),
-        None => Box::new(|_| None),
-    }
 }
 
 /// The cheapest by cost curves; the nearest number of threads stands for one that the machine doesn't have.
@@ -82,13 +77,13 @@ pub(crate) fn slice_scenario(report: &Report) -> &str {
 }
 
 /// `uniform` where it is among the names, else the first of them.
-fn usual<'a>(mut names: impl Iterator<Item = &'a str> + Clone) -> &'a str {
+pub(super) fn usual<'a>(mut names: impl Iterator<Item = &'a str> + Clone) -> &'a str {
     let first = names.clone().next();
     names.find(|n| *n == "uniform").or(first).unwrap_or("uniform")
 }
 
 /// The available algorithm of the same method and class of processor whose number of threads or GPUs is nearest.
-fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
+pub(super) fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
     let distance = |other: &&AlgorithmId| (f64::from(other.backend().width()) / f64::from(id.backend().width())).ln().abs();
     let alike = |a: &&AlgorithmId| a.method() == id.method() && a.backend().class() == id.backend().class();
     // The same GPU first, where there are several of equal number.
@@ -102,8 +97,8 @@ fn stand_in(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> 
     closest(id, available).or_else(of_method)
 }
 
-/// Position of the nearest hardware, by the logarithms of the parameters that both have, over their standard deviation.
-fn nearest(known: &[&Hardware], hardware: &Hardware) -> Option<usize> {
+/// Position of the nearest hardware, which the nearest machine is, by the logarithms of the parameters that both have, over their standard deviation.
+pub(crate) fn nearest(known: &[&Hardware], hardware: &Hardware) -> Option<usize> {
     let logarithm = |h: &Hardware, name: &str| figure(h, name).filter(|v| *v > 0.0).map(f64::ln);
     let mut distances = vec![0.0; known.len()];
     let of_gpu = GPU_PARAMETERS.map(|name| format!("{GPU_PREFIX}{name}"));

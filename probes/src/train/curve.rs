@@ -39,7 +39,30 @@ pub(crate) fn measured_fields(report: &Report, scenario: &str) -> Result<Fields>
 }
 
 /// The same without intervals from paired samples, which a profile does not hold.
-pub(super) fn profile_fields(profile: &Profile, scenario: &str) -> Result<Fields> {
+fn profile_fields(profile: &Profile, scenario: &str) -> Result<Fields> {
+    let loads = slice(profile, scenario)?;
+    let (costs, warnings) = measured_costs(profile);
+    let mut fields = slice_fields(costs, scenario, &loads)?;
+    fields.warnings = warnings;
+    Ok(fields)
+}
+
+/// Measured fields with the slice through these loads.
+///
+/// # Errors
+/// When there are no costs.
+pub(super) fn slice_fields(costs: Vec<AlgorithmCost>, scenario: &str, loads: &[Load]) -> Result<Fields> {
+    if costs.is_empty() {
+        bail!("no algorithm of the report was timed at {FEWEST_POINTS} points; measure again with `sapwise probe`");
+    }
+    Ok(Fields::from_costs(Source::Measured, scenario, costs, loads))
+}
+
+/// The loads of a scenario, ascending by objects.
+///
+/// # Errors
+/// When there are fewer than two; names the scenarios there are.
+pub(super) fn slice(profile: &Profile, scenario: &str) -> Result<Vec<Load>> {
     let mut loads: Vec<Load> = profile.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load).collect();
     loads.sort_by_key(|l| l.objects);
     loads.dedup_by_key(|l| l.objects);
@@ -50,13 +73,7 @@ pub(super) fn profile_fields(profile: &Profile, scenario: &str) -> Result<Fields
         let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
         bail!("the report has {} sizes of the scenario {scenario:?}, two are needed; it holds: {known}", loads.len());
     }
-    let (costs, warnings) = measured_costs(profile);
-    if costs.is_empty() {
-        bail!("no algorithm of the report was timed at {FEWEST_POINTS} points; measure again with `sapwise probe`");
-    }
-    let mut fields = Fields::from_costs(Source::Measured, scenario, costs, &loads);
-    fields.warnings = warnings;
-    Ok(fields)
+    Ok(loads)
 }
 
 /// The cost curve of each algorithm that was timed often enough, and a sentence for each other one.

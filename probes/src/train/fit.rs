@@ -135,7 +135,7 @@ fn machines(profiles: &[Profile]) -> Vec<usize> {
 }
 
 /// At most so many of the rows, evenly spaced, from a place that differs with `turn`.
-fn thinned(rows: Vec<Row>, most: usize, turn: usize) -> Vec<Row> {
+pub(super) fn thinned(rows: Vec<Row>, most: usize, turn: usize) -> Vec<Row> {
     let all = rows.len();
     if all <= most {
         return rows;
@@ -227,7 +227,7 @@ impl Design {
         let measured: Vec<usize> = (0..rows.len()).filter(|&k| !self.rows[rows[k]].floor).collect();
         let Some(first) = measured.first().filter(|_| measured.len() >= FEWEST_POINTS) else { return Ok(None) };
         let row = |k: usize| &self.rows[rows[k]];
-        let weights = self.weights(rows, profiles);
+        let weights = self.weights(rows, profiles, machines);
         let problem = Problem {
             terms: self.values.select(Axis(0), rows),
             ns: (0..rows.len()).map(|k| row(k).ns).collect(),
@@ -298,10 +298,13 @@ impl Design {
         self.other_values.select(Axis(0), rows).dot(&Array1::from(units)).to_vec()
     }
 
-    /// Every profile counts the same, and within it every octave of the number of objects. A contended one counts a quarter:
-    /// what other programs take changes from one second to the next, so that its parameters say little about its timings. On
-    /// the first one a cold fork and join was measured 800 times as long as a parallel frame took.
-    fn weights(&self, rows: &[usize], profiles: &[Profile]) -> Vec<f64> {
+    /// Every physical machine counts the same, however many profiles it has: what a machine has of its own, which no parameter
+    /// tells, stands in all of its profiles, so that twenty of one machine would pass off its own for what machines share. Within a
+    /// machine every profile counts the same, and within that every octave of the number of objects. A contended profile counts a
+    /// quarter of the others of its machine: what other programs take changes from one second to the next, so that its parameters
+    /// say little about its timings. On the first one a cold fork and join was measured 800 times as long as a parallel frame took.
+    /// And a row counts the less the further it lies behind the best of its point: nobody chooses the algorithm there.
+    fn weights(&self, rows: &[usize], profiles: &[Profile], machines: &[usize]) -> Vec<f64> {
         let octave = |k: &usize| (self.rows[*k].profile, self.rows[*k].load.objects.ilog2());
         let mut counts: BTreeMap<(usize, u32), f64> = BTreeMap::new();
         for k in rows {
@@ -312,9 +315,13 @@ impl Design {
             *octaves.entry(*profile).or_default() += 1.0;
         }
         let trust = |profile: usize| if profiles[profile].label == Label::RealContended { 0.25 } else { 1.0 };
+        let mut trusts: BTreeMap<usize, f64> = BTreeMap::new();
+        for &profile in octaves.keys() {
+            *trusts.entry(machines[profile]).or_default() += trust(profile);
+        }
         let weight = |k: &usize| {
             let Row { profile, behind, .. } = self.rows[*k];
-            trust(profile) / behind / (counts[&octave(k)] * octaves[&profile])
+            trust(profile) / behind / (trusts[&machines[profile]] * counts[&octave(k)] * octaves[&profile])
         };
         rows.iter().map(weight).collect()
     }
@@ -465,6 +472,29 @@ mod tests {
             errors = (errors.0 + error(&method), errors.1 + error(&bare));
         }
         assert!(errors.0 < 0.8 * errors.1, "{errors:?}");
+    }
+
+    #[test]
+    fn machines_count_the_same_however_many_profiles_they_have() {
+        let mut all = profiles(Machine::family().into_iter().take(3));
+        // The first machine comes with four profiles, one of them contended.
+        for k in 0..3 {
+            let mut twin = all[0].clone();
+            twin.label = if k == 0 { Label::RealContended } else { Label::RealRestricted };
+            all.push(twin);
+        }
+        let designs = Designs::new(&all);
+        for design in &designs.methods {
+            let rows: Vec<usize> = (0..design.rows.len()).collect();
+            let weights = design.weights(&rows, &all, &designs.machines);
+            let of = |chosen: &dyn Fn(usize) -> bool| -> f64 {
+                rows.iter().filter(|k| chosen(design.rows[**k].profile)).map(|k| weights[*k]).sum()
+            };
+            for machine in 0..3 {
+                assert!((of(&|p| designs.machines[p] == machine) - 1.0).abs() < 1e-9, "{}", design.name());
+            }
+            assert!((of(&|p| p == 3) / of(&|p| p == 0) - 0.25).abs() < 1e-9 && (of(&|p| p == 0) - 1.0 / 3.25).abs() < 1e-9);
+        }
     }
 
     #[test]

@@ -3,13 +3,17 @@
 mod baselines;
 mod clouds;
 mod columns;
+mod crossing;
 mod curve;
 mod direct;
 mod fit;
 mod folds;
+mod forest;
+mod held;
 mod learning;
 mod model;
 mod nnls;
+mod notes;
 mod partition;
 mod profile;
 #[cfg(test)]
@@ -17,6 +21,7 @@ mod reference;
 mod residual;
 mod robust;
 mod rows;
+mod scores;
 mod selection;
 #[cfg(test)]
 pub(crate) mod synthetic;
@@ -29,15 +34,17 @@ mod yardstick;
 use crate::progress::Progress;
 use anyhow::{Result, bail};
 use fit::Designs;
+use partition::Partition;
 use sapwise::hardware::{gpu, parameter};
-use sapwise::model::GPU_PREFIX;
+use sapwise::model::{GPU_PREFIX, Validation};
 use sapwise::{GpuKind, Hardware, Model};
 
 pub(crate) use baselines::{available, by_costs, slice_scenario};
 pub(crate) use curve::{measured_costs, measured_fields};
-pub(crate) use learning::Learning;
+pub(crate) use held::{Held, Time};
 pub(crate) use profile::Profile;
 pub(crate) use selection::{Selection, usable};
+pub(crate) use validate::OURS;
 pub(crate) use yardstick::{Chooser, Yardstick, average};
 
 /// Parameters by which the CPU of a machine is compared with those of the training.
@@ -91,8 +98,8 @@ pub(crate) struct Trained {
     pub(crate) model: Model,
     /// In sentences, what was left out and why, and what the validation does not say.
     pub(crate) notes: Vec<String>,
-    /// How well subsets of the machines did, of simulated ones only.
-    pub(crate) learning: Vec<Learning>,
+    /// What a picture shows of the validation.
+    pub(crate) held: Held,
 }
 
 /// Fits the model called `name` to what was selected of reports, and validates it.
@@ -120,23 +127,23 @@ pub(crate) fn train(selection: Selection, name: &str) -> Result<Trained> {
     model.folds = folds::folds(&profiles, &designs)?;
     notes.extend(designs.notes.iter().cloned());
     notes.extend(left_out);
-    let subsets = match evidence {
-        Evidence::Real => Vec::new(),
-        Evidence::Simulated => learning::subsets(&profiles),
-    };
-    let progress = Progress::new((profiles.len() + subsets.iter().map(|s| s.profiles.len()).sum::<usize>()) as u64);
+    let partition = Partition::new(&profiles);
+    let trainings = learning::trainings(&profiles);
+    let progress = Progress::new((partition.folds.len() + trainings.len()) as u64);
     progress.message("validating");
-    let (validation, limits) = validate::validate(&profiles, &designs, &progress)?;
-    model.validation = validation;
-    notes.extend(limits);
-    let learning = learning::learning(&subsets, &progress)?;
-    Ok(Trained { model, notes, learning })
+    let validated = validate::validate(&profiles, &designs, &partition, &progress)?;
+    notes.extend(validated.notes);
+    progress.message("validating trainings of fewer machines");
+    let learning = learning::learning(&profiles, &trainings, &progress)?;
+    model.validation = Validation { learning, ..validated.validation };
+    Ok(Trained { model, notes: notes::folded(notes), held: validated.held })
 }
 
 #[cfg(test)]
 mod tests {
     use super::synthetic::Machine;
     use super::*;
+    use sapwise::report::Label;
     use sapwise::{Report, json};
 
     fn reports() -> Vec<(String, Report)> {
@@ -178,7 +185,31 @@ mod tests {
     fn one_report_gives_a_model_without_scores() {
         let trained = train(of(&reports()[..1]), "test").unwrap();
         assert_eq!(trained.model.methods.len(), 4);
-        assert!(trained.model.validation.methods.is_empty());
+        assert!(trained.model.validation.methods.is_empty() && trained.model.validation.learning.is_empty());
+    }
+
+    #[test]
+    fn of_too_many_reports_the_counts_are_kept() {
+        let one = reports().remove(0);
+        let profile = Profile::of("a.json", &one.1);
+        let mut profiles = vec![profile; model::MOST_LISTED + 1];
+        profiles.iter_mut().enumerate().for_each(|(k, p)| {
+            p.file = format!("{k}.json");
+            p.hardware.machine.physical_id = format!("{:016x}", k / 2);
+        });
+        profiles[1].label = Label::RealRestricted;
+        let designs = Designs::new(&profiles);
+        let fitted = |chosen: &[bool]| model::model(&profiles, &designs, chosen, "many").unwrap().0;
+        let mut chosen = vec![true; profiles.len()];
+        let many = fitted(&chosen);
+        let counts: Vec<_> = many.trained_on_counts.iter().map(|c| (c.label, c.reports, c.physical_machines)).collect();
+        let all = model::MOST_LISTED;
+        assert_eq!(counts, [(Label::RealFull, all, all / 2 + 1), (Label::RealRestricted, 1, 1)]);
+        assert!(many.trained_on.is_empty() && !many.is_simulated());
+        assert_eq!(json::model(&json::write(&many).unwrap()).unwrap(), many);
+        chosen[0] = false;
+        let few = fitted(&chosen);
+        assert!(few.trained_on.len() == all && few.trained_on_counts.is_empty());
     }
 
     #[test]

@@ -4,8 +4,13 @@ use super::fit::Designs;
 use super::profile::Profile;
 use super::{GPU_PARAMETERS, PARAMETERS};
 use anyhow::{Result, bail};
-use sapwise::model::{GPU_PREFIX, ModelSchema, Range, TrainingReport, Validation};
+use sapwise::model::{GPU_PREFIX, ModelSchema, Range, TrainingCount, TrainingReport, Validation};
+use sapwise::report::Label;
 use sapwise::{Backend, GpuHardware, Model};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Reports that a model lists; of more it keeps the counts. One takes 130 bytes, and whoever links the library carries the file.
+pub(super) const MOST_LISTED: usize = 400;
 
 /// A model of the chosen profiles, without validation, and what was left out and why.
 ///
@@ -19,15 +24,15 @@ pub(crate) fn model(
 ) -> Result<(Model, Vec<String>)> {
     let (methods, notes) = designs.fit(chosen)?;
     let profiles: Vec<&Profile> = profiles.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
-    let training =
-        |p: &&Profile| TrainingReport { file: p.file.clone(), physical_id: p.machine().to_owned(), label: p.label };
+    let (trained_on, trained_on_counts) = trained_on(&profiles);
     let model = Model {
         schema: ModelSchema,
         name: name.to_owned(),
-        trained_on: profiles.iter().map(training).collect(),
+        trained_on,
+        trained_on_counts,
         ranges: ranges(&profiles),
         methods,
-        validation: Validation { held_out: String::new(), physical_machines: 0, profiles: 0, methods: Vec::new() },
+        validation: Validation::default(),
         clouds: Vec::new(),
         folds: Vec::new(),
     };
@@ -35,6 +40,28 @@ pub(crate) fn model(
         bail!("no model could be fitted: {defect}; {}", notes.join("; "));
     }
     Ok((model, notes))
+}
+
+/// The reports one by one, or their counts where they are too many.
+fn trained_on(profiles: &[&Profile]) -> (Vec<TrainingReport>, Vec<TrainingCount>) {
+    if profiles.len() <= MOST_LISTED {
+        let report =
+            |p: &&Profile| TrainingReport { file: p.file.clone(), physical_id: p.machine().to_owned(), label: p.label };
+        return (profiles.iter().map(report).collect(), Vec::new());
+    }
+    // By the name of the label, since labels have no order.
+    let mut kinds: BTreeMap<String, (Label, usize, BTreeSet<&str>)> = BTreeMap::new();
+    for profile in profiles {
+        let kind = kinds.entry(format!("{:?}", profile.label)).or_insert((profile.label, 0, BTreeSet::new()));
+        kind.1 += 1;
+        kind.2.insert(profile.machine());
+    }
+    let count = |(label, reports, machines): (Label, usize, BTreeSet<&str>)| TrainingCount {
+        label,
+        reports,
+        physical_machines: machines.len(),
+    };
+    (Vec::new(), kinds.into_values().map(count).collect())
 }
 
 /// Where the parameters lie in the profiles that have them: those of the machine, then those of the GPUs that were timed.

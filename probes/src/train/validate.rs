@@ -1,48 +1,61 @@
 //! How well each way to choose does on machines that it was not trained on.
 
 use super::baselines::{self, available, by_costs};
+use super::crossing::Borders;
 use super::curve::measured_costs;
 use super::direct::{direct, direct_elastic_net};
 use super::fit::Designs;
+use super::forest::{Forests, Table};
+use super::held::{Held, Time};
 use super::model::model;
 use super::partition::Partition;
 use super::profile::Profile;
-use super::yardstick::{Chooser, Regret, Yardstick, average};
+use super::scores::{self, Judged};
+use super::yardstick::{Chooser, Yardstick};
 use crate::progress::Progress;
 use anyhow::Result;
 use rayon::prelude::*;
-use sapwise::model::{MethodModel, MethodScore, Validation};
-use sapwise::{AlgorithmId, Model};
+use sapwise::model::{MethodModel, Validation};
+use sapwise::{AlgorithmCost, AlgorithmId, Hardware, Model};
+use std::sync::OnceLock;
 
 /// The way that scores are given relative to.
-const SINGLE_BEST: &str = "single best";
+pub(super) const SINGLE_BEST: &str = "single best";
+/// The way that `predict` takes.
+pub(crate) const OURS: &str = "physics + ridge";
 /// Profiles of a fold that are judged at most: scores of several hundred machines don't change with thousands more.
-const MOST_JUDGED: usize = 40;
+const MOST_JUDGED: usize = 16;
+/// Profiles of a training that the best single algorithm and the direct regression look at: a mean and a handful of slopes need no
+/// more, and both go through all of them for each held-out profile.
+const MOST_SEEN: usize = 400;
 
-/// Regrets of one way to choose on one held-out profile.
-struct Judged {
-    name: &'static str,
-    regret: Regret,
+/// What a validation finds.
+pub(super) struct Validated {
+    pub(super) validation: Validation,
+    /// In sentences, what the scores do not say.
+    pub(super) notes: Vec<String>,
+    /// What a picture shows of it.
+    pub(super) held: Held,
 }
 
-/// Leaves out one fold of a [`Partition`] after the other, fits to the others and lets every way choose on what was left out. Also
-/// sentences on what the scores do not say.
+/// Leaves out one fold of a [`Partition`] after the other, fits to the others and lets every way choose on what was left out.
 ///
-/// With one profile no method is scored. Each held-out profile is a step of `progress`.
+/// With one profile no way is scored. Each fold is a step of `progress`.
 ///
 /// # Errors
 /// When a regression fails.
-pub(crate) fn validate(
+pub(super) fn validate(
     profiles: &[Profile],
     designs: &Designs<'_>,
+    partition: &Partition,
     progress: &Progress,
-) -> Result<(Validation, Vec<String>)> {
-    let partition = Partition::new(profiles);
+) -> Result<Validated> {
     let mut machines: Vec<&str> = profiles.iter().map(Profile::machine).collect();
     machines.sort_unstable();
     machines.dedup();
     let mut notes = Vec::new();
     let mut all: Vec<Judged> = Vec::new();
+    let mut times = Vec::new();
     if profiles.len() < 2 {
         notes.push("nothing is validated: there is one report only; add reports of other machines".to_owned());
     } else {
@@ -54,47 +67,82 @@ pub(crate) fn validate(
             );
         }
         notes.push("the full sweep is judged by the timings that it was fitted to".to_owned());
-        let yardsticks: Vec<Yardstick> = profiles.par_iter().map(Yardstick::new).collect();
-        let always: Vec<Vec<f64>> = yardsticks.par_iter().map(Yardstick::always).collect();
-        let data = Data { profiles, designs, yardsticks, always };
-        let judged = partition.folds.par_iter().map(|fold| data.fold(fold, progress));
-        for (fold, told) in judged.collect::<Result<Vec<_>>>()? {
-            all.extend(fold);
-            notes.extend(told);
+        let data = Data::new(profiles, designs);
+        let fold = |fold: &Vec<usize>| {
+            let found = data.fold(fold);
+            progress.advance(1);
+            found
+        };
+        for found in partition.folds.par_iter().map(fold).collect::<Result<Vec<Found>>>()? {
+            all.extend(found.judged);
+            times.extend(found.times);
+            notes.extend(found.notes);
         }
     }
-    let mut unique: Vec<String> = Vec::new();
-    notes.retain(|n| {
-        !unique.contains(n) && {
-            unique.push(n.clone());
-            true
-        }
-    });
     let validation = Validation {
-        held_out: partition.held_out,
+        held_out: partition.held_out.clone(),
         physical_machines: machines.len(),
         profiles: profiles.len(),
-        methods: scores(&all),
+        methods: scores::scores(&all),
+        ..Validation::default()
     };
-    Ok((validation, notes))
+    Ok(Validated { validation, notes, held: Held::new(&all, times, partition.by_machine) })
 }
 
 /// What all folds share.
-struct Data<'a> {
+pub(super) struct Data<'a> {
     profiles: &'a [Profile],
     designs: &'a Designs<'a>,
+    table: Table,
     yardsticks: Vec<Yardstick>,
     /// Mean regret of each algorithm of each profile when it is chosen always.
     always: Vec<Vec<f64>>,
+    /// The measured costs of each profile, once they are asked for.
+    costs: Vec<OnceLock<Vec<AlgorithmCost>>>,
 }
 
-impl Data<'_> {
+/// What is found on one fold.
+#[derive(Default)]
+pub(super) struct Found {
+    pub(super) judged: Vec<Judged>,
+    times: Vec<Time>,
+    notes: Vec<String>,
+}
+
+/// What was fitted to the training of a fold.
+struct Fitted<'a> {
+    /// Positions of the profiles of the training, and the hardware of each.
+    known: Vec<usize>,
+    hardware: Vec<&'a Hardware>,
+    /// The model with its residual, and without; `None` where none could be fitted.
+    models: Option<(Model, Model)>,
+    forests: Forests,
+}
+
+/// One way to choose.
+struct Way<'a> {
+    name: &'static str,
+    choose: Chooser<'a>,
+    /// The costs that it chooses by, where it has any.
+    costs: Option<&'a [AlgorithmCost]>,
+}
+
+impl<'a> Data<'a> {
+    pub(super) fn new(profiles: &'a [Profile], designs: &'a Designs<'a>) -> Self {
+        let yardsticks: Vec<Yardstick> = profiles.par_iter().map(Yardstick::new).collect();
+        let always = yardsticks.par_iter().map(Yardstick::always).collect();
+        let costs = profiles.iter().map(|_| OnceLock::new()).collect();
+        Self { profiles, designs, table: Table::new(profiles), yardsticks, always, costs }
+    }
+
     /// The regrets on the profiles of a fold of every way, trained on the others.
-    fn fold(&self, fold: &[usize], progress: &Progress) -> Result<(Vec<Judged>, Vec<String>)> {
-        let mut notes = Vec::new();
+    ///
+    /// # Errors
+    /// When a regression fails.
+    pub(super) fn fold(&self, fold: &[usize]) -> Result<Found> {
+        let mut found = Found::default();
         let mut chosen = vec![true; self.profiles.len()];
         fold.iter().for_each(|&k| chosen[k] = false);
-        let known: Vec<usize> = (0..self.profiles.len()).filter(|&k| chosen[k]).collect();
         let models = match model(self.profiles, self.designs, &chosen, "validation") {
             Ok((model, _)) => {
                 let bare = |m: &MethodModel| MethodModel { residual: Vec::new(), residual_intercept: 0.0, ..m.clone() };
@@ -102,66 +150,101 @@ impl Data<'_> {
                 Some((model, physics))
             }
             Err(why) => {
-                notes.push(format!("no model could be fitted when {} was left out: {why:#}", self.profiles[fold[0]].file));
+                let file = &self.profiles[fold[0]].file;
+                found.notes.push(format!("no model could be fitted when {file} was left out: {why:#}"));
                 None
             }
         };
-        let mut judged = Vec::new();
+        let known: Vec<usize> = (0..self.profiles.len()).filter(|&k| chosen[k]).collect();
+        let hardware = known.iter().map(|&k| &self.profiles[k].hardware).collect();
+        let fitted = Fitted { known, hardware, models, forests: self.table.grow(&chosen)? };
         // Evenly over the fold, in which the profiles of a machine stand together.
         for &held in fold.iter().step_by(fold.len().div_ceil(MOST_JUDGED)) {
-            judged.extend(self.held_out(held, &known, models.as_ref(), &mut notes)?);
-            progress.advance(1);
+            self.held_out(held, &fitted, &mut found)?;
         }
-        Ok((judged, notes))
+        Ok(found)
     }
 
-    fn held_out(
-        &self,
-        held: usize,
-        known: &[usize],
-        models: Option<&(Model, Model)>,
-        notes: &mut Vec<String>,
-    ) -> Result<Vec<Judged>> {
+    /// The measured costs of a profile.
+    fn costs(&self, k: usize) -> &[AlgorithmCost] {
+        self.costs[k].get_or_init(|| measured_costs(&self.profiles[k]).0)
+    }
+
+    fn held_out(&self, held: usize, fitted: &Fitted<'_>, found: &mut Found) -> Result<()> {
         let profile = &self.profiles[held];
-        let training: Vec<&Profile> = known.iter().map(|&k| &self.profiles[k]).collect();
-        let always: Vec<(&Profile, &[f64])> = known.iter().map(|&k| (&self.profiles[k], &self.always[k][..])).collect();
+        let seen: Vec<usize> = fitted.known.iter().step_by(fitted.known.len().div_ceil(MOST_SEEN).max(1)).copied().collect();
+        let training: Vec<&Profile> = seen.iter().map(|&k| &self.profiles[k]).collect();
+        let always: Vec<(&Profile, &[f64])> = seen.iter().map(|&k| (&self.profiles[k], &self.always[k][..])).collect();
         let available = available(profile);
-        let (ridge, physics) = match models {
-            Some((ridge, physics)) => {
-                (predicted(ridge, profile, &available, notes), predicted(physics, profile, &available, notes))
-            }
-            None => (nothing(), nothing()),
+        let mut predicted = |model: fn(&(Model, Model)) -> &Model| {
+            let models = fitted.models.as_ref()?;
+            predict(model(models), profile, &available, &mut found.notes)
         };
-        let default_machine = baselines::default_machine(&training, &available).unwrap_or_else(|why| {
-            notes.push(format!("there is no default machine when {} is left out: {why:#}", profile.file));
-            nothing()
-        });
+        let (ridge, physics) = (predicted(|m| &m.0), predicted(|m| &m.1));
+        let nearest = baselines::nearest(&fitted.hardware, &profile.hardware).map(|k| self.costs(fitted.known[k]));
+        let default_machine = match fitted.known.first() {
+            None => nothing(),
+            Some(&first) => {
+                let own = baselines::default_machine(&self.profiles[first], self.costs(first), &available);
+                own.unwrap_or_else(|why| {
+                    found.notes.push(format!("there is no default machine when {} is left out: {why:#}", profile.file));
+                    nothing()
+                })
+            }
+        };
+        if let Some(costs) = &ridge {
+            found.times.extend(Time::of(profile, costs));
+        }
         let ways = [
-            ("physics + ridge", ridge),
-            ("physics", physics),
-            ("direct regression", direct(&training, &profile.hardware, &available, notes)?),
-            ("direct elastic net", direct_elastic_net(&training, &profile.hardware, &available, notes)?),
-            (SINGLE_BEST, baselines::single_best(&always, &available)),
-            ("frozen constants (64)", baselines::frozen(64, "strips", &available)),
-            ("frozen constants (1000)", baselines::frozen(999, "sweep", &available)),
-            ("default machine", default_machine),
-            ("nearest machine", baselines::nearest_machine(&training, &profile.hardware, &available)),
-            ("full sweep", by_costs(measured_costs(profile).0, &available)),
+            by(OURS, ridge.as_deref(), &available),
+            by("physics", physics.as_deref(), &available),
+            alone("random forest", fitted.forests.chooser(&profile.hardware, &available)),
+            alone("direct regression", direct(&training, &profile.hardware, &available, &mut found.notes)?),
+            alone("direct elastic net", direct_elastic_net(&training, &profile.hardware, &available, &mut found.notes)?),
+            alone(SINGLE_BEST, baselines::single_best(&always, &available)),
+            alone("frozen constants (64)", baselines::frozen(64, "strips", &available)),
+            alone("frozen constants (1000)", baselines::frozen(999, "sweep", &available)),
+            alone("default machine", default_machine),
+            by("nearest machine", nearest, &available),
+            by("full sweep", Some(self.costs(held)), &available),
         ];
-        let regret = |choose: &Chooser<'_>| self.yardsticks[held].regret(profile, choose);
-        Ok(ways.iter().map(|(name, choose)| Judged { name, regret: regret(choose) }).collect())
+        let borders = Borders::new(profile, self.costs(held));
+        found.judged.extend(ways.iter().map(|way| Judged {
+            name: way.name,
+            machine: profile.machine().to_owned(),
+            regret: self.yardsticks[held].regret(profile, &way.choose),
+            crossings: way.costs.map(|costs| borders.errors(costs)),
+        }));
+        Ok(())
     }
 }
 
-/// The choice of a model; nothing is chosen, which counts as the worst, where it predicts none of the algorithms.
-fn predicted<'a>(model: &Model, profile: &Profile, available: &'a [AlgorithmId], notes: &mut Vec<String>) -> Chooser<'a> {
+/// A way that chooses the cheapest by costs; nothing is chosen, which counts as the worst, where there are none.
+fn by<'a>(name: &'static str, costs: Option<&'a [AlgorithmCost]>, available: &'a [AlgorithmId]) -> Way<'a> {
+    let costs = costs.unwrap_or_default();
+    let choose = if costs.is_empty() { nothing() } else { by_costs(costs.to_vec(), available) };
+    Way { name, choose, costs: Some(costs) }
+}
+
+/// A way that predicts no costs.
+fn alone<'a>(name: &'static str, choose: Chooser<'a>) -> Way<'a> {
+    Way { name, choose, costs: None }
+}
+
+/// The costs that a model predicts, and a note where it predicts none.
+fn predict(
+    model: &Model,
+    profile: &Profile,
+    available: &[AlgorithmId],
+    notes: &mut Vec<String>,
+) -> Option<Vec<AlgorithmCost>> {
     let revision = |id: &AlgorithmId| profile.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);
     let wanted: Vec<(AlgorithmId, u32)> = available.iter().map(|id| (id.clone(), revision(id))).collect();
     match model.predict(&profile.hardware, &wanted) {
-        Ok(prediction) => by_costs(prediction.costs, available),
+        Ok(prediction) => Some(prediction.costs),
         Err(why) => {
             notes.push(format!("{} could not be predicted when it was left out: {why}", profile.file));
-            nothing()
+            None
         }
     }
 }
@@ -169,37 +252,6 @@ fn predicted<'a>(model: &Model, profile: &Profile, available: &'a [AlgorithmId],
 /// Chooses nothing, which counts as the worst.
 fn nothing<'a>() -> Chooser<'a> {
     Box::new(|_| None)
-}
-
-fn scores(all: &[Judged]) -> Vec<MethodScore> {
-    let mut names: Vec<&str> = Vec::new();
-    all.iter().for_each(|j| {
-        if !names.contains(&j.name) {
-            names.push(j.name);
-        }
-    });
-    let of = |name: &str| all.iter().filter(|j| j.name == name).map(|j| &j.regret).collect::<Vec<&Regret>>();
-    let mean =
-        |regrets: &[&Regret], of: &dyn Fn(&Regret) -> f64| average(&regrets.iter().map(|r| of(r)).collect::<Vec<_>>());
-    let single = mean(&of(SINGLE_BEST), &|r| r.mean);
-    let score = |name: &str| {
-        let regrets = of(name);
-        let mut means: Vec<f64> = regrets.iter().map(|r| r.mean).collect();
-        let mean_regret = average(&means);
-        means.sort_by(f64::total_cmp);
-        let cells: Vec<f64> = regrets.iter().flat_map(|r| &r.cells).copied().collect();
-        let over = cells.iter().filter(|r| **r > 0.1).count();
-        MethodScore {
-            name: name.to_owned(),
-            mean_regret,
-            p95_regret: means[((means.len() as f64 * 0.95).ceil() as usize).clamp(1, means.len()) - 1],
-            share_over_10_percent: over as f64 / cells.len().max(1) as f64,
-            // The oracle has no regret. Where the single best has none either there is no gap to close.
-            closed_gap: if single > 0.0 { (single - mean_regret) / single } else { 0.0 },
-            mean_regret_in_games: Some(mean(&regrets, &|r| r.as_in_games)),
-        }
-    };
-    names.into_iter().map(score).collect()
 }
 
 #[cfg(test)]
@@ -213,7 +265,9 @@ mod tests {
     }
 
     fn validated(profiles: &[Profile]) -> (Validation, Vec<String>) {
-        validate(profiles, &Designs::new(profiles), &Progress::new(0)).unwrap()
+        let partition = Partition::new(profiles);
+        let found = validate(profiles, &Designs::new(profiles), &partition, &Progress::new(0)).unwrap();
+        (found.validation, found.notes)
     }
 
     fn mean(validation: &Validation, name: &str) -> f64 {
@@ -233,6 +287,32 @@ mod tests {
         }
         for m in &validation.methods {
             assert!(m.mean_regret >= 0.0 && m.p95_regret >= m.mean_regret && m.closed_gap <= 1.0, "{m:?}");
+        }
+    }
+
+    #[test]
+    fn borders_are_judged_where_costs_are_predicted() {
+        let (validation, _) = validated(&profiles(Machine::family()));
+        let of = |name: &str| {
+            let score = validation.methods.iter().find(|m| m.name == name).unwrap();
+            score.crossing_error_octaves.zip(score.crossings_within_half_octave)
+        };
+        let (error, within) = of(OURS).unwrap();
+        assert!(error < 0.5 && within > 0.5, "{validation:#?}");
+        assert!(of("full sweep").unwrap().0 < 0.03 && of("nearest machine").unwrap().0 > error);
+        assert_eq!((of("random forest"), of(SINGLE_BEST)), (None, None));
+    }
+
+    #[test]
+    fn the_score_counts_a_machine_once_however_many_profiles_it_has() {
+        let family = Machine::family();
+        let mut many = vec![family[0].clone(); 5];
+        many.extend_from_slice(&family[1..4]);
+        let (few, many) = (validated(&profiles(family[..4].to_vec())).0, validated(&profiles(many)).0);
+        assert_eq!((many.physical_machines, many.profiles), (4, 8));
+        // The repeated profiles are left out together, so that no fit sees its own machine.
+        for (a, b) in few.methods.iter().zip(&many.methods).filter(|(a, _)| a.name == "full sweep" || a.name == OURS) {
+            assert!((a.mean_regret - b.mean_regret).abs() < 1e-3, "{a:?} {b:?}");
         }
     }
 

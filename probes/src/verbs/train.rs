@@ -5,8 +5,8 @@ use crate::document::{read_report, report_files};
 use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::table::columns;
-use crate::train::{self, Evidence, Learning, Selection, Trained};
-use crate::{card, files, interrupt, output};
+use crate::train::{self, Evidence, Selection, Trained};
+use crate::{card, files, interrupt, output, plot};
 use rayon::prelude::*;
 use sapwise::Model;
 use sapwise::model::Validation;
@@ -23,27 +23,26 @@ struct Answer<'a> {
     /// Name of the model.
     model: &'a str,
     notes: &'a [String],
-    /// Mean regrets by the number of machines; of simulated ones only.
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    simulated_learning: &'a [Learning],
 }
 
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let selection = select(&report_files(&arguments.reports)?, evidence)?;
-    let Trained { model, notes, learning } = train::train(selection, &name)?;
+    let Trained { model, notes, held } = train::train(selection, &name)?;
     let text = sapwise::json::write_model(&model)?;
     files::write_text(&arguments.out, &text)?;
     if let Some(path) = &arguments.card {
-        let page = card::page(&model, &notes, &learning);
-        files::write_text(path, &page)?;
+        files::write_text(path, &card::page(&model, &notes))?;
+    }
+    if let Some(path) = &arguments.plot {
+        files::write_text(path, &plot::training(&held, &model, &command(arguments, path))?)?;
     }
     if arguments.json {
         let Model { validation, name, .. } = &model;
-        output::print_json(&Answer { validation, model: name, notes: &notes, simulated_learning: &learning })?;
+        output::print_json(&Answer { validation, model: name, notes: &notes })?;
     } else {
-        output::print(&summary(&model, &notes, &learning, &arguments.out))?;
+        output::print(&summary(&model, &notes, &arguments.out))?;
     }
     Ok(Outcome::Done)
 }
@@ -76,10 +75,28 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
     Ok(name)
 }
 
-fn summary(model: &Model, notes: &[String], learning: &[Learning], path: &Path) -> String {
+/// The command that makes the picture again, without folders, which are of this machine alone.
+fn command(arguments: &Train, plot: &Path) -> String {
+    let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let reports = match &arguments.reports[..] {
+        [one] => name(one),
+        many => format!("({} reports or folders)", many.len()),
+    };
+    let simulated = if arguments.simulated { " --simulated" } else { "" };
+    format!("sapwise train{simulated} {reports} --out {} --plot {}", name(&arguments.out), name(plot))
+}
+
+/// What the columns in the summary mean, in few words.
+const COLUMNS: &str = "Regret is time over the best time, less one. In games: each number of objects as often as games are assumed to \
+have it (log-normal around\n800). Borders off by: octaves between measured and predicted borders, the median. --card explains all.\n";
+
+fn summary(model: &Model, notes: &[String], path: &Path) -> String {
     let mut text = card::scores(&model.validation, columns);
-    if !learning.is_empty() {
-        text.push_str(&format!("\n{}", card::course(learning, columns)));
+    if !model.validation.methods.is_empty() {
+        text.push_str(&format!("\n{COLUMNS}"));
+    }
+    if !model.validation.learning.is_empty() {
+        text.push_str(&format!("\n{}", card::course(&model.validation.learning, model.is_simulated(), columns)));
     }
     for note in notes {
         text.push_str(&format!("note: {note}\n"));

@@ -89,13 +89,14 @@ fn model(methods: Vec<MethodModel>, folds: Vec<Fold>, machines: usize) -> Model 
         schema: ModelSchema,
         name: "test".to_owned(),
         trained_on: Vec::new(),
+        trained_on_counts: Vec::new(),
         ranges: vec![range],
         methods,
         validation: Validation {
             held_out: "physical machine".to_owned(),
             physical_machines: machines,
             profiles: machines,
-            methods: Vec::new(),
+            ..Validation::default()
         },
         clouds: Vec::new(),
         folds,

@@ -1,0 +1,180 @@
+//! A random forest for the time of each method: what is left to a baseline that knows no physics.
+
+use super::fit::thinned;
+use super::profile::Profile;
+use super::rows::{Row, rows};
+use super::yardstick::Chooser;
+use super::{GPU_PARAMETERS, PARAMETERS};
+use anyhow::{Context, Result};
+use sapwise::{AlgorithmId, Backend, BackendClass, Hardware, Load};
+use smartcore::ensemble::random_forest_regressor::{RandomForestRegressor, RandomForestRegressorParameters};
+use smartcore::linalg::basic::matrix::DenseMatrix;
+use std::collections::BTreeMap;
+
+/// A method on one class of processor.
+type Key = (BackendClass, String);
+
+/// Trees of a forest.
+const TREES: usize = 30;
+/// Rows that a forest is grown from, at most.
+const MOST_ROWS: usize = 1000;
+/// Rows that are kept of a method, about, for all forests of it.
+const ROWS_OF_ALL: usize = 4 * MOST_ROWS;
+/// Rows in a leaf.
+const LEAF: usize = 2;
+/// Seed of the trees.
+const SEED: u64 = 1;
+
+/// The rows of every method, worked out once for all forests.
+pub(super) struct Table(BTreeMap<Key, Vec<Example>>);
+
+struct Example {
+    profile: usize,
+    features: Vec<f64>,
+    ln_ns: f64,
+}
+
+impl Table {
+    /// A bound of an algorithm that had left the race counts as a time: a tree does not extrapolate, and without it whoever left
+    /// at a thousand objects would be predicted to take no longer for a million.
+    pub(super) fn new(profiles: &[Profile]) -> Self {
+        let most = (ROWS_OF_ALL / profiles.len().max(1)).max(2);
+        let mut table: BTreeMap<Key, Vec<Example>> = BTreeMap::new();
+        for (k, profile) in profiles.iter().enumerate() {
+            let mut own: BTreeMap<Key, Vec<Row>> = BTreeMap::new();
+            for row in rows(profile, k) {
+                own.entry(key(profile.id(row.algorithm))).or_default().push(row);
+            }
+            for (key, rows) in own {
+                let example = |r: Row| Example {
+                    profile: k,
+                    features: features(&profile.hardware, profile.id(r.algorithm).backend(), &r.load),
+                    ln_ns: r.ns.ln(),
+                };
+                table.entry(key).or_default().extend(thinned(rows, most, k).into_iter().map(example));
+            }
+        }
+        Self(table)
+    }
+
+    /// The forests of the chosen profiles.
+    ///
+    /// # Errors
+    /// When smartcore refuses a fit.
+    pub(super) fn grow(&self, chosen: &[bool]) -> Result<Forests> {
+        let mut forests = BTreeMap::new();
+        for (key, examples) in &self.0 {
+            let known: Vec<&Example> = examples.iter().filter(|e| chosen[e.profile]).collect();
+            let known: Vec<&Example> = known.iter().step_by(known.len().div_ceil(MOST_ROWS).max(1)).copied().collect();
+            if known.len() > LEAF {
+                forests.insert(key.clone(), Forest::grow(&known)?);
+            }
+        }
+        Ok(Forests(forests))
+    }
+}
+
+/// A forest for each method that was timed in the training.
+pub(super) struct Forests(BTreeMap<Key, Forest>);
+
+impl Forests {
+    /// The algorithm with the least predicted time.
+    pub(super) fn chooser<'a>(&'a self, hardware: &'a Hardware, available: &'a [AlgorithmId]) -> Chooser<'a> {
+        Box::new(move |load| {
+            let ln_ns = |id: &AlgorithmId| self.0.get(&key(id))?.ln_ns(&features(hardware, id.backend(), load));
+            let costs = available.iter().filter_map(|id| Some((id, ln_ns(id)?)));
+            costs.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(id, _)| id.clone())
+        })
+    }
+}
+
+struct Forest(RandomForestRegressor<f64, f64, DenseMatrix<f64>, Vec<f64>>);
+
+impl Forest {
+    fn grow(examples: &[&Example]) -> Result<Self> {
+        let columns = examples.first().map_or(0, |e| e.features.len());
+        let values = examples.iter().flat_map(|e| e.features.iter().copied()).collect();
+        let x = DenseMatrix::new(examples.len(), columns, values, false).context("the rows of a random forest differ")?;
+        let y: Vec<f64> = examples.iter().map(|e| e.ln_ns).collect();
+        let parameters = RandomForestRegressorParameters::default()
+            .with_n_trees(TREES)
+            .with_m(columns.div_ceil(3))
+            .with_min_samples_leaf(LEAF)
+            .with_seed(SEED);
+        Ok(Self(RandomForestRegressor::fit(&x, &y, parameters).context("a random forest could not be grown")?))
+    }
+
+    fn ln_ns(&self, features: &[f64]) -> Option<f64> {
+        let x = DenseMatrix::new(1, features.len(), features.to_vec(), false).ok()?;
+        self.0.predict(&x).ok()?.first().copied()
+    }
+}
+
+fn key(id: &AlgorithmId) -> Key {
+    (id.backend().class(), id.method().to_owned())
+}
+
+/// What a tree may split by: the load, the number of threads or GPUs, and the logarithms of the parameters that machines are compared
+/// by, on a GPU those of the first one that takes part. A parameter that is missing is zero, which parts it from those that are there.
+fn features(hardware: &Hardware, backend: &Backend, load: &Load) -> Vec<f64> {
+    let of_load = [
+        f64::from(load.objects).ln_1p(),
+        load.axis_candidates.ln_1p(),
+        load.strip_candidates.ln_1p(),
+        load.pairs.ln_1p(),
+        load.moved,
+        f64::from(backend.width()).ln(),
+    ];
+    let logarithm = |value: Option<f64>| value.filter(|v| *v > 0.0).map_or(0.0, f64::ln);
+    let of_machine = PARAMETERS.iter().map(|name| logarithm(hardware.value(name)));
+    let of_gpu = match backend {
+        Backend::Gpu(indices) => {
+            let gpu = indices.first().and_then(|k| hardware.gpu(*k));
+            GPU_PARAMETERS.iter().map(|name| logarithm(gpu.and_then(|g| g.value(name)))).collect()
+        }
+        _ => Vec::new(),
+    };
+    of_load.into_iter().chain(of_machine).chain(of_gpu).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::baselines::available;
+    use super::super::synthetic::Machine;
+    use super::super::yardstick::Yardstick;
+    use super::*;
+
+    fn profiles() -> Vec<Profile> {
+        Machine::family_with_gpus().into_iter().map(|m| Profile::of(m.name, &m.report())).collect()
+    }
+
+    /// Mean regret on the last machine of forests that were grown from `chosen`.
+    fn regret(profiles: &[Profile], chosen: &[bool]) -> f64 {
+        let forests = Table::new(profiles).grow(chosen).unwrap();
+        let held = profiles.last().unwrap();
+        let available = available(held);
+        Yardstick::new(held).regret(held, &forests.chooser(&held.hardware, &available)).mean
+    }
+
+    #[test]
+    fn a_forest_that_saw_the_machine_chooses_well_and_one_that_did_not_chooses_worse_and_always_alike() {
+        let all = profiles();
+        let mut others = vec![true; all.len()];
+        others[all.len() - 1] = false;
+        let (seen, unseen) = (regret(&all, &vec![true; all.len()]), regret(&all, &others));
+        assert!(seen < unseen && unseen < 1.0, "{seen} {unseen}");
+        assert_eq!(unseen.to_bits(), regret(&all, &others).to_bits());
+    }
+
+    #[test]
+    fn whoever_left_the_race_is_not_chosen_beyond() {
+        let all = profiles();
+        let forests = Table::new(&all).grow(&vec![true; all.len()]).unwrap();
+        let available = available(&all[2]);
+        let choose = forests.chooser(&all[2].hardware, &available);
+        for spot in all[2].points.iter().filter(|s| s.load.objects > 100_000) {
+            assert_ne!(choose(&spot.load).unwrap().method(), "brute", "{:?}", spot.load);
+        }
+        assert!(Forests(BTreeMap::new()).chooser(&all[2].hardware, &available)(&all[2].points[0].load).is_none());
+    }
+}

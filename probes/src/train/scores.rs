@@ -1,0 +1,116 @@
+//! From regrets on held-out profiles to the scores of the ways to choose.
+
+use super::validate::SINGLE_BEST;
+use super::yardstick::Regret;
+use sapwise::measure::statistics::median;
+use sapwise::model::MethodScore;
+use std::collections::BTreeMap;
+
+/// A border that is predicted within so many octaves is near: a factor of 1.4.
+const NEAR_OCTAVES: f64 = 0.5;
+
+/// How one way to choose did on one held-out profile.
+pub(super) struct Judged {
+    pub(super) name: &'static str,
+    /// The physical machine.
+    pub(super) machine: String,
+    pub(super) regret: Regret,
+    /// Octaves between measured and predicted borders; `None` of a way that predicts no costs.
+    pub(super) crossings: Option<Vec<f64>>,
+}
+
+/// The scores of every way. Every physical machine counts the same, its profiles sharing its weight.
+pub(super) fn scores(all: &[Judged]) -> Vec<MethodScore> {
+    let mut score: Vec<MethodScore> = names(all).into_iter().map(|name| score(all, name)).collect();
+    let single = score.iter().find(|s| s.name == SINGLE_BEST).map_or(0.0, |s| s.mean_regret);
+    // The oracle has no regret. Where the single best has none either there is no gap to close.
+    let gap = |regret: f64| if single > 0.0 { (single - regret) / single } else { 0.0 };
+    score.iter_mut().for_each(|s| s.closed_gap = gap(s.mean_regret));
+    score
+}
+
+/// The names of the ways, in the order of the first profile.
+pub(super) fn names(all: &[Judged]) -> Vec<&'static str> {
+    let mut names: Vec<&str> = Vec::new();
+    all.iter().for_each(|j| {
+        if !names.contains(&j.name) {
+            names.push(j.name);
+        }
+    });
+    names
+}
+
+fn score(all: &[Judged], name: &str) -> MethodScore {
+    let own: Vec<&Judged> = all.iter().filter(|j| j.name == name).collect();
+    let mut profiles: BTreeMap<&str, f64> = BTreeMap::new();
+    own.iter().for_each(|j| *profiles.entry(&j.machine).or_default() += 1.0);
+    let weighted = |of: &dyn Fn(&Regret) -> f64| -> Vec<(f64, f64)> {
+        own.iter().map(|j| (of(&j.regret), 1.0 / profiles[&j.machine[..]])).collect()
+    };
+    let (means, in_games) = (weighted(&|r| r.mean), weighted(&|r| r.as_in_games));
+    let over = |r: &Regret| r.cells.iter().filter(|c| **c > 0.1).count() as f64 / r.cells.len().max(1) as f64;
+    let crossings: Option<Vec<f64>> =
+        own.iter().map(|j| j.crossings.as_deref()).collect::<Option<Vec<_>>>().map(|c| c.concat());
+    let near = |c: &Vec<f64>| c.iter().filter(|e| **e <= NEAR_OCTAVES).count() as f64 / c.len() as f64;
+    MethodScore {
+        name: name.to_owned(),
+        mean_regret: mean(&means),
+        p95_regret: percentile_95(means),
+        share_over_10_percent: mean(&weighted(&over)),
+        closed_gap: 0.0,
+        mean_regret_in_games: Some(mean(&in_games)),
+        p95_regret_in_games: Some(percentile_95(in_games)),
+        crossing_error_octaves: crossings.as_deref().and_then(median),
+        crossings_within_half_octave: crossings.as_ref().filter(|c| !c.is_empty()).map(near),
+    }
+}
+
+/// Mean of values with their weights.
+fn mean(values: &[(f64, f64)]) -> f64 {
+    let total: f64 = values.iter().map(|v| v.1).sum();
+    values.iter().map(|v| v.0 * v.1).sum::<f64>() / total
+}
+
+/// The least value that 95 % of the weight do not exceed.
+fn percentile_95(mut values: Vec<(f64, f64)>) -> f64 {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let needed = 0.95 * values.iter().map(|v| v.1).sum::<f64>() - 1e-9;
+    let mut passed = 0.0;
+    let reached = values.iter().find(|v| {
+        passed += v.1;
+        passed >= needed
+    });
+    reached.map_or(0.0, |v| v.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(name: &'static str, machine: &str, mean: f64) -> Judged {
+        let regret = Regret { cells: vec![0.0, 2.0 * mean], mean, as_in_games: mean / 2.0 };
+        Judged { name, machine: machine.to_owned(), regret, crossings: (name == "ours").then(|| vec![mean, 1.0]) }
+    }
+
+    #[test]
+    fn machines_share_their_weight_among_their_profiles() {
+        let mut all = vec![judged("ours", "b", 0.3), judged(SINGLE_BEST, "b", 1.0), judged(SINGLE_BEST, "a", 1.0)];
+        // Nine profiles without regret and one with little are one machine.
+        all.extend((0..9).map(|_| judged("ours", "a", 0.0)));
+        all.push(judged("ours", "a", 0.1));
+        let scores = scores(&all);
+        let ours = scores.iter().find(|s| s.name == "ours").unwrap();
+        assert!((ours.mean_regret - 0.155).abs() < 1e-12 && ours.p95_regret == 0.3, "{ours:?}");
+        assert!((ours.closed_gap - 0.845).abs() < 1e-12 && (ours.share_over_10_percent - 0.275).abs() < 1e-12, "{ours:?}");
+        assert_eq!((ours.p95_regret_in_games, ours.mean_regret_in_games.map(|r| r * 2.0)), (Some(0.15), Some(0.155)));
+        // Eleven borders are one octave off, of the others one is 0.3, one 0.1 and nine are exact.
+        assert_eq!((ours.crossing_error_octaves, ours.crossings_within_half_octave), (Some(0.65), Some(0.5)));
+        assert_eq!(scores.iter().find(|s| s.name == SINGLE_BEST).unwrap().crossing_error_octaves, None);
+    }
+
+    #[test]
+    fn the_percentile_of_twenty_is_the_nineteenth() {
+        let of = |n: usize| percentile_95((1..=n).rev().map(|k| (k as f64, 1.0)).collect());
+        assert_eq!((of(20), of(7), of(1)), (19.0, 7.0, 1.0));
+    }
+}
