@@ -84,6 +84,8 @@ fn times(area: &Area<'_>, held: &Held) -> anyhow::Result<()> {
         .x_desc("measured time of a frame (us)")
         .y_desc("predicted time of a frame (us)")
         .light_line_style(WHITE)
+        .axis_desc_style(("sans-serif", 15))
+        .label_style(("sans-serif", 13))
         .x_label_formatter(&|us| number(*us))
         .y_label_formatter(&|us| number(*us))
         .draw()?;
@@ -125,7 +127,8 @@ fn regrets(area: &Area<'_>, held: &Held) -> anyhow::Result<()> {
             Some((name, k, shape, regrets.into_iter().map(seen).collect()))
         })
         .collect();
-    let high = ways.iter().flat_map(|w| &w.3).copied().fold(1.0, f64::max) * 1.5;
+    // Room for the names above the highest curve.
+    let high = ways.iter().flat_map(|w| &w.3).copied().fold(1.0, f64::max) * 12.0;
     let unit = if held.by_machine { "physical machine" } else { "profile of the one machine" };
     let mut chart = ChartBuilder::on(area)
         .caption(format!("Regret on each held-out {unit}"), ("sans-serif", 18))
@@ -138,6 +141,8 @@ fn regrets(area: &Area<'_>, held: &Held) -> anyhow::Result<()> {
         .x_desc(format!("share of the held-out {unit}s with no more regret (%)"))
         .y_desc(format!("mean regret (%, {LEAST_PERCENT} or less at the bottom)"))
         .light_line_style(WHITE)
+        .axis_desc_style(("sans-serif", 15))
+        .label_style(("sans-serif", 13))
         .x_label_formatter(&|share| format!("{share:.0}"))
         .y_label_formatter(&|percent| number(*percent))
         .draw()?;
@@ -182,8 +187,10 @@ fn course(area: &Area<'_>, learning: &[Learning]) -> anyhow::Result<()> {
         .x_desc("physical machines in the training (beside each other for legibility)")
         .y_desc("regret (%), bars: 90 % of trainings")
         .light_line_style(WHITE)
+        .axis_desc_style(("sans-serif", 15))
+        .label_style(("sans-serif", 13))
         .disable_x_mesh()
-        .x_labels(0)
+        .x_label_formatter(&|_| String::new())
         .y_label_formatter(&|percent| number(*percent))
         .draw()?;
     for &count in &counts {
