@@ -28,28 +28,30 @@ const WAYS: [(&str, usize, Mark); 6] = [
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Predicted against measured times of what was left out, the regret on each held-out machine, and the regret by the number of machines,
-/// with the command that made it below.
+/// with the command that made it below. With fewer than three physical machines there is no number to learn from, and that panel is
+/// left away.
 ///
 /// # Errors
 /// When the picture can't be drawn.
 pub(crate) fn training(held: &Held, model: &Model, command: &str) -> anyhow::Result<String> {
+    let learning = &model.validation.learning;
+    let size = if learning.is_empty() { (SIZE.0, UPPER + CAPTION) } else { SIZE };
     let mut svg = String::new();
     {
-        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         root.fill(&WHITE)?;
-        let (panels, line) = root.split_vertically(SIZE.1 - CAPTION);
+        let (panels, line) = root.split_vertically(size.1 - CAPTION);
         let (upper, lower) = panels.split_vertically(UPPER);
         let (left, right) = upper.split_horizontally(SIZE.0 / 2);
         if held.times.is_empty() {
-            told(&left, "Nothing was left out: there is one report only.")?;
+            let text = "Nothing was left out: there is one report only.";
+            left.draw(&Text::new(text, (40, 60), ("sans-serif", 17).into_font()))?;
         } else {
             times(&left, held)?;
             regrets(&right, held)?;
         }
-        if model.validation.learning.is_empty() {
-            told(&lower, "Fewer than three physical machines: nothing to learn from their number.")?;
-        } else {
-            course(&lower, &model.validation.learning)?;
+        if !learning.is_empty() {
+            course(&lower, learning)?;
         }
         let simulated = if model.is_simulated() { "Simulated machines, no evidence of accuracy. " } else { "" };
         let machines = model.validation.physical_machines;
@@ -59,12 +61,6 @@ pub(crate) fn training(held: &Held, model: &Model, command: &str) -> anyhow::Res
         root.present()?;
     }
     Ok(svg)
-}
-
-/// A sentence where there is nothing to draw.
-fn told(area: &Area<'_>, text: &str) -> anyhow::Result<()> {
-    area.draw(&Text::new(text.to_owned(), (40, 60), ("sans-serif", 17).into_font()))?;
-    Ok(())
 }
 
 /// Each time as a point, by method; the black line is where the prediction is right, the grey ones a factor of two beside it.
@@ -84,6 +80,8 @@ fn times(area: &Area<'_>, held: &Held) -> anyhow::Result<()> {
         .x_desc("measured time of a frame (us)")
         .y_desc("predicted time of a frame (us)")
         .light_line_style(WHITE)
+        .axis_desc_style(("sans-serif", 15))
+        .label_style(("sans-serif", 13))
         .x_label_formatter(&|us| number(*us))
         .y_label_formatter(&|us| number(*us))
         .draw()?;
@@ -125,8 +123,9 @@ fn regrets(area: &Area<'_>, held: &Held) -> anyhow::Result<()> {
             Some((name, k, shape, regrets.into_iter().map(seen).collect()))
         })
         .collect();
-    let high = ways.iter().flat_map(|w| &w.3).copied().fold(1.0, f64::max) * 1.5;
-    let unit = if held.by_machine { "physical machine" } else { "profile of the one machine" };
+    // Room for the names above the highest curve.
+    let high = ways.iter().flat_map(|w| &w.3).copied().fold(1.0, f64::max) * 12.0;
+    let unit = if held.by_machine { "physical machine" } else { "profile" };
     let mut chart = ChartBuilder::on(area)
         .caption(format!("Regret on each held-out {unit}"), ("sans-serif", 18))
         .margin(10)
@@ -138,6 +137,8 @@ fn regrets(area: &Area<'_>, held: &Held) -> anyhow::Result<()> {
         .x_desc(format!("share of the held-out {unit}s with no more regret (%)"))
         .y_desc(format!("mean regret (%, {LEAST_PERCENT} or less at the bottom)"))
         .light_line_style(WHITE)
+        .axis_desc_style(("sans-serif", 15))
+        .label_style(("sans-serif", 13))
         .x_label_formatter(&|share| format!("{share:.0}"))
         .y_label_formatter(&|percent| number(*percent))
         .draw()?;
@@ -182,8 +183,10 @@ fn course(area: &Area<'_>, learning: &[Learning]) -> anyhow::Result<()> {
         .x_desc("physical machines in the training (beside each other for legibility)")
         .y_desc("regret (%), bars: 90 % of trainings")
         .light_line_style(WHITE)
+        .axis_desc_style(("sans-serif", 15))
+        .label_style(("sans-serif", 13))
         .disable_x_mesh()
-        .x_labels(0)
+        .x_label_formatter(&|_| String::new())
         .y_label_formatter(&|percent| number(*percent))
         .draw()?;
     for &count in &counts {
@@ -259,6 +262,6 @@ mod tests {
     #[test]
     fn what_is_missing_is_told() {
         let svg = drawn(&Held::default(), Vec::new());
-        assert!(svg.contains("there is one report only") && svg.contains("Fewer than three physical machines"), "{svg}");
+        assert!(svg.contains("there is one report only") && !svg.contains("machines in the training"), "{svg}");
     }
 }

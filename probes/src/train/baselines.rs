@@ -97,14 +97,23 @@ fn stand_in(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> 
     closest(id, available).or_else(of_method)
 }
 
-/// Position of the nearest hardware, which the nearest machine is, by the logarithms of the parameters that both have, over their standard deviation.
-pub(crate) fn nearest(known: &[&Hardware], hardware: &Hardware) -> Option<usize> {
-    let logarithm = |h: &Hardware, name: &str| figure(h, name).filter(|v| *v > 0.0).map(f64::ln);
+/// What machines are compared by: logarithms of their parameters, worked out once since each is compared with all others.
+#[derive(Debug, Clone)]
+pub(super) struct Likeness(Vec<Option<f64>>);
+
+impl Likeness {
+    pub(super) fn new(hardware: &Hardware) -> Self {
+        let of_gpu = GPU_PARAMETERS.map(|name| format!("{GPU_PREFIX}{name}"));
+        let names = PARAMETERS.into_iter().chain(of_gpu.iter().map(String::as_str));
+        Self(names.map(|name| figure(hardware, name).filter(|v| *v > 0.0).map(f64::ln)).collect())
+    }
+}
+
+/// Position of the nearest machine, by the logarithms of the parameters that both have, over their standard deviation.
+pub(super) fn nearest(known: &[&Likeness], own: &Likeness) -> Option<usize> {
     let mut distances = vec![0.0; known.len()];
-    let of_gpu = GPU_PARAMETERS.map(|name| format!("{GPU_PREFIX}{name}"));
-    for name in PARAMETERS.into_iter().chain(of_gpu.iter().map(String::as_str)) {
-        let Some(own) = logarithm(hardware, name) else { continue };
-        let values: Vec<Option<f64>> = known.iter().map(|h| logarithm(h, name)).collect();
+    for (k, own) in own.0.iter().enumerate().filter_map(|(k, own)| Some((k, (*own)?))) {
+        let values: Vec<Option<f64>> = known.iter().map(|other| other.0[k]).collect();
         let all: Vec<f64> = values.iter().flatten().copied().chain([own]).collect();
         let mean = average(&all);
         let variance = average(&all.iter().map(|v| (v - mean).powi(2)).collect::<Vec<f64>>());
@@ -140,10 +149,10 @@ mod tests {
 
     #[test]
     fn the_nearest_machine_is_itself_and_then_its_like() {
-        let family: Vec<Hardware> = Machine::family().iter().map(Machine::hardware).collect();
-        let known: Vec<&Hardware> = family.iter().collect();
-        for (k, hardware) in family.iter().enumerate() {
-            assert_eq!(nearest(&known, hardware), Some(k));
+        let family: Vec<Likeness> = Machine::family().iter().map(|m| Likeness::new(&m.hardware())).collect();
+        let known: Vec<&Likeness> = family.iter().collect();
+        for (k, own) in family.iter().enumerate() {
+            assert_eq!(nearest(&known, own), Some(k));
         }
         // Four cores and eight lanes are nearer to four cores and four lanes than to sixteen cores.
         assert_eq!(nearest(&[known[4], known[1]], known[6]), Some(1));

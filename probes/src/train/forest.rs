@@ -5,6 +5,7 @@ use super::profile::Profile;
 use super::rows::{Row, rows};
 use super::yardstick::Chooser;
 use super::{GPU_PARAMETERS, PARAMETERS};
+use crate::turns::Turns;
 use anyhow::{Context, Result};
 use sapwise::{AlgorithmId, Backend, BackendClass, Hardware, Load};
 use smartcore::ensemble::random_forest_regressor::{RandomForestRegressor, RandomForestRegressorParameters};
@@ -15,11 +16,13 @@ use std::collections::BTreeMap;
 type Key = (BackendClass, String);
 
 /// Trees of a forest.
-const TREES: usize = 30;
+const TREES: usize = 25;
 /// Rows that a forest is grown from, at most.
-const MOST_ROWS: usize = 1000;
-/// Rows that are kept of a method, about, for all forests of it.
-const ROWS_OF_ALL: usize = 4 * MOST_ROWS;
+const MOST_ROWS: usize = 1500;
+/// Profiles that forests are grown from, about, spread over all, and rows that each gives at least for a method: of a profile with a
+/// handful of rows no tree learns how time grows with the load.
+const MOST_PROFILES: usize = 400;
+const FEWEST_OF_PROFILE: usize = 15;
 /// Rows in a leaf.
 const LEAF: usize = 2;
 /// Seed of the trees.
@@ -38,9 +41,10 @@ impl Table {
     /// A bound of an algorithm that had left the race counts as a time: a tree does not extrapolate, and without it whoever left
     /// at a thousand objects would be predicted to take no longer for a million.
     pub(super) fn new(profiles: &[Profile]) -> Self {
-        let most = (ROWS_OF_ALL / profiles.len().max(1)).max(2);
+        let step = profiles.len().div_ceil(MOST_PROFILES).max(1);
+        let most = (MOST_ROWS / profiles.len().div_ceil(step).max(1)).max(FEWEST_OF_PROFILE);
         let mut table: BTreeMap<Key, Vec<Example>> = BTreeMap::new();
-        for (k, profile) in profiles.iter().enumerate() {
+        for (k, profile) in profiles.iter().enumerate().step_by(step) {
             let mut own: BTreeMap<Key, Vec<Row>> = BTreeMap::new();
             for row in rows(profile, k) {
                 own.entry(key(profile.id(row.algorithm))).or_default().push(row);
@@ -65,7 +69,9 @@ impl Table {
         let mut forests = BTreeMap::new();
         for (key, examples) in &self.0 {
             let known: Vec<&Example> = examples.iter().filter(|e| chosen[e.profile]).collect();
-            let known: Vec<&Example> = known.iter().step_by(known.len().div_ceil(MOST_ROWS).max(1)).copied().collect();
+            // At random: with even steps every profile would give rows of the same few sizes.
+            let order = Turns::new(SEED).order(known.len());
+            let known: Vec<&Example> = order.into_iter().take(MOST_ROWS).map(|k| known[k]).collect();
             if known.len() > LEAF {
                 forests.insert(key.clone(), Forest::grow(&known)?);
             }
@@ -157,12 +163,12 @@ mod tests {
     }
 
     #[test]
-    fn a_forest_that_saw_the_machine_chooses_well_and_one_that_did_not_chooses_worse_and_always_alike() {
+    fn forests_choose_well_on_a_machine_that_they_saw_and_on_another_and_always_alike() {
         let all = profiles();
         let mut others = vec![true; all.len()];
         others[all.len() - 1] = false;
         let (seen, unseen) = (regret(&all, &vec![true; all.len()]), regret(&all, &others));
-        assert!(seen < unseen && unseen < 1.0, "{seen} {unseen}");
+        assert!(seen < 0.1 && unseen < 0.5, "{seen} {unseen}");
         assert_eq!(unseen.to_bits(), regret(&all, &others).to_bits());
     }
 

@@ -21,7 +21,7 @@ pub(crate) struct Profile {
     pub(crate) algorithms: Vec<Timed>,
     /// Where they were timed, in the order of the report.
     pub(crate) points: Vec<Spot>,
-    /// Where two algorithms cross in the scenario of the slice.
+    /// Where two algorithms cross in the scenario of the slice; empty where nobody asked for it.
     pub(crate) crossings: Vec<Crossing>,
 }
 
@@ -44,6 +44,11 @@ pub(super) const FEWEST_SAMPLES: usize = 3;
 impl Profile {
     /// Keeps of a report what is sound. Timings with an error or too few samples go, and with them points that are empty then.
     pub(crate) fn of(file: &str, report: &Report) -> Self {
+        Self { crossings: crossings(report), ..Self::without_crossings(file, report) }
+    }
+
+    /// The same without crossings, which take longer to find than all the rest.
+    pub(crate) fn without_crossings(file: &str, report: &Report) -> Self {
         let mut hardware = report.hardware.clone();
         let of_gpus = hardware.gpus.iter_mut().flat_map(|g| &mut g.parameters);
         hardware.parameters.iter_mut().chain(of_gpus).for_each(|p| p.raw = Vec::new());
@@ -54,7 +59,7 @@ impl Profile {
             hardware: as_at_the_points(hardware, report),
             algorithms: report.algorithms.clone(),
             points: points.filter(|s| !s.medians.is_empty() && s.load.objects > 0).collect(),
-            crossings: crossings(report),
+            crossings: Vec::new(),
         }
     }
 

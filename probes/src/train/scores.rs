@@ -102,9 +102,10 @@ mod tests {
         let ours = scores.iter().find(|s| s.name == "ours").unwrap();
         assert!((ours.mean_regret - 0.155).abs() < 1e-12 && ours.p95_regret == 0.3, "{ours:?}");
         assert!((ours.closed_gap - 0.845).abs() < 1e-12 && (ours.share_over_10_percent - 0.275).abs() < 1e-12, "{ours:?}");
-        assert_eq!((ours.p95_regret_in_games, ours.mean_regret_in_games.map(|r| r * 2.0)), (Some(0.15), Some(0.155)));
+        assert!((ours.mean_regret_in_games.unwrap() - 0.0775).abs() < 1e-12 && ours.p95_regret_in_games == Some(0.15));
         // Eleven borders are one octave off, of the others one is 0.3, one 0.1 and nine are exact.
-        assert_eq!((ours.crossing_error_octaves, ours.crossings_within_half_octave), (Some(0.65), Some(0.5)));
+        assert!((ours.crossing_error_octaves.unwrap() - 0.65).abs() < 1e-12);
+        assert_eq!(ours.crossings_within_half_octave, Some(0.5));
         assert_eq!(scores.iter().find(|s| s.name == SINGLE_BEST).unwrap().crossing_error_octaves, None);
     }
 

@@ -9,10 +9,15 @@ use std::collections::{BTreeMap, HashMap};
 /// What shares a revision: a method on one class of processor.
 type Key = (BackendClass, String);
 
+/// Reports that crossings are looked for in, about: a regression on a handful of parameters needs no more.
+const MOST_CROSSED: usize = 600;
+
 /// The reports that can be trained on, gathered one by one so that none has to stay in memory.
 #[derive(Debug)]
 pub(crate) struct Selection {
     evidence: Evidence,
+    /// Crossings are looked for in each report whose place is a multiple of this.
+    crossed: usize,
     profiles: Vec<Profile>,
     /// File of each fingerprint.
     known: HashMap<u64, String>,
@@ -20,15 +25,22 @@ pub(crate) struct Selection {
 }
 
 impl Selection {
-    pub(crate) fn new(evidence: Evidence) -> Self {
-        Self { evidence, profiles: Vec::new(), known: HashMap::new(), notes: Vec::new() }
+    /// For about so many reports.
+    pub(crate) fn new(evidence: Evidence, reports: usize) -> Self {
+        Self {
+            evidence,
+            crossed: reports.div_ceil(MOST_CROSSED).max(1),
+            profiles: Vec::new(),
+            known: HashMap::new(),
+            notes: Vec::new(),
+        }
     }
 
     /// All of these reports.
     pub(crate) fn of(reports: &[(String, Report)], evidence: Evidence) -> Self {
-        let mut selection = Self::new(evidence);
-        for (file, report) in reports {
-            let reduced = selection.reduce(file, report);
+        let mut selection = Self::new(evidence, reports.len());
+        for (place, (file, report)) in reports.iter().enumerate() {
+            let reduced = selection.reduce(place, file, report);
             selection.add(reduced);
         }
         selection
@@ -39,11 +51,12 @@ impl Selection {
         self.evidence
     }
 
-    /// What of a report can be trained on, or why nothing can. Apart from [`Selection::add`] because it is work that threads can share.
-    pub(crate) fn reduce(&self, file: &str, report: &Report) -> Result<Profile, String> {
+    /// What of the report at a place among all can be trained on, or why nothing can. Apart from [`Selection::add`] because it is work that threads can share.
+    pub(crate) fn reduce(&self, place: usize, file: &str, report: &Report) -> Result<Profile, String> {
         match refusal(report, self.evidence) {
             Some(why) => Err(format!("{file} is left out: it {why}")),
-            None => Ok(Profile::of(file, report)),
+            None if place.is_multiple_of(self.crossed) => Ok(Profile::of(file, report)),
+            None => Ok(Profile::without_crossings(file, report)),
         }
     }
 

@@ -51,12 +51,13 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
 fn select(files: &[PathBuf], evidence: Evidence) -> anyhow::Result<Selection> {
     let progress = Progress::new(files.len() as u64);
     progress.message("reading");
-    let mut selection = Selection::new(evidence);
-    for some in files.chunks(AT_A_TIME) {
+    let mut selection = Selection::new(evidence, files.len());
+    let placed: Vec<(usize, &PathBuf)> = files.iter().enumerate().collect();
+    for some in placed.chunks(AT_A_TIME) {
         interrupt::check()?;
-        let read = |file: &PathBuf| {
+        let read = |&(place, file): &(usize, &PathBuf)| {
             let (name, report) = read_report(file)?;
-            Ok(selection.reduce(&name, &report))
+            Ok(selection.reduce(place, &name, &report))
         };
         let reduced: Vec<_> = some.par_iter().map(read).collect::<anyhow::Result<_>>()?;
         reduced.into_iter().for_each(|r| selection.add(r));
