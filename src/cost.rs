@@ -135,7 +135,7 @@ impl CostCurve {
         if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects).exp() }
     }
 
-    fn ln_correction(&self, x: f64) -> f64 {
+    pub(crate) fn ln_correction(&self, x: f64) -> f64 {
         let after = self.correction.partition_point(|k| k.log2_objects <= x);
         match (after.checked_sub(1).map(|k| self.correction[k]), self.correction.get(after)) {
             (Some(a), Some(b)) => {

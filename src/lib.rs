@@ -47,6 +47,7 @@ mod load;
 pub mod measure;
 pub mod model;
 mod pairs;
+pub mod posterior;
 mod registry;
 pub mod report;
 mod sample;
@@ -71,6 +72,7 @@ pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, M
 pub use load::Load;
 pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};
+pub use posterior::{Posterior, Prior};
 pub use registry::{Entry, Registry, usable_cores};
 pub use report::Report;
 pub use scenario::{Scenario, Scene};

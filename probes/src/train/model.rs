@@ -24,6 +24,7 @@ pub(crate) fn model(profiles: &[&Profile], name: &str) -> Result<(Model, Vec<Str
         trained_on: profiles.iter().map(training).collect(),
         ranges: ranges(profiles),
         methods,
+        prior: None,
         validation: Validation { held_out: String::new(), physical_machines: 0, profiles: 0, methods: Vec::new() },
     };
     if let Some(defect) = model.defect() {
