@@ -21,7 +21,7 @@ pub struct Fields {
     pub schema: FieldsSchema,
     /// Where the fields came from.
     pub source: Source,
-    /// Name of the model that predicted them; `None` unless predicted.
+    /// Name of the model that predicted them, whether they were corrected since or not; `None` where there was no prediction.
     pub model: Option<String>,
     /// Whether the machine lies outside what the model was trained on.
     pub extrapolated: bool,
@@ -37,6 +37,9 @@ pub struct Fields {
     pub interval_basis: String,
     /// The cost of each algorithm. Empty: `steps` decide.
     pub costs: Vec<AlgorithmCost>,
+    /// The samples by which a prediction was corrected before the first frame, in the order in which they were taken.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub samples: Vec<Observation>,
 }
 
 /// Where fields came from.
@@ -50,7 +53,7 @@ pub enum Source {
     Predicted,
     /// From timings of the algorithms on this machine.
     Measured,
-    /// Corrected by the frames that were run.
+    /// Predicted, then corrected by frames that were run: by samples before the first one ([`Fields::samples`]), or on line.
     Learned,
 }
 
@@ -95,6 +98,21 @@ pub struct AlgorithmCost {
     pub curve: CostCurve,
     /// Standard deviation of the natural logarithm of measured over modelled time.
     pub spread_ln: f64,
+}
+
+/// One algorithm, timed on some frames of the slice's scenario.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Observation {
+    /// The algorithm.
+    pub algorithm: AlgorithmId,
+    /// Number of objects.
+    pub objects: u32,
+    /// What the model predicted for it, without any sample.
+    pub predicted_ns: f64,
+    /// Median over the frames.
+    pub measured_ns: f64,
 }
 
 /// The two cheapest algorithms under a load.
@@ -159,6 +177,7 @@ impl Fields {
             crossovers: Vec::new(),
             interval_basis: String::new(),
             costs: Vec::new(),
+            samples: Vec::new(),
         }
     }
 
@@ -213,6 +232,10 @@ impl Fields {
         }
         if let Some(b) = self.crossovers.iter().find(|b| !(0.0 <= b.low && b.low <= b.objects && b.objects <= b.high)) {
             return Some(format!("the crossover from {} to {} does not lie within its interval", b.below, b.above));
+        }
+        let is_time = |ns: f64| ns.is_finite() && ns > 0.0;
+        if let Some(s) = self.samples.iter().find(|s| !is_time(s.predicted_ns) || !is_time(s.measured_ns)) {
+            return Some(format!("the sample of {} at {} objects has no time above zero", s.algorithm, s.objects));
         }
         for (k, cost) in self.costs.iter().enumerate() {
             let id = &cost.algorithm;

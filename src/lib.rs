@@ -67,7 +67,7 @@ pub use cpu::SimdLevel;
 pub use crossover::{Comparison, Crossover, Paired, Position};
 pub use displacement::Displacement;
 pub use error::{BoxDefect, Error};
-pub use fields::{AlgorithmCost, Border, Fields, Ranking, Source, Step};
+pub use fields::{AlgorithmCost, Border, Fields, Observation, Ranking, Source, Step};
 pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, Machine, Parameter};
 pub use load::Load;
 pub use model::Model;

@@ -8,6 +8,7 @@ mod fit;
 mod learning;
 mod model;
 mod nnls;
+mod prior;
 mod residual;
 mod robust;
 mod rows;
@@ -26,6 +27,8 @@ use sapwise::{GpuKind, Hardware, Model, Report};
 pub(crate) use baselines::{Chooser, available, average, by_costs, regrets, slice_scenario};
 pub(crate) use curve::{measured_costs, measured_fields};
 pub(crate) use learning::Learning;
+pub(crate) use model::model;
+pub(crate) use prior::{HeldOut, prior};
 pub(crate) use rows::{Profile, medians, usable};
 
 /// Parameters by which the CPU of a machine is compared with those of the training.
