@@ -1,6 +1,7 @@
 //! The fields of optimal performance: for each load the cheapest algorithm.
 
 use crate::cost::Counts;
+use crate::posterior::{Joint, Posterior};
 use crate::schema_tag::schema_tag;
 use crate::{AlgorithmId, CostCurve, Load, Registry};
 
@@ -161,7 +162,28 @@ impl Fields {
         let mut fields = Self { scenario: scenario.to_owned(), costs, ..Self::empty(source) };
         fields.interval_basis =
             "90 % of a normal distribution with the spread of measured over modelled time of the two algorithms".to_owned();
-        fields.cut(loads);
+        let spreads: Vec<f64> = fields.costs.iter().map(|c| c.spread_ln).collect();
+        fields.cut(loads, &mut |below, above, _| spreads[below].hypot(spreads[above]));
+        fields
+    }
+
+    /// Fields from costs that observations have corrected, of the algorithms that `usable` admits, which is asked by position in
+    /// [`Posterior::predicted`].
+    ///
+    /// As [`Fields::from_costs`], but with intervals from what is known of the ratio of two costs: what both share cancels.
+    #[must_use]
+    pub fn from_posterior(scenario: &str, posterior: &Posterior, usable: impl Fn(usize) -> bool, loads: &[Load]) -> Self {
+        let kept: Vec<usize> = (0..posterior.predicted().len()).filter(|&k| usable(k)).collect();
+        let all = posterior.costs();
+        let costs = kept.iter().map(|&k| all[k].clone()).collect();
+        let mut fields = Self { scenario: scenario.to_owned(), costs, ..Self::empty(Source::Learned) };
+        fields.interval_basis =
+            "90 % of a normal distribution with the spread that the samples left in the ratio of the two costs".to_owned();
+        let mut joint = Joint::default();
+        fields.cut(loads, &mut |below, above, load| {
+            posterior.joint(load, &mut joint);
+            joint.variance_of_ratio(kept[below], kept[above]).sqrt()
+        });
         fields
     }
 
@@ -253,7 +275,9 @@ impl Fields {
     }
 
     /// Walks the slice on a fine grid and notes where the cheapest algorithm changes.
-    fn cut(&mut self, loads: &[Load]) {
+    ///
+    /// `spread` gives the standard deviation of the logarithm of the ratio of two costs under a load.
+    fn cut(&mut self, loads: &[Load], spread: &mut dyn FnMut(usize, usize, &Load) -> f64) {
         let grid = fine_grid(loads);
         let winner = |load: &Load| self.rank(load, |_| true).map(|r| r.best);
         let mut steps: Vec<(Load, usize)> = Vec::new();
@@ -264,7 +288,11 @@ impl Fields {
                 steps.push((*load, best));
             }
         }
-        self.crossovers = steps.windows(2).map(|w| self.border(&grid, w[0].1, w[1].1, w[1].0.objects)).collect();
+        let border = |w: &[(Load, usize)]| {
+            let (below, above) = (w[0].1, w[1].1);
+            self.border(&grid, below, above, w[1].0.objects, &mut |load| spread(below, above, load))
+        };
+        self.crossovers = steps.windows(2).map(border).collect();
         self.steps = steps
             .iter()
             .enumerate()
@@ -275,14 +303,21 @@ impl Fields {
             .collect();
     }
 
-    fn border(&self, grid: &[Load], below: usize, above: usize, objects: u32) -> Border {
+    fn border(
+        &self,
+        grid: &[Load],
+        below: usize,
+        above: usize,
+        objects: u32,
+        spread: &mut dyn FnMut(&Load) -> f64,
+    ) -> Border {
         let (b, a) = (&self.costs[below], &self.costs[above]);
-        let doubt = 1.645 * b.spread_ln.hypot(a.spread_ln);
+        let mut doubt = |load: &Load| 1.645 * spread(load);
         // Positive where the algorithm of the upper field is cheaper.
         let gain = |load: &Load| (b.curve.cost_ns(load) / a.curve.cost_ns(load)).ln();
         let split = grid.partition_point(|l| l.objects < objects);
-        let low = grid[..split].iter().rev().take_while(|l| gain(l) > -doubt).last().map_or(objects, |l| l.objects);
-        let high = grid[split..].iter().take_while(|l| gain(l) < doubt).last().map_or(objects, |l| l.objects);
+        let low = grid[..split].iter().rev().take_while(|l| gain(l) > -doubt(l)).last().map_or(objects, |l| l.objects);
+        let high = grid[split..].iter().take_while(|l| gain(l) < doubt(l)).last().map_or(objects, |l| l.objects);
         Border {
             below: b.algorithm.clone(),
             above: a.algorithm.clone(),

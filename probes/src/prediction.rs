@@ -1,8 +1,10 @@
 //! Fields of a machine from its hardware parameters.
 
-use anyhow::Context;
+use crate::samples::{self, Live, Order, Taken};
+use anyhow::{Context, bail};
 use sapwise::hardware::parameter;
-use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Registry, Scenario, Source};
+use sapwise::model::Prediction;
+use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry, Scenario, Source};
 
 /// Objects of the slice that the fields show: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
@@ -20,11 +22,71 @@ pub(crate) fn predict(
     gpus: &[GpuIdentity],
     scenario: Scenario,
 ) -> anyhow::Result<Fields> {
-    let cores = hardware.value(parameter::USABLE_CORES).map_or(1, |k| k as u32);
-    let mut algorithms = Registry::with_cores(cores).available();
+    let prediction = prediction(model, hardware, gpus)?;
+    Ok(pure(model, prediction, scenario, &slice(scenario)?))
+}
+
+/// Predicts the fields of this machine and corrects them by up to `most` samples. Also gives whether an algorithm gave a wrong answer.
+///
+/// Whatever keeps samples from being taken, Ctrl-C too, is a warning: the prediction stays.
+///
+/// # Errors
+/// As [`predict`], and when no process can be started.
+pub(crate) fn predict_and_sample(
+    model: &Model,
+    hardware: &Hardware,
+    gpus: &[GpuIdentity],
+    scenario: Scenario,
+    most: u32,
+) -> anyhow::Result<(Fields, bool)> {
+    let mut prediction = prediction(model, hardware, gpus)?;
+    let loads = slice(scenario)?;
+    let order = Order {
+        scenario: scenario.to_string(),
+        seed: SEED,
+        cores: cores(hardware),
+        gpus: gpus.to_vec(),
+        algorithms: prediction.costs.iter().map(|c| c.algorithm.clone()).collect(),
+    };
+    let mut live = Live::new(order);
+    let prior = model.prior.unwrap_or(Prior::ASSUMED);
+    let learned = samples::learn(prediction.costs.clone(), &prior, &loads, &mut live, most as usize)?;
+    let (remarks, wrong) = live.remarks();
+    if !learned.usable.contains(&true) {
+        bail!("no algorithm is left: {}; the pure prediction is had by --samples 0", learned.remarks.join("; "));
+    }
+    let mut usable = learned.usable.iter();
+    prediction.costs.retain(|_| usable.next() == Some(&true));
+    let mut fields = pure(model, prediction, scenario, &loads);
+    // Without any sample the posterior is the prior, whose spread is that of machines left out and not of the model.
+    if !learned.taken.is_empty() {
+        let corrected = Fields::from_posterior(&scenario.to_string(), &learned.posterior, |k| learned.usable[k], &loads);
+        let samples = learned.taken.iter().map(Taken::observation).collect();
+        let Fields { model, extrapolated, warnings, .. } = fields;
+        fields = Fields { model, extrapolated, warnings, samples, ..corrected };
+    }
+    fields.warnings.extend(remarks);
+    fields.warnings.extend(learned.remarks);
+    if crate::interrupt::requested() {
+        let taken = learned.taken.len();
+        fields.warnings.push(format!("interrupted after {taken} samples: the prediction is corrected by those only"));
+    }
+    Ok((fields, wrong))
+}
+
+fn cores(hardware: &Hardware) -> u32 {
+    hardware.value(parameter::USABLE_CORES).map_or(1, |k| k as u32)
+}
+
+fn prediction(model: &Model, hardware: &Hardware, gpus: &[GpuIdentity]) -> anyhow::Result<Prediction> {
+    let mut algorithms = Registry::with_cores(cores(hardware)).available();
     algorithms.extend(sapwise::gpu::algorithms(gpus));
-    let prediction = model.predict(hardware, &algorithms).map_err(anyhow::Error::msg)?;
-    let mut fields = Fields::from_costs(Source::Predicted, &scenario.to_string(), prediction.costs, &slice(scenario)?);
+    model.predict(hardware, &algorithms).map_err(anyhow::Error::msg)
+}
+
+/// The fields of a prediction as it is.
+fn pure(model: &Model, prediction: Prediction, scenario: Scenario, loads: &[Load]) -> Fields {
+    let mut fields = Fields::from_costs(Source::Predicted, &scenario.to_string(), prediction.costs, loads);
     fields.model = Some(model.name.clone());
     fields.extrapolated = prediction.extrapolated;
     fields.warnings = prediction.warnings;
@@ -34,7 +96,7 @@ pub(crate) fn predict(
          physical machines); no claim about other machines",
         v.profiles, v.physical_machines
     );
-    Ok(fields)
+    fields
 }
 
 /// The load of a scenario over the number of objects, with the pairs that it really has.

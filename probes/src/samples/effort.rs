@@ -1,9 +1,14 @@
-//! How many frames a sample takes, and how long.
+//! How long a sample takes.
 
-/// Frames in a sample: as many as fit into this time, within bounds.
-const FRAMES_NS: f64 = 20e6;
-const FEWEST_FRAMES: f64 = 3.0;
-const MOST_FRAMES: f64 = 40.0;
+use crate::sweep::WARM_UP;
+use sapwise::{AlgorithmId, BackendClass, Registry};
+use std::time::Duration;
+
+/// Frames are timed for this long, so that a median of short ones stands on thousands, from more than one tick of the scheduler.
+pub(super) const TIMED: Duration = Duration::from_millis(15);
+
+/// Frames that are timed at least, however long they take.
+pub(super) const FEWEST_FRAMES: usize = 3;
 
 /// Time to make a scene and to advance it by a frame, for each object: what `uniform` takes on the first machine, rounded up.
 const START_NS: f64 = 60.0;
@@ -14,9 +19,6 @@ const FIXED_NS: f64 = 0.5e6;
 
 /// The first frame allocates buffers and wakes threads.
 const FIRST_FRAME: f64 = 3.0;
-
-/// Frames before the samples for algorithms that keep work from frame to frame, as in a sweep.
-pub(super) const WARM_UP: u32 = 24;
 
 /// What a sample needs beside the frames that are timed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,14 +32,42 @@ pub(crate) struct Effort {
 impl Effort {
     /// How long a sample will take where a frame takes `ns`.
     pub(crate) fn seconds(self, ns: f64) -> f64 {
-        let before = FIRST_FRAME + if self.keeps_work { f64::from(WARM_UP) } else { 0.0 };
-        let frames = before + f64::from(frames(ns));
-        let scene = f64::from(self.objects) * (START_NS + frames * ADVANCE_NS);
-        (FIXED_NS + scene + frames * ns) / 1e9
+        let objects = f64::from(self.objects);
+        let frame = ns + objects * ADVANCE_NS;
+        let before = FIRST_FRAME + if self.keeps_work { WARM_UP as f64 } else { 0.0 };
+        let timed = (FEWEST_FRAMES as f64 * frame).max(TIMED.as_nanos() as f64);
+        (FIXED_NS + objects * START_NS + before * frame + timed) / 1e9
     }
 }
 
-/// How many frames are timed where one takes `ns`.
-pub(super) fn frames(ns: f64) -> u32 {
-    (FRAMES_NS / ns).clamp(FEWEST_FRAMES, MOST_FRAMES) as u32
+/// The methods on the CPU that keep work from frame to frame.
+#[derive(Debug)]
+pub(super) struct Keepers(Vec<String>);
+
+impl Keepers {
+    pub(super) fn find() -> Self {
+        // A registry of one core makes its algorithms without threads.
+        let registry = Registry::with_cores(1);
+        let keeps_work = |id: &AlgorithmId| registry.create(id).is_ok_and(|a| a.keeps_work());
+        Self(registry.entries().iter().map(|e| &e.id).filter(|id| keeps_work(id)).map(|id| id.method().to_owned()).collect())
+    }
+
+    pub(super) fn contain(&self, algorithm: &AlgorithmId) -> bool {
+        algorithm.backend().class() == BackendClass::Cpu && self.0.iter().any(|m| m == algorithm.method())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_of_who_keeps_work_takes_the_frames_of_its_warm_up_longer() {
+        let effort = |keeps_work| Effort { objects: 100_000, keeps_work };
+        let [without, with] = [false, true].map(|k| effort(k).seconds(1e6));
+        assert!((with - without - WARM_UP as f64 * 2.5e-3).abs() < 1e-9, "{with} {without}");
+        let keepers = Keepers::find();
+        let of = |id: &str| keepers.contain(&id.parse().unwrap());
+        assert!(of("verlet@cpu1") && of("verlet@cpu8") && !of("strips@cpu1") && !of("verlet@gpu0"));
+    }
 }

@@ -1,13 +1,19 @@
 //! A handful of samples: which algorithm to time at which size, and what that tells about all of them.
 
 mod effort;
+mod live;
+mod order;
 mod replay;
+mod taker;
 
+use crate::gpus::uses;
 use sapwise::posterior::{Joint, Outlook};
-use sapwise::{AlgorithmCost, AlgorithmId, Load, Posterior, Prior};
+use sapwise::{AlgorithmCost, AlgorithmId, Load, Observation, Posterior, Prior};
 
 pub(crate) use effort::Effort;
-pub(crate) use replay::{Replay, ReplayPoint};
+pub(crate) use live::Live;
+pub(crate) use order::Order;
+pub(crate) use taker::take;
 
 /// Time for all samples together.
 pub(crate) const SECONDS: f64 = 2.0;
@@ -35,8 +41,15 @@ pub(crate) trait Source {
 pub(crate) enum Answer {
     /// It was taken.
     Taken(Sample),
-    /// The algorithm can't be used: it failed, gave wrong pairs, or its GPU is lost. Why, in a sentence for the user.
-    Failed(String),
+    /// Not this one, but others may be.
+    Skipped,
+    /// The algorithm can't be used, nor can any other on these GPUs.
+    Failed {
+        /// What happened, in words that follow the name of the algorithm.
+        why: String,
+        /// The GPUs that are lost with it.
+        gpus: Vec<u32>,
+    },
     /// Nothing more is to be had: the time is over, or the user stopped it.
     Over,
 }
@@ -65,15 +78,27 @@ pub(crate) struct Taken {
     pub(crate) predicted_ns: f64,
 }
 
+impl Taken {
+    /// As it stands in a file.
+    pub(crate) fn observation(&self) -> Observation {
+        Observation {
+            algorithm: self.algorithm.clone(),
+            objects: self.sample.load.objects,
+            predicted_ns: self.predicted_ns,
+            measured_ns: self.sample.ns,
+        }
+    }
+}
+
 /// Costs that samples have corrected.
 #[derive(Debug, Clone)]
 pub(crate) struct Learned {
-    /// Of every algorithm that did not fail.
-    pub(crate) costs: Vec<AlgorithmCost>,
+    /// What is known of all algorithms.
+    pub(crate) posterior: Posterior,
+    /// Which of them did not fail.
+    pub(crate) usable: Vec<bool>,
     /// What was sampled, in that order.
     pub(crate) taken: Vec<Taken>,
-    /// What is known, of the algorithms that failed too.
-    pub(crate) posterior: Posterior,
     /// Why algorithms were left out.
     pub(crate) remarks: Vec<String>,
 }
@@ -117,10 +142,15 @@ pub(crate) fn learn(
         let algorithm = posterior.predicted()[a].algorithm.clone();
         match source.sample(&algorithm, &slice[at])? {
             Answer::Over => break,
-            Answer::Failed(why) => {
-                usable[a] = false;
-                open.retain(|o| o.0 != a);
-                remarks.push(format!("{algorithm} is left out: {why}"));
+            Answer::Skipped => {}
+            Answer::Failed { why, gpus } => {
+                for (other, usable) in posterior.predicted().iter().zip(&mut usable) {
+                    let lost = uses(&other.algorithm).iter().any(|k| gpus.contains(k));
+                    *usable &= !lost && other.algorithm != algorithm;
+                }
+                open.retain(|o| usable[o.0]);
+                let with = if gpus.is_empty() { String::new() } else { format!(" with all on {}", algorithm.backend()) };
+                remarks.push(format!("{algorithm} is left out{with}: {why}"));
             }
             Answer::Taken(sample) => {
                 left -= sample.seconds;
@@ -131,10 +161,17 @@ pub(crate) fn learn(
             }
         }
     }
-    let mut kept = usable.iter();
-    let mut costs = posterior.costs();
-    costs.retain(|_| kept.next() == Some(&true));
-    Ok(Learned { costs, taken, posterior, remarks })
+    Ok(Learned { posterior, usable, taken, remarks })
+}
+
+impl Learned {
+    /// The corrected costs of the algorithms that did not fail.
+    pub(crate) fn costs(&self) -> Vec<AlgorithmCost> {
+        let mut usable = self.usable.iter();
+        let mut costs = self.posterior.costs();
+        costs.retain(|_| usable.next() == Some(&true));
+        costs
+    }
 }
 
 /// What algorithms may cost under each load, so that a sample that turns out dear seldom exceeds its time.

@@ -1,7 +1,8 @@
 //! Samples out of a report, as if its machine were there.
 
+use super::effort::Keepers;
 use super::{Answer, Effort, Sample, Source};
-use sapwise::{AlgorithmId, Load, Registry};
+use sapwise::{AlgorithmId, Load};
 
 /// What a report holds of one load.
 #[derive(Debug, Clone)]
@@ -21,17 +22,12 @@ const NEAR_LN: f64 = 0.8;
 pub(crate) struct Replay<'a> {
     points: &'a [ReplayPoint],
     given: Vec<(AlgorithmId, usize)>,
-    /// Methods that keep work from frame to frame.
-    keepers: Vec<String>,
+    keepers: Keepers,
 }
 
 impl<'a> Replay<'a> {
     pub(crate) fn new(points: &'a [ReplayPoint]) -> Self {
-        // A registry of one core makes its algorithms without threads.
-        let registry = Registry::with_cores(1);
-        let keeps_work = |id: &AlgorithmId| registry.create(id).is_ok_and(|a| a.keeps_work());
-        let methods = registry.entries().iter().map(|e| &e.id).filter(|id| keeps_work(id));
-        Self { points, given: Vec::new(), keepers: methods.map(|id| id.method().to_owned()).collect() }
+        Self { points, given: Vec::new(), keepers: Keepers::find() }
     }
 
     /// Position of the point nearest to a load at which the algorithm was timed.
@@ -49,13 +45,12 @@ impl Source for Replay<'_> {
         if self.given.iter().any(|g| g.0 == *algorithm && g.1 == at) {
             return None;
         }
-        let keeps_work = self.keepers.iter().any(|m| m == algorithm.method());
-        Some(Effort { objects: self.points[at].load.objects, keeps_work })
+        Some(Effort { objects: self.points[at].load.objects, keeps_work: self.keepers.contain(algorithm) })
     }
 
     fn sample(&mut self, algorithm: &AlgorithmId, load: &Load) -> anyhow::Result<Answer> {
         let (Some(at), Some(effort)) = (self.nearest(algorithm, load), self.effort(algorithm, load)) else {
-            return Ok(Answer::Failed("the report holds no timing of it there".to_owned()));
+            return Ok(Answer::Over);
         };
         self.given.push((algorithm.clone(), at));
         let point = &self.points[at];

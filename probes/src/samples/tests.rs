@@ -1,3 +1,4 @@
+use super::replay::{Replay, ReplayPoint};
 use super::*;
 use crate::simulate;
 use crate::train::{self, Profile};
@@ -92,7 +93,7 @@ fn evaluate(profiles: &[Profile], label: &str) {
                     seconds += began.elapsed().as_secs_f64();
                     count += learned.taken.len();
                     spent = spent.max(learned.taken.iter().map(|t| t.sample.seconds).sum());
-                    let choose = train::by_costs(learned.costs, available);
+                    let choose = train::by_costs(learned.costs(), available);
                     let all = train::average(&train::regrets(profile, &choose));
                     of_all.push(all);
                     let mut only = profile.clone();

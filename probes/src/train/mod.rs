@@ -104,7 +104,7 @@ pub(crate) fn train(reports: &[(String, Report)], name: &str, evidence: Evidence
         };
         bail!("no report can be trained on: {why}; {next}");
     }
-    let (mut model, left_out) = model::model(&profiles.iter().collect::<Vec<_>>(), name)?;
+    let (mut model, left_out) = model(&profiles.iter().collect::<Vec<_>>(), name)?;
     notes.extend(left_out);
     let subsets = match evidence {
         Evidence::Real => Vec::new(),
