@@ -7,7 +7,8 @@
 mod gain;
 mod prior;
 
-use crate::{AlgorithmCost, Knot, Load};
+use crate::cost::{Counts, MOST_UNIT_NS};
+use crate::{AlgorithmCost, Knot, Load, Term};
 
 pub use gain::Outlook;
 pub use prior::{Deviations, Part, Prior, width_correlation};
@@ -17,10 +18,19 @@ const KNOTS: usize = 12;
 const FIRST_OCTAVE: f64 = 2.0;
 const OCTAVES: f64 = 2.0;
 
+/// What is counted beside the number of objects, which the curves follow. Each has a factor of its own: one load may have ten times
+/// the pairs of another with as many objects.
+const COUNTS: [Term; 4] = [Term::AxisCandidates, Term::StripCandidates, Term::Pairs, Term::Moved];
+
+/// Entries of an algorithm in the state: its knots, then the logarithms of its factors.
+const STRIDE: usize = KNOTS + COUNTS.len();
+
 /// No observation moves a curve by more than this, a factor of 5e8: beyond lies a clock that is wrong.
 const MOST_SURPRISE_LN: f64 = 20.0;
 /// What a cost curve may hold ([`CostCurve::defect`](crate::CostCurve::defect)).
 const MOST_FACTOR_LN: f64 = 50.0;
+/// Beyond this the factor on a count is one of 150, and the count is not what the time goes with.
+const MOST_COUNT_FACTOR_LN: f64 = 5.0;
 
 /// The costs of all algorithms of a machine, as far as they are known from a prediction and from what was observed.
 ///
@@ -29,7 +39,7 @@ const MOST_FACTOR_LN: f64 = 50.0;
 pub struct Posterior {
     costs: Vec<AlgorithmCost>,
     prior: Prior,
-    /// Of each algorithm at each knot, knots of one algorithm side by side.
+    /// Of each algorithm, side by side: its curve at the knots, and the factors on its counts.
     mean: Vec<f64>,
     /// Of `mean`, row by row.
     covariance: Vec<f64>,
@@ -44,6 +54,9 @@ pub struct Joint {
     pub mean_ln: Vec<f64>,
     /// Covariance of these, row by row.
     pub covariance: Vec<f64>,
+    /// How these hang on the state, and how the state hangs on one of them.
+    slopes: Vec<Slope>,
+    with: Vec<f64>,
 }
 
 impl Joint {
@@ -56,7 +69,7 @@ impl Joint {
 }
 
 /// Between which knots a number of objects lies.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Place {
     knot: usize,
     /// Share of the next knot.
@@ -64,17 +77,40 @@ struct Place {
 }
 
 impl Place {
-    fn of(load: &Load) -> Self {
-        let at = (f64::from(load.objects.max(1)).log2() - FIRST_OCTAVE) / OCTAVES;
-        let at = at.clamp(0.0, (KNOTS - 1) as f64);
+    fn of(log2_objects: f64) -> Self {
+        let at = ((log2_objects - FIRST_OCTAVE) / OCTAVES).clamp(0.0, (KNOTS - 1) as f64);
         let knot = (at as usize).min(KNOTS - 2);
         Self { knot, share: at - knot as f64 }
     }
 
-    /// The value here of an algorithm's curve among the curves of all.
-    fn on(self, curves: &[f64], algorithm: usize) -> f64 {
-        let at = algorithm * KNOTS + self.knot;
-        (1.0 - self.share) * curves[at] + self.share * curves[at + 1]
+    /// The height of a curve, whose knots begin the list.
+    fn on(self, knots: &[f64]) -> f64 {
+        (1.0 - self.share) * knots[self.knot] + self.share * knots[self.knot + 1]
+    }
+}
+
+/// How the logarithm of one algorithm's cost under one load hangs on its entries of the state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Slope {
+    algorithm: usize,
+    place: Place,
+    /// Shares of the cost that go with each of [`COUNTS`].
+    counts: [f64; COUNTS.len()],
+}
+
+impl Slope {
+    /// What a change of the whole state, or a row of its covariance, means for this logarithm.
+    fn along(&self, state: &[f64]) -> f64 {
+        let (knots, factors) = state[self.algorithm * STRIDE..][..STRIDE].split_at(KNOTS);
+        self.place.on(knots) + self.counts.iter().zip(factors).map(|(share, factor)| share * factor).sum::<f64>()
+    }
+
+    /// The entries of the state that count, with their weights.
+    fn weights(&self) -> impl Iterator<Item = (usize, f64)> {
+        let from = self.algorithm * STRIDE;
+        let Place { knot, share } = self.place;
+        let counts = self.counts.into_iter().enumerate().map(move |(k, share)| (from + KNOTS + k, share));
+        [(from + knot, 1.0 - share), (from + knot + 1, share)].into_iter().chain(counts).filter(|w| w.1 != 0.0)
     }
 }
 
@@ -82,7 +118,7 @@ impl Posterior {
     /// What is known before anything was observed.
     #[must_use]
     pub fn new(costs: Vec<AlgorithmCost>, prior: &Prior) -> Self {
-        let dimension = costs.len() * KNOTS;
+        let dimension = costs.len() * STRIDE;
         let mut posterior = Self {
             costs,
             prior: *prior,
@@ -105,15 +141,15 @@ impl Posterior {
     ///
     /// Gives false, and learns nothing, where the time is no positive number or the predicted cost is none.
     pub fn observe(&mut self, algorithm: usize, load: &Load, ns: f64, noise_ln: f64) -> bool {
-        let surprise = ns.ln() - self.costs[algorithm].curve.cost_ns(load).ln();
+        let (mean_ln, slope) = self.look(algorithm, &Counts::new(load));
+        let surprise = ns.ln() - mean_ln;
         if !(surprise.is_finite() && noise_ln.is_finite()) {
             return false;
         }
-        let place = Place::of(load);
         let mut with = std::mem::take(&mut self.with);
-        let variance = self.covariances(algorithm, place, noise_ln, &mut with);
+        let variance = self.covariances(&slope, noise_ln, &mut with);
         let scale = 1.0 / variance;
-        let error = surprise.clamp(-MOST_SURPRISE_LN, MOST_SURPRISE_LN) - place.on(&self.mean, algorithm);
+        let error = surprise.clamp(-MOST_SURPRISE_LN, MOST_SURPRISE_LN);
         // Joseph's form, for one observation: an error in the gain is of second order in the covariance, which stays that of a
         // real vector. Every product is written so that both halves of the matrix round alike.
         for (i, row) in self.covariance.chunks_exact_mut(with.len()).enumerate() {
@@ -131,14 +167,38 @@ impl Posterior {
         true
     }
 
-    /// Fills `with` with the covariance of each curve with an observation, and gives the variance of that observation.
-    fn covariances(&self, algorithm: usize, place: Place, noise_ln: f64, with: &mut [f64]) -> f64 {
-        let dimension = self.mean.len();
-        let row = |knot: usize| &self.covariance[(algorithm * KNOTS + knot) * dimension..][..dimension];
-        for (w, (a, b)) in with.iter_mut().zip(row(place.knot).iter().zip(row(place.knot + 1))) {
-            *w = (1.0 - place.share) * a + place.share * b;
+    /// Fills `with` with the covariance of each entry of the state with an observation, and gives the variance of that observation.
+    fn covariances(&self, slope: &Slope, noise_ln: f64, with: &mut [f64]) -> f64 {
+        with.fill(0.0);
+        for (entry, weight) in slope.weights() {
+            let row = &self.covariance[entry * with.len()..][..with.len()];
+            with.iter_mut().zip(row).for_each(|(w, c)| *w += weight * c);
         }
-        place.on(with, algorithm).max(0.0) + self.noise(algorithm, noise_ln)
+        slope.along(with).max(0.0) + self.noise(slope.algorithm, noise_ln)
+    }
+
+    /// Expected natural logarithm of an algorithm's nanoseconds, infinite where there is none, and how it hangs on the state.
+    fn look(&self, algorithm: usize, counts: &Counts<'_>) -> (f64, Slope) {
+        let curve = &self.costs[algorithm].curve;
+        let (knots, factors) = self.mean[algorithm * STRIDE..][..STRIDE].split_at(KNOTS);
+        let place = Place::of(counts.log2_objects());
+        let (mut sum, mut parts) = (0.0, [0.0; COUNTS.len()]);
+        for t in &curve.terms {
+            let ns = t.unit_ns * counts.of(t.term, curve.cache_bytes);
+            match COUNTS.iter().position(|c| *c == t.term) {
+                Some(k) => {
+                    let ns = ns * count_factor(factors[k]);
+                    sum += ns;
+                    parts[k] += ns;
+                }
+                None => sum += ns,
+            }
+        }
+        let mean_ln = sum.ln() + curve.ln_correction(counts.log2_objects()) + place.on(knots);
+        if !mean_ln.is_finite() {
+            return (f64::INFINITY, Slope { algorithm, place, counts: [0.0; COUNTS.len()] });
+        }
+        (mean_ln, Slope { algorithm, place, counts: parts.map(|part| part / sum) })
     }
 
     /// Variance of an observation of an algorithm around its curve.
@@ -151,17 +211,26 @@ impl Posterior {
     /// that is goes back towards the prior.
     pub fn forget(&mut self, share: f64) {
         let Self { costs, prior, covariance, .. } = self;
-        let dimension = costs.len() * KNOTS;
+        let dimension = costs.len() * STRIDE;
         for (a, one) in costs.iter().enumerate() {
             let class = one.algorithm.backend().class();
+            let deviations = prior.of(class);
             for (b, other) in costs.iter().enumerate().filter(|(_, c)| c.algorithm.backend().class() == class) {
-                let apart: [f64; KNOTS] = std::array::from_fn(|k| {
-                    prior.of(class).covariance(&one.algorithm, &other.algorithm, k as f64 * OCTAVES)
-                });
-                for k in 0..KNOTS {
-                    for l in 0..KNOTS {
-                        let entry = &mut covariance[(a * KNOTS + k) * dimension + b * KNOTS + l];
-                        *entry += share * (apart[k.abs_diff(l)] - *entry);
+                let mut back = |k: usize, l: usize, before: f64| {
+                    let entry = &mut covariance[(a * STRIDE + k) * dimension + b * STRIDE + l];
+                    *entry += share * (before - *entry);
+                };
+                let apart: [f64; KNOTS] =
+                    std::array::from_fn(|k| deviations.covariance(&one.algorithm, &other.algorithm, k as f64 * OCTAVES));
+                let counts = deviations.covariance_of_counts(&one.algorithm, &other.algorithm);
+                for k in 0..STRIDE {
+                    for l in 0..STRIDE {
+                        let before = match (k < KNOTS, l < KNOTS) {
+                            (true, true) => apart[k.abs_diff(l)],
+                            (false, false) if k == l => counts,
+                            _ => 0.0,
+                        };
+                        back(k, l, before);
                     }
                 }
             }
@@ -177,15 +246,18 @@ impl Posterior {
             let mut octaves: Vec<f64> = cost.curve.correction.iter().map(|k| k.log2_objects).chain(own).collect();
             octaves.sort_by(f64::total_cmp);
             octaves.dedup();
+            let (knots, factors) = self.mean[a * STRIDE..][..STRIDE].split_at(KNOTS);
             let knot = |log2_objects: f64| {
-                let at = ((log2_objects - FIRST_OCTAVE) / OCTAVES).clamp(0.0, (KNOTS - 1) as f64);
-                let knot = (at as usize).min(KNOTS - 2);
-                let learned = Place { knot, share: at - knot as f64 }.on(&self.mean, a);
-                let ln_factor = cost.curve.ln_correction(log2_objects) + learned;
+                let ln_factor = cost.curve.ln_correction(log2_objects) + Place::of(log2_objects).on(knots);
                 Knot { log2_objects, ln_factor: ln_factor.clamp(-MOST_FACTOR_LN, MOST_FACTOR_LN) }
             };
             let correction = octaves.into_iter().map(knot).collect();
             cost.curve.correction = correction;
+            for term in &mut cost.curve.terms {
+                if let Some(k) = COUNTS.iter().position(|c| *c == term.term) {
+                    term.unit_ns = (term.unit_ns * count_factor(factors[k])).min(MOST_UNIT_NS);
+                }
+            }
             cost.spread_ln = self.spread_ln(a);
             cost
         };
@@ -195,7 +267,7 @@ impl Posterior {
     /// Root of the mean variance of an algorithm's logarithmic cost over the knots, noise included.
     fn spread_ln(&self, algorithm: usize) -> f64 {
         let dimension = self.mean.len();
-        let knots = algorithm * KNOTS..(algorithm + 1) * KNOTS;
+        let knots = algorithm * STRIDE..algorithm * STRIDE + KNOTS;
         let sum: f64 = knots.map(|i| self.covariance[i * dimension + i].max(0.0)).sum();
         (sum / KNOTS as f64 + self.noise(algorithm, 0.0)).sqrt()
     }
@@ -204,25 +276,27 @@ impl Posterior {
     ///
     /// The noise of single observations is not in it: what is uncertain here is the curve.
     pub fn joint(&self, load: &Load, joint: &mut Joint) {
-        let place = Place::of(load);
-        let count = self.costs.len();
-        joint.mean_ln.clear();
-        joint.mean_ln.extend((0..count).map(|a| self.mean_ln(a, load, place)));
-        joint.covariance.clear();
-        let dimension = self.mean.len();
-        for a in 0..count {
-            let at = (a * KNOTS + place.knot) * dimension;
-            let (low, high) = (&self.covariance[at..at + dimension], &self.covariance[at + dimension..at + 2 * dimension]);
-            let of = |b: usize| (1.0 - place.share) * place.on(low, b) + place.share * place.on(high, b);
-            joint.covariance.extend((0..count).map(of));
+        let counts = Counts::new(load);
+        let Joint { mean_ln, covariance, slopes, with } = joint;
+        mean_ln.clear();
+        slopes.clear();
+        for a in 0..self.costs.len() {
+            let (ln, slope) = self.look(a, &counts);
+            mean_ln.push(ln);
+            slopes.push(slope);
+        }
+        covariance.clear();
+        with.resize(self.mean.len(), 0.0);
+        for a in &*slopes {
+            self.covariances(a, 0.0, with);
+            covariance.extend(slopes.iter().map(|b| b.along(with)));
         }
     }
+}
 
-    /// Expected natural logarithm of an algorithm's nanoseconds under a load, which lies at `place`.
-    fn mean_ln(&self, algorithm: usize, load: &Load, place: Place) -> f64 {
-        let predicted = self.costs[algorithm].curve.cost_ns(load).ln();
-        if predicted.is_finite() { predicted + place.on(&self.mean, algorithm) } else { f64::INFINITY }
-    }
+/// The factor on a count, from its logarithm in the state.
+fn count_factor(ln: f64) -> f64 {
+    ln.clamp(-MOST_COUNT_FACTOR_LN, MOST_COUNT_FACTOR_LN).exp()
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! What an observation is worth before it is made.
 
-use super::{KNOTS, Place, Posterior};
+use super::{Posterior, Slope};
 use crate::Load;
+use crate::cost::Counts;
 
 /// A line further above the best than this many times its slope crosses it so rarely that it changes no gain by a millionth.
 const REACH: f64 = 5.0;
@@ -25,8 +26,9 @@ pub struct Outlook {
 
 #[derive(Debug, Clone)]
 struct Scene {
-    place: Place,
     load: Load,
+    /// By algorithm.
+    slopes: Vec<Slope>,
     /// By algorithm. Infinite for those that can't be chosen.
     mean_ln: Vec<f64>,
     /// The one that would be chosen.
@@ -44,7 +46,12 @@ impl Outlook {
     #[must_use]
     pub fn new(posterior: &Posterior, loads: &[Load], usable: &[bool]) -> Self {
         let count = posterior.costs.len();
-        let scene = |load: &Load| Scene { place: Place::of(load), load: *load, mean_ln: Vec::with_capacity(count), best: 0 };
+        let scene = |load: &Load| Scene {
+            load: *load,
+            slopes: Vec::with_capacity(count),
+            mean_ln: Vec::with_capacity(count),
+            best: 0,
+        };
         let mut outlook = Self {
             scenes: loads.iter().map(scene).collect(),
             with: vec![0.0; posterior.mean.len()],
@@ -57,10 +64,15 @@ impl Outlook {
 
     /// Takes over what `posterior` expects by now.
     pub fn refresh(&mut self, posterior: &Posterior, usable: &[bool]) {
-        for Scene { place, load, mean_ln, best } in &mut self.scenes {
+        for Scene { load, slopes, mean_ln, best } in &mut self.scenes {
+            let counts = Counts::new(load);
+            slopes.clear();
             mean_ln.clear();
-            let of = |(a, &usable): (usize, &bool)| if usable { posterior.mean_ln(a, load, *place) } else { f64::INFINITY };
-            mean_ln.extend(usable.iter().enumerate().map(of));
+            for (a, &usable) in usable.iter().enumerate() {
+                let (ln, slope) = posterior.look(a, &counts);
+                slopes.push(slope);
+                mean_ln.push(if usable { ln } else { f64::INFINITY });
+            }
             *best = (0..mean_ln.len()).min_by(|&a, &b| mean_ln[a].total_cmp(&mean_ln[b])).unwrap_or(0);
         }
     }
@@ -73,20 +85,19 @@ impl Outlook {
     /// normal beliefs, 2009).
     pub fn gain(&mut self, posterior: &Posterior, algorithm: usize, load: &Load, noise_ln: f64) -> f64 {
         let Self { scenes, with, lines, envelope } = self;
-        let variance = posterior.covariances(algorithm, Place::of(load), noise_ln, with);
+        let (_, slope) = posterior.look(algorithm, &Counts::new(load));
+        let variance = posterior.covariances(&slope, noise_ln, with);
         let deviation = variance.sqrt();
         let mut sum = 0.0;
-        for Scene { place, mean_ln, best, .. } in &*scenes {
+        for Scene { slopes, mean_ln, best, .. } in &*scenes {
             if !mean_ln.get(*best).is_some_and(|m| m.is_finite()) {
                 continue;
             }
-            let of_best = place.on(with, *best);
+            let of_best = slopes[*best].along(with);
             lines.clear();
             lines.push(Line { behind: 0.0, slope: 0.0 });
-            for (a, mean) in mean_ln.iter().enumerate() {
-                let at = a * KNOTS + place.knot;
-                let own = (1.0 - place.share) * with[at] + place.share * with[at + 1];
-                let line = Line { behind: mean - mean_ln[*best], slope: (own - of_best) / deviation };
+            for (slope, mean) in slopes.iter().zip(mean_ln) {
+                let line = Line { behind: mean - mean_ln[*best], slope: (slope.along(with) - of_best) / deviation };
                 if line.behind < REACH * line.slope.abs() {
                     lines.push(line);
                 }

@@ -28,6 +28,9 @@ pub struct Deviations {
     pub width: Part,
     /// What an algorithm has for itself.
     pub algorithm: Part,
+    /// Standard deviation of a factor on what is counted beside the objects: candidates, pairs, moved boxes. One for each, shared by
+    /// all algorithms of a method; half of its variance is shared by all methods.
+    pub load_ln: f64,
     /// Octaves of objects over which a curve keeps its height: the length scale of a squared exponential.
     pub length_octaves: f64,
     /// Standard deviation of a single observation around these curves: other loads of as many objects, and chance.
@@ -60,6 +63,7 @@ impl Prior {
             method: Part { constant_ln: 0.15, curve_ln: 0.15 },
             width: Part { constant_ln: 0.15, curve_ln: 0.15 },
             algorithm: Part { constant_ln: 0.05, curve_ln: 0.1 },
+            load_ln: 0.25,
             length_octaves: 3.3,
             noise_ln: 0.05,
         },
@@ -68,6 +72,7 @@ impl Prior {
             method: Part { constant_ln: 0.15, curve_ln: 0.15 },
             width: Part { constant_ln: 0.2, curve_ln: 0.1 },
             algorithm: Part { constant_ln: 0.05, curve_ln: 0.1 },
+            load_ln: 0.25,
             length_octaves: 3.3,
             noise_ln: 0.05,
         },
@@ -88,7 +93,7 @@ impl Prior {
         [BackendClass::Cpu, BackendClass::Gpu].into_iter().find_map(|class| {
             let d = self.of(class);
             let parts = [d.shared, d.method, d.width, d.algorithm];
-            let figures = parts.iter().flat_map(|p| [p.constant_ln, p.curve_ln]).chain([d.noise_ln]);
+            let figures = parts.iter().flat_map(|p| [p.constant_ln, p.curve_ln]).chain([d.noise_ln, d.load_ln]);
             if let Some(wrong) = figures.into_iter().find(|f| !(0.0..=MOST_LN).contains(f)) {
                 return Some(format!("the prior of the {class} has a standard deviation of {wrong}"));
             }
@@ -115,6 +120,12 @@ impl Deviations {
             sum += self.algorithm.covariance(alike);
         }
         sum
+    }
+
+    /// Covariance of the factors that two algorithms have on the same count.
+    #[must_use]
+    pub(super) fn covariance_of_counts(&self, a: &AlgorithmId, b: &AlgorithmId) -> f64 {
+        self.load_ln.powi(2) * if a.method() == b.method() { 1.0 } else { 0.5 }
     }
 
     /// Correlation of a curve with itself `octaves` further on.

@@ -56,10 +56,8 @@ fn solve(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
 fn dense(before: &Posterior, observed: &[(usize, u32, f64, f64)]) -> (Vec<f64>, Vec<f64>) {
     let dimension = before.mean.len();
     let weights = |algorithm: usize, objects: u32| {
-        let place = Place::of(&load(objects));
         let mut weights = vec![0.0; dimension];
-        weights[algorithm * KNOTS + place.knot] = 1.0 - place.share;
-        weights[algorithm * KNOTS + place.knot + 1] = place.share;
+        before.look(algorithm, &Counts::new(&load(objects))).1.weights().for_each(|(entry, weight)| weights[entry] = weight);
         weights
     };
     let design: Vec<Vec<f64>> = observed.iter().map(|o| weights(o.0, o.1)).collect();
@@ -180,20 +178,20 @@ fn the_gain_of_an_observation_is_the_mean_fall_of_regret_over_what_it_may_say() 
     for algorithm in 0..5 {
         let gain = outlook.gain(&posterior, algorithm, &loads[1], 0.1);
         // A sum over the surprises, each taken in for real. What is expected before is the mean of what is expected after.
-        let place = Place::of(&loads[1]);
         let mut with = vec![0.0; posterior.mean.len()];
-        let deviation = posterior.covariances(algorithm, place, 0.1, &mut with).sqrt();
+        let (mean_ln, slope) = posterior.look(algorithm, &Counts::new(&loads[1]));
+        let deviation = posterior.covariances(&slope, 0.1, &mut with).sqrt();
         let step = 0.01;
         let mut fall = 0.0;
         for k in -600..=600 {
             let z = f64::from(k) * step;
             let mut after = posterior.clone();
-            let ns = (posterior.mean_ln(algorithm, &loads[1], place) + z * deviation).exp();
+            let ns = (mean_ln + z * deviation).exp();
             assert!(after.observe(algorithm, &loads[1], ns, 0.1));
             let weight = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt() * step;
             for load in &loads {
                 let least = |p: &Posterior| {
-                    let of = |a: usize| p.mean_ln(a, load, Place::of(load));
+                    let of = |a: usize| p.look(a, &Counts::new(load)).0;
                     (0..5).filter(|&a| usable[a]).map(of).fold(f64::INFINITY, f64::min)
                 };
                 fall += weight * (least(&posterior) - least(&after)) / loads.len() as f64;
@@ -225,4 +223,37 @@ fn widths_share_by_the_ratio_of_their_logarithms() {
     };
     assert_eq!([of("a@cpu1", "b@cpu8"), of("a@gpu0", "a@gpu0"), of("a@cpu4", "b@cpu4")], [0.0, 0.0, 1.0]);
     assert!(of("a@cpu2", "a@cpu16") < of("a@cpu8", "a@cpu16"));
+}
+
+#[test]
+fn what_is_learned_of_a_count_holds_for_loads_that_have_more_or_less_of_it() {
+    let mut all = costs();
+    all.truncate(2);
+    for cost in &mut all {
+        cost.curve.terms.push(CostTerm { term: Term::Pairs, unit_ns: 50.0 });
+    }
+    let mut posterior = Posterior::new(all, &Prior::ASSUMED);
+    let with = |pairs: f64| Load { pairs, ..load(1000) };
+    // Twice as long as predicted where there are pairs, as predicted where there are none.
+    for _ in 0..20 {
+        for (pairs, ratio) in [(0.0, 1.0), (10_000.0, 2.0)] {
+            let ns = posterior.costs[1].curve.cost_ns(&with(pairs)) * ratio;
+            assert!(posterior.observe(1, &with(pairs), ns, 0.0));
+        }
+    }
+    let corrected = posterior.costs();
+    let ratio =
+        |a: usize, pairs: f64| corrected[a].curve.cost_ns(&with(pairs)) / posterior.costs[a].curve.cost_ns(&with(pairs));
+    assert!(
+        (ratio(1, 0.0) - 1.0).abs() < 0.1 && (ratio(1, 10_000.0) - 2.0).abs() < 0.2,
+        "{} {}",
+        ratio(1, 0.0),
+        ratio(1, 1e4)
+    );
+    // Another method has half of it.
+    assert!(ratio(0, 10_000.0) > 1.2 && ratio(0, 10_000.0) < 1.8, "{}", ratio(0, 10_000.0));
+    assert!(corrected.iter().all(|c| c.curve.defect().is_none()));
+    let mut joint = Joint::default();
+    posterior.joint(&with(300.0), &mut joint);
+    assert!((joint.mean_ln[1] - corrected[1].curve.cost_ns(&with(300.0)).ln()).abs() < 1e-9);
 }

@@ -70,6 +70,8 @@ fn deviations(held_out: &[&HeldOut], assumed: &Deviations) -> Deviations {
         method: part(1, assumed.method),
         width: part(2, assumed.width),
         algorithm: part(3, assumed.algorithm),
+        // These residuals tell nothing of the loads behind them.
+        load_ln: assumed.load_ln,
         length_octaves: (share * length.ln() + (1.0 - share) * assumed.length_octaves.ln()).exp(),
         noise_ln: drawn(noise, assumed.noise_ln).max(LEAST_NOISE_LN),
     }
@@ -205,6 +207,7 @@ mod tests {
             method: Part { constant_ln: 0.0, curve_ln: 0.2 },
             width: Part { constant_ln: 0.25, curve_ln: 0.0 },
             algorithm: Part { constant_ln: 0.0, curve_ln: 0.15 },
+            load_ln: 0.25,
             length_octaves: 2.2,
             noise_ln: 0.06,
         };
