@@ -18,28 +18,24 @@ const KNOTS: usize = 12;
 const FIRST_OCTAVE: f64 = 2.0;
 const OCTAVES: f64 = 2.0;
 
-/// What is counted beside the number of objects, which the curves follow. Each has a factor of its own: one load may have ten times
-/// the pairs of another with as many objects.
-const COUNTS: [Term; 4] = [Term::AxisCandidates, Term::StripCandidates, Term::Pairs, Term::Moved];
-
-/// Entries of an algorithm in the state: its knots, then the logarithms of its factors.
-const STRIDE: usize = KNOTS + COUNTS.len();
+/// Entries of an algorithm in the state: its knots, then the logarithms of the factors on its terms, in the order of [`Term::ALL`].
+const STRIDE: usize = KNOTS + Term::ALL.len();
 
 /// No observation moves a curve by more than this, a factor of 5e8: beyond lies a clock that is wrong.
 const MOST_SURPRISE_LN: f64 = 20.0;
 /// What a cost curve may hold ([`CostCurve::defect`](crate::CostCurve::defect)).
 const MOST_FACTOR_LN: f64 = 50.0;
-/// Beyond this the factor on a count is one of 150, and the count is not what the time goes with.
-const MOST_COUNT_FACTOR_LN: f64 = 5.0;
+/// Beyond a factor of 150 on a term the time goes with something else.
+const MOST_TERM_FACTOR_LN: f64 = 5.0;
 
 /// The costs of all algorithms of a machine, as far as they are known from a prediction and from what was observed.
 ///
-/// Memory grows with the square of the number of algorithms, 295 kB for 16, and is allocated when it is made.
+/// Memory grows with the square of the number of algorithms, 900 kB for 16, and is allocated when it is made.
 #[derive(Debug, Clone)]
 pub struct Posterior {
     costs: Vec<AlgorithmCost>,
     prior: Prior,
-    /// Of each algorithm, side by side: its curve at the knots, and the factors on its counts.
+    /// Of each algorithm, side by side: its curve at the knots, and the factors on its terms.
     mean: Vec<f64>,
     /// Of `mean`, row by row.
     covariance: Vec<f64>,
@@ -94,23 +90,23 @@ impl Place {
 struct Slope {
     algorithm: usize,
     place: Place,
-    /// Shares of the cost that go with each of [`COUNTS`].
-    counts: [f64; COUNTS.len()],
+    /// Shares of the cost by term, in the order of [`Term::ALL`].
+    terms: [f64; Term::ALL.len()],
 }
 
 impl Slope {
     /// What a change of the whole state, or a row of its covariance, means for this logarithm.
     fn along(&self, state: &[f64]) -> f64 {
         let (knots, factors) = state[self.algorithm * STRIDE..][..STRIDE].split_at(KNOTS);
-        self.place.on(knots) + self.counts.iter().zip(factors).map(|(share, factor)| share * factor).sum::<f64>()
+        self.place.on(knots) + self.terms.iter().zip(factors).map(|(share, factor)| share * factor).sum::<f64>()
     }
 
     /// The entries of the state that count, with their weights.
     fn weights(&self) -> impl Iterator<Item = (usize, f64)> {
         let from = self.algorithm * STRIDE;
         let Place { knot, share } = self.place;
-        let counts = self.counts.into_iter().enumerate().map(move |(k, share)| (from + KNOTS + k, share));
-        [(from + knot, 1.0 - share), (from + knot + 1, share)].into_iter().chain(counts).filter(|w| w.1 != 0.0)
+        let terms = self.terms.into_iter().enumerate().map(move |(k, share)| (from + KNOTS + k, share));
+        [(from + knot, 1.0 - share), (from + knot + 1, share)].into_iter().chain(terms).filter(|w| w.1 != 0.0)
     }
 }
 
@@ -182,23 +178,18 @@ impl Posterior {
         let curve = &self.costs[algorithm].curve;
         let (knots, factors) = self.mean[algorithm * STRIDE..][..STRIDE].split_at(KNOTS);
         let place = Place::of(counts.log2_objects());
-        let (mut sum, mut parts) = (0.0, [0.0; COUNTS.len()]);
+        let (mut sum, mut parts) = (0.0, [0.0; Term::ALL.len()]);
         for t in &curve.terms {
-            let ns = t.unit_ns * counts.of(t.term, curve.cache_bytes);
-            match COUNTS.iter().position(|c| *c == t.term) {
-                Some(k) => {
-                    let ns = ns * count_factor(factors[k]);
-                    sum += ns;
-                    parts[k] += ns;
-                }
-                None => sum += ns,
-            }
+            let k = position(t.term);
+            let ns = t.unit_ns * counts.of(t.term, curve.cache_bytes) * term_factor(factors[k]);
+            sum += ns;
+            parts[k] += ns;
         }
         let mean_ln = sum.ln() + curve.ln_correction(counts.log2_objects()) + place.on(knots);
         if !mean_ln.is_finite() {
-            return (f64::INFINITY, Slope { algorithm, place, counts: [0.0; COUNTS.len()] });
+            return (f64::INFINITY, Slope { algorithm, place, terms: [0.0; Term::ALL.len()] });
         }
-        (mean_ln, Slope { algorithm, place, counts: parts.map(|part| part / sum) })
+        (mean_ln, Slope { algorithm, place, terms: parts.map(|part| part / sum) })
     }
 
     /// Variance of an observation of an algorithm around its curve.
@@ -222,12 +213,13 @@ impl Posterior {
                 };
                 let apart: [f64; KNOTS] =
                     std::array::from_fn(|k| deviations.covariance(&one.algorithm, &other.algorithm, k as f64 * OCTAVES));
-                let counts = deviations.covariance_of_counts(&one.algorithm, &other.algorithm);
                 for k in 0..STRIDE {
                     for l in 0..STRIDE {
                         let before = match (k < KNOTS, l < KNOTS) {
                             (true, true) => apart[k.abs_diff(l)],
-                            (false, false) if k == l => counts,
+                            (false, false) if k == l => {
+                                deviations.covariance_of_terms(Term::ALL[k - KNOTS], &one.algorithm, &other.algorithm)
+                            }
                             _ => 0.0,
                         };
                         back(k, l, before);
@@ -254,9 +246,8 @@ impl Posterior {
             let correction = octaves.into_iter().map(knot).collect();
             cost.curve.correction = correction;
             for term in &mut cost.curve.terms {
-                if let Some(k) = COUNTS.iter().position(|c| *c == term.term) {
-                    term.unit_ns = (term.unit_ns * count_factor(factors[k])).min(MOST_UNIT_NS);
-                }
+                let factor = term_factor(factors[position(term.term)]);
+                term.unit_ns = (term.unit_ns * factor).min(MOST_UNIT_NS);
             }
             cost.spread_ln = self.spread_ln(a);
             cost
@@ -264,12 +255,18 @@ impl Posterior {
         self.costs.iter().enumerate().map(corrected).collect()
     }
 
-    /// Root of the mean variance of an algorithm's logarithmic cost over the knots, noise included.
+    /// Root of the mean variance of an algorithm's logarithmic cost, noise included: over the knots, and at each over its terms, as
+    /// if one of them had all the time.
     fn spread_ln(&self, algorithm: usize) -> f64 {
-        let dimension = self.mean.len();
-        let knots = algorithm * STRIDE..algorithm * STRIDE + KNOTS;
-        let sum: f64 = knots.map(|i| self.covariance[i * dimension + i].max(0.0)).sum();
-        (sum / KNOTS as f64 + self.noise(algorithm, 0.0)).sqrt()
+        let at = |i: usize, j: usize| self.covariance[(algorithm * STRIDE + i) * self.mean.len() + algorithm * STRIDE + j];
+        let terms = &self.costs[algorithm].curve.terms;
+        let sum: f64 = terms
+            .iter()
+            .map(|t| KNOTS + position(t.term))
+            .flat_map(|t| (0..KNOTS).map(move |k| (k, t)))
+            .map(|(k, t)| (at(k, k) + at(t, t) + 2.0 * at(k, t)).max(0.0))
+            .sum();
+        (sum / (terms.len() * KNOTS).max(1) as f64 + self.noise(algorithm, 0.0)).sqrt()
     }
 
     /// Expected logarithms of the costs under a load, and how they hang together. `joint` keeps its memory.
@@ -294,9 +291,14 @@ impl Posterior {
     }
 }
 
-/// The factor on a count, from its logarithm in the state.
-fn count_factor(ln: f64) -> f64 {
-    ln.clamp(-MOST_COUNT_FACTOR_LN, MOST_COUNT_FACTOR_LN).exp()
+/// Where a term stands in [`Term::ALL`].
+fn position(term: Term) -> usize {
+    Term::ALL.iter().position(|t| *t == term).unwrap_or(0)
+}
+
+/// The factor on a term, from its logarithm in the state.
+fn term_factor(ln: f64) -> f64 {
+    ln.clamp(-MOST_TERM_FACTOR_LN, MOST_TERM_FACTOR_LN).exp()
 }
 
 #[cfg(test)]

@@ -54,12 +54,15 @@ struct Figures {
     taken: usize,
 }
 
-fn figures(held: &Held<'_>, prior: &Prior, most: usize, tell: bool) -> Figures {
+fn figures(held: &Held<'_>, prior: &Prior, most: usize, across: bool, tell: bool) -> Figures {
     let scenario = train::slice_scenario(&held.profile.report);
-    let within: Vec<ReplayPoint> = points(held.profile).into_iter().filter(|p| p.0 == scenario).map(|p| p.1).collect();
+    let within: Vec<ReplayPoint> =
+        points(held.profile).into_iter().filter(|p| across || p.0 == scenario).map(|p| p.1).collect();
     let mut slice: Vec<Load> = within.iter().map(|p| p.load).collect();
-    slice.sort_by_key(|l| l.objects);
-    slice.dedup_by_key(|l| l.objects);
+    if !across {
+        slice.sort_by_key(|l| l.objects);
+        slice.dedup_by_key(|l| l.objects);
+    }
     let began = Instant::now();
     let learned = learn(held.costs.clone(), prior, &slice, &mut Replay::new(&within), most).unwrap();
     let thinking = began.elapsed().as_secs_f64();
@@ -118,31 +121,23 @@ fn evaluate(name: &str, groups: &[Vec<Held<'_>>]) {
         train::prior(&rest.cloned().collect::<Vec<_>>())
     };
     type Make<'a> = &'a dyn Fn(&[Held<'_>], &Held<'_>) -> Prior;
-    let ways: [(&str, Make<'_>); 8] = [
+    let ways: [(&str, Make<'_>); 6] = [
         ("assumed", &|_, _| Prior::ASSUMED),
-        ("no counts", &|_, _| assumed(&|d| d.load_ln = 0.0)),
-        ("counts .4", &|_, _| assumed(&|d| d.load_ln = 0.4)),
-        ("noise .03", &|_, _| assumed(&|d| d.noise_ln = 0.03)),
-        ("noise .1", &|_, _| assumed(&|d| d.noise_ln = 0.1)),
+        ("assumed, noise .1", &|_, _| assumed(&|d| d.noise_ln = 0.1)),
+        ("assumed, noise .2", &|_, _| assumed(&|d| d.noise_ln = 0.2)),
+        ("assumed, counts .2", &|_, _| assumed(&|d| d.count_ln = 0.2)),
         ("fitted", &others),
-        ("fitted, noise .05", &|g, h| {
+        ("fitted, counts .1", &|g, h| {
             let mut prior = others(g, h);
-            (prior.cpu.noise_ln, prior.gpu.noise_ln) = (0.05, 0.05);
+            (prior.cpu.count_ln, prior.gpu.count_ln) = (0.1, 0.1);
             prior
-        }),
-        ("algorithm .1/.15", &|_, _| {
-            assumed(&|d| d.algorithm = sapwise::posterior::Part { constant_ln: 0.1, curve_ln: 0.15 })
         }),
     ];
     for (way, make) in ways {
-        for most in [0, 8, 16] {
-            if most != 8 && way != "assumed" {
-                continue;
-            }
-            let show = most == 8 && way == "fitted";
+        for (most, across) in [(8, false)] {
             let all: Vec<Figures> =
-                groups.iter().flat_map(|g| g.iter().map(move |h| figures(h, &make(g, h), most, show))).collect();
-            tell(&format!("{name}, {way}, {most} samples"), &all);
+                groups.iter().flat_map(|g| g.iter().map(move |h| figures(h, &make(g, h), most, across, false))).collect();
+            tell(&format!("{name}, {way}, {most} samples {across}"), &all);
         }
     }
 }

@@ -28,6 +28,9 @@ const MOST_LN: f64 = 2.0;
 /// Length scales that are tried, in octaves.
 const LENGTHS: [f64; 6] = [1.0, 1.5, 2.2, 3.3, 5.0, 7.5];
 
+/// Share of the deviations of methods that factors on terms are taken to explain.
+const EXPLAINED: f64 = 0.8;
+
 /// Steps in which the correlation of widths is told apart.
 const WIDTH_STEPS: f64 = 20.0;
 
@@ -61,17 +64,23 @@ fn deviations(held_out: &[&HeldOut], assumed: &Deviations) -> Deviations {
     let Some((length, (variances, _))) = fits.into_iter().min_by(|a, b| a.1.1.total_cmp(&b.1.1)) else { return *assumed };
     let share = machines.len() as f64 / (machines.len() as f64 + ASSUMED_MACHINES);
     let drawn = |variance: f64, assumed: f64| (share * variance + (1.0 - share) * assumed.powi(2)).sqrt();
-    let part = |k: usize, assumed: Part| Part {
-        constant_ln: drawn(variances[k], assumed.constant_ln),
-        curve_ln: drawn(variances[4 + k], assumed.curve_ln),
+    // Factors on terms look like deviations that all algorithms share and like those of methods, by half each: at most numbers of objects
+    // one term has most of the time. They are what is found of both, as far as it is equal, less a fifth for what no term explains.
+    let of_terms = EXPLAINED * (variances[0] + variances[4]).min(variances[1] + variances[5]);
+    let part = |k: usize, assumed: Part| {
+        let both = variances[k] + variances[4 + k];
+        let left = if k < 2 && both > 0.0 { 1.0 - of_terms / both } else { 1.0 };
+        Part {
+            constant_ln: drawn(left * variances[k], assumed.constant_ln),
+            curve_ln: drawn(left * variances[4 + k], assumed.curve_ln),
+        }
     };
     Deviations {
         shared: part(0, assumed.shared),
         method: part(1, assumed.method),
         width: part(2, assumed.width),
         algorithm: part(3, assumed.algorithm),
-        // These residuals tell nothing of the loads behind them.
-        load_ln: assumed.load_ln,
+        count_ln: drawn(2.0 * of_terms, assumed.count_ln),
         length_octaves: (share * length.ln() + (1.0 - share) * assumed.length_octaves.ln()).exp(),
         noise_ln: drawn(noise, assumed.noise_ln).max(LEAST_NOISE_LN),
     }
@@ -207,7 +216,7 @@ mod tests {
             method: Part { constant_ln: 0.0, curve_ln: 0.2 },
             width: Part { constant_ln: 0.25, curve_ln: 0.0 },
             algorithm: Part { constant_ln: 0.0, curve_ln: 0.15 },
-            load_ln: 0.25,
+            count_ln: 0.0,
             length_octaves: 2.2,
             noise_ln: 0.06,
         };
@@ -215,8 +224,9 @@ mod tests {
         assert_eq!((found.defect(), found.gpu), (None, Prior::ASSUMED.gpu));
         let near = |found: f64, truth: f64| (found - truth).abs() < 0.2 * truth;
         let of = |p: Part| p.constant_ln.hypot(p.curve_ln);
+        let with_terms = |p: Part| (of(p).powi(2) + found.cpu.count_ln.powi(2) / 2.0).sqrt();
         assert!(near(found.cpu.noise_ln, 0.06) && near(found.cpu.length_octaves, 2.2), "{found:?}");
-        assert!(near(of(found.cpu.shared), 0.3) && near(of(found.cpu.method), 0.2), "{found:?}");
+        assert!(near(with_terms(found.cpu.shared), 0.3) && near(with_terms(found.cpu.method), 0.2), "{found:?}");
         assert!(near(of(found.cpu.width), 0.25) && near(of(found.cpu.algorithm), 0.15), "{found:?}");
         assert!(found.cpu.shared.constant_ln > 2.0 * found.cpu.shared.curve_ln, "{found:?}");
         assert!(found.cpu.method.curve_ln > 2.0 * found.cpu.method.constant_ln, "{found:?}");
