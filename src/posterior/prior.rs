@@ -30,7 +30,7 @@ pub struct Deviations {
     pub algorithm: Part,
     /// Standard deviation of the logarithm of a factor on one term of a cost, such as its calls or its pairs. The algorithms of a
     /// method share it; half of its variance is shared by all methods.
-    pub count_ln: f64,
+    pub term_ln: f64,
     /// Octaves of objects over which a curve keeps its height: the length scale of a squared exponential.
     pub length_octaves: f64,
     /// Standard deviation of a single observation around these curves: other loads of as many objects, and chance.
@@ -63,7 +63,7 @@ impl Prior {
             method: Part { constant_ln: 0.08, curve_ln: 0.08 },
             width: Part { constant_ln: 0.08, curve_ln: 0.08 },
             algorithm: Part { constant_ln: 0.03, curve_ln: 0.05 },
-            count_ln: 0.3,
+            term_ln: 0.2,
             length_octaves: 3.3,
             noise_ln: 0.06,
         },
@@ -72,7 +72,7 @@ impl Prior {
             method: Part { constant_ln: 0.08, curve_ln: 0.08 },
             width: Part { constant_ln: 0.1, curve_ln: 0.05 },
             algorithm: Part { constant_ln: 0.03, curve_ln: 0.05 },
-            count_ln: 0.3,
+            term_ln: 0.2,
             length_octaves: 3.3,
             noise_ln: 0.06,
         },
@@ -93,7 +93,7 @@ impl Prior {
         [BackendClass::Cpu, BackendClass::Gpu].into_iter().find_map(|class| {
             let d = self.of(class);
             let parts = [d.shared, d.method, d.width, d.algorithm];
-            let figures = parts.iter().flat_map(|p| [p.constant_ln, p.curve_ln]).chain([d.noise_ln, d.count_ln]);
+            let figures = parts.iter().flat_map(|p| [p.constant_ln, p.curve_ln]).chain([d.noise_ln, d.term_ln]);
             if let Some(wrong) = figures.into_iter().find(|f| !(0.0..=MOST_LN).contains(f)) {
                 return Some(format!("the prior of the {class} has a standard deviation of {wrong}"));
             }
@@ -130,7 +130,7 @@ impl Deviations {
         if term == Term::Call && wide(a) != wide(b) {
             return 0.0;
         }
-        self.count_ln.powi(2) * if a.method() == b.method() { 1.0 } else { 0.5 }
+        self.term_ln.powi(2) * if a.method() == b.method() { 1.0 } else { 0.5 }
     }
 
     /// Correlation of a curve with itself `octaves` further on.

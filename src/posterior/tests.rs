@@ -16,7 +16,7 @@ fn costs() -> Vec<AlgorithmCost> {
 /// Without factors on terms, which make costs bend: what follows from straight lines then holds to the last digits.
 fn straight() -> Prior {
     let part = Part { constant_ln: 0.15, curve_ln: 0.15 };
-    let parts = Deviations { shared: part, method: part, width: part, algorithm: part, count_ln: 0.0, ..Prior::ASSUMED.cpu };
+    let parts = Deviations { shared: part, method: part, width: part, algorithm: part, term_ln: 0.0, ..Prior::ASSUMED.cpu };
     Prior { cpu: parts, gpu: parts }
 }
 

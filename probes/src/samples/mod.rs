@@ -3,6 +3,7 @@
 mod effort;
 mod live;
 mod order;
+#[cfg_attr(not(test), allow(dead_code, reason = "for validation, which does not replay reports yet"))]
 mod replay;
 mod taker;
 
@@ -166,6 +167,7 @@ pub(crate) fn learn(
 
 impl Learned {
     /// The corrected costs of the algorithms that did not fail.
+    #[cfg_attr(not(test), allow(dead_code, reason = "for validation, which does not replay reports yet"))]
     pub(crate) fn costs(&self) -> Vec<AlgorithmCost> {
         let mut usable = self.usable.iter();
         let mut costs = self.posterior.costs();

@@ -20,7 +20,7 @@ pub(crate) struct HeldOut {
 }
 
 /// The assumed prior counts as much as this many machines.
-const ASSUMED_MACHINES: f64 = 4.0;
+const ASSUMED_MACHINES: f64 = 8.0;
 
 /// Beyond a factor of 7 it is a model that has missed something, and one such machine would decide alone.
 const MOST_LN: f64 = 2.0;
@@ -80,7 +80,7 @@ fn deviations(held_out: &[&HeldOut], assumed: &Deviations) -> Deviations {
         method: part(1, assumed.method),
         width: part(2, assumed.width),
         algorithm: part(3, assumed.algorithm),
-        count_ln: drawn(2.0 * of_terms, assumed.count_ln),
+        term_ln: drawn(2.0 * of_terms, assumed.term_ln),
         length_octaves: (share * length.ln() + (1.0 - share) * assumed.length_octaves.ln()).exp(),
         noise_ln: drawn(noise, assumed.noise_ln).max(LEAST_NOISE_LN),
     }
@@ -216,7 +216,7 @@ mod tests {
             method: Part { constant_ln: 0.0, curve_ln: 0.2 },
             width: Part { constant_ln: 0.25, curve_ln: 0.0 },
             algorithm: Part { constant_ln: 0.0, curve_ln: 0.15 },
-            count_ln: 0.0,
+            term_ln: 0.0,
             length_octaves: 2.2,
             noise_ln: 0.06,
         };
@@ -224,7 +224,7 @@ mod tests {
         assert_eq!((found.defect(), found.gpu), (None, Prior::ASSUMED.gpu));
         let near = |found: f64, truth: f64| (found - truth).abs() < 0.2 * truth;
         let of = |p: Part| p.constant_ln.hypot(p.curve_ln);
-        let with_terms = |p: Part| (of(p).powi(2) + found.cpu.count_ln.powi(2) / 2.0).sqrt();
+        let with_terms = |p: Part| (of(p).powi(2) + found.cpu.term_ln.powi(2) / 2.0).sqrt();
         assert!(near(found.cpu.noise_ln, 0.06) && near(found.cpu.length_octaves, 2.2), "{found:?}");
         assert!(near(with_terms(found.cpu.shared), 0.3) && near(with_terms(found.cpu.method), 0.2), "{found:?}");
         assert!(near(of(found.cpu.width), 0.25) && near(of(found.cpu.algorithm), 0.15), "{found:?}");
@@ -243,6 +243,6 @@ mod tests {
             .collect();
         let found = prior(&silent).cpu;
         let ratio = found.shared.constant_ln / Prior::ASSUMED.cpu.shared.constant_ln;
-        assert!((ratio - 0.8_f64.sqrt()).abs() < 1e-9, "{ratio}");
+        assert!((ratio - (8.0_f64 / 9.0).sqrt()).abs() < 1e-9, "{ratio}");
     }
 }
