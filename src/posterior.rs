@@ -21,8 +21,9 @@ const OCTAVES: f64 = 2.0;
 /// Entries of an algorithm in the state: its knots, then the logarithms of the factors on its terms, in the order of [`Term::ALL`].
 const STRIDE: usize = KNOTS + Term::ALL.len();
 
-/// No observation moves a curve by more than this, a factor of 5e8: beyond lies a clock that is wrong.
-const MOST_SURPRISE_LN: f64 = 20.0;
+/// No more than this many standard deviations of a surprise are believed at once. A frame whose threads waited for a core takes fifty
+/// times as long as predicted; all of that believed, every relative of its algorithm would pass for slow as well.
+const MOST_SURPRISE: f64 = 3.0;
 /// What a cost curve may hold ([`CostCurve::defect`](crate::CostCurve::defect)).
 const MOST_FACTOR_LN: f64 = 50.0;
 /// Beyond a factor of 150 on a term the time goes with something else.
@@ -145,7 +146,7 @@ impl Posterior {
         let mut with = std::mem::take(&mut self.with);
         let variance = self.covariances(&slope, noise_ln, &mut with);
         let scale = 1.0 / variance;
-        let error = surprise.clamp(-MOST_SURPRISE_LN, MOST_SURPRISE_LN);
+        let error = surprise.clamp(-MOST_SURPRISE * variance.sqrt(), MOST_SURPRISE * variance.sqrt());
         // Joseph's form, for one observation: an error in the gain is of second order in the covariance, which stays that of a
         // real vector. Every product is written so that both halves of the matrix round alike.
         for (i, row) in self.covariance.chunks_exact_mut(with.len()).enumerate() {

@@ -48,7 +48,8 @@ pub(crate) fn predict_and_sample(
         gpus: gpus.to_vec(),
         algorithms: prediction.costs.iter().map(|c| c.algorithm.clone()).collect(),
     };
-    let mut live = Live::new(order);
+    let disturbed: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
+    let mut live = Live::new(order, sapwise::measure::statistics::median(&disturbed));
     let prior = model.prior.unwrap_or(Prior::ASSUMED);
     let learned = samples::learn(prediction.costs.clone(), &prior, &loads, &mut live, most as usize)?;
     let (remarks, wrong) = live.remarks();

@@ -184,17 +184,16 @@ fn the_gain_of_an_observation_is_the_mean_fall_of_regret_over_what_it_may_say() 
     let mut outlook = Outlook::new(&posterior, &loads, &usable);
     for algorithm in 0..5 {
         let gain = outlook.gain(&posterior, algorithm, &loads[1], 0.1);
-        // A sum over the surprises, each taken in for real. What is expected before is the mean of what is expected after.
+        // A sum over the surprises, each taken in. What is expected before is the mean of what is expected after.
         let mut with = vec![0.0; posterior.mean.len()];
-        let (mean_ln, slope) = posterior.look(algorithm, &Counts::new(&loads[1]));
+        let (_, slope) = posterior.look(algorithm, &Counts::new(&loads[1]));
         let deviation = posterior.covariances(&slope, 0.1, &mut with).sqrt();
         let step = 0.01;
         let mut fall = 0.0;
         for k in -600..=600 {
             let z = f64::from(k) * step;
             let mut after = posterior.clone();
-            let ns = (mean_ln + z * deviation).exp();
-            assert!(after.observe(algorithm, &loads[1], ns, 0.1));
+            after.mean.iter_mut().zip(&with).for_each(|(mean, with)| *mean += z * with / deviation);
             let weight = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt() * step;
             for load in &loads {
                 let least = |p: &Posterior| {
@@ -263,4 +262,17 @@ fn what_is_learned_of_a_count_holds_for_loads_that_have_more_or_less_of_it() {
     let mut joint = Joint::default();
     posterior.joint(&with(300.0), &mut joint);
     assert!((joint.mean_ln[1] - corrected[1].curve.cost_ns(&with(300.0)).ln()).abs() < 1e-9);
+}
+
+#[test]
+fn a_surprise_beyond_three_deviations_is_believed_step_by_step() {
+    let moved = |ratio: f64, times: usize| {
+        let mut posterior = Posterior::new(costs(), &straight());
+        (0..times).for_each(|_| observe(&mut posterior, &(2, 1000, ratio, 0.0)));
+        (posterior.costs()[2].curve.cost_ns(&load(1000)) / posterior.costs[2].curve.cost_ns(&load(1000))).ln()
+    };
+    // Four parts of 0.15 twice have a deviation of 0.42.
+    assert!(moved(3.0, 1) > 0.95 * 3.0_f64.ln());
+    assert!(moved(50.0, 1) < 1.3 && (moved(50.0, 1) - moved(500.0, 1)).abs() < 1e-12);
+    assert!(moved(50.0, 20) > moved(50.0, 1) + 0.5);
 }

@@ -24,6 +24,7 @@ pub(crate) struct Live {
     keepers: Keepers,
     /// When the time is over; `None` before the first sample.
     end: Option<Instant>,
+    /// Share of the CPU that other programs take, by the latest figure.
     foreign_load: Option<f64>,
     /// What the user should know.
     remarks: Vec<String>,
@@ -32,9 +33,10 @@ pub(crate) struct Live {
 }
 
 impl Live {
-    pub(crate) fn new(order: Order) -> Self {
+    /// `foreign_load` is what other programs took before, which is taken to go on until a figure of the samples is there.
+    pub(crate) fn new(order: Order, foreign_load: Option<f64>) -> Self {
         let keepers = Keepers::find();
-        Self { order, dialogue: None, keepers, end: None, foreign_load: None, remarks: Vec::new(), wrong: false }
+        Self { order, dialogue: None, keepers, end: None, foreign_load, remarks: Vec::new(), wrong: false }
     }
 
     /// What the user should know of how the samples were taken, and whether an algorithm gave a wrong answer.
