@@ -11,7 +11,7 @@ use crate::cost::{Counts, MOST_UNIT_NS};
 use crate::{AlgorithmCost, Knot, Load, Term};
 
 pub use gain::Outlook;
-pub use prior::{Deviations, Part, Prior, width_correlation};
+pub use prior::{Deviations, Part, Prior, TERMS_SHARED, width_correlation};
 
 /// Knots of each curve: 2^2 to 2^24 objects, every second octave, linear in between.
 const KNOTS: usize = 12;

@@ -256,8 +256,8 @@ fn what_is_learned_of_a_count_holds_for_loads_that_have_more_or_less_of_it() {
         ratio(1, 0.0),
         ratio(1, 1e4)
     );
-    // Another method has half of it.
-    assert!(ratio(0, 10_000.0) > 1.2 && ratio(0, 10_000.0) < 1.8, "{}", ratio(0, 10_000.0));
+    // Another method has a part of it.
+    assert!(ratio(0, 10_000.0) > 1.2 && ratio(0, 10_000.0) < 0.95 * ratio(1, 10_000.0), "{}", ratio(0, 10_000.0));
     assert!(corrected.iter().all(|c| c.curve.defect().is_none()));
     let mut joint = Joint::default();
     posterior.joint(&with(300.0), &mut joint);

@@ -2,7 +2,7 @@
 
 use super::nnls::nnls;
 use ndarray::{Array1, Array2};
-use sapwise::posterior::{Deviations, Part, width_correlation};
+use sapwise::posterior::{Deviations, Part, TERMS_SHARED, width_correlation};
 use sapwise::{AlgorithmId, BackendClass, Prior};
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ const MOST_LN: f64 = 2.0;
 /// Length scales that are tried, in octaves.
 const LENGTHS: [f64; 6] = [1.0, 1.5, 2.2, 3.3, 5.0, 7.5];
 
-/// Share of the deviations of methods that factors on terms are taken to explain.
+/// Share of what all algorithms have in common that factors on terms are taken to explain, and of what methods have at most.
 const EXPLAINED: f64 = 0.8;
 
 /// Steps in which the correlation of widths is told apart.
@@ -64,12 +64,13 @@ fn deviations(held_out: &[&HeldOut], assumed: &Deviations) -> Deviations {
     let Some((length, (variances, _))) = fits.into_iter().min_by(|a, b| a.1.1.total_cmp(&b.1.1)) else { return *assumed };
     let share = machines.len() as f64 / (machines.len() as f64 + ASSUMED_MACHINES);
     let drawn = |variance: f64, assumed: f64| (share * variance + (1.0 - share) * assumed.powi(2)).sqrt();
-    // Factors on terms look like deviations that all algorithms share and like those of methods, by half each: at most numbers of objects
-    // one term has most of the time. They are what is found of both, as far as it is equal, less a fifth for what no term explains.
-    let of_terms = EXPLAINED * (variances[0] + variances[4]).min(variances[1] + variances[5]);
+    // At most numbers of objects one term has most of the time, so that factors on terms look like what all algorithms share, and
+    // those of methods like what methods share.
+    let of_terms = EXPLAINED * (variances[0] + variances[4]) / TERMS_SHARED;
     let part = |k: usize, assumed: Part| {
+        let explained = of_terms * [TERMS_SHARED, 1.0 - TERMS_SHARED, 0.0, 0.0][k];
         let both = variances[k] + variances[4 + k];
-        let left = if k < 2 && both > 0.0 { 1.0 - of_terms / both } else { 1.0 };
+        let left = if both > 0.0 { (1.0 - explained / both).max(1.0 - EXPLAINED) } else { 1.0 };
         Part {
             constant_ln: drawn(left * variances[k], assumed.constant_ln),
             curve_ln: drawn(left * variances[4 + k], assumed.curve_ln),
@@ -80,7 +81,7 @@ fn deviations(held_out: &[&HeldOut], assumed: &Deviations) -> Deviations {
         method: part(1, assumed.method),
         width: part(2, assumed.width),
         algorithm: part(3, assumed.algorithm),
-        term_ln: drawn(2.0 * of_terms, assumed.term_ln),
+        term_ln: drawn(of_terms, assumed.term_ln),
         length_octaves: (share * length.ln() + (1.0 - share) * assumed.length_octaves.ln()).exp(),
         noise_ln: drawn(noise, assumed.noise_ln).max(LEAST_NOISE_LN),
     }
@@ -224,9 +225,11 @@ mod tests {
         assert_eq!((found.defect(), found.gpu), (None, Prior::ASSUMED.gpu));
         let near = |found: f64, truth: f64| (found - truth).abs() < 0.2 * truth;
         let of = |p: Part| p.constant_ln.hypot(p.curve_ln);
-        let with_terms = |p: Part| (of(p).powi(2) + found.cpu.term_ln.powi(2) / 2.0).sqrt();
+        let with_terms = |p: Part, share: f64| (of(p).powi(2) + share * found.cpu.term_ln.powi(2)).sqrt();
+        let (shared, method) =
+            (with_terms(found.cpu.shared, TERMS_SHARED), with_terms(found.cpu.method, 1.0 - TERMS_SHARED));
         assert!(near(found.cpu.noise_ln, 0.06) && near(found.cpu.length_octaves, 2.2), "{found:?}");
-        assert!(near(with_terms(found.cpu.shared), 0.3) && near(with_terms(found.cpu.method), 0.2), "{found:?}");
+        assert!(near(shared, 0.3) && near(method, 0.2), "{found:?}");
         assert!(near(of(found.cpu.width), 0.25) && near(of(found.cpu.algorithm), 0.15), "{found:?}");
         assert!(found.cpu.shared.constant_ln > 2.0 * found.cpu.shared.curve_ln, "{found:?}");
         assert!(found.cpu.method.curve_ln > 2.0 * found.cpu.method.constant_ln, "{found:?}");
