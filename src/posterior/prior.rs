@@ -59,8 +59,8 @@ const LENGTHS: std::ops::RangeInclusive<f64> = 0.25..=64.0;
 pub const TERMS_SHARED: f64 = 0.8;
 
 impl Prior {
-    /// For a model that holds none. An assumption: of some that were tried, the one under which eight samples left the least regret on
-    /// simulated machines that the model had not seen, with somewhat more noise, since real timings have it.
+    /// For a model that holds none. An assumption: near to those under which eight samples left the least regret on simulated
+    /// machines that the model had not seen.
     pub const ASSUMED: Self = Self {
         cpu: Deviations {
             shared: Part { constant_ln: 0.08, curve_ln: 0.05 },
