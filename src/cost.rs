@@ -29,7 +29,7 @@ pub enum Term {
 
 /// Bounds of what a file may hold: an hour for one object, 2^64 objects, a correction by e^50. Beyond them the arithmetic of a
 /// cost would end in infinities, and an infinity less an infinity is no cost.
-const MOST_UNIT_NS: f64 = 3.6e12;
+pub(crate) const MOST_UNIT_NS: f64 = 3.6e12;
 const MOST_LOG2_OBJECTS: f64 = 64.0;
 const MOST_LN_FACTOR: f64 = 50.0;
 
@@ -71,7 +71,11 @@ impl<'a> Counts<'a> {
         Self { load, objects, log2_objects: objects.max(1.0).log2() }
     }
 
-    fn of(&self, term: Term, cache_bytes: f64) -> f64 {
+    pub(crate) fn log2_objects(&self) -> f64 {
+        self.log2_objects
+    }
+
+    pub(crate) fn of(&self, term: Term, cache_bytes: f64) -> f64 {
         let n = self.objects;
         match term {
             Term::Call => 1.0,
@@ -162,7 +166,7 @@ impl CostCurve {
         (low * lowest.exp(), high * highest.exp())
     }
 
-    fn ln_correction(&self, x: f64) -> f64 {
+    pub(crate) fn ln_correction(&self, x: f64) -> f64 {
         let after = self.correction.partition_point(|k| k.log2_objects <= x);
         match (after.checked_sub(1).map(|k| self.correction[k]), self.correction.get(after)) {
             (Some(a), Some(b)) => {

@@ -3,6 +3,7 @@
 mod slice;
 
 use crate::cost::Counts;
+use crate::posterior::{Joint, Posterior};
 use crate::schema_tag::schema_tag;
 use crate::{AlgorithmId, CostCurve, Load, Registry};
 
@@ -25,7 +26,7 @@ pub struct Fields {
     pub schema: FieldsSchema,
     /// Where the fields came from.
     pub source: Source,
-    /// Name of the model that predicted them; `None` unless predicted.
+    /// Name of the model that predicted them, whether they were corrected since or not; `None` where there was no prediction.
     pub model: Option<String>,
     /// Whether the machine lies outside what the model was trained on.
     pub extrapolated: bool,
@@ -41,6 +42,9 @@ pub struct Fields {
     pub interval_basis: String,
     /// The cost of each algorithm. Empty: `steps` decide.
     pub costs: Vec<AlgorithmCost>,
+    /// The samples by which a prediction was corrected before the first frame, in the order in which they were taken.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub samples: Vec<Observation>,
 }
 
 /// Where fields came from.
@@ -54,7 +58,7 @@ pub enum Source {
     Predicted,
     /// From timings of the algorithms on this machine.
     Measured,
-    /// Corrected by the frames that were run.
+    /// Predicted, then corrected by frames that were run: by samples before the first one ([`Fields::samples`]), or on line.
     Learned,
 }
 
@@ -100,6 +104,21 @@ pub struct AlgorithmCost {
     pub curve: CostCurve,
     /// Standard deviation of the natural logarithm of measured over modelled time.
     pub spread_ln: f64,
+}
+
+/// One algorithm, timed on some frames of the slice's scenario.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Observation {
+    /// The algorithm.
+    pub algorithm: AlgorithmId,
+    /// Number of objects.
+    pub objects: u32,
+    /// What the model predicted for it, without any sample.
+    pub predicted_ns: f64,
+    /// Median over the frames.
+    pub measured_ns: f64,
 }
 
 /// The two cheapest algorithms under a load.
@@ -165,7 +184,28 @@ impl Fields {
         let mut fields = Self { scenario: scenario.to_owned(), costs, ..Self::empty(source) };
         fields.interval_basis =
             "90 % of a normal distribution with the spread of measured over modelled time of the two algorithms".to_owned();
-        fields.cut(loads);
+        let spreads: Vec<f64> = fields.costs.iter().map(|c| c.spread_ln).collect();
+        fields.cut(loads, &|below, above, _| spreads[below].hypot(spreads[above]));
+        fields
+    }
+
+    /// Fields from costs that observations have corrected, of the algorithms that `usable` admits, which is asked by position in
+    /// [`Posterior::predicted`].
+    ///
+    /// As [`Fields::from_costs`], but with intervals from what is known of the ratio of two costs: what both share cancels.
+    #[must_use]
+    pub fn from_posterior(scenario: &str, posterior: &Posterior, usable: impl Fn(usize) -> bool, loads: &[Load]) -> Self {
+        let kept: Vec<usize> = (0..posterior.predicted().len()).filter(|&k| usable(k)).collect();
+        let all = posterior.costs();
+        let costs = kept.iter().map(|&k| all[k].clone()).collect();
+        let mut fields = Self { scenario: scenario.to_owned(), costs, ..Self::empty(Source::Learned) };
+        fields.interval_basis =
+            "90 % of a normal distribution with the spread that the samples left in the ratio of the two costs".to_owned();
+        fields.cut(loads, &|below, above, load| {
+            let mut joint = Joint::default();
+            posterior.joint(load, &mut joint);
+            joint.variance_of_ratio(kept[below], kept[above]).sqrt()
+        });
         fields
     }
 
@@ -181,6 +221,7 @@ impl Fields {
             crossovers: Vec::new(),
             interval_basis: String::new(),
             costs: Vec::new(),
+            samples: Vec::new(),
         }
     }
 
@@ -236,6 +277,10 @@ impl Fields {
         if let Some(b) = self.crossovers.iter().find(|b| !b.is_sound()) {
             return Some(format!("the crossover from {} to {} does not lie within its interval", b.below, b.above));
         }
+        let is_time = |ns: f64| ns.is_finite() && ns > 0.0;
+        if let Some(s) = self.samples.iter().find(|s| !is_time(s.predicted_ns) || !is_time(s.measured_ns)) {
+            return Some(format!("the sample of {} at {} objects has no time above zero", s.algorithm, s.objects));
+        }
         for (k, cost) in self.costs.iter().enumerate() {
             let id = &cost.algorithm;
             if let Some(defect) = cost.curve.defect() {
@@ -252,10 +297,16 @@ impl Fields {
     }
 
     /// Notes where along the slice the cheapest algorithm changes.
-    fn cut(&mut self, loads: &[Load]) {
+    ///
+    /// `spread` gives the standard deviation of the logarithm of the ratio of two costs under a load.
+    fn cut(&mut self, loads: &[Load], spread: &dyn Fn(usize, usize, &Load) -> f64) {
         let slice = Slice::new(loads);
         let steps = slice.steps(&self.costs);
-        self.crossovers = steps.windows(2).map(|w| self.border(&slice, w[0].1, w[1].1, w[1].0.objects)).collect();
+        let border = |w: &[(Load, usize)]| {
+            let (below, above) = (w[0].1, w[1].1);
+            self.border(&slice, below, above, w[1].0.objects, &|load| spread(below, above, load))
+        };
+        self.crossovers = steps.windows(2).map(border).collect();
         self.steps = steps
             .iter()
             .enumerate()
@@ -266,9 +317,9 @@ impl Fields {
             .collect();
     }
 
-    fn border(&self, slice: &Slice<'_>, below: usize, above: usize, objects: u32) -> Border {
+    fn border(&self, slice: &Slice<'_>, below: usize, above: usize, objects: u32, spread: &dyn Fn(&Load) -> f64) -> Border {
         let (b, a) = (&self.costs[below], &self.costs[above]);
-        let doubt = NORMAL_90 * b.spread_ln.hypot(a.spread_ln);
+        let doubt = |load: &Load| NORMAL_90 * spread(load);
         // Positive where the algorithm of the upper field is cheaper.
         let gain = |load: &Load| (b.curve.cost_ns(load) / a.curve.cost_ns(load)).ln();
         let objects = f64::from(objects);
@@ -276,8 +327,8 @@ impl Fields {
             below: b.algorithm.clone(),
             above: a.algorithm.clone(),
             objects,
-            low: Some(slice.reach(objects, false, |l| gain(l) <= -doubt)),
-            high: Some(slice.reach(objects, true, |l| gain(l) >= doubt)),
+            low: Some(slice.reach(objects, false, |l| gain(l) <= -doubt(l))),
+            high: Some(slice.reach(objects, true, |l| gain(l) >= doubt(l))),
         }
     }
 }
@@ -286,102 +337,4 @@ impl Fields {
 const NORMAL_90: f64 = 1.645;
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{CostTerm, Term};
-
-    fn cost(id: &str, terms: &[(Term, f64)], spread_ln: f64) -> AlgorithmCost {
-        let terms = terms.iter().map(|&(term, unit_ns)| CostTerm { term, unit_ns }).collect();
-        AlgorithmCost {
-            algorithm: id.parse().unwrap(),
-            revision: 1,
-            curve: CostCurve { terms, ..CostCurve::default() },
-            spread_ln,
-        }
-    }
-
-    fn loads() -> Vec<Load> {
-        (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect()
-    }
-
-    #[test]
-    fn crossovers_lie_where_the_curves_cross_and_intervals_around_them() {
-        // 0.5 n (n - 1) = 100 n at n = 201; 100 n = 20 n + 80 000 at n = 1000.
-        let costs = vec![
-            cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05),
-            cost("sweep@cpu1", &[(Term::Objects, 100.0)], 0.05),
-            cost("strips@cpu2", &[(Term::Call, 80_000.0), (Term::Objects, 20.0)], 0.05),
-        ];
-        let fields = Fields::from_costs(Source::Measured, "uniform", costs, &loads());
-        assert_eq!(fields.defect(), None);
-        let names: Vec<String> = fields.steps.iter().map(|s| s.algorithm.to_string()).collect();
-        assert_eq!(names, ["brute@cpu1", "sweep@cpu1", "strips@cpu2"]);
-        assert!((fields.crossovers[0].objects / 201.0 - 1.0).abs() < 0.02, "{:?}", fields.crossovers);
-        assert!((fields.crossovers[1].objects / 1000.0 - 1.0).abs() < 0.02, "{:?}", fields.crossovers);
-        let b = &fields.crossovers[0];
-        let (low, high) = b.interval().unwrap();
-        assert!(low < 195.0 && high > 208.0 && low > 150.0 && high < 260.0, "{b:?}");
-        assert_eq!(fields.step(5).unwrap().algorithm.method(), "brute");
-        assert_eq!(fields.step(u32::MAX).unwrap().algorithm.method(), "strips");
-    }
-
-    #[test]
-    fn an_interval_has_both_ends_or_none_and_holds_its_border() {
-        let costs =
-            vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sweep@cpu1", &[(Term::Objects, 100.0)], 0.05)];
-        let fields = Fields::from_costs(Source::Measured, "uniform", costs, &loads());
-        let defect = |low, high| {
-            let mut fields = fields.clone();
-            (fields.crossovers[0].low, fields.crossovers[0].high) = (low, high);
-            fields.defect()
-        };
-        assert_eq!((defect(None, None), defect(Some(0.0), Some(1e6))), (None, None));
-        for (low, high) in [(Some(1.0), None), (None, Some(1e6)), (Some(300.0), Some(400.0)), (Some(-1.0), Some(1e6))] {
-            assert!(defect(low, high).is_some(), "{low:?} {high:?}");
-        }
-    }
-
-    #[test]
-    fn an_algorithm_that_never_wins_has_no_step() {
-        let costs = vec![cost("brute@cpu1", &[(Term::Objects, 2.0)], 0.0), cost("sweep@cpu1", &[(Term::Objects, 1.0)], 0.0)];
-        let fields = Fields::from_costs(Source::Measured, "uniform", costs, &loads());
-        assert_eq!(fields.steps.len(), 1);
-        assert!(fields.crossovers.is_empty());
-    }
-
-    #[test]
-    fn rank_respects_what_is_usable() {
-        let costs = vec![
-            cost("a@cpu1", &[(Term::Call, 3.0)], 0.0),
-            cost("b@cpu1", &[(Term::Call, 1.0)], 0.0),
-            cost("c@cpu1", &[(Term::Call, 2.0)], 0.0),
-        ];
-        let fields = Fields::from_costs(Source::Measured, "uniform", costs, &loads());
-        let load = Load::default();
-        assert_eq!(fields.rank(&load, |_| true), Some(Ranking { best: 1, best_ns: 1.0, runner_up: Some((2, 2.0)) }));
-        assert_eq!(fields.rank(&load, |k| k != 1), Some(Ranking { best: 2, best_ns: 2.0, runner_up: Some((0, 3.0)) }));
-        assert_eq!(fields.rank(&load, |_| false), None);
-    }
-
-    #[test]
-    fn the_usual_fields_are_sound_with_any_number_of_cores() {
-        for cores in [1, 2, 6] {
-            let fields = Fields::usual(&Registry::with_cores(cores));
-            assert_eq!(fields.defect(), None);
-            let steps: Vec<_> = fields.steps.iter().map(|s| (s.from_objects, s.algorithm.to_string())).collect();
-            let (most, parallel) = (format!("verlet@cpu{cores}"), cores > 1 && cfg!(feature = "parallel"));
-            let mut expected = vec![(0, "brute@cpu1".to_owned()), (80, "verlet@cpu1".to_owned())];
-            expected.extend(parallel.then_some((3000, most)));
-            assert_eq!(steps, expected);
-        }
-    }
-
-    #[test]
-    fn hand_written_steps_are_checked() {
-        let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
-        assert!(Fields::from_steps(vec![step(0, "brute@cpu1"), step(64, "strips@cpu1")]).is_ok());
-        assert!(Fields::from_steps(vec![]).is_err());
-        assert!(Fields::from_steps(vec![step(5, "brute@cpu1")]).is_err());
-        assert!(Fields::from_steps(vec![step(0, "brute@cpu1"), step(0, "strips@cpu1")]).is_err());
-    }
-}
+mod tests;

@@ -12,7 +12,7 @@ mod validation;
 
 use crate::hardware::GpuKind;
 use crate::schema_tag::schema_tag;
-use crate::{BackendClass, Term};
+use crate::{BackendClass, Prior, Term};
 
 pub use cloud::{Cloud, CloudParameter, Place};
 use curve::Formula;
@@ -52,6 +52,10 @@ pub struct Model {
     pub ranges: Vec<Range>,
     /// One cost model for each method on each class of processor.
     pub methods: Vec<MethodModel>,
+    /// How far costs lay from their prediction on machines that were left out. A file without it is from before samples were
+    /// taken; [`Prior::ASSUMED`] holds then.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub prior: Option<Prior>,
     /// How well it did on what it had not seen.
     pub validation: Validation,
     /// The training's machines, and its GPUs, by all parameters together. None of those of which there are fewer than parameters
@@ -188,6 +192,9 @@ impl Model {
         }
         if let Some(r) = self.ranges.iter().find(|r| !(r.min.is_finite() && r.max.is_finite() && r.min <= r.max)) {
             return Some(format!("the range of {} is {} to {}", r.parameter, r.min, r.max));
+        }
+        if let Some(defect) = self.prior.and_then(|p| p.defect()) {
+            return Some(defect);
         }
         for m in &self.methods {
             let name = format!("{} on the {}", m.method, m.backend);

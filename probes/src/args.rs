@@ -119,7 +119,8 @@ impl Probe {
     }
 }
 
-/// Predicts which algorithm is fastest on this machine, for each number of objects, from its hardware parameters alone.
+/// Predicts which algorithm is fastest on this machine, for each number of objects, from its hardware parameters and a handful of
+/// samples.
 ///
 /// Measures the hardware in a few seconds, some more for each GPU, and runs no sweep. With --report it predicts for the machine
 /// of that report.
@@ -140,6 +141,10 @@ pub(crate) struct Predict {
     /// Use this model instead of the built-in one.
     #[arg(long, value_name = "M.json")]
     pub(crate) model: Option<PathBuf>,
+    /// Correct the prediction by timing up to this many algorithms, each at the size where that tells most, in two seconds at most.
+    /// 0 is the pure prediction, and so is the prediction for the machine of a report.
+    #[arg(long, value_name = "K", default_value_t = 8, conflicts_with = "measured", value_parser = clap::value_parser!(u32).range(0..=100))]
+    pub(crate) samples: u32,
     /// Scenario of the slice that is shown: the choice itself depends on the load of each frame. Without this option uniform,
     /// with --measured the first of a report that lacks it.
     #[arg(long, value_name = "NAME")]
@@ -355,6 +360,11 @@ pub(crate) enum PartKind {
         gpus: sapwise::Backend,
         #[arg(long)]
         threads: Option<u32>,
+    },
+    /// Takes the samples that standard input asks for, and prints an answer as JSON a line.
+    Samples {
+        /// What holds for all of them, as JSON.
+        order: String,
     },
     /// Sweeps one scenario and prints one event as JSON a line.
     Sweep {

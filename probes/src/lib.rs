@@ -52,6 +52,7 @@ mod provenance;
 mod random;
 mod restriction;
 mod revisions;
+mod samples;
 mod simulate;
 mod simulation;
 mod steadiness;

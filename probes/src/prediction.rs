@@ -2,9 +2,11 @@
 
 use crate::algorithms::Algorithms;
 use crate::revisions;
-use anyhow::Context;
+use crate::samples::{self, Live, Order, Taken};
+use anyhow::{Context, bail};
 use sapwise::hardware::parameter;
-use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Registry, Scenario};
+use sapwise::model::Prediction;
+use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry, Scenario};
 
 /// Objects of the slice that the fields show: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
@@ -23,14 +25,73 @@ pub(crate) fn predict(
     scenario: Scenario,
     algorithms: &Algorithms,
 ) -> anyhow::Result<Fields> {
-    let cores = hardware.value(parameter::USABLE_CORES).map_or(1, |k| k as u32);
-    let registry = algorithms.registry(cores);
-    let mut known = registry.available();
-    known.extend(sapwise::gpu::algorithms(gpus));
-    let prediction = model.predict(hardware, &known).map_err(anyhow::Error::msg)?;
-    let mut fields = prediction.fields(&scenario.to_string(), &slice(scenario)?);
+    let registry = algorithms.registry(cores(hardware));
+    let mut fields = prediction(model, hardware, gpus, &registry)?.fields(&scenario.to_string(), &slice(scenario)?);
     fields.warnings.extend(revisions::unknown_to(&registry, model));
     Ok(fields)
+}
+
+/// Predicts the fields of this machine and corrects them by up to `most` samples. Also gives whether an algorithm gave a wrong answer.
+///
+/// Whatever keeps samples from being taken, Ctrl-C too, is a warning: the prediction stays.
+///
+/// # Errors
+/// As [`predict`], and when no process can be started.
+pub(crate) fn predict_and_sample(
+    model: &Model,
+    hardware: &Hardware,
+    gpus: &[GpuIdentity],
+    scenario: Scenario,
+    algorithms: &Algorithms,
+    most: u32,
+) -> anyhow::Result<(Fields, bool)> {
+    let registry = algorithms.registry(cores(hardware));
+    let mut prediction = prediction(model, hardware, gpus, &registry)?;
+    let loads = slice(scenario)?;
+    let order = Order {
+        scenario: scenario.to_string(),
+        seed: SEED,
+        cores: cores(hardware),
+        gpus: gpus.to_vec(),
+        algorithms: prediction.costs.iter().map(|c| c.algorithm.clone()).collect(),
+    };
+    let disturbed: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
+    let mut live = Live::new(order, sapwise::measure::statistics::median(&disturbed));
+    let prior = model.prior.unwrap_or(Prior::ASSUMED);
+    let learned = samples::learn(prediction.costs.clone(), &prior, &loads, &mut live, most as usize)?;
+    let (remarks, wrong) = live.remarks();
+    if !learned.usable.contains(&true) {
+        bail!("no algorithm is left: {}; the pure prediction is had by --samples 0", learned.remarks.join("; "));
+    }
+    let mut usable = learned.usable.iter();
+    prediction.costs.retain(|_| usable.next() == Some(&true));
+    let mut fields = prediction.fields(&scenario.to_string(), &loads);
+    fields.warnings.extend(revisions::unknown_to(&registry, model));
+    // Without any sample the posterior is the prior, whose spread is that of machines left out and not of the model.
+    if !learned.taken.is_empty() {
+        let corrected = Fields::from_posterior(&scenario.to_string(), &learned.posterior, |k| learned.usable[k], &loads);
+        let samples = learned.taken.iter().map(Taken::observation).collect();
+        let Fields { model, extrapolated, warnings, .. } = fields;
+        fields = Fields { model, extrapolated, warnings, samples, ..corrected };
+    }
+    fields.warnings.extend(remarks);
+    fields.warnings.extend(learned.remarks);
+    if crate::interrupt::requested() {
+        let taken = learned.taken.len();
+        fields.warnings.push(format!("interrupted after {taken} samples: the prediction is corrected by those only"));
+    }
+    Ok((fields, wrong))
+}
+
+fn cores(hardware: &Hardware) -> u32 {
+    hardware.value(parameter::USABLE_CORES).map_or(1, |k| k as u32)
+}
+
+/// Costs of every algorithm of the registry and on these GPUs.
+fn prediction(model: &Model, hardware: &Hardware, gpus: &[GpuIdentity], registry: &Registry) -> anyhow::Result<Prediction> {
+    let mut known = registry.available();
+    known.extend(sapwise::gpu::algorithms(gpus));
+    model.predict(hardware, &known).map_err(anyhow::Error::msg)
 }
 
 /// The load of a scenario over the number of objects, with the pairs that it really has.

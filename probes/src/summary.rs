@@ -118,10 +118,23 @@ pub(crate) fn fields(fields: &Fields) -> String {
     if !fields.crossovers.iter().all(told) {
         text.push_str(&format!("  {}\n", fields.interval_basis));
     }
+    if !fields.samples.is_empty() {
+        text.push_str(&format!("\nsamples by which the prediction was corrected\n{}", samples(fields)));
+    }
     for warning in &fields.warnings {
         text.push_str(&format!("  warning: {warning}\n"));
     }
     text
+}
+
+/// What was timed, beside what had been predicted.
+fn samples(fields: &Fields) -> String {
+    let mut rows = vec![["  algorithm", "objects", "predicted", "measured"].map(str::to_owned).to_vec()];
+    rows.extend(fields.samples.iter().map(|s| {
+        let algorithm = format!("  {}", s.algorithm);
+        vec![algorithm, grouped(u64::from(s.objects)), duration(s.predicted_ns), duration(s.measured_ns)]
+    }));
+    columns(&rows)
 }
 
 /// A value with the unit that the end of its name says.

@@ -18,7 +18,7 @@ fn every_verb_has_help_with_an_example() {
 
 #[test]
 fn wrong_usage_is_exit_status_two() {
-    let cases: [&[&str]; 13] = [
+    let cases: [&[&str]; 15] = [
         &[],
         &["fly"],
         &["devices", "--fast"],
@@ -30,6 +30,8 @@ fn wrong_usage_is_exit_status_two() {
         &["predict", "--threads", "4096"],
         &["predict", "--measured"],
         &["predict", "--no-gpus", "--software-gpus"],
+        &["predict", "--samples", "101"],
+        &["predict", "--report", "r.json", "--measured", "--samples", "3"],
         &["pairs", "x.npy", "--no-gpus"],
         &["probe", "--hardware-only", "--quick"],
     ];

@@ -76,7 +76,7 @@ fn train_and_predict_keep_their_contracts() {
     let validation = &trained["validation"];
     assert_eq!((&validation["physical_machines"], &validation["profiles"]), (&2.into(), &2.into()));
     let methods = validation["methods"].as_array().unwrap();
-    assert_eq!(methods.len(), 11);
+    assert_eq!(methods.len(), 13);
     let figures = ["name", "mean_regret", "p95_regret", "share_over_10_percent", "closed_gap"];
     methods.iter().for_each(|m| assert_keys(m, &figures));
 
@@ -86,6 +86,13 @@ fn train_and_predict_keep_their_contracts() {
     predict.arg("predict").arg("--report").arg(&own).arg("--model").arg(&model).arg("--json").arg("--out").arg(&out);
     let fields = answer(&mut predict);
     assert_fields(&fields, "predicted");
+    assert!(fields.get("samples").is_none(), "{fields}");
+    // Of another machine no sample can be had, and whoever did not ask for none is told.
+    let said = |words: &[&str]| {
+        let text = success(sapwise().args(["predict", "--report"]).arg(&own).arg("--model").arg(&model).args(words));
+        text.contains("No sample was taken")
+    };
+    assert!(said(&[]) && said(&["--samples", "3"]) && !said(&["--samples", "0"]));
     assert_eq!(fields["model"], "model");
     assert_eq!(serde_json::from_str::<Value>(&fs::read_to_string(&out).unwrap()).unwrap(), fields);
 }
@@ -169,4 +176,26 @@ fn run_refuses_fields_and_reports_of_other_revisions() {
             assert!(complaint.contains(text), "{text} is missing: {complaint}");
         }
     }
+}
+
+#[test]
+fn samples_on_this_machine_correct_the_prediction_and_are_listed() {
+    let sampled = |k: &str| answer(sapwise().args(["predict", "--no-gpus", "--json", "--samples", k]));
+    let pure = sampled("0");
+    assert_fields(&pure, "predicted");
+    assert!(pure.get("samples").is_none(), "{pure}");
+    let fields = sampled("3");
+    assert_fields(&fields, "learned");
+    assert_eq!(fields["model"], pure["model"]);
+    let samples = fields["samples"].as_array().unwrap();
+    assert!((1..=3).contains(&samples.len()), "{samples:?}");
+    for sample in samples {
+        assert_keys(sample, &["algorithm", "objects", "predicted_ns", "measured_ns"]);
+        assert!(sample["measured_ns"].as_f64().unwrap() >= 1.0, "{sample}");
+    }
+    assert!(fields["interval_basis"].as_str().unwrap().contains("samples"), "{fields}");
+    let read = sapwise::json::fields(&fields.to_string()).unwrap();
+    assert_eq!((read.source, read.samples.len()), (sapwise::Source::Learned, samples.len()));
+    let text = success(sapwise().args(["predict", "--no-gpus", "--samples", "1"]));
+    assert!(text.contains("samples by which the prediction was corrected"), "{text}");
 }

@@ -73,6 +73,7 @@ fn model(methods: Vec<MethodModel>) -> Model {
         trained_on_counts: Vec::new(),
         ranges: vec![range(parameter::CLOCK_MEASURED_GHZ), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
         methods,
+        prior: None,
         validation: Validation::default(),
         clouds: Vec::new(),
         folds: Vec::new(),
@@ -182,4 +183,13 @@ fn hardware_with_impossible_gpus_is_told() {
         assert!(defect(&|h| h.gpu_groups.push(group(gpus))).contains("no group"));
     }
     assert!(defect(&|h| h.gpu_groups = vec![group(&[0, 1]), group(&[0, 1])]).contains("twice"));
+}
+
+#[test]
+fn a_prior_that_can_not_be_is_a_defect_and_none_is_not() {
+    let with = |prior| Model { prior, ..model(vec![method(BackendClass::Cpu, Scale::Cycle)]) }.defect();
+    assert_eq!((with(None), with(Some(Prior::ASSUMED))), (None, None));
+    let mut wrong = Prior::ASSUMED;
+    wrong.cpu.length_octaves = f64::NAN;
+    assert!(with(Some(wrong)).is_some_and(|d| d.contains("prior of the CPU")));
 }

@@ -14,7 +14,8 @@ pub(crate) use conduct::{Conditions, Found, conduct};
 pub(crate) use dropout::Standing;
 pub(crate) use order::{Course, Event, Order, Visit};
 pub(crate) use plan::Plan;
-pub(crate) use scenario::{next_frame, sweep};
+pub(crate) use race::WARM_UP;
+pub(crate) use scenario::{PAIR_LIMIT, add_gpus, next_frame, sweep};
 
 /// The median of samples in nanoseconds. `None` without samples.
 pub(crate) fn median(samples: &[u64]) -> Option<f64> {

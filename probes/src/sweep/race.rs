@@ -19,7 +19,7 @@ pub(super) const FEWEST_FRAMES: usize = 3;
 /// Frames before the samples for algorithms that keep work from frame to frame: how far boxes move is known in the second, and the
 /// shares of them that leave their grown boxes follow over some tens. Fewer would time the cheap frames after everything was found
 /// anew: at 3162 objects 11 us where the others take 34. They go on past the point's time for that reason.
-pub(super) const WARM_UP: usize = 24;
+pub(crate) const WARM_UP: usize = 24;
 /// Windows that may be thrown away for each that is kept: on a machine that is always busy more would only cost time.
 const MOST_REDONE: u32 = 2;
 /// Share of a point's time in which spoiled frames are redone. After that they are kept, with the foreign load beside them.

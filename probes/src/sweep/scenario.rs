@@ -10,7 +10,7 @@ use sapwise::{AlgorithmId, GpuIdentity, Registry, Scenario, Scene};
 use std::time::{Duration, Instant};
 
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
-const PAIR_LIMIT: usize = 32 << 20;
+pub(crate) const PAIR_LIMIT: usize = 32 << 20;
 
 /// Runs the algorithms of a registry along the course of an order and hands on what happens.
 ///
@@ -132,7 +132,7 @@ impl Stage<'_> {
 }
 
 /// Adds the algorithms on those of these GPUs that are still there, and gives what keeps others from running.
-fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<String> {
+pub(crate) fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<String> {
     if wanted.is_empty() {
         return Vec::new();
     }

@@ -381,8 +381,8 @@ mod tests {
             let found = models.iter().find(|m| m.method == truth.method).unwrap();
             for t in &truth.terms {
                 let unit = found.terms.iter().find(|f| (f.term, f.scale) == (t.term, t.scale)).map_or(0.0, |f| f.unit);
-                // Samples are whole nanoseconds, and the cache term is a few percent of the few rows that it is in.
-                let share = if t.term == Term::ColdObjects { 0.25 } else { 0.05 };
+                // Samples are whole nanoseconds. Objects outside the cache are nearly a combination of objects and their sort here.
+                let share = if t.term == Term::ColdObjects { 0.2 } else { 0.05 };
                 assert!((unit / t.unit - 1.0).abs() < share, "{}: {t:?} became {unit}; {:?}", truth.method, found.terms);
             }
             assert!(found.spread_ln < 0.005, "{found:?}");

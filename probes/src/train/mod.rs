@@ -15,12 +15,14 @@ mod model;
 mod nnls;
 mod notes;
 mod partition;
+mod prior;
 mod profile;
 #[cfg(test)]
 mod reference;
 mod residual;
 mod robust;
 mod rows;
+mod sampled;
 mod scores;
 mod selection;
 #[cfg(test)]
@@ -135,6 +137,7 @@ pub(crate) fn train(selection: Selection, name: &str) -> Result<Trained> {
     notes.extend(validated.notes);
     progress.message("validating trainings of fewer machines");
     let learning = learning::learning(&profiles, &trainings, &progress)?;
+    model.prior = validated.prior;
     model.validation = Validation { learning, ..validated.validation };
     Ok(Trained { model, notes: notes::folded(notes), held: validated.held })
 }

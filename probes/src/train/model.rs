@@ -32,6 +32,7 @@ pub(crate) fn model(
         trained_on_counts,
         ranges: ranges(&profiles),
         methods,
+        prior: None,
         validation: Validation::default(),
         clouds: Vec::new(),
         folds: Vec::new(),

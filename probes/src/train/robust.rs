@@ -52,10 +52,11 @@ impl Problem {
         }
         let few = self.some();
         let without = profiles.iter().step_by(profiles.len().div_ceil(MOST_STARTS)).map(|&p| Some(p));
-        let ends = std::iter::once(None).chain(without).map(|left_out| few.polished(few.start(left_out)));
-        let scored = ends.map(|units| (few.error(&units), units));
-        let best = scored.min_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(Vec::new, |best| best.1);
-        self.polished(self.reweighted(&best, &mut vec![false; self.ns.len()]))
+        let starts = std::iter::once(None).chain(without);
+        let scored = starts.map(|left_out| (few.error(&few.polished(few.start(left_out))), left_out));
+        let best = scored.min_by(|a, b| a.0.total_cmp(&b.0)).and_then(|best| best.1);
+        // Not from where the few rows ended: what they tell little of would hold back the rows that tell more as outliers.
+        self.polished(self.start(best))
     }
 
     /// The profiles that have rows, each once.

@@ -10,19 +10,23 @@ use super::held::{Held, Time};
 use super::model::model;
 use super::partition::Partition;
 use super::profile::Profile;
+use super::sampled::{self, Errors, Predicted};
 use super::scores::{self, Judged};
 use super::yardstick::{Chooser, Yardstick};
 use crate::progress::Progress;
 use anyhow::Result;
 use rayon::prelude::*;
 use sapwise::model::{MethodModel, Validation};
-use sapwise::{AlgorithmCost, AlgorithmId, Model};
+use sapwise::{AlgorithmCost, AlgorithmId, Model, Prior};
 use std::sync::OnceLock;
 
 /// The way that scores are given relative to.
 pub(super) const SINGLE_BEST: &str = "single best";
 /// The way that `predict` takes.
 pub(crate) const OURS: &str = "physics + ridge";
+/// Ours, corrected by [`sampled::SAMPLES`] samples of one scenario on the machine itself, under all loads and under those of that scenario.
+const SAMPLED: &str = "ours + 8 samples";
+const SAMPLED_THERE: &str = "... where sampled";
 /// Profiles of a fold that are judged at most: scores of several hundred machines don't change with thousands more.
 const MOST_JUDGED: usize = 16;
 /// Profiles of a training that the best single algorithm and the direct regression look at: a mean and a handful of slopes need no
@@ -36,6 +40,8 @@ pub(super) struct Validated {
     pub(super) notes: Vec<String>,
     /// What a picture shows of it.
     pub(super) held: Held,
+    /// How far costs lie from their prediction on what was left out; `None` where nothing was.
+    pub(super) prior: Option<Prior>,
 }
 
 /// Leaves out one fold of a [`Partition`] after the other, fits to the others and lets every way choose on what was left out.
@@ -55,7 +61,7 @@ pub(super) fn validate(
     machines.dedup();
     let mut notes = Vec::new();
     let mut all: Vec<Judged> = Vec::new();
-    let mut times = Vec::new();
+    let (mut times, mut prior) = (Vec::new(), None);
     if profiles.len() < 2 {
         notes.push("nothing is validated: there is one report only; add reports of other machines".to_owned());
     } else {
@@ -73,11 +79,16 @@ pub(super) fn validate(
             progress.advance(1);
             found
         };
+        let mut predicted = Vec::new();
         for found in partition.folds.par_iter().map(fold).collect::<Result<Vec<Found>>>()? {
             all.extend(found.judged);
             times.extend(found.times);
             notes.extend(found.notes);
+            predicted.push(found.predicted);
         }
+        let (sampled, of_all) = data.sampled(&partition.folds, predicted, partition.by_machine)?;
+        all.extend(sampled);
+        prior = of_all;
     }
     let validation = Validation {
         held_out: partition.held_out.clone(),
@@ -86,7 +97,7 @@ pub(super) fn validate(
         methods: scores::scores(&all),
         ..Validation::default()
     };
-    Ok(Validated { validation, notes, held: Held::new(&all, times, partition.by_machine) })
+    Ok(Validated { validation, notes, held: Held::new(&all, times, partition.by_machine), prior })
 }
 
 /// What all folds share.
@@ -107,6 +118,7 @@ pub(super) struct Data<'a> {
 #[derive(Default)]
 pub(super) struct Found {
     pub(super) judged: Vec<Judged>,
+    predicted: Vec<Predicted>,
     times: Vec<Time>,
     notes: Vec<String>,
 }
@@ -223,7 +235,43 @@ impl<'a> Data<'a> {
             regret: self.yardsticks[held].regret(profile, &way.choose),
             crossings: way.costs.map(|costs| borders.errors(costs)),
         }));
+        drop(ways);
+        found.predicted.extend(ridge.map(|costs| Predicted { held, costs }));
         Ok(())
+    }
+
+    /// What samples add to the predictions of each fold, with a prior from the others; and the prior of all.
+    fn sampled(
+        &self,
+        folds: &[Vec<usize>],
+        predicted: Vec<Vec<Predicted>>,
+        by_machine: bool,
+    ) -> Result<(Vec<Judged>, Option<Prior>)> {
+        let folds: Vec<(&Vec<usize>, usize)> =
+            folds.iter().zip(&predicted).flat_map(|(fold, p)| p.iter().map(move |_| fold)).zip(0..).collect();
+        let predicted: Vec<Predicted> = predicted.into_iter().flatten().collect();
+        let errors = Errors::new(self.profiles, &predicted, by_machine);
+        let judge = |&(fold, k): &(&Vec<usize>, usize)| {
+            let held = predicted[k].held;
+            let profile = &self.profiles[held];
+            let scenario = baselines::usual(profile.points.iter().map(|s| s.scenario.as_str()));
+            let Some(costs) = sampled::corrected(profile, scenario, &predicted[k], &errors.prior(fold))? else {
+                return Ok(Vec::new());
+            };
+            let available = available(profile);
+            let choose = by_costs(costs.clone(), &available);
+            let judged = |name, scenario: Option<&str>, crossings| Judged {
+                name,
+                machine: profile.machine().to_owned(),
+                regret: self.yardsticks[held].regret_in(scenario, profile, &choose),
+                crossings,
+            };
+            let errors = Borders::new(profile, self.costs(held)).errors(&costs);
+            Ok(vec![judged(SAMPLED, None, Some(errors)), judged(SAMPLED_THERE, Some(scenario), None)])
+        };
+        let judged = folds.par_iter().map(judge).collect::<Result<Vec<Vec<Judged>>>>()?;
+        let prior = (!predicted.is_empty()).then(|| errors.prior(&[]));
+        Ok((judged.into_iter().flatten().collect(), prior))
     }
 }
 
@@ -285,7 +333,7 @@ mod tests {
     #[test]
     fn physics_beats_every_constant_on_machines_left_out() {
         let (validation, _) = validated(&profiles(Machine::family()));
-        assert_eq!((validation.physical_machines, validation.profiles, validation.methods.len()), (7, 7, 11));
+        assert_eq!((validation.physical_machines, validation.profiles, validation.methods.len()), (7, 7, 13));
         assert_eq!(validation.held_out, "physical machine");
         for name in ["physics", "physics + ridge", "full sweep"] {
             assert!(mean(&validation, name) < 0.05, "{name}: {}", mean(&validation, name));
@@ -344,7 +392,7 @@ mod tests {
         let mut machines = Machine::family_with_gpus();
         machines[6].gpus.clear();
         let (validation, notes) = validated(&profiles(machines));
-        assert_eq!((validation.physical_machines, validation.methods.len()), (8, 11));
+        assert_eq!((validation.physical_machines, validation.methods.len()), (8, 13));
         for name in ["physics", "physics + ridge", "full sweep"] {
             assert!(mean(&validation, name) < 0.1, "{name}: {} {notes:?}", mean(&validation, name));
         }
@@ -357,7 +405,7 @@ mod tests {
         two.truncate(2);
         two[0].points.truncate(1);
         let (validation, notes) = validated(&two);
-        assert_eq!(validation.methods.len(), 11);
+        assert_eq!(validation.methods.len(), 13);
         assert!(notes.iter().any(|n| n.starts_with("there is no default machine when")), "{notes:?}");
     }
 

@@ -32,6 +32,7 @@ pub(crate) struct Yardstick {
 
 #[derive(Debug, Clone)]
 struct Cell {
+    scenario: String,
     /// Base-10 logarithm of the number of objects.
     decade: f64,
     /// The loads of its points.
@@ -66,6 +67,7 @@ impl Yardstick {
             Some((cell[k]? - least).exp())
         };
         let cells = groups.iter().map(|(&(scenario, quarter), spots)| Cell {
+            scenario: scenario.to_owned(),
             decade: quarter as f64 / PER_DECADE,
             loads: spots.iter().map(|s| s.load).collect(),
             // Who was not timed here may have been timed in the next cell: how far behind changes little from one to the other.
@@ -78,25 +80,30 @@ impl Yardstick {
 
     /// The regret of a way to choose among the algorithms of this profile.
     pub(crate) fn regret(&self, profile: &Profile, choose: &Chooser<'_>) -> Regret {
+        self.regret_in(None, profile, choose)
+    }
+
+    /// The same under the loads of one scenario, or of all.
+    pub(crate) fn regret_in(&self, scenario: Option<&str>, profile: &Profile, choose: &Chooser<'_>) -> Regret {
         let of = |cell: &Cell, load: &Load| {
             let chosen = choose(load).and_then(|id| profile.position(&id));
             chosen.map_or(NOT_TIMED, |k| cell.over_best[usize::from(k)]) - 1.0
         };
-        self.summed(|cell| average(&cell.loads.iter().map(|load| of(cell, load)).collect::<Vec<f64>>()))
+        let cells = self.cells.iter().filter(|c| scenario.is_none_or(|s| c.scenario == s));
+        summed(cells, |cell| average(&cell.loads.iter().map(|load| of(cell, load)).collect::<Vec<f64>>()))
     }
 
     /// The mean regret of choosing each algorithm always.
     pub(crate) fn always(&self) -> Vec<f64> {
-        (0..self.algorithms).map(|k| self.summed(|cell| cell.over_best[k] - 1.0).mean).collect()
+        (0..self.algorithms).map(|k| summed(self.cells.iter(), |cell| cell.over_best[k] - 1.0).mean).collect()
     }
+}
 
-    fn summed(&self, of: impl Fn(&Cell) -> f64) -> Regret {
-        let cells: Vec<f64> = self.cells.iter().map(of).collect();
-        let weights: Vec<f64> = self.cells.iter().map(|c| in_games(c.decade)).collect();
-        let total: f64 = weights.iter().sum();
-        let weighted: f64 = cells.iter().zip(&weights).map(|(r, w)| r * w).sum();
-        Regret { mean: average(&cells), as_in_games: if total > 0.0 { weighted / total } else { 0.0 }, cells }
-    }
+fn summed<'a>(cells: impl Iterator<Item = &'a Cell>, of: impl Fn(&Cell) -> f64) -> Regret {
+    let (regrets, weights): (Vec<f64>, Vec<f64>) = cells.map(|c| (of(c), in_games(c.decade))).unzip();
+    let total: f64 = weights.iter().sum();
+    let weighted: f64 = regrets.iter().zip(&weights).map(|(r, w)| r * w).sum();
+    Regret { mean: average(&regrets), as_in_games: if total > 0.0 { weighted / total } else { 0.0 }, cells: regrets }
 }
 
 fn quarter(spot: &Spot) -> i64 {

@@ -4,12 +4,15 @@ use crate::algorithms::Algorithms;
 use crate::args::{Part, PartKind};
 use crate::exit::{Outcome, WrongUsage};
 use crate::sweep::{Order, sweep};
-use crate::{child, gpus, output};
+use crate::{child, gpus, output, samples};
 use sapwise::Backend;
 use sapwise::measure::{self, Family, Options};
 
 pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
-    child::end_with_parent();
+    // Whoever takes samples reads orders from the pipe of which the others await the end only.
+    if !matches!(arguments.part, PartKind::Samples { .. }) {
+        child::end_with_parent();
+    }
     match arguments.part {
         PartKind::Hardware { family, threads } => {
             let family: Family = family.parse().map_err(WrongUsage)?;
@@ -24,6 +27,10 @@ pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Ou
             gpus::print_group(&indices, &Options { threads, ..Options::default() })?;
         }
         PartKind::GpuGroup { gpus, .. } => return Err(WrongUsage(format!("{gpus} is no group of GPUs")).into()),
+        PartKind::Samples { order } => {
+            let order = serde_json::from_str(&order).map_err(|e| WrongUsage(format!("the order: {e}")))?;
+            samples::take(&order, algorithms)?;
+        }
         PartKind::Sweep { order } => {
             let order: Order = serde_json::from_str(&order).map_err(|e| WrongUsage(format!("the order: {e}")))?;
             sweep(&order, algorithms, &mut |event| output::print_json(&event))?;

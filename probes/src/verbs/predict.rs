@@ -20,6 +20,8 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     let mut text = String::new();
     // A sentence on GPUs for people, and what went wrong with them for the file.
     let (mut told, mut remarks) = (None, Vec::new());
+    // Whether a sample gave wrong pairs.
+    let mut wrong = false;
     let mut fields = match (&model, &report) {
         (None, Some(report)) => {
             let mut report = report.clone();
@@ -55,18 +57,29 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
                     taken
                 }
             };
-            prediction::predict(model, &hardware, &gpus, scenario, algorithms)?
+            if report.is_none() && arguments.samples > 0 {
+                let sampled =
+                    prediction::predict_and_sample(model, &hardware, &gpus, scenario, algorithms, arguments.samples)?;
+                wrong = sampled.1;
+                sampled.0
+            } else {
+                prediction::predict(model, &hardware, &gpus, scenario, algorithms)?
+            }
         }
     };
     fields.warnings.append(&mut remarks);
     if let Some(path) = &arguments.out {
         files::write_text(path, &json::write(&fields)?)?;
     }
+    let outcome = if wrong || interrupt::requested() { Outcome::Failed } else { Outcome::Done };
     if arguments.json {
         output::print_json(&fields)?;
-        return Ok(Outcome::Done);
+        return Ok(outcome);
     }
     text += &summary::fields(&fields);
+    if report.is_some() && model.is_some() && arguments.samples > 0 {
+        text += "\nNo sample was taken: they are taken on this machine, and the prediction is for that of a report.\n";
+    }
     if let Some(told) = told {
         text += &format!("\n{told}\n");
     }
@@ -75,7 +88,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         None => "Next: the same with --out fields.json, then sapwise run fragmentation --fields fields.json".to_owned(),
     };
     output::print(&text)?;
-    Ok(Outcome::Done)
+    Ok(outcome)
 }
 
 /// The model in a file, or the one that is built in.

@@ -100,6 +100,7 @@ fn model(methods: Vec<MethodModel>, folds: Vec<Fold>, machines: usize) -> Model 
         },
         clouds: Vec::new(),
         folds,
+        prior: None,
     }
 }
 

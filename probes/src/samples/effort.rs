@@ -1,0 +1,73 @@
+//! How long a sample takes.
+
+use crate::sweep::WARM_UP;
+use sapwise::{AlgorithmId, BackendClass, Registry};
+use std::time::Duration;
+
+/// Frames are timed for this long, so that a median of short ones stands on thousands, from more than one tick of the scheduler.
+pub(super) const TIMED: Duration = Duration::from_millis(15);
+
+/// Frames that are timed at least, however long they take.
+pub(super) const FEWEST_FRAMES: usize = 3;
+
+/// Time to make a scene and to advance it by a frame, for each object: what `uniform` takes on the first machine, rounded up.
+const START_NS: f64 = 60.0;
+const ADVANCE_NS: f64 = 15.0;
+
+/// Time of a sample beside scene and frames: orders and answers.
+const FIXED_NS: f64 = 0.5e6;
+
+/// The first frame allocates buffers and wakes threads.
+const FIRST_FRAME: f64 = 3.0;
+
+/// What a sample needs beside the frames that are timed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Effort {
+    /// Objects of its scene.
+    pub(crate) objects: u32,
+    /// Whether the algorithm keeps work from frame to frame.
+    pub(crate) keeps_work: bool,
+}
+
+impl Effort {
+    /// How long a sample will take where a frame takes `ns`.
+    pub(crate) fn seconds(self, ns: f64) -> f64 {
+        let objects = f64::from(self.objects);
+        let frame = ns + objects * ADVANCE_NS;
+        let before = FIRST_FRAME + if self.keeps_work { WARM_UP as f64 } else { 0.0 };
+        let timed = (FEWEST_FRAMES as f64 * frame).max(TIMED.as_nanos() as f64);
+        (FIXED_NS + objects * START_NS + before * frame + timed) / 1e9
+    }
+}
+
+/// The methods on the CPU that keep work from frame to frame.
+#[derive(Debug)]
+pub(super) struct Keepers(Vec<String>);
+
+impl Keepers {
+    pub(super) fn find() -> Self {
+        // A registry of one core makes its algorithms without threads.
+        let registry = Registry::with_cores(1);
+        let keeps_work = |id: &AlgorithmId| registry.create(id).is_ok_and(|a| a.keeps_work());
+        Self(registry.entries().iter().map(|e| &e.id).filter(|id| keeps_work(id)).map(|id| id.method().to_owned()).collect())
+    }
+
+    pub(super) fn contain(&self, algorithm: &AlgorithmId) -> bool {
+        algorithm.backend().class() == BackendClass::Cpu && self.0.iter().any(|m| m == algorithm.method())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_of_who_keeps_work_takes_the_frames_of_its_warm_up_longer() {
+        let effort = |keeps_work| Effort { objects: 100_000, keeps_work };
+        let [without, with] = [false, true].map(|k| effort(k).seconds(1e6));
+        assert!((with - without - WARM_UP as f64 * 2.5e-3).abs() < 1e-9, "{with} {without}");
+        let keepers = Keepers::find();
+        let of = |id: &str| keepers.contain(&id.parse().unwrap());
+        assert!(of("verlet@cpu1") && of("verlet@cpu8") && !of("strips@cpu1") && !of("verlet@gpu0"));
+    }
+}

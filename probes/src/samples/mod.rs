@@ -1,0 +1,191 @@
+//! A handful of samples: which algorithm to time at which size, and what that tells about all of them.
+
+mod effort;
+mod live;
+mod order;
+mod replay;
+mod taker;
+
+use crate::gpus::uses;
+use sapwise::posterior::{Joint, Outlook};
+use sapwise::{AlgorithmCost, AlgorithmId, Load, Observation, Posterior, Prior};
+
+pub(crate) use effort::Effort;
+pub(crate) use live::Live;
+pub(crate) use order::Order;
+pub(crate) use replay::{Replay, ReplayPoint};
+pub(crate) use taker::take;
+
+/// Time for all samples together.
+pub(crate) const SECONDS: f64 = 2.0;
+
+/// No sample is taken that promises less than this, as a share of a frame's time.
+const LEAST_GAIN: f64 = 1e-5;
+
+/// How long a sample will take is forecast with a cost this many standard deviations above the expected one.
+const CAUTION: f64 = 1.0;
+
+/// Where samples come from: this machine, or a report of another.
+pub(crate) trait Source {
+    /// What it takes to time an algorithm there, beside its frames. `None` where no sample can be had.
+    fn effort(&self, algorithm: &AlgorithmId, load: &Load) -> Option<Effort>;
+
+    /// Times an algorithm on frames of that load.
+    ///
+    /// # Errors
+    /// When no further sample can be taken at all.
+    fn sample(&mut self, algorithm: &AlgorithmId, load: &Load) -> anyhow::Result<Answer>;
+}
+
+/// What became of a sample.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Answer {
+    /// It was taken.
+    Taken(Sample),
+    /// Not this one, but others may be.
+    Skipped,
+    /// The algorithm can't be used, nor can any other on these GPUs.
+    Failed {
+        /// What happened, in words that follow the name of the algorithm.
+        why: String,
+        /// The GPUs that are lost with it.
+        gpus: Vec<u32>,
+    },
+    /// Nothing more is to be had: the time is over, or the user stopped it.
+    Over,
+}
+
+/// One algorithm, timed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sample {
+    /// The load of the frames.
+    pub(crate) load: Load,
+    /// Median over the frames.
+    pub(crate) ns: f64,
+    /// Standard deviation of the logarithm of that median.
+    pub(crate) noise_ln: f64,
+    /// Wall clock that it took, everything included.
+    pub(crate) seconds: f64,
+}
+
+/// A sample beside what the model had predicted.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Taken {
+    /// The algorithm.
+    pub(crate) algorithm: AlgorithmId,
+    /// What was measured.
+    pub(crate) sample: Sample,
+    /// What the model had predicted, without any sample.
+    pub(crate) predicted_ns: f64,
+}
+
+impl Taken {
+    /// As it stands in a file.
+    pub(crate) fn observation(&self) -> Observation {
+        Observation {
+            algorithm: self.algorithm.clone(),
+            objects: self.sample.load.objects,
+            predicted_ns: self.predicted_ns,
+            measured_ns: self.sample.ns,
+        }
+    }
+}
+
+/// Costs that samples have corrected.
+#[derive(Debug, Clone)]
+pub(crate) struct Learned {
+    /// What is known of all algorithms.
+    pub(crate) posterior: Posterior,
+    /// Which of them did not fail.
+    pub(crate) usable: Vec<bool>,
+    /// What was sampled, in that order.
+    pub(crate) taken: Vec<Taken>,
+    /// Why algorithms were left out.
+    pub(crate) remarks: Vec<String>,
+}
+
+/// Takes up to `most` samples on loads of `slice`, each where it promises to lower the expected regret over the slice the most,
+/// as long as they fit into [`SECONDS`].
+///
+/// # Errors
+/// As [`Source::sample`].
+pub(crate) fn learn(
+    predicted: Vec<AlgorithmCost>,
+    prior: &Prior,
+    slice: &[Load],
+    source: &mut dyn Source,
+    most: usize,
+) -> anyhow::Result<Learned> {
+    let mut usable = vec![true; predicted.len()];
+    let mut open: Vec<(usize, usize)> = (0..predicted.len()).flat_map(|a| (0..slice.len()).map(move |at| (a, at))).collect();
+    let mut posterior = Posterior::new(predicted, prior);
+    let mut outlook = Outlook::new(&posterior, slice, &usable);
+    let mut expected = Vec::new();
+    let (mut taken, mut remarks, mut left) = (Vec::new(), Vec::new(), SECONDS);
+    while taken.len() < most {
+        outlook.refresh(&posterior, &usable);
+        cautious_ns(&posterior, slice, &mut expected);
+        // One sample may take two shares of what is left, so that the dear ones don't use up the time of the others.
+        let longest = left * 2.0 / (most - taken.len() + 1) as f64;
+        let mut next: Option<(f64, usize)> = None;
+        for (k, &(a, at)) in open.iter().enumerate() {
+            let effort = source.effort(&posterior.predicted()[a].algorithm, &slice[at]);
+            if effort.is_none_or(|e| e.seconds(expected[at][a]) > longest) {
+                continue;
+            }
+            let gain = outlook.gain(&posterior, a, &slice[at], 0.0);
+            if gain > next.map_or(LEAST_GAIN, |n| n.0) {
+                next = Some((gain, k));
+            }
+        }
+        let Some((_, k)) = next else { break };
+        let (a, at) = open.swap_remove(k);
+        let algorithm = posterior.predicted()[a].algorithm.clone();
+        match source.sample(&algorithm, &slice[at])? {
+            Answer::Over => break,
+            Answer::Skipped => {}
+            Answer::Failed { why, gpus } => {
+                for (other, usable) in posterior.predicted().iter().zip(&mut usable) {
+                    let lost = uses(&other.algorithm).iter().any(|k| gpus.contains(k));
+                    *usable &= !lost && other.algorithm != algorithm;
+                }
+                open.retain(|o| usable[o.0]);
+                let with = if gpus.is_empty() { String::new() } else { format!(" with all on {}", algorithm.backend()) };
+                remarks.push(format!("{algorithm} is left out{with}: {why}"));
+            }
+            Answer::Taken(sample) => {
+                left -= sample.seconds;
+                let predicted_ns = posterior.predicted()[a].curve.cost_ns(&sample.load);
+                if posterior.observe(a, &sample.load, sample.ns, sample.noise_ln) {
+                    taken.push(Taken { algorithm, sample, predicted_ns });
+                }
+            }
+        }
+    }
+    Ok(Learned { posterior, usable, taken, remarks })
+}
+
+impl Learned {
+    /// The corrected costs of the algorithms that did not fail.
+    pub(crate) fn costs(&self) -> Vec<AlgorithmCost> {
+        let mut usable = self.usable.iter();
+        let mut costs = self.posterior.costs();
+        costs.retain(|_| usable.next() == Some(&true));
+        costs
+    }
+}
+
+/// What algorithms may cost under each load, so that a sample that turns out dear seldom exceeds its time.
+fn cautious_ns(posterior: &Posterior, slice: &[Load], expected: &mut Vec<Vec<f64>>) {
+    let mut joint = Joint::default();
+    expected.clear();
+    expected.extend(slice.iter().map(|load| {
+        posterior.joint(load, &mut joint);
+        let count = joint.mean_ln.len();
+        let of = |a: usize| (joint.mean_ln[a] + CAUTION * joint.covariance[a * count + a].max(0.0).sqrt()).exp();
+        (0..count).map(of).collect::<Vec<f64>>()
+    }));
+}
+
+#[cfg(test)]
+mod tests;
