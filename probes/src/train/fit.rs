@@ -381,9 +381,7 @@ mod tests {
             let found = models.iter().find(|m| m.method == truth.method).unwrap();
             for t in &truth.terms {
                 let unit = found.terms.iter().find(|f| (f.term, f.scale) == (t.term, t.scale)).map_or(0.0, |f| f.unit);
-                // Samples are whole nanoseconds. Objects outside the cache are nearly a combination of objects and their sort here.
-                let share = if t.term == Term::ColdObjects { 0.2 } else { 0.05 };
-                assert!((unit / t.unit - 1.0).abs() < share, "{}: {t:?} became {unit}; {:?}", truth.method, found.terms);
+                assert!((unit / t.unit - 1.0).abs() < 0.05, "{}: {t:?} became {unit}; {:?}", truth.method, found.terms);
             }
             assert!(found.spread_ln < 0.005, "{found:?}");
             for (id, row) in rows_of(&all[6], found) {

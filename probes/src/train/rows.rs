@@ -23,8 +23,8 @@ pub(crate) struct Row {
     pub(crate) floor: bool,
 }
 
-/// An algorithm that left the race is taken to be at least this many times slower than the best at larger sizes, or as many
-/// times as it last was.
+/// An algorithm that left the race is taken to be at least this many times slower than the best at larger sizes, or half as many
+/// times as it last was: it may gain a little on a best that outgrows its caches.
 const LEFT_BEHIND: f64 = 2.0;
 
 /// One row for each algorithm and point, and a lower bound for each point of a scenario beyond the last at which an algorithm
@@ -58,7 +58,7 @@ pub(crate) fn rows(profile: &Profile, position: usize) -> Vec<Row> {
         for spot in &profile.points {
             let Some(&(objects, behind)) = last.get(spot.scenario.as_str()) else { continue };
             if let Some(best) = spot.best().filter(|_| spot.load.objects > objects) {
-                rows.push(row(spot, best, behind.max(LEFT_BEHIND), true));
+                rows.push(row(spot, best, (behind / 2.0).max(LEFT_BEHIND), true));
             }
         }
     }
