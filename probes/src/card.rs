@@ -119,7 +119,7 @@ pub(crate) fn course(learning: &[Learning], draw: impl Fn(&[Vec<String>]) -> Str
 }
 
 /// Rows as a Markdown table, the first its head.
-fn markdown(rows: &[Vec<String>]) -> String {
+pub(crate) fn markdown(rows: &[Vec<String>]) -> String {
     let mut text = String::new();
     for (k, row) in rows.iter().enumerate() {
         text.push_str(&format!("| {} |\n", row.join(" | ")));

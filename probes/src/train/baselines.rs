@@ -82,7 +82,7 @@ pub(crate) fn slice_scenario(report: &Report) -> &str {
 }
 
 /// `uniform` where it is among the names, else the first of them.
-fn usual<'a>(mut names: impl Iterator<Item = &'a str> + Clone) -> &'a str {
+pub(super) fn usual<'a>(mut names: impl Iterator<Item = &'a str> + Clone) -> &'a str {
     let first = names.clone().next();
     names.find(|n| *n == "uniform").or(first).unwrap_or("uniform")
 }

@@ -5,7 +5,10 @@ mod columns;
 mod curve;
 mod direct;
 mod fit;
+mod importance;
 mod learning;
+#[cfg(test)]
+mod misspecified;
 mod model;
 mod nnls;
 mod partition;
@@ -33,6 +36,7 @@ use sapwise::{GpuKind, Hardware, Model};
 
 pub(crate) use baselines::{available, by_costs, slice_scenario};
 pub(crate) use curve::{measured_costs, measured_fields};
+pub(crate) use importance::importance;
 pub(crate) use learning::Learning;
 pub(crate) use profile::Profile;
 pub(crate) use selection::{Selection, usable};

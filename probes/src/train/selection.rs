@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 type Key = (BackendClass, String);
 
 /// The reports that can be trained on, gathered one by one so that none has to stay in memory.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Selection {
     evidence: Evidence,
     profiles: Vec<Profile>,

@@ -32,18 +32,26 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let selection = select(&report_files(&arguments.reports)?, evidence)?;
+    let importance = arguments.importance.as_ref().map(|_| train::importance(&selection.clone().finish().0)).transpose()?;
     let Trained { model, notes, learning } = train::train(selection, &name)?;
     let text = sapwise::json::write(&model)?;
     files::write_text(&arguments.out, &text)?;
     if let Some(path) = &arguments.card {
-        let page = card::page(&model, &notes, &learning);
+        let mut page = card::page(&model, &notes, &learning);
+        if let Some(importance) = &importance {
+            page.push_str(&format!("\n## Importance\n\n{}", importance.page(card::markdown)));
+        }
         files::write_text(path, &page)?;
+    }
+    if let Some((path, importance)) = arguments.importance.as_ref().zip(importance.as_ref()) {
+        files::write_text(path, &sapwise::json::write(importance)?)?;
     }
     if arguments.json {
         let Model { validation, name, .. } = &model;
         output::print_json(&Answer { validation, model: name, notes: &notes, simulated_learning: &learning })?;
     } else {
-        output::print(&summary(&model, &notes, &learning, &arguments.out))?;
+        let importance = importance.map_or_else(String::new, |i| format!("{}\n", i.page(columns)));
+        output::print(&format!("{importance}{}", summary(&model, &notes, &learning, &arguments.out)))?;
     }
     Ok(Outcome::Done)
 }
