@@ -16,6 +16,11 @@ use sapwise::{AlgorithmId, Model, Term};
 /// What a model without one term may lose, over what the whole one loses.
 const MOST_LOST: f64 = 1.5;
 
+/// The terms whose loss the residual does not make good. It corrects a curve over the number of objects, at a slope that all machines
+/// share: pairs and moved boxes differ between scenarios of equal size, and what a fork and join costs a frame falls faster with the
+/// size than a parabola of its logarithm does.
+const NOT_MADE_GOOD: [&str; 3] = ["fork and join", "pairs, divided cycles", "moved, divided cycles"];
+
 /// A physical term over all methods: the tests of each method are one.
 type Withheld = (&'static str, fn(Term, Scale) -> bool);
 
@@ -24,7 +29,7 @@ const fn tests(term: Term) -> bool {
 }
 
 /// Every term of the list in `terms`.
-const WITHHELD: [Withheld; 18] = [
+const WITHHELD: [Withheld; 19] = [
     ("call, cycles", |t, s| t == Term::Call && s == Scale::Cycle),
     ("fork and join", |_, s| s == Scale::ForkJoin),
     ("objects, divided cycles", |t, s| t == Term::Objects && s == Scale::SharedCycle),
@@ -35,7 +40,8 @@ const WITHHELD: [Withheld; 18] = [
     ("pairs, divided cycles", |t, s| t == Term::Pairs && s == Scale::SharedCycle),
     ("moved, divided cycles", |t, _| t == Term::Moved),
     ("lines between cores", |_, s| s == Scale::SharedLine),
-    ("objects and sort, cycles", |t, s| matches!(t, Term::Objects | Term::Sort) && s == Scale::Cycle),
+    ("objects, cycles", |t, s| t == Term::Objects && s == Scale::Cycle),
+    ("sort, cycles", |t, s| t == Term::Sort && s == Scale::Cycle),
     ("GPU: round trip", |_, s| s == Scale::GpuRoundTrip),
     ("GPU: dispatches", |_, s| s == Scale::GpuDispatch),
     ("GPU: bytes up", |_, s| s == Scale::GpuUploadByte),
@@ -69,39 +75,58 @@ fn regret(profile: &Profile, model: &Model) -> f64 {
     })
 }
 
-fn simulated(machines: usize) -> Vec<Profile> {
-    let loads = simulate::Loads::of_a_sweep(1, Some(300_000)).unwrap();
+fn simulated(machines: usize, most_objects: u32) -> Vec<Profile> {
+    let loads = simulate::Loads::of_a_sweep(1, Some(most_objects)).unwrap();
     let reports = simulate::simulate(&simulate::built_in().unwrap(), machines, &loads, 1).unwrap();
     reports.into_iter().map(|(file, report)| Profile::of(&file, &report)).collect()
 }
 
-/// Regret with one term withheld after the other, over that of the whole model, in the order of [`WITHHELD`].
-fn ratios(profiles: &[Profile]) -> Vec<f64> {
-    let partition = Partition::of_machines(profiles, 6).unwrap();
+/// A term that was withheld and what came of it.
+struct Loss {
+    withheld: &'static str,
+    /// Mean regret with the residual, over that of the whole model.
+    ratio: f64,
+    /// The same of the terms alone.
+    ratio_of_terms: f64,
+}
+
+/// Withholds one term after the other, in the order of [`WITHHELD`], and prints a table.
+fn losses(profiles: &[Profile], folds: usize) -> Vec<Loss> {
+    let partition = Partition::of_machines(profiles, folds).unwrap();
     let whole = mean_regrets(profiles, &partition, &terms);
-    let without: Vec<(f64, f64)> = WITHHELD
-        .par_iter()
-        .map(|(_, is)| {
-            mean_regrets(profiles, &partition, &|method, class| {
-                terms(method, class).into_iter().filter(|&(t, s)| !is(t, s)).collect()
-            })
-        })
-        .collect();
-    let percent = |share: f64| format!("{:.2} %", share * 100.0);
-    let row = |name: &str, (ridge, physics): (f64, f64)| {
-        let ratio = |a: f64, b: f64| format!("{:.2}", a / b);
-        vec![name.to_owned(), percent(ridge), ratio(ridge, whole.0), percent(physics), ratio(physics, whole.0)]
+    let without = |(withheld, is): &Withheld| {
+        let left = |method: &str, class| terms(method, class).into_iter().filter(|&(t, s)| !is(t, s)).collect();
+        let (ridge, physics) = mean_regrets(profiles, &partition, &left);
+        Loss { withheld, ratio: ridge / whole.0, ratio_of_terms: physics / whole.0 }
     };
-    let mut rows = vec![["withheld", "with the residual", "ratio", "terms alone", "ratio"].map(str::to_owned).to_vec()];
-    rows.push(row("nothing", whole));
-    rows.extend(WITHHELD.iter().zip(&without).map(|(withheld, &regrets)| row(withheld.0, regrets)));
-    println!("{}", columns(&rows));
-    without.into_iter().map(|(ridge, _)| ridge / whole.0).collect()
+    let losses: Vec<Loss> = WITHHELD.par_iter().map(without).collect();
+    let mut rows = vec![["withheld", "with the residual", "terms alone"].map(str::to_owned).to_vec()];
+    let row = |l: &Loss| vec![l.withheld.to_owned(), format!("{:.2}", l.ratio), format!("{:.2}", l.ratio_of_terms)];
+    rows.extend(losses.iter().map(row));
+    println!("mean regret of the whole model: {:.2} %; over it:\n{}", whole.0 * 100.0, columns(&rows));
+    losses
+}
+
+fn check(losses: &[Loss]) {
+    for Loss { withheld, ratio, ratio_of_terms } in losses {
+        if NOT_MADE_GOOD.contains(withheld) {
+            // Whoever makes one good takes it off the list.
+            assert!(*ratio > MOST_LOST, "{withheld}: {ratio}");
+        } else {
+            assert!(*ratio <= MOST_LOST, "{withheld}: {ratio}");
+        }
+        // Where the terms alone are lost, most of it is made good.
+        assert!(*ratio_of_terms < 10.0 || ratio < &(ratio_of_terms / 4.0), "{withheld}: {ratio} {ratio_of_terms}");
+    }
 }
 
 #[test]
-#[ignore = "takes minutes; prints the table of all simulated machines"]
-fn the_table_of_all_simulated_machines() {
-    let most = ratios(&simulated(51)).into_iter().fold(0.0, f64::max);
-    assert!(most <= MOST_LOST, "{most}");
+fn the_residual_makes_good_for_most_terms_that_are_withheld() {
+    check(&losses(&simulated(12, 100_000), 6));
+}
+
+#[test]
+#[ignore = "takes minutes: all simulated machines"]
+fn the_residual_makes_good_for_most_terms_on_all_simulated_machines() {
+    check(&losses(&simulated(51, 300_000), 6));
 }

@@ -26,7 +26,6 @@ fn what_the_timings_were_made_of_is_linked_and_what_they_were_not_is_not() {
     assert!(memory.deviation_octaves > 0.3, "{memory:?}");
     let effects = memory.borders.iter().map(|b| &b.error_rise_octaves).chain([&memory.regret_rise]);
     effects.for_each(|e| assert_eq!(e.verdict, Verdict::NotLinked, "{e:?}"));
-    println!("{}", found.page(crate::table::columns));
 }
 
 #[test]
