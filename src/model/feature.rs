@@ -17,6 +17,9 @@ pub enum Feature {
     Log2Lanes,
     /// Base-2 logarithm of the threads of the algorithm, or of the number of its GPUs.
     Log2Threads,
+    /// The base-2 logarithms of the number of objects and of the threads multiplied: what threads cost a frame beyond their terms weighs
+    /// most where there are few objects. Not of a GPU.
+    Log2ObjectsTimesThreads,
 }
 
 impl Feature {
@@ -24,7 +27,13 @@ impl Feature {
     #[must_use]
     pub fn of(class: BackendClass) -> &'static [Self] {
         match class {
-            BackendClass::Cpu => &[Self::Log2Objects, Self::Log2ObjectsSquared, Self::Log2Lanes, Self::Log2Threads],
+            BackendClass::Cpu => &[
+                Self::Log2Objects,
+                Self::Log2ObjectsSquared,
+                Self::Log2Lanes,
+                Self::Log2Threads,
+                Self::Log2ObjectsTimesThreads,
+            ],
             BackendClass::Gpu => &[Self::Log2Objects, Self::Log2ObjectsSquared, Self::Log2Threads],
         }
     }
@@ -47,6 +56,7 @@ impl Feature {
             Self::Log2ObjectsSquared => octaves * octaves,
             Self::Log2Lanes => need(hardware, parameter::SIMD_LANES)?.log2(),
             Self::Log2Threads => f64::from(backend.width()).log2(),
+            Self::Log2ObjectsTimesThreads => octaves * f64::from(backend.width()).log2(),
         })
     }
 }
