@@ -46,21 +46,18 @@ fn every_parameter_that_a_cost_depends_on_is_looked_at() {
     let profiles = simulated(12);
     let designs = Designs::new(&profiles);
     let model = model(&profiles, &designs, &vec![true; profiles.len()], "all").unwrap().0;
-    let costs = |k: usize, hardware: &Hardware| {
-        let judge = Judge::new(&profiles[k]);
-        format!("{:?}", judge.outcome(&model, hardware))
-    };
+    let costs = |profile: &Profile, hardware: &Hardware| format!("{:?}", Judge::new(profile).outcome(&model, hardware));
     let looked_at: Vec<String> = Figure::ALL.into_iter().map(Figure::name).collect();
-    for k in 0..profiles.len() {
-        let hardware = &profiles[k].hardware;
-        let before = costs(k, hardware);
+    for profile in &profiles {
+        let hardware = &profile.hardware;
+        let before = costs(profile, hardware);
         for p in 0..hardware.parameters.len() {
             let mut other = hardware.clone();
             let name = other.parameters[p].name.clone();
             other.parameters[p].value = other.parameters[p].value.map(|v| v * 1.7);
             // Where the latency between cores is missing, the warm fork and join stands for it.
             let known = looked_at.contains(&name) || name == parameter::FORK_JOIN_WARM_NS;
-            assert!(known || costs(k, &other) == before, "{name}");
+            assert!(known || costs(profile, &other) == before, "{name}");
         }
     }
 }
