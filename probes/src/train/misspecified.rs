@@ -13,8 +13,10 @@ use rayon::prelude::*;
 use sapwise::model::{MethodModel, Scale};
 use sapwise::{AlgorithmId, Model, Term};
 
-/// What a model without one term may lose, over what the whole one loses.
+/// What a model without one term may lose, over what the whole one loses, on all simulated machines.
 const MOST_LOST: f64 = 1.5;
+/// The same on a part of them, on which the serial cycles of an object lie at 1.5 and a little to either side.
+const MOST_LOST_ON_A_PART: f64 = 1.75;
 
 /// The terms whose loss the residual does not make good. It corrects a curve over the number of objects, at a slope that all machines
 /// share: pairs and moved boxes differ between scenarios of equal size, and what a fork and join costs a frame falls faster with the
@@ -107,13 +109,13 @@ fn losses(profiles: &[Profile], folds: usize) -> Vec<Loss> {
     losses
 }
 
-fn check(losses: &[Loss]) {
+fn check(losses: &[Loss], most: f64) {
     for Loss { withheld, ratio, ratio_of_terms } in losses {
         if NOT_MADE_GOOD.contains(withheld) {
             // Whoever makes one good takes it off the list.
-            assert!(*ratio > MOST_LOST, "{withheld}: {ratio}");
+            assert!(*ratio > most, "{withheld}: {ratio}");
         } else {
-            assert!(*ratio <= MOST_LOST, "{withheld}: {ratio}");
+            assert!(*ratio <= most, "{withheld}: {ratio}");
         }
         // Where the terms alone are lost, most of it is made good.
         assert!(*ratio_of_terms < 10.0 || ratio < &(ratio_of_terms / 4.0), "{withheld}: {ratio} {ratio_of_terms}");
@@ -122,11 +124,11 @@ fn check(losses: &[Loss]) {
 
 #[test]
 fn the_residual_makes_good_for_most_terms_that_are_withheld() {
-    check(&losses(&simulated(24, 300_000), 6));
+    check(&losses(&simulated(24, 300_000), 6), MOST_LOST_ON_A_PART);
 }
 
 #[test]
 #[ignore = "takes minutes: all simulated machines"]
 fn the_residual_makes_good_for_most_terms_on_all_simulated_machines() {
-    check(&losses(&simulated(51, 300_000), 6));
+    check(&losses(&simulated(51, 300_000), 6), MOST_LOST);
 }
