@@ -226,6 +226,10 @@ pub(crate) struct Train {
     /// falls with the number of machines. SVG.
     #[arg(long, value_name = "P.svg")]
     pub(crate) plot: Option<PathBuf>,
+    /// Where JSON goes that says which hardware parameters matter for which crossover. That takes a fit of everything for each
+    /// parameter, and reports of at least five physical machines to say anything.
+    #[arg(long, value_name = "I.json")]
+    pub(crate) importance: Option<PathBuf>,
     /// One JSON object on standard output instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

@@ -228,7 +228,7 @@ pub(crate) fn course(learning: &[Learning], simulated: bool, draw: impl Fn(&[Vec
 }
 
 /// Rows as a Markdown table, the first its head.
-fn markdown(rows: &[Vec<String>]) -> String {
+pub(crate) fn markdown(rows: &[Vec<String>]) -> String {
     let mut text = String::new();
     for (k, row) in rows.iter().enumerate() {
         text.push_str(&format!("| {} |\n", row.join(" | ")));

@@ -80,18 +80,19 @@ impl<T: Iterator<Item = ModelTerm>, R: Iterator<Item = ResidualTerm>> Formula<T,
         let (mut fixed, mut with_load, mut corrected) = (self.intercept, Vec::with_capacity(2), self.intercept != 0.0);
         for r in self.residual {
             corrected = true;
-            if r.feature.of_octaves(0.0).is_some() {
+            if r.feature.of_octaves(0.0, figures.backend).is_some() {
                 with_load.push(r);
             } else {
                 fixed += r.slope * (figures.feature(r.feature)? - r.centre);
             }
         }
         let mut correction = Vec::new();
+        let backend = figures.backend;
         if corrected {
             let (fewest, most) = self.objects;
             correction.extend(CORRECTION_OCTAVES.map(|octave| {
                 let octaves = f64::from((1 << octave).min(most).max(fewest).max(1)).log2();
-                let slope = |r: &ResidualTerm| r.slope * (r.feature.of_octaves(octaves).unwrap_or(0.0) - r.centre);
+                let slope = |r: &ResidualTerm| r.slope * (r.feature.of_octaves(octaves, backend).unwrap_or(0.0) - r.centre);
                 Knot { log2_objects: f64::from(octave), ln_factor: fixed + with_load.iter().map(slope).sum::<f64>() }
             }));
         }

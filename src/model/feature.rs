@@ -17,6 +17,9 @@ pub enum Feature {
     Log2Lanes,
     /// Base-2 logarithm of the threads of the algorithm, or of the number of its GPUs.
     Log2Threads,
+    /// The base-2 logarithms of the number of objects and of the threads multiplied: what threads cost a frame beyond their terms weighs
+    /// most where there are few objects. Not of a GPU.
+    Log2ObjectsTimesThreads,
 }
 
 impl Feature {
@@ -24,7 +27,13 @@ impl Feature {
     #[must_use]
     pub fn of(class: BackendClass) -> &'static [Self] {
         match class {
-            BackendClass::Cpu => &[Self::Log2Objects, Self::Log2ObjectsSquared, Self::Log2Lanes, Self::Log2Threads],
+            BackendClass::Cpu => &[
+                Self::Log2Objects,
+                Self::Log2ObjectsSquared,
+                Self::Log2Lanes,
+                Self::Log2Threads,
+                Self::Log2ObjectsTimesThreads,
+            ],
             BackendClass::Gpu => &[Self::Log2Objects, Self::Log2ObjectsSquared, Self::Log2Threads],
         }
     }
@@ -38,15 +47,16 @@ impl Feature {
     /// # Errors
     /// Names the hardware parameter that is missing, or says that the feature is not one of that processor.
     pub fn value(self, hardware: &Hardware, backend: &Backend, load: &Load) -> Result<f64, String> {
-        match self.of_octaves(f64::from(load.objects.max(1)).log2()) {
+        match self.of_octaves(f64::from(load.objects.max(1)).log2(), backend) {
             Some(value) => Ok(value),
             None => self.of_machine(hardware, backend),
         }
     }
 
-    /// The feature at a base-2 logarithm of the number of objects, where it depends on that alone.
-    pub(super) fn of_octaves(self, octaves: f64) -> Option<f64> {
+    /// The feature on a backend at a base-2 logarithm of the number of objects, where it depends on that.
+    pub(super) fn of_octaves(self, octaves: f64, backend: &Backend) -> Option<f64> {
         match self {
+            Self::Log2ObjectsTimesThreads => Some(octaves * f64::from(backend.width()).log2()),
             Self::Log2Objects => Some(octaves),
             Self::Log2ObjectsSquared => Some(octaves * octaves),
             Self::Log2Lanes | Self::Log2Threads => None,

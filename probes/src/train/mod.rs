@@ -10,7 +10,10 @@ mod fit;
 mod folds;
 mod forest;
 mod held;
+mod importance;
 mod learning;
+#[cfg(test)]
+mod misspecified;
 mod model;
 mod nnls;
 mod notes;
@@ -44,6 +47,7 @@ use sapwise::{GpuKind, Hardware, Model};
 pub(crate) use baselines::{available, by_costs, slice_scenario};
 pub(crate) use curve::{measured_costs, measured_fields};
 pub(crate) use held::{Held, Time};
+pub(crate) use importance::importance;
 pub(crate) use profile::Profile;
 pub(crate) use selection::{Selection, usable};
 pub(crate) use validate::OURS;

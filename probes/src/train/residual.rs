@@ -169,7 +169,7 @@ mod tests {
     fn the_library_evaluates_a_stored_residual_as_linfa_does() {
         let machine = &Machine::family()[3];
         let threads = |k: usize| Backend::Cpu(1 << (k % 4));
-        let mut features = Array2::zeros((52, 4));
+        let mut features = Array2::zeros((52, Feature::of(BackendClass::Cpu).len()));
         for k in 0..52 {
             let load = Load { objects: 1 << (4 + k % 13), ..Load::default() };
             let values =

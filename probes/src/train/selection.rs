@@ -13,7 +13,7 @@ type Key = (BackendClass, String);
 const MOST_CROSSED: usize = 600;
 
 /// The reports that can be trained on, gathered one by one so that none has to stay in memory.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Selection {
     evidence: Evidence,
     /// Crossings are looked for in each report whose place is a multiple of this.

@@ -29,20 +29,29 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let selection = select(&report_files(&arguments.reports)?, evidence)?;
+    let importance = arguments.importance.as_ref().map(|_| train::importance(&selection.clone().finish().0)).transpose()?;
     let Trained { model, notes, held } = train::train(selection, &name)?;
     let text = sapwise::json::write_model(&model)?;
     files::write_text(&arguments.out, &text)?;
     if let Some(path) = &arguments.card {
-        files::write_text(path, &card::page(&model, &notes))?;
+        let mut page = card::page(&model, &notes);
+        if let Some(importance) = &importance {
+            page.push_str(&format!("\n## Importance\n\n{}", importance.page(card::markdown)));
+        }
+        files::write_text(path, &page)?;
     }
     if let Some(path) = &arguments.plot {
         files::write_text(path, &plot::training(&held, &model, &command(arguments, path))?)?;
+    }
+    if let Some((path, importance)) = arguments.importance.as_ref().zip(importance.as_ref()) {
+        files::write_text(path, &sapwise::json::write(importance)?)?;
     }
     if arguments.json {
         let Model { validation, name, .. } = &model;
         output::print_json(&Answer { validation, model: name, notes: &notes })?;
     } else {
-        output::print(&summary(&model, &notes, &arguments.out))?;
+        let importance = importance.map_or_else(String::new, |i| format!("{}\n", i.page(columns)));
+        output::print(&format!("{importance}{}", summary(&model, &notes, &arguments.out)))?;
     }
     Ok(Outcome::Done)
 }

@@ -1,0 +1,90 @@
+//! The parameters of a machine that its predicted costs depend on, and what it would be with others.
+
+use super::super::profile::Profile;
+use sapwise::hardware::{gpu, parameter};
+use sapwise::model::GPU_PREFIX;
+use sapwise::{GpuKind, Hardware, Parameter};
+
+/// A parameter that a term or a residual reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Figure {
+    /// Its name, and that of what stands for it where it is missing.
+    names: &'static [&'static str],
+    /// Of the GPUs; else of the machine.
+    of_gpus: bool,
+}
+
+const fn of_machine(names: &'static [&'static str]) -> Figure {
+    Figure { names, of_gpus: false }
+}
+
+const fn of_gpus(names: &'static [&'static str]) -> Figure {
+    Figure { names, of_gpus: true }
+}
+
+impl Figure {
+    /// Every one that a prediction reads, and at the end of those of the machine one that none reads, the size of the memory:
+    /// whatever is found of that is an error of the method. How several GPUs work together is not among them: few machines have
+    /// several.
+    pub(super) const ALL: [Self; 18] = [
+        of_machine(&[parameter::CLOCK_MEASURED_GHZ, parameter::CLOCK_REPORTED_GHZ]),
+        of_machine(&[parameter::SIMD_LANES]),
+        of_machine(&[parameter::CACHE_LLC_BYTES]),
+        of_machine(&[parameter::BANDWIDTH_ONE_THREAD_GB_PER_S]),
+        of_machine(&[parameter::BANDWIDTH_ALL_THREADS_GB_PER_S]),
+        of_machine(&[parameter::FORK_JOIN_COLD_NS]),
+        of_machine(&[parameter::CORE_TO_CORE_NS, parameter::FORK_JOIN_WARM_NS]),
+        of_machine(&[parameter::SCALING_TWO_THREADS_RATIO]),
+        of_machine(&[parameter::SCALING_ALL_THREADS_RATIO]),
+        of_machine(&[parameter::USABLE_CORES]),
+        of_machine(&[parameter::MEMORY_BYTES]),
+        of_gpus(&[gpu::parameter::ROUND_TRIP_NS]),
+        of_gpus(&[gpu::parameter::READ_BACK_NS]),
+        of_gpus(&[gpu::parameter::DISPATCH_NS]),
+        of_gpus(&[gpu::parameter::UPLOAD_RATE_GB_PER_S, gpu::parameter::UPLOAD_GB_PER_S]),
+        of_gpus(&[gpu::parameter::DOWNLOAD_RATE_GB_PER_S, gpu::parameter::DOWNLOAD_GB_PER_S]),
+        of_gpus(&[gpu::parameter::READ_GB_PER_S, gpu::parameter::COPY_GB_PER_S]),
+        of_gpus(&[gpu::parameter::ARITHMETIC_GFLOP_PER_S]),
+    ];
+
+    /// The name of the parameter, as it stands in the ranges of a model.
+    pub(super) fn name(self) -> String {
+        if self.of_gpus { format!("{GPU_PREFIX}{}", self.names[0]) } else { self.names[0].to_owned() }
+    }
+
+    /// Its value, above zero: of the machine, or of the first GPU that is no program.
+    pub(super) fn value(self, hardware: &Hardware) -> Option<f64> {
+        let of = |name: &&str| match self.of_gpus {
+            false => hardware.value(name),
+            true => hardware.gpus.iter().find(|g| g.gpu.kind != GpuKind::Software)?.value(name),
+        };
+        self.names.iter().find_map(of).filter(|v| *v > 0.0)
+    }
+
+    /// The hardware with `factor` times the value. All GPUs change alike, and so does what may stand for the parameter.
+    pub(super) fn times(self, hardware: &Hardware, factor: f64) -> Hardware {
+        let mut other = hardware.clone();
+        let change = |p: &mut Parameter| {
+            if self.names.contains(&p.name.as_str()) {
+                p.value = p.value.map(|v| v * factor);
+            }
+        };
+        match self.of_gpus {
+            false => other.parameters.iter_mut().for_each(change),
+            true => other.gpus.iter_mut().flat_map(|g| &mut g.parameters).for_each(change),
+        }
+        other
+    }
+
+    /// The profile as if this had been found to be `value`, where it was found at all.
+    pub(super) fn replaced(self, profile: &Profile, value: f64) -> Profile {
+        let mut other = profile.clone();
+        let Some(own) = self.value(&profile.hardware) else { return other };
+        other.hardware = self.times(&profile.hardware, value / own);
+        // How far the cores lay apart at each point would tell the fork and join and the latency again.
+        if self.names.iter().any(|n| [parameter::FORK_JOIN_COLD_NS, parameter::CORE_TO_CORE_NS].contains(n)) {
+            other.points.iter_mut().for_each(|p| p.core_to_core_ns = None);
+        }
+        other
+    }
+}

@@ -1,0 +1,97 @@
+//! What the intervals of a parameter say.
+
+use super::interval::Interval;
+use serde::Serialize;
+use std::fmt;
+
+/// Physical machines below which nothing is told: five draws of four machines are mostly the same machines.
+pub(super) const FEWEST_MACHINES: usize = 5;
+/// Standard deviation of a parameter over the machines, in octaves, below which they are alike in it: 7 %.
+const LEAST_DEVIATION: f64 = 0.1;
+
+/// Whether a parameter and an outcome belong together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Verdict {
+    /// Predictions of machines left out are worse with the values of others, or without it.
+    Linked,
+    /// They are worse by less than matters either way, with the intervals as proof.
+    NotLinked,
+    /// Neither is shown.
+    CannotBeTold,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Linked => "linked",
+            Self::NotLinked => "not linked",
+            Self::CannotBeTold => "cannot be told from these machines",
+        })
+    }
+}
+
+/// How much worse an outcome is on machines left out, and what follows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Effect {
+    /// With the value of another machine; none of too few machines.
+    pub(crate) permuted: Option<Interval>,
+    /// With one value for all machines, in the training too: what no other parameter stands in for.
+    pub(crate) refitted: Option<Interval>,
+    /// What follows.
+    pub(crate) verdict: Verdict,
+    /// Why it can't be told; empty where it can.
+    pub(crate) because: String,
+}
+
+impl Effect {
+    /// `deviation` is the standard deviation of the parameter over so many machines, in octaves; `least` what matters of the outcome.
+    pub(super) fn new(
+        permuted: Option<Interval>,
+        refitted: Option<Interval>,
+        machines: usize,
+        deviation: f64,
+        least: f64,
+    ) -> Self {
+        let enough = machines >= FEWEST_MACHINES;
+        let (Some(permuted), Some(refitted)) = (permuted.filter(|_| enough), refitted.filter(|_| enough)) else {
+            let because = format!("{machines} physical machines have both; it takes {FEWEST_MACHINES}");
+            return Self { permuted: None, refitted: None, verdict: Verdict::CannotBeTold, because };
+        };
+        let (mut verdict, mut because) = (Verdict::CannotBeTold, String::new());
+        if deviation < LEAST_DEVIATION {
+            because = format!("the parameter hardly varies: its standard deviation is {deviation:.3} octaves");
+        } else if permuted.high <= least && refitted.high <= least {
+            verdict = Verdict::NotLinked;
+        } else if permuted.low > 0.0 || refitted.low > 0.0 {
+            verdict = Verdict::Linked;
+        } else {
+            because = "the intervals hold zero, and more than what matters".to_owned();
+        }
+        Self { permuted: Some(permuted), refitted: Some(refitted), verdict, because }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn verdicts_follow_from_both_intervals() {
+        let interval = |low: f64, high: f64| Some(Interval { mean: (low + high) / 2.0, low, high });
+        let of = |permuted, refitted, machines, deviation| Effect::new(permuted, refitted, machines, deviation, 0.1);
+        let (none, wide, above) = (interval(-0.01, 0.01), interval(-0.2, 0.5), interval(0.05, 0.5));
+        assert_eq!(of(none, none, 9, 1.0).verdict, Verdict::NotLinked);
+        assert_eq!(of(none, above, 9, 1.0).verdict, Verdict::Linked);
+        assert_eq!(of(above, wide, 9, 1.0).verdict, Verdict::Linked);
+        // What is surely there and too small to matter.
+        assert_eq!(of(interval(0.01, 0.02), none, 9, 1.0).verdict, Verdict::NotLinked);
+        for (effect, word) in [
+            (of(wide, none, 9, 1.0), "hold zero"),
+            (of(above, above, 9, 0.01), "hardly varies"),
+            (of(above, above, 4, 1.0), "it takes 5"),
+        ] {
+            assert!(effect.verdict == Verdict::CannotBeTold && effect.because.contains(word), "{effect:?}");
+        }
+    }
+}
