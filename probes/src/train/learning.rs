@@ -74,7 +74,7 @@ pub(super) fn learning(profiles: &[Profile], trainings: &[Training], progress: &
         let positions = training.judged.iter().chain(&training.known);
         let some: Vec<Profile> = positions.map(|&k| profiles[k].clone()).collect();
         let judged: Vec<usize> = (0..training.judged.len()).collect();
-        let found = Data::new(&some, &Designs::new(&some)).fold(&judged)?;
+        let found = Data::new(&some, &Designs::new(&some)).fold(&judged, &judged)?;
         progress.advance(1);
         let scored = scores::scores(&found.judged);
         Ok(scores::names(&found.judged).into_iter().zip(scored).map(|(name, s)| (name, s.mean_regret)).collect())

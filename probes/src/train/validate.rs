@@ -27,11 +27,13 @@ pub(crate) const OURS: &str = "physics + ridge";
 /// Ours, corrected by [`sampled::SAMPLES`] samples of one scenario on the machine itself, under all loads and under those of that scenario.
 const SAMPLED: &str = "ours + 8 samples";
 const SAMPLED_THERE: &str = "... where sampled";
-/// Profiles of a fold that are judged at most: scores of several hundred machines don't change with thousands more.
-const MOST_JUDGED: usize = 16;
+/// Profiles that are judged, of all folds together, about: scores of a hundred machines change little with thousands more.
+const MOST_JUDGED: usize = 120;
+/// Held-out profiles on which samples are taken, at most.
+const MOST_SAMPLED: usize = 64;
 /// Profiles of a training that the best single algorithm and the direct regression look at: a mean and a handful of slopes need no
 /// more, and both go through all of them for each held-out profile.
-const MOST_SEEN: usize = 400;
+const MOST_SEEN: usize = 100;
 
 /// What a validation finds.
 pub(super) struct Validated {
@@ -74,8 +76,11 @@ pub(super) fn validate(
         }
         notes.push("the full sweep is judged by the timings that it was fitted to".to_owned());
         let data = Data::new(profiles, designs);
+        let most = MOST_JUDGED.div_ceil(partition.folds.len());
         let fold = |fold: &Vec<usize>| {
-            let found = data.fold(fold);
+            // Evenly over the fold, in which the profiles of a machine stand together.
+            let judged: Vec<usize> = fold.iter().step_by(fold.len().div_ceil(most)).copied().collect();
+            let found = data.fold(fold, &judged);
             progress.advance(1);
             found
         };
@@ -150,11 +155,11 @@ impl<'a> Data<'a> {
         Self { profiles, designs, table: Table::new(profiles), yardsticks, always, likeness, costs }
     }
 
-    /// The regrets on the profiles of a fold of every way, trained on the others.
+    /// The regrets of every way on some of the profiles of a fold, trained on those that are not in it.
     ///
     /// # Errors
     /// When a regression fails.
-    pub(super) fn fold(&self, fold: &[usize]) -> Result<Found> {
+    pub(super) fn fold(&self, fold: &[usize], judged: &[usize]) -> Result<Found> {
         let mut found = Found::default();
         let mut chosen = vec![true; self.profiles.len()];
         fold.iter().for_each(|&k| chosen[k] = false);
@@ -173,8 +178,7 @@ impl<'a> Data<'a> {
         let known: Vec<usize> = (0..self.profiles.len()).filter(|&k| chosen[k]).collect();
         let likeness = known.iter().map(|&k| &self.likeness[k]).collect();
         let fitted = Fitted { known, likeness, models, forests: self.table.grow(&chosen)? };
-        // Evenly over the fold, in which the profiles of a machine stand together.
-        for &held in fold.iter().step_by(fold.len().div_ceil(MOST_JUDGED)) {
+        for &held in judged {
             self.held_out(held, &fitted, &mut found)?;
         }
         Ok(found)
@@ -247,15 +251,18 @@ impl<'a> Data<'a> {
         predicted: Vec<Vec<Predicted>>,
         by_machine: bool,
     ) -> Result<(Vec<Judged>, Option<Prior>)> {
-        let folds: Vec<(&Vec<usize>, usize)> =
-            folds.iter().zip(&predicted).flat_map(|(fold, p)| p.iter().map(move |_| fold)).zip(0..).collect();
-        let predicted: Vec<Predicted> = predicted.into_iter().flatten().collect();
+        // Of many machines some: more tell neither the prior nor a mean regret better.
+        let all: usize = predicted.iter().map(Vec::len).sum();
+        let step = all.div_ceil(MOST_SAMPLED).max(1);
+        let owned = predicted.into_iter().enumerate().flat_map(|(f, p)| p.into_iter().map(move |p| (f, p)));
+        let (of_fold, predicted): (Vec<usize>, Vec<Predicted>) = owned.step_by(step).unzip();
         let errors = Errors::new(self.profiles, &predicted, by_machine);
-        let judge = |&(fold, k): &(&Vec<usize>, usize)| {
+        let priors: Vec<Prior> = folds.par_iter().map(|fold| errors.prior(fold)).collect();
+        let judge = |k: usize| {
             let held = predicted[k].held;
             let profile = &self.profiles[held];
             let scenario = baselines::usual(profile.points.iter().map(|s| s.scenario.as_str()));
-            let Some(costs) = sampled::corrected(profile, scenario, &predicted[k], &errors.prior(fold))? else {
+            let Some(costs) = sampled::corrected(profile, scenario, &predicted[k], &priors[of_fold[k]])? else {
                 return Ok(Vec::new());
             };
             let available = available(profile);
@@ -269,7 +276,7 @@ impl<'a> Data<'a> {
             let errors = Borders::new(profile, self.costs(held)).errors(&costs);
             Ok(vec![judged(SAMPLED, None, Some(errors)), judged(SAMPLED_THERE, Some(scenario), None)])
         };
-        let judged = folds.par_iter().map(judge).collect::<Result<Vec<Vec<Judged>>>>()?;
+        let judged = (0..predicted.len()).into_par_iter().map(judge).collect::<Result<Vec<Vec<Judged>>>>()?;
         let prior = (!predicted.is_empty()).then(|| errors.prior(&[]));
         Ok((judged.into_iter().flatten().collect(), prior))
     }
