@@ -5,7 +5,7 @@ use crate::revisions;
 use crate::samples::{self, Live, Order, Taken};
 use anyhow::{Context, bail};
 use sapwise::hardware::parameter;
-use sapwise::model::Prediction;
+use sapwise::model::{FEWEST_MACHINES, Prediction};
 use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry, Scenario};
 
 /// Objects of the slice that the fields show: four sizes a decade from ten to a million.
@@ -71,8 +71,13 @@ pub(crate) fn predict_and_sample(
     if !learned.taken.is_empty() {
         let corrected = Fields::from_posterior(&scenario.to_string(), &learned.posterior, |k| learned.usable[k], &loads);
         let samples = learned.taken.iter().map(Taken::observation).collect();
-        let Fields { model, extrapolated, warnings, .. } = fields;
-        fields = Fields { model, extrapolated, warnings, samples, ..corrected };
+        let Fields { model: name, extrapolated, warnings, interval_basis, .. } = fields;
+        fields = Fields { model: name, extrapolated, warnings, samples, ..corrected };
+        // What the prior says of a machine never seen was told by too few others to be claimed of this one, sampled or not.
+        if model.validation.physical_machines < FEWEST_MACHINES as usize {
+            fields.crossovers.iter_mut().for_each(|b| (b.low, b.high) = (None, None));
+            fields.interval_basis = interval_basis;
+        }
     }
     fields.warnings.extend(remarks);
     fields.warnings.extend(learned.remarks);

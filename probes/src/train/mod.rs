@@ -48,7 +48,7 @@ pub(crate) use baselines::{available, by_costs, slice_scenario};
 pub(crate) use curve::{measured_costs, measured_fields};
 pub(crate) use held::{Held, Time};
 pub(crate) use importance::importance;
-pub(crate) use profile::Profile;
+pub(crate) use profile::{Profile, as_at_the_points};
 pub(crate) use selection::{Selection, usable};
 pub(crate) use validate::OURS;
 pub(crate) use yardstick::{Chooser, Yardstick, average};

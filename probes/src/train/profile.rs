@@ -56,7 +56,7 @@ impl Profile {
         Self {
             file: file.to_owned(),
             label: report.label,
-            hardware: as_at_the_points(hardware, report),
+            hardware: as_at_the_points(&hardware, report),
             algorithms: report.algorithms.clone(),
             points: points.filter(|s| !s.medians.is_empty() && s.load.objects > 0).collect(),
             crossings: Vec::new(),
@@ -118,7 +118,7 @@ impl Profile {
 
 /// The hardware with its cores as far apart as they were at half of the points. Where a host moves them, the seconds in which the
 /// parameters were measured may have been unlike the minutes after.
-fn as_at_the_points(hardware: Hardware, report: &Report) -> Hardware {
+pub(crate) fn as_at_the_points(hardware: &Hardware, report: &Report) -> Hardware {
     let apart: Vec<f64> = report.points.iter().filter_map(between_cores).collect();
     median_of(&apart).map_or_else(|| hardware.clone(), |ns| hardware.with_cores_apart(ns))
 }

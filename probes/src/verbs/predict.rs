@@ -34,7 +34,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         (Some(model), report) => {
             let scenario = arguments.scenario.unwrap_or(Scenario::Uniform);
             let (hardware, measured) = match report {
-                Some(report) => (report.hardware.clone(), None),
+                Some(report) => (train::as_at_the_points(&report.hardware, report), None),
                 None => {
                     let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
                     (hardware, Some(measured))
