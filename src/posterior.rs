@@ -136,8 +136,12 @@ impl Posterior {
     /// Takes in that a frame under `load` took the algorithm `ns` nanoseconds. `noise_ln` is the standard deviation of that figure's
     /// logarithm, beside the noise of the prior.
     ///
-    /// Gives false, and learns nothing, where the time is no positive number or the predicted cost is none.
+    /// Gives false, and learns nothing, where the time is no positive number, the predicted cost is none, there is no such algorithm, or the
+    /// prior is unsound.
     pub fn observe(&mut self, algorithm: usize, load: &Load, ns: f64, noise_ln: f64) -> bool {
+        if algorithm >= self.costs.len() {
+            return false;
+        }
         let (mean_ln, slope) = self.look(algorithm, &Counts::new(load));
         let surprise = ns.ln() - mean_ln;
         if !(surprise.is_finite() && noise_ln.is_finite()) {
@@ -145,6 +149,11 @@ impl Posterior {
         }
         let mut with = std::mem::take(&mut self.with);
         let variance = self.covariances(&slope, noise_ln, &mut with);
+        // A prior that holds no sound figures.
+        if !(variance.is_finite() && variance > 0.0) {
+            self.with = with;
+            return false;
+        }
         let scale = 1.0 / variance;
         let error = surprise.clamp(-MOST_SURPRISE * variance.sqrt(), MOST_SURPRISE * variance.sqrt());
         // Joseph's form, for one observation: an error in the gain is of second order in the covariance, which stays that of a

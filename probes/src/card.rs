@@ -4,6 +4,8 @@ use sapwise::model::{Coverage, FEWEST_MACHINES, Learning, LearningScore, MethodM
 use sapwise::report::Label;
 use sapwise::{BackendClass, Model};
 
+const COVERED: &str = "see the coverage in the validation, where there is one.";
+
 /// What every model of this kind is, whatever it was trained on.
 const USE: &str = "
 Predicts, from the hardware parameters of a machine, what each broad-phase algorithm costs under a load; `predict` derives
@@ -54,7 +56,10 @@ const COLUMNS: &str = "
 
 /// What the ways to choose are, below the scores.
 const WAYS: &str = "
-`physics + ridge` is what `predict` does; `physics` the same without the residual. `random forest` predicts each method's time from
+`physics + ridge` is what `predict --samples 0` does; `physics` the same without the residual; `ours + 8 samples` what `predict` does,
+on at most 64 of the held-out reports: the samples are of one scenario and replayed from the timings by which the choice is judged, so that they
+are as exact as these. A held-out machine is taken with its cores as far apart as they were at half of its points, which `predict` sees only
+as they are in the seconds of its measurement. `random forest` predicts each method's time from
 load and hardware parameters and knows no physics. `direct regression` is the paper's: the position of each border as a power law of
 hardware parameters, and a choice by the number of objects alone. Notes say how many of its borders are means: there were no more
 machines with that crossing than parameters to regress it on. `frozen constants` are what engines ship (64 colliders in nexus, 1000 bodies in
@@ -108,8 +113,10 @@ fn intervals(model: &Model) -> String {
         ),
         0 => "None can be claimed: no fold was kept.".to_owned(),
         folds => format!(
-            "90 % by jackknife+ from {machines} physical machines, left out of the fit in {folds} parts; guaranteed for a machine \
-             like them are 80 %."
+            "90 % by the jackknife+ over {} of {machines} physical machines, left out of the fit in {folds} parts (with more machines than \
+             parts that is CV+). Errors are those under all loads and not those near a border, so that no share is guaranteed of \
+             borders; {COVERED}",
+            model.folds.iter().map(|f| f.machines).sum::<u32>()
         ),
     };
     let clouds: Vec<String> = model.clouds.iter().map(|c| format!("{} {}s", c.points, c.processor)).collect();

@@ -73,6 +73,8 @@ pub(crate) fn predict_and_sample(
         let samples = learned.taken.iter().map(Taken::observation).collect();
         let Fields { model: name, extrapolated, warnings, interval_basis, .. } = fields;
         fields = Fields { model: name, extrapolated, warnings, samples, ..corrected };
+        // What asked for samples has got them.
+        fields.warnings.retain(|w| !w.contains("--samples"));
         // What the prior says of a machine never seen was told by too few others to be claimed of this one, sampled or not.
         if model.validation.physical_machines < FEWEST_MACHINES as usize {
             fields.crossovers.iter_mut().for_each(|b| (b.low, b.high) = (None, None));

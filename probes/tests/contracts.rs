@@ -76,7 +76,7 @@ fn train_and_predict_keep_their_contracts() {
     let validation = &trained["validation"];
     assert_eq!((&validation["physical_machines"], &validation["profiles"]), (&2.into(), &2.into()));
     let methods = validation["methods"].as_array().unwrap();
-    assert_eq!(methods.len(), 13);
+    assert_eq!(methods.len(), 12);
     let figures = ["name", "mean_regret", "p95_regret", "share_over_10_percent", "closed_gap"];
     methods.iter().for_each(|m| assert_keys(m, &figures));
 

@@ -5,8 +5,8 @@
 #[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Validation {
-    /// What was left out in turn: `physical machine`, or `profile` where there is one physical machine only. The latter
-    /// says little about machines never seen.
+    /// What was left out in turn: `physical machine`, or `one of 24 groups of physical machines`; where there is one physical machine
+    /// only `SIMD level and thread count`, or `profile`. The last two say little about machines never seen.
     pub held_out: String,
     /// Physical machines in the data.
     pub physical_machines: usize,
@@ -24,18 +24,18 @@ pub struct Validation {
 
 /// The score of one way to choose an algorithm. Regret is the time of its choice over the time of the best, less one.
 ///
-/// Every physical machine counts the same, however many of its reports were held out.
+/// Every physical machine counts the same in regrets, however many of its reports were held out.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MethodScore {
     /// Name of the way to choose.
     pub name: String,
-    /// Regret, mean over the points of a held-out report, then over the reports.
+    /// Regret, mean over the cells of a held-out report, each a quarter of a decade of a scenario, then over the reports.
     pub mean_regret: f64,
     /// 95th percentile over held-out reports of their mean regret.
     pub p95_regret: f64,
-    /// Share of all points with a regret over 10 %.
+    /// Share of all cells with a regret over 10 %.
     pub share_over_10_percent: f64,
     /// How much of the gap between the best single algorithm (0) and the oracle (1) it closes.
     pub closed_gap: f64,

@@ -4,7 +4,7 @@
 pub(super) mod regression;
 
 use super::baselines::slice_scenario;
-use super::profile::Profile;
+use super::profile::{Profile, is_sound};
 use super::yardstick::Chooser;
 use super::{GPU_PARAMETERS as ALL_OF_GPU, PARAMETERS as ALL_OF_CPU};
 use anyhow::Result;
@@ -12,7 +12,7 @@ use regression::{Estimate, Regression};
 use sapwise::crossover::{Crossover, Paired, crossover};
 use sapwise::hardware::parameter;
 use sapwise::model::GPU_PREFIX;
-use sapwise::report::{Point, Report};
+use sapwise::report::{Point, Report, Timed};
 use sapwise::{AlgorithmId, BackendClass, Hardware};
 
 /// Parameters that a crossover is regressed on by least squares, as logarithms. Few, because there are as few rows as reports.
@@ -44,6 +44,15 @@ pub(crate) struct Crossing {
     found: Crossover,
 }
 
+impl Crossing {
+    /// Whether both of its methods are among these algorithms, on their class of processor.
+    pub(super) fn is_between(&self, algorithms: &[Timed]) -> bool {
+        let there =
+            |role: &Role| algorithms.iter().any(|t| t.id.method() == role.method && t.id.backend().class() == role.class);
+        there(&self.first) && there(&self.second)
+    }
+}
+
 /// The crossovers between the roles of a report in its scenario `uniform`, or its first one.
 pub(super) fn crossings(report: &Report) -> Vec<Crossing> {
     let scenario = slice_scenario(report);
@@ -63,7 +72,9 @@ pub(super) fn crossings(report: &Report) -> Vec<Crossing> {
 
 /// Points at which both were timed.
 fn common<'a>(points: &[&'a Point], first: &AlgorithmId, second: &AlgorithmId) -> Vec<Paired<'a>> {
-    let samples = |p: &'a Point, id: &AlgorithmId| p.timings.iter().find(|t| t.algorithm == *id).map(|t| &t.samples_ns[..]);
+    let samples = |p: &'a Point, id: &AlgorithmId| {
+        p.timings.iter().find(|t| t.algorithm == *id && is_sound(t)).map(|t| &t.samples_ns[..])
+    };
     let pair = |p: &&'a Point| {
         Some(Paired { objects: p.load.objects, first_ns: samples(p, first)?, second_ns: samples(p, second)? })
     };

@@ -161,8 +161,7 @@ impl Design {
         for row in rows {
             let profile = &profiles[row.profile];
             let id = profile.id(row.algorithm);
-            let moved = row.core_to_core_ns.map(|ns| profile.hardware.with_cores_apart(ns));
-            match nanoseconds(&all, moved.as_ref().unwrap_or(&profile.hardware), id, &row) {
+            match nanoseconds(&all, &profile.hardware_at(row.core_to_core_ns), id, &row) {
                 Ok((ns, of_residual)) => {
                     values.extend(ns);
                     features.extend(of_residual);

@@ -142,6 +142,9 @@ pub(crate) fn train(selection: Selection, name: &str) -> Result<Trained> {
     progress.message("validating trainings of fewer machines");
     let learning = learning::learning(&profiles, &trainings, &progress)?;
     model.prior = validated.prior;
+    if let Some(defect) = model.defect() {
+        bail!("the model that was fitted can't be used: {defect}; the machines of the reports may all be alike");
+    }
     model.validation = Validation { learning, ..validated.validation };
     Ok(Trained { model, notes: notes::folded(notes), held: validated.held })
 }

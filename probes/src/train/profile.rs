@@ -4,6 +4,7 @@ use super::direct::{Crossing, crossings};
 use sapwise::measure::statistics::median as median_of;
 use sapwise::report::{Label, Point, Report, Timed, Timing};
 use sapwise::{AlgorithmId, Hardware, Load};
+use std::borrow::Cow;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use crate::sweep::median;
@@ -15,8 +16,10 @@ pub(crate) struct Profile {
     pub(crate) file: String,
     /// What kind of evidence it is.
     pub(crate) label: Label,
-    /// Without the raw samples of its parameters.
+    /// Without the raw samples of its parameters, its cores as far apart as at half of the points.
     pub(crate) hardware: Hardware,
+    /// The same as it was measured, where that differs.
+    pub(crate) measured: Option<Hardware>,
     /// The algorithms that were timed.
     pub(crate) algorithms: Vec<Timed>,
     /// Where they were timed, in the order of the report.
@@ -53,13 +56,25 @@ impl Profile {
         let of_gpus = hardware.gpus.iter_mut().flat_map(|g| &mut g.parameters);
         hardware.parameters.iter_mut().chain(of_gpus).for_each(|p| p.raw = Vec::new());
         let points = report.points.iter().map(|p| Spot::of(p, &report.algorithms));
+        let moved = as_at_the_points(&hardware, report);
+        let measured = (moved != hardware).then_some(hardware);
         Self {
             file: file.to_owned(),
             label: report.label,
-            hardware: as_at_the_points(&hardware, report),
+            hardware: moved,
+            measured,
             algorithms: report.algorithms.clone(),
             points: points.filter(|s| !s.medians.is_empty() && s.load.objects > 0).collect(),
             crossings: Vec::new(),
+        }
+    }
+
+    /// The hardware with its cores as far apart as they were at a point, where that is known. Always from what was measured: a fork and
+    /// join that was bounded on the way to another place does not find back.
+    pub(crate) fn hardware_at(&self, core_to_core_ns: Option<f64>) -> Cow<'_, Hardware> {
+        match core_to_core_ns {
+            Some(ns) => Cow::Owned(self.measured.as_ref().unwrap_or(&self.hardware).with_cores_apart(ns)),
+            None => Cow::Borrowed(&self.hardware),
         }
     }
 
@@ -98,6 +113,8 @@ impl Profile {
         self.points.retain(|s| !s.medians.is_empty());
         let mut kept = kept.into_iter();
         self.algorithms.retain(|_| kept.next() == Some(true));
+        let algorithms = &self.algorithms;
+        self.crossings.retain(|c| c.is_between(algorithms));
     }
 
     /// The same for two copies of one measurement, whatever their file names and labels; in all likelihood for no two others.
@@ -128,9 +145,13 @@ fn between_cores(point: &Point) -> Option<f64> {
     point.core_to_core_ns.map(|[before, after]| (before * after).sqrt())
 }
 
+/// Whether a timing has no error and enough samples.
+pub(super) fn is_sound(timing: &Timing) -> bool {
+    timing.error.is_none() && timing.samples_ns.len() >= FEWEST_SAMPLES
+}
+
 impl Spot {
     fn of(point: &Point, algorithms: &[Timed]) -> Self {
-        let known = |t: &&Timing| t.error.is_none() && t.samples_ns.len() >= FEWEST_SAMPLES;
         let median = |t: &Timing| {
             let k = algorithms.iter().position(|a| a.id == t.algorithm)?;
             Some((k as u16, median(&t.samples_ns)?))
@@ -139,7 +160,7 @@ impl Spot {
             scenario: point.scenario.clone(),
             load: point.load,
             core_to_core_ns: between_cores(point),
-            medians: point.timings.iter().filter(known).filter_map(median).collect(),
+            medians: point.timings.iter().filter(|t| is_sound(t)).filter_map(median).collect(),
         }
     }
 

@@ -24,13 +24,16 @@ pub(super) struct Predicted {
 pub(super) struct Errors(BTreeMap<usize, Vec<HeldOut>>);
 
 impl Errors {
-    /// Of all predictions; `by_machine` tells whether errors on one physical machine belong together, else those on one profile do.
-    pub(super) fn new(profiles: &[Profile], predicted: &[Predicted], by_machine: bool) -> Self {
+    /// Of all predictions. Errors on one physical machine belong together, however many profiles it has.
+    pub(super) fn new(profiles: &[Profile], predicted: &[Predicted]) -> Self {
         let mut errors: BTreeMap<usize, Vec<HeldOut>> = BTreeMap::new();
         for p in predicted {
             let profile = &profiles[p.held];
-            let first = profiles.iter().position(|o| o.machine() == profile.machine());
-            let machine = if by_machine { first.unwrap_or(p.held) } else { p.held };
+            // Left out twice, for two restrictions: the errors of two models are no noise of the timings.
+            if errors.contains_key(&p.held) {
+                continue;
+            }
+            let machine = profiles.iter().position(|o| o.machine() == profile.machine()).unwrap_or(p.held);
             let all = profile.points.iter().flat_map(|spot| spot.medians.iter().map(move |m| (spot, *m)));
             let off = all.filter_map(|(spot, (k, ns))| {
                 let id = profile.id(k);
@@ -40,7 +43,7 @@ impl Errors {
             });
             let off: Vec<HeldOut> = off.collect();
             let step = off.len().div_ceil(TIMINGS).max(1);
-            errors.entry(p.held).or_default().extend(off.into_iter().step_by(step));
+            errors.insert(p.held, off.into_iter().step_by(step).collect());
         }
         Self(errors)
     }
@@ -109,8 +112,8 @@ mod tests {
                 Predicted { held, costs }
             })
             .collect();
-        let errors = Errors::new(&profiles, &predicted, true);
+        let errors = Errors::new(&profiles, &predicted);
         assert_ne!(errors.prior(&[3]), errors.prior(&[]));
-        assert_eq!(errors.prior(&[3]), Errors::new(&profiles, &predicted[..3], true).prior(&[]));
+        assert_eq!(errors.prior(&[3]), Errors::new(&profiles, &predicted[..3]).prior(&[]));
     }
 }

@@ -72,7 +72,7 @@ fn mean(values: &[(f64, f64)]) -> f64 {
 }
 
 /// The least value that 95 % of the weight do not exceed.
-fn percentile_95(mut values: Vec<(f64, f64)>) -> f64 {
+pub(super) fn percentile_95(mut values: Vec<(f64, f64)>) -> f64 {
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let needed = 0.95 * values.iter().map(|v| v.1).sum::<f64>() - 1e-9;
     let mut passed = 0.0;

@@ -122,6 +122,9 @@ fn refusal(report: &Report, evidence: Evidence) -> Option<String> {
             "was timed by an unoptimised build; measure again with one built by `cargo build --release`".to_owned(),
         );
     }
+    if let Some(why) = report.hardware.implausible() {
+        return Some(format!("can't be: {why}"));
+    }
     if report.points.is_empty() {
         return Some("holds no timings; measure again without `--hardware-only`".to_owned());
     }
@@ -172,6 +175,16 @@ mod tests {
         assert_eq!(profiles.len(), 1);
         let told = ["simulated", "published", "unoptimised", "--hardware-only", "the same measurement"];
         assert!(told.iter().all(|t| notes.iter().any(|n| n.contains(t))) && notes.len() == 5, "{notes:?}");
+    }
+
+    #[test]
+    fn a_report_of_no_machine_that_can_be_is_left_out() {
+        let good = Machine::family()[0].report();
+        let mut megahertz = good.clone();
+        let clock = megahertz.hardware.parameters.iter_mut().find(|p| p.name == "clock_measured_ghz").unwrap();
+        clock.value = clock.value.map(|ghz| ghz * 1000.0);
+        let (profiles, notes) = usable(&[megahertz, good].map(named), Evidence::Real);
+        assert!(profiles.len() == 1 && notes.len() == 1 && notes[0].contains("clock_measured_ghz"), "{notes:?}");
     }
 
     #[test]

@@ -68,6 +68,11 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         }
     };
     fields.warnings.append(&mut remarks);
+    if let Some((out, read)) = arguments.out.as_ref().zip(arguments.report.as_ref())
+        && out.canonicalize().is_ok_and(|out| read.canonicalize().is_ok_and(|read| read == out))
+    {
+        return Err(WrongUsage(format!("{} is the report that is read; name another file", out.display())).into());
+    }
     if let Some(path) = &arguments.out {
         files::write_text(path, &json::write(&fields)?)?;
     }

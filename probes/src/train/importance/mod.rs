@@ -228,7 +228,7 @@ fn notes(found: &Importance) -> Vec<String> {
     let told = found.parameters.iter().map(|p| 1 + p.borders.len()).sum::<usize>();
     vec![
         format!(
-            "these are {told} verdicts by intervals of 90 %: about one in twenty of those that hold nothing is `linked` by \
+            "these are {told} verdicts by intervals of 90 %: up to one in ten of those that hold nothing, more with few machines, is `linked` by \
              chance"
         ),
         "a link is one of the model that was fitted, on these machines; it says what predicts, not what causes".to_owned(),
