@@ -1,0 +1,120 @@
+use super::super::synthetic::Machine;
+use super::*;
+use crate::simulate;
+
+fn profiles(machines: Vec<Machine>) -> Vec<Profile> {
+    machines.into_iter().map(|m| Profile::of(&format!("{}.json", m.name), &m.report())).collect()
+}
+
+fn validated(profiles: &[Profile]) -> (Validation, Vec<String>) {
+    let partition = Partition::new(profiles);
+    let found = validate(profiles, &Designs::new(profiles), &partition, &Progress::new(0)).unwrap();
+    (found.validation, found.notes)
+}
+
+fn mean(validation: &Validation, name: &str) -> f64 {
+    validation.methods.iter().find(|m| m.name == name).unwrap().mean_regret
+}
+
+#[test]
+fn physics_beats_every_constant_on_machines_left_out() {
+    let (validation, _) = validated(&profiles(Machine::family()));
+    assert_eq!((validation.physical_machines, validation.profiles, validation.methods.len()), (7, 7, 12));
+    assert_eq!(validation.held_out, "physical machine");
+    for name in ["physics", "physics + ridge", "full sweep"] {
+        assert!(mean(&validation, name) < 0.05, "{name}: {}", mean(&validation, name));
+        for constant in [SINGLE_BEST, "frozen constants (64)", "frozen constants (1000)", "default machine"] {
+            assert!(mean(&validation, name) < mean(&validation, constant), "{name} {constant}");
+        }
+    }
+    for m in &validation.methods {
+        assert!(m.mean_regret >= 0.0 && m.p95_regret >= m.mean_regret && m.closed_gap <= 1.0, "{m:?}");
+    }
+}
+
+#[test]
+fn borders_are_judged_where_costs_are_predicted() {
+    let (validation, _) = validated(&profiles(Machine::family()));
+    let of = |name: &str| {
+        let score = validation.methods.iter().find(|m| m.name == name).unwrap();
+        score.crossing_error_octaves.zip(score.crossings_within_half_octave)
+    };
+    let (error, within) = of(OURS).unwrap();
+    assert!(error < 0.5 && within > 0.5, "{validation:#?}");
+    assert!(of("nearest machine").unwrap().0 > error, "{validation:#?}");
+    assert_eq!((of("random forest"), of("full sweep")), (None, None));
+}
+
+#[test]
+fn the_score_counts_a_machine_once_however_many_profiles_it_has() {
+    let family = Machine::family();
+    let mut many = vec![family[0].clone(); 5];
+    many.extend_from_slice(&family[1..4]);
+    let (few, many) = (validated(&profiles(family[..4].to_vec())).0, validated(&profiles(many)).0);
+    assert_eq!((many.physical_machines, many.profiles), (4, 8));
+    // The repeated profiles are left out together, so that no fit sees its own machine.
+    for (a, b) in few.methods.iter().zip(&many.methods).filter(|(a, _)| a.name == "full sweep" || a.name == OURS) {
+        assert!((a.mean_regret - b.mean_regret).abs() < 1e-3, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn a_dozen_simulated_machines_predict_those_left_out_better_than_the_nearest_one_does() {
+    let loads = simulate::Loads::of_a_sweep(1, Some(30_000)).unwrap();
+    let reports = simulate::simulate(&simulate::built_in().unwrap(), 12, &loads, 1).unwrap();
+    let profiles: Vec<Profile> = reports.into_iter().map(|(file, report)| Profile::of(&file, &report)).collect();
+    let (validation, notes) = validated(&profiles);
+    assert_eq!((validation.physical_machines, validation.held_out.as_str()), (12, "physical machine"));
+    assert!(validation.methods.iter().all(|m| m.mean_regret.is_finite() && m.mean_regret >= 0.0), "{validation:?}");
+    for other in ["nearest machine", SINGLE_BEST, "default machine"] {
+        assert!(mean(&validation, "physics + ridge") < mean(&validation, other), "{other} {validation:#?} {notes:?}");
+    }
+    // Their truth is no sum of the predictor's terms: one that is always right has seen it.
+    assert!(mean(&validation, "physics + ridge") > 0.005, "{validation:#?}");
+}
+
+#[test]
+fn machines_with_and_without_gpus_are_validated_together() {
+    let mut machines = Machine::family_with_gpus();
+    machines[6].gpus.clear();
+    let (validation, notes) = validated(&profiles(machines));
+    assert_eq!((validation.physical_machines, validation.methods.len()), (8, 12));
+    for name in ["physics", "physics + ridge", "full sweep"] {
+        assert!(mean(&validation, name) < 0.1, "{name}: {} {notes:?}", mean(&validation, name));
+    }
+    assert!(mean(&validation, "physics") < mean(&validation, SINGLE_BEST));
+}
+
+#[test]
+fn a_weak_profile_costs_its_folds_and_not_the_validation() {
+    let mut two = profiles(Machine::family());
+    two.truncate(2);
+    two[0].points.truncate(1);
+    let (validation, notes) = validated(&two);
+    assert_eq!(validation.methods.len(), 12);
+    assert!(notes.iter().any(|n| n.starts_with("there is no default machine when")), "{notes:?}");
+}
+
+#[test]
+fn profiles_of_one_machine_are_left_out_together() {
+    let mut twins = Machine::family();
+    twins.truncate(3);
+    twins[1].name = twins[0].name;
+    let (validation, _) = validated(&profiles(twins));
+    assert_eq!((validation.physical_machines, validation.profiles), (2, 3));
+}
+
+#[test]
+fn one_machine_is_told_and_one_profile_gives_no_scores() {
+    let mut twins = Machine::family();
+    twins.truncate(2);
+    twins[1].name = twins[0].name;
+    let (validation, notes) = validated(&profiles(twins.clone()));
+    assert!(
+        validation.held_out.starts_with("SIMD level")
+            && notes.iter().any(|n| n.contains("little about machines never seen"))
+    );
+    twins.truncate(1);
+    let (validation, notes) = validated(&profiles(twins));
+    assert!(validation.methods.is_empty() && notes[0].contains("one report only"));
+}
