@@ -3,13 +3,17 @@
 use super::curve;
 use super::prior::{HeldOut, prior};
 use super::profile::{Profile, Spot};
+use super::yardstick::average;
 use crate::samples::{Replay, ReplayPoint, learn};
 use anyhow::Result;
+use sapwise::model::{Coverage, FEWEST_MACHINES, Role};
 use sapwise::{AlgorithmCost, Prior};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Samples that are taken, as `predict` does unless told otherwise.
 pub(super) const SAMPLES: usize = 8;
+/// Share of new machines that an interval is to hold.
+const CONFIDENCE: f64 = 0.9;
 /// Timings of a held-out profile that tell how far predictions are off, about.
 const TIMINGS: usize = 120;
 
@@ -55,6 +59,48 @@ impl Errors {
     }
 }
 
+/// Share of held-out times that lie within the interval which the errors on the other held-out machines give, each machine weighing the
+/// same; `None` with fewer machines than an interval takes.
+///
+/// The interval is that of the jackknife+ but for the spread of the fits among each other, which widens it: the share is a lower bound.
+/// Borders are not looked at.
+pub(super) fn coverage(errors: &Errors) -> Option<Coverage> {
+    let mut roles: BTreeMap<Role, BTreeMap<usize, Vec<f64>>> = BTreeMap::new();
+    for held in errors.0.values().flatten() {
+        let of_machine = roles.entry(Role::of(&held.algorithm)).or_default().entry(held.machine).or_default();
+        of_machine.push(held.ln_ratio.abs());
+    }
+    let machines: BTreeSet<usize> = roles.values().flat_map(BTreeMap::keys).copied().collect();
+    if machines.len() < FEWEST_MACHINES as usize {
+        return None;
+    }
+    let (mut within, mut count) = (BTreeMap::<usize, (f64, f64)>::new(), 0);
+    for by_machine in roles.values().filter(|m| m.len() >= FEWEST_MACHINES as usize) {
+        for (machine, own) in by_machine {
+            let mut others: Vec<(f64, f64)> = by_machine
+                .iter()
+                .filter(|(other, _)| *other != machine)
+                .flat_map(|(_, errors)| errors.iter().map(|e| (*e, 1.0 / errors.len() as f64)))
+                .collect();
+            others.sort_by(|a, b| a.0.total_cmp(&b.0));
+            // One machine more than were seen is asked about.
+            let needed = CONFIDENCE * by_machine.len() as f64;
+            let mut passed = 0.0;
+            let reach = others.iter().find(|o| {
+                passed += o.1;
+                passed >= needed
+            });
+            let reach = reach.map_or(f64::INFINITY, |o| o.0);
+            let sum = within.entry(*machine).or_default();
+            sum.0 += own.iter().filter(|e| **e <= reach).count() as f64;
+            sum.1 += own.len() as f64;
+            count += own.len();
+        }
+    }
+    let shares: Vec<f64> = within.values().map(|(within, all)| within / all).collect();
+    Some(Coverage { times: average(&shares), times_count: count, crossings: None, crossings_count: 0 })
+}
+
 /// The costs after [`SAMPLES`] samples of the scenario, replayed from the profile. `None` where it has too few sizes of it.
 ///
 /// # Errors
@@ -80,6 +126,7 @@ mod tests {
     use super::super::yardstick::Yardstick;
     use super::super::{available, by_costs};
     use super::*;
+    use crate::random::Random;
 
     #[test]
     fn samples_mend_a_prediction_that_is_off_by_a_factor() {
@@ -97,6 +144,25 @@ mod tests {
         let mended = corrected(&profile, "uniform", &predicted, &Prior::ASSUMED).unwrap().unwrap();
         assert!(regret(&costs) > 0.05 && regret(&mended) < 0.5 * regret(&costs), "{} {}", regret(&costs), regret(&mended));
         assert!(corrected(&profile, "nowhere", &predicted, &Prior::ASSUMED).unwrap().is_none());
+    }
+
+    #[test]
+    fn nine_times_in_ten_lie_within_what_the_other_machines_give() {
+        let mut random = Random::named(7, &[]);
+        let id: sapwise::AlgorithmId = "strips@cpu1".parse().unwrap();
+        let mut errors = |machines: usize, factor: f64| {
+            let of = |machine: usize| {
+                let off = 0.2 * random.normal() * if machine == 0 { factor } else { 1.0 };
+                let held = |_| HeldOut { machine, algorithm: id.clone(), log2_objects: 10.0, ln_ratio: off };
+                (machine, (0..5).map(held).collect())
+            };
+            Errors((0..machines).map(of).collect())
+        };
+        assert_eq!(coverage(&errors(9, 1.0)), None);
+        let found = coverage(&errors(400, 1.0)).unwrap();
+        assert!((found.times - 0.9).abs() < 0.03 && found.times_count == 2000, "{found:?}");
+        let one_off = coverage(&errors(20, 100.0)).unwrap();
+        assert!(one_off.times < 1.0, "{one_off:?}");
     }
 
     #[test]

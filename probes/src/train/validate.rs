@@ -16,7 +16,7 @@ use super::yardstick::{Chooser, Yardstick, average};
 use crate::progress::Progress;
 use anyhow::Result;
 use rayon::prelude::*;
-use sapwise::model::{MethodModel, Validation};
+use sapwise::model::{Coverage, MethodModel, Validation};
 use sapwise::{AlgorithmCost, AlgorithmId, Model, Prior};
 use std::sync::OnceLock;
 
@@ -62,7 +62,7 @@ pub(super) fn validate(
     machines.dedup();
     let mut notes = Vec::new();
     let mut all: Vec<Judged> = Vec::new();
-    let (mut times, mut prior) = (Vec::new(), None);
+    let (mut times, mut prior, mut coverage) = (Vec::new(), None, None);
     if profiles.len() < 2 {
         notes.push("nothing is validated: there is one report only; add reports of other machines".to_owned());
     } else {
@@ -90,16 +90,17 @@ pub(super) fn validate(
             notes.extend(found.notes);
             predicted.push(found.predicted);
         }
-        let (sampled, of_all, told) = data.sampled(&partition.folds, predicted)?;
-        all.extend(sampled);
-        notes.extend(told);
-        prior = of_all;
+        let sampled = data.sampled(&partition.folds, predicted)?;
+        all.extend(sampled.judged);
+        notes.extend(sampled.told);
+        (prior, coverage) = (sampled.prior, sampled.coverage);
     }
     let validation = Validation {
         held_out: partition.held_out.clone(),
         physical_machines: machines.len(),
         profiles: profiles.len(),
         methods: scores::scores(&all),
+        coverage: if partition.by_machine { coverage } else { None },
         ..Validation::default()
     };
     Ok(Validated { validation, notes, held: Held::new(&all, times, partition.by_machine), prior })
@@ -126,6 +127,14 @@ pub(super) struct Found {
     predicted: Vec<Predicted>,
     times: Vec<Time>,
     notes: Vec<String>,
+}
+
+/// What is found by samples on what was left out, and of errors there.
+struct OfSamples {
+    judged: Vec<Judged>,
+    prior: Option<Prior>,
+    coverage: Option<Coverage>,
+    told: Option<String>,
 }
 
 /// What was fitted to the training of a fold.
@@ -245,11 +254,7 @@ impl<'a> Data<'a> {
     }
 
     /// What samples add to the predictions of each fold, with a prior from the others; and the prior of all.
-    fn sampled(
-        &self,
-        folds: &[Vec<usize>],
-        predicted: Vec<Vec<Predicted>>,
-    ) -> Result<(Vec<Judged>, Option<Prior>, Option<String>)> {
+    fn sampled(&self, folds: &[Vec<usize>], predicted: Vec<Vec<Predicted>>) -> Result<OfSamples> {
         // Of many machines some: more tell neither the prior nor a mean regret better.
         let all: usize = predicted.iter().map(Vec::len).sum();
         let step = all.div_ceil(MOST_SAMPLED).max(1);
@@ -290,7 +295,8 @@ impl<'a> Data<'a> {
             )
         });
         let prior = predicted.iter().any(|p| !p.costs.is_empty()).then(|| errors.prior(&[]));
-        Ok((found.into_iter().map(|f| f.0).collect(), prior, told))
+        let coverage = sampled::coverage(&errors);
+        Ok(OfSamples { judged: found.into_iter().map(|f| f.0).collect(), prior, coverage, told })
     }
 }
 
