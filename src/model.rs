@@ -19,7 +19,7 @@ use curve::Formula;
 pub use feature::Feature;
 pub use fold::{Fold, FoldMethod, LnErrors, QUANTILES, Role, RoleErrors};
 pub use interval::FEWEST_MACHINES;
-pub use predict::Prediction;
+pub use predict::{ASK, Prediction};
 pub use scale::Scale;
 pub use validation::{Coverage, Learning, LearningScore, MethodScore, Validation};
 

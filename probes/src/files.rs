@@ -4,6 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use crate::exit::WrongUsage;
 use anyhow::{Context, Result, bail};
 
 /// Writes what `write` produces to `path`, so that a reader never sees half of it.
@@ -60,6 +61,25 @@ fn buffered(file: &mut File, write: impl FnOnce(&mut dyn Write) -> Result<()>) -
     write(&mut buffer)?;
     // Dropping the buffer would write its rest too, and lose the error.
     buffer.flush()?;
+    Ok(())
+}
+
+/// Refuses to write over a report that is read, or twice into one file.
+///
+/// # Errors
+/// [`WrongUsage`] that names the file.
+pub(crate) fn refuse_overwriting(reports: &[PathBuf], outputs: &[&PathBuf]) -> Result<()> {
+    let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let read: Vec<PathBuf> = reports.iter().map(|path| place(path)).collect();
+    for (k, path) in outputs.iter().enumerate() {
+        let own = place(path);
+        if read.contains(&own) {
+            return Err(WrongUsage(format!("{} is a report that is read; name another file", path.display())).into());
+        }
+        if outputs[..k].iter().any(|o| place(o) == own) {
+            return Err(WrongUsage(format!("{} is named for two outputs", path.display())).into());
+        }
+    }
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use crate::revisions;
 use crate::samples::{self, Live, Order, Taken};
 use anyhow::{Context, bail};
 use sapwise::hardware::parameter;
-use sapwise::model::{FEWEST_MACHINES, Prediction};
+use sapwise::model::{ASK, FEWEST_MACHINES, Prediction};
 use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry, Scenario};
 
 /// Objects of the slice that the fields show: four sizes a decade from ten to a million.
@@ -74,7 +74,7 @@ pub(crate) fn predict_and_sample(
         let Fields { model: name, extrapolated, warnings, interval_basis, .. } = fields;
         fields = Fields { model: name, extrapolated, warnings, samples, ..corrected };
         // What asked for samples has got them.
-        fields.warnings.retain(|w| !w.contains("--samples"));
+        fields.warnings.retain(|w| w != ASK);
         // What the prior says of a machine never seen was told by too few others to be claimed of this one, sampled or not.
         if model.validation.physical_machines < FEWEST_MACHINES as usize {
             fields.crossovers.iter_mut().for_each(|b| (b.low, b.high) = (None, None));

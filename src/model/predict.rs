@@ -21,7 +21,7 @@ pub struct Prediction {
 }
 
 /// What to do where a machine is unlike those of training.
-const ASK: &str = "this machine is unlike those of training: measure a few timings with `sapwise predict --samples 8`, or all with \
+pub const ASK: &str = "this machine is unlike those of training: measure a few timings with `sapwise predict --samples 8`, or all with \
                    `sapwise probe`";
 
 impl Model {

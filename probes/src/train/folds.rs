@@ -2,12 +2,12 @@
 
 use super::fit::Designs;
 use super::partition::Partition;
-use super::profile::{Profile, Spot};
+use super::profile::{Profile, Spot, machines};
 use anyhow::Result;
 use rayon::prelude::*;
 use sapwise::model::{FEWEST_MACHINES, Fold, FoldMethod, LnErrors, MethodModel, ModelTerm, QUANTILES, Role, RoleErrors};
 use sapwise::{AlgorithmId, Hardware, Load};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Folds at most. With as many machines or fewer each fold is one machine, which is the jackknife+; with more it is CV+.
 const MOST_FOLDS: usize = 10;
@@ -36,8 +36,7 @@ type ByMachine = BTreeMap<usize, Vec<f64>>;
 /// # Errors
 /// When the regression of a residual fails.
 pub(crate) fn folds(profiles: &[Profile], designs: &Designs<'_>) -> Result<Vec<Fold>> {
-    let machines: BTreeSet<&str> = profiles.iter().map(Profile::machine).collect();
-    let enough = machines.len() >= FEWEST_MACHINES as usize;
+    let enough = machines(profiles).len() >= FEWEST_MACHINES as usize;
     let partition = Partition::of_machines(profiles, MOST_FOLDS).filter(|_| enough);
     let without = |left_out: &Vec<usize>| {
         let mut chosen = vec![true; profiles.len()];

@@ -1,7 +1,7 @@
 //! How accuracy grows with the number of machines.
 
 use super::fit::Designs;
-use super::profile::Profile;
+use super::profile::{Profile, machines};
 use super::scores;
 use super::validate::Data;
 use crate::progress::Progress;
@@ -36,9 +36,7 @@ pub(super) struct Training {
 /// Random trainings, those of the same size one behind the other, no two of them on the same machines. None of as many machines as there
 /// are, since there would be nothing to judge them by.
 pub(super) fn trainings(profiles: &[Profile]) -> Vec<Training> {
-    let mut machines: Vec<&str> = profiles.iter().map(|p| p.machine()).collect();
-    machines.sort_unstable();
-    machines.dedup();
+    let machines = machines(profiles);
     let mut of_machine: Vec<Vec<usize>> = vec![Vec::new(); machines.len()];
     for (k, profile) in profiles.iter().enumerate() {
         // Every machine of a profile is in the list.

@@ -145,6 +145,14 @@ fn between_cores(point: &Point) -> Option<f64> {
     point.core_to_core_ns.map(|[before, after]| (before * after).sqrt())
 }
 
+/// The physical machines of profiles, each once, in order.
+pub(super) fn machines(profiles: &[Profile]) -> Vec<&str> {
+    let mut machines: Vec<&str> = profiles.iter().map(Profile::machine).collect();
+    machines.sort_unstable();
+    machines.dedup();
+    machines
+}
+
 /// Whether a timing has no error and enough samples.
 pub(super) fn is_sound(timing: &Timing) -> bool {
     timing.error.is_none() && timing.samples_ns.len() >= FEWEST_SAMPLES

@@ -180,6 +180,16 @@ pub(crate) fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
     before.map(|b| b.0)
 }
 
+/// The least of values, given ascending with their weights, up to which at least this much weight is reached; `None` where all have less.
+pub(super) fn value_at_weight(values: &[(f64, f64)], weight: f64) -> Option<f64> {
+    let mut passed = 0.0;
+    let reached = values.iter().find(|v| {
+        passed += v.1;
+        passed >= weight
+    });
+    reached.map(|v| v.0)
+}
+
 /// Median; 0 for none.
 fn median(values: &[f64]) -> f64 {
     sapwise::measure::statistics::median(values).unwrap_or(0.0)

@@ -3,12 +3,13 @@
 use super::curve;
 use super::prior::{HeldOut, prior};
 use super::profile::{Profile, Spot};
+use super::robust::value_at_weight;
 use super::yardstick::average;
 use crate::samples::{Replay, ReplayPoint, learn};
 use anyhow::Result;
 use sapwise::model::{Coverage, FEWEST_MACHINES, Role};
 use sapwise::{AlgorithmCost, Prior};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Samples that are taken, as `predict` does unless told otherwise.
 pub(super) const SAMPLES: usize = 8;
@@ -70,10 +71,6 @@ pub(super) fn coverage(errors: &Errors) -> Option<Coverage> {
         let of_machine = roles.entry(Role::of(&held.algorithm)).or_default().entry(held.machine).or_default();
         of_machine.push(held.ln_ratio.abs());
     }
-    let machines: BTreeSet<usize> = roles.values().flat_map(BTreeMap::keys).copied().collect();
-    if machines.len() < FEWEST_MACHINES as usize {
-        return None;
-    }
     let (mut within, mut count) = (BTreeMap::<usize, (f64, f64)>::new(), 0);
     for by_machine in roles.values().filter(|m| m.len() >= FEWEST_MACHINES as usize) {
         for (machine, own) in by_machine {
@@ -85,12 +82,7 @@ pub(super) fn coverage(errors: &Errors) -> Option<Coverage> {
             others.sort_by(|a, b| a.0.total_cmp(&b.0));
             // One machine more than were seen is asked about.
             let needed = CONFIDENCE * by_machine.len() as f64;
-            let mut passed = 0.0;
-            let reach = others.iter().find(|o| {
-                passed += o.1;
-                passed >= needed
-            });
-            let reach = reach.map_or(f64::INFINITY, |o| o.0);
+            let reach = value_at_weight(&others, needed).unwrap_or(f64::INFINITY);
             let sum = within.entry(*machine).or_default();
             sum.0 += own.iter().filter(|e| **e <= reach).count() as f64;
             sum.1 += own.len() as f64;
@@ -98,7 +90,9 @@ pub(super) fn coverage(errors: &Errors) -> Option<Coverage> {
         }
     }
     let shares: Vec<f64> = within.values().map(|(within, all)| within / all).collect();
-    Some(Coverage { times: average(&shares), times_count: count, crossings: None, crossings_count: 0 })
+    let found = Coverage { times: average(&shares), times_count: count, crossings: None, crossings_count: 0 };
+    // No role was timed on enough machines.
+    (count > 0).then_some(found)
 }
 
 /// The costs after [`SAMPLES`] samples of the scenario, replayed from the profile. `None` where it has too few sizes of it.

@@ -1,5 +1,6 @@
 //! From regrets on held-out profiles to the scores of the ways to choose.
 
+use super::robust::value_at_weight;
 use super::validate::SINGLE_BEST;
 use super::yardstick::Regret;
 use sapwise::measure::statistics::median;
@@ -75,12 +76,7 @@ fn mean(values: &[(f64, f64)]) -> f64 {
 pub(super) fn percentile_95(mut values: Vec<(f64, f64)>) -> f64 {
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     let needed = 0.95 * values.iter().map(|v| v.1).sum::<f64>() - 1e-9;
-    let mut passed = 0.0;
-    let reached = values.iter().find(|v| {
-        passed += v.1;
-        passed >= needed
-    });
-    reached.map_or(0.0, |v| v.0)
+    value_at_weight(&values, needed).unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use super::forest::{Forests, Table};
 use super::held::{Held, Time};
 use super::model::model;
 use super::partition::Partition;
-use super::profile::Profile;
+use super::profile::{Profile, machines};
 use super::sampled::{self, Errors, Predicted};
 use super::scores::{self, Judged};
 use super::yardstick::{Chooser, Yardstick, average};
@@ -57,9 +57,6 @@ pub(super) fn validate(
     partition: &Partition,
     progress: &Progress,
 ) -> Result<Validated> {
-    let mut machines: Vec<&str> = profiles.iter().map(Profile::machine).collect();
-    machines.sort_unstable();
-    machines.dedup();
     let mut notes = Vec::new();
     let mut all: Vec<Judged> = Vec::new();
     let (mut times, mut prior, mut coverage) = (Vec::new(), None, None);
@@ -97,7 +94,7 @@ pub(super) fn validate(
     }
     let validation = Validation {
         held_out: partition.held_out.clone(),
-        physical_machines: machines.len(),
+        physical_machines: machines(profiles).len(),
         profiles: profiles.len(),
         methods: scores::scores(&all),
         coverage: if partition.by_machine { coverage } else { None },
@@ -142,6 +139,9 @@ struct Fitted<'a> {
     /// Positions of the profiles of the training, and what their machines are compared by.
     known: Vec<usize>,
     likeness: Vec<&'a Likeness>,
+    /// Some of them with the mean regret of each algorithm when it is chosen always, and some of those that have crossings.
+    always: Vec<(&'a Profile, &'a [f64])>,
+    crossed: Vec<&'a Profile>,
     /// The model with its residual, and without; `None` where none could be fitted.
     models: Option<(Model, Model)>,
     forests: Forests,
@@ -186,7 +186,13 @@ impl<'a> Data<'a> {
         };
         let known: Vec<usize> = (0..self.profiles.len()).filter(|&k| chosen[k]).collect();
         let likeness = known.iter().map(|&k| &self.likeness[k]).collect();
-        let fitted = Fitted { known, likeness, models, forests: self.table.grow(&chosen)? };
+        let seen = known.iter().step_by(known.len().div_ceil(MOST_SEEN).max(1));
+        let always = seen.map(|&k| (&self.profiles[k], &self.always[k][..])).collect();
+        // Of many reports some have crossings.
+        let crossed: Vec<&Profile> = known.iter().map(|&k| &self.profiles[k]).filter(|p| !p.crossings.is_empty()).collect();
+        let step = crossed.len().div_ceil(MOST_SEEN).max(1);
+        let crossed = crossed.into_iter().step_by(step).collect();
+        let fitted = Fitted { known, likeness, always, crossed, models, forests: self.table.grow(&chosen)? };
         for &held in judged {
             self.held_out(held, &fitted, &mut found)?;
         }
@@ -200,13 +206,6 @@ impl<'a> Data<'a> {
 
     fn held_out(&self, held: usize, fitted: &Fitted<'_>, found: &mut Found) -> Result<()> {
         let profile = &self.profiles[held];
-        let seen: Vec<usize> = fitted.known.iter().step_by(fitted.known.len().div_ceil(MOST_SEEN).max(1)).copied().collect();
-        // Of many reports some have crossings.
-        let crossed: Vec<&Profile> =
-            fitted.known.iter().map(|&k| &self.profiles[k]).filter(|p| !p.crossings.is_empty()).collect();
-        let step = crossed.len().div_ceil(MOST_SEEN).max(1);
-        let training: Vec<&Profile> = crossed.into_iter().step_by(step).collect();
-        let always: Vec<(&Profile, &[f64])> = seen.iter().map(|&k| (&self.profiles[k], &self.always[k][..])).collect();
         let available = available(profile);
         let mut predicted = |model: fn(&(Model, Model)) -> &Model| {
             let models = fitted.models.as_ref()?;
@@ -231,9 +230,12 @@ impl<'a> Data<'a> {
             by(OURS, ridge.as_deref(), &available),
             by("physics", physics.as_deref(), &available),
             alone("random forest", fitted.forests.chooser(&profile.hardware, &available)),
-            alone("direct regression", direct(&training, &profile.hardware, &available, &mut found.notes)?),
-            alone("direct elastic net", direct_elastic_net(&training, &profile.hardware, &available, &mut found.notes)?),
-            alone(SINGLE_BEST, baselines::single_best(&always, &available)),
+            alone("direct regression", direct(&fitted.crossed, &profile.hardware, &available, &mut found.notes)?),
+            alone(
+                "direct elastic net",
+                direct_elastic_net(&fitted.crossed, &profile.hardware, &available, &mut found.notes)?,
+            ),
+            alone(SINGLE_BEST, baselines::single_best(&fitted.always, &available)),
             alone("frozen constants (64)", baselines::frozen(64, "strips", &available)),
             alone("frozen constants (1000)", baselines::frozen(999, "sweep", &available)),
             alone("default machine", default_machine),

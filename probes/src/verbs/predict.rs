@@ -14,6 +14,7 @@ use std::path::Path;
 pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     hardware::check_threads(arguments.threads)?;
     let report = arguments.report.as_deref().map(read_report).transpose()?;
+    files::refuse_overwriting(arguments.report.as_slice(), &arguments.out.iter().collect::<Vec<_>>())?;
     let model = if arguments.measured { None } else { Some(model(arguments.model.as_deref())?) };
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
@@ -68,11 +69,6 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         }
     };
     fields.warnings.append(&mut remarks);
-    if let Some((out, read)) = arguments.out.as_ref().zip(arguments.report.as_ref())
-        && out.canonicalize().is_ok_and(|out| read.canonicalize().is_ok_and(|read| read == out))
-    {
-        return Err(WrongUsage(format!("{} is the report that is read; name another file", out.display())).into());
-    }
     if let Some(path) = &arguments.out {
         files::write_text(path, &json::write(&fields)?)?;
     }

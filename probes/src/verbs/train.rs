@@ -28,10 +28,10 @@ struct Answer<'a> {
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
-    let files = report_files(&arguments.reports)?;
+    let reports = report_files(&arguments.reports)?;
     let outputs = [Some(&arguments.out), arguments.card.as_ref(), arguments.plot.as_ref(), arguments.importance.as_ref()];
-    refuse_overwriting(&files, &outputs.into_iter().flatten().collect::<Vec<_>>())?;
-    let selection = select(&files, evidence)?;
+    files::refuse_overwriting(&reports, &outputs.into_iter().flatten().collect::<Vec<_>>())?;
+    let selection = select(&reports, evidence)?;
     let importance = arguments.importance.as_ref().map(|_| train::importance(&selection.clone().finish().0)).transpose()?;
     let Trained { model, notes, held } = train::train(selection, &name)?;
     let text = sapwise::json::write_model(&model)?;
@@ -57,22 +57,6 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
         output::print(&format!("{importance}{}", summary(&model, &notes, &arguments.out)))?;
     }
     Ok(Outcome::Done)
-}
-
-/// Refuses to write over a report that is read, or twice into one file.
-fn refuse_overwriting(reports: &[PathBuf], outputs: &[&PathBuf]) -> anyhow::Result<()> {
-    let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let read: Vec<PathBuf> = reports.iter().map(|path| place(path)).collect();
-    for (k, path) in outputs.iter().enumerate() {
-        let own = place(path);
-        if read.contains(&own) {
-            return Err(WrongUsage(format!("{} is a report that is read; name another file", path.display())).into());
-        }
-        if outputs[..k].iter().any(|o| place(o) == own) {
-            return Err(WrongUsage(format!("{} is named for two outputs", path.display())).into());
-        }
-    }
-    Ok(())
 }
 
 /// Reads the reports on all cores, some at a time, and keeps of each what is trained on.

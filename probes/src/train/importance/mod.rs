@@ -11,7 +11,7 @@ mod verdict;
 use super::fit::Designs;
 use super::model::model;
 use super::partition::Partition;
-use super::profile::Profile;
+use super::profile::{Profile, machines};
 use super::yardstick::average;
 use crate::progress::Progress;
 use crate::turns::Turns;
@@ -97,9 +97,7 @@ pub(crate) struct OfBorder {
 /// # Errors
 /// When a model can't be fitted without a fold.
 pub(crate) fn importance(profiles: &[Profile]) -> Result<Importance> {
-    let mut machines: Vec<&str> = profiles.iter().map(Profile::machine).collect();
-    machines.sort_unstable();
-    machines.dedup();
+    let machines = machines(profiles);
     let partition = Partition::of_machines(profiles, MOST_FOLDS).filter(|_| machines.len() >= FEWEST_MACHINES);
     let mut found = Importance {
         held_out: String::new(),
