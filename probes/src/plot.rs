@@ -91,9 +91,19 @@ where
         .draw_series(LineSeries::new(line, BLACK.stroke_width(2)))?
         .label("adaptive (band: its choice)")
         .legend(|(x, y)| Rectangle::new([(x, y - 1), (x + 16, y + 1)], BLACK.filled()));
+    legend(&mut chart, SeriesLabelPosition::UpperLeft)
+}
+
+/// Draws the names of the series of a chart.
+fn legend<'a, D, C>(chart: &mut ChartContext<'a, D, C>, position: SeriesLabelPosition) -> anyhow::Result<()>
+where
+    D: DrawingBackend + 'a,
+    D::ErrorType: 'static,
+    C: CoordTranslate,
+{
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
+        .position(position)
         .background_style(WHITE.mix(0.85))
         .border_style(RGBColor(180, 180, 180))
         .draw()?;

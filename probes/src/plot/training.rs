@@ -104,13 +104,7 @@ fn times(area: &Area<'_>, held: &Held) -> anyhow::Result<()> {
             .label(format!("{method} on the {class}"))
             .legend(move |(x, y)| mark((x + 8, y), shape, colour(k), 4));
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.85))
-        .border_style(RGBColor(180, 180, 180))
-        .draw()?;
-    Ok(())
+    super::legend(&mut chart, SeriesLabelPosition::UpperLeft)
 }
 
 /// The mean regret on each held-out machine, from the least to the most for each way to choose by itself: at 95 is the 95th percentile.
@@ -152,13 +146,7 @@ fn regrets(area: &Area<'_>, held: &Held) -> anyhow::Result<()> {
             .label(name)
             .legend(move |(x, y)| mark((x + 8, y), shape, colour(k), 4));
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.85))
-        .border_style(RGBColor(180, 180, 180))
-        .draw()?;
-    Ok(())
+    super::legend(&mut chart, SeriesLabelPosition::UpperLeft)
 }
 
 /// The mean regret by the number of machines in the training, with bars from the 5th to the 95th percentile over the trainings.
@@ -210,13 +198,7 @@ fn course(area: &Area<'_>, learning: &[Learning]) -> anyhow::Result<()> {
             .label(name)
             .legend(move |(x, y)| mark((x + 8, y), shape, colour(k), 4));
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .background_style(WHITE.mix(0.85))
-        .border_style(RGBColor(180, 180, 180))
-        .draw()?;
-    Ok(())
+    super::legend(&mut chart, SeriesLabelPosition::UpperRight)
 }
 
 /// A regret in percent, no less than what the axis shows.
