@@ -73,6 +73,9 @@ pub use load::Load;
 pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};
 pub use posterior::{Posterior, Prior};
+/// The version of rayon whose pools this library takes: [`Registry::use_pool`].
+#[cfg(feature = "parallel")]
+pub use rayon;
 pub use registry::{Entry, Registry, usable_cores};
 pub use report::Report;
 pub use scenario::{Scenario, Scene};

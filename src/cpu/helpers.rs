@@ -3,13 +3,16 @@
 use crate::cpu::threads::build_pool;
 use core_affinity::CoreId;
 use std::cell::Cell;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// A pool whose threads leave the calling thread's core to it.
+/// A pool whose threads leave the calling thread's core to it, or one that a program gave.
 #[derive(Debug)]
 pub(crate) struct Helpers {
-    pool: rayon::ThreadPool,
+    pool: Arc<rayon::ThreadPool>,
     seats: Option<Seats>,
+    /// Whether the caller may be a thread of the pool itself, as it may be of a pool that the program gave.
+    may_call: bool,
 }
 
 /// Cores for the helpers and one more. A scheduler that wakes a bound helper on the core of the caller would have them take turns
@@ -41,14 +44,26 @@ impl Helpers {
             free: AtomicUsize::new(0),
             caller: AtomicUsize::new(usize::MAX),
         });
-        Ok(Self { pool: build_pool(count, 1, pinned)?, seats })
+        Ok(Self { pool: Arc::new(build_pool(count, 1, pinned)?), seats, may_call: false })
     }
 
-    /// Runs `caller` here and `helper` on `count` helpers. Returns when all are done.
-    pub(crate) fn run(&self, count: usize, helper: impl Fn() + Sync, caller: impl FnOnce() + Send) {
+    /// The threads of a program's pool, which may run on any core.
+    pub(crate) fn of(pool: Arc<rayon::ThreadPool>) -> Self {
+        Self { pool, seats: None, may_call: true }
+    }
+
+    /// Runs `helper` on `count` helpers and `caller` here, which is told how many those are. Returns when all are done.
+    ///
+    /// A caller that is one of them can't help itself: then there is one less to help.
+    pub(crate) fn run(&self, count: usize, helper: impl Fn() + Sync, caller: impl FnOnce(usize) + Send) {
         if let Some(seats) = &self.seats {
             seats.caller.store(current_core(), Relaxed);
         }
+        let count = if self.may_call && self.pool.current_thread_index().is_some() {
+            count.min(self.pool.current_num_threads() - 1)
+        } else {
+            count
+        };
         self.pool.in_place_scope(|scope| {
             for _ in 0..count {
                 scope.spawn(|_| {
@@ -56,7 +71,7 @@ impl Helpers {
                     helper();
                 });
             }
-            caller();
+            caller(count);
         });
     }
 
