@@ -193,3 +193,50 @@ fn a_prior_that_can_not_be_is_a_defect_and_none_is_not() {
     wrong.cpu.length_octaves = f64::NAN;
     assert!(with(Some(wrong)).is_some_and(|d| d.contains("prior of the CPU")));
 }
+
+/// What a scale reads: with those parameters alone it has a value for any number of threads, and without any it has none for several.
+#[test]
+fn the_parameters_of_a_scale_are_those_that_it_reads() {
+    let with = |names: &[&str]| {
+        let parameters = names.iter().map(|name| Parameter::reported(name, 2.0, "test")).collect();
+        Hardware { parameters, gpus: Vec::new(), ..hardware() }
+    };
+    let of_cpu = [Scale::Cycle, Scale::SharedCycle, Scale::SharedLane, Scale::Byte, Scale::ForkJoin, Scale::SharedLine];
+    for scale in of_cpu {
+        for threads in [1, 2, 3, 8] {
+            let ns = scale.nanoseconds(&with(scale.parameters()), &Backend::Cpu(threads));
+            assert!(ns.is_ok(), "{scale:?} on {threads}: {ns:?}");
+        }
+        assert!(scale.nanoseconds(&with(&[]), &Backend::Cpu(2)).is_err());
+        // The last of a list is read wherever it stands alone for something: leaving it out changes or fails the scale.
+        for name in scale.parameters() {
+            let rest: Vec<&str> = scale.parameters().iter().copied().filter(|other| other != name).collect();
+            let mut other = with(&rest);
+            other.parameters.push(Parameter::reported(name, 3.0, "test"));
+            let differs = |threads| {
+                let backend = Backend::Cpu(threads);
+                scale.nanoseconds(&other, &backend) != scale.nanoseconds(&with(scale.parameters()), &backend)
+            };
+            // The second choice of a parameter shows where the first is absent.
+            let alone = scale.nanoseconds(&with(&rest), &Backend::Cpu(3)).is_ok();
+            assert!(alone || [2, 3, 8].into_iter().any(differs), "{scale:?} does not read {name}");
+        }
+    }
+}
+
+#[cfg(feature = "model")]
+#[test]
+fn the_built_in_model_predicts_from_the_parameters_that_it_names() {
+    let model = Model::built_in().unwrap();
+    let names = model.parameters();
+    assert!(names.is_sorted_by(|a, b| a < b) && !names.iter().any(|name| name.contains('/')), "{names:?}");
+    let figure = |name: &&str| match *name {
+        parameter::CACHE_LLC_BYTES => Parameter::reported(name, 33_554_432.0, "test"),
+        _ => Parameter::reported(name, 4.0, "test"),
+    };
+    let all = Hardware { parameters: names.iter().map(figure).collect(), gpus: Vec::new(), ..hardware() };
+    let algorithms: Vec<(AlgorithmId, u32)> =
+        crate::Registry::with_cores(4).entries().iter().map(|e| (e.id.clone(), e.revision)).collect();
+    let prediction = model.predict(&all, &algorithms).unwrap();
+    assert_eq!(prediction.costs.len(), algorithms.len(), "{:?}", prediction.warnings);
+}
