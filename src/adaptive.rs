@@ -1,11 +1,17 @@
 //! The in-line module: the cheapest algorithm for this frame, chosen before it runs.
 
+#[cfg(feature = "this-machine")]
+pub(crate) mod cache;
 mod decision;
 mod glance;
 mod learner;
+#[cfg(feature = "this-machine")]
+mod options;
 mod pace;
 mod policy;
 mod price;
+#[cfg(feature = "this-machine")]
+mod this_machine;
 
 use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step};
 use decision::Choice;
@@ -16,6 +22,10 @@ use std::fmt;
 use std::time::Instant;
 
 pub use decision::{Decision, Reason};
+#[cfg(feature = "this-machine")]
+pub use options::{Cache, Options};
+#[cfg(feature = "this-machine")]
+pub use this_machine::{Origin, SaveError, Setup};
 
 /// A runner-up that costs at most this much more than the choice gets its buffers ready: the next border may be near.
 const WARM_WITHIN: f64 = 1.5;
@@ -38,6 +48,9 @@ pub struct Adaptive {
     measured_ns: Option<f64>,
     /// [`decide`](Self::decide) was called for a frame of so many boxes that has not run yet.
     decided: Option<usize>,
+    /// How it came to its fields.
+    #[cfg(feature = "this-machine")]
+    start: this_machine::Start,
 }
 
 struct Candidate {
@@ -62,7 +75,12 @@ impl Adaptive {
             let hint = || "these fields name no algorithm; make them with `sapwise predict`".to_owned();
             return Err(failure.unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
         }
-        Ok(Self {
+        Ok(Self::with(fields, candidates))
+    }
+
+    /// Over instances that are there already, in the order of the algorithms of `fields`.
+    fn with(fields: Fields, candidates: Vec<Candidate>) -> Self {
+        Self {
             policy: policy(fields, &candidates),
             candidates,
             glance: Glance::default(),
@@ -70,7 +88,9 @@ impl Adaptive {
             choice: None,
             measured_ns: None,
             decided: None,
-        })
+            #[cfg(feature = "this-machine")]
+            start: this_machine::Start::default(),
+        }
     }
 
     /// Runs one algorithm always.
@@ -161,10 +181,10 @@ impl Adaptive {
     }
 
     /// Other fields, with an instance of each of their algorithms, take the place of those of before. The estimate of the load stays.
-    #[cfg(all(feature = "measure", feature = "model"))]
-    #[expect(dead_code, reason = "for fields that arrive while frames run already")]
+    #[cfg(feature = "this-machine")]
     fn adopt(&mut self, fields: Fields, candidates: Vec<Candidate>) {
-        self.policy = policy(fields, &candidates);
+        let before = std::mem::replace(&mut self.policy, policy(fields, &candidates));
+        self.policy.set_as(&before);
         self.candidates = candidates;
         self.decided = None;
         self.choice = None;
@@ -186,6 +206,8 @@ impl Adaptive {
 
     /// Estimates the load of the next frame and decides, without running anything.
     pub fn decide(&mut self, boxes: &[Aabb]) -> Option<Decision<'_>> {
+        #[cfg(feature = "this-machine")]
+        self.take_over();
         self.choose(boxes);
         self.decided = Some(boxes.len());
         self.last_decision()
@@ -221,6 +243,10 @@ impl Adaptive {
 impl BroadPhase for Adaptive {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         let decided = self.decided.take() == Some(boxes.len());
+        #[cfg(feature = "this-machine")]
+        if !decided {
+            self.take_over();
+        }
         let started = (decided || self.is_due(boxes)).then(Instant::now);
         if started.is_some() && !decided {
             self.choose(boxes);

@@ -25,7 +25,7 @@ pub use validation::{Coverage, Learning, LearningScore, MethodScore, Validation}
 
 schema_tag!(
     /// `model/1`.
-    ModelSchema = "model/1"
+    pub ModelSchema = "model/1"
 );
 
 /// What stands before the name of a GPU's parameter in a [`Range`]: `gpu/upload_rate_gb_per_s`.

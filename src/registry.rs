@@ -173,6 +173,33 @@ impl Registry {
         self.entries.iter().filter(|e| e.unavailable.is_none()).map(|e| (e.id.clone(), e.revision)).collect()
     }
 
+    /// The SIMD level that algorithms use.
+    #[cfg(feature = "this-machine")]
+    pub(crate) fn simd(&self) -> SimdLevel {
+        self.simd
+    }
+
+    /// Which threads help the calling one, in a word.
+    #[cfg(feature = "this-machine")]
+    pub(crate) fn helpers(&self) -> &'static str {
+        self.threads.kind()
+    }
+
+    /// The GPUs that were added.
+    #[cfg(all(feature = "measure-gpu", feature = "this-machine"))]
+    pub(crate) fn gpus(&self) -> &crate::gpu::Gpus {
+        &self.gpus
+    }
+
+    /// What the GPUs that were added say of themselves.
+    #[cfg(feature = "this-machine")]
+    pub(crate) fn gpu_identities(&self) -> Vec<crate::GpuIdentity> {
+        #[cfg(feature = "gpu")]
+        return self.gpus.identities().cloned().collect();
+        #[cfg(not(feature = "gpu"))]
+        Vec::new()
+    }
+
     /// Why a cost of `revision` of an algorithm says nothing here, if it doesn't.
     pub(crate) fn mismatch(&self, id: &AlgorithmId, revision: u32) -> Option<Error> {
         let unavailable = |reason| Some(Error::Unavailable { algorithm: id.clone(), reason });

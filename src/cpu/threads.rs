@@ -34,6 +34,16 @@ impl Threads {
         Self { given: Some((threads, Arc::new(Helpers::of(pool)))), ..Self::default() }
     }
 
+    /// Which threads these are: `pinned`, `free`, or `given` by the program.
+    #[cfg(feature = "this-machine")]
+    pub(crate) fn kind(&self) -> &'static str {
+        match (&self.given, self.pinned) {
+            (Some(_), _) => "given",
+            (None, true) => "pinned",
+            (None, false) => "free",
+        }
+    }
+
     /// The most threads that an algorithm may have, its caller's among them, where a program's pool says so.
     pub(crate) fn most(&self) -> Option<u32> {
         #[cfg(feature = "parallel")]

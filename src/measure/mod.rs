@@ -31,6 +31,8 @@ pub use core_to_core::core_to_core_ns;
 pub use foreign_load::Watch;
 #[cfg(feature = "measure-gpu")]
 pub use gpu::{gpu, gpu_group};
+#[cfg(feature = "this-machine")]
+pub(crate) use identity::fnv1a;
 
 /// Median, quantiles and dispersion, as the figures of a parameter follow from its samples.
 pub mod statistics {
