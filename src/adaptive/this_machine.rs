@@ -4,7 +4,7 @@ use super::cache::{Entry, Key};
 use super::options::Options;
 use super::{Adaptive, Candidate, candidates};
 use crate::hardware::parameter;
-use crate::{Displacement, Error, Fields, Hardware, Load, Model, Parameter, Registry, Scenario, measure};
+use crate::{AlgorithmId, Displacement, Error, Fields, Hardware, Load, Model, Parameter, Registry, Scenario, measure};
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -261,14 +261,28 @@ fn find(options: &Options, registry: &Registry, remarks: &mut Vec<String>) -> Op
         Some(Ok(None)) | None => {}
     }
     let hardware = hardware(options, registry, model, remarks);
-    let prediction = model.predict(&hardware, &registry.available()).map_err(|why| remarks.push(why)).ok()?;
-    let mut fields = prediction.fields(&Scenario::Uniform.to_string(), &slice());
-    fields.warnings.extend(hardware.disturbed());
+    let (fields, sound) = predict(model, hardware, &registry.available(), remarks)?;
     // Another process may have been quicker, and may even have learned: what it has kept stays.
-    if let Some(entry) = entry.as_ref().filter(|e| !matches!(e.read(), Ok(Some(_)))) {
+    if let Some(entry) = entry.as_ref().filter(|e| sound && !matches!(e.read(), Ok(Some(_)))) {
         remarks.extend(entry.write(fields.clone()).err());
     }
     Some((fields, Origin::Probed, entry))
+}
+
+/// Fields from hardware, without the figures that can't be: what needs one of them is left out, and whether there was none is told.
+fn predict(
+    model: &Model,
+    mut hardware: Hardware,
+    algorithms: &[(AlgorithmId, u32)],
+    remarks: &mut Vec<String>,
+) -> Option<(Fields, bool)> {
+    let dropped = hardware.drop_implausible();
+    let sound = dropped.is_empty();
+    remarks.extend(dropped.into_iter().map(|why| format!("{why}; it is left out, and the next start measures again")));
+    let prediction = model.predict(&hardware, algorithms).map_err(|why| remarks.push(why)).ok()?;
+    let mut fields = prediction.fields(&Scenario::Uniform.to_string(), &slice());
+    fields.warnings.extend(hardware.disturbed());
+    Some((fields, sound))
 }
 
 /// Measures what the model reads, of the machine as the registry uses it.
@@ -303,4 +317,44 @@ fn slice() -> Vec<Load> {
         Load::estimate(scene.boxes(), None, displacement.moved(scene.boxes()))
     };
     SLICE.map(load).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Machine;
+
+    #[test]
+    fn the_slice_ascends_from_ten() {
+        let loads = slice();
+        assert_eq!((loads[0].objects, loads[loads.len() - 1].objects), (10, 100_000));
+        assert!(loads.is_sorted_by(|a, b| a.objects < b.objects && a.axis_candidates <= b.axis_candidates));
+        // The density of the scenario, and boxes that move a little.
+        assert!(loads.iter().all(|l| l.moved > 0.0 && l.moved < 0.2), "{loads:?}");
+        let last = &loads[loads.len() - 1];
+        assert!(last.pairs > 1000.0 && last.pairs < last.strip_candidates, "{last:?}");
+    }
+
+    #[test]
+    fn a_figure_that_can_not_be_costs_what_needs_it_and_no_more() {
+        let model = Model::built_in().unwrap();
+        let figure = |name: &&str| match *name {
+            parameter::CACHE_LLC_BYTES => Parameter::reported(name, 33_554_432.0, "test"),
+            parameter::FORK_JOIN_COLD_NS => Parameter::reported(name, 5000.0, "test"),
+            parameter::USABLE_CORES | parameter::SCALING_ALL_THREADS_RATIO => Parameter::reported(name, 2.0, "test"),
+            _ => Parameter::reported(name, 4.0, "test"),
+        };
+        let parameters = model.parameters().iter().map(figure).collect();
+        let hardware = Hardware { machine: Machine::default(), parameters, gpus: Vec::new(), gpu_groups: Vec::new() };
+        let algorithms = Registry::with_cores(2).available();
+        let mut remarks = Vec::new();
+        let (fields, sound) = predict(&model, hardware.clone(), &algorithms, &mut remarks).unwrap();
+        assert_eq!((fields.costs.len(), sound, remarks.len()), (algorithms.len(), true, 0));
+        let mut broken = hardware;
+        broken.parameters.iter_mut().filter(|p| p.name == parameter::FORK_JOIN_COLD_NS).for_each(|p| p.value = Some(0.0));
+        let (fields, sound) = predict(&model, broken, &algorithms, &mut remarks).unwrap();
+        assert!(fields.costs.iter().all(|c| c.algorithm.threads() == 1) && !sound);
+        assert_eq!(fields.costs.len(), algorithms.len() / 2);
+        assert!(remarks.len() == 1 && remarks[0].contains("fork_join_cold_ns is 0"), "{remarks:?}");
+    }
 }
