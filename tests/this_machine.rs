@@ -283,6 +283,22 @@ fn a_model_that_knows_nothing_here_leaves_the_usual_fields() {
     assert!(names(folder.path()).is_empty());
 }
 
+/// What most programs do, but for the folder and the time.
+#[test]
+fn a_program_that_names_no_algorithms_gets_all_of_ours() {
+    let folder = tempfile::tempdir().unwrap();
+    for background in [true, false] {
+        let mut adaptive = start(&Options { registry: None, background, ..options(folder.path()) });
+        frames_until_it_came(&mut adaptive);
+        assert!([Origin::Probed, Origin::Cached].contains(&origin(&adaptive)), "{:?}", adaptive.setup());
+        let known: Vec<String> = adaptive.fields().algorithms().iter().map(ToString::to_string).collect();
+        for id in ["brute@cpu1", "sweep@cpu1", "strips@cpu1", "verlet@cpu1"] {
+            assert!(known.iter().any(|k| k == id), "{known:?}");
+        }
+        frame(&mut adaptive, &boxes(1000));
+    }
+}
+
 #[test]
 fn given_fields_have_no_start_of_their_own() {
     let registry = Registry::with_cores(1);

@@ -95,3 +95,43 @@ fn current_core() -> usize {
     #[cfg(not(target_os = "linux"))]
     usize::MAX
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::{Barrier, Mutex};
+    use std::thread::{ThreadId, current};
+
+    /// The threads that help when `threads` are asked for, and how many the caller was told.
+    fn helping(helpers: &Helpers, threads: usize) -> (Vec<ThreadId>, usize) {
+        let (seen, told) = (Mutex::new(Vec::new()), AtomicUsize::new(usize::MAX));
+        let note = || seen.lock().unwrap().push(current().id());
+        helpers.run(threads, note, |count| told.store(count, Relaxed));
+        (seen.into_inner().unwrap(), told.into_inner())
+    }
+
+    #[test]
+    fn a_programs_threads_help_and_a_caller_among_them_does_not_help_itself() {
+        for size in [1, 2, 4] {
+            let pool = Arc::new(build_pool(size, 0, false).unwrap());
+            let size = size as usize;
+            let own = pool.broadcast(|_| current().id());
+            let helpers = Helpers::of(Arc::clone(&pool));
+            let (seen, told) = helping(&helpers, size);
+            assert!(seen.len() == size && told == size && seen.iter().all(|id| own.contains(id)));
+            let (seen, told) = pool.install(|| helping(&helpers, size));
+            assert!(seen.len() == size - 1 && told == size - 1 && seen.iter().all(|id| own.contains(id)));
+        }
+    }
+
+    /// Were one helper less started, none of them would get past the barrier.
+    #[test]
+    fn all_helpers_work_at_the_same_time() {
+        let pool = Arc::new(build_pool(3, 0, false).unwrap());
+        let helpers = Helpers::of(Arc::clone(&pool));
+        let all = Barrier::new(4);
+        helpers.run(3, || _ = all.wait(), |_| _ = all.wait());
+        let others = Barrier::new(3);
+        pool.install(|| helpers.run(3, || _ = others.wait(), |_| _ = others.wait()));
+    }
+}
