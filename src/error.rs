@@ -23,7 +23,7 @@ pub enum Error {
     TooManyPairs {
         /// The limit that was set.
         limit: usize,
-        /// Overlapping pairs in the input, all counted.
+        /// Overlapping pairs in the input that the [`Filter`](crate::Filter) wants, all counted.
         pairs: u64,
     },
     /// An allocation was refused.

@@ -37,6 +37,7 @@ pub mod crossover;
 mod displacement;
 mod error;
 pub mod fields;
+mod filter;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod hardware;
@@ -68,6 +69,7 @@ pub use crossover::{Comparison, Crossover, Paired, Position};
 pub use displacement::Displacement;
 pub use error::{BoxDefect, Error};
 pub use fields::{AlgorithmCost, Border, Fields, Observation, Ranking, Source, Step};
+pub use filter::{Filter, Membership};
 pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, Machine, Parameter};
 pub use load::Load;
 pub use model::Model;

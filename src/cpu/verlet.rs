@@ -84,7 +84,7 @@ impl BroadPhase for Verlet {
             let Self { workers, finder, outputs, .. } = self;
             outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists))?;
         }
-        self.motion.found(boxes.len(), pairs.found());
+        self.motion.found(boxes.len(), pairs.overlapping());
         pairs.finish()
     }
 
