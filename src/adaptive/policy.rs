@@ -1,0 +1,272 @@
+//! Which algorithm runs the next frame: the cheapest by all that is known, seldom another one to learn what it costs.
+
+use super::decision::{Choice, Reason};
+use super::learner::{Learner, Place};
+use super::price::{Expected, Prices};
+use super::tally::Tally;
+use crate::cost::Counts;
+use crate::{Fields, Load};
+
+/// By number of objects alone, the algorithm of before stays while its own step is within this share.
+const STEP_SLACK: f64 = 0.05;
+
+/// A frame that explores is expected to cost at most this much more than the cheapest, its start included.
+const MOST_DEARER: f64 = 1.3;
+/// Frames between two that explore, at least.
+const EXPLORE_EVERY: u64 = 60;
+/// What is found out is taken to be of use for so many frames: five seconds of a game.
+const HORIZON: f64 = 300.0;
+
+/// Chooses, and learns from what the choices cost.
+#[derive(Debug, Clone)]
+pub(super) struct Policy {
+    fields: Fields,
+    /// Candidates that can run.
+    usable: Vec<bool>,
+    /// The candidate of each step.
+    steps: Vec<usize>,
+    /// Without cost curves there is nothing to correct.
+    learner: Option<Learner>,
+    learns: bool,
+    explores: bool,
+    prices: Prices,
+    /// The candidate that runs unless one explores, and what ran last.
+    settled: Option<usize>,
+    ran: Option<usize>,
+    /// What each candidate is expected to cost under the present load, and what the fields say of it without correction.
+    expected: Vec<Expected>,
+    predicted_ns: Vec<f64>,
+    log2_objects: f64,
+    tally: Tally,
+    /// What each candidate would have saved since it became cheaper than the one that runs.
+    saved_ns: Vec<f64>,
+    frame: u64,
+    explored_at: u64,
+}
+
+impl Policy {
+    /// `kept` gives for each candidate where it finds what the frame before left, if a frame is cheaper for it after one that was alike: one
+    /// number for all that share it.
+    pub(super) fn new(fields: Fields, kept: &[Option<usize>], usable: Vec<bool>) -> Self {
+        let count = usable.len();
+        let learner = (!fields.costs.is_empty()).then(|| Learner::new(&fields.costs));
+        let ids = fields.algorithms();
+        let steps = fields.steps.iter().filter_map(|s| ids.iter().position(|id| **id == s.algorithm)).collect();
+        Self {
+            steps,
+            learner,
+            learns: true,
+            explores: true,
+            prices: Prices::new(kept),
+            settled: None,
+            ran: None,
+            expected: vec![Expected { usual_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
+            predicted_ns: vec![f64::INFINITY; count],
+            log2_objects: 0.0,
+            tally: Tally::default(),
+            saved_ns: vec![0.0; count],
+            frame: 0,
+            explored_at: 0,
+            fields,
+            usable,
+        }
+    }
+
+    pub(super) fn fields(&self) -> &Fields {
+        &self.fields
+    }
+
+    pub(super) fn set_learning(&mut self, learns: bool) {
+        self.learns = learns;
+    }
+
+    pub(super) fn set_exploring(&mut self, explores: bool) {
+        self.explores = explores;
+    }
+
+    /// The learner, once it has observed something.
+    pub(super) fn learned(&self) -> Option<&Learner> {
+        self.learner.as_ref().filter(|l| l.observed() > 0)
+    }
+
+    pub(super) fn set_usable(&mut self, candidate: usize, usable: bool) {
+        self.usable[candidate] = usable;
+        self.saved_ns[candidate] = 0.0;
+        if !usable && self.settled == Some(candidate) {
+            self.settled = None;
+        }
+    }
+
+    /// The candidate that is to run the next frame, `frames` after the last one that was decided. `None` when none can run.
+    pub(super) fn choose(&mut self, load: &Load, frames: u32) -> Option<Choice> {
+        self.frame += u64::from(frames);
+        if self.fields.costs.is_empty() {
+            return self.choose_by_count(load.objects);
+        }
+        self.expect(load);
+        let best = self.cheapest(|_| true)?;
+        let (settled, reason) = match self.settled {
+            None if self.ran.is_none() => (best, Reason::First),
+            None => (best, Reason::FellBack),
+            Some(settled) => self.settle(settled, best, frames),
+        };
+        if self.settled != Some(settled) {
+            self.saved_ns.fill(0.0);
+            self.settled = Some(settled);
+        }
+        if reason == Reason::Stayed
+            && let Some(other) = self.worth_exploring(settled)
+        {
+            self.explored_at = self.frame;
+            return Some(self.choice(other, Reason::Explored));
+        }
+        Some(self.choice(settled, reason))
+    }
+
+    /// Fills in what every candidate is expected to cost.
+    fn expect(&mut self, load: &Load) {
+        let counts = Counts::new(load);
+        self.log2_objects = counts.log2_objects();
+        let place = Place::of(self.log2_objects);
+        let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
+        for (k, cost) in self.fields.costs.iter().enumerate() {
+            let factor = learner.map_or(1.0, |l| l.correction_ln(k, place).exp());
+            let ns = cost.curve.cost_of(&counts);
+            let alone_ns = cost.curve.otherwise_of(&counts).unwrap_or(ns).max(ns);
+            self.predicted_ns[k] = ns;
+            self.expected[k] = Expected { usual_ns: ns * factor, alone_ns: alone_ns * factor };
+        }
+    }
+
+    fn usual_ns(&self, candidate: usize) -> f64 {
+        self.expected[candidate].usual_ns
+    }
+
+    /// What the first frame of a candidate costs beside a usual one.
+    fn price_ns(&self, candidate: usize) -> f64 {
+        let expected = self.expected[candidate];
+        self.prices.first_ns(candidate, self.frame, expected) - expected.usual_ns
+    }
+
+    fn cheapest(&self, among: impl Fn(usize) -> bool) -> Option<usize> {
+        let usable = (0..self.usable.len()).filter(|&k| self.usable[k] && among(k));
+        usable.min_by(|&a, &b| self.usual_ns(a).total_cmp(&self.usual_ns(b)))
+    }
+
+    /// Whether to go on with the one that runs, or to which one to switch.
+    ///
+    /// A switch is made once the frames since the other became cheaper would have saved what it costs. Where costs hold still that
+    /// loses at most twice what knowing the future would, and where they flicker about a border nothing is ever saved for long.
+    fn settle(&mut self, settled: usize, best: usize, frames: u32) -> (usize, Reason) {
+        let now = self.usual_ns(settled);
+        for (saved, expected) in self.saved_ns.iter_mut().zip(&self.expected) {
+            let gain = (now - expected.usual_ns) * f64::from(frames);
+            *saved = if gain.is_finite() { (*saved + gain).max(0.0) } else { 0.0 };
+        }
+        if best == settled {
+            return (settled, Reason::Stayed);
+        }
+        let paid = |k: usize| self.usual_ns(k) < now && self.saved_ns[k] >= self.price_ns(k);
+        self.cheapest(paid).map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
+    }
+
+    /// The candidate of which one frame is expected to save the most over the next ones, if that is more than the frame costs.
+    fn worth_exploring(&self, settled: usize) -> Option<usize> {
+        let learner = self.learner.as_ref().filter(|_| self.learns && self.explores)?;
+        if self.frame < self.explored_at + EXPLORE_EVERY {
+            return None;
+        }
+        let place = Place::of(self.log2_objects);
+        let now = self.usual_ns(settled);
+        let worth = |k: usize| {
+            let first = self.usual_ns(k) + self.price_ns(k);
+            if k == settled || !self.usable[k] || first > MOST_DEARER * now {
+                return None;
+            }
+            let deviation = learner.variance_of_ratio(settled, k, place).sqrt();
+            let gain = now * expected_gain((self.usual_ns(k) / now).ln(), deviation) * HORIZON - (first - now).max(0.0);
+            (gain > 0.0).then_some((k, gain))
+        };
+        let best = (0..self.usable.len()).filter_map(worth).max_by(|a, b| a.1.total_cmp(&b.1));
+        best.map(|(k, _)| k)
+    }
+
+    fn choice(&self, chosen: usize, reason: Reason) -> Choice {
+        let runner_up = self.cheapest(|k| k != chosen).map(|k| (k, self.usual_ns(k)));
+        Choice { chosen, predicted_ns: Some(self.usual_ns(chosen)), runner_up, reason }
+    }
+
+    /// Takes in that a candidate ran the frame that was decided, and what that took.
+    pub(super) fn ran(&mut self, candidate: usize, ns: f64) {
+        let entered = self.ran != Some(candidate);
+        self.ran = Some(candidate);
+        let expected = self.expected[candidate];
+        let usual = self.prices.ran(candidate, entered, self.frame, ns, expected, self.learns);
+        let Some(learner) = self.learner.as_mut().filter(|_| self.learns) else { return };
+        if !self.tally.takes(candidate, self.log2_objects) {
+            if self.tally.frames > 0 {
+                learner.observe(&self.tally, self.frame);
+            }
+            self.tally = self.tally.next(candidate);
+        }
+        if usual || self.settled != Some(candidate) {
+            let dearest_ns = self.prices.anew_ns(candidate, expected);
+            self.tally.add(ns, self.predicted_ns[candidate], self.log2_objects, dearest_ns);
+        }
+        if self.tally.is_full() {
+            learner.observe(&self.tally, self.frame);
+            self.tally = self.tally.next(candidate);
+        }
+    }
+
+    /// Whether the next frame has to be decided: this one explored.
+    pub(super) fn is_exploring(&self) -> bool {
+        self.ran.is_some() && self.ran != self.settled
+    }
+
+    /// The step that holds at this number of objects, or the nearest below or above that can run.
+    fn choose_by_count(&mut self, objects: u32) -> Option<Choice> {
+        let steps = &self.fields.steps;
+        let split = steps.partition_point(|s| s.from_objects <= objects);
+        let (below, above) = self.steps.split_at(split);
+        let chosen = below.iter().rev().chain(above).copied().find(|&k| self.usable[k])?;
+        // The present one stays where it would hold a little below or above: only its own borders count.
+        let holds = |current: usize, share: f64| {
+            let scaled = (f64::from(objects) * share) as u32;
+            let step = steps.partition_point(|s| s.from_objects <= scaled).checked_sub(1);
+            step.is_some_and(|k| self.steps[k] == current)
+        };
+        let (chosen, reason) = match self.settled {
+            None if self.ran.is_none() => (chosen, Reason::First),
+            None => (chosen, Reason::FellBack),
+            Some(current) if current == chosen => (chosen, Reason::Stayed),
+            Some(current) if holds(current, 1.0 - STEP_SLACK) || holds(current, 1.0 + STEP_SLACK) => {
+                (current, Reason::Hysteresis)
+            }
+            Some(_) => (chosen, Reason::Switched),
+        };
+        self.settled = Some(chosen);
+        Some(Choice { chosen, predicted_ns: None, runner_up: None, reason })
+    }
+}
+
+/// Expected saving, as a share of the present cost, of knowing what another costs: the mean over a normal distribution of the logarithm
+/// `ln_ratio` of other over present cost, of what is below nought.
+fn expected_gain(ln_ratio: f64, deviation: f64) -> f64 {
+    if deviation <= 0.0 {
+        return 0.0;
+    }
+    let u = -ln_ratio / deviation;
+    // What is saved beside what a switch without looking would save already.
+    (deviation * (density(u) + u * cumulative(u)) - (-ln_ratio).max(0.0)).max(0.0)
+}
+
+/// Density of the standard normal distribution.
+fn density(x: f64) -> f64 {
+    (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt()
+}
+
+/// Its cumulative distribution, to 1e-3: the logistic curve that comes closest.
+fn cumulative(x: f64) -> f64 {
+    1.0 / (1.0 + (-1.702 * x).exp())
+}
