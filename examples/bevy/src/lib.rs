@@ -15,6 +15,8 @@
 //!         commands.spawn((BoxCollider { half: Vec3::splat(0.5) }, Transform::from_xyz(x, 0.0, 0.0)));
 //!     }
 //! });
+//! // The first update starts the clock; the second has a fixed step.
+//! app.update();
 //! app.update();
 //! assert_eq!(app.world().resource::<Overlaps>().pairs().len(), 1);
 //! ```
@@ -27,7 +29,7 @@ use bevy_math::{Vec3, Vec3A};
 use bevy_transform::components::{GlobalTransform, Transform};
 use bevy_transform::plugins::TransformPlugin;
 use bevy_transform::systems::{mark_dirty_trees, propagate_parent_transforms, sync_simple_transforms};
-use sapwise::{Aabb, BroadPhase, Error};
+use sapwise::Aabb;
 
 pub use overlaps::Overlaps;
 
@@ -78,8 +80,9 @@ pub fn world_box(collider: &BoxCollider, transform: &GlobalTransform) -> Aabb {
     let affine = transform.affine();
     let axes = affine.matrix3;
     // Each axis of the box reaches as far as its half extent, whichever way it points.
-    let half: Vec3A =
-        axes.x_axis.abs() * collider.half.x.abs() + axes.y_axis.abs() * collider.half.y.abs() + axes.z_axis.abs() * collider.half.z.abs();
+    let half: Vec3A = axes.x_axis.abs() * collider.half.x.abs()
+        + axes.y_axis.abs() * collider.half.y.abs()
+        + axes.z_axis.abs() * collider.half.z.abs();
     let centre = affine.translation;
     Aabb::new((centre - half).to_array(), (centre + half).to_array())
 }

@@ -1,7 +1,7 @@
 //! The overlaps of one fixed step, and what changed since the one before.
 
 use bevy_ecs::prelude::*;
-use sapwise::{Aabb, Adaptive, BroadPhase, Error, Fields, Pairs, Registry};
+use sapwise::{Aabb, Adaptive, BroadPhase, Error, Fields, Pair, Pairs, Registry};
 use std::sync::{Mutex, PoisonError};
 
 /// The entities that overlap, as of the last fixed step.
@@ -89,6 +89,17 @@ impl Overlaps {
             }
             Err(error) => return Err(error.into()),
         }
+        std::mem::swap(&mut self.pairs, &mut self.before);
+        let entities = &self.entities;
+        let named = |&(i, j): &Pair| (entities[i as usize], entities[j as usize]);
+        self.pairs.clear();
+        self.pairs.extend(self.found.iter().map(named).map(|(a, b)| (a.min(b), a.max(b))));
+        self.pairs.sort_unstable();
+        let lacks = |list: &[(Entity, Entity)], pair: &(Entity, Entity)| list.binary_search(pair).is_err();
+        self.began.clear();
+        self.began.extend(self.pairs.iter().filter(|&pair| lacks(&self.before, pair)));
+        self.ended.clear();
+        self.ended.extend(self.before.iter().filter(|&pair| lacks(&self.pairs, pair)));
         Ok(())
     }
 }

@@ -15,7 +15,7 @@ const MARGIN: f32 = 0.04;
 ///
 /// # What is compared
 /// Rapier keeps a box for each collider: the collider's own box, grown by half the prediction distance (1 cm for a unit of length of
-/// 1 m). Where a later box leaves the one that is kept, it is kept anew, grown by another 4 cm ([`MARGIN`]). The kept boxes that
+/// 1 m). Where a later box leaves the one that is kept, it is kept anew, grown by another 4 cm. The kept boxes that
 /// overlap, touching ones included, are rapier's pairs; but two colliders of one body are no pair, and neither are two of
 /// which none moves. A contact pair is handed to the narrow phase for each of them, and only for them, whether they sleep or not.
 ///
