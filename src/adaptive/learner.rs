@@ -6,6 +6,7 @@
 //! objects. A Kalman filter follows both: the regime with all its covariances, which takes a dozen numbers, the own parts each
 //! by itself. [`Posterior`](crate::Posterior) knows more and takes some 50 microseconds for an observation, longer than most frames.
 
+use super::tally::Tally;
 use crate::{AlgorithmCost, BackendClass};
 
 /// Knots of an own curve: 2^3 to 2^21 objects, every second octave, linear in between and constant beyond.
@@ -31,10 +32,12 @@ const OWN_FRAMES: f64 = 6000.0;
 /// The noise of a frame is learned for each algorithm; it starts here, and is never believed to be less.
 const NOISE_LN: f64 = 0.1;
 const LEAST_NOISE_LN: f64 = 0.02;
+/// Of so many frames in a row the mean is as noisy as of this power of their number far apart.
+const ALIKE: f64 = 0.7;
 /// Share of each new deviation in the noise.
-const NOISE_SHARE: f64 = 1.0 / 32.0;
+const NOISE_SHARE: f64 = 1.0 / 8.0;
 
-/// A surprise counts as no more than so many standard deviations: a frame whose thread waited for a core takes fifty times as long.
+/// A surprise counts as no more than so many standard deviations: frames whose threads waited for a core take fifty times as long.
 const MOST_SURPRISE: f64 = 3.0;
 /// This many of them in a row, all to the same side, are no accident: the machine or the scene has changed.
 const NO_ACCIDENT: u32 = 3;
@@ -194,30 +197,18 @@ impl Learner {
         shared.max(0.0) + self.own_variance(a, place) + self.own_variance(b, place)
     }
 
-    /// So many frames have passed: the regime may have changed since.
-    pub(super) fn pass(&mut self, frames: u32) {
-        self.frame += u64::from(frames);
-        let size = self.mean.len();
-        let frames = f64::from(frames);
-        for i in 0..size {
-            for j in 0..size {
-                let aged = frames / self.lasts[i].min(self.lasts[j]);
-                let share = aged / (1.0 + aged);
-                let before = if i == j { self.before[i] } else { 0.0 };
-                let entry = &mut self.covariance[i * size + j];
-                *entry += share * (before - *entry);
-            }
-        }
-    }
-
-    /// Takes in that a frame took the algorithm `real_ln` where `predicted_ln` was predicted without correction, both logarithms of
-    /// nanoseconds. `doubt` is a variance of that figure beside the algorithm's noise.
-    pub(super) fn observe(&mut self, algorithm: usize, place: Place, real_ln: f64, predicted_ln: f64, doubt: f64) {
-        let surprise = real_ln - predicted_ln - self.correction_ln(algorithm, place);
+    /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction.
+    pub(super) fn observe(&mut self, tally: &Tally, frame: u64) {
+        let algorithm = tally.candidate;
+        let place = Place::of(tally.log2_objects());
+        let surprise = (tally.real_ns / tally.predicted_ns).ln() - self.correction_ln(algorithm, place);
         if !surprise.is_finite() {
             return;
         }
+        self.pass(frame);
         self.observed += 1;
+        // Frames in a row are alike, so that many of them tell less than as many that were far apart.
+        let worth = f64::from(tally.frames).powf(ALIKE);
         let size = self.mean.len();
         let Self { algorithms, mean, covariance, with, frame, .. } = self;
         let a = &mut algorithms[algorithm];
@@ -232,7 +223,7 @@ impl Learner {
         }
         let of_regime: f64 = regime.iter().map(|&(k, weight)| weight * with[k]).sum();
         let of_own: f64 = place.knots().iter().map(|&(k, weight)| weight * weight * a.own[k].variance).sum();
-        let variance = of_regime.max(0.0) + of_own + a.noise + doubt;
+        let variance = of_regime.max(0.0) + of_own + a.noise / worth;
         let most = MOST_SURPRISE * variance.sqrt();
         let error = surprise.clamp(-most, most);
         let side = if error == surprise { 0 } else { surprise.signum() as i32 };
@@ -243,7 +234,7 @@ impl Learner {
         } else {
             a.run + side
         };
-        let deviation = error * error - of_regime - of_own;
+        let deviation = (error * error - of_regime - of_own) * worth;
         a.noise += NOISE_SHARE * (deviation.max(0.0) - a.noise);
         a.noise = a.noise.max(LEAST_NOISE_LN.powi(2));
         if a.run.unsigned_abs() >= NO_ACCIDENT {
@@ -264,6 +255,22 @@ impl Learner {
             let with = weight * own.variance;
             own.mean += with * gain;
             own.variance -= with * with / variance;
+        }
+    }
+
+    /// The regime may have changed since the last observation.
+    fn pass(&mut self, frame: u64) {
+        let frames = frame.saturating_sub(self.frame) as f64;
+        self.frame = self.frame.max(frame);
+        let size = self.mean.len();
+        for i in 0..size {
+            for j in 0..size {
+                let aged = frames / self.lasts[i].min(self.lasts[j]);
+                let share = aged / (1.0 + aged);
+                let before = if i == j { self.before[i] } else { 0.0 };
+                let entry = &mut self.covariance[i * size + j];
+                *entry += share * (before - *entry);
+            }
         }
     }
 
