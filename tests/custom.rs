@@ -111,7 +111,7 @@ fn an_invalid_box_is_named_and_the_next_frame_is_right() {
         match adaptive.find_pairs(boxes, &mut Pairs::new()) {
             Ok(()) => assert_eq!(run(&mut adaptive, boxes).0, ID),
             Err(error) => {
-                assert!(matches!(error, Error::InvalidBox { index: 7, .. }) && boxes[7].defect().is_some(), "{error}")
+                assert!(matches!(error, Error::InvalidBox { index: 7, .. }) && boxes[7].defect().is_some(), "{error}");
             }
         }
     }
