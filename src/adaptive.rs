@@ -2,15 +2,13 @@
 
 mod decision;
 mod glance;
-#[cfg(all(test, feature = "model"))]
-mod lab;
 mod learner;
 mod pace;
 mod policy;
 mod price;
 mod tally;
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step};
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step, Term};
 use decision::Choice;
 use glance::Glance;
 use pace::Pace;
@@ -156,6 +154,10 @@ impl Adaptive {
                 ln_factor: (uncorrected.ln_correction(log2_objects) + learner.correction_at(k, log2_objects))
                     .clamp(-50.0, 50.0),
             };
+            let factor = learner.factor_on_calls(k);
+            for term in cost.curve.terms.iter_mut().chain(&mut cost.curve.otherwise).filter(|t| t.term == Term::Call) {
+                term.unit_ns *= factor;
+            }
             cost.curve.correction = octaves.into_iter().map(knot).collect();
             cost.spread_ln = learner.spread_ln(k);
         }
