@@ -1,51 +1,43 @@
 //! The in-line module: the cheapest algorithm for this frame, chosen before it runs.
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Displacement, Error, Fields, Load, Pairs, Registry, Source, Step};
+mod decision;
+mod glance;
+mod learner;
+mod pace;
+mod policy;
+mod price;
+
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step};
+use decision::Choice;
+use glance::Glance;
+use pace::Pace;
+use policy::Policy;
 use std::fmt;
+use std::time::Instant;
 
-/// A switch must promise to save at least this share of a frame. Without it the choice would flicker at a border, where
-/// two costs are equal and the estimate of the load moves by a few percent from frame to frame.
-const HYSTERESIS: f64 = 0.05;
-
-/// Frames after which the boxes are sampled anew even if their number has not changed. A sample takes 16 us at 10 000 objects and
-/// 25 us at a million on the first machine; spread over 32 frames a decision among six stays below 1 us.
-const SAMPLE_EVERY: u32 = 32;
-
-/// A change of the number of objects within a sixteenth, or within this many, needs no new sample. In a scene of a few boxes
-/// the sample costs as much as the frame.
-const SAMPLE_DRIFT: u32 = 16;
+pub use decision::{Decision, Reason};
 
 /// A runner-up that costs at most this much more than the choice gets its buffers ready: the next border may be near.
 const WARM_WITHIN: f64 = 1.5;
 
-/// A broad phase that runs whichever algorithm its [`Fields`] call cheapest for each frame.
+/// Sizes of the slice that learned fields show: four a decade from ten to a million, in quarters of a decade.
+const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
+
+/// A broad phase that runs whichever algorithm is expected to be cheapest for each frame.
 ///
-/// Every algorithm takes the same boxes and gives the same pairs, so a switch is invisible but for its speed.
+/// Every algorithm takes the same boxes and gives the same pairs, so a switch is invisible but for its speed. What is expected comes from
+/// [`Fields`] and, where these have cost curves, from the times of the frames that were run: [`set_learning`](Self::set_learning).
 pub struct Adaptive {
-    fields: Fields,
     /// In the order of [`Fields::algorithms`].
     candidates: Vec<Candidate>,
-    current: Option<usize>,
-    load: Load,
-    /// Objects when the load was sampled, and frames since.
-    sampled: u32,
-    age: u32,
-    displacement: Displacement,
-    watching: Watching,
-    /// Objects and pairs of the frame before.
-    before: Option<(u32, u64)>,
+    policy: Policy,
+    glance: Glance,
+    pace: Pace,
     choice: Option<Choice>,
-}
-
-/// How far the boxes move is found out in the frame after each sample.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Watching {
-    /// It is known.
-    Done,
-    /// It was sampled; this frame is to be watched when its pairs are found.
-    Due,
-    /// The next frame is to be compared with what was watched.
-    Begun,
+    /// What the frame of `choice` took, where it was timed.
+    measured_ns: Option<f64>,
+    /// [`decide`](Self::decide) was called for a frame of so many boxes that has not run yet.
+    decided: Option<usize>,
 }
 
 struct Candidate {
@@ -53,50 +45,7 @@ struct Candidate {
     /// `None` once it failed, or where it can't run.
     algorithm: Option<Box<dyn BroadPhase>>,
     /// Objects that its buffers are ready for.
-    ready: u32,
-}
-
-/// A decision by position, without a copy of any name.
-#[derive(Clone, Copy)]
-struct Choice {
-    chosen: usize,
-    predicted_ns: Option<f64>,
-    runner_up: Option<(usize, f64)>,
-    reason: Reason,
-    load: Load,
-}
-
-/// Why an algorithm was chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Reason {
-    /// The first frame: nothing ran before.
-    First,
-    /// It ran before and is still the cheapest.
-    Stayed,
-    /// Another would be cheaper, but by too little to switch.
-    Hysteresis,
-    /// It became cheaper than the one before.
-    Switched,
-    /// The one that was chosen failed in this frame.
-    FellBack,
-}
-
-/// The last decision and what it rested on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Decision<'a> {
-    /// The algorithm that ran.
-    pub algorithm: &'a AlgorithmId,
-    /// Its predicted cost in nanoseconds; `None` where only the number of objects decides.
-    pub predicted_ns: Option<f64>,
-    /// The cheapest of the others and its predicted cost in nanoseconds.
-    pub runner_up: Option<(&'a AlgorithmId, f64)>,
-    /// Why it was chosen.
-    pub reason: Reason,
-    /// Where the costs came from.
-    pub source: Source,
-    /// The load that was estimated.
-    pub load: Load,
+    ready: usize,
 }
 
 impl Adaptive {
@@ -108,29 +57,19 @@ impl Adaptive {
     /// # Errors
     /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made.
     pub fn new(fields: Fields, registry: &Registry) -> Result<Self, Error> {
-        let mut failure = None;
-        let mut candidates = Vec::new();
-        for id in fields.algorithms() {
-            let stale = fields.costs.iter().find(|c| c.algorithm == *id).and_then(|c| registry.mismatch(id, c.revision));
-            let made = stale.map_or_else(|| registry.create(id), Err);
-            let algorithm = made.map_err(|e| failure = Some(e)).ok();
-            candidates.push(Candidate { id: id.clone(), algorithm, ready: 0 });
-        }
+        let (candidates, failure) = candidates(&fields, registry);
         if candidates.iter().all(|c| c.algorithm.is_none()) {
             let hint = || "these fields name no algorithm; make them with `sapwise predict`".to_owned();
             return Err(failure.unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
         }
         Ok(Self {
-            fields,
+            policy: policy(fields, &candidates),
             candidates,
-            current: None,
-            load: Load::default(),
-            sampled: 0,
-            age: 0,
-            displacement: Displacement::default(),
-            watching: Watching::Done,
-            before: None,
+            glance: Glance::default(),
+            pace: Pace::default(),
             choice: None,
+            measured_ns: None,
+            decided: None,
         })
     }
 
@@ -144,10 +83,91 @@ impl Adaptive {
         Self::new(fields, registry)
     }
 
-    /// The fields that decide.
+    /// Whether the times of frames correct the expected costs. On unless it is turned off; what was learned until then stays in use.
+    ///
+    /// Fields without cost curves have nothing to correct, and decide by the number of objects always.
+    pub fn set_learning(&mut self, learns: bool) {
+        self.policy.set_learning(learns);
+    }
+
+    /// Whether now and then a frame is run by another algorithm than the cheapest, to learn what that one costs: at most one frame in
+    /// 60, none that is expected to cost more than 30 % over the cheapest, and only where what it may save in the next 300
+    /// frames is more than what it costs. On unless it is turned off; without [learning](Self::set_learning) it does nothing.
+    pub fn set_exploring(&mut self, explores: bool) {
+        self.policy.set_exploring(explores);
+    }
+
+    /// The fields that it began with.
     #[must_use]
     pub fn fields(&self) -> &Fields {
-        &self.fields
+        self.policy.fields()
+    }
+
+    /// The fields as they are known now: corrected by what was learned, with the slice of scenes like the present one. Those that it began
+    /// with where nothing was learned.
+    #[must_use]
+    pub fn learned(&self) -> Fields {
+        let fields = self.policy.fields();
+        let Some(learner) = self.policy.learned() else { return fields.clone() };
+        let mut costs = fields.costs.clone();
+        for (k, cost) in costs.iter_mut().enumerate() {
+            let before = std::mem::take(&mut cost.curve.correction);
+            let uncorrected = crate::CostCurve { correction: before, ..crate::CostCurve::default() };
+            let mut octaves: Vec<f64> = uncorrected.correction.iter().map(|k| k.log2_objects).collect();
+            octaves.extend(learner.octaves());
+            octaves.sort_by(f64::total_cmp);
+            octaves.dedup();
+            let knot = |log2_objects: f64| Knot {
+                log2_objects,
+                ln_factor: (uncorrected.ln_correction(log2_objects) + learner.correction_at(k, log2_objects))
+                    .clamp(-50.0, 50.0),
+            };
+            cost.curve.correction = octaves.into_iter().map(knot).collect();
+            cost.spread_ln = learner.spread_ln(k);
+        }
+        let load = self.glance.load();
+        let like = |quarter: u32| {
+            let objects = 10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32;
+            load.rescaled(objects, load.pairs * f64::from(objects) / f64::from(load.objects.max(1)))
+        };
+        let loads: Vec<Load> = SLICE.map(like).collect();
+        let learned = Fields::from_costs(Source::Learned, "like the last frame", costs, &loads);
+        Fields {
+            model: fields.model.clone(),
+            extrapolated: fields.extrapolated,
+            warnings: fields.warnings.clone(),
+            samples: fields.samples.clone(),
+            ..learned
+        }
+    }
+
+    /// Makes every algorithm anew from this registry: one that was lost and is back, or all of them on a pool of another size. What was
+    /// learned stays; what algorithms kept from frame to frame is gone.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new); the algorithms of before stay then.
+    pub fn revive(&mut self, registry: &Registry) -> Result<(), Error> {
+        let (candidates, failure) = candidates(self.policy.fields(), registry);
+        if let (true, Some(error)) = (candidates.iter().all(|c| c.algorithm.is_none()), failure) {
+            return Err(error);
+        }
+        for (k, candidate) in candidates.iter().enumerate() {
+            self.policy.set_usable(k, candidate.algorithm.is_some());
+        }
+        self.candidates = candidates;
+        self.decided = None;
+        self.choice = None;
+        Ok(())
+    }
+
+    /// Other fields, with an instance of each of their algorithms, take the place of those of before. The estimate of the load stays.
+    #[cfg(all(feature = "measure", feature = "model"))]
+    #[expect(dead_code, reason = "for fields that arrive while frames run already")]
+    fn adopt(&mut self, fields: Fields, candidates: Vec<Candidate>) {
+        self.policy = policy(fields, &candidates);
+        self.candidates = candidates;
+        self.decided = None;
+        self.choice = None;
     }
 
     /// What was decided for the last frame; `None` before the first.
@@ -156,147 +176,91 @@ impl Adaptive {
         self.choice.map(|c| Decision {
             algorithm: &self.candidates[c.chosen].id,
             predicted_ns: c.predicted_ns,
+            measured_ns: self.measured_ns,
             runner_up: c.runner_up.map(|(k, ns)| (&self.candidates[k].id, ns)),
             reason: c.reason,
-            source: self.fields.source,
-            load: c.load,
+            source: if self.policy.learned().is_some() { Source::Learned } else { self.policy.fields().source },
+            load: self.glance.load(),
         })
     }
 
     /// Estimates the load of the next frame and decides, without running anything.
     pub fn decide(&mut self, boxes: &[Aabb]) -> Option<Decision<'_>> {
-        self.observe(boxes);
-        self.choose();
+        self.choose(boxes);
+        self.decided = Some(boxes.len());
         self.last_decision()
     }
 
-    /// Brings the load up to date: sampled when the scene has grown, shrunk or aged, else scaled from the last sample.
-    fn observe(&mut self, boxes: &[Aabb]) {
-        let objects = u32::try_from(boxes.len()).unwrap_or(u32::MAX);
-        let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
-        if self.watching == Watching::Begun {
-            self.load.moved = self.displacement.moved(boxes).unwrap_or(1.0);
-            self.watching = Watching::Done;
-        }
-        let drift = objects.abs_diff(self.sampled);
-        if self.before.is_none() || self.age >= SAMPLE_EVERY || drift > (self.sampled / 16).max(SAMPLE_DRIFT) {
-            self.load = Load::estimate(boxes, pairs, self.before.map(|_| self.load.moved));
-            self.watching = Watching::Due;
-            self.sampled = objects;
-            self.age = 0;
-            return;
-        }
-        self.age += 1;
-        let pairs = pairs.unwrap_or(self.load.pairs);
-        self.load = self.load.rescaled(objects, pairs);
+    fn choose(&mut self, boxes: &[Aabb]) {
+        self.glance.look(boxes);
+        let frames = self.pace.decide(objects(boxes));
+        self.choice = self.policy.choose(&self.glance.load(), frames);
+        self.measured_ns = None;
     }
 
-    fn choose(&mut self) {
-        let load = self.load;
-        let usable = |k: usize| self.candidates[k].algorithm.is_some();
-        let Some(ranking) = self.fields.rank(&load, usable) else {
-            self.choice = self.choose_by_count();
-            return;
-        };
-        let mut choice = Choice {
-            chosen: ranking.best,
-            predicted_ns: Some(ranking.best_ns),
-            runner_up: ranking.runner_up,
-            reason: Reason::Switched,
-            load,
-        };
-        match self.current {
-            None => choice.reason = Reason::First,
-            Some(current) if current == ranking.best => choice.reason = Reason::Stayed,
-            Some(current) if usable(current) => {
-                let now = self.fields.costs[current].curve.cost_ns(&load);
-                if ranking.best_ns > now * (1.0 - HYSTERESIS) {
-                    choice.chosen = current;
-                    choice.predicted_ns = Some(now);
-                    choice.runner_up = Some((ranking.best, ranking.best_ns));
-                    choice.reason = Reason::Hysteresis;
-                }
-            }
-            Some(_) => choice.reason = Reason::FellBack,
-        }
-        self.choice = Some(choice);
-    }
-
-    /// The step that holds at this number of objects, or the nearest below or above that can run.
-    fn choose_by_count(&self) -> Option<Choice> {
-        let objects = self.load.objects;
-        let position = |s: &Step| self.candidates.iter().position(|c| c.id == s.algorithm && c.algorithm.is_some());
-        let split = self.fields.steps.partition_point(|s| s.from_objects <= objects);
-        let (below, above) = self.fields.steps.split_at(split);
-        let chosen = below.iter().rev().chain(above).find_map(position)?;
-        // The present one stays where it would hold a little below or above: only its own borders count.
-        let holds = |current: usize, share: f64| {
-            let step = self.fields.step((f64::from(objects) * share) as u32);
-            step.is_some_and(|s| s.algorithm == self.candidates[current].id)
-        };
-        let (chosen, reason) = match self.current {
-            None => (chosen, Reason::First),
-            Some(current) if current == chosen => (chosen, Reason::Stayed),
-            Some(current) if self.candidates[current].algorithm.is_none() => (chosen, Reason::FellBack),
-            Some(current) if holds(current, 1.0 - HYSTERESIS) || holds(current, 1.0 + HYSTERESIS) => {
-                (current, Reason::Hysteresis)
-            }
-            Some(_) => (chosen, Reason::Switched),
-        };
-        Some(Choice { chosen, predicted_ns: None, runner_up: None, reason, load: self.load })
+    /// Whether the next frame needs a decision of its own.
+    fn is_due(&self, boxes: &[Aabb]) -> bool {
+        self.choice.is_none() || self.pace.is_due(objects(boxes)) || self.glance.is_watching() || self.policy.is_exploring()
     }
 
     /// Gets the runner-up ready when its turn may come soon.
-    fn warm_runner_up(&mut self) {
-        let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), load, .. }) = self.choice else { return };
+    fn warm_runner_up(&mut self, boxes: usize) {
+        let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), .. }) = self.choice else { return };
         let candidate = &mut self.candidates[next];
-        if ns > best * WARM_WITHIN || candidate.ready >= load.objects {
+        if ns > best * WARM_WITHIN || candidate.ready >= boxes {
             return;
         }
         if let Some(algorithm) = &mut candidate.algorithm {
             // By powers of two, so that a growing scene pays for this a few times in all.
-            candidate.ready = load.objects.checked_next_power_of_two().unwrap_or(u32::MAX);
-            algorithm.prepare(candidate.ready as usize);
+            candidate.ready = boxes.checked_next_power_of_two().unwrap_or(boxes);
+            algorithm.prepare(candidate.ready);
         }
     }
 }
 
 impl BroadPhase for Adaptive {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        self.observe(boxes);
-        self.choose();
+        let decided = self.decided.take() == Some(boxes.len());
+        let started = (decided || self.is_due(boxes)).then(Instant::now);
+        if started.is_some() && !decided {
+            self.choose(boxes);
+        }
         loop {
             let Some(choice) = self.choice else {
                 let reason = "every algorithm of the fields has failed".to_owned();
-                let algorithm = self.candidates[self.current.unwrap_or(0)].id.clone();
-                return Err(Error::Unavailable { algorithm, reason });
+                return Err(Error::Unavailable { algorithm: self.candidates[0].id.clone(), reason });
             };
             let candidate = &mut self.candidates[choice.chosen];
             let Some(algorithm) = candidate.algorithm.as_mut() else {
                 // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
                 return Err(Error::Unavailable { algorithm: candidate.id.clone(), reason: "it failed before".to_owned() });
             };
-            let result = algorithm.find_pairs(boxes, pairs);
-            self.current = Some(choice.chosen);
-            match result {
+            let running = started.map(|_| Instant::now());
+            match algorithm.find_pairs(boxes, pairs) {
                 Ok(()) => {
-                    candidate.ready = candidate.ready.max(choice.load.objects);
-                    self.before = Some((choice.load.objects, pairs.len() as u64));
-                    // Not while observing: `decide` and `find_pairs` may both observe one frame, and it has not moved in between.
-                    if self.watching == Watching::Due {
-                        self.displacement.watch(boxes);
-                        self.watching = Watching::Begun;
-                    }
-                    self.warm_runner_up();
+                    candidate.ready = candidate.ready.max(boxes.len());
+                    let usual_ns = self.pace.ran();
+                    let Some((started, running)) = started.zip(running) else {
+                        self.glance.ran(boxes, pairs.len(), usual_ns);
+                        return Ok(());
+                    };
+                    let ns = (running.elapsed().as_nanos() as f64).max(1.0);
+                    self.measured_ns = Some(ns);
+                    self.glance.ran(boxes, pairs.len(), ns);
+                    self.policy.ran(choice.chosen, ns);
+                    self.pace.took(started.elapsed().as_nanos() as f64 - ns, ns);
+                    self.warm_runner_up(boxes.len());
                     return Ok(());
                 }
                 // The algorithm is at fault, not the boxes: the next cheapest runs in this same frame.
                 Err(Error::Unavailable { .. }) => {
                     candidate.algorithm = None;
-                    self.choose();
+                    self.policy.set_usable(choice.chosen, false);
+                    let next = self.policy.choose(&self.glance.load(), 0);
+                    self.choice = next.map(|c| Choice { reason: Reason::FellBack, ..c });
                 }
                 Err(error) => {
-                    self.before = None;
+                    self.glance.lost();
                     return Err(error);
                 }
             }
@@ -307,7 +271,7 @@ impl BroadPhase for Adaptive {
         for candidate in &mut self.candidates {
             if let Some(algorithm) = &mut candidate.algorithm {
                 algorithm.prepare(objects);
-                candidate.ready = candidate.ready.max(u32::try_from(objects).unwrap_or(u32::MAX));
+                candidate.ready = candidate.ready.max(objects);
             }
         }
     }
@@ -323,9 +287,25 @@ impl fmt::Debug for Adaptive {
     }
 }
 
-/// A count that grows in proportion to the objects.
-fn scaled(count: f64, objects: u32, before: u32) -> f64 {
-    if before == 0 { count } else { count * f64::from(objects) / f64::from(before) }
+/// An instance of every algorithm of the fields, and why the last of those that can't be made can't be.
+fn candidates(fields: &Fields, registry: &Registry) -> (Vec<Candidate>, Option<Error>) {
+    let mut failure = None;
+    let candidates = fields.algorithms().into_iter().map(|id| {
+        let stale = fields.costs.iter().find(|c| c.algorithm == *id).and_then(|c| registry.mismatch(id, c.revision));
+        let made = stale.map_or_else(|| registry.create(id), Err);
+        Candidate { id: id.clone(), algorithm: made.map_err(|e| failure = Some(e)).ok(), ready: 0 }
+    });
+    (candidates.collect(), failure)
+}
+
+fn policy(fields: Fields, candidates: &[Candidate]) -> Policy {
+    let of = |c: &Candidate| (c.algorithm.is_some(), c.algorithm.as_ref().is_some_and(|a| a.keeps_work()));
+    let (usable, keeps_work): (Vec<bool>, Vec<bool>) = candidates.iter().map(of).unzip();
+    Policy::new(fields, &keeps_work, usable)
+}
+
+fn objects(boxes: &[Aabb]) -> u32 {
+    u32::try_from(boxes.len()).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

@@ -19,6 +19,13 @@ fn fields_of(terms: [Term; 2], costs: &[(&str, f64, f64)]) -> Fields {
     Fields::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
 }
 
+/// Over algorithms whose costs are made up: what their frames really take is to change nothing.
+fn fixed(fields: Fields) -> Adaptive {
+    let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
+    adaptive.set_learning(false);
+    adaptive
+}
+
 /// The revision that this build has of a method of the CPU; 1 of any other.
 fn revision(id: &str) -> u32 {
     let registry = Registry::with_cores(1);
@@ -39,7 +46,7 @@ fn chosen(adaptive: &mut Adaptive, objects: usize) -> (String, Reason) {
 fn it_switches_at_the_border_and_not_within_the_hysteresis() {
     // 10 n = 1000 + 5 n at n = 200.
     let fields = fields(&[("brute@cpu1", 0.0, 10.0), ("strips@cpu1", 1000.0, 5.0)]);
-    let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
+    let mut adaptive = fixed(fields);
     let (brute, strips) = ("brute@cpu1".to_owned(), "strips@cpu1".to_owned());
     assert_eq!(chosen(&mut adaptive, 100), (brute.clone(), Reason::First));
     assert_eq!(chosen(&mut adaptive, 150), (brute.clone(), Reason::Stayed));
@@ -121,7 +128,7 @@ fn course(adaptive: &mut Adaptive, scenario: Scenario, frames: usize) -> Vec<(St
 /// 40 n, and 15 n + 100 n moved.
 fn strips_or_verlet() -> Adaptive {
     let fields = fields_of([Term::Objects, Term::Moved], &[("strips@cpu1", 40.0, 0.0), ("verlet@cpu1", 15.0, 100.0)]);
-    Adaptive::new(fields, &Registry::with_cores(1)).unwrap()
+    fixed(fields)
 }
 
 #[test]
@@ -133,8 +140,10 @@ fn from_the_second_frame_on_it_knows_how_far_boxes_move() {
     ] {
         let course = course(&mut strips_or_verlet(), scenario, 70);
         assert_eq!(course[0], ("strips@cpu1".to_owned(), 1.0), "{scenario}");
-        for (chosen, moved) in &course[1..] {
-            assert!(chosen == algorithm && (least..=most).contains(moved), "{scenario}: {chosen}, {moved}");
+        for (k, (chosen, moved)) in course.iter().enumerate().skip(1) {
+            assert!((least..=most).contains(moved), "{scenario}: {moved}");
+            // A frame for what the start of `verlet` costs to be saved.
+            assert!(k < 2 || chosen == algorithm, "{scenario}, frame {k}: {chosen}");
         }
     }
 }

@@ -1,0 +1,115 @@
+//! The load of the next frame, from a sample now and then and from the frame before in between.
+
+use crate::{Aabb, Displacement, Load};
+use std::time::Instant;
+
+/// Share of the frames' time that samples may take where the number of objects holds still ...
+const SHARE: f64 = 0.005;
+/// ... and by how much that share rises with the change of that number since the last sample, as a ratio. A scene that doubles is
+/// sampled after a frame or two, one that grows by a sixteenth when a hundred times the sample's cost has passed.
+const SHARE_OF_DRIFT: f64 = 0.1;
+
+/// A number of objects that has changed by this factor, or by this many, makes the last sample worthless: no wait.
+const JUMP: f64 = 2.0;
+
+/// Samples are at least this many frames apart where nothing drifts: what `moved` tells changes slowly.
+const SAMPLE_EVERY: u32 = 32;
+
+/// Keeps the estimate of the load up to date.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Glance {
+    load: Load,
+    /// Objects when the load was sampled, and frames and their time since.
+    sampled: u32,
+    age: u32,
+    passed_ns: f64,
+    /// What the last sample took.
+    price_ns: f64,
+    displacement: Displacement,
+    watching: Watching,
+    /// Objects and pairs of the frame before.
+    before: Option<(u32, u64)>,
+}
+
+/// How far the boxes move is found out in the frame after each sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Watching {
+    /// It is known.
+    #[default]
+    Done,
+    /// It was sampled; this frame is to be watched when its pairs are found.
+    Due,
+    /// The next frame is to be compared with what was watched.
+    Begun,
+}
+
+impl Glance {
+    /// The load that was estimated last.
+    pub(super) fn load(&self) -> Load {
+        self.load
+    }
+
+    /// Whether the next frame has to be looked at because of the frame before it: how far boxes moved shows in no other.
+    pub(super) fn is_watching(&self) -> bool {
+        self.watching == Watching::Begun
+    }
+
+    /// Brings the load up to date: sampled where that pays, else scaled from the last sample.
+    pub(super) fn look(&mut self, boxes: &[Aabb]) {
+        let objects = count(boxes);
+        let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
+        let mut moved = self.before.map(|_| self.load.moved);
+        if self.watching == Watching::Begun {
+            moved = Some(self.displacement.moved(boxes).unwrap_or(1.0));
+            self.watching = Watching::Done;
+        }
+        if self.is_due(objects) {
+            let started = Instant::now();
+            self.load = Load::estimate(boxes, pairs, moved);
+            self.price_ns = started.elapsed().as_nanos() as f64;
+            self.watching = Watching::Due;
+            (self.sampled, self.age, self.passed_ns) = (objects, 0, 0.0);
+            return;
+        }
+        self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
+        self.load.moved = moved.unwrap_or(self.load.moved);
+    }
+
+    fn is_due(&self, objects: u32) -> bool {
+        let (now, then) = (f64::from(objects.max(1)), f64::from(self.sampled.max(1)));
+        let ratio = (now / then).max(then / now);
+        if self.before.is_none() || ratio >= JUMP {
+            return true;
+        }
+        let drift = ratio - 1.0;
+        let rested = self.age >= SAMPLE_EVERY || drift > 1.0 / 16.0;
+        rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.price_ns
+    }
+
+    /// Takes in a frame that was run: its pairs, and about how long it took.
+    pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: usize, ns: f64) {
+        self.before = Some((count(boxes), pairs as u64));
+        self.age = self.age.saturating_add(1);
+        self.passed_ns += ns;
+        // Not while looking: a frame may be looked at twice before it runs, and it has not moved in between.
+        if self.watching == Watching::Due {
+            self.displacement.watch(boxes);
+            self.watching = Watching::Begun;
+        }
+    }
+
+    /// After a frame that gave no pairs nothing is known of the one before.
+    pub(super) fn lost(&mut self) {
+        self.before = None;
+        self.watching = Watching::Done;
+    }
+}
+
+fn count(boxes: &[Aabb]) -> u32 {
+    u32::try_from(boxes.len()).unwrap_or(u32::MAX)
+}
+
+/// A count that grows in proportion to the objects.
+fn scaled(count: f64, objects: u32, before: u32) -> f64 {
+    if before == 0 { count } else { count * f64::from(objects) / f64::from(before) }
+}

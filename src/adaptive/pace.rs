@@ -1,0 +1,49 @@
+//! How often to decide: in short frames not in each of them.
+
+/// Share of the frames' time that decisions and their clock may take.
+const SHARE: f64 = 0.01;
+/// Frames between two decisions, at most.
+const MOST_FRAMES: u32 = 128;
+
+/// A number of objects that has changed by this share, or by this many, is decided on at once.
+const CHANGE: u32 = 32;
+const FEWEST: u32 = 4;
+
+/// Counts the frames until the next decision.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Pace {
+    /// Objects at the last decision, and frames since.
+    objects: u32,
+    frames: u32,
+    rest: u32,
+    /// What a decision takes, learning and the clock included.
+    decision_ns: f64,
+    frame_ns: f64,
+}
+
+impl Pace {
+    /// Whether a frame with so many objects is to be decided on anew.
+    pub(super) fn is_due(&self, objects: u32) -> bool {
+        self.frames >= self.rest || objects.abs_diff(self.objects) > (self.objects / CHANGE).max(FEWEST)
+    }
+
+    /// Counts a frame. Gives about how long frames take now, in nanoseconds.
+    pub(super) fn ran(&mut self) -> f64 {
+        self.frames = self.frames.saturating_add(1);
+        self.frame_ns
+    }
+
+    /// Begins a decision; gives the frames since the last one, this one included.
+    pub(super) fn decide(&mut self, objects: u32) -> u32 {
+        self.objects = objects;
+        std::mem::take(&mut self.frames).max(1)
+    }
+
+    /// What the decision and its frame took.
+    pub(super) fn took(&mut self, decision_ns: f64, frame_ns: f64) {
+        // The least of late: a decision that was interrupted says nothing, and neither does one that had to wait for memory.
+        self.decision_ns = if self.decision_ns > 0.0 { decision_ns.min(1.05 * self.decision_ns) } else { decision_ns };
+        self.frame_ns = frame_ns;
+        self.rest = (self.decision_ns / (SHARE * frame_ns.max(1.0))).min(f64::from(MOST_FRAMES)) as u32;
+    }
+}

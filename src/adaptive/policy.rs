@@ -1,0 +1,248 @@
+//! Which algorithm runs the next frame: the cheapest by all that is known, seldom another one to learn what it costs.
+
+use super::decision::{Choice, Reason};
+use super::learner::{Learner, Place};
+use super::price::Prices;
+use crate::cost::Counts;
+use crate::{Fields, Load};
+
+/// By number of objects alone, the algorithm of before stays while its own step is within this share.
+const STEP_SLACK: f64 = 0.05;
+
+/// A frame that explores is expected to cost at most this much more than the cheapest, its start included.
+const MOST_DEARER: f64 = 1.3;
+/// Frames between two that explore, at least.
+const EXPLORE_EVERY: u64 = 60;
+/// What is found out is taken to be of use for so many frames: five seconds of a game.
+const HORIZON: f64 = 300.0;
+
+/// Chooses, and learns from what the choices cost.
+#[derive(Debug, Clone)]
+pub(super) struct Policy {
+    fields: Fields,
+    /// Candidates that can run.
+    usable: Vec<bool>,
+    /// The candidate of each step.
+    steps: Vec<usize>,
+    /// Without cost curves there is nothing to correct.
+    learner: Option<Learner>,
+    learns: bool,
+    explores: bool,
+    prices: Prices,
+    /// The candidate that runs unless one explores, and what ran last.
+    settled: Option<usize>,
+    ran: Option<usize>,
+    /// Expected cost of each candidate under the present load, nanoseconds, and the natural logarithm without correction.
+    costs_ns: Vec<f64>,
+    predicted_ln: Vec<f64>,
+    place: Place,
+    /// What each candidate would have saved since it became cheaper than the one that runs.
+    saved_ns: Vec<f64>,
+    frame: u64,
+    explored_at: u64,
+}
+
+impl Policy {
+    /// `keeps_work` says of each candidate whether a frame is cheaper for it after one that was alike.
+    pub(super) fn new(fields: Fields, keeps_work: &[bool], usable: Vec<bool>) -> Self {
+        let count = usable.len();
+        let learner = (!fields.costs.is_empty()).then(|| Learner::new(&fields.costs));
+        let ids = fields.algorithms();
+        let steps = fields.steps.iter().filter_map(|s| ids.iter().position(|id| **id == s.algorithm)).collect();
+        Self {
+            steps,
+            learner,
+            learns: true,
+            explores: true,
+            prices: Prices::new(keeps_work),
+            settled: None,
+            ran: None,
+            costs_ns: vec![f64::INFINITY; count],
+            predicted_ln: vec![f64::INFINITY; count],
+            place: Place::of(0.0),
+            saved_ns: vec![0.0; count],
+            frame: 0,
+            explored_at: 0,
+            fields,
+            usable,
+        }
+    }
+
+    pub(super) fn fields(&self) -> &Fields {
+        &self.fields
+    }
+
+    pub(super) fn set_learning(&mut self, learns: bool) {
+        self.learns = learns;
+    }
+
+    pub(super) fn set_exploring(&mut self, explores: bool) {
+        self.explores = explores;
+    }
+
+    /// The learner, once it has observed something.
+    pub(super) fn learned(&self) -> Option<&Learner> {
+        self.learner.as_ref().filter(|l| l.observed() > 0)
+    }
+
+    pub(super) fn set_usable(&mut self, candidate: usize, usable: bool) {
+        self.usable[candidate] = usable;
+        self.saved_ns[candidate] = 0.0;
+        if !usable && self.settled == Some(candidate) {
+            self.settled = None;
+        }
+    }
+
+    /// The candidate that is to run the next frame, `frames` after the last one that was decided. `None` when none can run.
+    pub(super) fn choose(&mut self, load: &Load, frames: u32) -> Option<Choice> {
+        self.frame += u64::from(frames);
+        if self.fields.costs.is_empty() {
+            return self.choose_by_count(load.objects);
+        }
+        self.expect(load, frames);
+        let usable = (0..self.usable.len()).filter(|&k| self.usable[k]);
+        let best = usable.min_by(|&a, &b| self.costs_ns[a].total_cmp(&self.costs_ns[b]))?;
+        let (settled, reason) = match self.settled {
+            None if self.ran.is_none() => (best, Reason::First),
+            None => (best, Reason::FellBack),
+            Some(settled) => self.settle(settled, best, frames),
+        };
+        if self.settled != Some(settled) {
+            self.saved_ns.fill(0.0);
+            self.settled = Some(settled);
+        }
+        if reason == Reason::Stayed
+            && let Some(other) = self.worth_exploring(settled)
+        {
+            self.explored_at = self.frame;
+            return Some(self.choice(other, Reason::Explored));
+        }
+        Some(self.choice(settled, reason))
+    }
+
+    /// Fills in what every candidate is expected to cost.
+    fn expect(&mut self, load: &Load, frames: u32) {
+        let counts = Counts::new(load);
+        self.place = Place::of(counts.log2_objects());
+        let learner = self.learner.as_mut().filter(|_| self.learns);
+        if let Some(learner) = learner {
+            learner.pass(frames);
+        }
+        for (k, cost) in self.fields.costs.iter().enumerate() {
+            let ns = cost.curve.cost_of(&counts);
+            self.predicted_ln[k] = ns.ln();
+            self.costs_ns[k] = match &self.learner {
+                Some(learner) if learner.observed() > 0 => ns * learner.correction_ln(k, self.place).exp(),
+                _ => ns,
+            };
+        }
+    }
+
+    /// Whether to go on with the one that runs, or to which one to switch.
+    ///
+    /// A switch is made once the frames since the other became cheaper would have saved what it costs. Where costs hold still that
+    /// loses at most twice what knowing the future would, and where they flicker about a border nothing is ever saved for long.
+    fn settle(&mut self, settled: usize, best: usize, frames: u32) -> (usize, Reason) {
+        let now = self.costs_ns[settled];
+        for (k, saved) in self.saved_ns.iter_mut().enumerate() {
+            let gain = (now - self.costs_ns[k]) * f64::from(frames);
+            *saved = if gain.is_finite() { (*saved + gain).max(0.0) } else { 0.0 };
+        }
+        if best == settled {
+            return (settled, Reason::Stayed);
+        }
+        let paid = |&k: &usize| {
+            self.usable[k] && self.costs_ns[k] < now && self.saved_ns[k] >= self.prices.of(k, self.frame) * self.costs_ns[k]
+        };
+        let target = (0..self.usable.len()).filter(paid).min_by(|&a, &b| self.costs_ns[a].total_cmp(&self.costs_ns[b]));
+        target.map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
+    }
+
+    /// The candidate of which one frame is expected to save the most over the next ones, if that is more than the frame costs.
+    fn worth_exploring(&self, settled: usize) -> Option<usize> {
+        let learner = self.learner.as_ref().filter(|_| self.learns && self.explores)?;
+        if self.frame < self.explored_at + EXPLORE_EVERY {
+            return None;
+        }
+        let now = self.costs_ns[settled];
+        let worth = |k: usize| {
+            let price = self.prices.of(k, self.frame) * self.costs_ns[k] + self.costs_ns[k];
+            if k == settled || !self.usable[k] || price > MOST_DEARER * now {
+                return None;
+            }
+            let deviation = learner.variance_of_ratio(settled, k, self.place).sqrt();
+            let gain = now * expected_gain((self.costs_ns[k] / now).ln(), deviation) * HORIZON - (price - now).max(0.0);
+            (gain > 0.0).then_some((k, gain))
+        };
+        let best = (0..self.usable.len()).filter_map(worth).max_by(|a, b| a.1.total_cmp(&b.1));
+        best.map(|(k, _)| k)
+    }
+
+    fn choice(&self, chosen: usize, reason: Reason) -> Choice {
+        let others = (0..self.usable.len()).filter(|&k| k != chosen && self.usable[k]);
+        let runner_up = others.map(|k| (k, self.costs_ns[k])).min_by(|a, b| a.1.total_cmp(&b.1));
+        Choice { chosen, predicted_ns: Some(self.costs_ns[chosen]), runner_up, reason }
+    }
+
+    /// Takes in that a candidate ran the frame that was decided, and what that took.
+    pub(super) fn ran(&mut self, candidate: usize, ns: f64) {
+        let entered = self.ran != Some(candidate);
+        self.ran = Some(candidate);
+        let over_usual = self.learns.then(|| ns / self.costs_ns[candidate]);
+        let start = self.prices.ran(candidate, entered, self.frame, over_usual);
+        if let (Some(learner), Some((factor, doubt)), true) = (&mut self.learner, start, self.learns) {
+            learner.observe(candidate, self.place, (ns / factor).ln(), self.predicted_ln[candidate], doubt);
+        }
+    }
+
+    /// Whether the next frame has to be decided: this one explored.
+    pub(super) fn is_exploring(&self) -> bool {
+        self.ran.is_some() && self.ran != self.settled
+    }
+
+    /// The step that holds at this number of objects, or the nearest below or above that can run.
+    fn choose_by_count(&mut self, objects: u32) -> Option<Choice> {
+        let steps = &self.fields.steps;
+        let split = steps.partition_point(|s| s.from_objects <= objects);
+        let (below, above) = self.steps.split_at(split);
+        let chosen = below.iter().rev().chain(above).copied().find(|&k| self.usable[k])?;
+        // The present one stays where it would hold a little below or above: only its own borders count.
+        let holds = |current: usize, share: f64| {
+            let scaled = (f64::from(objects) * share) as u32;
+            let step = steps.partition_point(|s| s.from_objects <= scaled).checked_sub(1);
+            step.is_some_and(|k| self.steps[k] == current)
+        };
+        let (chosen, reason) = match self.settled {
+            None if self.ran.is_none() => (chosen, Reason::First),
+            None => (chosen, Reason::FellBack),
+            Some(current) if current == chosen => (chosen, Reason::Stayed),
+            Some(current) if holds(current, 1.0 - STEP_SLACK) || holds(current, 1.0 + STEP_SLACK) => {
+                (current, Reason::Hysteresis)
+            }
+            Some(_) => (chosen, Reason::Switched),
+        };
+        self.settled = Some(chosen);
+        Some(Choice { chosen, predicted_ns: None, runner_up: None, reason })
+    }
+}
+
+/// Expected saving, as a share of the present cost, of knowing what another costs: the mean over a normal distribution of the logarithm
+/// `ln_ratio` of other over present cost, of what is below nought.
+fn expected_gain(ln_ratio: f64, deviation: f64) -> f64 {
+    if deviation <= 0.0 {
+        return 0.0;
+    }
+    let u = -ln_ratio / deviation;
+    // What is saved beside what a switch without looking would save already.
+    (deviation * (density(u) + u * cumulative(u)) - (-ln_ratio).max(0.0)).max(0.0)
+}
+
+/// Density of the standard normal distribution.
+fn density(x: f64) -> f64 {
+    (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt()
+}
+
+/// Its cumulative distribution, to 1e-3: the logistic curve that comes closest.
+fn cumulative(x: f64) -> f64 {
+    1.0 / (1.0 + (-1.702 * x).exp())
+}
