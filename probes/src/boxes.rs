@@ -191,7 +191,10 @@ fn without_absent(mut boxes: Vec<Aabb>, frames: usize, objects: usize) -> Result
         let rows = &boxes[first..first + objects];
         let present = rows.iter().rposition(|b| !absent(b)).map_or(0, |last| last + 1);
         if let Some(row) = rows[..present].iter().position(absent) {
-            bail!("frame {frame}: row {row} is NaN, and row {} is not; absent boxes stand at the end of a frame", present - 1);
+            bail!(
+                "frame {frame}: row {row} is NaN, and row {} is not; absent boxes stand at the end of a frame",
+                present - 1
+            );
         }
         boxes.copy_within(first..first + present, kept);
         kept += present;
