@@ -1,6 +1,6 @@
 //! Figure 8 of Avril, Gouranton and Arnaldi (ISVRI 2011): what each number of GPUs and of cores costs, and what was chosen.
 
-use super::{Picture, colour, legend};
+use super::{Picture, colour};
 use crate::simulation::{Course, Outcome};
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -24,6 +24,8 @@ struct Panel {
     class: BackendClass,
     /// Numbers of GPUs or cores, ascending, each with a position among the fixed algorithms.
     units: Vec<(u32, usize)>,
+    /// Whether algorithms of the other class took part.
+    other: bool,
 }
 
 impl Panel {
@@ -35,13 +37,28 @@ impl Panel {
         let on = |width: u32| move |id: &AlgorithmId| id.backend().class() == class && id.backend().width() == width;
         // One that sat out frames has no total and is no curve.
         let units = widths.into_iter().filter_map(|width| Some((width, outcome.best_of(on(width))?.0))).collect();
-        Self { class, units }
+        Self { class, units, other: outcome.fixed.iter().any(|id| id.backend().class() != class) }
     }
 
-    /// The row of an algorithm among the choices: 0 is the other class, then the numbers in turn.
-    fn row(&self, id: &AlgorithmId) -> usize {
-        let own = self.units.iter().position(|u| id.backend().class() == self.class && id.backend().width() == u.0);
-        own.map_or(0, |k| k + 1)
+    /// The position of an algorithm's number of GPUs or cores. `None` for the other class.
+    fn unit(&self, id: &AlgorithmId) -> Option<usize> {
+        self.units.iter().position(|u| id.backend().class() == self.class && id.backend().width() == u.0)
+    }
+
+    /// The row among the choices: those of the numbers in turn, above that of the other class, where there is one.
+    fn row(&self, unit: Option<usize>) -> usize {
+        unit.map_or(0, |unit| unit + usize::from(self.other))
+    }
+
+    /// What the rows are called from the lowest up.
+    fn rows(&self) -> Vec<String> {
+        let other = match self.class {
+            BackendClass::Cpu => "a GPU",
+            BackendClass::Gpu => "the CPU",
+        };
+        let other = self.other.then(|| other.to_owned());
+        let events = ["explored", "switches"].map(str::to_owned);
+        other.into_iter().chain(self.units.iter().map(|u| self.name(u.0))).chain(events).collect()
     }
 
     fn name(&self, width: u32) -> String {
@@ -93,12 +110,13 @@ where
     D::ErrorType: 'static,
 {
     if panel.units.is_empty() {
-        let (width, height) = area.dim_in_pixel();
-        let style = ("sans-serif", 20).into_font().color(&RGBColor(90, 90, 90));
         let text = match panel.class {
             BackendClass::Gpu => "no GPU algorithm ran here",
             BackendClass::Cpu => "no algorithm ran on the CPU",
         };
+        let area = area.titled(panel.title(), ("sans-serif", 22))?;
+        let (width, height) = area.dim_in_pixel();
+        let style = ("sans-serif", 20).into_font().color(&RGBColor(90, 90, 90));
         area.draw(&Text::new(text, (width as i32 / 2 - 120, height as i32 / 2), style))?;
         return Ok(());
     }
@@ -190,40 +208,35 @@ where
     D::ErrorType: 'static,
 {
     let taken = outcome.last_taken();
-    let rows = panel.units.len() + 1;
-    let other = match panel.class {
-        BackendClass::Cpu => "a GPU",
-        BackendClass::Gpu => "the CPU",
-    };
+    let rows = panel.rows();
     let label = |y: &SegmentValue<usize>| match y {
-        SegmentValue::CenterOf(0) => other.to_owned(),
-        SegmentValue::CenterOf(row) => panel.units.get(row - 1).map_or("switches".to_owned(), |u| panel.name(u.0)),
+        SegmentValue::CenterOf(row) => rows.get(*row).cloned().unwrap_or_default(),
         _ => String::new(),
     };
     let mut chart = ChartBuilder::on(area)
         .margin(10)
         .set_label_area_size(LabelAreaPosition::Left, AXIS)
         .set_label_area_size(LabelAreaPosition::Bottom, 12)
-        // The row behind the last number is that of the switches.
-        .build_cartesian_2d(0..taken.len().max(1), (0..rows).into_segmented())?;
+        .build_cartesian_2d(0..taken.len().max(1), (0..rows.len() - 1).into_segmented())?;
     chart
         .configure_mesh()
         .disable_mesh()
-        .y_labels(rows + 1)
+        .y_labels(rows.len())
         .label_style(("sans-serif", 15))
         .x_label_formatter(&|_| String::new())
         .y_label_formatter(&label)
         .draw()?;
-    let row = |at: usize| taken[at].chosen.map(|k| panel.row(&outcome.fixed[k]));
+    let unit = |at: usize| taken[at].chosen.map(|k| panel.unit(&outcome.fixed[k]));
     // Frames in a row that are alike are one rectangle and one line.
     let mut line: Vec<(usize, SegmentValue<usize>)> = Vec::new();
     let mut first = 0;
     for at in 1..=taken.len() {
-        if at < taken.len() && row(at) == row(first) {
+        if at < taken.len() && unit(at) == unit(first) {
             continue;
         }
-        if let Some(row) = row(first) {
-            let shade = if row == 0 { RGBColor(190, 190, 190) } else { colour(row - 1) };
+        if let Some(unit) = unit(first) {
+            let shade = unit.map_or(RGBColor(190, 190, 190), colour);
+            let row = panel.row(unit);
             let corners = [(first, SegmentValue::Exact(row)), (at, SegmentValue::Exact(row + 1))];
             chart.draw_series([Rectangle::new(corners, shade.mix(0.75).filled())])?;
             line.extend([first, at].map(|end| (end, SegmentValue::CenterOf(row))));
@@ -232,21 +245,13 @@ where
     }
     chart.draw_series(LineSeries::new(line, BLACK.stroke_width(2)))?;
     // The line does not show where another algorithm takes over on as many as before.
-    let tick = |at: usize| {
-        PathElement::new([SegmentValue::Exact(rows), SegmentValue::Exact(rows + 1)].map(|y| (at, y)), BLACK.stroke_width(1))
-    };
+    let top = rows.len();
+    let tick = |at: usize| PathElement::new([top - 1, top].map(|y| (at, SegmentValue::Exact(y))), BLACK.stroke_width(1));
     chart.draw_series(outcome.switches().into_iter().map(tick))?;
-    let explored = taken.iter().enumerate().filter(|(_, t)| t.explored).filter_map(|(at, _)| Some((at, row(at)?)));
-    let explored: Vec<(usize, usize)> = explored.collect();
-    if explored.is_empty() {
-        return Ok(());
-    }
-    let ring = |&(at, row): &(usize, usize)| Circle::new((at, SegmentValue::CenterOf(row)), 5, BLACK.stroke_width(1));
-    chart
-        .draw_series(explored.iter().map(ring))?
-        .label("explored")
-        .legend(|(x, y)| Circle::new((x + 8, y), 5, BLACK.stroke_width(1)));
-    legend(&mut chart, SeriesLabelPosition::UpperRight)
+    let explored = taken.iter().enumerate().filter(|(_, t)| t.explored).map(|(at, _)| at);
+    let ring = |at: usize| Circle::new((at, SegmentValue::CenterOf(top - 2)), 5, BLACK.stroke_width(1));
+    chart.draw_series(explored.map(ring))?;
+    Ok(())
 }
 
 fn objects<D>(area: &Area<'_, D>, outcome: &Outcome) -> anyhow::Result<()>
@@ -317,9 +322,10 @@ mod tests {
         // The pair of GPUs sat out a frame.
         let gpus = Panel::new(BackendClass::Gpu, &both);
         assert_eq!(gpus.units, [(1, 3)]);
-        let row = |panel: &Panel, id: &str| panel.row(&id.parse().unwrap());
-        assert_eq!([row(&cores, "brute@cpu1"), row(&cores, "brute@cpu2"), row(&cores, "sweep@gpu0")], [1, 2, 0]);
-        assert_eq!([row(&gpus, "brute@cpu1"), row(&gpus, "strips@gpu1")], [0, 1]);
+        let row = |panel: &Panel, id: &str| panel.rows()[panel.row(panel.unit(&id.parse().unwrap()))].clone();
+        let named = ["brute@cpu1", "brute@cpu2", "sweep@gpu0"].map(|id| row(&cores, id));
+        assert_eq!(named, ["1 core", "2 cores", "a GPU"]);
+        assert_eq!(["brute@cpu1", "strips@gpu1"].map(|id| row(&gpus, id)), ["the CPU", "1 GPU"]);
         let svg = drawn(&both, Some(CoRunner { from_frame: 1, threads: None }));
         let needed = [
             "1 core: strips@cpu1",
@@ -341,7 +347,7 @@ mod tests {
     #[test]
     fn a_machine_without_gpus_is_told_so() {
         let svg = drawn(&outcome(&["brute@cpu1"], &[(10, 1.0, &[1.0], taken(0))]), None);
-        assert!(svg.contains("no GPU algorithm ran here") && !svg.contains("explored"), "{svg}");
+        assert!(svg.contains("no GPU algorithm ran here") && !svg.contains("a GPU"), "{svg}");
     }
 
     #[test]

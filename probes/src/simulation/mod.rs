@@ -3,6 +3,7 @@
 mod co_runner;
 mod contestant;
 mod footage;
+mod oracle;
 mod outcome;
 mod samples;
 mod trace;
@@ -22,6 +23,7 @@ pub(crate) use footage::Footage;
 pub(crate) use outcome::{Frame, Outcome, Part};
 pub(crate) use trace::{Format as TraceFormat, write_trace};
 
+use oracle::Oracle;
 use outcome::{Taken, Told};
 
 #[cfg(test)]
@@ -249,6 +251,7 @@ impl Stage {
         Outcome {
             slowdown: course.co_runner.map(slowdown),
             fixed: self.contestants.into_iter().map(|c| c.id).collect(),
+            oracle: Oracle::new(&frames),
             frames,
             repeats: self.repeats,
             told: self.told,

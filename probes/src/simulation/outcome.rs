@@ -1,7 +1,8 @@
 //! What came of a simulation, frame by frame, and the figures that follow from it.
 
 use super::co_runner::Slowdown;
-use super::samples::{Samples, optimistic_oracle, oracle, oracle_in};
+use super::oracle::{Oracle, optimistic};
+use super::samples::Samples;
 use sapwise::measure::statistics::quantile;
 use sapwise::{AlgorithmId, Load, Reason};
 use std::ops::Range;
@@ -19,7 +20,6 @@ pub(crate) struct Frame {
     pub(crate) unexplored_ns: f64,
     /// The time of each fixed algorithm; infinite where it sat out.
     pub(crate) fixed_ns: Vec<f64>,
-    pub(crate) oracle_ns: f64,
     pub(crate) adaptive: Samples,
     pub(crate) fixed: Vec<Samples>,
 }
@@ -50,7 +50,6 @@ impl Frame {
             adaptive_ns: mean_over_choices(&adaptive, taken),
             unexplored_ns: mean_over_choices(&adaptive.of(|r| !taken[r].0.explored), taken),
             fixed_ns: fixed.iter().map(Samples::time).collect(),
-            oracle_ns: oracle(&fixed),
             adaptive,
             fixed,
         }
@@ -80,6 +79,7 @@ fn mean_over_choices(adaptive: &Samples, taken: &[(Taken, Option<Taken>)]) -> f6
 pub(crate) struct Outcome {
     pub(crate) fixed: Vec<AlgorithmId>,
     pub(crate) frames: Vec<Frame>,
+    pub(crate) oracle: Oracle,
     /// What ran at every frame, for each repeat that all frames have; one that Ctrl-C cut short is left out.
     pub(crate) repeats: Vec<Vec<Taken>>,
     /// What the adaptive module told of every frame of the last of these.
@@ -137,12 +137,12 @@ impl Outcome {
 
     /// The total of an oracle that runs the best fixed algorithm of every frame and needs no time to choose it.
     pub(crate) fn oracle_ms(&self) -> f64 {
-        total_ms(self.frames.iter().map(|f| f.oracle_ns))
+        total_ms(self.oracle.ns.iter().copied())
     }
 
     /// The total of the least times.
     pub(crate) fn optimistic_oracle_ms(&self) -> f64 {
-        total_ms(self.frames.iter().map(|f| optimistic_oracle(&f.fixed)))
+        total_ms(self.frames.iter().map(|f| optimistic(&f.fixed)))
     }
 
     /// The total of a fixed algorithm; `None` when it sat out frames.
@@ -205,28 +205,30 @@ impl Outcome {
     pub(crate) fn part(&self, range: Range<usize>) -> Part {
         let frames = &self.frames[range.clone()];
         let over = |ns: f64| frames.iter().map(|f| f.adaptive_ns).sum::<f64>() / ns - 1.0;
-        let worst = |f: &Frame| f.unexplored_ns / f.oracle_ns;
-        let numbered = range.clone().zip(frames).filter(|(_, f)| f.unexplored_ns.is_finite());
+        let oracle_ns = &self.oracle.ns[range.clone()];
+        let unexplored = frames.iter().map(|f| f.unexplored_ns).zip(oracle_ns).zip(range.clone());
+        let worst = unexplored.filter(|((own, _), _)| own.is_finite()).map(|((own, oracle), at)| (own / oracle, at));
         Part {
-            regret: over(frames.iter().map(|f| f.oracle_ns).sum()),
-            optimistic_regret: over(frames.iter().map(|f| optimistic_oracle(&f.fixed)).sum()),
-            of_repeats: (0..self.repeats.len()).filter_map(|repeat| regret_of(frames, repeat)).collect(),
+            regret: over(oracle_ns.iter().sum()),
+            optimistic_regret: over(frames.iter().map(|f| optimistic(&f.fixed)).sum()),
+            of_repeats: (0..self.repeats.len()).filter_map(|repeat| self.regret_of(range.clone(), repeat)).collect(),
             switches: self.switches().iter().filter(|at| range.contains(at)).count(),
             explored: self.last_taken()[range.clone()].iter().filter(|t| t.explored).count(),
-            worst_frame: numbered.map(|(at, f)| (worst(f), at)).max_by(|a, b| a.0.total_cmp(&b.0)),
+            worst_frame: worst.max_by(|a, b| a.0.total_cmp(&b.0)),
             frames: range,
         }
     }
-}
 
-/// The regret of one repeat against an oracle that saw the other half of the repeats only.
-fn regret_of(frames: &[Frame], repeat: usize) -> Option<f64> {
-    let (mut own, mut oracle) = (0.0, 0.0);
-    for frame in frames {
-        own += frame.adaptive.at(repeat)?;
-        oracle += oracle_in(&frame.fixed, repeat)?;
+    /// The regret of one repeat against an oracle that saw the other half of the repeats only.
+    fn regret_of(&self, range: Range<usize>, repeat: usize) -> Option<f64> {
+        let (mut own, mut oracle) = (0.0, 0.0);
+        for at in range {
+            let frame = &self.frames[at];
+            own += frame.adaptive.at(repeat)?;
+            oracle += self.oracle.in_repeat(at, frame, repeat)?;
+        }
+        Some(own / oracle - 1.0)
     }
-    Some(own / oracle - 1.0)
 }
 
 fn total_ms(ns: impl Iterator<Item = f64>) -> f64 {
@@ -241,6 +243,11 @@ pub(crate) mod tests {
         let mut samples = Samples::default();
         ns.iter().enumerate().filter(|(_, ns)| ns.is_finite()).for_each(|(repeat, &ns)| samples.push(repeat, ns));
         samples
+    }
+
+    /// A frame of which only the fixed algorithms matter.
+    pub(crate) fn frame_of(objects: usize, fixed: Vec<Samples>) -> Frame {
+        Frame::new(objects, Samples::default(), fixed, &[])
     }
 
     pub(crate) fn taken(chosen: usize) -> Taken {
@@ -263,9 +270,11 @@ pub(crate) mod tests {
             measured_ns: None,
             runner_up: None,
         };
+        let frames_of: Vec<Frame> = frames.iter().map(frame).collect();
         Outcome {
             fixed: fixed.iter().map(|id| id.parse().unwrap()).collect(),
-            frames: frames.iter().map(frame).collect(),
+            oracle: Oracle::new(&frames_of),
+            frames: frames_of,
             repeats: vec![frames.iter().map(|f| f.3).collect()],
             told: vec![told; frames.len()],
             interrupted: false,
@@ -339,6 +348,7 @@ pub(crate) mod tests {
         let fixed = vec![samples(&[10.0, 12.0, 10.0, 14.0]), samples(&[20.0; 4])];
         let mut outcome = outcome(&["brute@cpu1", "strips@cpu1"], &[(5, 1.0, &[1.0, 2.0], taken(0))]);
         outcome.frames = vec![Frame::new(5, samples(&[10.0, 18.0, 15.0, 14.0]), fixed, &stays)];
+        outcome.oracle = Oracle::new(&outcome.frames);
         outcome.repeats = vec![vec![taken(0)]; 4];
         let whole = outcome.whole();
         assert_eq!(whole.of_repeats, [0.0, 0.5, 0.5, 0.0]);

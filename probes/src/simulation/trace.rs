@@ -77,7 +77,7 @@ fn rows(outcome: &Outcome) -> impl Iterator<Item = Row> {
             runner_up: told.runner_up.as_ref().map(|r| r.0.to_string()),
             runner_up_ns: told.runner_up.as_ref().map(|r| r.1),
             adaptive_ns: f.adaptive_ns,
-            oracle_ns: f.oracle_ns,
+            oracle_ns: outcome.oracle.ns[frame],
             fixed_ns: fixed.zip(finite).collect(),
         }
     })

@@ -110,8 +110,8 @@ fn comparisons(answer: &Answer<'_>) -> String {
     }
     lines.push(match answer.oracle {
         Oracle::Halves => format!(
-            "The oracle is chosen by one half of the repeats and timed in the other; against the least time of every frame the \
-             regret is {}.",
+            "The oracle's algorithms are chosen by one half of the repeats and timed in the other. Against the least time of every \
+             frame,\nwhich luck has a part in, the regret is {}.",
             percent(answer.figures.optimistic_regret)
         ),
         Oracle::Optimistic => {
