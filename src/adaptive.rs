@@ -6,8 +6,9 @@ mod learner;
 mod pace;
 mod policy;
 mod price;
+mod tally;
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step};
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step, Term};
 use decision::Choice;
 use glance::Glance;
 use pace::Pace;
@@ -30,6 +31,7 @@ const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 pub struct Adaptive {
     /// In the order of [`Fields::algorithms`].
     candidates: Vec<Candidate>,
+    instances: Vec<Instance>,
     policy: Policy,
     glance: Glance,
     pace: Pace,
@@ -42,10 +44,39 @@ pub struct Adaptive {
 
 struct Candidate {
     id: AlgorithmId,
-    /// `None` once it failed, or where it can't run.
-    algorithm: Option<Box<dyn BroadPhase>>,
+    /// Its position among the instances; `None` once it failed, or where it can't run.
+    instance: Option<usize>,
+}
+
+/// Runs one candidate, or several that differ in their number of threads only and share what they keep from frame to frame.
+struct Instance {
+    algorithm: Box<dyn BroadPhase>,
+    /// Where several share it, on how many threads it runs.
+    threads: Option<u32>,
     /// Objects that its buffers are ready for.
     ready: usize,
+}
+
+impl Instance {
+    fn alone(algorithm: Box<dyn BroadPhase>) -> Self {
+        Self { algorithm, threads: None, ready: 0 }
+    }
+
+    fn run(&mut self, id: &AlgorithmId, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        let wanted = id.threads();
+        if self.threads.is_some_and(|threads| threads != wanted) {
+            if !self.algorithm.set_threads(wanted) {
+                return Err(Error::Unavailable {
+                    algorithm: id.clone(),
+                    reason: format!("it can't run on {wanted} threads"),
+                });
+            }
+            self.threads = Some(wanted);
+        }
+        self.algorithm.find_pairs(boxes, pairs)?;
+        self.ready = self.ready.max(boxes.len());
+        Ok(())
+    }
 }
 
 impl Adaptive {
@@ -57,14 +88,15 @@ impl Adaptive {
     /// # Errors
     /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made.
     pub fn new(fields: Fields, registry: &Registry) -> Result<Self, Error> {
-        let (candidates, failure) = candidates(&fields, registry);
-        if candidates.iter().all(|c| c.algorithm.is_none()) {
+        let Made { candidates, instances, failure } = make(&fields, registry);
+        if instances.is_empty() {
             let hint = || "these fields name no algorithm; make them with `sapwise predict`".to_owned();
             return Err(failure.unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
         }
         Ok(Self {
-            policy: policy(fields, &candidates),
+            policy: policy(fields, &candidates, &instances),
             candidates,
+            instances,
             glance: Glance::default(),
             pace: Pace::default(),
             choice: None,
@@ -122,6 +154,10 @@ impl Adaptive {
                 ln_factor: (uncorrected.ln_correction(log2_objects) + learner.correction_at(k, log2_objects))
                     .clamp(-50.0, 50.0),
             };
+            let factor = learner.factor_on_calls(k);
+            for term in cost.curve.terms.iter_mut().chain(&mut cost.curve.otherwise).filter(|t| t.term == Term::Call) {
+                term.unit_ns *= factor;
+            }
             cost.curve.correction = octaves.into_iter().map(knot).collect();
             cost.spread_ln = learner.spread_ln(k);
         }
@@ -147,14 +183,14 @@ impl Adaptive {
     /// # Errors
     /// As [`new`](Self::new); the algorithms of before stay then.
     pub fn revive(&mut self, registry: &Registry) -> Result<(), Error> {
-        let (candidates, failure) = candidates(self.policy.fields(), registry);
-        if let (true, Some(error)) = (candidates.iter().all(|c| c.algorithm.is_none()), failure) {
+        let Made { candidates, instances, failure } = make(self.policy.fields(), registry);
+        if let (true, Some(error)) = (instances.is_empty(), failure) {
             return Err(error);
         }
         for (k, candidate) in candidates.iter().enumerate() {
-            self.policy.set_usable(k, candidate.algorithm.is_some());
+            self.policy.set_usable(k, candidate.instance.is_some());
         }
-        self.candidates = candidates;
+        (self.candidates, self.instances) = (candidates, instances);
         self.decided = None;
         self.choice = None;
         Ok(())
@@ -163,9 +199,9 @@ impl Adaptive {
     /// Other fields, with an instance of each of their algorithms, take the place of those of before. The estimate of the load stays.
     #[cfg(all(feature = "measure", feature = "model"))]
     #[expect(dead_code, reason = "for fields that arrive while frames run already")]
-    fn adopt(&mut self, fields: Fields, candidates: Vec<Candidate>) {
-        self.policy = policy(fields, &candidates);
-        self.candidates = candidates;
+    fn adopt(&mut self, fields: Fields, made: Made) {
+        self.policy = policy(fields, &made.candidates, &made.instances);
+        (self.candidates, self.instances) = (made.candidates, made.instances);
         self.decided = None;
         self.choice = None;
     }
@@ -206,14 +242,11 @@ impl Adaptive {
     /// Gets the runner-up ready when its turn may come soon.
     fn warm_runner_up(&mut self, boxes: usize) {
         let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), .. }) = self.choice else { return };
-        let candidate = &mut self.candidates[next];
-        if ns > best * WARM_WITHIN || candidate.ready >= boxes {
-            return;
-        }
-        if let Some(algorithm) = &mut candidate.algorithm {
+        let Some(instance) = self.candidates[next].instance.map(|k| &mut self.instances[k]) else { return };
+        if ns <= best * WARM_WITHIN && instance.ready < boxes {
             // By powers of two, so that a growing scene pays for this a few times in all.
-            candidate.ready = boxes.checked_next_power_of_two().unwrap_or(boxes);
-            algorithm.prepare(candidate.ready);
+            instance.ready = boxes.checked_next_power_of_two().unwrap_or(boxes);
+            instance.algorithm.prepare(instance.ready);
         }
     }
 }
@@ -230,15 +263,14 @@ impl BroadPhase for Adaptive {
                 let reason = "every algorithm of the fields has failed".to_owned();
                 return Err(Error::Unavailable { algorithm: self.candidates[0].id.clone(), reason });
             };
-            let candidate = &mut self.candidates[choice.chosen];
-            let Some(algorithm) = candidate.algorithm.as_mut() else {
+            let candidate = &self.candidates[choice.chosen];
+            let Some(instance) = candidate.instance.map(|k| &mut self.instances[k]) else {
                 // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
                 return Err(Error::Unavailable { algorithm: candidate.id.clone(), reason: "it failed before".to_owned() });
             };
             let running = started.map(|_| Instant::now());
-            match algorithm.find_pairs(boxes, pairs) {
+            match instance.run(&candidate.id, boxes, pairs) {
                 Ok(()) => {
-                    candidate.ready = candidate.ready.max(boxes.len());
                     let usual_ns = self.pace.ran();
                     let Some((started, running)) = started.zip(running) else {
                         self.glance.ran(boxes, pairs.len(), usual_ns);
@@ -254,7 +286,7 @@ impl BroadPhase for Adaptive {
                 }
                 // The algorithm is at fault, not the boxes: the next cheapest runs in this same frame.
                 Err(Error::Unavailable { .. }) => {
-                    candidate.algorithm = None;
+                    self.candidates[choice.chosen].instance = None;
                     self.policy.set_usable(choice.chosen, false);
                     let next = self.policy.choose(&self.glance.load(), 0);
                     self.choice = next.map(|c| Choice { reason: Reason::FellBack, ..c });
@@ -268,16 +300,14 @@ impl BroadPhase for Adaptive {
     }
 
     fn prepare(&mut self, objects: usize) {
-        for candidate in &mut self.candidates {
-            if let Some(algorithm) = &mut candidate.algorithm {
-                algorithm.prepare(objects);
-                candidate.ready = candidate.ready.max(objects);
-            }
+        for instance in &mut self.instances {
+            instance.algorithm.prepare(objects);
+            instance.ready = instance.ready.max(objects);
         }
     }
 
     fn keeps_work(&self) -> bool {
-        self.candidates.iter().filter_map(|c| c.algorithm.as_ref()).any(|a| a.keeps_work())
+        self.instances.iter().any(|instance| instance.algorithm.keeps_work())
     }
 }
 
@@ -287,21 +317,60 @@ impl fmt::Debug for Adaptive {
     }
 }
 
-/// An instance of every algorithm of the fields, and why the last of those that can't be made can't be.
-fn candidates(fields: &Fields, registry: &Registry) -> (Vec<Candidate>, Option<Error>) {
-    let mut failure = None;
-    let candidates = fields.algorithms().into_iter().map(|id| {
-        let stale = fields.costs.iter().find(|c| c.algorithm == *id).and_then(|c| registry.mismatch(id, c.revision));
-        let made = stale.map_or_else(|| registry.create(id), Err);
-        Candidate { id: id.clone(), algorithm: made.map_err(|e| failure = Some(e)).ok(), ready: 0 }
-    });
-    (candidates.collect(), failure)
+/// What runs the algorithms of some fields, and why the last of those that can't run can't.
+struct Made {
+    candidates: Vec<Candidate>,
+    instances: Vec<Instance>,
+    failure: Option<Error>,
 }
 
-fn policy(fields: Fields, candidates: &[Candidate]) -> Policy {
-    let of = |c: &Candidate| (c.algorithm.is_some(), c.algorithm.as_ref().is_some_and(|a| a.keeps_work()));
-    let (usable, keeps_work): (Vec<bool>, Vec<bool>) = candidates.iter().map(of).unzip();
-    Policy::new(fields, &keeps_work, usable)
+fn make(fields: &Fields, registry: &Registry) -> Made {
+    let ids = fields.algorithms();
+    let mut made = Made {
+        candidates: ids.iter().map(|&id| Candidate { id: id.clone(), instance: None }).collect(),
+        instances: Vec::new(),
+        failure: None,
+    };
+    let stale = |id: &AlgorithmId| {
+        let cost = fields.costs.iter().find(|c| c.algorithm == *id);
+        cost.and_then(|c| registry.mismatch(id, c.revision)).map_or(Ok(()), Err)
+    };
+    for (k, &id) in ids.iter().enumerate() {
+        if made.candidates[k].instance.is_some() {
+            continue;
+        }
+        if let Err(why) = stale(id) {
+            made.failure = Some(why);
+            continue;
+        }
+        // Those that differ from it in their number of threads only.
+        let kin = |other: &&AlgorithmId| {
+            other.method() == id.method() && other.backend().class() == id.backend().class() && stale(other).is_ok()
+        };
+        let family: Vec<&AlgorithmId> = ids.iter().copied().filter(kin).collect();
+        if let Some(Ok(algorithm)) = registry.create_for(&family) {
+            for candidate in made.candidates.iter_mut().filter(|c| family.contains(&&c.id)) {
+                candidate.instance = Some(made.instances.len());
+            }
+            // On none of them yet, so that the first frame sets it.
+            made.instances.push(Instance { threads: Some(0), ..Instance::alone(algorithm) });
+            continue;
+        }
+        match registry.create(id) {
+            Ok(algorithm) => {
+                made.candidates[k].instance = Some(made.instances.len());
+                made.instances.push(Instance::alone(algorithm));
+            }
+            Err(why) => made.failure = Some(why),
+        }
+    }
+    made
+}
+
+fn policy(fields: Fields, candidates: &[Candidate], instances: &[Instance]) -> Policy {
+    let kept = |c: &Candidate| c.instance.filter(|&k| instances[k].algorithm.keeps_work());
+    let kept: Vec<Option<usize>> = candidates.iter().map(kept).collect();
+    Policy::new(fields, &kept, candidates.iter().map(|c| c.instance.is_some()).collect())
 }
 
 fn objects(boxes: &[Aabb]) -> u32 {
