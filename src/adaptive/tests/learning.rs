@@ -99,7 +99,7 @@ fn a_clock_that_throttles_moves_every_expectation_and_no_choice() {
     let frames = run(&mut policy, 0..600, 1000, &truth);
     assert!(frames.iter().all(|f| f.chosen == 0 || f.reason == Reason::Explored));
     let late = frames[500..].iter().filter(|f| f.chosen == 0);
-    assert!(late.clone().all(|f| (f.predicted_ns / 160_000.0 - 1.0).abs() < 0.15), "{:?}", late.last());
+    assert!(late.clone().all(|f| (f.predicted_ns / 160_000.0 - 1.0).abs() < 0.15), "{:?}", frames[599]);
     // The other has become dearer in what is expected of it too, though it never ran.
     assert!(frames[590].cheapest_ns > 140_000.0);
 }
@@ -109,7 +109,7 @@ fn a_core_that_another_program_takes_is_left_and_found_again() {
     // Two threads are faster, but from frame 300 to 900 one frame in eight waits 4 ms for a core.
     let right = fields_of_threads();
     let truth = |k: usize, n: f64, at: usize| {
-        let waits = k == 1 && (300..900).contains(&at) && at % 8 == 0;
+        let waits = k == 1 && (300..900).contains(&at) && at.is_multiple_of(8);
         n * [100.0, 60.0][k] + if waits { 4e6 } else { 0.0 }
     };
     let mut policy = policy(right);
