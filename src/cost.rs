@@ -149,6 +149,12 @@ impl CostCurve {
         (!self.otherwise.is_empty()).then(|| ns * self.ln_correction(counts.log2_objects).exp())
     }
 
+    /// What of the predicted nanoseconds is due to [`Term::Call`].
+    pub(crate) fn calls_of(&self, counts: &Counts<'_>) -> f64 {
+        let ns: f64 = self.terms.iter().filter(|t| t.term == Term::Call).map(|t| t.unit_ns).sum();
+        ns * self.ln_correction(counts.log2_objects).exp()
+    }
+
     /// The sum of the terms, of the cheaper way where there are two.
     fn uncorrected(&self, counts: &Counts<'_>) -> f64 {
         let sum =

@@ -1,9 +1,9 @@
 //! Which algorithm runs the next frame: the cheapest by all that is known, seldom another one to learn what it costs.
 
 use super::decision::{Choice, Reason};
-use super::learner::{Learner, Place};
+use super::learner::{Learner, Place, View};
 use super::price::{Expected, Prices};
-use super::tally::Tally;
+use super::tally::{Predicted, Tally};
 use crate::cost::Counts;
 use crate::{Fields, Load};
 
@@ -35,7 +35,7 @@ pub(super) struct Policy {
     ran: Option<usize>,
     /// What each candidate is expected to cost under the present load, and what the fields say of it without correction.
     expected: Vec<Expected>,
-    predicted_ns: Vec<f64>,
+    predicted: Vec<Predicted>,
     log2_objects: f64,
     tally: Tally,
     /// What each candidate would have saved since it became cheaper than the one that runs.
@@ -61,7 +61,7 @@ impl Policy {
             settled: None,
             ran: None,
             expected: vec![Expected { usual_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
-            predicted_ns: vec![f64::INFINITY; count],
+            predicted: vec![Predicted::default(); count],
             log2_objects: 0.0,
             tally: Tally::default(),
             saved_ns: vec![0.0; count],
@@ -82,6 +82,12 @@ impl Policy {
 
     pub(super) fn set_exploring(&mut self, explores: bool) {
         self.explores = explores;
+    }
+
+    /// Learns and explores if that one does.
+    #[cfg(feature = "this-machine")]
+    pub(super) fn set_as(&mut self, other: &Self) {
+        (self.learns, self.explores) = (other.learns, other.explores);
     }
 
     /// The learner, once it has observed something.
@@ -130,11 +136,13 @@ impl Policy {
         let place = Place::of(self.log2_objects);
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
         for (k, cost) in self.fields.costs.iter().enumerate() {
-            let factor = learner.map_or(1.0, |l| l.correction_ln(k, place).exp());
             let ns = cost.curve.cost_of(&counts);
             let alone_ns = cost.curve.otherwise_of(&counts).unwrap_or(ns).max(ns);
-            self.predicted_ns[k] = ns;
-            self.expected[k] = Expected { usual_ns: ns * factor, alone_ns: alone_ns * factor };
+            let predicted = Predicted { ns, calls_ns: cost.curve.calls_of(&counts).min(ns) };
+            let factor = learner.map_or(1.0, |l| l.correction_ln(k, View { place, calls: predicted.calls() }).exp());
+            let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));
+            self.predicted[k] = predicted;
+            self.expected[k] = Expected { usual_ns: ns * factor + wait_ns, alone_ns: alone_ns * factor + wait_ns };
         }
     }
 
@@ -177,13 +185,14 @@ impl Policy {
             return None;
         }
         let place = Place::of(self.log2_objects);
+        let view = |k: usize| (k, View { place, calls: self.predicted[k].calls() });
         let now = self.usual_ns(settled);
         let worth = |k: usize| {
             let first = self.usual_ns(k) + self.price_ns(k);
             if k == settled || !self.usable[k] || first > MOST_DEARER * now {
                 return None;
             }
-            let deviation = learner.variance_of_ratio(settled, k, place).sqrt();
+            let deviation = learner.variance_of_ratio(view(settled), view(k)).sqrt();
             let gain = now * expected_gain((self.usual_ns(k) / now).ln(), deviation) * HORIZON - (first - now).max(0.0);
             (gain > 0.0).then_some((k, gain))
         };
@@ -211,7 +220,9 @@ impl Policy {
         }
         if usual || self.settled != Some(candidate) {
             let dearest_ns = self.prices.anew_ns(candidate, expected);
-            self.tally.add(ns, self.predicted_ns[candidate], self.log2_objects, dearest_ns);
+            self.tally.cold = entered;
+            let waited_ns = self.tally.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns);
+            learner.waited(candidate, waited_ns, self.frame);
         }
         if self.tally.is_full() {
             learner.observe(&self.tally, self.frame);

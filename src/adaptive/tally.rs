@@ -11,6 +11,20 @@ const OCTAVES: f64 = 0.5;
 /// What counts of a frame, at most: so many times what the dearest kind of frame is expected to cost. The rest is another program's.
 const MOST_OVER: f64 = 2.0;
 
+/// What the fields say of a frame, without any correction, in nanoseconds: all of it, and the calls in it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Predicted {
+    pub(super) ns: f64,
+    pub(super) calls_ns: f64,
+}
+
+impl Predicted {
+    /// Share of the calls.
+    pub(super) fn calls(self) -> f64 {
+        self.calls_ns / self.ns
+    }
+}
+
 /// The sum over some frames in a row.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Tally {
@@ -19,7 +33,10 @@ pub(super) struct Tally {
     /// Real time, and time that the fields predict without any correction, in nanoseconds.
     pub(super) real_ns: f64,
     pub(super) predicted_ns: f64,
+    calls_ns: f64,
     log2_objects: f64,
+    /// It is the one frame with which the candidate began.
+    pub(super) cold: bool,
     /// Frames until it is full.
     room: u32,
 }
@@ -28,6 +45,11 @@ impl Tally {
     /// Mean logarithm of the number of objects.
     pub(super) fn log2_objects(&self) -> f64 {
         self.log2_objects / f64::from(self.frames.max(1))
+    }
+
+    /// Share of calls in the predicted time.
+    pub(super) fn calls(&self) -> f64 {
+        self.calls_ns / self.predicted_ns
     }
 
     /// Whether a frame belongs to it.
@@ -39,12 +61,15 @@ impl Tally {
         self.frames > 0 && self.frames >= self.room
     }
 
-    /// Adds a frame, of which no more counts than `dearest_ns` allows.
-    pub(super) fn add(&mut self, ns: f64, predicted_ns: f64, log2_objects: f64, dearest_ns: f64) {
+    /// Adds a frame, of which no more counts than `dearest_ns` allows. Gives the rest.
+    pub(super) fn add(&mut self, ns: f64, predicted: Predicted, log2_objects: f64, dearest_ns: f64) -> f64 {
+        let counted = ns.min(MOST_OVER * dearest_ns);
         self.frames += 1;
-        self.real_ns += ns.min(MOST_OVER * dearest_ns);
-        self.predicted_ns += predicted_ns;
+        self.calls_ns += predicted.calls_ns;
+        self.real_ns += counted;
+        self.predicted_ns += predicted.ns;
         self.log2_objects += log2_objects;
+        ns - counted
     }
 
     /// An empty one. Where the candidate is the one of before, it has more room than that.
