@@ -48,7 +48,7 @@ fn run(scene: impl AsRef<std::ffi::OsStr>, fields: &Path, words: &[&str]) -> ass
 #[test]
 fn a_recorded_scene_is_run_and_searched_like_the_scene() {
     let folder = tempfile::tempdir().unwrap();
-    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let fields = steps(folder.path(), "brute@cpu1", 20, "strips@cpu1");
     let stream = folder.path().join("stream.npy");
     let scene = ["--objects", "300", "--frames", "90", "--repeats", "1", "--json", "--record"];
     let recorded = answer(run("fragmentation", &fields, &scene).arg(&stream));
