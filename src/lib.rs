@@ -25,18 +25,21 @@
 //! - `model`: reports, models and fields as JSON; prediction.
 //! - `measure`: measures the hardware parameters of this machine.
 //! - `measure-gpu`: those of its GPUs too.
+//! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and keeps the fields for the next start.
 //! - `schema`: the JSON Schemas of the files, for tools.
 
 mod aabb;
 mod adaptive;
 mod algorithm;
 mod broad_phase;
+mod changes;
 mod cost;
 mod cpu;
 pub mod crossover;
 mod displacement;
 mod error;
 pub mod fields;
+mod filter;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod hardware;
@@ -60,19 +63,26 @@ mod statistics;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
+#[cfg(feature = "this-machine")]
+pub use adaptive::{Cache, Options, Origin, SaveError, Setup};
 pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
 pub use broad_phase::BroadPhase;
+pub use changes::Changes;
 pub use cost::{CostCurve, CostTerm, Knot, Term};
 pub use cpu::SimdLevel;
 pub use crossover::{Comparison, Crossover, Paired, Position};
 pub use displacement::Displacement;
 pub use error::{BoxDefect, Error};
 pub use fields::{AlgorithmCost, Border, Fields, Observation, Ranking, Source, Step};
+pub use filter::{Filter, Membership};
 pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, Machine, Parameter};
 pub use load::Load;
 pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};
 pub use posterior::{Posterior, Prior};
+/// The version of rayon whose pools this library takes: [`Registry::use_pool`].
+#[cfg(feature = "parallel")]
+pub use rayon;
 pub use registry::{Entry, Registry, usable_cores};
 pub use report::Report;
 pub use scenario::{Scenario, Scene};
