@@ -9,7 +9,7 @@ use crate::args::{Run, Scene};
 use crate::boxes::{Frames, read_frames};
 use crate::exit::{Outcome, WrongUsage};
 use crate::plot::{self, Picture};
-use crate::simulation::{Course, Footage, TraceFormat, simulate, write_trace};
+use crate::simulation::{Course, Footage, TraceFormat, simulate, too_wide, write_trace};
 use crate::{files, interrupt, output};
 use anyhow::{Context, bail};
 use sapwise::{Scenario, usable_cores};
@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     })?;
     origin.fields.warnings.append(&mut outcome.notes);
     let parts: Vec<_> = parts(&cuts, course.frames).into_iter().map(|range| outcome.part(range)).collect();
-    let answer = answer::Answer::new(&course, &outcome, &origin, &parts);
+    let answer = answer::Answer::new(&course, &outcome, &origin, too_wide(&origin.fields, &registry), &parts);
     if let Some((path, format)) = trace {
         write_trace(path, format, &outcome)?;
     }
