@@ -98,7 +98,7 @@ impl BroadPhase for Verlet {
             let workers = &widths[*width];
             outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists))?;
         }
-        self.motion.found(boxes.len(), pairs.found());
+        self.motion.found(boxes.len(), pairs.overlapping());
         pairs.finish()
     }
 

@@ -1,7 +1,7 @@
 //! What the tests of the contract share.
 #![allow(dead_code, reason = "each test program uses a part of this")]
 
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pair, Registry, SimdLevel};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Pair, Registry, SimdLevel};
 
 /// The oracle: the definition of overlap, in a double loop.
 pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {
@@ -37,6 +37,17 @@ pub(crate) fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
     all
 }
 
+/// The same past a filter: that, too, by its definition.
+pub(crate) fn naive_filtered(boxes: &[Aabb], memberships: &[Membership]) -> Vec<Pair> {
+    let of = |k: u32| memberships.get(k as usize).copied().unwrap_or_default();
+    let mut pairs = naive(boxes);
+    pairs.retain(|&(i, j)| {
+        let (a, b) = (of(i), of(j));
+        a.groups & b.mask != 0 && b.groups & a.mask != 0 && !(a.fixed && b.fixed)
+    });
+    pairs
+}
+
 /// A small generator of its own (Marsaglia's xorshift), so that the test does not rest on the library's.
 pub(crate) struct Random(pub(crate) u64);
 
@@ -47,6 +58,14 @@ impl Random {
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
         (self.0 >> 40) as f32 / (1_u64 << 24) as f32
+    }
+
+    /// In one or two of eight groups, not colliding with some of them, one in four fixed, one in sixteen in every group.
+    pub(crate) fn membership(&mut self) -> Membership {
+        let group = |at: f32| 1 << (at * 8.0) as u32;
+        let (groups, mask) = (group(self.next()) | group(self.next()), !(group(self.next()) | group(self.next())));
+        let fixed = self.next() < 0.25;
+        if self.next() < 1.0 / 16.0 { Membership::default() } else { Membership { groups, mask, fixed } }
     }
 
     /// Cubes of up to 1.1 times that half edge in a world of that size.
