@@ -28,6 +28,11 @@ const CLASS_FRAMES: f64 = 2500.0;
 const WIDTH_FRAMES: f64 = 800.0;
 const OWN_FRAMES: f64 = 6000.0;
 
+/// Share of each frame in the mean time that frames of a width wait for other programs, and tallies of an algorithm before its frames count
+/// for that: until then what is dearer than expected was expected wrongly.
+const WAIT_SHARE: f64 = 1.0 / 128.0;
+const KNOWN: u32 = 4;
+
 /// The noise of a frame is learned for each algorithm; it starts here, and is never believed to be less.
 const NOISE_LN: f64 = 0.1;
 const LEAST_NOISE_LN: f64 = 0.02;
@@ -64,6 +69,9 @@ struct Algorithm {
     before: f64,
     own: [Own; KNOTS],
     noise: f64,
+    /// Where in the list of waits its width stands, and how often it was observed.
+    wait: usize,
+    tallies: u32,
     /// Surprises in a row, counted with their sign.
     run: i32,
 }
@@ -79,6 +87,8 @@ pub(super) struct Learner {
     /// Frames after which each counts for 1/e.
     lasts: Vec<f64>,
     with: Vec<f64>,
+    /// For each class and width the mean time that a frame waits for other programs, nanoseconds, and the frame at which that held.
+    waits: Vec<(f64, u64)>,
     frame: u64,
     observed: u64,
 }
@@ -128,8 +138,13 @@ impl Learner {
                 parts.len() - 1
             })
         };
+        let mut widths: Vec<(BackendClass, u32)> = Vec::new();
         let algorithms = costs.iter().map(|cost| {
             let backend = cost.algorithm.backend();
+            let width_of = (backend.class(), backend.width());
+            if !widths.contains(&width_of) {
+                widths.push(width_of);
+            }
             let width = (backend.width() > 1).then(|| {
                 let all = place(Part::Width(backend.class(), backend.width()));
                 // Always next to each other: no other adds one in between.
@@ -143,6 +158,8 @@ impl Learner {
                 before,
                 own: [Own { mean: 0.0, variance: before, at: 0 }; KNOTS],
                 noise: NOISE_LN.powi(2),
+                wait: widths.iter().position(|w| *w == width_of).unwrap_or(0),
+                tallies: 0,
                 run: 0,
             }
         });
@@ -159,6 +176,7 @@ impl Learner {
             lasts: parts.iter().map(|p| p.lasts()).collect(),
             with: vec![0.0; parts.len()],
             before,
+            waits: vec![(0.0, 0); widths.len()],
             frame: 0,
             observed: 0,
         }
@@ -180,7 +198,23 @@ impl Learner {
         (class + self.mean[width] + whole.ln(), slopes)
     }
 
-    /// Expected natural logarithm of real over predicted time.
+    /// Mean time that a frame of an algorithm waits for other programs, in nanoseconds. A helper whose core another program has waits
+    /// until the scheduler's next turn, however short the frame: a hundred times as long as some. The mean is what counts, so that this is not
+    /// noise, and it is no factor either.
+    pub(super) fn wait_ns(&self, algorithm: usize, frame: u64) -> f64 {
+        let (ns, at) = self.waits[self.algorithms[algorithm].wait];
+        ns / (1.0 + frame.saturating_sub(at) as f64 / WIDTH_FRAMES)
+    }
+
+    /// Takes in that a frame took so many nanoseconds more than any of its kind is expected to, or none.
+    pub(super) fn waited(&mut self, algorithm: usize, ns: f64, frame: u64) {
+        if self.algorithms[algorithm].tallies >= KNOWN {
+            let before = self.wait_ns(algorithm, frame);
+            self.waits[self.algorithms[algorithm].wait] = (before + WAIT_SHARE * (ns - before), frame);
+        }
+    }
+
+    /// Expected natural logarithm of real over predicted time, waits left out.
     pub(super) fn correction_ln(&self, algorithm: usize, view: View) -> f64 {
         let a = &self.algorithms[algorithm];
         self.regime(a, view).0 + view.place.knots().iter().map(|&(k, weight)| weight * a.own[k].mean).sum::<f64>()
@@ -218,6 +252,7 @@ impl Learner {
         }
         self.pass(frame);
         self.observed += 1;
+        self.algorithms[algorithm].tallies = self.algorithms[algorithm].tallies.saturating_add(1);
         // Frames in a row are alike, so that many of them tell less than as many that were far apart.
         let worth = if tally.cold { COLD_WORTH[usize::from(surprise < 0.0)] } else { f64::from(tally.frames).powf(ALIKE) };
         let size = self.mean.len();

@@ -134,8 +134,9 @@ impl Policy {
             let alone_ns = cost.curve.otherwise_of(&counts).unwrap_or(ns).max(ns);
             let predicted = Predicted { ns, calls_ns: cost.curve.calls_of(&counts).min(ns) };
             let factor = learner.map_or(1.0, |l| l.correction_ln(k, View { place, calls: predicted.calls() }).exp());
+            let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));
             self.predicted[k] = predicted;
-            self.expected[k] = Expected { usual_ns: ns * factor, alone_ns: alone_ns * factor };
+            self.expected[k] = Expected { usual_ns: ns * factor + wait_ns, alone_ns: alone_ns * factor + wait_ns };
         }
     }
 
@@ -214,7 +215,8 @@ impl Policy {
         if usual || self.settled != Some(candidate) {
             let dearest_ns = self.prices.anew_ns(candidate, expected);
             self.tally.cold = entered;
-            self.tally.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns);
+            let waited_ns = self.tally.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns);
+            learner.waited(candidate, waited_ns, self.frame);
         }
         if self.tally.is_full() {
             learner.observe(&self.tally, self.frame);

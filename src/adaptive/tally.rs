@@ -61,13 +61,15 @@ impl Tally {
         self.frames > 0 && self.frames >= self.room
     }
 
-    /// Adds a frame, of which no more counts than `dearest_ns` allows.
-    pub(super) fn add(&mut self, ns: f64, predicted: Predicted, log2_objects: f64, dearest_ns: f64) {
+    /// Adds a frame, of which no more counts than `dearest_ns` allows. Gives the rest.
+    pub(super) fn add(&mut self, ns: f64, predicted: Predicted, log2_objects: f64, dearest_ns: f64) -> f64 {
+        let counted = ns.min(MOST_OVER * dearest_ns);
         self.frames += 1;
         self.calls_ns += predicted.calls_ns;
-        self.real_ns += ns.min(MOST_OVER * dearest_ns);
+        self.real_ns += counted;
         self.predicted_ns += predicted.ns;
         self.log2_objects += log2_objects;
+        ns - counted
     }
 
     /// An empty one. Where the candidate is the one of before, it has more room than that.
