@@ -1,14 +1,22 @@
 //! The in-line module: the cheapest algorithm for this frame, chosen before it runs.
 
+#[cfg(feature = "this-machine")]
+pub(crate) mod cache;
+mod candidates;
 mod decision;
 mod glance;
 mod learner;
+#[cfg(feature = "this-machine")]
+mod options;
 mod pace;
 mod policy;
 mod price;
 mod tally;
+#[cfg(feature = "this-machine")]
+mod this_machine;
 
 use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step, Term};
+use candidates::{Candidate, Instance, Made};
 use decision::Choice;
 use glance::Glance;
 use pace::Pace;
@@ -17,6 +25,10 @@ use std::fmt;
 use std::time::Instant;
 
 pub use decision::{Decision, Reason};
+#[cfg(feature = "this-machine")]
+pub use options::{Cache, Options};
+#[cfg(feature = "this-machine")]
+pub use this_machine::{Origin, SaveError, Setup};
 
 /// A runner-up that costs at most this much more than the choice gets its buffers ready: the next border may be near.
 const WARM_WITHIN: f64 = 1.5;
@@ -40,43 +52,9 @@ pub struct Adaptive {
     measured_ns: Option<f64>,
     /// [`decide`](Self::decide) was called for a frame of so many boxes that has not run yet.
     decided: Option<usize>,
-}
-
-struct Candidate {
-    id: AlgorithmId,
-    /// Its position among the instances; `None` once it failed, or where it can't run.
-    instance: Option<usize>,
-}
-
-/// Runs one candidate, or several that differ in their number of threads only and share what they keep from frame to frame.
-struct Instance {
-    algorithm: Box<dyn BroadPhase>,
-    /// Where several share it, on how many threads it runs.
-    threads: Option<u32>,
-    /// Objects that its buffers are ready for.
-    ready: usize,
-}
-
-impl Instance {
-    fn alone(algorithm: Box<dyn BroadPhase>) -> Self {
-        Self { algorithm, threads: None, ready: 0 }
-    }
-
-    fn run(&mut self, id: &AlgorithmId, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        let wanted = id.threads();
-        if self.threads.is_some_and(|threads| threads != wanted) {
-            if !self.algorithm.set_threads(wanted) {
-                return Err(Error::Unavailable {
-                    algorithm: id.clone(),
-                    reason: format!("it can't run on {wanted} threads"),
-                });
-            }
-            self.threads = Some(wanted);
-        }
-        self.algorithm.find_pairs(boxes, pairs)?;
-        self.ready = self.ready.max(boxes.len());
-        Ok(())
-    }
+    /// How it came to its fields.
+    #[cfg(feature = "this-machine")]
+    start: this_machine::Start,
 }
 
 impl Adaptive {
@@ -88,21 +66,31 @@ impl Adaptive {
     /// # Errors
     /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made.
     pub fn new(fields: Fields, registry: &Registry) -> Result<Self, Error> {
-        let Made { candidates, instances, failure } = make(&fields, registry);
-        if instances.is_empty() {
+        let mut made = Made::of(&fields, registry);
+        if made.instances.is_empty() {
             let hint = || "these fields name no algorithm; make them with `sapwise predict`".to_owned();
-            return Err(failure.unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
+            return Err(made
+                .failure
+                .take()
+                .unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
         }
-        Ok(Self {
-            policy: policy(fields, &candidates, &instances),
-            candidates,
-            instances,
+        Ok(Self::with(fields, made))
+    }
+
+    /// Over instances that are there already.
+    fn with(fields: Fields, made: Made) -> Self {
+        Self {
+            policy: policy(fields, &made),
+            candidates: made.candidates,
+            instances: made.instances,
             glance: Glance::default(),
             pace: Pace::default(),
             choice: None,
             measured_ns: None,
             decided: None,
-        })
+            #[cfg(feature = "this-machine")]
+            start: this_machine::Start::default(),
+        }
     }
 
     /// Runs one algorithm always.
@@ -183,7 +171,7 @@ impl Adaptive {
     /// # Errors
     /// As [`new`](Self::new); the algorithms of before stay then.
     pub fn revive(&mut self, registry: &Registry) -> Result<(), Error> {
-        let Made { candidates, instances, failure } = make(self.policy.fields(), registry);
+        let Made { candidates, instances, failure } = Made::of(self.policy.fields(), registry);
         if let (true, Some(error)) = (instances.is_empty(), failure) {
             return Err(error);
         }
@@ -197,10 +185,10 @@ impl Adaptive {
     }
 
     /// Other fields, with an instance of each of their algorithms, take the place of those of before. The estimate of the load stays.
-    #[cfg(all(feature = "measure", feature = "model"))]
-    #[expect(dead_code, reason = "for fields that arrive while frames run already")]
+    #[cfg(feature = "this-machine")]
     fn adopt(&mut self, fields: Fields, made: Made) {
-        self.policy = policy(fields, &made.candidates, &made.instances);
+        let before = std::mem::replace(&mut self.policy, policy(fields, &made));
+        self.policy.set_as(&before);
         (self.candidates, self.instances) = (made.candidates, made.instances);
         self.decided = None;
         self.choice = None;
@@ -222,6 +210,8 @@ impl Adaptive {
 
     /// Estimates the load of the next frame and decides, without running anything.
     pub fn decide(&mut self, boxes: &[Aabb]) -> Option<Decision<'_>> {
+        #[cfg(feature = "this-machine")]
+        self.take_over();
         self.choose(boxes);
         self.decided = Some(boxes.len());
         self.last_decision()
@@ -254,6 +244,10 @@ impl Adaptive {
 impl BroadPhase for Adaptive {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         let decided = self.decided.take() == Some(boxes.len());
+        #[cfg(feature = "this-machine")]
+        if !decided {
+            self.take_over();
+        }
         let started = (decided || self.is_due(boxes)).then(Instant::now);
         if started.is_some() && !decided {
             self.choose(boxes);
@@ -317,60 +311,10 @@ impl fmt::Debug for Adaptive {
     }
 }
 
-/// What runs the algorithms of some fields, and why the last of those that can't run can't.
-struct Made {
-    candidates: Vec<Candidate>,
-    instances: Vec<Instance>,
-    failure: Option<Error>,
-}
-
-fn make(fields: &Fields, registry: &Registry) -> Made {
-    let ids = fields.algorithms();
-    let mut made = Made {
-        candidates: ids.iter().map(|&id| Candidate { id: id.clone(), instance: None }).collect(),
-        instances: Vec::new(),
-        failure: None,
-    };
-    let stale = |id: &AlgorithmId| {
-        let cost = fields.costs.iter().find(|c| c.algorithm == *id);
-        cost.and_then(|c| registry.mismatch(id, c.revision)).map_or(Ok(()), Err)
-    };
-    for (k, &id) in ids.iter().enumerate() {
-        if made.candidates[k].instance.is_some() {
-            continue;
-        }
-        if let Err(why) = stale(id) {
-            made.failure = Some(why);
-            continue;
-        }
-        // Those that differ from it in their number of threads only.
-        let kin = |other: &&AlgorithmId| {
-            other.method() == id.method() && other.backend().class() == id.backend().class() && stale(other).is_ok()
-        };
-        let family: Vec<&AlgorithmId> = ids.iter().copied().filter(kin).collect();
-        if let Some(Ok(algorithm)) = registry.create_for(&family) {
-            for candidate in made.candidates.iter_mut().filter(|c| family.contains(&&c.id)) {
-                candidate.instance = Some(made.instances.len());
-            }
-            // On none of them yet, so that the first frame sets it.
-            made.instances.push(Instance { threads: Some(0), ..Instance::alone(algorithm) });
-            continue;
-        }
-        match registry.create(id) {
-            Ok(algorithm) => {
-                made.candidates[k].instance = Some(made.instances.len());
-                made.instances.push(Instance::alone(algorithm));
-            }
-            Err(why) => made.failure = Some(why),
-        }
-    }
-    made
-}
-
-fn policy(fields: Fields, candidates: &[Candidate], instances: &[Instance]) -> Policy {
-    let kept = |c: &Candidate| c.instance.filter(|&k| instances[k].algorithm.keeps_work());
-    let kept: Vec<Option<usize>> = candidates.iter().map(kept).collect();
-    Policy::new(fields, &kept, candidates.iter().map(|c| c.instance.is_some()).collect())
+fn policy(fields: Fields, made: &Made) -> Policy {
+    let kept = |c: &Candidate| c.instance.filter(|&k| made.instances[k].algorithm.keeps_work());
+    let kept: Vec<Option<usize>> = made.candidates.iter().map(kept).collect();
+    Policy::new(fields, &kept, made.candidates.iter().map(|c| c.instance.is_some()).collect())
 }
 
 fn objects(boxes: &[Aabb]) -> u32 {

@@ -11,7 +11,7 @@ pub(crate) use slice::Slice;
 
 schema_tag!(
     /// `fields/1`.
-    FieldsSchema = "fields/1"
+    pub FieldsSchema = "fields/1"
 );
 
 /// Which algorithm to run under which load, and where that knowledge came from.

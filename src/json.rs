@@ -145,16 +145,17 @@ fn one_line_samples(text: &str) -> String {
     out
 }
 
-/// File names and texts of the JSON Schemas of everything that [`read`] accepts.
+/// File names and texts of the JSON Schemas of everything that [`read`] accepts, and of the files in the cache.
 ///
 /// # Errors
 /// When a schema can't be written.
 #[cfg(feature = "schema")]
-pub fn schemas() -> Result<[(&'static str, String); 3], JsonError> {
-    Ok([
+pub fn schemas() -> Result<Vec<(&'static str, String)>, JsonError> {
+    Ok(vec![
         ("report-1.schema.json", write(&schemars::schema_for!(Report))?),
         ("model-1.schema.json", write(&schemars::schema_for!(Model))?),
         ("fields-1.schema.json", write(&schemars::schema_for!(Fields))?),
+        ("cache-1.schema.json", write(&schemars::schema_for!(crate::adaptive::cache::Cached))?),
     ])
 }
 

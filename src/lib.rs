@@ -25,6 +25,7 @@
 //! - `model`: reports, models and fields as JSON; prediction.
 //! - `measure`: measures the hardware parameters of this machine.
 //! - `measure-gpu`: those of its GPUs too.
+//! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and keeps the fields for the next start.
 //! - `schema`: the JSON Schemas of the files, for tools.
 
 mod aabb;
@@ -62,6 +63,8 @@ mod statistics;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
+#[cfg(feature = "this-machine")]
+pub use adaptive::{Cache, Options, Origin, SaveError, Setup};
 pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
 pub use broad_phase::BroadPhase;
 pub use changes::Changes;
@@ -77,6 +80,9 @@ pub use load::Load;
 pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};
 pub use posterior::{Posterior, Prior};
+/// The version of rayon whose pools this library takes: [`Registry::use_pool`].
+#[cfg(feature = "parallel")]
+pub use rayon;
 pub use registry::{Entry, Registry, usable_cores};
 pub use report::Report;
 pub use scenario::{Scenario, Scene};

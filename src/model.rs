@@ -10,7 +10,7 @@ mod predict;
 mod scale;
 mod validation;
 
-use crate::hardware::GpuKind;
+use crate::hardware::{GpuKind, parameter};
 use crate::schema_tag::schema_tag;
 use crate::{BackendClass, Prior, Term};
 
@@ -25,7 +25,7 @@ pub use validation::{Coverage, Learning, LearningScore, MethodScore, Validation}
 
 schema_tag!(
     /// `model/1`.
-    ModelSchema = "model/1"
+    pub ModelSchema = "model/1"
 );
 
 /// What stands before the name of a GPU's parameter in a [`Range`]: `gpu/upload_rate_gb_per_s`.
@@ -175,6 +175,25 @@ impl Model {
     #[cfg(feature = "model")]
     pub fn built_in() -> Result<Self, crate::json::JsonError> {
         crate::json::model(include_str!("../models/default.json"))
+    }
+
+    /// Names of the hardware parameters that a prediction looks at, those of GPUs aside, each once: for its costs, and to tell
+    /// whether the machine is like those of training.
+    #[must_use]
+    pub fn parameters(&self) -> Vec<&str> {
+        let of_method = |m: &MethodModel| {
+            let scales = m.terms.iter().chain(&m.otherwise).flat_map(|t| t.scale.parameters());
+            let features = m.residual.iter().flat_map(|r| r.feature.parameters());
+            let cache = (m.backend == BackendClass::Cpu).then_some(&parameter::CACHE_LLC_BYTES);
+            scales.chain(features).chain(cache).copied().collect::<Vec<_>>()
+        };
+        let ranges = self.ranges.iter().map(|r| r.parameter.as_str()).filter(|name| !name.starts_with(GPU_PREFIX));
+        let clouds = self.clouds.iter().filter(|c| c.processor == BackendClass::Cpu);
+        let clouds = clouds.flat_map(|c| c.parameters.iter().map(|p| p.name.as_str()));
+        let mut names: Vec<&str> = self.methods.iter().flat_map(of_method).chain(ranges).chain(clouds).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
     }
 
     /// Whether a report behind it is simulated, which makes its predictions no evidence of anything.

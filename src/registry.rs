@@ -54,7 +54,7 @@ impl Registry {
                 registry.entries.push(Entry {
                     id: AlgorithmId::cpu(method.name, threads),
                     revision: method.revision,
-                    unavailable: cpu::unavailable(threads),
+                    unavailable: registry.threads.unavailable(threads),
                 });
                 registry.factories.push(None);
             }
@@ -121,6 +121,46 @@ impl Registry {
         self.threads.pinned = true;
     }
 
+    /// Makes the threads of a program's own pool the helpers of our algorithms on several cores that are made from now on, in
+    /// place of pools of ours. Algorithms on GPUs keep threads of their own, which wait for drivers.
+    ///
+    /// An algorithm on K threads has the calling thread and K - 1 of the pool, so the most is one more than the pool has; beyond that
+    /// it is [unavailable](Entry::unavailable). Called from within the pool (`install`, `scope`, a job), a frame takes no more
+    /// threads than the pool has. Each phase of a frame is a scope of rayon, with rayon's rules: it ends when the pool has come
+    /// to its jobs, so a thread of the pool must not wait for the one that calls, and a caller that is one of them may run
+    /// other jobs of the pool meanwhile. [Pinning](Self::pin_threads) does not apply: where the pool's threads run is the
+    /// program's business. The version of rayon is [the one that this library exports](crate::rayon).
+    ///
+    /// ```
+    /// use sapwise::{Registry, rayon};
+    /// use std::sync::Arc;
+    ///
+    /// let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(3).build()?);
+    /// let mut registry = Registry::with_cores(8);
+    /// registry.use_pool(Arc::clone(&pool));
+    /// let most = registry.available().iter().map(|(id, _)| id.threads()).max();
+    /// assert_eq!(most, Some(4));
+    /// # Ok::<(), rayon::ThreadPoolBuildError>(())
+    /// ```
+    #[cfg(feature = "parallel")]
+    pub fn use_pool(&mut self, pool: std::sync::Arc<rayon::ThreadPool>) {
+        self.threads = Threads::of(pool);
+        let most = self.threads.most().unwrap_or(1);
+        for method in cpu::METHODS {
+            let wider = |e: &Entry| e.id.method() == method.name && matches!(*e.id.backend(), Backend::Cpu(k) if k > most);
+            let id = AlgorithmId::cpu(method.name, most);
+            if let Some(at) = self.entries.iter().position(wider).filter(|_| !self.entries.iter().any(|e| e.id == id)) {
+                self.entries.insert(at, Entry { id, revision: method.revision, unavailable: None });
+                self.factories.insert(at, None);
+            }
+        }
+        for (entry, factory) in self.entries.iter_mut().zip(&self.factories) {
+            if let (&Backend::Cpu(threads), None) = (entry.id.backend(), factory) {
+                entry.unavailable = self.threads.unavailable(threads);
+            }
+        }
+    }
+
     /// Every algorithm, ours first.
     #[must_use]
     pub fn entries(&self) -> &[Entry] {
@@ -131,6 +171,33 @@ impl Registry {
     #[must_use]
     pub fn available(&self) -> Vec<(AlgorithmId, u32)> {
         self.entries.iter().filter(|e| e.unavailable.is_none()).map(|e| (e.id.clone(), e.revision)).collect()
+    }
+
+    /// The SIMD level that algorithms use.
+    #[cfg(feature = "this-machine")]
+    pub(crate) fn simd(&self) -> SimdLevel {
+        self.simd
+    }
+
+    /// Which threads help the calling one, in a word.
+    #[cfg(feature = "this-machine")]
+    pub(crate) fn helpers(&self) -> &'static str {
+        self.threads.kind()
+    }
+
+    /// The GPUs that were added.
+    #[cfg(all(feature = "measure-gpu", feature = "this-machine"))]
+    pub(crate) fn gpus(&self) -> &crate::gpu::Gpus {
+        &self.gpus
+    }
+
+    /// What the GPUs that were added say of themselves.
+    #[cfg(feature = "this-machine")]
+    pub(crate) fn gpu_identities(&self) -> Vec<crate::GpuIdentity> {
+        #[cfg(feature = "gpu")]
+        return self.gpus.identities().cloned().collect();
+        #[cfg(not(feature = "gpu"))]
+        Vec::new()
     }
 
     /// Why a cost of `revision` of an algorithm says nothing here, if it doesn't.
@@ -161,7 +228,7 @@ impl Registry {
         }
         let method = cpu::METHODS.iter().find(|m| m.name == id.method());
         match (method, id.backend()) {
-            (Some(method), &Backend::Cpu(threads)) => match cpu::unavailable(threads) {
+            (Some(method), &Backend::Cpu(threads)) => match self.threads.unavailable(threads) {
                 None => (method.create)(threads, &self.threads, self.simd),
                 Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
             },
@@ -187,7 +254,9 @@ impl Registry {
         for id in ids {
             let replaced = || self.entries.iter().zip(&self.factories).any(|(e, f)| e.id == **id && f.is_some());
             match id.backend() {
-                &Backend::Cpu(k) if id.method() == first.method() && cpu::unavailable(k).is_none() && !replaced() => {
+                &Backend::Cpu(k)
+                    if id.method() == first.method() && self.threads.unavailable(k).is_none() && !replaced() =>
+                {
                     threads.push(k);
                 }
                 _ => return None,

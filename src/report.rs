@@ -5,7 +5,7 @@ use crate::{AlgorithmId, Hardware, Load};
 
 schema_tag!(
     /// `report/1`.
-    ReportSchema = "report/1"
+    pub ReportSchema = "report/1"
 );
 
 /// The hardware parameters of a machine and the raw timings of every algorithm on it.

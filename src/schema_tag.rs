@@ -2,14 +2,14 @@
 
 /// Defines a zero-sized type that is written as one fixed text and refuses to be read from any other.
 macro_rules! schema_tag {
-    ($(#[$doc:meta])* $name:ident = $text:literal) => {
+    ($(#[$doc:meta])* $seen:vis $name:ident = $text:literal) => {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-        pub struct $name;
+        $seen struct $name;
 
         impl $name {
             /// The text in the file.
-            pub const TEXT: &'static str = $text;
+            $seen const TEXT: &'static str = $text;
         }
 
         #[cfg(feature = "model")]

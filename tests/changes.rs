@@ -167,9 +167,9 @@ fn run(order: PairOrder, steps: &[(u32, &str)]) -> (Vec<Output>, BTreeSet<Algori
     for frame in 0..120 {
         // Up to some 900 boxes and down again, through every border.
         if frame < 60 {
-            world.frame(20, 5)
+            world.frame(20, 5);
         } else {
-            world.frame(3, 18)
+            world.frame(3, 18);
         }
         pairs.filter_mut().unwrap().memberships.clone_from(&world.memberships);
         adaptive.find_pairs(&world.boxes, &mut pairs).unwrap();

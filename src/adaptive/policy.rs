@@ -84,6 +84,12 @@ impl Policy {
         self.explores = explores;
     }
 
+    /// Learns and explores if that one does.
+    #[cfg(feature = "this-machine")]
+    pub(super) fn set_as(&mut self, other: &Self) {
+        (self.learns, self.explores) = (other.learns, other.explores);
+    }
+
     /// The learner, once it has observed something.
     pub(super) fn learned(&self) -> Option<&Learner> {
         self.learner.as_ref().filter(|l| l.observed() > 0)

@@ -47,8 +47,3 @@ pub(crate) const METHODS: &[Method] = &[
     Method { name: "strips", revision: 2, create: strips::create, create_for: None },
     Method { name: "verlet", revision: 1, create: verlet::create, create_for: Some(verlet::create_for) },
 ];
-
-/// Why `threads` threads can't be used in this build, if they can't.
-pub(crate) fn unavailable(threads: u32) -> Option<String> {
-    (threads > 1 && !cfg!(feature = "parallel")).then(|| "built without the feature `parallel`".to_owned())
-}

@@ -77,10 +77,10 @@ impl Workers {
                 drain();
                 done.fetch_add(1, Ordering::Release);
             };
-            return helpers.run(self.threads - 1, helper, || {
+            return helpers.run(self.threads - 1, helper, |helping| {
                 drain();
                 let mut spins = 0;
-                while done.load(Ordering::Acquire) + 1 < self.threads && spins < SPINS {
+                while done.load(Ordering::Acquire) < helping && spins < SPINS {
                     std::hint::spin_loop();
                     spins += 1;
                 }

@@ -1,10 +1,10 @@
-//! The GPUs of this machine: found, numbered, opened once and shared.
+//! The GPUs of this machine, found or given by the program: numbered, opened once and shared.
 
 use super::device::Gpu;
 use crate::hardware::{GpuIdentity, GpuKind};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The GPUs that were found, in the order of their numbers. A GPU is opened once for all clones.
+/// The GPUs that were found or given, in the order of their numbers. A GPU is opened once for all clones.
 #[derive(Debug, Clone, Default)]
 pub struct Gpus {
     found: Vec<Arc<Found>>,
@@ -13,7 +13,8 @@ pub struct Gpus {
 #[derive(Debug)]
 struct Found {
     identity: GpuIdentity,
-    adapter: wgpu::Adapter,
+    /// `None` of a GPU that the program opened itself.
+    adapter: Option<wgpu::Adapter>,
     opened: Mutex<Option<Result<Gpu, String>>>,
 }
 
@@ -38,9 +39,36 @@ impl Gpus {
             infos.iter().cloned().zip(adapters).enumerate().filter(|(k, _)| keep(*k)).map(|(_, found)| found).collect();
         adapters.sort_by_key(|(info, _)| kind(info.device_type));
         let found = adapters.into_iter().enumerate().map(|(k, (info, adapter))| {
-            Arc::new(Found { identity: identity(k as u32, &info), adapter, opened: Mutex::new(None) })
+            Arc::new(Found { identity: GpuIdentity::of(k as u32, &info), adapter: Some(adapter), opened: Mutex::new(None) })
         });
         Self { found: found.collect() }
+    }
+
+    /// GPUs that the program has opened itself, under the numbers of their identities: algorithms work on its devices and
+    /// queues. Of two with one number the first is taken.
+    ///
+    /// ```no_run
+    /// use sapwise::gpu::{Gpu, Gpus, wgpu};
+    /// use sapwise::{GpuIdentity, Registry};
+    ///
+    /// fn registry(device: &wgpu::Device, queue: &wgpu::Queue) -> Registry {
+    ///     let identity = GpuIdentity::of(0, &device.adapter_info());
+    ///     let mut registry = Registry::new();
+    ///     registry.add_gpus(&Gpus::of([Gpu::from_parts(device.clone(), queue.clone(), identity)]));
+    ///     registry
+    /// }
+    /// ```
+    #[must_use]
+    pub fn of(gpus: impl IntoIterator<Item = Gpu>) -> Self {
+        let mut found: Vec<Arc<Found>> = Vec::new();
+        for gpu in gpus {
+            let identity = gpu.identity().clone();
+            if !found.iter().any(|f| f.identity.index == identity.index) {
+                found.push(Arc::new(Found { identity, adapter: None, opened: Mutex::new(Some(Ok(gpu))) }));
+            }
+        }
+        found.sort_by_key(|f| f.identity.index);
+        Self { found }
     }
 
     /// No GPU at all, without looking.
@@ -81,10 +109,10 @@ impl Gpus {
         self.found.is_empty()
     }
 
-    /// The adapter of a number, for queries beyond what [`GpuIdentity`] says.
+    /// The adapter of a number, for queries beyond what [`GpuIdentity`] says; `None` of a GPU that the program opened itself.
     #[must_use]
     pub fn adapter(&self, index: u32) -> Option<&wgpu::Adapter> {
-        self.found(index).map(|f| &f.adapter)
+        self.found(index)?.adapter.as_ref()
     }
 
     /// Opens a GPU, or gives the one that is open already.
@@ -105,16 +133,40 @@ impl Gpus {
         };
         // A panic in a driver while the lock was held leaves the slot as it was.
         let mut slot = found.opened.lock().unwrap_or_else(PoisonError::into_inner);
-        slot.get_or_insert_with(|| Gpu::open(&found.adapter, found.identity.clone())).clone()
+        slot.get_or_insert_with(|| found.open()).clone()
     }
 
     /// Opens a GPU a second time, with a queue and memory of its own.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// As [`open`](Self::open), and of a GPU that the program opened itself.
     pub fn open_another(&self, index: u32) -> Result<Gpu, String> {
-        let found = self.found(index).ok_or_else(|| format!("there is no gpu{index}"))?;
-        Gpu::open(&found.adapter, found.identity.clone())
+        self.found(index).ok_or_else(|| format!("there is no gpu{index}"))?.open()
+    }
+}
+
+impl Found {
+    fn open(&self) -> Result<Gpu, String> {
+        let Some(adapter) = &self.adapter else {
+            return Err(format!("gpu{} is the program's own device, which can't be opened anew", self.identity.index));
+        };
+        Gpu::open(adapter, self.identity.clone())
+    }
+}
+
+impl GpuIdentity {
+    /// What wgpu says of an adapter, as the GPU of a number. `wgpu::Device::adapter_info` has it of an open device.
+    #[must_use]
+    pub fn of(index: u32, info: &wgpu::AdapterInfo) -> Self {
+        let driver = format!("{} {}", info.driver, info.driver_info);
+        Self {
+            index,
+            name: info.name.clone(),
+            device: format!("{:04x}:{:04x}", info.vendor, info.device),
+            driver: driver.trim().to_owned(),
+            api: info.backend.to_str().to_owned(),
+            kind: kind(info.device_type),
+        }
     }
 }
 
@@ -136,18 +188,6 @@ fn kind(device_type: wgpu::DeviceType) -> GpuKind {
         wgpu::DeviceType::VirtualGpu => GpuKind::Virtual,
         wgpu::DeviceType::Cpu => GpuKind::Software,
         wgpu::DeviceType::Other => GpuKind::Other,
-    }
-}
-
-fn identity(index: u32, info: &wgpu::AdapterInfo) -> GpuIdentity {
-    let driver = format!("{} {}", info.driver, info.driver_info);
-    GpuIdentity {
-        index,
-        name: info.name.clone(),
-        device: format!("{:04x}:{:04x}", info.vendor, info.device),
-        driver: driver.trim().to_owned(),
-        api: info.backend.to_str().to_owned(),
-        kind: kind(info.device_type),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Bounds that no machine lies beyond: a figure outside is in another unit, or nonsense.
 
+#[cfg(feature = "this-machine")]
+use super::Parameter;
 use super::{GpuHardware, Hardware, gpu, parameter};
 
 /// A parameter's lowest and highest plausible value, and why.
@@ -71,6 +73,21 @@ impl Hardware {
     #[must_use]
     pub fn implausible(&self) -> Option<String> {
         OF_MACHINE.iter().find_map(|bounds| outside(bounds, "", self.value(bounds.0)))
+    }
+
+    /// Takes out every figure of the machine, GPUs aside, that no machine has: too few samples on a machine that was busy. A
+    /// sentence on each, which stands in its place too.
+    #[cfg(feature = "this-machine")]
+    pub(crate) fn drop_implausible(&mut self) -> Vec<String> {
+        let mut told = Vec::new();
+        for bounds in &OF_MACHINE {
+            if let Some(why) = outside(bounds, "", self.value(bounds.0)) {
+                let figures = self.parameters.iter_mut().filter(|p| p.name == bounds.0);
+                figures.for_each(|p| *p = Parameter::missing(bounds.0, &why));
+                told.push(why);
+            }
+        }
+        told
     }
 }
 

@@ -6,7 +6,7 @@ use std::cell::Cell;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use super::{Options, foreign_load, memory};
+use super::{Options, UNDER_LIMIT, foreign_load, memory};
 use crate::hardware::{Parameter, parameter};
 
 /// Bytes up to which a set is walked once, untimed, before its samples. A lap of a larger one takes longer than its samples.
@@ -136,6 +136,9 @@ fn latencies(options: &Options) -> Vec<Parameter> {
         }
         if options.brief && kib > BRIEF_KIB {
             return Parameter::missing(&name, "left out of a brief run");
+        }
+        if options.limit.is_some() {
+            return Parameter::missing(&name, UNDER_LIMIT);
         }
         let Some(lines) = lines(bytes as usize / size_of::<Line<'_>>()) else {
             return Parameter::missing(&name, "no memory for the working set");

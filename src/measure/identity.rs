@@ -36,7 +36,7 @@ fn physical_id(cpu: &Cpu, llc_bytes: u64) -> String {
 }
 
 /// FNV-1a, 64 bits. Written out because ids must stay the same in every release, and `std`'s hasher promises nothing.
-fn fnv1a(text: &str) -> u64 {
+pub(crate) fn fnv1a(text: &str) -> u64 {
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 

@@ -16,6 +16,9 @@ const BYTES_PER_ELEMENT: u64 = 24;
 /// The most that one array takes. First touch of more would take longer than the measurement.
 const LARGEST_ARRAY_BYTES: u64 = 512 << 20;
 
+/// The same in a run with a limit of time.
+const LARGEST_UNDER_LIMIT_BYTES: u64 = 128 << 20;
+
 /// Elements that a thread takes at a time.
 const CHUNK: usize = 65_536;
 
@@ -59,9 +62,9 @@ fn parse_mem_total(text: &str) -> Option<u64> {
 /// Bytes of one array, and what to say of how they were chosen.
 ///
 /// STREAM asks for four times the sum of the last-level caches; less measures the caches too.
-fn array_bytes(llc: Option<u64>, memory: Option<u64>) -> (u64, String) {
+fn array_bytes(llc: Option<u64>, memory: Option<u64>, largest: u64) -> (u64, String) {
     let wanted = llc.unwrap_or(ASSUMED_LLC_BYTES).saturating_mul(4);
-    let cap = LARGEST_ARRAY_BYTES.min(memory.map_or(LARGEST_ARRAY_BYTES, |bytes| bytes / 24));
+    let cap = largest.min(memory.map_or(largest, |bytes| bytes / 24));
     let bytes = wanted.min(cap);
     let of = if llc.is_some() { "the last-level caches" } else { "an assumed last-level cache of 64 MiB" };
     let mib = bytes >> 20;
@@ -83,7 +86,8 @@ fn triad(options: &Options) -> Result<Vec<Parameter>, String> {
     let (array_bytes, array_choice) = if options.brief {
         (4 << 20, "three arrays of 4 MiB, brief run".to_owned())
     } else {
-        array_bytes(llc, total().map(|(bytes, _)| bytes))
+        let largest = if options.limit.is_some() { LARGEST_UNDER_LIMIT_BYTES } else { LARGEST_ARRAY_BYTES };
+        array_bytes(llc, total().map(|(bytes, _)| bytes), largest)
     };
     let pool = pool(threads)?;
     let mut arrays = Arrays::new(&pool, array_bytes as usize / size_of::<f64>()).ok_or("no memory for the arrays")?;
@@ -245,14 +249,15 @@ mod tests {
     fn array_sizes() {
         let (mib, gib) = (1_u64 << 20, 1_u64 << 30);
         assert_eq!(
-            array_bytes(Some(32 * mib), Some(24 * gib)),
+            array_bytes(Some(32 * mib), Some(24 * gib), LARGEST_ARRAY_BYTES),
             (128 * mib, "three arrays of 128 MiB, four times the last-level caches".to_owned())
         );
-        assert_eq!(array_bytes(Some(256 * mib), Some(256 * gib)).0, 512 * mib);
+        assert_eq!(array_bytes(Some(256 * mib), Some(256 * gib), LARGEST_ARRAY_BYTES).0, 512 * mib);
+        assert_eq!(array_bytes(Some(256 * mib), Some(256 * gib), LARGEST_UNDER_LIMIT_BYTES).0, 128 * mib);
         // An eighth of a small memory for all three.
-        assert_eq!(array_bytes(Some(32 * mib), Some(240 * mib)).0, 10 * mib);
-        assert_eq!(array_bytes(None, None).0, 256 * mib);
-        assert!(array_bytes(Some(u64::MAX), None).1.contains("capped"));
+        assert_eq!(array_bytes(Some(32 * mib), Some(240 * mib), LARGEST_ARRAY_BYTES).0, 10 * mib);
+        assert_eq!(array_bytes(None, None, LARGEST_ARRAY_BYTES).0, 256 * mib);
+        assert!(array_bytes(Some(u64::MAX), None, LARGEST_ARRAY_BYTES).1.contains("capped"));
     }
 
     #[test]

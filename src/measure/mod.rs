@@ -20,7 +20,7 @@ mod topology;
 
 use std::fmt;
 use std::str::FromStr;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
 
@@ -31,6 +31,8 @@ pub use core_to_core::core_to_core_ns;
 pub use foreign_load::Watch;
 #[cfg(feature = "measure-gpu")]
 pub use gpu::{gpu, gpu_group};
+#[cfg(feature = "this-machine")]
+pub(crate) use identity::fnv1a;
 
 /// Median, quantiles and dispersion, as the figures of a parameter follow from its samples.
 pub mod statistics {
@@ -126,6 +128,9 @@ impl FromStr for Family {
     }
 }
 
+/// Why a parameter is missing that no cost model reads.
+const UNDER_LIMIT: &str = "left out of a run with a limit of time";
+
 /// What to measure with.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Options {
@@ -133,15 +138,23 @@ pub struct Options {
     pub threads: Option<u32>,
     /// Stops after a few samples of small working sets. For tests: the figures are not fit for a report.
     pub brief: bool,
+    /// Takes no longer than this, a sample more or less, for a program that starts and has no time for a report: for one
+    /// family, for all together, or for one GPU, as the function that is called measures. Load latencies and what no cost model
+    /// reads of a GPU are left out then. `None` takes as long as a report needs.
+    pub limit: Option<Duration>,
 }
 
 impl Options {
     fn plan(&self, samples: usize, limit_ms: u64) -> Plan {
-        if self.brief {
-            Plan { samples: 4, limit: Duration::from_millis(limit_ms / 20) }
-        } else {
-            Plan { samples, limit: Duration::from_millis(limit_ms) }
-        }
+        let (samples, ms) = if self.brief { (4, limit_ms / 20) } else { (samples, limit_ms) };
+        let limit = Duration::from_millis(ms);
+        Plan { samples, limit: self.limit.map_or(limit, |at_most| limit.min(at_most)) }
+    }
+
+    /// The same with an equal share of the time that is left, where there is a limit, for each of `parts` parts.
+    fn share(&self, began: Instant, parts: usize) -> Self {
+        let left = |limit: Duration| limit.saturating_sub(began.elapsed()) / u32::try_from(parts).unwrap_or(u32::MAX).max(1);
+        Self { limit: self.limit.map(left), ..self.clone() }
     }
 
     /// Threads that may run at once, at least 1.
@@ -178,7 +191,27 @@ pub fn machine() -> Machine {
 /// Measures every family in this process.
 #[must_use]
 pub fn hardware(options: &Options) -> Hardware {
-    assemble(machine(), Family::ALL.into_iter().flat_map(|f| family(f, options)).collect())
+    families(Family::ALL.to_vec(), options)
+}
+
+/// Measures those families in this process that hold one of these parameters; those of the others are missing.
+///
+/// [`Model::parameters`](crate::Model::parameters) has the names that a prediction needs.
+#[must_use]
+pub fn hardware_for(parameters: &[&str], options: &Options) -> Hardware {
+    let holds = |family: &Family| family.parameters().iter().any(|name| parameters.contains(&name.as_str()));
+    families(Family::ALL.into_iter().filter(holds).collect(), options)
+}
+
+fn families(mut wanted: Vec<Family>, options: &Options) -> Hardware {
+    let began = Instant::now();
+    if options.limit.is_some() {
+        // To fill its arrays takes a time that can't be shortened, and what the others leave of theirs it gets.
+        wanted.sort_by_key(|&family| family == Family::Memory);
+    }
+    let count = wanted.len();
+    let measured = wanted.into_iter().enumerate().flat_map(|(k, f)| family(f, &options.share(began, count - k)));
+    assemble(machine(), measured.collect())
 }
 
 /// Puts parameters, in any order, into the order of a report: every name of [`parameter::all_names`] once.

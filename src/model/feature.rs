@@ -42,6 +42,15 @@ impl Feature {
         Self::of(class).contains(&self)
     }
 
+    /// The hardware parameters that it looks at.
+    #[must_use]
+    pub fn parameters(self) -> &'static [&'static str] {
+        match self {
+            Self::Log2Lanes => &[parameter::SIMD_LANES],
+            Self::Log2Objects | Self::Log2ObjectsSquared | Self::Log2Threads | Self::Log2ObjectsTimesThreads => &[],
+        }
+    }
+
     /// The feature of an algorithm on a backend of a machine under a load.
     ///
     /// # Errors

@@ -61,6 +61,40 @@ impl Scale {
         }
     }
 
+    /// The hardware parameters of the machine that [`nanoseconds`](Self::nanoseconds) looks at; none of a scale of GPUs, whose
+    /// parameters are those of the GPU.
+    #[must_use]
+    pub fn parameters(self) -> &'static [&'static str] {
+        use parameter as p;
+        match self {
+            Self::Cycle => &[p::CLOCK_MEASURED_GHZ, p::CLOCK_REPORTED_GHZ],
+            Self::SharedCycle => &[
+                p::CLOCK_MEASURED_GHZ,
+                p::CLOCK_REPORTED_GHZ,
+                p::USABLE_CORES,
+                p::SCALING_TWO_THREADS_RATIO,
+                p::SCALING_ALL_THREADS_RATIO,
+            ],
+            Self::SharedLane => &[
+                p::CLOCK_MEASURED_GHZ,
+                p::CLOCK_REPORTED_GHZ,
+                p::USABLE_CORES,
+                p::SCALING_TWO_THREADS_RATIO,
+                p::SCALING_ALL_THREADS_RATIO,
+                p::SIMD_LANES,
+            ],
+            Self::Byte => &[p::BANDWIDTH_ONE_THREAD_GB_PER_S, p::BANDWIDTH_ALL_THREADS_GB_PER_S],
+            Self::ForkJoin => &[p::FORK_JOIN_COLD_NS],
+            Self::SharedLine => &[p::CORE_TO_CORE_NS, p::FORK_JOIN_WARM_NS],
+            Self::GpuRoundTrip
+            | Self::GpuDispatch
+            | Self::GpuUploadByte
+            | Self::GpuDownloadByte
+            | Self::GpuMemoryByte
+            | Self::GpuOperation => &[],
+        }
+    }
+
     /// Nanoseconds that one unit takes on a backend of a machine.
     ///
     /// # Errors

@@ -193,3 +193,55 @@ fn a_prior_that_can_not_be_is_a_defect_and_none_is_not() {
     wrong.cpu.length_octaves = f64::NAN;
     assert!(with(Some(wrong)).is_some_and(|d| d.contains("prior of the CPU")));
 }
+
+/// What a scale reads: with those parameters alone it has a value for any number of threads, and without any it has none for several.
+#[test]
+fn the_parameters_of_a_scale_are_those_that_it_reads() {
+    // Four cores of which two threads use one and a half, so that every figure shows in some number of threads.
+    let figure = |name: &str| match name {
+        parameter::USABLE_CORES => 4.0,
+        parameter::SCALING_TWO_THREADS_RATIO => 1.5,
+        parameter::BANDWIDTH_ALL_THREADS_GB_PER_S => 5.0,
+        _ => 2.0,
+    };
+    let with = |names: &[&str]| {
+        let parameters = names.iter().map(|name| Parameter::reported(name, figure(name), "test")).collect();
+        Hardware { parameters, gpus: Vec::new(), ..hardware() }
+    };
+    let of_cpu = [Scale::Cycle, Scale::SharedCycle, Scale::SharedLane, Scale::Byte, Scale::ForkJoin, Scale::SharedLine];
+    for scale in of_cpu {
+        for threads in [1, 2, 3, 8] {
+            let ns = scale.nanoseconds(&with(scale.parameters()), &Backend::Cpu(threads));
+            assert!(ns.is_ok(), "{scale:?} on {threads}: {ns:?}");
+        }
+        assert!(scale.nanoseconds(&with(&[]), &Backend::Cpu(2)).is_err());
+        for name in scale.parameters() {
+            // What stands in for the first shows where that one is absent.
+            let shows = |names: &[&str]| {
+                let mut other = with(names);
+                other.parameters.iter_mut().filter(|p| p.name == *name).for_each(|p| p.value = p.value.map(|v| 1.5 * v));
+                let on = |hardware: &Hardware, threads| scale.nanoseconds(hardware, &Backend::Cpu(threads));
+                [1, 2, 3, 8].into_iter().any(|k| on(&other, k) != on(&with(names), k))
+            };
+            assert!(shows(scale.parameters()) || shows(&scale.parameters()[1..]), "{scale:?} does not read {name}");
+        }
+    }
+}
+
+#[cfg(feature = "model")]
+#[test]
+fn the_built_in_model_predicts_from_the_parameters_that_it_names() {
+    let model = Model::built_in().unwrap();
+    let names = model.parameters();
+    assert!(names.is_sorted_by(|a, b| a < b) && !names.iter().any(|name| name.contains('/')), "{names:?}");
+    let figure = |name: &&str| match *name {
+        parameter::CACHE_LLC_BYTES => Parameter::reported(name, 33_554_432.0, "test"),
+        parameter::FORK_JOIN_COLD_NS => Parameter::reported(name, 5000.0, "test"),
+        _ => Parameter::reported(name, 4.0, "test"),
+    };
+    let all = Hardware { parameters: names.iter().map(figure).collect(), gpus: Vec::new(), ..hardware() };
+    let algorithms: Vec<(AlgorithmId, u32)> =
+        crate::Registry::with_cores(4).entries().iter().map(|e| (e.id.clone(), e.revision)).collect();
+    let prediction = model.predict(&all, &algorithms).unwrap();
+    assert_eq!(prediction.costs.len(), algorithms.len(), "{:?}", prediction.warnings);
+}

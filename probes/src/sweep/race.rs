@@ -80,7 +80,7 @@ impl Race {
             naive: Pairs::new(),
             turns: Turns::new(seed),
             displacement: Displacement::default(),
-            cores: Options { threads: Some(cores), brief: false },
+            cores: Options { threads: Some(cores), ..Options::default() },
             contended,
         }
     }

@@ -22,6 +22,9 @@ const MOST_GROUPS: u32 = 2048;
 
 pub(super) fn measure(bench: &Bench<'_>) -> Vec<Parameter> {
     let mut parameters = or_missing(&[p::ARITHMETIC_GFLOP_PER_S], arithmetic(bench));
+    if bench.options.limit.is_some() {
+        return parameters;
+    }
     parameters.extend(or_missing(&[p::ATOMIC_G_PER_S], atomics(bench)));
     parameters.extend(or_missing(&[p::PARALLEL_UNITS], units(bench)));
     parameters

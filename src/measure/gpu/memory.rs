@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::bench::{Bench, Bound, Kernel, calibrate, or_missing, per_ns};
 use crate::hardware::Parameter;
 use crate::hardware::gpu::parameter as p;
+use crate::measure::UNDER_LIMIT;
 
 const SOURCE: &str = include_str!("shaders/memory.wgsl");
 
@@ -96,7 +97,9 @@ fn bandwidths(bench: &Bench<'_>, free_bytes: Option<u64>) -> Result<Vec<Paramete
 
 /// A working set, or why it is left out.
 fn set(bytes: u64, largest: u64, bench: &Bench<'_>) -> Result<u64, String> {
-    if bytes <= largest {
+    if bench.options.limit.is_some() {
+        Err(UNDER_LIMIT.to_owned())
+    } else if bytes <= largest {
         Ok(bytes)
     } else if bench.options.brief {
         Err("left out of a brief run".to_owned())

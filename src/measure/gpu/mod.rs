@@ -19,7 +19,7 @@ mod transfer;
 
 use std::time::{Duration, Instant};
 
-use super::Options;
+use super::{Options, UNDER_LIMIT};
 use crate::gpu::{Gpu, Gpus};
 use crate::hardware::gpu::parameter;
 use crate::hardware::{GpuGroup, GpuHardware, Parameter};
@@ -30,28 +30,36 @@ const WARM_UP: Duration = Duration::from_millis(50);
 
 /// Measures one GPU: each name of [`parameter::all_names`] once, measured, reported or missing with a reason.
 ///
-/// The GPU is opened anew, so that memory and submissions of the caller don't stand in the way. [`Options::threads`] has no
-/// effect.
+/// The GPU is opened anew, so that memory and submissions of the caller don't stand in the way; but one that the program
+/// opened itself ([`Gpus::of`]) is measured as it is, and what else it does meanwhile makes it look slower. [`Options::threads`] has
+/// no effect. With [`Options::limit`] only what a cost model reads is measured.
 ///
 /// # Errors
 /// A sentence, when there is no such GPU or its driver refuses to open it.
 pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, String> {
-    let opened = gpus.open_another(index)?;
-    let adapter = gpus.adapter(index).ok_or_else(|| format!("there is no gpu{index}"))?;
+    let began = Instant::now();
+    let (opened, raw) = match gpus.adapter(index) {
+        Some(adapter) => (gpus.open_another(index)?, raw::query(adapter)),
+        None => (gpus.open(index)?, raw::Raw::default()),
+    };
+    let whole = options.limit.is_none();
     let bench = Bench::new(&opened, options);
-    let raw = raw::query(adapter);
     if !bench.is_software() {
         // A failure shows in what is measured next.
         let _ = warm_up(&bench);
     }
-    let mut measured = transfer::measure(&bench);
-    measured.extend(memory::measure(&bench, raw.free_bytes()));
-    measured.extend(latency::measure(&bench));
-    measured.extend(compute::measure(&bench));
-    measured.extend(properties::measure(&bench, adapter, &raw));
+    // Arithmetic is the shortest part and takes what the others leave.
+    let mut measured = transfer::measure(&Bench::new(&opened, &options.share(began, 4)));
+    measured.extend(memory::measure(&Bench::new(&opened, &options.share(began, 3)), raw.free_bytes()));
+    measured.extend(latency::measure(&Bench::new(&opened, &options.share(began, 2))));
+    measured.extend(compute::measure(&Bench::new(&opened, &options.share(began, 1))));
+    if whole {
+        measured.extend(properties::measure(&bench, &raw));
+    }
+    let absent = if whole { "not measured" } else { UNDER_LIMIT };
     let find = |name: String| {
         let found = measured.iter().find(|p| p.name == name).cloned();
-        found.unwrap_or_else(|| Parameter::missing(&name, "not measured"))
+        found.unwrap_or_else(|| Parameter::missing(&name, absent))
     };
     let parameters = parameter::all_names().into_iter().map(find).collect();
     Ok(GpuHardware { gpu: opened.identity().clone(), parameters })

@@ -16,8 +16,8 @@ const NVIDIA: u32 = 0x10de;
 const INTEL: u32 = 0x8086;
 const APPLE: u32 = 0x106b;
 
-pub(super) fn measure(bench: &Bench<'_>, adapter: &wgpu::Adapter, raw: &Raw) -> Vec<Parameter> {
-    let info = adapter.get_info();
+pub(super) fn measure(bench: &Bench<'_>, raw: &Raw) -> Vec<Parameter> {
+    let info = bench.gpu.device().adapter_info();
     let (nvml, sysfs, clock) = if bench.is_software() { (None, None, None) } else { ask(bench, &info) };
     let mut parameters = limits(bench);
     parameters.push(memory(bench, raw, nvml.as_ref(), sysfs.as_ref()));

@@ -1,0 +1,168 @@
+//! Fields kept from one start of a program to the next.
+//!
+//! A file for each [`Key`]. It is written beside its place and renamed, so that two processes at once leave one whole file; what
+//! was cut off by a crash of the machine can't be read and is replaced.
+
+use super::options::Cache;
+use crate::measure::{fnv1a, machine};
+use crate::schema_tag::schema_tag;
+use crate::{AlgorithmId, Fields, GpuIdentity, Machine, Model, Registry, json, usable_cores};
+use etcetera::BaseStrategy;
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+schema_tag!(
+    /// `cache/1`.
+    CacheSchema = "cache/1"
+);
+
+/// A file that is longer was written by something else.
+const LONGEST_BYTES: u64 = 16 << 20;
+
+/// The file.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub(crate) struct Cached {
+    /// Always `cache/1`.
+    schema: CacheSchema,
+    /// What the fields hold for.
+    key: Key,
+    /// The fields, predicted or learned.
+    fields: Fields,
+}
+
+/// All that fields depend on, in plain words. Names no host, no user and no single piece of hardware.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub(super) struct Key {
+    /// Version of this library.
+    version: String,
+    /// The machine; its SIMD level is the one that the algorithms use.
+    machine: Machine,
+    /// Cores that this process may use.
+    usable_cores: u32,
+    /// Which threads help the calling one: `pinned`, `free`, or `given` by the program.
+    helpers: String,
+    /// The algorithms that can run.
+    algorithms: Vec<Known>,
+    /// The GPUs that they run on, with their drivers.
+    gpus: Vec<GpuIdentity>,
+    /// Name of the model.
+    model: String,
+    /// FNV-1a of its file, as 16 hex digits.
+    model_hash: String,
+}
+
+/// An algorithm that can run.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+struct Known {
+    /// The algorithm.
+    algorithm: AlgorithmId,
+    /// Its revision.
+    revision: u32,
+}
+
+impl Key {
+    pub(super) fn new(registry: &Registry, model: &Model) -> Result<Self, json::JsonError> {
+        let known = |(algorithm, revision)| Known { algorithm, revision };
+        Ok(Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            machine: Machine { simd: registry.simd().to_string(), ..machine() },
+            usable_cores: usable_cores(),
+            helpers: registry.helpers().to_owned(),
+            algorithms: registry.available().into_iter().map(known).collect(),
+            gpus: registry.gpu_identities(),
+            model: model.name.clone(),
+            model_hash: format!("{:016x}", fnv1a(&json::write_model(model)?)),
+        })
+    }
+}
+
+/// The place of one key.
+#[derive(Debug)]
+pub(super) struct Entry {
+    key: Key,
+    file: PathBuf,
+}
+
+impl Entry {
+    /// The place of a key; `None` where nothing is to be kept.
+    ///
+    /// # Errors
+    /// A sentence, when the user has no cache folder.
+    pub(super) fn new(cache: &Cache, key: Key) -> Result<Option<Self>, String> {
+        let folder = match cache {
+            Cache::None => return Ok(None),
+            Cache::Folder(folder) => folder.clone(),
+            Cache::User => etcetera::base_strategy::choose_native_strategy()
+                .map_err(|e| format!("the user has no cache folder ({e}); name one with `Cache::Folder`"))?
+                .cache_dir()
+                .join("sapwise"),
+        };
+        let text = serde_json::to_string(&key).map_err(|e| e.to_string())?;
+        let file = folder.join(format!("fields-{:016x}.json", fnv1a(&text)));
+        Ok(Some(Self { key, file }))
+    }
+
+    pub(super) fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// The fields that are kept; `None` where there are none.
+    ///
+    /// # Errors
+    /// A sentence that says why what is there can't be used.
+    pub(super) fn read(&self) -> Result<Option<Fields>, String> {
+        let ignored = |why: &str| format!("{} is ignored and replaced: {why}", self.file.display());
+        match fs::metadata(&self.file) {
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(ignored(&e.to_string())),
+            // To open a pipe would wait for whoever writes to it.
+            Ok(found) if !found.is_file() => return Err(ignored("it is no file")),
+            Ok(found) if found.len() > LONGEST_BYTES => return Err(ignored("it is too long")),
+            Ok(_) => {}
+        }
+        let text = fs::read_to_string(&self.file).map_err(|e| ignored(&e.to_string()))?;
+        let cached: Cached = serde_json::from_str(&text).map_err(|e| ignored(&e.to_string()))?;
+        if cached.key != self.key {
+            return Err(ignored("it is of another machine, another build or another model"));
+        }
+        match cached.fields.defect() {
+            Some(defect) => Err(ignored(&defect)),
+            None => Ok(Some(cached.fields)),
+        }
+    }
+
+    /// Keeps fields in place of those that are there.
+    ///
+    /// # Errors
+    /// A sentence that says why they can't be kept.
+    pub(super) fn write(&self, fields: Fields) -> Result<(), String> {
+        let cached = Cached { schema: CacheSchema, key: self.key.clone(), fields };
+        let text = json::write(&cached).map_err(|e| e.to_string())?;
+        self.replace(&text).map_err(|e| format!("{} can't be written: {e}", self.file.display()))
+    }
+
+    fn replace(&self, text: &str) -> std::io::Result<()> {
+        let folder = self.file.parent().unwrap_or(Path::new("."));
+        fs::create_dir_all(folder)?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".sapwise-").suffix(".tmp");
+        // Private otherwise, where every other program's files follow the umask.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let mut temporary = builder.tempfile_in(folder)?;
+        // Not forced to the disk, which may take longer than measuring anew what a crash of the machine cuts off.
+        temporary.write_all(text.as_bytes())?;
+        temporary.persist(&self.file).map_err(|failed| failed.error)?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

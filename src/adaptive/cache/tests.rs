@@ -1,0 +1,141 @@
+use super::*;
+use crate::Step;
+
+/// Fields that tell which writer they are of.
+fn fields(writer: u32) -> Fields {
+    let step = |from_objects| Step { from_objects, algorithm: AlgorithmId::cpu("brute", 1) };
+    Fields::from_steps(std::iter::once(0).chain(1_000 * writer + 1..1_000 * writer + 200).map(step).collect()).unwrap()
+}
+
+fn key() -> Key {
+    Key::new(&Registry::with_cores(2), &Model::built_in().unwrap()).unwrap()
+}
+
+fn entry(folder: &Path, key: Key) -> Entry {
+    Entry::new(&Cache::Folder(folder.to_owned()), key).unwrap().unwrap()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+}
+
+#[test]
+fn what_is_kept_comes_back_and_nothing_else_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    // A folder that is not there yet.
+    let inner = folder.path().join("a").join("b");
+    let entry = entry(&inner, key());
+    assert_eq!(entry.read(), Ok(None));
+    for writer in [1, 2] {
+        entry.write(fields(writer)).unwrap();
+        assert_eq!(entry.read(), Ok(Some(fields(writer))));
+    }
+    assert_eq!(names(&inner), [entry.file().file_name().unwrap().to_str().unwrap()]);
+    assert!(Entry::new(&Cache::None, key()).unwrap().is_none());
+}
+
+#[test]
+fn every_part_of_the_key_has_a_place_of_its_own() {
+    let folder = Path::new("nowhere");
+    let gpu = GpuIdentity {
+        index: 0,
+        name: "card".to_owned(),
+        device: "1:2".to_owned(),
+        driver: "1.0".to_owned(),
+        api: "vulkan".to_owned(),
+        kind: crate::GpuKind::Discrete,
+    };
+    let with_gpu = Key { gpus: vec![gpu.clone()], ..key() };
+    let new_driver = Key { gpus: vec![GpuIdentity { driver: "1.1".to_owned(), ..gpu }], ..key() };
+    let mut revised = key();
+    revised.algorithms[0].revision += 1;
+    let mut pinned = Registry::with_cores(2);
+    pinned.pin_threads();
+    let mut slow = Registry::with_cores(2);
+    slow.limit_simd(crate::SimdLevel::Portable);
+    let mut model = Model::built_in().unwrap();
+    model.methods[0].terms[0].unit *= 2.0;
+    let of = |registry: &Registry| Key::new(registry, &Model::built_in().unwrap()).unwrap();
+    let mut keys = vec![
+        key(),
+        with_gpu,
+        new_driver,
+        revised,
+        of(&pinned),
+        of(&Registry::with_cores(1)),
+        Key::new(&Registry::with_cores(2), &model).unwrap(),
+        Key { version: "0.0.0".to_owned(), ..key() },
+        Key { usable_cores: key().usable_cores + 1, ..key() },
+        Key { machine: Machine { physical_id: "0".to_owned(), ..key().machine }, ..key() },
+    ];
+    if crate::SimdLevel::in_use() > crate::SimdLevel::Portable {
+        keys.push(of(&slow));
+    }
+    let count = keys.len();
+    let mut files: Vec<PathBuf> = keys.into_iter().map(|key| entry(folder, key).file).collect();
+    files.sort();
+    files.dedup();
+    assert_eq!(files.len(), count);
+    assert_eq!(entry(folder, key()).file, entry(folder, key()).file);
+}
+
+#[test]
+fn what_is_damaged_foreign_or_old_is_told_and_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let entry = entry(folder.path(), key());
+    entry.write(fields(1)).unwrap();
+    let whole = fs::read_to_string(entry.file()).unwrap();
+    let other_key = whole.replacen(&key().machine.physical_id, "0123456789abcdef", 1);
+    let steps = whole.replacen("\"from_objects\": 0", "\"from_objects\": 7", 1);
+    for (text, why) in [
+        ("", "EOF"),
+        (&whole[..whole.len() / 2], "EOF"),
+        (&whole[..whole.len() - 2], "EOF"),
+        (&whole.replacen("cache/1", "cache/0", 1), "this version reads \"cache/1\""),
+        (&whole.replacen("\"key\"", "\"host\": \"x\",\n  \"key\"", 1), "unknown field `host`"),
+        (&other_key, "another machine"),
+        (&steps, "don't begin at 0"),
+    ] {
+        assert_ne!(text, whole);
+        fs::write(entry.file(), text).unwrap();
+        let told = entry.read().unwrap_err();
+        assert!(told.contains(why), "{why}: {told}");
+        entry.write(fields(2)).unwrap();
+        assert_eq!(entry.read(), Ok(Some(fields(2))));
+    }
+    fs::write(entry.file(), [0xff; 100]).unwrap();
+    assert!(entry.read().is_err());
+}
+
+#[test]
+fn a_folder_in_its_place_is_an_error_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let entry = entry(folder.path(), key());
+    fs::create_dir_all(entry.file().join("inside")).unwrap();
+    assert!(entry.read().unwrap_err().contains("it is no file"));
+    let told = entry.write(fields(1)).unwrap_err();
+    assert!(told.contains("can't be written"), "{told}");
+    assert_eq!(names(folder.path()).len(), 1);
+}
+
+/// Two writers and a reader, as of several processes at once: each file that is seen is whole and one of theirs.
+#[test]
+fn writers_at_once_leave_a_whole_file() {
+    let folder = tempfile::tempdir().unwrap();
+    entry(folder.path(), key()).write(fields(0)).unwrap();
+    std::thread::scope(|scope| {
+        let writers: Vec<_> = [1, 2]
+            .map(|writer| {
+                let entry = entry(folder.path(), key());
+                scope.spawn(move || (0..200).for_each(|_| entry.write(fields(writer)).unwrap()))
+            })
+            .into();
+        let entry = entry(folder.path(), key());
+        let known = [fields(0), fields(1), fields(2)];
+        while writers.iter().any(|w| !w.is_finished()) {
+            let seen = entry.read().unwrap().unwrap();
+            assert!(known.contains(&seen));
+        }
+    });
+    assert_eq!(names(folder.path()).len(), 1);
+}

@@ -1,0 +1,60 @@
+//! What a program may ask of the start of an adaptive broad phase.
+
+use crate::{Model, Registry};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How [`Adaptive::for_this_machine`](crate::Adaptive::for_this_machine) goes about it. The default is what most engines want.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Whether the times of frames correct the predicted costs: [`Adaptive::set_learning`](crate::Adaptive::set_learning). On by
+    /// default.
+    pub learning: bool,
+    /// Whether a frame is now and then run by another algorithm, to learn what it costs:
+    /// [`Adaptive::set_exploring`](crate::Adaptive::set_exploring). On by default.
+    pub exploring: bool,
+    /// Whether all that takes time happens on a thread of its own, so that the constructor returns at once: looking for GPUs, reading
+    /// the cache, measuring, predicting, making the algorithms. Until it is done [`Fields::usual`](crate::Fields::usual) decides.
+    /// On by default. A program that shows a loading screen turns it off: what is measured while other threads work is off by
+    /// what they take.
+    pub background: bool,
+    /// Where fields are kept from one start to the next. The user's cache folder by default.
+    pub cache: Cache,
+    /// The algorithms to choose from: the program's own, its thread pool ([`Registry::use_pool`]), its GPUs
+    /// ([`Registry::add_gpus`]). `None`, the default: ours on all usable cores with
+    /// [pinned threads](Registry::pin_threads), and with the feature `measure-gpu` on every GPU that is no program on the CPU.
+    pub registry: Option<Arc<Registry>>,
+    /// The model that predicts, for a program with algorithms of its own, which the built-in one does not know. `None`, the
+    /// default: [`Model::built_in`].
+    pub model: Option<Model>,
+    /// The longest that the hardware may be measured, a sample more or less, and each GPU once more. Two seconds by default; where
+    /// other programs work meanwhile less than one gives figures that are far off. What is had in the time is used.
+    pub probe_limit: Duration,
+}
+
+/// Where fields are kept from one start to the next.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Cache {
+    /// The folder `sapwise` in the user's cache folder: `$XDG_CACHE_HOME` or `~/.cache`, `~/Library/Caches`, `%LOCALAPPDATA%`.
+    #[default]
+    User,
+    /// This folder, which is made where it is missing.
+    Folder(PathBuf),
+    /// Nowhere: every start measures.
+    None,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            learning: true,
+            exploring: true,
+            background: true,
+            cache: Cache::User,
+            registry: None,
+            model: None,
+            probe_limit: Duration::from_secs(2),
+        }
+    }
+}

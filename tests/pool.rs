@@ -1,0 +1,121 @@
+//! Algorithms on several cores with the threads of a program's own pool, called from outside it and from within.
+
+mod common;
+
+use common::{Random, naive};
+use sapwise::rayon::{self, ThreadPool, ThreadPoolBuilder};
+use sapwise::{Aabb, Adaptive, AlgorithmId, Backend, BroadPhase, Error, Fields, PairOrder, Pairs, Registry, Scenario};
+use std::sync::Arc;
+
+fn pool(threads: usize) -> Arc<ThreadPool> {
+    Arc::new(ThreadPoolBuilder::new().num_threads(threads).build().unwrap())
+}
+
+fn registry(cores: u32, pool: &Arc<ThreadPool>) -> Registry {
+    let mut registry = Registry::with_cores(cores);
+    registry.use_pool(Arc::clone(pool));
+    registry
+}
+
+/// Every algorithm on every number of threads that the pool allows.
+fn every_algorithm(registry: &Registry, most: u32) -> Vec<(AlgorithmId, Box<dyn BroadPhase>)> {
+    let mut methods: Vec<&str> = registry.entries().iter().map(|e| e.id.method()).collect();
+    methods.dedup();
+    let ids = methods.iter().flat_map(|m| (1..=most).map(|k| AlgorithmId::new(m, Backend::Cpu(k)).unwrap()));
+    ids.map(|id| (id.clone(), registry.create(&id).unwrap())).collect()
+}
+
+/// Scenes with enough in them for every phase to have tasks for all threads.
+fn scenes() -> Vec<(&'static str, Vec<Aabb>)> {
+    let clustered = Scenario::Clustered.start(3000, 1).boxes().to_vec();
+    vec![
+        ("nothing", Vec::new()),
+        ("one box", vec![Aabb::cube([0.0; 3], 1.0)]),
+        ("cubes", Random(3).cubes(5000, [30.0; 3], 0.5)),
+        ("clusters", clustered),
+    ]
+}
+
+#[test]
+fn every_algorithm_on_the_programs_threads_agrees_with_the_oracle() {
+    let scenes: Vec<_> = scenes().into_iter().map(|(name, boxes)| (name, naive(&boxes), boxes)).collect();
+    for threads in [1, 2, 4] {
+        let pool = pool(threads);
+        let registry = registry(64, &pool);
+        let other = self::pool(2);
+        for (id, mut algorithm) in every_algorithm(&registry, threads as u32 + 1) {
+            for (name, expected, boxes) in &scenes {
+                let mut pairs = Pairs::with_order(PairOrder::Canonical);
+                let mut run = |place: &str| {
+                    algorithm.find_pairs(boxes, &mut pairs).unwrap();
+                    assert!(pairs.as_slice() == expected, "{id} {place} a pool of {threads} on {name}");
+                };
+                run("outside");
+                pool.install(|| run("in"));
+                pool.scope(|scope| scope.spawn(|_| run("in a job of")));
+                other.install(|| run("in another pool than"));
+                run("outside, after it,");
+            }
+        }
+    }
+}
+
+/// More frames at once than threads: each of them waits for helpers that run a frame themselves.
+#[test]
+fn frames_in_every_thread_of_the_pool_end() {
+    let pool = pool(2);
+    let registry = registry(8, &pool);
+    let boxes = Random(5).cubes(3000, [25.0; 3], 0.5);
+    let expected = naive(&boxes);
+    let mut algorithms = every_algorithm(&registry, 3);
+    for _ in 0..5 {
+        pool.scope(|scope| {
+            for (id, algorithm) in &mut algorithms {
+                let (boxes, expected) = (&boxes, &expected);
+                scope.spawn(move |_| {
+                    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+                    algorithm.find_pairs(boxes, &mut pairs).unwrap();
+                    assert!(pairs.as_slice() == expected, "{id}");
+                });
+            }
+        });
+    }
+}
+
+#[test]
+fn more_threads_than_the_pool_has_are_unavailable_with_a_reason() {
+    let pool = pool(4);
+    let mut registry = registry(8, &pool);
+    let counts = |registry: &Registry, available: bool| -> Vec<u32> {
+        let of_brute =
+            registry.entries().iter().filter(|e| e.id.method() == "brute" && e.unavailable.is_none() == available);
+        of_brute.map(|e| e.id.threads()).collect()
+    };
+    // All that there are stand in the list, as without a pool.
+    assert_eq!((counts(&registry, true), counts(&registry, false)), (vec![1, 2, 4, 5], vec![8]));
+    for text in ["brute@cpu8", "verlet@cpu6"] {
+        let Err(Error::Unavailable { reason, .. }) = registry.create(&text.parse().unwrap()) else { panic!("made {text}") };
+        assert!(reason.contains("has 4 threads, with the calling one 5"), "{reason}");
+    }
+    registry.use_pool(self::pool(1));
+    assert_eq!((counts(&registry, true), counts(&registry, false)), (vec![1, 2], vec![4, 5, 8]));
+    registry.use_pool(self::pool(30));
+    assert_eq!(counts(&registry, true), [1, 2, 4, 5, 8]);
+    // A pool on a machine of one core helps nobody.
+    assert_eq!(counts(&self::registry(1, &pool), true), [1]);
+}
+
+#[test]
+fn the_choice_keeps_to_the_pool() {
+    let pool = pool(2);
+    let registry = registry(8, &pool);
+    let mut adaptive = Adaptive::new(Fields::usual(&registry), &registry).unwrap();
+    let boxes = Random(11).cubes(6000, [40.0; 3], 0.5);
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    pool.install(|| adaptive.find_pairs(&boxes, &mut pairs)).unwrap();
+    assert!(pairs.as_slice() == naive(&boxes));
+    assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "verlet@cpu3");
+    // The pool outlives what used it.
+    drop((adaptive, registry));
+    assert_eq!(pool.install(rayon::current_num_threads), 2);
+}

@@ -1,0 +1,308 @@
+//! The start on a machine: cache, measurement in the foreground and in the background, and frames through all of it.
+
+mod common;
+
+use common::{Random, naive};
+use sapwise::{
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Cache, Error, Fields, Options, Origin, PairOrder, Pairs, Registry, Setup,
+    Source,
+};
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::time::Duration;
+
+/// Measures as briefly as it can: what comes out is not looked at. On one core, whose figures can't be spoiled beyond belief by the other
+/// tests.
+fn options(folder: &Path) -> Options {
+    Options {
+        background: false,
+        cache: Cache::Folder(folder.to_owned()),
+        registry: Some(Arc::new(Registry::with_cores(1))),
+        probe_limit: Duration::ZERO,
+        ..Options::default()
+    }
+}
+
+fn start(options: &Options) -> Adaptive {
+    Adaptive::for_this_machine(options).unwrap()
+}
+
+fn origin(adaptive: &Adaptive) -> Origin {
+    adaptive.setup().origin
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+}
+
+/// Runs a frame and holds it against the oracle.
+fn frame(adaptive: &mut Adaptive, boxes: &[Aabb]) {
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    adaptive.find_pairs(boxes, &mut pairs).unwrap();
+    assert!(pairs.as_slice() == naive(boxes));
+}
+
+/// The same, decided on and therefore timed, many times.
+fn learn(adaptive: &mut Adaptive, boxes: &[Aabb]) {
+    for _ in 0..50 {
+        adaptive.decide(boxes);
+        frame(adaptive, boxes);
+    }
+}
+
+fn boxes(count: usize) -> Vec<Aabb> {
+    Random(7).cubes(count, [20.0; 3], 0.6)
+}
+
+/// Runs frames until the background has brought something; how many.
+fn frames_until_it_came(adaptive: &mut Adaptive) -> usize {
+    let boxes = boxes(300);
+    let mut frames = 0;
+    while origin(adaptive) == Origin::Awaited {
+        frame(adaptive, &boxes);
+        frames += 1;
+    }
+    frame(adaptive, &boxes);
+    frames
+}
+
+#[test]
+fn the_second_start_takes_what_the_first_has_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut first = start(&options(folder.path()));
+    assert_eq!(first.setup().remarks, [""; 0]);
+    assert_eq!((origin(&first), first.fields().source), (Origin::Probed, Source::Predicted));
+    assert_eq!(first.fields().defect(), None);
+    frame(&mut first, &boxes(500));
+    let file = first.setup().file.clone().unwrap();
+    assert_eq!(names(folder.path()), [file.file_name().unwrap().to_str().unwrap()]);
+    let mut second = start(&options(folder.path()));
+    assert_eq!(origin(&second), Origin::Cached);
+    assert_eq!(second.fields(), first.fields());
+    assert!(second.setup().remarks.is_empty() && second.setup().file == Some(file));
+    frame(&mut second, &boxes(500));
+    // Other algorithms have other fields, in a file of their own.
+    let mut more = Registry::with_cores(1);
+    more.add("mine@cpu1".parse().unwrap(), 1, || Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap()));
+    let other = Options { registry: Some(Arc::new(more)), ..options(folder.path()) };
+    assert_eq!(origin(&start(&other)), Origin::Probed);
+    assert_eq!(origin(&start(&other)), Origin::Cached);
+    assert_eq!(names(folder.path()).len(), 2);
+}
+
+#[test]
+fn what_was_learned_is_there_at_the_next_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut first = start(&options(folder.path()));
+    let boxes = boxes(400);
+    learn(&mut first, &boxes);
+    let learned = first.learned();
+    assert_eq!(learned.source, Source::Learned);
+    first.save().unwrap();
+    let second = start(&options(folder.path()));
+    assert_eq!((origin(&second), second.fields()), (Origin::Cached, &learned));
+    let mut third = start(&Options { learning: false, ..options(folder.path()) });
+    learn(&mut third, &boxes);
+    assert_eq!(third.learned(), learned);
+}
+
+#[test]
+fn a_damaged_file_is_told_replaced_and_harmless() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = start(&options(folder.path())).setup().file.clone().unwrap();
+    let whole = fs::read_to_string(&file).unwrap();
+    for text in ["", "{}", &whole[..whole.len() / 2], &whole.replace("cache/1", "cache/0")] {
+        fs::write(&file, text).unwrap();
+        let mut again = start(&options(folder.path()));
+        assert_eq!(origin(&again), Origin::Probed);
+        assert!(again.setup().remarks.len() == 1 && again.setup().remarks[0].contains("is ignored"), "{:?}", again.setup());
+        frame(&mut again, &boxes(200));
+        assert_eq!(origin(&start(&options(folder.path()))), Origin::Cached);
+    }
+}
+
+#[test]
+fn no_cache_a_folder_in_its_place_and_a_file_in_the_folders_place_keep_nothing_from_working() {
+    let folder = tempfile::tempdir().unwrap();
+    let works = |options: &Options, remarks: &[&str]| {
+        let mut adaptive = start(options);
+        assert_eq!(origin(&adaptive), Origin::Probed);
+        let told = &adaptive.setup().remarks;
+        assert!(told.len() == remarks.len() && remarks.iter().zip(told).all(|(r, t)| t.contains(r)), "{told:?}");
+        frame(&mut adaptive, &boxes(200));
+        adaptive
+    };
+    let none = works(&Options { cache: Cache::None, ..options(folder.path()) }, &[]);
+    assert!(none.save().unwrap_err().to_string().contains("no cache"));
+    let file = start(&options(folder.path())).setup().file.clone().unwrap();
+    fs::remove_file(&file).unwrap();
+    fs::create_dir_all(file.join("inside")).unwrap();
+    let blocked = works(&options(folder.path()), &["is ignored", "can't be written"]);
+    assert!(blocked.save().unwrap_err().to_string().contains("can't be written"));
+    // Where the folder should be there is a file: it can neither be read nor made. So it is on a disk that can't be written.
+    let occupied = folder.path().join("occupied");
+    fs::write(&occupied, "").unwrap();
+    works(&options(&occupied.join("cache")), &["is ignored", "can't be written"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_without_write_permission_keeps_nothing_from_working() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    fs::set_permissions(folder.path(), PermissionsExt::from_mode(0o555)).unwrap();
+    let mut adaptive = start(&options(folder.path()));
+    frame(&mut adaptive, &boxes(200));
+    // A superuser may write anyway.
+    let refused = fs::File::create(folder.path().join("try")).is_err();
+    assert_eq!(adaptive.save().is_err(), refused);
+    assert_eq!(adaptive.setup().remarks.len(), usize::from(refused));
+    fs::set_permissions(folder.path(), PermissionsExt::from_mode(0o755)).unwrap();
+}
+
+#[test]
+fn starts_at_once_share_a_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    std::thread::scope(|scope| {
+        for _ in 0..3 {
+            scope.spawn(|| {
+                let mut adaptive = start(&options(folder.path()));
+                learn(&mut adaptive, &boxes(200));
+                adaptive.save().unwrap();
+            });
+        }
+    });
+    let after = start(&options(folder.path()));
+    assert_eq!((origin(&after), after.fields().source), (Origin::Cached, Source::Learned));
+    assert_eq!(names(folder.path()).len(), 1);
+}
+
+#[test]
+fn the_background_takes_over_between_frames() {
+    let folder = tempfile::tempdir().unwrap();
+    let background = Options { background: true, exploring: false, ..options(folder.path()) };
+    let mut first = start(&background);
+    // The flag is only looked at when a frame runs.
+    assert_eq!((origin(&first), first.fields().source), (Origin::Awaited, Source::Default));
+    assert!(first.save().unwrap_err().to_string().contains("not there yet"));
+    assert!(frames_until_it_came(&mut first) > 0);
+    assert_eq!((origin(&first), first.fields().source), (Origin::Probed, Source::Predicted));
+    assert!(first.setup().remarks.is_empty() && first.setup().seconds > 0.0, "{:?}", first.setup());
+    assert!(first.last_decision().unwrap().predicted_ns.is_some());
+    first.save().unwrap();
+    let mut second = start(&background);
+    assert_eq!(origin(&second), Origin::Awaited);
+    frames_until_it_came(&mut second);
+    assert_eq!(origin(&second), Origin::Cached);
+    // A decision without a frame takes over too.
+    let mut third = start(&background);
+    while origin(&third) == Origin::Awaited {
+        assert!(third.decide(&boxes(100)).is_some());
+    }
+    frame(&mut third, &boxes(100));
+    assert_eq!(origin(&third), Origin::Cached);
+}
+
+#[test]
+fn switches_outlast_the_background() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut adaptive = start(&Options { background: true, ..options(folder.path()) });
+    adaptive.set_learning(false);
+    frames_until_it_came(&mut adaptive);
+    assert_eq!(origin(&adaptive), Origin::Probed);
+    learn(&mut adaptive, &boxes(300));
+    assert_eq!(adaptive.learned().source, Source::Predicted);
+}
+
+#[test]
+fn what_is_dropped_while_it_waits_ends_by_itself_and_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let registry = Arc::new(Registry::with_cores(1));
+    drop(start(&Options { background: true, registry: Some(Arc::clone(&registry)), ..options(folder.path()) }));
+    // The thread lets go of the registry when it ends.
+    while Arc::strong_count(&registry) > 1 {
+        std::thread::yield_now();
+    }
+    assert_eq!(origin(&start(&options(folder.path()))), Origin::Cached);
+}
+
+/// A registry whose `strips@cpu1` is made by `make`.
+fn with_strips(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static) -> Option<Arc<Registry>> {
+    let mut registry = Registry::with_cores(1);
+    let strips: AlgorithmId = "strips@cpu1".parse().unwrap();
+    let revision = registry.entries().iter().find(|e| e.id == strips).unwrap().revision;
+    registry.add(strips, revision, make);
+    Some(Arc::new(registry))
+}
+
+#[test]
+fn a_panic_in_the_background_is_a_remark() {
+    let folder = tempfile::tempdir().unwrap();
+    let registry = with_strips(|| panic!("as the test wants"));
+    let mut adaptive = start(&Options { background: true, registry, ..options(folder.path()) });
+    frames_until_it_came(&mut adaptive);
+    assert_eq!((origin(&adaptive), adaptive.fields().source), (Origin::Usual, Source::Default));
+    assert!(
+        adaptive.setup().remarks.len() == 1 && adaptive.setup().remarks[0].contains("panicked"),
+        "{:?}",
+        adaptive.setup()
+    );
+    frame(&mut adaptive, &boxes(5000));
+    assert!(adaptive.save().unwrap_err().to_string().contains("nothing was predicted"));
+}
+
+/// Algorithms are made once for a start, and on the thread in the background.
+#[test]
+fn algorithms_are_made_off_the_calling_thread() {
+    static MADE: AtomicUsize = AtomicUsize::new(0);
+    let folder = tempfile::tempdir().unwrap();
+    let caller = std::thread::current().id();
+    let registry = with_strips(move || {
+        assert_ne!(std::thread::current().id(), caller);
+        MADE.fetch_add(1, Relaxed);
+        Registry::with_cores(1).create(&"strips@cpu1".parse().unwrap())
+    });
+    let mut adaptive = start(&Options { background: true, registry, ..options(folder.path()) });
+    frames_until_it_came(&mut adaptive);
+    assert_eq!((origin(&adaptive), MADE.load(Relaxed)), (Origin::Probed, 1), "{:?}", adaptive.setup());
+}
+
+#[test]
+fn a_model_that_knows_nothing_here_leaves_the_usual_fields() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut model = sapwise::Model::built_in().unwrap();
+    model.methods.iter_mut().for_each(|m| m.revision += 1);
+    for background in [false, true] {
+        let mut adaptive = start(&Options { model: Some(model.clone()), background, ..options(folder.path()) });
+        frames_until_it_came(&mut adaptive);
+        assert_eq!(origin(&adaptive), Origin::Usual);
+        assert!(adaptive.setup().remarks[0].contains("predicts none"), "{:?}", adaptive.setup());
+    }
+    assert!(names(folder.path()).is_empty());
+}
+
+/// What most programs do, but for the folder and the time.
+#[test]
+fn a_program_that_names_no_algorithms_gets_all_of_ours() {
+    let folder = tempfile::tempdir().unwrap();
+    for background in [true, false] {
+        let mut adaptive = start(&Options { registry: None, background, ..options(folder.path()) });
+        frames_until_it_came(&mut adaptive);
+        assert!([Origin::Probed, Origin::Cached].contains(&origin(&adaptive)), "{:?}", adaptive.setup());
+        let known: Vec<String> = adaptive.fields().algorithms().iter().map(ToString::to_string).collect();
+        for id in ["brute@cpu1", "sweep@cpu1", "strips@cpu1", "verlet@cpu1"] {
+            assert!(known.iter().any(|k| k == id), "{known:?}");
+        }
+        frame(&mut adaptive, &boxes(1000));
+    }
+}
+
+#[test]
+fn given_fields_have_no_start_of_their_own() {
+    let registry = Registry::with_cores(1);
+    let adaptive = Adaptive::new(Fields::usual(&registry), &registry).unwrap();
+    assert_eq!(adaptive.setup(), &Setup::default());
+    assert!(adaptive.save().unwrap_err().to_string().contains("given by the program"));
+}
