@@ -2,6 +2,7 @@
 
 #[cfg(feature = "this-machine")]
 pub(crate) mod cache;
+mod candidates;
 mod decision;
 mod glance;
 mod learner;
@@ -10,10 +11,12 @@ mod options;
 mod pace;
 mod policy;
 mod price;
+mod tally;
 #[cfg(feature = "this-machine")]
 mod this_machine;
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step};
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step, Term};
+use candidates::{Candidate, Instance, Made};
 use decision::Choice;
 use glance::Glance;
 use pace::Pace;
@@ -40,6 +43,7 @@ const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 pub struct Adaptive {
     /// In the order of [`Fields::algorithms`].
     candidates: Vec<Candidate>,
+    instances: Vec<Instance>,
     policy: Policy,
     glance: Glance,
     pace: Pace,
@@ -53,14 +57,6 @@ pub struct Adaptive {
     start: this_machine::Start,
 }
 
-struct Candidate {
-    id: AlgorithmId,
-    /// `None` once it failed, or where it can't run.
-    algorithm: Option<Box<dyn BroadPhase>>,
-    /// Objects that its buffers are ready for.
-    ready: usize,
-}
-
 impl Adaptive {
     /// An adaptive broad phase over those algorithms of `fields` that `registry` can make.
     ///
@@ -70,19 +66,23 @@ impl Adaptive {
     /// # Errors
     /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made.
     pub fn new(fields: Fields, registry: &Registry) -> Result<Self, Error> {
-        let (candidates, failure) = candidates(&fields, registry);
-        if candidates.iter().all(|c| c.algorithm.is_none()) {
+        let mut made = Made::of(&fields, registry);
+        if made.instances.is_empty() {
             let hint = || "these fields name no algorithm; make them with `sapwise predict`".to_owned();
-            return Err(failure.unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
+            return Err(made
+                .failure
+                .take()
+                .unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
         }
-        Ok(Self::with(fields, candidates))
+        Ok(Self::with(fields, made))
     }
 
-    /// Over instances that are there already, in the order of the algorithms of `fields`.
-    fn with(fields: Fields, candidates: Vec<Candidate>) -> Self {
+    /// Over instances that are there already.
+    fn with(fields: Fields, made: Made) -> Self {
         Self {
-            policy: policy(fields, &candidates),
-            candidates,
+            policy: policy(fields, &made),
+            candidates: made.candidates,
+            instances: made.instances,
             glance: Glance::default(),
             pace: Pace::default(),
             choice: None,
@@ -142,6 +142,10 @@ impl Adaptive {
                 ln_factor: (uncorrected.ln_correction(log2_objects) + learner.correction_at(k, log2_objects))
                     .clamp(-50.0, 50.0),
             };
+            let factor = learner.factor_on_calls(k);
+            for term in cost.curve.terms.iter_mut().chain(&mut cost.curve.otherwise).filter(|t| t.term == Term::Call) {
+                term.unit_ns *= factor;
+            }
             cost.curve.correction = octaves.into_iter().map(knot).collect();
             cost.spread_ln = learner.spread_ln(k);
         }
@@ -167,14 +171,14 @@ impl Adaptive {
     /// # Errors
     /// As [`new`](Self::new); the algorithms of before stay then.
     pub fn revive(&mut self, registry: &Registry) -> Result<(), Error> {
-        let (candidates, failure) = candidates(self.policy.fields(), registry);
-        if let (true, Some(error)) = (candidates.iter().all(|c| c.algorithm.is_none()), failure) {
+        let Made { candidates, instances, failure } = Made::of(self.policy.fields(), registry);
+        if let (true, Some(error)) = (instances.is_empty(), failure) {
             return Err(error);
         }
         for (k, candidate) in candidates.iter().enumerate() {
-            self.policy.set_usable(k, candidate.algorithm.is_some());
+            self.policy.set_usable(k, candidate.instance.is_some());
         }
-        self.candidates = candidates;
+        (self.candidates, self.instances) = (candidates, instances);
         self.decided = None;
         self.choice = None;
         Ok(())
@@ -182,10 +186,10 @@ impl Adaptive {
 
     /// Other fields, with an instance of each of their algorithms, take the place of those of before. The estimate of the load stays.
     #[cfg(feature = "this-machine")]
-    fn adopt(&mut self, fields: Fields, candidates: Vec<Candidate>) {
-        let before = std::mem::replace(&mut self.policy, policy(fields, &candidates));
+    fn adopt(&mut self, fields: Fields, made: Made) {
+        let before = std::mem::replace(&mut self.policy, policy(fields, &made));
         self.policy.set_as(&before);
-        self.candidates = candidates;
+        (self.candidates, self.instances) = (made.candidates, made.instances);
         self.decided = None;
         self.choice = None;
     }
@@ -228,14 +232,11 @@ impl Adaptive {
     /// Gets the runner-up ready when its turn may come soon.
     fn warm_runner_up(&mut self, boxes: usize) {
         let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), .. }) = self.choice else { return };
-        let candidate = &mut self.candidates[next];
-        if ns > best * WARM_WITHIN || candidate.ready >= boxes {
-            return;
-        }
-        if let Some(algorithm) = &mut candidate.algorithm {
+        let Some(instance) = self.candidates[next].instance.map(|k| &mut self.instances[k]) else { return };
+        if ns <= best * WARM_WITHIN && instance.ready < boxes {
             // By powers of two, so that a growing scene pays for this a few times in all.
-            candidate.ready = boxes.checked_next_power_of_two().unwrap_or(boxes);
-            algorithm.prepare(candidate.ready);
+            instance.ready = boxes.checked_next_power_of_two().unwrap_or(boxes);
+            instance.algorithm.prepare(instance.ready);
         }
     }
 }
@@ -256,15 +257,14 @@ impl BroadPhase for Adaptive {
                 let reason = "every algorithm of the fields has failed".to_owned();
                 return Err(Error::Unavailable { algorithm: self.candidates[0].id.clone(), reason });
             };
-            let candidate = &mut self.candidates[choice.chosen];
-            let Some(algorithm) = candidate.algorithm.as_mut() else {
+            let candidate = &self.candidates[choice.chosen];
+            let Some(instance) = candidate.instance.map(|k| &mut self.instances[k]) else {
                 // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
                 return Err(Error::Unavailable { algorithm: candidate.id.clone(), reason: "it failed before".to_owned() });
             };
             let running = started.map(|_| Instant::now());
-            match algorithm.find_pairs(boxes, pairs) {
+            match instance.run(&candidate.id, boxes, pairs) {
                 Ok(()) => {
-                    candidate.ready = candidate.ready.max(boxes.len());
                     let usual_ns = self.pace.ran();
                     let Some((started, running)) = started.zip(running) else {
                         self.glance.ran(boxes, pairs.len(), usual_ns);
@@ -280,7 +280,7 @@ impl BroadPhase for Adaptive {
                 }
                 // The algorithm is at fault, not the boxes: the next cheapest runs in this same frame.
                 Err(Error::Unavailable { .. }) => {
-                    candidate.algorithm = None;
+                    self.candidates[choice.chosen].instance = None;
                     self.policy.set_usable(choice.chosen, false);
                     let next = self.policy.choose(&self.glance.load(), 0);
                     self.choice = next.map(|c| Choice { reason: Reason::FellBack, ..c });
@@ -294,16 +294,14 @@ impl BroadPhase for Adaptive {
     }
 
     fn prepare(&mut self, objects: usize) {
-        for candidate in &mut self.candidates {
-            if let Some(algorithm) = &mut candidate.algorithm {
-                algorithm.prepare(objects);
-                candidate.ready = candidate.ready.max(objects);
-            }
+        for instance in &mut self.instances {
+            instance.algorithm.prepare(objects);
+            instance.ready = instance.ready.max(objects);
         }
     }
 
     fn keeps_work(&self) -> bool {
-        self.candidates.iter().filter_map(|c| c.algorithm.as_ref()).any(|a| a.keeps_work())
+        self.instances.iter().any(|instance| instance.algorithm.keeps_work())
     }
 }
 
@@ -313,21 +311,10 @@ impl fmt::Debug for Adaptive {
     }
 }
 
-/// An instance of every algorithm of the fields, and why the last of those that can't be made can't be.
-fn candidates(fields: &Fields, registry: &Registry) -> (Vec<Candidate>, Option<Error>) {
-    let mut failure = None;
-    let candidates = fields.algorithms().into_iter().map(|id| {
-        let stale = fields.costs.iter().find(|c| c.algorithm == *id).and_then(|c| registry.mismatch(id, c.revision));
-        let made = stale.map_or_else(|| registry.create(id), Err);
-        Candidate { id: id.clone(), algorithm: made.map_err(|e| failure = Some(e)).ok(), ready: 0 }
-    });
-    (candidates.collect(), failure)
-}
-
-fn policy(fields: Fields, candidates: &[Candidate]) -> Policy {
-    let of = |c: &Candidate| (c.algorithm.is_some(), c.algorithm.as_ref().is_some_and(|a| a.keeps_work()));
-    let (usable, keeps_work): (Vec<bool>, Vec<bool>) = candidates.iter().map(of).unzip();
-    Policy::new(fields, &keeps_work, usable)
+fn policy(fields: Fields, made: &Made) -> Policy {
+    let kept = |c: &Candidate| c.instance.filter(|&k| made.instances[k].algorithm.keeps_work());
+    let kept: Vec<Option<usize>> = made.candidates.iter().map(kept).collect();
+    Policy::new(fields, &kept, made.candidates.iter().map(|c| c.instance.is_some()).collect())
 }
 
 fn objects(boxes: &[Aabb]) -> u32 {

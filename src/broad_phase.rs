@@ -29,6 +29,14 @@ pub trait BroadPhase: Send {
     fn keeps_work(&self) -> bool {
         false
     }
+
+    /// Runs on so many threads from the next frame on, with all that it keeps. False where it can't, and then nothing changes.
+    ///
+    /// One instance for several numbers of threads is had from [`Registry::create_for`](crate::Registry::create_for).
+    fn set_threads(&mut self, threads: u32) -> bool {
+        let _ = threads;
+        false
+    }
 }
 
 /// `Ok` when 32-bit pair members can name `objects` boxes.

@@ -143,6 +143,18 @@ impl CostCurve {
         if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects).exp() }
     }
 
+    /// Predicted nanoseconds of the other way, where there are two.
+    pub(crate) fn otherwise_of(&self, counts: &Counts<'_>) -> Option<f64> {
+        let ns: f64 = self.otherwise.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum();
+        (!self.otherwise.is_empty()).then(|| ns * self.ln_correction(counts.log2_objects).exp())
+    }
+
+    /// What of the predicted nanoseconds is due to [`Term::Call`].
+    pub(crate) fn calls_of(&self, counts: &Counts<'_>) -> f64 {
+        let ns: f64 = self.terms.iter().filter(|t| t.term == Term::Call).map(|t| t.unit_ns).sum();
+        ns * self.ln_correction(counts.log2_objects).exp()
+    }
+
     /// The sum of the terms, of the cheaper way where there are two.
     fn uncorrected(&self, counts: &Counts<'_>) -> f64 {
         let sum =

@@ -23,8 +23,15 @@ pub enum Error {
     TooManyPairs {
         /// The limit that was set.
         limit: usize,
-        /// Overlapping pairs in the input, all counted.
+        /// Overlapping pairs in the input that the [`Filter`](crate::Filter) wants, all counted.
         pairs: u64,
+    },
+    /// A pair has a member that has no id in [`Changes::update`](crate::Changes::update).
+    MissingId {
+        /// The position of the member in the input.
+        position: u32,
+        /// Ids that were given.
+        ids: usize,
     },
     /// An allocation was refused.
     OutOfMemory {
@@ -78,6 +85,9 @@ impl fmt::Display for Error {
             }
             Error::TooManyPairs { limit, pairs } => {
                 write!(f, "{pairs} pairs overlap, more than the limit of {limit}; raise the limit or thin out the scene")
+            }
+            Error::MissingId { position, ids } => {
+                write!(f, "box {position} is in a pair and has no id: {ids} were given; give one for each box")
             }
             Error::OutOfMemory { what, elements } => {
                 write!(f, "no memory for {elements} {what}; set a limit on the pairs or use fewer boxes")

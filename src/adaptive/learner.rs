@@ -1,11 +1,12 @@
 //! What the frames that were run tell about the cost of every algorithm.
 //!
-//! The natural logarithm of measured over predicted time is taken to be the sum of two parts. The *regime* is shared: one factor for
-//! each class of processor (a clock that throttles, another program), and one for each number of threads or GPUs beside that, for small
-//! and for large frames (cores that moved apart, a core that is taken). The *own* part of an algorithm is a curve over the number of
+//! The natural logarithm of measured over predicted time is taken to be the sum of two parts. The *regime* is shared: a factor for each class
+//! of processor (a clock that throttles, fields of another machine), and for each number of threads or GPUs one beside that, and one on
+//! what a call costs (cores that moved apart, a core that is taken). The *own* part of an algorithm is a curve over the number of
 //! objects. A Kalman filter follows both: the regime with all its covariances, which takes a dozen numbers, the own parts each
 //! by itself. [`Posterior`](crate::Posterior) knows more and takes some 50 microseconds for an observation, longer than most frames.
 
+use super::tally::Tally;
 use crate::{AlgorithmCost, BackendClass};
 
 /// Knots of an own curve: 2^3 to 2^21 objects, every second octave, linear in between and constant beyond.
@@ -13,28 +14,37 @@ const KNOTS: usize = 10;
 const FIRST_OCTAVE: f64 = 3.0;
 const OCTAVES: f64 = 2.0;
 
-/// Where a frame counts as small and where as large, for what a number of threads costs: in between the two share.
-const SMALL_OCTAVE: f64 = 8.0;
-const LARGE_OCTAVE: f64 = 16.0;
-
-/// Standard deviations before anything was observed. A clock may halve, and a core that is taken may double a time.
-const CLASS_LN: f64 = 0.4;
-const WIDTH_LN: f64 = 0.35;
+/// Standard deviations before anything was observed. Fields of another machine are off by a factor of several for all algorithms at once, and
+/// a core that is taken doubles the time of those that use it.
+const CLASS_LN: f64 = 1.5;
+const WIDTH_LN: f64 = 0.2;
+const CALL_LN: f64 = 0.7;
 /// The least of an own part: fields that were measured a minute ago are off by this in the next scene.
 const OWN_LN: f64 = 0.15;
 
-/// Frames after which what was observed counts for 1/e: the regime changes in seconds, an own curve only with the scene.
-const CLASS_FRAMES: f64 = 100.0;
-const WIDTH_FRAMES: f64 = 600.0;
+/// Frames after which what was observed counts for 1/e. In a hundred frames a class may change by 30 %, a width by 12 % and an own curve,
+/// which changes with the scene only, by 2 % (standard deviations).
+const CLASS_FRAMES: f64 = 2500.0;
+const WIDTH_FRAMES: f64 = 800.0;
 const OWN_FRAMES: f64 = 6000.0;
+
+/// Share of each frame in the mean time that frames of a width wait for other programs, and tallies of an algorithm before its frames count
+/// for that: until then what is dearer than expected was expected wrongly.
+const WAIT_SHARE: f64 = 1.0 / 128.0;
+const KNOWN: u32 = 4;
 
 /// The noise of a frame is learned for each algorithm; it starts here, and is never believed to be less.
 const NOISE_LN: f64 = 0.1;
 const LEAST_NOISE_LN: f64 = 0.02;
+/// Of so many frames in a row the mean is as noisy as of this power of their number far apart.
+const ALIKE: f64 = 0.7;
+/// And the frame with which an algorithm begins as this part of one where it was slower than expected, for its threads may have slept or met
+/// another program; where it was faster, that was no accident.
+const COLD_WORTH: [f64; 2] = [0.02, 0.5];
 /// Share of each new deviation in the noise.
-const NOISE_SHARE: f64 = 1.0 / 32.0;
+const NOISE_SHARE: f64 = 1.0 / 8.0;
 
-/// A surprise counts as no more than so many standard deviations: a frame whose thread waited for a core takes fifty times as long.
+/// A surprise counts as no more than so many standard deviations: frames whose threads waited for a core take fifty times as long.
 const MOST_SURPRISE: f64 = 3.0;
 /// This many of them in a row, all to the same side, are no accident: the machine or the scene has changed.
 const NO_ACCIDENT: u32 = 3;
@@ -51,13 +61,17 @@ struct Own {
 /// What is known about one algorithm beside the regime.
 #[derive(Debug, Clone)]
 struct Algorithm {
-    /// The part of the regime that is its class of processor's, and the two of its width if it is wider than one.
+    /// The part of the regime that is its class of processor's, and the two of its width if it is wider than one: on all of its cost,
+    /// and behind it in the list on its calls.
     class: usize,
     width: Option<usize>,
     /// Variance of the own part before anything was observed.
     before: f64,
     own: [Own; KNOTS],
     noise: f64,
+    /// Where in the list of waits its width stands, and how often it was observed.
+    wait: usize,
+    tallies: u32,
     /// Surprises in a row, counted with their sign.
     run: i32,
 }
@@ -73,30 +87,37 @@ pub(super) struct Learner {
     /// Frames after which each counts for 1/e.
     lasts: Vec<f64>,
     with: Vec<f64>,
+    /// For each class and width the mean time that a frame waits for other programs, nanoseconds, and the frame at which that held.
+    waits: Vec<(f64, u64)>,
     frame: u64,
     observed: u64,
 }
 
-/// A number of objects among the knots, and between small and large.
+/// A number of objects among the knots.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     knot: usize,
     share: f64,
-    large: f64,
 }
 
 impl Place {
     pub(super) fn of(log2_objects: f64) -> Self {
         let at = ((log2_objects - FIRST_OCTAVE) / OCTAVES).clamp(0.0, (KNOTS - 1) as f64);
         let knot = (at as usize).min(KNOTS - 2);
-        let large = ((log2_objects - SMALL_OCTAVE) / (LARGE_OCTAVE - SMALL_OCTAVE)).clamp(0.0, 1.0);
-        Self { knot, share: at - knot as f64, large }
+        Self { knot, share: at - knot as f64 }
     }
 
     /// The knots on both sides, with their weights.
     fn knots(self) -> [(usize, f64); 2] {
         [(self.knot, 1.0 - self.share), (self.knot + 1, self.share)]
     }
+}
+
+/// Where an algorithm is looked at: the number of objects, and the share of its predicted cost that calls have.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View {
+    pub(super) place: Place,
+    pub(super) calls: f64,
 }
 
 impl Own {
@@ -117,13 +138,18 @@ impl Learner {
                 parts.len() - 1
             })
         };
+        let mut widths: Vec<(BackendClass, u32)> = Vec::new();
         let algorithms = costs.iter().map(|cost| {
             let backend = cost.algorithm.backend();
+            let width_of = (backend.class(), backend.width());
+            if !widths.contains(&width_of) {
+                widths.push(width_of);
+            }
             let width = (backend.width() > 1).then(|| {
-                let small = place(Part::Width(backend.class(), backend.width(), false));
+                let all = place(Part::Width(backend.class(), backend.width()));
                 // Always next to each other: no other adds one in between.
-                place(Part::Width(backend.class(), backend.width(), true));
-                small
+                place(Part::Calls(backend.class(), backend.width()));
+                all
             });
             let before = cost.spread_ln.max(OWN_LN).powi(2);
             Algorithm {
@@ -132,6 +158,8 @@ impl Learner {
                 before,
                 own: [Own { mean: 0.0, variance: before, at: 0 }; KNOTS],
                 noise: NOISE_LN.powi(2),
+                wait: widths.iter().position(|w| *w == width_of).unwrap_or(0),
+                tallies: 0,
                 run: 0,
             }
         });
@@ -148,6 +176,7 @@ impl Learner {
             lasts: parts.iter().map(|p| p.lasts()).collect(),
             with: vec![0.0; parts.len()],
             before,
+            waits: vec![(0.0, 0); widths.len()],
             frame: 0,
             observed: 0,
         }
@@ -158,19 +187,37 @@ impl Learner {
         self.observed
     }
 
-    /// The parts of the regime that count for an algorithm, with their weights.
-    fn regime(algorithm: &Algorithm, place: Place) -> [(usize, f64); 3] {
-        match algorithm.width {
-            Some(k) => [(algorithm.class, 1.0), (k, 1.0 - place.large), (k + 1, place.large)],
-            None => [(algorithm.class, 1.0), (0, 0.0), (0, 0.0)],
+    /// What the regime adds to the logarithm of an algorithm's cost, and the parts that do with their slopes.
+    fn regime(&self, algorithm: &Algorithm, view: View) -> (f64, [(usize, f64); 3]) {
+        let class = self.mean[algorithm.class];
+        let Some(width) = algorithm.width else { return (class, [(algorithm.class, 1.0), (0, 0.0), (0, 0.0)]) };
+        // A factor on the calls alone. What it adds to the whole is not linear in its logarithm; its slope is that of the present one.
+        let calls = view.calls * self.mean[width + 1].exp();
+        let whole = 1.0 - view.calls + calls;
+        let slopes = [(algorithm.class, 1.0), (width, 1.0), (width + 1, calls / whole)];
+        (class + self.mean[width] + whole.ln(), slopes)
+    }
+
+    /// Mean time that a frame of an algorithm waits for other programs, in nanoseconds. A helper whose core another program has waits
+    /// until the scheduler's next turn, however short the frame: a hundred times as long as some. The mean is what counts, so that this is not
+    /// noise, and it is no factor either.
+    pub(super) fn wait_ns(&self, algorithm: usize, frame: u64) -> f64 {
+        let (ns, at) = self.waits[self.algorithms[algorithm].wait];
+        ns / (1.0 + frame.saturating_sub(at) as f64 / WIDTH_FRAMES)
+    }
+
+    /// Takes in that a frame took so many nanoseconds more than any of its kind is expected to, or none.
+    pub(super) fn waited(&mut self, algorithm: usize, ns: f64, frame: u64) {
+        if self.algorithms[algorithm].tallies >= KNOWN {
+            let before = self.wait_ns(algorithm, frame);
+            self.waits[self.algorithms[algorithm].wait] = (before + WAIT_SHARE * (ns - before), frame);
         }
     }
 
-    /// Expected natural logarithm of real over predicted time.
-    pub(super) fn correction_ln(&self, algorithm: usize, place: Place) -> f64 {
+    /// Expected natural logarithm of real over predicted time, waits left out.
+    pub(super) fn correction_ln(&self, algorithm: usize, view: View) -> f64 {
         let a = &self.algorithms[algorithm];
-        let regime: f64 = Self::regime(a, place).iter().map(|&(k, weight)| weight * self.mean[k]).sum();
-        regime + place.knots().iter().map(|&(k, weight)| weight * a.own[k].mean).sum::<f64>()
+        self.regime(a, view).0 + view.place.knots().iter().map(|&(k, weight)| weight * a.own[k].mean).sum::<f64>()
     }
 
     fn own_variance(&self, algorithm: usize, place: Place) -> f64 {
@@ -179,49 +226,39 @@ impl Learner {
     }
 
     /// Variance of the logarithm of the ratio of two costs.
-    pub(super) fn variance_of_ratio(&self, a: usize, b: usize, place: Place) -> f64 {
+    pub(super) fn variance_of_ratio(&self, (a, of_a): (usize, View), (b, of_b): (usize, View)) -> f64 {
         let mut weights = [(0, 0.0); 6];
-        let (of_a, of_b) = weights.split_at_mut(3);
-        of_a.copy_from_slice(&Self::regime(&self.algorithms[a], place));
-        of_b.copy_from_slice(&Self::regime(&self.algorithms[b], place));
-        of_b.iter_mut().for_each(|(_, weight)| *weight = -*weight);
+        let (first, second) = weights.split_at_mut(3);
+        first.copy_from_slice(&self.regime(&self.algorithms[a], of_a).1);
+        second.copy_from_slice(&self.regime(&self.algorithms[b], of_b).1);
+        second.iter_mut().for_each(|(_, weight)| *weight = -*weight);
         let size = self.mean.len();
         let shared: f64 = weights
             .iter()
             .flat_map(|&(i, x)| weights.iter().map(move |&(j, y)| (i, j, x * y)))
             .map(|(i, j, weight)| weight * self.covariance[i * size + j])
             .sum();
-        shared.max(0.0) + self.own_variance(a, place) + self.own_variance(b, place)
+        shared.max(0.0) + self.own_variance(a, of_a.place) + self.own_variance(b, of_b.place)
     }
 
-    /// So many frames have passed: the regime may have changed since.
-    pub(super) fn pass(&mut self, frames: u32) {
-        self.frame += u64::from(frames);
-        let size = self.mean.len();
-        let frames = f64::from(frames);
-        for i in 0..size {
-            for j in 0..size {
-                let aged = frames / self.lasts[i].min(self.lasts[j]);
-                let share = aged / (1.0 + aged);
-                let before = if i == j { self.before[i] } else { 0.0 };
-                let entry = &mut self.covariance[i * size + j];
-                *entry += share * (before - *entry);
-            }
-        }
-    }
-
-    /// Takes in that a frame took the algorithm `real_ln` where `predicted_ln` was predicted without correction, both logarithms of
-    /// nanoseconds. `doubt` is a variance of that figure beside the algorithm's noise.
-    pub(super) fn observe(&mut self, algorithm: usize, place: Place, real_ln: f64, predicted_ln: f64, doubt: f64) {
-        let surprise = real_ln - predicted_ln - self.correction_ln(algorithm, place);
+    /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction.
+    pub(super) fn observe(&mut self, tally: &Tally, frame: u64) {
+        let algorithm = tally.candidate;
+        let place = Place::of(tally.log2_objects());
+        let view = View { place, calls: tally.calls() };
+        let surprise = (tally.real_ns / tally.predicted_ns).ln() - self.correction_ln(algorithm, view);
         if !surprise.is_finite() {
             return;
         }
+        self.pass(frame);
         self.observed += 1;
+        self.algorithms[algorithm].tallies = self.algorithms[algorithm].tallies.saturating_add(1);
+        // Frames in a row are alike, so that many of them tell less than as many that were far apart.
+        let worth = if tally.cold { COLD_WORTH[usize::from(surprise < 0.0)] } else { f64::from(tally.frames).powf(ALIKE) };
         let size = self.mean.len();
+        let (_, regime) = self.regime(&self.algorithms[algorithm], view);
         let Self { algorithms, mean, covariance, with, frame, .. } = self;
         let a = &mut algorithms[algorithm];
-        let regime = Self::regime(a, place);
         for (i, w) in with.iter_mut().enumerate() {
             *w = regime.iter().map(|&(k, weight)| weight * covariance[i * size + k]).sum();
         }
@@ -232,7 +269,7 @@ impl Learner {
         }
         let of_regime: f64 = regime.iter().map(|&(k, weight)| weight * with[k]).sum();
         let of_own: f64 = place.knots().iter().map(|&(k, weight)| weight * weight * a.own[k].variance).sum();
-        let variance = of_regime.max(0.0) + of_own + a.noise + doubt;
+        let variance = of_regime.max(0.0) + of_own + a.noise / worth;
         let most = MOST_SURPRISE * variance.sqrt();
         let error = surprise.clamp(-most, most);
         let side = if error == surprise { 0 } else { surprise.signum() as i32 };
@@ -243,7 +280,7 @@ impl Learner {
         } else {
             a.run + side
         };
-        let deviation = error * error - of_regime - of_own;
+        let deviation = (error * error - of_regime - of_own) * worth;
         a.noise += NOISE_SHARE * (deviation.max(0.0) - a.noise);
         a.noise = a.noise.max(LEAST_NOISE_LN.powi(2));
         if a.run.unsigned_abs() >= NO_ACCIDENT {
@@ -267,6 +304,25 @@ impl Learner {
         }
     }
 
+    /// The regime may have changed since the last observation.
+    fn pass(&mut self, frame: u64) {
+        let frames = frame.saturating_sub(self.frame) as f64;
+        self.frame = self.frame.max(frame);
+        let size = self.mean.len();
+        for i in 0..size {
+            self.mean[i] /= 1.0 + frames / self.lasts[i];
+            for j in 0..size {
+                // What stays of each, so that the matrix remains that of a real vector.
+                let stays = (1.0 / (1.0 + frames / self.lasts[i])) * (1.0 / (1.0 + frames / self.lasts[j]));
+                let entry = &mut self.covariance[i * size + j];
+                *entry *= stays.sqrt();
+                if i == j {
+                    *entry += (1.0 - stays.sqrt()) * self.before[i];
+                }
+            }
+        }
+    }
+
     /// What was observed holds no longer: the next frames count as if they were the first.
     fn doubt_all(&mut self, algorithm: usize, place: Place) {
         let size = self.mean.len();
@@ -282,12 +338,17 @@ impl Learner {
 
     /// Logarithms of the numbers of objects between which corrections are linear.
     pub(super) fn octaves(&self) -> impl Iterator<Item = f64> {
-        (0..KNOTS).map(|k| FIRST_OCTAVE + OCTAVES * k as f64).chain([SMALL_OCTAVE, LARGE_OCTAVE])
+        (0..KNOTS).map(|k| FIRST_OCTAVE + OCTAVES * k as f64)
     }
 
-    /// As [`correction_ln`](Self::correction_ln), at a number of objects.
+    /// As [`correction_ln`](Self::correction_ln), without the factor on calls, at a number of objects.
     pub(super) fn correction_at(&self, algorithm: usize, log2_objects: f64) -> f64 {
-        self.correction_ln(algorithm, Place::of(log2_objects))
+        self.correction_ln(algorithm, View { place: Place::of(log2_objects), calls: 0.0 })
+    }
+
+    /// The factor on the calls of an algorithm.
+    pub(super) fn factor_on_calls(&self, algorithm: usize) -> f64 {
+        self.algorithms[algorithm].width.map_or(1.0, |width| self.mean[width + 1].exp())
     }
 
     /// Standard deviation of the logarithm of a frame's time around the corrected cost: the root of the mean over the knots.
@@ -302,8 +363,9 @@ impl Learner {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Part {
     Class(BackendClass),
-    /// Of a number of threads or GPUs, in large frames or in small ones.
-    Width(BackendClass, u32, bool),
+    /// Of a number of threads or GPUs: on all of the cost, and on its calls.
+    Width(BackendClass, u32),
+    Calls(BackendClass, u32),
 }
 
 impl Part {
@@ -311,13 +373,14 @@ impl Part {
         match self {
             Self::Class(_) => CLASS_LN,
             Self::Width(..) => WIDTH_LN,
+            Self::Calls(..) => CALL_LN,
         }
     }
 
     fn lasts(self) -> f64 {
         match self {
             Self::Class(_) => CLASS_FRAMES,
-            Self::Width(..) => WIDTH_FRAMES,
+            Self::Width(..) | Self::Calls(..) => WIDTH_FRAMES,
         }
     }
 }

@@ -1,8 +1,9 @@
 //! Which algorithm runs the next frame: the cheapest by all that is known, seldom another one to learn what it costs.
 
 use super::decision::{Choice, Reason};
-use super::learner::{Learner, Place};
-use super::price::Prices;
+use super::learner::{Learner, Place, View};
+use super::price::{Expected, Prices};
+use super::tally::{Predicted, Tally};
 use crate::cost::Counts;
 use crate::{Fields, Load};
 
@@ -32,10 +33,11 @@ pub(super) struct Policy {
     /// The candidate that runs unless one explores, and what ran last.
     settled: Option<usize>,
     ran: Option<usize>,
-    /// Expected cost of each candidate under the present load, nanoseconds, and the natural logarithm without correction.
-    costs_ns: Vec<f64>,
-    predicted_ln: Vec<f64>,
-    place: Place,
+    /// What each candidate is expected to cost under the present load, and what the fields say of it without correction.
+    expected: Vec<Expected>,
+    predicted: Vec<Predicted>,
+    log2_objects: f64,
+    tally: Tally,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
     frame: u64,
@@ -43,8 +45,9 @@ pub(super) struct Policy {
 }
 
 impl Policy {
-    /// `keeps_work` says of each candidate whether a frame is cheaper for it after one that was alike.
-    pub(super) fn new(fields: Fields, keeps_work: &[bool], usable: Vec<bool>) -> Self {
+    /// `kept` gives for each candidate where it finds what the frame before left, if a frame is cheaper for it after one that was alike: one
+    /// number for all that share it.
+    pub(super) fn new(fields: Fields, kept: &[Option<usize>], usable: Vec<bool>) -> Self {
         let count = usable.len();
         let learner = (!fields.costs.is_empty()).then(|| Learner::new(&fields.costs));
         let ids = fields.algorithms();
@@ -54,12 +57,13 @@ impl Policy {
             learner,
             learns: true,
             explores: true,
-            prices: Prices::new(keeps_work),
+            prices: Prices::new(kept),
             settled: None,
             ran: None,
-            costs_ns: vec![f64::INFINITY; count],
-            predicted_ln: vec![f64::INFINITY; count],
-            place: Place::of(0.0),
+            expected: vec![Expected { usual_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
+            predicted: vec![Predicted::default(); count],
+            log2_objects: 0.0,
+            tally: Tally::default(),
             saved_ns: vec![0.0; count],
             frame: 0,
             explored_at: 0,
@@ -105,9 +109,8 @@ impl Policy {
         if self.fields.costs.is_empty() {
             return self.choose_by_count(load.objects);
         }
-        self.expect(load, frames);
-        let usable = (0..self.usable.len()).filter(|&k| self.usable[k]);
-        let best = usable.min_by(|&a, &b| self.costs_ns[a].total_cmp(&self.costs_ns[b]))?;
+        self.expect(load);
+        let best = self.cheapest(|_| true)?;
         let (settled, reason) = match self.settled {
             None if self.ran.is_none() => (best, Reason::First),
             None => (best, Reason::FellBack),
@@ -127,21 +130,35 @@ impl Policy {
     }
 
     /// Fills in what every candidate is expected to cost.
-    fn expect(&mut self, load: &Load, frames: u32) {
+    fn expect(&mut self, load: &Load) {
         let counts = Counts::new(load);
-        self.place = Place::of(counts.log2_objects());
-        let learner = self.learner.as_mut().filter(|_| self.learns);
-        if let Some(learner) = learner {
-            learner.pass(frames);
-        }
+        self.log2_objects = counts.log2_objects();
+        let place = Place::of(self.log2_objects);
+        let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
         for (k, cost) in self.fields.costs.iter().enumerate() {
             let ns = cost.curve.cost_of(&counts);
-            self.predicted_ln[k] = ns.ln();
-            self.costs_ns[k] = match &self.learner {
-                Some(learner) if learner.observed() > 0 => ns * learner.correction_ln(k, self.place).exp(),
-                _ => ns,
-            };
+            let alone_ns = cost.curve.otherwise_of(&counts).unwrap_or(ns).max(ns);
+            let predicted = Predicted { ns, calls_ns: cost.curve.calls_of(&counts).min(ns) };
+            let factor = learner.map_or(1.0, |l| l.correction_ln(k, View { place, calls: predicted.calls() }).exp());
+            let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));
+            self.predicted[k] = predicted;
+            self.expected[k] = Expected { usual_ns: ns * factor + wait_ns, alone_ns: alone_ns * factor + wait_ns };
         }
+    }
+
+    fn usual_ns(&self, candidate: usize) -> f64 {
+        self.expected[candidate].usual_ns
+    }
+
+    /// What the first frame of a candidate costs beside a usual one.
+    fn price_ns(&self, candidate: usize) -> f64 {
+        let expected = self.expected[candidate];
+        self.prices.first_ns(candidate, self.frame, expected) - expected.usual_ns
+    }
+
+    fn cheapest(&self, among: impl Fn(usize) -> bool) -> Option<usize> {
+        let usable = (0..self.usable.len()).filter(|&k| self.usable[k] && among(k));
+        usable.min_by(|&a, &b| self.usual_ns(a).total_cmp(&self.usual_ns(b)))
     }
 
     /// Whether to go on with the one that runs, or to which one to switch.
@@ -149,19 +166,16 @@ impl Policy {
     /// A switch is made once the frames since the other became cheaper would have saved what it costs. Where costs hold still that
     /// loses at most twice what knowing the future would, and where they flicker about a border nothing is ever saved for long.
     fn settle(&mut self, settled: usize, best: usize, frames: u32) -> (usize, Reason) {
-        let now = self.costs_ns[settled];
-        for (k, saved) in self.saved_ns.iter_mut().enumerate() {
-            let gain = (now - self.costs_ns[k]) * f64::from(frames);
+        let now = self.usual_ns(settled);
+        for (saved, expected) in self.saved_ns.iter_mut().zip(&self.expected) {
+            let gain = (now - expected.usual_ns) * f64::from(frames);
             *saved = if gain.is_finite() { (*saved + gain).max(0.0) } else { 0.0 };
         }
         if best == settled {
             return (settled, Reason::Stayed);
         }
-        let paid = |&k: &usize| {
-            self.usable[k] && self.costs_ns[k] < now && self.saved_ns[k] >= self.prices.of(k, self.frame) * self.costs_ns[k]
-        };
-        let target = (0..self.usable.len()).filter(paid).min_by(|&a, &b| self.costs_ns[a].total_cmp(&self.costs_ns[b]));
-        target.map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
+        let paid = |k: usize| self.usual_ns(k) < now && self.saved_ns[k] >= self.price_ns(k);
+        self.cheapest(paid).map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
     }
 
     /// The candidate of which one frame is expected to save the most over the next ones, if that is more than the frame costs.
@@ -170,14 +184,16 @@ impl Policy {
         if self.frame < self.explored_at + EXPLORE_EVERY {
             return None;
         }
-        let now = self.costs_ns[settled];
+        let place = Place::of(self.log2_objects);
+        let view = |k: usize| (k, View { place, calls: self.predicted[k].calls() });
+        let now = self.usual_ns(settled);
         let worth = |k: usize| {
-            let price = self.prices.of(k, self.frame) * self.costs_ns[k] + self.costs_ns[k];
-            if k == settled || !self.usable[k] || price > MOST_DEARER * now {
+            let first = self.usual_ns(k) + self.price_ns(k);
+            if k == settled || !self.usable[k] || first > MOST_DEARER * now {
                 return None;
             }
-            let deviation = learner.variance_of_ratio(settled, k, self.place).sqrt();
-            let gain = now * expected_gain((self.costs_ns[k] / now).ln(), deviation) * HORIZON - (price - now).max(0.0);
+            let deviation = learner.variance_of_ratio(view(settled), view(k)).sqrt();
+            let gain = now * expected_gain((self.usual_ns(k) / now).ln(), deviation) * HORIZON - (first - now).max(0.0);
             (gain > 0.0).then_some((k, gain))
         };
         let best = (0..self.usable.len()).filter_map(worth).max_by(|a, b| a.1.total_cmp(&b.1));
@@ -185,19 +201,32 @@ impl Policy {
     }
 
     fn choice(&self, chosen: usize, reason: Reason) -> Choice {
-        let others = (0..self.usable.len()).filter(|&k| k != chosen && self.usable[k]);
-        let runner_up = others.map(|k| (k, self.costs_ns[k])).min_by(|a, b| a.1.total_cmp(&b.1));
-        Choice { chosen, predicted_ns: Some(self.costs_ns[chosen]), runner_up, reason }
+        let runner_up = self.cheapest(|k| k != chosen).map(|k| (k, self.usual_ns(k)));
+        Choice { chosen, predicted_ns: Some(self.usual_ns(chosen)), runner_up, reason }
     }
 
     /// Takes in that a candidate ran the frame that was decided, and what that took.
     pub(super) fn ran(&mut self, candidate: usize, ns: f64) {
         let entered = self.ran != Some(candidate);
         self.ran = Some(candidate);
-        let over_usual = self.learns.then(|| ns / self.costs_ns[candidate]);
-        let start = self.prices.ran(candidate, entered, self.frame, over_usual);
-        if let (Some(learner), Some((factor, doubt)), true) = (&mut self.learner, start, self.learns) {
-            learner.observe(candidate, self.place, (ns / factor).ln(), self.predicted_ln[candidate], doubt);
+        let expected = self.expected[candidate];
+        let usual = self.prices.ran(candidate, entered, self.frame, ns, expected, self.learns);
+        let Some(learner) = self.learner.as_mut().filter(|_| self.learns) else { return };
+        if !self.tally.takes(candidate, self.log2_objects) {
+            if self.tally.frames > 0 {
+                learner.observe(&self.tally, self.frame);
+            }
+            self.tally = self.tally.next(candidate);
+        }
+        if usual || self.settled != Some(candidate) {
+            let dearest_ns = self.prices.anew_ns(candidate, expected);
+            self.tally.cold = entered;
+            let waited_ns = self.tally.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns);
+            learner.waited(candidate, waited_ns, self.frame);
+        }
+        if self.tally.is_full() {
+            learner.observe(&self.tally, self.frame);
+            self.tally = self.tally.next(candidate);
         }
     }
 

@@ -1,8 +1,9 @@
 //! From nothing to fields of this machine: the cache, else a measurement and a prediction.
 
+use super::Adaptive;
 use super::cache::{Entry, Key};
+use super::candidates::Made;
 use super::options::Options;
-use super::{Adaptive, Candidate, candidates};
 use crate::hardware::parameter;
 use crate::{
     AlgorithmId, Displacement, Error, Fields, GpuHardware, Hardware, Load, Model, Parameter, Registry, Scenario, measure,
@@ -87,7 +88,7 @@ struct Arrival {
     setup: Setup,
     entry: Option<Entry>,
     /// `None`: the usual ones stay.
-    fields: Option<(Fields, Vec<Candidate>)>,
+    fields: Option<(Fields, Made)>,
 }
 
 impl fmt::Debug for Arrival {
@@ -119,7 +120,7 @@ impl Adaptive {
             // Only where there is no prediction: to make algorithms takes memory, and on GPUs time.
             let Arrival { setup, entry, fields } = arrival;
             let mut adaptive = match fields {
-                Some((fields, candidates)) => Self::with(fields, candidates),
+                Some((fields, made)) => Self::with(fields, made),
                 None => Self::new(Fields::usual(&registry), &registry)?,
             };
             adaptive.start = Start { setup, entry, awaited: None };
@@ -166,8 +167,8 @@ impl Adaptive {
         let Some(arrival) = handover.slot.lock().unwrap_or_else(PoisonError::into_inner).take() else { return };
         self.start.setup = arrival.setup;
         self.start.entry = arrival.entry;
-        if let Some((fields, candidates)) = arrival.fields {
-            self.adopt(fields, candidates);
+        if let Some((fields, made)) = arrival.fields {
+            self.adopt(fields, made);
         }
     }
 }
@@ -232,19 +233,19 @@ fn arrive(options: &Options, registry: &Registry, began: Instant, wanted: impl F
     let mut remarks = Vec::new();
     let found = find(options, registry, &mut remarks);
     let made = found.filter(|_| wanted()).and_then(|(fields, origin, entry)| {
-        let (candidates, failure) = candidates(&fields, registry);
-        if candidates.iter().any(|c| c.algorithm.is_some()) {
-            return Some((fields, candidates, origin, entry));
+        let made = Made::of(&fields, registry);
+        if !made.instances.is_empty() {
+            return Some((fields, made, origin, entry));
         }
-        remarks.extend(failure.map(|e| format!("none of the algorithms that were predicted can be made: {e}")));
+        remarks.extend(made.failure.map(|e| format!("none of the algorithms that were predicted can be made: {e}")));
         None
     });
-    let Some((fields, candidates, origin, entry)) = made else {
+    let Some((fields, made, origin, entry)) = made else {
         return Arrival { setup: Setup { remarks, ..usual(began) }, entry: None, fields: None };
     };
     let file = entry.as_ref().map(|e| e.file().to_owned());
     let setup = Setup { origin, remarks, seconds: began.elapsed().as_secs_f64(), file };
-    Arrival { setup, entry, fields: Some((fields, candidates)) }
+    Arrival { setup, entry, fields: Some((fields, made)) }
 }
 
 /// Fields from the cache, else from a prediction, and their place in the cache. `None` where nothing can be predicted.

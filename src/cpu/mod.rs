@@ -33,14 +33,17 @@ pub(crate) struct Method {
     pub(crate) revision: u32,
     /// Makes an instance that runs on that many threads at that SIMD level.
     pub(crate) create: Create,
+    /// Makes one that runs on any of some numbers of threads, where what it keeps from frame to frame is worth taking along.
+    pub(crate) create_for: Option<CreateFor>,
 }
 
 type Create = fn(u32, &Threads, SimdLevel) -> Result<Box<dyn BroadPhase>, Error>;
+type CreateFor = fn(&[u32], &Threads, SimdLevel) -> Result<Box<dyn BroadPhase>, Error>;
 
 /// Every method, the simplest first.
 pub(crate) const METHODS: &[Method] = &[
-    Method { name: "brute", revision: 2, create: brute::create },
-    Method { name: "sweep", revision: 2, create: sweep::create },
-    Method { name: "strips", revision: 2, create: strips::create },
-    Method { name: "verlet", revision: 1, create: verlet::create },
+    Method { name: "brute", revision: 2, create: brute::create, create_for: None },
+    Method { name: "sweep", revision: 2, create: sweep::create, create_for: None },
+    Method { name: "strips", revision: 2, create: strips::create, create_for: None },
+    Method { name: "verlet", revision: 1, create: verlet::create, create_for: Some(verlet::create_for) },
 ];

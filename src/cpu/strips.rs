@@ -94,6 +94,7 @@ impl BroadPhase for Strips {
 }
 
 impl Finder {
+    /// Memory for any workers that have no more threads than these.
     pub(super) fn new(workers: &Workers, level: SimdLevel) -> Self {
         let bins = (0..workers.threads()).map(|_| Bins::default()).collect();
         let tasks = (0..workers.tasks()).map(|_| Task::default()).collect();
@@ -104,7 +105,8 @@ impl Finder {
     pub(super) fn find(&mut self, workers: &Workers, boxes: &[Aabb], lists: &mut [Pairs]) -> Result<(), Error> {
         let grid = StripGrid::plan(&Sample::of(boxes), boxes.len());
         let Self { bins, large, tasks, level } = self;
-        let threads = bins.len();
+        let threads = workers.threads();
+        let (bins, tasks) = (&mut bins[..threads], &mut tasks[..workers.tasks()]);
         workers.each(bins, |k, bin| {
             let share = part(boxes.len(), k, threads);
             bin.error = bin.fill(&grid, boxes, share).err();

@@ -13,6 +13,7 @@ mod motion;
 mod tree;
 
 use crate::broad_phase::check_count;
+use crate::cpu::columns::part;
 use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::strips::Finder;
 use crate::cpu::workers::{Outputs, Workers};
@@ -25,7 +26,9 @@ use tree::{FAR, Tree};
 /// The method; see the module.
 #[derive(Debug)]
 struct Verlet {
-    workers: Workers,
+    /// One for each number of threads that it may run on, ascending, and which of them runs it now.
+    widths: Vec<Workers>,
+    width: usize,
     finder: Finder,
     outputs: Outputs,
     motion: Motion,
@@ -33,8 +36,10 @@ struct Verlet {
     tree: Tree,
     /// One for each task: its share of the boxes.
     shares: Vec<Share>,
-    /// One for each task: its share of the kept pairs.
+    /// One for each task: its share of the kept pairs. Tasks beyond those of the present width have none.
     kept: Vec<Pairs>,
+    /// The kept pairs of all tasks, while they are dealt out to another number of them.
+    dealt: Pairs,
 }
 
 /// What came of keeping pairs in a frame.
@@ -49,17 +54,25 @@ enum Kept {
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("verlet", threads, pools)?;
-    let tasks = workers.tasks();
+    create_for(&[threads], pools, level)
+}
+
+/// One instance that can run on any of these numbers of threads, ascending. It begins with the least.
+pub(super) fn create_for(threads: &[u32], pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
+    let widths: Vec<Workers> = threads.iter().map(|&k| Workers::new("verlet", k, pools)).collect::<Result<_, _>>()?;
+    let widest = &widths[widths.len() - 1];
+    let tasks = widest.tasks();
     Ok(Box::new(Verlet {
-        finder: Finder::new(&workers, level),
+        finder: Finder::new(widest, level),
         outputs: Outputs::default(),
         motion: Motion::default(),
         grown: Grown::new(level),
         tree: Tree::new(level),
         shares: (0..tasks).map(|_| Share::default()).collect(),
         kept: (0..tasks).map(|_| Pairs::new()).collect(),
-        workers,
+        dealt: Pairs::new(),
+        width: 0,
+        widths,
     }))
 }
 
@@ -81,10 +94,11 @@ impl BroadPhase for Verlet {
         };
         if kept == Kept::Not {
             pairs.clear();
-            let Self { workers, finder, outputs, .. } = self;
+            let Self { widths, width, finder, outputs, .. } = self;
+            let workers = &widths[*width];
             outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists))?;
         }
-        self.motion.found(boxes.len(), pairs.found());
+        self.motion.found(boxes.len(), pairs.overlapping());
         pairs.finish()
     }
 
@@ -97,18 +111,53 @@ impl BroadPhase for Verlet {
     fn keeps_work(&self) -> bool {
         true
     }
+
+    fn set_threads(&mut self, threads: u32) -> bool {
+        let Some(width) = self.widths.iter().position(|w| w.threads() == threads as usize) else { return false };
+        if width != self.width {
+            let before = self.widths[self.width].tasks();
+            self.width = width;
+            self.deal(before);
+        }
+        true
+    }
+}
+
+/// Kept pairs of a task, at most, when there are so many boxes and tasks.
+fn most_kept(boxes: usize, tasks: usize) -> usize {
+    MOST_KEPT as usize * boxes / tasks + 1024
 }
 
 impl Verlet {
+    /// Deals the kept pairs of so many tasks out to those of the present width.
+    fn deal(&mut self, before: usize) {
+        let Self { widths, width, kept, dealt, grown, .. } = self;
+        let tasks = widths[*width].tasks();
+        dealt.clear();
+        kept[..before].iter().for_each(|list| dealt.append(list));
+        if !dealt.is_complete() {
+            // Without memory for them the next frame makes them anew, and tells if it has none either.
+            grown.forget();
+        }
+        let most = most_kept(grown.as_slice().len(), tasks);
+        for (k, list) in kept[..tasks].iter_mut().enumerate() {
+            list.clear();
+            list.set_limit(Some(most));
+            dealt.as_slice()[part(dealt.len(), k, tasks)].iter().for_each(|&(i, j)| list.push(i, j));
+        }
+    }
+
     /// Finds the pairs among the kept ones, as far as those can be kept.
     fn keep(&mut self, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
-        let Self { workers, finder, outputs, motion, grown, tree, shares, kept } = self;
+        let Self { widths, width, finder, outputs, motion, grown, tree, shares, kept, .. } = self;
+        let workers = &widths[*width];
+        let (shares, kept) = (&mut shares[..workers.tasks()], &mut kept[..workers.tasks()]);
         let changes = grown.check(workers, boxes, margin, shares)?;
         let anew = motion.wants_anew(boxes.len(), &changes);
         if anew {
             grown.grow_all(workers, boxes, motion.renew(boxes), shares);
             tree.build(workers, grown.as_slice())?;
-            let most = MOST_KEPT as usize * boxes.len() / kept.len() + 1024;
+            let most = most_kept(boxes.len(), kept.len());
             for list in kept.iter_mut() {
                 list.clear();
                 list.set_limit(Some(most));

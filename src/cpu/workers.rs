@@ -174,13 +174,10 @@ impl Workers {
 pub(crate) struct Outputs(Vec<Pairs>);
 
 impl Outputs {
-    /// As many lists as `workers` has tasks, each empty and under the caller's limit.
+    /// As many lists as `workers` has tasks, each empty and under the caller's limit and filter.
     fn ready(&mut self, workers: &Workers, pairs: &Pairs) {
         self.0.resize_with(workers.tasks(), Pairs::new);
-        for list in &mut self.0 {
-            list.clear();
-            list.set_limit(pairs.limit());
-        }
+        self.0.iter_mut().for_each(|list| list.begin_part(pairs));
     }
 
     /// Lets `find` add to as many lists as `workers` has tasks, then joins them in order.
@@ -196,9 +193,12 @@ impl Outputs {
             return find(std::slice::from_mut(pairs));
         }
         self.ready(workers, pairs);
-        find(&mut self.0)?;
-        self.join(workers, pairs);
-        Ok(())
+        let found = find(&mut self.0);
+        if found.is_ok() {
+            self.join(workers, pairs);
+        }
+        self.0.iter_mut().for_each(Pairs::end_part);
+        found
     }
 
     /// One phase where it pays: copies all lists behind one another.
@@ -212,7 +212,7 @@ impl Outputs {
                 (to, list)
             });
             workers.each_of(parts, |(to, list)| to.copy_from_slice(list.as_slice()));
-            pairs.extend_by(total);
+            pairs.extend_by_parts(&self.0);
         } else {
             self.0.iter().for_each(|list| pairs.append(list));
         }

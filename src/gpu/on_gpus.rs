@@ -115,10 +115,8 @@ impl OnGpus {
         slabs.plan(sample, boxes, each.into_iter());
         debug_assert_eq!(slabs.count(), parts.len() * rounds);
         let slabs = &*slabs;
-        let limit = pairs.limit();
         for part in parts.iter_mut() {
-            part.pairs.clear();
-            part.pairs.set_limit(limit);
+            part.pairs.begin_part(pairs);
             part.work = 0.0;
             part.began = None;
         }
@@ -203,7 +201,7 @@ impl BroadPhase for OnGpus {
                 let sample = Sample::of(boxes);
                 let room: usize = parts.iter().map(|p| p.engine.most_objects()).sum();
                 let mut rounds = boxes.len().div_ceil(room.max(1)).max(1);
-                loop {
+                let found = loop {
                     pairs.clear();
                     match self.slabs(rounds, &sample, boxes, pairs) {
                         Ok(true) => break Ok(()),
@@ -218,7 +216,9 @@ impl BroadPhase for OnGpus {
                         }
                         Err(failure) => break Err(failure),
                     }
-                }
+                };
+                self.parts.iter_mut().for_each(|part| part.pairs.end_part());
+                found
             }
         };
         match found {

@@ -1,7 +1,7 @@
 //! What the tests of the contract share.
 #![allow(dead_code, reason = "each test program uses a part of this")]
 
-use sapwise::{Aabb, Pair};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Pair, Registry, SimdLevel};
 
 /// The oracle: the definition of overlap, in a double loop.
 pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {
@@ -16,6 +16,38 @@ pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {
     pairs
 }
 
+/// Every method on 1, 2, 3 and 7 threads at every SIMD level of this machine.
+pub(crate) fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
+    let mut all = Vec::new();
+    for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
+        let mut registry = Registry::with_cores(1);
+        registry.limit_simd(level);
+        let methods: Vec<String> = registry.entries().iter().map(|e| e.id.method().to_owned()).collect();
+        for method in methods {
+            for threads in [1, 2, 3, 7] {
+                let id: AlgorithmId = format!("{method}@cpu{threads}").parse().unwrap();
+                match registry.create(&id) {
+                    Ok(algorithm) => all.push((format!("{id} at {level}"), algorithm)),
+                    Err(Error::Unavailable { .. }) if threads > 1 && !cfg!(feature = "parallel") => {}
+                    Err(error) => panic!("{id}: {error}"),
+                }
+            }
+        }
+    }
+    all
+}
+
+/// The same past a filter: that, too, by its definition.
+pub(crate) fn naive_filtered(boxes: &[Aabb], memberships: &[Membership]) -> Vec<Pair> {
+    let of = |k: u32| memberships.get(k as usize).copied().unwrap_or_default();
+    let mut pairs = naive(boxes);
+    pairs.retain(|&(i, j)| {
+        let (a, b) = (of(i), of(j));
+        a.groups & b.mask != 0 && b.groups & a.mask != 0 && !(a.fixed && b.fixed)
+    });
+    pairs
+}
+
 /// A small generator of its own (Marsaglia's xorshift), so that the test does not rest on the library's.
 pub(crate) struct Random(pub(crate) u64);
 
@@ -26,6 +58,14 @@ impl Random {
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
         (self.0 >> 40) as f32 / (1_u64 << 24) as f32
+    }
+
+    /// In one or two of eight groups, not colliding with some of them, one in four fixed, one in sixteen in every group.
+    pub(crate) fn membership(&mut self) -> Membership {
+        let group = |at: f32| 1 << (at * 8.0) as u32;
+        let (groups, mask) = (group(self.next()) | group(self.next()), !(group(self.next()) | group(self.next())));
+        let fixed = self.next() < 0.25;
+        if self.next() < 1.0 / 16.0 { Membership::default() } else { Membership { groups, mask, fixed } }
     }
 
     /// Cubes of up to 1.1 times that half edge in a world of that size.
@@ -60,6 +100,27 @@ pub(crate) fn large_boxes() -> Vec<Aabb> {
         boxes.insert(k * 97, Aabb::new(at, [at[0] + size[0], at[1] + size[1], at[2] + size[2]]));
     }
     boxes
+}
+
+/// The frames of a `.npy` array of little-endian float32 of shape frames x most boxes x 6, without the rows of NaN in which frames with
+/// fewer boxes end.
+pub(crate) fn npy_frames(file: &[u8]) -> Vec<Vec<Aabb>> {
+    let length = usize::from(u16::from_le_bytes([file[8], file[9]]));
+    let (header, data) = file[10..].split_at(length);
+    let header = str::from_utf8(header).unwrap();
+    let shape = header.split_once("'shape': (").unwrap().1.split_once(", 6)").unwrap().0;
+    let (frames, most) = shape.split_once(", ").unwrap();
+    let (frames, most): (usize, usize) = (frames.parse().unwrap(), most.parse().unwrap());
+    assert!(header.contains("'<f4'") && data.len() == frames * most * 24, "{header}");
+    let (values, _) = data.as_chunks::<4>();
+    let (rows, _) = values.as_chunks::<6>();
+    let row = |row: &[[u8; 4]; 6]| row.map(f32::from_le_bytes);
+    let absent = |r: &[f32; 6]| r.iter().all(|v| v.is_nan());
+    let frame = |rows: &[[[u8; 4]; 6]]| -> Vec<Aabb> {
+        let present = rows.iter().map(row).take_while(|r| !absent(r));
+        present.map(|r| Aabb::new([r[0], r[1], r[2]], [r[3], r[4], r[5]])).collect()
+    };
+    rows.chunks(most).map(frame).collect()
 }
 
 /// The GPUs of this machine; `None`, said aloud, where there is none and none is required.

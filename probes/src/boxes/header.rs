@@ -3,7 +3,12 @@
 //! Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>. Parsed here and not by ndarray-npy 0.9,
 //! which panics on a shape such as `(0, 2**40, 2**40)` and runs out of stack on a header of ten thousand brackets.
 
+use std::io::{Read, Write};
+
 use anyhow::{Context, Result, bail, ensure};
+
+/// The first bytes of every file.
+const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// What a header says of the data that follow it.
 #[derive(Debug, PartialEq)]
@@ -17,23 +22,49 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// The header at the beginning of `file`, and the bytes after it.
-    pub(super) fn split(file: &[u8]) -> Result<(Self, &[u8])> {
-        ensure!(!file.is_empty(), "the file is empty");
-        let Some(rest) = file.strip_prefix(b"\x93NUMPY") else {
-            bail!("it is no .npy file: the first bytes aren't \\x93NUMPY");
-        };
+    /// Reads the header at the beginning of a file, and nothing after it.
+    pub(super) fn read(file: &mut impl Read) -> Result<Self> {
         let truncated = "the file ends within its header";
-        let (version, rest) = rest.split_first_chunk::<2>().context(truncated)?;
-        let (length, rest) = match version[0] {
-            1 => rest.split_first_chunk().map(|(length, rest)| (u32::from(u16::from_le_bytes(*length)), rest)),
-            2 | 3 => rest.split_first_chunk().map(|(length, rest)| (u32::from_le_bytes(*length), rest)),
+        let mut magic = Vec::new();
+        file.take(6).read_to_end(&mut magic)?;
+        ensure!(!magic.is_empty(), "the file is empty");
+        ensure!(magic == MAGIC, "it is no .npy file: the first bytes aren't \\x93NUMPY");
+        let mut version = [0; 2];
+        file.read_exact(&mut version).context(truncated)?;
+        let length = match version[0] {
+            1 => {
+                let mut length = [0; 2];
+                file.read_exact(&mut length).context(truncated)?;
+                u64::from(u16::from_le_bytes(length))
+            }
+            2 | 3 => {
+                let mut length = [0; 4];
+                file.read_exact(&mut length).context(truncated)?;
+                u64::from(u32::from_le_bytes(length))
+            }
             other => bail!("version {other} of the .npy format is unknown"),
-        }
-        .context(truncated)?;
-        let (header, data) = rest.split_at_checked(usize::try_from(length)?).context(truncated)?;
-        let text = str::from_utf8(header).context("the header is no text")?;
-        Ok((Self::parse(text).context("the header is malformed")?, data))
+        };
+        let mut header = Vec::new();
+        file.take(length).read_to_end(&mut header)?;
+        ensure!(header.len() as u64 == length, truncated);
+        let text = str::from_utf8(&header).context("the header is no text")?;
+        Self::parse(text).context("the header is malformed")
+    }
+
+    /// Writes the header of a file whose data begin at a multiple of 64 bytes, as numpy does. The shape has two axes or more.
+    pub(super) fn write(&self, out: &mut dyn Write) -> Result<()> {
+        let axes: Vec<String> = self.shape.iter().map(u64::to_string).collect();
+        let order = if self.fortran_order { "True" } else { "False" };
+        let descr = &self.descr;
+        let dict = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': ({}), }}", axes.join(", "));
+        // Magic, version and length before the text, and a line end after it.
+        let used = MAGIC.len() + 4 + dict.len() + 1;
+        let text = format!("{dict}{}\n", " ".repeat(used.next_multiple_of(64) - used));
+        out.write_all(MAGIC)?;
+        out.write_all(&[1, 0])?;
+        out.write_all(&u16::try_from(text.len())?.to_le_bytes())?;
+        out.write_all(text.as_bytes())?;
+        Ok(())
     }
 
     /// Reads `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 6), }` with the keys in any order.
@@ -111,14 +142,14 @@ mod tests {
     fn every_cut_and_every_changed_byte_is_read_or_refused() {
         let mut file = b"\x93NUMPY\x01\x00\x3a\x00{'descr': '<f4', 'fortran_order': False, 'shape': (3, 6), }".to_vec();
         for length in 0..file.len() {
-            let cut = Header::split(&file[..length]);
+            let cut = Header::read(&mut &file[..length]);
             assert!(cut.is_err() || length >= 68, "{length}: {cut:?}");
         }
         for at in 0..file.len() {
             for byte in 0..=255 {
                 let old = std::mem::replace(&mut file[at], byte);
                 // Whatever comes of it, it is no panic.
-                let _ = Header::split(&file);
+                let _ = Header::read(&mut &file[..]);
                 file[at] = old;
             }
         }
@@ -131,6 +162,6 @@ mod tests {
         }
         let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (99999999999999999999, 6), }";
         assert!(Header::parse(text).is_err());
-        assert!(Header::split(b"\x93NUMPY\x02\x00\xff\xff\xff\xff{").is_err());
+        assert!(Header::read(&mut &b"\x93NUMPY\x02\x00\xff\xff\xff\xff{"[..]).is_err());
     }
 }

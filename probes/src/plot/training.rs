@@ -36,10 +36,7 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(crate) fn training(held: &Held, model: &Model, command: &str) -> anyhow::Result<String> {
     let learning = &model.validation.learning;
     let size = if learning.is_empty() { (SIZE.0, UPPER + CAPTION) } else { SIZE };
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        root.fill(&WHITE)?;
+    super::svg(size, |root| {
         let (panels, line) = root.split_vertically(size.1 - CAPTION);
         let (upper, lower) = panels.split_vertically(UPPER);
         let (left, right) = upper.split_horizontally(SIZE.0 / 2);
@@ -58,9 +55,8 @@ pub(crate) fn training(held: &Held, model: &Model, command: &str) -> anyhow::Res
         let plural = if machines == 1 { "" } else { "s" };
         let caption = format!("{simulated}{machines} physical machine{plural}. Made by: {command}");
         line.draw(&Text::new(caption, (20, 8), ("sans-serif", 15).into_font()))?;
-        root.present()?;
-    }
-    Ok(svg)
+        Ok(())
+    })
 }
 
 /// Each time as a point, by method; the black line is where the prediction is right, the grey ones a factor of two beside it.

@@ -2,7 +2,7 @@
 
 use crate::algorithms::Algorithms;
 use crate::args::Probe;
-use crate::contention::Contention;
+use crate::contention::contend;
 use crate::destination::Destination;
 use crate::exit::Outcome;
 use crate::hardware::{self, measure_hardware};
@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     if arguments.leashed {
         child::stop_with_parent();
     }
-    let contention = arguments.contended.map(|kind| Contention::start(kind, arguments.threads)).transpose();
+    let contention = arguments.contended.map(|kind| contend(kind, arguments.threads)).transpose();
     let contention = contention.context("the threads for --contended can't be started")?;
     let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
     let told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);

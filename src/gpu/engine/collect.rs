@@ -18,7 +18,7 @@ impl Engine {
             let header = self.header_of(&frame)?;
             let total = header.total();
             all += total;
-            if pairs.limit().is_some_and(|limit| pairs.len() as u64 + total > limit as u64) {
+            if pairs.is_too_small_for(total) {
                 // More than the caller wants: they are counted and stay where they are.
                 pairs.skip(total);
             } else {
@@ -84,7 +84,7 @@ impl Engine {
         }
         if total > u64::from(u32::MAX) {
             let reason = format!("{total} pairs are more than the 2^32 that gpu{} can number", self.index());
-            return Err(Failure::Gpu(format!("{reason}; set a limit on the pairs")));
+            return Err(Failure::Gpu(format!("{reason}; set a limit on the pairs, and no filter")));
         }
         self.download.ensure(&self.gpu, PAIRS_AT + total.min(self.downloadable()) * PAIR)?;
         if total > u64::from(self.output.capacity()) {

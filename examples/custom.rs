@@ -1,0 +1,101 @@
+//! An algorithm of your own, which the adaptive module chooses where it is cheapest: for scenes in which nothing moves at times.
+//!
+//! ```sh
+//! cargo run --release -p sapwise --example custom
+//! ```
+//!
+//! Its cost is guessed here, and corrected by the frames that it runs. A cost that was measured comes from a command of your own:
+//! `probes/examples/bvh.rs`.
+
+use sapwise::{
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Fields, Load, Pairs, Registry,
+    Scenario, Source, Term,
+};
+
+/// What it is called in fields, reports and decisions.
+pub(crate) const ID: &str = "rested@cpu1";
+
+/// Gives the pairs of the frame before where no box has changed, and leaves other frames to another algorithm.
+pub(crate) struct Rested {
+    other: Box<dyn BroadPhase>,
+    before: Vec<Aabb>,
+    pairs: Pairs,
+}
+
+impl Rested {
+    pub(crate) fn new(other: Box<dyn BroadPhase>) -> Self {
+        Self { other, before: Vec::new(), pairs: Pairs::new() }
+    }
+}
+
+impl BroadPhase for Rested {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        // A bound that is NaN differs from itself, so an invalid box is always left to the other one, which names it.
+        if self.before != boxes {
+            // Were there an error, nothing would be known of the frame before.
+            self.before.clear();
+            self.pairs.clear();
+            self.other.find_pairs(boxes, &mut self.pairs)?;
+            self.before.extend_from_slice(boxes);
+        }
+        // One by one and not the list as a whole: the order, the limit and whatever else the caller wants are matters of `pairs`.
+        self.pairs.iter().for_each(|&(i, j)| pairs.push(i, j));
+        pairs.finish()
+    }
+
+    /// A frame is cheaper after one that was alike.
+    fn keeps_work(&self) -> bool {
+        true
+    }
+}
+
+/// A registry of ours with [`Rested`] in it, which leaves frames to `other`.
+pub(crate) fn registry(other: &'static str) -> Registry {
+    let mut registry = Registry::with_cores(1);
+    // The 1 is the revision: counted up whenever it gets faster or slower, so that what was measured before is told to be stale.
+    registry.add(ID.parse().expect("a method and a backend"), 1, move || {
+        let other = other.parse().expect("a method and a backend");
+        Ok(Box::new(Rested::new(Registry::with_cores(1).create(&other)?)))
+    });
+    registry
+}
+
+/// The cost of an algorithm: nanoseconds for each unit of some terms.
+pub(crate) fn cost(registry: &Registry, id: &str, terms: &[(Term, f64)]) -> AlgorithmCost {
+    let algorithm: AlgorithmId = id.parse().expect("a method and a backend");
+    let revision = registry.entries().iter().find(|e| e.id == algorithm).map_or(1, |e| e.revision);
+    let terms = terms.iter().map(|&(term, unit_ns)| CostTerm { term, unit_ns }).collect();
+    AlgorithmCost { algorithm, revision, curve: CostCurve { terms, ..CostCurve::default() }, spread_ln: 0.5 }
+}
+
+/// Fields from these costs, with the borders of scenes from 10 to a million objects.
+pub(crate) fn fields(costs: Vec<AlgorithmCost>) -> Fields {
+    let load = |k: u32| Load { objects: 10_u32.pow(k), ..Load::default() };
+    Fields::from_costs(Source::Default, "", costs, &(1..=6).map(load).collect::<Vec<Load>>())
+}
+
+#[allow(dead_code, reason = "the tests of this example have no use for its main")]
+fn main() -> Result<(), Error> {
+    let registry = registry("strips@cpu1");
+    // Comparing a box takes a nanosecond or so; where boxes move, it costs what the other one does, and more.
+    let fields = fields(vec![
+        cost(&registry, "strips@cpu1", &[(Term::Objects, 60.0)]),
+        cost(&registry, ID, &[(Term::Objects, 2.0), (Term::Moved, 1000.0)]),
+    ]);
+    let mut adaptive = Adaptive::new(fields, &registry)?;
+    let mut scene = Scenario::Uniform.start(5000, 1);
+    let mut pairs = Pairs::new();
+    for frame in 0..600 {
+        // Three times in turn everything moves for a hundred frames and rests for a hundred.
+        if frame % 200 < 100 {
+            scene.advance();
+        }
+        adaptive.find_pairs(scene.boxes(), &mut pairs)?;
+        if let (0, Some(decision)) = (frame % 50, adaptive.last_decision()) {
+            let ns = decision.predicted_ns.unwrap_or_default();
+            println!("frame {frame}: {} pairs by {}, expected to take {ns:.0} ns", pairs.len(), decision.algorithm);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,141 @@
+//! Where the fields of a run come from.
+
+use crate::algorithms::Algorithms;
+use crate::args::Run;
+use crate::document::read_document;
+use crate::gpus::{self, GpuChoice};
+use crate::hardware::measure_hardware;
+use crate::verbs::predict;
+use crate::{prediction, revisions, train};
+use anyhow::{Context, bail};
+use sapwise::json::Document;
+use sapwise::{AlgorithmId, Fields, Registry, Scenario, Source, measure};
+use serde::Serialize;
+use std::path::Path;
+
+/// The fields, and what is told about them.
+pub(super) struct Origin {
+    pub(super) fields: Fields,
+    pub(super) from: From,
+    /// The processor of the other machine whose report they come from.
+    pub(super) other_machine: Option<String>,
+    /// An algorithm gave wrong pairs while it was sampled.
+    pub(super) wrong: bool,
+}
+
+/// What they were taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum From {
+    /// A model and the parameters of this machine.
+    Prediction,
+    /// A fields file.
+    Fields,
+    /// The timings of a report.
+    Report,
+}
+
+impl Origin {
+    /// Where the fields come from, in a sentence.
+    pub(super) fn text(&self) -> String {
+        let Fields { source, model, samples, .. } = &self.fields;
+        let model = model.as_ref().map_or(String::new(), |name| format!(" by the model {name}"));
+        let corrected = match samples.len() {
+            0 => String::new(),
+            1 => ", corrected by 1 sample".to_owned(),
+            count => format!(", corrected by {count} samples"),
+        };
+        match (self.from, source) {
+            (From::Prediction, _) => format!("predicted for this machine{model}{corrected}"),
+            (From::Report, _) => match &self.other_machine {
+                Some(cpu) => format!("measured on another machine ({cpu})"),
+                None => "measured on this machine".to_owned(),
+            },
+            (From::Fields, Source::Default) => "from a file, written down by hand".to_owned(),
+            (From::Fields, Source::Predicted) => format!("from a file, predicted{model}"),
+            (From::Fields, Source::Measured) => "from a file, measured".to_owned(),
+            (From::Fields, Source::Learned) if samples.is_empty() => format!("from a file, learned on line{model}"),
+            (From::Fields, Source::Learned) => format!("from a file, predicted{model}{corrected}"),
+        }
+    }
+}
+
+/// Fields predicted for this machine.
+///
+/// # Errors
+/// When no process can be started, a GPU that was asked for is not there, or the model predicts none of the algorithms.
+pub(super) fn predicted(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Origin> {
+    let (hardware, measured) = measure_hardware(None, &arguments.gpus)?;
+    let model = predict::model(None)?;
+    let (usable, scenario) = (&measured.usable, Scenario::Uniform);
+    let (mut fields, wrong) = match arguments.samples {
+        0 => (prediction::predict(&model, &hardware, usable, scenario, algorithms)?, false),
+        most => prediction::predict_and_sample(&model, &hardware, usable, scenario, algorithms, most)?,
+    };
+    fields.warnings.extend(measured.remarks);
+    Ok(Origin { fields, from: From::Prediction, other_machine: None, wrong })
+}
+
+/// The fields of a file, which may be a report whose timings they are measured from.
+///
+/// # Errors
+/// When the file is neither, or tells of other revisions of the algorithms than those of this build.
+pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyhow::Result<Origin> {
+    let fresh = |stale: Vec<String>| match &stale[..] {
+        [] => Ok(()),
+        _ => bail!("{} is stale: {}; predict again or probe again", path.display(), stale.join("; ")),
+    };
+    match read_document(path)? {
+        Document::Fields(fields) => {
+            fresh(revisions::stale_in_fields(&fields, registry))?;
+            Ok(Origin { fields: *fields, from: From::Fields, other_machine: None, wrong: false })
+        }
+        Document::Report(mut report) => {
+            choice.restrict(&mut report);
+            fresh(revisions::stale_in_report(&report, registry))?;
+            let fields = train::measured_fields(&report, train::slice_scenario(&report))
+                .with_context(|| format!("{} gives no fields", path.display()))?;
+            let machine = &report.hardware.machine;
+            let here = machine.physical_id == measure::machine().physical_id;
+            let other_machine = (!here).then(|| machine.cpu.clone());
+            Ok(Origin { fields, from: From::Report, other_machine, wrong: false })
+        }
+        _ => bail!("{} is a model; give fields or a report, or leave --fields out to have them predicted", path.display()),
+    }
+}
+
+/// Adds the algorithms on the GPUs that are taken, where the fields name any, and gives what keeps some from running.
+///
+/// # Errors
+/// When no process can be started.
+pub(super) fn add_gpus(registry: &mut Registry, fields: &Fields, choice: &GpuChoice) -> anyhow::Result<Vec<String>> {
+    let mut named: Vec<&AlgorithmId> = fields.algorithms();
+    named.retain(|id| !gpus::uses(id).is_empty());
+    if named.is_empty() {
+        return Ok(Vec::new());
+    }
+    if choice.no_gpus {
+        return Ok(named.into_iter().map(|id| format!("{id} is left out by --no-gpus")).collect());
+    }
+    let seen = gpus::look()?;
+    choice.check(&seen)?;
+    let mut warnings: Vec<String> = Vec::new();
+    let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.iter().cloned().partition(|g| choice.takes(g));
+    for id in named {
+        let out = left_out.iter().find(|g| gpus::uses(id).contains(&g.index));
+        warnings.extend(seen.lacks(gpus::uses(id)).map(|why| format!("{id} is left out: {why}")));
+        warnings.extend(out.map(|g| match choice.only[..] {
+            [] => {
+                format!("{id} is left out: gpu{} ({}) is a program on the CPU; --software-gpus takes it in", g.index, g.name)
+            }
+            _ => format!("{id} is left out: --gpu does not name gpu{}", g.index),
+        }));
+    }
+    if !taken.is_empty() {
+        match seen.load() {
+            Ok(gpus) => registry.add_gpus(&gpus.choose(|g| taken.contains(g))),
+            Err(why) => warnings.push(why),
+        }
+    }
+    Ok(warnings)
+}

@@ -1,0 +1,204 @@
+//! `sapwise run`: the in-line simulation.
+
+mod answer;
+mod fields;
+mod text;
+
+use crate::algorithms::Algorithms;
+use crate::args::{Run, Scene};
+use crate::boxes::{Frames, read_frames};
+use crate::exit::{Outcome, WrongUsage};
+use crate::plot::{self, Picture};
+use crate::simulation::{Course, Footage, TraceFormat, simulate, too_wide, write_trace};
+use crate::{files, interrupt, output};
+use anyhow::{Context, bail};
+use sapwise::{Scenario, usable_cores};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Objects of a scenario where nothing is said.
+const OBJECTS: u32 = 20_000;
+/// Frames of a scenario where nothing is said, but for fragmentation, whose cycle they are.
+const FRAMES: usize = 200;
+/// Frames that learning may take before the figures count: five seconds of a game.
+const LEARNED_BY: usize = 300;
+
+pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
+    let mut registry = algorithms.registry(usable_cores());
+    registry.pin_threads();
+    let trace = arguments.trace.as_deref().map(|path| Ok::<_, WrongUsage>((path, TraceFormat::of(path)?))).transpose()?;
+    let picture = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, Picture::of(path)?))).transpose()?;
+    refuse_overwriting(arguments)?;
+    let mut course = course(arguments)?;
+    let cuts = cuts(arguments, course.frames)?;
+    let read = arguments.fields.as_deref().map(|path| fields::read(path, &registry, &arguments.gpus)).transpose()?;
+    // Until here Ctrl-C ends the program, even when it waits for a pipe.
+    interrupt::listen()?;
+    if let Some(path) = &arguments.record {
+        course.footage.record(path, course.frames)?;
+    }
+    let mut origin = read.map_or_else(|| fields::predicted(arguments, algorithms), Ok)?;
+    interrupt::check()?;
+    let gpu_warnings = fields::add_gpus(&mut registry, &origin.fields, &arguments.gpus)?;
+    origin.fields.warnings.extend(gpu_warnings);
+    // Steps have no costs to correct.
+    course.learning &= !origin.fields.costs.is_empty();
+    course.exploring &= course.learning;
+    let hint = "none of the algorithms of the fields runs here; leave --fields out to have them predicted for this machine";
+    let mut outcome = simulate(&course, &origin.fields, &registry).map_err(|error| match error.downcast_ref() {
+        Some(sapwise::Error::Unavailable { .. } | sapwise::Error::UnknownAlgorithm { .. }) => error.context(hint),
+        _ => error,
+    })?;
+    origin.fields.warnings.append(&mut outcome.notes);
+    let parts: Vec<_> = parts(&cuts, course.frames).into_iter().map(|range| outcome.part(range)).collect();
+    let answer = answer::Answer::new(&course, &outcome, &origin, too_wide(&origin.fields, &registry), &parts);
+    if let Some((path, format)) = trace {
+        write_trace(path, format, &outcome)?;
+    }
+    if let Some((path, picture)) = picture {
+        let told = text::caption(arguments, &answer, &origin);
+        let drawn = plot::simulation(picture, &course, &outcome, &told)?;
+        files::write_atomically(path, |out| Ok(out.write_all(&drawn)?))?;
+    }
+    if arguments.json {
+        output::print_json(&answer)?;
+    } else {
+        output::print(&text::text(arguments, &answer, &origin))?;
+    }
+    Ok(if outcome.interrupted || origin.wrong { Outcome::Failed } else { Outcome::Done })
+}
+
+/// Refuses to write over what is read, and to write two things to one file.
+///
+/// # Errors
+/// [`WrongUsage`] that names the file.
+fn refuse_overwriting(arguments: &Run) -> anyhow::Result<()> {
+    let mut read: Vec<PathBuf> = arguments.fields.iter().cloned().collect();
+    if let Scene::Stream(path) = &arguments.scene {
+        read.push(path.clone());
+    }
+    let outputs = [&arguments.record, &arguments.trace, &arguments.plot];
+    files::refuse_overwriting(&read, &outputs.into_iter().flatten().collect::<Vec<_>>())
+}
+
+/// What to simulate.
+///
+/// # Errors
+/// When the stream can't be read, holds what no algorithm takes, or is asked for what only a scenario has.
+fn course(arguments: &Run) -> anyhow::Result<Course> {
+    let asked = arguments.frames.map(|frames| frames as usize);
+    let (footage, frames) = match &arguments.scene {
+        Scene::Scenario(scenario) => {
+            let objects = arguments.objects.unwrap_or(OBJECTS) as usize;
+            let usual = if *scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as usize } else { FRAMES };
+            (Footage::Scene { scenario: *scenario, objects, seed: arguments.seed }, asked.unwrap_or(usual))
+        }
+        Scene::Stream(path) => {
+            let wrong =
+                |what: &str| Err(WrongUsage(format!("{what}: {} is a stream, whose boxes are given", path.display())));
+            if arguments.objects.is_some() {
+                wrong("--objects")?;
+            }
+            if arguments.record.is_some() {
+                wrong("--record")?;
+            }
+            let frames = read_stream(path)?;
+            let count = frames.len();
+            if let Some(asked) = asked.filter(|&asked| asked > count) {
+                let why = format!("--frames {asked}: {} has {count} frames; ask for no more", path.display());
+                return Err(WrongUsage(why).into());
+            }
+            let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+            (Footage::Stream { name, frames }, asked.unwrap_or(count))
+        }
+    };
+    Ok(Course {
+        footage,
+        frames,
+        repeats: arguments.repeats as usize,
+        seed: arguments.seed,
+        learning: !arguments.no_learning,
+        exploring: !arguments.no_exploring,
+        co_runner: arguments.co_runner,
+    })
+}
+
+fn read_stream(path: &Path) -> anyhow::Result<Frames> {
+    let frames = read_frames(path)?;
+    frames.check().with_context(|| format!("{} can't be run", path.display()))?;
+    if frames.len() == 0 {
+        bail!("{} has no frames; `sapwise run SCENARIO --record S.npy` shows how a stream looks", path.display());
+    }
+    Ok(frames)
+}
+
+/// The frames at which a part ends and another begins, ascending.
+///
+/// # Errors
+/// When one lies outside of the run.
+fn cuts(arguments: &Run, frames: usize) -> Result<Vec<usize>, WrongUsage> {
+    let within = |option: &str, frame: usize, first: usize| {
+        if (first..frames).contains(&frame) {
+            return Ok(());
+        }
+        let last = frames - 1;
+        Err(WrongUsage(format!("{option} {frame}: give a frame from {first} to {last}, or more --frames")))
+    };
+    arguments.after.iter().try_for_each(|&frame| within("--after", frame, 1))?;
+    let from = arguments.co_runner.map(|c| c.from_frame);
+    from.map_or(Ok(()), |frame| within("--co-runner", frame, 0))?;
+    let mut cuts = arguments.after.clone();
+    if cuts.is_empty() && !arguments.no_learning {
+        cuts.push(from.unwrap_or(0) + LEARNED_BY);
+    }
+    cuts.extend(from);
+    cuts.retain(|cut| (1..frames).contains(cut));
+    cuts.sort_unstable();
+    cuts.dedup();
+    Ok(cuts)
+}
+
+/// The parts between the cuts; none where there is no cut.
+fn parts(cuts: &[usize], frames: usize) -> Vec<Range<usize>> {
+    if cuts.is_empty() {
+        return Vec::new();
+    }
+    let ends = cuts.iter().copied().chain([frames]);
+    [0].iter().chain(cuts).copied().zip(ends).map(|(from, to)| from..to).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    fn arguments(words: &[&str]) -> Run {
+        let words = ["sapwise", "run", "uniform"].iter().chain(words);
+        match crate::args::Arguments::parse_from(words).verb {
+            crate::args::Verb::Run(run) => run,
+            _ => panic!("another verb"),
+        }
+    }
+
+    #[test]
+    fn parts_lie_between_the_cuts() {
+        let cuts = |words: &[&str], frames| cuts(&arguments(words), frames).unwrap();
+        assert_eq!(cuts(&[], 200), [0; 0]);
+        assert_eq!(cuts(&[], 301), [300]);
+        assert_eq!(cuts(&["--no-learning"], 900), [0; 0]);
+        assert_eq!(cuts(&["--after", "50,20", "--after", "50"], 200), [20, 50]);
+        assert_eq!(cuts(&["--co-runner", "450"], 900), [450, 750]);
+        assert_eq!(cuts(&["--co-runner", "0"], 900), [300]);
+        assert_eq!(cuts(&["--co-runner", "450:1", "--after", "100", "--no-learning"], 900), [100, 450]);
+        assert_eq!(parts(&[20, 50], 200), [0..20, 20..50, 50..200]);
+        assert!(parts(&[], 200).is_empty());
+    }
+
+    #[test]
+    fn frames_beyond_the_end_are_refused() {
+        for words in [["--after", "200"], ["--after", "0"], ["--co-runner", "200"]] {
+            let why = cuts(&arguments(&words), 200).unwrap_err().to_string();
+            assert!(why.contains(words[0]) && why.contains("to 199"), "{why}");
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! What a person reads at the end of a run.
+
+use super::answer::{Answer, Figures, LeftOut, Oracle, Slowed};
+use super::fields::Origin;
+use crate::args::{Run, Scene};
+use crate::table::{columns, grouped};
+use std::path::Path;
+
+/// Totals, figures and what there is to say about them.
+pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> String {
+    let mut text = format!(
+        "{}, {} frames of {} objects, medians of {} repeats, verified against each other\n",
+        answer.scenario,
+        answer.frames,
+        extent(answer),
+        answer.repeats
+    );
+    text += &format!("Fields: {}. {}\n\n", origin.text(), learning(answer));
+    text += &totals(answer);
+    for (id, LeftOut { after_frame, frames, at_least_ms }) in &answer.left_out {
+        let after = after_frame.map_or("from the first on".to_owned(), |frame| format!("after frame {frame}"));
+        text += &format!("{id} sat out {frames} frames {after}, hopeless or failed: {at_least_ms:.2} ms without them\n");
+    }
+    text += &format!("\n{}\n", figures(answer));
+    text += &comparisons(answer);
+    if let Some(slowed) = &answer.co_runner {
+        text += &format!("\n{}", co_runner(slowed));
+    }
+    if let Some(load) = answer.foreign_load {
+        text += &format!("\nOther programs took {:.0} % of the CPU, median over the frames.", load * 100.0);
+    }
+    for warning in &answer.warnings {
+        text += &format!("\nwarning: {warning}");
+    }
+    if answer.interrupted {
+        text += "\nInterrupted: the repeats that were complete are shown.";
+    }
+    for (verb, path) in [("Recorded", &arguments.record), ("Traced", &arguments.trace), ("Drawn", &arguments.plot)] {
+        text += &path.as_ref().map(|p| format!("\n{verb} in {}.", p.display())).unwrap_or_default();
+    }
+    text
+}
+
+/// What stands below the picture: the figures, where the fields come from, and the command that makes it again.
+pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> [String; 3] {
+    let Figures { regret, switches, explored, .. } = answer.figures;
+    let name = answer.scenario;
+    [
+        format!(
+            "{name}: regret {}, {switches} switches, {explored} frames explored; medians of {} repeats, decisions of the last",
+            percent(regret),
+            answer.repeats
+        ),
+        format!("Fields: {}. {}", origin.text(), learning(answer)),
+        format!("Made by: {}", command(arguments)),
+    ]
+}
+
+fn extent(answer: &Answer<'_>) -> String {
+    let [min, max] = [answer.objects.min, answer.objects.max].map(|n| grouped(n as u64));
+    if min == max { max } else { format!("{min} to {max}") }
+}
+
+fn learning(answer: &Answer<'_>) -> &'static str {
+    match (answer.learning, answer.exploring) {
+        (true, true) => "Learning and exploring.",
+        (true, false) => "Learning, without exploring.",
+        (false, _) => "Without learning.",
+    }
+}
+
+fn totals(answer: &Answer<'_>) -> String {
+    let oracle = answer.total_ms.oracle;
+    let row = |name: &str, ms: f64| vec![name.to_owned(), format!("{ms:.2}"), format!("{:.3}", ms / oracle)];
+    let mut fixed: Vec<(&String, f64)> = answer.total_ms.fixed.iter().map(|(id, ms)| (id, *ms)).collect();
+    fixed.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut rows = vec![["run by", "total ms", "over the oracle"].map(str::to_owned).to_vec()];
+    rows.push(row("oracle (best at every frame)", oracle));
+    rows.push(row("adaptive", answer.total_ms.adaptive));
+    rows.extend(fixed.iter().map(|(id, ms)| row(id, *ms)));
+    columns(&rows)
+}
+
+/// The figures of all frames and of each part.
+fn figures(answer: &Answer<'_>) -> String {
+    let head = ["frames", "regret", "middle half of repeats", "switches", "explored", "worst frame"];
+    let row = |frames: String, f: &Figures| {
+        let within = f.regret_quartiles.map_or("-".to_owned(), |[a, b]| format!("{} to {}", percent(a), percent(b)));
+        let worst = f.worst_frame.zip(f.worst_frame_at);
+        let worst = worst.map_or("-".to_owned(), |(ratio, at)| format!("{ratio:.2} times the oracle's, frame {at}"));
+        vec![frames, percent(f.regret), within, f.switches.to_string(), f.explored.to_string(), worst]
+    };
+    let mut rows = vec![head.map(str::to_owned).to_vec(), row("all".to_owned(), &answer.figures)];
+    rows.extend(answer.parts.iter().map(|p| row(format!("{} to {}", p.from_frame, p.to_frame), &p.figures)));
+    columns(&rows)
+}
+
+fn comparisons(answer: &Answer<'_>) -> String {
+    let mut lines = Vec::new();
+    if !answer.best_fixed.is_empty() {
+        lines.push(format!("{} of the time of the best fixed, {}.", times(answer.over_best_fixed), answer.best_fixed));
+    }
+    if let Some(largest) = &answer.best_at_largest {
+        let objects = grouped(largest.objects as u64);
+        let over = match largest.over {
+            Some(over) => format!("{} of the time of", times(over)),
+            None => "No total to compare with of".to_owned(),
+        };
+        lines.push(format!("{over} {}, the best where there are most objects ({objects}).", largest.algorithm));
+    }
+    lines.push(match answer.oracle {
+        Oracle::Halves => format!(
+            "The oracle's algorithms are chosen by one half of the repeats and timed in the other. Against the least time of every \
+             frame,\nwhich luck has a part in, the regret is {}.",
+            percent(answer.figures.optimistic_regret)
+        ),
+        Oracle::Optimistic => {
+            "One repeat: the oracle has the least time of every frame, in which luck has a part; two or more --repeats leave it out."
+                .to_owned()
+        }
+    });
+    lines.join("\n")
+}
+
+fn co_runner(slowed: &Slowed) -> String {
+    let reached = match slowed.slowdown {
+        Some(ratio) => format!("a loop beside the frames then took {ratio:.2} times as long"),
+        None => "no frame ran before, to compare with".to_owned(),
+    };
+    let own: Vec<f64> = slowed.slowdown_of.values().copied().flatten().collect();
+    let (least, most) = own.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), &x| (a.min(x), b.max(x)));
+    let of_fixed = match own[..] {
+        [] => String::new(),
+        _ => format!(", and the fixed algorithms {least:.2} to {most:.2} times, on frames with as many objects"),
+    };
+    let threads = slowed.threads;
+    let plural = if threads == 1 { "" } else { "s" };
+    format!("From frame {} on {threads} thread{plural} ran beside it: {reached}{of_fixed}.", slowed.from_frame)
+}
+
+fn times(ratio: f64) -> String {
+    format!("Adaptive takes {ratio:.3}")
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.2} %", share * 100.0)
+}
+
+/// The command that makes the picture again, without folders, which are of this machine alone.
+fn command(arguments: &Run) -> String {
+    let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut words = vec!["sapwise run".to_owned()];
+    words.push(match &arguments.scene {
+        Scene::Scenario(scenario) => scenario.to_string(),
+        Scene::Stream(path) => name(path),
+    });
+    match &arguments.fields {
+        Some(path) => words.push(format!("--fields {}", name(path))),
+        None => words.push(format!("--samples {}", arguments.samples)),
+    }
+    words.extend(arguments.objects.map(|n| format!("--objects {n}")));
+    words.extend(arguments.frames.map(|n| format!("--frames {n}")));
+    words.push(format!("--repeats {} --seed {}", arguments.repeats, arguments.seed));
+    words.extend(arguments.co_runner.map(|c| format!("--co-runner {c}")));
+    for (flag, given) in [("--no-learning", arguments.no_learning), ("--no-exploring", arguments.no_exploring)] {
+        words.extend(given.then(|| flag.to_owned()));
+    }
+    for (flag, given) in [("--no-gpus", arguments.gpus.no_gpus), ("--software-gpus", arguments.gpus.software_gpus)] {
+        words.extend(given.then(|| flag.to_owned()));
+    }
+    words.extend(arguments.gpus.only.iter().map(|gpu| format!("--gpu {gpu}")));
+    words.extend(arguments.plot.as_deref().map(|path| format!("--plot {}", name(path))));
+    words.join(" ")
+}

@@ -1,0 +1,94 @@
+//! The algorithms to choose from, and what runs them.
+
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Pairs, Registry};
+
+/// An algorithm of the fields.
+pub(super) struct Candidate {
+    pub(super) id: AlgorithmId,
+    /// Its position among the instances; `None` once it failed, or where it can't run.
+    pub(super) instance: Option<usize>,
+}
+
+/// Runs one candidate, or several that differ in their number of threads only and share what they keep from frame to frame.
+pub(super) struct Instance {
+    pub(super) algorithm: Box<dyn BroadPhase>,
+    /// Where several share it, on how many threads it runs.
+    threads: Option<u32>,
+    /// Objects that its buffers are ready for.
+    pub(super) ready: usize,
+}
+
+impl Instance {
+    fn alone(algorithm: Box<dyn BroadPhase>) -> Self {
+        Self { algorithm, threads: None, ready: 0 }
+    }
+
+    pub(super) fn run(&mut self, id: &AlgorithmId, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        let wanted = id.threads();
+        if self.threads.is_some_and(|threads| threads != wanted) {
+            if !self.algorithm.set_threads(wanted) {
+                return Err(Error::Unavailable {
+                    algorithm: id.clone(),
+                    reason: format!("it can't run on {wanted} threads"),
+                });
+            }
+            self.threads = Some(wanted);
+        }
+        self.algorithm.find_pairs(boxes, pairs)?;
+        self.ready = self.ready.max(boxes.len());
+        Ok(())
+    }
+}
+
+/// What runs the algorithms of some fields, and why the last of those that can't run can't.
+pub(super) struct Made {
+    /// In the order of [`Fields::algorithms`].
+    pub(super) candidates: Vec<Candidate>,
+    pub(super) instances: Vec<Instance>,
+    pub(super) failure: Option<Error>,
+}
+
+impl Made {
+    pub(super) fn of(fields: &Fields, registry: &Registry) -> Self {
+        let ids = fields.algorithms();
+        let mut made = Self {
+            candidates: ids.iter().map(|&id| Candidate { id: id.clone(), instance: None }).collect(),
+            instances: Vec::new(),
+            failure: None,
+        };
+        let stale = |id: &AlgorithmId| {
+            let cost = fields.costs.iter().find(|c| c.algorithm == *id);
+            cost.and_then(|c| registry.mismatch(id, c.revision)).map_or(Ok(()), Err)
+        };
+        for (k, &id) in ids.iter().enumerate() {
+            if made.candidates[k].instance.is_some() {
+                continue;
+            }
+            if let Err(why) = stale(id) {
+                made.failure = Some(why);
+                continue;
+            }
+            // Those that differ from it in their number of threads only.
+            let kin = |other: &&AlgorithmId| {
+                other.method() == id.method() && other.backend().class() == id.backend().class() && stale(other).is_ok()
+            };
+            let family: Vec<&AlgorithmId> = ids.iter().copied().filter(kin).collect();
+            if let Some(Ok(algorithm)) = registry.create_for(&family) {
+                for candidate in made.candidates.iter_mut().filter(|c| family.contains(&&c.id)) {
+                    candidate.instance = Some(made.instances.len());
+                }
+                // On none of them yet, so that the first frame sets it.
+                made.instances.push(Instance { threads: Some(0), ..Instance::alone(algorithm) });
+                continue;
+            }
+            match registry.create(id) {
+                Ok(algorithm) => {
+                    made.candidates[k].instance = Some(made.instances.len());
+                    made.instances.push(Instance::alone(algorithm));
+                }
+                Err(why) => made.failure = Some(why),
+            }
+        }
+        made
+    }
+}

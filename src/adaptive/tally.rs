@@ -1,0 +1,80 @@
+//! Frames of one algorithm, added up until they tell its cost.
+//!
+//! An algorithm that keeps work runs cheap frames for a while and then a dear one, in which it looks anew. What counts is their mean, so that
+//! frames are added up before they are compared with what was expected.
+
+/// Frames that are added up where an algorithm runs on, and right after it began.
+const MOST: u32 = 16;
+const FEWEST: u32 = 2;
+/// Octaves of objects over which a tally goes at most.
+const OCTAVES: f64 = 0.5;
+/// What counts of a frame, at most: so many times what the dearest kind of frame is expected to cost. The rest is another program's.
+const MOST_OVER: f64 = 2.0;
+
+/// What the fields say of a frame, without any correction, in nanoseconds: all of it, and the calls in it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Predicted {
+    pub(super) ns: f64,
+    pub(super) calls_ns: f64,
+}
+
+impl Predicted {
+    /// Share of the calls.
+    pub(super) fn calls(self) -> f64 {
+        self.calls_ns / self.ns
+    }
+}
+
+/// The sum over some frames in a row.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Tally {
+    pub(super) candidate: usize,
+    pub(super) frames: u32,
+    /// Real time, and time that the fields predict without any correction, in nanoseconds.
+    pub(super) real_ns: f64,
+    pub(super) predicted_ns: f64,
+    calls_ns: f64,
+    log2_objects: f64,
+    /// It is the one frame with which the candidate began.
+    pub(super) cold: bool,
+    /// Frames until it is full.
+    room: u32,
+}
+
+impl Tally {
+    /// Mean logarithm of the number of objects.
+    pub(super) fn log2_objects(&self) -> f64 {
+        self.log2_objects / f64::from(self.frames.max(1))
+    }
+
+    /// Share of calls in the predicted time.
+    pub(super) fn calls(&self) -> f64 {
+        self.calls_ns / self.predicted_ns
+    }
+
+    /// Whether a frame belongs to it.
+    pub(super) fn takes(&self, candidate: usize, log2_objects: f64) -> bool {
+        self.frames > 0 && self.candidate == candidate && (self.log2_objects() - log2_objects).abs() <= OCTAVES
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.frames > 0 && self.frames >= self.room
+    }
+
+    /// Adds a frame, of which no more counts than `dearest_ns` allows. Gives the rest.
+    pub(super) fn add(&mut self, ns: f64, predicted: Predicted, log2_objects: f64, dearest_ns: f64) -> f64 {
+        let counted = ns.min(MOST_OVER * dearest_ns);
+        self.frames += 1;
+        self.calls_ns += predicted.calls_ns;
+        self.real_ns += counted;
+        self.predicted_ns += predicted.ns;
+        self.log2_objects += log2_objects;
+        ns - counted
+    }
+
+    /// An empty one. Where the candidate is the one of before, it has more room than that.
+    pub(super) fn next(&self, candidate: usize) -> Self {
+        let room = if self.frames > 0 && candidate == self.candidate { (2 * self.room).min(MOST) } else { FEWEST };
+        Self { candidate, room, ..Self::default() }
+    }
+}

@@ -1,0 +1,199 @@
+//! How our algorithms write pairs: in blocks, past a filter, from lists of their tasks.
+
+use super::{Pair, Pairs};
+use crate::cpu::each_bit;
+use crate::error::Error;
+
+/// Pairs that are fetched together, then tested together: few enough for the first-level cache, enough for memory to answer.
+const SIFTED_TOGETHER: usize = 64;
+
+impl Pairs {
+    /// Adds `id` paired with each of `others` whose bit is set in `mask`.
+    #[inline]
+    pub(crate) fn push_mask(&mut self, id: u32, others: &[u32], mask: u32) {
+        if self.is_full() && self.filter.is_none() {
+            self.beyond += u64::from(mask.count_ones());
+        } else {
+            each_bit(mask, |bit| self.push(id, others[bit]));
+        }
+    }
+
+    /// Adds those of `pairs` for which `wanted` holds. They stand lower member first. `fetch` is told of each some time before
+    /// `wanted` is asked, so that memory can be on its way.
+    #[inline]
+    pub(crate) fn extend_where(&mut self, pairs: &[Pair], fetch: impl Fn(Pair), wanted: impl Fn(Pair) -> bool) {
+        let mut ahead = pairs.iter();
+        ahead.by_ref().take(SIFTED_TOGETHER).for_each(|&pair| fetch(pair));
+        for pairs in pairs.chunks(SIFTED_TOGETHER) {
+            ahead.by_ref().take(SIFTED_TOGETHER).for_each(|&pair| fetch(pair));
+            self.add_where(pairs, &wanted);
+        }
+    }
+
+    /// Drops those for which `dropped` holds, and adds to `out` those of the rest for which `wanted` holds. `fetch` as above.
+    #[inline]
+    pub(crate) fn sift(
+        &mut self,
+        out: &mut Pairs,
+        dropped: impl Fn(Pair) -> bool,
+        fetch: impl Fn(Pair),
+        wanted: impl Fn(Pair) -> bool,
+    ) {
+        let (mut kept, mut tested) = (0, 0);
+        for from in (0..self.len).step_by(SIFTED_TOGETHER) {
+            let first = kept;
+            for at in from..(from + SIFTED_TOGETHER).min(self.len) {
+                let pair = self.buffer[at];
+                fetch(pair);
+                self.buffer[kept] = pair;
+                kept += usize::from(!dropped(pair));
+            }
+            // Those that were fetched a round before.
+            out.add_where(&self.buffer[tested..first], &wanted);
+            tested = first;
+        }
+        out.add_where(&self.buffer[tested..kept], &wanted);
+        self.len = kept;
+        self.beyond = 0;
+    }
+
+    #[inline]
+    fn add_where(&mut self, pairs: &[Pair], wanted: impl Fn(Pair) -> bool) {
+        if let Some(room) = self.room(pairs.len()) {
+            let mut added = 0;
+            for &pair in pairs {
+                // Written in any case and kept if wanted: no branch, which would often be guessed wrong.
+                room[added] = pair;
+                added += usize::from(wanted(pair));
+            }
+            self.extend_by(added);
+        } else {
+            pairs.iter().filter(|&&pair| wanted(pair)).for_each(|&(i, j)| self.push(i, j));
+        }
+    }
+
+    /// Makes room for half as many pairs again where there is room for less than an eighth more: a list that grows and
+    /// shrinks around a size then allocates once.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub(crate) fn reserve_some_more(&mut self) -> Result<(), Error> {
+        if self.buffer.len() < self.len + self.len / 8 { self.reserve(self.len + self.len / 2) } else { Ok(()) }
+    }
+
+    /// Takes in those that the filter wants of the pairs that were written at the head of [`Pairs::room`], lower member first.
+    #[inline]
+    pub(crate) fn extend_by(&mut self, added: usize) {
+        if self.filter.is_none() {
+            self.len += added;
+        } else {
+            self.extend_by_wanted(added);
+        }
+    }
+
+    /// The pairs still are in the first-level cache: few are written at a time.
+    #[cold]
+    fn extend_by_wanted(&mut self, added: usize) {
+        let Self { buffer, len, filter, unwanted, .. } = self;
+        let written = &mut buffer[*len..*len + added];
+        let wanted = filter.as_ref().map_or(added, |filter| filter.keep_wanted(written));
+        *unwanted += (added - wanted) as u64;
+        *len += wanted;
+    }
+
+    /// Room for `more` pairs behind the present ones; `None` near the limit or when memory is refused.
+    #[inline]
+    pub(crate) fn room(&mut self, more: usize) -> Option<&mut [Pair]> {
+        if self.buffer.len() - self.len < more && !self.grow(more) || self.limit.is_some_and(|l| l - self.len < more) {
+            return None;
+        }
+        Some(&mut self.buffer[self.len..self.len + more])
+    }
+
+    /// Whether nothing more can be stored. From there on pairs are only counted, without a filter sixteen at a time: 2^20 boxes in one
+    /// point have 5 * 10^11.
+    #[inline]
+    pub(crate) fn is_full(&self) -> bool {
+        self.refused.is_some() || self.limit.is_some_and(|limit| self.len >= limit)
+    }
+
+    /// Appends those that the filter wants of pairs that stand lower member first.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn extend(&mut self, pairs: &[[u32; 2]]) -> Result<(), Error> {
+        if self.filter.is_none() {
+            self.reserve(self.len + pairs.len())?;
+        }
+        for pairs in pairs.chunks(SIFTED_TOGETHER) {
+            if let Some(room) = self.room(pairs.len()) {
+                room.iter_mut().zip(pairs).for_each(|(to, &[a, b])| *to = (a, b));
+                self.extend_by(pairs.len());
+            } else {
+                pairs.iter().for_each(|&[a, b]| self.push(a, b));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether `more` pairs, none of which was looked at, are too many: then [`skip`](Self::skip) is all there is to do with them.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn is_too_small_for(&self, more: u64) -> bool {
+        self.filter.is_none() && self.limit.is_some_and(|limit| self.len as u64 + more > limit as u64)
+    }
+
+    /// Counts pairs that are not stored.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn skip(&mut self, pairs: u64) {
+        self.beyond += pairs;
+    }
+
+    /// Empties a list that takes a part of the pairs of `whole`, under the same limit and filter.
+    pub(crate) fn begin_part(&mut self, whole: &Pairs) {
+        self.clear();
+        self.limit = whole.limit;
+        self.filter.clone_from(&whole.filter);
+    }
+
+    /// Gives the filter back: shared, it would be copied before the caller could change it.
+    pub(crate) fn end_part(&mut self) {
+        self.set_filter(None);
+    }
+
+    /// Takes in complete parts, whose pairs were written one behind another to the head of [`Pairs::room`].
+    pub(crate) fn extend_by_parts(&mut self, parts: &[Pairs]) {
+        for part in parts {
+            self.len += part.len;
+            self.unwanted += part.unwanted;
+        }
+    }
+
+    /// Appends a part: its pairs, its counts and its refused allocation.
+    pub(crate) fn append(&mut self, part: &Pairs) {
+        self.refused = self.refused.or(part.refused);
+        let fits = self.limit.map_or(part.len, |l| part.len.min(l.saturating_sub(self.len)));
+        self.unwanted += part.unwanted;
+        if self.len + fits > self.buffer.len() && self.reserve(self.len + fits).is_err() {
+            self.refused = Some(self.len + fits);
+            self.beyond += part.found();
+        } else {
+            self.buffer[self.len..self.len + fits].copy_from_slice(&part.buffer[..fits]);
+            self.len += fits;
+            self.beyond += part.found() - fits as u64;
+        }
+    }
+
+    /// Room for `more` pairs beyond the present ones; `false` at the limit or when memory is refused.
+    #[cold]
+    pub(super) fn grow(&mut self, more: usize) -> bool {
+        let limit = self.limit.unwrap_or(usize::MAX);
+        if self.refused.is_some() || self.len + more > limit {
+            return false;
+        }
+        let wanted = (self.buffer.len() * 2).max(self.len + more).max(64).min(limit);
+        if self.buffer.try_reserve_exact(wanted - self.buffer.len()).is_err() {
+            self.refused = Some(wanted);
+            return false;
+        }
+        self.buffer.resize(wanted, (0, 0));
+        true
+    }
+}

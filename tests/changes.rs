@@ -1,0 +1,210 @@
+//! Pairs followed from frame to frame by ids, against sets; and the whole chain from boxes to changes, bit for bit.
+
+mod common;
+
+use common::{Random, every_algorithm, naive};
+use proptest::prelude::*;
+use sapwise::{
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Fields, Filter, Membership, Pair, PairOrder, Pairs, Registry,
+    Step,
+};
+use std::collections::BTreeSet;
+
+/// Boxes with ids, of which some come, some go and all move.
+struct World {
+    random: Random,
+    boxes: Vec<Aabb>,
+    ids: Vec<u64>,
+    memberships: Vec<Membership>,
+    /// How often an id was given out.
+    given: u64,
+}
+
+impl World {
+    fn new(seed: u64) -> Self {
+        Self { random: Random(seed), boxes: Vec::new(), ids: Vec::new(), memberships: Vec::new(), given: 0 }
+    }
+
+    fn frame(&mut self, come: usize, go: usize) {
+        for b in &mut self.boxes {
+            let by = (self.random.next() - 0.5) * 0.1;
+            *b = Aabb::new(b.min.map(|v| v + by), b.max.map(|v| v + by));
+        }
+        for _ in 0..go.min(self.boxes.len()) {
+            let at = (self.random.next() * self.boxes.len() as f32) as usize;
+            self.boxes.swap_remove(at);
+            self.ids.swap_remove(at);
+            self.memberships.swap_remove(at);
+        }
+        for _ in 0..come {
+            self.given += 1;
+            // Not ascending, and never the same: the factor is odd.
+            self.ids.push(self.given.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            self.boxes.extend(self.random.cubes(1, [9.0; 3], 0.7));
+            self.memberships.push(self.random.membership());
+        }
+    }
+}
+
+fn by_ids(pairs: &[Pair], ids: &[u64]) -> BTreeSet<(u64, u64)> {
+    let named = pairs.iter().map(|&(i, j)| (ids[i as usize], ids[j as usize]));
+    named.map(|(a, b)| (a.min(b), a.max(b))).filter(|&(a, b)| a != b).collect()
+}
+
+fn assert_changes(changes: &Changes<u64>, now: &BTreeSet<(u64, u64)>, before: &BTreeSet<(u64, u64)>, what: &str) {
+    assert!(changes.begun().iter().eq(now.difference(before)), "{what}: what began");
+    assert!(changes.ended().iter().eq(before.difference(now)), "{what}: what ended");
+    assert!(changes.pairs().iter().eq(now), "{what}: all pairs");
+    assert_eq!(changes.lasting(), now.intersection(before).count(), "{what}: how many last");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Any lists of pairs, and ids that repeat, come, go and change places.
+    #[test]
+    fn changes_are_the_differences_of_sets(
+        frames in prop::collection::vec(
+            prop::collection::vec(0_u64..40, 2..60).prop_flat_map(|ids| {
+                let count = ids.len() as u32;
+                (Just(ids), prop::collection::vec((0..count, 0..count), 0..120))
+            }),
+            1..8,
+        ),
+    ) {
+        let mut changes = Changes::new();
+        let mut before = BTreeSet::new();
+        let mut pairs = Pairs::new();
+        for (frame, (ids, members)) in frames.iter().enumerate() {
+            pairs.clear();
+            members.iter().filter(|(a, b)| a != b).for_each(|&(a, b)| pairs.push(a, b));
+            changes.update(&pairs, ids).unwrap();
+            let now = by_ids(pairs.as_slice(), ids);
+            assert_changes(&changes, &now, &before, &format!("frame {frame}"));
+            before = now;
+        }
+    }
+
+    #[test]
+    fn boxes_come_and_go_and_their_pairs_are_followed(
+        seed in 1_u64..u64::MAX,
+        frames in prop::collection::vec((0_usize..60, 0_usize..40), 1..12),
+    ) {
+        let registry = Registry::with_cores(1);
+        let mut algorithm = registry.create(&"verlet@cpu1".parse().unwrap()).unwrap();
+        let mut world = World::new(seed);
+        let mut changes = Changes::new();
+        let mut before = BTreeSet::new();
+        let mut pairs = Pairs::new();
+        for (frame, &(come, go)) in frames.iter().enumerate() {
+            world.frame(come, go);
+            algorithm.find_pairs(&world.boxes, &mut pairs).unwrap();
+            changes.update(&pairs, &world.ids).unwrap();
+            let now = by_ids(&naive(&world.boxes), &world.ids);
+            assert_changes(&changes, &now, &before, &format!("frame {frame}"));
+            before = now;
+        }
+    }
+
+    #[test]
+    fn a_list_of_ids_that_is_too_short_is_an_error_and_changes_nothing(short in 0_usize..50, seed in 1_u64..u64::MAX) {
+        let mut world = World::new(seed);
+        world.frame(50, 0);
+        let mut pairs = Pairs::new();
+        // Each box is in a pair.
+        (0..49).for_each(|k| pairs.push(k + 1, k));
+        let mut changes = Changes::new();
+        changes.update(&pairs, &world.ids).unwrap();
+        let all = changes.pairs().to_vec();
+        let error = changes.update(&pairs, &world.ids[..short]).unwrap_err();
+        let Error::MissingId { position, ids } = error else { panic!("{error}") };
+        prop_assert!(position as usize >= short && position < 50 && ids == short, "{}", error);
+        prop_assert!(changes.begun().is_empty() && changes.ended().is_empty() && changes.pairs() == all);
+        changes.update(&pairs, &world.ids).unwrap();
+        prop_assert!(changes.begun().is_empty() && changes.ended().is_empty() && changes.lasting() == 49);
+    }
+}
+
+#[test]
+fn every_algorithm_in_any_order_gives_the_same_changes() {
+    let mut algorithms = every_algorithm();
+    let mut followed: Vec<Changes<u64>> = algorithms.iter().map(|_| Changes::new()).collect();
+    let mut world = World::new(0xc4a9);
+    let mut pairs = Pairs::with_order(PairOrder::Any);
+    let mut before = BTreeSet::new();
+    for frame in 0..30 {
+        world.frame(if frame == 0 { 700 } else { 20 }, if frame % 4 == 1 { 50 } else { 5 });
+        let now = by_ids(&naive(&world.boxes), &world.ids);
+        assert!(frame == 0 || now.intersection(&before).count() > 100, "most pairs last");
+        for ((id, algorithm), changes) in algorithms.iter_mut().zip(&mut followed) {
+            algorithm.find_pairs(&world.boxes, &mut pairs).unwrap();
+            changes.update(&pairs, &world.ids).unwrap();
+            assert_changes(changes, &now, &before, &format!("{id}, frame {frame}"));
+        }
+        before = now;
+    }
+}
+
+/// All that an engine gets of a frame.
+#[derive(Debug, Default, PartialEq)]
+struct Output {
+    pairs: Vec<Pair>,
+    begun: Vec<(u64, u64)>,
+    ended: Vec<(u64, u64)>,
+    all: Vec<(u64, u64)>,
+}
+
+/// Every frame of one world, and the algorithms that ran, with `steps` as fields.
+fn run(order: PairOrder, steps: &[(u32, &str)]) -> (Vec<Output>, BTreeSet<AlgorithmId>) {
+    let step = |&(from_objects, id): &(u32, &str)| Step { from_objects, algorithm: id.parse().unwrap() };
+    let fields = Fields::from_steps(steps.iter().map(step).collect()).unwrap();
+    let mut adaptive = Adaptive::new(fields, &Registry::with_cores(2)).unwrap();
+    let mut world = World::new(0x10c4);
+    let mut pairs = Pairs::with_order(order);
+    pairs.set_filter(Some(Filter::default()));
+    let mut changes = Changes::new();
+    let (mut outputs, mut ran) = (Vec::new(), BTreeSet::new());
+    for frame in 0..120 {
+        // Up to some 900 boxes and down again, through every border.
+        if frame < 60 {
+            world.frame(20, 5);
+        } else {
+            world.frame(3, 18);
+        }
+        pairs.filter_mut().unwrap().memberships.clone_from(&world.memberships);
+        adaptive.find_pairs(&world.boxes, &mut pairs).unwrap();
+        ran.insert(adaptive.last_decision().unwrap().algorithm.clone());
+        changes.update(&pairs, &world.ids).unwrap();
+        outputs.push(Output {
+            pairs: pairs.as_slice().to_vec(),
+            begun: changes.begun().to_vec(),
+            ended: changes.ended().to_vec(),
+            all: changes.pairs().to_vec(),
+        });
+    }
+    (outputs, ran)
+}
+
+#[test]
+fn runs_with_different_algorithms_and_switches_are_the_same_bit_for_bit() {
+    let parallel = if cfg!(feature = "parallel") { "strips@cpu2" } else { "strips@cpu1" };
+    let courses: [&[(u32, &str)]; 3] = [
+        &[(0, "brute@cpu1"), (150, "sweep@cpu1")],
+        &[(0, "verlet@cpu1")],
+        &[(0, "strips@cpu1"), (400, parallel), (700, "verlet@cpu1")],
+    ];
+    let first = run(PairOrder::Canonical, courses[0]);
+    assert!(first.0.iter().filter(|o| !o.begun.is_empty() && !o.ended.is_empty()).count() > 80, "much begins and ends");
+    assert!(first.0.iter().any(|o| o.pairs.len() > 300) && first.1.len() == 2, "{:?}", first.1);
+    for course in &courses[1..] {
+        let other = run(PairOrder::Canonical, course);
+        assert!(first.1.is_disjoint(&other.1), "{:?} and {:?}", first.1, other.1);
+        for (frame, (a, b)) in first.0.iter().zip(&other.0).enumerate() {
+            assert!(a == b, "{course:?}, frame {frame}");
+        }
+    }
+    // In any order the pairs may stand elsewhere; what is said in ids may not.
+    for (frame, (a, b)) in first.0.iter().zip(run(PairOrder::Any, courses[2]).0).enumerate() {
+        assert!((&a.begun, &a.ended, &a.all) == (&b.begun, &b.ended, &b.all), "in any order, frame {frame}");
+    }
+}

@@ -1,0 +1,118 @@
+//! An algorithm of a user's: chosen by its cost, and learned where its cost was wrong.
+
+mod common;
+#[path = "../examples/custom.rs"]
+mod custom;
+
+use common::naive;
+use custom::{ID, cost, fields, registry};
+use sapwise::{Aabb, Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Scenario, Term};
+use std::time::Duration;
+
+/// Boxes that rest after the first frame.
+fn resting(count: usize) -> Vec<Aabb> {
+    common::Random(9).cubes(count, [20.0; 3], 0.5)
+}
+
+fn run(adaptive: &mut Adaptive, boxes: &[Aabb]) -> (String, Reason) {
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    adaptive.find_pairs(boxes, &mut pairs).unwrap();
+    assert!(pairs.as_slice() == naive(boxes));
+    let decision = adaptive.last_decision().unwrap();
+    (decision.algorithm.to_string(), decision.reason)
+}
+
+#[test]
+fn it_runs_where_the_fields_say_that_it_is_cheapest() {
+    let registry = registry("brute@cpu1");
+    let costs = vec![
+        cost(&registry, "brute@cpu1", &[(Term::Objects, 60.0)]),
+        cost(&registry, ID, &[(Term::Objects, 2.0), (Term::Moved, 1e6)]),
+    ];
+    let mut adaptive = Adaptive::new(fields(costs), &registry).unwrap();
+    adaptive.set_learning(false);
+    let mut scene = Scenario::Uniform.start(300, 1);
+    for frame in 0..900 {
+        let rests = frame % 300 >= 150;
+        if !rests {
+            scene.advance();
+        }
+        let (ran, _) = run(&mut adaptive, scene.boxes());
+        // A change is seen when the boxes are looked at again.
+        if frame % 150 == 149 {
+            assert_eq!(ran, if rests { ID } else { "brute@cpu1" }, "frame {frame}");
+        }
+    }
+}
+
+/// The double loop of brute force, after a sleep: two milliseconds are so much more than 40 boxes take that no noise of any machine
+/// turns the order round.
+struct Sleeper(Box<dyn BroadPhase>, Duration);
+
+impl BroadPhase for Sleeper {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        std::thread::sleep(self.1);
+        self.0.find_pairs(boxes, pairs)
+    }
+}
+
+/// Beside ours `slow@cpu1`, which sleeps, and `quick@cpu1`, which does not.
+fn with_sleepers() -> Registry {
+    let mut registry = Registry::with_cores(1);
+    for (id, ms) in [("slow@cpu1", 2), ("quick@cpu1", 0)] {
+        let brute = "brute@cpu1".parse().unwrap();
+        let make = move || {
+            let sleeper = Sleeper(Registry::with_cores(1).create(&brute)?, Duration::from_millis(ms));
+            Ok(Box::new(sleeper) as Box<dyn BroadPhase>)
+        };
+        registry.add(id.parse().unwrap(), 1, make);
+    }
+    registry
+}
+
+fn calls(registry: &Registry, costs: &[(&str, f64)]) -> Adaptive {
+    let costs = costs.iter().map(|&(id, ns)| cost(registry, id, &[(Term::Call, ns)])).collect();
+    Adaptive::new(fields(costs), registry).unwrap()
+}
+
+#[test]
+fn one_whose_cost_was_far_too_low_is_left() {
+    let registry = with_sleepers();
+    let mut adaptive = calls(&registry, &[("quick@cpu1", 50_000.0), ("slow@cpu1", 10_000.0)]);
+    let boxes = resting(40);
+    let ran: Vec<String> = (0..300).map(|_| run(&mut adaptive, &boxes).0).collect();
+    assert_eq!(ran[0], "slow@cpu1");
+    let slow = ran.iter().filter(|id| *id == "slow@cpu1").count();
+    assert!(ran[299] == "quick@cpu1" && slow < 30, "{slow} of 300 frames by the slow one, the last by {}", ran[299]);
+    // What was learned is fields like any others.
+    let learned = adaptive.learned();
+    let mut again = Adaptive::new(learned, &registry).unwrap();
+    again.set_learning(false);
+    assert_eq!(run(&mut again, &boxes).0, "quick@cpu1");
+}
+
+#[test]
+fn one_whose_cost_was_too_high_is_tried_and_stays() {
+    let mut adaptive = calls(&with_sleepers(), &[("slow@cpu1", 2_000_000.0), ("quick@cpu1", 2_100_000.0)]);
+    let boxes = resting(40);
+    let ran: Vec<(String, Reason)> = (0..300).map(|_| run(&mut adaptive, &boxes)).collect();
+    assert_eq!(ran[0], ("slow@cpu1".to_owned(), Reason::First));
+    let quick = ran.iter().filter(|(id, _)| id == "quick@cpu1").count();
+    assert!(ran[299].0 == "quick@cpu1" && quick > 100, "{quick} of 300 frames by the quick one, the last by {}", ran[299].0);
+}
+
+#[test]
+fn an_invalid_box_is_named_and_the_next_frame_is_right() {
+    let mut adaptive = Adaptive::only(ID.parse().unwrap(), &registry("brute@cpu1")).unwrap();
+    let boxes = resting(100);
+    let mut wrong = boxes.clone();
+    wrong[7].max[2] = f32::NAN;
+    for boxes in [&boxes, &wrong, &wrong, &boxes, &boxes] {
+        match adaptive.find_pairs(boxes, &mut Pairs::new()) {
+            Ok(()) => assert_eq!(run(&mut adaptive, boxes).0, ID),
+            Err(error) => {
+                assert!(matches!(error, Error::InvalidBox { index: 7, .. }) && boxes[7].defect().is_some(), "{error}");
+            }
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! A filter on the pairs: every algorithm against the double loop that applies its definition.
+
+mod common;
+
+use common::{Random, every_algorithm, naive, naive_filtered};
+use sapwise::{Aabb, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, Scenario};
+
+/// That many random memberships.
+fn memberships(count: usize, random: &mut Random) -> Vec<Membership> {
+    (0..count).map(|_| random.membership()).collect()
+}
+
+#[test]
+fn every_algorithm_gives_the_wanted_pairs_of_every_scenario() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(0xf117);
+    let mut canonical = Pairs::with_order(PairOrder::Canonical);
+    let mut any = Pairs::new();
+    for scenario in Scenario::ALL {
+        for objects in [12, 700, 4000] {
+            let mut scene = scenario.start(objects, 42);
+            for frame in 0..2 {
+                let boxes = scene.boxes();
+                // The last boxes have none.
+                let memberships = memberships(boxes.len() - boxes.len() / 50, &mut random);
+                let expected = naive_filtered(boxes, &memberships);
+                let all = naive(boxes).len();
+                canonical.set_filter(Some(Filter::new(memberships.clone())));
+                any.set_filter(Some(Filter::new(memberships)));
+                for (id, algorithm) in &mut algorithms {
+                    algorithm.find_pairs(boxes, &mut canonical).unwrap();
+                    let (found, wanted) = (canonical.len(), expected.len());
+                    assert!(
+                        canonical.as_slice() == expected,
+                        "{id} on {scenario}, frame {frame}: {found} pairs, not {wanted}"
+                    );
+                    assert_eq!(canonical.overlapping(), all as u64, "{id} on {scenario}, frame {frame}");
+                    algorithm.find_pairs(boxes, &mut any).unwrap();
+                    assert_eq!(
+                        any.fingerprint(),
+                        canonical.fingerprint(),
+                        "{id} on {scenario}, frame {frame}, in any order"
+                    );
+                }
+                (0..if scenario == Scenario::Fragmentation { 90 } else { 1 }).for_each(|_| scene.advance());
+            }
+        }
+    }
+}
+
+/// Long enough for pairs to be kept from frame to frame: those that are kept must not have passed a filter that has changed.
+#[test]
+fn memberships_change_while_pairs_are_kept() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(71);
+    let mut boxes = random.cubes(600, [11.0; 3], 0.6);
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    pairs.set_filter(Some(Filter::new(memberships(600, &mut random))));
+    for frame in 0..60 {
+        for b in &mut boxes {
+            let by = (random.next() - 0.5) * 0.08;
+            (b.min[frame % 3], b.max[frame % 3]) = (b.min[frame % 3] + by, b.max[frame % 3] + by);
+        }
+        let filter = pairs.filter_mut().unwrap();
+        for _ in 0..20 {
+            filter.memberships[(random.next() * 500.0) as usize] = random.membership();
+        }
+        if frame % 9 == 4 {
+            boxes.swap_remove(frame);
+            filter.memberships.swap_remove(frame);
+        }
+        if frame % 20 == 10 {
+            let filter = pairs.filter().cloned();
+            pairs.set_filter(None);
+            for (id, algorithm) in &mut algorithms {
+                algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+                assert!(pairs.as_slice() == naive(&boxes), "{id}, frame {frame}, without a filter");
+            }
+            pairs.set_filter(filter);
+        }
+        let expected = naive_filtered(&boxes, &pairs.filter().unwrap().memberships);
+        assert!(!expected.is_empty() && expected.len() < naive(&boxes).len());
+        for (id, algorithm) in &mut algorithms {
+            algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+            assert!(pairs.as_slice() == expected, "{id}, frame {frame}: {} pairs, not {}", pairs.len(), expected.len());
+        }
+    }
+}
+
+#[test]
+fn a_scene_of_fixed_boxes_has_no_pair_however_small_the_limit() {
+    let boxes = [Aabb::cube([3.0; 3], 1.0); 2000];
+    let mut pairs = Pairs::new();
+    pairs.set_filter(Some(Filter::new(vec![Membership { fixed: true, ..Membership::ALL }; 2000])));
+    pairs.set_limit(Some(0));
+    for (id, mut algorithm) in every_algorithm() {
+        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+        assert!(pairs.is_empty(), "{id}");
+        assert_eq!(pairs.overlapping(), 1_999_000, "{id}");
+    }
+}
+
+#[test]
+fn the_limit_and_its_error_count_the_wanted_pairs_only() {
+    // All overlap; of 1200 boxes the 100 of the second group collide with the 1100 of the first, and with nothing else.
+    let boxes = [Aabb::cube([3.0; 3], 1.0); 1200];
+    let of = |k: usize| if k % 12 == 5 { (2, 1) } else { (1, 2) };
+    let membership = |k: usize| Membership { groups: of(k).0, mask: of(k).1, fixed: false };
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    pairs.set_filter(Some(Filter::new((0..1200).map(membership).collect())));
+    for (id, mut algorithm) in every_algorithm() {
+        for limit in [0, 1, 1000, 109_999] {
+            pairs.set_limit(Some(limit));
+            let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+            assert_eq!(error, Error::TooManyPairs { limit, pairs: 110_000 }, "{id}");
+        }
+        pairs.set_limit(Some(110_000));
+        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+        assert!(pairs.len() == 110_000 && pairs.iter().all(|&(i, j)| (i % 12 == 5) != (j % 12 == 5)), "{id}");
+    }
+}
+
+/// Pushes every pair, in either order of its members.
+struct Everything;
+
+impl BroadPhase for Everything {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        (0..boxes.len() as u32).for_each(|j| (0..j).for_each(|i| pairs.push(j, i)));
+        pairs.finish()
+    }
+}
+
+#[test]
+fn an_algorithm_of_the_users_is_filtered_like_ours() {
+    let mut registry = Registry::with_cores(1);
+    registry.add("everything@cpu1".parse().unwrap(), 1, || Ok(Box::new(Everything)));
+    let mut algorithm = registry.create(&"everything@cpu1".parse().unwrap()).unwrap();
+    let boxes = [Aabb::cube([0.0; 3], 1.0); 300];
+    let memberships = memberships(290, &mut Random(5));
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    pairs.set_filter(Some(Filter::new(memberships.clone())));
+    algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+    assert!(pairs.as_slice() == naive_filtered(&boxes, &memberships));
+}
+
+#[test]
+fn a_clone_has_a_filter_of_its_own() {
+    let mut pairs = Pairs::new();
+    pairs.set_filter(Some(Filter::new(vec![Membership::ALL; 2])));
+    let clone = pairs.clone();
+    pairs.filter_mut().unwrap().memberships[1].mask = 0;
+    pairs.push(0, 1);
+    assert!(pairs.is_empty());
+    assert_eq!(clone.filter().unwrap().memberships[1], Membership::ALL);
+}

@@ -1,0 +1,324 @@
+//! Frames without number in which things go wrong at random: no pair is lost and no memory leaks.
+//!
+//! `fragmentation` at small sizes runs through the adaptive module, each frame held against the double loop. From a seed a GPU is lost and
+//! comes back, pools are made anew with other sizes, frames are refused, and the program starts again with what it has learned. With the
+//! feature `this-machine` every fourth program starts from a cache whose files are damaged, cut off, replaced by folders or can't be
+//! written. A run of a million frames takes minutes:
+//!
+//! ```sh
+//! SAPWISE_SOAK_FRAMES=1000000 cargo test -p sapwise --features this-machine --test soak -- --nocapture
+//! ```
+//!
+//! One test only, because the counter sees every thread of the process.
+
+mod common;
+#[cfg(feature = "this-machine")]
+#[path = "soak/kept.rs"]
+mod kept;
+
+use common::{Random, naive};
+use sapwise::{
+    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Fields, Load, PairOrder, Pairs, Reason, Registry,
+    Scenario, Source, Term,
+};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicIsize, AtomicU64, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+/// Frames unless the environment tells another number.
+const FRAMES: u64 = 50_000;
+
+/// Frames from one start of the program to the next, on average.
+const LIFE: u64 = 1000;
+
+/// Live memory may end so much above where it was early on: rayon frees what its threads leave when it comes to it.
+const SLACK_BYTES: isize = 64 << 10;
+
+/// The system's allocator, counting the bytes that are in use.
+struct Counting;
+
+static LIVE: AtomicIsize = AtomicIsize::new(0);
+
+// SAFETY: every call is passed on unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        LIVE.fetch_add(layout.size() as isize, Relaxed);
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        LIVE.fetch_sub(layout.size() as isize, Relaxed);
+        // SAFETY: the caller's promise.
+        unsafe { System.dealloc(at, layout) }
+    }
+
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        LIVE.fetch_add(size as isize - layout.size() as isize, Relaxed);
+        // SAFETY: the caller's promise.
+        unsafe { System.realloc(at, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// A place for a GPU: even while there is none, odd while there is one, another number for each device.
+#[derive(Default)]
+struct Slot(AtomicU64);
+
+impl Slot {
+    fn is_present(&self) -> bool {
+        self.0.load(Relaxed) % 2 == 1
+    }
+
+    fn turn(&self) {
+        self.0.fetch_add(1, Relaxed);
+    }
+}
+
+/// An algorithm on a GPU that is an act, of the device that was there when it was made.
+struct OnGpu {
+    slot: Arc<Slot>,
+    device: u64,
+    inner: Box<dyn BroadPhase>,
+}
+
+const GPU: &str = "mock@gpu0";
+
+fn lost() -> Error {
+    Error::Unavailable { algorithm: GPU.parse().unwrap(), reason: "the device is lost".to_owned() }
+}
+
+impl BroadPhase for OnGpu {
+    fn find_pairs(&mut self, boxes: &[sapwise::Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        if self.slot.0.load(Relaxed) == self.device {
+            return self.inner.find_pairs(boxes, pairs);
+        }
+        // Lost in the middle of its work: what it has left is no answer.
+        pairs.clear();
+        (1..boxes.len() as u32).for_each(|k| pairs.push(0, k));
+        Err(lost())
+    }
+}
+
+fn registry(cores: u32, slot: &Arc<Slot>) -> Registry {
+    let mut registry = Registry::with_cores(cores);
+    let slot = Arc::clone(slot);
+    registry.add(GPU.parse().unwrap(), 1, move || {
+        let device = slot.0.load(Relaxed);
+        let inner = Registry::with_cores(1).create(&"sweep@cpu1".parse().unwrap())?;
+        if slot.is_present() { Ok(Box::new(OnGpu { slot: Arc::clone(&slot), device, inner })) } else { Err(lost()) }
+    });
+    registry
+}
+
+/// Fields in which few boxes are for brute force, many for the GPU, and for several threads where it is lost.
+fn fields() -> Fields {
+    let registry = Registry::with_cores(1);
+    let cost = |id: &str, call: f64, object: f64| {
+        let of_method = registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method())));
+        let term = |term, unit_ns| CostTerm { term, unit_ns };
+        AlgorithmCost {
+            algorithm: id.parse().unwrap(),
+            revision: of_method.map_or(1, |e| e.revision),
+            curve: CostCurve { terms: vec![term(Term::Call, call), term(Term::Objects, object)], ..CostCurve::default() },
+            spread_ln: 0.3,
+        }
+    };
+    let costs = vec![
+        cost("brute@cpu1", 100.0, 60.0),
+        cost("verlet@cpu1", 1500.0, 40.0),
+        cost(GPU, 4000.0, 5.0),
+        cost("sweep@cpu1", 2500.0, 45.0),
+        cost("strips@cpu2", 4000.0, 25.0),
+        cost("brute@cpu2", 3000.0, 31.0),
+        cost("verlet@cpu3", 5000.0, 14.0),
+        cost("strips@cpu4", 5500.0, 11.0),
+    ];
+    let loads: Vec<Load> = (0..12).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    Fields::from_costs(Source::Default, "fragmentation", costs, &loads)
+}
+
+/// What has happened so far.
+#[derive(Debug, Default)]
+struct Tally {
+    starts: u64,
+    frames: u64,
+    gpus_lost: u64,
+    fell_back: u64,
+    gpus_back: u64,
+    pools: u64,
+    invalid: u64,
+    over_limit: u64,
+    learned: u64,
+    cached: u64,
+    probed: u64,
+    unreadable: u64,
+    unwritable: u64,
+    ran: BTreeMap<String, u64>,
+}
+
+/// Uniform below `most`.
+fn below(random: &mut Random, most: u64) -> u64 {
+    (f64::from(random.next()) * most as f64) as u64
+}
+
+/// A machine whose GPU comes and goes, and whose cores the program may use so many of.
+struct Machine {
+    slot: Arc<Slot>,
+    cores: u32,
+}
+
+impl Machine {
+    fn new(random: &mut Random) -> Self {
+        let slot = Arc::new(Slot::default());
+        if below(random, 4) > 0 {
+            slot.turn();
+        }
+        Self { slot, cores: 1 + below(random, 4) as u32 }
+    }
+}
+
+/// One program from start to end. Gives the fields that it ends with.
+fn program(fields: Fields, frames: u64, random: &mut Random, tally: &mut Tally) -> Fields {
+    let mut machine = Machine::new(random);
+    let mut adaptive = Adaptive::new(fields, &registry(machine.cores, &machine.slot)).unwrap();
+    // The costs that it starts with hold on machines that nobody has: they keep all algorithms busy where nothing is learned.
+    adaptive.set_learning(below(random, 4) == 0);
+    tally.starts += 1;
+    life(&mut adaptive, &mut machine, frames, random, tally);
+    let learned = adaptive.learned();
+    assert_eq!(learned.defect(), None);
+    tally.learned += u64::from(learned.source == Source::Learned);
+    learned
+}
+
+/// So many frames of a scene, each held against the double loop.
+fn life(adaptive: &mut Adaptive, machine: &mut Machine, frames: u64, random: &mut Random, tally: &mut Tally) {
+    let Machine { slot, cores } = machine;
+    let mut scene = Scenario::Fragmentation.start(10 + below(random, 400) as usize, below(random, 1 << 20));
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    let mut on_gpu = false;
+    for _ in 0..frames {
+        scene.advance();
+        let boxes = scene.boxes();
+        let expected = naive(boxes);
+        if below(random, 100) == 0 {
+            adaptive.set_learning(below(random, 4) == 0);
+            adaptive.decide(boxes);
+        }
+        match below(random, 400) {
+            // Now and then anyway, more often while it is at work.
+            0 | 1 if slot.is_present() => {
+                slot.turn();
+                tally.gpus_lost += 1;
+            }
+            20..40 if on_gpu => {
+                slot.turn();
+                tally.gpus_lost += 1;
+            }
+            0..=7 if !slot.is_present() => {
+                slot.turn();
+                adaptive.revive(&registry(*cores, slot)).unwrap();
+                tally.gpus_back += 1;
+            }
+            8 => {
+                *cores = 1 + below(random, 4) as u32;
+                adaptive.revive(&registry(*cores, slot)).unwrap();
+                tally.pools += 1;
+            }
+            9 => {
+                let mut wrong = boxes.to_vec();
+                let index = below(random, wrong.len() as u64) as usize;
+                wrong[index].max[1] = f32::NAN;
+                let error = adaptive.find_pairs(&wrong, &mut pairs).unwrap_err();
+                assert!(matches!(error, Error::InvalidBox { index: told, .. } if told == index), "{error}");
+                tally.invalid += 1;
+            }
+            10 if !expected.is_empty() => {
+                pairs.set_limit(Some(expected.len() - 1));
+                let error = adaptive.find_pairs(boxes, &mut pairs).unwrap_err();
+                assert!(matches!(error, Error::TooManyPairs { pairs, .. } if pairs == expected.len() as u64), "{error}");
+                pairs.set_limit(None);
+                tally.over_limit += 1;
+            }
+            _ => {}
+        }
+        adaptive.find_pairs(boxes, &mut pairs).unwrap();
+        let decision = adaptive.last_decision().unwrap();
+        let (id, reason) = (decision.algorithm, decision.reason);
+        assert!(pairs.as_slice() == expected, "{id}, {reason:?}, start {}, frame {}", tally.starts, scene.frame());
+        // The reason of a decision stands until the next one.
+        tally.fell_back += u64::from(reason == Reason::FellBack && on_gpu);
+        let id = id.to_string();
+        on_gpu = id == GPU;
+        assert!(slot.is_present() || !on_gpu, "a GPU that is lost has run, start {}", tally.starts);
+        *tally.ran.entry(id).or_default() += 1;
+        tally.frames += 1;
+    }
+}
+
+/// Bytes in use once the threads of the last start have ended; or so many milliseconds later, where they are more than ever.
+fn live_bytes(lowest: isize) -> isize {
+    for _ in 0..50 {
+        if LIVE.load(Relaxed) <= lowest {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    LIVE.load(Relaxed)
+}
+
+#[test]
+fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
+    let told =
+        std::env::var("SAPWISE_SOAK_FRAMES").map(|text| text.parse().expect("SAPWISE_SOAK_FRAMES is a number of frames"));
+    let frames: u64 = told.unwrap_or(FRAMES);
+    let began = Instant::now();
+    let mut random = Random(0x5eed_50a4);
+    let mut tally = Tally::default();
+    let mut known = fields();
+    #[cfg(feature = "this-machine")]
+    let mut kept = kept::Kept::new();
+    let mut live = Vec::with_capacity(2 * (frames / LIFE) as usize + 64);
+    let mut lowest = isize::MAX;
+    while tally.frames < frames {
+        let length = (LIFE / 2 + below(&mut random, LIFE)).min(frames - tally.frames);
+        if cfg!(feature = "this-machine") && below(&mut random, 4) == 0 {
+            #[cfg(feature = "this-machine")]
+            kept.program(length, &mut random, &mut tally);
+        } else {
+            let learned = program(known, length, &mut random, &mut tally);
+            // A start goes on with what the one before has learned, until somebody deletes it.
+            known = if below(&mut random, 2) == 0 { fields() } else { learned };
+        }
+        lowest = lowest.min(live_bytes(lowest));
+        live.push(live_bytes(lowest));
+    }
+    let (early, late) = (&live[live.len() / 4..live.len() / 2], &live[live.len() * 3 / 4..]);
+    let least = |bytes: &[isize]| bytes.iter().copied().min().unwrap();
+    let seconds = began.elapsed().as_secs_f64();
+    println!("{tally:#?}\n{seconds:.1} s, {} bytes in use early on, {} at the end", least(early), least(late));
+    assert!(least(late) <= least(early) + SLACK_BYTES, "{} bytes in use early on, {} at the end", least(early), least(late));
+    for (what, times) in [
+        ("a GPU was lost", tally.gpus_lost),
+        ("it was lost in a frame of its own", tally.fell_back),
+        ("a GPU came back", tally.gpus_back),
+        ("pools of another size", tally.pools),
+        ("an invalid box", tally.invalid),
+        ("a limit on the pairs", tally.over_limit),
+        ("learned fields", tally.learned),
+    ] {
+        // One in some thousands of frames each, or the seed has hit upon nothing that this test is for.
+        assert!(times >= frames / 20_000, "{what}: {times} times in {frames} frames");
+    }
+    assert!(tally.ran.len() >= if cfg!(feature = "parallel") { 6 } else { 4 }, "{:?}", tally.ran);
+    if cfg!(feature = "this-machine") {
+        let Tally { cached, probed, unreadable, unwritable, .. } = tally;
+        let least = [cached, probed, unreadable, unwritable].into_iter().min();
+        assert!(least >= Some(frames / 100_000), "{tally:?}");
+    }
+}
