@@ -190,9 +190,49 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
         let complaint = failure(&mut run(&scene, &fields, words), status);
         assert!(needed.iter().all(|text| complaint.contains(text)), "{scene:?} {words:?}: {complaint}");
     }
+    let nowhere = folder.path().join("missing").join("a.svg");
+    let complaint = failure(run("uniform", &fields, &[]).arg("--plot").arg(&nowhere), 1);
+    assert!(complaint.contains("a.svg") && complaint.contains("no such folder"), "{complaint}");
     for words in [["--co-runner", "x"], ["--samples", "3"], ["--trace", "a.txt"]] {
         failure(&mut run("uniform", &fields, &words), 2);
     }
     let complaint = failure(run(&scene, &fields, &[]).arg("--trace").arg(folder.path().join("steps.json")), 2);
     assert!(complaint.contains("steps.json"), "{complaint}");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_the_co_runner_and_keeps_the_repeats_that_are_complete() {
+    use std::io::Read;
+    let folder = tempfile::tempdir().unwrap();
+    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let trace = folder.path().join("trace.csv");
+    // More repeats than it lives for; the first is over in a hundredth of a second.
+    let words = ["--objects", "30", "--frames", "40", "--repeats", "1000", "--co-runner", "1:1", "--seed", "3", "--json"];
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+    command.args(["run", "uniform", "--fields"]).arg(&fields).args(words).arg("--trace").arg(&trace);
+    let mut child = command.stdout(std::process::Stdio::piped()).spawn().unwrap();
+    // A child that has no handler yet ends at once, without an answer: then it is tried again, later.
+    let mut wait = std::time::Duration::from_millis(200);
+    loop {
+        std::thread::sleep(wait);
+        assert!(child.try_wait().unwrap().is_none(), "a thousand repeats were over before it could be interrupted");
+        let sent = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let mut text = String::new();
+        child.stdout.take().unwrap().read_to_string(&mut text).unwrap();
+        let status = child.wait().unwrap();
+        if !text.is_empty() {
+            let told: Value = serde_json::from_str(&text).unwrap();
+            assert_eq!((status.code(), &told["interrupted"]), (Some(1), &true.into()));
+            let repeats = told["repeats"].as_u64().unwrap();
+            assert!((1..1000).contains(&repeats), "{told}");
+            assert_eq!(told["regret_of_repeats"].as_array().unwrap().len() as u64, repeats);
+            assert_eq!(fs::read_to_string(&trace).unwrap().lines().count(), 41);
+            return;
+        }
+        assert!(wait.as_secs() < 60, "interrupted before the first repeat, however late");
+        wait *= 2;
+        child = command.spawn().unwrap();
+    }
 }

@@ -7,11 +7,13 @@ use plotters::prelude::*;
 use sapwise::{AlgorithmId, BackendClass};
 
 /// Width and height. Here and below lengths are in units: pixels of an SVG, which a viewer scales.
-const SIZE: (u32, u32) = (1500, 1010);
+const SIZE: (u32, u32) = (1500, 1034);
 /// Pixels of a PNG in a unit: with one, letters have too few to be read with ease.
 const PNG_UNIT: u32 = 2;
 /// Height of the lines of text below, and of each chart of a panel; the objects have the rest.
-const CAPTION: u32 = 84;
+const CAPTION: u32 = 108;
+/// Letters that fit into a line of it.
+const LETTERS: usize = 150;
 const COSTS: u32 = 520;
 const CHOICES: u32 = 190;
 /// Room beside the left axis of every chart, so that their frames stand below each other.
@@ -20,6 +22,8 @@ const AXIS: u32 = 96;
 const POINTS: usize = 1200;
 
 type Area<D> = DrawingArea<D, Shift>;
+/// Frames, each with a value.
+type Points = Vec<(usize, f64)>;
 
 /// How many pixels a unit has.
 #[derive(Debug, Clone, Copy)]
@@ -126,11 +130,28 @@ where
     let (left, right) = panels.split_horizontally(scale.length(SIZE.0 / 2));
     panel(&left, scale, &Panel::new(BackendClass::Gpu, outcome), course, outcome)?;
     panel(&right, scale, &Panel::new(BackendClass::Cpu, outcome), course, outcome)?;
-    for (k, line) in told.iter().enumerate() {
+    for (k, line) in told.iter().flat_map(|line| wrapped(line)).enumerate() {
         let place = (scale.offset(24), scale.offset(6 + 24 * k as i32));
         caption.draw(&Text::new(line.as_str(), place, scale.font(17).into_font()))?;
     }
     Ok(())
+}
+
+/// The words of a text in lines that fit.
+fn wrapped(text: &str) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let last = lines.len() - 1;
+        if lines[last].is_empty() {
+            lines[last].push_str(word);
+        } else if lines[last].chars().count() + 1 + word.chars().count() <= LETTERS {
+            lines[last].push(' ');
+            lines[last].push_str(word);
+        } else {
+            lines.push(format!("    {word}"));
+        }
+    }
+    lines
 }
 
 fn panel<D>(area: &Area<D>, scale: Scale, panel: &Panel, course: &Course, outcome: &Outcome) -> anyhow::Result<()>
@@ -158,7 +179,7 @@ where
 }
 
 /// Means over equal numbers of frames, few enough to be seen, each at its first frame. Infinite times are left out.
-fn curve(values: impl Iterator<Item = f64>, frames: usize) -> Vec<(usize, f64)> {
+fn curve(values: impl Iterator<Item = f64>, frames: usize) -> Points {
     let step = frames.div_ceil(POINTS).max(1);
     let values: Vec<f64> = values.collect();
     let mean = |(k, chunk): (usize, &[f64])| {
@@ -176,7 +197,7 @@ where
     let count = outcome.frames.len();
     let of = |k: usize| curve(outcome.frames.iter().map(|f| f.fixed_ns[k] / 1e3), count);
     let adaptive = curve(outcome.frames.iter().map(|f| f.adaptive_ns / 1e3), count);
-    let curves: Vec<(u32, usize, Vec<(usize, f64)>)> = panel.units.iter().map(|&(width, k)| (width, k, of(k))).collect();
+    let curves: Vec<(u32, usize, Points)> = panel.units.iter().map(|&(width, k)| (width, k, of(k))).collect();
     let all = || curves.iter().flat_map(|c| &c.2).chain(&adaptive).map(|point| point.1);
     let floor = all().fold(f64::INFINITY, f64::min) / 1.5;
     // Room for the names above the highest curve.
@@ -387,6 +408,16 @@ mod tests {
     fn a_machine_without_gpus_is_told_so() {
         let svg = drawn(&outcome(&["brute@cpu1"], &[(10, 1.0, &[1.0], taken(0))]), None);
         assert!(svg.contains("no GPU algorithm ran here") && !svg.contains("a GPU"), "{svg}");
+    }
+
+    #[test]
+    fn a_long_line_goes_on_below() {
+        assert_eq!(wrapped("Made by: sapwise run"), ["Made by: sapwise run"]);
+        let long = "sapwise run --option ".repeat(20);
+        let lines = wrapped(long.trim());
+        assert!(lines.len() > 2 && lines.iter().all(|l| l.len() <= LETTERS), "{lines:?}");
+        let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(words(&lines.join(" ")), words(&long));
     }
 
     #[test]
