@@ -19,6 +19,7 @@ Examples:
   sapwise run fragmentation
   sapwise run fragmentation --fields report.json --plot run.svg    (fields measured on this machine)
   sapwise run fragmentation --fields elsewhere.json --after 300    (wrong fields: what learning makes of them)
+  sapwise run clustered --swing 50 --frames 600                    (growing and shrinking)
   sapwise run uniform --frames 900 --co-runner 450 --trace run.csv
   sapwise run clustered --objects 50000 --frames 100 --record clustered.npy --json
   sapwise run clustered.npy --samples 0 --no-learning              (the pure prediction, on a recorded stream)")]
@@ -43,6 +44,9 @@ pub(crate) struct Run {
     /// Objects; in fragmentation the largest number of them. Without this option 20 000. A stream has its own.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub(crate) objects: Option<u32>,
+    /// Let the number of objects go from this one up to all and back over the frames.
+    #[arg(long, value_name = "LEAST", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub(crate) swing: Option<u32>,
     /// Frames. Without this option 200, in fragmentation one cycle of 600, of a stream all.
     #[arg(long, value_name = "F", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) frames: Option<u32>,

@@ -355,7 +355,7 @@ mod tests {
     use sapwise::Scenario;
 
     fn course(co_runner: Option<CoRunner>) -> Course {
-        let footage = Footage::Scene { scenario: Scenario::Slab, objects: 10, seed: 1 };
+        let footage = Footage::Scene { scenario: Scenario::Slab, objects: 10, seed: 1, swing: None };
         Course { footage, frames: 3, repeats: 1, seed: 1, learning: true, exploring: true, co_runner }
     }
 

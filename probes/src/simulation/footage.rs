@@ -8,13 +8,32 @@ use std::path::Path;
 /// A seeded scene, or a stream that was recorded.
 #[derive(Debug, Clone)]
 pub(crate) enum Footage {
-    Scene { scenario: Scenario, objects: usize, seed: u64 },
+    Scene { scenario: Scenario, objects: usize, seed: u64, swing: Option<Swing> },
     Stream { name: String, frames: Frames },
+}
+
+/// The number of objects goes up and down: the first so many of the scene are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Swing {
+    /// Objects of the first frame and of the last.
+    pub(crate) least: usize,
+    /// Frames from the least to the most and back.
+    pub(crate) frames: usize,
+}
+
+impl Swing {
+    /// Objects of a frame where there are at most so many: a straight line in their logarithm, up and down.
+    fn objects(self, at: usize, most: usize) -> usize {
+        let half = (self.frames.max(2) - 1) as f64 / 2.0;
+        let share = (1.0 - (at as f64 - half).abs() / half).clamp(0.0, 1.0);
+        let (low, high) = ((self.least.max(1) as f64).ln(), (most.max(1) as f64).ln());
+        ((low + share * (high - low)).exp().round() as usize).min(most)
+    }
 }
 
 /// A [`Footage`] at one of its frames.
 pub(crate) enum Reel<'a> {
-    Scene(Box<Scene>),
+    Scene { scene: Box<Scene>, swing: Option<Swing>, at: usize },
     Stream { frames: &'a Frames, at: usize },
 }
 
@@ -30,7 +49,9 @@ impl Footage {
     /// Begins at the first frame.
     pub(crate) fn start(&self) -> Reel<'_> {
         match self {
-            Self::Scene { scenario, objects, seed } => Reel::Scene(Box::new(scenario.start(*objects, *seed))),
+            Self::Scene { scenario, objects, seed, swing } => {
+                Reel::Scene { scene: Box::new(scenario.start(*objects, *seed)), swing: *swing, at: 0 }
+            }
             Self::Stream { frames, .. } => Reel::Stream { frames, at: 0 },
         }
     }
@@ -64,7 +85,10 @@ impl Reel<'_> {
     /// The boxes of this frame; none after the last of a stream.
     pub(crate) fn boxes(&self) -> &[Aabb] {
         match self {
-            Self::Scene(scene) => scene.boxes(),
+            Self::Scene { scene, swing, at } => {
+                let all = scene.boxes();
+                &all[..swing.map_or(all.len(), |s| s.objects(*at, all.len()))]
+            }
             Self::Stream { frames, at } => frames.frame(*at),
         }
     }
@@ -72,7 +96,10 @@ impl Reel<'_> {
     /// Goes on to the next frame.
     pub(crate) fn advance(&mut self) {
         match self {
-            Self::Scene(scene) => scene.advance(),
+            Self::Scene { scene, at, .. } => {
+                scene.advance();
+                *at += 1;
+            }
             Self::Stream { at, .. } => *at += 1,
         }
     }
@@ -84,11 +111,24 @@ mod tests {
     use crate::boxes::read_frames;
 
     #[test]
+    fn a_swing_goes_from_the_least_to_all_and_back() {
+        let swing = Some(Swing { least: 10, frames: 41 });
+        let mut reel = Footage::Scene { scenario: Scenario::Clustered, objects: 1000, seed: 1, swing }.start();
+        let mut counts = Vec::new();
+        for _ in 0..41 {
+            counts.push(reel.boxes().len());
+            reel.advance();
+        }
+        assert_eq!([counts[0], counts[10], counts[20], counts[30], counts[40]], [10, 100, 1000, 100, 10]);
+        assert!(counts[..21].is_sorted() && counts[20..].is_sorted_by(|a, b| a >= b));
+    }
+
+    #[test]
     fn a_scene_that_was_recorded_shows_the_same_frames() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.npy");
         // The number of boxes goes up and down.
-        let scene = Footage::Scene { scenario: Scenario::Fragmentation, objects: 300, seed: 3 };
+        let scene = Footage::Scene { scenario: Scenario::Fragmentation, objects: 300, seed: 3, swing: None };
         scene.record(&path, 90).unwrap();
         let stream = Footage::Stream { name: "scene.npy".to_owned(), frames: read_frames(&path).unwrap() };
         let (mut first, mut second) = (scene.start(), stream.start());

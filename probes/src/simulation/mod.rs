@@ -19,7 +19,7 @@ use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Fields, Pairs, Rea
 use std::time::Instant;
 
 pub(crate) use co_runner::{CoRunner, SHARE};
-pub(crate) use footage::Footage;
+pub(crate) use footage::{Footage, Swing};
 pub(crate) use outcome::{Frame, Outcome, Part};
 pub(crate) use trace::{Format as TraceFormat, write_trace};
 

@@ -10,7 +10,7 @@ fn steps(list: &[(u32, &str)]) -> Fields {
 }
 
 fn course(scenario: Scenario, objects: usize, frames: usize, repeats: usize) -> Course {
-    let footage = Footage::Scene { scenario, objects, seed: 1 };
+    let footage = Footage::Scene { scenario, objects, seed: 1, swing: None };
     Course { footage, frames, repeats, seed: 1, learning: true, exploring: true, co_runner: None }
 }
 

@@ -9,7 +9,7 @@ use crate::args::{Run, Scene};
 use crate::boxes::{Frames, read_frames};
 use crate::exit::{Outcome, WrongUsage};
 use crate::plot::{self, Picture};
-use crate::simulation::{Course, Footage, TraceFormat, simulate, too_wide, write_trace};
+use crate::simulation::{Course, Footage, Swing, TraceFormat, simulate, too_wide, write_trace};
 use crate::{files, interrupt, output};
 use anyhow::{Context, bail};
 use sapwise::{Scenario, usable_cores};
@@ -99,13 +99,21 @@ fn course(arguments: &Run) -> anyhow::Result<Course> {
         Scene::Scenario(scenario) => {
             let objects = arguments.objects.unwrap_or(OBJECTS) as usize;
             let usual = if *scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as usize } else { FRAMES };
-            (Footage::Scene { scenario: *scenario, objects, seed: arguments.seed }, asked.unwrap_or(usual))
+            let frames = asked.unwrap_or(usual);
+            if let Some(least) = arguments.swing.filter(|&least| least as usize > objects) {
+                return Err(WrongUsage(format!("--swing {least}: more than the {objects} objects; raise --objects")).into());
+            }
+            let swing = arguments.swing.map(|least| Swing { least: least as usize, frames });
+            (Footage::Scene { scenario: *scenario, objects, seed: arguments.seed, swing }, frames)
         }
         Scene::Stream(path) => {
             let wrong =
                 |what: &str| Err(WrongUsage(format!("{what}: {} is a stream, whose boxes are given", path.display())));
             if arguments.objects.is_some() {
                 wrong("--objects")?;
+            }
+            if arguments.swing.is_some() {
+                wrong("--swing")?;
             }
             if arguments.record.is_some() {
                 wrong("--record")?;
