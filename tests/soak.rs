@@ -1,16 +1,20 @@
-//! Frames by the hundred thousand in which things go wrong at random: no pair is lost and no memory leaks.
+//! Frames without number in which things go wrong at random: no pair is lost and no memory leaks.
 //!
 //! `fragmentation` at small sizes runs through the adaptive module, each frame held against the double loop. From a seed a GPU is lost and
-//! comes back, pools are made anew with other sizes, frames are refused, and the program starts again with what it has learned. A
-//! run of a million frames takes minutes:
+//! comes back, pools are made anew with other sizes, frames are refused, and the program starts again with what it has learned. With the
+//! feature `this-machine` every fourth program starts from a cache whose files are damaged, cut off, replaced by folders or can't be
+//! written. A run of a million frames takes minutes:
 //!
 //! ```sh
-//! SAPWISE_SOAK_FRAMES=1000000 cargo test --test soak -- --nocapture
+//! SAPWISE_SOAK_FRAMES=1000000 cargo test -p sapwise --features this-machine --test soak -- --nocapture
 //! ```
 //!
 //! One test only, because the counter sees every thread of the process.
 
 mod common;
+#[cfg(feature = "this-machine")]
+#[path = "soak/kept.rs"]
+mod kept;
 
 use common::{Random, naive};
 use sapwise::{
@@ -24,7 +28,7 @@ use std::sync::atomic::{AtomicIsize, AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 /// Frames unless the environment tells another number.
-const FRAMES: u64 = 100_000;
+const FRAMES: u64 = 50_000;
 
 /// Frames from one start of the program to the next, on average.
 const LIFE: u64 = 1000;
@@ -150,6 +154,10 @@ struct Tally {
     invalid: u64,
     over_limit: u64,
     learned: u64,
+    cached: u64,
+    probed: u64,
+    unreadable: u64,
+    unwritable: u64,
     ran: BTreeMap<String, u64>,
 }
 
@@ -158,20 +166,42 @@ fn below(random: &mut Random, most: u64) -> u64 {
     (f64::from(random.next()) * most as f64) as u64
 }
 
-/// One program from start to end: `frames` frames. Gives the fields that it ends with.
-fn life(fields: Fields, frames: u64, random: &mut Random, tally: &mut Tally) -> Fields {
-    let slot = Arc::new(Slot::default());
-    if below(random, 4) > 0 {
-        slot.turn();
+/// A machine whose GPU comes and goes, and whose cores the program may use so many of.
+struct Machine {
+    slot: Arc<Slot>,
+    cores: u32,
+}
+
+impl Machine {
+    fn new(random: &mut Random) -> Self {
+        let slot = Arc::new(Slot::default());
+        if below(random, 4) > 0 {
+            slot.turn();
+        }
+        Self { slot, cores: 1 + below(random, 4) as u32 }
     }
-    let mut cores = 1 + below(random, 4) as u32;
-    let mut adaptive = Adaptive::new(fields, &registry(cores, &slot)).unwrap();
+}
+
+/// One program from start to end. Gives the fields that it ends with.
+fn program(fields: Fields, frames: u64, random: &mut Random, tally: &mut Tally) -> Fields {
+    let mut machine = Machine::new(random);
+    let mut adaptive = Adaptive::new(fields, &registry(machine.cores, &machine.slot)).unwrap();
     // The costs that it starts with hold on machines that nobody has: they keep all algorithms busy where nothing is learned.
     adaptive.set_learning(below(random, 4) == 0);
+    tally.starts += 1;
+    life(&mut adaptive, &mut machine, frames, random, tally);
+    let learned = adaptive.learned();
+    assert_eq!(learned.defect(), None);
+    tally.learned += u64::from(learned.source == Source::Learned);
+    learned
+}
+
+/// So many frames of a scene, each held against the double loop.
+fn life(adaptive: &mut Adaptive, machine: &mut Machine, frames: u64, random: &mut Random, tally: &mut Tally) {
+    let Machine { slot, cores } = machine;
     let mut scene = Scenario::Fragmentation.start(10 + below(random, 400) as usize, below(random, 1 << 20));
     let mut pairs = Pairs::with_order(PairOrder::Canonical);
     let mut on_gpu = false;
-    tally.starts += 1;
     for _ in 0..frames {
         scene.advance();
         let boxes = scene.boxes();
@@ -192,12 +222,12 @@ fn life(fields: Fields, frames: u64, random: &mut Random, tally: &mut Tally) -> 
             }
             0..=7 if !slot.is_present() => {
                 slot.turn();
-                adaptive.revive(&registry(cores, &slot)).unwrap();
+                adaptive.revive(&registry(*cores, slot)).unwrap();
                 tally.gpus_back += 1;
             }
             8 => {
-                cores = 1 + below(random, 4) as u32;
-                adaptive.revive(&registry(cores, &slot)).unwrap();
+                *cores = 1 + below(random, 4) as u32;
+                adaptive.revive(&registry(*cores, slot)).unwrap();
                 tally.pools += 1;
             }
             9 => {
@@ -229,10 +259,6 @@ fn life(fields: Fields, frames: u64, random: &mut Random, tally: &mut Tally) -> 
         *tally.ran.entry(id).or_default() += 1;
         tally.frames += 1;
     }
-    let learned = adaptive.learned();
-    assert_eq!(learned.defect(), None);
-    tally.learned += u64::from(learned.source == Source::Learned);
-    learned
 }
 
 /// Bytes in use once the threads of the last start have ended; or so many milliseconds later, where they are more than ever.
@@ -255,13 +281,20 @@ fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
     let mut random = Random(0x5eed_50a4);
     let mut tally = Tally::default();
     let mut known = fields();
+    #[cfg(feature = "this-machine")]
+    let mut kept = kept::Kept::new();
     let mut live = Vec::with_capacity(2 * (frames / LIFE) as usize + 64);
     let mut lowest = isize::MAX;
     while tally.frames < frames {
         let length = (LIFE / 2 + below(&mut random, LIFE)).min(frames - tally.frames);
-        let learned = life(known, length, &mut random, &mut tally);
-        // Each start goes on with what the one before has learned, until somebody deletes it.
-        known = if below(&mut random, 2) == 0 { fields() } else { learned };
+        if cfg!(feature = "this-machine") && below(&mut random, 4) == 0 {
+            #[cfg(feature = "this-machine")]
+            kept.program(length, &mut random, &mut tally);
+        } else {
+            let learned = program(known, length, &mut random, &mut tally);
+            // A start goes on with what the one before has learned, until somebody deletes it.
+            known = if below(&mut random, 2) == 0 { fields() } else { learned };
+        }
         lowest = lowest.min(live_bytes(lowest));
         live.push(live_bytes(lowest));
     }
@@ -282,5 +315,10 @@ fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
         // One in some thousands of frames each, or the seed has hit upon nothing that this test is for.
         assert!(times >= frames / 20_000, "{what}: {times} times in {frames} frames");
     }
-    assert!(tally.ran.len() >= 6, "{:?}", tally.ran);
+    assert!(tally.ran.len() >= if cfg!(feature = "parallel") { 6 } else { 4 }, "{:?}", tally.ran);
+    if cfg!(feature = "this-machine") {
+        let Tally { cached, probed, unreadable, unwritable, .. } = tally;
+        let least = [cached, probed, unreadable, unwritable].into_iter().min();
+        assert!(least >= Some(frames / 100_000), "{tally:?}");
+    }
 }

@@ -1,4 +1,4 @@
-//! A plugin that an author of a Bevy app would write around Sapwise: which entities overlap, and which began and ceased to.
+//! A plugin that an author of a Bevy app would write around Sapwise: which entities overlap, and which have begun and ceased to.
 //!
 //! ```
 //! use bevy_app::{App, Startup};
@@ -43,7 +43,7 @@ pub struct BoxCollider {
 
 /// Two entities whose boxes overlap now and did not in the fixed step before; the lower one first.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct OverlapBegan(pub Entity, pub Entity);
+pub struct OverlapBegun(pub Entity, pub Entity);
 
 /// Two entities whose boxes overlapped in the fixed step before and don't now, or of which one is gone; the lower one first.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -68,7 +68,7 @@ impl Plugin for SapwisePlugin {
         // would be those of the frame before.
         let systems = (mark_dirty_trees, propagate_parent_transforms, sync_simple_transforms, find_overlaps);
         app.init_resource::<Overlaps>()
-            .add_message::<OverlapBegan>()
+            .add_message::<OverlapBegun>()
             .add_message::<OverlapEnded>()
             .add_systems(FixedUpdate, systems.chain().in_set(SapwiseSystems));
     }
@@ -90,11 +90,11 @@ pub fn world_box(collider: &BoxCollider, transform: &GlobalTransform) -> Aabb {
 fn find_overlaps(
     colliders: Query<(Entity, &BoxCollider, &GlobalTransform)>,
     mut overlaps: ResMut<Overlaps>,
-    mut began: MessageWriter<OverlapBegan>,
+    mut begun: MessageWriter<OverlapBegun>,
     mut ended: MessageWriter<OverlapEnded>,
 ) -> Result<(), BevyError> {
     overlaps.find(colliders.iter().map(|(entity, collider, transform)| (entity, world_box(collider, transform))))?;
-    began.write_batch(overlaps.began().iter().map(|&(a, b)| OverlapBegan(a, b)));
+    begun.write_batch(overlaps.begun().iter().map(|&(a, b)| OverlapBegun(a, b)));
     ended.write_batch(overlaps.ended().iter().map(|&(a, b)| OverlapEnded(a, b)));
     Ok(())
 }

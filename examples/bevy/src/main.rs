@@ -5,7 +5,7 @@ use bevy_ecs::prelude::*;
 use bevy_math::Vec3;
 use bevy_time::{TimePlugin, TimeUpdateStrategy};
 use bevy_transform::components::Transform;
-use sapwise_example_bevy::{BoxCollider, OverlapBegan, OverlapEnded, Overlaps, SapwisePlugin, SapwiseSystems};
+use sapwise_example_bevy::{BoxCollider, OverlapBegun, OverlapEnded, Overlaps, SapwisePlugin, SapwiseSystems};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -29,7 +29,7 @@ struct Course {
     steps: u64,
     step: u64,
     random: u64,
-    began: usize,
+    begun: usize,
     ended: usize,
 }
 
@@ -73,19 +73,19 @@ fn drift(mut all: Query<(&mut Transform, &mut Velocity)>) {
 fn report(
     mut course: ResMut<Course>,
     mut overlaps: ResMut<Overlaps>,
-    mut began: MessageReader<OverlapBegan>,
+    mut begun: MessageReader<OverlapBegun>,
     mut ended: MessageReader<OverlapEnded>,
     all: Query<&BoxCollider>,
     mut exit: MessageWriter<AppExit>,
 ) {
-    course.began += began.read().count();
+    course.begun += begun.read().count();
     course.ended += ended.read().count();
     let last = course.step == course.steps;
     if course.step.is_multiple_of(50) || last {
         let algorithm = overlaps.algorithm().unwrap_or_default();
-        let Course { step, began, ended, .. } = *course;
+        let Course { step, begun, ended, .. } = *course;
         let (entities, pairs) = (all.iter().len(), overlaps.pairs().len());
-        println!("{step:>6} {entities:>9} {pairs:>9} {began:>9} {ended:>9}  {algorithm}");
+        println!("{step:>6} {entities:>9} {pairs:>9} {begun:>9} {ended:>9}  {algorithm}");
     }
     if last {
         exit.write(AppExit::Success);
@@ -108,7 +108,7 @@ fn main() -> ExitCode {
         .add_plugins((TaskPoolPlugin::default(), TimePlugin, ScheduleRunnerPlugin::run_loop(Duration::ZERO), SapwisePlugin))
         // One fixed step for each turn of the loop, however long that takes.
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
-        .insert_resource(Course { steps, step: 0, random: 0x5eed, began: 0, ended: 0 })
+        .insert_resource(Course { steps, step: 0, random: 0x5eed, begun: 0, ended: 0 })
         .add_systems(FixedUpdate, (spawn_and_despawn, drift).chain().before(SapwiseSystems))
         .add_systems(FixedUpdate, report.after(SapwiseSystems))
         .run();

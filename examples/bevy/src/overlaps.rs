@@ -1,7 +1,7 @@
 //! The overlaps of one fixed step, and what changed since the one before.
 
 use bevy_ecs::prelude::*;
-use sapwise::{Aabb, Adaptive, BroadPhase, Error, Fields, Pair, Pairs, Registry};
+use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Fields, Pairs, Registry};
 use std::sync::{Mutex, PoisonError};
 
 /// The entities that overlap, as of the last fixed step.
@@ -11,12 +11,8 @@ pub struct Overlaps {
     broad_phase: Mutex<Adaptive>,
     entities: Vec<Entity>,
     boxes: Vec<Aabb>,
-    found: Pairs,
-    /// Sorted, and so are the other three.
-    pairs: Vec<(Entity, Entity)>,
-    before: Vec<(Entity, Entity)>,
-    began: Vec<(Entity, Entity)>,
-    ended: Vec<(Entity, Entity)>,
+    pairs: Pairs,
+    changes: Changes<Entity>,
 }
 
 impl FromWorld for Overlaps {
@@ -37,30 +33,27 @@ impl Overlaps {
             broad_phase: Mutex::new(broad_phase),
             entities: Vec::new(),
             boxes: Vec::new(),
-            found: Pairs::new(),
-            pairs: Vec::new(),
-            before: Vec::new(),
-            began: Vec::new(),
-            ended: Vec::new(),
+            pairs: Pairs::new(),
+            changes: Changes::new(),
         }
     }
 
     /// All pairs of entities that overlap, each with the lower one first, sorted.
     #[must_use]
     pub fn pairs(&self) -> &[(Entity, Entity)] {
-        &self.pairs
+        self.changes.pairs()
     }
 
     /// The pairs that overlap now and did not in the step before, sorted.
     #[must_use]
-    pub fn began(&self) -> &[(Entity, Entity)] {
-        &self.began
+    pub fn begun(&self) -> &[(Entity, Entity)] {
+        self.changes.begun()
     }
 
     /// The pairs that overlapped in the step before and don't now, sorted. Those of an entity that is gone are among them.
     #[must_use]
     pub fn ended(&self) -> &[(Entity, Entity)] {
-        &self.ended
+        self.changes.ended()
     }
 
     /// The algorithm that found them; `None` before the first step.
@@ -82,24 +75,14 @@ impl Overlaps {
             self.boxes.push(b);
         }
         let broad_phase = self.broad_phase.get_mut().unwrap_or_else(PoisonError::into_inner);
-        match broad_phase.find_pairs(&self.boxes, &mut self.found) {
+        match broad_phase.find_pairs(&self.boxes, &mut self.pairs) {
             Ok(()) => {}
             Err(error @ Error::InvalidBox { index, .. }) => {
                 return Err(format!("entity {}: {error}", self.entities[index]).into());
             }
             Err(error) => return Err(error.into()),
         }
-        std::mem::swap(&mut self.pairs, &mut self.before);
-        let entities = &self.entities;
-        let named = |&(i, j): &Pair| (entities[i as usize], entities[j as usize]);
-        self.pairs.clear();
-        self.pairs.extend(self.found.iter().map(named).map(|(a, b)| (a.min(b), a.max(b))));
-        self.pairs.sort_unstable();
-        let lacks = |list: &[(Entity, Entity)], pair: &(Entity, Entity)| list.binary_search(pair).is_err();
-        self.began.clear();
-        self.began.extend(self.pairs.iter().filter(|&pair| lacks(&self.before, pair)));
-        self.ended.clear();
-        self.ended.extend(self.before.iter().filter(|&pair| lacks(&self.pairs, pair)));
+        self.changes.update(&self.pairs, &self.entities)?;
         Ok(())
     }
 }

@@ -5,7 +5,7 @@ use bevy_ecs::prelude::*;
 use bevy_math::{Quat, Vec3};
 use bevy_time::{TimePlugin, TimeUpdateStrategy};
 use bevy_transform::components::Transform;
-use sapwise_example_bevy::{BoxCollider, OverlapBegan, OverlapEnded, Overlaps, SapwisePlugin, SapwiseSystems};
+use sapwise_example_bevy::{BoxCollider, OverlapBegun, OverlapEnded, Overlaps, SapwisePlugin, SapwiseSystems};
 use std::collections::BTreeSet;
 use std::sync::Mutex;
 
@@ -62,12 +62,12 @@ impl Random {
 /// What the messages told, one by one.
 #[derive(Resource, Default)]
 struct Told {
-    began: Vec<(Entity, Entity)>,
+    begun: Vec<(Entity, Entity)>,
     ended: Vec<(Entity, Entity)>,
 }
 
-fn listen(mut told: ResMut<Told>, mut began: MessageReader<OverlapBegan>, mut ended: MessageReader<OverlapEnded>) {
-    told.began = began.read().map(|&OverlapBegan(a, b)| (a, b)).collect();
+fn listen(mut told: ResMut<Told>, mut begun: MessageReader<OverlapBegun>, mut ended: MessageReader<OverlapEnded>) {
+    told.begun = begun.read().map(|&OverlapBegun(a, b)| (a, b)).collect();
     told.ended = ended.read().map(|&OverlapEnded(a, b)| (a, b)).collect();
 }
 
@@ -102,9 +102,9 @@ fn pairs_and_their_changes_are_those_of_the_double_loop_in_every_step() {
         let now = naive(app.world_mut());
         assert_eq!(pairs(&app), now, "step {step}");
         let told = app.world().resource::<Told>();
-        let (began, ended): (Set, Set) = (&now - &before, &before - &now);
+        let (begun, ended): (Set, Set) = (&now - &before, &before - &now);
         // Lists, so that a pair that is told twice is seen.
-        assert!(told.began.iter().eq(&began), "step {step}: {:?}, not {began:?}", told.began);
+        assert!(told.begun.iter().eq(&begun), "step {step}: {:?}, not {begun:?}", told.begun);
         assert!(told.ended.iter().eq(&ended), "step {step}: {:?}, not {ended:?}", told.ended);
         gone += ended.iter().filter(|(a, b)| [a, b].iter().any(|&&e| app.world().get_entity(e).is_err())).count();
         before = now;
@@ -119,13 +119,13 @@ fn an_entity_that_is_despawned_ends_its_pairs_even_if_another_takes_its_place() 
     let stays = app.world_mut().spawn(cube(0.0, 0.0, 0.0)).id();
     let goes = app.world_mut().spawn(cube(0.4, 0.0, 0.0)).id();
     app.update();
-    assert_eq!(app.world().resource::<Told>().began, [ordered(stays, goes)]);
+    assert_eq!(app.world().resource::<Told>().begun, [ordered(stays, goes)]);
     app.world_mut().despawn(goes);
     let comes = app.world_mut().spawn(cube(0.4, 0.0, 0.0)).id();
     assert_ne!(comes, goes);
     app.update();
     let told = app.world().resource::<Told>();
-    assert_eq!((&told.began[..], &told.ended[..]), (&[ordered(stays, comes)][..], &[ordered(stays, goes)][..]));
+    assert_eq!((&told.begun[..], &told.ended[..]), (&[ordered(stays, comes)][..], &[ordered(stays, goes)][..]));
 }
 
 #[test]

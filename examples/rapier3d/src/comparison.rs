@@ -1,7 +1,7 @@
 //! Sapwise beside rapier's own broad phase.
 
 use rapier3d::prelude::*;
-use sapwise::{Aabb, Adaptive, BroadPhase, Decision, Error, Fields, Pairs, Registry};
+use sapwise::{Aabb, Adaptive, BroadPhase, Decision, Error, Fields, Filter, Membership, Pairs, Registry};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
@@ -16,13 +16,16 @@ const MARGIN: f32 = 0.04;
 /// # What is compared
 /// Rapier keeps a box for each collider: the collider's own box, grown by half the prediction distance (1 cm for a unit of length of
 /// 1 m). Where a later box leaves the one that is kept, it is kept anew, grown by another 4 cm. The kept boxes that
-/// overlap, touching ones included, are rapier's pairs; but two colliders of one body are no pair, and neither are two of
-/// which none moves. A contact pair is handed to the narrow phase for each of them, and only for them, whether they sleep or not.
+/// overlap, touching ones included, are rapier's pairs; but two of which none moves are no pair, nor are two whose collision groups don't let
+/// each other through, nor two colliders of one body. A contact pair is handed to the narrow phase for each pair, and for no
+/// other, whether its bodies sleep or not.
+///
+/// Sapwise leaves out the first two kinds by a [`Filter`], before they are written. Of bodies it knows nothing: the third kind is left
+/// out afterwards.
 ///
 /// In every step two things hold, or there is a [`Mismatch`]:
 ///
-/// 1. The boxes as rapier keeps them, in an [`Adaptive`] of their own, give rapier's pairs, all of them and no other, once those are
-///    left out that may not interact.
+/// 1. The boxes as rapier keeps them, in an [`Adaptive`] of their own, give rapier's pairs, all of them and no other.
 /// 2. The colliders' own boxes, in another [`Adaptive`], give those of rapier's pairs whose own boxes overlap, all of them and no
 ///    other. These are the boxes that an engine without margins hands over, and the ones that are recorded.
 pub struct Comparison {
@@ -46,9 +49,11 @@ struct Side {
 pub struct Counts {
     /// Colliders, and boxes.
     pub boxes: usize,
-    /// Pairs whose own boxes overlap, those that may not interact included.
-    pub overlapping: usize,
-    /// Those of them that may interact.
+    /// Pairs whose own boxes overlap, whether they may interact or not.
+    pub overlapping: u64,
+    /// Those of them that the filter lets through.
+    pub wanted: usize,
+    /// Those of them that belong to different bodies: the ones that may interact.
     pub own: usize,
     /// Rapier's pairs.
     pub rapier: usize,
@@ -72,7 +77,23 @@ pub struct Mismatch {
 impl Side {
     fn new(registry: &Registry) -> Result<Self, Error> {
         let broad_phase = Adaptive::new(Fields::usual(registry), registry)?;
-        Ok(Self { broad_phase, boxes: Vec::new(), pairs: Pairs::new() })
+        let mut pairs = Pairs::new();
+        pairs.set_filter(Some(Filter::default()));
+        Ok(Self { broad_phase, boxes: Vec::new(), pairs })
+    }
+
+    fn clear(&mut self) {
+        self.boxes.clear();
+        self.memberships().clear();
+    }
+
+    fn push(&mut self, b: Aabb, membership: Membership) {
+        self.boxes.push(b);
+        self.memberships().push(membership);
+    }
+
+    fn memberships(&mut self) -> &mut Vec<Membership> {
+        &mut self.pairs.filter_mut().expect("every side begins with a filter").memberships
     }
 
     fn find(&mut self) -> Result<(), Error> {
@@ -115,8 +136,8 @@ impl Comparison {
     pub fn before_step(&mut self, physics: &PhysicsWorld) -> Result<(), Error> {
         let params = &physics.integration_parameters;
         let margin = Vector::splat(MARGIN * params.length_unit);
-        self.own.boxes.clear();
-        self.kept.boxes.clear();
+        self.own.clear();
+        self.kept.clear();
         self.colliders.clear();
         self.margins.retain(|&collider, _| physics.colliders.contains(collider));
         for (handle, collider) in physics.colliders.iter() {
@@ -126,9 +147,10 @@ impl Comparison {
                 *kept = corners(grown.mins - margin, grown.maxs + margin);
             }
             let own = collider.compute_aabb();
+            let membership = membership(physics, collider);
             self.colliders.push(handle);
-            self.own.boxes.push(corners(own.mins, own.maxs));
-            self.kept.boxes.push(*kept);
+            self.own.push(corners(own.mins, own.maxs), membership);
+            self.kept.push(*kept, membership);
         }
         self.own.find()?;
         self.kept.find()
@@ -146,10 +168,10 @@ impl Comparison {
             .filter_map(|p| Some((*place.get(&p.collider1)?, *place.get(&p.collider2)?)))
             .map(|(a, b)| (a.min(b), a.max(b)))
             .collect();
-        let may_interact = |i: usize, j: usize| may_interact(physics, self.colliders[i], self.colliders[j]);
+        let body = |place: usize| physics.colliders.get(self.colliders[place]).and_then(Collider::parent);
         let ours = |side: &Side| -> HashSet<(usize, usize)> {
             let places = side.pairs.iter().map(|&(i, j)| (i as usize, j as usize));
-            places.filter(|&(i, j)| may_interact(i, j)).collect()
+            places.filter(|&(i, j)| body(i) != body(j)).collect()
         };
         let (own, kept) = (ours(&self.own), ours(&self.kept));
         let overlapping: HashSet<(usize, usize)> =
@@ -158,7 +180,8 @@ impl Comparison {
         self.differ(&own, &overlapping, false)?;
         self.step += 1;
         let boxes = self.colliders.len();
-        Ok(Counts { boxes, overlapping: self.own.pairs.len(), own: own.len(), rapier: rapier.len() })
+        let found = &self.own.pairs;
+        Ok(Counts { boxes, overlapping: found.overlapping(), wanted: found.len(), own: own.len(), rapier: rapier.len() })
     }
 
     fn differ(&self, ours: &HashSet<(usize, usize)>, theirs: &HashSet<(usize, usize)>, kept: bool) -> Result<(), Mismatch> {
@@ -170,12 +193,15 @@ impl Comparison {
     }
 }
 
-/// Whether rapier makes a pair of two colliders whose boxes overlap: they belong to different bodies, one of which moves.
-fn may_interact(physics: &PhysicsWorld, a: ColliderHandle, b: ColliderHandle) -> bool {
-    let body = |collider| physics.colliders.get(collider).and_then(Collider::parent);
-    let moves = |body: Option<RigidBodyHandle>| body.and_then(|b| physics.bodies.get(b)).is_some_and(RigidBody::is_dynamic);
-    let (a, b) = (body(a), body(b));
-    a != b && (moves(a) || moves(b))
+/// What rapier asks of two colliders whose boxes overlap, in Sapwise's words.
+fn membership(physics: &PhysicsWorld, collider: &Collider) -> Membership {
+    let groups = collider.collision_groups();
+    let body = collider.parent().and_then(|b| physics.bodies.get(b));
+    Membership {
+        groups: groups.memberships.bits(),
+        mask: groups.filter.bits(),
+        fixed: !body.is_some_and(RigidBody::is_dynamic),
+    }
 }
 
 fn corners(min: Vector, max: Vector) -> Aabb {
@@ -224,13 +250,12 @@ mod tests {
         })
     }
 
-    /// Leaves out the last pair that may interact.
-    fn lose_a_pair(side: &mut Side, may_interact: impl Fn(usize, usize) -> bool) {
-        let mut left: Vec<(u32, u32)> = side.pairs.as_slice().to_vec();
-        let lost = left.iter().rposition(|&(i, j)| may_interact(i as usize, j as usize)).unwrap();
-        left.remove(lost);
-        side.pairs.clear();
-        left.iter().for_each(|&(i, j)| side.pairs.push(i, j));
+    /// Lets one box, in a pair of two bodies, collide with nothing.
+    fn lose_pairs(side: &mut Side, body: impl Fn(usize) -> Option<RigidBodyHandle>) {
+        let of_two = |&&(i, j): &&(u32, u32)| body(i as usize) != body(j as usize);
+        let (_, lost) = *side.pairs.iter().find(of_two).unwrap();
+        side.memberships()[lost as usize].mask = 0;
+        side.find().unwrap();
     }
 
     #[test]
@@ -239,12 +264,23 @@ mod tests {
             let [spoiled, sound] = outcomes(|c, physics| {
                 let colliders = c.colliders.clone();
                 let side = if kept { &mut c.kept } else { &mut c.own };
-                lose_a_pair(side, |i, j| may_interact(physics, colliders[i], colliders[j]));
+                lose_pairs(side, |place| physics.colliders.get(colliders[place]).and_then(Collider::parent));
             });
             let mismatch = spoiled.unwrap_err();
             assert_eq!((mismatch.step, mismatch.only_ours, mismatch.kept), (99, false, kept));
             assert!(sound.is_ok());
         }
+    }
+
+    #[test]
+    fn pairs_that_rapiers_groups_leave_out_are_told_where_ours_let_them_through() {
+        let [spoiled, sound] = outcomes(|c, _| {
+            c.own.memberships().fill(Membership::ALL);
+            c.own.find().unwrap();
+        });
+        assert!(spoiled.unwrap_err().only_ours);
+        let counts = sound.unwrap();
+        assert!(counts.overlapping > counts.wanted as u64 && counts.wanted > counts.own, "{counts:?}");
     }
 
     #[test]

@@ -34,6 +34,9 @@ const SHRUNK: f32 = 0.96;
 /// Speed at which pieces fly apart, in metres per second.
 const APART: f32 = 1.5;
 
+/// Share of the smallest pieces that are debris: they collide with everything but each other, as games have it.
+const DEBRIS: f32 = 0.5;
+
 /// What a simulation is made from. The same settings give the same boxes in every step, on one machine and build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
@@ -181,7 +184,13 @@ impl World {
                 .linvel(velocity)
                 .angvel(whole.angvel());
             let edge = half * SHRUNK;
-            let collider = ColliderBuilder::cuboid(edge, edge, edge).restitution(0.2);
+            let smallest = cube.generation + 1 == self.generations;
+            let groups = if smallest && self.random.chance(DEBRIS) {
+                InteractionGroups::new(Group::GROUP_2, !Group::GROUP_2, InteractionTestMode::And)
+            } else {
+                InteractionGroups::all()
+            };
+            let collider = ColliderBuilder::cuboid(edge, edge, edge).restitution(0.2).collision_groups(groups);
             let (body, _) = self.physics.insert(body, collider);
             self.cubes.push_back(Cube { body, half: edge, generation: cube.generation + 1 });
         }
