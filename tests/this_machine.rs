@@ -299,6 +299,40 @@ fn a_program_that_names_no_algorithms_gets_all_of_ours() {
     }
 }
 
+/// The program's pool and its GPU in one registry: measured, predicted, run and kept.
+#[cfg(feature = "measure-gpu")]
+#[test]
+fn a_program_brings_its_pool_and_its_gpu() {
+    use sapwise::gpu::{Gpu, Gpus, wgpu};
+    use sapwise::{GpuIdentity, rayon};
+    let Some(gpus) = common::gpus() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let opened = gpus.adapter(0).unwrap().request_device(&wgpu::DeviceDescriptor::default());
+    let (device, queue) = pollster::block_on(opened).unwrap();
+    let identity = GpuIdentity::of(0, &device.adapter_info());
+    let mut registry = Registry::with_cores(1);
+    registry.use_pool(Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap()));
+    registry.add_gpus(&Gpus::of([Gpu::from_parts(device, queue, identity.clone())]));
+    let options = Options { background: true, registry: Some(Arc::new(registry)), ..options(folder.path()) };
+    let mut first = start(&options);
+    frames_until_it_came(&mut first);
+    assert_eq!(origin(&first), Origin::Probed);
+    frame(&mut first, &boxes(1000));
+    // Under the load of other tests one sample may be a figure that can't be; then it is told and measured again.
+    let known: Vec<String> = first.fields().algorithms().iter().map(ToString::to_string).collect();
+    let predicted = ["brute@gpu0", "sweep@gpu0", "strips@gpu0"].iter().all(|id| known.iter().any(|k| k == id));
+    let told = first.setup().remarks.iter().any(|r| r.contains("gpu0") && r.contains("measures again"));
+    assert!(predicted != told, "{known:?}: {:?}", first.setup());
+    if predicted {
+        let text = fs::read_to_string(first.setup().file.as_ref().unwrap()).unwrap();
+        assert!(text.contains("\"given\"") && text.contains(&format!("\"name\": {:?}", identity.name)), "{text}");
+        let mut second = start(&options);
+        frames_until_it_came(&mut second);
+        assert_eq!((origin(&second), second.fields()), (Origin::Cached, first.fields()));
+        frame(&mut second, &boxes(1000));
+    }
+}
+
 #[test]
 fn given_fields_have_no_start_of_their_own() {
     let registry = Registry::with_cores(1);

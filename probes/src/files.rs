@@ -64,17 +64,17 @@ fn buffered(file: &mut File, write: impl FnOnce(&mut dyn Write) -> Result<()>) -
     Ok(())
 }
 
-/// Refuses to write over a report that is read, or twice into one file.
+/// Refuses to write over a file that is read, or twice into one file.
 ///
 /// # Errors
 /// [`WrongUsage`] that names the file.
-pub(crate) fn refuse_overwriting(reports: &[PathBuf], outputs: &[&PathBuf]) -> Result<()> {
+pub(crate) fn refuse_overwriting(inputs: &[PathBuf], outputs: &[&PathBuf]) -> Result<()> {
     let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let read: Vec<PathBuf> = reports.iter().map(|path| place(path)).collect();
+    let read: Vec<PathBuf> = inputs.iter().map(|path| place(path)).collect();
     for (k, path) in outputs.iter().enumerate() {
         let own = place(path);
         if read.contains(&own) {
-            return Err(WrongUsage(format!("{} is a report that is read; name another file", path.display())).into());
+            return Err(WrongUsage(format!("{} is a file that is read; name another", path.display())).into());
         }
         if outputs[..k].iter().any(|o| place(o) == own) {
             return Err(WrongUsage(format!("{} is named for two outputs", path.display())).into());

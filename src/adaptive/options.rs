@@ -16,13 +16,13 @@ pub struct Options {
     pub exploring: bool,
     /// Whether all that takes time happens on a thread of its own, so that the constructor returns at once: looking for GPUs, reading
     /// the cache, measuring, predicting, making the algorithms. Until it is done [`Fields::usual`](crate::Fields::usual) decides.
-    /// On by default. A program that shows a loading screen turns it off: what is measured while other threads work is off by
-    /// what they take.
+    /// On by default. A program that shows a loading screen turns it off: what is measured while its other threads work is off by
+    /// what they take, which can't be told from a slower machine, and is kept until [`save`](crate::Adaptive::save) has better.
     pub background: bool,
     /// Where fields are kept from one start to the next. The user's cache folder by default.
     pub cache: Cache,
     /// The algorithms to choose from: the program's own, its thread pool ([`Registry::use_pool`]), its GPUs
-    /// ([`Registry::add_gpus`]). `None`, the default: ours on all usable cores with
+    /// (`Registry::add_gpus`). `None`, the default: ours on all usable cores with
     /// [pinned threads](Registry::pin_threads), and with the feature `measure-gpu` on every GPU that is no program on the CPU.
     pub registry: Option<Arc<Registry>>,
     /// The model that predicts, for a program with algorithms of its own, which the built-in one does not know. `None`, the

@@ -1,3 +1,5 @@
+mod learning;
+
 use super::*;
 use crate::{AlgorithmCost, CostCurve, CostTerm, Scenario, Term};
 

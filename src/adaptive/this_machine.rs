@@ -5,7 +5,9 @@ use super::cache::{Entry, Key};
 use super::candidates::Made;
 use super::options::Options;
 use crate::hardware::parameter;
-use crate::{AlgorithmId, Displacement, Error, Fields, Hardware, Load, Model, Parameter, Registry, Scenario, measure};
+use crate::{
+    AlgorithmId, Displacement, Error, Fields, GpuHardware, Hardware, Load, Model, Parameter, Registry, Scenario, measure,
+};
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -270,14 +272,15 @@ fn find(options: &Options, registry: &Registry, remarks: &mut Vec<String>) -> Op
     Some((fields, Origin::Probed, entry))
 }
 
-/// Fields from hardware, without the figures that can't be: what needs one of them is left out, and whether there was none is told.
+/// Fields from hardware, without the figures and the GPUs that can't be: what needs one of them is left out. Also whether there was none.
 fn predict(
     model: &Model,
     mut hardware: Hardware,
     algorithms: &[(AlgorithmId, u32)],
     remarks: &mut Vec<String>,
 ) -> Option<(Fields, bool)> {
-    let dropped = hardware.drop_implausible();
+    let mut dropped = hardware.drop_implausible();
+    dropped.extend(hardware.gpus.iter().filter_map(GpuHardware::implausible));
     let sound = dropped.is_empty();
     remarks.extend(dropped.into_iter().map(|why| format!("{why}; it is left out, and the next start measures again")));
     let prediction = model.predict(&hardware, algorithms).map_err(|why| remarks.push(why)).ok()?;

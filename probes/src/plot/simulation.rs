@@ -6,10 +6,14 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use sapwise::{AlgorithmId, BackendClass};
 
-/// Width and height in pixels.
-const SIZE: (u32, u32) = (1500, 1010);
+/// Width and height. Here and below lengths are in units: pixels of an SVG, which a viewer scales.
+const SIZE: (u32, u32) = (1500, 1034);
+/// Pixels of a PNG in a unit: with one, letters have too few to be read with ease.
+const PNG_UNIT: u32 = 2;
 /// Height of the lines of text below, and of each chart of a panel; the objects have the rest.
-const CAPTION: u32 = 84;
+const CAPTION: u32 = 108;
+/// Letters that fit into a line of it.
+const LETTERS: usize = 150;
 const COSTS: u32 = 520;
 const CHOICES: u32 = 190;
 /// Room beside the left axis of every chart, so that their frames stand below each other.
@@ -17,7 +21,31 @@ const AXIS: u32 = 96;
 /// Points of a curve at most: more can't be seen, and make an SVG of megabytes.
 const POINTS: usize = 1200;
 
-type Area<'a, D> = DrawingArea<D, Shift>;
+type Area<D> = DrawingArea<D, Shift>;
+/// Frames, each with a value.
+type Points = Vec<(usize, f64)>;
+
+/// How many pixels a unit has.
+#[derive(Debug, Clone, Copy)]
+struct Scale(u32);
+
+impl Scale {
+    fn length(self, units: u32) -> u32 {
+        units * self.0
+    }
+
+    fn offset(self, units: i32) -> i32 {
+        units * self.0 as i32
+    }
+
+    fn font(self, size: u32) -> (&'static str, u32) {
+        ("sans-serif", self.length(size))
+    }
+
+    fn line(self, colour: RGBAColor, width: u32) -> ShapeStyle {
+        colour.stroke_width(self.length(width))
+    }
+}
 
 /// One panel: a class of processors, and the best fixed algorithm on each number of them.
 struct Panel {
@@ -84,27 +112,49 @@ impl Panel {
 /// When the picture can't be drawn.
 pub(crate) fn simulation(picture: Picture, course: &Course, outcome: &Outcome, told: &[String]) -> anyhow::Result<Vec<u8>> {
     Ok(match picture {
-        Picture::Svg => super::svg(SIZE, |root| figure(root, course, outcome, told))?.into_bytes(),
-        Picture::Png => super::png(SIZE, |root| figure(root, course, outcome, told))?,
+        Picture::Svg => super::svg(SIZE, |root| figure(root, Scale(1), course, outcome, told))?.into_bytes(),
+        Picture::Png => {
+            let scale = Scale(PNG_UNIT);
+            let size = (scale.length(SIZE.0), scale.length(SIZE.1));
+            super::png(size, |root| figure(root, scale, course, outcome, told))?
+        }
     })
 }
 
-fn figure<D>(root: &Area<'_, D>, course: &Course, outcome: &Outcome, told: &[String]) -> anyhow::Result<()>
+fn figure<D>(root: &Area<D>, scale: Scale, course: &Course, outcome: &Outcome, told: &[String]) -> anyhow::Result<()>
 where
     D: DrawingBackend,
     D::ErrorType: 'static,
 {
-    let (panels, caption) = root.split_vertically(SIZE.1 - CAPTION);
-    let (left, right) = panels.split_horizontally(SIZE.0 / 2);
-    panel(&left, &Panel::new(BackendClass::Gpu, outcome), course, outcome)?;
-    panel(&right, &Panel::new(BackendClass::Cpu, outcome), course, outcome)?;
-    for (k, line) in told.iter().enumerate() {
-        caption.draw(&Text::new(line.as_str(), (24, 6 + 24 * k as i32), ("sans-serif", 17).into_font()))?;
+    let (panels, caption) = root.split_vertically(scale.length(SIZE.1 - CAPTION));
+    let (left, right) = panels.split_horizontally(scale.length(SIZE.0 / 2));
+    panel(&left, scale, &Panel::new(BackendClass::Gpu, outcome), course, outcome)?;
+    panel(&right, scale, &Panel::new(BackendClass::Cpu, outcome), course, outcome)?;
+    for (k, line) in told.iter().flat_map(|line| wrapped(line)).enumerate() {
+        let place = (scale.offset(24), scale.offset(6 + 24 * k as i32));
+        caption.draw(&Text::new(line.as_str(), place, scale.font(17).into_font()))?;
     }
     Ok(())
 }
 
-fn panel<D>(area: &Area<'_, D>, panel: &Panel, course: &Course, outcome: &Outcome) -> anyhow::Result<()>
+/// The words of a text in lines that fit.
+fn wrapped(text: &str) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let last = lines.len() - 1;
+        if lines[last].is_empty() {
+            lines[last].push_str(word);
+        } else if lines[last].chars().count() + 1 + word.chars().count() <= LETTERS {
+            lines[last].push(' ');
+            lines[last].push_str(word);
+        } else {
+            lines.push(format!("    {word}"));
+        }
+    }
+    lines
+}
+
+fn panel<D>(area: &Area<D>, scale: Scale, panel: &Panel, course: &Course, outcome: &Outcome) -> anyhow::Result<()>
 where
     D: DrawingBackend,
     D::ErrorType: 'static,
@@ -114,21 +164,22 @@ where
             BackendClass::Gpu => "no GPU algorithm ran here",
             BackendClass::Cpu => "no algorithm ran on the CPU",
         };
-        let area = area.titled(panel.title(), ("sans-serif", 22))?;
+        let margin = scale.length(10);
+        let area = area.margin(margin, margin, margin, margin).titled(panel.title(), scale.font(22))?;
         let (width, height) = area.dim_in_pixel();
-        let style = ("sans-serif", 20).into_font().color(&RGBColor(90, 90, 90));
-        area.draw(&Text::new(text, (width as i32 / 2 - 120, height as i32 / 2), style))?;
+        let style = scale.font(20).into_font().color(&RGBColor(90, 90, 90));
+        area.draw(&Text::new(text, (width as i32 / 2 - scale.offset(120), height as i32 / 2), style))?;
         return Ok(());
     }
-    let (upper, lower) = area.split_vertically(COSTS);
-    let (middle, lower) = lower.split_vertically(CHOICES);
-    costs(&upper, panel, course, outcome)?;
-    choices(&middle, panel, outcome)?;
-    objects(&lower, outcome)
+    let (upper, lower) = area.split_vertically(scale.length(COSTS));
+    let (middle, lower) = lower.split_vertically(scale.length(CHOICES));
+    costs(&upper, scale, panel, course, outcome)?;
+    choices(&middle, scale, panel, outcome)?;
+    objects(&lower, scale, outcome)
 }
 
 /// Means over equal numbers of frames, few enough to be seen, each at its first frame. Infinite times are left out.
-fn curve(values: impl Iterator<Item = f64>, frames: usize) -> Vec<(usize, f64)> {
+fn curve(values: impl Iterator<Item = f64>, frames: usize) -> Points {
     let step = frames.div_ceil(POINTS).max(1);
     let values: Vec<f64> = values.collect();
     let mean = |(k, chunk): (usize, &[f64])| {
@@ -138,7 +189,7 @@ fn curve(values: impl Iterator<Item = f64>, frames: usize) -> Vec<(usize, f64)> 
     values.chunks(step).enumerate().filter_map(mean).collect()
 }
 
-fn costs<D>(area: &Area<'_, D>, panel: &Panel, course: &Course, outcome: &Outcome) -> anyhow::Result<()>
+fn costs<D>(area: &Area<D>, scale: Scale, panel: &Panel, course: &Course, outcome: &Outcome) -> anyhow::Result<()>
 where
     D: DrawingBackend,
     D::ErrorType: 'static,
@@ -146,23 +197,23 @@ where
     let count = outcome.frames.len();
     let of = |k: usize| curve(outcome.frames.iter().map(|f| f.fixed_ns[k] / 1e3), count);
     let adaptive = curve(outcome.frames.iter().map(|f| f.adaptive_ns / 1e3), count);
-    let curves: Vec<(u32, usize, Vec<(usize, f64)>)> = panel.units.iter().map(|&(width, k)| (width, k, of(k))).collect();
+    let curves: Vec<(u32, usize, Points)> = panel.units.iter().map(|&(width, k)| (width, k, of(k))).collect();
     let all = || curves.iter().flat_map(|c| &c.2).chain(&adaptive).map(|point| point.1);
     let floor = all().fold(f64::INFINITY, f64::min) / 1.5;
     // Room for the names above the highest curve.
     let high = all().fold(0.0, f64::max) * 4.0;
     let mut chart = ChartBuilder::on(area)
-        .caption(format!("{} ({})", panel.title(), course.footage.name()), ("sans-serif", 22))
-        .margin(10)
-        .set_label_area_size(LabelAreaPosition::Left, AXIS)
-        .set_label_area_size(LabelAreaPosition::Bottom, 30)
+        .caption(format!("{} ({})", panel.title(), course.footage.name()), scale.font(22))
+        .margin(scale.length(10))
+        .set_label_area_size(LabelAreaPosition::Left, scale.length(AXIS))
+        .set_label_area_size(LabelAreaPosition::Bottom, scale.length(30))
         .build_cartesian_2d(0..count.max(1), (floor..high).log_scale())?;
     chart
         .configure_mesh()
         .y_desc("time of a frame (us)")
         .light_line_style(WHITE)
-        .axis_desc_style(("sans-serif", 17))
-        .label_style(("sans-serif", 15))
+        .axis_desc_style(scale.font(17))
+        .label_style(scale.font(15))
         .x_label_formatter(&|frame| frame.to_string())
         .y_label_formatter(&|us| number(*us))
         .draw()?;
@@ -176,25 +227,33 @@ where
     }
     for (at, (width, k, own)) in curves.iter().enumerate() {
         chart
-            .draw_series(LineSeries::new(own.iter().copied(), colour(at).stroke_width(2)))?
+            .draw_series(LineSeries::new(own.iter().copied(), scale.line(colour(at).into(), 2)))?
             .label(format!("{}: {}", panel.name(*width), outcome.fixed[*k]))
-            .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 16, y + 5)], colour(at).filled()));
+            .legend(move |(x, y)| {
+                Rectangle::new([(x, y - scale.offset(5)), (x + scale.offset(16), y + scale.offset(5))], colour(at).filled())
+            });
     }
-    chart
-        .draw_series(LineSeries::new(adaptive, BLACK.stroke_width(2)))?
-        .label("adaptive")
-        .legend(|(x, y)| Rectangle::new([(x, y - 1), (x + 16, y + 1)], BLACK.filled()));
+    chart.draw_series(LineSeries::new(adaptive, scale.line(BLACK.into(), 2)))?.label("adaptive").legend(move |(x, y)| {
+        Rectangle::new([(x, y - scale.offset(1)), (x + scale.offset(16), y + scale.offset(1))], BLACK.filled())
+    });
     if let Some(co_runner) = course.co_runner {
         let from = co_runner.from_frame;
         chart
-            .draw_series(DashedLineSeries::new([(from, floor), (from, high)], 4, 4, BLACK.mix(0.6).stroke_width(1)))?
+            .draw_series(DashedLineSeries::new(
+                [(from, floor), (from, high)],
+                scale.length(4),
+                scale.length(4),
+                scale.line(BLACK.mix(0.6), 1),
+            ))?
             .label("a co-runner begins")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 16, y)], BLACK.mix(0.6)));
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + scale.offset(16), y)], BLACK.mix(0.6)));
     }
     chart
         .configure_series_labels()
         .position(SeriesLabelPosition::UpperLeft)
-        .label_font(("sans-serif", 15))
+        .label_font(scale.font(15))
+        .legend_area_size(scale.length(24))
+        .margin(scale.length(10))
         .background_style(WHITE.mix(0.85))
         .border_style(RGBColor(180, 180, 180))
         .draw()?;
@@ -202,7 +261,7 @@ where
 }
 
 /// What ran in each frame of the last repeat: a row for each number, the black line through what was chosen.
-fn choices<D>(area: &Area<'_, D>, panel: &Panel, outcome: &Outcome) -> anyhow::Result<()>
+fn choices<D>(area: &Area<D>, scale: Scale, panel: &Panel, outcome: &Outcome) -> anyhow::Result<()>
 where
     D: DrawingBackend,
     D::ErrorType: 'static,
@@ -214,15 +273,15 @@ where
         _ => String::new(),
     };
     let mut chart = ChartBuilder::on(area)
-        .margin(10)
-        .set_label_area_size(LabelAreaPosition::Left, AXIS)
-        .set_label_area_size(LabelAreaPosition::Bottom, 12)
+        .margin(scale.length(10))
+        .set_label_area_size(LabelAreaPosition::Left, scale.length(AXIS))
+        .set_label_area_size(LabelAreaPosition::Bottom, scale.length(12))
         .build_cartesian_2d(0..taken.len().max(1), (0..rows.len() - 1).into_segmented())?;
     chart
         .configure_mesh()
         .disable_mesh()
         .y_labels(rows.len())
-        .label_style(("sans-serif", 15))
+        .label_style(scale.font(15))
         .x_label_formatter(&|_| String::new())
         .y_label_formatter(&label)
         .draw()?;
@@ -243,18 +302,19 @@ where
         }
         first = at;
     }
-    chart.draw_series(LineSeries::new(line, BLACK.stroke_width(2)))?;
+    chart.draw_series(LineSeries::new(line, scale.line(BLACK.into(), 2)))?;
     // The line does not show where another algorithm takes over on as many as before.
     let top = rows.len();
-    let tick = |at: usize| PathElement::new([top - 1, top].map(|y| (at, SegmentValue::Exact(y))), BLACK.stroke_width(1));
+    let tick =
+        |at: usize| PathElement::new([top - 1, top].map(|y| (at, SegmentValue::Exact(y))), scale.line(BLACK.into(), 1));
     chart.draw_series(outcome.switches().into_iter().map(tick))?;
     let explored = taken.iter().enumerate().filter(|(_, t)| t.explored).map(|(at, _)| at);
-    let ring = |at: usize| Circle::new((at, SegmentValue::CenterOf(top - 2)), 5, BLACK.stroke_width(1));
+    let ring = |at: usize| Circle::new((at, SegmentValue::CenterOf(top - 2)), scale.length(5), scale.line(BLACK.into(), 1));
     chart.draw_series(explored.map(ring))?;
     Ok(())
 }
 
-fn objects<D>(area: &Area<'_, D>, outcome: &Outcome) -> anyhow::Result<()>
+fn objects<D>(area: &Area<D>, scale: Scale, outcome: &Outcome) -> anyhow::Result<()>
 where
     D: DrawingBackend,
     D::ErrorType: 'static,
@@ -264,21 +324,21 @@ where
     let low = line.iter().map(|p| p.1).fold(f64::INFINITY, f64::min) / 1.2;
     let high = line.iter().map(|p| p.1).fold(1.0, f64::max) * 1.2;
     let mut chart = ChartBuilder::on(area)
-        .margin(10)
-        .set_label_area_size(LabelAreaPosition::Left, AXIS)
-        .set_label_area_size(LabelAreaPosition::Bottom, 45)
+        .margin(scale.length(10))
+        .set_label_area_size(LabelAreaPosition::Left, scale.length(AXIS))
+        .set_label_area_size(LabelAreaPosition::Bottom, scale.length(45))
         .build_cartesian_2d(0..count.max(1), (low..high).log_scale())?;
     chart
         .configure_mesh()
         .x_desc("frame")
         .y_desc("objects")
         .light_line_style(WHITE)
-        .axis_desc_style(("sans-serif", 17))
-        .label_style(("sans-serif", 15))
+        .axis_desc_style(scale.font(17))
+        .label_style(scale.font(15))
         .x_label_formatter(&|frame| frame.to_string())
         .y_label_formatter(&|n| number(*n))
         .draw()?;
-    chart.draw_series(LineSeries::new(line, RGBColor(90, 90, 90).stroke_width(2)))?;
+    chart.draw_series(LineSeries::new(line, scale.line(RGBColor(90, 90, 90).into(), 2)))?;
     Ok(())
 }
 
@@ -351,6 +411,16 @@ mod tests {
     }
 
     #[test]
+    fn a_long_line_goes_on_below() {
+        assert_eq!(wrapped("Made by: sapwise run"), ["Made by: sapwise run"]);
+        let long = "sapwise run --option ".repeat(20);
+        let lines = wrapped(long.trim());
+        assert!(lines.len() > 2 && lines.iter().all(|l| l.len() <= LETTERS), "{lines:?}");
+        let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(words(&lines.join(" ")), words(&long));
+    }
+
+    #[test]
     fn many_frames_are_drawn_as_few_points() {
         let values = (0..10_000).map(|k| if k % 9 == 0 { f64::INFINITY } else { f64::from(k) });
         let points = curve(values, 10_000);
@@ -367,7 +437,7 @@ mod tests {
             let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().unwrap();
             let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
             let info = reader.next_frame(&mut pixels).unwrap();
-            assert_eq!((info.width, info.height), SIZE);
+            assert_eq!((info.width, info.height), (PNG_UNIT * SIZE.0, PNG_UNIT * SIZE.1));
             pixels.chunks(3).filter(|p| p.iter().all(|&c| c < 60)).count()
         };
         // Dark pixels of letters, without any font of the system.

@@ -15,7 +15,7 @@ use anyhow::{Context, bail};
 use contestant::{Contestant, best};
 use samples::Samples;
 use sapwise::measure::Watch;
-use sapwise::{Aabb, Adaptive, BroadPhase, Error, Fields, Pairs, Reason, Registry};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Fields, Pairs, Reason, Registry};
 use std::time::Instant;
 
 pub(crate) use co_runner::{CoRunner, SHARE};
@@ -86,6 +86,13 @@ pub(crate) fn simulate(course: &Course, fields: &Fields, registry: &Registry) ->
     Ok(stage.outcome(course, done, watch.foreign_load()))
 }
 
+/// Algorithms of the fields with more threads than the registry lists, as those of a larger machine have: the adaptive module leaves them
+/// out. Where the fields are steps it runs them all the same.
+pub(crate) fn too_wide<'a>(fields: &'a Fields, registry: &Registry) -> Vec<&'a AlgorithmId> {
+    let most = registry.entries().iter().map(|e| e.id.threads()).max().unwrap_or(1);
+    fields.algorithms().into_iter().filter(|id| !fields.costs.is_empty() && id.threads() > most).collect()
+}
+
 /// The contestants and what they have done so far.
 struct Stage {
     contestants: Vec<Contestant>,
@@ -118,8 +125,10 @@ impl Stage {
             }
         }
         // Fields may name a number of threads that the registry doesn't list but can make.
+        let too_wide = too_wide(fields, registry);
         for id in fields.algorithms() {
             if !contestants.iter().any(|c| c.id == *id)
+                && !too_wide.contains(&id)
                 && let Ok(contestant) = Contestant::new(id.clone(), course.frames, registry)
             {
                 contestants.push(contestant);

@@ -47,8 +47,8 @@ impl Frame {
     pub(super) fn new(objects: usize, adaptive: Samples, fixed: Vec<Samples>, taken: &[(Taken, Option<Taken>)]) -> Self {
         Self {
             objects,
-            adaptive_ns: mean_over_choices(&adaptive, taken),
-            unexplored_ns: mean_over_choices(&adaptive.of(|r| !taken[r].0.explored), taken),
+            adaptive_ns: mean_over_kinds(&adaptive, taken),
+            unexplored_ns: mean_over_kinds(&adaptive.of(|r| !taken[r].0.explored), taken),
             fixed_ns: fixed.iter().map(Samples::time).collect(),
             adaptive,
             fixed,
@@ -56,21 +56,35 @@ impl Frame {
     }
 }
 
-/// The mean over what was chosen of its times, by the repeats that chose it. Infinite without samples.
-///
-/// Not one median over all repeats: that would leave out a dear frame, one that explores or switches, wherever most of the repeats have
-/// theirs at other frames.
-fn mean_over_choices(adaptive: &Samples, taken: &[(Taken, Option<Taken>)]) -> f64 {
-    // A frame that switches costs more than the next one of the same algorithm.
-    let kind = |r: usize| (taken[r].0, taken[r].1.is_some_and(|before| before.chosen != taken[r].0.chosen));
-    let mut sum = 0.0;
-    for repeat in 0..taken.len() {
-        let alike = adaptive.of(|r| kind(r) == kind(repeat));
-        // Each kind once, at the first of its repeats, weighted by all of them.
-        if alike.at(repeat).is_some() && !(0..repeat).any(|r| kind(r) == kind(repeat) && alike.at(r).is_some()) {
-            sum += alike.time() * alike.len() as f64;
+/// What a frame of the adaptive module is beside one that goes on with what ran before.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    GoesOn,
+    /// It costs more than the next one of the same algorithm.
+    Switches,
+    Explores,
+}
+
+impl Kind {
+    const ALL: [Self; 3] = [Self::GoesOn, Self::Switches, Self::Explores];
+
+    fn of(taken: Taken, before: Option<Taken>) -> Self {
+        match before {
+            _ if taken.explored => Self::Explores,
+            Some(before) if before.chosen != taken.chosen => Self::Switches,
+            _ => Self::GoesOn,
         }
     }
+}
+
+/// The mean of the times of each kind, weighted by the repeats in which the frame is of that kind. Infinite without samples.
+///
+/// Not one time of all repeats: that would leave out a dear frame, one that explores or switches, wherever most of the repeats have
+/// theirs at other frames.
+fn mean_over_kinds(adaptive: &Samples, taken: &[(Taken, Option<Taken>)]) -> f64 {
+    let kinds: Vec<Kind> = taken.iter().map(|&(now, before)| Kind::of(now, before)).collect();
+    let own = Kind::ALL.map(|kind| adaptive.of(|repeat| kinds[repeat] == kind));
+    let sum: f64 = own.iter().filter(|s| s.len() > 0).map(|s| s.time() * s.len() as f64).sum();
     if adaptive.len() == 0 { f64::INFINITY } else { sum / adaptive.len() as f64 }
 }
 

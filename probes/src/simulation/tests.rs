@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::boxes::read_frames;
-use sapwise::{AlgorithmId, Scenario, Step};
+use sapwise::{Scenario, Step};
 
 fn steps(list: &[(u32, &str)]) -> Fields {
     let step = |&(from_objects, id): &(u32, &str)| Step { from_objects, algorithm: id.parse().unwrap() };

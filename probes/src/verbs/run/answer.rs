@@ -151,7 +151,13 @@ struct Decision<'a> {
 }
 
 impl<'a> Answer<'a> {
-    pub(super) fn new(course: &'a Course, outcome: &'a Outcome, origin: &'a Origin, parts: &[Part]) -> Self {
+    pub(super) fn new(
+        course: &'a Course,
+        outcome: &'a Outcome,
+        origin: &'a Origin,
+        too_wide: Vec<&'a AlgorithmId>,
+        parts: &[Part],
+    ) -> Self {
         let objects = || outcome.frames.iter().map(|f| f.objects);
         let whole = outcome.whole();
         let named = || outcome.fixed.iter().map(ToString::to_string).enumerate();
@@ -170,7 +176,7 @@ impl<'a> Answer<'a> {
         let part = |p: &Part| OfPart { from_frame: p.frames.start, to_frame: p.frames.end - 1, figures: Figures::new(p) };
         let repeats = outcome.repeats.len();
         let mut warnings = origin.fields.warnings.clone();
-        warnings.extend(warnings_of(origin));
+        warnings.extend(warnings_of(origin, &too_wide));
         Self {
             scenario: course.footage.name(),
             frames: outcome.frames.len(),
@@ -185,7 +191,7 @@ impl<'a> Answer<'a> {
                 model: &origin.fields.model,
                 samples: origin.fields.samples.len(),
                 other_machine: &origin.other_machine,
-                too_many_threads: origin.too_wide(),
+                too_many_threads: too_wide,
             },
             extrapolated: origin.fields.extrapolated,
             warnings,
@@ -232,10 +238,9 @@ impl Figures {
 }
 
 /// What the reader should know about fields that were not made for this machine.
-fn warnings_of(origin: &Origin) -> Vec<String> {
+fn warnings_of(origin: &Origin, too_wide: &[&AlgorithmId]) -> Vec<String> {
     let mut warnings = Vec::new();
     warnings.extend(origin.other_machine.as_ref().map(|cpu| format!("the report was measured on another machine: {cpu}")));
-    let too_wide = origin.too_wide();
     if !too_wide.is_empty() {
         let names: Vec<String> = too_wide.iter().map(ToString::to_string).collect();
         let names = names.join(", ");

@@ -9,7 +9,7 @@ use crate::verbs::predict;
 use crate::{prediction, revisions, train};
 use anyhow::{Context, bail};
 use sapwise::json::Document;
-use sapwise::{AlgorithmId, Fields, Registry, Scenario, Source, measure, usable_cores};
+use sapwise::{AlgorithmId, Fields, Registry, Scenario, Source, measure};
 use serde::Serialize;
 use std::path::Path;
 
@@ -57,14 +57,6 @@ impl Origin {
             (From::Fields, Source::Learned) if samples.is_empty() => format!("from a file, learned on line{model}"),
             (From::Fields, Source::Learned) => format!("from a file, predicted{model}{corrected}"),
         }
-    }
-
-    /// Algorithms of the fields that the adaptive module leaves out, because they have more threads than this machine has cores. Where
-    /// the fields are steps it runs them all the same.
-    pub(super) fn too_wide(&self) -> Vec<&AlgorithmId> {
-        let cores = usable_cores();
-        let costs = !self.fields.costs.is_empty();
-        self.fields.algorithms().into_iter().filter(|id| costs && id.threads() > cores).collect()
     }
 }
 

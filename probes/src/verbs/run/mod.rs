@@ -9,7 +9,7 @@ use crate::args::{Run, Scene};
 use crate::boxes::{Frames, read_frames};
 use crate::exit::{Outcome, WrongUsage};
 use crate::plot::{self, Picture};
-use crate::simulation::{Course, Footage, TraceFormat, simulate, write_trace};
+use crate::simulation::{Course, Footage, TraceFormat, simulate, too_wide, write_trace};
 use crate::{files, interrupt, output};
 use anyhow::{Context, bail};
 use sapwise::{Scenario, usable_cores};
@@ -28,7 +28,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     registry.pin_threads();
     let trace = arguments.trace.as_deref().map(|path| Ok::<_, WrongUsage>((path, TraceFormat::of(path)?))).transpose()?;
     let picture = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, Picture::of(path)?))).transpose()?;
-    refuse_overwriting(arguments)?;
+    check_outputs(arguments)?;
     let mut course = course(arguments)?;
     let cuts = cuts(arguments, course.frames)?;
     let read = arguments.fields.as_deref().map(|path| fields::read(path, &registry, &arguments.gpus)).transpose()?;
@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     })?;
     origin.fields.warnings.append(&mut outcome.notes);
     let parts: Vec<_> = parts(&cuts, course.frames).into_iter().map(|range| outcome.part(range)).collect();
-    let answer = answer::Answer::new(&course, &outcome, &origin, &parts);
+    let answer = answer::Answer::new(&course, &outcome, &origin, too_wide(&origin.fields, &registry), &parts);
     if let Some((path, format)) = trace {
         write_trace(path, format, &outcome)?;
     }
@@ -68,17 +68,25 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     Ok(if outcome.interrupted || origin.wrong { Outcome::Failed } else { Outcome::Done })
 }
 
-/// Refuses to write over what is read, and to write two things to one file.
+/// Refuses to write over what is read, to write two things to one file, and into a folder that isn't there: after the run its figures
+/// would be lost with the file.
 ///
 /// # Errors
-/// [`WrongUsage`] that names the file.
-fn refuse_overwriting(arguments: &Run) -> anyhow::Result<()> {
+/// Names the file.
+fn check_outputs(arguments: &Run) -> anyhow::Result<()> {
     let mut read: Vec<PathBuf> = arguments.fields.iter().cloned().collect();
     if let Scene::Stream(path) = &arguments.scene {
         read.push(path.clone());
     }
     let outputs = [&arguments.record, &arguments.trace, &arguments.plot];
-    files::refuse_overwriting(&read, &outputs.into_iter().flatten().collect::<Vec<_>>())
+    let outputs: Vec<&PathBuf> = outputs.into_iter().flatten().collect();
+    for path in &outputs {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        if folder.is_some_and(|folder| !folder.is_dir()) {
+            bail!("can't write {}: there is no such folder; make it or name another", path.display());
+        }
+    }
+    files::refuse_overwriting(&read, &outputs)
 }
 
 /// What to simulate.

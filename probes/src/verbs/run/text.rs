@@ -4,6 +4,7 @@ use super::answer::{Answer, Figures, LeftOut, Oracle, Slowed};
 use super::fields::Origin;
 use crate::args::{Run, Scene};
 use crate::table::{columns, grouped};
+use sapwise::measure::statistics::quantile;
 use std::path::Path;
 
 /// Totals, figures and what there is to say about them.
@@ -19,7 +20,8 @@ pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> Str
     text += &totals(answer);
     for (id, LeftOut { after_frame, frames, at_least_ms }) in &answer.left_out {
         let after = after_frame.map_or("from the first on".to_owned(), |frame| format!("after frame {frame}"));
-        text += &format!("{id} sat out {frames} frames {after}, hopeless or failed: {at_least_ms:.2} ms without them\n");
+        text +=
+            &format!("{id} sat out {frames} frames {after}: it was hopeless or failed; {at_least_ms:.2} ms without them\n");
     }
     text += &format!("\n{}\n", figures(answer));
     text += &comparisons(answer);
@@ -128,10 +130,12 @@ fn co_runner(slowed: &Slowed) -> String {
         None => "no frame ran before, to compare with".to_owned(),
     };
     let own: Vec<f64> = slowed.slowdown_of.values().copied().flatten().collect();
-    let (least, most) = own.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), &x| (a.min(x), b.max(x)));
-    let of_fixed = match own[..] {
-        [] => String::new(),
-        _ => format!(", and the fixed algorithms {least:.2} to {most:.2} times, on frames with as many objects"),
+    let range = [0.5, 0.0, 1.0].map(|q| quantile(&own, q));
+    let of_fixed = match range {
+        [Some(median), Some(least), Some(most)] => {
+            format!(",\nthe fixed algorithms {median:.2} times ({least:.2} to {most:.2}) on frames with as many objects")
+        }
+        _ => String::new(),
     };
     let threads = slowed.threads;
     let plural = if threads == 1 { "" } else { "s" };

@@ -1,0 +1,238 @@
+//! `sapwise run` from the outside: streams, fields of other machines, traces, pictures, wrong usage.
+
+mod common;
+
+use common::{failure, npy, sapwise, success};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn answer(command: &mut assert_cmd::Command) -> Value {
+    serde_json::from_str(&success(command)).unwrap()
+}
+
+/// Fields that run the first algorithm below that many objects and the second from there on.
+fn steps(folder: &Path, first: &str, border: u32, second: &str) -> PathBuf {
+    let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
+    let fields = json!({
+        "schema": "fields/1", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
+        "steps": [step(0, first), step(border, second)], "crossovers": [], "interval_basis": "", "costs": []
+    });
+    let path = folder.join("steps.json");
+    fs::write(&path, fields.to_string()).unwrap();
+    path
+}
+
+/// Fields with the costs of strips on one thread, and on so many.
+fn costs(folder: &Path, threads: u32) -> PathBuf {
+    let (one, many) = ("strips@cpu1".to_owned(), format!("strips@cpu{threads}"));
+    let devices: Value = answer(sapwise().args(["devices", "--no-gpus", "--json"]));
+    let own = devices["algorithms"].as_array().unwrap().iter().find(|a| a["id"] == "strips@cpu1").unwrap();
+    let mut fixture: Value = serde_json::from_str(include_str!("../../tests/fixtures/fields-1.json")).unwrap();
+    let curve = fixture["costs"][0]["curve"].clone();
+    let cost = |id: &str| json!({"algorithm": id, "revision": own["revision"], "curve": curve, "spread_ln": 0.1});
+    fixture["costs"] = json!([cost(&one), cost(&many)]);
+    fixture["crossovers"] = json!([]);
+    fixture["steps"] = json!([{"from_objects": 0, "algorithm": one}]);
+    let path = folder.join("costs.json");
+    fs::write(&path, fixture.to_string()).unwrap();
+    path
+}
+
+fn run(scene: impl AsRef<std::ffi::OsStr>, fields: &Path, words: &[&str]) -> assert_cmd::Command {
+    let mut command = sapwise();
+    command.arg("run").arg(scene).arg("--fields").arg(fields).args(words);
+    command
+}
+
+#[test]
+fn a_recorded_scene_is_run_and_searched_like_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let fields = steps(folder.path(), "brute@cpu1", 20, "strips@cpu1");
+    let stream = folder.path().join("stream.npy");
+    let scene = ["--objects", "300", "--frames", "90", "--repeats", "1", "--json", "--record"];
+    let recorded = answer(run("fragmentation", &fields, &scene).arg(&stream));
+    let again = answer(&mut run(&stream, &fields, &["--repeats", "1", "--json"]));
+    assert_eq!((&again["scenario"], &again["frames"]), (&"stream.npy".into(), &90.into()));
+    assert_eq!((&again["objects"], &again["decisions"]), (&recorded["objects"], &recorded["decisions"]));
+    assert!(again["decisions"].as_array().unwrap().len() > 1, "{again}");
+    let few = answer(&mut run(&stream, &fields, &["--repeats", "1", "--frames", "7", "--json"]));
+    assert_eq!(few["frames"], 7);
+    // `pairs` sees as many boxes in each frame: none of the absent ones has a pair, or is refused.
+    let pairs = answer(sapwise().arg("pairs").arg(&stream).arg("--json"));
+    assert_eq!((&pairs["frames"], &pairs["objects"]), (&90.into(), &recorded["objects"]["max"]));
+}
+
+#[test]
+fn a_run_tells_its_figures_by_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let words = ["--objects", "200", "--frames", "30", "--repeats", "4", "--after", "10,20", "--json"];
+    let told = answer(&mut run("fragmentation", &fields, &words));
+    let parts = told["parts"].as_array().unwrap();
+    let range = |p: &Value| (p["from_frame"].as_u64().unwrap(), p["to_frame"].as_u64().unwrap());
+    assert_eq!(parts.iter().map(range).collect::<Vec<_>>(), [(0, 9), (10, 19), (20, 29)]);
+    for figures in parts.iter().chain([&told]) {
+        let number = |key: &str| figures[key].as_f64().unwrap_or_else(|| panic!("{key}: {figures}"));
+        assert!(number("regret") > -1.0 && number("worst_frame") > 0.0 && number("explored") == 0.0);
+        assert!(number("optimistic_regret") >= number("regret") - 1e-9, "{figures}");
+        let [low, high] = [0, 1].map(|k| figures["regret_quartiles"][k].as_f64().unwrap());
+        assert!(low <= high, "{figures}");
+    }
+    let switches = |f: &Value| f["switches"].as_u64().unwrap();
+    assert_eq!(parts.iter().map(switches).sum::<u64>(), switches(&told));
+    assert_eq!((&told["oracle"], &told["learning"], &told["exploring"]), (&"halves".into(), &false.into(), &false.into()));
+    assert_eq!(told["regret_of_repeats"].as_array().unwrap().len(), 4);
+    let largest = &told["best_at_largest"];
+    assert_eq!(largest["objects"], told["objects"]["max"]);
+    assert!(told["total_ms"]["fixed"].get(largest["algorithm"].as_str().unwrap()).is_some(), "{told}");
+    let text = success(&mut run("uniform", &fields, &["--objects", "50", "--frames", "3", "--repeats", "1"]));
+    for needed in ["One repeat: the oracle has the least time", "Without learning.", "written down by hand"] {
+        assert!(text.contains(needed), "{needed}: {text}");
+    }
+}
+
+#[test]
+fn fields_of_another_machine_are_taken_and_what_it_lacks_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
+    let too_many = format!("strips@cpu{}", cores + 1);
+    let fields = costs(folder.path(), cores + 1);
+    let small = ["--objects", "200", "--frames", "5", "--repeats", "2", "--json"];
+    let told = answer(&mut run("uniform", &fields, &small));
+    assert_eq!(told["fields"]["too_many_threads"], json!([too_many]));
+    assert!(told["warnings"].to_string().contains(&too_many), "{told}");
+    assert_eq!((&told["learning"], &told["exploring"]), (&true.into(), &true.into()));
+    assert!(told["total_ms"]["fixed"].get(&too_many).is_none(), "{told}");
+    let without = answer(run("uniform", &fields, &small).arg("--no-learning"));
+    assert_eq!((&without["learning"], &without["exploring"]), (&false.into(), &false.into()));
+    let without = answer(run("uniform", &fields, &small).arg("--no-exploring"));
+    assert_eq!((&without["learning"], &without["exploring"]), (&true.into(), &false.into()));
+}
+
+#[test]
+fn a_prediction_without_samples_is_told_as_such() {
+    let words =
+        ["run", "uniform", "--samples", "0", "--no-gpus", "--objects", "100", "--frames", "3", "--repeats", "2", "--json"];
+    let told = answer(sapwise().args(words));
+    assert_eq!((&told["source"], &told["fields"]["from"]), (&"predicted".into(), &"prediction".into()));
+    assert_eq!(told["fields"]["samples"], 0);
+}
+
+#[test]
+fn a_co_runner_is_told_with_what_it_reached() {
+    let folder = tempfile::tempdir().unwrap();
+    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let words = ["--objects", "500", "--frames", "20", "--repeats", "2", "--co-runner", "10:1", "--json"];
+    let told = answer(&mut run("uniform", &fields, &words));
+    let own = &told["co_runner"];
+    assert_eq!((&own["from_frame"], &own["threads"]), (&10.into(), &1.into()));
+    assert!(own["slowdown"].as_f64().unwrap() > 0.0 && own["slowdown_of"]["strips@cpu1"].as_f64().unwrap() > 0.0, "{own}");
+    let parts = told["parts"].as_array().unwrap();
+    assert_eq!((parts.len(), &parts[1]["from_frame"]), (2, &10.into()));
+}
+
+#[test]
+fn every_frame_is_traced_and_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let file = |name: &str| folder.path().join(name);
+    let words = ["--objects", "200", "--frames", "12", "--repeats", "2"];
+    let both = |trace: &str, plot: &str| {
+        let text =
+            success(run("fragmentation", &fields, &words).arg("--trace").arg(file(trace)).arg("--plot").arg(file(plot)));
+        assert!(text.contains(trace) && text.contains(plot), "{text}");
+    };
+    both("a.csv", "a.svg");
+    both("a.json", "a.png");
+    let csv = fs::read_to_string(file("a.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 13);
+    assert!(csv.starts_with("frame,objects,") && csv.lines().nth(1).unwrap().contains("brute@cpu1"), "{csv}");
+    let json: Value = serde_json::from_str(&fs::read_to_string(file("a.json")).unwrap()).unwrap();
+    assert_eq!(json["frames"].as_array().unwrap().len(), 12);
+    let svg = fs::read_to_string(file("a.svg")).unwrap();
+    for needed in ["1 core: ", "Made by: sapwise run fragmentation --fields steps.json", "written down by hand"] {
+        assert!(svg.contains(needed), "{needed}");
+    }
+    // The folder is of this machine alone.
+    assert!(!svg.contains(folder.path().to_str().unwrap()));
+    assert!(fs::read(file("a.png")).unwrap().starts_with(b"\x89PNG\r\n"));
+}
+
+#[test]
+fn what_can_not_be_run_is_refused_with_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let good = [0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0];
+    let nan = [f32::NAN; 6];
+    let file = |name: &str, shape: &str, rows: &[[f32; 6]]| npy(folder.path(), name, "<f4", shape, rows.as_flattened());
+    let mut broken = good;
+    broken[4] = f32::NAN;
+    let empty = folder.path().join("empty.npy");
+    fs::write(&empty, []).unwrap();
+    let scene = file("good.npy", "2, 1, 6", &[good, good]);
+    let cases: [(PathBuf, &[&str], i32, &[&str]); 13] = [
+        (file("flat.npy", "2, 3", &[good]), &[], 1, &["flat.npy", "shape is [2, 3]"]),
+        (file("gap.npy", "1, 3, 6", &[good, nan, good]), &[], 1, &["gap.npy", "frame 0: row 1", "at the end of a frame"]),
+        (file("broken.npy", "2, 1, 6", &[good, broken]), &[], 1, &["broken.npy", "frame 1", "box 0", "NaN"]),
+        (file("none.npy", "0, 5, 6", &[]), &[], 1, &["none.npy has no frames", "--record"]),
+        (empty, &[], 1, &["empty.npy", "empty"]),
+        (folder.path().join("absent.npy"), &[], 1, &["absent.npy"]),
+        (fields.clone(), &[], 1, &["steps.json", "no .npy file"]),
+        ("unifrom".into(), &[], 2, &["no scenario", "uniform", "name a file"]),
+        (scene.clone(), &["--frames", "3"], 2, &["--frames 3", "2 frames"]),
+        (scene.clone(), &["--objects", "3"], 2, &["--objects", "stream"]),
+        ("uniform".into(), &["--frames", "5", "--after", "5"], 2, &["--after 5", "1 to 4"]),
+        ("uniform".into(), &["--frames", "5", "--co-runner", "5:1"], 2, &["--co-runner 5", "0 to 4"]),
+        ("uniform".into(), &["--plot", "a.pdf"], 2, &["a.pdf", ".svg or .png"]),
+    ];
+    for (scene, words, status, needed) in cases {
+        let complaint = failure(&mut run(&scene, &fields, words), status);
+        assert!(needed.iter().all(|text| complaint.contains(text)), "{scene:?} {words:?}: {complaint}");
+    }
+    let nowhere = folder.path().join("missing").join("a.svg");
+    let complaint = failure(run("uniform", &fields, &[]).arg("--plot").arg(&nowhere), 1);
+    assert!(complaint.contains("a.svg") && complaint.contains("no such folder"), "{complaint}");
+    for words in [["--co-runner", "x"], ["--samples", "3"], ["--trace", "a.txt"]] {
+        failure(&mut run("uniform", &fields, &words), 2);
+    }
+    let complaint = failure(run(&scene, &fields, &[]).arg("--trace").arg(folder.path().join("steps.json")), 2);
+    assert!(complaint.contains("steps.json"), "{complaint}");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_the_co_runner_and_keeps_the_repeats_that_are_complete() {
+    use std::io::Read;
+    let folder = tempfile::tempdir().unwrap();
+    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let trace = folder.path().join("trace.csv");
+    // More repeats than it lives for; the first is over in a hundredth of a second.
+    let words = ["--objects", "30", "--frames", "40", "--repeats", "1000", "--co-runner", "1:1", "--seed", "3", "--json"];
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+    command.args(["run", "uniform", "--fields"]).arg(&fields).args(words).arg("--trace").arg(&trace);
+    let mut child = command.stdout(std::process::Stdio::piped()).spawn().unwrap();
+    // A child that has no handler yet ends at once, without an answer: then it is tried again, later.
+    let mut wait = std::time::Duration::from_millis(200);
+    loop {
+        std::thread::sleep(wait);
+        assert!(child.try_wait().unwrap().is_none(), "a thousand repeats were over before it could be interrupted");
+        let sent = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let mut text = String::new();
+        child.stdout.take().unwrap().read_to_string(&mut text).unwrap();
+        let status = child.wait().unwrap();
+        if !text.is_empty() {
+            let told: Value = serde_json::from_str(&text).unwrap();
+            assert_eq!((status.code(), &told["interrupted"]), (Some(1), &true.into()));
+            let repeats = told["repeats"].as_u64().unwrap();
+            assert!((1..1000).contains(&repeats), "{told}");
+            assert_eq!(told["regret_of_repeats"].as_array().unwrap().len() as u64, repeats);
+            assert_eq!(fs::read_to_string(&trace).unwrap().lines().count(), 41);
+            return;
+        }
+        assert!(wait.as_secs() < 60, "interrupted before the first repeat, however late");
+        wait *= 2;
+        child = command.spawn().unwrap();
+    }
+}
