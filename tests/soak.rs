@@ -1,4 +1,4 @@
-//! Frames without number in which things go wrong at random: no pair is lost and no memory leaks.
+//! Many frames in which things go wrong at random: no pair is lost and no memory leaks.
 //!
 //! `fragmentation` at small sizes runs through the adaptive module, each frame held against the double loop. From a seed a GPU is lost and
 //! comes back, pools are made anew with other sizes, frames are refused, and the program starts again with what it has learned. With the

@@ -7,6 +7,7 @@ use bevy_time::{TimePlugin, TimeUpdateStrategy};
 use bevy_transform::components::Transform;
 use sapwise_example_bevy::{BoxCollider, OverlapBegun, OverlapEnded, Overlaps, SapwisePlugin, SapwiseSystems};
 use std::collections::BTreeSet;
+use std::process::Command;
 use std::sync::Mutex;
 
 type Set = BTreeSet<(Entity, Entity)>;
@@ -177,4 +178,16 @@ fn an_invalid_box_is_an_error_that_names_the_entity() {
     app.update();
     let errors = ERRORS.lock().unwrap();
     assert!(errors.len() == 1 && errors[0].contains(&bad.to_string()) && errors[0].contains("NaN"), "{errors:?}");
+}
+
+#[test]
+fn the_app_counts_as_many_ended_overlaps_as_begun_ones_once_every_entity_is_gone() {
+    let run = |steps| Command::new(env!("CARGO_BIN_EXE_sapwise-example-bevy")).arg(steps).output().unwrap();
+    let done = run("200");
+    assert!(done.status.success(), "{done:?}");
+    let told = String::from_utf8(done.stdout).unwrap();
+    let last: Vec<&str> = told.lines().last().unwrap().split_whitespace().collect();
+    assert_eq!(last[..3], ["200", "0", "0"], "{told}");
+    assert!(last[3] == last[4] && last[3].parse::<u32>().unwrap() > 1000, "{told}");
+    assert_eq!(run("none").status.code(), Some(2));
 }

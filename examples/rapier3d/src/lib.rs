@@ -2,7 +2,7 @@
 //! the boxes of their colliders in Sapwise's adaptive broad phase, compared with rapier's own in every step.
 //!
 //! [`World`] is the simulation, [`Comparison`] runs Sapwise beside it and holds the pairs of one against those of the other, and
-//! [`Recording`] keeps the boxes for a file that `sapwise pairs` reads.
+//! [`Recording`] keeps the boxes for a file that `sapwise run` and `sapwise pairs` read.
 
 mod comparison;
 mod random;

@@ -18,8 +18,8 @@ usage: cargo run --release -p sapwise-example-rapier3d -- [OPTIONS]
   --frames N     frames of a sixtieth of a second; 600 unless told otherwise
   --bodies N     the most bodies at once; 1000 unless told otherwise
   --seed N       of places, velocities and bursts; 1 unless told otherwise
-  --record FILE  writes the boxes of all frames as frames x boxes x 6 float32 (.npy), for `sapwise pairs FILE`; a frame with
-                 fewer boxes than the fullest ends in rows of NaN
+  --record FILE  writes the boxes of all frames as frames x boxes x 6 float32 (.npy), for `sapwise run FILE` and
+                 `sapwise pairs FILE`; a frame with fewer boxes than the fullest ends in rows of NaN
   --quiet        prints the last line only
 
 example: cargo run --release -p sapwise-example-rapier3d -- --frames 300 --bodies 100 --record stream.npy";

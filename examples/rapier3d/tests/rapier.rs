@@ -3,6 +3,7 @@
 use rapier3d::prelude::*;
 use sapwise::{Aabb, Registry};
 use sapwise_example_rapier3d::{Comparison, Counts, Mismatch, Recording, Settings, World};
+use std::process::{Command, Output};
 
 /// So many frames, each compared.
 fn course(settings: Settings, frames: usize) -> (Vec<Counts>, Recording) {
@@ -100,4 +101,36 @@ fn a_recording_is_an_array_whose_shorter_frames_end_in_nan() {
     assert_eq!(values[..12], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
     assert_eq!(values[12..18], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
     assert!(values[18..].iter().all(|v| v.is_nan()));
+}
+
+fn command(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sapwise-example-rapier3d")).args(arguments).output().unwrap()
+}
+
+#[test]
+fn the_command_records_what_it_compares_and_refuses_what_it_does_not_know() {
+    let (_, recording) = course(Settings { bodies: 30, seed: 7 }, 90);
+    let mut expected = Vec::new();
+    recording.write_npy(&mut expected).unwrap();
+    let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("recorded.npy");
+    let path = file.to_str().unwrap();
+    let done = command(&["--frames", "90", "--bodies", "30", "--seed", "7", "--quiet", "--record", path]);
+    assert!(done.status.success(), "{done:?}");
+    let told = String::from_utf8(done.stdout).unwrap();
+    assert!(told.starts_with("90 frames of ") && told.lines().count() == 1, "{told}");
+    assert!(std::fs::read(&file).unwrap() == expected, "another recording than the library's");
+
+    for (arguments, told) in [
+        (&["--frame"][..], "no option --frame"),
+        (&["--frames"], "--frames needs a value"),
+        (&["--seed", "x"], "\"x\" is no number"),
+        (&["--frames", "0"], "no frame to run"),
+    ] {
+        let refused = command(arguments);
+        let error = String::from_utf8(refused.stderr).unwrap();
+        assert!(refused.status.code() == Some(2) && error.contains(told), "{arguments:?}: {error}");
+    }
+    let failed = command(&["--frames", "1", "--record", "missing/folder/s.npy"]);
+    let error = String::from_utf8(failed.stderr).unwrap();
+    assert!(failed.status.code() == Some(1) && error.contains("can't write missing/folder/s.npy"), "{error}");
 }
