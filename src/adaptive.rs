@@ -267,12 +267,12 @@ impl BroadPhase for Adaptive {
                 Ok(()) => {
                     let usual_ns = self.pace.ran();
                     let Some((started, running)) = started.zip(running) else {
-                        self.glance.ran(boxes, pairs.len(), usual_ns);
+                        self.glance.ran(boxes, pairs.overlapping(), usual_ns);
                         return Ok(());
                     };
                     let ns = (running.elapsed().as_nanos() as f64).max(1.0);
                     self.measured_ns = Some(ns);
-                    self.glance.ran(boxes, pairs.len(), ns);
+                    self.glance.ran(boxes, pairs.overlapping(), ns);
                     self.policy.ran(choice.chosen, ns);
                     self.pace.took(started.elapsed().as_nanos() as f64 - ns, ns);
                     self.warm_runner_up(boxes.len());

@@ -4,10 +4,11 @@
 //! One test only, because the counter sees every thread of the process.
 
 use sapwise::{
-    Adaptive, AlgorithmCost, BroadPhase, Changes, CostCurve, CostTerm, Fields, Filter, Load, Membership, Pairs, Registry,
-    Scenario, Source, Term,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, Changes, CostCurve, CostTerm, Error, Fields, Filter, Load,
+    Membership, Pairs, Registry, Scenario, Source, Term,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// The system's allocator, counting calls.
@@ -118,12 +119,49 @@ fn a_steady_state_allocates_nothing() {
             assert_eq!(large, 0, "{id} on {scenario}");
         }
     }
-    let mut adaptive = Adaptive::new(fields(&registry), &registry).unwrap();
-    let (counted, _) = allocations(Scenario::Fragmentation, 3000, 600, &mut adaptive, false);
-    assert_eq!(counted, 0, "adaptive, switches included");
-    // What learns switches when timings say so, to an algorithm that may not have had so large a frame.
-    let mut adaptive = Adaptive::new(fields(&registry), &registry).unwrap();
-    adaptive.set_learning(false);
-    let (counted, _) = allocations(Scenario::Fragmentation, 3000, 600, &mut adaptive, true);
-    assert_eq!(counted, 0, "adaptive with all extras, switches included");
+    for extras in [false, true] {
+        // What learns switches when timings say so, to an algorithm that may not have had so large a frame.
+        let mut adaptive = Adaptive::new(fields(&registry), &registry).unwrap();
+        adaptive.set_learning(false);
+        let (counted, _) = allocations(Scenario::Fragmentation, 3000, 600, &mut adaptive, extras);
+        assert_eq!(counted, 0, "adaptive, switches included, extras: {extras}");
+    }
+    let (mut adaptive, switched) = idle_candidates();
+    let (counted, _) = allocations(Scenario::Fragmentation, 300, 600, &mut adaptive, false);
+    assert_eq!(counted, 0, "learning, switching and exploring");
+    assert!(switched.load(Relaxed) > 10, "they took {} turns", switched.load(Relaxed));
+}
+
+/// An adaptive module that learns, over algorithms that allocate nothing and take as long as they like; and how often one of them ran that
+/// had not run the frame before.
+fn idle_candidates() -> (Adaptive, Arc<AtomicUsize>) {
+    struct Idle(usize, Arc<[AtomicUsize; 2]>, Arc<AtomicUsize>, u64);
+    impl BroadPhase for Idle {
+        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+            self.2.fetch_add(usize::from(self.1[0].swap(self.0, Relaxed) != self.0), Relaxed);
+            // Each is slow for a while in turn.
+            let frame = self.1[1].fetch_add(1, Relaxed);
+            for k in 0..if frame / 100 % 4 == self.0 { 40_000 } else { 10_000 } {
+                self.3 = std::hint::black_box(self.3.wrapping_mul(k | 1));
+            }
+            pairs.clear();
+            pairs.finish()
+        }
+    }
+    let mut registry = Registry::with_cores(1);
+    let (shared, turns) = (Arc::new([const { AtomicUsize::new(0) }; 2]), Arc::new(AtomicUsize::new(0)));
+    let ids: Vec<AlgorithmId> = (0..4).map(|k| format!("idle-{k}@cpu1").parse().unwrap()).collect();
+    for (k, id) in ids.iter().enumerate() {
+        let (shared, turns) = (Arc::clone(&shared), Arc::clone(&turns));
+        registry.add(id.clone(), 1, move || Ok(Box::new(Idle(k, Arc::clone(&shared), Arc::clone(&turns), 3))));
+    }
+    let costs = ids.into_iter().map(|algorithm| AlgorithmCost {
+        algorithm,
+        revision: 1,
+        curve: CostCurve { terms: vec![CostTerm { term: Term::Call, unit_ns: 10_000.0 }], ..CostCurve::default() },
+        spread_ln: 0.1,
+    });
+    let loads = [Load { objects: 10, ..Load::default() }, Load { objects: 1000, ..Load::default() }];
+    let fields = Fields::from_costs(Source::Predicted, "uniform", costs.collect(), &loads);
+    (Adaptive::new(fields, &registry).unwrap(), turns)
 }

@@ -86,9 +86,9 @@ impl Glance {
         rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.price_ns
     }
 
-    /// Takes in a frame that was run: its pairs, and about how long it took.
-    pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: usize, ns: f64) {
-        self.before = Some((count(boxes), pairs as u64));
+    /// Takes in a frame that was run: its overlapping pairs, those that a filter kept out included, and about how long it took.
+    pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: f64) {
+        self.before = Some((count(boxes), pairs));
         self.age = self.age.saturating_add(1);
         self.passed_ns += ns;
         // Not while looking: a frame may be looked at twice before it runs, and it has not moved in between.
