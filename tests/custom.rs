@@ -93,12 +93,15 @@ fn one_whose_cost_was_far_too_low_is_left() {
 
 #[test]
 fn one_whose_cost_was_too_high_is_tried_and_stays() {
-    let mut adaptive = calls(&with_sleepers(), &[("slow@cpu1", 2_000_000.0), ("quick@cpu1", 2_100_000.0)]);
+    let mut adaptive = calls(&with_sleepers(), &[("slow@cpu1", 2_000_000.0), ("quick@cpu1", 2_010_000.0)]);
     let boxes = resting(40);
-    let ran: Vec<(String, Reason)> = (0..300).map(|_| run(&mut adaptive, &boxes)).collect();
-    assert_eq!(ran[0], ("slow@cpu1".to_owned(), Reason::First));
-    let quick = ran.iter().filter(|(id, _)| id == "quick@cpu1").count();
-    assert!(ran[299].0 == "quick@cpu1" && quick > 100, "{quick} of 300 frames by the quick one, the last by {}", ran[299].0);
+    assert_eq!(run(&mut adaptive, &boxes), ("slow@cpu1".to_owned(), Reason::First));
+    // Usually in the first hundred frames. Where other programs delay the sleeper, it is some time until what it costs is clear enough
+    // for another to be worth a try.
+    let tried = (0..3000).position(|_| run(&mut adaptive, &boxes).0 == "quick@cpu1");
+    assert!(tried.is_some(), "in 3000 frames by the slow one the quick one was not tried");
+    let quick = (0..300).filter(|_| run(&mut adaptive, &boxes).0 == "quick@cpu1").count();
+    assert!(quick > 200, "{quick} of 300 frames by the quick one after it was tried in frame {tried:?}");
 }
 
 #[test]
