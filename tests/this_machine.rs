@@ -333,6 +333,48 @@ fn a_program_brings_its_pool_and_its_gpu() {
     }
 }
 
+/// A process that keeps its fields in the user's folder; with a home that is no folder it works all the same.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "a process that the_users_folder_is_shared_by_processes starts, with variables of its own"]
+fn a_process_of_the_user() {
+    let Some(folder) = std::env::var_os("XDG_CACHE_HOME") else {
+        let mut adaptive = start(&Options { cache: Cache::User, ..options(Path::new("")) });
+        frame(&mut adaptive, &boxes(200));
+        assert_eq!(origin(&adaptive), Origin::Probed);
+        let told = &adaptive.setup().remarks;
+        assert!(told.iter().any(|r| r.contains("/dev/null/.cache/sapwise") && r.contains("can't be written")), "{told:?}");
+        return;
+    };
+    let mut adaptive = start(&Options { cache: Cache::User, ..options(Path::new("")) });
+    let file = adaptive.setup().file.clone().unwrap();
+    assert_eq!(file.parent().unwrap(), Path::new(&folder).join("sapwise"));
+    for _ in 0..20 {
+        learn(&mut adaptive, &boxes(50));
+        adaptive.save().unwrap();
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_users_folder_is_shared_by_processes() {
+    let folder = tempfile::tempdir().unwrap();
+    let process = |variable: &str, value: &Path| {
+        let mut command = std::process::Command::new(std::env::current_exe().unwrap());
+        command.args(["--exact", "a_process_of_the_user", "--ignored"]).env_remove("XDG_CACHE_HOME").env(variable, value);
+        command.stdout(std::process::Stdio::null()).spawn().unwrap()
+    };
+    let shared = [0, 1].map(|_| process("XDG_CACHE_HOME", folder.path()));
+    let homeless = process("HOME", Path::new("/dev/null"));
+    for mut child in shared.into_iter().chain([homeless]) {
+        assert!(child.wait().unwrap().success());
+    }
+    let kept = folder.path().join("sapwise");
+    let after = start(&options(&kept));
+    assert_eq!((origin(&after), after.fields().source), (Origin::Cached, Source::Learned));
+    assert_eq!(names(&kept).len(), 1);
+}
+
 #[test]
 fn given_fields_have_no_start_of_their_own() {
     let registry = Registry::with_cores(1);

@@ -113,7 +113,8 @@ mod tests {
     #[test]
     fn a_swing_goes_from_the_least_to_all_and_back() {
         let swing = Some(Swing { least: 10, frames: 41 });
-        let mut reel = Footage::Scene { scenario: Scenario::Clustered, objects: 1000, seed: 1, swing }.start();
+        let footage = Footage::Scene { scenario: Scenario::Clustered, objects: 1000, seed: 1, swing };
+        let mut reel = footage.start();
         let mut counts = Vec::new();
         for _ in 0..41 {
             counts.push(reel.boxes().len());

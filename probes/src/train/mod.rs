@@ -5,6 +5,8 @@ mod clouds;
 mod columns;
 mod crossing;
 mod curve;
+#[cfg(test)]
+mod density;
 mod direct;
 mod fit;
 mod folds;
