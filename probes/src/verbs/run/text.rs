@@ -163,6 +163,7 @@ fn command(arguments: &Run) -> String {
         None => words.push(format!("--samples {}", arguments.samples)),
     }
     words.extend(arguments.objects.map(|n| format!("--objects {n}")));
+    words.extend(arguments.swing.map(|least| format!("--swing {least}")));
     words.extend(arguments.frames.map(|n| format!("--frames {n}")));
     words.push(format!("--repeats {} --seed {}", arguments.repeats, arguments.seed));
     words.extend(arguments.co_runner.map(|c| format!("--co-runner {c}")));
@@ -175,4 +176,29 @@ fn command(arguments: &Run) -> String {
     words.extend(arguments.gpus.only.iter().map(|gpu| format!("--gpu {gpu}")));
     words.extend(arguments.plot.as_deref().map(|path| format!("--plot {}", name(path))));
     words.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::{Arguments, Verb};
+    use clap::Parser;
+
+    #[test]
+    fn the_command_below_a_picture_makes_it_again() {
+        let said = |words: &str| match Arguments::parse_from(words.split(' ')).verb {
+            Verb::Run(run) => command(&run),
+            _ => panic!("another verb"),
+        };
+        for words in [
+            "sapwise run slab --samples 8 --repeats 6 --seed 1",
+            "sapwise run uniform --fields t.json --objects 9 --swing 3 --frames 7 --repeats 2 --seed 4 --no-gpus",
+            "sapwise run s.npy --samples 0 --repeats 1 --seed 1 --co-runner 3:2 --no-learning --no-exploring --plot p.png",
+            "sapwise run mixed --samples 8 --repeats 6 --seed 1 --gpu 0 --gpu 2 --plot p.svg",
+        ] {
+            assert_eq!(said(words), words);
+        }
+        let named = said("sapwise run /a/s.npy --fields /b/t.json --plot c/p.svg");
+        assert_eq!(named, "sapwise run s.npy --fields t.json --repeats 6 --seed 1 --plot p.svg");
+    }
 }
