@@ -6,11 +6,8 @@ use std::time::Instant;
 /// Share of the frames' time that samples may take where the number of objects holds still ...
 const SHARE: f64 = 0.005;
 /// ... and by how much that share rises with the change of that number since the last sample, as a ratio. A scene that doubles is
-/// sampled after a frame or two, one that grows by a sixteenth when a hundred times the sample's cost has passed.
+/// sampled when ten times the sample's cost has passed, one that grows by a sixteenth after ninety times.
 const SHARE_OF_DRIFT: f64 = 0.1;
-
-/// A number of objects that has changed by this factor, or by this many, makes the last sample worthless: no wait.
-const JUMP: f64 = 2.0;
 
 /// Samples are at least this many frames apart where nothing drifts: what `moved` tells changes slowly.
 const SAMPLE_EVERY: u32 = 32;
@@ -78,12 +75,9 @@ impl Glance {
     fn is_due(&self, objects: u32) -> bool {
         let (now, then) = (f64::from(objects.max(1)), f64::from(self.sampled.max(1)));
         let ratio = (now / then).max(then / now);
-        if self.before.is_none() || ratio >= JUMP {
-            return true;
-        }
         let drift = ratio - 1.0;
         let rested = self.age >= SAMPLE_EVERY || drift > 1.0 / 16.0;
-        rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.price_ns
+        self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.price_ns
     }
 
     /// Takes in a frame that was run: its overlapping pairs, those that a filter kept out included, and about how long it took.

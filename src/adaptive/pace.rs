@@ -6,8 +6,8 @@ const SHARE: f64 = 0.01;
 const MOST_FRAMES: u32 = 128;
 
 /// A number of objects that has changed by this share, or by this many, is decided on at once.
-const CHANGE: u32 = 32;
-const FEWEST: u32 = 4;
+const CHANGE: u32 = 16;
+const FEWEST: u32 = 16;
 
 /// Counts the frames until the next decision.
 #[derive(Debug, Clone, Default)]

@@ -2,7 +2,7 @@
 
 use super::decision::{Choice, Reason};
 use super::learner::{Learner, Place, View};
-use super::price::{Expected, Prices};
+use super::price::{Expected, Kind, Prices};
 use super::tally::{Predicted, Tally};
 use crate::cost::Counts;
 use crate::{Fields, Load};
@@ -16,6 +16,9 @@ const MOST_DEARER: f64 = 1.3;
 const EXPLORE_EVERY: u64 = 60;
 /// What is found out is taken to be of use for so many frames: five seconds of a game.
 const HORIZON: f64 = 300.0;
+
+/// A scene has grown when it has so many times the objects of the decision before.
+const GREW: f64 = 1.002;
 
 /// Chooses, and learns from what the choices cost.
 #[derive(Debug, Clone)]
@@ -33,10 +36,15 @@ pub(super) struct Policy {
     /// The candidate that runs unless one explores, and what ran last.
     settled: Option<usize>,
     ran: Option<usize>,
-    /// What each candidate is expected to cost under the present load, and what the fields say of it without correction.
+    /// What each candidate is expected to cost under the present load, in the mean over its frames with all waits and by kinds of frames, and
+    /// what the fields say of it without correction.
+    mean_ns: Vec<f64>,
     expected: Vec<Expected>,
     predicted: Vec<Predicted>,
     log2_objects: f64,
+    /// Objects at the decision before, and whether there are more now.
+    objects: u32,
+    grew: bool,
     tally: Tally,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
@@ -60,9 +68,12 @@ impl Policy {
             prices: Prices::new(kept),
             settled: None,
             ran: None,
-            expected: vec![Expected { usual_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
+            mean_ns: vec![f64::INFINITY; count],
+            expected: vec![Expected { built_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
             predicted: vec![Predicted::default(); count],
             log2_objects: 0.0,
+            objects: 0,
+            grew: false,
             tally: Tally::default(),
             saved_ns: vec![0.0; count],
             frame: 0,
@@ -132,6 +143,8 @@ impl Policy {
     /// Fills in what every candidate is expected to cost.
     fn expect(&mut self, load: &Load) {
         let counts = Counts::new(load);
+        self.grew = f64::from(load.objects) > GREW * f64::from(self.objects);
+        self.objects = load.objects;
         self.log2_objects = counts.log2_objects();
         let place = Place::of(self.log2_objects);
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
@@ -142,23 +155,21 @@ impl Policy {
             let factor = learner.map_or(1.0, |l| l.correction_ln(k, View { place, calls: predicted.calls() }).exp());
             let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));
             self.predicted[k] = predicted;
-            self.expected[k] = Expected { usual_ns: ns * factor + wait_ns, alone_ns: alone_ns * factor + wait_ns };
+            self.expected[k] = Expected { built_ns: ns * factor, alone_ns: alone_ns * factor };
+            self.mean_ns[k] = self.prices.mean_ns(k, self.frame, self.expected[k]) + wait_ns;
         }
     }
 
-    fn usual_ns(&self, candidate: usize) -> f64 {
-        self.expected[candidate].usual_ns
-    }
-
-    /// What the first frame of a candidate costs beside a usual one.
+    /// What the first frame of a candidate costs beside the mean of its frames.
     fn price_ns(&self, candidate: usize) -> f64 {
         let expected = self.expected[candidate];
-        self.prices.first_ns(candidate, self.frame, expected) - expected.usual_ns
+        let first_ns = self.prices.first_ns(candidate, self.frame, expected);
+        (first_ns - self.prices.mean_ns(candidate, self.frame, expected)).max(0.0)
     }
 
     fn cheapest(&self, among: impl Fn(usize) -> bool) -> Option<usize> {
         let usable = (0..self.usable.len()).filter(|&k| self.usable[k] && among(k));
-        usable.min_by(|&a, &b| self.usual_ns(a).total_cmp(&self.usual_ns(b)))
+        usable.min_by(|&a, &b| self.mean_ns[a].total_cmp(&self.mean_ns[b]))
     }
 
     /// Whether to go on with the one that runs, or to which one to switch.
@@ -166,15 +177,15 @@ impl Policy {
     /// A switch is made once the frames since the other became cheaper would have saved what it costs. Where costs hold still that
     /// loses at most twice what knowing the future would, and where they flicker about a border nothing is ever saved for long.
     fn settle(&mut self, settled: usize, best: usize, frames: u32) -> (usize, Reason) {
-        let now = self.usual_ns(settled);
-        for (saved, expected) in self.saved_ns.iter_mut().zip(&self.expected) {
-            let gain = (now - expected.usual_ns) * f64::from(frames);
+        let now = self.mean_ns[settled];
+        for (saved, mean_ns) in self.saved_ns.iter_mut().zip(&self.mean_ns) {
+            let gain = (now - mean_ns) * f64::from(frames);
             *saved = if gain.is_finite() { (*saved + gain).max(0.0) } else { 0.0 };
         }
         if best == settled {
             return (settled, Reason::Stayed);
         }
-        let paid = |k: usize| self.usual_ns(k) < now && self.saved_ns[k] >= self.price_ns(k);
+        let paid = |k: usize| self.mean_ns[k] < now && self.saved_ns[k] >= self.price_ns(k);
         self.cheapest(paid).map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
     }
 
@@ -186,14 +197,14 @@ impl Policy {
         }
         let place = Place::of(self.log2_objects);
         let view = |k: usize| (k, View { place, calls: self.predicted[k].calls() });
-        let now = self.usual_ns(settled);
+        let now = self.mean_ns[settled];
         let worth = |k: usize| {
-            let first = self.usual_ns(k) + self.price_ns(k);
+            let first = self.mean_ns[k] + self.price_ns(k);
             if k == settled || !self.usable[k] || first > MOST_DEARER * now {
                 return None;
             }
             let deviation = learner.variance_of_ratio(view(settled), view(k)).sqrt();
-            let gain = now * expected_gain((self.usual_ns(k) / now).ln(), deviation) * HORIZON - (first - now).max(0.0);
+            let gain = now * expected_gain((self.mean_ns[k] / now).ln(), deviation) * HORIZON - (first - now).max(0.0);
             (gain > 0.0).then_some((k, gain))
         };
         let best = (0..self.usable.len()).filter_map(worth).max_by(|a, b| a.1.total_cmp(&b.1));
@@ -201,8 +212,8 @@ impl Policy {
     }
 
     fn choice(&self, chosen: usize, reason: Reason) -> Choice {
-        let runner_up = self.cheapest(|k| k != chosen).map(|k| (k, self.usual_ns(k)));
-        Choice { chosen, predicted_ns: Some(self.usual_ns(chosen)), runner_up, reason }
+        let runner_up = self.cheapest(|k| k != chosen).map(|k| (k, self.mean_ns[k]));
+        Choice { chosen, predicted_ns: Some(self.mean_ns[chosen]), runner_up, reason }
     }
 
     /// Takes in that a candidate ran the frame that was decided, and what that took.
@@ -210,7 +221,7 @@ impl Policy {
         let entered = self.ran != Some(candidate);
         self.ran = Some(candidate);
         let expected = self.expected[candidate];
-        let usual = self.prices.ran(candidate, entered, self.frame, ns, expected, self.learns);
+        let kind = self.prices.ran(candidate, entered, self.frame, ns, expected, self.learns);
         let Some(learner) = self.learner.as_mut().filter(|_| self.learns) else { return };
         if !self.tally.takes(candidate, self.log2_objects) {
             if self.tally.frames > 0 {
@@ -218,7 +229,10 @@ impl Policy {
             }
             self.tally = self.tally.next(candidate);
         }
-        if usual || self.settled != Some(candidate) {
+        let first_of_many = kind == Kind::First && self.settled == Some(candidate);
+        // Boxes that came have to be looked up in what is kept: such a frame tells nothing of the next.
+        let grew = self.prices.keeps(candidate) && self.grew;
+        if kind != Kind::Anew && !first_of_many && !grew {
             let dearest_ns = self.prices.anew_ns(candidate, expected);
             self.tally.cold = entered;
             let waited_ns = self.tally.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns);

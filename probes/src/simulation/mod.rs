@@ -24,6 +24,7 @@ pub(crate) use outcome::{Frame, Outcome, Part};
 pub(crate) use trace::{Format as TraceFormat, write_trace};
 
 use oracle::Oracle;
+pub(crate) use oracle::WINDOW;
 use outcome::{Taken, Told};
 
 #[cfg(test)]
@@ -261,6 +262,7 @@ impl Stage {
             slowdown: course.co_runner.map(slowdown),
             fixed: self.contestants.into_iter().map(|c| c.id).collect(),
             oracle: Oracle::new(&frames),
+            windows: Oracle::of_windows(&frames),
             frames,
             repeats: self.repeats,
             told: self.told,

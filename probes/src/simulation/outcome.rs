@@ -94,6 +94,8 @@ pub(crate) struct Outcome {
     pub(crate) fixed: Vec<AlgorithmId>,
     pub(crate) frames: Vec<Frame>,
     pub(crate) oracle: Oracle,
+    /// One that runs an algorithm for a window of frames at least.
+    pub(crate) windows: Oracle,
     /// What ran at every frame, for each repeat that all frames have; one that Ctrl-C cut short is left out.
     pub(crate) repeats: Vec<Vec<Taken>>,
     /// What the adaptive module told of every frame of the last of these.
@@ -114,6 +116,8 @@ pub(crate) struct Part {
     pub(crate) frames: Range<usize>,
     /// Time of the adaptive module over that of the oracle, less one.
     pub(crate) regret: f64,
+    /// The same against the best algorithm of every window.
+    pub(crate) window_regret: f64,
     /// The same against the least time of every frame.
     pub(crate) optimistic_regret: f64,
     /// The regret of each repeat by itself, from single samples.
@@ -224,6 +228,7 @@ impl Outcome {
         let worst = unexplored.filter(|((own, _), _)| own.is_finite()).map(|((own, oracle), at)| (own / oracle, at));
         Part {
             regret: over(oracle_ns.iter().sum()),
+            window_regret: over(self.windows.ns[range.clone()].iter().sum()),
             optimistic_regret: over(frames.iter().map(|f| optimistic(&f.fixed)).sum()),
             of_repeats: (0..self.repeats.len()).filter_map(|repeat| self.regret_of(range.clone(), repeat)).collect(),
             switches: self.switches().iter().filter(|at| range.contains(at)).count(),
@@ -288,6 +293,7 @@ pub(crate) mod tests {
         Outcome {
             fixed: fixed.iter().map(|id| id.parse().unwrap()).collect(),
             oracle: Oracle::new(&frames_of),
+            windows: Oracle::of_windows(&frames_of),
             frames: frames_of,
             repeats: vec![frames.iter().map(|f| f.3).collect()],
             told: vec![told; frames.len()],

@@ -100,6 +100,8 @@ pub(super) struct Figures {
     pub(super) regret: f64,
     /// Over the repeats; null with fewer than four.
     pub(super) regret_quartiles: Option<[f64; 2]>,
+    /// Against the best algorithm of every 32 frames together.
+    pub(super) window_regret: f64,
     /// Against the least times.
     pub(super) optimistic_regret: f64,
     /// In the last repeat, frames that explore aside.
@@ -228,6 +230,7 @@ impl Figures {
         Self {
             regret: part.regret,
             regret_quartiles: part.quartiles(),
+            window_regret: part.window_regret,
             optimistic_regret: part.optimistic_regret,
             switches: part.switches,
             explored: part.explored,

@@ -3,6 +3,7 @@
 use super::answer::{Answer, Figures, LeftOut, Oracle, Slowed};
 use super::fields::Origin;
 use crate::args::{Run, Scene};
+use crate::simulation::WINDOW;
 use crate::table::{columns, grouped};
 use sapwise::measure::statistics::quantile;
 use std::path::Path;
@@ -85,12 +86,20 @@ fn totals(answer: &Answer<'_>) -> String {
 
 /// The figures of all frames and of each part.
 fn figures(answer: &Answer<'_>) -> String {
-    let head = ["frames", "regret", "middle half of repeats", "switches", "explored", "worst frame"];
+    let head = ["frames", "regret", "middle half of repeats", "of windows", "switches", "explored", "worst frame"];
     let row = |frames: String, f: &Figures| {
         let within = f.regret_quartiles.map_or("-".to_owned(), |[a, b]| format!("{} to {}", percent(a), percent(b)));
         let worst = f.worst_frame.zip(f.worst_frame_at);
         let worst = worst.map_or("-".to_owned(), |(ratio, at)| format!("{ratio:.2} times the oracle's, frame {at}"));
-        vec![frames, percent(f.regret), within, f.switches.to_string(), f.explored.to_string(), worst]
+        vec![
+            frames,
+            percent(f.regret),
+            within,
+            percent(f.window_regret),
+            f.switches.to_string(),
+            f.explored.to_string(),
+            worst,
+        ]
     };
     let mut rows = vec![head.map(str::to_owned).to_vec(), row("all".to_owned(), &answer.figures)];
     rows.extend(answer.parts.iter().map(|p| row(format!("{} to {}", p.from_frame, p.to_frame), &p.figures)));
@@ -110,6 +119,10 @@ fn comparisons(answer: &Answer<'_>) -> String {
         };
         lines.push(format!("{over} {}, the best where there are most objects ({objects}).", largest.algorithm));
     }
+    lines.push(format!(
+        "Of windows: against the best algorithm of every {WINDOW} frames together. One that keeps work makes it anew now and then; the oracle of \
+         every frame takes\nits cheap frames and leaves that one to another, which nobody can."
+    ));
     lines.push(match answer.oracle {
         Oracle::Halves => format!(
             "The oracle's algorithms are chosen by one half of the repeats and timed in the other. Against the least time of every \
