@@ -32,7 +32,7 @@ run() {
     shift
     echo "== $name: run $*"
     "$sapwise" run "$@" --no-gpus --plot "$folder/$name.svg" --trace "$folder/$name.csv" >"$folder/$name.txt"
-    grep -A 12 '^frames' "$folder/$name.txt" | sed '/^$/,$d'
+    grep -A 6 '^frames' "$folder/$name.txt" | sed '/^$/,$d'
     grep -E 'of the time of|co-runner|Other programs' "$folder/$name.txt"
 }
 
@@ -47,6 +47,6 @@ for fields in measured predicted; do
 done
 run fragmentation-wrong fragmentation --frames 1200 --fields "$other" --after 300
 run clustered-wrong clustered --swing 50 --frames 1200 --fields "$other" --after 300
-run stream-wrong $stream --fields "$other" --after 300
+run stream-wrong $stream --fields "$other"
 run fragmentation-shared fragmentation --frames 1500 --fields "$report" --co-runner 600 --after 900
 run uniform-shared uniform --objects 5000 --frames 1200 --fields "$report" --co-runner 600 --after 900

@@ -1,8 +1,8 @@
 //! What the frames that were run tell about the cost of every algorithm.
 //!
 //! The natural logarithm of measured over predicted time is taken to be the sum of two parts. The *regime* is shared: a factor for each class
-//! of processor (a clock that throttles, fields of another machine), and for each number of threads or GPUs one beside that, and one on
-//! what a call costs (cores that moved apart, a core that is taken). The *own* part of an algorithm is a curve over the number of
+//! of processor (a clock that throttles, fields of another machine); beside that for each number of threads or GPUs one, and one on what
+//! a call costs (cores that moved apart, a core that is taken); and for all algorithms that keep the same from frame to frame one. The *own* part of an algorithm is a curve over the number of
 //! objects. A Kalman filter follows both: the regime with all its covariances, which takes a dozen numbers, the own parts each
 //! by itself. [`Posterior`](crate::Posterior) knows more and takes some 50 microseconds for an observation, longer than most frames.
 
@@ -17,14 +17,16 @@ const OCTAVES: f64 = 2.0;
 /// Standard deviations before anything was observed. Fields of another machine are off by a factor of several for all algorithms at once, and
 /// a core that is taken doubles the time of those that use it.
 const CLASS_LN: f64 = 1.5;
+const KEPT_LN: f64 = 0.5;
 const WIDTH_LN: f64 = 0.2;
 const CALL_LN: f64 = 0.7;
 /// The least of an own part: fields that were measured a minute ago are off by this in the next scene.
 const OWN_LN: f64 = 0.15;
 
-/// Frames after which what was observed counts for 1/e. In a hundred frames a class may change by 30 %, a width by 12 % and an own curve,
-/// which changes with the scene only, by 2 % (standard deviations).
-const CLASS_FRAMES: f64 = 2500.0;
+/// Frames after which what was observed counts for half. In a hundred frames a class may change by 15 %, what keeping saves by 25 %, a width
+/// by 7 % and an own curve by 2 % (standard deviations); a faster change shows in surprises.
+const CLASS_FRAMES: f64 = 10_000.0;
+const KEPT_FRAMES: f64 = 400.0;
 const WIDTH_FRAMES: f64 = 800.0;
 const OWN_FRAMES: f64 = 6000.0;
 
@@ -65,6 +67,8 @@ struct Algorithm {
     /// and behind it in the list on its calls.
     class: usize,
     width: Option<usize>,
+    /// The part that it shares with those that keep the same from frame to frame.
+    kept: Option<usize>,
     /// Variance of the own part before anything was observed.
     before: f64,
     own: [Own; KNOTS],
@@ -113,6 +117,10 @@ impl Place {
     }
 }
 
+/// Parts of the regime that count for one algorithm at most, and how the logarithm of its cost hangs on each.
+const PARTS: usize = 4;
+type Slopes = [(usize, f64); PARTS];
+
 /// Where an algorithm is looked at: the number of objects, and the share of its predicted cost that calls have.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View {
@@ -130,7 +138,8 @@ impl Own {
 }
 
 impl Learner {
-    pub(super) fn new(costs: &[AlgorithmCost]) -> Self {
+    /// `kept` as [`Policy::new`](super::policy::Policy::new) has it.
+    pub(super) fn new(costs: &[AlgorithmCost], kept: &[Option<usize>]) -> Self {
         let mut parts: Vec<Part> = Vec::new();
         let mut place = |part: Part| {
             parts.iter().position(|p| *p == part).unwrap_or_else(|| {
@@ -139,7 +148,7 @@ impl Learner {
             })
         };
         let mut widths: Vec<(BackendClass, u32)> = Vec::new();
-        let algorithms = costs.iter().map(|cost| {
+        let algorithms = costs.iter().zip(kept).map(|(cost, kept)| {
             let backend = cost.algorithm.backend();
             let width_of = (backend.class(), backend.width());
             if !widths.contains(&width_of) {
@@ -154,6 +163,7 @@ impl Learner {
             let before = cost.spread_ln.max(OWN_LN).powi(2);
             Algorithm {
                 class: place(Part::Class(backend.class())),
+                kept: kept.map(|at| place(Part::Kept(at))),
                 width,
                 before,
                 own: [Own { mean: 0.0, variance: before, at: 0 }; KNOTS],
@@ -188,14 +198,15 @@ impl Learner {
     }
 
     /// What the regime adds to the logarithm of an algorithm's cost, and the parts that do with their slopes.
-    fn regime(&self, algorithm: &Algorithm, view: View) -> (f64, [(usize, f64); 3]) {
-        let class = self.mean[algorithm.class];
-        let Some(width) = algorithm.width else { return (class, [(algorithm.class, 1.0), (0, 0.0), (0, 0.0)]) };
+    fn regime(&self, algorithm: &Algorithm, view: View) -> (f64, Slopes) {
+        let kept = algorithm.kept.map_or((0, 0.0), |k| (k, 1.0));
+        let shared = self.mean[algorithm.class] + kept.1 * self.mean[kept.0];
+        let Some(width) = algorithm.width else { return (shared, [(algorithm.class, 1.0), kept, (0, 0.0), (0, 0.0)]) };
         // A factor on the calls alone. What it adds to the whole is not linear in its logarithm; its slope is that of the present one.
         let calls = view.calls * self.mean[width + 1].exp();
         let whole = 1.0 - view.calls + calls;
-        let slopes = [(algorithm.class, 1.0), (width, 1.0), (width + 1, calls / whole)];
-        (class + self.mean[width] + whole.ln(), slopes)
+        let slopes = [(algorithm.class, 1.0), kept, (width, 1.0), (width + 1, calls / whole)];
+        (shared + self.mean[width] + whole.ln(), slopes)
     }
 
     /// Mean time that a frame of an algorithm waits for other programs, in nanoseconds. A helper whose core another program has waits
@@ -227,8 +238,8 @@ impl Learner {
 
     /// Variance of the logarithm of the ratio of two costs.
     pub(super) fn variance_of_ratio(&self, (a, of_a): (usize, View), (b, of_b): (usize, View)) -> f64 {
-        let mut weights = [(0, 0.0); 6];
-        let (first, second) = weights.split_at_mut(3);
+        let mut weights = [(0, 0.0); 2 * PARTS];
+        let (first, second) = weights.split_at_mut(PARTS);
         first.copy_from_slice(&self.regime(&self.algorithms[a], of_a).1);
         second.copy_from_slice(&self.regime(&self.algorithms[b], of_b).1);
         second.iter_mut().for_each(|(_, weight)| *weight = -*weight);
@@ -363,6 +374,8 @@ impl Learner {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Part {
     Class(BackendClass),
+    /// Of those that keep the same: a scene may spare them more or less of their work than those that the fields were made from.
+    Kept(usize),
     /// Of a number of threads or GPUs: on all of the cost, and on its calls.
     Width(BackendClass, u32),
     Calls(BackendClass, u32),
@@ -372,6 +385,7 @@ impl Part {
     fn deviation(self) -> f64 {
         match self {
             Self::Class(_) => CLASS_LN,
+            Self::Kept(_) => KEPT_LN,
             Self::Width(..) => WIDTH_LN,
             Self::Calls(..) => CALL_LN,
         }
@@ -380,6 +394,7 @@ impl Part {
     fn lasts(self) -> f64 {
         match self {
             Self::Class(_) => CLASS_FRAMES,
+            Self::Kept(_) => KEPT_FRAMES,
             Self::Width(..) | Self::Calls(..) => WIDTH_FRAMES,
         }
     }

@@ -17,9 +17,6 @@ const EXPLORE_EVERY: u64 = 60;
 /// What is found out is taken to be of use for so many frames: five seconds of a game.
 const HORIZON: f64 = 300.0;
 
-/// A scene has grown when it has so many times the objects of the decision before.
-const GREW: f64 = 1.002;
-
 /// Chooses, and learns from what the choices cost.
 #[derive(Debug, Clone)]
 pub(super) struct Policy {
@@ -42,9 +39,6 @@ pub(super) struct Policy {
     expected: Vec<Expected>,
     predicted: Vec<Predicted>,
     log2_objects: f64,
-    /// Objects at the decision before, and whether there are more now.
-    objects: u32,
-    grew: bool,
     tally: Tally,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
@@ -57,7 +51,7 @@ impl Policy {
     /// number for all that share it.
     pub(super) fn new(fields: Fields, kept: &[Option<usize>], usable: Vec<bool>) -> Self {
         let count = usable.len();
-        let learner = (!fields.costs.is_empty()).then(|| Learner::new(&fields.costs));
+        let learner = (!fields.costs.is_empty()).then(|| Learner::new(&fields.costs, kept));
         let ids = fields.algorithms();
         let steps = fields.steps.iter().filter_map(|s| ids.iter().position(|id| **id == s.algorithm)).collect();
         Self {
@@ -72,8 +66,6 @@ impl Policy {
             expected: vec![Expected { built_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
             predicted: vec![Predicted::default(); count],
             log2_objects: 0.0,
-            objects: 0,
-            grew: false,
             tally: Tally::default(),
             saved_ns: vec![0.0; count],
             frame: 0,
@@ -143,8 +135,6 @@ impl Policy {
     /// Fills in what every candidate is expected to cost.
     fn expect(&mut self, load: &Load) {
         let counts = Counts::new(load);
-        self.grew = f64::from(load.objects) > GREW * f64::from(self.objects);
-        self.objects = load.objects;
         self.log2_objects = counts.log2_objects();
         let place = Place::of(self.log2_objects);
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
@@ -230,9 +220,7 @@ impl Policy {
             self.tally = self.tally.next(candidate);
         }
         let first_of_many = kind == Kind::First && self.settled == Some(candidate);
-        // Boxes that came have to be looked up in what is kept: such a frame tells nothing of the next.
-        let grew = self.prices.keeps(candidate) && self.grew;
-        if kind != Kind::Anew && !first_of_many && !grew {
+        if kind != Kind::Anew && !first_of_many {
             let dearest_ns = self.prices.anew_ns(candidate, expected);
             self.tally.cold = entered;
             let waited_ns = self.tally.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns);

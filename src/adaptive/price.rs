@@ -81,11 +81,6 @@ impl Prices {
         Self { prices: kept.iter().map(price).collect(), places: vec![Place { last: None, anew: ANEW }; places] }
     }
 
-    /// Whether a candidate keeps something from frame to frame.
-    pub(super) fn keeps(&self, candidate: usize) -> bool {
-        self.prices[candidate].kept.is_some()
-    }
-
     /// What a frame of a candidate takes in the mean, those included that are made anew.
     pub(super) fn mean_ns(&self, candidate: usize, frame: u64, expected: Expected) -> f64 {
         let share = self.prices[candidate].kept.map_or(0.0, |place| self.places[place].anew_at(frame));
