@@ -226,7 +226,9 @@ impl Adaptive {
 
     /// Whether the next frame needs a decision of its own.
     fn is_due(&self, boxes: &[Aabb]) -> bool {
-        self.choice.is_none() || self.pace.is_due(objects(boxes)) || self.glance.is_watching() || self.policy.is_exploring()
+        // By the number of objects alone a decision costs next to nothing, and is to depend on no clock.
+        let anew = self.choice.is_none() || self.policy.is_by_count();
+        anew || self.pace.is_due(objects(boxes)) || self.glance.is_watching() || self.policy.is_exploring()
     }
 
     /// Gets the runner-up ready when its turn may come soon.

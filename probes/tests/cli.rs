@@ -176,12 +176,12 @@ fn a_full_disk_is_a_failure_and_a_closed_pipe_is_none() {
 }
 
 #[test]
-fn schema_writes_three_files() {
+fn schema_writes_a_file_for_every_kind() {
     let folder = tempfile::tempdir().unwrap();
     let told = success(sapwise().args(["schema", "--json", "--out"]).arg(folder.path().join("new")));
     let told: serde_json::Value = serde_json::from_str(&told).unwrap();
-    assert_eq!(told["files"].as_array().unwrap().len(), 3);
-    for name in ["report-1", "model-1", "fields-1"] {
+    assert_eq!(told["files"].as_array().unwrap().len(), 4);
+    for name in ["report-1", "model-1", "fields-1", "cache-1"] {
         let text = fs::read_to_string(folder.path().join("new").join(format!("{name}.schema.json"))).unwrap();
         let schema: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert!(schema["properties"]["schema"].is_object() || schema["$defs"].is_object(), "{text}");

@@ -245,7 +245,7 @@ fn a_driver_that_crashes_costs_the_gpus_and_a_remark() {
     assert!(predicted["warnings"].to_string().contains("ended by signal 6"), "{predicted}");
     // No driver is loaded, so nothing crashes and nothing is said.
     let without = report(with_it().args(TINY).arg("--no-gpus"));
-    assert_eq!(without.remarks, without.hardware.disturbed());
+    assert!(!without.remarks.iter().any(|r| r.contains("signal") || r.contains("GPU")), "{:?}", without.remarks);
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
     let complaint = failure(with_it().arg("pairs").arg(&boxes).args(["--algorithm", "strips@gpu0"]), 2);
     assert!(complaint.contains("ended by signal 6"), "{complaint}");

@@ -106,10 +106,15 @@ impl Policy {
         }
     }
 
+    /// Whether the number of objects alone decides.
+    pub(super) fn is_by_count(&self) -> bool {
+        self.fields.costs.is_empty()
+    }
+
     /// The candidate that is to run the next frame, `frames` after the last one that was decided. `None` when none can run.
     pub(super) fn choose(&mut self, load: &Load, frames: u32) -> Option<Choice> {
         self.frame += u64::from(frames);
-        if self.fields.costs.is_empty() {
+        if self.is_by_count() {
             return self.choose_by_count(load.objects);
         }
         self.expect(load);
