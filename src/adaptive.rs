@@ -9,13 +9,14 @@ mod learner;
 #[cfg(feature = "this-machine")]
 mod options;
 mod pace;
+mod place;
 mod policy;
 mod price;
 mod tally;
 #[cfg(feature = "this-machine")]
 mod this_machine;
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step, Term};
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step};
 use candidates::{Candidate, Instance, Made};
 use decision::Choice;
 use glance::Glance;
@@ -50,6 +51,8 @@ pub struct Adaptive {
     choice: Option<Choice>,
     /// What the frame of `choice` took, where it was timed.
     measured_ns: Option<f64>,
+    /// The most objects that were to be prepared for.
+    prepared: usize,
     /// [`decide`](Self::decide) was called for a frame of so many boxes that has not run yet.
     decided: Option<usize>,
     /// How it came to its fields.
@@ -87,6 +90,7 @@ impl Adaptive {
             pace: Pace::default(),
             choice: None,
             measured_ns: None,
+            prepared: 0,
             decided: None,
             #[cfg(feature = "this-machine")]
             start: this_machine::Start::default(),
@@ -123,8 +127,9 @@ impl Adaptive {
         self.policy.fields()
     }
 
-    /// The fields as they are known now: corrected by what was learned, with the slice of scenes like the present one. Those that it began
-    /// with where nothing was learned.
+    /// The fields corrected by what was learned of the machine and of each algorithm, with the slice of scenes like the present one. What
+    /// passes is left out: another program on a core, cores that moved apart, how much this scene spares algorithms that keep work. Those
+    /// that it began with where nothing was learned.
     #[must_use]
     pub fn learned(&self) -> Fields {
         let fields = self.policy.fields();
@@ -134,18 +139,14 @@ impl Adaptive {
             let before = std::mem::take(&mut cost.curve.correction);
             let uncorrected = crate::CostCurve { correction: before, ..crate::CostCurve::default() };
             let mut octaves: Vec<f64> = uncorrected.correction.iter().map(|k| k.log2_objects).collect();
-            octaves.extend(learner.octaves());
+            octaves.extend(place::octaves());
             octaves.sort_by(f64::total_cmp);
             octaves.dedup();
             let knot = |log2_objects: f64| Knot {
                 log2_objects,
-                ln_factor: (uncorrected.ln_correction(log2_objects) + learner.correction_at(k, log2_objects))
+                ln_factor: (uncorrected.ln_correction(log2_objects) + learner.lasting_ln(k, log2_objects))
                     .clamp(-50.0, 50.0),
             };
-            let factor = learner.factor_on_calls(k);
-            for term in cost.curve.terms.iter_mut().chain(&mut cost.curve.otherwise).filter(|t| t.term == Term::Call) {
-                term.unit_ns *= factor;
-            }
             cost.curve.correction = octaves.into_iter().map(knot).collect();
             cost.spread_ln = learner.spread_ln(k);
         }
@@ -166,7 +167,8 @@ impl Adaptive {
     }
 
     /// Makes every algorithm anew from this registry: one that was lost and is back, or all of them on a pool of another size. What was
-    /// learned stays; what algorithms kept from frame to frame is gone.
+    /// learned stays, unless algorithms that keep work came or went; what they kept from frame to frame is gone. Fields that are still
+    /// awaited from the background bring algorithms of the registry that they were asked with.
     ///
     /// # Errors
     /// As [`new`](Self::new); the algorithms of before stay then.
@@ -175,12 +177,12 @@ impl Adaptive {
         if let (true, Some(error)) = (instances.is_empty(), failure) {
             return Err(error);
         }
-        for (k, candidate) in candidates.iter().enumerate() {
-            self.policy.set_usable(k, candidate.instance.is_some());
-        }
-        (self.candidates, self.instances) = (candidates, instances);
+        let made = Made { candidates, instances, failure: None };
+        self.policy.remade(&made.kept(), &made.usable());
+        (self.candidates, self.instances) = (made.candidates, made.instances);
         self.decided = None;
         self.choice = None;
+        self.prepare(self.prepared);
         Ok(())
     }
 
@@ -192,6 +194,7 @@ impl Adaptive {
         (self.candidates, self.instances) = (made.candidates, made.instances);
         self.decided = None;
         self.choice = None;
+        self.prepare(self.prepared);
     }
 
     /// What was decided for the last frame; `None` before the first.
@@ -250,12 +253,15 @@ impl BroadPhase for Adaptive {
         if !decided {
             self.take_over();
         }
-        let started = (decided || self.is_due(boxes)).then(Instant::now);
+        let mut started = (decided || self.is_due(boxes)).then(Instant::now);
+        self.measured_ns = None;
         if started.is_some() && !decided {
             self.choose(boxes);
         }
         loop {
             let Some(choice) = self.choice else {
+                // What the last one left is no answer.
+                pairs.clear();
                 let reason = "every algorithm of the fields has failed".to_owned();
                 return Err(Error::Unavailable { algorithm: self.candidates[0].id.clone(), reason });
             };
@@ -276,7 +282,12 @@ impl BroadPhase for Adaptive {
                     self.measured_ns = Some(ns);
                     self.glance.ran(boxes, pairs.overlapping(), ns);
                     self.policy.ran(choice.chosen, ns);
-                    self.pace.took(started.elapsed().as_nanos() as f64 - ns, ns);
+                    let decision_ns = (!decided).then(|| started.elapsed().as_nanos() as f64 - ns);
+                    self.pace.took(decision_ns, ns);
+                    if !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis) {
+                        // What began in this frame is looked at once more before it may rest.
+                        self.pace.wake();
+                    }
                     self.warm_runner_up(boxes.len());
                     return Ok(());
                 }
@@ -284,10 +295,14 @@ impl BroadPhase for Adaptive {
                 Err(Error::Unavailable { .. }) => {
                     self.candidates[choice.chosen].instance = None;
                     self.policy.set_usable(choice.chosen, false);
+                    // The one that runs instead is told apart from what ran before.
+                    started.get_or_insert_with(Instant::now);
                     let next = self.policy.choose(&self.glance.load(), 0);
                     self.choice = next.map(|c| Choice { reason: Reason::FellBack, ..c });
                 }
                 Err(error) => {
+                    // A frame that was to explore has told nothing, and the next one is to run what is cheapest.
+                    self.pace.wake();
                     self.glance.lost();
                     return Err(error);
                 }
@@ -296,6 +311,7 @@ impl BroadPhase for Adaptive {
     }
 
     fn prepare(&mut self, objects: usize) {
+        self.prepared = self.prepared.max(objects);
         for instance in &mut self.instances {
             instance.algorithm.prepare(objects);
             instance.ready = instance.ready.max(objects);
@@ -314,9 +330,7 @@ impl fmt::Debug for Adaptive {
 }
 
 fn policy(fields: Fields, made: &Made) -> Policy {
-    let kept = |c: &Candidate| c.instance.filter(|&k| made.instances[k].algorithm.keeps_work());
-    let kept: Vec<Option<usize>> = made.candidates.iter().map(kept).collect();
-    Policy::new(fields, &kept, made.candidates.iter().map(|c| c.instance.is_some()).collect())
+    Policy::new(fields, &made.kept(), made.usable())
 }
 
 fn objects(boxes: &[Aabb]) -> u32 {

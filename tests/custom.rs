@@ -83,7 +83,7 @@ fn one_whose_cost_was_far_too_low_is_left() {
     let ran: Vec<String> = (0..300).map(|_| run(&mut adaptive, &boxes).0).collect();
     assert_eq!(ran[0], "slow@cpu1");
     let slow = ran.iter().filter(|id| *id == "slow@cpu1").count();
-    assert!(ran[299] == "quick@cpu1" && slow < 30, "{slow} of 300 frames by the slow one, the last by {}", ran[299]);
+    assert!(ran[299] == "quick@cpu1" && slow < 150, "{slow} of 300 frames by the slow one, the last by {}", ran[299]);
     // What was learned is fields like any others.
     let learned = adaptive.learned();
     let mut again = Adaptive::new(learned, &registry).unwrap();

@@ -56,6 +56,37 @@ fn wander(boxes: &mut [Aabb], step: f32, random: &mut Random) {
 }
 
 #[test]
+fn no_kept_pair_is_lost_on_the_way_from_many_threads_to_one() {
+    let registry = Registry::with_cores(8);
+    let ids = ["verlet@cpu1", "verlet@cpu8"].map(|id| id.parse().unwrap());
+    let Some(Ok(mut verlet)) = registry.create_for(&ids.each_ref()) else {
+        // Built without threads.
+        return;
+    };
+    let mut random = Random(0xdea1);
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    // So many pairs a box as the lists of eight threads have room for and that of one has not.
+    let mut boxes = random.cubes(400, [11.0; 3], 0.5);
+    let middle = boxes[0].min;
+    for frame in 0..400 {
+        assert!(verlet.set_threads(if frame % 3 == 2 { 1 } else { 8 }));
+        for (k, b) in boxes.iter_mut().enumerate() {
+            // Towards each other until they are crowded, and a few that leave their grown box in every frame.
+            let pull = if frame < 330 { 0.006 } else { 0.0 };
+            for (a, middle) in middle.into_iter().enumerate() {
+                let by = (middle - b.min[a]) * pull + if k % 40 == frame % 40 { 0.2 } else { 0.0 };
+                b.min[a] += by;
+                b.max[a] += by;
+            }
+        }
+        verlet.find_pairs(&boxes, &mut pairs).unwrap();
+        let expected = naive(&boxes);
+        assert!(pairs.as_slice() == expected, "frame {frame}: {} pairs, not {}", pairs.len(), expected.len());
+    }
+    assert!(pairs.len() > 40 * boxes.len(), "{} pairs", pairs.len());
+}
+
+#[test]
 fn whatever_happens_between_two_frames_no_pair_is_lost_or_doubled() {
     let mut algorithms = every_algorithm();
     let mut random = Random(0x5eed);

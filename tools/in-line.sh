@@ -25,7 +25,8 @@ if [ -z "$other" ]; then
     [ -s "$other" ] || "$sapwise" simulate --out "$folder/other" >/dev/null
 fi
 
-stream=tests/fixtures/fragments.npy
+stream=$folder/rapier3d.npy
+[ -s "$stream" ] || cargo run --quiet --release -p sapwise-example-rapier3d -- --frames 900 --bodies 2000 --quiet --record "$stream"
 # One name, then the scene and what differs.
 run() {
     local name=$1
@@ -43,10 +44,10 @@ for fields in measured predicted; do
     run "fragmentation-$fields" fragmentation "${given[@]}"
     run "fragmentation-2000-$fields" fragmentation --objects 2000 "${given[@]}"
     run "clustered-$fields" "${clustered[@]}" "${given[@]}"
-    run "stream-$fields" $stream "${given[@]}"
+    run "stream-$fields" "$stream" "${given[@]}"
 done
 run fragmentation-wrong fragmentation --frames 1200 --fields "$other" --after 300
 run clustered-wrong clustered --swing 50 --frames 1200 --fields "$other" --after 300
-run stream-wrong $stream --fields "$other"
+run stream-wrong "$stream" --fields "$other" --after 300
 run fragmentation-shared fragmentation --frames 1500 --fields "$report" --co-runner 600 --after 900
 run uniform-shared uniform --objects 5000 --frames 1200 --fields "$report" --co-runner 600 --after 900

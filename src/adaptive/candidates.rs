@@ -49,6 +49,17 @@ pub(super) struct Made {
 }
 
 impl Made {
+    /// Of each candidate where it finds what the frame before left: one number for all that share it. `None` where nothing is kept.
+    pub(super) fn kept(&self) -> Vec<Option<usize>> {
+        let keeps = |c: &Candidate| c.instance.filter(|&k| self.instances[k].algorithm.keeps_work());
+        self.candidates.iter().map(keeps).collect()
+    }
+
+    /// Which candidates can run.
+    pub(super) fn usable(&self) -> Vec<bool> {
+        self.candidates.iter().map(|c| c.instance.is_some()).collect()
+    }
+
     pub(super) fn of(fields: &Fields, registry: &Registry) -> Self {
         let ids = fields.algorithms();
         let mut made = Self {
@@ -68,12 +79,14 @@ impl Made {
                 made.failure = Some(why);
                 continue;
             }
-            // Those that differ from it in their number of threads only.
+            // Those that differ from it in their number of threads only and can run here.
+            let runs = |id: &AlgorithmId| !registry.entries().iter().any(|e| e.id == *id && e.unavailable.is_some());
             let kin = |other: &&AlgorithmId| {
-                other.method() == id.method() && other.backend().class() == id.backend().class() && stale(other).is_ok()
+                let alike = other.method() == id.method() && other.backend().class() == id.backend().class();
+                alike && runs(other) && stale(other).is_ok()
             };
             let family: Vec<&AlgorithmId> = ids.iter().copied().filter(kin).collect();
-            if let Some(Ok(algorithm)) = registry.create_for(&family) {
+            if let Some(Ok(algorithm)) = registry.create_for(&family).filter(|_| family.contains(&id)) {
                 for candidate in made.candidates.iter_mut().filter(|c| family.contains(&&c.id)) {
                     candidate.instance = Some(made.instances.len());
                 }

@@ -1,22 +1,19 @@
 //! What the frames that were run tell about the cost of every algorithm.
 //!
-//! The natural logarithm of measured over predicted time is taken to be the sum of two parts. The *regime* is shared: a factor for each class
-//! of processor (a clock that throttles, fields of another machine); beside that for each number of threads or GPUs one, and one on what
-//! a call costs (cores that moved apart, a core that is taken); and for all algorithms that keep the same from frame to frame one. The *own* part of an algorithm is a curve over the number of
-//! objects. A Kalman filter follows both: the regime with all its covariances, which takes a dozen numbers, the own parts each
-//! by itself. [`Posterior`](crate::Posterior) knows more and takes some 50 microseconds for an observation, longer than most frames.
+//! The natural logarithm of measured over predicted time is taken to be the sum of two parts. The *regime* is shared: a factor for each
+//! class of processor (a clock that throttles, fields of another machine); beside that for each number of threads or GPUs one, and one
+//! on what a call costs (cores that moved apart, a core that is taken); and for all algorithms that keep the same from frame to frame
+//! one. The *own* part of an algorithm is a curve over the number of objects. A Kalman filter follows both: the regime with all its
+//! covariances, which takes a dozen numbers, the own parts each by itself. [`Posterior`](crate::Posterior) knows more and takes some 50
+//! microseconds for an observation, longer than most frames.
 
+use super::place::{KNOTS, Place, View};
 use super::tally::Tally;
 use crate::{AlgorithmCost, BackendClass};
 
-/// Knots of an own curve: 2^3 to 2^21 objects, every second octave, linear in between and constant beyond.
-const KNOTS: usize = 10;
-const FIRST_OCTAVE: f64 = 3.0;
-const OCTAVES: f64 = 2.0;
-
 /// Standard deviations before anything was observed. Fields of another machine are off by a factor of several for all algorithms at once, and
 /// a core that is taken doubles the time of those that use it.
-const CLASS_LN: f64 = 1.5;
+const CLASS_LN: f64 = 0.8;
 const KEPT_LN: f64 = 0.5;
 const WIDTH_LN: f64 = 0.2;
 const CALL_LN: f64 = 0.7;
@@ -97,36 +94,9 @@ pub(super) struct Learner {
     observed: u64,
 }
 
-/// A number of objects among the knots.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
-    knot: usize,
-    share: f64,
-}
-
-impl Place {
-    pub(super) fn of(log2_objects: f64) -> Self {
-        let at = ((log2_objects - FIRST_OCTAVE) / OCTAVES).clamp(0.0, (KNOTS - 1) as f64);
-        let knot = (at as usize).min(KNOTS - 2);
-        Self { knot, share: at - knot as f64 }
-    }
-
-    /// The knots on both sides, with their weights.
-    fn knots(self) -> [(usize, f64); 2] {
-        [(self.knot, 1.0 - self.share), (self.knot + 1, self.share)]
-    }
-}
-
 /// Parts of the regime that count for one algorithm at most, and how the logarithm of its cost hangs on each.
 const PARTS: usize = 4;
 type Slopes = [(usize, f64); PARTS];
-
-/// Where an algorithm is looked at: the number of objects, and the share of its predicted cost that calls have.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct View {
-    pub(super) place: Place,
-    pub(super) calls: f64,
-}
 
 impl Own {
     /// The variance goes back towards what it was before, as what was observed ages.
@@ -217,9 +187,14 @@ impl Learner {
         ns / (1.0 + frame.saturating_sub(at) as f64 / WIDTH_FRAMES)
     }
 
+    /// Whether an algorithm was observed often enough to tell a frame that waited from one that was expected wrongly.
+    pub(super) fn knows(&self, algorithm: usize) -> bool {
+        self.algorithms[algorithm].tallies >= KNOWN
+    }
+
     /// Takes in that a frame took so many nanoseconds more than any of its kind is expected to, or none.
     pub(super) fn waited(&mut self, algorithm: usize, ns: f64, frame: u64) {
-        if self.algorithms[algorithm].tallies >= KNOWN {
+        if self.knows(algorithm) {
             let before = self.wait_ns(algorithm, frame);
             self.waits[self.algorithms[algorithm].wait] = (before + WAIT_SHARE * (ns - before), frame);
         }
@@ -296,7 +271,7 @@ impl Learner {
         a.noise = a.noise.max(LEAST_NOISE_LN.powi(2));
         if a.run.unsigned_abs() >= NO_ACCIDENT {
             a.run = 0;
-            return self.doubt_all(algorithm, place);
+            return self.doubt_all(algorithm, place, surprise);
         }
         let gain = error / variance;
         for (m, w) in mean.iter_mut().zip(&*with) {
@@ -334,8 +309,9 @@ impl Learner {
         }
     }
 
-    /// What was observed holds no longer: the next frames count as if they were the first.
-    fn doubt_all(&mut self, algorithm: usize, place: Place) {
+    /// What was observed holds no longer: the next frames count as if they were the first. And what the regime has not explained until now is
+    /// more likely the algorithm's own.
+    fn doubt_all(&mut self, algorithm: usize, place: Place, surprise: f64) {
         let size = self.mean.len();
         self.covariance.fill(0.0);
         for (k, &before) in self.before.iter().enumerate() {
@@ -343,23 +319,16 @@ impl Learner {
         }
         let a = &mut self.algorithms[algorithm];
         for (k, _) in place.knots() {
-            a.own[k].variance = a.before;
+            a.own[k].variance = a.before.max(surprise * surprise);
         }
     }
 
-    /// Logarithms of the numbers of objects between which corrections are linear.
-    pub(super) fn octaves(&self) -> impl Iterator<Item = f64> {
-        (0..KNOTS).map(|k| FIRST_OCTAVE + OCTAVES * k as f64)
-    }
-
-    /// As [`correction_ln`](Self::correction_ln), without the factor on calls, at a number of objects.
-    pub(super) fn correction_at(&self, algorithm: usize, log2_objects: f64) -> f64 {
-        self.correction_ln(algorithm, View { place: Place::of(log2_objects), calls: 0.0 })
-    }
-
-    /// The factor on the calls of an algorithm.
-    pub(super) fn factor_on_calls(&self, algorithm: usize) -> f64 {
-        self.algorithms[algorithm].width.map_or(1.0, |width| self.mean[width + 1].exp())
+    /// Expected natural logarithm of real over predicted time at a number of objects, without what passes: only the class's part and
+    /// the algorithm's own.
+    pub(super) fn lasting_ln(&self, algorithm: usize, log2_objects: f64) -> f64 {
+        let a = &self.algorithms[algorithm];
+        let own: f64 = Place::of(log2_objects).knots().iter().map(|&(k, weight)| weight * a.own[k].mean).sum();
+        self.mean[a.class] + own
     }
 
     /// Standard deviation of the logarithm of a frame's time around the corrected cost: the root of the mean over the knots.

@@ -33,16 +33,23 @@ impl Pace {
         self.frame_ns
     }
 
-    /// Begins a decision; gives the frames since the last one, this one included.
+    /// Begins a decision; gives the frames that ran since the last one.
     pub(super) fn decide(&mut self, objects: u32) -> u32 {
         self.objects = objects;
-        std::mem::take(&mut self.frames).max(1)
+        std::mem::take(&mut self.frames)
     }
 
-    /// What the decision and its frame took.
-    pub(super) fn took(&mut self, decision_ns: f64, frame_ns: f64) {
-        // The least of late: a decision that was interrupted says nothing, and neither does one that had to wait for memory.
-        self.decision_ns = if self.decision_ns > 0.0 { decision_ns.min(1.05 * self.decision_ns) } else { decision_ns };
+    /// The next frame is to be decided on anew.
+    pub(super) fn wake(&mut self) {
+        self.rest = 0;
+    }
+
+    /// What the decision took, where that is known, and its frame.
+    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64) {
+        if let Some(ns) = decision_ns {
+            // The least of late: a decision that was interrupted says nothing, and neither does one that had to wait for memory.
+            self.decision_ns = if self.decision_ns > 0.0 { ns.min(1.05 * self.decision_ns) } else { ns };
+        }
         self.frame_ns = frame_ns;
         self.rest = (self.decision_ns / (SHARE * frame_ns.max(1.0))).min(f64::from(MOST_FRAMES)) as u32;
     }

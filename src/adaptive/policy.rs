@@ -1,7 +1,8 @@
 //! Which algorithm runs the next frame: the cheapest by all that is known, seldom another one to learn what it costs.
 
 use super::decision::{Choice, Reason};
-use super::learner::{Learner, Place, View};
+use super::learner::Learner;
+use super::place::{Place, View};
 use super::price::{Expected, Kind, Prices};
 use super::tally::{Predicted, Tally};
 use crate::cost::Counts;
@@ -111,8 +112,24 @@ impl Policy {
         self.fields.costs.is_empty()
     }
 
+    /// Other instances take the place of those of before.
+    pub(super) fn remade(&mut self, kept: &[Option<usize>], usable: &[bool]) {
+        (0..usable.len()).for_each(|k| self.set_usable(k, usable[k]));
+        // A frame with them is a first one, and begins a tally of its own.
+        self.ran = None;
+        self.tally = Tally::default();
+        if !self.prices.remade(kept) {
+            self.prices = Prices::new(kept);
+            self.learner = self.learner.is_some().then(|| Learner::new(&self.fields.costs, kept));
+        }
+    }
+
     /// The candidate that is to run the next frame, `frames` after the last one that was decided. `None` when none can run.
     pub(super) fn choose(&mut self, load: &Load, frames: u32) -> Option<Choice> {
+        if let Some(ran) = self.ran.filter(|_| frames > 0) {
+            // All frames since it was decided on.
+            self.prices.went_on(ran, self.frame + u64::from(frames) - 1);
+        }
         self.frame += u64::from(frames);
         if self.is_by_count() {
             return self.choose_by_count(load.objects);
@@ -226,7 +243,9 @@ impl Policy {
         }
         let first_of_many = kind == Kind::First && self.settled == Some(candidate);
         if kind != Kind::Anew && !first_of_many {
-            let dearest_ns = self.prices.anew_ns(candidate, expected);
+            // Until it is known what is dear, all of a frame counts.
+            let known = learner.knows(candidate);
+            let dearest_ns = if known { self.prices.anew_ns(candidate, expected) } else { f64::INFINITY };
             self.tally.cold = entered;
             let waited_ns = self.tally.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns);
             learner.waited(candidate, waited_ns, self.frame);

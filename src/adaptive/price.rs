@@ -81,6 +81,19 @@ impl Prices {
         Self { prices: kept.iter().map(price).collect(), places: vec![Place { last: None, anew: ANEW }; places] }
     }
 
+    /// Other instances keep, in the same places as those of before, nothing yet. False where the places are others.
+    pub(super) fn remade(&mut self, kept: &[Option<usize>]) -> bool {
+        self.places.iter_mut().for_each(|place| place.last = None);
+        self.prices.iter().map(|p| p.kept).eq(kept.iter().copied())
+    }
+
+    /// A candidate ran all frames up to this one.
+    pub(super) fn went_on(&mut self, candidate: usize, frame: u64) {
+        if let Some(place) = self.prices[candidate].kept.map(|k| &mut self.places[k]) {
+            place.last = place.last.max(Some(frame));
+        }
+    }
+
     /// What a frame of a candidate takes in the mean, those included that are made anew.
     pub(super) fn mean_ns(&self, candidate: usize, frame: u64, expected: Expected) -> f64 {
         let share = self.prices[candidate].kept.map_or(0.0, |place| self.places[place].anew_at(frame));

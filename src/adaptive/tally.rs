@@ -21,8 +21,13 @@ pub(super) struct Predicted {
 impl Predicted {
     /// Share of the calls.
     pub(super) fn calls(self) -> f64 {
-        self.calls_ns / self.ns
+        share(self.calls_ns, self.ns)
     }
+}
+
+/// Nothing of nothing is nothing.
+fn share(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { part / whole } else { 0.0 }
 }
 
 /// The sum over some frames in a row.
@@ -49,12 +54,13 @@ impl Tally {
 
     /// Share of calls in the predicted time.
     pub(super) fn calls(&self) -> f64 {
-        self.calls_ns / self.predicted_ns
+        share(self.calls_ns, self.predicted_ns)
     }
 
     /// Whether a frame belongs to it.
     pub(super) fn takes(&self, candidate: usize, log2_objects: f64) -> bool {
-        self.frames > 0 && self.candidate == candidate && (self.log2_objects() - log2_objects).abs() <= OCTAVES
+        let near = self.frames == 0 || (self.log2_objects() - log2_objects).abs() <= OCTAVES;
+        self.room > 0 && self.candidate == candidate && near
     }
 
     pub(super) fn is_full(&self) -> bool {
@@ -76,5 +82,39 @@ impl Tally {
     pub(super) fn next(&self, candidate: usize) -> Self {
         let room = if self.frames > 0 && candidate == self.candidate { (2 * self.room).min(MOST) } else { FEWEST };
         Self { candidate, room, ..Self::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tallies_grow_while_an_algorithm_runs_on_and_begin_small_with_another() {
+        let predicted = Predicted { ns: 100.0, calls_ns: 50.0 };
+        let mut tally = Tally::default();
+        let mut full = Vec::new();
+        for frame in 0..60 {
+            let candidate = usize::from(frame >= 50);
+            // Twice the objects from frame 55 on: another tally, with more room than the one before.
+            let log2_objects = if frame < 55 { 10.0 } else { 11.0 };
+            if !tally.takes(candidate, log2_objects) {
+                tally = tally.next(candidate);
+            }
+            tally.add(150.0, predicted, log2_objects, 200.0);
+            if tally.is_full() {
+                assert_eq!((tally.real_ns, tally.calls()), (150.0 * f64::from(tally.frames), 0.5));
+                full.push((frame, tally.frames));
+                tally = tally.next(candidate);
+            }
+        }
+        assert_eq!(full, [(1, 2), (5, 4), (13, 8), (29, 16), (45, 16), (51, 2)]);
+    }
+
+    #[test]
+    fn what_other_programs_took_is_given_back() {
+        let mut tally = Tally::default().next(0);
+        assert_eq!(tally.add(1000.0, Predicted { ns: 0.0, calls_ns: 0.0 }, 3.0, 100.0), 800.0);
+        assert_eq!((tally.real_ns, tally.calls()), (200.0, 0.0));
     }
 }

@@ -269,7 +269,8 @@ fn find(options: &Options, registry: &Registry, remarks: &mut Vec<String>) -> Op
     if let Some(entry) = entry.as_ref().filter(|e| sound && !matches!(e.read(), Ok(Some(_)))) {
         remarks.extend(entry.write(fields.clone()).err());
     }
-    Some((fields, Origin::Probed, entry))
+    // Nor may what is learned upon them take the place of a sound measurement.
+    Some((fields, Origin::Probed, entry.filter(|_| sound)))
 }
 
 /// Fields from hardware, without the figures and the GPUs that can't be: what needs one of them is left out. Also whether there was none.

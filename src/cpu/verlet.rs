@@ -131,19 +131,25 @@ fn most_kept(boxes: usize, tasks: usize) -> usize {
 impl Verlet {
     /// Deals the kept pairs of so many tasks out to those of the present width.
     fn deal(&mut self, before: usize) {
-        let Self { widths, width, kept, dealt, grown, .. } = self;
+        let Self { widths, width, kept, dealt, grown, motion, .. } = self;
         let tasks = widths[*width].tasks();
         dealt.clear();
-        kept[..before].iter().for_each(|list| dealt.append(list));
-        if !dealt.is_complete() {
-            // Without memory for them the next frame makes them anew, and tells if it has none either.
-            grown.forget();
+        // After a frame that forgot all the lists hold nothing of use.
+        if !grown.as_slice().is_empty() {
+            kept[..before].iter().for_each(|list| dealt.append(list));
         }
+        kept.iter_mut().for_each(Pairs::clear);
         let most = most_kept(grown.as_slice().len(), tasks);
         for (k, list) in kept[..tasks].iter_mut().enumerate() {
-            list.clear();
-            list.set_limit(Some(most));
-            dealt.as_slice()[part(dealt.len(), k, tasks)].iter().for_each(|&(i, j)| list.push(i, j));
+            let share = part(dealt.len(), k, tasks);
+            // Many narrow tasks may keep more than a wide one: none of that is to be lost.
+            list.set_limit(Some(most.max(share.len())));
+            dealt.as_slice()[share].iter().for_each(|&(i, j)| list.push(i, j));
+        }
+        if !(dealt.is_complete() && kept.iter().all(Pairs::is_complete)) {
+            // Without memory for them the next frame makes them anew, and tells if it has none either.
+            grown.forget();
+            motion.interrupt();
         }
     }
 

@@ -174,10 +174,15 @@ impl Workers {
 pub(crate) struct Outputs(Vec<Pairs>);
 
 impl Outputs {
-    /// As many lists as `workers` has tasks, each empty and under the caller's limit and filter.
-    fn ready(&mut self, workers: &Workers, pairs: &Pairs) {
-        self.0.resize_with(workers.tasks(), Pairs::new);
-        self.0.iter_mut().for_each(|list| list.begin_part(pairs));
+    /// As many lists as `workers` has tasks, each empty and under the caller's limit and filter. Those of more tasks stay for when there
+    /// are as many again.
+    fn ready(&mut self, workers: &Workers, pairs: &Pairs) -> &mut [Pairs] {
+        if self.0.len() < workers.tasks() {
+            self.0.resize_with(workers.tasks(), Pairs::new);
+        }
+        let lists = &mut self.0[..workers.tasks()];
+        lists.iter_mut().for_each(|list| list.begin_part(pairs));
+        lists
     }
 
     /// Lets `find` add to as many lists as `workers` has tasks, then joins them in order.
@@ -192,29 +197,29 @@ impl Outputs {
         if workers.threads() == 1 {
             return find(std::slice::from_mut(pairs));
         }
-        self.ready(workers, pairs);
-        let found = find(&mut self.0);
+        let lists = self.ready(workers, pairs);
+        let found = find(lists);
         if found.is_ok() {
-            self.join(workers, pairs);
+            Self::join(lists, workers, pairs);
         }
-        self.0.iter_mut().for_each(Pairs::end_part);
+        lists.iter_mut().for_each(Pairs::end_part);
         found
     }
 
     /// One phase where it pays: copies all lists behind one another.
-    fn join(&self, workers: &Workers, pairs: &mut Pairs) {
-        let total: usize = self.0.iter().map(Pairs::len).sum();
-        let complete = self.0.iter().all(Pairs::is_complete);
+    fn join(lists: &[Pairs], workers: &Workers, pairs: &mut Pairs) {
+        let total: usize = lists.iter().map(Pairs::len).sum();
+        let complete = lists.iter().all(Pairs::is_complete);
         if let Some(mut room) = pairs.room(total).filter(|_| complete && total >= SMALLEST_JOIN) {
-            let parts = self.0.iter().map(|list| {
+            let parts = lists.iter().map(|list| {
                 let (to, behind) = std::mem::take(&mut room).split_at_mut(list.len());
                 room = behind;
                 (to, list)
             });
             workers.each_of(parts, |(to, list)| to.copy_from_slice(list.as_slice()));
-            pairs.extend_by_parts(&self.0);
+            pairs.extend_by_parts(lists);
         } else {
-            self.0.iter().for_each(|list| pairs.append(list));
+            lists.iter().for_each(|list| pairs.append(list));
         }
     }
 

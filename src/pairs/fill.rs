@@ -53,8 +53,8 @@ impl Pairs {
             tested = first;
         }
         out.add_where(&self.buffer[tested..kept], &wanted);
+        // What could not be stored before is missing still.
         self.len = kept;
-        self.beyond = 0;
     }
 
     #[inline]
