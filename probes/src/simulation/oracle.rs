@@ -46,9 +46,10 @@ impl Oracle {
         rest.into_iter().fold(by_frame, |best, next| if next.total() < best.total() { next } else { best })
     }
 
-    /// One algorithm for each window of frames, which pays for what it keeps.
+    /// One algorithm for each window of frames, which pays for what it keeps. Where noise misleads that choice, one for all frames.
     pub(super) fn of_windows(frames: &[Frame]) -> Self {
-        Self::with(frames, Sight::Window)
+        let [windows, course] = [Sight::Window, Sight::Course].map(|sight| Self::with(frames, sight));
+        if course.total() < windows.total() { course } else { windows }
     }
 
     fn with(frames: &[Frame], sight: Sight) -> Self {

@@ -37,8 +37,10 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     if let Some(path) = &arguments.record {
         course.footage.record(path, course.frames)?;
     }
-    let mut origin = read.map_or_else(|| fields::predicted(arguments, algorithms), Ok)?;
+    let origin = read.map_or_else(|| fields::predicted(arguments, algorithms), Ok);
+    // First: a prediction that was interrupted may complain of what was not measured.
     interrupt::check()?;
+    let mut origin = origin?;
     let gpu_warnings = fields::add_gpus(&mut registry, &origin.fields, &arguments.gpus)?;
     origin.fields.warnings.extend(gpu_warnings);
     // Steps have no costs to correct.
