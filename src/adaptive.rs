@@ -16,10 +16,10 @@ mod tally;
 #[cfg(feature = "this-machine")]
 mod this_machine;
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Knot, Load, Pairs, Registry, Source, Step};
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Load, Pairs, Registry, Source, Step};
 use candidates::{Candidate, Instance, Made};
 use decision::Choice;
-use glance::Glance;
+use glance::{Glance, count};
 use pace::Pace;
 use policy::Policy;
 use std::fmt;
@@ -136,23 +136,13 @@ impl Adaptive {
         let Some(learner) = self.policy.learned() else { return fields.clone() };
         let mut costs = fields.costs.clone();
         for (k, cost) in costs.iter_mut().enumerate() {
-            let before = std::mem::take(&mut cost.curve.correction);
-            let uncorrected = crate::CostCurve { correction: before, ..crate::CostCurve::default() };
-            let mut octaves: Vec<f64> = uncorrected.correction.iter().map(|k| k.log2_objects).collect();
-            octaves.extend(place::octaves());
-            octaves.sort_by(f64::total_cmp);
-            octaves.dedup();
-            let knot = |log2_objects: f64| Knot {
-                log2_objects,
-                ln_factor: (uncorrected.ln_correction(log2_objects) + learner.lasting_ln(k, log2_objects))
-                    .clamp(-50.0, 50.0),
-            };
-            cost.curve.correction = octaves.into_iter().map(knot).collect();
+            let lasting = |log2_objects| learner.lasting_ln(k, log2_objects);
+            cost.curve.correction = cost.curve.corrected_by(place::octaves(), lasting);
             cost.spread_ln = learner.spread_ln(k);
         }
         let load = self.glance.load();
         let like = |quarter: u32| {
-            let objects = 10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32;
+            let objects = place::objects_of(quarter);
             load.rescaled(objects, load.pairs * f64::from(objects) / f64::from(load.objects.max(1)))
         };
         let loads: Vec<Load> = SLICE.map(like).collect();
@@ -173,16 +163,12 @@ impl Adaptive {
     /// # Errors
     /// As [`new`](Self::new); the algorithms of before stay then.
     pub fn revive(&mut self, registry: &Registry) -> Result<(), Error> {
-        let Made { candidates, instances, failure } = Made::of(self.policy.fields(), registry);
-        if let (true, Some(error)) = (instances.is_empty(), failure) {
+        let mut made = Made::of(self.policy.fields(), registry);
+        if let (true, Some(error)) = (made.instances.is_empty(), made.failure.take()) {
             return Err(error);
         }
-        let made = Made { candidates, instances, failure: None };
         self.policy.remade(&made.kept(), &made.usable());
-        (self.candidates, self.instances) = (made.candidates, made.instances);
-        self.decided = None;
-        self.choice = None;
-        self.prepare(self.prepared);
+        self.exchange(made);
         Ok(())
     }
 
@@ -191,6 +177,11 @@ impl Adaptive {
     fn adopt(&mut self, fields: Fields, made: Made) {
         let before = std::mem::replace(&mut self.policy, policy(fields, &made));
         self.policy.set_as(&before);
+        self.exchange(made);
+    }
+
+    /// Other candidates take the place of those of before, prepared as those were. What was decided goes with them.
+    fn exchange(&mut self, made: Made) {
         (self.candidates, self.instances) = (made.candidates, made.instances);
         self.decided = None;
         self.choice = None;
@@ -222,7 +213,7 @@ impl Adaptive {
 
     fn choose(&mut self, boxes: &[Aabb]) {
         self.glance.look(boxes);
-        let frames = self.pace.decide(objects(boxes));
+        let frames = self.pace.decide(count(boxes));
         self.choice = self.policy.choose(&self.glance.load(), frames);
         self.measured_ns = None;
     }
@@ -231,7 +222,7 @@ impl Adaptive {
     fn is_due(&self, boxes: &[Aabb]) -> bool {
         // By the number of objects alone a decision costs next to nothing, and is to depend on no clock.
         let anew = self.choice.is_none() || self.policy.is_by_count();
-        anew || self.pace.is_due(objects(boxes)) || self.glance.is_watching() || self.policy.is_exploring()
+        anew || self.pace.is_due(count(boxes)) || self.glance.is_watching() || self.policy.is_exploring()
     }
 
     /// Gets the runner-up ready when its turn may come soon.
@@ -331,10 +322,6 @@ impl fmt::Debug for Adaptive {
 
 fn policy(fields: Fields, made: &Made) -> Policy {
     Policy::new(fields, &made.kept(), made.usable())
-}
-
-fn objects(boxes: &[Aabb]) -> u32 {
-    u32::try_from(boxes.len()).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

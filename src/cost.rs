@@ -178,6 +178,18 @@ impl CostCurve {
         (low * lowest.exp(), high * highest.exp())
     }
 
+    /// The correction with `ln` added to it, as knots at its own places and at `octaves`, within what a file may hold.
+    pub(crate) fn corrected_by(&self, octaves: impl Iterator<Item = f64>, ln: impl Fn(f64) -> f64) -> Vec<Knot> {
+        let mut octaves: Vec<f64> = self.correction.iter().map(|k| k.log2_objects).chain(octaves).collect();
+        octaves.sort_by(f64::total_cmp);
+        octaves.dedup();
+        let knot = |log2_objects: f64| {
+            let ln_factor = self.ln_correction(log2_objects) + ln(log2_objects);
+            Knot { log2_objects, ln_factor: ln_factor.clamp(-MOST_LN_FACTOR, MOST_LN_FACTOR) }
+        };
+        octaves.into_iter().map(knot).collect()
+    }
+
     pub(crate) fn ln_correction(&self, x: f64) -> f64 {
         let after = self.correction.partition_point(|k| k.log2_objects <= x);
         match (after.checked_sub(1).map(|k| self.correction[k]), self.correction.get(after)) {

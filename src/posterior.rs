@@ -8,7 +8,7 @@ mod gain;
 mod prior;
 
 use crate::cost::{Counts, MOST_UNIT_NS};
-use crate::{AlgorithmCost, CostTerm, Knot, Load, Term};
+use crate::{AlgorithmCost, CostTerm, Load, Term};
 
 pub use gain::Outlook;
 pub use prior::{Deviations, Part, Prior, TERMS_SHARED, width_correlation};
@@ -24,8 +24,6 @@ const STRIDE: usize = KNOTS + Term::ALL.len();
 /// No more than this many standard deviations of a surprise are believed at once. A frame whose threads waited for a core takes fifty
 /// times as long as predicted; all of that believed, every relative of its algorithm would pass for slow as well.
 const MOST_SURPRISE: f64 = 3.0;
-/// What a cost curve may hold ([`CostCurve::defect`](crate::CostCurve::defect)).
-const MOST_FACTOR_LN: f64 = 50.0;
 /// Beyond a factor of 150 on a term the time goes with something else.
 const MOST_TERM_FACTOR_LN: f64 = 5.0;
 
@@ -255,16 +253,8 @@ impl Posterior {
         let corrected = |(a, cost): (usize, &AlgorithmCost)| {
             let mut cost = cost.clone();
             let own = (0..KNOTS).map(|k| FIRST_OCTAVE + OCTAVES * k as f64);
-            let mut octaves: Vec<f64> = cost.curve.correction.iter().map(|k| k.log2_objects).chain(own).collect();
-            octaves.sort_by(f64::total_cmp);
-            octaves.dedup();
             let (knots, factors) = self.mean[a * STRIDE..][..STRIDE].split_at(KNOTS);
-            let knot = |log2_objects: f64| {
-                let ln_factor = cost.curve.ln_correction(log2_objects) + Place::of(log2_objects).on(knots);
-                Knot { log2_objects, ln_factor: ln_factor.clamp(-MOST_FACTOR_LN, MOST_FACTOR_LN) }
-            };
-            let correction = octaves.into_iter().map(knot).collect();
-            cost.curve.correction = correction;
+            cost.curve.correction = cost.curve.corrected_by(own, |log2_objects| Place::of(log2_objects).on(knots));
             for term in cost.curve.terms.iter_mut().chain(&mut cost.curve.otherwise) {
                 let factor = term_factor(factors[position(term.term)]);
                 term.unit_ns = (term.unit_ns * factor).min(MOST_UNIT_NS);

@@ -99,7 +99,8 @@ impl Glance {
     }
 }
 
-fn count(boxes: &[Aabb]) -> u32 {
+/// Boxes of a frame; an algorithm refuses more than this can tell.
+pub(super) fn count(boxes: &[Aabb]) -> u32 {
     u32::try_from(boxes.len()).unwrap_or(u32::MAX)
 }
 

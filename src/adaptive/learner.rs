@@ -85,7 +85,7 @@ pub(super) struct Learner {
     mean: Vec<f64>,
     covariance: Vec<f64>,
     before: Vec<f64>,
-    /// Frames after which each counts for 1/e.
+    /// Frames after which each counts for half.
     lasts: Vec<f64>,
     with: Vec<f64>,
     /// For each class and width the mean time that a frame waits for other programs, nanoseconds, and the frame at which that held.
@@ -97,6 +97,13 @@ pub(super) struct Learner {
 /// Parts of the regime that count for one algorithm at most, and how the logarithm of its cost hangs on each.
 const PARTS: usize = 4;
 type Slopes = [(usize, f64); PARTS];
+
+impl Algorithm {
+    /// The own part.
+    fn own_ln(&self, place: Place) -> f64 {
+        place.knots().iter().map(|&(k, weight)| weight * self.own[k].mean).sum()
+    }
+}
 
 impl Own {
     /// The variance goes back towards what it was before, as what was observed ages.
@@ -146,9 +153,7 @@ impl Learner {
         let algorithms: Vec<Algorithm> = algorithms.collect();
         let before: Vec<f64> = parts.iter().map(|p| p.deviation().powi(2)).collect();
         let mut covariance = vec![0.0; parts.len() * parts.len()];
-        for (k, variance) in before.iter().enumerate() {
-            covariance[k * parts.len() + k] = *variance;
-        }
+        unobserve(&mut covariance, &before);
         Self {
             algorithms,
             mean: vec![0.0; parts.len()],
@@ -162,7 +167,7 @@ impl Learner {
         }
     }
 
-    /// Frames that were observed.
+    /// Tallies that were observed.
     pub(super) fn observed(&self) -> u64 {
         self.observed
     }
@@ -203,7 +208,7 @@ impl Learner {
     /// Expected natural logarithm of real over predicted time, waits left out.
     pub(super) fn correction_ln(&self, algorithm: usize, view: View) -> f64 {
         let a = &self.algorithms[algorithm];
-        self.regime(a, view).0 + view.place.knots().iter().map(|&(k, weight)| weight * a.own[k].mean).sum::<f64>()
+        self.regime(a, view).0 + a.own_ln(view.place)
     }
 
     fn own_variance(&self, algorithm: usize, place: Place) -> f64 {
@@ -312,11 +317,7 @@ impl Learner {
     /// What was observed holds no longer: the next frames count as if they were the first. And what the regime has not explained until now is
     /// more likely the algorithm's own.
     fn doubt_all(&mut self, algorithm: usize, place: Place, surprise: f64) {
-        let size = self.mean.len();
-        self.covariance.fill(0.0);
-        for (k, &before) in self.before.iter().enumerate() {
-            self.covariance[k * size + k] = before;
-        }
+        unobserve(&mut self.covariance, &self.before);
         let a = &mut self.algorithms[algorithm];
         for (k, _) in place.knots() {
             a.own[k].variance = a.before.max(surprise * surprise);
@@ -327,8 +328,7 @@ impl Learner {
     /// the algorithm's own.
     pub(super) fn lasting_ln(&self, algorithm: usize, log2_objects: f64) -> f64 {
         let a = &self.algorithms[algorithm];
-        let own: f64 = Place::of(log2_objects).knots().iter().map(|&(k, weight)| weight * a.own[k].mean).sum();
-        self.mean[a.class] + own
+        self.mean[a.class] + a.own_ln(Place::of(log2_objects))
     }
 
     /// Standard deviation of the logarithm of a frame's time around the corrected cost: the root of the mean over the knots.
@@ -336,6 +336,14 @@ impl Learner {
         let a = &self.algorithms[algorithm];
         let own: f64 = a.own.iter().map(|own| own.variance_at(self.frame, a.before)).sum();
         (own / KNOTS as f64 + a.noise).sqrt()
+    }
+}
+
+/// Makes a covariance that of parts that nothing was observed of, which have these variances.
+fn unobserve(covariance: &mut [f64], before: &[f64]) {
+    covariance.fill(0.0);
+    for (k, &variance) in before.iter().enumerate() {
+        covariance[k * before.len() + k] = variance;
     }
 }
 

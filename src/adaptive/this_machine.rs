@@ -4,6 +4,7 @@ use super::Adaptive;
 use super::cache::{Entry, Key};
 use super::candidates::Made;
 use super::options::Options;
+use super::place::objects_of;
 use crate::hardware::parameter;
 use crate::{
     AlgorithmId, Displacement, Error, Fields, GpuHardware, Hardware, Load, Model, Parameter, Registry, Scenario, measure,
@@ -315,7 +316,7 @@ fn hardware(options: &Options, registry: &Registry, model: &Model, remarks: &mut
 /// The load of `uniform` over the number of objects, with the pairs that its density lets expect.
 fn slice() -> Vec<Load> {
     let load = |quarter: u32| {
-        let mut scene = Scenario::Uniform.start(10.0_f64.powf(f64::from(quarter) / 4.0).round() as usize, SEED);
+        let mut scene = Scenario::Uniform.start(objects_of(quarter) as usize, SEED);
         let mut displacement = Displacement::default();
         displacement.watch(scene.boxes());
         scene.advance();

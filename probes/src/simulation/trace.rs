@@ -40,7 +40,7 @@ struct Row {
     algorithm: Option<String>,
     reason: &'static str,
     predicted_ns: Option<f64>,
-    /// Of the last frame that was timed for a decision: short frames are not all.
+    /// Null where the frame was not timed: short frames are not all.
     measured_ns: Option<f64>,
     runner_up: Option<String>,
     runner_up_ns: Option<f64>,
