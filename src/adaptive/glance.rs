@@ -9,6 +9,10 @@ const SHARE: f64 = 0.005;
 /// sampled when ten times the sample's cost has passed, one that grows by a sixteenth after ninety times.
 const SHARE_OF_DRIFT: f64 = 0.1;
 
+/// A sample that the system interrupts looks dear. Taken at its word it would put off the next one for seconds of frames, over
+/// which a change of the scene goes unseen.
+const PRICE_RISES: f64 = 2.0;
+
 /// Samples are at least this many frames apart where nothing drifts: what `moved` tells changes slowly.
 const SAMPLE_EVERY: u32 = 32;
 
@@ -20,7 +24,7 @@ pub(super) struct Glance {
     sampled: u32,
     age: u32,
     passed_ns: f64,
-    /// What the last sample took.
+    /// What a sample takes: the last one, but at most `PRICE_RISES` times what the one before was taken to be.
     price_ns: f64,
     displacement: Displacement,
     watching: Watching,
@@ -63,13 +67,20 @@ impl Glance {
         if self.is_due(objects) {
             let started = Instant::now();
             self.load = Load::estimate(boxes, pairs, moved);
-            self.price_ns = started.elapsed().as_nanos() as f64;
+            let took = started.elapsed().as_nanos() as f64;
+            self.price_ns = if self.price_ns > 0.0 { took.min(self.price_ns * PRICE_RISES) } else { took };
             self.watching = Watching::Due;
             (self.sampled, self.age, self.passed_ns) = (objects, 0, 0.0);
             return;
         }
         self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
         self.load.moved = moved.unwrap_or(self.load.moved);
+    }
+
+    /// Frames since the last sample.
+    #[cfg(test)]
+    pub(super) fn age(&self) -> u32 {
+        self.age
     }
 
     fn is_due(&self, objects: u32) -> bool {
