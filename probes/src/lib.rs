@@ -53,6 +53,7 @@ mod random;
 mod restriction;
 mod revisions;
 mod samples;
+mod sheet;
 mod simulate;
 mod simulation;
 mod steadiness;
