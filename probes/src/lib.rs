@@ -44,6 +44,7 @@ mod gpus;
 mod hardware;
 mod interrupt;
 mod output;
+mod page;
 mod plot;
 mod prediction;
 mod profiles;
