@@ -58,6 +58,7 @@ mod sheet;
 mod simulate;
 mod simulation;
 mod steadiness;
+mod study;
 mod summary;
 mod sweep;
 mod table;
