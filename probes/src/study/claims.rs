@@ -21,6 +21,8 @@ pub(super) enum Outcome {
     Confirmed,
     Refuted,
     Undecidable,
+    /// The claim is about the paper's cards alone.
+    NotAsked,
 }
 
 /// What the paper says of a parameter.
@@ -55,6 +57,7 @@ impl fmt::Display for Outcome {
             Self::Confirmed => "confirmed",
             Self::Refuted => "refuted",
             Self::Undecidable => "undecidable",
+            Self::NotAsked => "not asked",
         })
     }
 }
@@ -120,7 +123,7 @@ fn by_its_table(said: Said, values: [Option<f64>; 3]) -> (Outcome, String) {
 /// By the links with the times on GPUs.
 fn by_reports(said: Said, parameter: &str, influence: &Influence) -> (Outcome, String) {
     if said == Said::AlikeOnAll {
-        return (Outcome::Undecidable, "it is a claim about the three cards".to_owned());
+        return (Outcome::NotAsked, "it is a claim about the three cards".to_owned());
     }
     let named = format!("gpu/{parameter}");
     let on_gpu = |link: &&Link| match &link.on {

@@ -3,7 +3,7 @@
 use super::entry::Entry;
 use super::hardware::words;
 use super::influence::parameters;
-use super::speed::{SpeedUp, speed_ups};
+use super::speed::{LARGE, SpeedUp, speed_ups};
 use crate::plot::{RatioGroup, RatioKind, RatioValue, Ratios};
 use crate::sheet::{Cell, Sheet};
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,7 +23,7 @@ pub(super) struct Comparison<'a> {
 impl<'a> Comparison<'a> {
     /// Of the studied machines, and of the published ones with each other where the reference is published.
     pub(super) fn new(entries: &'a [Entry], reference: usize, others: &[usize]) -> Self {
-        let other = |&k: &usize| (k, speed_ups(&entries[reference], &entries[k]));
+        let other = |&k: &usize| (k, speed_ups(&entries[reference], &entries[k], LARGE..u32::MAX));
         Self { entries, reference, others: others.iter().filter(|k| **k != reference).map(other).collect() }
     }
 

@@ -3,7 +3,7 @@
 //! Between machines parameters go together. Here one is changed on purpose and the rest stays, so a link is a cause, on this machine.
 
 use super::entry::Entry;
-use super::speed::speed_ups;
+use super::speed::{LARGE, speed_ups};
 use crate::train::{Verdict, average};
 use sapwise::report::{Proof, Restricted};
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,6 +16,8 @@ const LEAST_LN: f64 = 0.05;
 pub(super) struct Effect {
     pub(super) taken: Restricted,
     pub(super) algorithm: String,
+    /// Whether of frames with 1000 objects or more, or of those with fewer.
+    pub(super) large: bool,
     /// Time with it taken over time without: geometric mean, least and most over the pairs.
     pub(super) slowdown: f64,
     pub(super) least: f64,
@@ -44,26 +46,29 @@ struct Pair {
 
 /// The effects of every restriction on every algorithm, and what the parameters show of them.
 pub(super) fn effects(entries: &[Entry]) -> (Vec<Effect>, Vec<Shown>) {
-    let mut found: BTreeMap<(&str, String, String), (Restricted, Vec<f64>, BTreeSet<usize>)> = BTreeMap::new();
+    let mut found: BTreeMap<(&str, String, String, bool), (Restricted, Vec<f64>, BTreeSet<usize>)> = BTreeMap::new();
     let mut shown: BTreeMap<(String, String), (Restricted, Vec<f64>)> = BTreeMap::new();
     for pair in pairs(entries) {
         let (without, with) = (&entries[pair.without], &entries[pair.with]);
-        for (algorithm, speed_up) in speed_ups(without, with) {
-            let key = (with.machine(), pair.taken.to_string(), algorithm);
-            let (_, effects, reports) = found.entry(key).or_insert_with(|| (pair.taken, Vec::new(), BTreeSet::new()));
-            effects.push(-speed_up.mean.ln());
-            reports.extend([pair.without, pair.with]);
+        for (sizes, large) in [(0..LARGE, false), (LARGE..u32::MAX, true)] {
+            for (algorithm, speed_up) in speed_ups(without, with, sizes) {
+                let key = (with.machine(), pair.taken.to_string(), algorithm, large);
+                let (_, effects, reports) = found.entry(key).or_insert_with(|| (pair.taken, Vec::new(), BTreeSet::new()));
+                effects.push(-speed_up.mean.ln());
+                reports.extend([pair.without, pair.with]);
+            }
         }
         for (parameter, ratio) in shown_by(with, pair.taken) {
             let key = (pair.taken.to_string(), parameter);
             shown.entry(key).or_insert_with(|| (pair.taken, Vec::new())).1.push(ratio);
         }
     }
-    let effects = found.into_iter().map(|((_, _, algorithm), (taken, effects, reports))| {
+    let effects = found.into_iter().map(|((_, _, algorithm, large), (taken, effects, reports))| {
         let (least, most) = effects.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), e| (a.min(*e), b.max(*e)));
         Effect {
             taken,
             algorithm,
+            large,
             slowdown: average(&effects).exp(),
             least: least.exp(),
             most: most.exp(),

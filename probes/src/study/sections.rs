@@ -170,7 +170,8 @@ fn ratios(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resu
     let mut part = Part::new("ratios", "Machines beside each other", missing);
     part.text(
         "Figures 10 and 11 of the paper: how many times the reference machine's value each parameter is, beside how many times as fast each \
-         algorithm is. A speed-up is the geometric mean over all scenarios and sizes that both were timed at, with its quartiles.",
+         algorithm is. A speed-up is the geometric mean over all scenarios and sizes from 1000 objects on that both were timed at, with its \
+         quartiles.",
     );
     let published: Vec<usize> = (0..study.entries.len()).filter(|&k| study.entries[k].is_published()).collect();
     if let [first, _, ..] = published[..] {
@@ -193,7 +194,7 @@ fn ratios(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resu
 fn influences(study: &Study, influence: &Influence, folder: &mut Folder, missing: &mut Vec<String>) -> Result<Section> {
     let mut part = Part::new("influence", "Which parameters matter for which algorithm and border", missing);
     part.text(
-        "Three methods. Rank correlation over machines (Spearman; a verdict of linked allows one in ten of them to be none): what goes \
+        "Three methods. Rank correlation over machines (Spearman, of an algorithm with its time for frames of 1000 objects or more; a verdict of linked allows one in ten of them to be none): what goes \
          together, whatever the cause. Permuted: how much worse predictions of machines that were left out are when they get the value of \
          another machine. Fitted without: how much worse they are when every machine has the same value, in the training too: what no \
          other parameter stands in for. All intervals are of 90 %. Where the model reads a parameter the verdict is that of the last \
@@ -332,6 +333,7 @@ fn taken(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resul
     let mut sheet = Sheet::new([
         ("taken", "taken"),
         ("algorithm", "algorithm"),
+        ("objects", "objects"),
         ("time over time without", "slowdown_ratio"),
         ("least", "slowdown_least_ratio"),
         ("most", "slowdown_most_ratio"),
@@ -341,7 +343,8 @@ fn taken(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resul
     for e in &effects {
         let figures = [e.slowdown, e.least, e.most].map(|r| Cell::number(r, 3));
         let ends = [Cell::count(e.pairs as u64), Cell::text(e.verdict.to_string())];
-        let heads = [Cell::text(e.taken.to_string()), Cell::text(&e.algorithm)];
+        let sizes = if e.large { "1000 or more" } else { "fewer than 1000" };
+        let heads = [Cell::text(e.taken.to_string()), Cell::text(&e.algorithm), Cell::text(sizes)];
         sheet.push([&heads[..], &figures, &ends].concat(), &e.reports);
     }
     part.push(folder.table("taken", "What each restriction does to the time of each algorithm.", sheet))?;

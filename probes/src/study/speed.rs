@@ -3,9 +3,12 @@
 use super::entry::{Entry, Place};
 use sapwise::measure::statistics::quantile;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 /// Places that two machines must share: the mean of fewer is that of one scenario's corner.
 const FEWEST_PLACES: usize = 5;
+/// Objects from which on a frame is large: below, fork and join and the clock make up most of it, and above, the work does.
+pub(super) const LARGE: u32 = 1000;
 /// Rounds of fitting machines and places in turn; the effects stand still to a thousandth after ten.
 const ROUNDS: usize = 20;
 
@@ -20,12 +23,13 @@ pub(super) struct SpeedUp {
     pub(super) places: usize,
 }
 
-/// The speed-up from `reference` to `other` of each algorithm that both were timed with at five places or more.
-pub(super) fn speed_ups(reference: &Entry, other: &Entry) -> BTreeMap<String, SpeedUp> {
+/// The speed-up from `reference` to `other` of each algorithm that both were timed with at five places or more with so many objects.
+pub(super) fn speed_ups(reference: &Entry, other: &Entry, sizes: Range<u32>) -> BTreeMap<String, SpeedUp> {
     let (before, mut after) = (reference.times(), other.times());
     let of = |(name, before): (String, BTreeMap<Place<'_>, f64>)| {
         let after = after.remove(&name)?;
-        let ratios: Vec<f64> = before.iter().filter_map(|(place, ns)| Some((ns / after.get(place)?).ln())).collect();
+        let own = before.iter().filter(|(place, _)| sizes.contains(&place.1));
+        let ratios: Vec<f64> = own.filter_map(|(place, ns)| Some((ns / after.get(place)?).ln())).collect();
         if ratios.len() < FEWEST_PLACES {
             return None;
         }
@@ -36,7 +40,8 @@ pub(super) fn speed_ups(reference: &Entry, other: &Entry) -> BTreeMap<String, Sp
     before.into_iter().filter_map(of).collect()
 }
 
-/// For each algorithm the natural logarithm of the time that each entry takes, over that of the mean entry at the same places.
+/// For each algorithm the natural logarithm of the time that each entry takes for large frames, over that of the mean entry at the same
+/// places.
 ///
 /// Not every machine was timed everywhere, so places and machines are fitted in turn to the logarithms (a two-way table of
 /// effects, Tukey 1977, with means). A machine that shares fewer than five places with others has none.
@@ -53,7 +58,8 @@ fn effects(times: &[Option<&BTreeMap<Place<'_>, f64>>]) -> Vec<Option<f64>> {
     let rows: Vec<Vec<(Place<'_>, f64)>> = times
         .iter()
         .map(|t| {
-            let shared = t.iter().flat_map(|t| t.iter()).filter(|(place, _)| machines_at[*place] > 1);
+            let large = t.iter().flat_map(|t| t.iter()).filter(|(place, _)| place.1 >= LARGE);
+            let shared = large.filter(|(place, _)| machines_at[*place] > 1);
             shared.map(|(place, ns)| (*place, ns.ln())).collect()
         })
         .map(|row: Vec<_>| if row.len() < FEWEST_PLACES { Vec::new() } else { row })
@@ -84,7 +90,7 @@ mod tests {
         // Places cost 1, 2, 4, ...; the machines are 1, 3 and 9 times as slow and miss some places each.
         let cost = |place: usize| (1 << place) as f64;
         let machine = |factor: f64, places: &[usize]| -> BTreeMap<Place<'static>, f64> {
-            places.iter().map(|&p| (("uniform", p as u32), factor * cost(p))).collect()
+            places.iter().map(|&p| (("uniform", LARGE + p as u32), factor * cost(p))).collect()
         };
         let all = [
             machine(1.0, &[0, 1, 2, 3, 4, 5]),
