@@ -44,8 +44,8 @@ impl Crossings {
         let mut entries: Vec<(Sign, String)> =
             names.into_iter().map(|(style, name)| (Sign::Mark(style), name.to_owned())).collect();
         let left_out = self.pairs.iter().filter(|p| !p.is_drawn()).count();
-        entries.push((Sign::Line(EXACT), "as predicted".to_owned()));
-        entries.push((Sign::Line(TWICE), "twice, half".to_owned()));
+        entries.push((Sign::Line(EXACT), "the prediction is right".to_owned()));
+        entries.push((Sign::Line(TWICE), "it is off by a factor of two".to_owned()));
         if left_out > 0 {
             entries.push((Sign::None, format!("{left_out} without a position: left out")));
         }

@@ -5,7 +5,7 @@ use super::axis::Axis;
 use super::chart::{BELOW, Chart, Frame, Line, fill, missing, path, words};
 use super::legend::{Legend, Sign};
 use super::paper::Area;
-use super::style::{self, GAP, GRID, INK, LABEL, PANEL, SECONDARY, WIDTH, line_height};
+use super::style::{self, GAP, GRID, INK, LABEL, PANEL, PAPER, SECONDARY, WIDTH, line_height};
 use super::{Figure, Tabled, font, tabled};
 use crate::sheet::Sheet;
 use plotters_backend::text_anchor::{HPos, VPos};
@@ -150,18 +150,14 @@ impl Figure for Ratios {
         // Names instead of numbers: rows have theirs.
         let rows = Axis::linear(0.0, f64::from(height)).with_names(Vec::new());
         let chart = Chart::new(area, frame, Axis::log(shown.chain([1.0]), 1.2), rows);
-        let parts = self.parts();
-        let mut top = frame.top;
-        for (_, groups) in &parts {
-            let below = top + HEAD;
-            fill(area, Frame { left: whole.left, top, bottom: below, right: frame.right }, GRID, 0.5)?;
-            top = below + groups.len() as i32 * self.row_height();
-        }
         chart.grid("", &format!("times the reference ({})", self.reference), "")?;
         chart.numbers_above()?;
         chart.upright(1.0, REFERENCE)?;
         let mut top = frame.top;
-        for (heading, groups) in &parts {
+        for (heading, groups) in self.parts() {
+            let ground = Frame { left: whole.left, top, bottom: top + HEAD, right: frame.right };
+            fill(area, ground, PAPER, 1.0)?;
+            fill(area, ground, GRID, 0.5)?;
             let place = (whole.left + 6, top + HEAD / 2);
             words(area, heading, place, PANEL, INK, HPos::Left, VPos::Center)?;
             top += HEAD;
