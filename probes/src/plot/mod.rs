@@ -94,12 +94,12 @@ pub(crate) trait Figure {
 
 /// Height of lines of text with room around them.
 fn block(text: &[String], size: u32) -> u32 {
-    if text.is_empty() { 0 } else { (text.len() as i32 * line_height(size) + GAP) as u32 }
+    if text.is_empty() { 0 } else { (text.len() as i32 * line_height(size) + GAP * 5 / 3) as u32 }
 }
 
 fn lines(area: &Area<'_>, text: &[String], size: u32, colour: RGBColor) -> anyhow::Result<()> {
     for (k, line) in text.iter().enumerate() {
-        let place = (GAP, GAP / 2 + k as i32 * line_height(size));
+        let place = (GAP, GAP * 2 / 3 + k as i32 * line_height(size));
         area.draw(&Text::new(line.as_str(), place, style::text(size, colour, HPos::Left, VPos::Top)))?;
     }
     Ok(())
