@@ -8,6 +8,9 @@ mod ids;
 mod link;
 mod table;
 
+#[cfg(test)]
+mod tests;
+
 use crate::sheet::{Cell, Column, Row, Sheet};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
