@@ -103,7 +103,7 @@ pub(crate) fn html(page: &Page) -> String {
                 header {
                     h1 { (page.title) }
                     @for paragraph in &page.lead { p { (paragraph) } }
-                    @if !page.command.is_empty() { p.made { "Made by" } pre { code { (page.command) } } }
+                    @if !page.command.is_empty() { p.made { "Made by" } pre tabindex="0" { code { (page.command) } } }
                 }
                 nav aria-label="Contents" {
                     h2 { "Contents" }

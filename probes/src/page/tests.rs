@@ -312,6 +312,7 @@ fn all_of_it_is_printed_and_in_light() {
         assert_eq!(style("svg rect", "fill"), json!("rgb(255, 255, 255)"));
         assert_eq!(style(".tall", "maxHeight"), json!("none"));
         assert_eq!(style(".tall thead th", "position"), json!("static"));
+        assert_eq!(style(".tall thead button", "display"), json!("contents"));
         assert_eq!(style("main a", "textDecorationLine"), json!("none"));
         assert_eq!(
             browser.value("document.querySelector('#hostile details a').checkVisibility({ contentVisibilityAuto: true })"),
