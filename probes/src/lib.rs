@@ -60,6 +60,7 @@ mod steadiness;
 mod summary;
 mod sweep;
 mod table;
+mod terminal;
 mod train;
 mod turns;
 mod verbs;
