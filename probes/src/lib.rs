@@ -44,6 +44,7 @@ mod gpus;
 mod hardware;
 mod interrupt;
 mod output;
+#[allow(dead_code, unused_imports, reason = "the study takes its figures from here")]
 mod plot;
 mod prediction;
 mod profiles;

@@ -1,28 +1,39 @@
 //! Pictures.
 
+mod axis;
+mod chart;
+mod crossings;
+mod curves;
 mod font;
+mod influence;
+mod legend;
+mod map;
 mod mark;
+mod paper;
+mod ratios;
 mod simulation;
+mod style;
+mod tabled;
 mod training;
 
 use crate::exit::WrongUsage;
-use plotters::coord::Shift;
-use plotters::prelude::*;
+use paper::Area;
+use plotters_backend::text_anchor::{HPos, VPos};
 use std::path::Path;
+use style::{GAP, INK, SECONDARY, SMALL, TITLE, line_height};
 
+pub(crate) use crossings::{CrossingPair, Crossings};
+pub(crate) use curves::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
+pub(crate) use influence::{Influence, InfluenceCell, Mark3};
+pub(crate) use map::{FieldMap, MapCell, MapPanel, MapPoint};
+pub(crate) use ratios::{RatioGroup, RatioKind, RatioValue, Ratios};
 pub(crate) use simulation::simulation;
+pub(crate) use tabled::Tabled;
 pub(crate) use training::training;
 
-/// Colours that stay apart for colour-blind readers (Okabe and Ito 2008); black is kept for the adaptive module.
-const COLOURS: [RGBColor; 7] = [
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(150, 150, 150),
-];
+/// Lines at most of a title, and of a paragraph of a caption: a name or command of a megabyte makes no picture of a mile.
+const TITLE_LINES: usize = 3;
+const CAPTION_LINES: usize = 12;
 
 /// How a picture is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,9 +56,58 @@ impl Picture {
     }
 }
 
-fn colour(k: usize) -> RGBColor {
-    COLOURS[k % COLOURS.len()]
+/// A picture of plain data.
+pub(crate) trait Figure {
+    /// What stands above it; nothing where this is empty.
+    fn title(&self) -> &str;
+
+    /// Width and height in units of what `draw_on` draws, without title and caption.
+    fn size(&self) -> (u32, u32);
+
+    /// Draws it from the upper left corner.
+    ///
+    /// # Errors
+    /// When the picture can't be drawn.
+    fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()>;
+
+    /// The whole picture, each paragraph of the caption on lines of its own below: sources and the command that makes it.
+    ///
+    /// # Errors
+    /// When the picture can't be drawn.
+    fn draw(&self, picture: Picture, caption: &[String]) -> anyhow::Result<Vec<u8>> {
+        font::register()?;
+        let (width, height) = self.size();
+        let room = width as i32 - 2 * GAP;
+        let title = if self.title().is_empty() { Vec::new() } else { font::wrapped(self.title(), TITLE, room, TITLE_LINES) };
+        let caption: Vec<String> = caption.iter().flat_map(|text| font::wrapped(text, SMALL, room, CAPTION_LINES)).collect();
+        let top = block(&title, TITLE);
+        let bottom = block(&caption, SMALL);
+        paper::picture(picture, (width, top + height + bottom), |root| {
+            let (above, rest) = root.split_vertically(top);
+            let (body, below) = rest.split_vertically(height);
+            lines(&above, &title, TITLE, INK)?;
+            self.draw_on(&body)?;
+            lines(&below, &caption, SMALL, SECONDARY)
+        })
+    }
 }
+
+/// Height of lines of text with room around them.
+fn block(text: &[String], size: u32) -> u32 {
+    if text.is_empty() { 0 } else { (text.len() as i32 * line_height(size) + GAP) as u32 }
+}
+
+fn lines(area: &Area<'_>, text: &[String], size: u32, colour: RGBColor) -> anyhow::Result<()> {
+    for (k, line) in text.iter().enumerate() {
+        let place = (GAP, GAP / 2 + k as i32 * line_height(size));
+        area.draw(&Text::new(line.as_str(), place, style::text(size, colour, HPos::Left, VPos::Top)))?;
+    }
+    Ok(())
+}
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use style::colour;
 
 /// An SVG of that width and height.
 ///
@@ -102,21 +162,10 @@ where
         .configure_series_labels()
         .position(position)
         .background_style(WHITE.mix(0.85))
-        .border_style(RGBColor(180, 180, 180))
+        .border_style(style::GRID)
         .draw()?;
     Ok(())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_name_of_the_file_says_how_it_is_stored() {
-        assert_eq!(Picture::of(Path::new("a.svg")).unwrap(), Picture::Svg);
-        assert_eq!(Picture::of(Path::new("b.c/a.png")).unwrap(), Picture::Png);
-        for other in ["a", "a.pdf", "svg"] {
-            assert!(Picture::of(Path::new(other)).unwrap_err().to_string().contains(".svg or .png"));
-        }
-    }
-}
+mod tests;

@@ -221,13 +221,16 @@ mod tests {
     #[test]
     fn every_way_and_the_command_are_drawn() {
         let time = |method: &str, ns: f64| Time {
+            file: "a.json".to_owned(),
+            objects: 100,
             method: method.to_owned(),
             class: BackendClass::Cpu,
             measured_ns: ns,
             predicted_ns: 1.3 * ns,
         };
         let regrets = WAYS.iter().map(|w| (w.0, vec![0.0, 0.05, 0.4])).collect();
-        let held = Held { times: vec![time("sweep", 2e3), time("strips", 5e6)], regrets, by_machine: true };
+        let held =
+            Held { times: vec![time("sweep", 2e3), time("strips", 5e6)], regrets, by_machine: true, ..Held::default() };
         let score = |name: &str| LearningScore { name: name.to_owned(), mean_regret: 0.05, low: 0.0, high: 0.3 };
         let of = |machines| Learning { machines, trainings: 8, methods: WAYS.iter().map(|w| score(w.0)).collect() };
         let svg = drawn(&held, vec![of(2), of(12)]);

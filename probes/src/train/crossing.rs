@@ -23,11 +23,10 @@ impl Borders {
         found.unwrap_or_default()
     }
 
-    /// For each border that both algorithms have a predicted cost for, the octaves between it and the nearest crossing of those
-    /// costs in the same direction. Where they do not cross so within the slice, the octaves to the end beyond which they
-    /// would, which is the upper one where the algorithm below the border is predicted to be cheaper at it: a lower bound.
-    /// The nearest number of threads stands for one that was not predicted.
-    pub(super) fn errors(&self, costs: &[AlgorithmCost]) -> Vec<f64> {
+    /// For each border that both algorithms have a predicted cost for, the nearest crossing of those costs in the same direction.
+    /// Where they do not cross so within the slice, the end beyond which they would, which is the upper one where the algorithm
+    /// below the border is predicted to be cheaper at it. The nearest number of threads stands for one that was not predicted.
+    pub(super) fn predicted(&self, costs: &[AlgorithmCost]) -> Vec<Beside> {
         let ids: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
         let cost = |id: &AlgorithmId| {
             let found = closest(id, &ids)?;
@@ -35,19 +34,51 @@ impl Borders {
             // Under its own name, since one cost may stand for both sides.
             Some(AlgorithmCost { algorithm: id.clone(), ..cost.clone() })
         };
-        self.borders.iter().filter_map(|b| Some(self.error(b, cost(&b.below)?, cost(&b.above)?))).collect()
+        self.borders.iter().filter_map(|b| Some(self.beside(b, cost(&b.below)?, cost(&b.above)?))).collect()
     }
 
-    fn error(&self, border: &Border, below: AlgorithmCost, above: AlgorithmCost) -> f64 {
-        let octaves = |objects: f64| (objects / border.objects).log2().abs();
+    /// Octaves between the two positions of each of them.
+    pub(super) fn errors(&self, costs: &[AlgorithmCost]) -> Vec<f64> {
+        self.predicted(costs).iter().map(Beside::octaves).collect()
+    }
+
+    fn beside(&self, border: &Border, below: AlgorithmCost, above: AlgorithmCost) -> Beside {
+        let beside = |predicted: f64, crosses| Beside {
+            below: border.below.clone(),
+            above: border.above.clone(),
+            measured: border.objects,
+            predicted,
+            crosses,
+        };
         let fields = Fields::from_costs(Source::Predicted, "", vec![below, above], &self.loads);
-        let alike = fields.crossovers.iter().filter(|b| b.below == border.below);
-        if let Some(nearest) = alike.map(|b| octaves(b.objects)).min_by(f64::total_cmp) {
+        let alike = fields.crossovers.iter().filter(|b| b.below == border.below).map(|b| beside(b.objects, true));
+        if let Some(nearest) = alike.min_by(|a, b| a.octaves().total_cmp(&b.octaves())) {
             return nearest;
         }
         let later = fields.step(border.objects as u32).is_some_and(|s| s.algorithm == border.below);
         let end = if later { self.loads.last() } else { self.loads.first() };
-        end.map_or(0.0, |load| octaves(f64::from(load.objects.max(1))))
+        beside(end.map_or(border.objects, |load| f64::from(load.objects.max(1))), false)
+    }
+}
+
+/// A measured border beside the predicted one.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Beside {
+    /// The cheaper one below the border, and the one above it.
+    pub(crate) below: AlgorithmId,
+    pub(crate) above: AlgorithmId,
+    /// Objects at the measured border.
+    pub(crate) measured: f64,
+    /// Objects at the predicted one; where the predicted costs do not cross, the end of the slice beyond which they would.
+    pub(crate) predicted: f64,
+    /// Whether the predicted costs cross within the slice.
+    pub(crate) crosses: bool,
+}
+
+impl Beside {
+    /// Octaves between the two, a lower bound where the predicted costs do not cross.
+    pub(crate) fn octaves(&self) -> f64 {
+        (self.predicted / self.measured).log2().abs()
     }
 }
 

@@ -1,7 +1,9 @@
 //! What a picture shows of a validation.
 
+use super::crossing::Beside;
 use super::profile::Profile;
 use super::scores::{Judged, names};
+use super::validate::OURS;
 use super::yardstick::average;
 use sapwise::{AlgorithmCost, BackendClass};
 use std::collections::BTreeMap;
@@ -18,13 +20,28 @@ pub(crate) struct Held {
     pub(crate) times: Vec<Time>,
     /// For each way to choose the mean regret on each held-out machine, or profile where there is one machine only.
     pub(crate) regrets: Vec<(&'static str, Vec<f64>)>,
+    /// The machine, by its physical id, or the file of the profile that each regret of [`OURS`] is of.
+    pub(crate) units: Vec<String>,
     /// Whether the regrets are of machines.
     pub(crate) by_machine: bool,
+    /// Measured borders beside the predicted ones.
+    pub(crate) borders: Vec<HeldBorder>,
+}
+
+/// A border of a held-out profile.
+#[derive(Debug, Clone)]
+pub(crate) struct HeldBorder {
+    /// The file of the profile.
+    pub(crate) file: String,
+    pub(crate) beside: Beside,
 }
 
 /// A time of an algorithm on a held-out profile.
 #[derive(Debug, Clone)]
 pub(crate) struct Time {
+    /// The file of the profile.
+    pub(crate) file: String,
+    pub(crate) objects: u32,
     pub(crate) method: String,
     pub(crate) class: BackendClass,
     pub(crate) measured_ns: f64,
@@ -46,6 +63,8 @@ impl Time {
         let time = |&(id, spot, measured_ns, cost): &_| {
             let (id, spot, cost): (&sapwise::AlgorithmId, &super::profile::Spot, &AlgorithmCost) = (id, spot, cost);
             Self {
+                file: profile.file.clone(),
+                objects: spot.load.objects,
                 method: id.method().to_owned(),
                 class: id.backend().class(),
                 measured_ns,
@@ -57,7 +76,7 @@ impl Time {
 }
 
 impl Held {
-    pub(super) fn new(all: &[Judged], times: Vec<Time>, by_machine: bool) -> Self {
+    pub(super) fn new(all: &[Judged], times: Vec<Time>, borders: Vec<HeldBorder>, by_machine: bool) -> Self {
         let step = times.len().div_ceil(MOST_TIMES).max(1);
         let regrets = names(all).into_iter().map(|name| {
             let own = all.iter().filter(|j| j.name == name);
@@ -69,6 +88,12 @@ impl Held {
             (name, machines.values().map(|m| average(m)).collect())
         });
         let regrets = regrets.collect();
-        Self { times: times.into_iter().step_by(step).collect(), regrets, by_machine }
+        let ours = all.iter().filter(|j| j.name == OURS);
+        let mut units: Vec<String> = ours.map(|j| if by_machine { &j.machine } else { &j.file }).cloned().collect();
+        if by_machine {
+            units.sort_unstable();
+            units.dedup();
+        }
+        Self { times: times.into_iter().step_by(step).collect(), regrets, units, by_machine, borders }
     }
 }

@@ -47,8 +47,9 @@ use sapwise::model::{GPU_PREFIX, Validation};
 use sapwise::{GpuKind, Hardware, Model};
 
 pub(crate) use baselines::{available, by_costs, slice_scenario};
+pub(crate) use crossing::Beside;
 pub(crate) use curve::{measured_costs, measured_fields};
-pub(crate) use held::{Held, Time};
+pub(crate) use held::{Held, HeldBorder, Time};
 pub(crate) use importance::importance;
 pub(crate) use profile::{Profile, as_at_the_points};
 pub(crate) use selection::{Selection, usable};

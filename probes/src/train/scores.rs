@@ -13,6 +13,8 @@ const NEAR_OCTAVES: f64 = 0.5;
 /// How one way to choose did on one held-out profile.
 pub(super) struct Judged {
     pub(super) name: &'static str,
+    /// The file of the profile.
+    pub(super) file: String,
     /// The physical machine.
     pub(super) machine: String,
     pub(super) regret: Regret,
@@ -85,7 +87,13 @@ mod tests {
 
     fn judged(name: &'static str, machine: &str, mean: f64) -> Judged {
         let regret = Regret { cells: vec![0.0, 2.0 * mean], mean, as_in_games: mean / 2.0 };
-        Judged { name, machine: machine.to_owned(), regret, crossings: (name == "ours").then(|| vec![mean, 1.0]) }
+        Judged {
+            name,
+            file: String::new(),
+            machine: machine.to_owned(),
+            regret,
+            crossings: (name == "ours").then(|| vec![mean, 1.0]),
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::curve::measured_costs;
 use super::direct::{direct, direct_elastic_net};
 use super::fit::Designs;
 use super::forest::{Forests, Table};
-use super::held::{Held, Time};
+use super::held::{Held, HeldBorder, Time};
 use super::model::model;
 use super::partition::Partition;
 use super::profile::{Profile, machines};
@@ -59,7 +59,7 @@ pub(super) fn validate(
 ) -> Result<Validated> {
     let mut notes = Vec::new();
     let mut all: Vec<Judged> = Vec::new();
-    let (mut times, mut prior, mut coverage) = (Vec::new(), None, None);
+    let (mut times, mut borders, mut prior, mut coverage) = (Vec::new(), Vec::new(), None, None);
     if profiles.len() < 2 {
         notes.push("nothing is validated: there is one report only; add reports of other machines".to_owned());
     } else {
@@ -84,6 +84,7 @@ pub(super) fn validate(
         for found in partition.folds.par_iter().map(fold).collect::<Result<Vec<Found>>>()? {
             all.extend(found.judged);
             times.extend(found.times);
+            borders.extend(found.borders);
             notes.extend(found.notes);
             predicted.push(found.predicted);
         }
@@ -100,7 +101,7 @@ pub(super) fn validate(
         coverage: if partition.by_machine { coverage } else { None },
         ..Validation::default()
     };
-    Ok(Validated { validation, notes, held: Held::new(&all, times, partition.by_machine), prior })
+    Ok(Validated { validation, notes, held: Held::new(&all, times, borders, partition.by_machine), prior })
 }
 
 /// What all folds share.
@@ -123,6 +124,7 @@ pub(super) struct Found {
     pub(super) judged: Vec<Judged>,
     predicted: Vec<Predicted>,
     times: Vec<Time>,
+    borders: Vec<HeldBorder>,
     notes: Vec<String>,
 }
 
@@ -244,8 +246,11 @@ impl<'a> Data<'a> {
             Way { costs: None, ..by("full sweep", Some(self.costs(held)), &available) },
         ];
         let borders = Borders::new(profile, self.costs(held));
+        let beside = ridge.as_deref().map(|costs| borders.predicted(costs)).unwrap_or_default();
+        found.borders.extend(beside.into_iter().map(|beside| HeldBorder { file: profile.file.clone(), beside }));
         found.judged.extend(ways.iter().map(|way| Judged {
             name: way.name,
+            file: profile.file.clone(),
             machine: profile.machine().to_owned(),
             regret: self.yardsticks[held].regret(profile, &way.choose),
             crossings: way.costs.map(|costs| borders.errors(costs)),
@@ -276,6 +281,7 @@ impl<'a> Data<'a> {
             let there = |way: &Way<'_>| self.yardsticks[held].regret_in(Some(scenario), profile, &way.choose).mean;
             let judged = Judged {
                 name: SAMPLED,
+                file: profile.file.clone(),
                 machine: profile.machine().to_owned(),
                 regret: self.yardsticks[held].regret(profile, &with.choose),
                 crossings: Some(Borders::new(profile, self.costs(held)).errors(costs)),

@@ -6,7 +6,7 @@ use super::super::profile::Profile;
 use super::super::yardstick::{NOT_TIMED, Yardstick, average};
 use super::borders::{Pair, pairs, slice};
 use super::interval::Interval;
-use sapwise::{AlgorithmId, Hardware, Load, Model};
+use sapwise::{AlgorithmCost, AlgorithmId, Hardware, Load, Model};
 use std::collections::BTreeMap;
 
 /// A profile with what its predictions are held against.
@@ -27,6 +27,9 @@ pub(super) struct Outcome {
     pub(super) regret: f64,
     /// Octaves of each pair of the judge; `None` where one side was not predicted.
     octaves: Vec<Option<f64>>,
+    /// For each method on a class of processor that was predicted the mean distance of its times from the measured ones, as the
+    /// absolute value of a logarithm.
+    distances_ln: BTreeMap<String, f64>,
 }
 
 impl<'a> Judge<'a> {
@@ -44,12 +47,36 @@ impl<'a> Judge<'a> {
     pub(super) fn outcome(&self, model: &Model, hardware: &Hardware) -> Outcome {
         let Ok(prediction) = model.predict(hardware, &self.wanted) else {
             // Nothing is chosen, which is charged like what was never timed.
-            return Outcome { regret: NOT_TIMED - 1.0, octaves: vec![None; self.pairs.len()] };
+            return Outcome {
+                regret: NOT_TIMED - 1.0,
+                octaves: vec![None; self.pairs.len()],
+                distances_ln: BTreeMap::new(),
+            };
         };
         let octaves = self.pairs.iter().map(|(pair, _)| pair.octaves(&prediction.costs, &self.slice)).collect();
+        let distances_ln = self.distances_ln(&prediction.costs);
         let choose = by_costs(prediction.costs, &self.available);
-        Outcome { regret: self.yardstick.regret(self.profile, &choose).mean, octaves }
+        Outcome { regret: self.yardstick.regret(self.profile, &choose).mean, octaves, distances_ln }
     }
+
+    fn distances_ln(&self, costs: &[AlgorithmCost]) -> BTreeMap<String, f64> {
+        let mut found: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+        let position = |k: u16| costs.iter().find(|c| c.algorithm == *self.profile.id(k));
+        let known: Vec<Option<&AlgorithmCost>> = (0..self.profile.algorithms.len() as u16).map(position).collect();
+        for spot in &self.profile.points {
+            for &(k, ns) in &spot.medians {
+                let Some(cost) = known[usize::from(k)] else { continue };
+                let distance = (cost.curve.cost_ns(&spot.load) / ns).ln().abs();
+                found.entry(method_name(&cost.algorithm)).or_default().push(distance);
+            }
+        }
+        found.into_iter().map(|(name, distances)| (name, average(&distances))).collect()
+    }
+}
+
+/// A method on a class of processor, whatever the number of threads or GPUs.
+fn method_name(id: &AlgorithmId) -> String {
+    format!("{} on the {}", id.method(), id.backend().class())
 }
 
 /// What of an outcome changes.
@@ -61,9 +88,11 @@ pub(super) enum What {
     Moves,
     /// The distance of the border from the measured one.
     Error,
+    /// The distance of the times of an algorithm from the measured ones.
+    Time,
 }
 
-/// Changes of outcomes: of what and at which border, by the position of the physical machine.
+/// Changes of outcomes: of what and at which border or algorithm, by the position of the physical machine.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Shifts(BTreeMap<(What, String), BTreeMap<usize, Vec<f64>>>);
 
@@ -74,6 +103,11 @@ impl Shifts {
             self.0.entry((what, border.to_owned())).or_default().entry(machine).or_default().push(by);
         };
         put(What::Regret, "", after.regret - before.regret);
+        for (algorithm, distance) in &before.distances_ln {
+            if let Some(after) = after.distances_ln.get(algorithm) {
+                put(What::Time, algorithm, after - distance);
+            }
+        }
         for ((pair, measured), (before, after)) in judge.pairs.iter().zip(before.octaves.iter().zip(&after.octaves)) {
             let (Some(before), Some(after)) = (before, after) else { continue };
             put(What::Moves, &pair.name, (after - before).abs());
@@ -90,9 +124,9 @@ impl Shifts {
         self
     }
 
-    /// The borders of which something is known.
-    pub(super) fn borders(&self) -> Vec<&str> {
-        self.0.keys().filter(|k| k.0 == What::Error).map(|k| k.1.as_str()).collect()
+    /// The borders or algorithms of which something is known.
+    pub(super) fn of(&self, what: What) -> Vec<&str> {
+        self.0.keys().filter(|k| k.0 == what).map(|k| k.1.as_str()).collect()
     }
 
     /// Physical machines with this.

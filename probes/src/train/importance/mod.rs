@@ -31,6 +31,9 @@ pub(crate) use verdict::{Effect, Verdict};
 /// Folds of whole machines. Each costs a fit of everything for each parameter, and of ten machines or more a sixth tells little more
 /// than a tenth.
 const MOST_FOLDS: usize = 6;
+/// Machines that are looked at, at most, evenly taken: intervals over more say little more, and each of their profiles is predicted
+/// anew for each parameter and order.
+const MOST_MACHINES: usize = 60;
 /// Orders in which the machines exchange the values of a parameter.
 const PERMUTATIONS: usize = 8;
 /// Seed of these orders.
@@ -39,6 +42,8 @@ const SEED: u64 = 1;
 const LEAST_REGRET: f64 = 0.005;
 /// A shift of a border that matters, in octaves: 7 % more objects.
 const LEAST_OCTAVES: f64 = 0.1;
+/// A rise of the distance between predicted and measured times that matters: 2 %.
+const LEAST_LN: f64 = 0.02;
 
 /// What each hardware parameter is worth to predictions of machines that were left out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -70,8 +75,21 @@ pub(crate) struct OfParameter {
     pub(crate) deviation_octaves: f64,
     /// Rise of the mean regret.
     pub(crate) regret_rise: Effect,
+    /// The algorithms, each method on a class of processor.
+    pub(crate) algorithms: Vec<OfAlgorithm>,
     /// The borders between pairs of algorithms.
     pub(crate) borders: Vec<OfBorder>,
+}
+
+/// What one parameter is worth to the predicted times of one method.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct OfAlgorithm {
+    /// The method and its class of processor.
+    pub(crate) algorithm: String,
+    /// Physical machines that have the parameter and timings of it.
+    pub(crate) physical_machines: usize,
+    /// Rise of the mean distance between predicted and measured times, as the absolute value of a natural logarithm.
+    pub(crate) distance_rise_ln: Effect,
 }
 
 /// What one parameter is worth to one border in the slice of the usual scenario. A border that is not there counts as lying at
@@ -97,7 +115,19 @@ pub(crate) struct OfBorder {
 /// # Errors
 /// When a model can't be fitted without a fold.
 pub(crate) fn importance(profiles: &[Profile]) -> Result<Importance> {
-    let machines = machines(profiles);
+    let all = machines(profiles);
+    let step = all.len().div_ceil(MOST_MACHINES).max(1);
+    if step == 1 {
+        return of_machines(profiles, &all);
+    }
+    let kept: Vec<&str> = all.iter().step_by(step).copied().collect();
+    let some: Vec<Profile> = profiles.iter().filter(|p| kept.contains(&p.machine())).cloned().collect();
+    let mut found = of_machines(&some, &kept)?;
+    found.notes.insert(0, format!("{} of {} physical machines are looked at here, evenly taken", kept.len(), all.len()));
+    Ok(found)
+}
+
+fn of_machines(profiles: &[Profile], machines: &[&str]) -> Result<Importance> {
     let partition = Partition::of_machines(profiles, MOST_FOLDS).filter(|_| machines.len() >= FEWEST_MACHINES);
     let mut found = Importance {
         held_out: String::new(),
@@ -115,7 +145,7 @@ pub(crate) fn importance(profiles: &[Profile]) -> Result<Importance> {
         ));
         found.parameters = Figure::ALL
             .into_iter()
-            .map(|figure| of_parameter(figure, &machines, profiles, &Shifts::default(), &Shifts::default()))
+            .map(|figure| of_parameter(figure, machines, profiles, &Shifts::default(), &Shifts::default()))
             .collect();
         return Ok(found);
     };
@@ -139,9 +169,9 @@ pub(crate) fn importance(profiles: &[Profile]) -> Result<Importance> {
         (0..profiles.len()).into_par_iter().map(|k| judges[k].outcome(&models[fold_of(k)], &profiles[k].hardware)).collect();
     let position = |k: usize| machines.binary_search(&profiles[k].machine()).unwrap_or_default();
     let one = |figure: Figure| -> Result<OfParameter> {
-        let values = values(figure, profiles, &machines);
+        let values = values(figure, profiles, machines);
         let Some(middle) = median(&values.values().copied().collect::<Vec<f64>>()) else {
-            return Ok(of_parameter(figure, &machines, profiles, &Shifts::default(), &Shifts::default()));
+            return Ok(of_parameter(figure, machines, profiles, &Shifts::default(), &Shifts::default()));
         };
         let with: Vec<usize> = (0..profiles.len()).filter(|&k| values.contains_key(&position(k))).collect();
         let donors = donors(&values);
@@ -164,7 +194,7 @@ pub(crate) fn importance(profiles: &[Profile]) -> Result<Importance> {
             shifts
         });
         let refitted = refitted.reduce(Shifts::default, Shifts::and);
-        Ok(of_parameter(figure, &machines, profiles, &permuted, &refitted))
+        Ok(of_parameter(figure, machines, profiles, &permuted, &refitted))
     };
     found.parameters = Figure::ALL.into_par_iter().map(one).collect::<Result<_>>()?;
     let mut regrets: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
@@ -213,17 +243,26 @@ fn of_parameter(
             error_rise_octaves: effect(What::Error, border, machines, LEAST_OCTAVES),
         }
     };
+    let of_algorithm = |algorithm: &str| {
+        let machines = permuted.machines(What::Time, algorithm);
+        OfAlgorithm {
+            algorithm: algorithm.to_owned(),
+            physical_machines: machines,
+            distance_rise_ln: effect(What::Time, algorithm, machines, LEAST_LN),
+        }
+    };
     OfParameter {
         parameter: figure.name(),
         physical_machines: logs.len(),
         deviation_octaves: deviation,
         regret_rise: effect(What::Regret, "", logs.len(), LEAST_REGRET),
-        borders: permuted.borders().into_iter().map(of_border).collect(),
+        algorithms: permuted.of(What::Time).into_iter().map(of_algorithm).collect(),
+        borders: permuted.of(What::Error).into_iter().map(of_border).collect(),
     }
 }
 
 fn notes(found: &Importance) -> Vec<String> {
-    let told = found.parameters.iter().map(|p| 1 + p.borders.len()).sum::<usize>();
+    let told = found.parameters.iter().map(|p| 1 + p.algorithms.len() + p.borders.len()).sum::<usize>();
     vec![
         format!(
             "these are {told} verdicts by intervals of 90 %: up to one in ten of those that hold nothing, more with few machines, is `linked` by \

@@ -1,0 +1,334 @@
+//! A frame with two axes, and what is drawn in it.
+
+use super::axis::{Axis, Lies};
+use super::font;
+use super::mark::{Mark, mark};
+use super::paper::Area;
+use super::style::{self, AXIS, GRID, INK, LABEL, PANEL, PAPER, SECONDARY, line_height};
+use plotters::prelude::*;
+use plotters_backend::text_anchor::{HPos, VPos};
+
+/// A place in units of its area.
+pub(super) type Place = (i32, i32);
+
+/// A rectangle of an area.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Frame {
+    pub(super) left: i32,
+    pub(super) top: i32,
+    pub(super) right: i32,
+    pub(super) bottom: i32,
+}
+
+impl Frame {
+    pub(super) fn width(self) -> i32 {
+        self.right - self.left
+    }
+
+    pub(super) fn height(self) -> i32 {
+        self.bottom - self.top
+    }
+
+    /// What is left after taking that much away on the left, above, on the right and below.
+    pub(super) fn within(self, left: i32, top: i32, right: i32, bottom: i32) -> Self {
+        Self { left: self.left + left, top: self.top + top, right: self.right - right, bottom: self.bottom - bottom }
+    }
+
+    /// That many frames of the same size in rows of `columns`, with a gap between them.
+    pub(super) fn parts(self, count: usize, columns: usize, gap: i32) -> Vec<Self> {
+        let (columns, rows) = (columns.max(1) as i32, count.div_ceil(columns.max(1)).max(1) as i32);
+        let (width, height) = ((self.width() + gap) / columns, (self.height() + gap) / rows);
+        let part = |k: i32| {
+            let (left, top) = (self.left + k % columns * width, self.top + k / columns * height);
+            Self { left, top, right: left + width - gap, bottom: top + height - gap }
+        };
+        (0..count as i32).map(part).collect()
+    }
+}
+
+/// Room beside a chart for numbers and names of the axes.
+pub(super) const LEFT: i32 = 74;
+pub(super) const BELOW: i32 = 50;
+pub(super) const ABOVE: i32 = 30;
+
+/// A line: its colour, width and dashes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Line {
+    pub(super) colour: RGBColor,
+    pub(super) width: u32,
+    pub(super) dashes: &'static [i32],
+}
+
+impl Line {
+    /// That of the series at a position.
+    pub(super) fn of(k: usize) -> Self {
+        Self { colour: style::colour(k), width: 2, dashes: style::dashes(k) }
+    }
+
+    pub(super) const fn solid(colour: RGBColor, width: u32) -> Self {
+        Self { colour, width, dashes: &[] }
+    }
+
+    pub(super) const fn dashed(colour: RGBColor, width: u32) -> Self {
+        Self { colour, width, dashes: &[5, 4] }
+    }
+}
+
+/// A chart under way.
+pub(super) struct Chart<'a, 'p> {
+    area: &'a Area<'p>,
+    /// Without what stands beside the axes.
+    pub(super) frame: Frame,
+    pub(super) x: Axis,
+    pub(super) y: Axis,
+}
+
+impl<'a, 'p> Chart<'a, 'p> {
+    pub(super) fn new(area: &'a Area<'p>, frame: Frame, x: Axis, y: Axis) -> Self {
+        Self { area, frame, x, y }
+    }
+
+    /// The grid and the numbers beside it, with what the axes are.
+    pub(super) fn grid(&self, title: &str, x_name: &str, y_name: &str) -> anyhow::Result<()> {
+        let Frame { left, top, right, bottom } = self.frame;
+        for tick in self.y.ticks(self.frame.height(), Lies::Upright) {
+            let Some(y) = self.y.share(tick.value).map(|share| self.up(share)) else { continue };
+            path(self.area, &[(left, y), (right, y)], Line::solid(GRID, 1))?;
+            words(self.area, &tick.label, (left - 6, y), LABEL, INK, HPos::Right, VPos::Center)?;
+        }
+        for tick in self.x.ticks(self.frame.width(), Lies::Flat) {
+            let Some(x) = self.x.share(tick.value).map(|share| self.across(share)) else { continue };
+            path(self.area, &[(x, top), (x, bottom)], Line::solid(GRID, 1))?;
+            words(self.area, &tick.label, (x, bottom + 6), LABEL, INK, HPos::Center, VPos::Top)?;
+        }
+        self.border()?;
+        let (middle, centre) = ((left + right) / 2, (top + bottom) / 2);
+        if !x_name.is_empty() {
+            words(self.area, x_name, (middle, bottom + 8 + line_height(LABEL)), AXIS, INK, HPos::Center, VPos::Top)?;
+        }
+        if !y_name.is_empty() {
+            let turned = style::text(AXIS, INK, HPos::Center, VPos::Center).transform(FontTransform::Rotate270);
+            self.area.draw(&Text::new(y_name.to_owned(), (left - LEFT + 14, centre), turned))?;
+        }
+        for line in font::wrapped(title, PANEL, self.frame.width(), 1).iter().filter(|line| !line.is_empty()) {
+            words(self.area, line, (left, top - 8), PANEL, INK, HPos::Left, VPos::Bottom)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn border(&self) -> anyhow::Result<()> {
+        let Frame { left, top, right, bottom } = self.frame;
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
+        path(self.area, &corners, Line::solid(SECONDARY, 1))
+    }
+
+    fn across(&self, share: f64) -> i32 {
+        self.frame.left + (share * f64::from(self.frame.width())).round() as i32
+    }
+
+    fn up(&self, share: f64) -> i32 {
+        self.frame.bottom - (share * f64::from(self.frame.height())).round() as i32
+    }
+
+    /// Where a pair of values is. `None` where one of them has no place on its axis.
+    pub(super) fn place(&self, x: f64, y: f64) -> Option<Place> {
+        Some((self.across(self.x.share(x)?), self.up(self.y.share(y)?)))
+    }
+
+    /// The rectangle between two values of each axis, cut at its ends.
+    pub(super) fn rectangle(&self, x: (f64, f64), y: (f64, f64)) -> Option<Frame> {
+        let (left, right) = (self.across(self.x.end(x.0)?), self.across(self.x.end(x.1)?));
+        let (bottom, top) = (self.up(self.y.end(y.0)?), self.up(self.y.end(y.1)?));
+        (left < right && top < bottom).then_some(Frame { left, top, right, bottom })
+    }
+
+    /// A line through these values, in pieces where one has no place.
+    pub(super) fn line(&self, values: impl IntoIterator<Item = (f64, f64)>, line: Line) -> anyhow::Result<()> {
+        let places: Vec<Option<Place>> = values.into_iter().map(|(x, y)| self.place(x, y)).collect();
+        for piece in places.split(Option::is_none) {
+            let piece: Vec<Place> = piece.iter().flatten().copied().collect();
+            path(self.area, &piece, line)?;
+        }
+        Ok(())
+    }
+
+    /// A bar from one value to another above `x`.
+    pub(super) fn bar(&self, x: f64, low: f64, high: f64, line: Line) -> anyhow::Result<()> {
+        let ends = (self.x.share(x), self.y.end(low), self.y.end(high));
+        let (Some(x), Some(low), Some(high)) = ends else { return Ok(()) };
+        self.capped((self.across(x), self.up(low)), (self.across(x), self.up(high)), line)
+    }
+
+    /// A bar from one value to another beside `y`.
+    pub(super) fn flat_bar(&self, y: f64, low: f64, high: f64, line: Line) -> anyhow::Result<()> {
+        let ends = (self.y.share(y), self.x.end(low), self.x.end(high));
+        let (Some(y), Some(low), Some(high)) = ends else { return Ok(()) };
+        self.capped((self.across(low), self.up(y)), (self.across(high), self.up(y)), line)
+    }
+
+    /// With short lines across its ends. One of no length would be a spot beside the mark.
+    fn capped(&self, a: Place, b: Place, line: Line) -> anyhow::Result<()> {
+        if a == b {
+            return Ok(());
+        }
+        let cap = if a.0 == b.0 { (3, 0) } else { (0, 3) };
+        path(self.area, &[a, b], line)?;
+        for (x, y) in [a, b] {
+            path(self.area, &[(x - cap.0, y - cap.1), (x + cap.0, y + cap.1)], line)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn mark(&self, x: f64, y: f64, shape: Mark, colour: RGBColor, size: i32) -> anyhow::Result<()> {
+        if let Some(place) = self.place(x, y) {
+            self.area.draw(&mark(place, shape, colour, size))?;
+        }
+        Ok(())
+    }
+
+    /// A line over the whole height.
+    pub(super) fn upright(&self, x: f64, line: Line) -> anyhow::Result<()> {
+        let Some(x) = self.x.share(x).map(|share| self.across(share)) else { return Ok(()) };
+        path(self.area, &[(x, self.frame.bottom), (x, self.frame.top)], line)
+    }
+
+    /// What is missing, in the middle of an empty frame.
+    pub(super) fn missing(&self, sentence: &str) -> anyhow::Result<()> {
+        missing(self.area, self.frame, sentence)
+    }
+}
+
+/// A frame with a sentence in it.
+pub(super) fn missing(area: &Area<'_>, frame: Frame, sentence: &str) -> anyhow::Result<()> {
+    let Frame { left, top, right, bottom } = frame;
+    path(area, &[(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], Line::solid(GRID, 1))?;
+    let lines = font::wrapped(sentence, AXIS, frame.width() - 20, 6);
+    let first = (top + bottom - (lines.len() as i32 - 1) * line_height(AXIS)) / 2;
+    for (k, line) in lines.iter().enumerate() {
+        let place = ((left + right) / 2, first + k as i32 * line_height(AXIS));
+        words(area, line, place, AXIS, SECONDARY, HPos::Center, VPos::Center)?;
+    }
+    Ok(())
+}
+
+/// Text at a place.
+pub(super) fn words(
+    area: &Area<'_>,
+    text: &str,
+    place: Place,
+    size: u32,
+    colour: RGBColor,
+    h: HPos,
+    v: VPos,
+) -> anyhow::Result<()> {
+    Ok(area.draw(&Text::new(text.to_owned(), place, style::text(size, colour, h, v)))?)
+}
+
+/// Text on a ground of paper, so that lines below don't cross it.
+pub(super) fn words_on_paper(area: &Area<'_>, text: &str, (x, y): Place, size: u32, h: HPos) -> anyhow::Result<()> {
+    let width = font::width(text, size);
+    let left = match h {
+        HPos::Left => x,
+        HPos::Center => x - width / 2,
+        HPos::Right => x - width,
+    };
+    let half = line_height(size) / 2;
+    fill(area, Frame { left: left - 3, top: y - half, right: left + width + 3, bottom: y + half }, PAPER, 0.85)?;
+    words(area, text, (x, y), size, INK, h, VPos::Center)
+}
+
+/// A rectangle in one colour.
+pub(super) fn fill(area: &Area<'_>, frame: Frame, colour: RGBColor, alpha: f64) -> anyhow::Result<()> {
+    let Frame { left, top, right, bottom } = frame;
+    Ok(area.draw(&Rectangle::new([(left, top), (right, bottom)], colour.mix(alpha).filled()))?)
+}
+
+/// A line through places, in strokes where it has dashes.
+pub(super) fn path(area: &Area<'_>, places: &[Place], line: Line) -> anyhow::Result<()> {
+    let mut places = places.to_vec();
+    // The polygon that a PNG makes of a wide line has no direction between two points at one place.
+    places.dedup();
+    if places.len() < 2 {
+        return Ok(());
+    }
+    let style = line.colour.stroke_width(line.width);
+    if line.dashes.is_empty() {
+        return Ok(area.draw(&PathElement::new(places, style))?);
+    }
+    for stroke in strokes(&places, line.dashes) {
+        area.draw(&PathElement::new(stroke, style))?;
+    }
+    Ok(())
+}
+
+/// The strokes of a dashed line; gaps go around its corners.
+fn strokes(places: &[Place], dashes: &[i32]) -> Vec<Vec<Place>> {
+    let mut strokes = Vec::new();
+    let (mut k, mut left) = (0, f64::from(dashes[0]));
+    let mut stroke = vec![places[0]];
+    for pair in places.windows(2) {
+        let [from, to] = [pair[0], pair[1]].map(|(x, y)| (f64::from(x), f64::from(y)));
+        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+        let length = dx.hypot(dy);
+        let mut done = 0.0;
+        while length - done > left {
+            done += left;
+            let share = done / length;
+            let place = ((from.0 + dx * share).round() as i32, (from.1 + dy * share).round() as i32);
+            if k % 2 == 0 {
+                stroke.push(place);
+                strokes.push(std::mem::take(&mut stroke));
+            }
+            k += 1;
+            stroke = vec![place];
+            left = f64::from(dashes[k % dashes.len()]);
+        }
+        left -= length - done;
+        stroke.push(pair[1]);
+    }
+    if k % 2 == 0 {
+        strokes.push(stroke);
+    }
+    strokes.iter_mut().for_each(|stroke| stroke.dedup());
+    strokes.retain(|stroke| stroke.len() > 1);
+    strokes
+}
+
+/// Lines over a rectangle that tell fields apart without colours. They go on in the next rectangle as if it were the same.
+pub(super) fn hatch(area: &Area<'_>, frame: Frame, k: usize, colour: RGBColor) -> anyhow::Result<()> {
+    const EVERY: i32 = 12;
+    let line = Line::solid(colour, 1);
+    let Frame { left, top, right, bottom } = frame;
+    let [rising, falling, flat] = match k % 5 {
+        0 => [false; 3],
+        1 => [true, false, false],
+        2 => [false, true, false],
+        3 => [false, false, true],
+        _ => [true, true, false],
+    };
+    let first = |low: i32| low + (EVERY - low.rem_euclid(EVERY)) % EVERY;
+    if rising {
+        // Those of x + y = sum.
+        for sum in (first(left + top)..right + bottom).step_by(EVERY as usize) {
+            let (a, b) = (left.max(sum - bottom), right.min(sum - top));
+            if a < b {
+                path(area, &[(a, sum - a), (b, sum - b)], line)?;
+            }
+        }
+    }
+    if falling {
+        // Those of x - y = difference.
+        for difference in (first(left - bottom)..right - top).step_by(EVERY as usize) {
+            let (a, b) = (left.max(difference + top), right.min(difference + bottom));
+            if a < b {
+                path(area, &[(a, a - difference), (b, b - difference)], line)?;
+            }
+        }
+    }
+    if flat {
+        for y in (first(top)..bottom).step_by(EVERY as usize) {
+            path(area, &[(left, y), (right, y)], line)?;
+        }
+    }
+    Ok(())
+}

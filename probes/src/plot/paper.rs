@@ -1,0 +1,185 @@
+//! What pictures are drawn on: SVG and PNG behind one type, so that a figure is drawn by one function and both look the same.
+
+use super::Picture;
+use super::font::{self, SANS};
+use super::style::PAPER;
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters_backend::text_anchor::VPos;
+use plotters_backend::{
+    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingErrorKind, FontTransform,
+};
+use std::io;
+
+/// Pixels of a PNG in a unit, which is a pixel of an SVG: with one, letters have too few to be read with ease.
+pub(super) const PNG_UNIT: u32 = 2;
+
+/// A picture under way. Lengths are in units.
+pub(crate) type Area<'a> = DrawingArea<Paper<'a>, Shift>;
+
+/// Takes what is drawn in units, and text of any characters.
+pub(crate) struct Paper<'a>(Kind<'a>);
+
+enum Kind<'a> {
+    Svg(SVGBackend<'a>),
+    Png(BitMapBackend<'a>),
+}
+
+type Drawn = Result<(), DrawingErrorKind<io::Error>>;
+
+/// A picture of that width and height in units.
+///
+/// # Errors
+/// When it can't be drawn.
+pub(super) fn picture(
+    picture: Picture,
+    (width, height): (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> anyhow::Result<()>,
+) -> anyhow::Result<Vec<u8>> {
+    font::register()?;
+    let finish = |kind: Kind<'_>| {
+        let root = Paper(kind).into_drawing_area();
+        root.fill(&PAPER)?;
+        draw(&root)?;
+        anyhow::Ok(root.present()?)
+    };
+    if picture == Picture::Svg {
+        let mut svg = String::new();
+        finish(Kind::Svg(SVGBackend::with_string(&mut svg, (width, height))))?;
+        return Ok(svg.into_bytes());
+    }
+    let (width, height) = (width * PNG_UNIT, height * PNG_UNIT);
+    let mut pixels = vec![0; 3 * width as usize * height as usize];
+    finish(Kind::Png(BitMapBackend::with_buffer(&mut pixels, (width, height))))?;
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.write_header()?.write_image_data(&pixels)?;
+    Ok(file)
+}
+
+/// A colour and a width in pixels.
+struct Pen(BackendColor, u32);
+
+impl BackendStyle for Pen {
+    fn color(&self) -> BackendColor {
+        self.0
+    }
+
+    fn stroke_width(&self) -> u32 {
+        self.1
+    }
+}
+
+/// The pen of a PNG for one in units.
+fn pen(style: &impl BackendStyle) -> Pen {
+    Pen(style.color(), style.stroke_width() * PNG_UNIT)
+}
+
+fn pixels((x, y): BackendCoord) -> BackendCoord {
+    (x * PNG_UNIT as i32, y * PNG_UNIT as i32)
+}
+
+fn of_png(done: Result<(), DrawingErrorKind<<BitMapBackend<'_> as DrawingBackend>::ErrorType>>) -> Drawn {
+    done.map_err(|error| match error {
+        DrawingErrorKind::DrawingError(e) => DrawingErrorKind::DrawingError(io::Error::other(e)),
+        DrawingErrorKind::FontError(e) => DrawingErrorKind::FontError(e),
+    })
+}
+
+impl DrawingBackend for Paper<'_> {
+    type ErrorType = io::Error;
+
+    fn get_size(&self) -> (u32, u32) {
+        match &self.0 {
+            Kind::Svg(svg) => svg.get_size(),
+            Kind::Png(png) => {
+                let (width, height) = png.get_size();
+                (width / PNG_UNIT, height / PNG_UNIT)
+            }
+        }
+    }
+
+    fn ensure_prepared(&mut self) -> Drawn {
+        match &mut self.0 {
+            Kind::Svg(svg) => svg.ensure_prepared(),
+            Kind::Png(png) => of_png(png.ensure_prepared()),
+        }
+    }
+
+    fn present(&mut self) -> Drawn {
+        match &mut self.0 {
+            Kind::Svg(svg) => svg.present(),
+            Kind::Png(png) => of_png(png.present()),
+        }
+    }
+
+    fn draw_pixel(&mut self, at: BackendCoord, colour: BackendColor) -> Drawn {
+        self.draw_rect(at, (at.0 + 1, at.1 + 1), &Pen(colour, 1), true)
+    }
+
+    fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Drawn {
+        match &mut self.0 {
+            Kind::Svg(svg) => svg.draw_line(from, to, style),
+            Kind::Png(png) => of_png(png.draw_line(pixels(from), pixels(to), &pen(style))),
+        }
+    }
+
+    fn draw_rect<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S, fill: bool) -> Drawn {
+        if !fill {
+            // That of SVG leaves the width of the line out.
+            let corners = [from, (to.0, from.1), to, (from.0, to.1), from];
+            return self.draw_path(corners, style);
+        }
+        match &mut self.0 {
+            Kind::Svg(svg) => svg.draw_rect(from, to, style, fill),
+            Kind::Png(png) => of_png(png.draw_rect(pixels(from), pixels(to), &pen(style), fill)),
+        }
+    }
+
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, path: I, style: &S) -> Drawn {
+        match &mut self.0 {
+            Kind::Svg(svg) => svg.draw_path(path, style),
+            Kind::Png(png) => of_png(png.draw_path(path.into_iter().map(pixels), &pen(style))),
+        }
+    }
+
+    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, path: I, style: &S) -> Drawn {
+        match &mut self.0 {
+            Kind::Svg(svg) => svg.fill_polygon(path, style),
+            Kind::Png(png) => of_png(png.fill_polygon(path.into_iter().map(pixels), &pen(style))),
+        }
+    }
+
+    fn draw_circle<S: BackendStyle>(&mut self, at: BackendCoord, radius: u32, style: &S, fill: bool) -> Drawn {
+        match &mut self.0 {
+            Kind::Svg(svg) => svg.draw_circle(at, radius, style, fill),
+            Kind::Png(png) => of_png(png.draw_circle(pixels(at), radius * PNG_UNIT, &pen(style), fill)),
+        }
+    }
+
+    fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, at: BackendCoord) -> Drawn {
+        let png = match &mut self.0 {
+            Kind::Svg(svg) => return svg.draw_text(&font::sound(text), style, at),
+            Kind::Png(png) => png,
+        };
+        // The letters of an SVG have their size in the em, those that plotters draws in the height of a line. It also sets them too high.
+        let em = style.size() / 1.24 * f64::from(PNG_UNIT);
+        let lower = match style.anchor().v_pos {
+            VPos::Top => 0.18,
+            VPos::Center => 0.16,
+            VPos::Bottom => 0.09,
+        };
+        let lower = (lower * em).round() as i32;
+        let (x, y) = pixels(at);
+        let at = match style.transform() {
+            FontTransform::None => (x, y + lower),
+            FontTransform::Rotate90 => (x - lower, y),
+            FontTransform::Rotate180 => (x, y - lower),
+            FontTransform::Rotate270 => (x + lower, y),
+        };
+        let font = FontDesc::new(SANS, em * font::LINE, style.style()).transform(style.transform());
+        let own = TextStyle { font, color: style.color(), pos: style.anchor() };
+        of_png(png.draw_text(&font::drawable(text), &own, at))
+    }
+}
