@@ -98,9 +98,7 @@ impl Axis {
             Lies::Flat => font::width(&tick.label, LABEL) + 12,
             Lies::Upright => line_height(LABEL) + 4,
         };
-        let apart = |pair: &[Tick]| {
-            place(&pair[1]) - place(&pair[0]) >= f64::from(needs(&pair[0]) + needs(&pair[1])) / 2.0
-        };
+        let apart = |pair: &[Tick]| place(&pair[1]) - place(&pair[0]) >= f64::from(needs(&pair[0]) + needs(&pair[1])) / 2.0;
         ticks.windows(2).all(apart)
     }
 

@@ -1,8 +1,8 @@
 //! Predicted against measured positions of the borders between fields.
 
-use super::{Figure, Tabled};
 use super::paper::Area;
 use super::style::WIDTH;
+use super::{Figure, Tabled};
 use crate::sheet::Sheet;
 
 /// Both axes in objects.

@@ -1,8 +1,8 @@
 //! Which hardware parameters are linked to which algorithms and crossovers.
 
-use super::{Figure, Tabled};
 use super::paper::Area;
 use super::style::WIDTH;
+use super::{Figure, Tabled};
 use crate::sheet::Sheet;
 
 /// A matrix of verdicts: a row for each parameter, a column for each algorithm or crossover.

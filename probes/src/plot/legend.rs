@@ -84,7 +84,12 @@ impl Sign {
             }
             Self::Line(line) => path(area, &ends, line)?,
             Self::Interval(line) => {
-                fill(area, Frame { left: middle - 8, top: y - 7, right: middle + 8, bottom: y + 7 }, SECONDARY, style::INTERVAL)?;
+                fill(
+                    area,
+                    Frame { left: middle - 8, top: y - 7, right: middle + 8, bottom: y + 7 },
+                    SECONDARY,
+                    style::INTERVAL,
+                )?;
                 path(area, &[(middle, y - 7), (middle, y + 7)], line)?;
             }
         }

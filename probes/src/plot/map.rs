@@ -1,8 +1,8 @@
 //! The map that the paper could not draw: fields of optimal performance over two axes.
 
-use super::{Figure, Tabled};
 use super::paper::Area;
 use super::style::WIDTH;
+use super::{Figure, Tabled};
 use crate::sheet::Sheet;
 
 /// Panels beside each other, measured beside predicted, over the number of objects and a density.

@@ -158,12 +158,7 @@ where
     D::ErrorType: 'static,
     C: CoordTranslate,
 {
-    chart
-        .configure_series_labels()
-        .position(position)
-        .background_style(WHITE.mix(0.85))
-        .border_style(style::GRID)
-        .draw()?;
+    chart.configure_series_labels().position(position).background_style(WHITE.mix(0.85)).border_style(style::GRID).draw()?;
     Ok(())
 }
 

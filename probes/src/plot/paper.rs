@@ -6,9 +6,7 @@ use super::style::PAPER;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters_backend::text_anchor::VPos;
-use plotters_backend::{
-    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingErrorKind, FontTransform,
-};
+use plotters_backend::{BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingErrorKind, FontTransform};
 use std::io;
 
 /// Pixels of a PNG in a unit, which is a pixel of an SVG: with one, letters have too few to be read with ease.

@@ -1,9 +1,9 @@
 //! Figures 10 and 11 of Avril, Gouranton and Arnaldi (ISVRI 2011): each hardware parameter as a ratio to a reference machine, beside the
 //! speed-up of each algorithm.
 
-use super::{Figure, Tabled};
 use super::paper::Area;
 use super::style::WIDTH;
+use super::{Figure, Tabled};
 use crate::sheet::Sheet;
 
 /// A row for each parameter and each algorithm, a mark for each machine.

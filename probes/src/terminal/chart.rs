@@ -46,7 +46,8 @@ impl Chart {
     /// The plot with its title and the names of its curves, where the terminal is wide enough and there are two points at least.
     pub(crate) fn draw(&self, terminal: Terminal) -> Option<String> {
         let columns = terminal.plot_columns()?.min(WIDEST);
-        let drawable = |&&(x, y): &&(f64, f64)| x.is_finite() && y.is_finite() && y > 0.0 && (self.across == Axis::Linear || x > 0.0);
+        let drawable =
+            |&&(x, y): &&(f64, f64)| x.is_finite() && y.is_finite() && y > 0.0 && (self.across == Axis::Linear || x > 0.0);
         let series: Vec<Vec<(f64, f64)>> =
             self.series.iter().map(|s| s.points.iter().filter(drawable).copied().collect()).collect();
         let extent = |pick: fn(&(f64, f64)) -> f64| {
@@ -109,7 +110,10 @@ where
             .set_label_area_size(LabelAreaPosition::Bottom, 2 * high)
             // Half of the last label.
             .margin_right(3 * wide)
-            .build_cartesian_2d(across, upwards.clone().log_scale().with_key_points(marks(upwards.start, upwards.end, LABELS_DOWN)))?;
+            .build_cartesian_2d(
+                across,
+                upwards.clone().log_scale().with_key_points(marks(upwards.start, upwards.end, LABELS_DOWN)),
+            )?;
         chart
             .configure_mesh()
             .disable_mesh()
@@ -180,7 +184,11 @@ mod tests {
             across: Axis::Logarithmic,
             series: vec![line("verlet@cpu1", 0.1, 0.02), line("verlet@cpu2", 5.0, 0.011), line("sweep@gpu0", 300.0, 0.001)],
         };
-        for t in [WIDE, Terminal { columns: Some(80), colour: false, unicode: true }, Terminal { columns: Some(80), colour: false, unicode: false }] {
+        for t in [
+            WIDE,
+            Terminal { columns: Some(80), colour: false, unicode: true },
+            Terminal { columns: Some(80), colour: false, unicode: false },
+        ] {
             println!("{}", chart.draw(t).unwrap());
         }
         let chart = Chart { across: Axis::Linear, ..chart };

@@ -8,6 +8,10 @@ use sapwise::{AlgorithmId, Fields, Load, Report};
 /// Curves in a chart, at most: beyond that they can't be told apart.
 const MOST: usize = 6;
 
+/// A curve is drawn where it takes this many times the least at most: those of a scene in which all boxes are compared with all others
+/// would take half of the height.
+const FARTHEST: f64 = 100.0;
+
 /// The predicted or fitted time of a frame over the objects of a slice, for the algorithms that hold a field and those that come next.
 ///
 /// `None` of fields without costs.
@@ -21,7 +25,8 @@ pub(crate) fn costs(fields: &Fields, loads: &[Load]) -> Option<Chart> {
 
 /// The same of what a report measured in a scenario.
 pub(crate) fn timings(report: &Report, scenario: &str) -> Option<Chart> {
-    let mut all: Vec<(AlgorithmId, Vec<(f64, f64)>)> = report.algorithms.iter().map(|t| (t.id.clone(), Vec::new())).collect();
+    let mut all: Vec<(AlgorithmId, Vec<(f64, f64)>)> =
+        report.algorithms.iter().map(|t| (t.id.clone(), Vec::new())).collect();
     for point in report.points.iter().filter(|p| p.scenario == scenario) {
         let sound = |t: &&Timing| t.error.is_none();
         for timing in point.timings.iter().filter(sound) {
@@ -52,7 +57,8 @@ fn chart(scenario: &str, all: Vec<(AlgorithmId, Vec<(f64, f64)>)>, how: &str) ->
         let over: Vec<f64> = objects.iter().zip(&least).filter_map(|(&x, least)| Some(at(points, x)? / least)).collect();
         let Some(nearest) = over.iter().copied().min_by(f64::total_cmp) else { continue };
         let first = over.iter().filter(|&&ratio| ratio <= 1.0).count();
-        ranked.push((nearest, first, (id.clone(), points.clone())));
+        let near = |p: &&(f64, f64)| objects.iter().zip(&least).any(|(&x, least)| x == p.0 && p.1 <= FARTHEST * least);
+        ranked.push((nearest, first, (id.clone(), points.iter().filter(near).copied().collect())));
     }
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
     let series: Vec<Series> =

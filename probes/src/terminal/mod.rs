@@ -117,7 +117,9 @@ pub(crate) mod tests {
     pub(crate) const WIDE: Terminal = Terminal { columns: Some(200), colour: true, unicode: true };
 
     fn rows() -> Vec<Vec<String>> {
-        [["parameter", "value", "how"], ["clock", "3.2 GHz", "measured, 12 samples"]].map(|r| r.map(str::to_owned).to_vec()).to_vec()
+        [["parameter", "value", "how"], ["clock", "3.2 GHz", "measured, 12 samples"]]
+            .map(|r| r.map(str::to_owned).to_vec())
+            .to_vec()
     }
 
     #[test]
