@@ -62,6 +62,7 @@ mod study;
 mod summary;
 mod sweep;
 mod table;
+mod terminal;
 mod train;
 mod turns;
 mod verbs;
