@@ -7,7 +7,7 @@ use sapwise::hardware::gpu::parameter as gpu;
 use std::fmt;
 
 /// The speed-up from the Quadro 4600 to the 5800 that the paper prints ("1.5X much faster"). It prints no other timing in figures.
-const PRINTED_SPEED_UP: f64 = 1.5;
+pub(super) const PRINTED_SPEED_UP: f64 = 1.5;
 /// The cards between which it is.
 const SLOWER: &str = "quadro-fx-4600";
 const FASTER: &str = "quadro-fx-5800";
@@ -62,6 +62,12 @@ impl fmt::Display for Outcome {
     }
 }
 
+/// The positions of the paper's cards, from the smallest to the fastest.
+pub(super) fn cards(entries: &[Entry]) -> [Option<usize>; 3] {
+    let card = |name: &str| entries.iter().position(|e| e.is_published() && e.name.ends_with(name));
+    [SMALLEST, SLOWER, FASTER].map(card)
+}
+
 /// The claims of Section 6, in its order.
 pub(super) fn claims(entries: &[Entry], influence: &Influence) -> Vec<Claim> {
     let said = [
@@ -75,8 +81,7 @@ pub(super) fn claims(entries: &[Entry], influence: &Influence) -> Vec<Claim> {
         ("The internal bandwidth of the GPU influences it.", gpu::COPY_GB_PER_S, Said::Linked),
         ("The number of cores of the GPU influences it.", gpu::LANES, Said::Linked),
     ];
-    let card = |name: &str| entries.iter().position(|e| e.is_published() && e.name().ends_with(name));
-    let cards = [SMALLEST, SLOWER, FASTER].map(card);
+    let cards = cards(entries);
     let claim = |(text, parameter, said): (&str, &str, Said)| {
         let value = |card: Option<usize>| entries[card?].gpu()?.value(parameter);
         let values = cards.map(value);

@@ -1,6 +1,6 @@
 //! The sections of the page, in the order in which they are read.
 
-use super::claims::{Claim, Outcome};
+use super::claims::{self, Claim, Outcome, PRINTED_SPEED_UP};
 use super::entry::Entry;
 use super::folder::Folder;
 use super::influence::{Influence, Link, On};
@@ -173,17 +173,29 @@ fn ratios(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resu
          algorithm is. A speed-up is the geometric mean over all scenarios and sizes from 1000 objects on that both were timed at, with its \
          quartiles.",
     );
-    let published: Vec<usize> = (0..study.entries.len()).filter(|&k| study.entries[k].is_published()).collect();
-    if let [first, _, ..] = published[..] {
-        let of_paper = Comparison::new(&study.entries, first, &published);
-        let told = "The paper's cards over the first of them, as its Figure 10 has it. It prints no times in figures to set beside them.";
-        part.push(folder.figure("figure-10-paper", &of_paper.figure(), told, &published))?;
+    let mut drawn = |part: &mut Part<'_>, id: &str, comparison: &Comparison<'_>, told: &str| {
+        let (figure, alike) = comparison.figure();
+        let alike = if alike.is_empty() { String::new() } else { format!(" Alike within 5 %: {}.", alike.join(", ")) };
+        part.push(folder.figure(id, &figure, &format!("{told}{alike}"), &comparison.drawn()))
+    };
+    if let [Some(smallest), Some(slower), Some(faster)] = claims::cards(&study.entries) {
+        let ten = Comparison::new(&study.entries, smallest, &[slower, faster]);
+        let told = "Figure 10 of the paper: its cards over the smallest of them. It prints no times in figures to set beside these.";
+        drawn(&mut part, "figure-10-paper", &ten, told)?;
+        let eleven =
+            Comparison::new(&study.entries, slower, &[faster]).with_printed("broad phase, as printed", PRINTED_SPEED_UP);
+        let told = "Figure 11 of the paper: the 5800 over the 4600, with the one speed-up that it prints in figures.";
+        drawn(&mut part, "figure-11-paper", &eleven, told)?;
     }
     match study.reference {
         Some(reference) if study.wanted.iter().any(|k| *k != reference) => {
             let comparison = Comparison::new(&study.entries, reference, &study.wanted);
-            let told = "Parameters and speed over those of the reference, quartiles as bars.";
-            part.push(folder.figure("figure-10-11", &comparison.figure(), told, &comparison.drawn()))?;
+            drawn(
+                &mut part,
+                "figure-10-11",
+                &comparison,
+                "Parameters and speed over those of the reference, quartiles as bars.",
+            )?;
             part.push(folder.table("ratios", "Every ratio, of all machines that were asked for.", comparison.sheet()))?;
         }
         _ => part.lacks("it takes two reports with timings to set one beside the other"),
@@ -433,7 +445,13 @@ fn prediction(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> 
     if sheet.rows.is_empty() {
         part.lacks("no border was measured on what was left out");
     } else {
-        part.push(folder.figure("crossings", &figure, "Borders between fields, measured with 90 % intervals.", &studied))?;
+        let ends = trained.held.borders.iter().filter(|b| !b.beside.crosses).count();
+        let told = format!(
+            "Borders between fields, measured with 90 % intervals. Of {} predicted ones {ends} do not cross within the sizes that were \
+             measured; the end beyond which they would stands for them.",
+            trained.held.borders.len()
+        );
+        part.push(folder.figure("crossings", &figure, &told, &studied))?;
         part.push(folder.table("crossings", "Every one of these borders.", sheet))?;
     }
     if validation.learning.is_empty() {
