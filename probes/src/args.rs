@@ -1,6 +1,7 @@
 //! The command line.
 
 mod run;
+mod study;
 
 use crate::contention::Contended;
 use crate::exit::WrongUsage;
@@ -11,6 +12,7 @@ use sapwise::{AlgorithmId, Scenario};
 use std::path::PathBuf;
 
 pub(crate) use run::{Run, Scene};
+pub(crate) use study::Study;
 
 /// Measures this machine, predicts which broad-phase algorithm is fastest on it, and runs it.
 #[derive(Debug, Parser)]
@@ -30,6 +32,7 @@ pub(crate) enum Verb {
     Probe(Probe),
     Run(Run),
     Train(Train),
+    Study(Study),
     Pairs(Pairs),
     Check(Check),
     Compare(Compare),

@@ -1,5 +1,6 @@
 //! Reading the files of Sapwise.
 
+use crate::progress::Progress;
 use anyhow::{Context, bail};
 use sapwise::Report;
 use sapwise::json::Document;
@@ -24,7 +25,15 @@ pub(crate) fn read_document(path: &Path) -> anyhow::Result<Document> {
 /// # Errors
 /// As [`report_files`] and [`read_report`].
 pub(crate) fn read_reports(paths: &[PathBuf]) -> anyhow::Result<Vec<(String, Report)>> {
-    report_files(paths)?.iter().map(|file| read_report(file)).collect()
+    let files = report_files(paths)?;
+    let progress = Progress::new(files.len() as u64);
+    progress.message("reading");
+    let read = |file: &PathBuf| {
+        let report = read_report(file);
+        progress.advance(1);
+        report
+    };
+    files.iter().map(read).collect()
 }
 
 /// Files, and the `*.json` files of folders, in the order of their names.

@@ -1,6 +1,7 @@
 //! Fields of a machine from its hardware parameters.
 
 use crate::algorithms::Algorithms;
+use crate::progress::Progress;
 use crate::revisions;
 use crate::samples::{self, Live, Order, Taken};
 use anyhow::{Context, bail};
@@ -14,6 +15,24 @@ const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 /// Seed of the scenes that the slice goes through.
 const SEED: u64 = 1;
 
+/// The loads of a scenario over the number of objects.
+pub(crate) struct Slice {
+    scenario: Scenario,
+    /// Ascending.
+    pub(crate) loads: Vec<Load>,
+}
+
+impl Slice {
+    /// The loads of a scenario, with the pairs that it really has.
+    ///
+    /// # Errors
+    /// As [`loads`].
+    pub(crate) fn of(scenario: Scenario) -> anyhow::Result<Self> {
+        let sizes: Vec<u32> = SLICE.map(|quarter| 10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32).collect();
+        Ok(Self { scenario, loads: loads(scenario, &sizes, SEED)? })
+    }
+}
+
 /// Predicts the fields of a machine: every algorithm on 1, 2, 4, ... and all of its cores, and on these of its GPUs.
 ///
 /// # Errors
@@ -22,11 +41,11 @@ pub(crate) fn predict(
     model: &Model,
     hardware: &Hardware,
     gpus: &[GpuIdentity],
-    scenario: Scenario,
+    slice: &Slice,
     algorithms: &Algorithms,
 ) -> anyhow::Result<Fields> {
     let registry = algorithms.registry(cores(hardware));
-    let mut fields = prediction(model, hardware, gpus, &registry)?.fields(&scenario.to_string(), &slice(scenario)?);
+    let mut fields = prediction(model, hardware, gpus, &registry)?.fields(&slice.scenario.to_string(), &slice.loads);
     fields.warnings.extend(revisions::unknown_to(&registry, model));
     Ok(fields)
 }
@@ -41,13 +60,13 @@ pub(crate) fn predict_and_sample(
     model: &Model,
     hardware: &Hardware,
     gpus: &[GpuIdentity],
-    scenario: Scenario,
+    slice: &Slice,
     algorithms: &Algorithms,
     most: u32,
 ) -> anyhow::Result<(Fields, bool)> {
     let registry = algorithms.registry(cores(hardware));
     let mut prediction = prediction(model, hardware, gpus, &registry)?;
-    let loads = slice(scenario)?;
+    let Slice { scenario, loads } = slice;
     let order = Order {
         scenario: scenario.to_string(),
         seed: SEED,
@@ -58,18 +77,18 @@ pub(crate) fn predict_and_sample(
     let disturbed: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
     let mut live = Live::new(order, sapwise::measure::statistics::median(&disturbed));
     let prior = model.prior.unwrap_or(Prior::ASSUMED);
-    let learned = samples::learn(prediction.costs.clone(), &prior, &loads, &mut live, most as usize)?;
+    let learned = samples::learn(prediction.costs.clone(), &prior, loads, &mut live, most as usize)?;
     let (remarks, wrong) = live.remarks();
     if !learned.usable.contains(&true) {
         bail!("no algorithm is left: {}; the pure prediction is had by --samples 0", learned.remarks.join("; "));
     }
     let mut usable = learned.usable.iter();
     prediction.costs.retain(|_| usable.next() == Some(&true));
-    let mut fields = prediction.fields(&scenario.to_string(), &loads);
+    let mut fields = prediction.fields(&scenario.to_string(), loads);
     fields.warnings.extend(revisions::unknown_to(&registry, model));
     // Without any sample the posterior is the prior, whose spread is that of machines left out and not of the model.
     if !learned.taken.is_empty() {
-        let corrected = Fields::from_posterior(&scenario.to_string(), &learned.posterior, |k| learned.usable[k], &loads);
+        let corrected = Fields::from_posterior(&scenario.to_string(), &learned.posterior, |k| learned.usable[k], loads);
         let samples = learned.taken.iter().map(Taken::observation).collect();
         let Fields { model: name, extrapolated, warnings, interval_basis, .. } = fields;
         fields = Fields { model: name, extrapolated, warnings, samples, ..corrected };
@@ -101,15 +120,6 @@ fn prediction(model: &Model, hardware: &Hardware, gpus: &[GpuIdentity], registry
     model.predict(hardware, &known).map_err(anyhow::Error::msg)
 }
 
-/// The load of a scenario over the number of objects, with the pairs that it really has.
-///
-/// # Errors
-/// As [`loads`].
-pub(crate) fn slice(scenario: Scenario) -> anyhow::Result<Vec<Load>> {
-    let sizes: Vec<u32> = SLICE.map(|quarter| 10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32).collect();
-    loads(scenario, &sizes, SEED)
-}
-
 /// The load of a scenario's second frame at each of some sizes, with the pairs that it really has.
 ///
 /// # Errors
@@ -120,6 +130,8 @@ pub(crate) fn loads(scenario: Scenario, sizes: &[u32], seed: u64) -> anyhow::Res
     let mut pairs = Pairs::new();
     let mut displacement = Displacement::default();
     let mut loads = Vec::new();
+    let progress = Progress::new(sizes.iter().map(|&n| u64::from(n)).sum());
+    progress.message(format!("pairs of the scenario {scenario}"));
     for &objects in sizes {
         crate::interrupt::check()?;
         let mut scene = scenario.start(objects as usize, seed);
@@ -130,6 +142,7 @@ pub(crate) fn loads(scenario: Scenario, sizes: &[u32], seed: u64) -> anyhow::Res
             .with_context(|| format!("the pairs of {scenario} at {objects} objects"))?;
         let moved = displacement.moved(scene.boxes());
         loads.push(Load::estimate(scene.boxes(), Some(pairs.len() as f64), moved));
+        progress.advance(u64::from(objects));
     }
     Ok(loads)
 }
@@ -140,8 +153,7 @@ mod tests {
 
     #[test]
     fn a_slice_ascends_and_sees_the_density_of_its_scenario() {
-        let uniform = slice(Scenario::Uniform).unwrap();
-        let clustered = slice(Scenario::Clustered).unwrap();
+        let [uniform, clustered] = [Scenario::Uniform, Scenario::Clustered].map(|s| Slice::of(s).unwrap().loads);
         assert_eq!(uniform.len(), 21);
         assert!(uniform.is_sorted_by(|a, b| a.objects < b.objects && a.axis_candidates <= b.axis_candidates));
         assert!(clustered[20].pairs > 3.0 * uniform[20].pairs);

@@ -1,62 +1,96 @@
 //! A progress bar on standard error for whatever takes over a second.
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::time::{Duration, Instant};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use std::fmt::{self, Write};
+use std::io::IsTerminal;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
 
 /// Nothing is drawn before this: work that is done by then needs no bar.
 const DELAY: Duration = Duration::from_secs(1);
 
+/// The bar is drawn anew this often while nothing is said to be done, so that the seconds go on.
+const TICK: Duration = Duration::from_secs(1);
+
+/// What the bar shows. The time left follows from how fast the steps were done of late.
+const TEMPLATE: &str = "{bar:32} {percent:>3} % {elapsed}{left}  {wide_msg}";
+
 /// A bar that shows itself after a second, and not at all when standard error is no terminal.
+///
+/// Where steps take unlike times their number is no share of the work: give each as many as it takes milliseconds or bytes.
 pub(crate) struct Progress {
     bar: ProgressBar,
-    began: Instant,
-    shown: AtomicBool,
+    /// Shows the bar after the delay, unless the sender is gone by then.
+    showing: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
 impl Progress {
     /// A bar of that many steps.
     pub(crate) fn new(steps: u64) -> Self {
         let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::hidden());
-        if let Ok(style) = ProgressStyle::with_template("{bar:32} {pos}/{len} {elapsed} {wide_msg}") {
-            bar.set_style(style);
+        if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
+            bar.set_style(style.with_key("left", left));
         }
-        Self { bar, began: Instant::now(), shown: AtomicBool::new(false) }
+        let showing = std::io::stderr().is_terminal().then(|| show_later(bar.clone())).flatten();
+        Self { bar, showing }
     }
 
     /// Says what is being done.
     pub(crate) fn message(&self, text: impl Into<String>) {
         self.bar.set_message(text.into());
-        self.show();
     }
 
     /// Some steps are done.
     pub(crate) fn advance(&self, steps: u64) {
         self.bar.inc(steps);
-        self.show();
     }
 
     /// That many steps are done in all.
     pub(crate) fn position(&self, steps: u64) {
         self.bar.set_position(steps);
-        self.show();
+    }
+
+    /// There are that many steps in all, as has turned out.
+    pub(crate) fn steps(&self, steps: u64) {
+        self.bar.set_length(steps);
     }
 
     /// Prints something while the bar is out of the way.
     pub(crate) fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
         self.bar.suspend(print)
     }
+}
 
-    fn show(&self) {
-        if self.began.elapsed() >= DELAY && !self.shown.swap(true, Relaxed) {
-            // A draw target that is no terminal draws nothing by itself.
-            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+/// The time left; nothing before the first step, when it can't be told.
+fn left(state: &ProgressState, out: &mut dyn Write) {
+    let written: fmt::Result =
+        if state.pos() == 0 { Ok(()) } else { write!(out, ", {:#} left", HumanDuration(state.eta())) };
+    // A bar has nobody to tell that it can't be written.
+    let _ = written;
+}
+
+/// A thread that shows the bar after the delay: whoever does the work may wait for a driver then, and say nothing. Without a thread there
+/// is no bar.
+fn show_later(bar: ProgressBar) -> Option<(Sender<()>, JoinHandle<()>)> {
+    let (alive, ended) = channel();
+    let show = move || {
+        if ended.recv_timeout(DELAY) == Err(RecvTimeoutError::Timeout) {
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+            bar.enable_steady_tick(TICK);
         }
-    }
+    };
+    let thread = std::thread::Builder::new().name("progress".to_owned()).spawn(show).ok()?;
+    Some((alive, thread))
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
+        if let Some((alive, thread)) = self.showing.take() {
+            drop(alive);
+            // A bar that was shown after the end would stay on the screen.
+            let _ = thread.join();
+        }
         self.bar.finish_and_clear();
     }
 }

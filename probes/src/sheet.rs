@@ -1,5 +1,6 @@
 //! A table of text and figures: for the page, where it sorts, and for a CSV file.
 
+use crate::table::grouped;
 use anyhow::Context;
 use std::borrow::Cow;
 
@@ -40,6 +41,18 @@ pub(crate) enum Cell {
 }
 
 impl Sheet {
+    /// Without rows, under columns that are called so for a reader and in CSV.
+    pub(crate) fn new<const N: usize>(columns: [(&str, &str); N]) -> Self {
+        let columns = columns.map(|(title, key)| Column { title: title.to_owned(), key: key.to_owned() }).into();
+        Self { columns, rows: Vec::new() }
+    }
+
+    /// Adds a row whose figures are from these reports.
+    pub(crate) fn push(&mut self, cells: Vec<Cell>, reports: &[usize]) {
+        debug_assert_eq!(cells.len(), self.columns.len());
+        self.rows.push(Row { cells, reports: reports.to_vec() });
+    }
+
     /// The sheet as CSV in UTF-8: a line of keys, then the rows, as RFC 4180 has it but with bare line feeds. Figures have all their
     /// digits. Where rows name reports, a last column `reports` has their labels, which `labels` gives in the order of the list, with
     /// blanks between.
@@ -69,6 +82,38 @@ impl Sheet {
 }
 
 impl Cell {
+    /// Words.
+    pub(crate) fn text(text: impl Into<String>) -> Self {
+        Self::Text(text.into())
+    }
+
+    /// A figure with so many digits after the point.
+    pub(crate) fn number(value: f64, decimals: usize) -> Self {
+        if value.is_finite() {
+            Self::Number { value, shown: format!("{value:.decimals$}") }
+        } else {
+            Self::Missing("it is not finite".to_owned())
+        }
+    }
+
+    /// A figure where there is one.
+    pub(crate) fn optional(value: Option<f64>, decimals: usize, why: &str) -> Self {
+        value.map_or_else(|| Self::Missing(why.to_owned()), |v| Self::number(v, decimals))
+    }
+
+    /// A whole number in groups of three digits.
+    pub(crate) fn count(value: u64) -> Self {
+        Self::Number { value: value as f64, shown: grouped(value) }
+    }
+
+    /// A share as a percentage; its value is the share.
+    pub(crate) fn percent(share: f64) -> Self {
+        match Self::number(share, 4) {
+            Self::Number { value, .. } => Self::Number { value, shown: format!("{:.1} %", 100.0 * share) },
+            missing => missing,
+        }
+    }
+
     fn csv(&self) -> Cow<'_, str> {
         match self {
             Self::Text(text) => inert(text),

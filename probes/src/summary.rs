@@ -1,27 +1,30 @@
 //! What a person reads at the end of a probe or a prediction.
 
 use crate::gpus::GpuChoice;
-use crate::table::{bytes, columns, duration, grouped};
+use crate::table::{bytes, columns, count, duration, grouped};
+use crate::terminal::{self, Terminal};
 use crate::train::{measured_fields, slice_scenario};
 use sapwise::hardware::gpu::parameter::UNIFIED_MEMORY;
 use sapwise::report::Label;
 use sapwise::{Backend, Border, Fields, GpuHardware, GpuIdentity, Hardware, How, Parameter, Report};
 use std::path::Path;
 
-/// The hardware, then the fields of every scenario that was swept.
-pub(crate) fn report(report: &Report) -> String {
-    let mut text = hardware(&report.hardware);
+/// The hardware, then the fields of every scenario that was swept, and the timings of one of them as curves where there is room.
+pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
+    let mut text = hardware(&report.hardware, terminal);
     for scenario in scenarios(report) {
         match measured_fields(report, scenario) {
-            Ok(measured) => text.push_str(&format!("\n{}", fields(&measured))),
+            Ok(measured) => text.push_str(&format!("\n{}", fields(&measured, terminal))),
             Err(why) => text.push_str(&format!("\n{scenario}: no fields: {why:#}\n")),
         }
     }
+    let chart = terminal::timings(report, slice_scenario(report)).and_then(|chart| chart.draw(terminal));
+    text += &chart.map(|chart| format!("\n{chart}")).unwrap_or_default();
     if report.label != Label::RealFull {
         text.push_str(&format!("\nThis report is labelled {}.\n", label(report.label)));
     }
     for remark in &report.remarks {
-        text.push_str(&format!("\nremark: {remark}\n"));
+        text.push_str(&format!("\n{} {remark}\n", terminal.warning("remark:")));
     }
     text
 }
@@ -39,22 +42,22 @@ pub(crate) fn next_step(report: &Report, path: &Path) -> String {
 }
 
 /// The parameters of a machine, of each of its GPUs and of their groups, as tables.
-pub(crate) fn hardware(hardware: &Hardware) -> String {
+pub(crate) fn hardware(hardware: &Hardware, terminal: Terminal) -> String {
     let machine = &hardware.machine;
     let mut text = format!(
         "{}, {}, vector instructions: {}\n\n{}",
         machine.cpu,
         machine.arch,
         machine.simd,
-        parameters(&hardware.parameters)
+        parameters(&hardware.parameters, terminal)
     );
     for GpuHardware { gpu, parameters: list } in &hardware.gpus {
         let GpuIdentity { index, name, driver, api, kind, .. } = gpu;
-        text += &format!("\ngpu{index}: {name}, {kind}, {api}, {driver}\n\n{}", parameters(list));
+        text += &format!("\ngpu{index}: {name}, {kind}, {api}, {driver}\n\n{}", parameters(list, terminal));
     }
     for group in &hardware.gpu_groups {
         let name = Backend::Gpu(group.gpus.clone());
-        text += &format!("\n{name}, all at the same time\n\n{}", parameters(&group.parameters));
+        text += &format!("\n{name}, all at the same time\n\n{}", parameters(&group.parameters, terminal));
     }
     text
 }
@@ -72,7 +75,7 @@ pub(crate) fn gpus_left_out(
 }
 
 /// Parameters as a table. Those that are missing for the same reason share a row.
-fn parameters(parameters: &[Parameter]) -> String {
+fn parameters(parameters: &[Parameter], terminal: Terminal) -> String {
     let mut rows = vec![["parameter", "value", "spread", "how"].map(str::to_owned).to_vec()];
     let missing = |p: &Parameter| p.how == How::Missing;
     for (k, p) in parameters.iter().enumerate() {
@@ -89,18 +92,18 @@ fn parameters(parameters: &[Parameter]) -> String {
         let disturbed = p.foreign_load.filter(|&load| load > 0.05);
         let disturbed = disturbed.map_or(String::new(), |load| format!(", foreign load {:.0} %", load * 100.0));
         let how = match p.how {
-            How::Measured => format!("measured, {} samples{disturbed}", p.samples),
+            How::Measured => format!("measured, {}{disturbed}", count(p.samples as usize, "sample")),
             How::Reported => "reported".to_owned(),
             How::Published => "published".to_owned(),
             How::Missing => format!("missing: {}", p.source),
         };
         rows.push(vec![name, p.value.map_or("-".to_owned(), |v| value(&p.name, v)), spread, how]);
     }
-    columns(&rows)
+    terminal.table(&rows)
 }
 
 /// The steps of a slice, with where each begins and how sure that is.
-pub(crate) fn fields(fields: &Fields) -> String {
+pub(crate) fn fields(fields: &Fields, terminal: Terminal) -> String {
     let mut rows = Vec::new();
     for step in &fields.steps {
         // The first step begins at 0 without a border.
@@ -113,32 +116,33 @@ pub(crate) fn fields(fields: &Fields) -> String {
     }
     let told = |b: &Border| b.interval().is_some();
     let with = if fields.crossovers.iter().any(told) { ", with 90 % intervals" } else { "" };
-    let mut text = format!("{}: the fastest algorithm by number of objects{with}\n", fields.scenario);
+    let head = format!("{}: the fastest algorithm by number of objects{with}", fields.scenario);
+    let mut text = format!("{}\n", terminal.head(&head));
     text.push_str(&columns(&rows));
     if !fields.crossovers.iter().all(told) {
         text.push_str(&format!("  {}\n", fields.interval_basis));
     }
     if !fields.samples.is_empty() {
-        text.push_str(&format!("\nsamples by which the prediction was corrected\n{}", samples(fields)));
+        text.push_str(&format!("\nsamples by which the prediction was corrected\n{}", samples(fields, terminal)));
     }
     for warning in &fields.warnings {
-        text.push_str(&format!("  warning: {warning}\n"));
+        text.push_str(&format!("  {} {warning}\n", terminal.warning("warning:")));
     }
     text
 }
 
 /// What was timed, beside what had been predicted.
-fn samples(fields: &Fields) -> String {
+fn samples(fields: &Fields, terminal: Terminal) -> String {
     let mut rows = vec![["  algorithm", "objects", "predicted", "measured"].map(str::to_owned).to_vec()];
     rows.extend(fields.samples.iter().map(|s| {
         let algorithm = format!("  {}", s.algorithm);
         vec![algorithm, grouped(u64::from(s.objects)), duration(s.predicted_ns), duration(s.measured_ns)]
     }));
-    columns(&rows)
+    terminal.table(&rows)
 }
 
 /// A value with the unit that the end of its name says.
-fn value(name: &str, value: f64) -> String {
+pub(crate) fn value(name: &str, value: f64) -> String {
     match name {
         _ if name.ends_with("_gb_per_s") => format!("{value:.1} GB/s"),
         _ if name.ends_with("_gflop_per_s") => format!("{value:.0} GFLOP/s"),

@@ -3,8 +3,7 @@
 /// Rows with every column but the last padded to its widest cell, two blanks between columns.
 pub(crate) fn columns(rows: &[Vec<String>]) -> String {
     let count = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |column: usize| rows.iter().filter_map(|r| r.get(column)).map(|c| c.chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..count).map(width).collect();
+    let widths: Vec<usize> = (0..count).map(|column| width(rows, column)).collect();
     let mut text = String::new();
     for row in rows {
         let mut line = String::new();
@@ -15,6 +14,16 @@ pub(crate) fn columns(rows: &[Vec<String>]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// Characters of the widest cell of a column.
+pub(crate) fn width(rows: &[Vec<String>], column: usize) -> usize {
+    rows.iter().filter_map(|r| r.get(column)).map(|c| c.chars().count()).max().unwrap_or(0)
+}
+
+/// A number of things, with the plural of their name but for one.
+pub(crate) fn count(number: usize, thing: &str) -> String {
+    format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
 }
 
 /// Nanoseconds with the unit that keeps one to three digits before the point.
@@ -61,6 +70,11 @@ mod tests {
     fn columns_are_aligned_without_trailing_blanks() {
         let rows = [vec!["a".to_owned(), "long".to_owned(), "x".to_owned()], vec!["bcd".to_owned(), "e".to_owned()]];
         assert_eq!(columns(&rows), "a    long  x\nbcd  e\n");
+    }
+
+    #[test]
+    fn one_thing_has_no_plural() {
+        assert_eq!([0, 1, 2].map(|k| count(k, "repeat")), ["0 repeats", "1 repeat", "2 repeats"]);
     }
 
     #[test]

@@ -38,17 +38,21 @@ pub(crate) fn measure(choice: &GpuChoice, threads: Option<u32>) -> anyhow::Resul
         measured.remarks.push("GPUs are left out: interrupted before they were looked for".to_owned());
         return Ok(measured);
     }
+    let progress = Progress::new(0);
+    progress.message("looking for GPUs");
     let seen = look()?;
     choice.check(&seen)?;
     measured.remarks.extend(seen.remark);
     let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.into_iter().partition(|g| choice.takes(g));
     measured.left_out = left_out;
-    let progress = Progress::new(taken.len() as u64);
+    // One more for what several do together.
+    progress.steps(taken.len() as u64 + 1);
     for identity in taken {
         progress.message(format!("hardware: gpu{}", identity.index));
         measured.gpu(identity, threads)?;
         progress.advance(1);
     }
+    progress.message("hardware: several GPUs together");
     measured.measure_groups(threads)?;
     Ok(measured)
 }

@@ -8,6 +8,9 @@ mod ids;
 mod link;
 mod table;
 
+#[cfg(test)]
+mod tests;
+
 use crate::sheet::{Cell, Column, Row, Sheet};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -100,7 +103,7 @@ pub(crate) fn html(page: &Page) -> String {
                 header {
                     h1 { (page.title) }
                     @for paragraph in &page.lead { p { (paragraph) } }
-                    @if !page.command.is_empty() { p.made { "Made by" } pre { code { (page.command) } } }
+                    @if !page.command.is_empty() { p.made { "Made by" } pre tabindex="0" { code { (page.command) } } }
                 }
                 nav aria-label="Contents" {
                     h2 { "Contents" }

@@ -3,7 +3,7 @@
 use super::chart::Frame;
 use super::paper::Area;
 use super::{Figure, LearningCurve, LearningPoint, LearningWay, Regrets, TimePair, Times, TimesOf, Way};
-use crate::train::{Held, OURS};
+use crate::train::{Held, OURS, Time};
 use sapwise::BackendClass;
 use sapwise::model::Learning;
 
@@ -36,8 +36,8 @@ fn times(held: &Held) -> Times {
     methods.dedup();
     let of = |(style, (class, method)): (usize, (BackendClass, &str))| {
         let own = held.times.iter().filter(|t| (t.class, &t.method[..]) == (class, method));
-        let pairs = own.map(|t| TimePair { measured_ns: t.measured_ns, predicted_ns: t.predicted_ns }).collect();
-        TimesOf { name: format!("{method} on the {class}"), style, pairs }
+        let pair = |t: &Time| TimePair { measured_ns: t.measured_ns, predicted_ns: t.predicted_ns };
+        TimesOf { name: format!("{method} on the {class}"), style, pairs: own.map(pair).collect() }
     };
     let title = "What was left out: predicted and measured times".to_owned();
     Times { title, methods: methods.into_iter().enumerate().map(of).collect() }
@@ -93,7 +93,6 @@ impl Figure for Training {
 mod tests {
     use super::*;
     use crate::plot::Picture;
-    use crate::train::Time;
     use sapwise::model::LearningScore;
 
     fn drawn(held: &Held, learning: Vec<Learning>) -> String {

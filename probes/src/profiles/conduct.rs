@@ -43,8 +43,6 @@ pub(super) struct Conduct<'a> {
     there: &'a There<'a>,
     /// The most that each should take.
     times: Vec<Duration>,
-    /// Time of those that were measured, and the most that they should have taken.
-    taken: (Duration, Duration),
 }
 
 impl<'a> Conduct<'a> {
@@ -57,7 +55,7 @@ impl<'a> Conduct<'a> {
     ) -> Self {
         let states = done.into_iter().map(|path| path.map_or(State::Waiting, State::Found)).collect();
         let times = family.iter().map(|p| p.time(scenarios, there.family.max_objects)).collect();
-        Self { family, states, there, times, taken: (Duration::ZERO, Duration::ZERO) }
+        Self { family, states, there, times }
     }
 
     /// Measures whatever waits.
@@ -65,28 +63,29 @@ impl<'a> Conduct<'a> {
     /// # Errors
     /// When no process can be started.
     pub(super) fn run(&mut self) -> anyhow::Result<End> {
-        let progress = Progress::new(self.times.iter().map(Duration::as_secs).sum());
+        // Those that are there take no time: counted as done, they would make the others seem fast.
+        let waiting = (0..self.family.len()).filter(|&k| self.states[k] == State::Waiting);
+        let progress = Progress::new(waiting.map(|k| self.times[k].as_secs()).sum());
+        let mut before = Duration::ZERO;
         for k in 0..self.family.len() {
             if self.states[k] == State::Waiting {
                 if interrupt::requested() {
                     return Ok(End::Interrupted);
                 }
-                let began = Instant::now();
-                let Some(state) = self.measure(k, &progress)? else { return Ok(End::Interrupted) };
-                self.taken.0 += began.elapsed();
-                self.taken.1 += self.times[k];
+                let Some(state) = self.measure(k, before, &progress)? else { return Ok(End::Interrupted) };
+                before += self.times[k];
+                progress.position(before.as_secs());
                 if let State::Failed(why, _) = &state {
                     progress.aside(|| output::complain(&format!("{}: FAILED: {why}", self.family[k].name)));
                 }
                 self.states[k] = state;
             }
-            progress.position(self.times[..=k].iter().map(Duration::as_secs).sum());
         }
         Ok(End::Complete)
     }
 
-    /// Measures a profile. `None` when the user interrupted it.
-    fn measure(&self, k: usize, progress: &Progress) -> anyhow::Result<Option<State>> {
+    /// Measures a profile, where those before it should have taken so long. `None` when the user interrupted it.
+    fn measure(&self, k: usize, before: Duration, progress: &Progress) -> anyhow::Result<Option<State>> {
         let profile = &self.family[k];
         let failed = |why: String| Ok(Some(State::Failed(why, None)));
         let path = self.there.path(profile);
@@ -111,8 +110,8 @@ impl<'a> Conduct<'a> {
         let began = Instant::now();
         let count = self.family.len();
         let ended = run_verb(&arguments, &profile.variables(), LIMIT, &mut || {
-            let left = self.left(k).saturating_sub(began.elapsed());
-            progress.message(format!("{} of {count}: {}, about {} left", k + 1, profile.name, minutes(left)));
+            progress.message(format!("{} of {count}: {}", k + 1, profile.name));
+            progress.position((before + began.elapsed().min(self.times[k])).as_secs());
         })?;
         match ended {
             Ended::Interrupted => return Ok(None),
@@ -144,14 +143,6 @@ impl<'a> Conduct<'a> {
             State::Found(path) | State::Measured { path, .. } | State::Failed(_, Some(path)) => Some(path),
             State::Waiting | State::Failed(_, None) => None,
         }
-    }
-
-    /// The time for this profile and those that wait behind it, judged by those that were measured.
-    fn left(&self, from: usize) -> Duration {
-        let waiting = self.times[from..].iter().zip(&self.states[from..]).filter(|(_, s)| **s == State::Waiting);
-        let most: Duration = waiting.map(|(time, _)| *time).sum();
-        let (took, most_of_them) = self.taken;
-        if most_of_them.is_zero() { most } else { most.mul_f64(took.as_secs_f64() / most_of_them.as_secs_f64()) }
     }
 
     /// Whether any profile has failed.

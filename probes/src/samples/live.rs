@@ -6,6 +6,7 @@ use super::{Answer, Effort, SECONDS, Sample, Source};
 use crate::child::{Dialogue, Ended};
 use crate::gpus::uses;
 use crate::output;
+use crate::progress::Progress;
 use anyhow::Context;
 use sapwise::measure::Watch;
 use sapwise::{AlgorithmId, Load};
@@ -30,13 +31,17 @@ pub(crate) struct Live {
     remarks: Vec<String>,
     /// Whether an algorithm gave a wrong answer.
     wrong: bool,
+    /// Of the milliseconds that all samples take at most.
+    progress: Progress,
 }
 
 impl Live {
     /// `foreign_load` is what other programs took before, which is taken to go on until a figure of the samples is there.
     pub(crate) fn new(order: Order, foreign_load: Option<f64>) -> Self {
         let keepers = Keepers::find();
-        Self { order, dialogue: None, keepers, end: None, foreign_load, remarks: Vec::new(), wrong: false }
+        let progress = Progress::new((SECONDS * 1e3) as u64);
+        progress.message(if order.gpus.is_empty() { "samples" } else { "opening GPUs for samples" });
+        Self { order, dialogue: None, keepers, end: None, foreign_load, remarks: Vec::new(), wrong: false, progress }
     }
 
     /// What the user should know of how the samples were taken, and whether an algorithm gave a wrong answer.
@@ -125,6 +130,8 @@ impl Source for Live {
         let began = Instant::now();
         self.end.get_or_insert(began + Duration::from_secs_f64(SECONDS));
         let left = self.left();
+        self.progress.position((SECONDS * 1e3) as u64 - left.as_millis() as u64);
+        self.progress.message(format!("sample: {algorithm} at {} objects", load.objects));
         let seconds = left.as_secs_f64() - ANSWERING;
         if seconds <= 0.0 {
             return Ok(Answer::Over);

@@ -1,7 +1,6 @@
 //! The frames that simulated machines are timed on: those of real scenes.
 
 use crate::prediction;
-use crate::progress::Progress;
 use crate::sweep::Plan;
 use anyhow::Result;
 use sapwise::{Load, Scenario};
@@ -21,13 +20,7 @@ impl Loads {
     /// When the pairs of a scene can't be found.
     pub(crate) fn of_a_sweep(seed: u64, max_objects: Option<u32>) -> Result<Self> {
         let plan = Plan::new(true, &SCENARIOS, max_objects);
-        let progress = Progress::new(plan.scenarios.len() as u64);
-        let of = |&scenario: &Scenario| {
-            progress.message(format!("pairs of the scenario {scenario}"));
-            let loads = prediction::loads(scenario, &plan.sizes, seed)?;
-            progress.advance(1);
-            Ok((scenario, loads))
-        };
+        let of = |&scenario: &Scenario| Ok((scenario, prediction::loads(scenario, &plan.sizes, seed)?));
         Ok(Self(plan.scenarios.iter().map(of).collect::<Result<_>>()?))
     }
 }

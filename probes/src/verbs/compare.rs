@@ -6,7 +6,8 @@ use crate::document::read_reports;
 use crate::exit::Outcome;
 use crate::output;
 use crate::steadiness::Steadiness;
-use crate::table::{columns, grouped};
+use crate::table::grouped;
+use crate::terminal::Terminal;
 
 pub(crate) fn run(arguments: &Compare) -> anyhow::Result<Outcome> {
     let mut reports = read_reports(&arguments.reports)?;
@@ -28,12 +29,14 @@ pub(crate) fn run(arguments: &Compare) -> anyhow::Result<Outcome> {
         let told = left_out
             .iter()
             .map(|name| format!("{name} is left out: the cores were elsewhere, moved, or where they were is not known\n"));
-        output::print(&(told.collect::<String>() + &text(&comparison)))?;
+        let reports: Vec<String> = arguments.reports.iter().map(|path| path.display().to_string()).collect();
+        let next = format!("\nNext: sapwise train {} --out model.json", reports.join(" "));
+        output::print(&(told.collect::<String>() + &text(&comparison, Terminal::of_standard_output()) + &next))?;
     }
     Ok(Outcome::Done)
 }
 
-fn text(comparison: &Comparison) -> String {
+fn text(comparison: &Comparison, terminal: Terminal) -> String {
     let mut text = format!("{} reports of one machine", comparison.reports);
     if let Some(load) = comparison.foreign_load {
         text.push_str(&format!(", foreign load at most {} at half of the points of each", percent(load)));
@@ -51,12 +54,12 @@ fn text(comparison: &Comparison) -> String {
     text.push_str("\n\n");
     let head = ["parameter", "median", "IQR/median", "least to most"].map(str::to_owned).to_vec();
     let rows = comparison.parameters.iter().map(spread);
-    text.push_str(&columns(&std::iter::once(head).chain(rows).collect::<Vec<_>>()));
+    text.push_str(&terminal.table(&std::iter::once(head).chain(rows).collect::<Vec<_>>()));
     if !comparison.borders.is_empty() {
         text.push('\n');
         let head = ["border", "", "objects", "farthest", "IQR/median", "in its interval", "slope", "reports"];
         let rows = comparison.borders.iter().map(border);
-        text.push_str(&columns(&std::iter::once(head.map(str::to_owned).to_vec()).chain(rows).collect::<Vec<_>>()));
+        text.push_str(&terminal.table(&std::iter::once(head.map(str::to_owned).to_vec()).chain(rows).collect::<Vec<_>>()));
     }
     if let Some(Losses { own, others, beyond_own, beyond_own_most }) = &comparison.losses {
         text.push_str(&format!(

@@ -5,7 +5,9 @@ use crate::args::Devices;
 use crate::exit::Outcome;
 use crate::gpus::{self, Limits, OnGpus, Seen, look};
 use crate::output;
-use crate::table::{bytes, columns};
+use crate::progress::Progress;
+use crate::table::{bytes, count};
+use crate::terminal::Terminal;
 use sapwise::{AlgorithmId, GpuIdentity, SimdLevel, usable_cores};
 use serde::Serialize;
 
@@ -39,18 +41,26 @@ struct Adapter {
 }
 
 pub(crate) fn run(arguments: &Devices, known: &Algorithms) -> anyhow::Result<Outcome> {
+    let progress = Progress::new(0);
+    progress.message("looking for GPUs");
     let seen = if arguments.no_gpus { Seen::default() } else { look()? };
+    // One more for the algorithms on them.
+    progress.steps(seen.identities.len() as u64 + 1);
     let mut adapters = Vec::new();
     for identity in &seen.identities {
+        progress.message(format!("opening gpu{}", identity.index));
         let limits = gpus::limits(identity.index)?;
         let refused = limits.as_ref().err().cloned();
         adapters.push(Adapter { identity: identity.clone(), limits: limits.ok(), refused });
+        progress.advance(1);
     }
+    progress.message("algorithms on the GPUs");
     let answer = Answer { algorithms: algorithms(&seen, &adapters, known)?, adapters, remark: seen.remark };
+    drop(progress);
     if arguments.json {
         output::print_json(&answer)?;
     } else {
-        output::print(&text(&answer, arguments.no_gpus))?;
+        output::print(&text(&answer, arguments.no_gpus, Terminal::of_standard_output()))?;
     }
     Ok(Outcome::Done)
 }
@@ -88,26 +98,25 @@ fn algorithms(seen: &Seen, adapters: &[Adapter], known: &Algorithms) -> anyhow::
     Ok(list)
 }
 
-fn text(answer: &Answer, no_gpus: bool) -> String {
-    let mut text = gpu_table(&answer.adapters);
+fn text(answer: &Answer, no_gpus: bool, terminal: Terminal) -> String {
+    let mut text = gpu_table(&answer.adapters, terminal);
     let mut rows = vec![["algorithm", "revision", "runs here"].map(str::to_owned).to_vec()];
     for a in &answer.algorithms {
         let here = a.reason.as_ref().map_or_else(|| "yes".to_owned(), |reason| format!("no: {reason}"));
         rows.push(vec![a.id.clone(), a.revision.to_string(), here]);
     }
-    let cores = usable_cores();
-    let plural = if cores == 1 { "" } else { "s" };
-    text += &format!("{}\n{cores} usable core{plural}, vector instructions: {}.", columns(&rows), SimdLevel::in_use());
+    let cores = count(usable_cores() as usize, "usable core");
+    text += &format!("{}\n{cores}, vector instructions: {}.", terminal.table(&rows), SimdLevel::in_use());
     if let Some(remark) = &answer.remark {
-        text += &format!("\n{remark}.");
+        text += &format!("\n{}", terminal.warning(&format!("{remark}.")));
     } else if answer.adapters.is_empty() && !no_gpus {
         text += "\nNo GPU was found; everything else works on the CPU.";
     }
-    text
+    text + "\nNext: sapwise predict"
 }
 
 /// Nothing without GPUs.
-fn gpu_table(adapters: &[Adapter]) -> String {
+fn gpu_table(adapters: &[Adapter], terminal: Terminal) -> String {
     if adapters.is_empty() {
         return String::new();
     }
@@ -135,5 +144,5 @@ fn gpu_table(adapters: &[Adapter]) -> String {
             refusals += &format!("gpu{} can't be used: {why}\n", g.index);
         }
     }
-    format!("{}{refusals}\n", columns(&rows))
+    format!("{}{refusals}\n", terminal.table(&rows))
 }

@@ -6,7 +6,7 @@ use crate::boxes::{Frames, read_frames, write_pairs};
 use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::sweep::median;
-use crate::table::{duration, grouped};
+use crate::table::{count, duration, grouped};
 use crate::{gpus, interrupt, output};
 use anyhow::Context;
 use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry, usable_cores};
@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Res
     if arguments.json {
         output::print_json(&answer)?;
     } else {
-        output::print(&text(&answer, median_ns))?;
+        output::print(&(text(&answer, median_ns) + &next_step(arguments, frames.len())))?;
     }
     Ok(Outcome::Done)
 }
@@ -140,13 +140,26 @@ fn measure(
 fn text(answer: &Answer, median_ns: f64) -> String {
     let Answer { algorithm, objects, frames, pairs, samples_ms, fingerprint, .. } = answer;
     let last = grouped(pairs.last().copied().unwrap_or(0));
-    let plural = if *frames == 1 { "" } else { "s" };
     format!(
-        "{algorithm}: {} boxes, {frames} frame{plural}\n\
+        "{algorithm}: {} boxes, {}\n\
          pairs in the last frame: {last} (fingerprint {fingerprint})\n\
-         median of {} samples: {}",
+         median of {}: {}",
         grouped(*objects as u64),
-        samples_ms.len(),
+        count(*frames, "frame"),
+        count(samples_ms.len(), "sample"),
         duration(median_ns)
     )
+}
+
+/// What tells more of the same boxes.
+fn next_step(arguments: &Arguments, frames: usize) -> String {
+    let boxes = arguments.boxes.display();
+    match (&arguments.out, frames) {
+        // A stream of one frame shows no choice.
+        (_, 2..) => format!("\nNext: sapwise run {boxes}"),
+        (None, _) => format!("\nNext: sapwise pairs {boxes} --out pairs.npy"),
+        (Some(path), _) => {
+            format!("\nWritten to {}. Next: the same with --algorithm ID, as `sapwise devices` lists them", path.display())
+        }
+    }
 }

@@ -5,7 +5,9 @@ use crate::args::Predict;
 use crate::document::read_document;
 use crate::exit::{Outcome, WrongUsage};
 use crate::hardware::{self, measure_hardware};
-use crate::{files, interrupt, output, prediction, summary, train};
+use crate::prediction::{self, Slice};
+use crate::terminal::{self, Terminal};
+use crate::{files, interrupt, output, summary, train};
 use anyhow::{Context, bail};
 use sapwise::json::{self, Document};
 use sapwise::{Model, Report, Scenario};
@@ -18,7 +20,8 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     let model = if arguments.measured { None } else { Some(model(arguments.model.as_deref())?) };
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
-    let mut text = String::new();
+    let terminal = Terminal::of_standard_output();
+    let (mut text, mut slice) = (String::new(), None);
     // A sentence on GPUs for people, and what went wrong with them for the file.
     let (mut told, mut remarks) = (None, Vec::new());
     // Whether a sample gave wrong pairs.
@@ -42,7 +45,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
                 }
             };
             if report.is_none() {
-                text = format!("{}\n", summary::hardware(&hardware));
+                text = format!("{}\n", summary::hardware(&hardware, terminal));
             }
             interrupt::check()?;
             let gpus = match measured {
@@ -58,13 +61,13 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
                     taken
                 }
             };
+            let slice = slice.insert(Slice::of(scenario)?);
             if report.is_none() && arguments.samples > 0 {
-                let sampled =
-                    prediction::predict_and_sample(model, &hardware, &gpus, scenario, algorithms, arguments.samples)?;
+                let sampled = prediction::predict_and_sample(model, &hardware, &gpus, slice, algorithms, arguments.samples)?;
                 wrong = sampled.1;
                 sampled.0
             } else {
-                prediction::predict(model, &hardware, &gpus, scenario, algorithms)?
+                prediction::predict(model, &hardware, &gpus, slice, algorithms)?
             }
         }
     };
@@ -77,7 +80,12 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         output::print_json(&fields)?;
         return Ok(outcome);
     }
-    text += &summary::fields(&fields);
+    text += &summary::fields(&fields, terminal);
+    let chart = match (&slice, &report) {
+        (Some(slice), _) => terminal::costs(&fields, &slice.loads),
+        (None, report) => report.as_ref().and_then(|report| terminal::timings(report, &fields.scenario)),
+    };
+    text += &chart.and_then(|chart| chart.draw(terminal)).map(|chart| format!("\n{chart}")).unwrap_or_default();
     if report.is_some() && model.is_some() && arguments.samples > 0 {
         text += "\nNo sample was taken: they are taken on this machine, and the prediction is for that of a report.\n";
     }

@@ -8,6 +8,7 @@ use crate::exit::Outcome;
 use crate::hardware::{self, measure_hardware};
 use crate::steadiness::Steadiness;
 use crate::sweep::{self, Conditions, Found, Plan};
+use crate::terminal::Terminal;
 use crate::{child, interrupt, output, profiles, provenance, restriction, summary};
 use anyhow::Context;
 use sapwise::report::Restriction;
@@ -66,7 +67,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     } else {
         let next = saved.as_ref().ok().and_then(|path| path.map(|path| summary::next_step(&report, path)));
         let told = told.map(|told| format!("\n{told}\n")).unwrap_or_default();
-        summary::report(&report) + &told + &next.unwrap_or_default()
+        summary::report(&report, Terminal::of_standard_output()) + &told + &next.unwrap_or_default()
     };
     // A standard output that is closed or full is told last: what went wrong with the report matters more.
     let printed = output::print(&text);

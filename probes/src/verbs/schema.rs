@@ -26,7 +26,8 @@ pub(crate) fn run(arguments: &Schema) -> anyhow::Result<Outcome> {
     if arguments.json {
         output::print_json(&Answer { files })?;
     } else {
-        output::print(&files.iter().map(|f| format!("wrote {f}\n")).collect::<String>())?;
+        let wrote = files.iter().map(|f| format!("wrote {f}\n")).collect::<String>();
+        output::print(&(wrote + "Next: sapwise check FILE, which looks at more than a schema can say"))?;
     }
     Ok(Outcome::Done)
 }

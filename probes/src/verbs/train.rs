@@ -5,12 +5,12 @@ use crate::document::{read_report, report_files};
 use crate::exit::{Outcome, WrongUsage};
 use crate::plot::{self, Figure, Picture};
 use crate::progress::Progress;
-use crate::table::columns;
-use crate::train::{self, Evidence, Selection, Trained};
+use crate::terminal::{Axis, Chart, Series, Terminal};
+use crate::train::{self, Evidence, Held, OURS, Selection, Trained};
 use crate::{card, files, interrupt, output};
 use rayon::prelude::*;
 use sapwise::Model;
-use sapwise::model::Validation;
+use sapwise::model::{Learning, Validation};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -57,8 +57,9 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
         let Model { validation, name, .. } = &model;
         output::print_json(&Answer { validation, model: name, notes: &notes })?;
     } else {
-        let importance = importance.map_or_else(String::new, |i| format!("{}\n", i.page(columns)));
-        output::print(&format!("{importance}{}", summary(&model, &notes, &arguments.out)))?;
+        let terminal = Terminal::of_standard_output();
+        let importance = importance.map_or_else(String::new, |i| format!("{}\n", i.page(|rows| terminal.table(rows))));
+        output::print(&format!("{importance}{}", summary(&model, &held, &notes, &arguments.out, terminal)))?;
     }
     Ok(Outcome::Done)
 }
@@ -115,18 +116,57 @@ fn command(arguments: &Train, plot: &Path) -> String {
 const COLUMNS: &str = "Regret is time over the best time, less one. In games: each number of objects as often as games are assumed to \
 have it (log-normal around\n800). Borders off by: octaves between measured and predicted borders, the median. --card explains all.\n";
 
-fn summary(model: &Model, notes: &[String], path: &Path) -> String {
-    let mut text = card::scores(&model.validation, columns);
+fn summary(model: &Model, held: &Held, notes: &[String], path: &Path, terminal: Terminal) -> String {
+    let table = |rows: &[Vec<String>]| terminal.table(rows);
+    let mut text = card::scores(&model.validation, table);
     if !model.validation.methods.is_empty() {
         text.push_str(&format!("\n{COLUMNS}"));
     }
     if !model.validation.learning.is_empty() {
-        text.push_str(&format!("\n{}", card::course(&model.validation.learning, model.is_simulated(), columns)));
+        text.push_str(&format!("\n{}", card::course(&model.validation.learning, model.is_simulated(), table)));
     }
+    let chart = chart(&model.validation.learning, held).draw(terminal);
+    text += &chart.map(|chart| format!("\n{chart}\n")).unwrap_or_default();
     for note in notes {
-        text.push_str(&format!("note: {note}\n"));
+        text.push_str(&format!("{} {note}\n", terminal.warning("note:")));
     }
     let shown = path.display();
     text.push_str(&format!("\nThe model {} is in {shown}. Next: sapwise predict --model {shown}", model.name));
     text
+}
+
+/// Ways to choose in the chart at most, and the regret below which there is no telling them apart, in percent.
+const MOST_WAYS: usize = 6;
+const LEAST_PERCENT: f64 = 0.1;
+
+/// The regret by the number of machines; where there are too few for that, by held-out machine or profile.
+fn chart(learning: &[Learning], held: &Held) -> Chart {
+    let percent = |regret: f64| (100.0 * regret).max(LEAST_PERCENT);
+    let (title, mut all): (_, Vec<(&str, Vec<(f64, f64)>)>) = if learning.len() > 1 {
+        let names = learning[0].methods.iter().map(|m| &m.name[..]);
+        let course = |name: &str| {
+            let of = |l: &Learning| {
+                let score = l.methods.iter().find(|m| m.name == name)?;
+                Some((l.machines as f64, percent(score.mean_regret)))
+            };
+            learning.iter().filter_map(of).collect()
+        };
+        ("mean regret (%) over physical machines in the training".to_owned(), names.map(|n| (n, course(n))).collect())
+    } else {
+        let ranked = |regrets: &[f64]| {
+            let mut regrets: Vec<f64> = regrets.iter().copied().map(percent).collect();
+            regrets.sort_by(f64::total_cmp);
+            regrets.into_iter().enumerate().map(|(k, regret)| (k as f64 + 1.0, regret)).collect()
+        };
+        let unit = if held.by_machine { "machines" } else { "profiles" };
+        let title = format!("regret (%) on the held-out {unit}, of each way to choose from the least to the most");
+        (title, held.regrets.iter().map(|(name, regrets)| (*name, ranked(regrets))).collect())
+    };
+    // Ours first, then those that end with the least regret.
+    all.sort_by(|a, b| {
+        let last = |points: &[(f64, f64)]| points.last().map_or(f64::INFINITY, |p| p.1);
+        (a.0 != OURS).cmp(&(b.0 != OURS)).then(last(&a.1).total_cmp(&last(&b.1)))
+    });
+    let series = all.into_iter().take(MOST_WAYS).map(|(name, points)| Series { name: name.to_owned(), points });
+    Chart { title, across: Axis::Linear, series: series.collect() }
 }

@@ -25,6 +25,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use verdict::FEWEST_MACHINES;
 
+pub(crate) use borders::measured_borders;
 pub(crate) use interval::Interval;
 pub(crate) use verdict::{Effect, Verdict};
 

@@ -5,8 +5,9 @@ use crate::args::Run;
 use crate::document::read_document;
 use crate::gpus::{self, GpuChoice};
 use crate::hardware::measure_hardware;
+use crate::prediction::{self, Slice};
 use crate::verbs::predict;
-use crate::{prediction, revisions, train};
+use crate::{revisions, train};
 use anyhow::{Context, bail};
 use sapwise::json::Document;
 use sapwise::{AlgorithmId, Fields, Registry, Scenario, Source, measure};
@@ -67,10 +68,10 @@ impl Origin {
 pub(super) fn predicted(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Origin> {
     let (hardware, measured) = measure_hardware(None, &arguments.gpus)?;
     let model = predict::model(None)?;
-    let (usable, scenario) = (&measured.usable, Scenario::Uniform);
+    let (usable, slice) = (&measured.usable, Slice::of(Scenario::Uniform)?);
     let (mut fields, wrong) = match arguments.samples {
-        0 => (prediction::predict(&model, &hardware, usable, scenario, algorithms)?, false),
-        most => prediction::predict_and_sample(&model, &hardware, usable, scenario, algorithms, most)?,
+        0 => (prediction::predict(&model, &hardware, usable, &slice, algorithms)?, false),
+        most => prediction::predict_and_sample(&model, &hardware, usable, &slice, algorithms, most)?,
     };
     fields.warnings.extend(measured.remarks);
     Ok(Origin { fields, from: From::Prediction, other_machine: None, wrong })

@@ -10,6 +10,7 @@ use crate::boxes::{Frames, read_frames};
 use crate::exit::{Outcome, WrongUsage};
 use crate::plot::{self, Figure, Picture};
 use crate::simulation::{Course, Footage, Swing, TraceFormat, simulate, too_wide, write_trace};
+use crate::terminal::Terminal;
 use crate::{files, interrupt, output};
 use anyhow::{Context, bail};
 use sapwise::{Scenario, usable_cores};
@@ -65,7 +66,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     if arguments.json {
         output::print_json(&answer)?;
     } else {
-        output::print(&text::text(arguments, &answer, &origin))?;
+        output::print(&text::text(arguments, &answer, &origin, &outcome, Terminal::of_standard_output()))?;
     }
     Ok(if outcome.interrupted || origin.wrong { Outcome::Failed } else { Outcome::Done })
 }

@@ -1,30 +1,35 @@
 //! What a person reads at the end of a run.
 
 use super::answer::{Answer, Figures, LeftOut, Oracle, Slowed};
-use super::fields::Origin;
+use super::fields::{From, Origin};
 use crate::args::{Run, Scene};
-use crate::simulation::WINDOW;
-use crate::table::{columns, grouped};
+use crate::simulation::{Outcome, WINDOW};
+use crate::table::{count, grouped};
+use crate::terminal::{Axis, Chart, Series, Terminal};
 use sapwise::measure::statistics::quantile;
 use std::path::Path;
 
-/// Totals, figures and what there is to say about them.
-pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> String {
-    let mut text = format!(
-        "{}, {} frames of {} objects, medians of {} repeats, verified against each other\n",
+/// Totals, figures, what there is to say about them, and what to do next.
+pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, outcome: &Outcome, terminal: Terminal) -> String {
+    let head = format!(
+        "{}, {} of {} objects, medians of {}, verified against each other",
         answer.scenario,
-        answer.frames,
+        count(answer.frames, "frame"),
         extent(answer),
-        answer.repeats
+        count(answer.repeats, "repeat")
     );
+    let mut text = format!("{}\n", terminal.head(&head));
     text += &format!("Fields: {}. {}\n\n", origin.text(), learning(answer));
-    text += &totals(answer);
+    text += &totals(answer, terminal);
     for (id, LeftOut { after_frame, frames, at_least_ms }) in &answer.left_out {
         let after = after_frame.map_or("from the first on".to_owned(), |frame| format!("after frame {frame}"));
-        text +=
-            &format!("{id} sat out {frames} frames {after}: it was hopeless or failed; {at_least_ms:.2} ms without them\n");
+        text += &format!(
+            "{id} sat out {} {after}: it was hopeless or failed; {at_least_ms:.2} ms without them\n",
+            count(*frames, "frame")
+        );
     }
-    text += &format!("\n{}\n", figures(answer));
+    text += &format!("\n{}\n", figures(answer, terminal));
+    text += &chart(answer, outcome, terminal).draw(terminal).map(|chart| format!("{chart}\n")).unwrap_or_default();
     text += &comparisons(answer);
     if let Some(slowed) = &answer.co_runner {
         text += &format!("\n{}", co_runner(slowed));
@@ -33,15 +38,48 @@ pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> Str
         text += &format!("\nOther programs took {:.0} % of the CPU, median over the frames.", load * 100.0);
     }
     for warning in &answer.warnings {
-        text += &format!("\nwarning: {warning}");
+        text += &format!("\n{} {warning}", terminal.warning("warning:"));
     }
     if answer.interrupted {
-        text += "\nInterrupted: the repeats that were complete are shown.";
+        text += &format!("\n{} the repeats that were complete are shown.", terminal.warning("Interrupted:"));
     }
     for (verb, path) in [("Recorded", &arguments.record), ("Traced", &arguments.trace), ("Drawn", &arguments.plot)] {
         text += &path.as_ref().map(|p| format!("\n{verb} in {}.", p.display())).unwrap_or_default();
     }
-    text
+    text + &format!("\nNext: {}", next_step(arguments, origin))
+}
+
+/// What tells more than this run did.
+fn next_step(arguments: &Run, origin: &Origin) -> &'static str {
+    match (origin.from, &arguments.plot) {
+        (_, None) => "the same with --plot run.svg, which draws the decisions",
+        (From::Prediction, _) => {
+            "sapwise probe --out report.json, then the same with --fields report.json, which are measured fields"
+        }
+        (_, Some(_)) => "the same without --fields, to see what a prediction is worth",
+    }
+}
+
+/// The time of a frame over the frames: the adaptive module, the oracle and the best fixed algorithm.
+fn chart(answer: &Answer<'_>, outcome: &Outcome, terminal: Terminal) -> Chart {
+    // A frame for each column, as there are no more dots to tell them apart; between them the most is shown, that no dear frame is lost.
+    let step = outcome.frames.len().div_ceil(terminal.plot_columns().unwrap_or(1)).max(1);
+    let thinned = |ns: Vec<f64>| -> Vec<(f64, f64)> {
+        let most = |some: &[f64]| some.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        ns.chunks(step).enumerate().map(|(k, some)| ((k * step) as f64, most(some) / 1e3)).collect()
+    };
+    let series = |name: &str, ns: Vec<f64>| Series { name: name.to_owned(), points: thinned(ns) };
+    let mut all = vec![
+        series("adaptive", outcome.frames.iter().map(|f| f.adaptive_ns).collect()),
+        series("oracle", outcome.oracle.ns.clone()),
+    ];
+    if let Some((best, _)) = outcome.best_fixed() {
+        let name = format!("best fixed, {}", outcome.fixed[best]);
+        all.push(series(&name, outcome.frames.iter().map(|f| f.fixed_ns[best]).collect()));
+    }
+    let thinning = if step > 1 { format!(", the most of every {step}") } else { String::new() };
+    let title = format!("{}: time of a frame (us) over frames{thinning}", answer.scenario);
+    Chart { title, across: Axis::Linear, series: all }
 }
 
 /// What stands below the picture: the figures, where the fields come from, and the command that makes it again.
@@ -50,9 +88,11 @@ pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> 
     let name = answer.scenario;
     [
         format!(
-            "{name}: regret {}, {switches} switches, {explored} frames explored; medians of {} repeats, decisions of the last",
+            "{name}: regret {}, {switches} switch{}, {} explored; medians of {}, decisions of the last",
             percent(regret),
-            answer.repeats
+            if switches == 1 { "" } else { "es" },
+            count(explored, "frame"),
+            count(answer.repeats, "repeat")
         ),
         format!("Fields: {}. {}", origin.text(), learning(answer)),
         format!("Made by: {}", command(arguments)),
@@ -72,7 +112,7 @@ fn learning(answer: &Answer<'_>) -> &'static str {
     }
 }
 
-fn totals(answer: &Answer<'_>) -> String {
+fn totals(answer: &Answer<'_>, terminal: Terminal) -> String {
     let oracle = answer.total_ms.oracle;
     let row = |name: &str, ms: f64| vec![name.to_owned(), format!("{ms:.2}"), format!("{:.3}", ms / oracle)];
     let mut fixed: Vec<(&String, f64)> = answer.total_ms.fixed.iter().map(|(id, ms)| (id, *ms)).collect();
@@ -81,11 +121,11 @@ fn totals(answer: &Answer<'_>) -> String {
     rows.push(row("oracle (best at every frame)", oracle));
     rows.push(row("adaptive", answer.total_ms.adaptive));
     rows.extend(fixed.iter().map(|(id, ms)| row(id, *ms)));
-    columns(&rows)
+    terminal.table(&rows)
 }
 
 /// The figures of all frames and of each part.
-fn figures(answer: &Answer<'_>) -> String {
+fn figures(answer: &Answer<'_>, terminal: Terminal) -> String {
     let head = ["frames", "regret", "middle half of repeats", "of windows", "switches", "explored", "worst frame"];
     let row = |frames: String, f: &Figures| {
         let within = f.regret_quartiles.map_or("-".to_owned(), |[a, b]| format!("{} to {}", percent(a), percent(b)));
@@ -103,7 +143,7 @@ fn figures(answer: &Answer<'_>) -> String {
     };
     let mut rows = vec![head.map(str::to_owned).to_vec(), row("all".to_owned(), &answer.figures)];
     rows.extend(answer.parts.iter().map(|p| row(format!("{} to {}", p.from_frame, p.to_frame), &p.figures)));
-    columns(&rows)
+    terminal.table(&rows)
 }
 
 fn comparisons(answer: &Answer<'_>) -> String {
@@ -150,9 +190,8 @@ fn co_runner(slowed: &Slowed) -> String {
         }
         _ => String::new(),
     };
-    let threads = slowed.threads;
-    let plural = if threads == 1 { "" } else { "s" };
-    format!("From frame {} on {threads} thread{plural} ran beside it: {reached}{of_fixed}.", slowed.from_frame)
+    let threads = count(slowed.threads as usize, "thread");
+    format!("From frame {} on {threads} ran beside it: {reached}{of_fixed}.", slowed.from_frame)
 }
 
 fn times(ratio: f64) -> String {

@@ -1,0 +1,72 @@
+//! The curves of costs and of timings over the number of objects.
+
+use super::{Axis, Chart, Series};
+use crate::sweep::median;
+use sapwise::report::Timing;
+use sapwise::{AlgorithmId, Fields, Load, Report};
+
+/// Curves in a chart, at most: beyond that they can't be told apart.
+const MOST: usize = 6;
+
+/// A curve is drawn where it takes this many times the least at most: those of a scene in which all boxes are compared with all others
+/// would take half of the height.
+const FARTHEST: f64 = 100.0;
+
+/// The predicted or fitted time of a frame over the objects of a slice, for the algorithms that hold a field and those that come next.
+///
+/// `None` of fields without costs.
+pub(crate) fn costs(fields: &Fields, loads: &[Load]) -> Option<Chart> {
+    let all = fields.costs.iter().map(|cost| {
+        let points = loads.iter().map(|load| (f64::from(load.objects), cost.curve.cost_ns(load) / 1e3)).collect();
+        (cost.algorithm.clone(), points)
+    });
+    chart(&fields.scenario, all.collect(), "expected")
+}
+
+/// The same of what a report measured in a scenario.
+pub(crate) fn timings(report: &Report, scenario: &str) -> Option<Chart> {
+    let mut all: Vec<(AlgorithmId, Vec<(f64, f64)>)> =
+        report.algorithms.iter().map(|t| (t.id.clone(), Vec::new())).collect();
+    for point in report.points.iter().filter(|p| p.scenario == scenario) {
+        let sound = |t: &&Timing| t.error.is_none();
+        for timing in point.timings.iter().filter(sound) {
+            let Some(ns) = median(&timing.samples_ns) else { continue };
+            if let Some((_, points)) = all.iter_mut().find(|(id, _)| *id == timing.algorithm) {
+                points.push((f64::from(point.load.objects), ns / 1e3));
+            }
+        }
+    }
+    for (_, points) in &mut all {
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Several visits to a size are one point: the least disturbed.
+        points.dedup_by(|next, kept| next.0 == kept.0 && (kept.1 = kept.1.min(next.1), true).1);
+    }
+    chart(scenario, all, "measured")
+}
+
+/// The curves that come nearest to the least time somewhere, those that are the least at most places first.
+fn chart(scenario: &str, all: Vec<(AlgorithmId, Vec<(f64, f64)>)>, how: &str) -> Option<Chart> {
+    let mut objects: Vec<f64> = all.iter().flat_map(|(_, points)| points.iter().map(|p| p.0)).collect();
+    objects.sort_by(f64::total_cmp);
+    objects.dedup();
+    // By place: how much longer than the least time each takes.
+    let mut ranked: Vec<(f64, usize, (AlgorithmId, Vec<(f64, f64)>))> = Vec::new();
+    let least = |x: f64| all.iter().filter_map(|(_, points)| at(points, x)).fold(f64::INFINITY, f64::min);
+    let least: Vec<f64> = objects.iter().map(|&x| least(x)).collect();
+    for (id, points) in &all {
+        let over: Vec<f64> = objects.iter().zip(&least).filter_map(|(&x, least)| Some(at(points, x)? / least)).collect();
+        let Some(nearest) = over.iter().copied().min_by(f64::total_cmp) else { continue };
+        let first = over.iter().filter(|&&ratio| ratio <= 1.0).count();
+        let near = |p: &&(f64, f64)| objects.iter().zip(&least).any(|(&x, least)| x == p.0 && p.1 <= FARTHEST * least);
+        ranked.push((nearest, first, (id.clone(), points.iter().filter(near).copied().collect())));
+    }
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+    let series: Vec<Series> =
+        ranked.into_iter().take(MOST).map(|(.., (id, points))| Series { name: id.to_string(), points }).collect();
+    let title = format!("{scenario}: {how} time of a frame (us) over objects, the cheapest algorithms");
+    (!series.is_empty()).then_some(Chart { title, across: Axis::Logarithmic, series })
+}
+
+fn at(points: &[(f64, f64)], x: f64) -> Option<f64> {
+    points.iter().find(|p| p.0 == x).map(|p| p.1)
+}
