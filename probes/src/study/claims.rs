@@ -152,15 +152,16 @@ fn by_reports(said: Said, parameter: &str, influence: &Influence) -> (Outcome, S
         );
         return (Outcome::Undecidable, why);
     }
-    // Where the model reads a parameter its verdict counts: ranks alone can't tell a cause from what goes together with it.
-    let by_model: Vec<&&Link> = links.iter().filter(|l| l.effect.as_ref().is_some_and(|e| e.permuted.is_some())).collect();
-    let (verdicts, how): (Vec<Verdict>, &str) = if by_model.is_empty() {
+    // What a parameter adds to predictions counts: ranks alone can't tell a cause from what goes together with it.
+    let by_predictions: Vec<&&Link> = links.iter().filter(|l| l.effect.is_some() || l.left.is_some()).collect();
+    let (verdicts, how): (Vec<Verdict>, &str) = if by_predictions.is_empty() {
         (
             links.iter().map(|l| l.verdict).collect(),
             "rank correlation alone, which can't tell a cause from what goes with it",
         )
     } else {
-        (by_model.iter().map(|l| l.verdict).collect(), "its worth to predictions of machines left out")
+        let how = "what it adds to predictions of machines left out";
+        (by_predictions.iter().map(|l| l.verdict).collect(), how)
     };
     let linked = verdicts.iter().filter(|v| **v == Verdict::Linked).count();
     let not = verdicts.iter().filter(|v| **v == Verdict::NotLinked).count();
@@ -184,7 +185,7 @@ fn by_reports(said: Said, parameter: &str, influence: &Influence) -> (Outcome, S
     let outcome = match found {
         None => Outcome::Undecidable,
         // A rank is no proof that something is a cause, so it refutes nothing and confirms nothing that is said to be one.
-        Some(Said::Linked) if by_model.is_empty() => Outcome::Undecidable,
+        Some(Said::Linked) if by_predictions.is_empty() => Outcome::Undecidable,
         Some(found) if found == said => Outcome::Confirmed,
         Some(_) => Outcome::Refuted,
     };

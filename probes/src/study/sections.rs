@@ -206,11 +206,12 @@ fn ratios(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resu
 fn influences(study: &Study, influence: &Influence, folder: &mut Folder, missing: &mut Vec<String>) -> Result<Section> {
     let mut part = Part::new("influence", "Which parameters matter for which algorithm and border", missing);
     part.text(
-        "Three methods. Rank correlation over machines (Spearman, of an algorithm with its time for frames of 1000 objects or more; a verdict of linked allows one in ten of them to be none): what goes \
+        "Four methods. Rank correlation over machines (Spearman, of an algorithm with its time for frames of 1000 objects or more; a verdict of linked allows one in ten of them to be none): what goes \
          together, whatever the cause. Permuted: how much worse predictions of machines that were left out are when they get the value of \
          another machine. Fitted without: how much worse they are when every machine has the same value, in the training too: what no \
-         other parameter stands in for. All intervals are of 90 %. Where the model reads a parameter the verdict is that of the last \
-         two; else that of the ranks.",
+         other parameter stands in for. Left: rank correlation of a parameter that predictions of an algorithm do not read with the time \
+         over the predicted one on machines that were left out: what it would add. All intervals are of 90 %. The verdict is that of \
+         permuted and fitted without, else that of what is left, else that of the ranks.",
     );
     match &study.importance {
         Err(why) => part.lacks(why.clone()),
@@ -218,8 +219,7 @@ fn influences(study: &Study, influence: &Influence, folder: &mut Folder, missing
             part.section.blocks.push(Block::List(importance.notes.clone()));
         }
     }
-    let told = |link: &&Link| link.rank.is_some() || link.effect.as_ref().is_some_and(|e| e.permuted.is_some());
-    let links: Vec<&Link> = influence.links.iter().filter(told).collect();
+    let links: Vec<&Link> = influence.links.iter().collect();
     if links.is_empty() {
         part.lacks(format!(
             "{} physical machine{} studied, and it takes {} to tell a link between machines; what was taken from one machine on \
@@ -253,7 +253,7 @@ fn matrix(influence: &Influence, links: &[&Link]) -> plot::Influence {
     let weight = |parameter: &str| {
         let own = links.iter().filter(|l| l.parameter == parameter);
         let count = |verdict| own.clone().filter(|l| l.verdict == verdict).count();
-        let read = own.clone().any(|l| l.effect.is_some());
+        let read = own.clone().filter(|l| l.effect.is_some()).count() > 1;
         (read, count(Verdict::Linked), count(Verdict::NotLinked))
     };
     let mut rows: Vec<&str> = links.iter().map(|l| l.parameter.as_str()).collect::<BTreeSet<_>>().into_iter().collect();
@@ -296,6 +296,9 @@ fn links_sheet(links: &[&Link]) -> Sheet {
         ("from", "fitted_without_low"),
         ("to", "fitted_without_high"),
         ("by predictions", "prediction_verdict"),
+        ("left", "left_correlation"),
+        ("from", "left_low"),
+        ("to", "left_high"),
     ]);
     for link in links {
         let mut cells =
@@ -305,8 +308,8 @@ fn links_sheet(links: &[&Link]) -> Sheet {
         cells.extend([rank(|r| r.correlation), rank(|r| r.low), rank(|r| r.high)]);
         cells.push(Cell::optional(link.rank.map(|r| r.machines as f64), 0, few));
         cells.push(link.rank.map_or_else(|| Cell::Missing(few.to_owned()), |r| Cell::text(r.verdict.to_string())));
-        let effect = link.effect.as_ref().filter(|e| e.permuted.is_some());
-        let unread = "no prediction reads it, or too few machines have it";
+        let effect = link.effect.as_ref();
+        let unread = "predictions of this do not read it, or too few machines have it";
         let mut interval = |of: fn(&Effect) -> Option<Interval>| {
             let found = effect.and_then(of);
             cells.extend(
@@ -316,6 +319,9 @@ fn links_sheet(links: &[&Link]) -> Sheet {
         interval(|e| e.permuted);
         interval(|e| e.refitted);
         cells.push(effect.map_or_else(|| Cell::Missing(unread.to_owned()), |e| Cell::text(e.verdict.to_string())));
+        let read = "predictions read it, or it is no time";
+        let left = link.left.map_or([None; 3], |r| [r.correlation, r.low, r.high].map(Some));
+        cells.extend(left.map(|v| Cell::optional(v, 2, read)));
         sheet.push(cells, &[]);
     }
     sheet
