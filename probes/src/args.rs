@@ -192,7 +192,7 @@ pub(crate) struct Train {
     #[arg(long, value_name = "CARD.md")]
     pub(crate) card: Option<PathBuf>,
     /// Where a picture goes: predicted against measured times on what was left out, the regret on each machine, and how the regret
-    /// falls with the number of machines. SVG.
+    /// falls with the number of machines. SVG or PNG by its ending.
     #[arg(long, value_name = "P.svg")]
     pub(crate) plot: Option<PathBuf>,
     /// Where JSON goes that says which hardware parameters matter for which crossover. That takes a fit of everything for each

@@ -152,6 +152,19 @@ impl<'a, 'p> Chart<'a, 'p> {
         Ok(())
     }
 
+    /// The area below a line through these values.
+    pub(super) fn below(
+        &self,
+        values: impl IntoIterator<Item = (f64, f64)>,
+        colour: RGBColor,
+        alpha: f64,
+    ) -> anyhow::Result<()> {
+        let mut places: Vec<Place> = values.into_iter().filter_map(|(x, y)| self.place(x, y)).collect();
+        let (Some(first), Some(last)) = (places.first().copied(), places.last().copied()) else { return Ok(()) };
+        places.extend([(last.0, self.frame.bottom), (first.0, self.frame.bottom)]);
+        Ok(self.area.draw(&Polygon::new(places, colour.mix(alpha).filled()))?)
+    }
+
     /// A bar from one value to another above `x`.
     pub(super) fn bar(&self, x: f64, low: f64, high: f64, line: Line) -> anyhow::Result<()> {
         let ends = (self.x.share(x), self.y.end(low), self.y.end(high));

@@ -19,6 +19,8 @@ const ROW: i32 = line_height(LABEL) + 3;
 pub(super) enum Sign {
     /// Line and mark of the series at a position.
     Curve(usize),
+    /// Its mark on a line without gaps.
+    Marked(usize),
     /// Its mark alone.
     Mark(usize),
     /// Its field, the colour and the lines over it, with its mark.
@@ -80,6 +82,10 @@ impl Sign {
         match self {
             Self::Curve(k) => {
                 path(area, &ends, Line::of(k))?;
+                area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?;
+            }
+            Self::Marked(k) => {
+                path(area, &ends, Line::solid(style::colour(k), 2))?;
                 area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?;
             }
             Self::Mark(k) => area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?,

@@ -1,7 +1,7 @@
 //! The map that the paper could not draw: fields of optimal performance over two axes.
 
 use super::axis::Axis;
-use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, Line, fill, hatch, missing};
+use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, fill, hatch, missing};
 use super::legend::{Legend, Sign};
 use super::mark::Mark;
 use super::paper::Area;

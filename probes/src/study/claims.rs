@@ -7,7 +7,7 @@ use sapwise::hardware::gpu::parameter as gpu;
 use std::fmt;
 
 /// The speed-up from the Quadro 4600 to the 5800 that the paper prints ("1.5X much faster"). It prints no other timing in figures.
-const PRINTED_SPEED_UP: f64 = 1.5;
+pub(super) const PRINTED_SPEED_UP: f64 = 1.5;
 /// The cards between which it is.
 const SLOWER: &str = "quadro-fx-4600";
 const FASTER: &str = "quadro-fx-5800";
@@ -62,6 +62,12 @@ impl fmt::Display for Outcome {
     }
 }
 
+/// The positions of the paper's cards, from the smallest to the fastest.
+pub(super) fn cards(entries: &[Entry]) -> [Option<usize>; 3] {
+    let card = |name: &str| entries.iter().position(|e| e.is_published() && e.name.ends_with(name));
+    [SMALLEST, SLOWER, FASTER].map(card)
+}
+
 /// The claims of Section 6, in its order.
 pub(super) fn claims(entries: &[Entry], influence: &Influence) -> Vec<Claim> {
     let said = [
@@ -75,8 +81,7 @@ pub(super) fn claims(entries: &[Entry], influence: &Influence) -> Vec<Claim> {
         ("The internal bandwidth of the GPU influences it.", gpu::COPY_GB_PER_S, Said::Linked),
         ("The number of cores of the GPU influences it.", gpu::LANES, Said::Linked),
     ];
-    let card = |name: &str| entries.iter().position(|e| e.is_published() && e.name().ends_with(name));
-    let cards = [SMALLEST, SLOWER, FASTER].map(card);
+    let cards = cards(entries);
     let claim = |(text, parameter, said): (&str, &str, Said)| {
         let value = |card: Option<usize>| entries[card?].gpu()?.value(parameter);
         let values = cards.map(value);
@@ -147,15 +152,16 @@ fn by_reports(said: Said, parameter: &str, influence: &Influence) -> (Outcome, S
         );
         return (Outcome::Undecidable, why);
     }
-    // Where the model reads a parameter its verdict counts: ranks alone can't tell a cause from what goes together with it.
-    let by_model: Vec<&&Link> = links.iter().filter(|l| l.effect.as_ref().is_some_and(|e| e.permuted.is_some())).collect();
-    let (verdicts, how): (Vec<Verdict>, &str) = if by_model.is_empty() {
+    // What a parameter adds to predictions counts: ranks alone can't tell a cause from what goes together with it.
+    let by_predictions: Vec<&&Link> = links.iter().filter(|l| l.effect.is_some() || l.left.is_some()).collect();
+    let (verdicts, how): (Vec<Verdict>, &str) = if by_predictions.is_empty() {
         (
             links.iter().map(|l| l.verdict).collect(),
             "rank correlation alone, which can't tell a cause from what goes with it",
         )
     } else {
-        (by_model.iter().map(|l| l.verdict).collect(), "its worth to predictions of machines left out")
+        let how = "what it adds to predictions of machines left out";
+        (by_predictions.iter().map(|l| l.verdict).collect(), how)
     };
     let linked = verdicts.iter().filter(|v| **v == Verdict::Linked).count();
     let not = verdicts.iter().filter(|v| **v == Verdict::NotLinked).count();
@@ -179,7 +185,7 @@ fn by_reports(said: Said, parameter: &str, influence: &Influence) -> (Outcome, S
     let outcome = match found {
         None => Outcome::Undecidable,
         // A rank is no proof that something is a cause, so it refutes nothing and confirms nothing that is said to be one.
-        Some(Said::Linked) if by_model.is_empty() => Outcome::Undecidable,
+        Some(Said::Linked) if by_predictions.is_empty() => Outcome::Undecidable,
         Some(found) if found == said => Outcome::Confirmed,
         Some(_) => Outcome::Refuted,
     };

@@ -111,7 +111,7 @@ impl Compared {
             // Too few sizes for curves; the points are drawn all the same.
             Err(_) => (Vec::new(), Vec::new()),
         };
-        CurvePanel { title: format!("{} ({scenario})", entry.name()), series, fields, crossings }
+        CurvePanel { title: format!("{} ({scenario})", entry.name), series, fields, crossings }
     }
 }
 

@@ -14,6 +14,8 @@ pub(crate) struct Entry {
     pub(crate) path: PathBuf,
     /// The same without the folders that all reports share: unlike in all of them, and nothing of the machine that reads it.
     pub(crate) file: String,
+    /// What figures call it: the name of the file without its ending, and without folders where no other is called so.
+    pub(crate) name: String,
     /// What kind of evidence it is.
     pub(crate) kind: Label,
     pub(crate) provenance: Provenance,
@@ -35,6 +37,7 @@ impl Entry {
         Self {
             path: path.to_owned(),
             file: file.to_owned(),
+            name: file.strip_suffix(".json").unwrap_or(file).to_owned(),
             kind: report.label,
             provenance: report.provenance,
             // As it was measured: the profile has moved the cores to where they were at the points.
@@ -42,11 +45,6 @@ impl Entry {
             profile,
             studied,
         }
-    }
-
-    /// The name of the file without its ending.
-    pub(crate) fn name(&self) -> &str {
-        self.file.strip_suffix(".json").unwrap_or(&self.file)
     }
 
     /// The physical machine.
@@ -119,6 +117,19 @@ fn everywhere(id: &AlgorithmId, threads: u32) -> Vec<String> {
         (BackendClass::Gpu, width) => names.push(format!("{} on {width} GPUs", id.method())),
     }
     names
+}
+
+/// Calls entries without folders where no two of them are called the same then.
+pub(crate) fn shorten(entries: &mut [Entry]) {
+    let short = |e: &Entry| e.name.rsplit('/').next().unwrap_or_default().to_owned();
+    let mut count: BTreeMap<String, usize> = BTreeMap::new();
+    entries.iter().for_each(|e| *count.entry(short(e)).or_default() += 1);
+    for entry in entries {
+        let name = short(entry);
+        if count[&name] == 1 {
+            entry.name = name;
+        }
+    }
 }
 
 /// Of each physical machine that is studied the report that has most of it; of one machine alone all reports.

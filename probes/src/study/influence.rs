@@ -10,7 +10,7 @@ use sapwise::model::GPU_PREFIX;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Machines that are looked at, at most, evenly taken.
-const MOST_MACHINES: usize = 300;
+const MOST_MACHINES: usize = 200;
 
 /// What an influence is on.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -31,9 +31,11 @@ pub(super) struct Link {
     pub(super) on: On,
     /// Between machines; none of too few, or where one of both does not vary.
     pub(super) rank: Option<Rank>,
-    /// What it is worth to predictions; none of what the model does not read.
+    /// What it is worth to predictions; none of what the model of this outcome does not read.
     pub(super) effect: Option<Effect>,
-    /// Where the model reads the parameter its verdict, else that of the ranks.
+    /// Between machines, of the parameter and what predictions that do not read it leave of the time; none where they read it.
+    pub(super) left: Option<Rank>,
+    /// That of the effect, of what is left, or of the ranks: the first of them that there is.
     pub(super) verdict: Verdict,
 }
 
@@ -83,16 +85,28 @@ impl Influence {
             })
             .collect();
         rank::judge(&mut ranks.iter_mut().flatten().collect::<Vec<_>>());
-        let mut links: Vec<Link> = cells
-            .into_iter()
-            .zip(ranks)
-            .map(|((k, on), rank)| link(&parameters[k], on, rank, importance))
-            .filter(|link| link.rank.is_some() || link.effect.is_some())
-            .collect();
-        for of in importance.iter().flat_map(|i| &i.parameters).filter(|p| p.physical_machines > 0) {
+        let mut links: Vec<Link> =
+            cells.iter().zip(ranks).map(|(&(k, on), rank)| link(&parameters[k], on, rank, importance)).collect();
+        for (link, &(k, on)) in links.iter_mut().zip(&cells).filter(|(link, _)| link.effect.is_none()) {
+            let On::Algorithm(name) = on else { continue };
+            let left = importance.zip(method(name)).and_then(|(i, method)| i.left_ln.get(&method));
+            let Some(left) = left else { continue };
+            let both = chosen.iter().zip(&values[k]).filter_map(|(e, value)| Some(((*value)?, *left.get(e.machine())?)));
+            link.left = Rank::of(&both.collect::<Vec<_>>());
+        }
+        rank::judge(&mut links.iter_mut().filter_map(|l| l.left.as_mut()).collect::<Vec<_>>());
+        // Ranks see what goes together, whatever the cause; the two others what a parameter adds to those that predictions read.
+        for link in &mut links {
+            let verdicts =
+                [link.effect.as_ref().map(|e| e.verdict), link.left.map(|r| r.verdict), link.rank.map(|r| r.verdict)];
+            link.verdict = verdicts.into_iter().flatten().next().unwrap_or(Verdict::CannotBeTold);
+        }
+        links.retain(|link| link.rank.is_some() || link.effect.is_some());
+        for of in importance.iter().flat_map(|i| &i.parameters).filter(|p| p.regret_rise.is_told()) {
             let effect = of.regret_rise.clone();
             let verdict = effect.verdict;
-            links.push(Link { parameter: of.parameter.clone(), on: On::Choice, rank: None, effect: Some(effect), verdict });
+            let parameter = of.parameter.clone();
+            links.push(Link { parameter, on: On::Choice, rank: None, effect: Some(effect), left: None, verdict });
         }
         Self { links, machines: chosen.len(), reports }
     }
@@ -113,11 +127,8 @@ fn link(parameter: &str, on: &On, rank: Option<Rank>, importance: Option<&Import
         On::Border(name) => of.borders.iter().find(|b| b.border == *name).map(|b| b.error_rise_octaves.clone()),
         On::Choice => None,
     });
-    // Ranks see what goes together; a model that is fitted with all the others sees what this one adds. Effects of too few machines
-    // have no intervals and say nothing.
-    let of_effect = effect.as_ref().filter(|e| e.permuted.is_some()).map(|e| e.verdict);
-    let verdict = of_effect.or(rank.map(|r| r.verdict)).unwrap_or(Verdict::CannotBeTold);
-    Link { parameter: parameter.to_owned(), on: on.clone(), rank, effect, verdict }
+    let effect = effect.filter(Effect::is_told);
+    Link { parameter: parameter.to_owned(), on: on.clone(), rank, effect, left: None, verdict: Verdict::CannotBeTold }
 }
 
 /// The method on its class of processor, as importance names it.

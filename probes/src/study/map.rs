@@ -95,7 +95,7 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
         panel("predicted, without this machine", by_predicted, at_predicted),
     ];
     let names = ids.iter().enumerate().map(|(k, id)| (id.to_string(), k)).collect();
-    let title = format!("Fields over objects and density: {}", entry.name());
+    let title = format!("Fields over objects and density: {}", entry.name);
     let figure = FieldMap { title, names, x, y, y_name: "overlapping pairs of an object".to_owned(), panels };
     Ok(Map { figure, held_out, regret: crate::train::average(&regrets), points: count, agreeing })
 }

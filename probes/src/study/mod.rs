@@ -26,7 +26,7 @@ use std::path::Path;
 
 pub(crate) use answer::{Answer, Read};
 pub(crate) use curves::Compared;
-pub(crate) use entry::{Entry, names, representatives};
+pub(crate) use entry::{Entry, names, representatives, shorten};
 pub(crate) use folder::{PAGE, prepare};
 
 /// What was read and fitted.

@@ -9,7 +9,9 @@ use crate::sheet::{Cell, Sheet};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Machines in one picture.
-const MOST_DRAWN: usize = 8;
+const MOST_DRAWN: usize = 4;
+/// A parameter that is within this of the reference on every machine is told and not drawn.
+const ALIKE: f64 = 0.05;
 
 /// A comparison of machines with one of them.
 pub(super) struct Comparison<'a> {
@@ -18,13 +20,21 @@ pub(super) struct Comparison<'a> {
     pub(super) reference: usize,
     /// The others, with the speed-up of each algorithm.
     others: Vec<(usize, BTreeMap<String, SpeedUp>)>,
+    /// A speed-up that is printed somewhere, and what it is called.
+    printed: Option<(&'a str, f64)>,
 }
 
 impl<'a> Comparison<'a> {
-    /// Of the studied machines, and of the published ones with each other where the reference is published.
+    /// Of these machines, by position, with the reference.
     pub(super) fn new(entries: &'a [Entry], reference: usize, others: &[usize]) -> Self {
         let other = |&k: &usize| (k, speed_ups(&entries[reference], &entries[k], LARGE..u32::MAX));
-        Self { entries, reference, others: others.iter().filter(|k| **k != reference).map(other).collect() }
+        let others = others.iter().filter(|k| **k != reference).map(other).collect();
+        Self { entries, reference, others, printed: None }
+    }
+
+    /// With a printed speed-up of every other machine.
+    pub(super) fn with_printed(self, name: &'a str, speed_up: f64) -> Self {
+        Self { printed: Some((name, speed_up)), ..self }
     }
 
     /// Every ratio, a row for each machine and parameter or algorithm.
@@ -42,7 +52,7 @@ impl<'a> Comparison<'a> {
         let reference = &self.entries[self.reference];
         for (k, speed_ups) in &self.others {
             let machine = &self.entries[*k];
-            let heads = |of: &str, what: &str| [machine.name(), reference.name(), of, what].map(Cell::text).to_vec();
+            let heads = |of: &str, what: &str| [&machine.name[..], &reference.name[..], of, what].map(Cell::text).to_vec();
             let one = || Cell::Missing("a parameter has one value".to_owned());
             for name in parameters() {
                 let Some(ratio) = self.parameter(&name, *k) else { continue };
@@ -58,13 +68,18 @@ impl<'a> Comparison<'a> {
         sheet
     }
 
-    /// The picture of the first machines.
-    pub(super) fn figure(&self) -> Ratios {
-        let drawn = &self.others[..self.others.len().min(MOST_DRAWN)];
-        let mut groups = Vec::new();
+    /// The picture of some machines, and the parameters that are alike on all of them.
+    pub(super) fn figure(&self) -> (Ratios, Vec<String>) {
+        let drawn = self.some();
+        let (mut groups, mut alike) = (Vec::new(), Vec::new());
         for name in parameters() {
-            let value = |ratio| RatioValue { ratio, low: None, high: None };
-            let values: Vec<_> = drawn.iter().map(|(k, _)| self.parameter(&name, *k).map(value)).collect();
+            let ratios: Vec<Option<f64>> = drawn.iter().map(|(k, _)| self.parameter(&name, *k)).collect();
+            if ratios.iter().flatten().all(|r| (r - 1.0).abs() <= ALIKE) {
+                alike.extend(ratios.iter().any(Option::is_some).then(|| words(&name)));
+                continue;
+            }
+            let value = |ratio: Option<f64>| ratio.map(|ratio| RatioValue { ratio, low: None, high: None });
+            let values = ratios.into_iter().map(value).collect();
             groups.push(RatioGroup { name: words(&name), kind: RatioKind::Parameter, values });
         }
         let names: BTreeSet<&String> = drawn.iter().flat_map(|(_, s)| s.keys()).collect();
@@ -73,19 +88,33 @@ impl<'a> Comparison<'a> {
             let values = drawn.iter().map(|(_, speed_ups)| speed_ups.get(name).map(value)).collect();
             groups.push(RatioGroup { name: name.clone(), kind: RatioKind::Algorithm, values });
         }
-        groups.retain(|g| g.values.iter().any(Option::is_some));
-        Ratios {
-            title: format!("Parameters and speed over those of {}", self.entries[self.reference].name()),
-            reference: self.entries[self.reference].name().to_owned(),
-            machines: drawn.iter().map(|(k, _)| self.entries[*k].name().to_owned()).collect(),
-            groups,
+        if let Some((name, ratio)) = self.printed {
+            let value = RatioValue { ratio, low: None, high: None };
+            groups.push(RatioGroup {
+                name: name.to_owned(),
+                kind: RatioKind::Algorithm,
+                values: vec![Some(value); drawn.len()],
+            });
         }
+        groups.retain(|g| g.values.iter().any(Option::is_some));
+        let figure = Ratios {
+            title: format!("Parameters and speed over those of {}", self.entries[self.reference].name),
+            reference: self.entries[self.reference].name.clone(),
+            machines: drawn.iter().map(|(k, _)| self.entries[*k].name.clone()).collect(),
+            groups,
+        };
+        (figure, alike)
     }
 
     /// The reports that are drawn.
     pub(super) fn drawn(&self) -> Vec<usize> {
-        let others = self.others.iter().take(MOST_DRAWN).map(|(k, _)| *k);
-        std::iter::once(self.reference).chain(others).collect()
+        std::iter::once(self.reference).chain(self.some().iter().map(|(k, _)| *k)).collect()
+    }
+
+    /// Of many machines some, evenly taken.
+    fn some(&self) -> Vec<&(usize, BTreeMap<String, SpeedUp>)> {
+        let step = self.others.len().div_ceil(MOST_DRAWN).max(1);
+        self.others.iter().step_by(step).collect()
     }
 
     fn parameter(&self, name: &str, other: usize) -> Option<f64> {

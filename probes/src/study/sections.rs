@@ -1,6 +1,6 @@
 //! The sections of the page, in the order in which they are read.
 
-use super::claims::{Claim, Outcome};
+use super::claims::{self, Claim, Outcome, PRINTED_SPEED_UP};
 use super::entry::Entry;
 use super::folder::Folder;
 use super::influence::{Influence, Link, On};
@@ -173,17 +173,29 @@ fn ratios(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resu
          algorithm is. A speed-up is the geometric mean over all scenarios and sizes from 1000 objects on that both were timed at, with its \
          quartiles.",
     );
-    let published: Vec<usize> = (0..study.entries.len()).filter(|&k| study.entries[k].is_published()).collect();
-    if let [first, _, ..] = published[..] {
-        let of_paper = Comparison::new(&study.entries, first, &published);
-        let told = "The paper's cards over the first of them, as its Figure 10 has it. It prints no times in figures to set beside them.";
-        part.push(folder.figure("figure-10-paper", &of_paper.figure(), told, &published))?;
+    let mut drawn = |part: &mut Part<'_>, id: &str, comparison: &Comparison<'_>, told: &str| {
+        let (figure, alike) = comparison.figure();
+        let alike = if alike.is_empty() { String::new() } else { format!(" Alike within 5 %: {}.", alike.join(", ")) };
+        part.push(folder.figure(id, &figure, &format!("{told}{alike}"), &comparison.drawn()))
+    };
+    if let [Some(smallest), Some(slower), Some(faster)] = claims::cards(&study.entries) {
+        let ten = Comparison::new(&study.entries, smallest, &[slower, faster]);
+        let told = "Figure 10 of the paper: its cards over the smallest of them. It prints no times in figures to set beside these.";
+        drawn(&mut part, "figure-10-paper", &ten, told)?;
+        let eleven =
+            Comparison::new(&study.entries, slower, &[faster]).with_printed("broad phase, as printed", PRINTED_SPEED_UP);
+        let told = "Figure 11 of the paper: the 5800 over the 4600, with the one speed-up that it prints in figures.";
+        drawn(&mut part, "figure-11-paper", &eleven, told)?;
     }
     match study.reference {
         Some(reference) if study.wanted.iter().any(|k| *k != reference) => {
             let comparison = Comparison::new(&study.entries, reference, &study.wanted);
-            let told = "Parameters and speed over those of the reference, quartiles as bars.";
-            part.push(folder.figure("figure-10-11", &comparison.figure(), told, &comparison.drawn()))?;
+            drawn(
+                &mut part,
+                "figure-10-11",
+                &comparison,
+                "Parameters and speed over those of the reference, quartiles as bars.",
+            )?;
             part.push(folder.table("ratios", "Every ratio, of all machines that were asked for.", comparison.sheet()))?;
         }
         _ => part.lacks("it takes two reports with timings to set one beside the other"),
@@ -194,11 +206,12 @@ fn ratios(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resu
 fn influences(study: &Study, influence: &Influence, folder: &mut Folder, missing: &mut Vec<String>) -> Result<Section> {
     let mut part = Part::new("influence", "Which parameters matter for which algorithm and border", missing);
     part.text(
-        "Three methods. Rank correlation over machines (Spearman, of an algorithm with its time for frames of 1000 objects or more; a verdict of linked allows one in ten of them to be none): what goes \
+        "Four methods. Rank correlation over machines (Spearman, of an algorithm with its time for frames of 1000 objects or more; a verdict of linked allows one in ten of them to be none): what goes \
          together, whatever the cause. Permuted: how much worse predictions of machines that were left out are when they get the value of \
          another machine. Fitted without: how much worse they are when every machine has the same value, in the training too: what no \
-         other parameter stands in for. All intervals are of 90 %. Where the model reads a parameter the verdict is that of the last \
-         two; else that of the ranks.",
+         other parameter stands in for. Left: rank correlation of a parameter that predictions of an algorithm do not read with the time \
+         over the predicted one on machines that were left out: what it would add. All intervals are of 90 %. The verdict is that of \
+         permuted and fitted without, else that of what is left, else that of the ranks.",
     );
     match &study.importance {
         Err(why) => part.lacks(why.clone()),
@@ -206,8 +219,7 @@ fn influences(study: &Study, influence: &Influence, folder: &mut Folder, missing
             part.section.blocks.push(Block::List(importance.notes.clone()));
         }
     }
-    let told = |link: &&Link| link.rank.is_some() || link.effect.as_ref().is_some_and(|e| e.permuted.is_some());
-    let links: Vec<&Link> = influence.links.iter().filter(told).collect();
+    let links: Vec<&Link> = influence.links.iter().collect();
     if links.is_empty() {
         part.lacks(format!(
             "{} physical machine{} studied, and it takes {} to tell a link between machines; what was taken from one machine on \
@@ -241,7 +253,7 @@ fn matrix(influence: &Influence, links: &[&Link]) -> plot::Influence {
     let weight = |parameter: &str| {
         let own = links.iter().filter(|l| l.parameter == parameter);
         let count = |verdict| own.clone().filter(|l| l.verdict == verdict).count();
-        let read = own.clone().any(|l| l.effect.is_some());
+        let read = own.clone().filter(|l| l.effect.is_some()).count() > 1;
         (read, count(Verdict::Linked), count(Verdict::NotLinked))
     };
     let mut rows: Vec<&str> = links.iter().map(|l| l.parameter.as_str()).collect::<BTreeSet<_>>().into_iter().collect();
@@ -284,6 +296,9 @@ fn links_sheet(links: &[&Link]) -> Sheet {
         ("from", "fitted_without_low"),
         ("to", "fitted_without_high"),
         ("by predictions", "prediction_verdict"),
+        ("left", "left_correlation"),
+        ("from", "left_low"),
+        ("to", "left_high"),
     ]);
     for link in links {
         let mut cells =
@@ -293,8 +308,8 @@ fn links_sheet(links: &[&Link]) -> Sheet {
         cells.extend([rank(|r| r.correlation), rank(|r| r.low), rank(|r| r.high)]);
         cells.push(Cell::optional(link.rank.map(|r| r.machines as f64), 0, few));
         cells.push(link.rank.map_or_else(|| Cell::Missing(few.to_owned()), |r| Cell::text(r.verdict.to_string())));
-        let effect = link.effect.as_ref().filter(|e| e.permuted.is_some());
-        let unread = "no prediction reads it, or too few machines have it";
+        let effect = link.effect.as_ref();
+        let unread = "predictions of this do not read it, or too few machines have it";
         let mut interval = |of: fn(&Effect) -> Option<Interval>| {
             let found = effect.and_then(of);
             cells.extend(
@@ -304,6 +319,9 @@ fn links_sheet(links: &[&Link]) -> Sheet {
         interval(|e| e.permuted);
         interval(|e| e.refitted);
         cells.push(effect.map_or_else(|| Cell::Missing(unread.to_owned()), |e| Cell::text(e.verdict.to_string())));
+        let read = "predictions read it, or it is no time";
+        let left = link.left.map_or([None; 3], |r| [r.correlation, r.low, r.high].map(Some));
+        cells.extend(left.map(|v| Cell::optional(v, 2, read)));
         sheet.push(cells, &[]);
     }
     sheet
@@ -433,7 +451,13 @@ fn prediction(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> 
     if sheet.rows.is_empty() {
         part.lacks("no border was measured on what was left out");
     } else {
-        part.push(folder.figure("crossings", &figure, "Borders between fields, measured with 90 % intervals.", &studied))?;
+        let ends = trained.held.borders.iter().filter(|b| !b.beside.crosses).count();
+        let told = format!(
+            "Borders between fields, measured with 90 % intervals. Of {} predicted ones {ends} do not cross within the sizes that were \
+             measured; the end beyond which they would stands for them.",
+            trained.held.borders.len()
+        );
+        part.push(folder.figure("crossings", &figure, &told, &studied))?;
         part.push(folder.table("crossings", "Every one of these borders.", sheet))?;
     }
     if validation.learning.is_empty() {

@@ -27,6 +27,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let Read { mut entries, selection, unreadable } = read(&files, &names, evidence)?;
     let (profiles, mut notes) = selection.clone().finish();
     tell_studied(&mut entries, &profiles, &notes);
+    study::shorten(&mut entries);
     let importance = match profiles.is_empty() {
         true => Err("no report can be studied".to_owned()),
         false => train::importance(&profiles).map_err(|why| format!("{why:#}")),
