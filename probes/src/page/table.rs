@@ -12,7 +12,7 @@ const FILTERED: usize = 15;
 const TALL: usize = 60;
 
 /// A wider table is printed across the page.
-const WIDE: usize = 8;
+const WIDE: usize = 12;
 
 /// Longer texts are words, which go over several lines; shorter ones stay on one.
 const WORDS: usize = 32;
