@@ -2,6 +2,7 @@
 
 mod known;
 mod run;
+mod study;
 
 use crate::contention::Contended;
 use crate::exit::WrongUsage;
@@ -13,6 +14,7 @@ use sapwise::{AlgorithmId, Scenario};
 use std::path::PathBuf;
 
 pub(crate) use run::{Run, Scene};
+pub(crate) use study::Study;
 
 /// Measures this machine, predicts which broad-phase algorithm is fastest on it, and runs it.
 #[derive(Debug, Parser)]
@@ -32,6 +34,7 @@ pub(crate) enum Verb {
     Probe(Probe),
     Run(Run),
     Train(Train),
+    Study(Study),
     Pairs(Pairs),
     Check(Check),
     Compare(Compare),
@@ -194,7 +197,7 @@ pub(crate) struct Train {
     #[arg(long, value_name = "CARD.md")]
     pub(crate) card: Option<PathBuf>,
     /// Where a picture goes: predicted against measured times on what was left out, the regret on each machine, and how the regret
-    /// falls with the number of machines. SVG.
+    /// falls with the number of machines. SVG or PNG by its ending.
     #[arg(long, value_name = "P.svg")]
     pub(crate) plot: Option<PathBuf>,
     /// Where JSON goes that says which hardware parameters matter for which crossover. That takes a fit of everything for each

@@ -44,7 +44,7 @@ mod gpus;
 mod hardware;
 mod interrupt;
 mod output;
-#[allow(dead_code, unused_imports, reason = "the study takes its figures from here")]
+mod page;
 mod plot;
 mod prediction;
 mod profiles;
@@ -58,6 +58,7 @@ mod sheet;
 mod simulate;
 mod simulation;
 mod steadiness;
+mod study;
 mod summary;
 mod sweep;
 mod table;

@@ -142,7 +142,7 @@ fn samples(fields: &Fields, terminal: Terminal) -> String {
 }
 
 /// A value with the unit that the end of its name says.
-fn value(name: &str, value: f64) -> String {
+pub(crate) fn value(name: &str, value: f64) -> String {
     match name {
         _ if name.ends_with("_gb_per_s") => format!("{value:.1} GB/s"),
         _ if name.ends_with("_gflop_per_s") => format!("{value:.0} GFLOP/s"),

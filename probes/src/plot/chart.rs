@@ -152,6 +152,19 @@ impl<'a, 'p> Chart<'a, 'p> {
         Ok(())
     }
 
+    /// The area below a line through these values.
+    pub(super) fn below(
+        &self,
+        values: impl IntoIterator<Item = (f64, f64)>,
+        colour: RGBColor,
+        alpha: f64,
+    ) -> anyhow::Result<()> {
+        let mut places: Vec<Place> = values.into_iter().filter_map(|(x, y)| self.place(x, y)).collect();
+        let (Some(first), Some(last)) = (places.first().copied(), places.last().copied()) else { return Ok(()) };
+        places.extend([(last.0, self.frame.bottom), (first.0, self.frame.bottom)]);
+        Ok(self.area.draw(&Polygon::new(places, colour.mix(alpha).filled()))?)
+    }
+
     /// A bar from one value to another above `x`.
     pub(super) fn bar(&self, x: f64, low: f64, high: f64, line: Line) -> anyhow::Result<()> {
         let ends = (self.x.share(x), self.y.end(low), self.y.end(high));
@@ -192,6 +205,25 @@ impl<'a, 'p> Chart<'a, 'p> {
         path(self.area, &[(x, self.frame.bottom), (x, self.frame.top)], line)
     }
 
+    /// Lines where the second value is the first times a factor. Both axes must be logarithmic and the same.
+    pub(super) fn factors(&self, factors: &[(f64, Line)]) -> anyhow::Result<()> {
+        let (low, high) = self.x.ends();
+        for &(factor, line) in factors {
+            let ends = [low.max(low / factor), high.min(high / factor)];
+            self.line(ends.map(|x| (x, x * factor)), line)?;
+        }
+        Ok(())
+    }
+
+    /// The numbers of the flat axis once more, above a chart that may be too high to see both ends.
+    pub(super) fn numbers_above(&self) -> anyhow::Result<()> {
+        for tick in self.x.ticks(self.frame.width(), Lies::Flat) {
+            let Some(x) = self.x.share(tick.value).map(|share| self.across(share)) else { continue };
+            words(self.area, &tick.label, (x, self.frame.top - 12), LABEL, INK, HPos::Center, VPos::Center)?;
+        }
+        Ok(())
+    }
+
     /// What is missing, in the middle of an empty frame.
     pub(super) fn missing(&self, sentence: &str) -> anyhow::Result<()> {
         missing(self.area, self.frame, sentence)
@@ -221,6 +253,9 @@ pub(super) fn words(
     h: HPos,
     v: VPos,
 ) -> anyhow::Result<()> {
+    if text.is_empty() {
+        return Ok(());
+    }
     Ok(area.draw(&Text::new(text.to_owned(), place, style::text(size, colour, h, v)))?)
 }
 

@@ -85,7 +85,7 @@ impl Curves {
         names.sort_by_key(|&(style, name, curve)| (style, name, !curve));
         names.dedup_by_key(|&mut (style, name, _)| (style, name));
         let sign = |(style, name, curve): (usize, &String, bool)| {
-            (if curve { Sign::Curve(style) } else { Sign::Field(style) }, name.clone())
+            (if curve { Sign::Curve(style) } else { Sign::Mark(style) }, name.clone())
         };
         let mut entries: Vec<(Sign, String)> = names.into_iter().map(sign).collect();
         if self.panels.iter().any(|p| !p.crossings.is_empty()) {

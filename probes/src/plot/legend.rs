@@ -1,8 +1,9 @@
 //! What the series are called, in columns below a chart.
 
+use super::Mark3;
 use super::chart::{Frame, Line, fill, hatch, path, words};
 use super::font;
-use super::mark::mark;
+use super::mark::{Mark, mark};
 use super::paper::Area;
 use super::style::{self, INK, LABEL, SECONDARY, line_height};
 use plotters_backend::text_anchor::{HPos, VPos};
@@ -18,14 +19,21 @@ const ROW: i32 = line_height(LABEL) + 3;
 pub(super) enum Sign {
     /// Line and mark of the series at a position.
     Curve(usize),
+    /// Its mark on a line without gaps.
+    Marked(usize),
     /// Its mark alone.
     Mark(usize),
-    /// Its field: the colour and the lines over it.
+    /// Its field, the colour and the lines over it, with its mark.
     Field(usize),
     /// A line that is no series.
     Line(Line),
     /// A line with a band around it.
     Interval(Line),
+    /// The ring around a mark.
+    Ring,
+    /// A verdict in its cell.
+    Verdict(Mark3),
+    None,
 }
 
 /// The names of some series.
@@ -76,12 +84,23 @@ impl Sign {
                 path(area, &ends, Line::of(k))?;
                 area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?;
             }
+            Self::Marked(k) => {
+                path(area, &ends, Line::solid(style::colour(k), 2))?;
+                area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?;
+            }
             Self::Mark(k) => area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?,
             Self::Field(k) => {
                 let frame = Frame { left, top: y - 7, right, bottom: y + 7 };
                 fill(area, frame, style::colour(k), style::FIELD)?;
                 hatch(area, frame, k, style::colour(k))?;
+                area.draw(&mark((middle, y), Mark::Ground, style::PAPER, 6))?;
+                area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?;
             }
+            Self::Ring => area.draw(&mark((middle, y), Mark::Ring, INK, 7))?,
+            Self::Verdict(verdict) => {
+                verdict.draw(area, Frame { left, top: y - 9, right, bottom: y + 9 }, (middle, y))?;
+            }
+            Self::None => {}
             Self::Line(line) => path(area, &ends, line)?,
             Self::Interval(line) => {
                 fill(

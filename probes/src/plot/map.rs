@@ -1,8 +1,12 @@
 //! The map that the paper could not draw: fields of optimal performance over two axes.
 
+use super::axis::Axis;
+use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, fill, hatch, missing};
+use super::legend::{Legend, Sign};
+use super::mark::Mark;
 use super::paper::Area;
-use super::style::WIDTH;
-use super::{Figure, Tabled};
+use super::style::{self, GAP, INK, WIDTH};
+use super::{Figure, Tabled, tabled};
 use crate::sheet::Sheet;
 
 /// Panels beside each other, measured beside predicted, over the number of objects and a density.
@@ -48,22 +52,140 @@ pub(crate) struct MapPoint {
     pub(crate) loss: Option<f64>,
 }
 
+/// A regret over this gets a ring.
+const LOSS: f64 = 0.1;
+const ALONE: i32 = 480;
+const BESIDE: i32 = 400;
+
+impl MapPoint {
+    fn is_lossy(&self) -> bool {
+        self.loss.is_some_and(|loss| loss > LOSS)
+    }
+}
+
+/// Cells beside each other in a row, and then rows of the same width below each other, as one: a picture of a fine grid is smaller by far.
+fn merged(grid: &[MapCell]) -> Vec<MapCell> {
+    let mut cells: Vec<MapCell> = grid.to_vec();
+    cells.sort_by(|a, b| (a.y.0.total_cmp(&b.y.0)).then(a.y.1.total_cmp(&b.y.1)).then(a.x.0.total_cmp(&b.x.0)));
+    cells.dedup_by(|next, last| {
+        let one = last.algorithm == next.algorithm && last.y == next.y && last.x.1 == next.x.0;
+        if one {
+            last.x.1 = next.x.1;
+        }
+        one
+    });
+    cells.sort_by(|a, b| (a.x.0.total_cmp(&b.x.0)).then(a.x.1.total_cmp(&b.x.1)).then(a.y.0.total_cmp(&b.y.0)));
+    cells.dedup_by(|next, last| {
+        let one = last.algorithm == next.algorithm && last.x == next.x && last.y.1 == next.y.0;
+        if one {
+            last.y.1 = next.y.1;
+        }
+        one
+    });
+    cells
+}
+
+impl FieldMap {
+    fn legend(&self) -> Legend {
+        let mut entries: Vec<(Sign, String)> =
+            self.names.iter().map(|(name, style)| (Sign::Field(*style), name.clone())).collect();
+        if self.panels.iter().flat_map(|p| &p.points).any(MapPoint::is_lossy) {
+            entries.push((Sign::Ring, format!("regret over {} %", 100.0 * LOSS)));
+        }
+        Legend::new(entries, WIDTH as i32 - 2 * GAP)
+    }
+
+    fn style(&self, algorithm: usize) -> Option<usize> {
+        self.names.get(algorithm).map(|name| name.1)
+    }
+
+    fn panel(&self, area: &Area<'_>, frame: Frame, panel: &MapPanel) -> anyhow::Result<()> {
+        let points = || self.panels.iter().flat_map(|p| &p.points);
+        let axes = (
+            Axis::log(points().map(|p| p.x).chain([self.x.0, self.x.1]), 1.0),
+            Axis::log(points().map(|p| p.y).chain([self.y.0, self.y.1]), 1.0),
+        );
+        let chart = Chart::new(area, frame.within(LEFT, ABOVE, GAP, BELOW), axes.0, axes.1);
+        if panel.grid.is_empty() && panel.points.is_empty() {
+            return chart.missing(&format!("{}: {NOTHING}", panel.title));
+        }
+        chart.grid(&panel.title, "objects", &self.y_name)?;
+        for cell in merged(&panel.grid) {
+            let shaded = chart.rectangle(cell.x, cell.y).zip(self.style(cell.algorithm));
+            let Some((shaded, style)) = shaded else { continue };
+            fill(area, shaded, style::colour(style), 1.5 * style::FIELD)?;
+            hatch(area, shaded, style, style::colour(style))?;
+        }
+        chart.border()?;
+        for point in &panel.points {
+            let Some(style) = self.style(point.algorithm) else { continue };
+            chart.mark(point.x, point.y, Mark::Ground, style::PAPER, 6)?;
+            chart.mark(point.x, point.y, style::mark(style), style::colour(style), 4)?;
+            if point.is_lossy() {
+                chart.mark(point.x, point.y, Mark::Ring, INK, 9)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+const NOTHING: &str = "no fields are known";
+
 impl Figure for FieldMap {
     fn title(&self) -> &str {
         &self.title
     }
 
     fn size(&self) -> (u32, u32) {
-        (WIDTH, 0)
+        let panels = if self.panels.len() < 2 { ALONE } else { self.panels.len().div_ceil(2) as i32 * (BESIDE + GAP) };
+        (WIDTH, (panels + GAP + self.legend().height()) as u32)
     }
 
-    fn draw_on(&self, _area: &Area<'_>) -> anyhow::Result<()> {
-        Ok(())
+    fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()> {
+        let legend = self.legend();
+        let bottom = self.size().1 as i32 - legend.height();
+        let whole = Frame { left: 0, top: 0, right: WIDTH as i32, bottom: bottom - GAP };
+        if self.panels.is_empty() {
+            missing(area, whole.within(GAP, GAP, GAP, GAP), NOTHING)?;
+        }
+        for (panel, frame) in self.panels.iter().zip(whole.parts(self.panels.len(), self.panels.len().min(2), GAP)) {
+            self.panel(area, frame, panel)?;
+        }
+        legend.draw(area, (GAP, bottom))
     }
 }
 
 impl Tabled for FieldMap {
     fn csv(&self) -> Sheet {
-        Sheet::default()
+        let mut rows = Vec::new();
+        for panel in &self.panels {
+            let mut row = |what: &str, algorithm: usize, figures: [f64; 6], loss: Option<f64>| {
+                let name = self.names.get(algorithm).map_or("", |name| &name.0);
+                let mut row = [&panel.title, what, name].map(tabled::text).to_vec();
+                row.extend(figures.map(tabled::figure));
+                row.push(tabled::maybe(loss, "no regret is known"));
+                rows.push(row);
+            };
+            for c in merged(&panel.grid) {
+                row("field", c.algorithm, [f64::NAN, c.x.0, c.x.1, f64::NAN, c.y.0, c.y.1], None);
+            }
+            for p in &panel.points {
+                row("frame", p.algorithm, [p.x, f64::NAN, f64::NAN, p.y, f64::NAN, f64::NAN], p.loss);
+            }
+        }
+        let [y, y_low, y_high] = ["", ", from", ", to"].map(|end| format!("{}{end}", self.y_name));
+        let columns = [
+            ("panel", "panel"),
+            ("what", "what"),
+            ("algorithm", "algorithm"),
+            ("objects", "objects"),
+            ("from objects", "low_objects"),
+            ("to objects", "high_objects"),
+            (&y, "density"),
+            (&y_low, "low_density"),
+            (&y_high, "high_density"),
+            ("regret", "regret"),
+        ];
+        tabled::sheet(&columns, rows)
     }
 }

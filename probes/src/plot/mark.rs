@@ -13,6 +13,8 @@ pub(super) enum Mark {
     Ring,
     Square,
     Plus,
+    /// Not of a series: a disc below a mark, of paper, so that what is behind does not cross it.
+    Ground,
 }
 
 /// A shape at a place, in data coordinates or in pixels, with so many pixels from its middle to its edge.
@@ -47,7 +49,7 @@ impl<C, D: DrawingBackend> Drawable<D> for Shape<C> {
         let Some((x, y)) = places.next() else { return Ok(()) };
         let (r, line) = (self.size, self.colour.stroke_width(2));
         match self.mark {
-            Mark::Disc => backend.draw_circle((x, y), r as u32, &self.colour, true),
+            Mark::Disc | Mark::Ground => backend.draw_circle((x, y), r as u32, &self.colour, true),
             Mark::Ring => backend.draw_circle((x, y), r as u32, &line, false),
             Mark::Triangle => backend.fill_polygon([(x - r - 1, y + r), (x + r + 1, y + r), (x, y - r - 1)], &self.colour),
             Mark::Square => backend.draw_rect((x - r, y - r), (x + r, y + r), &line, false),

@@ -6,18 +6,25 @@ mod crossings;
 mod curves;
 mod font;
 mod influence;
+mod learning;
 mod legend;
 mod map;
 mod mark;
 mod paper;
 mod ratios;
+mod regrets;
 mod simulation;
 mod style;
 mod tabled;
+mod times;
 mod training;
 
 use crate::exit::WrongUsage;
+use chart::{ABOVE, BELOW, Frame, LEFT};
+use legend::Legend;
 use paper::Area;
+use plotters::element::Text;
+use plotters::style::RGBColor;
 use plotters_backend::text_anchor::{HPos, VPos};
 use std::path::Path;
 use style::{GAP, INK, SECONDARY, SMALL, TITLE, line_height};
@@ -25,11 +32,14 @@ use style::{GAP, INK, SECONDARY, SMALL, TITLE, line_height};
 pub(crate) use crossings::{CrossingPair, Crossings};
 pub(crate) use curves::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
 pub(crate) use influence::{Influence, InfluenceCell, Mark3};
+pub(crate) use learning::{LearningCurve, LearningPoint, LearningWay};
 pub(crate) use map::{FieldMap, MapCell, MapPanel, MapPoint};
 pub(crate) use ratios::{RatioGroup, RatioKind, RatioValue, Ratios};
-pub(crate) use simulation::simulation;
+pub(crate) use regrets::{Regrets, Way};
+pub(crate) use simulation::Simulation;
 pub(crate) use tabled::Tabled;
-pub(crate) use training::training;
+pub(crate) use times::{TimePair, Times, TimesOf};
+pub(crate) use training::Training;
 
 /// Lines at most of a title, and of a paragraph of a caption: a name or command of a megabyte makes no picture of a mile.
 const TITLE_LINES: usize = 3;
@@ -75,7 +85,6 @@ pub(crate) trait Figure {
     /// # Errors
     /// When the picture can't be drawn.
     fn draw(&self, picture: Picture, caption: &[String]) -> anyhow::Result<Vec<u8>> {
-        font::register()?;
         let (width, height) = self.size();
         let room = width as i32 - 2 * GAP;
         let title = if self.title().is_empty() { Vec::new() } else { font::wrapped(self.title(), TITLE, room, TITLE_LINES) };
@@ -94,72 +103,26 @@ pub(crate) trait Figure {
 
 /// Height of lines of text with room around them.
 fn block(text: &[String], size: u32) -> u32 {
-    if text.is_empty() { 0 } else { (text.len() as i32 * line_height(size) + GAP) as u32 }
+    if text.is_empty() { 0 } else { (text.len() as i32 * line_height(size) + GAP * 5 / 3) as u32 }
 }
 
 fn lines(area: &Area<'_>, text: &[String], size: u32, colour: RGBColor) -> anyhow::Result<()> {
     for (k, line) in text.iter().enumerate() {
-        let place = (GAP, GAP / 2 + k as i32 * line_height(size));
+        let place = (GAP, GAP * 2 / 3 + k as i32 * line_height(size));
         area.draw(&Text::new(line.as_str(), place, style::text(size, colour, HPos::Left, VPos::Top)))?;
     }
     Ok(())
 }
 
-use plotters::coord::Shift;
-use plotters::prelude::*;
-use style::colour;
-
-/// An SVG of that width and height.
-///
-/// # Errors
-/// When it can't be drawn.
-fn svg(
-    size: (u32, u32),
-    draw: impl FnOnce(&DrawingArea<SVGBackend<'_>, Shift>) -> anyhow::Result<()>,
-) -> anyhow::Result<String> {
-    font::register()?;
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        root.fill(&WHITE)?;
-        draw(&root)?;
-        root.present()?;
-    }
-    Ok(svg)
-}
-
-/// A PNG of that width and height.
-///
-/// # Errors
-/// When it can't be drawn.
-fn png(
-    size: (u32, u32),
-    draw: impl FnOnce(&DrawingArea<BitMapBackend<'_>, Shift>) -> anyhow::Result<()>,
-) -> anyhow::Result<Vec<u8>> {
-    font::register()?;
-    let mut pixels = vec![0; 3 * size.0 as usize * size.1 as usize];
-    {
-        let root = BitMapBackend::with_buffer(&mut pixels, size).into_drawing_area();
-        root.fill(&WHITE)?;
-        draw(&root)?;
-        root.present()?;
-    }
-    let mut file = Vec::new();
-    let mut encoder = png::Encoder::new(&mut file, size.0, size.1);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.write_header()?.write_image_data(&pixels)?;
-    Ok(file)
-}
-
-/// Draws the names of the series of a chart.
-fn legend<'a, D, C>(chart: &mut ChartContext<'a, D, C>, position: SeriesLabelPosition) -> anyhow::Result<()>
-where
-    D: DrawingBackend + 'a,
-    D::ErrorType: 'static,
-    C: CoordTranslate,
-{
-    chart.configure_series_labels().position(position).background_style(WHITE.mix(0.85)).border_style(style::GRID).draw()?;
-    Ok(())
+/// A chart in a frame, with what stands beside its axes, and its legend below it.
+fn above_its_legend(
+    area: &Area<'_>,
+    frame: Frame,
+    legend: &Legend,
+    chart: impl FnOnce(Frame) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    chart(frame.within(LEFT, ABOVE, GAP, BELOW + GAP + legend.height()))?;
+    legend.draw(area, (frame.left + GAP, frame.bottom - legend.height()))
 }
 
 #[cfg(test)]

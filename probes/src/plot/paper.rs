@@ -1,12 +1,12 @@
 //! What pictures are drawn on: SVG and PNG behind one type, so that a figure is drawn by one function and both look the same.
 
 use super::Picture;
-use super::font::{self, SANS};
+use super::font;
 use super::style::PAPER;
 use plotters::coord::Shift;
 use plotters::prelude::*;
-use plotters_backend::text_anchor::VPos;
-use plotters_backend::{BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingErrorKind, FontTransform};
+use plotters_backend::text_anchor::{HPos, VPos};
+use plotters_backend::{BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingErrorKind};
 use std::io;
 
 /// Pixels of a PNG in a unit, which is a pixel of an SVG: with one, letters have too few to be read with ease.
@@ -34,7 +34,6 @@ pub(super) fn picture(
     (width, height): (u32, u32),
     draw: impl FnOnce(&Area<'_>) -> anyhow::Result<()>,
 ) -> anyhow::Result<Vec<u8>> {
-    font::register()?;
     let finish = |kind: Kind<'_>| {
         let root = Paper(kind).into_drawing_area();
         root.fill(&PAPER)?;
@@ -161,23 +160,24 @@ impl DrawingBackend for Paper<'_> {
             Kind::Svg(svg) => return svg.draw_text(&font::sound(text), style, at),
             Kind::Png(png) => png,
         };
-        // The letters of an SVG have their size in the em, those that plotters draws in the height of a line. It also sets them too high.
-        let em = style.size() / 1.24 * f64::from(PNG_UNIT);
+        // As an SVG has it.
+        let em = font::em(style.size()) * f64::from(PNG_UNIT);
         let lower = match style.anchor().v_pos {
-            VPos::Top => 0.18,
-            VPos::Center => 0.16,
-            VPos::Bottom => 0.09,
+            VPos::Top => 0.76,
+            VPos::Center => 0.27,
+            VPos::Bottom => -0.27,
         };
-        let lower = (lower * em).round() as i32;
+        let left = match style.anchor().h_pos {
+            HPos::Left => 0.0,
+            HPos::Center => 0.5,
+            HPos::Right => 1.0,
+        };
+        let from = ((-left * font::width_in(text, em)).round() as i32, (lower * em).round() as i32);
         let (x, y) = pixels(at);
-        let at = match style.transform() {
-            FontTransform::None => (x, y + lower),
-            FontTransform::Rotate90 => (x - lower, y),
-            FontTransform::Rotate180 => (x, y - lower),
-            FontTransform::Rotate270 => (x + lower, y),
-        };
-        let font = FontDesc::new(SANS, em * font::LINE, style.style()).transform(style.transform());
-        let own = TextStyle { font, color: style.color(), pos: style.anchor() };
-        of_png(png.draw_text(&font::drawable(text), &own, at))
+        let (turned, colour) = (style.transform(), style.color());
+        of_png(font::draw(text, em, |(dx, dy), share| {
+            let (dx, dy) = turned.transform(from.0 + dx, from.1 + dy);
+            png.draw_pixel((x + dx, y + dy), colour.mix(share))
+        }))
     }
 }

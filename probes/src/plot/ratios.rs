@@ -1,10 +1,14 @@
 //! Figures 10 and 11 of Avril, Gouranton and Arnaldi (ISVRI 2011): each hardware parameter as a ratio to a reference machine, beside the
 //! speed-up of each algorithm.
 
+use super::axis::Axis;
+use super::chart::{BELOW, Chart, Frame, Line, fill, missing, path, words};
+use super::legend::{Legend, Sign};
 use super::paper::Area;
-use super::style::WIDTH;
-use super::{Figure, Tabled};
+use super::style::{self, GAP, GRID, INK, LABEL, PANEL, PAPER, SECONDARY, WIDTH, line_height};
+use super::{Figure, Tabled, font, tabled};
 use crate::sheet::Sheet;
+use plotters_backend::text_anchor::{HPos, VPos};
 
 /// A row for each parameter and each algorithm, a mark for each machine.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -43,22 +47,157 @@ pub(crate) struct RatioValue {
     pub(crate) high: Option<f64>,
 }
 
+/// Height of the line above each of the two parts.
+const HEAD: i32 = line_height(PANEL) + 10;
+/// Height for each machine in a row.
+const MARK: i32 = 11;
+/// Room for the numbers above the chart.
+const NUMBERS: i32 = 26;
+/// The longest name of a row is cut to this width.
+const NAMES: i32 = 330;
+
+impl RatioGroup {
+    /// The ratio for a machine, where there is one that has a place on a logarithmic axis.
+    fn of(&self, machine: usize) -> Option<RatioValue> {
+        self.values.get(machine).copied().flatten().filter(|v| v.ratio.is_finite() && v.ratio > 0.0)
+    }
+}
+
+impl Ratios {
+    /// The two parts with their headings, without one that has no rows.
+    fn parts(&self) -> Vec<(&'static str, Vec<&RatioGroup>)> {
+        let of = |kind| self.groups.iter().filter(|g| g.kind == kind).collect::<Vec<_>>();
+        let parts = [
+            ("Hardware parameters: value over that of the reference", of(RatioKind::Parameter)),
+            ("Algorithms: speed-up over the reference", of(RatioKind::Algorithm)),
+        ];
+        parts.into_iter().filter(|(_, groups)| !groups.is_empty()).collect()
+    }
+
+    fn row_height(&self) -> i32 {
+        (self.machines.len() as i32 * MARK + 8).max(line_height(LABEL) + 6)
+    }
+
+    fn chart_height(&self) -> i32 {
+        self.parts().len() as i32 * HEAD + self.groups.len() as i32 * self.row_height()
+    }
+
+    fn values(&self) -> impl Iterator<Item = RatioValue> {
+        self.groups.iter().flat_map(|g| (0..self.machines.len()).filter_map(|k| g.of(k)))
+    }
+
+    fn legend(&self) -> Legend {
+        let mut entries: Vec<(Sign, String)> =
+            self.machines.iter().enumerate().map(|(k, name)| (Sign::Mark(k), name.clone())).collect();
+        entries.push((Sign::Line(REFERENCE), format!("{} (the reference)", self.reference)));
+        if self.groups.iter().any(|g| (0..self.machines.len()).any(|k| g.of(k).is_none())) {
+            entries.push((Sign::None, "no mark: a value is missing".to_owned()));
+        }
+        Legend::new(entries, WIDTH as i32 - 2 * GAP)
+    }
+
+    fn row(&self, area: &Area<'_>, chart: &Chart<'_, '_>, group: &RatioGroup, top: i32) -> anyhow::Result<()> {
+        let Frame { left, right, .. } = chart.frame;
+        let middle = top + self.row_height() / 2;
+        let name = font::wrapped(&group.name, LABEL, left - 2 * GAP, 1).concat();
+        words(area, &name, (left - 8, middle), LABEL, INK, HPos::Right, VPos::Center)?;
+        path(area, &[(left, top), (right, top)], Line::solid(GRID, 1))?;
+        if (0..self.machines.len()).all(|k| group.of(k).is_none()) {
+            return words(area, "missing", (left + 8, middle), LABEL, SECONDARY, HPos::Left, VPos::Center);
+        }
+        for k in 0..self.machines.len() {
+            let Some(value) = group.of(k) else { continue };
+            let y = middle + (2 * k as i32 + 1 - self.machines.len() as i32) * MARK / 2;
+            // The chart counts from below.
+            let y = f64::from(chart.frame.bottom - y);
+            let colour = style::colour(k);
+            if let (Some(low), Some(high)) = (value.low, value.high) {
+                chart.flat_bar(y, low, high, Line::solid(colour, 1))?;
+            }
+            chart.mark(value.ratio, y, style::mark(k), colour, 4)?;
+        }
+        Ok(())
+    }
+}
+
+/// The line at one.
+const REFERENCE: Line = Line::solid(INK, 2);
+
+const NOTHING: &str = "there is no parameter and no algorithm that two machines have in common";
+
 impl Figure for Ratios {
     fn title(&self) -> &str {
         &self.title
     }
 
     fn size(&self) -> (u32, u32) {
-        (WIDTH, 0)
+        let chart = if self.values().next().is_none() { 160 } else { NUMBERS + self.chart_height() + BELOW };
+        (WIDTH, (chart + GAP + self.legend().height()) as u32)
     }
 
-    fn draw_on(&self, _area: &Area<'_>) -> anyhow::Result<()> {
+    fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()> {
+        let legend = self.legend();
+        let bottom = self.size().1 as i32 - legend.height() - GAP;
+        legend.draw(area, (GAP, bottom + GAP))?;
+        let whole = Frame { left: GAP, top: 0, right: WIDTH as i32 - GAP, bottom };
+        if self.values().next().is_none() {
+            return missing(area, whole, NOTHING);
+        }
+        let names = self.groups.iter().map(|g| font::width(&g.name, LABEL)).max().unwrap_or(0).min(NAMES);
+        let height = self.chart_height();
+        let frame = whole.within(names + GAP, NUMBERS, GAP, BELOW);
+        let shown = self.values().flat_map(|v| [Some(v.ratio), v.low, v.high]).flatten();
+        // Names instead of numbers: rows have theirs.
+        let rows = Axis::linear(0.0, f64::from(height)).with_names(Vec::new());
+        let chart = Chart::new(area, frame, Axis::log(shown.chain([1.0]), 1.2), rows);
+        chart.grid("", &format!("times the reference ({})", self.reference), "")?;
+        chart.numbers_above()?;
+        chart.upright(1.0, REFERENCE)?;
+        let mut top = frame.top;
+        for (heading, groups) in self.parts() {
+            let ground = Frame { left: whole.left, top, bottom: top + HEAD, right: frame.right };
+            fill(area, ground, PAPER, 1.0)?;
+            fill(area, ground, GRID, 0.5)?;
+            let place = (whole.left + 6, top + HEAD / 2);
+            words(area, heading, place, PANEL, INK, HPos::Left, VPos::Center)?;
+            top += HEAD;
+            for group in groups {
+                self.row(area, &chart, group, top)?;
+                top += self.row_height();
+            }
+        }
         Ok(())
     }
 }
 
 impl Tabled for Ratios {
     fn csv(&self) -> Sheet {
-        Sheet::default()
+        let mut rows = Vec::new();
+        for group in &self.groups {
+            let kind = match group.kind {
+                RatioKind::Parameter => "parameter",
+                RatioKind::Algorithm => "algorithm",
+            };
+            for (k, machine) in self.machines.iter().enumerate() {
+                let value = group.values.get(k).copied().flatten();
+                let none = "missing on one of the two machines";
+                let mut row = [kind, &group.name, machine, &self.reference].map(tabled::text).to_vec();
+                row.push(tabled::maybe(value.map(|v| v.ratio), none));
+                row.extend(
+                    [value.and_then(|v| v.low), value.and_then(|v| v.high)].map(|end| tabled::maybe(end, "no interval")),
+                );
+                rows.push(row);
+            }
+        }
+        let columns = [
+            ("what", "what"),
+            ("name", "name"),
+            ("machine", "machine"),
+            ("reference", "reference"),
+            ("ratio", "ratio"),
+            ("ratio, low end", "low_ratio"),
+            ("ratio, high end", "high_ratio"),
+        ];
+        tabled::sheet(&columns, rows)
     }
 }

@@ -47,10 +47,9 @@ use sapwise::model::{GPU_PREFIX, Validation};
 use sapwise::{GpuKind, Hardware, Model};
 
 pub(crate) use baselines::{available, by_costs, slice_scenario};
-pub(crate) use crossing::Beside;
 pub(crate) use curve::{measured_costs, measured_fields};
 pub(crate) use held::{Held, HeldBorder, Time};
-pub(crate) use importance::importance;
+pub(crate) use importance::{Effect, Importance, Interval, Verdict, importance, measured_borders};
 pub(crate) use profile::{Profile, as_at_the_points};
 pub(crate) use selection::{Selection, usable};
 pub(crate) use validate::OURS;
@@ -109,6 +108,23 @@ pub(crate) struct Trained {
     pub(crate) notes: Vec<String>,
     /// What a picture shows of the validation.
     pub(crate) held: Held,
+}
+
+/// The model fitted to all profiles but those that are held out together with that of `file`, and what these are, in words.
+///
+/// # Errors
+/// When no model can be fitted to the others, or there are none.
+pub(crate) fn without(profiles: &[Profile], file: &str) -> Result<(Model, String)> {
+    let partition = Partition::new(profiles);
+    let mut chosen = vec![true; profiles.len()];
+    // Of one machine alone a profile is in a fold of its vectors and in one of its threads; both would tell of it.
+    let own = |fold: &&Vec<usize>| fold.iter().any(|&k| profiles[k].file == file);
+    partition.folds.iter().filter(own).flatten().for_each(|&k| chosen[k] = false);
+    if !chosen.contains(&true) {
+        bail!("no report is left when {file} is left out");
+    }
+    let model = model::model(profiles, &Designs::new(profiles), &chosen, "without")?.0;
+    Ok((model, partition.held_out))
 }
 
 /// Fits the model called `name` to what was selected of reports, and validates it.

@@ -12,6 +12,7 @@ mod probe;
 mod run;
 mod schema;
 mod simulate;
+mod study;
 mod train;
 
 use crate::algorithms::Algorithms;
@@ -33,6 +34,7 @@ pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome
         Verb::Probe(arguments) => probe::run(&arguments, algorithms),
         Verb::Run(arguments) => run::run(&arguments, algorithms),
         Verb::Train(arguments) => train::run(&arguments),
+        Verb::Study(arguments) => study::run(&arguments),
         Verb::Pairs(arguments) => pairs::run(&arguments, algorithms),
         Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments, algorithms),

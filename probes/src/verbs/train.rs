@@ -3,10 +3,11 @@
 use crate::args::Train;
 use crate::document::{read_report, report_files};
 use crate::exit::{Outcome, WrongUsage};
+use crate::plot::{self, Figure, Picture};
 use crate::progress::Progress;
 use crate::terminal::{Axis, Chart, Series, Terminal};
 use crate::train::{self, Evidence, Held, OURS, Selection, Trained};
-use crate::{card, files, interrupt, output, plot};
+use crate::{card, files, interrupt, output};
 use rayon::prelude::*;
 use sapwise::Model;
 use sapwise::model::{Learning, Validation};
@@ -27,6 +28,7 @@ struct Answer<'a> {
 
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
+    let picture = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, Picture::of(path)?))).transpose()?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let reports = report_files(&arguments.reports)?;
     let outputs = [Some(&arguments.out), arguments.card.as_ref(), arguments.plot.as_ref(), arguments.importance.as_ref()];
@@ -43,8 +45,10 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
         }
         files::write_text(path, &page)?;
     }
-    if let Some(path) = &arguments.plot {
-        files::write_text(path, &plot::training(&held, &model, &command(arguments, path))?)?;
+    if let Some((path, picture)) = picture {
+        let picture = plot::Training::new(&held, &model.validation.learning)
+            .draw(picture, &caption(&model, &command(arguments, path)))?;
+        files::write_atomically(path, |out| Ok(out.write_all(&picture)?))?;
     }
     if let Some((path, importance)) = arguments.importance.as_ref().zip(importance.as_ref()) {
         files::write_text(path, &sapwise::json::write(importance)?)?;
@@ -87,6 +91,14 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
         return Err(WrongUsage(format!("{} names no file", arguments.out.display())).into());
     }
     Ok(name)
+}
+
+/// What stands below the picture.
+fn caption(model: &Model, command: &str) -> Vec<String> {
+    let simulated = if model.is_simulated() { "Simulated machines, no evidence of accuracy. " } else { "" };
+    let machines = model.validation.physical_machines;
+    let plural = if machines == 1 { "" } else { "s" };
+    vec![format!("{simulated}{machines} physical machine{plural}."), format!("Made by: {command}")]
 }
 
 /// The command that makes the picture again, without folders, which are of this machine alone.

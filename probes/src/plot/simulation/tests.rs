@@ -1,6 +1,7 @@
 //! Tests of the picture of a simulation.
 
 use super::*;
+use crate::plot::Picture;
 use crate::simulation::examples::{outcome, taken};
 use crate::simulation::{CoRunner, Footage};
 use sapwise::Scenario;
@@ -12,7 +13,8 @@ fn course(co_runner: Option<CoRunner>) -> Course {
 
 fn drawn(outcome: &Outcome, co_runner: Option<CoRunner>) -> String {
     let told = ["regret 3 %".to_owned(), "Made by: sapwise run slab".to_owned()];
-    String::from_utf8(simulation(Picture::Svg, &course(co_runner), outcome, &told).unwrap()).unwrap()
+    let figure = Simulation { course: &course(co_runner), outcome };
+    String::from_utf8(figure.draw(Picture::Svg, &told).unwrap()).unwrap()
 }
 
 #[test]
@@ -62,35 +64,10 @@ fn a_machine_without_gpus_is_told_so() {
 }
 
 #[test]
-fn a_long_line_goes_on_below() {
-    assert_eq!(wrapped("Made by: sapwise run"), ["Made by: sapwise run"]);
-    let long = "sapwise run --option ".repeat(20);
-    let lines = wrapped(long.trim());
-    assert!(lines.len() > 2 && lines.iter().all(|l| l.len() <= LETTERS), "{lines:?}");
-    let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-    assert_eq!(words(&lines.join(" ")), words(&long));
-}
-
-#[test]
 fn many_frames_are_drawn_as_few_points() {
     let values = (0..10_000).map(|k| if k % 9 == 0 { f64::INFINITY } else { f64::from(k) });
     let points = curve(values, 10_000);
     assert!(points.len() <= POINTS && points.iter().all(|p| p.1.is_finite()));
     assert!(points.windows(2).all(|w| w[0].0 < w[1].0 && w[0].1 < w[1].1));
     assert_eq!(curve([2.0, 3.0].into_iter(), 2), [(0, 2.0), (1, 3.0)]);
-}
-
-#[test]
-fn a_png_has_the_size_and_text_in_it() {
-    let example = outcome(&["brute@cpu1"], &[(10, 1.0, &[1.0], taken(0)), (9, 1.5, &[1.0], taken(0))]);
-    let png = |told: &str| {
-        let file = simulation(Picture::Png, &course(None), &example, &[told.to_owned()]).unwrap();
-        let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().unwrap();
-        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-        let info = reader.next_frame(&mut pixels).unwrap();
-        assert_eq!((info.width, info.height), (PNG_UNIT * SIZE.0, PNG_UNIT * SIZE.1));
-        pixels.chunks(3).filter(|p| p.iter().all(|&c| c < 60)).count()
-    };
-    // Dark pixels of letters, without any font of the system.
-    assert!(png("a caption with letters in it") > png("") + 200);
 }

@@ -1,6 +1,7 @@
 //! Where one side of a pair of algorithms gives way to the other on a machine, by cost curves.
 
-use super::super::baselines::usual;
+use super::super::baselines::{available, usual};
+use super::super::curve::measured_costs;
 use super::super::profile::Profile;
 use sapwise::{AlgorithmCost, AlgorithmId, Backend, BackendClass, Load};
 
@@ -43,6 +44,13 @@ pub(super) fn pairs(available: &[AlgorithmId]) -> Vec<Pair> {
     pairs.push(Pair { name: "CPU, GPU".to_owned(), first: class(BackendClass::Cpu), second: class(BackendClass::Gpu) });
     pairs.retain(|p| !p.first.0.is_empty() && !p.second.0.is_empty());
     pairs
+}
+
+/// Every pair whose border was measured, by name, with the place of the border in octaves of the slice.
+pub(crate) fn measured_borders(profile: &Profile) -> Vec<(String, f64)> {
+    let (slice, measured) = (slice(profile), measured_costs(profile).0);
+    let at = |pair: Pair| Some((pair.octaves(&measured, &slice)?, pair.name));
+    pairs(&available(profile)).into_iter().filter_map(at).map(|(octaves, name)| (name, octaves)).collect()
 }
 
 /// The loads of the slice of a profile, ascending by objects, each size once.

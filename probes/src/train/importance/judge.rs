@@ -27,9 +27,17 @@ pub(super) struct Outcome {
     pub(super) regret: f64,
     /// Octaves of each pair of the judge; `None` where one side was not predicted.
     octaves: Vec<Option<f64>>,
-    /// For each method on a class of processor that was predicted the mean distance of its times from the measured ones, as the
-    /// absolute value of a logarithm.
-    distances_ln: BTreeMap<String, f64>,
+    /// For each method on a class of processor that was predicted how its measured times lie to the predicted ones.
+    pub(super) off: BTreeMap<String, Off>,
+}
+
+/// Logarithms of measured over predicted times.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Off {
+    /// Their mean: above zero where the machine is slower than predicted.
+    pub(super) mean_ln: f64,
+    /// The mean of their absolute values.
+    distance_ln: f64,
 }
 
 impl<'a> Judge<'a> {
@@ -47,30 +55,30 @@ impl<'a> Judge<'a> {
     pub(super) fn outcome(&self, model: &Model, hardware: &Hardware) -> Outcome {
         let Ok(prediction) = model.predict(hardware, &self.wanted) else {
             // Nothing is chosen, which is charged like what was never timed.
-            return Outcome {
-                regret: NOT_TIMED - 1.0,
-                octaves: vec![None; self.pairs.len()],
-                distances_ln: BTreeMap::new(),
-            };
+            return Outcome { regret: NOT_TIMED - 1.0, octaves: vec![None; self.pairs.len()], off: BTreeMap::new() };
         };
         let octaves = self.pairs.iter().map(|(pair, _)| pair.octaves(&prediction.costs, &self.slice)).collect();
-        let distances_ln = self.distances_ln(&prediction.costs);
+        let off = self.off(&prediction.costs);
         let choose = by_costs(prediction.costs, &self.available);
-        Outcome { regret: self.yardstick.regret(self.profile, &choose).mean, octaves, distances_ln }
+        Outcome { regret: self.yardstick.regret(self.profile, &choose).mean, octaves, off }
     }
 
-    fn distances_ln(&self, costs: &[AlgorithmCost]) -> BTreeMap<String, f64> {
+    fn off(&self, costs: &[AlgorithmCost]) -> BTreeMap<String, Off> {
         let mut found: BTreeMap<String, Vec<f64>> = BTreeMap::new();
         let position = |k: u16| costs.iter().find(|c| c.algorithm == *self.profile.id(k));
         let known: Vec<Option<&AlgorithmCost>> = (0..self.profile.algorithms.len() as u16).map(position).collect();
         for spot in &self.profile.points {
             for &(k, ns) in &spot.medians {
                 let Some(cost) = known[usize::from(k)] else { continue };
-                let distance = (cost.curve.cost_ns(&spot.load) / ns).ln().abs();
-                found.entry(method_name(&cost.algorithm)).or_default().push(distance);
+                let ln = (ns / cost.curve.cost_ns(&spot.load)).ln();
+                found.entry(method_name(&cost.algorithm)).or_default().push(ln);
             }
         }
-        found.into_iter().map(|(name, distances)| (name, average(&distances))).collect()
+        let off = |logs: Vec<f64>| {
+            let distances: Vec<f64> = logs.iter().map(|ln| ln.abs()).collect();
+            Off { mean_ln: average(&logs), distance_ln: average(&distances) }
+        };
+        found.into_iter().map(|(name, logs)| (name, off(logs))).collect()
     }
 }
 
@@ -103,9 +111,9 @@ impl Shifts {
             self.0.entry((what, border.to_owned())).or_default().entry(machine).or_default().push(by);
         };
         put(What::Regret, "", after.regret - before.regret);
-        for (algorithm, distance) in &before.distances_ln {
-            if let Some(after) = after.distances_ln.get(algorithm) {
-                put(What::Time, algorithm, after - distance);
+        for (algorithm, before) in &before.off {
+            if let Some(after) = after.off.get(algorithm) {
+                put(What::Time, algorithm, after.distance_ln - before.distance_ln);
             }
         }
         for ((pair, measured), (before, after)) in judge.pairs.iter().zip(before.octaves.iter().zip(&after.octaves)) {

@@ -25,6 +25,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use verdict::FEWEST_MACHINES;
 
+pub(crate) use borders::measured_borders;
 pub(crate) use interval::Interval;
 pub(crate) use verdict::{Effect, Verdict};
 
@@ -60,6 +61,9 @@ pub(crate) struct Importance {
     pub(crate) mean_regret: Option<f64>,
     /// In the order of a report: those of the machine, then those of its GPUs.
     pub(crate) parameters: Vec<OfParameter>,
+    /// For each method on a class of processor and each physical machine the mean logarithm of measured over predicted time when it
+    /// was left out, with every parameter as it is: what predictions leave.
+    pub(crate) left_ln: BTreeMap<String, BTreeMap<String, f64>>,
     /// In sentences, what the figures don't say.
     pub(crate) notes: Vec<String>,
 }
@@ -136,6 +140,7 @@ fn of_machines(profiles: &[Profile], machines: &[&str]) -> Result<Importance> {
         permutations: PERMUTATIONS,
         mean_regret: None,
         parameters: Vec::new(),
+        left_ln: BTreeMap::new(),
         notes: Vec::new(),
     };
     let Some(partition) = partition else {
@@ -197,11 +202,25 @@ fn of_machines(profiles: &[Profile], machines: &[&str]) -> Result<Importance> {
         Ok(of_parameter(figure, machines, profiles, &permuted, &refitted))
     };
     found.parameters = Figure::ALL.into_par_iter().map(one).collect::<Result<_>>()?;
+    found.left_ln = left(profiles, &outcomes);
     let mut regrets: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     outcomes.iter().enumerate().for_each(|(k, o)| regrets.entry(position(k)).or_default().push(o.regret));
     found.mean_regret = Some(average(&regrets.values().map(|r| average(r)).collect::<Vec<_>>()));
     found.notes = notes(&found);
     Ok(found)
+}
+
+/// What predictions leave of each machine: the mean over its profiles.
+fn left(profiles: &[Profile], outcomes: &[Outcome]) -> BTreeMap<String, BTreeMap<String, f64>> {
+    let mut found: BTreeMap<String, BTreeMap<String, Vec<f64>>> = BTreeMap::new();
+    for (profile, outcome) in profiles.iter().zip(outcomes) {
+        for (algorithm, off) in &outcome.off {
+            let machines = found.entry(algorithm.clone()).or_default();
+            machines.entry(profile.machine().to_owned()).or_default().push(off.mean_ln);
+        }
+    }
+    let means = |machines: BTreeMap<String, Vec<f64>>| machines.into_iter().map(|(k, lns)| (k, average(&lns))).collect();
+    found.into_iter().map(|(algorithm, machines)| (algorithm, means(machines))).collect()
 }
 
 /// The value of each machine that has it: the median over its profiles.

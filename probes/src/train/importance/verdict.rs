@@ -45,6 +45,13 @@ pub(crate) struct Effect {
 }
 
 impl Effect {
+    /// Whether it says anything: not of too few machines, and not where what was fitted never reads the parameter, whose values can't
+    /// change anything then.
+    pub(crate) fn is_told(&self) -> bool {
+        let moves = |i: &Interval| i.low != 0.0 || i.high != 0.0;
+        self.permuted.iter().chain(&self.refitted).any(moves)
+    }
+
     /// `deviation` is the standard deviation of the parameter over so many machines, in octaves; `least` what matters of the outcome.
     pub(super) fn new(
         permuted: Option<Interval>,

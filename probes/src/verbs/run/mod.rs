@@ -8,7 +8,7 @@ use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
 use crate::boxes::{Frames, read_frames};
 use crate::exit::{Outcome, WrongUsage};
-use crate::plot::{self, Picture};
+use crate::plot::{self, Figure, Picture};
 use crate::simulation::{Course, Footage, Swing, TraceFormat, simulate, too_wide, write_trace};
 use crate::terminal::Terminal;
 use crate::{files, interrupt, output};
@@ -60,7 +60,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     }
     if let Some((path, picture)) = picture {
         let told = text::caption(arguments, &answer, &origin);
-        let drawn = plot::simulation(picture, &course, &outcome, &told)?;
+        let drawn = plot::Simulation { course: &course, outcome: &outcome }.draw(picture, &told)?;
         files::write_atomically(path, |out| Ok(out.write_all(&drawn)?))?;
     }
     if arguments.json {

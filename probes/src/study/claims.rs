@@ -1,0 +1,210 @@
+//! What Section 6 of the paper says of hardware parameters, held against its own table and against these machines.
+
+use super::entry::Entry;
+use super::influence::{Influence, Link, On};
+use crate::train::Verdict;
+use sapwise::hardware::gpu::parameter as gpu;
+use std::fmt;
+
+/// The speed-up from the Quadro 4600 to the 5800 that the paper prints ("1.5X much faster"). It prints no other timing in figures.
+pub(super) const PRINTED_SPEED_UP: f64 = 1.5;
+/// The cards between which it is.
+const SLOWER: &str = "quadro-fx-4600";
+const FASTER: &str = "quadro-fx-5800";
+const SMALLEST: &str = "quadro-fx-3600m";
+/// A parameter that differs by less than this between two cards did not vary: what it does can't be seen.
+const VARIED: f64 = 1.1;
+
+/// What became of a claim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Outcome {
+    Confirmed,
+    Refuted,
+    Undecidable,
+    /// The claim is about the paper's cards alone.
+    NotAsked,
+}
+
+/// What the paper says of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Said {
+    /// It does not influence the time, or hardly.
+    NotLinked,
+    /// It does.
+    Linked,
+    /// It is about the same on the three cards.
+    AlikeOnAll,
+}
+
+/// A claim with what follows from either evidence.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Claim {
+    /// In our words.
+    pub(super) text: String,
+    /// The parameter of a GPU.
+    pub(super) parameter: String,
+    /// By the paper's own table, and why.
+    pub(super) by_its_table: (Outcome, String),
+    /// By the studied reports, and why.
+    pub(super) by_reports: (Outcome, String),
+    /// Positions of the paper's cards.
+    pub(super) cards: Vec<usize>,
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Confirmed => "confirmed",
+            Self::Refuted => "refuted",
+            Self::Undecidable => "undecidable",
+            Self::NotAsked => "not asked",
+        })
+    }
+}
+
+/// The positions of the paper's cards, from the smallest to the fastest.
+pub(super) fn cards(entries: &[Entry]) -> [Option<usize>; 3] {
+    let card = |name: &str| entries.iter().position(|e| e.is_published() && e.name.ends_with(name));
+    [SMALLEST, SLOWER, FASTER].map(card)
+}
+
+/// The claims of Section 6, in its order.
+pub(super) fn claims(entries: &[Entry], influence: &Influence) -> Vec<Claim> {
+    let said = [
+        ("The clock rate of the GPU does not influence the time of the broad phase.", gpu::CLOCK_GHZ, Said::NotLinked),
+        ("The clock rate is almost the same on the three cards.", gpu::CLOCK_GHZ, Said::AlikeOnAll),
+        ("The bandwidth from CPU to GPU is almost the same on them.", gpu::UPLOAD_GB_PER_S, Said::AlikeOnAll),
+        ("The bandwidth from GPU to CPU is similar on them.", gpu::DOWNLOAD_GB_PER_S, Said::AlikeOnAll),
+        ("The bandwidth from CPU to GPU does not influence it.", gpu::UPLOAD_GB_PER_S, Said::NotLinked),
+        ("The bandwidth from GPU to CPU does not influence it.", gpu::DOWNLOAD_GB_PER_S, Said::NotLinked),
+        ("The memory size of the GPU hardly influences it.", gpu::MEMORY_BYTES, Said::NotLinked),
+        ("The internal bandwidth of the GPU influences it.", gpu::COPY_GB_PER_S, Said::Linked),
+        ("The number of cores of the GPU influences it.", gpu::LANES, Said::Linked),
+    ];
+    let cards = cards(entries);
+    let claim = |(text, parameter, said): (&str, &str, Said)| {
+        let value = |card: Option<usize>| entries[card?].gpu()?.value(parameter);
+        let values = cards.map(value);
+        Claim {
+            text: text.to_owned(),
+            parameter: parameter.to_owned(),
+            by_its_table: by_its_table(said, values),
+            by_reports: by_reports(said, parameter, influence),
+            cards: cards.iter().flatten().copied().collect(),
+        }
+    };
+    said.into_iter().map(claim).collect()
+}
+
+fn by_its_table(said: Said, values: [Option<f64>; 3]) -> (Outcome, String) {
+    let [Some(smallest), Some(slower), Some(faster)] = values else {
+        let why = "the paper's three cards are not among the reports; they are in datasets/published";
+        return (Outcome::Undecidable, why.to_owned());
+    };
+    let ratio = faster / slower;
+    let (least, most) = [smallest, slower, faster].iter().fold((f64::MAX, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
+    if said == Said::AlikeOnAll {
+        let why = format!("the highest is {:.2} times the lowest", most / least);
+        return (if most / least < VARIED { Outcome::Confirmed } else { Outcome::Refuted }, why);
+    }
+    let three = format!("over all three cards it differs by a factor of {:.2}", most / least);
+    if ratio < VARIED && ratio > 1.0 / VARIED {
+        let why = format!(
+            "from the 4600 to the 5800, the one pair with a printed speed-up ({PRINTED_SPEED_UP} x), it is {ratio:.2} times as much: what \
+             hardly varies can't be shown not to matter; {three}, for which no times are printed"
+        );
+        return (Outcome::Undecidable, why);
+    }
+    // If the time were a power of this parameter alone.
+    let exponent = PRINTED_SPEED_UP.ln() / ratio.ln();
+    let why = format!(
+        "from the 4600 to the 5800 it is {ratio:.2} times as much and the time 1/{PRINTED_SPEED_UP}: were this the only cause, the time would \
+         go with its power -{exponent:.2}; memory size, internal bandwidth and cores all rise between these cards, and one pair can't \
+         tell which it was"
+    );
+    (Outcome::Undecidable, why)
+}
+
+/// By the links with the times on GPUs.
+fn by_reports(said: Said, parameter: &str, influence: &Influence) -> (Outcome, String) {
+    if said == Said::AlikeOnAll {
+        return (Outcome::NotAsked, "it is a claim about the three cards".to_owned());
+    }
+    let named = format!("gpu/{parameter}");
+    let on_gpu = |link: &&Link| match &link.on {
+        On::Algorithm(name) => name.contains("gpu"),
+        On::Border(_) | On::Choice => false,
+    };
+    // The model reads a rate in place of the bandwidth that the paper measured, where a report has both.
+    let read_instead = match parameter {
+        gpu::UPLOAD_GB_PER_S => gpu::UPLOAD_RATE_GB_PER_S,
+        gpu::DOWNLOAD_GB_PER_S => gpu::DOWNLOAD_RATE_GB_PER_S,
+        gpu::COPY_GB_PER_S => gpu::READ_GB_PER_S,
+        other => other,
+    };
+    let names = [named, format!("gpu/{read_instead}")];
+    let links: Vec<&Link> = influence.links.iter().filter(|l| names.contains(&l.parameter)).filter(on_gpu).collect();
+    if links.is_empty() {
+        let why = format!(
+            "fewer than {} machines with a GPU, programs that act as one left out, have both the parameter and timings on it; \
+             add their reports",
+            super::rank::FEWEST_MACHINES
+        );
+        return (Outcome::Undecidable, why);
+    }
+    // What a parameter adds to predictions counts: ranks alone can't tell a cause from what goes together with it.
+    let by_predictions: Vec<&&Link> = links.iter().filter(|l| l.effect.is_some() || l.left.is_some()).collect();
+    let (verdicts, how): (Vec<Verdict>, &str) = if by_predictions.is_empty() {
+        (
+            links.iter().map(|l| l.verdict).collect(),
+            "rank correlation alone, which can't tell a cause from what goes with it",
+        )
+    } else {
+        let how = "what it adds to predictions of machines left out";
+        (by_predictions.iter().map(|l| l.verdict).collect(), how)
+    };
+    let linked = verdicts.iter().filter(|v| **v == Verdict::Linked).count();
+    let not = verdicts.iter().filter(|v| **v == Verdict::NotLinked).count();
+    let ranks: Vec<String> = links
+        .iter()
+        .filter_map(|l| {
+            let On::Algorithm(name) = &l.on else { return None };
+            l.rank.map(|r| format!("{name}: {:+.2} ({:+.2} to {:+.2})", r.correlation, r.low, r.high))
+        })
+        .collect();
+    let why = format!(
+        "by {how}, linked with {linked} and not linked with {not} of {} algorithms on GPUs; ranks of it and their times: {}",
+        verdicts.len(),
+        if ranks.is_empty() { "none".to_owned() } else { ranks.join(", ") }
+    );
+    let found = match (linked, not) {
+        (1.., _) => Some(Said::Linked),
+        (0, n) if n == verdicts.len() => Some(Said::NotLinked),
+        _ => None,
+    };
+    let outcome = match found {
+        None => Outcome::Undecidable,
+        // A rank is no proof that something is a cause, so it refutes nothing and confirms nothing that is said to be one.
+        Some(Said::Linked) if by_predictions.is_empty() => Outcome::Undecidable,
+        Some(found) if found == said => Outcome::Confirmed,
+        Some(_) => Outcome::Refuted,
+    };
+    (outcome, why)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_table_decides_little() {
+        let of = |said, values: [f64; 3]| by_its_table(said, values.map(Some));
+        let (outcome, why) = of(Said::NotLinked, [1.25, 1.2, 1.296]);
+        assert!(outcome == Outcome::Undecidable && why.contains("1.08 times") && why.contains("hardly varies"), "{why}");
+        let (outcome, why) = of(Said::Linked, [31.99, 44.36, 71.11]);
+        assert!(outcome == Outcome::Undecidable && why.contains("1.60 times") && why.contains("power -0.86"), "{why}");
+        let (outcome, why) = of(Said::AlikeOnAll, [1.856, 2.496, 2.463]);
+        assert!(outcome == Outcome::Refuted && why.contains("1.34 times"), "{why}");
+        assert_eq!(by_its_table(Said::Linked, [None, Some(1.0), Some(2.0)]).0, Outcome::Undecidable);
+    }
+}

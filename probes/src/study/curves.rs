@@ -1,0 +1,228 @@
+//! Figures 4, 6 and 7 of the paper: time over objects, CPU against GPU, on 1..k GPUs, on 1..k threads.
+
+use super::entry::Entry;
+use crate::plot::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
+use crate::sweep::median;
+use crate::train::{measured_fields, slice_scenario};
+use sapwise::measure::statistics::quantile;
+use sapwise::{AlgorithmId, Backend, BackendClass, Fields, Report};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Machines in one picture.
+const MOST_PANELS: usize = 4;
+
+/// Which processors a picture compares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Compared {
+    /// One core, all cores, GPUs: Figure 4.
+    CpuAndGpu,
+    /// Numbers of GPUs: Figure 6.
+    Gpus,
+    /// Numbers of threads: Figure 7.
+    Threads,
+}
+
+impl Compared {
+    pub(crate) const ALL: [Self; 3] = [Self::CpuAndGpu, Self::Gpus, Self::Threads];
+
+    /// Whether a report has more than one side to compare.
+    fn is_in(self, entry: &Entry) -> bool {
+        let timed = entry.profile.points.iter().flat_map(|p| &p.medians).map(|m| entry.profile.id(m.0));
+        let widths: BTreeSet<(BackendClass, Vec<u32>)> = timed.map(|id| side(id.backend())).collect();
+        let count = |class| widths.iter().filter(|w| w.0 == class).count();
+        match self {
+            Self::CpuAndGpu => count(BackendClass::Cpu) > 0 && count(BackendClass::Gpu) > 0,
+            Self::Gpus => widths.iter().any(|w| w.0 == BackendClass::Gpu && w.1.len() > 1),
+            Self::Threads => count(BackendClass::Cpu) > 1,
+        }
+    }
+
+    fn takes(self, id: &AlgorithmId, threads: u32) -> bool {
+        match (self, id.backend()) {
+            (Self::CpuAndGpu, Backend::Cpu(k)) => *k == 1 || *k == threads,
+            (Self::CpuAndGpu, _) => true,
+            (_, backend) => (backend.class() == BackendClass::Gpu) == (self == Self::Gpus),
+        }
+    }
+
+    /// The reports that it is drawn of: of each physical machine the one that has most of it, up to four.
+    pub(crate) fn drawn(self, entries: &[Entry], wanted: &[usize]) -> Vec<usize> {
+        let mut machines: BTreeMap<&str, usize> = BTreeMap::new();
+        for &k in wanted.iter().filter(|&&k| entries[k].studied.is_ok() && self.is_in(&entries[k])) {
+            let rank = |k: usize| (self.sides(&entries[k]), entries[k].wholeness());
+            let best = machines.entry(entries[k].machine()).or_insert(k);
+            if rank(k) > rank(*best) {
+                *best = k;
+            }
+        }
+        let mut all: Vec<usize> = machines.into_values().collect();
+        all.sort_unstable();
+        let step = all.len().div_ceil(MOST_PANELS).max(1);
+        all.into_iter().step_by(step).collect()
+    }
+
+    fn sides(self, entry: &Entry) -> usize {
+        let ids = entry.profile.algorithms.iter().map(|t| &t.id).filter(|id| self.takes(id, entry.threads()));
+        ids.map(|id| side(id.backend())).collect::<BTreeSet<_>>().len()
+    }
+
+    pub(super) fn title(self) -> &'static str {
+        match self {
+            Self::CpuAndGpu => "CPU against GPU",
+            Self::Gpus => "On one and more GPUs",
+            Self::Threads => "On one and more threads",
+        }
+    }
+
+    pub(super) fn id(self) -> &'static str {
+        match self {
+            Self::CpuAndGpu => "figure-4-cpu-gpu",
+            Self::Gpus => "figure-6-gpus",
+            Self::Threads => "figure-7-threads",
+        }
+    }
+
+    /// The picture of these reports, each a panel. The time of each side is that of its fastest algorithm at each size.
+    pub(super) fn figure(self, drawn: &[(&Entry, &Report)]) -> Curves {
+        let mut sides: BTreeSet<(BackendClass, Vec<u32>)> = BTreeSet::new();
+        for (entry, report) in drawn {
+            let ids = report.algorithms.iter().map(|t| &t.id).filter(|id| self.takes(id, entry.threads()));
+            sides.extend(ids.map(|id| side(id.backend())));
+        }
+        let sides: Vec<_> = sides.into_iter().collect();
+        let panels = drawn.iter().map(|(entry, report)| self.panel(entry, report, &sides)).collect();
+        Curves { title: self.title().to_owned(), panels }
+    }
+
+    fn panel(self, entry: &Entry, report: &Report, sides: &[(BackendClass, Vec<u32>)]) -> CurvePanel {
+        let threads = entry.threads();
+        let scenario = slice_scenario(report).to_owned();
+        let own = only(report, |id| self.takes(id, threads));
+        let style = |id: &AlgorithmId| sides.iter().position(|s| *s == side(id.backend())).unwrap_or_default();
+        let mut series: Vec<Curve> = Vec::new();
+        for (k, of) in sides.iter().enumerate() {
+            let points = envelope(&own, &scenario, |id| side(id.backend()) == *of);
+            if !points.is_empty() {
+                series.push(Curve { name: name(of), style: k, points });
+            }
+        }
+        let (fields, crossings) = match measured_fields(&own, &scenario) {
+            Ok(fields) => (bands(&fields, style, |k| name(&sides[k])), crossings(&fields)),
+            // Too few sizes for curves; the points are drawn all the same.
+            Err(_) => (Vec::new(), Vec::new()),
+        };
+        CurvePanel { title: format!("{} ({scenario})", entry.name), series, fields, crossings }
+    }
+}
+
+/// A side by its class of processor and the numbers of the GPUs, or as one number that of the threads.
+fn side(backend: &Backend) -> (BackendClass, Vec<u32>) {
+    match backend {
+        Backend::Gpu(gpus) => (BackendClass::Gpu, gpus.clone()),
+        other => (other.class(), vec![other.width()]),
+    }
+}
+
+fn name((class, numbers): &(BackendClass, Vec<u32>)) -> String {
+    match class {
+        BackendClass::Cpu if numbers[..] == [1] => "1 thread".to_owned(),
+        BackendClass::Cpu => format!("{} threads", numbers[0]),
+        BackendClass::Gpu => Backend::Gpu(numbers.clone()).to_string(),
+    }
+}
+
+/// The report with some of its algorithms only.
+fn only(report: &Report, takes: impl Fn(&AlgorithmId) -> bool) -> Report {
+    let mut own = report.clone();
+    own.algorithms.retain(|t| takes(&t.id));
+    own.points.iter_mut().for_each(|p| p.timings.retain(|t| takes(&t.algorithm)));
+    own
+}
+
+/// At each size the median and the quartiles of the fastest of the algorithms, over the rounds.
+fn envelope(report: &Report, scenario: &str, of: impl Fn(&AlgorithmId) -> bool) -> Vec<CurvePoint> {
+    let mut sizes: BTreeMap<u32, BTreeMap<&AlgorithmId, Vec<u64>>> = BTreeMap::new();
+    for point in report.points.iter().filter(|p| p.scenario == scenario && p.load.objects > 0) {
+        for timing in point.timings.iter().filter(|t| of(&t.algorithm) && t.error.is_none() && !t.samples_ns.is_empty()) {
+            let samples = sizes.entry(point.load.objects).or_default().entry(&timing.algorithm).or_default();
+            samples.extend(&timing.samples_ns);
+        }
+    }
+    let fastest = |(objects, algorithms): (u32, BTreeMap<&AlgorithmId, Vec<u64>>)| {
+        let medians = algorithms.into_values().filter_map(|samples| Some((median(&samples)?, samples)));
+        let (ns, samples) = medians.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let samples: Vec<f64> = samples.into_iter().map(|ns| ns as f64).collect();
+        let [low_ns, high_ns] = [0.25, 0.75].map(|share| quantile(&samples, share).unwrap_or(ns));
+        Some(CurvePoint { objects: f64::from(objects), ns, low_ns, high_ns })
+    };
+    sizes.into_iter().filter_map(fastest).collect()
+}
+
+/// The steps of the slice, those in a row that are of the same side joined.
+fn bands(fields: &Fields, style: impl Fn(&AlgorithmId) -> usize, name: impl Fn(usize) -> String) -> Vec<Band> {
+    let mut bands: Vec<Band> = Vec::new();
+    for step in &fields.steps {
+        let (from, style) = (f64::from(step.from_objects), style(&step.algorithm));
+        match bands.last_mut() {
+            Some(last) if last.style == style => {}
+            last => {
+                if let Some(last) = last {
+                    last.to = from;
+                }
+                bands.push(Band { from, to: f64::INFINITY, style, name: name(style) });
+            }
+        }
+    }
+    bands
+}
+
+/// The borders between sides.
+fn crossings(fields: &Fields) -> Vec<Crossing> {
+    let apart = fields.crossovers.iter().filter(|b| side(b.below.backend()) != side(b.above.backend()));
+    let crossing = |b: &sapwise::Border| {
+        let (low, high) = b.interval().unwrap_or((b.objects, b.objects));
+        Crossing { objects: b.objects, low, high }
+    };
+    apart.map(crossing).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::synthetic::Machine;
+
+    fn entry(machine: &Machine) -> (Entry, Report) {
+        let report = machine.report();
+        (Entry::new(std::path::Path::new("a.json"), "a.json", report.clone(), Ok(())), report)
+    }
+
+    #[test]
+    fn sides_are_their_fastest_algorithm_with_the_fields_behind() {
+        let (entry, report) = entry(&Machine::family()[2]);
+        let curves = Compared::Threads.figure(&[(&entry, &report)]);
+        let panel = &curves.panels[0];
+        let names: Vec<&str> = panel.series.iter().map(|s| s.name.as_str()).collect();
+        assert!(names.len() > 1 && names[0] == "1 thread", "{names:?}");
+        for point in &panel.series[0].points {
+            let of = |p: &&sapwise::report::Point| {
+                f64::from(p.load.objects) == point.objects && p.scenario == slice_scenario(&report)
+            };
+            let timings = report.points.iter().filter(of).flat_map(|p| &p.timings);
+            let single = timings.filter(|t| *t.algorithm.backend() == Backend::Cpu(1));
+            let least = single.filter_map(|t| median(&t.samples_ns)).min_by(f64::total_cmp).unwrap();
+            assert!(point.ns <= least * 1.001 && point.low_ns <= point.ns && point.ns <= point.high_ns, "{point:?} {least}");
+        }
+        // Bands follow each other, and each border between two of them is a crossing.
+        assert!(panel.fields.len() > 1 && panel.fields.windows(2).all(|w| w[0].to == w[1].from && w[0].style != w[1].style));
+        assert!(panel.crossings.len() >= panel.fields.len() - 1);
+        assert!(!Compared::Gpus.is_in(&entry) && !Compared::CpuAndGpu.is_in(&entry) && Compared::Threads.is_in(&entry));
+    }
+
+    #[test]
+    fn of_a_machine_the_report_with_most_sides_is_drawn() {
+        let (mut few, _) = entry(&Machine::family()[2]);
+        few.profile.retain(|t| t.id.threads() == 1);
+        let (all, _) = entry(&Machine::family()[2]);
+        assert_eq!(Compared::Threads.drawn(&[few, all], &[0, 1]), [1]);
+    }
+}

@@ -1,0 +1,173 @@
+//! The files of a study: the page, and for each figure and table what a program or a paper takes of it.
+
+use super::answer::Answer;
+use crate::files;
+use crate::page::Block;
+use crate::plot::{Picture, Tabled};
+use crate::sheet::Sheet;
+use anyhow::{Context, Result, bail};
+use std::fs;
+use std::path::{Component, Path};
+
+/// The page, and what it says for machines.
+pub(crate) const PAGE: &str = "index.html";
+const ANSWER: &str = "study.json";
+/// Where what is beside them goes.
+const FIGURES: &str = "figures";
+const TABLES: &str = "tables";
+
+/// Files that are to be written, by their path in the folder.
+pub(super) struct Folder {
+    /// What the rows of tables call each report.
+    labels: Vec<String>,
+    /// What stands below every figure: the command.
+    command: String,
+    files: Vec<(String, Vec<u8>)>,
+}
+
+impl Folder {
+    pub(super) fn new(labels: Vec<String>, command: String) -> Self {
+        Self { labels, command, files: Vec::new() }
+    }
+
+    /// A figure as SVG, PNG and CSV, and the block that shows it. `of` are the positions of the reports that it is from, and `told`
+    /// what it shows in words.
+    ///
+    /// # Errors
+    /// When it can't be drawn.
+    pub(super) fn figure(&mut self, id: &str, figure: &impl Tabled, told: &str, of: &[usize]) -> Result<Block> {
+        let from = match of {
+            [] => String::new(),
+            _ => format!(" From {}.", self.named(of)),
+        };
+        let caption = [format!("{told}{from}"), format!("Made by: {}", self.command)];
+        let svg = figure.draw(Picture::Svg, &caption).with_context(|| format!("the figure {id} can't be drawn"))?;
+        let png = figure.draw(Picture::Png, &caption).with_context(|| format!("the figure {id} can't be drawn"))?;
+        let text = String::from_utf8(svg.clone())?;
+        let csv = figure.csv().csv(&self.labels)?.into_bytes();
+        let mut links = Vec::new();
+        for (name, ending, bytes) in [("SVG", "svg", svg), ("PNG", "png", png), ("CSV", "csv", csv)] {
+            let path = format!("{FIGURES}/{id}.{ending}");
+            links.push((name.to_owned(), path.clone()));
+            self.files.push((path, bytes));
+        }
+        let alt = format!("{}. {told}", figure.title());
+        Ok(Block::Figure { id: id.to_owned(), caption: caption[0].clone(), svg: text, links, alt })
+    }
+
+    /// A table as CSV, and the block that shows it.
+    ///
+    /// # Errors
+    /// When a row does not fit its columns.
+    pub(super) fn table(&mut self, id: &str, caption: &str, sheet: Sheet) -> Result<Block> {
+        let path = format!("{TABLES}/{id}.csv");
+        self.files.push((path.clone(), sheet.csv(&self.labels)?.into_bytes()));
+        Ok(Block::Table { id: id.to_owned(), caption: caption.to_owned(), sheet, csv: path })
+    }
+
+    /// Labels of reports, as many as can be read.
+    fn named(&self, of: &[usize]) -> String {
+        const MOST: usize = 12;
+        let names: Vec<&str> = of.iter().take(MOST).map(|&k| self.labels[k].as_str()).collect();
+        let more = of.len().saturating_sub(MOST);
+        if more > 0 { format!("{} and {more} more", names.join(", ")) } else { names.join(", ") }
+    }
+
+    /// Writes everything into a folder that [`prepare`] has seen, in place of the files of an earlier study.
+    ///
+    /// # Errors
+    /// Names the file.
+    pub(super) fn write(self, folder: &Path, page: &str, answer: &Answer) -> Result<()> {
+        if let Some(earlier) = earlier(folder)? {
+            earlier.files.iter().filter(|name| is_within(name)).for_each(|name| {
+                // One that the user has removed already is no failure.
+                let _ = fs::remove_file(folder.join(name));
+            });
+        }
+        for part in [FIGURES, TABLES] {
+            let part = folder.join(part);
+            fs::create_dir_all(&part).with_context(|| format!("the folder {} can't be made", part.display()))?;
+        }
+        let names = self.files.iter().map(|(name, _)| name.clone()).chain([PAGE.to_owned()]).collect();
+        // First, so that a study that was stopped half-way is taken for one the next time.
+        let answer = Answer { files: names, ..answer.clone() };
+        files::write_text(&folder.join(ANSWER), &sapwise::json::write(&answer)?)?;
+        for (name, bytes) in self.files {
+            files::write_atomically(&folder.join(&name), |out| Ok(out.write_all(&bytes)?))?;
+        }
+        files::write_text(&folder.join(PAGE), page)
+    }
+}
+
+/// Sees that a study can be written to a folder before minutes of work: it is empty, not there, or holds an earlier study.
+///
+/// # Errors
+/// When it holds something else, or takes no file.
+pub(crate) fn prepare(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made", folder.display()))?;
+    tempfile::tempfile_in(folder)
+        .with_context(|| format!("no file can be made in {}; name another folder with --out", folder.display()))?;
+    let mut entries = fs::read_dir(folder).with_context(|| format!("the folder {} can't be read", folder.display()))?;
+    if entries.next().is_some() && earlier(folder)?.is_none() {
+        bail!("{} is not empty and holds no earlier study; name a new folder with --out", folder.display());
+    }
+    Ok(())
+}
+
+/// The answer of the study that a folder holds, if any.
+fn earlier(folder: &Path) -> Result<Option<Answer>> {
+    let path = folder.join(ANSWER);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let text = crate::document::read_text(&path)?;
+    Ok(serde_json::from_str(&text).ok())
+}
+
+/// Whether a path that a file names stays in its folder. A file may come from anyone, and what it names is removed.
+fn is_within(name: &str) -> bool {
+    Path::new(name).components().all(|part| matches!(part, Component::Normal(_)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn answer(files: &[&str]) -> String {
+        let files = files.iter().map(|f| (*f).to_owned()).collect();
+        serde_json::to_string(&Answer { files, ..Answer::default() }).unwrap()
+    }
+
+    #[test]
+    fn a_folder_of_something_else_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let new = folder.path().join("a/b");
+        prepare(&new).unwrap();
+        fs::write(new.join("thesis.tex"), "").unwrap();
+        let error = prepare(&new).unwrap_err().to_string();
+        assert!(error.contains("not empty") && error.contains("--out"), "{error}");
+        // Another program's study.json makes it no study.
+        fs::write(new.join(ANSWER), "{}").unwrap();
+        assert!(prepare(&new).is_err());
+        assert!(prepare(&new.join("thesis.tex")).is_err());
+    }
+
+    #[test]
+    fn an_earlier_study_is_replaced_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join("study").join(name);
+        fs::create_dir_all(path(FIGURES)).unwrap();
+        for name in ["figures/old.svg", "figures/mine.svg", "../outside"] {
+            fs::write(path(name), name).unwrap();
+        }
+        fs::write(path(ANSWER), answer(&["figures/old.svg", "../outside", "/etc/none", "figures/gone.svg"])).unwrap();
+        prepare(&path("")).unwrap();
+        let mut new = Folder::new(vec!["R1".to_owned()], "sapwise study".to_owned());
+        new.table("machines", "", Sheet::new([("a", "a")])).unwrap();
+        new.write(&path(""), "<html>", &Answer::default()).unwrap();
+        assert!(!path("figures/old.svg").exists());
+        assert!(path("figures/mine.svg").exists() && path("../outside").exists());
+        assert_eq!(earlier(&path("")).unwrap().unwrap().files, ["tables/machines.csv", PAGE]);
+        assert_eq!(fs::read_to_string(path("tables/machines.csv")).unwrap(), "a\n");
+    }
+}

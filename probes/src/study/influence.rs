@@ -1,0 +1,139 @@
+//! Which hardware parameters go with which algorithm and which border, by three methods.
+
+use super::entry::{Entry, representatives};
+use super::rank::{self, Rank};
+use super::speed::slownesses;
+use crate::train::{Effect, Importance, Verdict, measured_borders};
+use rayon::prelude::*;
+use sapwise::hardware::{gpu, parameter};
+use sapwise::model::GPU_PREFIX;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Machines that are looked at, at most, evenly taken.
+const MOST_MACHINES: usize = 200;
+
+/// What an influence is on.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum On {
+    /// The time of an algorithm, by what it is called on every machine.
+    Algorithm(String),
+    /// The place of a border between two sides.
+    Border(String),
+    /// The regret of what is chosen.
+    Choice,
+}
+
+/// One parameter and one outcome.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Link {
+    /// Its name, that of a GPU with `gpu/` before it.
+    pub(super) parameter: String,
+    pub(super) on: On,
+    /// Between machines; none of too few, or where one of both does not vary.
+    pub(super) rank: Option<Rank>,
+    /// What it is worth to predictions; none of what the model of this outcome does not read.
+    pub(super) effect: Option<Effect>,
+    /// Between machines, of the parameter and what predictions that do not read it leave of the time; none where they read it.
+    pub(super) left: Option<Rank>,
+    /// That of the effect, of what is left, or of the ranks: the first of them that there is.
+    pub(super) verdict: Verdict,
+}
+
+/// Every link that was looked at.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Influence {
+    pub(super) links: Vec<Link>,
+    /// Physical machines behind the ranks.
+    pub(super) machines: usize,
+    /// The reports that stand for them, by position.
+    pub(super) reports: Vec<usize>,
+}
+
+/// The parameters whose ranks are taken: every one of the machine and of its first GPU that is no program.
+pub(super) fn parameters() -> Vec<String> {
+    let of_gpu = gpu::parameter::all_names().into_iter().map(|name| format!("{GPU_PREFIX}{name}"));
+    parameter::all_names().into_iter().chain(of_gpu).collect()
+}
+
+impl Influence {
+    /// Of the studied entries; each physical machine is one, by the report that has most of it.
+    pub(super) fn new(entries: &[Entry], importance: Option<&Importance>) -> Self {
+        let all = representatives(entries);
+        let machines: BTreeSet<&str> = all.iter().map(|&k| entries[k].machine()).collect();
+        // Reports of one machine alone are not many machines.
+        let reports = if machines.len() > 1 { all } else { all.into_iter().take(1).collect() };
+        let step = reports.len().div_ceil(MOST_MACHINES).max(1);
+        let reports: Vec<usize> = reports.into_iter().step_by(step).collect();
+        let chosen: Vec<&Entry> = reports.iter().map(|&k| &entries[k]).collect();
+        let mut outcomes: BTreeMap<On, Vec<Option<f64>>> =
+            slownesses(&chosen).into_iter().map(|(name, values)| (On::Algorithm(name), values)).collect();
+        let borders: Vec<BTreeMap<String, f64>> =
+            chosen.par_iter().map(|e| measured_borders(&e.profile).into_iter().collect()).collect();
+        let names: BTreeSet<&String> = borders.iter().flat_map(BTreeMap::keys).collect();
+        for name in names {
+            outcomes.insert(On::Border(name.clone()), borders.iter().map(|b| b.get(name).copied()).collect());
+        }
+        let parameters = parameters();
+        let values: Vec<Vec<Option<f64>>> =
+            parameters.iter().map(|name| chosen.iter().map(|e| e.value(name)).collect()).collect();
+        let cells: Vec<(usize, &On)> = (0..parameters.len()).flat_map(|k| outcomes.keys().map(move |on| (k, on))).collect();
+        let mut ranks: Vec<Option<Rank>> = cells
+            .par_iter()
+            .map(|&(k, on)| {
+                let both = values[k].iter().zip(&outcomes[on]).filter_map(|(x, y)| Some(((*x)?, (*y)?)));
+                Rank::of(&both.collect::<Vec<_>>())
+            })
+            .collect();
+        rank::judge(&mut ranks.iter_mut().flatten().collect::<Vec<_>>());
+        let mut links: Vec<Link> =
+            cells.iter().zip(ranks).map(|(&(k, on), rank)| link(&parameters[k], on, rank, importance)).collect();
+        for (link, &(k, on)) in links.iter_mut().zip(&cells).filter(|(link, _)| link.effect.is_none()) {
+            let On::Algorithm(name) = on else { continue };
+            let left = importance.zip(method(name)).and_then(|(i, method)| i.left_ln.get(&method));
+            let Some(left) = left else { continue };
+            let both = chosen.iter().zip(&values[k]).filter_map(|(e, value)| Some(((*value)?, *left.get(e.machine())?)));
+            link.left = Rank::of(&both.collect::<Vec<_>>());
+        }
+        rank::judge(&mut links.iter_mut().filter_map(|l| l.left.as_mut()).collect::<Vec<_>>());
+        // Ranks see what goes together, whatever the cause; the two others what a parameter adds to those that predictions read.
+        for link in &mut links {
+            let verdicts =
+                [link.effect.as_ref().map(|e| e.verdict), link.left.map(|r| r.verdict), link.rank.map(|r| r.verdict)];
+            link.verdict = verdicts.into_iter().flatten().next().unwrap_or(Verdict::CannotBeTold);
+        }
+        links.retain(|link| link.rank.is_some() || link.effect.is_some());
+        for of in importance.iter().flat_map(|i| &i.parameters).filter(|p| p.regret_rise.is_told()) {
+            let effect = of.regret_rise.clone();
+            let verdict = effect.verdict;
+            let parameter = of.parameter.clone();
+            links.push(Link { parameter, on: On::Choice, rank: None, effect: Some(effect), left: None, verdict });
+        }
+        Self { links, machines: chosen.len(), reports }
+    }
+
+    /// The link of a parameter with an outcome, where it was looked at.
+    pub(super) fn link(&self, parameter: &str, on: &On) -> Option<&Link> {
+        self.links.iter().find(|l| l.parameter == parameter && l.on == *on)
+    }
+}
+
+fn link(parameter: &str, on: &On, rank: Option<Rank>, importance: Option<&Importance>) -> Link {
+    let of = importance.and_then(|i| i.parameters.iter().find(|p| p.parameter == parameter));
+    let effect = of.and_then(|of| match on {
+        On::Algorithm(name) => {
+            let method = method(name)?;
+            of.algorithms.iter().find(|a| a.algorithm == method).map(|a| a.distance_rise_ln.clone())
+        }
+        On::Border(name) => of.borders.iter().find(|b| b.border == *name).map(|b| b.error_rise_octaves.clone()),
+        On::Choice => None,
+    });
+    let effect = effect.filter(Effect::is_told);
+    Link { parameter: parameter.to_owned(), on: on.clone(), rank, effect, left: None, verdict: Verdict::CannotBeTold }
+}
+
+/// The method on its class of processor, as importance names it.
+fn method(name: &str) -> Option<String> {
+    let (method, rest) = name.split_once('@').or_else(|| name.split_once(" on "))?;
+    let class = if rest.contains("gpu") || rest.contains("GPU") { "GPU" } else { "CPU" };
+    Some(format!("{method} on the {class}"))
+}

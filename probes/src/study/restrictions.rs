@@ -1,0 +1,167 @@
+//! What it does to each algorithm when one thing is taken from a machine: pairs of its own reports that differ in nothing else.
+//!
+//! Between machines parameters go together. Here one is changed on purpose and the rest stays, so a link is a cause, on this machine.
+
+use super::entry::Entry;
+use super::speed::{LARGE, speed_ups};
+use crate::train::{Verdict, average};
+use sapwise::report::{Proof, Restricted};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A change of a time that matters, as a natural logarithm: 5 %. Reports of one machine differ by 2 to 3 % by themselves.
+const LEAST_LN: f64 = 0.05;
+
+/// What taking one thing does to one algorithm, over all pairs of reports of a machine.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Effect {
+    pub(super) taken: Restricted,
+    pub(super) algorithm: String,
+    /// Whether of frames with 1000 objects or more, or of those with fewer.
+    pub(super) large: bool,
+    /// Time with it taken over time without: geometric mean, least and most over the pairs.
+    pub(super) slowdown: f64,
+    pub(super) least: f64,
+    pub(super) most: f64,
+    pub(super) pairs: usize,
+    pub(super) verdict: Verdict,
+    /// Positions of the reports.
+    pub(super) reports: Vec<usize>,
+}
+
+/// How far a parameter shows that something was taken: its value with over that without, over the pairs.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Shown {
+    pub(super) taken: Restricted,
+    pub(super) parameter: String,
+    pub(super) ratio: f64,
+    pub(super) pairs: usize,
+}
+
+/// Two reports of which the second one has one thing less.
+struct Pair {
+    taken: Restricted,
+    without: usize,
+    with: usize,
+}
+
+/// The effects of every restriction on every algorithm, and what the parameters show of them.
+pub(super) fn effects(entries: &[Entry]) -> (Vec<Effect>, Vec<Shown>) {
+    let mut found: BTreeMap<(&str, String, String, bool), (Restricted, Vec<f64>, BTreeSet<usize>)> = BTreeMap::new();
+    let mut shown: BTreeMap<(String, String), (Restricted, Vec<f64>)> = BTreeMap::new();
+    for pair in pairs(entries) {
+        let (without, with) = (&entries[pair.without], &entries[pair.with]);
+        for (sizes, large) in [(0..LARGE, false), (LARGE..u32::MAX, true)] {
+            for (algorithm, speed_up) in speed_ups(without, with, sizes) {
+                let key = (with.machine(), pair.taken.to_string(), algorithm, large);
+                let (_, effects, reports) = found.entry(key).or_insert_with(|| (pair.taken, Vec::new(), BTreeSet::new()));
+                effects.push(-speed_up.mean.ln());
+                reports.extend([pair.without, pair.with]);
+            }
+        }
+        for (parameter, ratio) in shown_by(with, pair.taken) {
+            let key = (pair.taken.to_string(), parameter);
+            shown.entry(key).or_insert_with(|| (pair.taken, Vec::new())).1.push(ratio);
+        }
+    }
+    let effects = found.into_iter().map(|((_, _, algorithm, large), (taken, effects, reports))| {
+        let (least, most) = effects.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), e| (a.min(*e), b.max(*e)));
+        Effect {
+            taken,
+            algorithm,
+            large,
+            slowdown: average(&effects).exp(),
+            least: least.exp(),
+            most: most.exp(),
+            pairs: effects.len(),
+            verdict: verdict(&effects),
+            reports: reports.into_iter().collect(),
+        }
+    });
+    let shown = shown.into_iter().map(|((_, parameter), (taken, ratios))| Shown {
+        taken,
+        parameter,
+        ratio: average(&ratios.iter().map(|r| r.ln()).collect::<Vec<_>>()).exp(),
+        pairs: ratios.len(),
+    });
+    (effects.collect(), shown.collect())
+}
+
+/// Linked where the same is seen in every pair, and not linked where nothing is seen in any. One pair can't be told from chance.
+fn verdict(effects: &[f64]) -> Verdict {
+    let all = |holds: &dyn Fn(f64) -> bool| effects.len() > 1 && effects.iter().all(|e| holds(*e));
+    if all(&|e| e >= LEAST_LN) || all(&|e| e <= -LEAST_LN) {
+        Verdict::Linked
+    } else if all(&|e| e.abs() < LEAST_LN) {
+        Verdict::NotLinked
+    } else {
+        Verdict::CannotBeTold
+    }
+}
+
+/// The parameters that must show what was taken, with over without.
+fn shown_by(entry: &Entry, taken: Restricted) -> Vec<(String, f64)> {
+    let proofs = entry.provenance.restriction.iter().flat_map(|r| &r.proof);
+    let of = |p: &Proof| {
+        let (with, without) = p.with.zip(p.without).filter(|(with, without)| *with > 0.0 && *without > 0.0)?;
+        let of_gpu = p.gpu.map_or(String::new(), |k| format!("gpu{k}/"));
+        Some((format!("{of_gpu}{}", p.parameter), with / without))
+    };
+    proofs.filter(|p| p.kind == taken).filter_map(of).collect()
+}
+
+/// Every two studied reports of a machine that differ in one thing that was taken.
+fn pairs(entries: &[Entry]) -> Vec<Pair> {
+    let mut machines: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (k, entry) in entries.iter().enumerate().filter(|(_, e)| e.studied.is_ok()) {
+        machines.entry(entry.machine()).or_default().push(k);
+    }
+    let mut found = Vec::new();
+    for own in machines.into_values() {
+        for &without in &own {
+            for &with in &own {
+                let taken = taken(&entries[without], &entries[with]);
+                found.extend(taken.map(|taken| Pair { taken, without, with }));
+            }
+        }
+    }
+    found
+}
+
+/// What the second report has less than the first, where that is one thing and all else is the same.
+fn taken(without: &Entry, with: &Entry) -> Option<Restricted> {
+    let gpus = |e: &Entry| e.hardware.gpus.iter().map(|g| g.gpu.name.clone()).collect::<Vec<_>>();
+    if gpus(without) != gpus(with) {
+        return None;
+    }
+    let (before, after) = (kinds(without), kinds(with));
+    let more: Vec<Restricted> = after.iter().filter(|k| !before.contains(k)).copied().collect();
+    let [taken] = more[..] else { return None };
+    // Nothing else may differ: neither what was taken besides, nor how much of it.
+    let others_stay = before.iter().all(|k| after.contains(k));
+    let level = |e: &Entry, kind| match kind {
+        Restricted::Threads => e.provenance.threads.map(|t| t.to_string()),
+        Restricted::Simd => e.provenance.simd.clone(),
+        Restricted::GpuThreads => e.provenance.gpu_threads.map(|t| t.to_string()),
+        Restricted::ContendedMemory | Restricted::ContendedCache => None,
+    };
+    (others_stay && before.iter().all(|kind| level(without, *kind) == level(with, *kind))).then_some(taken)
+}
+
+fn kinds(entry: &Entry) -> Vec<Restricted> {
+    entry.provenance.restriction.as_ref().map_or(Vec::new(), |r| r.kinds.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_is_seen_in_every_pair() {
+        assert_eq!(verdict(&[0.2, 0.06, 0.4]), Verdict::Linked);
+        assert_eq!(verdict(&[-0.2, -0.06]), Verdict::Linked);
+        assert_eq!(verdict(&[0.02, -0.01]), Verdict::NotLinked);
+        for unclear in [&[0.2][..], &[0.2, 0.01], &[0.2, -0.2], &[]] {
+            assert_eq!(verdict(unclear), Verdict::CannotBeTold);
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! How much faster an algorithm is on one machine than on another.
+
+use super::entry::{Entry, Place};
+use sapwise::measure::statistics::quantile;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+/// Places that two machines must share: the mean of fewer is that of one scenario's corner.
+const FEWEST_PLACES: usize = 5;
+/// Objects from which on a frame is large: below, fork and join and the clock make up most of it, and above, the work does.
+pub(super) const LARGE: u32 = 1000;
+/// Rounds of fitting machines and places in turn; the effects stand still to a thousandth after ten.
+const ROUNDS: usize = 20;
+
+/// A speed over that of another machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SpeedUp {
+    /// Geometric mean over the places that both have.
+    pub(super) mean: f64,
+    /// First and third quartile over them.
+    pub(super) low: f64,
+    pub(super) high: f64,
+    pub(super) places: usize,
+}
+
+/// The speed-up from `reference` to `other` of each algorithm that both were timed with at five places or more with so many objects.
+pub(super) fn speed_ups(reference: &Entry, other: &Entry, sizes: Range<u32>) -> BTreeMap<String, SpeedUp> {
+    let (before, mut after) = (reference.times(), other.times());
+    let of = |(name, before): (String, BTreeMap<Place<'_>, f64>)| {
+        let after = after.remove(&name)?;
+        let own = before.iter().filter(|(place, _)| sizes.contains(&place.1));
+        let ratios: Vec<f64> = own.filter_map(|(place, ns)| Some((ns / after.get(place)?).ln())).collect();
+        if ratios.len() < FEWEST_PLACES {
+            return None;
+        }
+        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        let at = |share| quantile(&ratios, share).map(f64::exp);
+        Some((name, SpeedUp { mean: mean.exp(), low: at(0.25)?, high: at(0.75)?, places: ratios.len() }))
+    };
+    before.into_iter().filter_map(of).collect()
+}
+
+/// For each algorithm the natural logarithm of the time that each entry takes for large frames, over that of the mean entry at the same
+/// places.
+///
+/// Not every machine was timed everywhere, so places and machines are fitted in turn to the logarithms (a two-way table of
+/// effects, Tukey 1977, with means). A machine that shares fewer than five places with others has none.
+pub(super) fn slownesses(entries: &[&Entry]) -> BTreeMap<String, Vec<Option<f64>>> {
+    let times: Vec<_> = entries.iter().map(|e| e.times()).collect();
+    let names: BTreeSet<&String> = times.iter().flat_map(BTreeMap::keys).collect();
+    names.into_iter().map(|name| (name.clone(), effects(&times.iter().map(|t| t.get(name)).collect::<Vec<_>>()))).collect()
+}
+
+fn effects(times: &[Option<&BTreeMap<Place<'_>, f64>>]) -> Vec<Option<f64>> {
+    let mut machines_at: BTreeMap<Place<'_>, usize> = BTreeMap::new();
+    times.iter().flatten().flat_map(|t| t.keys()).for_each(|place| *machines_at.entry(*place).or_default() += 1);
+    // A place that one machine has alone says nothing about the others.
+    let rows: Vec<Vec<(Place<'_>, f64)>> = times
+        .iter()
+        .map(|t| {
+            let large = t.iter().flat_map(|t| t.iter()).filter(|(place, _)| place.1 >= LARGE);
+            let shared = large.filter(|(place, _)| machines_at[*place] > 1);
+            shared.map(|(place, ns)| (*place, ns.ln())).collect()
+        })
+        .map(|row: Vec<_>| if row.len() < FEWEST_PLACES { Vec::new() } else { row })
+        .collect();
+    let mut effects = vec![0.0; rows.len()];
+    for _ in 0..ROUNDS {
+        let mut places: BTreeMap<Place<'_>, (f64, f64)> = BTreeMap::new();
+        for (row, effect) in rows.iter().zip(&effects) {
+            for (place, ln) in row {
+                let (sum, count) = places.entry(*place).or_default();
+                (*sum, *count) = (*sum + ln - effect, *count + 1.0);
+            }
+        }
+        for (row, effect) in rows.iter().zip(&mut effects).filter(|(row, _)| !row.is_empty()) {
+            let off = |(place, ln): &(Place<'_>, f64)| ln - places[place].0 / places[place].1;
+            *effect = row.iter().map(off).sum::<f64>() / row.len() as f64;
+        }
+    }
+    effects.into_iter().zip(&rows).map(|(effect, row)| (!row.is_empty()).then_some(effect)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn effects_are_found_where_machines_were_timed_at_different_places() {
+        // Places cost 1, 2, 4, ...; the machines are 1, 3 and 9 times as slow and miss some places each.
+        let cost = |place: usize| (1 << place) as f64;
+        let machine = |factor: f64, places: &[usize]| -> BTreeMap<Place<'static>, f64> {
+            places.iter().map(|&p| (("uniform", LARGE + p as u32), factor * cost(p))).collect()
+        };
+        let all = [
+            machine(1.0, &[0, 1, 2, 3, 4, 5]),
+            machine(3.0, &[2, 3, 4, 5, 6, 7, 8]),
+            machine(9.0, &[0, 1, 5, 6, 7, 8]),
+            machine(5.0, &[0, 1, 2]),
+        ];
+        let found = effects(&all.iter().map(Some).chain([None]).collect::<Vec<_>>());
+        let ratio = |a: usize, b: usize| (found[a].unwrap() - found[b].unwrap()).exp();
+        assert!((ratio(1, 0) - 3.0).abs() < 0.01 && (ratio(2, 1) - 3.0).abs() < 0.01, "{found:?}");
+        assert_eq!(&found[3..], [None, None]);
+    }
+}
