@@ -4,7 +4,7 @@ use super::axis::{Axis, Lies};
 use super::font;
 use super::mark::{Mark, mark};
 use super::paper::Area;
-use super::style::{self, AXIS, GRID, INK, LABEL, PANEL, PAPER, SECONDARY, line_height};
+use super::style::{self, AXIS, GRID, INK, LABEL, PANEL, SECONDARY, line_height};
 use plotters::prelude::*;
 use plotters_backend::text_anchor::{HPos, VPos};
 
@@ -49,6 +49,8 @@ impl Frame {
 /// Room beside a chart for numbers and names of the axes.
 pub(super) const LEFT: i32 = 74;
 pub(super) const BELOW: i32 = 50;
+/// The last number below may stand in the middle below the corner.
+pub(super) const RIGHT: i32 = 22;
 pub(super) const ABOVE: i32 = 30;
 
 /// A line: its colour, width and dashes.
@@ -103,12 +105,13 @@ impl<'a, 'p> Chart<'a, 'p> {
         }
         self.border()?;
         let (middle, centre) = ((left + right) / 2, (top + bottom) / 2);
-        if !x_name.is_empty() {
-            words(self.area, x_name, (middle, bottom + 8 + line_height(LABEL)), AXIS, INK, HPos::Center, VPos::Top)?;
+        for x_name in font::wrapped(x_name, AXIS, right - left + RIGHT, 1) {
+            words(self.area, &x_name, (middle, bottom + 8 + line_height(LABEL)), AXIS, INK, HPos::Center, VPos::Top)?;
         }
-        if !y_name.is_empty() {
+        // It may go on beside what is above and below.
+        for y_name in font::wrapped(y_name, AXIS, bottom - top + BELOW, 1).into_iter().filter(|name| !name.is_empty()) {
             let turned = style::text(AXIS, INK, HPos::Center, VPos::Center).transform(FontTransform::Rotate270);
-            self.area.draw(&Text::new(y_name.to_owned(), (left - LEFT + 14, centre), turned))?;
+            self.area.draw(&Text::new(y_name, (left - LEFT + 14, centre), turned))?;
         }
         for line in font::wrapped(title, PANEL, self.frame.width(), 1).iter().filter(|line| !line.is_empty()) {
             words(self.area, line, (left, top - 8), PANEL, INK, HPos::Left, VPos::Bottom)?;
@@ -257,19 +260,6 @@ pub(super) fn words(
         return Ok(());
     }
     Ok(area.draw(&Text::new(text.to_owned(), place, style::text(size, colour, h, v)))?)
-}
-
-/// Text on a ground of paper, so that lines below don't cross it.
-pub(super) fn words_on_paper(area: &Area<'_>, text: &str, (x, y): Place, size: u32, h: HPos) -> anyhow::Result<()> {
-    let width = font::width(text, size);
-    let left = match h {
-        HPos::Left => x,
-        HPos::Center => x - width / 2,
-        HPos::Right => x - width,
-    };
-    let half = line_height(size) / 2;
-    fill(area, Frame { left: left - 3, top: y - half, right: left + width + 3, bottom: y + half }, PAPER, 0.85)?;
-    words(area, text, (x, y), size, INK, h, VPos::Center)
 }
 
 /// A rectangle in one colour.

@@ -1,7 +1,7 @@
 //! Predicted against measured positions of the borders between fields.
 
 use super::axis::Axis;
-use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, Line, missing};
+use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, Line, RIGHT, missing};
 use super::legend::{Legend, Sign};
 use super::paper::Area;
 use super::style::{self, GAP, INK, SECONDARY, WIDTH};
@@ -69,7 +69,7 @@ impl Figure for Crossings {
 
     fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()> {
         let drawn: Vec<&CrossingPair> = self.pairs.iter().filter(|p| p.is_drawn()).collect();
-        let frame = Frame { left: 0, top: 0, right: CHART, bottom: CHART }.within(LEFT, GAP, GAP, BELOW);
+        let frame = Frame { left: 0, top: 0, right: CHART, bottom: CHART }.within(LEFT, GAP, RIGHT, BELOW);
         if drawn.is_empty() {
             return missing(area, Frame { right: WIDTH as i32 - GAP, ..frame }, NOTHING);
         }

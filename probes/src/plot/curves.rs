@@ -2,7 +2,7 @@
 //! optimal performance shaded.
 
 use super::axis::{Axis, time_unit};
-use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, Line, fill, missing, path, words};
+use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, Line, RIGHT, fill, missing, path, words};
 use super::legend::{Legend, Sign};
 use super::mark::mark;
 use super::paper::Area;
@@ -105,7 +105,7 @@ const CROSSING: Line = Line::dashed(INK, 1);
 impl CurvePanel {
     fn draw(&self, area: &Area<'_>, frame: Frame, axes: &(Axis, Axis), unit: (&str, f64)) -> anyhow::Result<()> {
         let strip = if self.fields.is_empty() { 0 } else { STRIP };
-        let chart = Chart::new(area, frame.within(LEFT, ABOVE + strip, GAP, BELOW), axes.0.clone(), axes.1.clone());
+        let chart = Chart::new(area, frame.within(LEFT, ABOVE + strip, RIGHT, BELOW), axes.0.clone(), axes.1.clone());
         let drawn = |p: &CurvePoint| chart.place(p.objects, p.ns / unit.1).is_some();
         if !self.series.iter().flat_map(|s| &s.points).any(drawn) {
             let sentence = if self.title.is_empty() { NOTHING.to_owned() } else { format!("{}: {NOTHING}", self.title) };

@@ -85,6 +85,9 @@ pub(super) fn wrapped(text: &str, size: u32, room: i32, most: usize) -> Vec<Stri
     let fits = |line: &str| width(line, size) <= room;
     let mut lines: Vec<String> = vec![String::new()];
     for word in text.split(' ') {
+        if lines.len() > most {
+            break;
+        }
         let last = lines.len() - 1;
         let joined = if lines[last].is_empty() { word.to_owned() } else { format!("{} {word}", lines[last]) };
         if fits(&joined) {
@@ -95,6 +98,10 @@ pub(super) fn wrapped(text: &str, size: u32, room: i32, most: usize) -> Vec<Stri
             lines.push(String::new());
         }
         for letter in word.chars() {
+            // The rest of a word of a megabyte is not drawn and need not be measured.
+            if lines.len() > most {
+                break;
+            }
             let last = lines.len() - 1;
             let longer = format!("{}{letter}", lines[last]);
             if fits(&longer) || lines[last].is_empty() {

@@ -58,8 +58,8 @@ impl LearningCurve {
         let (first, last) = machines.ends();
         let regrets = percent_axis(self.points().flat_map(|p| [p.mean_regret, p.high]).map(seen));
         let chart = Chart::new(area, frame, machines, regrets);
-        let y_name = format!("regret (%, {}), bars: 90 % of trainings", bottom());
-        chart.grid(title, "physical machines in the training (marks beside each other for legibility)", &y_name)?;
+        let x_name = "physical machines in the training (marks beside each other, bars: 90 % of trainings)";
+        chart.grid(title, x_name, &format!("mean regret (%, {})", bottom()))?;
         for (place, way) in self.ways.iter().enumerate() {
             let beside = (last / first).powf(0.008 * (place as f64 - (self.ways.len() as f64 - 1.0) / 2.0));
             let colour = style::colour(way.style);

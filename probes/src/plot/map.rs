@@ -1,7 +1,7 @@
 //! The map that the paper could not draw: fields of optimal performance over two axes.
 
 use super::axis::Axis;
-use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, fill, hatch, missing};
+use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, RIGHT, fill, hatch, missing};
 use super::legend::{Legend, Sign};
 use super::mark::Mark;
 use super::paper::Area;
@@ -105,7 +105,7 @@ impl FieldMap {
             Axis::log(points().map(|p| p.x).chain([self.x.0, self.x.1]), 1.0),
             Axis::log(points().map(|p| p.y).chain([self.y.0, self.y.1]), 1.0),
         );
-        let chart = Chart::new(area, frame.within(LEFT, ABOVE, GAP, BELOW), axes.0, axes.1);
+        let chart = Chart::new(area, frame.within(LEFT, ABOVE, RIGHT, BELOW), axes.0, axes.1);
         if panel.grid.is_empty() && panel.points.is_empty() {
             return chart.missing(&format!("{}: {NOTHING}", panel.title));
         }

@@ -20,7 +20,7 @@ mod times;
 mod training;
 
 use crate::exit::WrongUsage;
-use chart::{ABOVE, BELOW, Frame, LEFT};
+use chart::{ABOVE, BELOW, Frame, LEFT, RIGHT};
 use legend::Legend;
 use paper::Area;
 use plotters::element::Text;
@@ -103,12 +103,12 @@ pub(crate) trait Figure {
 
 /// Height of lines of text with room around them.
 fn block(text: &[String], size: u32) -> u32 {
-    if text.is_empty() { 0 } else { (text.len() as i32 * line_height(size) + GAP * 5 / 3) as u32 }
+    if text.is_empty() { 0 } else { (text.len() as i32 * line_height(size) + 2 * GAP) as u32 }
 }
 
 fn lines(area: &Area<'_>, text: &[String], size: u32, colour: RGBColor) -> anyhow::Result<()> {
     for (k, line) in text.iter().enumerate() {
-        let place = (GAP, GAP * 2 / 3 + k as i32 * line_height(size));
+        let place = (GAP, GAP + k as i32 * line_height(size));
         area.draw(&Text::new(line.as_str(), place, style::text(size, colour, HPos::Left, VPos::Top)))?;
     }
     Ok(())
@@ -121,7 +121,7 @@ fn above_its_legend(
     legend: &Legend,
     chart: impl FnOnce(Frame) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    chart(frame.within(LEFT, ABOVE, GAP, BELOW + GAP + legend.height()))?;
+    chart(frame.within(LEFT, ABOVE, RIGHT, BELOW + GAP + legend.height()))?;
     legend.draw(area, (frame.left + GAP, frame.bottom - legend.height()))
 }
 

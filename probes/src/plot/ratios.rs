@@ -2,7 +2,7 @@
 //! speed-up of each algorithm.
 
 use super::axis::Axis;
-use super::chart::{BELOW, Chart, Frame, Line, fill, missing, path, words};
+use super::chart::{BELOW, Chart, Frame, Line, RIGHT, fill, missing, path, words};
 use super::legend::{Legend, Sign};
 use super::paper::Area;
 use super::style::{self, GAP, GRID, INK, LABEL, PANEL, PAPER, SECONDARY, WIDTH, line_height};
@@ -145,7 +145,7 @@ impl Figure for Ratios {
         }
         let names = self.groups.iter().map(|g| font::width(&g.name, LABEL)).max().unwrap_or(0).min(NAMES);
         let height = self.chart_height();
-        let frame = whole.within(names + GAP, NUMBERS, GAP, BELOW);
+        let frame = whole.within(names + GAP, NUMBERS, RIGHT - GAP, BELOW);
         let shown = self.values().flat_map(|v| [Some(v.ratio), v.low, v.high]).flatten();
         // Names instead of numbers: rows have theirs.
         let rows = Axis::linear(0.0, f64::from(height)).with_names(Vec::new());

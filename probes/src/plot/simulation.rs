@@ -2,7 +2,7 @@
 
 use super::Figure;
 use super::axis::{Axis, Tick, time_unit};
-use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, Line, fill, missing};
+use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, Line, RIGHT, fill, missing};
 use super::legend::{Legend, Sign};
 use super::mark::Mark;
 use super::paper::Area;
@@ -125,7 +125,7 @@ impl Simulation<'_> {
     }
 
     fn panel(&self, area: &Area<'_>, frame: Frame, panel: &Panel) -> anyhow::Result<()> {
-        let Frame { left, top, right, .. } = frame.within(NAMES, ABOVE, GAP, 0);
+        let Frame { left, top, right, .. } = frame.within(NAMES, ABOVE, RIGHT, 0);
         if panel.units.is_empty() {
             let text = match panel.class {
                 BackendClass::Gpu => "no GPU algorithm ran here",

@@ -1,7 +1,7 @@
 //! Predicted against measured times on what was left out of a training.
 
 use super::axis::{Axis, time_unit};
-use super::chart::{BELOW, Chart, Frame, LEFT, Line, missing};
+use super::chart::{BELOW, Chart, Frame, LEFT, Line, RIGHT, missing};
 use super::legend::{Legend, Sign};
 use super::paper::Area;
 use super::style::{self, GAP, INK, SECONDARY, WIDTH};
@@ -80,7 +80,7 @@ impl Figure for Times {
     }
 
     fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()> {
-        let frame = Frame { left: 0, top: 0, right: CHART, bottom: CHART }.within(LEFT, GAP, GAP, BELOW);
+        let frame = Frame { left: 0, top: 0, right: CHART, bottom: CHART }.within(LEFT, GAP, RIGHT, BELOW);
         self.chart(area, frame, "")?;
         self.legend(WIDTH as i32 - CHART - 2 * GAP).draw(area, (CHART + GAP, GAP))
     }

@@ -2,6 +2,7 @@
 
 use super::chart::Frame;
 use super::paper::Area;
+use super::style::GAP;
 use super::{Figure, LearningCurve, LearningPoint, LearningWay, Regrets, TimePair, Times, TimesOf, Way};
 use crate::train::{Held, OURS, Time};
 use sapwise::BackendClass;
@@ -83,7 +84,7 @@ impl Figure for Training {
         self.times.draw_in(area, halves[0])?;
         self.regrets.draw_in(area, halves[1])?;
         match &self.learning {
-            Some(learning) => learning.draw_in(area, Frame { top: UPPER, bottom: UPPER + LOWER, ..upper }),
+            Some(learning) => learning.draw_in(area, Frame { top: UPPER + GAP, bottom: UPPER + LOWER, ..upper }),
             None => Ok(()),
         }
     }
