@@ -81,11 +81,12 @@ impl Folder {
         if more > 0 { format!("{} and {more} more", names.join(", ")) } else { names.join(", ") }
     }
 
-    /// Writes everything into a folder that [`prepare`] has seen, in place of the files of an earlier study.
+    /// Writes everything into a folder that [`prepare`] has seen, in place of the files of an earlier study. Gives the answer with the names
+    /// of the files.
     ///
     /// # Errors
     /// Names the file.
-    pub(super) fn write(self, folder: &Path, page: &str, answer: &Answer) -> Result<()> {
+    pub(super) fn write(self, folder: &Path, page: &str, answer: Answer) -> Result<Answer> {
         if let Some(earlier) = earlier(folder)? {
             earlier.files.iter().filter(|name| is_within(name)).for_each(|name| {
                 // One that the user has removed already is no failure.
@@ -98,12 +99,13 @@ impl Folder {
         }
         let names = self.files.iter().map(|(name, _)| name.clone()).chain([PAGE.to_owned()]).collect();
         // First, so that a study that was stopped half-way is taken for one the next time.
-        let answer = Answer { files: names, ..answer.clone() };
+        let answer = Answer { files: names, ..answer };
         files::write_text(&folder.join(ANSWER), &sapwise::json::write(&answer)?)?;
         for (name, bytes) in self.files {
             files::write_atomically(&folder.join(&name), |out| Ok(out.write_all(&bytes)?))?;
         }
-        files::write_text(&folder.join(PAGE), page)
+        files::write_text(&folder.join(PAGE), page)?;
+        Ok(answer)
     }
 }
 
@@ -172,7 +174,7 @@ mod tests {
         prepare(&path("")).unwrap();
         let mut new = Folder::new(vec!["R1".to_owned()], "sapwise study".to_owned());
         new.table("machines", "", Sheet::new([("a", "a")])).unwrap();
-        new.write(&path(""), "<html>", &Answer::default()).unwrap();
+        new.write(&path(""), "<html>", Answer::default()).unwrap();
         assert!(!path("figures/old.svg").exists());
         assert!(path("figures/mine.svg").exists() && path("../outside").exists());
         assert_eq!(earlier(&path("")).unwrap().unwrap().files, ["tables/machines.csv", PAGE]);
