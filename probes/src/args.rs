@@ -1,5 +1,6 @@
 //! The command line.
 
+mod known;
 mod run;
 mod study;
 
@@ -8,6 +9,7 @@ use crate::exit::WrongUsage;
 use crate::gpus::GpuChoice;
 use crate::restriction::Lifted;
 use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
 use sapwise::{AlgorithmId, Scenario};
 use std::path::PathBuf;
 
@@ -38,6 +40,8 @@ pub(crate) enum Verb {
     Compare(Compare),
     Simulate(Simulate),
     Schema(Schema),
+    Completions(Completions),
+    Man(Man),
     #[command(hide = true)]
     Part(Part),
 }
@@ -68,7 +72,7 @@ Examples:
 pub(crate) struct Probe {
     /// Measure the whole family of reports of this machine, one after the other: fewer threads, lower SIMD levels, memory and
     /// cache contended, each GPU. The same command goes on where it was stopped.
-    #[arg(long, conflicts_with_all = ["hardware_only", "threads", "contended", "json", "unrestricted", "leashed"])]
+    #[arg(long, conflicts_with_all = ["hardware_only", "threads", "contended", "json"])]
     pub(crate) profiles: bool,
     /// List the profiles and the time that they take, and measure nothing.
     #[arg(long, requires = "profiles")]
@@ -95,13 +99,14 @@ pub(crate) struct Probe {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(10..=10_000_000))]
     pub(crate) max_objects: Option<u32>,
     /// Sweep this scenario instead of the usual ones; may be given several times.
-    #[arg(long = "scenario", value_name = "NAME")]
+    #[arg(long = "scenario", value_name = "NAME", value_parser = known::scenario_name())]
     pub(crate) scenarios: Vec<String>,
     /// A report from which one thing less was taken, to prove this restriction by.
-    #[arg(long, hide = true, value_name = "KIND=R.json")]
+    // What is hidden says itself what it conflicts with: completions leave it out, and what they hold may name nothing that they lack.
+    #[arg(long, hide = true, value_name = "KIND=R.json", conflicts_with = "profiles")]
     pub(crate) unrestricted: Vec<Lifted>,
     /// Stop as at Ctrl-C when standard input ends. For a process that starts this one.
-    #[arg(long, hide = true)]
+    #[arg(long, hide = true, conflicts_with = "profiles")]
     pub(crate) leashed: bool,
     /// Where the report goes. Without this option it goes to report.json, or with --json nowhere else. With --profiles a folder,
     /// without this option reports/.
@@ -154,7 +159,7 @@ pub(crate) struct Predict {
     pub(crate) samples: u32,
     /// Scenario of the slice that is shown: the choice itself depends on the load of each frame. Without this option uniform,
     /// with --measured the first of a report that lacks it.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = known::scenario())]
     pub(crate) scenario: Option<Scenario>,
     /// Use this many cores at most, as if the machine had no more.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=4096))]
@@ -217,7 +222,7 @@ pub(crate) struct Pairs {
     #[arg(value_name = "BOXES.npy")]
     pub(crate) boxes: PathBuf,
     /// One of the algorithms that `sapwise devices` lists, such as strips@cpu1 or strips@gpu0.
-    #[arg(long, value_name = "ID")]
+    #[arg(long, value_name = "ID", value_parser = known::algorithm(), hide_possible_values = true)]
     pub(crate) algorithm: Option<AlgorithmId>,
     /// Go through all frames that many times.
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -298,6 +303,37 @@ pub(crate) struct Schema {
     pub(crate) out: PathBuf,
     /// One JSON object on standard output instead of text.
     #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Prints what a shell completes this command by.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Where it goes:
+  bash        sapwise completions bash > ~/.local/share/bash-completion/completions/sapwise
+  zsh         sapwise completions zsh > ~/.zfunc/_sapwise            (with fpath+=~/.zfunc before compinit in ~/.zshrc)
+  fish        sapwise completions fish > ~/.config/fish/completions/sapwise.fish
+  powershell  sapwise completions powershell >> $PROFILE
+  elvish      sapwise completions elvish >> ~/.config/elvish/rc.elv")]
+pub(crate) struct Completions {
+    /// The shell.
+    #[arg(value_name = "SHELL")]
+    pub(crate) shell: Shell,
+}
+
+/// Prints the manual, or writes a page for each verb.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  sapwise man | man -l -
+  sapwise man --out ~/.local/share/man/man1    (then man sapwise, man sapwise-probe, ...)")]
+pub(crate) struct Man {
+    /// The folder that the pages go to, sapwise.1, sapwise-probe.1 and so on; made when it is not there. Without this option the page of
+    /// the command goes to standard output.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// One JSON object on standard output that names the files, instead of text.
+    #[arg(long, requires = "out")]
     pub(crate) json: bool,
 }
 

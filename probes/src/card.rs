@@ -1,5 +1,6 @@
 //! The card of a model: what it was trained on and how well it did.
 
+use crate::table::count as counted;
 use sapwise::model::{Coverage, FEWEST_MACHINES, Learning, LearningScore, MethodModel, TrainingCount, Validation};
 use sapwise::report::Label;
 use sapwise::{BackendClass, Model};
@@ -108,15 +109,16 @@ fn intervals(model: &Model) -> String {
     let machines = model.validation.physical_machines;
     let claimed = match model.folds.len() {
         _ if machines < FEWEST_MACHINES as usize => format!(
-            "None can be claimed: the training holds {machines} physical machine{}, and a 90 % interval takes {FEWEST_MACHINES}.",
-            if machines == 1 { "" } else { "s" }
+            "None can be claimed: the training holds {}, and a 90 % interval takes {FEWEST_MACHINES}.",
+            counted(machines, "physical machine")
         ),
         0 => "None can be claimed: no fold was kept.".to_owned(),
         folds => format!(
-            "90 % by the jackknife+ over {} of {machines} physical machines, left out of the fit in {folds} parts (with more machines than \
+            "90 % by the jackknife+ over {} of {machines} physical machines, left out of the fit in {} (with more machines than \
              parts that is CV+). Errors are those under all loads and not those near a border, so that no share is guaranteed of \
              borders; {COVERED}",
-            model.folds.iter().map(|f| f.machines).sum::<u32>()
+            model.folds.iter().map(|f| f.machines).sum::<u32>(),
+            counted(folds, "part")
         ),
     };
     let clouds: Vec<String> = model.clouds.iter().map(|c| format!("{} {}s", c.points, c.processor)).collect();
@@ -162,8 +164,7 @@ fn percent(share: f64) -> String {
 /// What was held out, and the scores as a table that `draw` draws.
 pub(crate) fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) -> String {
     let Validation { held_out, physical_machines, profiles, methods, coverage, .. } = validation;
-    let count = |number: usize, what: &str| format!("{number} {what}{}", if number == 1 { "" } else { "s" });
-    let data = format!("{} in {}", count(*physical_machines, "physical machine"), count(*profiles, "profile"));
+    let data = format!("{} in {}", counted(*physical_machines, "physical machine"), counted(*profiles, "profile"));
     if methods.is_empty() {
         return format!("{data}; not validated.\n");
     }
@@ -214,7 +215,7 @@ fn covered(coverage: &Coverage) -> String {
 /// How accuracy grows with the number of machines, as a table that `draw` draws.
 pub(crate) fn course(learning: &[Learning], simulated: bool, draw: impl Fn(&[Vec<String>]) -> String) -> String {
     let names = learning.first().map_or(&[][..], |l| &l.methods);
-    let head = ["way to choose".to_owned()].into_iter().chain(learning.iter().map(|l| format!("{} machines", l.machines)));
+    let head = ["way to choose".to_owned()].into_iter().chain(learning.iter().map(|l| counted(l.machines, "machine")));
     let mut rows = vec![head.collect::<Vec<_>>()];
     rows.extend(names.iter().map(|LearningScore { name, .. }| {
         let of = |l: &Learning| {
@@ -261,7 +262,7 @@ mod tests {
             assert!(page(&model, &[]).contains(text), "{}", intervals(&model));
         }
         model.folds = vec![sapwise::model::Fold { machines: 12, methods: Vec::new(), errors: Vec::new() }];
-        assert!(intervals(&model).contains("12 physical machines, left out of the fit in 1 parts"));
+        assert!(intervals(&model).contains("12 physical machines, left out of the fit in 1 part "));
         assert!(intervals(&model).contains("each parameter alone"));
     }
 

@@ -4,6 +4,7 @@ use crate::algorithms::Algorithms;
 use crate::progress::Progress;
 use crate::revisions;
 use crate::samples::{self, Live, Order, Taken};
+use crate::table::count;
 use anyhow::{Context, bail};
 use sapwise::hardware::parameter;
 use sapwise::model::{ASK, FEWEST_MACHINES, Prediction};
@@ -103,8 +104,8 @@ pub(crate) fn predict_and_sample(
     fields.warnings.extend(remarks);
     fields.warnings.extend(learned.remarks);
     if crate::interrupt::requested() {
-        let taken = learned.taken.len();
-        fields.warnings.push(format!("interrupted after {taken} samples: the prediction is corrected by those only"));
+        let taken = count(learned.taken.len(), "sample");
+        fields.warnings.push(format!("interrupted after {taken}: the prediction is corrected by those only"));
     }
     Ok((fields, wrong))
 }

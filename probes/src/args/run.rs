@@ -26,7 +26,7 @@ Examples:
 pub(crate) struct Run {
     /// The scenario; or a stream of your own frames, NumPy's format, 32-bit floats of shape frames x n x 6, each box min x y z, max
     /// x y z. Rows of NaN at the end of a frame are absent boxes.
-    #[arg(value_name = "SCENARIO|BOXES.npy")]
+    #[arg(value_name = "SCENARIO|BOXES.npy", value_parser = super::known::scene())]
     pub(crate) scene: Scene,
     /// Fields, or a report to measure them from; those of another machine show how learning corrects them. Without this option
     /// they are predicted from this machine's hardware.

@@ -12,7 +12,10 @@ const FILTERED: usize = 15;
 const TALL: usize = 60;
 
 /// A wider table is printed across the page.
-const WIDE: usize = 8;
+const WIDE: usize = 12;
+
+/// Longer texts are words, which go over several lines; shorter ones stay on one.
+const WORDS: usize = 32;
 
 /// The table below the caption `{id}-caption`. `row_id` gives the name of a row's place, by its position.
 pub(super) fn table(id: &str, sheet: &Sheet, reports: &Reports<'_>, row_id: &dyn Fn(usize) -> Option<String>) -> Markup {
@@ -35,7 +38,7 @@ pub(super) fn table(id: &str, sheet: &Sheet, reports: &Reports<'_>, row_id: &dyn
                     @for (k, row) in sheet.rows.iter().enumerate() {
                         tr id=[row_id(k)] {
                             @for (k, cell) in row.cells.iter().enumerate() { (self::cell(cell, k == 0)) }
-                            @if traced { td { (reports.links(&row.reports)) } }
+                            @if traced { td.reports { (reports.links(&row.reports)) } }
                         }
                     }
                 }
@@ -48,8 +51,8 @@ pub(super) fn table(id: &str, sheet: &Sheet, reports: &Reports<'_>, row_id: &dyn
 
 fn cell(cell: &Cell, heads_row: bool) -> Markup {
     match cell {
-        Cell::Text(text) if heads_row => html! { th scope="row" { (text) } },
-        Cell::Text(text) => html! { td { (text) } },
+        Cell::Text(text) if heads_row => html! { th.words[is_long(text)] scope="row" { (text) } },
+        Cell::Text(text) => html! { td.words[is_long(text)] { (text) } },
         Cell::Number { value, shown } if value.is_finite() => html! { td data-value=(figure(*value)) { (shown) } },
         Cell::Number { shown, .. } => html! { td { (shown) } },
         Cell::Missing(why) => html! { td.missing title=(why) { "–" span.heard { (why) } } },
@@ -73,6 +76,10 @@ fn reasons(sheet: &Sheet) -> Markup {
             }
         }
     }
+}
+
+fn is_long(text: &str) -> bool {
+    text.chars().nth(WORDS).is_some()
 }
 
 fn is_numeric(rows: &[Row], column: usize) -> bool {

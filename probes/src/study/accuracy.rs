@@ -62,6 +62,27 @@ pub(super) fn regrets(held: &Held, entries: &[Entry]) -> Sheet {
     sheet
 }
 
+/// Predicted beside measured times.
+pub(super) fn times(held: &Held, entries: &[Entry]) -> Sheet {
+    let mut sheet = Sheet::new([
+        ("report", "report"),
+        ("method", "method"),
+        ("on the", "processor"),
+        ("objects", "objects"),
+        ("measured (us)", "measured_us"),
+        ("predicted (us)", "predicted_us"),
+        ("predicted over measured", "predicted_over_measured_ratio"),
+    ]);
+    for t in &held.times {
+        let own = entries.iter().position(|e| e.file == t.file);
+        let times = [t.measured_ns, t.predicted_ns].map(|ns| Cell::number(ns / 1e3, 2));
+        let heads = [Cell::text(&t.file), Cell::text(&t.method), Cell::text(t.class.to_string())];
+        let ratio = Cell::number(t.predicted_ns / t.measured_ns, 3);
+        sheet.push([&heads[..], &[Cell::count(t.objects.into())], &times, &[ratio]].concat(), own.as_slice());
+    }
+    sheet
+}
+
 /// How the regret falls with the number of machines in the training.
 pub(super) fn learning(validation: &Validation) -> Sheet {
     let mut sheet = Sheet::new([

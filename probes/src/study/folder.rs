@@ -16,6 +16,9 @@ const ANSWER: &str = "study.json";
 const FIGURES: &str = "figures";
 const TABLES: &str = "tables";
 
+/// Rows of a table on the page, at most: a page of a hundred thousand rows takes a browser minutes to open.
+const MOST_ROWS: usize = 400;
+
 /// Files that are to be written, by their path in the folder.
 pub(super) struct Folder {
     /// What the rows of tables call each report.
@@ -55,14 +58,19 @@ impl Folder {
         Ok(Block::Figure { id: id.to_owned(), caption: caption[0].clone(), svg: text, links, alt })
     }
 
-    /// A table as CSV, and the block that shows it.
+    /// A table as CSV, and the block that shows it, of many rows the first ones.
     ///
     /// # Errors
     /// When a row does not fit its columns.
-    pub(super) fn table(&mut self, id: &str, caption: &str, sheet: Sheet) -> Result<Block> {
+    pub(super) fn table(&mut self, id: &str, caption: &str, mut sheet: Sheet) -> Result<Block> {
         let path = format!("{TABLES}/{id}.csv");
         self.files.push((path.clone(), sheet.csv(&self.labels)?.into_bytes()));
-        Ok(Block::Table { id: id.to_owned(), caption: caption.to_owned(), sheet, csv: path })
+        let mut caption = caption.to_owned();
+        if sheet.rows.len() > MOST_ROWS {
+            caption += &format!(" The first {MOST_ROWS} of {} rows; the CSV has all.", sheet.rows.len());
+            sheet.rows.truncate(MOST_ROWS);
+        }
+        Ok(Block::Table { id: id.to_owned(), caption, sheet, csv: path })
     }
 
     /// Labels of reports, as many as can be read.

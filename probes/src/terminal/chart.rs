@@ -127,6 +127,10 @@ where
         for (k, points) in series.iter().enumerate().rev() {
             chart.draw_series(LineSeries::new(points.iter().copied(), &colour_of(k)))?;
         }
+        // The axes end one character before they would meet.
+        let corner = if terminal.unicode { "└" } else { "+" };
+        let at = ((LABELS - 1) * wide, (LINES as i32 - 2) * high);
+        root.draw(&Text::new(corner, at, ("sans-serif", high).into_font()))?;
         // Each letter at another place along its curve, so that those of curves side by side don't hide one another.
         let style = |k: usize| ("sans-serif", high).into_font().color(&colour_of(k));
         for (k, points) in series.iter().enumerate().filter(|s| !s.1.is_empty()) {
@@ -153,7 +157,7 @@ fn marks(low: f64, high: f64, most: usize) -> Vec<f64> {
     marks.into_iter().step_by(step).collect()
 }
 
-/// A number in few characters: with a blank between groups of three digits, or in powers of a thousand.
+/// A number in few characters, from ten thousand on in thousands and from a million on in millions.
 fn figure(value: f64) -> String {
     match value.abs() {
         v if v >= 1e6 => format!("{}M", short(value / 1e6)),
@@ -173,25 +177,80 @@ mod tests {
     use super::super::tests::WIDE;
     use super::*;
 
-    #[test]
-    fn show() {
-        let line = |name: &str, a: f64, b: f64| Series {
-            name: name.to_owned(),
-            points: (4..=24).map(|q| 10f64.powf(f64::from(q) / 4.0)).map(|x| (x, a + b * x)).collect(),
-        };
-        let chart = Chart {
-            title: "uniform: time of a frame (us) over objects".into(),
-            across: Axis::Logarithmic,
-            series: vec![line("verlet@cpu1", 0.1, 0.02), line("verlet@cpu2", 5.0, 0.011), line("sweep@gpu0", 300.0, 0.001)],
-        };
-        for t in [
-            WIDE,
-            Terminal { columns: Some(80), colour: false, unicode: true },
-            Terminal { columns: Some(80), colour: false, unicode: false },
-        ] {
-            println!("{}", chart.draw(t).unwrap());
+    const PLAIN: Terminal = Terminal { columns: Some(80), colour: false, unicode: false };
+
+    fn chart(across: Axis) -> Chart {
+        let decades = || (0..=30).map(|k| 10.0_f64.powf(f64::from(k) / 10.0));
+        let series =
+            |name: &str, y: fn(f64) -> f64| Series { name: name.to_owned(), points: decades().map(|x| (x, y(x))).collect() };
+        Chart {
+            title: "time over objects".to_owned(),
+            across,
+            series: vec![series("grows", |x| x), series("stays", |_| 30.0)],
         }
-        let chart = Chart { across: Axis::Linear, ..chart };
-        println!("{}", chart.draw(WIDE).unwrap());
+    }
+
+    #[test]
+    fn curves_lie_where_their_figures_are() {
+        let text = chart(Axis::Logarithmic).draw(PLAIN).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!((lines.len(), lines[0], lines[LINES + 1]), (LINES + 2, "time over objects", "   a grows   b stays"));
+        assert_eq!(lines[LINES].split_whitespace().collect::<Vec<_>>(), ["1", "10", "100", "1000"]);
+        assert!(text.lines().all(|line| line.len() <= 80 && line.is_ascii()), "{text}");
+        // The one that grows goes from the lower left to the upper right, half way at the middle; the other keeps its line.
+        let of = |letter: char| -> Vec<(usize, usize)> {
+            let at = |(y, line): (usize, &&str)| {
+                line.char_indices().filter(|c| c.1 == letter).map(|(x, _)| (x, y)).collect::<Vec<_>>()
+            };
+            lines[1..LINES - 1].iter().enumerate().flat_map(at).collect()
+        };
+        let (grows, stays) = (of('a'), of('b'));
+        let left = LABELS as usize;
+        assert!(grows.contains(&(left, LINES - 3)) && grows.iter().any(|&(x, y)| x > 70 && y == 0), "{text}");
+        assert!(stays.iter().all(|s| s.1 == stays[0].1) && stays.len() > 50, "{text}");
+        let thirty = grows.iter().find(|g| g.1 == stays[0].1).unwrap();
+        let wanted = left as f64 + (77 - left) as f64 * 30.0_f64.log10() / 3.0;
+        assert!((thirty.0 as f64 - wanted).abs() < 6.0, "{thirty:?} {wanted} {text}");
+    }
+
+    #[test]
+    fn colours_and_dots_show_where_the_terminal_has_them() {
+        let coloured = chart(Axis::Logarithmic).draw(WIDE).unwrap();
+        assert!(
+            coloured.contains("\u{1b}[32ma grows\u{1b}[0m") && coloured.contains("\u{1b}[35mb stays\u{1b}[0m"),
+            "{coloured}"
+        );
+        assert!(coloured.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)));
+        let dots = chart(Axis::Logarithmic).draw(Terminal { colour: false, ..WIDE }).unwrap();
+        assert!(!dots.contains('\u{1b}') && dots.lines().all(|line| line.chars().count() <= WIDEST), "{dots}");
+        // Without colours the letter on a curve says which it is.
+        assert!(dots.lines().skip(1).take(LINES).filter(|l| l.contains('a') || l.contains('b')).count() == 2, "{dots}");
+    }
+
+    #[test]
+    fn what_can_not_be_drawn_is_left_away() {
+        let narrow = Terminal { columns: Some(79), ..WIDE };
+        assert_eq!((chart(Axis::Linear).draw(narrow), chart(Axis::Linear).draw(Terminal::NONE)), (None, None));
+        let of = |points: &[(f64, f64)]| {
+            let series = vec![Series { name: "a".to_owned(), points: points.to_vec() }];
+            Chart { title: String::new(), across: Axis::Linear, series }.draw(PLAIN)
+        };
+        assert_eq!(of(&[]), None);
+        assert_eq!(of(&[(1.0, 5.0)]), None);
+        assert_eq!(of(&[(1.0, 5.0), (2.0, 0.0), (3.0, f64::INFINITY)]), None);
+        for points in
+            [&[(0.0, 5.0), (2.0, 5.0)][..], &[(0.0, 1e-3), (1e9, 1e12)], &[(0.0, 5.0), (1.0, f64::NAN), (2.0, 6.0)]]
+        {
+            let text = of(points).unwrap();
+            assert!(text.matches('a').count() > 20, "{text}");
+        }
+    }
+
+    #[test]
+    fn marks_are_round_and_few() {
+        assert_eq!(marks(3.0, 2e4, 5), [10.0, 100.0, 1000.0, 10_000.0]);
+        assert_eq!(marks(2.0, 9.0, 5), [2.0, 5.0]);
+        assert_eq!(marks(1.0, 1e9, 5), [1.0, 100.0, 1e4, 1e6, 1e8]);
+        assert_eq!([0.001, 0.25, 1000.0, 10_000.0, 2.5e6, 0.0].map(figure), ["0.001", "0.25", "1000", "10k", "2.5M", "0"]);
     }
 }

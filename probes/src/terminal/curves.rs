@@ -70,3 +70,36 @@ fn chart(scenario: &str, all: Vec<(AlgorithmId, Vec<(f64, f64)>)>, how: &str) ->
 fn at(points: &[(f64, f64)], x: f64) -> Option<f64> {
     points.iter().find(|p| p.0 == x).map(|p| p.1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(id: &str, points: &[(f64, f64)]) -> (AlgorithmId, Vec<(f64, f64)>) {
+        (id.parse().unwrap(), points.to_vec())
+    }
+
+    #[test]
+    fn the_cheapest_come_first_and_what_is_far_from_them_is_cut_off() {
+        let all = vec![
+            curve("brute@cpu1", &[(10.0, 2.0), (100.0, 200.0), (1000.0, 20_000.0)]),
+            curve("sweep@cpu1", &[(10.0, 3.0), (100.0, 30.0), (1000.0, 300.0)]),
+            curve("verlet@cpu1", &[(10.0, 1.0), (100.0, 10.0), (1000.0, 105.0)]),
+            curve("verlet@cpu2", &[(10.0, 9.0), (100.0, 12.0), (1000.0, 100.0)]),
+            curve("sweep@cpu2", &[]),
+        ];
+        let chart = chart("uniform", all, "measured").unwrap();
+        let named: Vec<(&str, usize)> = chart.series.iter().map(|s| (&s.name[..], s.points.len())).collect();
+        assert_eq!(named, [("verlet@cpu1", 3), ("verlet@cpu2", 3), ("brute@cpu1", 2), ("sweep@cpu1", 3)]);
+        assert!(chart.title.starts_with("uniform: measured time") && chart.across == Axis::Logarithmic);
+    }
+
+    #[test]
+    fn there_are_six_at_most_and_none_without_costs() {
+        let many = (1..=9).map(|k| curve(&format!("brute@cpu{k}"), &[(10.0, f64::from(k)), (20.0, f64::from(k))])).collect();
+        let chart = chart("uniform", many, "expected").unwrap();
+        assert_eq!(chart.series.iter().map(|s| &s.name[..]).collect::<Vec<_>>().last(), Some(&"brute@cpu6"));
+        let step = sapwise::Step { from_objects: 0, algorithm: "brute@cpu1".parse().unwrap() };
+        assert_eq!(costs(&Fields::from_steps(vec![step]).unwrap(), &[]), None);
+    }
+}

@@ -2,7 +2,9 @@
 
 mod check;
 mod compare;
+mod completions;
 mod devices;
+mod man;
 mod pairs;
 mod part;
 mod predict;
@@ -38,6 +40,8 @@ pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome
         Verb::Check(arguments) => check::run(&arguments, algorithms),
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),
+        Verb::Completions(arguments) => completions::run(&arguments),
+        Verb::Man(arguments) => man::run(&arguments),
         Verb::Part(arguments) => part::run(arguments, algorithms),
     }
 }

@@ -149,6 +149,13 @@ impl Browser {
         sent.map(|e| e["params"]["request"]["url"].as_str().unwrap().to_owned()).collect()
     }
 
+    /// Elements whose text has too little contrast with what is behind it, by WCAG AA. Panics on a page that has little text.
+    pub(crate) fn unreadable(&self) -> Vec<String> {
+        let found = self.value(UNREADABLE);
+        let found = found.as_array().expect("a page with a hundred texts");
+        found.iter().map(|e| e.as_str().unwrap().to_owned()).collect()
+    }
+
     /// Keeps a picture of the whole page for eyes.
     pub(crate) fn screenshot(&self, name: &str) {
         let picture = self.devtools("Page.captureScreenshot", &json!({ "captureBeyondViewport": true }));
@@ -191,6 +198,25 @@ impl Drop for Browser {
         let _ = self.driver.wait();
     }
 }
+
+const UNREADABLE: &str = "(() => {
+    const numbers = (colour) => colour.match(/[\\d.]+/g).map(Number);
+    const light = (colour) => numbers(colour).slice(0, 3).map((v) => v / 255)
+        .map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+        .reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
+    const behind = (e) => {
+        const colour = e ? getComputedStyle(e).backgroundColor : 'rgb(255, 255, 255)';
+        return numbers(colour)[3] === 0 ? behind(e.parentElement) : colour;
+    };
+    const own = (e) => [...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim());
+    const all = [...document.body.querySelectorAll('*')].filter((e) => own(e) && !e.closest('script, title'));
+    const ratio = (e) => {
+        const style = getComputedStyle(e);
+        const both = [light(e.closest('svg') ? style.fill : style.color), light(behind(e))].sort((a, b) => b - a);
+        return (both[0] + 0.05) / (both[1] + 0.05);
+    };
+    return all.length < 100 ? null : all.filter((e) => ratio(e) < 4.5).map((e) => e.outerHTML.slice(0, 200));
+})()";
 
 /// The browser of this machine. The driver knows the usual places as well, but not all names.
 fn installed() -> Option<PathBuf> {

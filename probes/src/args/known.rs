@@ -1,0 +1,52 @@
+//! Values that the command knows: a shell completes them, and the help lists them.
+
+use super::Scene;
+use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use clap::error::Error;
+use clap::{Arg, Command};
+use sapwise::{AlgorithmId, Registry, Scenario, usable_cores};
+use std::ffi::OsStr;
+
+/// Reads values as `parser` does, with its errors, which say more than that a value is none of a list.
+#[derive(Clone)]
+struct Known<P> {
+    parser: P,
+    values: fn() -> Vec<String>,
+}
+
+impl<P: TypedValueParser> TypedValueParser for Known<P> {
+    type Value = P::Value;
+
+    fn parse_ref(&self, command: &Command, arg: Option<&Arg>, value: &OsStr) -> Result<P::Value, Error> {
+        self.parser.parse_ref(command, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new((self.values)().into_iter().map(PossibleValue::new)))
+    }
+}
+
+fn scenarios() -> Vec<String> {
+    Scenario::ALL.map(|s| s.name().to_owned()).to_vec()
+}
+
+/// A scenario.
+pub(super) fn scenario() -> impl TypedValueParser<Value = Scenario> {
+    Known { parser: |text: &str| text.parse::<Scenario>(), values: scenarios }
+}
+
+/// The name of a scenario, which is read later.
+pub(super) fn scenario_name() -> impl TypedValueParser<Value = String> {
+    Known { parser: StringValueParser::new(), values: scenarios }
+}
+
+/// A scenario or a file.
+pub(super) fn scene() -> impl TypedValueParser<Value = Scene> {
+    Known { parser: |text: &str| text.parse::<Scene>(), values: scenarios }
+}
+
+/// An algorithm. Those of GPUs and of a user's program are taken as well; a shell that completes them would have to load drivers.
+pub(super) fn algorithm() -> impl TypedValueParser<Value = AlgorithmId> {
+    let ours = || Registry::with_cores(usable_cores()).available().into_iter().map(|(id, _)| id.to_string()).collect();
+    Known { parser: |text: &str| text.parse::<AlgorithmId>(), values: ours }
+}

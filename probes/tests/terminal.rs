@@ -1,0 +1,74 @@
+//! What a person at a terminal sees, and what a pipe gets instead.
+
+mod common;
+
+use common::{sapwise, success};
+use std::path::PathBuf;
+#[cfg(target_os = "linux")]
+use std::process::Command;
+
+fn report() -> PathBuf {
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/amd-epyc-2c-full--2026-11-21.json"))
+}
+
+/// What the prediction for a report shows on a terminal of that many columns. `None`, with a line that says so, where the program is missing
+/// that makes a terminal.
+#[cfg(target_os = "linux")]
+fn on_a_terminal(columns: u32, variables: &[(&str, &str)]) -> Option<String> {
+    let quoted = |text: &str| format!("'{text}'");
+    let program = quoted(&assert_cmd::cargo::cargo_bin!("sapwise").display().to_string());
+    let report = quoted(&report().display().to_string());
+    let mut command = Command::new("script");
+    for name in ["NO_COLOR", "LC_ALL", "LC_CTYPE", "SAPWISE_SIMD"] {
+        command.env_remove(name);
+    }
+    command.env("TERM", "xterm-256color").env("LANG", "C.UTF-8").envs(variables.iter().copied());
+    let line = format!("stty rows 40 cols {columns} && {program} predict --no-gpus --report {report}");
+    match command.args(["-qec", &line, "/dev/null"]).output() {
+        Ok(ended) => {
+            let text = String::from_utf8(ended.stdout).unwrap();
+            assert!(ended.status.success(), "{text}");
+            Some(text.replace('\r', ""))
+        }
+        Err(why) => {
+            eprintln!("nothing is looked at on a terminal: script: {why}");
+            None
+        }
+    }
+}
+
+/// Whether there is a character of Braille.
+#[cfg(target_os = "linux")]
+fn dotted(text: &str) -> bool {
+    text.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c))
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_wide_terminal_shows_curves_and_a_narrow_one_none() {
+    let Some(wide) = on_a_terminal(100, &[]) else { return };
+    assert!(dotted(&wide) && wide.contains("\u{1b}[1muniform: the fastest algorithm"), "{wide}");
+    assert!(wide.contains("time of a frame (us) over objects") && wide.contains("\nNext: "), "{wide}");
+    let narrow = on_a_terminal(79, &[]).unwrap();
+    assert!(!dotted(&narrow) && narrow.contains("\u{1b}[1m") && narrow.contains("\nNext: "), "{narrow}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_terminal_may_refuse_colours_and_know_ascii_only() {
+    for (name, value) in [("NO_COLOR", "1"), ("TERM", "dumb")] {
+        let Some(text) = on_a_terminal(100, &[(name, value)]) else { return };
+        assert!(dotted(&text) && !text.contains('\u{1b}'), "{name}: {text}");
+    }
+    let coloured = on_a_terminal(100, &[("NO_COLOR", ""), ("LANG", "C")]).unwrap();
+    assert!(coloured.contains('\u{1b}') && coloured.is_ascii() && coloured.contains("over objects"), "{coloured}");
+}
+
+#[test]
+fn a_pipe_gets_neither_colours_nor_curves() {
+    let mut command = sapwise();
+    command.env("TERM", "xterm-256color").env("CLICOLOR_FORCE", "1").env("LANG", "C.UTF-8");
+    let text = success(command.args(["predict", "--no-gpus", "--report"]).arg(report()));
+    assert!(text.is_ascii() && !text.contains('\u{1b}') && !text.contains("over objects"), "{text}");
+    assert!(text.contains("\nNext: "), "{text}");
+}
