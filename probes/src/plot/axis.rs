@@ -43,6 +43,12 @@ impl Axis {
         Self { low: low / wider, high: high * wider, logarithmic: true, names: None }
     }
 
+    /// The same logarithmic axis with that share of it more at each end.
+    pub(super) fn wider(self, share: f64) -> Self {
+        let factor = (self.high / self.low).powf(share);
+        Self { low: self.low / factor, high: self.high * factor, ..self }
+    }
+
     /// A linear axis between these values.
     pub(super) fn linear(low: f64, high: f64) -> Self {
         let sound = low.is_finite() && high.is_finite() && low < high && high - low <= MOST;

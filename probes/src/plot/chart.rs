@@ -319,22 +319,37 @@ fn strokes(places: &[Place], dashes: &[i32]) -> Vec<Vec<Place>> {
     strokes
 }
 
-/// Lines over a rectangle that tell fields apart without colours. They go on in the next rectangle as if it were the same.
-pub(super) fn hatch(area: &Area<'_>, frame: Frame, k: usize, colour: RGBColor) -> anyhow::Result<()> {
-    const EVERY: i32 = 12;
+/// Lines over a rectangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Hatch {
+    None,
+    Rising,
+    Falling,
+    Flat,
+    Crossed,
+    /// Closer than those of fields, which may be below.
+    Interval,
+}
+
+impl Hatch {
+    /// That of the field of the series at a position.
+    pub(super) fn of(k: usize) -> Self {
+        [Self::None, Self::Rising, Self::Falling, Self::Flat, Self::Crossed][k % 5]
+    }
+}
+
+/// Draws lines over a rectangle, which tell fields apart without colours. They go on in the next rectangle as if it were the same.
+pub(super) fn hatch(area: &Area<'_>, frame: Frame, hatch: Hatch, colour: RGBColor) -> anyhow::Result<()> {
+    let every = if hatch == Hatch::Interval { 6 } else { 12 };
+    let rising = matches!(hatch, Hatch::Rising | Hatch::Crossed | Hatch::Interval);
+    let falling = matches!(hatch, Hatch::Falling | Hatch::Crossed);
+    let flat = hatch == Hatch::Flat;
     let line = Line::solid(colour, 1);
     let Frame { left, top, right, bottom } = frame;
-    let [rising, falling, flat] = match k % 5 {
-        0 => [false; 3],
-        1 => [true, false, false],
-        2 => [false, true, false],
-        3 => [false, false, true],
-        _ => [true, true, false],
-    };
-    let first = |low: i32| low + (EVERY - low.rem_euclid(EVERY)) % EVERY;
+    let first = |low: i32| low + (every - low.rem_euclid(every)) % every;
     if rising {
         // Those of x + y = sum.
-        for sum in (first(left + top)..right + bottom).step_by(EVERY as usize) {
+        for sum in (first(left + top)..right + bottom).step_by(every as usize) {
             let (a, b) = (left.max(sum - bottom), right.min(sum - top));
             if a < b {
                 path(area, &[(a, sum - a), (b, sum - b)], line)?;
@@ -343,7 +358,7 @@ pub(super) fn hatch(area: &Area<'_>, frame: Frame, k: usize, colour: RGBColor) -
     }
     if falling {
         // Those of x - y = difference.
-        for difference in (first(left - bottom)..right - top).step_by(EVERY as usize) {
+        for difference in (first(left - bottom)..right - top).step_by(every as usize) {
             let (a, b) = (left.max(difference + top), right.min(difference + bottom));
             if a < b {
                 path(area, &[(a, a - difference), (b, b - difference)], line)?;
@@ -351,7 +366,7 @@ pub(super) fn hatch(area: &Area<'_>, frame: Frame, k: usize, colour: RGBColor) -
         }
     }
     if flat {
-        for y in (first(top)..bottom).step_by(EVERY as usize) {
+        for y in (first(top)..bottom).step_by(every as usize) {
             path(area, &[(left, y), (right, y)], line)?;
         }
     }

@@ -2,7 +2,7 @@
 //! optimal performance shaded.
 
 use super::axis::{Axis, time_unit};
-use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, Line, RIGHT, fill, missing, path, words};
+use super::chart::{ABOVE, BELOW, Chart, Frame, Hatch, LEFT, Line, RIGHT, fill, hatch, missing, path, words};
 use super::legend::{Legend, Sign};
 use super::mark::mark;
 use super::paper::Area;
@@ -118,7 +118,7 @@ impl CurvePanel {
         }
         for crossing in &self.crossings {
             if let Some(shaded) = chart.rectangle((crossing.low, crossing.high), (0.0, f64::INFINITY)) {
-                fill(area, shaded, SECONDARY, style::INTERVAL)?;
+                hatch(area, shaded, Hatch::Interval, SECONDARY)?;
             }
         }
         chart.grid("", "objects", &format!("time of a frame ({})", unit.0))?;

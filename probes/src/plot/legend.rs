@@ -1,7 +1,7 @@
 //! What the series are called, in columns below a chart.
 
 use super::Mark3;
-use super::chart::{Frame, Line, fill, hatch, path, words};
+use super::chart::{Frame, Hatch, Line, fill, hatch, path, words};
 use super::font;
 use super::mark::{Mark, mark};
 use super::paper::Area;
@@ -27,7 +27,7 @@ pub(super) enum Sign {
     Field(usize),
     /// A line that is no series.
     Line(Line),
-    /// A line with a band around it.
+    /// A line with the interval around it.
     Interval(Line),
     /// The ring around a mark.
     Ring,
@@ -92,7 +92,7 @@ impl Sign {
             Self::Field(k) => {
                 let frame = Frame { left, top: y - 7, right, bottom: y + 7 };
                 fill(area, frame, style::colour(k), style::FIELD)?;
-                hatch(area, frame, k, style::colour(k))?;
+                hatch(area, frame, Hatch::of(k), style::colour(k))?;
                 area.draw(&mark((middle, y), Mark::Ground, style::PAPER, 6))?;
                 area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?;
             }
@@ -103,12 +103,7 @@ impl Sign {
             Self::None => {}
             Self::Line(line) => path(area, &ends, line)?,
             Self::Interval(line) => {
-                fill(
-                    area,
-                    Frame { left: middle - 8, top: y - 7, right: middle + 8, bottom: y + 7 },
-                    SECONDARY,
-                    style::INTERVAL,
-                )?;
+                hatch(area, Frame { left, top: y - 7, right, bottom: y + 7 }, Hatch::Interval, SECONDARY)?;
                 path(area, &[(middle, y - 7), (middle, y + 7)], line)?;
             }
         }

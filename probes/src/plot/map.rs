@@ -1,7 +1,7 @@
 //! The map that the paper could not draw: fields of optimal performance over two axes.
 
 use super::axis::Axis;
-use super::chart::{ABOVE, BELOW, Chart, Frame, LEFT, RIGHT, fill, hatch, missing};
+use super::chart::{ABOVE, BELOW, Chart, Frame, Hatch, LEFT, RIGHT, fill, hatch, missing};
 use super::legend::{Legend, Sign};
 use super::mark::Mark;
 use super::paper::Area;
@@ -54,6 +54,8 @@ pub(crate) struct MapPoint {
 
 /// A regret over this gets a ring.
 const LOSS: f64 = 0.1;
+/// Share of the axes that is left at each end, so that no ring is over the numbers.
+const MARGIN: f64 = 0.025;
 const ALONE: i32 = 480;
 const BESIDE: i32 = 400;
 
@@ -102,8 +104,8 @@ impl FieldMap {
     fn panel(&self, area: &Area<'_>, frame: Frame, panel: &MapPanel) -> anyhow::Result<()> {
         let points = || self.panels.iter().flat_map(|p| &p.points);
         let axes = (
-            Axis::log(points().map(|p| p.x).chain([self.x.0, self.x.1]), 1.0),
-            Axis::log(points().map(|p| p.y).chain([self.y.0, self.y.1]), 1.0),
+            Axis::log(points().map(|p| p.x).chain([self.x.0, self.x.1]), 1.0).wider(MARGIN),
+            Axis::log(points().map(|p| p.y).chain([self.y.0, self.y.1]), 1.0).wider(MARGIN),
         );
         let chart = Chart::new(area, frame.within(LEFT, ABOVE, RIGHT, BELOW), axes.0, axes.1);
         if panel.grid.is_empty() && panel.points.is_empty() {
@@ -114,7 +116,7 @@ impl FieldMap {
             let shaded = chart.rectangle(cell.x, cell.y).zip(self.style(cell.algorithm));
             let Some((shaded, style)) = shaded else { continue };
             fill(area, shaded, style::colour(style), 1.5 * style::FIELD)?;
-            hatch(area, shaded, style, style::colour(style))?;
+            hatch(area, shaded, Hatch::of(style), style::colour(style))?;
         }
         chart.border()?;
         for point in &panel.points {

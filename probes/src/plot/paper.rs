@@ -3,6 +3,7 @@
 use super::Picture;
 use super::font;
 use super::style::PAPER;
+use anyhow::ensure;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters_backend::text_anchor::{HPos, VPos};
@@ -11,6 +12,9 @@ use std::io;
 
 /// Pixels of a PNG in a unit, which is a pixel of an SVG: with one, letters have too few to be read with ease.
 pub(super) const PNG_UNIT: u32 = 2;
+
+/// Pixels of a PNG at most: this many take 800 MB while it is drawn.
+const MOST_PIXELS: u64 = 1 << 28;
 
 /// A picture under way. Lengths are in units.
 pub(crate) type Area<'a> = DrawingArea<Paper<'a>, Shift>;
@@ -28,7 +32,7 @@ type Drawn = Result<(), DrawingErrorKind<io::Error>>;
 /// A picture of that width and height in units.
 ///
 /// # Errors
-/// When it can't be drawn.
+/// When it can't be drawn, as a PNG of more pixels than memory may have room for.
 pub(super) fn picture(
     picture: Picture,
     (width, height): (u32, u32),
@@ -46,7 +50,9 @@ pub(super) fn picture(
         return Ok(svg.into_bytes());
     }
     let (width, height) = (width * PNG_UNIT, height * PNG_UNIT);
-    let mut pixels = vec![0; 3 * width as usize * height as usize];
+    let count = u64::from(width) * u64::from(height);
+    ensure!(count <= MOST_PIXELS, "a PNG would have {width} x {height} pixels; draw fewer things, or an SVG");
+    let mut pixels = vec![0; 3 * count as usize];
     finish(Kind::Png(BitMapBackend::with_buffer(&mut pixels, (width, height))))?;
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, width, height);

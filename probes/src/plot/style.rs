@@ -33,14 +33,19 @@ pub(super) const fn line_height(size: u32) -> i32 {
     size as i32 * 13 / 10
 }
 
-/// Colours that stay apart for colour-blind readers (Okabe and Ito 2008); black is kept for the adaptive module.
-const COLOURS: [RGBColor; 7] = [
+/// Six colours that stay apart for colour-blind readers (Okabe and Ito 2008), then five that do so less, for those who draw more; black is
+/// kept for the adaptive module.
+const COLOURS: [RGBColor; 11] = [
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
+    RGBColor(120, 94, 240),
+    RGBColor(140, 90, 40),
+    RGBColor(150, 150, 30),
+    RGBColor(160, 40, 90),
     RGBColor(150, 150, 150),
 ];
 
@@ -54,7 +59,7 @@ pub(super) fn mark(k: usize) -> Mark {
     [Mark::Disc, Mark::Triangle, Mark::Cross, Mark::Ring, Mark::Square, Mark::Plus][k % 6]
 }
 
-/// Lengths of its strokes and gaps in turn, none for a line without gaps. There are five: colour, mark and dashes together differ for 210
+/// Lengths of its strokes and gaps in turn, none for a line without gaps. There are five: colour, mark and dashes together differ for 330
 /// series.
 pub(super) fn dashes(k: usize) -> &'static [i32] {
     [&[][..], &[8, 4], &[2, 4], &[12, 4, 2, 4], &[5, 3]][k % 5]
@@ -65,6 +70,5 @@ pub(super) fn text(size: u32, colour: RGBColor, h: HPos, v: VPos) -> TextStyle<'
     super::font::SANS.into_font().resize(f64::from(size)).color(&colour).pos(Pos::new(h, v))
 }
 
-/// Opacity of fields and of intervals behind curves.
+/// Opacity of fields behind curves.
 pub(super) const FIELD: f64 = 0.2;
-pub(super) const INTERVAL: f64 = 0.25;

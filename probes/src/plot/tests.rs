@@ -56,7 +56,7 @@ fn well_formed(svg: &str) {
 /// Every number is one and inside the picture, and there are no colours but those of the style.
 fn in_style(svg: &str, width: u32, height: u32) {
     let neutral = [style::PAPER, INK, SECONDARY, style::GRID];
-    let colours: Vec<String> = (0..7)
+    let colours: Vec<String> = (0..11)
         .map(style::colour)
         .chain(neutral)
         .map(|RGBColor(r, g, b)| format!("#{r:02X}{g:02X}{b:02X}"))
