@@ -46,7 +46,8 @@ impl Folder {
         let caption = [format!("{told}{from}"), format!("Made by: {}", self.command)];
         let svg = figure.draw(Picture::Svg, &caption).with_context(|| format!("the figure {id} can't be drawn"))?;
         let png = figure.draw(Picture::Png, &caption).with_context(|| format!("the figure {id} can't be drawn"))?;
-        let text = String::from_utf8(svg.clone())?;
+        // On the page the caption stands below the figure, where a reader can take it.
+        let text = String::from_utf8(figure.draw(Picture::Svg, &[])?)?;
         let csv = figure.csv().csv(&self.labels)?.into_bytes();
         let mut links = Vec::new();
         for (name, ending, bytes) in [("SVG", "svg", svg), ("PNG", "png", png), ("CSV", "csv", csv)] {

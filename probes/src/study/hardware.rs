@@ -83,7 +83,7 @@ fn columns(sheet: &mut Sheet, names: &[String]) {
 pub(super) fn words(name: &str) -> String {
     let units = ["_gb_per_s", "_gflop_per_s", "_g_per_s", "_bytes", "_ghz", "_ns", "_ratio"];
     let bare = units.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name);
-    bare.replace('/', " ").replace('_', " ")
+    bare.replace(['/', '_'], " ")
 }
 
 /// Those of the names that any of the lists has a value of.
