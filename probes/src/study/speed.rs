@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn effects_are_found_where_machines_were_timed_at_different_places() {
         // Places cost 1, 2, 4, ...; the machines are 1, 3 and 9 times as slow and miss some places each.
-        let cost = |place: usize| (1 << place) as f64;
+        let cost = |place: usize| f64::from(1_u32 << place);
         let machine = |factor: f64, places: &[usize]| -> BTreeMap<Place<'static>, f64> {
             places.iter().map(|&p| (("uniform", LARGE + p as u32), factor * cost(p))).collect()
         };
