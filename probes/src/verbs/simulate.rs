@@ -4,6 +4,7 @@ use crate::args::Simulate;
 use crate::document::{json_files, read_text};
 use crate::exit::Outcome;
 use crate::simulate::{Loads, built_in, read, simulate};
+use crate::table::count;
 use crate::{files, output};
 use anyhow::{Context, bail};
 use serde::Serialize;
@@ -40,9 +41,9 @@ pub(crate) fn run(arguments: &Simulate) -> anyhow::Result<Outcome> {
     } else {
         let shown = folder.display();
         output::print(&format!(
-            "{} simulated machines are in {shown}. They are no evidence of accuracy.\nNext: sapwise train --simulated {shown} --out \
+            "Reports of {} are in {shown}. They are no evidence of accuracy.\nNext: sapwise train --simulated {shown} --out \
              simulated-model.json",
-            written.len()
+            count(written.len(), "simulated machine")
         ))?;
     }
     Ok(Outcome::Done)
