@@ -107,20 +107,19 @@ fn by_its_table(said: Said, values: [Option<f64>; 3]) -> (Outcome, String) {
         let why = format!("the highest is {:.2} times the lowest", most / least);
         return (if most / least < VARIED { Outcome::Confirmed } else { Outcome::Refuted }, why);
     }
-    let three = format!("over all three cards it differs by a factor of {:.2}", most / least);
+    let three = format!("it varies by {:.2} over all three, for which no times are printed", most / least);
     if ratio < VARIED && ratio > 1.0 / VARIED {
         let why = format!(
-            "from the 4600 to the 5800, the one pair with a printed speed-up ({PRINTED_SPEED_UP} x), it is {ratio:.2} times as much: what \
-             hardly varies can't be shown not to matter; {three}, for which no times are printed"
+            "{ratio:.2} times as much from the 4600 to the 5800, the one pair with a printed time: what hardly varies can't be shown not to \
+             matter; {three}"
         );
         return (Outcome::Undecidable, why);
     }
     // If the time were a power of this parameter alone.
     let exponent = PRINTED_SPEED_UP.ln() / ratio.ln();
     let why = format!(
-        "from the 4600 to the 5800 it is {ratio:.2} times as much and the time 1/{PRINTED_SPEED_UP}: were this the only cause, the time would \
-         go with its power -{exponent:.2}; memory size, internal bandwidth and cores all rise between these cards, and one pair can't \
-         tell which it was"
+        "{ratio:.2} times as much from the 4600 to the 5800, which takes 1/{PRINTED_SPEED_UP} of the time: alone, the time would go with its \
+         power -{exponent:.2}; memory size, internal bandwidth and cores rise together there"
     );
     (Outcome::Undecidable, why)
 }

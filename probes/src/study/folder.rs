@@ -46,7 +46,8 @@ impl Folder {
         let caption = [format!("{told}{from}"), format!("Made by: {}", self.command)];
         let svg = figure.draw(Picture::Svg, &caption).with_context(|| format!("the figure {id} can't be drawn"))?;
         let png = figure.draw(Picture::Png, &caption).with_context(|| format!("the figure {id} can't be drawn"))?;
-        let text = String::from_utf8(svg.clone())?;
+        // On the page the caption stands below the figure, where a reader can take it.
+        let text = String::from_utf8(figure.draw(Picture::Svg, &[])?)?;
         let csv = figure.csv().csv(&self.labels)?.into_bytes();
         let mut links = Vec::new();
         for (name, ending, bytes) in [("SVG", "svg", svg), ("PNG", "png", png), ("CSV", "csv", csv)] {
@@ -81,11 +82,12 @@ impl Folder {
         if more > 0 { format!("{} and {more} more", names.join(", ")) } else { names.join(", ") }
     }
 
-    /// Writes everything into a folder that [`prepare`] has seen, in place of the files of an earlier study.
+    /// Writes everything into a folder that [`prepare`] has seen, in place of the files of an earlier study. Gives the answer with the names
+    /// of the files.
     ///
     /// # Errors
     /// Names the file.
-    pub(super) fn write(self, folder: &Path, page: &str, answer: &Answer) -> Result<()> {
+    pub(super) fn write(self, folder: &Path, page: &str, answer: Answer) -> Result<Answer> {
         if let Some(earlier) = earlier(folder)? {
             earlier.files.iter().filter(|name| is_within(name)).for_each(|name| {
                 // One that the user has removed already is no failure.
@@ -98,12 +100,13 @@ impl Folder {
         }
         let names = self.files.iter().map(|(name, _)| name.clone()).chain([PAGE.to_owned()]).collect();
         // First, so that a study that was stopped half-way is taken for one the next time.
-        let answer = Answer { files: names, ..answer.clone() };
+        let answer = Answer { files: names, ..answer };
         files::write_text(&folder.join(ANSWER), &sapwise::json::write(&answer)?)?;
         for (name, bytes) in self.files {
             files::write_atomically(&folder.join(&name), |out| Ok(out.write_all(&bytes)?))?;
         }
-        files::write_text(&folder.join(PAGE), page)
+        files::write_text(&folder.join(PAGE), page)?;
+        Ok(answer)
     }
 }
 
@@ -172,7 +175,7 @@ mod tests {
         prepare(&path("")).unwrap();
         let mut new = Folder::new(vec!["R1".to_owned()], "sapwise study".to_owned());
         new.table("machines", "", Sheet::new([("a", "a")])).unwrap();
-        new.write(&path(""), "<html>", &Answer::default()).unwrap();
+        new.write(&path(""), "<html>", Answer::default()).unwrap();
         assert!(!path("figures/old.svg").exists());
         assert!(path("figures/mine.svg").exists() && path("../outside").exists());
         assert_eq!(earlier(&path("")).unwrap().unwrap().files, ["tables/machines.csv", PAGE]);

@@ -21,7 +21,7 @@ const PAPER: [(&str, &str); 7] = [
 
 /// The table as the paper has it, its cards first, one row a GPU. What acts as a GPU is told by its kind.
 pub(super) fn as_in_the_paper(entries: &[Entry]) -> Sheet {
-    let mut sheet = heads(&["GPU", "kind"]);
+    let mut sheet = heads(&["GPU", "kind", "report"]);
     sheet.columns.extend(PAPER.map(|(title, key)| Column { title: title.to_owned(), key: key.to_owned() }));
     let mut gpus: Vec<(usize, &GpuHardware)> =
         entries.iter().enumerate().flat_map(|(k, e)| e.hardware.gpus.iter().map(move |g| (k, g))).collect();
@@ -36,13 +36,13 @@ pub(super) fn as_in_the_paper(entries: &[Entry]) -> Sheet {
 
 /// Every parameter of the machines that any of them has, one row a report.
 pub(super) fn machines(entries: &[Entry]) -> Sheet {
-    let mut sheet = heads(&["CPU", "kind", "vectors"]);
+    let mut sheet = heads(&["report", "CPU", "kind", "vectors"]);
     let lists = || entries.iter().map(|e| &e.hardware.parameters[..]);
     let names = present(parameter::all_names(), lists());
     columns(&mut sheet, &names);
     for (k, entry) in entries.iter().enumerate() {
         let machine = &entry.hardware.machine;
-        let mut cells = vec![Cell::text(&machine.cpu), Cell::text(kind(entry.kind)), Cell::text(&machine.simd)];
+        let mut cells = [&entry.name[..], &machine.cpu, kind(entry.kind), &machine.simd].map(Cell::text).to_vec();
         cells.extend(names.iter().map(|name| cell(name, &entry.hardware.parameters)));
         sheet.push(cells, &[k]);
     }
@@ -51,7 +51,7 @@ pub(super) fn machines(entries: &[Entry]) -> Sheet {
 
 /// The same of the GPUs, one row each.
 pub(super) fn gpus(entries: &[Entry]) -> Sheet {
-    let mut sheet = heads(&["GPU", "kind"]);
+    let mut sheet = heads(&["GPU", "kind", "report"]);
     let lists = || entries.iter().flat_map(|e| &e.hardware.gpus).map(|g| &g.parameters[..]);
     let names = present(gpu::all_names(), lists());
     columns(&mut sheet, &names);
@@ -72,7 +72,7 @@ fn heads(titles: &[&str]) -> Sheet {
 
 fn gpu_heads(entry: &Entry, gpu: &GpuHardware) -> Vec<Cell> {
     let kind = if entry.is_published() { "published".to_owned() } else { gpu.gpu.kind.to_string() };
-    vec![Cell::text(&gpu.gpu.name), Cell::text(kind)]
+    vec![Cell::text(&gpu.gpu.name), Cell::text(kind), Cell::text(&entry.name)]
 }
 
 fn columns(sheet: &mut Sheet, names: &[String]) {
@@ -83,7 +83,7 @@ fn columns(sheet: &mut Sheet, names: &[String]) {
 pub(super) fn words(name: &str) -> String {
     let units = ["_gb_per_s", "_gflop_per_s", "_g_per_s", "_bytes", "_ghz", "_ns", "_ratio"];
     let bare = units.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name);
-    bare.replace('/', " ").replace('_', " ")
+    bare.replace(['/', '_'], " ")
 }
 
 /// Those of the names that any of the lists has a value of.

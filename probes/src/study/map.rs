@@ -128,7 +128,7 @@ fn spread_evenly(objects: f64, pairs_of_object: f64, moved: f64) -> Load {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sapwise::{BroadPhase, Pairs, Registry};
+    use sapwise::{Pairs, Registry};
 
     #[test]
     fn a_cell_has_the_density_that_it_is_drawn_at() {

@@ -86,8 +86,7 @@ impl Study {
             reports: labels.iter().zip(&self.entries).map(source).collect(),
             sections,
         };
-        folder.write(to, &page::html(&page), &answer)?;
-        Ok(answer)
+        folder.write(to, &page::html(&page), answer)
     }
 
     /// Positions of the reports whose timings are studied.

@@ -37,6 +37,9 @@ pub(super) struct Shown {
     pub(super) pairs: usize,
 }
 
+/// The machine, what was taken, the algorithm, and whether of large frames.
+type Key<'a> = (&'a str, String, String, bool);
+
 /// Two reports of which the second one has one thing less.
 struct Pair {
     taken: Restricted,
@@ -46,7 +49,7 @@ struct Pair {
 
 /// The effects of every restriction on every algorithm, and what the parameters show of them.
 pub(super) fn effects(entries: &[Entry]) -> (Vec<Effect>, Vec<Shown>) {
-    let mut found: BTreeMap<(&str, String, String, bool), (Restricted, Vec<f64>, BTreeSet<usize>)> = BTreeMap::new();
+    let mut found: BTreeMap<Key<'_>, (Restricted, Vec<f64>, BTreeSet<usize>)> = BTreeMap::new();
     let mut shown: BTreeMap<(String, String), (Restricted, Vec<f64>)> = BTreeMap::new();
     for pair in pairs(entries) {
         let (without, with) = (&entries[pair.without], &entries[pair.with]);

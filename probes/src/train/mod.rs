@@ -121,7 +121,7 @@ pub(crate) fn without(profiles: &[Profile], file: &str) -> Result<(Model, String
     let own = |fold: &&Vec<usize>| fold.iter().any(|&k| profiles[k].file == file);
     partition.folds.iter().filter(own).flatten().for_each(|&k| chosen[k] = false);
     if !chosen.contains(&true) {
-        bail!("no report is left when {file} is left out");
+        bail!("there is no other report to predict {file} from");
     }
     let model = model::model(profiles, &Designs::new(profiles), &chosen, "without")?.0;
     Ok((model, partition.held_out))

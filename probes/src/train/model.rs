@@ -38,7 +38,7 @@ pub(crate) fn model(
         folds: Vec::new(),
     };
     if let Some(defect) = model.defect() {
-        bail!("no model could be fitted: {defect}; {}", notes.join("; "));
+        bail!("no model could be fitted: {}", [vec![defect], notes].concat().join("; "));
     }
     Ok((model, notes))
 }

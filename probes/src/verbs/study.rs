@@ -107,7 +107,8 @@ fn read(files: &[PathBuf], names: &[String], evidence: Evidence) -> anyhow::Resu
     for some in placed.chunks(AT_A_TIME) {
         interrupt::check()?;
         let read = |&(place, file): &(usize, &PathBuf)| match read_report(file) {
-            Err(why) => (place, Err(format!("{:#}", why.root_cause()))),
+            // By the name that the page has, which is no path of this machine.
+            Err(why) => (place, Err(why.root_cause().to_string().replace(&file.display().to_string(), &names[place]))),
             Ok((_, report)) => {
                 let reduced = found.selection.reduce(place, &names[place], &report);
                 let studied = reduced.as_ref().map(|_| ()).map_err(Clone::clone);
@@ -176,12 +177,9 @@ fn command(arguments: &Arguments) -> String {
     let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let mut words = vec!["sapwise study".to_owned()];
     words.extend(arguments.simulated.then(|| "--simulated".to_owned()));
-    if let [few @ ..] = &arguments.reports[..]
-        && few.len() <= 3
-    {
-        words.extend(few.iter().map(|p| name(p)));
-    } else {
-        words.push(format!("({} reports or folders)", arguments.reports.len()));
+    match &arguments.reports[..] {
+        few if few.len() <= 3 => words.extend(few.iter().map(|p| name(p))),
+        many => words.push(format!("({} reports or folders)", many.len())),
     }
     words.push(format!("--out {}", name(&arguments.out)));
     words.extend(arguments.reference.iter().map(|p| format!("--reference {}", name(p))));

@@ -37,13 +37,18 @@ pub(super) fn influences(
     }
     let links: Vec<&Link> = influence.links.iter().collect();
     if links.is_empty() {
-        part.lacks(format!(
-            "{} physical machine{} studied, and it takes {} to tell a link between machines; what was taken from one machine on \
-             purpose is in the next section",
-            influence.machines,
-            if influence.machines == 1 { " was" } else { "s were" },
-            rank::FEWEST_MACHINES
-        ));
+        let few = influence.machines < rank::FEWEST_MACHINES;
+        let plural = if influence.machines == 1 { " was" } else { "s were" };
+        part.lacks(if few {
+            format!(
+                "{} physical machine{plural} studied, and it takes {} to tell a link between machines; what was taken from one machine on \
+                 purpose is in the next section",
+                influence.machines,
+                rank::FEWEST_MACHINES
+            )
+        } else {
+            format!("no parameter and no time or border are known of {} machines, and vary", rank::FEWEST_MACHINES)
+        });
         return Ok(part.section);
     }
     let told =
