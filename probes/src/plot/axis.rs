@@ -133,8 +133,8 @@ impl Axis {
         let decade = least.log10().floor() as i32;
         let steps = [1.0, 2.0, 5.0];
         let candidates = (0..).map(|k: i32| (steps[k as usize % 3], decade + k / 3));
-        let wide = candidates.skip_while(|&(d, k)| d * 10_f64.powi(k) < least * (1.0 - 1e-9));
-        let Some((digit, exponent)) = wide.skip(coarser as usize).next() else { return Vec::new() };
+        let mut wide = candidates.skip_while(|&(d, k)| d * 10_f64.powi(k) < least * (1.0 - 1e-9));
+        let Some((digit, exponent)) = wide.nth(coarser as usize) else { return Vec::new() };
         let step = digit * 10_f64.powi(exponent);
         let (first, last) = ((self.low / step).ceil(), (self.high / step).floor());
         let count = (last - first).clamp(0.0, 100.0) as i32;

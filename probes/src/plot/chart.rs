@@ -327,7 +327,7 @@ pub(super) enum Hatch {
     Falling,
     Flat,
     Crossed,
-    /// Closer than those of fields, which may be below.
+    /// Closer than those of fields.
     Interval,
 }
 
@@ -340,7 +340,7 @@ impl Hatch {
 
 /// Draws lines over a rectangle, which tell fields apart without colours. They go on in the next rectangle as if it were the same.
 pub(super) fn hatch(area: &Area<'_>, frame: Frame, hatch: Hatch, colour: RGBColor) -> anyhow::Result<()> {
-    let every = if hatch == Hatch::Interval { 6 } else { 12 };
+    let every = if hatch == Hatch::Interval { 9 } else { 12 };
     let rising = matches!(hatch, Hatch::Rising | Hatch::Crossed | Hatch::Interval);
     let falling = matches!(hatch, Hatch::Falling | Hatch::Crossed);
     let flat = hatch == Hatch::Flat;

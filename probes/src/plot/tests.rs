@@ -148,13 +148,9 @@ fn curves_show_fields_and_crossovers() {
     assert!(svg.contains("objects\n") && svg.contains("time of a frame (us)") && svg.contains("crossover, with"));
     // In the legend and in the row of fields.
     assert_eq!((svg.matches("sweep@cpu1\n").count(), svg.matches("sweep@cpu4\n").count()), (2, 2), "{svg}");
-    let shaded = |style| {
-        format!(
-            "fill=\"{}\"",
-            [1, 4].map(|k| style::colour(k)).map(|RGBColor(r, g, b)| format!("#{r:02X}{g:02X}{b:02X}"))[style]
-        )
-    };
-    assert!((0..2).all(|k| svg.contains(&shaded(k))));
+    for RGBColor(r, g, b) in [1, 4].map(style::colour) {
+        assert!(svg.contains(&format!("opacity=\"{}\" fill=\"#{r:02X}{g:02X}{b:02X}\"", style::FIELD)), "{svg}");
+    }
     let sheet = told(&one, 7);
     assert_eq!(sheet.rows[0].cells[7], Cell::Number { value: 900.0, shown: "900".to_owned() });
     let four = Curves { title: String::new(), panels: vec![panel; 4] };
