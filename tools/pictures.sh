@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# Makes the pictures of the README anew: those of the study from datasets/, and one of a run on this machine, which takes a minute and
+# should find nothing else running.
+#
+#   tools/pictures.sh [DIR]    into DIR, without it into pictures/
+set -euo pipefail
+cd "$(dirname "$0")/.."
+out=${1:-pictures}
+mkdir -p "$out"
+cargo build --release --locked -p sapwise-cli
+sapwise=${CARGO_TARGET_DIR:-target}/release/sapwise
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+"$sapwise" study datasets datasets/published --out "$work/study" > "$work/study.txt"
+for figure in figure-7-threads field-map; do
+  cp "$work/study/figures/$figure.svg" "$out/$figure.svg"
+done
+"$sapwise" run fragmentation --objects 20000 --fields datasets/amd-epyc-2c-full--2026-11-21.json --no-gpus --plot "$out/fragmentation.svg"
+echo "The pictures are in $out."
