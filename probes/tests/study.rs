@@ -80,7 +80,9 @@ fn figures_come_from_the_reports_that_they_name() {
     assert!(looked_at > 150, "{looked_at}");
     // Vectors were taken twice, from two threads and from one, and both reports show it.
     let taken = rows(&out.join("tables/taken.csv"));
-    let own = |algorithm: &str| taken.iter().find(|r| r["taken"] == "simd" && r["algorithm"] == algorithm && r["objects"].starts_with("1000"));
+    let own = |algorithm: &str| {
+        taken.iter().find(|r| r["taken"] == "simd" && r["algorithm"] == algorithm && r["objects"].starts_with("1000"))
+    };
     let strips = own("strips@cpu1").unwrap();
     assert_eq!((strips["pairs"].as_str(), strips["reports"].split(' ').count()), ("2", 4), "{strips:?}");
     let proof = rows(&out.join("tables/restrictions.csv"));
