@@ -26,7 +26,7 @@ const MARKS: usize = 12;
 /// Frames, each with a value.
 type Points = Vec<(usize, f64)>;
 
-/// Two panels, GPUs on the left and cores on the right: above the time of the best fixed algorithm on each number of them in colour and that
+/// GPUs on the left and cores on the right, where both ran: above the time of the best fixed algorithm on each number of them in colour and that
 /// of the adaptive module in black, then what it chose, and the number of objects below.
 pub(crate) struct Simulation<'a> {
     pub(crate) course: &'a Course,
@@ -96,6 +96,14 @@ impl Panel {
     }
 }
 
+/// What is said of a class of processors on which nothing ran.
+fn absent(class: BackendClass) -> &'static str {
+    match class {
+        BackendClass::Gpu => "no GPU algorithm ran here",
+        BackendClass::Cpu => "no algorithm ran on the CPU",
+    }
+}
+
 /// Means over equal numbers of frames, few enough to be seen, each at its first frame. Infinite times are left out.
 fn curve(values: impl Iterator<Item = f64>, frames: usize) -> Points {
     let step = frames.div_ceil(POINTS).max(1);
@@ -108,11 +116,14 @@ fn curve(values: impl Iterator<Item = f64>, frames: usize) -> Points {
 }
 
 impl Simulation<'_> {
-    fn panels(&self) -> [Panel; 2] {
-        [BackendClass::Gpu, BackendClass::Cpu].map(|class| Panel::new(class, self.outcome))
+    /// Those of the classes that ran; the one that is alone has the whole width.
+    fn panels(&self) -> Vec<Panel> {
+        let all = [BackendClass::Gpu, BackendClass::Cpu].map(|class| Panel::new(class, self.outcome));
+        let alone = all.iter().filter(|p| !p.units.is_empty()).count() == 1;
+        all.into_iter().filter(|p| !alone || !p.units.is_empty()).collect()
     }
 
-    fn legend(&self, panel: &Panel) -> Legend {
+    fn legend(&self, panel: &Panel, width: i32) -> Legend {
         let mut entries: Vec<(Sign, String)> = Vec::new();
         for (at, (width, k)) in panel.units.iter().enumerate() {
             entries.push((Sign::Marked(at), format!("{}: {}", panel.name(*width), self.outcome.fixed[*k])));
@@ -121,23 +132,20 @@ impl Simulation<'_> {
         if self.course.co_runner.is_some() {
             entries.push((Sign::Line(CO_RUNNER), "a co-runner begins".to_owned()));
         }
-        Legend::new(entries, WIDTH / 2 - 2 * GAP)
+        Legend::new(entries, width - 2 * GAP)
     }
 
     fn panel(&self, area: &Area<'_>, frame: Frame, panel: &Panel) -> anyhow::Result<()> {
         let Frame { left, top, right, .. } = frame.within(NAMES, ABOVE, RIGHT, 0);
         if panel.units.is_empty() {
-            let text = match panel.class {
-                BackendClass::Gpu => "no GPU algorithm ran here",
-                BackendClass::Cpu => "no algorithm ran on the CPU",
-            };
+            let text = absent(panel.class);
             return missing(area, Frame { left, top, right, bottom: top + TIMES + CHOICES + OBJECTS - BELOW }, text);
         }
         let strip = |top: i32, height: i32, below: i32| Frame { left, top, right, bottom: top + height - below };
         self.times(area, strip(top, TIMES, 26), panel)?;
         self.choices(area, strip(top + TIMES, CHOICES, GAP), panel)?;
         self.objects(area, strip(top + TIMES + CHOICES, OBJECTS, BELOW))?;
-        self.legend(panel).draw(area, (frame.left + GAP, top + TIMES + CHOICES + OBJECTS))
+        self.legend(panel, right - frame.left).draw(area, (frame.left + GAP, top + TIMES + CHOICES + OBJECTS))
     }
 
     /// The frames from the first to the last.
@@ -153,7 +161,11 @@ impl Simulation<'_> {
         let all = || curves.iter().flatten().chain(&adaptive).map(|point| point.1);
         let (name, unit) = time_unit(all());
         let chart = Chart::new(area, frame, self.frames(), Axis::log(all().map(|ns| ns / unit), 1.5));
-        let title = format!("{} ({})", panel.title(), self.course.footage.name());
+        let mut title = format!("{} ({})", panel.title(), self.course.footage.name());
+        if !panel.other {
+            let other = if panel.class == BackendClass::Cpu { BackendClass::Gpu } else { BackendClass::Cpu };
+            title += &format!("; {}", absent(other));
+        }
         chart.grid(&title, "", &format!("time of a frame ({name})"))?;
         let drawn = |points: &Points| points.iter().map(|&(at, ns)| (at as f64, ns / unit)).collect::<Vec<_>>();
         // The dearest first, so that no area hides another one's curve.
@@ -238,13 +250,15 @@ impl Figure for Simulation<'_> {
     }
 
     fn size(&self) -> (u32, u32) {
-        let legends = self.panels().map(|panel| self.legend(&panel).height());
-        (WIDTH as u32, (ABOVE + TIMES + CHOICES + OBJECTS + legends[0].max(legends[1])) as u32)
+        let panels = self.panels();
+        let legends = panels.iter().map(|panel| self.legend(panel, WIDTH / panels.len() as i32).height());
+        (WIDTH as u32, (ABOVE + TIMES + CHOICES + OBJECTS + legends.max().unwrap_or(0)) as u32)
     }
 
     fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()> {
         let whole = Frame { left: 0, top: 0, right: WIDTH, bottom: self.size().1 as i32 };
-        for (panel, frame) in self.panels().iter().zip(whole.parts(2, 2, 0)) {
+        let panels = self.panels();
+        for (panel, frame) in panels.iter().zip(whole.parts(panels.len(), panels.len(), 0)) {
             self.panel(area, frame, panel)?;
         }
         Ok(())

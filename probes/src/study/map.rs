@@ -92,7 +92,7 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
     let count = at_measured.len();
     let panels = vec![
         panel("measured", by_measured, at_measured),
-        panel("predicted, without this machine", by_predicted, at_predicted),
+        panel("predicted", by_predicted, at_predicted),
     ];
     let names = ids.iter().enumerate().map(|(k, id)| (id.to_string(), k)).collect();
     let title = format!("Fields over objects and density: {}", entry.name);

@@ -32,7 +32,7 @@ pub(super) fn fields(study: &Study, folder: &mut Folder, missing: &mut Vec<Strin
     part.text(
         "The map that the paper could not draw: the number of objects alone does not decide. Cells are boxes spread evenly that move as in \
          the scenario uniform, by curves fitted to the machine's own timings on the left, and on the right predicted from its parameters by a \
-         model that has not seen it. Points are what was timed, scenarios that clump or rest among them, so that a point may differ from its cell.",
+         model that was trained without what the caption says. Points are what was timed, scenarios that clump or rest among them, so that a point may differ from its cell.",
     );
     let threads = study.drawn.iter().find(|(compared, _)| *compared == Compared::Threads);
     let first = threads.and_then(|(_, drawn)| drawn.first()).map(|d| d.0).or_else(|| study.studied().first().copied());
@@ -42,7 +42,7 @@ pub(super) fn fields(study: &Study, folder: &mut Folder, missing: &mut Vec<Strin
         Some((_, Err(why))) => part.lacks(format!("{why:#}")),
         Some((k, Ok(map))) => {
             let told = format!(
-                "Left out: the {} of this report. At {} points the predicted choices lose {:.1} % on average; in {:.0} % of the cells both \
+                "Left out of the training: the {} of this report. At {} points the predicted choices lose {:.1} % on average; in {:.0} % of the cells both \
                  choose the same.",
                 map.held_out,
                 map.points,
