@@ -261,8 +261,8 @@ fn moved(parameters: &[Parameter]) -> Option<String> {
 /// What is wrong with a list of parameters, if anything.
 fn defect(of: &str, parameters: &[Parameter]) -> Option<String> {
     for (k, p) in parameters.iter().enumerate() {
-        if p.value.is_some_and(|v| !v.is_finite() || v < 0.0) {
-            return Some(format!("the parameter {}{of} is {:?}", p.name, p.value));
+        if let Some(value) = p.value.filter(|v| !v.is_finite() || *v < 0.0) {
+            return Some(format!("the parameter {}{of} is {value:e}", p.name));
         }
         if let Some(why) = p.disagreement() {
             return Some(format!("the parameter {}{of}: {why}", p.name));

@@ -10,9 +10,14 @@ use std::collections::BTreeMap;
 
 /// Kinds of borders, each drawn with a mark of its own.
 const KINDS: [&str; 3] = ["between methods", "between numbers of threads or GPUs", "between CPU and GPU"];
+/// Those whose predicted curves do not cross.
+const APART: &str = "predicted not to cross: an end of the sizes";
+
+/// Two fits mean the same border where they are within 5 % of each other, as a natural logarithm.
+const SAME_LN: f64 = 0.05;
 
 /// The score of every way to choose.
-pub(super) fn scores(validation: &Validation) -> Sheet {
+pub(super) fn scores(validation: &Validation, studied: &[usize]) -> Sheet {
     let mut sheet = Sheet::new([
         ("way to choose", "way_to_choose"),
         ("mean regret", "mean_regret_share"),
@@ -36,7 +41,7 @@ pub(super) fn scores(validation: &Validation) -> Sheet {
             Cell::optional(m.crossing_error_octaves, 2, none),
             share(m.crossings_within_half_octave, none),
         ];
-        sheet.push(cells, &[]);
+        sheet.push(cells, studied);
     }
     sheet
 }
@@ -84,7 +89,7 @@ pub(super) fn times(held: &Held, entries: &[Entry]) -> Sheet {
 }
 
 /// How the regret falls with the number of machines in the training.
-pub(super) fn learning(validation: &Validation) -> Sheet {
+pub(super) fn learning(validation: &Validation, studied: &[usize]) -> Sheet {
     let mut sheet = Sheet::new([
         ("machines", "machines"),
         ("trainings", "trainings"),
@@ -97,7 +102,7 @@ pub(super) fn learning(validation: &Validation) -> Sheet {
         for m in &l.methods {
             let counts = [l.machines, l.trainings].map(|n| Cell::count(n as u64));
             let regrets = [m.mean_regret, m.low, m.high].map(Cell::percent);
-            sheet.push([&counts[..], &[Cell::text(&m.name)], &regrets[..]].concat(), &[]);
+            sheet.push([&counts[..], &[Cell::text(&m.name)], &regrets[..]].concat(), studied);
         }
     }
     sheet
@@ -137,10 +142,10 @@ pub(super) fn borders(held: &Held, measured: &Measured, entries: &[Entry]) -> (S
             Cell::text(if beside.crosses { "yes" } else { "no: an end of the slice stands for it" }),
         ];
         sheet.push(cells, own.as_slice());
-        let kind = kind(&beside.below, &beside.above);
+        let kind = if beside.crosses { kind(&beside.below, &beside.above) } else { KINDS.len() };
         let (measured_low, measured_high) = interval.unwrap_or((beside.measured, beside.measured));
         pairs.push(CrossingPair {
-            name: KINDS[kind].to_owned(),
+            name: KINDS.get(kind).copied().unwrap_or(APART).to_owned(),
             style: kind,
             measured: beside.measured,
             measured_low,
@@ -151,11 +156,11 @@ pub(super) fn borders(held: &Held, measured: &Measured, entries: &[Entry]) -> (S
     (sheet, Crossings { title: format!("Predicted and measured borders, {OURS}"), pairs })
 }
 
-/// The interval of the measured border between two algorithms that is nearest to a place.
+/// The interval of the measured border between two algorithms at a place. Both fits, that of the validation and that with intervals, see the
+/// same timings; where they do not agree on a border its interval is not known.
 fn interval(borders: &[Border], below: &AlgorithmId, above: &AlgorithmId, objects: f64) -> Option<(f64, f64)> {
-    let own = borders.iter().filter(|b| b.below == *below && b.above == *above);
-    let off = |b: &&Border| (b.objects / objects).ln().abs();
-    own.min_by(|a, b| off(a).total_cmp(&off(b)))?.interval()
+    let is_own = |b: &&Border| b.below == *below && b.above == *above && (b.objects / objects).ln().abs() < SAME_LN;
+    borders.iter().find(is_own)?.interval().filter(|(low, high)| (*low..=*high).contains(&objects))
 }
 
 fn kind(below: &AlgorithmId, above: &AlgorithmId) -> usize {

@@ -1,6 +1,6 @@
 //! Figures 4, 6 and 7 of the paper: time over objects, CPU against GPU, on 1..k GPUs, on 1..k threads.
 
-use super::entry::Entry;
+use super::entry::{Entry, SOFTWARE};
 use crate::plot::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
 use crate::sweep::median;
 use crate::train::{measured_fields, slice_scenario};
@@ -95,9 +95,10 @@ impl Compared {
     }
 
     fn panel(self, entry: &Entry, report: &Report, sides: &[(BackendClass, Vec<u32>)]) -> CurvePanel {
-        let threads = entry.threads();
+        let (threads, programs) = (entry.threads(), entry.programs());
+        let name = |side: &(BackendClass, Vec<u32>)| name(side, &programs);
         let scenario = slice_scenario(report).to_owned();
-        let own = only(report, |id| self.takes(id, threads));
+        let own = only(report, |id| self.takes(id, threads) && entry.profile.position(id).is_some());
         let style = |id: &AlgorithmId| sides.iter().position(|s| *s == side(id.backend())).unwrap_or_default();
         let mut series: Vec<Curve> = Vec::new();
         for (k, of) in sides.iter().enumerate() {
@@ -123,8 +124,11 @@ fn side(backend: &Backend) -> (BackendClass, Vec<u32>) {
     }
 }
 
-fn name((class, numbers): &(BackendClass, Vec<u32>)) -> String {
+fn name((class, numbers): &(BackendClass, Vec<u32>), programs: &[u32]) -> String {
     match class {
+        BackendClass::Gpu if numbers.iter().any(|g| programs.contains(g)) => {
+            format!("{}{SOFTWARE}", Backend::Gpu(numbers.clone()))
+        }
         BackendClass::Cpu if numbers[..] == [1] => "1 thread".to_owned(),
         BackendClass::Cpu => format!("{} threads", numbers[0]),
         BackendClass::Gpu => Backend::Gpu(numbers.clone()).to_string(),
@@ -134,9 +138,14 @@ fn name((class, numbers): &(BackendClass, Vec<u32>)) -> String {
 /// The report with some of its algorithms only.
 fn only(report: &Report, takes: impl Fn(&AlgorithmId) -> bool) -> Report {
     let mut own = report.clone();
-    own.algorithms.retain(|t| takes(&t.id));
-    own.points.iter_mut().for_each(|p| p.timings.retain(|t| takes(&t.algorithm)));
+    keep(&mut own, takes);
     own
+}
+
+/// Takes all but some algorithms out of a report.
+pub(crate) fn keep(report: &mut Report, takes: impl Fn(&AlgorithmId) -> bool) {
+    report.algorithms.retain(|t| takes(&t.id));
+    report.points.iter_mut().for_each(|p| p.timings.retain(|t| takes(&t.algorithm)));
 }
 
 /// At each size the median and the quartiles of the fastest of the algorithms, over the rounds.

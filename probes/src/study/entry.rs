@@ -3,7 +3,7 @@
 use crate::train::Profile;
 use sapwise::hardware::parameter;
 use sapwise::report::{Label, Provenance, Report};
-use sapwise::{AlgorithmId, BackendClass, GpuHardware, GpuKind, Hardware};
+use sapwise::{AlgorithmId, Backend, BackendClass, GpuHardware, GpuKind, Hardware};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Entry {
     /// Where it was read from.
     pub(crate) path: PathBuf,
-    /// The same without the folders that all reports share: unlike in all of them, and nothing of the machine that reads it.
+    /// The name of the file, with its folder or a number where another is called so. No path: it is of the machine that reads it.
     pub(crate) file: String,
-    /// What figures call it: the name of the file without its ending, and without folders where no other is called so.
+    /// The same without its ending.
     pub(crate) name: String,
     /// What kind of evidence it is.
     pub(crate) kind: Label,
@@ -27,11 +27,19 @@ pub(crate) struct Entry {
     pub(crate) studied: Result<(), String>,
 }
 
+/// What is said of algorithms on all cores, and of GPUs that are programs.
+pub(super) const ON_ALL_CORES: &str = " on all cores";
+pub(super) const SOFTWARE: &str = " (software)";
+
 /// A place at which algorithms were timed: the scenario and the number of objects.
 pub(super) type Place<'a> = (&'a str, u32);
 
 impl Entry {
-    pub(crate) fn new(path: &Path, file: &str, report: Report, studied: Result<(), String>) -> Self {
+    pub(crate) fn new(path: &Path, file: &str, mut report: Report, studied: Result<(), String>) -> Self {
+        let machine = &mut report.hardware.machine;
+        let of_gpus = report.hardware.gpus.iter_mut().map(|g| &mut g.gpu.name);
+        let told = [&mut machine.cpu, &mut machine.simd, &mut report.provenance.command, &mut report.provenance.version];
+        told.into_iter().chain(of_gpus).for_each(|text| *text = legible(text));
         let profile = Profile::without_crossings(file, &report);
         let measured = profile.measured.clone();
         Self {
@@ -81,6 +89,12 @@ impl Entry {
         }
     }
 
+    /// Numbers of the GPUs that are programs on the CPU.
+    pub(super) fn programs(&self) -> Vec<u32> {
+        let programs = self.hardware.gpus.iter().filter(|g| g.gpu.kind == GpuKind::Software);
+        programs.map(|g| g.gpu.index).collect()
+    }
+
     /// The most threads that an algorithm was timed on.
     pub(super) fn threads(&self) -> u32 {
         let on_cpu = self.profile.algorithms.iter().filter(|t| t.id.backend().class() == BackendClass::Cpu);
@@ -91,10 +105,11 @@ impl Entry {
     /// called on every machine.
     pub(super) fn times(&self) -> BTreeMap<String, BTreeMap<Place<'_>, f64>> {
         let threads = self.threads();
+        let programs = self.programs();
         let mut times: BTreeMap<String, BTreeMap<Place<'_>, f64>> = BTreeMap::new();
         for spot in &self.profile.points {
             for &(k, ns) in &spot.medians {
-                for name in everywhere(self.profile.id(k), threads) {
+                for name in everywhere(self.profile.id(k), threads, &programs) {
                     times.entry(name).or_default().insert((spot.scenario.as_str(), spot.load.objects), ns);
                 }
             }
@@ -103,33 +118,26 @@ impl Entry {
     }
 }
 
-/// What an algorithm is called on every machine: on one core, on all cores, which may be one, on each number of GPUs. Nothing of some
-/// but not all cores.
-fn everywhere(id: &AlgorithmId, threads: u32) -> Vec<String> {
+/// What an algorithm is called on every machine: on one core, on all cores, which may be one, on each number of GPUs; those that are `programs`
+/// are told apart, since they are the CPU again. Nothing of some but not all cores.
+fn everywhere(id: &AlgorithmId, threads: u32, programs: &[u32]) -> Vec<String> {
     let mut names = Vec::new();
-    match (id.backend().class(), id.backend().width()) {
-        (BackendClass::Cpu, width) => {
-            names.extend((width == 1).then(|| id.to_string()));
-            names.extend((width == threads).then(|| format!("{} on all cores", id.method())));
+    match id.backend() {
+        Backend::Gpu(gpus) => {
+            let software = if gpus.iter().any(|g| programs.contains(g)) { SOFTWARE } else { "" };
+            match gpus[..] {
+                // The first alone, or so many together.
+                [0] => names.push(format!("{id}{software}")),
+                [_] => {}
+                _ => names.push(format!("{} on {} GPUs{software}", id.method(), gpus.len())),
+            }
         }
-        // The first alone, or so many together.
-        (BackendClass::Gpu, 1) => names.extend((id.backend().to_string() == "gpu0").then(|| id.to_string())),
-        (BackendClass::Gpu, width) => names.push(format!("{} on {width} GPUs", id.method())),
+        other => {
+            names.extend((other.width() == 1).then(|| id.to_string()));
+            names.extend((other.width() == threads).then(|| format!("{}{ON_ALL_CORES}", id.method())));
+        }
     }
     names
-}
-
-/// Calls entries without folders where no two of them are called the same then.
-pub(crate) fn shorten(entries: &mut [Entry]) {
-    let short = |e: &Entry| e.name.rsplit('/').next().unwrap_or_default().to_owned();
-    let mut count: BTreeMap<String, usize> = BTreeMap::new();
-    entries.iter().for_each(|e| *count.entry(short(e)).or_default() += 1);
-    for entry in entries {
-        let name = short(entry);
-        if count[&name] == 1 {
-            entry.name = name;
-        }
-    }
 }
 
 /// Of each physical machine that is studied the report that has most of it; of one machine alone all reports.
@@ -147,13 +155,39 @@ pub(crate) fn representatives(entries: &[Entry]) -> Vec<usize> {
     found
 }
 
-/// The names of files without the folders that all of them share.
+/// Letters of a name, at most: one of a megabyte fills a page.
+const MOST_LETTERS: usize = 100;
+
+/// A name without what would turn the direction of the text after it, ring a bell or fill screens.
+fn legible(text: &str) -> String {
+    let turns = |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let sound = |c: char| if c.is_control() || turns(c) { char::REPLACEMENT_CHARACTER } else { c };
+    let mut short: String = text.chars().take(MOST_LETTERS).map(sound).collect();
+    if text.chars().nth(MOST_LETTERS).is_some() {
+        short.push_str("...");
+    }
+    short
+}
+
+/// Names of files, each unlike all others: those that several share have their folder before them, and a number where that does not help.
 pub(crate) fn names(files: &[PathBuf]) -> Vec<String> {
-    let parts = |path: &Path| -> Vec<String> { path.iter().map(|p| p.to_string_lossy().into_owned()).collect() };
-    let all: Vec<Vec<String>> = files.iter().map(|f| parts(&f.canonicalize().unwrap_or_else(|_| f.clone()))).collect();
-    let Some(first) = all.first() else { return Vec::new() };
-    let shared = (0..first.len()).take_while(|&k| all.iter().all(|p| p.len() > k + 1 && p[k] == first[k])).count();
-    all.iter().map(|p| p[shared..].join("/")).collect()
+    let last =
+        |path: Option<&Path>| path.and_then(Path::file_name).map(|n| legible(&n.to_string_lossy())).unwrap_or_default();
+    let short: Vec<String> = files.iter().map(|f| last(Some(f))).collect();
+    let with_folder = |k: usize| match last(files[k].parent()) {
+        folder if folder.is_empty() => short[k].clone(),
+        folder => format!("{folder}/{}", short[k]),
+    };
+    let mut count: BTreeMap<&str, usize> = BTreeMap::new();
+    short.iter().for_each(|name| *count.entry(name).or_default() += 1);
+    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    let unlike = |k: usize| {
+        let name = if count[short[k].as_str()] > 1 { with_folder(k) } else { short[k].clone() };
+        let times = seen.entry(name.clone()).or_default();
+        *times += 1;
+        if *times > 1 { format!("{name} ({times})") } else { name }
+    };
+    (0..files.len()).map(unlike).collect()
 }
 
 #[cfg(test)]
@@ -161,22 +195,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_without_shared_folders_and_unlike() {
+    fn names_are_unlike_and_no_paths() {
         let named = |paths: &[&str]| names(&paths.iter().map(PathBuf::from).collect::<Vec<_>>());
-        assert_eq!(named(&["/none/a/r.json"]), ["r.json"]);
-        assert_eq!(named(&["/none/a/r.json", "/none/b/r.json", "/none/b/c/r.json"]), ["a/r.json", "b/r.json", "b/c/r.json"]);
-        assert_eq!(named(&["/none/a/r.json", "/none/a/s.json"]), ["r.json", "s.json"]);
+        assert_eq!(named(&["/home/me/r.json", "s.json"]), ["r.json", "s.json"]);
+        assert_eq!(
+            named(&["/home/me/a/r.json", "b/r.json", "/home/a/r.json", "s.json"]),
+            ["a/r.json", "b/r.json", "a/r.json (2)", "s.json"]
+        );
+        assert_eq!(named(&["r.json", "../r.json", "/r.json"]), ["r.json", "r.json (2)", "r.json (3)"]);
         assert!(named(&[]).is_empty());
+        let long = "x".repeat(200);
+        let odd = named(&["a\u{202e}b\u{7}.json", &long]);
+        assert_eq!((odd[0].as_str(), odd[1].chars().count()), ("a\u{fffd}b\u{fffd}.json", MOST_LETTERS + 3));
     }
 
     #[test]
     fn algorithms_have_the_same_name_on_every_machine() {
-        let named = |id: &str, threads| everywhere(&id.parse().unwrap(), threads);
+        let named = |id: &str, threads| everywhere(&id.parse().unwrap(), threads, &[2]);
         assert_eq!(named("strips@cpu1", 8), ["strips@cpu1"]);
         assert_eq!(named("strips@cpu8", 8), ["strips on all cores"]);
         assert_eq!(named("strips@cpu1", 1), ["strips@cpu1", "strips on all cores"]);
         assert!(named("strips@cpu4", 8).is_empty() && named("strips@gpu1", 8).is_empty());
         assert_eq!(named("strips@gpu0", 8), ["strips@gpu0"]);
         assert_eq!(named("strips@gpu0+1", 8), ["strips on 2 GPUs"]);
+        assert_eq!(named("strips@gpu0+2", 8), ["strips on 2 GPUs (software)"]);
     }
 }

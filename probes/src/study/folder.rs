@@ -89,7 +89,7 @@ impl Folder {
     /// Names the file.
     pub(super) fn write(self, folder: &Path, page: &str, answer: Answer) -> Result<Answer> {
         if let Some(earlier) = earlier(folder)? {
-            earlier.files.iter().filter(|name| is_within(name)).for_each(|name| {
+            earlier.files.iter().filter(|name| is_ours(folder, name)).for_each(|name| {
                 // One that the user has removed already is no failure.
                 let _ = fs::remove_file(folder.join(name));
             });
@@ -135,9 +135,18 @@ fn earlier(folder: &Path) -> Result<Option<Answer>> {
     Ok(serde_json::from_str(&text).ok())
 }
 
-/// Whether a path that a file names stays in its folder. A file may come from anyone, and what it names is removed.
-fn is_within(name: &str) -> bool {
-    Path::new(name).components().all(|part| matches!(part, Component::Normal(_)))
+/// Whether a file that `study.json` names is one that a study writes, in a folder and not behind a link. The file may come from anyone, and
+/// what it names is removed.
+fn is_ours(folder: &Path, name: &str) -> bool {
+    if name == PAGE {
+        return true;
+    }
+    let Some((part, file)) = name.split_once('/') else { return false };
+    let ending = Path::new(file).extension().and_then(|e| e.to_str());
+    let known =
+        (part == FIGURES && matches!(ending, Some("svg" | "png" | "csv"))) || (part == TABLES && ending == Some("csv"));
+    let plain = matches!(Path::new(file).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
+    known && plain && fs::symlink_metadata(folder.join(part)).is_ok_and(|found| found.is_dir())
 }
 
 #[cfg(test)]
@@ -168,16 +177,29 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join("study").join(name);
         fs::create_dir_all(path(FIGURES)).unwrap();
-        for name in ["figures/old.svg", "figures/mine.svg", "../outside"] {
+        for name in ["figures/old.svg", "figures/mine.svg", "figures/mine.txt", "mine.csv", "../outside"] {
             fs::write(path(name), name).unwrap();
         }
-        fs::write(path(ANSWER), answer(&["figures/old.svg", "../outside", "/etc/none", "figures/gone.svg"])).unwrap();
+        fs::write(
+            path(ANSWER),
+            answer(&[
+                "figures/old.svg",
+                "figures/mine.txt",
+                "mine.csv",
+                "figures/../mine.csv",
+                "../outside",
+                "figures/gone.svg",
+            ]),
+        )
+        .unwrap();
         prepare(&path("")).unwrap();
         let mut new = Folder::new(vec!["R1".to_owned()], "sapwise study".to_owned());
         new.table("machines", "", Sheet::new([("a", "a")])).unwrap();
         new.write(&path(""), "<html>", Answer::default()).unwrap();
         assert!(!path("figures/old.svg").exists());
-        assert!(path("figures/mine.svg").exists() && path("../outside").exists());
+        for name in ["figures/mine.svg", "figures/mine.txt", "mine.csv", "../outside"] {
+            assert!(path(name).exists(), "{name}");
+        }
         assert_eq!(earlier(&path("")).unwrap().unwrap().files, ["tables/machines.csv", PAGE]);
         assert_eq!(fs::read_to_string(path("tables/machines.csv")).unwrap(), "a\n");
     }

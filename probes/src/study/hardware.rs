@@ -8,6 +8,9 @@ use sapwise::hardware::{How, parameter};
 use sapwise::report::Label;
 use sapwise::{GpuHardware, Parameter};
 
+/// Letters of a value that is sound, at most.
+const MOST_LETTERS: usize = 24;
+
 /// The rows of the paper's table, in its order, with what each is called here.
 const PAPER: [(&str, &str); 7] = [
     ("CPU to GPU", gpu::UPLOAD_GB_PER_S),
@@ -95,7 +98,12 @@ fn present<'a>(names: Vec<String>, lists: impl Iterator<Item = &'a [Parameter]> 
 fn cell(name: &str, parameters: &[Parameter]) -> Cell {
     match parameters.iter().find(|p| p.name == name) {
         None => Cell::Missing("the report does not have it".to_owned()),
-        Some(Parameter { value: Some(value), .. }) => Cell::Number { value: *value, shown: summary::value(name, *value) },
+        Some(Parameter { value: Some(value), .. }) => {
+            let shown = summary::value(name, *value);
+            // A value that can't be, such as 1e300, has hundreds of digits.
+            let shown = if shown.len() > MOST_LETTERS { format!("{value:e}") } else { shown };
+            Cell::Number { value: *value, shown }
+        }
         Some(p) if p.how == How::Missing => Cell::Missing(p.source.clone()),
         Some(_) => Cell::Missing("the report holds no value".to_owned()),
     }

@@ -5,6 +5,7 @@ use super::rank::{self, Rank};
 use super::speed::slownesses;
 use crate::train::{Effect, Importance, Verdict, measured_borders};
 use rayon::prelude::*;
+use sapwise::Backend;
 use sapwise::hardware::{gpu, parameter};
 use sapwise::model::GPU_PREFIX;
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,6 +18,8 @@ const MOST_MACHINES: usize = 200;
 pub(super) enum On {
     /// The time of an algorithm, by what it is called on every machine.
     Algorithm(String),
+    /// The times of a method on a class of processor, on any number of threads or GPUs, over what is predicted for them.
+    Method(String),
     /// The place of a border between two sides.
     Border(String),
     /// The regret of what is chosen.
@@ -43,9 +46,9 @@ pub(super) struct Link {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Influence {
     pub(super) links: Vec<Link>,
-    /// Physical machines behind the ranks.
+    /// Physical machines that are studied.
     pub(super) machines: usize,
-    /// The reports that stand for them, by position.
+    /// The reports that stand for those behind the ranks, by position; of many machines some, evenly taken.
     pub(super) reports: Vec<usize>,
 }
 
@@ -62,13 +65,13 @@ impl Influence {
         let machines: BTreeSet<&str> = all.iter().map(|&k| entries[k].machine()).collect();
         // Reports of one machine alone are not many machines.
         let reports = if machines.len() > 1 { all } else { all.into_iter().take(1).collect() };
+        let machines = machines.len();
         let step = reports.len().div_ceil(MOST_MACHINES).max(1);
         let reports: Vec<usize> = reports.into_iter().step_by(step).collect();
         let chosen: Vec<&Entry> = reports.iter().map(|&k| &entries[k]).collect();
         let mut outcomes: BTreeMap<On, Vec<Option<f64>>> =
             slownesses(&chosen).into_iter().map(|(name, values)| (On::Algorithm(name), values)).collect();
-        let borders: Vec<BTreeMap<String, f64>> =
-            chosen.par_iter().map(|e| measured_borders(&e.profile).into_iter().collect()).collect();
+        let borders: Vec<BTreeMap<String, f64>> = chosen.par_iter().map(|e| borders_of(e)).collect();
         let names: BTreeSet<&String> = borders.iter().flat_map(BTreeMap::keys).collect();
         for name in names {
             outcomes.insert(On::Border(name.clone()), borders.iter().map(|b| b.get(name).copied()).collect());
@@ -86,13 +89,16 @@ impl Influence {
             .collect();
         rank::judge(&mut ranks.iter_mut().flatten().collect::<Vec<_>>());
         let mut links: Vec<Link> =
-            cells.iter().zip(ranks).map(|(&(k, on), rank)| link(&parameters[k], on, rank, importance)).collect();
-        for (link, &(k, on)) in links.iter_mut().zip(&cells).filter(|(link, _)| link.effect.is_none()) {
-            let On::Algorithm(name) = on else { continue };
-            let left = importance.zip(method(name)).and_then(|(i, method)| i.left_ln.get(&method));
-            let Some(left) = left else { continue };
-            let both = chosen.iter().zip(&values[k]).filter_map(|(e, value)| Some(((*value)?, *left.get(e.machine())?)));
-            link.left = Rank::of(&both.collect::<Vec<_>>());
+            cells.into_iter().zip(ranks).map(|((k, on), rank)| link(&parameters[k], on.clone(), rank, importance)).collect();
+        for (name, left) in importance.iter().flat_map(|i| &i.left_ln) {
+            for (parameter, values) in parameters.iter().zip(&values) {
+                let mut link = link(parameter, On::Method(name.clone()), None, importance);
+                if link.effect.is_none() {
+                    let of = |(e, value): (&&Entry, &Option<f64>)| Some(((*value)?, *left.get(e.machine())?));
+                    link.left = Rank::of(&chosen.iter().zip(values).filter_map(of).collect::<Vec<_>>());
+                }
+                links.push(link);
+            }
         }
         rank::judge(&mut links.iter_mut().filter_map(|l| l.left.as_mut()).collect::<Vec<_>>());
         // Ranks see what goes together, whatever the cause; the two others what a parameter adds to those that predictions read.
@@ -101,14 +107,14 @@ impl Influence {
                 [link.effect.as_ref().map(|e| e.verdict), link.left.map(|r| r.verdict), link.rank.map(|r| r.verdict)];
             link.verdict = verdicts.into_iter().flatten().next().unwrap_or(Verdict::CannotBeTold);
         }
-        links.retain(|link| link.rank.is_some() || link.effect.is_some());
+        links.retain(|link| link.rank.is_some() || link.effect.is_some() || link.left.is_some());
         for of in importance.iter().flat_map(|i| &i.parameters).filter(|p| p.regret_rise.is_told()) {
             let effect = of.regret_rise.clone();
             let verdict = effect.verdict;
             let parameter = of.parameter.clone();
             links.push(Link { parameter, on: On::Choice, rank: None, effect: Some(effect), left: None, verdict });
         }
-        Self { links, machines: chosen.len(), reports }
+        Self { links, machines, reports }
     }
 
     /// The link of a parameter with an outcome, where it was looked at.
@@ -117,23 +123,21 @@ impl Influence {
     }
 }
 
-fn link(parameter: &str, on: &On, rank: Option<Rank>, importance: Option<&Importance>) -> Link {
-    let of = importance.and_then(|i| i.parameters.iter().find(|p| p.parameter == parameter));
-    let effect = of.and_then(|of| match on {
-        On::Algorithm(name) => {
-            let method = method(name)?;
-            of.algorithms.iter().find(|a| a.algorithm == method).map(|a| a.distance_rise_ln.clone())
-        }
-        On::Border(name) => of.borders.iter().find(|b| b.border == *name).map(|b| b.error_rise_octaves.clone()),
-        On::Choice => None,
-    });
-    let effect = effect.filter(Effect::is_told);
-    Link { parameter: parameter.to_owned(), on: on.clone(), rank, effect, left: None, verdict: Verdict::CannotBeTold }
+/// Where sides give way to each other on a machine. A program that acts as a GPU is no side against the CPU.
+fn borders_of(entry: &Entry) -> BTreeMap<String, f64> {
+    let mut profile = entry.profile.clone();
+    let programs = entry.programs();
+    profile.retain(|t| !matches!(t.id.backend(), Backend::Gpu(gpus) if gpus.iter().any(|g| programs.contains(g))));
+    measured_borders(&profile).into_iter().collect()
 }
 
-/// The method on its class of processor, as importance names it.
-fn method(name: &str) -> Option<String> {
-    let (method, rest) = name.split_once('@').or_else(|| name.split_once(" on "))?;
-    let class = if rest.contains("gpu") || rest.contains("GPU") { "GPU" } else { "CPU" };
-    Some(format!("{method} on the {class}"))
+fn link(parameter: &str, on: On, rank: Option<Rank>, importance: Option<&Importance>) -> Link {
+    let of = importance.and_then(|i| i.parameters.iter().find(|p| p.parameter == parameter));
+    let effect = of.and_then(|of| match &on {
+        On::Method(name) => of.algorithms.iter().find(|a| a.algorithm == *name).map(|a| a.distance_rise_ln.clone()),
+        On::Border(name) => of.borders.iter().find(|b| b.border == *name).map(|b| b.error_rise_octaves.clone()),
+        On::Algorithm(_) | On::Choice => None,
+    });
+    let effect = effect.filter(Effect::is_told);
+    Link { parameter: parameter.to_owned(), on, rank, effect, left: None, verdict: Verdict::CannotBeTold }
 }

@@ -3,7 +3,7 @@
 use super::entry::Entry;
 use crate::plot::{FieldMap, MapCell, MapPanel, MapPoint};
 use crate::random::Random;
-use crate::train::{Profile, available, measured_costs, without};
+use crate::train::{Profile, available, average, measured_costs, without};
 use anyhow::Result;
 use rayon::prelude::*;
 use sapwise::measure::statistics::median;
@@ -22,8 +22,9 @@ pub(super) struct Map {
     pub(super) figure: FieldMap,
     /// What was left out of the training of the prediction, in words.
     pub(super) held_out: String,
-    /// Mean regret of the predicted choices at the points, and how many points there are.
-    pub(super) regret: f64,
+    /// Mean regret of the predicted choices at the points where the choice was timed, how many these are, and of how many; none of none.
+    pub(super) regret: Option<f64>,
+    pub(super) known: usize,
     pub(super) points: usize,
     /// Share of the cells in which both choose the same.
     pub(super) agreeing: f64,
@@ -90,14 +91,13 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
     };
     let [at_measured, at_predicted] = points;
     let count = at_measured.len();
-    let panels = vec![
-        panel("measured", by_measured, at_measured),
-        panel("predicted", by_predicted, at_predicted),
-    ];
+    let panels = vec![panel("measured", by_measured, at_measured), panel("predicted", by_predicted, at_predicted)];
     let names = ids.iter().enumerate().map(|(k, id)| (id.to_string(), k)).collect();
     let title = format!("Fields over objects and density: {}", entry.name);
     let figure = FieldMap { title, names, x, y, y_name: "overlapping pairs of an object".to_owned(), panels };
-    Ok(Map { figure, held_out, regret: crate::train::average(&regrets), points: count, agreeing })
+    let (known, points) = (regrets.len(), count);
+    let regret = (known > 0).then(|| average(&regrets));
+    Ok(Map { figure, held_out, regret, known, points, agreeing })
 }
 
 /// The load of so many unit cubes spread evenly, with so many pairs an object.

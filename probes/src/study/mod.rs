@@ -25,8 +25,8 @@ use sapwise::Report;
 use std::path::Path;
 
 pub(crate) use answer::{Answer, Read};
-pub(crate) use curves::Compared;
-pub(crate) use entry::{Entry, names, representatives, shorten};
+pub(crate) use curves::{Compared, keep};
+pub(crate) use entry::{Entry, names, representatives};
 pub(crate) use folder::{PAGE, prepare};
 
 /// What was read and fitted.

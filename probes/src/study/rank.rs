@@ -1,9 +1,16 @@
 //! Whether two figures of machines rise together: Spearman's rank correlation, with what its interval says.
 
 use crate::train::Verdict;
+use crate::turns::Turns;
 
 /// Machines below which nothing is told; the interval needs four.
 pub(super) const FEWEST_MACHINES: usize = 5;
+/// Machines up to which the chance is taken from orders: with few of them the normal distribution calls every perfect order a link.
+const FEW: usize = 10;
+/// Orders in which the machines exchange one figure.
+const ORDERS: usize = 20_000;
+/// Seed of these orders.
+const SEED: u64 = 1;
 /// Quantile of the normal distribution for either end of a 90 % interval.
 const INTERVAL: f64 = 1.645;
 /// A correlation within this is none that matters: it tells less than a tenth of the variance of the ranks.
@@ -41,10 +48,23 @@ impl Rank {
         let error = ((1.0 + correlation * correlation / 2.0) / over).sqrt();
         let end = |sign: f64| (z + sign * INTERVAL * error).tanh();
         // Without a link the variance of the transform is 1.06 over n - 3 (Fieller, Hartley and Pearson 1957).
-        let chance = libm::erfc(z.abs() / (2.0 * 1.06 / over).sqrt());
+        let chance = match pairs.len() {
+            ..=FEW => by_orders(&x, &y, correlation),
+            _ => libm::erfc(z.abs() / (2.0 * 1.06 / over).sqrt()),
+        };
         let (low, high) = (end(-1.0), end(1.0));
         Some(Self { correlation, low, high, machines: pairs.len(), chance, verdict: Verdict::CannotBeTold })
     }
+}
+
+/// The share of orders of one side that correlate as much; the order that was found is one of them.
+fn by_orders(x: &[f64], y: &[f64], found: f64) -> f64 {
+    let mut turns = Turns::new(SEED);
+    let as_much = |_: &usize| {
+        let other: Vec<f64> = turns.order(y.len()).into_iter().map(|k| y[k]).collect();
+        correlation(x, &other).is_some_and(|c| c.abs() >= found.abs() - 1e-9)
+    };
+    (1 + (0..ORDERS).filter(as_much).count()) as f64 / (1 + ORDERS) as f64
 }
 
 /// Gives the verdicts. Of those called linked a tenth is expected to be none (Benjamini and Hochberg 1995), however many are looked at.
@@ -118,6 +138,16 @@ mod tests {
         judge(&mut found.iter_mut().collect::<Vec<_>>());
         let verdicts: Vec<Verdict> = found.iter().map(|f| f.verdict).collect();
         assert_eq!(verdicts, [Verdict::Linked, Verdict::NotLinked, Verdict::CannotBeTold], "{found:?}");
+    }
+
+    #[test]
+    fn of_few_machines_noise_gives_no_links() {
+        for machines in [5, 6, 8] {
+            let mut found: Vec<Rank> = (0..300).map(|k| Rank::of(&pairs(machines, 0.0, k)).unwrap()).collect();
+            judge(&mut found.iter_mut().collect::<Vec<_>>());
+            let linked = found.iter().filter(|f| f.verdict == Verdict::Linked).count();
+            assert!(linked <= 1, "{linked} of {machines} machines");
+        }
     }
 
     #[test]

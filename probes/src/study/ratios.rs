@@ -60,7 +60,7 @@ impl<'a> Comparison<'a> {
                 sheet.push([heads("parameter", &name), figures.to_vec()].concat(), &[self.reference, *k]);
             }
             for (name, s) in speed_ups {
-                let figures = [s.mean, s.low, s.high].map(|r| Cell::number(r, 3)).to_vec();
+                let figures = [s.median, s.low, s.high].map(|r| Cell::number(r, 3)).to_vec();
                 let cells = [heads("speed-up", name), figures, vec![Cell::count(s.places as u64)]].concat();
                 sheet.push(cells, &[self.reference, *k]);
             }
@@ -84,7 +84,7 @@ impl<'a> Comparison<'a> {
         }
         let names: BTreeSet<&String> = drawn.iter().flat_map(|(_, s)| s.keys()).collect();
         for name in names {
-            let value = |s: &SpeedUp| RatioValue { ratio: s.mean, low: Some(s.low), high: Some(s.high) };
+            let value = |s: &SpeedUp| RatioValue { ratio: s.median, low: Some(s.low), high: Some(s.high) };
             let values = drawn.iter().map(|(_, speed_ups)| speed_ups.get(name).map(value)).collect();
             groups.push(RatioGroup { name: name.clone(), kind: RatioKind::Algorithm, values });
         }

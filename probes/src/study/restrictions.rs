@@ -1,20 +1,24 @@
 //! What it does to each algorithm when one thing is taken from a machine: pairs of its own reports that differ in nothing else.
 //!
-//! Between machines parameters go together. Here one is changed on purpose and the rest stays, so a link is a cause, on this machine.
+//! Between machines parameters go together. Here one thing is changed on purpose. Pairs also differ in when they were measured, so a link
+//! needs several of them, each with a report of its own to compare with.
 
-use super::entry::Entry;
+use super::entry::{Entry, ON_ALL_CORES};
 use super::speed::{LARGE, speed_ups};
 use crate::train::{Verdict, average};
 use sapwise::report::{Proof, Restricted};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Pairs of reports that a verdict needs: two drift the same way by chance in every second case.
+const FEWEST_PAIRS: usize = 3;
 /// A change of a time that matters, as a natural logarithm: 5 %. Reports of one machine differ by 2 to 3 % by themselves.
 const LEAST_LN: f64 = 0.05;
 
 /// What taking one thing does to one algorithm, over all pairs of reports of a machine.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Effect {
-    pub(super) taken: Restricted,
+    /// What was taken, with how much of it where there are several levels.
+    pub(super) taken: String,
     pub(super) algorithm: String,
     /// Whether of frames with 1000 objects or more, or of those with fewer.
     pub(super) large: bool,
@@ -31,10 +35,15 @@ pub(super) struct Effect {
 /// How far a parameter shows that something was taken: its value with over that without, over the pairs.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Shown {
-    pub(super) taken: Restricted,
+    pub(super) taken: String,
     pub(super) parameter: String,
+    /// Geometric mean, least and most over the pairs.
     pub(super) ratio: f64,
+    pub(super) least: f64,
+    pub(super) most: f64,
     pub(super) pairs: usize,
+    /// Positions of the reports.
+    pub(super) reports: Vec<usize>,
 }
 
 /// The machine, what was taken, the algorithm, and whether of large frames.
@@ -43,55 +52,68 @@ type Key<'a> = (&'a str, String, String, bool);
 /// Two reports of which the second one has one thing less.
 struct Pair {
     taken: Restricted,
+    /// With its level.
+    name: String,
     without: usize,
     with: usize,
 }
 
-/// The effects of every restriction on every algorithm, and what the parameters show of them.
+/// The effects of every restriction on every algorithm, and what the parameters show of them. Pairs whose parameters do not show that
+/// anything was taken are left out: what they lack can't be told from what they have.
 pub(super) fn effects(entries: &[Entry]) -> (Vec<Effect>, Vec<Shown>) {
-    let mut found: BTreeMap<Key<'_>, (Restricted, Vec<f64>, BTreeSet<usize>)> = BTreeMap::new();
-    let mut shown: BTreeMap<(String, String), (Restricted, Vec<f64>)> = BTreeMap::new();
+    let mut found: BTreeMap<Key<'_>, (Vec<f64>, BTreeSet<usize>)> = BTreeMap::new();
+    let mut shown: BTreeMap<(String, String), (Vec<f64>, BTreeSet<usize>)> = BTreeMap::new();
     for pair in pairs(entries) {
         let (without, with) = (&entries[pair.without], &entries[pair.with]);
+        for (parameter, ratio) in shown_by(with, pair.taken) {
+            let (ratios, reports) = shown.entry((pair.name.clone(), parameter)).or_default();
+            ratios.push(ratio.ln());
+            reports.extend([pair.without, pair.with]);
+        }
+        if !is_shown(with, pair.taken) {
+            continue;
+        }
+        // On one core all cores are that one, which has rows of its own.
+        let one_core = without.threads() == 1 && with.threads() == 1;
         for (sizes, large) in [(0..LARGE, false), (LARGE..u32::MAX, true)] {
             for (algorithm, speed_up) in speed_ups(without, with, sizes) {
-                let key = (with.machine(), pair.taken.to_string(), algorithm, large);
-                let (_, effects, reports) = found.entry(key).or_insert_with(|| (pair.taken, Vec::new(), BTreeSet::new()));
-                effects.push(-speed_up.mean.ln());
+                if one_core && algorithm.ends_with(ON_ALL_CORES) {
+                    continue;
+                }
+                let (effects, reports) = found.entry((with.machine(), pair.name.clone(), algorithm, large)).or_default();
+                effects.push(-speed_up.median.ln());
                 reports.extend([pair.without, pair.with]);
             }
         }
-        for (parameter, ratio) in shown_by(with, pair.taken) {
-            let key = (pair.taken.to_string(), parameter);
-            shown.entry(key).or_insert_with(|| (pair.taken, Vec::new())).1.push(ratio);
-        }
     }
-    let effects = found.into_iter().map(|((_, _, algorithm, large), (taken, effects, reports))| {
-        let (least, most) = effects.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), e| (a.min(*e), b.max(*e)));
-        Effect {
-            taken,
-            algorithm,
-            large,
-            slowdown: average(&effects).exp(),
-            least: least.exp(),
-            most: most.exp(),
-            pairs: effects.len(),
-            verdict: verdict(&effects),
-            reports: reports.into_iter().collect(),
-        }
+    let effects = found.into_iter().map(|((_, taken, algorithm, large), (effects, reports))| {
+        let [slowdown, least, most] = over_pairs(&effects);
+        let verdict = verdict(&effects);
+        let (pairs, reports) = (effects.len(), reports.into_iter().collect());
+        Effect { taken, algorithm, large, slowdown, least, most, pairs, verdict, reports }
     });
-    let shown = shown.into_iter().map(|((_, parameter), (taken, ratios))| Shown {
-        taken,
-        parameter,
-        ratio: average(&ratios.iter().map(|r| r.ln()).collect::<Vec<_>>()).exp(),
-        pairs: ratios.len(),
+    let shown = shown.into_iter().map(|((taken, parameter), (logs, reports))| {
+        let [ratio, least, most] = over_pairs(&logs);
+        Shown { taken, parameter, ratio, least, most, pairs: logs.len(), reports: reports.into_iter().collect() }
     });
     (effects.collect(), shown.collect())
 }
 
-/// Linked where the same is seen in every pair, and not linked where nothing is seen in any. One pair can't be told from chance.
+/// Geometric mean, least and most of ratios whose logarithms these are.
+fn over_pairs(logs: &[f64]) -> [f64; 3] {
+    let (least, most) = logs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), ln| (a.min(*ln), b.max(*ln)));
+    [average(logs), least, most].map(f64::exp)
+}
+
+/// Whether the parameters of a report show that this was taken.
+fn is_shown(entry: &Entry, taken: Restricted) -> bool {
+    let mut proofs = entry.provenance.restriction.iter().flat_map(|r| &r.proof);
+    proofs.any(|p| p.kind == taken && p.shows)
+}
+
+/// Linked where the same is seen in every pair, and not linked where nothing is seen in any. A few pairs can't be told from chance.
 fn verdict(effects: &[f64]) -> Verdict {
-    let all = |holds: &dyn Fn(f64) -> bool| effects.len() > 1 && effects.iter().all(|e| holds(*e));
+    let all = |holds: &dyn Fn(f64) -> bool| effects.len() >= FEWEST_PAIRS && effects.iter().all(|e| holds(*e));
     if all(&|e| e >= LEAST_LN) || all(&|e| e <= -LEAST_LN) {
         Verdict::Linked
     } else if all(&|e| e.abs() < LEAST_LN) {
@@ -123,7 +145,7 @@ fn pairs(entries: &[Entry]) -> Vec<Pair> {
         for &without in &own {
             for &with in &own {
                 let taken = taken(&entries[without], &entries[with]);
-                found.extend(taken.map(|taken| Pair { taken, without, with }));
+                found.extend(taken.map(|taken| Pair { taken, name: name(taken, &entries[with]), without, with }));
             }
         }
     }
@@ -150,6 +172,17 @@ fn taken(without: &Entry, with: &Entry) -> Option<Restricted> {
     (others_stay && before.iter().all(|kind| level(without, *kind) == level(with, *kind))).then_some(taken)
 }
 
+/// What was taken, and down to which level.
+fn name(taken: Restricted, with: &Entry) -> String {
+    let level = match taken {
+        Restricted::Threads => with.provenance.threads.map(|k| k.to_string()),
+        Restricted::Simd => with.provenance.simd.clone(),
+        Restricted::GpuThreads => with.provenance.gpu_threads.map(|k| k.to_string()),
+        Restricted::ContendedMemory | Restricted::ContendedCache => None,
+    };
+    level.map_or_else(|| taken.to_string(), |level| format!("{taken}: {level} left"))
+}
+
 fn kinds(entry: &Entry) -> Vec<Restricted> {
     entry.provenance.restriction.as_ref().map_or(Vec::new(), |r| r.kinds.clone())
 }
@@ -161,9 +194,9 @@ mod tests {
     #[test]
     fn a_link_is_seen_in_every_pair() {
         assert_eq!(verdict(&[0.2, 0.06, 0.4]), Verdict::Linked);
-        assert_eq!(verdict(&[-0.2, -0.06]), Verdict::Linked);
-        assert_eq!(verdict(&[0.02, -0.01]), Verdict::NotLinked);
-        for unclear in [&[0.2][..], &[0.2, 0.01], &[0.2, -0.2], &[]] {
+        assert_eq!(verdict(&[-0.2, -0.06, -0.1]), Verdict::Linked);
+        assert_eq!(verdict(&[0.02, -0.01, 0.0]), Verdict::NotLinked);
+        for unclear in [&[0.2, 0.2][..], &[0.2, 0.1, 0.01], &[0.2, 0.1, -0.2], &[]] {
             assert_eq!(verdict(unclear), Verdict::CannotBeTold);
         }
     }

@@ -9,14 +9,15 @@ use std::ops::Range;
 const FEWEST_PLACES: usize = 5;
 /// Objects from which on a frame is large: below, fork and join and the clock make up most of it, and above, the work does.
 pub(super) const LARGE: u32 = 1000;
-/// Rounds of fitting machines and places in turn; the effects stand still to a thousandth after ten.
-const ROUNDS: usize = 20;
+/// Rounds of fitting machines and places in turn, at most, and the step at which the effects stand still.
+const MOST_ROUNDS: usize = 500;
+const STILL_LN: f64 = 1e-7;
 
 /// A speed over that of another machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SpeedUp {
-    /// Geometric mean over the places that both have.
-    pub(super) mean: f64,
+    /// Median over the places that both have.
+    pub(super) median: f64,
     /// First and third quartile over them.
     pub(super) low: f64,
     pub(super) high: f64,
@@ -33,9 +34,8 @@ pub(super) fn speed_ups(reference: &Entry, other: &Entry, sizes: Range<u32>) -> 
         if ratios.len() < FEWEST_PLACES {
             return None;
         }
-        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
         let at = |share| quantile(&ratios, share).map(f64::exp);
-        Some((name, SpeedUp { mean: mean.exp(), low: at(0.25)?, high: at(0.75)?, places: ratios.len() }))
+        Some((name, SpeedUp { median: at(0.5)?, low: at(0.25)?, high: at(0.75)?, places: ratios.len() }))
     };
     before.into_iter().filter_map(of).collect()
 }
@@ -52,20 +52,10 @@ pub(super) fn slownesses(entries: &[&Entry]) -> BTreeMap<String, Vec<Option<f64>
 }
 
 fn effects(times: &[Option<&BTreeMap<Place<'_>, f64>>]) -> Vec<Option<f64>> {
-    let mut machines_at: BTreeMap<Place<'_>, usize> = BTreeMap::new();
-    times.iter().flatten().flat_map(|t| t.keys()).for_each(|place| *machines_at.entry(*place).or_default() += 1);
-    // A place that one machine has alone says nothing about the others.
-    let rows: Vec<Vec<(Place<'_>, f64)>> = times
-        .iter()
-        .map(|t| {
-            let large = t.iter().flat_map(|t| t.iter()).filter(|(place, _)| place.1 >= LARGE);
-            let shared = large.filter(|(place, _)| machines_at[*place] > 1);
-            shared.map(|(place, ns)| (*place, ns.ln())).collect()
-        })
-        .map(|row: Vec<_>| if row.len() < FEWEST_PLACES { Vec::new() } else { row })
-        .collect();
+    let rows = times.iter().map(|t| large(t.iter().copied().flatten())).collect();
+    let rows: Vec<Vec<(Place<'_>, f64)>> = connected(rows);
     let mut effects = vec![0.0; rows.len()];
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_ROUNDS {
         let mut places: BTreeMap<Place<'_>, (f64, f64)> = BTreeMap::new();
         for (row, effect) in rows.iter().zip(&effects) {
             for (place, ln) in row {
@@ -73,12 +63,57 @@ fn effects(times: &[Option<&BTreeMap<Place<'_>, f64>>]) -> Vec<Option<f64>> {
                 (*sum, *count) = (*sum + ln - effect, *count + 1.0);
             }
         }
+        let mut moved = 0.0_f64;
         for (row, effect) in rows.iter().zip(&mut effects).filter(|(row, _)| !row.is_empty()) {
             let off = |(place, ln): &(Place<'_>, f64)| ln - places[place].0 / places[place].1;
-            *effect = row.iter().map(off).sum::<f64>() / row.len() as f64;
+            let now = row.iter().map(off).sum::<f64>() / row.len() as f64;
+            moved = moved.max((now - *effect).abs());
+            *effect = now;
+        }
+        if moved < STILL_LN {
+            break;
         }
     }
     effects.into_iter().zip(&rows).map(|(effect, row)| (!row.is_empty()).then_some(effect)).collect()
+}
+
+/// The logarithms of the times at places with many objects.
+fn large<'a, 'b: 'a>(times: impl Iterator<Item = (&'a Place<'b>, &'a f64)>) -> Vec<(Place<'b>, f64)> {
+    times.filter(|(place, _)| place.1 >= LARGE).map(|(place, ns)| (*place, ns.ln())).collect()
+}
+
+/// The rows of the largest group of machines that can be compared, through others where they share no place themselves; the others empty.
+/// A place that one machine has alone says nothing, and neither does a machine with few places.
+fn connected<'a>(mut rows: Vec<Vec<(Place<'a>, f64)>>) -> Vec<Vec<(Place<'a>, f64)>> {
+    loop {
+        let mut machines_at: BTreeMap<Place<'a>, usize> = BTreeMap::new();
+        rows.iter().flatten().for_each(|(place, _)| *machines_at.entry(*place).or_default() += 1);
+        let before: usize = rows.iter().map(Vec::len).sum();
+        for row in &mut rows {
+            row.retain(|(place, _)| machines_at[place] > 1);
+            if row.len() < FEWEST_PLACES {
+                row.clear();
+            }
+        }
+        if rows.iter().map(Vec::len).sum::<usize>() == before {
+            break;
+        }
+    }
+    let mut groups: Vec<(BTreeSet<Place<'a>>, Vec<usize>)> = Vec::new();
+    for (k, row) in rows.iter().enumerate().filter(|(_, row)| !row.is_empty()) {
+        let mut joined = (row.iter().map(|(place, _)| *place).collect::<BTreeSet<_>>(), vec![k]);
+        for group in std::mem::take(&mut groups) {
+            if group.0.is_disjoint(&joined.0) {
+                groups.push(group);
+            } else {
+                joined.0.extend(group.0);
+                joined.1.extend(group.1);
+            }
+        }
+        groups.push(joined);
+    }
+    let largest = groups.into_iter().max_by_key(|g| g.1.len()).map_or(Vec::new(), |g| g.1);
+    rows.into_iter().enumerate().map(|(k, row)| if largest.contains(&k) { row } else { Vec::new() }).collect()
 }
 
 #[cfg(test)]
@@ -102,5 +137,9 @@ mod tests {
         let ratio = |a: usize, b: usize| (found[a].unwrap() - found[b].unwrap()).exp();
         assert!((ratio(1, 0) - 3.0).abs() < 0.01 && (ratio(2, 1) - 3.0).abs() < 0.01, "{found:?}");
         assert_eq!(&found[3..], [None, None]);
+        // Two that share places with each other alone can't be compared with the three.
+        let apart = [machine(2.0, &[20, 21, 22, 23, 24]), machine(4.0, &[20, 21, 22, 23, 24])];
+        let found = effects(&all[..3].iter().chain(&apart).map(Some).collect::<Vec<_>>());
+        assert!(found[..3].iter().all(Option::is_some) && found[3..] == [None, None], "{found:?}");
     }
 }

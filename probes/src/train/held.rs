@@ -6,7 +6,7 @@ use super::scores::{Judged, names};
 use super::validate::OURS;
 use super::yardstick::average;
 use sapwise::{AlgorithmCost, BackendClass};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Times of a profile that are kept, about.
 const TIMES_OF_PROFILE: usize = 40;
@@ -80,20 +80,14 @@ impl Held {
         let step = times.len().div_ceil(MOST_TIMES).max(1);
         let regrets = names(all).into_iter().map(|name| {
             let own = all.iter().filter(|j| j.name == name);
-            if !by_machine {
-                return (name, own.map(|j| j.regret.mean).collect());
-            }
-            let mut machines: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-            own.for_each(|j| machines.entry(&j.machine).or_default().push(j.regret.mean));
-            (name, machines.values().map(|m| average(m)).collect())
+            let mut units: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+            own.for_each(|j| units.entry(j.unit(by_machine)).or_default().push(j.regret.mean));
+            (name, units.values().map(|m| average(m)).collect())
         });
         let regrets = regrets.collect();
         let ours = all.iter().filter(|j| j.name == OURS);
-        let mut units: Vec<String> = ours.map(|j| if by_machine { &j.machine } else { &j.file }).cloned().collect();
-        if by_machine {
-            units.sort_unstable();
-            units.dedup();
-        }
+        let units: BTreeSet<&str> = ours.map(|j| j.unit(by_machine)).collect();
+        let units = units.into_iter().map(str::to_owned).collect();
         Self { times: times.into_iter().step_by(step).collect(), regrets, units, by_machine, borders }
     }
 }

@@ -22,6 +22,14 @@ pub(super) struct Judged {
     pub(super) crossings: Option<Vec<f64>>,
 }
 
+impl Judged {
+    /// What one regret is told of: the machine, or the profile of the only one, which is left out more than once, with its vectors and
+    /// with its threads.
+    pub(super) fn unit(&self, by_machine: bool) -> &str {
+        if by_machine { &self.machine } else { &self.file }
+    }
+}
+
 /// The scores of every way. Every physical machine counts the same, its profiles sharing its weight.
 pub(super) fn scores(all: &[Judged]) -> Vec<MethodScore> {
     let mut score: Vec<MethodScore> = names(all).into_iter().map(|name| score(all, name)).collect();

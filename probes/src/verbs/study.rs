@@ -3,11 +3,12 @@
 use crate::args::Study as Arguments;
 use crate::document::{read_report, report_files};
 use crate::exit::{Outcome, WrongUsage};
+use crate::output;
 use crate::progress::Progress;
 use crate::study::{self, Answer, Compared, Entry, PAGE, Study};
-use crate::table::columns;
+use crate::table::count;
+use crate::terminal::Terminal;
 use crate::train::{self, Evidence, Held, Profile, Selection};
-use crate::{interrupt, output};
 use anyhow::bail;
 use rayon::prelude::*;
 use sapwise::{Border, Report};
@@ -27,7 +28,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let Read { mut entries, selection, unreadable } = read(&files, &names, evidence)?;
     let (profiles, mut notes) = selection.clone().finish();
     tell_studied(&mut entries, &profiles, &notes);
-    study::shorten(&mut entries);
     let importance = match profiles.is_empty() {
         true => Err("no report can be studied".to_owned()),
         false => train::importance(&profiles).map_err(|why| format!("{why:#}")),
@@ -63,7 +63,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Err(_) => BTreeMap::new(),
     };
     progress.advance(1);
-    interrupt::check()?;
     progress.message("drawing");
     let study = Study {
         entries,
@@ -85,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if arguments.json {
         output::print_json(&answer)?;
     } else {
-        output::print(&summary(&answer, &arguments.out))?;
+        output::print(&summary(&answer, &arguments.out, arguments.simulated))?;
     }
     Ok(Outcome::Done)
 }
@@ -105,7 +104,6 @@ fn read(files: &[PathBuf], names: &[String], evidence: Evidence) -> anyhow::Resu
     let mut found = Read { entries: Vec::new(), selection: Selection::new(evidence, files.len()), unreadable: Vec::new() };
     let placed: Vec<(usize, &PathBuf)> = files.iter().enumerate().collect();
     for some in placed.chunks(AT_A_TIME) {
-        interrupt::check()?;
         let read = |&(place, file): &(usize, &PathBuf)| match read_report(file) {
             // By the name that the page has, which is no path of this machine.
             Err(why) => (place, Err(why.root_cause().to_string().replace(&file.display().to_string(), &names[place]))),
@@ -137,6 +135,10 @@ fn read(files: &[PathBuf], names: &[String], evidence: Evidence) -> anyhow::Resu
 /// Marks those whose timings are left out, with the reason that the selection gave.
 fn tell_studied(entries: &mut [Entry], profiles: &[Profile], notes: &[String]) {
     let kept: BTreeSet<&str> = profiles.iter().map(|p| p.file.as_str()).collect();
+    for profile in profiles {
+        // Without timings of stale revisions: another algorithm under the same name is no other machine.
+        entries.iter_mut().filter(|e| e.file == profile.file).for_each(|e| e.profile = profile.clone());
+    }
     for entry in entries.iter_mut().filter(|e| !kept.contains(e.file.as_str())) {
         let beginning = format!("{} is left out: ", entry.file);
         let why = notes.iter().find_map(|n| n.strip_prefix(&beginning));
@@ -149,7 +151,8 @@ fn borders(held: &Held, entries: &[Entry]) -> BTreeMap<String, Vec<Border>> {
     let files: BTreeSet<&str> = held.borders.iter().map(|b| b.file.as_str()).collect();
     let own: Vec<&Entry> = entries.iter().filter(|e| files.contains(e.file.as_str())).collect();
     let borders = |entry: &&Entry| {
-        let report = read_report(&entry.path).ok()?.1;
+        let mut report = read_report(&entry.path).ok()?.1;
+        study::keep(&mut report, |id| entry.profile.position(id).is_some());
         let fields = train::measured_fields(&report, train::slice_scenario(&report)).ok()?;
         Some((entry.file.clone(), fields.crossovers))
     };
@@ -172,31 +175,44 @@ fn places(paths: &[PathBuf], files: &[PathBuf]) -> Result<Vec<PathBuf>, WrongUsa
     paths.iter().map(place).collect()
 }
 
-/// The command that makes the study again, without folders, which are of this machine alone.
+/// Paths in the command at most; more tell nobody anything.
+const MOST_PATHS: usize = 6;
+
+/// The command that makes the study again where it was called. What is above the folder it was called in is of this machine alone, and of
+/// a path that begins there the last name stands.
 fn command(arguments: &Arguments) -> String {
-    let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let mut words = vec!["sapwise study".to_owned()];
     words.extend(arguments.simulated.then(|| "--simulated".to_owned()));
     match &arguments.reports[..] {
-        few if few.len() <= 3 => words.extend(few.iter().map(|p| name(p))),
+        few if few.len() <= MOST_PATHS => words.extend(few.iter().map(|p| shown(p))),
         many => words.push(format!("({} reports or folders)", many.len())),
     }
-    words.push(format!("--out {}", name(&arguments.out)));
-    words.extend(arguments.reference.iter().map(|p| format!("--reference {}", name(p))));
-    words.extend(arguments.machines.iter().map(|p| format!("--machine {}", name(p))));
+    words.push(format!("--out {}", shown(&arguments.out)));
+    words.extend(arguments.reference.iter().map(|p| format!("--reference {}", shown(p))));
+    words.extend(arguments.machines.iter().map(|p| format!("--machine {}", shown(p))));
     words.join(" ")
 }
 
-fn summary(answer: &Answer, out: &Path) -> String {
+/// A path as a shell takes it, without what is of this machine alone.
+fn shown(path: &Path) -> String {
+    let last = || path.file_name().map(|n| n.to_string_lossy().into_owned());
+    let text = if path.is_relative() { path.display().to_string() } else { last().unwrap_or_else(|| "/".to_owned()) };
+    let plain = |c: char| c.is_alphanumeric() || "-_./+=,@%".contains(c);
+    if text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+fn summary(answer: &Answer, out: &Path, simulated: bool) -> String {
     let studied = answer.reports.iter().filter(|r| r.left_out.is_none()).count();
+    let simulated =
+        if simulated { "simulated machines, which are no evidence of how fast any is" } else { "physical machines" };
     let mut text = format!(
-        "{} reports, the timings of {studied} studied, physical machines: {}\n\n",
-        answer.reports.len(),
+        "{} read, the timings of {studied} studied; {simulated}: {}\n\n",
+        count(answer.reports.len(), "report"),
         answer.physical_machines
     );
     let mut rows = vec![["the paper says", "by its own table", "by these reports"].map(str::to_owned).to_vec()];
     rows.extend(answer.claims.iter().map(|c| vec![c.claim.clone(), c.by_its_table.clone(), c.by_these_reports.clone()]));
-    text.push_str(&columns(&rows));
+    text.push_str(&Terminal::of_standard_output().table(&rows));
     if let Some(regret) = answer.mean_regret {
         text.push_str(&format!(
             "\nPredicted from hardware parameters, left out in turn by {}: mean regret {:.1} %\n",

@@ -41,12 +41,13 @@ pub(super) fn fields(study: &Study, folder: &mut Folder, missing: &mut Vec<Strin
         None => part.lacks("no report has timings that can be studied"),
         Some((_, Err(why))) => part.lacks(format!("{why:#}")),
         Some((k, Ok(map))) => {
+            let regret = map.regret.map_or("is not known".to_owned(), |regret| format!("is {:.1} %", 100.0 * regret));
             let told = format!(
-                "Left out of the training: the {} of this report. At {} points the predicted choices lose {:.1} % on average; in {:.0} % of the cells both \
-                 choose the same.",
+                "Left out of the training: the {} of this report. The mean regret of the predicted choices {regret}, at {} of {} points: at \
+                 the others what was chosen had left the race and was not timed. In {:.0} % of the cells both choose the same.",
                 map.held_out,
+                map.known,
                 map.points,
-                100.0 * map.regret,
                 100.0 * map.agreeing
             );
             part.push(folder.figure("field-map", &map.figure, &told, &[k]))?;
@@ -80,7 +81,7 @@ pub(super) fn prediction(study: &Study, folder: &mut Folder, missing: &mut Vec<S
     part.push(folder.table(
         "scores",
         "Ways to choose an algorithm for a machine that was left out.",
-        accuracy::scores(validation),
+        accuracy::scores(validation, &studied),
     ))?;
     part.push(folder.table(
         "regrets",
@@ -99,9 +100,14 @@ pub(super) fn prediction(study: &Study, folder: &mut Folder, missing: &mut Vec<S
     } else {
         let ends = trained.held.borders.iter().filter(|b| !b.beside.crosses).count();
         let told = format!(
-            "Borders between fields, measured with 90 % intervals. Of {} predicted ones {ends} do not cross within the sizes that were \
-             measured; the end beyond which they would stands for them.",
-            trained.held.borders.len()
+            "Borders between fields, measured with 90 % intervals where these are known. Of {} predicted ones {ends} do not cross within the \
+             sizes that were measured; the end beyond which they would stands for them, drawn apart.{}",
+            trained.held.borders.len(),
+            if trained.held.by_machine {
+                ""
+            } else {
+                " One machine's report is left out with its vectors and with its threads: twice."
+            }
         );
         part.push(folder.figure("crossings", &figure, &told, &studied))?;
         part.push(folder.table("crossings", "Every one of these borders.", sheet))?;
@@ -112,6 +118,6 @@ pub(super) fn prediction(study: &Study, folder: &mut Folder, missing: &mut Vec<S
     };
     let told = "Regret by the number of physical machines in the training; bars hold 90 % of the trainings.";
     part.push(folder.figure("learning", learning, told, &studied))?;
-    part.push(folder.table("learning", "The same in figures.", accuracy::learning(validation)))?;
+    part.push(folder.table("learning", "The same in figures.", accuracy::learning(validation, &studied)))?;
     Ok(part.section)
 }

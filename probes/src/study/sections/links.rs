@@ -56,13 +56,14 @@ pub(super) fn influences(
     part.push(folder.figure("influence", &matrix(influence, &links), told, &influence.reports))?;
     let caption = "Every link that was looked at. Permuted and fitted without: of an algorithm the rise of the distance between predicted and \
                    measured times (natural logarithm), of a border that of its distance in octaves, of the choice that of the regret.";
-    part.push(folder.table("influence", caption, links_sheet(&links)))?;
+    part.push(folder.table("influence", caption, links_sheet(&links, &influence.reports)))?;
     Ok(part.section)
 }
 
 fn outcome(on: &On) -> String {
     match on {
         On::Algorithm(name) => format!("time of {name}"),
+        On::Method(name) => format!("prediction of {name}"),
         On::Border(name) => format!("border {name}"),
         On::Choice => "the choice".to_owned(),
     }
@@ -100,7 +101,7 @@ fn matrix(influence: &Influence, links: &[&Link]) -> plot::Influence {
     }
 }
 
-fn links_sheet(links: &[&Link]) -> Sheet {
+fn links_sheet(links: &[&Link], reports: &[usize]) -> Sheet {
     let mut sheet = Sheet::new([
         ("parameter", "parameter"),
         ("of", "of"),
@@ -143,7 +144,7 @@ fn links_sheet(links: &[&Link]) -> Sheet {
         let read = "predictions read it, or it is no time";
         let left = link.left.map_or([None; 3], |r| [r.correlation, r.low, r.high].map(Some));
         cells.extend(left.map(|v| Cell::optional(v, 2, read)));
-        sheet.push(cells, &[]);
+        sheet.push(cells, reports);
     }
     sheet
 }
@@ -158,15 +159,22 @@ pub(super) fn taken(study: &Study, folder: &mut Folder, missing: &mut Vec<String
         return Ok(part.section);
     }
     part.text(
-        "Between machines everything differs at once. Here are pairs of reports of one machine that differ in one thing that was taken \
-         on purpose, so that a link is a cause on that machine: linked where every pair shows 5 % or more to the same side, not linked \
-         where none does. A restriction is proved by what it does to parameters.",
+        "Between machines everything differs at once. Here are pairs of reports of one machine that differ in one thing that was taken on \
+         purpose, and in when they were measured. A verdict takes three pairs: linked where each shows 5 % or more to the same side, not \
+         linked where none does. Only pairs count whose parameters show that something was taken.",
     );
-    let mut proofs =
-        Sheet::new([("taken", "taken"), ("parameter", "parameter"), ("with over without", "ratio"), ("pairs", "pairs")]);
+    let mut proofs = Sheet::new([
+        ("taken", "taken"),
+        ("parameter", "parameter"),
+        ("with over without", "ratio"),
+        ("least", "least_ratio"),
+        ("most", "most_ratio"),
+        ("pairs", "pairs"),
+    ]);
     for s in &shown {
-        let figures = [Cell::number(s.ratio, 3), Cell::count(s.pairs as u64)];
-        proofs.push([&[Cell::text(s.taken.to_string()), Cell::text(&s.parameter)][..], &figures].concat(), &[]);
+        let heads = [Cell::text(&s.taken), Cell::text(&s.parameter)];
+        let figures = [s.ratio, s.least, s.most].map(|r| Cell::number(r, 3));
+        proofs.push([&heads[..], &figures, &[Cell::count(s.pairs as u64)]].concat(), &s.reports);
     }
     part.push(folder.table("restrictions", "What the parameters show of each restriction.", proofs))?;
     let mut sheet = Sheet::new([
@@ -183,7 +191,7 @@ pub(super) fn taken(study: &Study, folder: &mut Folder, missing: &mut Vec<String
         let figures = [e.slowdown, e.least, e.most].map(|r| Cell::number(r, 3));
         let ends = [Cell::count(e.pairs as u64), Cell::text(e.verdict.to_string())];
         let sizes = if e.large { "1000 or more" } else { "fewer than 1000" };
-        let heads = [Cell::text(e.taken.to_string()), Cell::text(&e.algorithm), Cell::text(sizes)];
+        let heads = [Cell::text(&e.taken), Cell::text(&e.algorithm), Cell::text(sizes)];
         sheet.push([&heads[..], &figures, &ends].concat(), &e.reports);
     }
     part.push(folder.table("taken", "What each restriction does to the time of each algorithm.", sheet))?;

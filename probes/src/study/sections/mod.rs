@@ -8,7 +8,7 @@ use super::entry::Entry;
 use super::folder::Folder;
 use super::influence::Influence;
 use super::ratios::Comparison;
-use super::{Study, hardware, rank};
+use super::{Study, hardware};
 use crate::page::{Block, Section};
 use crate::sheet::{Cell, Sheet};
 use crate::table::grouped;
@@ -78,6 +78,12 @@ pub(in crate::study) fn lead(study: &Study, influence: &Influence) -> Vec<String
         grouped(studied.len() as u64),
         count(influence.machines, "physical machine"),
     )];
+    if influence.reports.len() < influence.machines && influence.machines > 1 {
+        lead.push(format!(
+            "Rank correlations look at {} of these machines, evenly taken.",
+            grouped(influence.reports.len() as u64)
+        ));
+    }
     if simulated {
         lead.push(
             "These machines are simulated. They show what the cost model that made them says, and are no evidence of how fast any machine is."
@@ -132,9 +138,8 @@ fn decided(claims: &[Claim], folder: &mut Folder, missing: &mut Vec<String>) -> 
     let undecided = claims.iter().filter(|c| c.by_reports.0 == Outcome::Undecidable).count();
     if undecided > 0 {
         part.lacks(format!(
-            "{undecided} of {} claims can't be decided by these reports; it takes those of {} or more machines with different GPUs",
-            claims.len(),
-            rank::FEWEST_MACHINES
+            "{undecided} of {} claims can't be decided by these reports; the table says why for each",
+            claims.len()
         ));
     }
     Ok(part.section)
@@ -167,7 +172,7 @@ fn ratios(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resu
     let mut part = Part::new("ratios", "Machines beside each other", missing);
     part.text(
         "Figures 10 and 11 of the paper: how many times the reference machine's value each parameter is, beside how many times as fast each \
-         algorithm is. A speed-up is the geometric mean over all scenarios and sizes from 1000 objects on that both were timed at, with its \
+         algorithm is. A speed-up is the median over all scenarios and sizes from 1000 objects on that both were timed at, with its \
          quartiles.",
     );
     let mut drawn = |part: &mut Part<'_>, id: &str, comparison: &Comparison<'_>, told: &str| {
