@@ -57,6 +57,7 @@ impl Compared {
         }
         let mut all: Vec<usize> = machines.into_values().collect();
         all.sort_unstable();
+        // Of many machines some, evenly taken.
         let step = all.len().div_ceil(MOST_PANELS).max(1);
         all.into_iter().step_by(step).collect()
     }

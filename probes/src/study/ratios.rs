@@ -106,6 +106,12 @@ impl<'a> Comparison<'a> {
         (figure, alike)
     }
 
+    /// How many of how many machines are drawn, where that is not all.
+    pub(super) fn share_drawn(&self) -> Option<(usize, usize)> {
+        let (drawn, all) = (self.some().len(), self.others.len());
+        (drawn < all).then_some((drawn, all))
+    }
+
     /// The reports that are drawn.
     pub(super) fn drawn(&self) -> Vec<usize> {
         std::iter::once(self.reference).chain(self.some().iter().map(|(k, _)| *k)).collect()

@@ -59,7 +59,8 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     } else {
         let terminal = Terminal::of_standard_output();
         let importance = importance.map_or_else(String::new, |i| format!("{}\n", i.page(|rows| terminal.table(rows))));
-        output::print(&format!("{importance}{}", summary(&model, &held, &notes, &arguments.out, terminal)))?;
+        let drawn = arguments.plot.as_ref().map_or(String::new(), |path| format!("\nDrawn in {}.", path.display()));
+        output::print(&format!("{importance}{}{drawn}", summary(&model, &held, &notes, &arguments.out, terminal)))?;
     }
     Ok(Outcome::Done)
 }

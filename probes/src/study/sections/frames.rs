@@ -21,7 +21,7 @@ pub(super) fn curves(study: &Study, folder: &mut Folder, missing: &mut Vec<Strin
             part.lacks(format!("{}: no report has timings of both sides", compared.title()));
             continue;
         }
-        let told = format!("{}, by the number of objects.", compared.title());
+        let told = format!("{}, by the number of objects, of up to four machines.", compared.title());
         part.push(folder.figure(compared.id(), &compared.figure(&reports), &told, &of))?;
     }
     Ok(part.section)

@@ -51,9 +51,14 @@ pub(super) fn influences(
         });
         return Ok(part.section);
     }
-    let told =
-        "Parameters against algorithms, borders and the choice: the verdict, and the rank correlation where there is one.";
-    part.push(folder.figure("influence", &matrix(influence, &links), told, &influence.reports))?;
+    let matrix = matrix(influence, &links);
+    let all = links.iter().map(|l| l.parameter.as_str()).collect::<BTreeSet<_>>().len();
+    let told = format!(
+        "{} of {all} parameters, those first that say most, against algorithms, predictions of methods, borders and the choice: the verdict, \
+         and the rank correlation where there is one.",
+        matrix.rows.len()
+    );
+    part.push(folder.figure("influence", &matrix, &told, &influence.reports))?;
     let caption = "Every link that was looked at. Permuted and fitted without: of an algorithm the rise of the distance between predicted and \
                    measured times (natural logarithm), of a border that of its distance in octaves, of the choice that of the regret.";
     part.push(folder.table("influence", caption, links_sheet(&links, &influence.reports)))?;

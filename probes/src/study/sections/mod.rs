@@ -178,7 +178,10 @@ fn ratios(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resu
     let mut drawn = |part: &mut Part<'_>, id: &str, comparison: &Comparison<'_>, told: &str| {
         let (figure, alike) = comparison.figure();
         let alike = if alike.is_empty() { String::new() } else { format!(" Alike within 5 %: {}.", alike.join(", ")) };
-        part.push(folder.figure(id, &figure, &format!("{told}{alike}"), &comparison.drawn()))
+        let some = comparison
+            .share_drawn()
+            .map_or(String::new(), |(drawn, all)| format!(" Drawn: {drawn} of {all}, evenly taken."));
+        part.push(folder.figure(id, &figure, &format!("{told}{some}{alike}"), &comparison.drawn()))
     };
     if let [Some(smallest), Some(slower), Some(faster)] = claims::cards(&study.entries) {
         let ten = Comparison::new(&study.entries, smallest, &[slower, faster]);
