@@ -59,7 +59,7 @@ pub(super) fn influences(
         matrix.rows.len()
     );
     part.push(folder.figure("influence", &matrix, &told, &influence.reports))?;
-    let caption = "Every link that was looked at. Permuted and fitted without: of an algorithm the rise of the distance between predicted and \
+    let caption = "Every link that was looked at. Permuted and fitted without: of the prediction of a method the rise of its distance from the \
                    measured times (natural logarithm), of a border that of its distance in octaves, of the choice that of the regret.";
     part.push(folder.table("influence", caption, links_sheet(&links, &influence.reports)))?;
     Ok(part.section)
