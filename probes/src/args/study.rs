@@ -27,7 +27,8 @@ pub(crate) struct Study {
     /// The report that others are held against. Without this option the first one of a whole machine.
     #[arg(long, value_name = "REPORT")]
     pub(crate) reference: Option<PathBuf>,
-    /// A report to draw; may be given several times. Without this option each machine is drawn by the report that has most of it.
+    /// A report to draw; may be given several times. Without this option each machine is drawn by the report that has most of it, and of
+    /// one machine alone some of its reports.
     #[arg(long = "machine", value_name = "REPORT")]
     pub(crate) machines: Vec<PathBuf>,
     /// One JSON object on standard output instead of a summary.

@@ -13,13 +13,13 @@ const MOST_LETTERS: usize = 24;
 
 /// The rows of the paper's table, in its order, with what each is called here.
 const PAPER: [(&str, &str); 7] = [
-    ("CPU to GPU", gpu::UPLOAD_GB_PER_S),
-    ("GPU to CPU", gpu::DOWNLOAD_GB_PER_S),
-    ("internal GPU", gpu::COPY_GB_PER_S),
+    ("CPU to GPU (upload)", gpu::UPLOAD_GB_PER_S),
+    ("GPU to CPU (download)", gpu::DOWNLOAD_GB_PER_S),
+    ("internal GPU (copy)", gpu::COPY_GB_PER_S),
     ("memory size", gpu::MEMORY_BYTES),
     ("clock rate", gpu::CLOCK_GHZ),
     ("processors", gpu::PROCESSORS),
-    ("cores", gpu::LANES),
+    ("cores (lanes)", gpu::LANES),
 ];
 
 /// The table as the paper has it, its cards first, one row a GPU. What acts as a GPU is told by its kind.

@@ -66,8 +66,9 @@ impl Influence {
         // Reports of one machine alone are not many machines.
         let reports = if machines.len() > 1 { all } else { all.into_iter().take(1).collect() };
         let machines = machines.len();
+        let every: Vec<&Entry> = reports.iter().map(|&k| &entries[k]).collect();
         let step = reports.len().div_ceil(MOST_MACHINES).max(1);
-        let reports: Vec<usize> = reports.into_iter().step_by(step).collect();
+        let reports: Vec<usize> = reports.iter().copied().step_by(step).collect();
         let chosen: Vec<&Entry> = reports.iter().map(|&k| &entries[k]).collect();
         let mut outcomes: BTreeMap<On, Vec<Option<f64>>> =
             slownesses(&chosen).into_iter().map(|(name, values)| (On::Algorithm(name), values)).collect();
@@ -91,11 +92,12 @@ impl Influence {
         let mut links: Vec<Link> =
             cells.into_iter().zip(ranks).map(|((k, on), rank)| link(&parameters[k], on.clone(), rank, importance)).collect();
         for (name, left) in importance.iter().flat_map(|i| &i.left_ln) {
-            for (parameter, values) in parameters.iter().zip(&values) {
+            for parameter in &parameters {
                 let mut link = link(parameter, On::Method(name.clone()), None, importance);
                 if link.effect.is_none() {
-                    let of = |(e, value): (&&Entry, &Option<f64>)| Some(((*value)?, *left.get(e.machine())?));
-                    link.left = Rank::of(&chosen.iter().zip(values).filter_map(of).collect::<Vec<_>>());
+                    // Of every machine that was left out: these are other ones than those that ranks look at where there are many.
+                    let of = |e: &&Entry| Some((e.value(parameter)?, *left.get(e.machine())?));
+                    link.left = Rank::of(&every.iter().filter_map(of).collect::<Vec<_>>());
                 }
                 links.push(link);
             }

@@ -50,6 +50,7 @@ pub(super) struct Shown {
 type Key<'a> = (&'a str, String, String, bool);
 
 /// Two reports of which the second one has one thing less.
+#[derive(Clone)]
 struct Pair {
     taken: Restricted,
     /// With its level.
@@ -61,7 +62,7 @@ struct Pair {
 /// The effects of every restriction on every algorithm, and what the parameters show of them. Pairs whose parameters do not show that
 /// anything was taken are left out: what they lack can't be told from what they have.
 pub(super) fn effects(entries: &[Entry]) -> (Vec<Effect>, Vec<Shown>) {
-    let mut found: BTreeMap<Key<'_>, (Vec<f64>, BTreeSet<usize>)> = BTreeMap::new();
+    let mut found: BTreeMap<Key<'_>, Vec<(f64, Pair)>> = BTreeMap::new();
     let mut shown: BTreeMap<(String, String), (Vec<f64>, BTreeSet<usize>)> = BTreeMap::new();
     for pair in pairs(entries) {
         let (without, with) = (&entries[pair.without], &entries[pair.with]);
@@ -80,17 +81,20 @@ pub(super) fn effects(entries: &[Entry]) -> (Vec<Effect>, Vec<Shown>) {
                 if one_core && algorithm.ends_with(ON_ALL_CORES) {
                     continue;
                 }
-                let (effects, reports) = found.entry((with.machine(), pair.name.clone(), algorithm, large)).or_default();
-                effects.push(-speed_up.median.ln());
-                reports.extend([pair.without, pair.with]);
+                let key = (with.machine(), pair.name.clone(), algorithm, large);
+                found.entry(key).or_default().push((-speed_up.median.ln(), pair.clone()));
             }
         }
     }
-    let effects = found.into_iter().map(|((_, taken, algorithm, large), (effects, reports))| {
+    let effects = found.into_iter().map(|((_, taken, algorithm, large), seen)| {
+        let effects: Vec<f64> = seen.iter().map(|s| s.0).collect();
         let [slowdown, least, most] = over_pairs(&effects);
-        let verdict = verdict(&effects);
-        let (pairs, reports) = (effects.len(), reports.into_iter().collect());
-        Effect { taken, algorithm, large, slowdown, least, most, pairs, verdict, reports }
+        // Two that share a report share its disturbances.
+        let apart = |of: fn(&Pair) -> usize| seen.iter().map(|s| of(&s.1)).collect::<BTreeSet<_>>();
+        let (without, with) = (apart(|p| p.without), apart(|p| p.with));
+        let verdict = verdict(&effects, without.len().min(with.len()));
+        let reports = without.union(&with).copied().collect();
+        Effect { taken, algorithm, large, slowdown, least, most, pairs: seen.len(), verdict, reports }
     });
     let shown = shown.into_iter().map(|((taken, parameter), (logs, reports))| {
         let [ratio, least, most] = over_pairs(&logs);
@@ -111,9 +115,10 @@ fn is_shown(entry: &Entry, taken: Restricted) -> bool {
     proofs.any(|p| p.kind == taken && p.shows)
 }
 
-/// Linked where the same is seen in every pair, and not linked where nothing is seen in any. A few pairs can't be told from chance.
-fn verdict(effects: &[f64]) -> Verdict {
-    let all = |holds: &dyn Fn(f64) -> bool| effects.len() >= FEWEST_PAIRS && effects.iter().all(|e| holds(*e));
+/// Linked where the same is seen in every pair, and not linked where nothing is seen in any. A few pairs can't be told from chance; `apart`
+/// are those that share no report.
+fn verdict(effects: &[f64], apart: usize) -> Verdict {
+    let all = |holds: &dyn Fn(f64) -> bool| apart >= FEWEST_PAIRS && effects.iter().all(|e| holds(*e));
     if all(&|e| e >= LEAST_LN) || all(&|e| e <= -LEAST_LN) {
         Verdict::Linked
     } else if all(&|e| e.abs() < LEAST_LN) {
@@ -193,11 +198,13 @@ mod tests {
 
     #[test]
     fn a_link_is_seen_in_every_pair() {
-        assert_eq!(verdict(&[0.2, 0.06, 0.4]), Verdict::Linked);
-        assert_eq!(verdict(&[-0.2, -0.06, -0.1]), Verdict::Linked);
-        assert_eq!(verdict(&[0.02, -0.01, 0.0]), Verdict::NotLinked);
+        assert_eq!(verdict(&[0.2, 0.06, 0.4], 3), Verdict::Linked);
+        assert_eq!(verdict(&[-0.2, -0.06, -0.1], 3), Verdict::Linked);
+        assert_eq!(verdict(&[0.02, -0.01, 0.0], 3), Verdict::NotLinked);
         for unclear in [&[0.2, 0.2][..], &[0.2, 0.1, 0.01], &[0.2, 0.1, -0.2], &[]] {
-            assert_eq!(verdict(unclear), Verdict::CannotBeTold);
+            assert_eq!(verdict(unclear, unclear.len()), Verdict::CannotBeTold);
         }
+        // Three pairs with one report in common.
+        assert_eq!(verdict(&[0.2, 0.06, 0.4], 1), Verdict::CannotBeTold);
     }
 }

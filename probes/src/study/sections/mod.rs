@@ -159,7 +159,9 @@ fn parameters(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> 
                        transfers of 32 MiB or reported by the driver. Software is a program on the CPU that acts as a GPU.";
         part.push(folder.table("figure-9", caption, paper))?;
     }
-    let caption = "Every parameter of the machines, one row a report. A dash says why on hover.";
+    let caption = "Every parameter of the machines, one row a report. Kinds: real_full is a whole machine, real_restricted one with fewer cores or \
+                   shorter vectors than it has, real_contended one that other programs load, real_software_gpu one whose GPU is a program; \
+                   simulated is made up, published from a publication. datasets/README.md says how each parameter is measured.";
     part.push(folder.table("machines", caption, hardware::machines(entries)))?;
     let gpus = hardware::gpus(entries);
     if !gpus.rows.is_empty() {
