@@ -167,6 +167,11 @@ fn scenarios(report: &Report) -> Vec<&str> {
     names
 }
 
+/// The label as it stands in the file.
+pub(crate) fn kind(of: Label) -> &'static str {
+    label(of).split_once(':').map_or_else(|| label(of), |(kind, _)| kind)
+}
+
 /// The label as it stands in the file, and what it means.
 fn label(label: Label) -> &'static str {
     match label {

@@ -3,9 +3,10 @@
 use super::axis::{Axis, Tick};
 use super::chart::{Chart, Frame, Line, missing};
 use super::legend::{Legend, Sign};
+use super::legended::Legended;
 use super::paper::Area;
 use super::regrets::{bottom, percent_axis, seen};
-use super::style::{self, GAP, WIDTH};
+use super::style;
 use super::{Figure, Tabled, tabled};
 use crate::sheet::Sheet;
 
@@ -38,12 +39,14 @@ pub(crate) struct LearningPoint {
 const NOTHING: &str = "there are too few machines to train on fewer";
 
 impl LearningCurve {
-    fn legend(&self, width: i32) -> Legend {
-        Legend::new(self.ways.iter().map(|w| (Sign::Curve(w.style), w.name.clone())).collect(), width)
-    }
-
     fn points(&self) -> impl Iterator<Item = &LearningPoint> {
         self.ways.iter().flat_map(|w| &w.points)
+    }
+}
+
+impl Legended for LearningCurve {
+    fn legend(&self, width: i32) -> Legend {
+        Legend::new(self.ways.iter().map(|w| (Sign::Curve(w.style), w.name.clone())).collect(), width)
     }
 
     fn chart(&self, area: &Area<'_>, frame: Frame, title: &str) -> anyhow::Result<()> {
@@ -74,11 +77,6 @@ impl LearningCurve {
         }
         Ok(())
     }
-
-    /// Chart and names below each other, the title above.
-    pub(super) fn draw_in(&self, area: &Area<'_>, frame: Frame) -> anyhow::Result<()> {
-        super::above_its_legend(area, frame, &self.legend(frame.width()), |chart| self.chart(area, chart, &self.title))
-    }
 }
 
 impl Figure for LearningCurve {
@@ -87,12 +85,11 @@ impl Figure for LearningCurve {
     }
 
     fn size(&self) -> (u32, u32) {
-        (WIDTH, (480 + self.legend(WIDTH as i32 - 2 * GAP).height()) as u32)
+        self.size_alone()
     }
 
     fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()> {
-        let frame = Frame { left: GAP, top: 0, right: WIDTH as i32 - GAP, bottom: self.size().1 as i32 };
-        super::above_its_legend(area, frame, &self.legend(frame.width()), |chart| self.chart(area, chart, ""))
+        self.draw_alone(area)
     }
 }
 

@@ -8,6 +8,7 @@ mod font;
 mod influence;
 mod learning;
 mod legend;
+mod legended;
 mod map;
 mod mark;
 mod paper;
@@ -20,8 +21,6 @@ mod times;
 mod training;
 
 use crate::exit::WrongUsage;
-use chart::{ABOVE, BELOW, Frame, LEFT, RIGHT};
-use legend::Legend;
 use paper::Area;
 use plotters::element::Text;
 use plotters::style::RGBColor;
@@ -112,17 +111,6 @@ fn lines(area: &Area<'_>, text: &[String], size: u32, colour: RGBColor) -> anyho
         area.draw(&Text::new(line.as_str(), place, style::text(size, colour, HPos::Left, VPos::Top)))?;
     }
     Ok(())
-}
-
-/// A chart in a frame, with what stands beside its axes, and its legend below it.
-fn above_its_legend(
-    area: &Area<'_>,
-    frame: Frame,
-    legend: &Legend,
-    chart: impl FnOnce(Frame) -> anyhow::Result<()>,
-) -> anyhow::Result<()> {
-    chart(frame.within(LEFT, ABOVE, RIGHT, BELOW + GAP + legend.height()))?;
-    legend.draw(area, (frame.left + GAP, frame.bottom - legend.height()))
 }
 
 #[cfg(test)]

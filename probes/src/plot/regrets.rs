@@ -3,8 +3,9 @@
 use super::axis::Axis;
 use super::chart::{Chart, Frame, Line, missing};
 use super::legend::{Legend, Sign};
+use super::legended::Legended;
 use super::paper::Area;
-use super::style::{self, GAP, WIDTH};
+use super::style;
 use super::{Figure, Tabled, tabled};
 use crate::sheet::Sheet;
 
@@ -48,7 +49,7 @@ pub(super) fn bottom() -> String {
 
 const NOTHING: &str = "Nothing was left out: there is one report only.";
 
-impl Regrets {
+impl Legended for Regrets {
     fn legend(&self, width: i32) -> Legend {
         Legend::new(self.ways.iter().map(|w| (Sign::Curve(w.style), w.name.clone())).collect(), width)
     }
@@ -73,11 +74,6 @@ impl Regrets {
         }
         Ok(())
     }
-
-    /// Chart and names below each other, the title above.
-    pub(super) fn draw_in(&self, area: &Area<'_>, frame: Frame) -> anyhow::Result<()> {
-        super::above_its_legend(area, frame, &self.legend(frame.width()), |chart| self.chart(area, chart, &self.title))
-    }
 }
 
 impl Figure for Regrets {
@@ -86,12 +82,11 @@ impl Figure for Regrets {
     }
 
     fn size(&self) -> (u32, u32) {
-        (WIDTH, (480 + self.legend(WIDTH as i32 - 2 * GAP).height()) as u32)
+        self.size_alone()
     }
 
     fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()> {
-        let frame = Frame { left: GAP, top: 0, right: WIDTH as i32 - GAP, bottom: self.size().1 as i32 };
-        super::above_its_legend(area, frame, &self.legend(frame.width()), |chart| self.chart(area, chart, ""))
+        self.draw_alone(area)
     }
 }
 

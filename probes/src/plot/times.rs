@@ -3,6 +3,7 @@
 use super::axis::{Axis, time_unit};
 use super::chart::{BELOW, Chart, Frame, LEFT, Line, RIGHT, missing};
 use super::legend::{Legend, Sign};
+use super::legended::Legended;
 use super::paper::Area;
 use super::style::{self, GAP, INK, SECONDARY, WIDTH};
 use super::{Figure, Tabled, tabled};
@@ -37,7 +38,7 @@ const TWICE: Line = Line::dashed(SECONDARY, 1);
 
 const NOTHING: &str = "Nothing was left out: there is one report only.";
 
-impl Times {
+impl Legended for Times {
     fn legend(&self, width: i32) -> Legend {
         let methods = self.methods.iter().map(|m| (Sign::Mark(m.style), m.name.clone()));
         let lines = [(EXACT, "the prediction is right"), (TWICE, "it is off by a factor of two")];
@@ -62,11 +63,6 @@ impl Times {
             }
         }
         chart.factors(&[(0.5, TWICE), (1.0, EXACT), (2.0, TWICE)])
-    }
-
-    /// Chart and names below each other, the title above.
-    pub(super) fn draw_in(&self, area: &Area<'_>, frame: Frame) -> anyhow::Result<()> {
-        super::above_its_legend(area, frame, &self.legend(frame.width()), |chart| self.chart(area, chart, &self.title))
     }
 }
 

@@ -1,6 +1,7 @@
 //! How well a model did on machines that were left out: three figures, alone or together.
 
 use super::chart::Frame;
+use super::legended::Legended;
 use super::paper::Area;
 use super::style::GAP;
 use super::{Figure, LearningCurve, LearningPoint, LearningWay, Regrets, TimePair, Times, TimesOf, Way};

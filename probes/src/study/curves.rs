@@ -1,6 +1,6 @@
 //! Figures 4, 6 and 7 of the paper: time over objects, CPU against GPU, on 1..k GPUs, on 1..k threads.
 
-use super::entry::{Entry, SOFTWARE};
+use super::entry::{Entry, SOFTWARE, best_of_machines};
 use crate::plot::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
 use crate::sweep::median;
 use crate::train::{measured_fields, slice_scenario};
@@ -47,16 +47,8 @@ impl Compared {
 
     /// The reports that it is drawn of: of each physical machine the one that has most of it, up to four.
     pub(crate) fn drawn(self, entries: &[Entry], wanted: &[usize]) -> Vec<usize> {
-        let mut machines: BTreeMap<&str, usize> = BTreeMap::new();
-        for &k in wanted.iter().filter(|&&k| entries[k].studied.is_ok() && self.is_in(&entries[k])) {
-            let rank = |k: usize| (self.sides(&entries[k]), entries[k].wholeness());
-            let best = machines.entry(entries[k].machine()).or_insert(k);
-            if rank(k) > rank(*best) {
-                *best = k;
-            }
-        }
-        let mut all: Vec<usize> = machines.into_values().collect();
-        all.sort_unstable();
+        let among = wanted.iter().copied().filter(|&k| entries[k].studied.is_ok() && self.is_in(&entries[k]));
+        let all = best_of_machines(entries, among, |e| (self.sides(e), e.wholeness()));
         // Of many machines some, evenly taken.
         let step = all.len().div_ceil(MOST_PANELS).max(1);
         all.into_iter().step_by(step).collect()

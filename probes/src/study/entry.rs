@@ -1,6 +1,6 @@
 //! One report of a study: what the page tells of it, and its medians.
 
-use crate::train::Profile;
+use crate::train::{self, Profile};
 use sapwise::hardware::parameter;
 use sapwise::report::{Label, Provenance, Report};
 use sapwise::{AlgorithmId, Backend, BackendClass, GpuHardware, GpuKind, Hardware};
@@ -83,10 +83,7 @@ impl Entry {
 
     /// A parameter of the machine, or with `gpu/` before its name one of its first GPU that is no program.
     pub(super) fn value(&self, name: &str) -> Option<f64> {
-        match name.strip_prefix(sapwise::model::GPU_PREFIX) {
-            Some(name) => self.gpu()?.value(name),
-            None => self.hardware.value(name),
-        }
+        train::figure(&self.hardware, name)
     }
 
     /// Numbers of the GPUs that are programs on the CPU.
@@ -142,15 +139,25 @@ fn everywhere(id: &AlgorithmId, threads: u32, programs: &[u32]) -> Vec<String> {
 
 /// Of each physical machine that is studied the report that has most of it; of one machine alone all reports.
 pub(crate) fn representatives(entries: &[Entry]) -> Vec<usize> {
-    let mut machines: BTreeMap<&str, usize> = BTreeMap::new();
     let studied = || (0..entries.len()).filter(|&k| entries[k].studied.is_ok());
-    for k in studied() {
+    let best = best_of_machines(entries, studied(), Entry::wholeness);
+    if best.len() > 1 { best } else { studied().collect() }
+}
+
+/// Of each physical machine the first of the entries with the highest rank, by position, ascending.
+pub(super) fn best_of_machines<R: Ord>(
+    entries: &[Entry],
+    among: impl Iterator<Item = usize>,
+    rank: impl Fn(&Entry) -> R,
+) -> Vec<usize> {
+    let mut machines: BTreeMap<&str, usize> = BTreeMap::new();
+    for k in among {
         let best = machines.entry(entries[k].machine()).or_insert(k);
-        if entries[k].wholeness() > entries[*best].wholeness() {
+        if rank(&entries[k]) > rank(&entries[*best]) {
             *best = k;
         }
     }
-    let mut found: Vec<usize> = if machines.len() > 1 { machines.into_values().collect() } else { studied().collect() };
+    let mut found: Vec<usize> = machines.into_values().collect();
     found.sort_unstable();
     found
 }

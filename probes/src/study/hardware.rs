@@ -5,7 +5,6 @@ use crate::sheet::{Cell, Column, Sheet};
 use crate::summary;
 use sapwise::hardware::gpu::parameter as gpu;
 use sapwise::hardware::{How, parameter};
-use sapwise::report::Label;
 use sapwise::{GpuHardware, Parameter};
 
 /// Letters of a value that is sound, at most.
@@ -45,7 +44,7 @@ pub(super) fn machines(entries: &[Entry]) -> Sheet {
     columns(&mut sheet, &names);
     for (k, entry) in entries.iter().enumerate() {
         let machine = &entry.hardware.machine;
-        let mut cells = [&entry.name[..], &machine.cpu, kind(entry.kind), &machine.simd].map(Cell::text).to_vec();
+        let mut cells = [&entry.name[..], &machine.cpu, summary::kind(entry.kind), &machine.simd].map(Cell::text).to_vec();
         cells.extend(names.iter().map(|name| cell(name, &entry.hardware.parameters)));
         sheet.push(cells, &[k]);
     }
@@ -106,18 +105,6 @@ fn cell(name: &str, parameters: &[Parameter]) -> Cell {
         }
         Some(p) if p.how == How::Missing => Cell::Missing(p.source.clone()),
         Some(_) => Cell::Missing("the report holds no value".to_owned()),
-    }
-}
-
-/// What kind of evidence a report is, as it stands in its file.
-pub(super) fn kind(label: Label) -> &'static str {
-    match label {
-        Label::RealFull => "real_full",
-        Label::RealRestricted => "real_restricted",
-        Label::RealContended => "real_contended",
-        Label::RealSoftwareGpu => "real_software_gpu",
-        Label::Simulated => "simulated",
-        Label::Published => "published",
     }
 }
 

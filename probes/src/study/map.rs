@@ -40,9 +40,7 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
     let (model, held_out) = without(profiles, &profile.file)?;
     let measured = measured_costs(profile).0;
     let ids = available(profile);
-    let revision = |id: &AlgorithmId| profile.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);
-    let wanted: Vec<(AlgorithmId, u32)> = ids.iter().map(|id| (id.clone(), revision(id))).collect();
-    let predicted = model.predict(&profile.hardware, &wanted).map_err(anyhow::Error::msg)?.costs;
+    let predicted = model.predict(&profile.hardware, &profile.with_revisions(&ids)).map_err(anyhow::Error::msg)?.costs;
     let density = |load: &Load| load.pairs / f64::from(load.objects.max(1));
     let places: Vec<(f64, f64)> =
         profile.points.iter().map(|p| (f64::from(p.load.objects), density(&p.load))).filter(|(_, y)| *y > 0.0).collect();

@@ -16,6 +16,7 @@ mod sections;
 mod speed;
 
 use crate::page::{self, Page, Section, Source};
+use crate::summary;
 use crate::train::{Importance, Profile, Trained};
 use accuracy::Measured;
 use anyhow::Result;
@@ -99,7 +100,7 @@ fn read(label: &str, entry: &Entry) -> Read {
     Read {
         label: label.to_owned(),
         file: entry.file.clone(),
-        kind: hardware::kind(entry.kind).to_owned(),
+        kind: summary::kind(entry.kind).to_owned(),
         left_out: entry.studied.clone().err(),
     }
 }

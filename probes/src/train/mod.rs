@@ -83,7 +83,7 @@ const GPU_PARAMETERS: [&str; 10] = [
 
 /// A parameter of a machine by the name that it has in a model's ranges. That of a GPU is the one of the first GPU, which is a
 /// discrete one where there is any; programs that act as GPUs don't count.
-fn figure(hardware: &Hardware, name: &str) -> Option<f64> {
+pub(crate) fn figure(hardware: &Hardware, name: &str) -> Option<f64> {
     match name.strip_prefix(GPU_PREFIX) {
         Some(name) => hardware.gpus.iter().find(|g| g.gpu.kind != GpuKind::Software)?.value(name),
         None => hardware.value(name),

@@ -94,6 +94,12 @@ impl Profile {
         spot.medians.iter().map(|&(k, ns)| (self.id(k), ns))
     }
 
+    /// These algorithms with the revisions that they were timed in, 0 of one that was not, as a model is asked for them.
+    pub(crate) fn with_revisions(&self, ids: &[AlgorithmId]) -> Vec<(AlgorithmId, u32)> {
+        let revision = |id: &AlgorithmId| self.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);
+        ids.iter().map(|id| (id.clone(), revision(id))).collect()
+    }
+
     /// Position of an algorithm among those of the report.
     pub(crate) fn position(&self, id: &AlgorithmId) -> Option<u16> {
         self.algorithms.iter().position(|t| t.id == *id).map(|k| k as u16)

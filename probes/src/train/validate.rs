@@ -327,9 +327,7 @@ fn predict(
     available: &[AlgorithmId],
     notes: &mut Vec<String>,
 ) -> Option<Vec<AlgorithmCost>> {
-    let revision = |id: &AlgorithmId| profile.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);
-    let wanted: Vec<(AlgorithmId, u32)> = available.iter().map(|id| (id.clone(), revision(id))).collect();
-    match model.predict(&profile.hardware, &wanted) {
+    match model.predict(&profile.hardware, &profile.with_revisions(available)) {
         Ok(prediction) => Some(prediction.costs),
         Err(why) => {
             notes.push(format!("{} could not be predicted when it was left out: {why}", profile.file));

@@ -43,8 +43,7 @@ pub(super) struct Off {
 impl<'a> Judge<'a> {
     pub(super) fn new(profile: &'a Profile) -> Self {
         let available = available(profile);
-        let revision = |id: &AlgorithmId| profile.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);
-        let wanted = available.iter().map(|id| (id.clone(), revision(id))).collect();
+        let wanted = profile.with_revisions(&available);
         let (slice, measured) = (slice(profile), measured_costs(profile).0);
         let at = |pair: Pair| pair.octaves(&measured, &slice).map(|octaves| (pair, octaves));
         let pairs = pairs(&available).into_iter().filter_map(at).collect();
