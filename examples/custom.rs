@@ -8,11 +8,11 @@
 //! `probes/examples/bvh.rs`.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Fields, Load, Pairs, Registry,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, Pairs, Registry,
     Scenario, Source, Term,
 };
 
-/// What it is called in fields, reports and decisions.
+/// What it is called in tuning, reports and decisions.
 pub(crate) const ID: &str = "rested@cpu1";
 
 /// Gives the pairs of the frame before where no box has changed, and leaves other frames to another algorithm.
@@ -45,7 +45,7 @@ impl BroadPhase for Rested {
     }
 
     /// A frame is cheaper after one that was alike.
-    fn keeps_work(&self) -> bool {
+    fn is_incremental(&self) -> bool {
         true
     }
 }
@@ -69,21 +69,21 @@ pub(crate) fn cost(registry: &Registry, id: &str, terms: &[(Term, f64)]) -> Algo
     AlgorithmCost { algorithm, revision, curve: CostCurve { terms, ..CostCurve::default() }, spread_ln: 0.5 }
 }
 
-/// Fields from these costs, with the borders of scenes from 10 to a million objects.
-pub(crate) fn fields(costs: Vec<AlgorithmCost>) -> Fields {
+/// Tuning from these costs, with the borders of scenes from 10 to a million objects.
+pub(crate) fn tuning(costs: Vec<AlgorithmCost>) -> Tuning {
     let load = |k: u32| Load { objects: 10_u32.pow(k), ..Load::default() };
-    Fields::from_costs(Source::Default, "", costs, &(1..=6).map(load).collect::<Vec<Load>>())
+    Tuning::from_costs(Source::Default, "", costs, &(1..=6).map(load).collect::<Vec<Load>>())
 }
 
 #[allow(dead_code, reason = "the tests of this example have no use for its main")]
 fn main() -> Result<(), Error> {
-    let registry = registry("strips@cpu1");
+    let registry = registry("grid-sap@cpu1");
     // Comparing a box takes a nanosecond or so; where boxes move, it costs what the other one does, and more.
-    let fields = fields(vec![
-        cost(&registry, "strips@cpu1", &[(Term::Objects, 60.0)]),
+    let tuning = tuning(vec![
+        cost(&registry, "grid-sap@cpu1", &[(Term::Objects, 60.0)]),
         cost(&registry, ID, &[(Term::Objects, 2.0), (Term::Moved, 1000.0)]),
     ]);
-    let mut adaptive = Adaptive::new(fields, &registry)?;
+    let mut adaptive = Adaptive::new(tuning, &registry)?;
     let mut scene = Scenario::Uniform.start(5000, 1);
     let mut pairs = Pairs::new();
     for frame in 0..600 {

@@ -16,7 +16,7 @@ mod tally;
 #[cfg(feature = "this-machine")]
 mod this_machine;
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Load, Pairs, Registry, Source, Step};
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Tuning, Load, Pairs, Registry, Source, Step};
 use candidates::{Candidate, Instance, Made};
 use decision::Choice;
 use glance::{Glance, count};
@@ -34,15 +34,15 @@ pub use this_machine::{Origin, SaveError, Setup};
 /// A runner-up that costs at most this much more than the choice gets its buffers ready: the next border may be near.
 const WARM_WITHIN: f64 = 1.5;
 
-/// Sizes of the slice that learned fields show: four a decade from ten to a million, in quarters of a decade.
+/// Sizes of the slice that learned tuning shows: four a decade from ten to a million, in quarters of a decade.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 
 /// A broad phase that runs whichever algorithm is expected to be cheapest for each frame.
 ///
 /// Every algorithm takes the same boxes and gives the same pairs, so a switch is invisible but for its speed. What is expected comes from
-/// [`Fields`] and, where these have cost curves, from the times of the frames that were run: [`set_learning`](Self::set_learning).
+/// [`Tuning`] and, where these have cost curves, from the times of the frames that were run: [`set_learning`](Self::set_learning).
 pub struct Adaptive {
-    /// In the order of [`Fields::algorithms`].
+    /// In the order of [`Tuning::algorithms`].
     candidates: Vec<Candidate>,
     instances: Vec<Instance>,
     policy: Policy,
@@ -55,35 +55,35 @@ pub struct Adaptive {
     prepared: usize,
     /// [`decide`](Self::decide) was called for a frame of so many boxes that has not run yet.
     decided: Option<usize>,
-    /// How it came to its fields.
+    /// How it came to its tuning.
     #[cfg(feature = "this-machine")]
     start: this_machine::Start,
 }
 
 impl Adaptive {
-    /// An adaptive broad phase over those algorithms of `fields` that `registry` can make.
+    /// An adaptive broad phase over those algorithms of `tuning` that `registry` can make.
     ///
     /// An algorithm whose cost was found for another revision is left out, and so is one with more threads than the registry
     /// lists: its cost says nothing about this build or this machine.
     ///
     /// # Errors
     /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made.
-    pub fn new(fields: Fields, registry: &Registry) -> Result<Self, Error> {
-        let mut made = Made::of(&fields, registry);
+    pub fn new(tuning: Tuning, registry: &Registry) -> Result<Self, Error> {
+        let mut made = Made::of(&tuning, registry);
         if made.instances.is_empty() {
-            let hint = || "these fields name no algorithm; make them with `sapwise predict`".to_owned();
+            let hint = || "this tuning name no algorithm; make them with `sapwise predict`".to_owned();
             return Err(made
                 .failure
                 .take()
                 .unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
         }
-        Ok(Self::with(fields, made))
+        Ok(Self::with(tuning, made))
     }
 
     /// Over instances that are there already.
-    fn with(fields: Fields, made: Made) -> Self {
+    fn with(tuning: Tuning, made: Made) -> Self {
         Self {
-            policy: policy(fields, &made),
+            policy: policy(tuning, &made),
             candidates: made.candidates,
             instances: made.instances,
             glance: Glance::default(),
@@ -103,13 +103,13 @@ impl Adaptive {
     /// As [`Registry::create`].
     pub fn only(algorithm: AlgorithmId, registry: &Registry) -> Result<Self, Error> {
         let steps = vec![Step { from_objects: 0, algorithm }];
-        let fields = Fields::from_steps(steps).map_err(|hint| Error::UnknownAlgorithm { text: String::new(), hint })?;
-        Self::new(fields, registry)
+        let tuning = Tuning::from_steps(steps).map_err(|hint| Error::UnknownAlgorithm { text: String::new(), hint })?;
+        Self::new(tuning, registry)
     }
 
     /// Whether the times of frames correct the expected costs. On unless it is turned off; what was learned until then stays in use.
     ///
-    /// Fields without cost curves have nothing to correct, and decide by the number of objects always.
+    /// Tuning without cost curves have nothing to correct, and decide by the number of objects always.
     pub fn set_learning(&mut self, learns: bool) {
         self.policy.set_learning(learns);
     }
@@ -121,20 +121,20 @@ impl Adaptive {
         self.policy.set_exploring(explores);
     }
 
-    /// The fields that it began with.
+    /// The tuning that it began with.
     #[must_use]
-    pub fn fields(&self) -> &Fields {
-        self.policy.fields()
+    pub fn tuning(&self) -> &Tuning {
+        self.policy.tuning()
     }
 
-    /// The fields corrected by what was learned of the machine and of each algorithm, with the slice of scenes like the present one. What
+    /// The tuning corrected by what was learned of the machine and of each algorithm, with the slice of scenes like the present one. What
     /// passes is left out: another program on a core, cores that moved apart, how much this scene spares algorithms that keep work. Those
     /// that it began with where nothing was learned.
     #[must_use]
-    pub fn learned(&self) -> Fields {
-        let fields = self.policy.fields();
-        let Some(learner) = self.policy.learned() else { return fields.clone() };
-        let mut costs = fields.costs.clone();
+    pub fn learned(&self) -> Tuning {
+        let tuning = self.policy.tuning();
+        let Some(learner) = self.policy.learned() else { return tuning.clone() };
+        let mut costs = tuning.costs.clone();
         for (k, cost) in costs.iter_mut().enumerate() {
             let lasting = |log2_objects| learner.lasting_ln(k, log2_objects);
             cost.curve.correction = cost.curve.corrected_by(place::octaves(), lasting);
@@ -146,24 +146,24 @@ impl Adaptive {
             load.rescaled(objects, load.pairs * f64::from(objects) / f64::from(load.objects.max(1)))
         };
         let loads: Vec<Load> = SLICE.map(like).collect();
-        let learned = Fields::from_costs(Source::Learned, "like the last frame", costs, &loads);
-        Fields {
-            model: fields.model.clone(),
-            extrapolated: fields.extrapolated,
-            warnings: fields.warnings.clone(),
-            samples: fields.samples.clone(),
+        let learned = Tuning::from_costs(Source::Learned, "like the last frame", costs, &loads);
+        Tuning {
+            model: tuning.model.clone(),
+            extrapolated: tuning.extrapolated,
+            warnings: tuning.warnings.clone(),
+            samples: tuning.samples.clone(),
             ..learned
         }
     }
 
     /// Makes every algorithm anew from this registry: one that was lost and is back, or all of them on a pool of another size. What was
-    /// learned stays, unless algorithms that keep work came or went; what they kept from frame to frame is gone. Fields that are still
+    /// learned stays, unless algorithms that keep work came or went; what they kept from frame to frame is gone. Tuning that are still
     /// awaited from the background bring algorithms of the registry that they were asked with.
     ///
     /// # Errors
     /// As [`new`](Self::new); the algorithms of before stay then.
     pub fn revive(&mut self, registry: &Registry) -> Result<(), Error> {
-        let mut made = Made::of(self.policy.fields(), registry);
+        let mut made = Made::of(self.policy.tuning(), registry);
         if let (true, Some(error)) = (made.instances.is_empty(), made.failure.take()) {
             return Err(error);
         }
@@ -172,10 +172,10 @@ impl Adaptive {
         Ok(())
     }
 
-    /// Other fields, with an instance of each of their algorithms, take the place of those of before. The estimate of the load stays.
+    /// Another tuning, with an instance of each of their algorithms, take the place of those of before. The estimate of the load stays.
     #[cfg(feature = "this-machine")]
-    fn adopt(&mut self, fields: Fields, made: Made) {
-        let before = std::mem::replace(&mut self.policy, policy(fields, &made));
+    fn adopt(&mut self, tuning: Tuning, made: Made) {
+        let before = std::mem::replace(&mut self.policy, policy(tuning, &made));
         self.policy.set_as(&before);
         self.exchange(made);
     }
@@ -197,7 +197,7 @@ impl Adaptive {
             measured_ns: self.measured_ns,
             runner_up: c.runner_up.map(|(k, ns)| (&self.candidates[k].id, ns)),
             reason: c.reason,
-            source: if self.policy.learned().is_some() { Source::Learned } else { self.policy.fields().source },
+            source: if self.policy.learned().is_some() { Source::Learned } else { self.policy.tuning().source },
             load: self.glance.load(),
         })
     }
@@ -253,7 +253,7 @@ impl BroadPhase for Adaptive {
             let Some(choice) = self.choice else {
                 // What the last one left is no answer.
                 pairs.clear();
-                let reason = "every algorithm of the fields has failed".to_owned();
+                let reason = "every algorithm of the tuning has failed".to_owned();
                 return Err(Error::Unavailable { algorithm: self.candidates[0].id.clone(), reason });
             };
             let candidate = &self.candidates[choice.chosen];
@@ -309,8 +309,8 @@ impl BroadPhase for Adaptive {
         }
     }
 
-    fn keeps_work(&self) -> bool {
-        self.instances.iter().any(|instance| instance.algorithm.keeps_work())
+    fn is_incremental(&self) -> bool {
+        self.instances.iter().any(|instance| instance.algorithm.is_incremental())
     }
 }
 
@@ -320,8 +320,8 @@ impl fmt::Debug for Adaptive {
     }
 }
 
-fn policy(fields: Fields, made: &Made) -> Policy {
-    Policy::new(fields, &made.kept(), made.usable())
+fn policy(tuning: Tuning, made: &Made) -> Policy {
+    Policy::new(tuning, &made.kept(), made.usable())
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// A method and where it runs, written `method@backend`: `brute@cpu1`, `strips@cpu8`, `sweep@gpu0`, `strips@gpu0+1`.
+/// A method and where it runs, written `method@backend`: `brute@cpu1`, `grid-sap@cpu8`, `sap@gpu0`, `grid-sap@gpu0+1`.
 ///
 /// The same text stands in JSON, on the command line and in logs.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -163,7 +163,7 @@ impl FromStr for AlgorithmId {
     fn from_str(text: &str) -> Result<Self, ParseIdError> {
         let (method, backend) = text
             .split_once('@')
-            .ok_or_else(|| ParseIdError(format!("{text:?} is no algorithm; write method@backend, such as strips@cpu1")))?;
+            .ok_or_else(|| ParseIdError(format!("{text:?} is no algorithm; write method@backend, such as grid-sap@cpu1")))?;
         Self::new(method, backend.parse()?)
     }
 }
@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn ids_read_back_what_they_write() {
-        for text in ["brute@cpu1", "strips@cpu16", "sweep@gpu0", "strips@gpu0+1", "my-tree_2@cpu2"] {
+        for text in ["brute@cpu1", "grid-sap@cpu16", "sap@gpu0", "grid-sap@gpu0+1", "my-tree_2@cpu2"] {
             assert_eq!(text.parse::<AlgorithmId>().unwrap().to_string(), text);
         }
     }

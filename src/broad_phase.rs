@@ -6,7 +6,7 @@ use crate::{Aabb, Error, Pairs};
 ///
 /// Every implementation gives the same set of pairs for the same boxes: each overlapping pair once, the lower position
 /// first, touching boxes included. Implementations keep their buffers between calls and allocate nothing once they have
-/// seen a frame as large and as dense; but with more than one thread rayon allocates small jobs, and what `verlet` keeps follows
+/// seen a frame as large and as dense; but with more than one thread rayon allocates small jobs, and what `pair-cache` keeps follows
 /// its margin, so that it settles over some frames more.
 pub trait BroadPhase: Send {
     /// Replaces the content of `pairs` with the overlapping pairs of `boxes`.
@@ -26,7 +26,7 @@ pub trait BroadPhase: Send {
     }
 
     /// Whether a frame is cheaper after one that was alike. Whoever times it has to run some frames first.
-    fn keeps_work(&self) -> bool {
+    fn is_incremental(&self) -> bool {
         false
     }
 

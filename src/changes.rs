@@ -12,7 +12,7 @@ use crate::error::Error;
 /// count as one: a pair between two of them is left out, and two ids are one pair however many of their boxes overlap.
 ///
 /// An update sorts the pairs as numbers of 64 bits and runs along those of the update before. On one core of an AMD EPYC that
-/// takes 10 to 20 ns a pair with 1000 to 100 000 pairs: about as long as `strips@cpu1` takes to find the pairs of a crowded scene,
+/// takes 10 to 20 ns a pair with 1000 to 100 000 pairs: about as long as `grid-sap@cpu1` takes to find the pairs of a crowded scene,
 /// and a third of it where they come in canonical order and ids ascend with the positions. When ids have changed it sorts them
 /// too. Memory for each pair: 8 bytes and two pairs of ids, and another for each that began or ended; for each box 8 bytes and
 /// two ids.

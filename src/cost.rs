@@ -98,7 +98,7 @@ impl<'a> Counts<'a> {
 pub struct CostCurve {
     /// Terms of the sum; none is negative.
     pub terms: Vec<CostTerm>,
-    /// Terms of another way to do the same, which the algorithm goes where this sum is the smaller one: Verlet lists leave a frame to
+    /// Terms of another way to do the same, which the algorithm goes where this sum is the smaller one: pair-cache lists leave a frame to
     /// the strips where boxes move too far. Empty where there is one way only.
     #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub otherwise: Vec<CostTerm>,

@@ -36,7 +36,7 @@ impl Default for Membership {
 /// Keeps pairs out of a [`Pairs`](crate::Pairs) before they are written.
 ///
 /// 12 bytes for each box, and a look at two memberships for each overlapping pair. In a crowded scene of which half the pairs pass
-/// that adds half to the time of `strips@cpu1` while the memberships fit into the caches, and one and a half times with 850 000 boxes.
+/// that adds half to the time of `grid-sap@cpu1` while the memberships fit into the caches, and one and a half times with 850 000 boxes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
     /// One for each box, at the position that the box has in the input. A box beyond the end is [`Membership::ALL`].

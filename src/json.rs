@@ -1,8 +1,8 @@
-//! Reports, models and fields as JSON text.
+//! Reports, models and tuning as JSON text.
 
 use crate::report::{Report, ReportSchema};
-use crate::{Fields, Model};
-use crate::{fields::FieldsSchema, model::ModelSchema};
+use crate::{Tuning, Model};
+use crate::{tuning::TuningSchema, model::ModelSchema};
 use std::fmt;
 
 /// A file of Sapwise, whatever its schema.
@@ -13,8 +13,8 @@ pub enum Document {
     Report(Box<Report>),
     /// `model/1`.
     Model(Box<Model>),
-    /// `fields/1`.
-    Fields(Box<Fields>),
+    /// `tuning/1`.
+    Tuning(Box<Tuning>),
 }
 
 /// Why a text is no sound file.
@@ -49,12 +49,12 @@ pub fn read(text: &str) -> Result<Document, JsonError> {
     match tag.schema.as_str() {
         ReportSchema::TEXT => report(text).map(|r| Document::Report(Box::new(r))),
         ModelSchema::TEXT => model(text).map(|m| Document::Model(Box::new(m))),
-        FieldsSchema::TEXT => fields(text).map(|f| Document::Fields(Box::new(f))),
+        TuningSchema::TEXT => tuning(text).map(|f| Document::Tuning(Box::new(f))),
         other => Err(JsonError(format!(
             "the schema is {other:?}; this version reads {:?}, {:?} and {:?}",
             ReportSchema::TEXT,
             ModelSchema::TEXT,
-            FieldsSchema::TEXT
+            TuningSchema::TEXT
         ))),
     }
 }
@@ -77,16 +77,16 @@ pub fn model(text: &str) -> Result<Model, JsonError> {
     model.defect().map_or(Ok(model), |d| Err(JsonError(d)))
 }
 
-/// Reads fields and checks their figures.
+/// Reads tuning and checks their figures.
 ///
 /// # Errors
 /// As [`read`].
-pub fn fields(text: &str) -> Result<Fields, JsonError> {
-    let fields: Fields = serde_json::from_str(text)?;
-    fields.defect().map_or(Ok(fields), |d| Err(JsonError(d)))
+pub fn tuning(text: &str) -> Result<Tuning, JsonError> {
+    let tuning: Tuning = serde_json::from_str(text)?;
+    tuning.defect().map_or(Ok(tuning), |d| Err(JsonError(d)))
 }
 
-/// Writes a report, model or fields, one key a line.
+/// Writes a report, model or tuning, one key a line.
 ///
 /// # Errors
 /// When a figure can't be written.
@@ -154,7 +154,7 @@ pub fn schemas() -> Result<Vec<(&'static str, String)>, JsonError> {
     Ok(vec![
         ("report-1.schema.json", write(&schemars::schema_for!(Report))?),
         ("model-1.schema.json", write(&schemars::schema_for!(Model))?),
-        ("fields-1.schema.json", write(&schemars::schema_for!(Fields))?),
+        ("tuning-1.schema.json", write(&schemars::schema_for!(Tuning))?),
         ("cache-1.schema.json", write(&schemars::schema_for!(crate::adaptive::cache::Cached))?),
     ])
 }

@@ -1,34 +1,34 @@
 //! Broad-phase collision detection that knows which algorithm is fastest on this machine, for this frame.
 //!
 //! An engine hands its [`Aabb`]s to [`Adaptive`] every frame and gets [`Pairs`] back. Which algorithm of the [`Registry`]
-//! ran was decided by [`Fields`]: the cheapest for the [`Load`] of the frame.
+//! ran was decided by [`Tuning`]: the cheapest for the [`Load`] of the frame.
 //!
 //! ```
-//! use sapwise::{Aabb, Adaptive, BroadPhase, Fields, Pairs, Registry};
+//! use sapwise::{Aabb, Adaptive, BroadPhase, Tuning, Pairs, Registry};
 //!
 //! let registry = Registry::new();
-//! let mut broad_phase = Adaptive::new(Fields::usual(&registry), &registry)?;
+//! let mut broad_phase = Adaptive::new(Tuning::usual(&registry), &registry)?;
 //! let mut pairs = Pairs::new();
 //! broad_phase.find_pairs(&[Aabb::cube([0.0; 3], 0.5), Aabb::cube([1.0, 0.0, 0.0], 0.5)], &mut pairs)?;
 //! assert_eq!(pairs.as_slice(), [(0, 1)]);
 //! # Ok::<(), sapwise::Error>(())
 //! ```
 //!
-//! With the feature `this-machine`, `Adaptive::for_this_machine` does all of that: it measures the hardware once, predicts the fields and
+//! With the feature `this-machine`, `Adaptive::for_this_machine` does all of that: it measures the hardware once, predicts the tuning and
 //! keeps them for the next start.
 //!
-//! Where fields come from, in ascending order of trust: written by hand ([`Fields::usual`], [`Fields::from_steps`]),
+//! Where tuning comes from, in ascending order of trust: written by hand ([`Tuning::usual`], [`Tuning::from_steps`]),
 //! predicted by a [`Model`] from the parameters of the [`Hardware`], or measured, from the timings in a [`Report`]. Reports,
-//! models and fields are files of the feature `model`; the command `sapwise` makes them.
+//! models and tuning is files of the feature `model`; the command `sapwise` makes them.
 //!
 //! # Features
 //!
 //! - `parallel` (default): the algorithms on several cores, through rayon. Without it only `@cpu1`.
 //! - `gpu`: the algorithms on GPUs, through wgpu; see the module `gpu`.
-//! - `model`: reports, models and fields as JSON; prediction.
+//! - `model`: reports, models and tuning as JSON; prediction.
 //! - `measure`: measures the hardware parameters of this machine.
 //! - `measure-gpu`: those of its GPUs too.
-//! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and keeps the fields for the next start.
+//! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and keeps the tuning for the next start.
 //! - `schema`: the JSON Schemas of the files, for tools.
 
 mod aabb;
@@ -41,7 +41,7 @@ mod cpu;
 pub mod crossover;
 mod displacement;
 mod error;
-pub mod fields;
+pub mod tuning;
 mod filter;
 #[cfg(feature = "gpu")]
 pub mod gpu;
@@ -76,7 +76,7 @@ pub use cpu::SimdLevel;
 pub use crossover::{Comparison, Crossover, Paired, Position};
 pub use displacement::Displacement;
 pub use error::{BoxDefect, Error};
-pub use fields::{AlgorithmCost, Border, Fields, Observation, Ranking, Source, Step};
+pub use tuning::{AlgorithmCost, Border, Tuning, Observation, Ranking, Source, Step};
 pub use filter::{Filter, Membership};
 pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, Machine, Parameter};
 pub use load::Load;

@@ -41,7 +41,7 @@ pub const GPU_PREFIX: &str = "gpu/";
 pub struct Model {
     /// Always `model/1`.
     pub schema: ModelSchema,
-    /// Name by which fields refer to it.
+    /// Name by which tuning refer to it.
     pub name: String,
     /// The reports behind it, one by one. Empty where there are too many to list: then `trained_on_counts` tells them.
     pub trained_on: Vec<TrainingReport>,

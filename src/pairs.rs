@@ -58,7 +58,7 @@ impl Pairs {
     /// Sets the most pairs that may be stored, 8 bytes each, or lifts that limit.
     ///
     /// A frame with more wanted pairs is [`Error::TooManyPairs`], which tells how many there are. An algorithm on `k` threads, `k` above 1,
-    /// may hold up to `8 k + 1` times the limit while it works: each of its tasks has a list of its own. `verlet` keeps up to 32 pairs
+    /// may hold up to `8 k + 1` times the limit while it works: each of its tasks has a list of its own. `pair-cache` keeps up to 32 pairs
     /// for each box beside that, whatever the limit.
     pub fn set_limit(&mut self, limit: Option<usize>) {
         self.limit = limit;

@@ -10,7 +10,7 @@ schema_tag!(
 
 /// The hardware parameters of a machine and the raw timings of every algorithm on it.
 ///
-/// Facts only: cost curves, crossovers and fields are derived from it and never stored in it.
+/// Facts only: cost curves, crossovers and tuning is derived from it and never stored in it.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]

@@ -5,7 +5,7 @@ mod common;
 use common::{Random, every_algorithm, naive};
 use proptest::prelude::*;
 use sapwise::{
-    Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Fields, Filter, Membership, Pair, PairOrder, Pairs, Registry,
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Tuning, Filter, Membership, Pair, PairOrder, Pairs, Registry,
     Step,
 };
 use std::collections::BTreeSet;
@@ -91,7 +91,7 @@ proptest! {
         frames in prop::collection::vec((0_usize..60, 0_usize..40), 1..12),
     ) {
         let registry = Registry::with_cores(1);
-        let mut algorithm = registry.create(&"verlet@cpu1".parse().unwrap()).unwrap();
+        let mut algorithm = registry.create(&"pair-cache@cpu1".parse().unwrap()).unwrap();
         let mut world = World::new(seed);
         let mut changes = Changes::new();
         let mut before = BTreeSet::new();
@@ -154,11 +154,11 @@ struct Output {
     all: Vec<(u64, u64)>,
 }
 
-/// Every frame of one world, and the algorithms that ran, with `steps` as fields.
+/// Every frame of one world, and the algorithms that ran, with `steps` as tuning.
 fn run(order: PairOrder, steps: &[(u32, &str)]) -> (Vec<Output>, BTreeSet<AlgorithmId>) {
     let step = |&(from_objects, id): &(u32, &str)| Step { from_objects, algorithm: id.parse().unwrap() };
-    let fields = Fields::from_steps(steps.iter().map(step).collect()).unwrap();
-    let mut adaptive = Adaptive::new(fields, &Registry::with_cores(2)).unwrap();
+    let tuning = Tuning::from_steps(steps.iter().map(step).collect()).unwrap();
+    let mut adaptive = Adaptive::new(tuning, &Registry::with_cores(2)).unwrap();
     let mut world = World::new(0x10c4);
     let mut pairs = Pairs::with_order(order);
     pairs.set_filter(Some(Filter::default()));
@@ -187,11 +187,11 @@ fn run(order: PairOrder, steps: &[(u32, &str)]) -> (Vec<Output>, BTreeSet<Algori
 
 #[test]
 fn runs_with_different_algorithms_and_switches_are_the_same_bit_for_bit() {
-    let parallel = if cfg!(feature = "parallel") { "strips@cpu2" } else { "strips@cpu1" };
+    let parallel = if cfg!(feature = "parallel") { "grid-sap@cpu2" } else { "grid-sap@cpu1" };
     let courses: [&[(u32, &str)]; 3] = [
-        &[(0, "brute@cpu1"), (150, "sweep@cpu1")],
-        &[(0, "verlet@cpu1")],
-        &[(0, "strips@cpu1"), (400, parallel), (700, "verlet@cpu1")],
+        &[(0, "brute@cpu1"), (150, "sap@cpu1")],
+        &[(0, "pair-cache@cpu1")],
+        &[(0, "grid-sap@cpu1"), (400, parallel), (700, "pair-cache@cpu1")],
     ];
     let first = run(PairOrder::Canonical, courses[0]);
     assert!(first.0.iter().filter(|o| !o.begun.is_empty() && !o.ended.is_empty()).count() > 80, "much begins and ends");

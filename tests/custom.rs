@@ -5,7 +5,7 @@ mod common;
 mod custom;
 
 use common::naive;
-use custom::{ID, cost, fields, registry};
+use custom::{ID, cost, tuning, registry};
 use sapwise::{Aabb, Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Scenario, Term};
 use std::time::Duration;
 
@@ -23,13 +23,13 @@ fn run(adaptive: &mut Adaptive, boxes: &[Aabb]) -> (String, Reason) {
 }
 
 #[test]
-fn it_runs_where_the_fields_say_that_it_is_cheapest() {
+fn it_runs_where_the_tuning_say_that_it_is_cheapest() {
     let registry = registry("brute@cpu1");
     let costs = vec![
         cost(&registry, "brute@cpu1", &[(Term::Objects, 60.0)]),
         cost(&registry, ID, &[(Term::Objects, 2.0), (Term::Moved, 1e6)]),
     ];
-    let mut adaptive = Adaptive::new(fields(costs), &registry).unwrap();
+    let mut adaptive = Adaptive::new(tuning(costs), &registry).unwrap();
     adaptive.set_learning(false);
     let mut scene = Scenario::Uniform.start(300, 1);
     for phase in 0..6 {
@@ -73,7 +73,7 @@ fn with_sleepers() -> Registry {
 
 fn calls(registry: &Registry, costs: &[(&str, f64)]) -> Adaptive {
     let costs = costs.iter().map(|&(id, ns)| cost(registry, id, &[(Term::Call, ns)])).collect();
-    Adaptive::new(fields(costs), registry).unwrap()
+    Adaptive::new(tuning(costs), registry).unwrap()
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn one_whose_cost_was_far_too_low_is_left() {
     assert_eq!(ran[0], "slow@cpu1");
     let slow = ran.iter().filter(|id| *id == "slow@cpu1").count();
     assert!(ran[299] == "quick@cpu1" && slow < 150, "{slow} of 300 frames by the slow one, the last by {}", ran[299]);
-    // What was learned is fields like any others.
+    // What was learned is tuning like any others.
     let learned = adaptive.learned();
     let mut again = Adaptive::new(learned, &registry).unwrap();
     again.set_learning(false);

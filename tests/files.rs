@@ -116,11 +116,11 @@ fn every_schema_version_stays_readable() {
     assert_eq!((model.folds.len(), model.clouds.len()), (2, 1));
     assert!(json::model(&json::write_model(&model).unwrap()).unwrap() == *model);
     assert!(json::read(&folds.replacen("[0.012,", "[0.9,", 1)).unwrap_err().to_string().contains("a fold: errors of"));
-    let Ok(Document::Fields(fields)) = json::read(include_str!("fixtures/fields-1.json")) else { panic!("no fields") };
-    let text = json::write(&fields).unwrap();
-    assert_eq!(json::fields(&text).unwrap(), *fields);
-    let ranking = fields.rank(&sapwise::Load { objects: 10, ..Default::default() }, |_| true).unwrap();
-    assert_eq!(fields.costs[ranking.best].algorithm.to_string(), "brute@cpu1");
+    let Ok(Document::Tuning(tuning)) = json::read(include_str!("fixtures/tuning-1.json")) else { panic!("no tuning") };
+    let text = json::write(&tuning).unwrap();
+    assert_eq!(json::tuning(&text).unwrap(), *tuning);
+    let ranking = tuning.rank(&sapwise::Load { objects: 10, ..Default::default() }, |_| true).unwrap();
+    assert_eq!(tuning.costs[ranking.best].algorithm.to_string(), "brute@cpu1");
 }
 
 #[test]

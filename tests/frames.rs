@@ -17,9 +17,9 @@ fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
                 all.push((format!("{id} at {level}"), registry.create(&id).unwrap()));
             }
         }
-        let ids = ["verlet@cpu1", "verlet@cpu2", "verlet@cpu3"].map(|id| id.parse().unwrap());
+        let ids = ["pair-cache@cpu1", "pair-cache@cpu2", "pair-cache@cpu3"].map(|id| id.parse().unwrap());
         if let Some(Ok(all_widths)) = registry.create_for(&ids.each_ref()) {
-            all.push((format!("verlet on changing threads at {level}"), Box::new(Roaming(all_widths, Random(7)))));
+            all.push((format!("pair_cache on changing threads at {level}"), Box::new(Roaming(all_widths, Random(7)))));
         }
     }
     all
@@ -58,8 +58,8 @@ fn wander(boxes: &mut [Aabb], step: f32, random: &mut Random) {
 #[test]
 fn no_kept_pair_is_lost_on_the_way_from_many_threads_to_one() {
     let registry = Registry::with_cores(8);
-    let ids = ["verlet@cpu1", "verlet@cpu8"].map(|id| id.parse().unwrap());
-    let Some(Ok(mut verlet)) = registry.create_for(&ids.each_ref()) else {
+    let ids = ["pair-cache@cpu1", "pair-cache@cpu8"].map(|id| id.parse().unwrap());
+    let Some(Ok(mut pair_cache)) = registry.create_for(&ids.each_ref()) else {
         // Built without threads.
         return;
     };
@@ -69,7 +69,7 @@ fn no_kept_pair_is_lost_on_the_way_from_many_threads_to_one() {
     let mut boxes = random.cubes(400, [11.0; 3], 0.5);
     let middle = boxes[0].min;
     for frame in 0..400 {
-        assert!(verlet.set_threads(if frame % 3 == 2 { 1 } else { 8 }));
+        assert!(pair_cache.set_threads(if frame % 3 == 2 { 1 } else { 8 }));
         for (k, b) in boxes.iter_mut().enumerate() {
             // Towards each other until they are crowded, and a few that leave their grown box in every frame.
             let pull = if frame < 330 { 0.006 } else { 0.0 };
@@ -79,7 +79,7 @@ fn no_kept_pair_is_lost_on_the_way_from_many_threads_to_one() {
                 b.max[a] += by;
             }
         }
-        verlet.find_pairs(&boxes, &mut pairs).unwrap();
+        pair_cache.find_pairs(&boxes, &mut pairs).unwrap();
         let expected = naive(&boxes);
         assert!(pairs.as_slice() == expected, "frame {frame}: {} pairs, not {}", pairs.len(), expected.len());
     }
@@ -211,9 +211,9 @@ fn boxes_that_jump_in_every_frame_while_the_others_rest() {
 fn many_boxes_of_which_many_leave_at_once() {
     let registry = Registry::with_cores(3);
     let create = |id: &str| registry.create(&id.parse().unwrap());
-    let mut strips = create("strips@cpu1").unwrap();
+    let mut strips = create("grid-sap@cpu1").unwrap();
     let (mut expected, mut pairs) = (Pairs::new(), Pairs::new());
-    for id in ["verlet@cpu1", "verlet@cpu3"] {
+    for id in ["pair-cache@cpu1", "pair-cache@cpu3"] {
         let Ok(mut algorithm) = create(id) else { continue };
         let mut random = Random(41);
         let mut boxes = random.cubes(60_000, [80.0; 3], 0.6);

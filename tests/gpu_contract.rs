@@ -15,7 +15,7 @@ fn every_algorithm(gpus: &Gpus) -> Vec<(String, Box<dyn BroadPhase>)> {
     let ids = registry.available().into_iter().map(|(id, _)| id).filter(|id| id.to_string().contains("@gpu"));
     let mut all: Vec<(String, Box<dyn BroadPhase>)> =
         ids.map(|id| (id.to_string(), registry.create(&id).unwrap())).collect();
-    for method in ["brute", "sweep", "strips"] {
+    for method in ["brute", "sap", "grid-sap"] {
         let devices = vec![gpus.open(0).unwrap(), gpus.open_another(0).unwrap()];
         all.push((format!("{method} on gpu0 twice"), broad_phase(method, devices).unwrap()));
     }

@@ -5,11 +5,11 @@ mod common;
 use common::{Random, gpus, naive};
 use sapwise::gpu::{Gpu, Gpus, broad_phase, wgpu};
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Fields, Load, PairOrder, Pairs, Reason, Registry,
+    Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, PairOrder, Pairs, Reason, Registry,
     Scenario, Source, Term,
 };
 
-const METHODS: [&str; 3] = ["brute", "sweep", "strips"];
+const METHODS: [&str; 3] = ["brute", "sap", "grid-sap"];
 
 /// The first GPU as a device whose buffers are that small.
 fn small(gpus: &Gpus, bytes: u64) -> Gpu {
@@ -32,8 +32,8 @@ fn revision(id: &str) -> u32 {
     registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method()))).map_or(1, |e| e.revision)
 }
 
-/// Fields in which each algorithm costs that much a frame.
-fn fields(costs: &[(&str, f64)]) -> Fields {
+/// Tuning in which each algorithm costs that much a frame.
+fn tuning(costs: &[(&str, f64)]) -> Tuning {
     let cost = |&(id, ns): &(&str, f64)| AlgorithmCost {
         algorithm: id.parse().unwrap(),
         revision: revision(id),
@@ -41,7 +41,7 @@ fn fields(costs: &[(&str, f64)]) -> Fields {
         spread_ln: 0.0,
     };
     let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
-    Fields::from_costs(Source::Measured, "uniform", costs.iter().map(cost).collect(), &loads)
+    Tuning::from_costs(Source::Measured, "uniform", costs.iter().map(cost).collect(), &loads)
 }
 
 #[test]
@@ -68,8 +68,8 @@ fn the_adaptive_module_goes_on_without_a_lost_device_in_the_same_frame() {
     let Some(gpus) = gpus() else { return };
     let mut registry = Registry::with_cores(1);
     registry.add_gpus(&gpus);
-    let fields = fields(&[("strips@gpu0", 1.0), ("sweep@gpu0", 2.0), ("strips@cpu1", 3.0), ("brute@cpu1", 9.0)]);
-    let mut adaptive = Adaptive::new(fields, &registry).unwrap();
+    let tuning = tuning(&[("grid-sap@gpu0", 1.0), ("sap@gpu0", 2.0), ("grid-sap@cpu1", 3.0), ("brute@cpu1", 9.0)]);
+    let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
     // Where a GPU is an act, the CPU is soon known to be faster.
     adaptive.set_learning(false);
     let mut scene = Scenario::Uniform.start(2000, 3);
@@ -83,10 +83,10 @@ fn the_adaptive_module_goes_on_without_a_lost_device_in_the_same_frame() {
         let decision = adaptive.last_decision().unwrap();
         chosen.push((decision.algorithm.to_string(), decision.reason));
     }
-    assert_eq!(chosen[2].0, "strips@gpu0");
-    assert_eq!(chosen[3], ("strips@cpu1".to_owned(), Reason::FellBack));
+    assert_eq!(chosen[2].0, "grid-sap@gpu0");
+    assert_eq!(chosen[3], ("grid-sap@cpu1".to_owned(), Reason::FellBack));
     // The reason stands until the next decision, which frames as short as these don't need at once.
-    assert_eq!(chosen[5].0, "strips@cpu1");
+    assert_eq!(chosen[5].0, "grid-sap@cpu1");
 }
 
 /// The same GPU again and again: lost in a frame, found anew some frames later and taken up at once, without a missing pair.
@@ -98,8 +98,8 @@ fn a_device_that_is_lost_and_back_is_taken_up_again() {
         registry.add_gpus(gpus);
         registry
     };
-    let fields = fields(&[("strips@gpu0", 1.0), ("sweep@gpu0", 2.0), ("strips@cpu1", 3.0), ("brute@cpu1", 9.0)]);
-    let mut adaptive = Adaptive::new(fields, &registry(&gpus)).unwrap();
+    let tuning = tuning(&[("grid-sap@gpu0", 1.0), ("sap@gpu0", 2.0), ("grid-sap@cpu1", 3.0), ("brute@cpu1", 9.0)]);
+    let mut adaptive = Adaptive::new(tuning, &registry(&gpus)).unwrap();
     // Where a GPU is an act, the CPU is soon known to be faster.
     adaptive.set_learning(false);
     let mut scene = Scenario::Fragmentation.start(400, 5);
@@ -116,7 +116,7 @@ fn a_device_that_is_lost_and_back_is_taken_up_again() {
         assert!(pairs_of(&mut adaptive, scene.boxes()).unwrap() == naive(scene.boxes()), "frame {frame}");
         let decision = adaptive.last_decision().unwrap();
         let present = !(7..15).contains(&(frame % 20));
-        assert_eq!(decision.algorithm.to_string(), if present { "strips@gpu0" } else { "strips@cpu1" }, "frame {frame}");
+        assert_eq!(decision.algorithm.to_string(), if present { "grid-sap@gpu0" } else { "grid-sap@cpu1" }, "frame {frame}");
         assert!(!lost || decision.reason == Reason::FellBack, "frame {frame}: {:?}", decision.reason);
     }
 }
@@ -144,13 +144,13 @@ fn is_software(gpu: &Gpu) -> bool {
 
 #[test]
 fn a_gpu_that_is_gone_leaves_the_cpu() {
-    let fields = fields(&[("strips@gpu0", 1.0), ("strips@gpu6+7", 2.0), ("strips@cpu1", 3.0)]);
+    let tuning = tuning(&[("grid-sap@gpu0", 1.0), ("grid-sap@gpu6+7", 2.0), ("grid-sap@cpu1", 3.0)]);
     let mut registry = Registry::with_cores(1);
     registry.add_gpus(&Gpus::none());
-    let mut adaptive = Adaptive::new(fields, &registry).unwrap();
+    let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
     let boxes = Random(2).cubes(500, [9.0; 3], 0.5);
     assert!(pairs_of(&mut adaptive, &boxes).unwrap() == naive(&boxes));
-    assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "strips@cpu1");
+    assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "grid-sap@cpu1");
     assert!(Gpus::none().open(0).unwrap_err().contains("no GPU was found"));
 }
 
@@ -161,9 +161,9 @@ fn frames_beyond_the_limits_of_a_device_come_in_pieces() {
     let gpu = small(&gpus, 1 << 20);
     let mut scene = Scenario::Uniform.start(100_000, 4);
     scene.advance();
-    let oracle = pairs_of(Registry::with_cores(1).create(&"strips@cpu1".parse().unwrap()).unwrap().as_mut(), scene.boxes());
+    let oracle = pairs_of(Registry::with_cores(1).create(&"grid-sap@cpu1".parse().unwrap()).unwrap().as_mut(), scene.boxes());
     let oracle = oracle.unwrap();
-    for method in ["sweep", "strips"] {
+    for method in ["sap", "grid-sap"] {
         let mut algorithm = broad_phase(method, vec![gpu.clone()]).unwrap();
         assert!(pairs_of(algorithm.as_mut(), scene.boxes()).unwrap() == oracle, "{method}");
     }
@@ -176,7 +176,7 @@ fn frames_beyond_the_limits_of_a_device_come_in_pieces() {
 #[test]
 fn the_first_invalid_box_is_named_across_pieces() {
     let Some(gpus) = gpus() else { return };
-    let mut algorithm = broad_phase("strips", vec![small(&gpus, 64 << 10)]).unwrap();
+    let mut algorithm = broad_phase("grid-sap", vec![small(&gpus, 64 << 10)]).unwrap();
     let mut boxes: Vec<Aabb> = (0..9000).map(|k| Aabb::cube([k as f32, 0.0, 0.0], 0.4)).collect();
     boxes.reverse();
     // The first in the list is the last along the axis, so that another piece comes upon the other one first.
@@ -193,7 +193,7 @@ fn several_threads_share_a_gpu() {
     let boxes = Random(12).cubes(300, [8.0; 3], 0.5);
     let oracle = naive(&boxes);
     std::thread::scope(|scope| {
-        for method in ["strips", "brute", "strips"] {
+        for method in ["grid-sap", "brute", "grid-sap"] {
             let (gpu, boxes, oracle) = (gpu.clone(), &boxes, &oracle);
             scope.spawn(move || {
                 let mut algorithm = broad_phase(method, vec![gpu]).unwrap();
@@ -228,7 +228,7 @@ fn boxes_that_can_not_be_cut_into_pieces_are_an_error() {
     let boxes = vec![Aabb::cube([0.0; 3], 1.0); 5000];
     let mut pairs = Pairs::new();
     pairs.set_limit(Some(10));
-    let error = broad_phase("strips", vec![gpu]).unwrap().find_pairs(&boxes, &mut pairs).unwrap_err();
+    let error = broad_phase("grid-sap", vec![gpu]).unwrap().find_pairs(&boxes, &mut pairs).unwrap_err();
     assert!(error.to_string().contains("cut into pieces"), "{error}");
 }
 

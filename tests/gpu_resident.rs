@@ -44,7 +44,7 @@ fn resident_frames_equal_the_oracle() {
     let mut random = Random(21);
     for index in 0..gpus.len() as u32 {
         let gpu = gpus.open(index).unwrap();
-        for method in ["brute", "sweep", "strips"] {
+        for method in ["brute", "sap", "grid-sap"] {
             let mut resident = Resident::new(&gpu, method).unwrap();
             for count in [0, 1, 2, 33, 1000, 5000, 700] {
                 let boxes = random.cubes(count, [14.0, 16.0, 12.0], 0.6);
@@ -65,7 +65,7 @@ fn resident_frames_equal_the_oracle() {
 fn wrong_input_is_an_error() {
     let Some(gpus) = gpus() else { return };
     let gpu = gpus.open(0).unwrap();
-    let mut resident = Resident::new(&gpu, "strips").unwrap();
+    let mut resident = Resident::new(&gpu, "grid-sap").unwrap();
     let mut boxes = Random(5).cubes(100, [9.0; 3], 0.5);
     let uniform = buffer(&gpu, &boxes, wgpu::BufferUsages::UNIFORM);
     let error = resident.find_pairs(&uniform, 100).unwrap_err().to_string();

@@ -4,7 +4,7 @@ mod common;
 
 use common::{Random, naive};
 use sapwise::rayon::{self, ThreadPool, ThreadPoolBuilder};
-use sapwise::{Aabb, Adaptive, AlgorithmId, Backend, BroadPhase, Error, Fields, PairOrder, Pairs, Registry, Scenario};
+use sapwise::{Aabb, Adaptive, AlgorithmId, Backend, BroadPhase, Error, Tuning, PairOrder, Pairs, Registry, Scenario};
 use std::sync::Arc;
 
 fn pool(threads: usize) -> Arc<ThreadPool> {
@@ -93,7 +93,7 @@ fn more_threads_than_the_pool_has_are_unavailable_with_a_reason() {
     };
     // All that there are stand in the list, as without a pool.
     assert_eq!((counts(&registry, true), counts(&registry, false)), (vec![1, 2, 4, 5], vec![8]));
-    for text in ["brute@cpu8", "verlet@cpu6"] {
+    for text in ["brute@cpu8", "pair-cache@cpu6"] {
         let Err(Error::Unavailable { reason, .. }) = registry.create(&text.parse().unwrap()) else { panic!("made {text}") };
         assert!(reason.contains("has 4 threads, with the calling one 5"), "{reason}");
     }
@@ -109,12 +109,12 @@ fn more_threads_than_the_pool_has_are_unavailable_with_a_reason() {
 fn the_choice_keeps_to_the_pool() {
     let pool = pool(2);
     let registry = registry(8, &pool);
-    let mut adaptive = Adaptive::new(Fields::usual(&registry), &registry).unwrap();
+    let mut adaptive = Adaptive::new(Tuning::usual(&registry), &registry).unwrap();
     let boxes = Random(11).cubes(6000, [40.0; 3], 0.5);
     let mut pairs = Pairs::with_order(PairOrder::Canonical);
     pool.install(|| adaptive.find_pairs(&boxes, &mut pairs)).unwrap();
     assert!(pairs.as_slice() == naive(&boxes));
-    assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "verlet@cpu3");
+    assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "pair-cache@cpu3");
     // The pool outlives what used it.
     drop((adaptive, registry));
     assert_eq!(pool.install(rayon::current_num_threads), 2);

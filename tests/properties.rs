@@ -1,7 +1,7 @@
 //! What must hold for any boxes at all.
 
 use proptest::prelude::*;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Displacement, Fields, Load, PairOrder, Pairs, Registry, Step};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Displacement, Tuning, Load, PairOrder, Pairs, Registry, Step};
 
 /// Bounds that meet often, with infinities, zeros of both signs and denormals among them.
 fn bound() -> impl Strategy<Value = f32> {
@@ -89,9 +89,9 @@ proptest! {
         frames in prop::collection::vec(prop::collection::vec(valid_box(), 0..400), 1..4),
     ) {
         let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
-        let fields = Fields::from_steps(vec![step(0, "brute@cpu1"), step(border, "strips@cpu1")]).unwrap();
+        let tuning = Tuning::from_steps(vec![step(0, "brute@cpu1"), step(border, "grid-sap@cpu1")]).unwrap();
         let registry = Registry::with_cores(1);
-        let mut adaptive = Adaptive::new(fields, &registry).unwrap();
+        let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
         let mut brute = registry.create(&"brute@cpu1".parse().unwrap()).unwrap();
         let (mut a, mut b) = (Pairs::new(), Pairs::new());
         for boxes in frames {

@@ -18,7 +18,7 @@ mod kept;
 
 use common::{Random, naive};
 use sapwise::{
-    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Fields, Load, PairOrder, Pairs, Reason, Registry,
+    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, PairOrder, Pairs, Reason, Registry,
     Scenario, Source, Term,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -109,14 +109,14 @@ fn registry(cores: u32, slot: &Arc<Slot>) -> Registry {
     let slot = Arc::clone(slot);
     registry.add(GPU.parse().unwrap(), 1, move || {
         let device = slot.0.load(Relaxed);
-        let inner = Registry::with_cores(1).create(&"sweep@cpu1".parse().unwrap())?;
+        let inner = Registry::with_cores(1).create(&"sap@cpu1".parse().unwrap())?;
         if slot.is_present() { Ok(Box::new(OnGpu { slot: Arc::clone(&slot), device, inner })) } else { Err(lost()) }
     });
     registry
 }
 
-/// Fields in which few boxes are for brute force, many for the GPU, and for several threads where it is lost.
-fn fields() -> Fields {
+/// Tuning in which few boxes are for brute force, many for the GPU, and for several threads where it is lost.
+fn tuning() -> Tuning {
     let registry = Registry::with_cores(1);
     let cost = |id: &str, call: f64, object: f64| {
         let of_method = registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method())));
@@ -130,16 +130,16 @@ fn fields() -> Fields {
     };
     let costs = vec![
         cost("brute@cpu1", 100.0, 60.0),
-        cost("verlet@cpu1", 1500.0, 40.0),
+        cost("pair-cache@cpu1", 1500.0, 40.0),
         cost(GPU, 4000.0, 5.0),
-        cost("sweep@cpu1", 2500.0, 45.0),
-        cost("strips@cpu2", 4000.0, 25.0),
+        cost("sap@cpu1", 2500.0, 45.0),
+        cost("grid-sap@cpu2", 4000.0, 25.0),
         cost("brute@cpu2", 3000.0, 31.0),
-        cost("verlet@cpu3", 5000.0, 14.0),
-        cost("strips@cpu4", 5500.0, 11.0),
+        cost("pair-cache@cpu3", 5000.0, 14.0),
+        cost("grid-sap@cpu4", 5500.0, 11.0),
     ];
     let loads: Vec<Load> = (0..12).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
-    Fields::from_costs(Source::Default, "fragmentation", costs, &loads)
+    Tuning::from_costs(Source::Default, "fragmentation", costs, &loads)
 }
 
 /// What has happened so far.
@@ -182,10 +182,10 @@ impl Machine {
     }
 }
 
-/// One program from start to end. Gives the fields that it ends with.
-fn program(fields: Fields, frames: u64, random: &mut Random, tally: &mut Tally) -> Fields {
+/// One program from start to end. Gives the tuning that it ends with.
+fn program(tuning: Tuning, frames: u64, random: &mut Random, tally: &mut Tally) -> Tuning {
     let mut machine = Machine::new(random);
-    let mut adaptive = Adaptive::new(fields, &registry(machine.cores, &machine.slot)).unwrap();
+    let mut adaptive = Adaptive::new(tuning, &registry(machine.cores, &machine.slot)).unwrap();
     // The costs that it starts with hold on machines that nobody has: they keep all algorithms busy where nothing is learned.
     adaptive.set_learning(below(random, 4) == 0);
     tally.starts += 1;
@@ -280,7 +280,7 @@ fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
     let began = Instant::now();
     let mut random = Random(0x5eed_50a4);
     let mut tally = Tally::default();
-    let mut known = fields();
+    let mut known = tuning();
     #[cfg(feature = "this-machine")]
     let mut kept = kept::Kept::new();
     let mut live = Vec::with_capacity(2 * (frames / LIFE) as usize + 64);
@@ -293,7 +293,7 @@ fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
         } else {
             let learned = program(known, length, &mut random, &mut tally);
             // A start goes on with what the one before has learned, until somebody deletes it.
-            known = if below(&mut random, 2) == 0 { fields() } else { learned };
+            known = if below(&mut random, 2) == 0 { tuning() } else { learned };
         }
         lowest = lowest.min(live_bytes(lowest));
         live.push(live_bytes(lowest));
@@ -310,7 +310,7 @@ fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
         ("pools of another size", tally.pools),
         ("an invalid box", tally.invalid),
         ("a limit on the pairs", tally.over_limit),
-        ("learned fields", tally.learned),
+        ("learned tuning", tally.learned),
     ] {
         // One in some thousands of frames each, or the seed has hit upon nothing that this test is for.
         assert!(times >= frames / 20_000, "{what}: {times} times in {frames} frames");

@@ -4,7 +4,7 @@
 //! One test only, because the counter sees every thread of the process.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, Changes, CostCurve, CostTerm, Error, Fields, Filter, Load,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, Changes, CostCurve, CostTerm, Error, Tuning, Filter, Load,
     Membership, Pairs, Registry, Scenario, Source, Term,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -48,7 +48,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// Allocations, and large ones, of `run` in all of `frames` further frames of a scene, after seven rounds of the same frames: `verlet` finds
+/// Allocations, and large ones, of `run` in all of `frames` further frames of a scene, after seven rounds of the same frames: `pair-cache` finds
 /// its margin in them, and what it keeps varies with the margin.
 ///
 /// With `extras` a filter that changes in each frame, and changes by ids of which two do.
@@ -81,8 +81,8 @@ fn allocations(scenario: Scenario, objects: usize, frames: usize, run: &mut dyn 
     (counted, large)
 }
 
-/// Fields whose borders `fragmentation` crosses: 30 n = 5000 + 5 n at n = 200, 0.05 n^2 = 30 n at n = 600.
-fn fields(registry: &Registry) -> Fields {
+/// Tuning whose borders `fragmentation` crosses: 30 n = 5000 + 5 n at n = 200, 0.05 n^2 = 30 n at n = 600.
+fn tuning(registry: &Registry) -> Tuning {
     let cost = |id: &str, call: f64, object: f64| AlgorithmCost {
         algorithm: id.parse().unwrap(),
         revision: registry.entries().iter().find(|e| e.id.to_string() == id).unwrap().revision,
@@ -93,8 +93,8 @@ fn fields(registry: &Registry) -> Fields {
         spread_ln: 0.0,
     };
     let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
-    let costs = vec![cost("brute@cpu1", 0.0, 60.0), cost("sweep@cpu1", 5_000.0, 30.0), cost("strips@cpu1", 30_000.0, 10.0)];
-    Fields::from_costs(Source::Measured, "uniform", costs, &loads)
+    let costs = vec![cost("brute@cpu1", 0.0, 60.0), cost("sap@cpu1", 5_000.0, 30.0), cost("grid-sap@cpu1", 30_000.0, 10.0)];
+    Tuning::from_costs(Source::Measured, "uniform", costs, &loads)
 }
 
 #[test]
@@ -110,8 +110,8 @@ fn a_steady_state_allocates_nothing() {
             // rayon allocates a job of some 100 bytes for each helper in each phase, and now and then a block of its queue.
             let phases = match id.method() {
                 "brute" => 4,
-                "strips" => 3,
-                "sweep" => 6,
+                "grid-sap" => 3,
+                "sap" => 6,
                 _ => 12,
             };
             let jobs = FRAMES * (id.threads() as usize - 1) * phases;
@@ -121,7 +121,7 @@ fn a_steady_state_allocates_nothing() {
     }
     for extras in [false, true] {
         // What learns switches when timings say so, to an algorithm that may not have had so large a frame.
-        let mut adaptive = Adaptive::new(fields(&registry), &registry).unwrap();
+        let mut adaptive = Adaptive::new(tuning(&registry), &registry).unwrap();
         adaptive.set_learning(false);
         let (counted, _) = allocations(Scenario::Fragmentation, 3000, 600, &mut adaptive, extras);
         assert_eq!(counted, 0, "adaptive, switches included, extras: {extras}");
@@ -162,6 +162,6 @@ fn idle_candidates() -> (Adaptive, Arc<AtomicUsize>) {
         spread_ln: 0.1,
     });
     let loads = [Load { objects: 10, ..Load::default() }, Load { objects: 1000, ..Load::default() }];
-    let fields = Fields::from_costs(Source::Predicted, "uniform", costs.collect(), &loads);
-    (Adaptive::new(fields, &registry).unwrap(), turns)
+    let tuning = Tuning::from_costs(Source::Predicted, "uniform", costs.collect(), &loads);
+    (Adaptive::new(tuning, &registry).unwrap(), turns)
 }

@@ -10,7 +10,7 @@
 mod common;
 
 use common::{every_algorithm, naive, npy_frames};
-use sapwise::{Aabb, Adaptive, BroadPhase, Fields, PairOrder, Pairs, Registry};
+use sapwise::{Aabb, Adaptive, BroadPhase, Tuning, PairOrder, Pairs, Registry};
 
 fn frames() -> Vec<Vec<Aabb>> {
     npy_frames(include_bytes!("fixtures/fragments.npy"))
@@ -42,7 +42,7 @@ fn every_algorithm_finds_the_pairs_of_the_double_loop_in_every_frame() {
 #[test]
 fn the_adaptive_module_finds_them_too_as_it_switches() {
     let registry = Registry::with_cores(2);
-    let mut adaptive = Adaptive::new(Fields::usual(&registry), &registry).unwrap();
+    let mut adaptive = Adaptive::new(Tuning::usual(&registry), &registry).unwrap();
     let mut pairs = Pairs::with_order(PairOrder::Canonical);
     let mut ran = Vec::new();
     for (at, boxes) in frames().iter().enumerate() {

@@ -4,7 +4,7 @@ mod common;
 
 use common::{Random, naive};
 use sapwise::{
-    Aabb, Adaptive, AlgorithmId, BroadPhase, Cache, Error, Fields, Options, Origin, PairOrder, Pairs, Registry, Setup,
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Cache, Error, Tuning, Options, Origin, PairOrder, Pairs, Registry, Setup,
     Source,
 };
 use std::fs;
@@ -73,17 +73,17 @@ fn the_second_start_takes_what_the_first_has_kept() {
     let folder = tempfile::tempdir().unwrap();
     let mut first = start(&options(folder.path()));
     assert_eq!(first.setup().remarks, [""; 0]);
-    assert_eq!((origin(&first), first.fields().source), (Origin::Probed, Source::Predicted));
-    assert_eq!(first.fields().defect(), None);
+    assert_eq!((origin(&first), first.tuning().source), (Origin::Probed, Source::Predicted));
+    assert_eq!(first.tuning().defect(), None);
     frame(&mut first, &boxes(500));
     let file = first.setup().file.clone().unwrap();
     assert_eq!(names(folder.path()), [file.file_name().unwrap().to_str().unwrap()]);
     let mut second = start(&options(folder.path()));
     assert_eq!(origin(&second), Origin::Cached);
-    assert_eq!(second.fields(), first.fields());
+    assert_eq!(second.tuning(), first.tuning());
     assert!(second.setup().remarks.is_empty() && second.setup().file == Some(file));
     frame(&mut second, &boxes(500));
-    // Other algorithms have other fields, in a file of their own.
+    // Other algorithms have another tuning, in a file of their own.
     let mut more = Registry::with_cores(1);
     more.add("mine@cpu1".parse().unwrap(), 1, || Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap()));
     let other = Options { registry: Some(Arc::new(more)), ..options(folder.path()) };
@@ -102,7 +102,7 @@ fn what_was_learned_is_there_at_the_next_start() {
     assert_eq!(learned.source, Source::Learned);
     first.save().unwrap();
     let second = start(&options(folder.path()));
-    assert_eq!((origin(&second), second.fields()), (Origin::Cached, &learned));
+    assert_eq!((origin(&second), second.tuning()), (Origin::Cached, &learned));
     let mut third = start(&Options { learning: false, ..options(folder.path()) });
     learn(&mut third, &boxes);
     assert_eq!(third.learned(), learned);
@@ -175,7 +175,7 @@ fn starts_at_once_share_a_folder() {
         }
     });
     let after = start(&options(folder.path()));
-    assert_eq!((origin(&after), after.fields().source), (Origin::Cached, Source::Learned));
+    assert_eq!((origin(&after), after.tuning().source), (Origin::Cached, Source::Learned));
     assert_eq!(names(folder.path()).len(), 1);
 }
 
@@ -185,10 +185,10 @@ fn the_background_takes_over_between_frames() {
     let background = Options { background: true, exploring: false, ..options(folder.path()) };
     let mut first = start(&background);
     // The flag is only looked at when a frame runs.
-    assert_eq!((origin(&first), first.fields().source), (Origin::Awaited, Source::Default));
+    assert_eq!((origin(&first), first.tuning().source), (Origin::Awaited, Source::Default));
     assert!(first.save().unwrap_err().to_string().contains("not there yet"));
     assert!(frames_until_it_came(&mut first) > 0);
-    assert_eq!((origin(&first), first.fields().source), (Origin::Probed, Source::Predicted));
+    assert_eq!((origin(&first), first.tuning().source), (Origin::Probed, Source::Predicted));
     assert!(first.setup().remarks.is_empty() && first.setup().seconds > 0.0, "{:?}", first.setup());
     assert!(first.last_decision().unwrap().predicted_ns.is_some());
     first.save().unwrap();
@@ -228,10 +228,10 @@ fn what_is_dropped_while_it_waits_ends_by_itself_and_is_kept() {
     assert_eq!(origin(&start(&options(folder.path()))), Origin::Cached);
 }
 
-/// A registry whose `strips@cpu1` is made by `make`.
-fn with_strips(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static) -> Option<Arc<Registry>> {
+/// A registry whose `grid-sap@cpu1` is made by `make`.
+fn with_grid_sap(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static) -> Option<Arc<Registry>> {
     let mut registry = Registry::with_cores(1);
-    let strips: AlgorithmId = "strips@cpu1".parse().unwrap();
+    let strips: AlgorithmId = "grid-sap@cpu1".parse().unwrap();
     let revision = registry.entries().iter().find(|e| e.id == strips).unwrap().revision;
     registry.add(strips, revision, make);
     Some(Arc::new(registry))
@@ -240,10 +240,10 @@ fn with_strips(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sy
 #[test]
 fn a_panic_in_the_background_is_a_remark() {
     let folder = tempfile::tempdir().unwrap();
-    let registry = with_strips(|| panic!("as the test wants"));
+    let registry = with_grid_sap(|| panic!("as the test wants"));
     let mut adaptive = start(&Options { background: true, registry, ..options(folder.path()) });
     frames_until_it_came(&mut adaptive);
-    assert_eq!((origin(&adaptive), adaptive.fields().source), (Origin::Usual, Source::Default));
+    assert_eq!((origin(&adaptive), adaptive.tuning().source), (Origin::Usual, Source::Default));
     assert!(
         adaptive.setup().remarks.len() == 1 && adaptive.setup().remarks[0].contains("panicked"),
         "{:?}",
@@ -259,10 +259,10 @@ fn algorithms_are_made_off_the_calling_thread() {
     static MADE: AtomicUsize = AtomicUsize::new(0);
     let folder = tempfile::tempdir().unwrap();
     let caller = std::thread::current().id();
-    let registry = with_strips(move || {
+    let registry = with_grid_sap(move || {
         assert_ne!(std::thread::current().id(), caller);
         MADE.fetch_add(1, Relaxed);
-        Registry::with_cores(1).create(&"strips@cpu1".parse().unwrap())
+        Registry::with_cores(1).create(&"grid-sap@cpu1".parse().unwrap())
     });
     let mut adaptive = start(&Options { background: true, registry, ..options(folder.path()) });
     frames_until_it_came(&mut adaptive);
@@ -270,7 +270,7 @@ fn algorithms_are_made_off_the_calling_thread() {
 }
 
 #[test]
-fn a_model_that_knows_nothing_here_leaves_the_usual_fields() {
+fn a_model_that_knows_nothing_here_leaves_the_usual_tuning() {
     let folder = tempfile::tempdir().unwrap();
     let mut model = sapwise::Model::built_in().unwrap();
     model.methods.iter_mut().for_each(|m| m.revision += 1);
@@ -291,8 +291,8 @@ fn a_program_that_names_no_algorithms_gets_all_of_ours() {
         let mut adaptive = start(&Options { registry: None, background, ..options(folder.path()) });
         frames_until_it_came(&mut adaptive);
         assert!([Origin::Probed, Origin::Cached].contains(&origin(&adaptive)), "{:?}", adaptive.setup());
-        let known: Vec<String> = adaptive.fields().algorithms().iter().map(ToString::to_string).collect();
-        for id in ["brute@cpu1", "sweep@cpu1", "strips@cpu1", "verlet@cpu1"] {
+        let known: Vec<String> = adaptive.tuning().algorithms().iter().map(ToString::to_string).collect();
+        for id in ["brute@cpu1", "sap@cpu1", "grid-sap@cpu1", "pair-cache@cpu1"] {
             assert!(known.iter().any(|k| k == id), "{known:?}");
         }
         frame(&mut adaptive, &boxes(1000));
@@ -319,8 +319,8 @@ fn a_program_brings_its_pool_and_its_gpu() {
     assert_eq!(origin(&first), Origin::Probed);
     frame(&mut first, &boxes(1000));
     // Under the load of other tests one sample may be a figure that can't be; then it is told and measured again.
-    let known: Vec<String> = first.fields().algorithms().iter().map(ToString::to_string).collect();
-    let predicted = ["brute@gpu0", "sweep@gpu0", "strips@gpu0"].iter().all(|id| known.iter().any(|k| k == id));
+    let known: Vec<String> = first.tuning().algorithms().iter().map(ToString::to_string).collect();
+    let predicted = ["brute@gpu0", "sap@gpu0", "grid-sap@gpu0"].iter().all(|id| known.iter().any(|k| k == id));
     let told = first.setup().remarks.iter().any(|r| r.contains("gpu0") && r.contains("measures again"));
     assert!(predicted != told, "{known:?}: {:?}", first.setup());
     if predicted {
@@ -328,12 +328,12 @@ fn a_program_brings_its_pool_and_its_gpu() {
         assert!(text.contains("\"given\"") && text.contains(&format!("\"name\": {:?}", identity.name)), "{text}");
         let mut second = start(&options);
         frames_until_it_came(&mut second);
-        assert_eq!((origin(&second), second.fields()), (Origin::Cached, first.fields()));
+        assert_eq!((origin(&second), second.tuning()), (Origin::Cached, first.tuning()));
         frame(&mut second, &boxes(1000));
     }
 }
 
-/// A process that keeps its fields in the user's folder; with a home that is no folder it works all the same.
+/// A process that keeps its tuning in the user's folder; with a home that is no folder it works all the same.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "a process that the_users_folder_is_shared_by_processes starts, with variables of its own"]
@@ -371,14 +371,14 @@ fn the_users_folder_is_shared_by_processes() {
     }
     let kept = folder.path().join("sapwise");
     let after = start(&options(&kept));
-    assert_eq!((origin(&after), after.fields().source), (Origin::Cached, Source::Learned));
+    assert_eq!((origin(&after), after.tuning().source), (Origin::Cached, Source::Learned));
     assert_eq!(names(&kept).len(), 1);
 }
 
 #[test]
-fn given_fields_have_no_start_of_their_own() {
+fn given_tuning_have_no_start_of_their_own() {
     let registry = Registry::with_cores(1);
-    let adaptive = Adaptive::new(Fields::usual(&registry), &registry).unwrap();
+    let adaptive = Adaptive::new(Tuning::usual(&registry), &registry).unwrap();
     assert_eq!(adaptive.setup(), &Setup::default());
     assert!(adaptive.save().unwrap_err().to_string().contains("given by the program"));
 }

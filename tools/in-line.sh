@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Measures what the adaptive module is worth on this machine: its regret against the best algorithm of every frame, with fields that were
+# Measures what the adaptive module is worth on this machine: its regret against the best algorithm of every frame, with tuning that was
 # measured, predicted, or are of another machine, and beside another program.
 #
 #     tools/in-line.sh [DIR] [OTHER.json]
 #
 # Texts, traces and pictures go into DIR (`in-line` by default), where a report that is there already is used again. OTHER.json is the
-# report of another machine, whose fields are to be corrected; without it one is simulated. Nothing else should run meanwhile;
+# report of another machine, whose tuning is to be corrected; without it one is simulated. Nothing else should run meanwhile;
 # takes about ten minutes beside the report's three.
 set -euo pipefail
 
@@ -38,16 +38,16 @@ run() {
 }
 
 clustered=(clustered --swing 50 --frames 600)
-for fields in measured predicted; do
+for tuning in measured predicted; do
     given=(--samples 8)
-    [ $fields = measured ] && given=(--fields "$report")
-    run "fragmentation-$fields" fragmentation "${given[@]}"
-    run "fragmentation-2000-$fields" fragmentation --objects 2000 "${given[@]}"
-    run "clustered-$fields" "${clustered[@]}" "${given[@]}"
-    run "stream-$fields" "$stream" "${given[@]}"
+    [ $tuning = measured ] && given=(--tuning "$report")
+    run "fragmentation-$tuning" fragmentation "${given[@]}"
+    run "fragmentation-2000-$tuning" fragmentation --objects 2000 "${given[@]}"
+    run "clustered-$tuning" "${clustered[@]}" "${given[@]}"
+    run "stream-$tuning" "$stream" "${given[@]}"
 done
-run fragmentation-wrong fragmentation --frames 1200 --fields "$other" --after 300
-run clustered-wrong clustered --swing 50 --frames 1200 --fields "$other" --after 300
-run stream-wrong "$stream" --fields "$other" --after 300
-run fragmentation-shared fragmentation --frames 1500 --fields "$report" --co-runner 600 --after 900
-run uniform-shared uniform --objects 5000 --frames 1200 --fields "$report" --co-runner 600 --after 900
+run fragmentation-wrong fragmentation --frames 1200 --tuning "$other" --after 300
+run clustered-wrong clustered --swing 50 --frames 1200 --tuning "$other" --after 300
+run stream-wrong "$stream" --tuning "$other" --after 300
+run fragmentation-shared fragmentation --frames 1500 --tuning "$report" --co-runner 600 --after 900
+run uniform-shared uniform --objects 5000 --frames 1200 --tuning "$report" --co-runner 600 --after 900

@@ -4,8 +4,8 @@
 #     tools/real-gpu.sh OUT_DIR
 #
 # The algorithms on GPUs against the oracle, the benchmark of 1000 to 10 million objects with boxes in host and in device memory,
-# the full probe and sweep, fields, and a scenario that runs on them. OUT_DIR gets a log of each step, bench.md, the report
-# (for datasets/), fields and a picture. A step that fails does not stop the others; the exit status is 1 if any did.
+# the full probe and sweep, tuning, and a scenario that runs on them. OUT_DIR gets a log of each step, bench.md, the report
+# (for datasets/), tuning and a picture. A step that fails does not stop the others; the exit status is 1 if any did.
 #
 # Builds with cargo. For a machine without a Rust toolchain or a network, build where there are both and carry one folder:
 #
@@ -182,7 +182,7 @@ reserve=0
 step check 5 "$bin/sapwise" check report.json
 step predict 25 "$bin/sapwise" predict --out predicted.json
 step measured 5 "$bin/sapwise" predict --report report.json --measured --out measured.json
-step run 45 "$bin/sapwise" run fragmentation --objects 200000 --repeats 1 --fields measured.json --plot run.svg
+step run 45 "$bin/sapwise" run fragmentation --objects 200000 --repeats 1 --tuning measured.json --plot run.svg
 
 if [ ${#failed[@]} = 0 ]; then
     echo "all done in $SECONDS s; $out/report.json is the report, bench.md the benchmark"

@@ -13,7 +13,7 @@ fn walk<T>(frames: &[T]) -> impl Iterator<Item = &T> + Clone {
 }
 
 fn strips() -> Box<dyn BroadPhase> {
-    Registry::with_cores(1).create(&"strips@cpu1".parse().expect("an id")).expect("one core is enough")
+    Registry::with_cores(1).create(&"grid-sap@cpu1".parse().expect("an id")).expect("one core is enough")
 }
 
 /// Pairs of every frame.

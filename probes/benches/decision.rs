@@ -2,12 +2,12 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use sapwise::{
-    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Fields, Knot, Load, Pairs, Registry, Scenario, Source, Term,
+    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Tuning, Knot, Load, Pairs, Registry, Scenario, Source, Term,
 };
 use std::hint::black_box;
 
 /// As many algorithms, terms and knots as a predicted field of a 16-core machine has.
-fn fields(registry: &Registry) -> Fields {
+fn tuning(registry: &Registry) -> Tuning {
     let curve = |k: u32| CostCurve {
         terms: Term::ALL.map(|term| CostTerm { term, unit_ns: 1.0 + f64::from(k) / 100.0 }).to_vec(),
         cache_bytes: 3.2e7,
@@ -22,19 +22,19 @@ fn fields(registry: &Registry) -> Fields {
         spread_ln: 0.05,
     });
     let loads: Vec<Load> = (3..20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
-    Fields::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
+    Tuning::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
 }
 
 fn decision(c: &mut Criterion) {
     let registry = Registry::with_cores(16);
-    let fields = fields(&registry);
+    let tuning = tuning(&registry);
     let load = Load { objects: 12_345, axis_candidates: 1e6, strip_candidates: 1e5, pairs: 6e3, moved: 1.0 };
-    c.bench_function(&format!("rank {} algorithms", fields.costs.len()), |b| {
-        b.iter(|| fields.rank(black_box(&load), |_| true));
+    c.bench_function(&format!("rank {} algorithms", tuning.costs.len()), |b| {
+        b.iter(|| tuning.rank(black_box(&load), |_| true));
     });
     for objects in [100, 10_000, 1_000_000] {
         let scene = Scenario::Uniform.start(objects, 1);
-        let mut adaptive = Adaptive::new(fields.clone(), &registry).expect("available");
+        let mut adaptive = Adaptive::new(tuning.clone(), &registry).expect("available");
         adaptive.find_pairs(scene.boxes(), &mut Pairs::new()).expect("valid boxes");
         let mut group = c.benchmark_group("decide, the sample spread over its frames");
         group.bench_function(BenchmarkId::from_parameter(objects), |b| {

@@ -1,4 +1,4 @@
-//! Every method on every GPU of this machine, beside `strips` on one core and on all cores, on the same boxes in turn.
+//! Every method on every GPU of this machine, beside `grid-sap` on one core and on all cores, on the same boxes in turn.
 //!
 //! ```sh
 //! cargo bench -p sapwise-cli --bench gpu                            # all GPUs
@@ -43,7 +43,7 @@ const LONGEST_FRAME: Duration = Duration::from_secs(3);
 /// A method, the largest size at which it is asked for, and the power of the number of objects with which its time grows in
 /// `uniform`.
 const METHODS: [(&str, usize, f64); 3] =
-    [("brute", 100_000, 2.0), ("sweep", 1_000_000, 5.0 / 3.0), ("strips", 10_000_000, 1.1)];
+    [("brute", 100_000, 2.0), ("sap", 1_000_000, 5.0 / 3.0), ("grid-sap", 10_000_000, 1.1)];
 
 /// Goes through one frame; the time it took and the fingerprint of the pairs.
 type Turn = Box<dyn FnMut(&[Aabb]) -> Result<(Duration, u64), String>>;
@@ -258,7 +258,7 @@ fn bench() -> Result<Vec<String>, String> {
     let mut remarks = Vec::new();
     let mut cpu = vec![1, usable_cores()];
     cpu.dedup();
-    let cpu = cpu.into_iter().map(|k| AlgorithmId::new("strips", Backend::Cpu(k)).map_err(|e| e.to_string()));
+    let cpu = cpu.into_iter().map(|k| AlgorithmId::new("grid-sap", Backend::Cpu(k)).map_err(|e| e.to_string()));
     let mut contestants = Vec::new();
     for id in cpu.chain(on_gpus(&registry)?.into_iter().map(Ok)) {
         let id = id?;
@@ -276,7 +276,7 @@ fn bench() -> Result<Vec<String>, String> {
         }
     }
     println!(
-        "\n| objects | algorithm | memory | median ms | quartiles ms | frames | times strips@cpu{} | G box tests/s |\n\
+        "\n| objects | algorithm | memory | median ms | quartiles ms | frames | times grid-sap@cpu{} | G box tests/s |\n\
          |---|---|---|---|---|---|---|---|",
         usable_cores()
     );

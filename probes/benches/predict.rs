@@ -1,4 +1,4 @@
-//! What a prediction costs from the text of a model to the fields: reading, predicting, and cutting a slice with intervals.
+//! What a prediction costs from the text of a model to the tuning: reading, predicting, and cutting a slice with intervals.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use sapwise::hardware::parameter;
@@ -73,22 +73,22 @@ fn predict(c: &mut Criterion) {
         Registry::with_cores(CORES).entries().iter().map(|e| (e.id.clone(), e.revision)).collect();
     let loads: Vec<Load> = (4..=24).map(|k| load(10.0_f64.powf(f64::from(k) / 4.0).round())).collect();
     let prediction = model.predict(&hardware, &algorithms).expect("known methods");
-    let fields = prediction.clone().fields("uniform", &loads);
-    assert!(fields.crossovers.iter().all(|b| b.interval().is_some()), "{}", fields.interval_basis);
+    let tuning = prediction.clone().tuning("uniform", &loads);
+    assert!(tuning.crossovers.iter().all(|b| b.interval().is_some()), "{}", tuning.interval_basis);
     let name = format!(
         "{} algorithms, {} borders, a model of {} kB",
         prediction.costs.len(),
-        fields.crossovers.len(),
+        tuning.crossovers.len(),
         text.len() / 1000
     );
     let mut group = c.benchmark_group(name);
     group.bench_function("read the model", |b| b.iter(|| json::model(black_box(&text)).expect("a sound model")));
     group.bench_function("predict", |b| b.iter(|| model.predict(black_box(&hardware), &algorithms).expect("known methods")));
-    group.bench_function("fields with intervals", |b| b.iter(|| prediction.clone().fields("uniform", black_box(&loads))));
+    group.bench_function("tuning with intervals", |b| b.iter(|| prediction.clone().tuning("uniform", black_box(&loads))));
     group.bench_function("all", |b| {
         b.iter(|| {
             let model = json::model(black_box(&text)).expect("a sound model");
-            model.predict(&hardware, &algorithms).expect("known methods").fields("uniform", &loads)
+            model.predict(&hardware, &algorithms).expect("known methods").tuning("uniform", &loads)
         });
     });
     group.finish();

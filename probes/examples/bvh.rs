@@ -4,8 +4,8 @@
 //! bvh() { cargo run --release -p sapwise-cli --example bvh -- "$@"; }
 //! bvh probe --no-gpus --out bvh.json                      # times it beside ours, and verifies every answer
 //! bvh train bvh.json --out with-bvh.json                  # fits its cost beside those of ours
-//! bvh predict --model with-bvh.json --out fields.json     # where it pays on this machine
-//! bvh run fragmentation --fields fields.json              # what choosing it is worth
+//! bvh predict --model with-bvh.json --out tuning.json     # where it pays on this machine
+//! bvh run fragmentation --tuning tuning.json              # what choosing it is worth
 //! ```
 //!
 //! The manifest of a program outside of this repository needs `sapwise` and `sapwise-cli`.
@@ -17,7 +17,7 @@ use std::process::ExitCode;
 
 /// Visible to the test of this example, which is a command with the same `main`.
 pub(crate) fn main() -> ExitCode {
-    // The name stands in reports, models and fields. The 1 is the revision: count it up whenever `find_pairs` gets faster or slower, so
+    // The name stands in reports, models and tuning. The 1 is the revision: count it up whenever `find_pairs` gets faster or slower, so
     // that what was measured before is told to be stale. An algorithm on several threads is added by `with_threads`.
     sapwise_cli::Command::new().with("bvh", 1, || Ok(Box::new(Tree::default()))).run()
 }
@@ -45,7 +45,7 @@ impl BroadPhase for Tree {
     }
 
     /// The tree of the frame before makes this frame cheaper, so a probe lets some frames pass before it takes samples.
-    fn keeps_work(&self) -> bool {
+    fn is_incremental(&self) -> bool {
         true
     }
 }

@@ -92,7 +92,7 @@ mod tests {
         let mut algorithms = Algorithms::default();
         for (name, why) in [
             ("brute", "is the name of a method of Sapwise"),
-            ("verlet", "is the name of a method of Sapwise"),
+            ("pair-cache", "is the name of a method of Sapwise"),
             ("My Tree", "is no method name"),
             ("tree@cpu1", "is no method name"),
             ("", "is no method name"),

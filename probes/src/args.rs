@@ -140,14 +140,14 @@ impl Probe {
 #[command(after_help = "\
 Examples:
   sapwise predict
-  sapwise predict --scenario clustered --out fields.json
+  sapwise predict --scenario clustered --out tuning.json
   sapwise predict --report other-machine.json --model mine.json
-  sapwise predict --report this-machine.json --measured --out fields.json    (measured, for an engine to ship)")]
+  sapwise predict --report this-machine.json --measured --out tuning.json    (measured, for an engine to ship)")]
 pub(crate) struct Predict {
     /// Predict for the machine of this report instead of measuring this one.
     #[arg(long, value_name = "R.json", conflicts_with = "threads")]
     pub(crate) report: Option<PathBuf>,
-    /// Take the fields from the report's own timings instead of a model: slower to get than a prediction, and surer.
+    /// Take the tuning from the report's own timings instead of a model: slower to get than a prediction, and surer.
     #[arg(long, requires = "report", conflicts_with = "model")]
     pub(crate) measured: bool,
     /// Use this model instead of the built-in one.
@@ -166,10 +166,10 @@ pub(crate) struct Predict {
     pub(crate) threads: Option<u32>,
     #[command(flatten)]
     pub(crate) gpus: GpuChoice,
-    /// Where the fields go.
+    /// Where the tuning go.
     #[arg(long, value_name = "T.json")]
     pub(crate) out: Option<PathBuf>,
-    /// The fields on standard output instead of a summary.
+    /// The tuning on standard output instead of a summary.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -216,12 +216,12 @@ pub(crate) struct Train {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  sapwise pairs boxes.npy --algorithm strips@cpu1 --repeat 10 --out pairs.npy")]
+  sapwise pairs boxes.npy --algorithm grid-sap@cpu1 --repeat 10 --out pairs.npy")]
 pub(crate) struct Pairs {
     /// The boxes.
     #[arg(value_name = "BOXES.npy")]
     pub(crate) boxes: PathBuf,
-    /// One of the algorithms that `sapwise devices` lists, such as strips@cpu1 or strips@gpu0.
+    /// One of the algorithms that `sapwise devices` lists, such as grid-sap@cpu1 or grid-sap@gpu0.
     #[arg(long, value_name = "ID", value_parser = known::algorithm(), hide_possible_values = true)]
     pub(crate) algorithm: Option<AlgorithmId>,
     /// Go through all frames that many times.
@@ -238,7 +238,7 @@ pub(crate) struct Pairs {
     pub(crate) json: bool,
 }
 
-/// Says whether reports, models and fields files are sound, current and applicable on this machine.
+/// Says whether reports, models and tuning files are sound, current and applicable on this machine.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  sapwise check report.json models/*.json")]
 pub(crate) struct Check {
@@ -250,7 +250,7 @@ pub(crate) struct Check {
     pub(crate) json: bool,
 }
 
-/// Says how well repeated reports of one machine agree: parameters, borders, and what the fields of one lose on another.
+/// Says how well repeated reports of one machine agree: parameters, borders, and what the tuning of one lose on another.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -294,7 +294,7 @@ pub(crate) struct Simulate {
     pub(crate) json: bool,
 }
 
-/// Writes the JSON Schemas of reports, models and fields files.
+/// Writes the JSON Schemas of reports, models and tuning files.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  sapwise schema --out schemas")]
 pub(crate) struct Schema {

@@ -48,7 +48,7 @@ const COLUMNS: &str = "
   zero is worse than that single algorithm.
 - **in games**: the mean regret and its 95th percentile where each number of objects counts as often as games have it. That is an
   assumption, not a count: log-normal around 800 objects, two thirds of the frames within 220 to 2800.
-- **borders off by**: octaves between the measured border of two fields in the scenario `uniform` and where the predicted costs of the
+- **borders off by**: octaves between the measured border of two tuning in the scenario `uniform` and where the predicted costs of the
   same two algorithms cross, the median; one octave is a factor of two in objects. Where they do not cross in the measured sizes, the
   distance to the end of these, a lower bound. **within 1/2 octave**: the share of the borders. Both only for what predicts costs. A
   border between two algorithms that cost nearly the same is vague and harmless: the regret tells what it costs.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Files larger than this are refused before they fill the memory. A full report of a machine with 64 threads has 2 MB.
 const LARGEST_BYTES: u64 = 64 << 20;
 
-/// Reads a report, model or fields file.
+/// Reads a report, model or tuning file.
 ///
 /// # Errors
 /// Names the file, and the line and column or the figure that is wrong.

@@ -1,4 +1,4 @@
-//! Fields of a machine from its hardware parameters.
+//! Tuning of a machine from its hardware parameters.
 
 use crate::algorithms::Algorithms;
 use crate::progress::Progress;
@@ -8,9 +8,9 @@ use crate::table::count;
 use anyhow::{Context, bail};
 use sapwise::hardware::parameter;
 use sapwise::model::{ASK, FEWEST_MACHINES, Prediction};
-use sapwise::{Displacement, Fields, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry, Scenario};
+use sapwise::{Displacement, Tuning, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry, Scenario};
 
-/// Objects of the slice that the fields show: four sizes a decade from ten to a million.
+/// Objects of the slice that the tuning shows: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 
 /// Seed of the scenes that the slice goes through.
@@ -34,7 +34,7 @@ impl Slice {
     }
 }
 
-/// Predicts the fields of a machine: every algorithm on 1, 2, 4, ... and all of its cores, and on these of its GPUs.
+/// Predicts the tuning of a machine: every algorithm on 1, 2, 4, ... and all of its cores, and on these of its GPUs.
 ///
 /// # Errors
 /// When the model predicts none of the algorithms.
@@ -44,14 +44,14 @@ pub(crate) fn predict(
     gpus: &[GpuIdentity],
     slice: &Slice,
     algorithms: &Algorithms,
-) -> anyhow::Result<Fields> {
+) -> anyhow::Result<Tuning> {
     let registry = algorithms.registry(cores(hardware));
-    let mut fields = prediction(model, hardware, gpus, &registry)?.fields(&slice.scenario.to_string(), &slice.loads);
-    fields.warnings.extend(revisions::unknown_to(&registry, model));
-    Ok(fields)
+    let mut tuning = prediction(model, hardware, gpus, &registry)?.tuning(&slice.scenario.to_string(), &slice.loads);
+    tuning.warnings.extend(revisions::unknown_to(&registry, model));
+    Ok(tuning)
 }
 
-/// Predicts the fields of this machine and corrects them by up to `most` samples. Also gives whether an algorithm gave a wrong answer.
+/// Predicts the tuning of this machine and corrects them by up to `most` samples. Also gives whether an algorithm gave a wrong answer.
 ///
 /// Whatever keeps samples from being taken, Ctrl-C too, is a warning: the prediction stays.
 ///
@@ -64,7 +64,7 @@ pub(crate) fn predict_and_sample(
     slice: &Slice,
     algorithms: &Algorithms,
     most: u32,
-) -> anyhow::Result<(Fields, bool)> {
+) -> anyhow::Result<(Tuning, bool)> {
     let registry = algorithms.registry(cores(hardware));
     let mut prediction = prediction(model, hardware, gpus, &registry)?;
     let Slice { scenario, loads } = slice;
@@ -85,29 +85,29 @@ pub(crate) fn predict_and_sample(
     }
     let mut usable = learned.usable.iter();
     prediction.costs.retain(|_| usable.next() == Some(&true));
-    let mut fields = prediction.fields(&scenario.to_string(), loads);
-    fields.warnings.extend(revisions::unknown_to(&registry, model));
+    let mut tuning = prediction.tuning(&scenario.to_string(), loads);
+    tuning.warnings.extend(revisions::unknown_to(&registry, model));
     // Without any sample the posterior is the prior, whose spread is that of machines left out and not of the model.
     if !learned.taken.is_empty() {
-        let corrected = Fields::from_posterior(&scenario.to_string(), &learned.posterior, |k| learned.usable[k], loads);
+        let corrected = Tuning::from_posterior(&scenario.to_string(), &learned.posterior, |k| learned.usable[k], loads);
         let samples = learned.taken.iter().map(Taken::observation).collect();
-        let Fields { model: name, extrapolated, warnings, interval_basis, .. } = fields;
-        fields = Fields { model: name, extrapolated, warnings, samples, ..corrected };
+        let Tuning { model: name, extrapolated, warnings, interval_basis, .. } = tuning;
+        tuning = Tuning { model: name, extrapolated, warnings, samples, ..corrected };
         // What asked for samples has got them.
-        fields.warnings.retain(|w| w != ASK);
+        tuning.warnings.retain(|w| w != ASK);
         // What the prior says of a machine never seen was told by too few others to be claimed of this one, sampled or not.
         if model.validation.physical_machines < FEWEST_MACHINES as usize {
-            fields.crossovers.iter_mut().for_each(|b| (b.low, b.high) = (None, None));
-            fields.interval_basis = interval_basis;
+            tuning.crossovers.iter_mut().for_each(|b| (b.low, b.high) = (None, None));
+            tuning.interval_basis = interval_basis;
         }
     }
-    fields.warnings.extend(remarks);
-    fields.warnings.extend(learned.remarks);
+    tuning.warnings.extend(remarks);
+    tuning.warnings.extend(learned.remarks);
     if crate::interrupt::requested() {
         let taken = count(learned.taken.len(), "sample");
-        fields.warnings.push(format!("interrupted after {taken}: the prediction is corrected by those only"));
+        tuning.warnings.push(format!("interrupted after {taken}: the prediction is corrected by those only"));
     }
-    Ok((fields, wrong))
+    Ok((tuning, wrong))
 }
 
 fn cores(hardware: &Hardware) -> u32 {
@@ -127,7 +127,7 @@ fn prediction(model: &Model, hardware: &Hardware, gpus: &[GpuIdentity], registry
 /// When the pairs can't be found, for want of memory, and on Ctrl-C.
 pub(crate) fn loads(scenario: Scenario, sizes: &[u32], seed: u64) -> anyhow::Result<Vec<Load>> {
     let registry = Registry::with_cores(1);
-    let mut counter = registry.create(&"strips@cpu1".parse()?)?;
+    let mut counter = registry.create(&"grid-sap@cpu1".parse()?)?;
     let mut pairs = Pairs::new();
     let mut displacement = Displacement::default();
     let mut loads = Vec::new();

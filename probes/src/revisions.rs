@@ -1,15 +1,15 @@
 //! Whether what a file tells about algorithms holds for those of this build.
 
-use sapwise::{AlgorithmId, BackendClass, Fields, GpuIdentity, GpuKind, Model, Registry, Report};
+use sapwise::{AlgorithmId, BackendClass, Tuning, GpuIdentity, GpuKind, Model, Registry, Report};
 
 /// What keeps the timings of a report from holding for this build, one sentence for each method.
 pub(crate) fn stale_in_report(report: &Report, registry: &Registry) -> Vec<String> {
     stale(report.algorithms.iter().map(|t| (of(&t.id), t.revision)), registry)
 }
 
-/// The same of fields. Those without costs hold no revisions.
-pub(crate) fn stale_in_fields(fields: &Fields, registry: &Registry) -> Vec<String> {
-    stale(fields.costs.iter().map(|c| (of(&c.algorithm), c.revision)), registry)
+/// The same of tuning. Those without costs hold no revisions.
+pub(crate) fn stale_in_tuning(tuning: &Tuning, registry: &Registry) -> Vec<String> {
+    stale(tuning.costs.iter().map(|c| (of(&c.algorithm), c.revision)), registry)
 }
 
 /// What has a revision: a method on one class of processor.

@@ -3,19 +3,19 @@
 use crate::gpus::GpuChoice;
 use crate::table::{bytes, columns, count, duration, grouped};
 use crate::terminal::{self, Terminal};
-use crate::train::{measured_fields, slice_scenario};
+use crate::train::{measured_tuning, slice_scenario};
 use sapwise::hardware::gpu::parameter::UNIFIED_MEMORY;
 use sapwise::report::Label;
-use sapwise::{Backend, Border, Fields, GpuHardware, GpuIdentity, Hardware, How, Parameter, Report};
+use sapwise::{Backend, Border, Tuning, GpuHardware, GpuIdentity, Hardware, How, Parameter, Report};
 use std::path::Path;
 
-/// The hardware, then the fields of every scenario that was swept, and the timings of one of them as curves where there is room.
+/// The hardware, then the tuning of every scenario that was swept, and the timings of one of them as curves where there is room.
 pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
     let mut text = hardware(&report.hardware, terminal);
     for scenario in scenarios(report) {
-        match measured_fields(report, scenario) {
-            Ok(measured) => text.push_str(&format!("\n{}", fields(&measured, terminal))),
-            Err(why) => text.push_str(&format!("\n{scenario}: no fields: {why:#}\n")),
+        match measured_tuning(report, scenario) {
+            Ok(measured) => text.push_str(&format!("\n{}", tuning(&measured, terminal))),
+            Err(why) => text.push_str(&format!("\n{scenario}: no tuning: {why:#}\n")),
         }
     }
     let chart = terminal::timings(report, slice_scenario(report)).and_then(|chart| chart.draw(terminal));
@@ -33,8 +33,8 @@ pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
 pub(crate) fn next_step(report: &Report, path: &Path) -> String {
     let path = path.display();
     // A report without a sweep, or one that was interrupted early, serves for its hardware only.
-    let next = if measured_fields(report, slice_scenario(report)).is_ok() {
-        format!("sapwise run fragmentation --fields {path}, or sapwise train {path} --out model.json")
+    let next = if measured_tuning(report, slice_scenario(report)).is_ok() {
+        format!("sapwise run fragmentation --tuning {path}, or sapwise train {path} --out model.json")
     } else {
         format!("sapwise predict --report {path}")
     };
@@ -103,11 +103,11 @@ fn parameters(parameters: &[Parameter], terminal: Terminal) -> String {
 }
 
 /// The steps of a slice, with where each begins and how sure that is.
-pub(crate) fn fields(fields: &Fields, terminal: Terminal) -> String {
+pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
     let mut rows = Vec::new();
-    for step in &fields.steps {
+    for step in &tuning.steps {
         // The first step begins at 0 without a border.
-        let border = fields.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
+        let border = tuning.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
         let interval = border.and_then(Border::interval).map_or(String::new(), |(low, high)| {
             format!("{} to {}", grouped(low.round() as u64), grouped(high.round() as u64))
         });
@@ -115,26 +115,26 @@ pub(crate) fn fields(fields: &Fields, terminal: Terminal) -> String {
         rows.push(vec![from, step.algorithm.to_string(), interval]);
     }
     let told = |b: &Border| b.interval().is_some();
-    let with = if fields.crossovers.iter().any(told) { ", with 90 % intervals" } else { "" };
-    let head = format!("{}: the fastest algorithm by number of objects{with}", fields.scenario);
+    let with = if tuning.crossovers.iter().any(told) { ", with 90 % intervals" } else { "" };
+    let head = format!("{}: the fastest algorithm by number of objects{with}", tuning.scenario);
     let mut text = format!("{}\n", terminal.head(&head));
     text.push_str(&columns(&rows));
-    if !fields.crossovers.iter().all(told) {
-        text.push_str(&format!("  {}\n", fields.interval_basis));
+    if !tuning.crossovers.iter().all(told) {
+        text.push_str(&format!("  {}\n", tuning.interval_basis));
     }
-    if !fields.samples.is_empty() {
-        text.push_str(&format!("\nsamples by which the prediction was corrected\n{}", samples(fields, terminal)));
+    if !tuning.samples.is_empty() {
+        text.push_str(&format!("\nsamples by which the prediction was corrected\n{}", samples(tuning, terminal)));
     }
-    for warning in &fields.warnings {
+    for warning in &tuning.warnings {
         text.push_str(&format!("  {} {warning}\n", terminal.warning("warning:")));
     }
     text
 }
 
 /// What was timed, beside what had been predicted.
-fn samples(fields: &Fields, terminal: Terminal) -> String {
+fn samples(tuning: &Tuning, terminal: Terminal) -> String {
     let mut rows = vec![["  algorithm", "objects", "predicted", "measured"].map(str::to_owned).to_vec()];
-    rows.extend(fields.samples.iter().map(|s| {
+    rows.extend(tuning.samples.iter().map(|s| {
         let algorithm = format!("  {}", s.algorithm);
         vec![algorithm, grouped(u64::from(s.objects)), duration(s.predicted_ns), duration(s.measured_ns)]
     }));

@@ -47,9 +47,9 @@ fn revision() -> u32 {
     registry.entries().iter().find(|e| e.id.method() == "brute").unwrap().revision
 }
 
-fn fields(steps: &Value) -> Value {
+fn tuning(steps: &Value) -> Value {
     json!({
-        "schema": "fields/1", "source": "default", "model": null, "extrapolated": false, "warnings": [],
+        "schema": "tuning/1", "source": "default", "model": null, "extrapolated": false, "warnings": [],
         "scenario": "uniform", "steps": steps, "crossovers": [], "interval_basis": "", "costs": []
     })
 }
@@ -74,12 +74,12 @@ fn sound_files_pass() {
     let folder = tempfile::tempdir().unwrap();
     let report = write(folder.path(), "report.json", report().to_string());
     let steps = json!([{"from_objects": 0, "algorithm": "brute@cpu1"}]);
-    let fields = write(folder.path(), "fields.json", fields(&steps).to_string());
-    let (status, findings) = check(&[report, fields]);
+    let tuning = write(folder.path(), "tuning.json", tuning(&steps).to_string());
+    let (status, findings) = check(&[report, tuning]);
     assert_eq!(status, 0, "{findings:?}");
     assert!(findings.iter().all(|f| f["sound"] == true && f["current"] == true), "{findings:?}");
     assert_eq!((&findings[0]["schema"], &findings[0]["applicable"]), (&"report/1".into(), &false.into()));
-    assert_eq!((&findings[1]["schema"], &findings[1]["applicable"]), (&"fields/1".into(), &true.into()));
+    assert_eq!((&findings[1]["schema"], &findings[1]["applicable"]), (&"tuning/1".into(), &true.into()));
     assert!(findings[0]["notes"].to_string().contains("no evidence of accuracy"), "{findings:?}");
 }
 
@@ -93,15 +93,15 @@ fn stale_and_inapplicable_files_fail_and_say_which_algorithm() {
     let old = write(folder.path(), "old.json", old.to_string());
     let steps = json!([
         {"from_objects": 0, "algorithm": "brute@cpu4096"}, {"from_objects": 9, "algorithm": "octree@cpu1"},
-        {"from_objects": 99, "algorithm": "strips@gpu99"}
+        {"from_objects": 99, "algorithm": "grid-sap@gpu99"}
     ]);
-    let elsewhere = write(folder.path(), "elsewhere.json", fields(&steps).to_string());
+    let elsewhere = write(folder.path(), "elsewhere.json", tuning(&steps).to_string());
     let (status, findings) = check(&[old, elsewhere]);
     assert_eq!(status, 1);
     assert_eq!((&findings[0]["sound"], &findings[0]["current"]), (&true.into(), &false.into()));
     assert!(findings[0]["problems"].to_string().contains("brute has revision 999999"), "{findings:?}");
     assert_eq!(findings[1]["applicable"], false);
-    for text in ["brute@cpu4096", "octree@cpu1", "strips@gpu99"] {
+    for text in ["brute@cpu4096", "octree@cpu1", "grid-sap@gpu99"] {
         assert!(findings[1]["problems"].to_string().contains(text), "{findings:?}");
     }
 }
@@ -135,7 +135,7 @@ fn damaged_files_are_told_with_their_place_and_do_not_hide_the_others() {
         (folder.path().join("huge.json"), "64 MiB"),
         (folder.path().to_path_buf(), "folder"),
         (folder.path().join("absent.json"), "absent.json"),
-        (path("steps.json", fields(&json!([])).to_string().as_bytes()), "steps"),
+        (path("steps.json", tuning(&json!([])).to_string().as_bytes()), "steps"),
     ];
     let last = path("good.json", good.as_bytes());
     let files: Vec<PathBuf> = cases.iter().map(|c| c.0.clone()).chain([last]).collect();
@@ -154,10 +154,10 @@ fn damaged_files_are_told_with_their_place_and_do_not_hide_the_others() {
 fn train_refuses_what_is_no_report() {
     let folder = tempfile::tempdir().unwrap();
     let steps = json!([{"from_objects": 0, "algorithm": "brute@cpu1"}]);
-    let fields = write(folder.path(), "fields.json", fields(&steps).to_string());
+    let tuning = write(folder.path(), "tuning.json", tuning(&steps).to_string());
     let out = folder.path().join("model.json");
-    let complaint = failure(sapwise().arg("train").arg(&fields).arg("--out").arg(&out), 1);
-    assert!(complaint.contains("fields.json is no report"), "{complaint}");
+    let complaint = failure(sapwise().arg("train").arg(&tuning).arg("--out").arg(&out), 1);
+    assert!(complaint.contains("tuning.json is no report"), "{complaint}");
     let empty = folder.path().join("empty");
     fs::create_dir(&empty).unwrap();
     let complaint = failure(sapwise().arg("train").arg(&empty).arg("--out").arg(&out), 1);

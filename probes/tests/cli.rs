@@ -24,7 +24,7 @@ fn wrong_usage_is_exit_status_two() {
         &["devices", "--fast"],
         &["pairs"],
         &["pairs", "x.npy", "--repeat", "0"],
-        &["pairs", "x.npy", "--algorithm", "strips"],
+        &["pairs", "x.npy", "--algorithm", "grid-sap"],
         &["probe", "--scenario", "nowhere"],
         &["probe", "--threads", "4096"],
         &["predict", "--threads", "4096"],
@@ -73,7 +73,7 @@ fn pairs_keeps_its_contract() {
     let second = [[0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0]; 4];
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "2, 4, 6", &[first, second].concat().concat());
     let out = folder.path().join("pairs.npy");
-    for algorithm in ["brute@cpu1", "strips@cpu1"] {
+    for algorithm in ["brute@cpu1", "grid-sap@cpu1"] {
         let text = success(
             sapwise()
                 .arg("pairs")
@@ -181,7 +181,7 @@ fn schema_writes_a_file_for_every_kind() {
     let told = success(sapwise().args(["schema", "--json", "--out"]).arg(folder.path().join("new")));
     let told: serde_json::Value = serde_json::from_str(&told).unwrap();
     assert_eq!(told["files"].as_array().unwrap().len(), 4);
-    for name in ["report-1", "model-1", "fields-1", "cache-1"] {
+    for name in ["report-1", "model-1", "tuning-1", "cache-1"] {
         let text = fs::read_to_string(folder.path().join("new").join(format!("{name}.schema.json"))).unwrap();
         let schema: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert!(schema["properties"]["schema"].is_object() || schema["$defs"].is_object(), "{text}");

@@ -35,13 +35,13 @@ fn assert_keys(value: &Value, keys: &[&str]) {
     }
 }
 
-fn assert_fields(fields: &Value, source: &str) {
-    assert_keys(fields, &["schema", "source", "extrapolated", "warnings", "scenario", "steps", "crossovers", "costs"]);
-    assert!(fields.get("model").is_some());
-    assert_eq!((&fields["schema"], &fields["source"]), (&"fields/1".into(), &source.into()));
-    assert_eq!((&fields["scenario"], &fields["steps"][0]["from_objects"]), (&"uniform".into(), &0.into()));
-    fields["steps"].as_array().unwrap().iter().for_each(|step| assert_keys(step, &["from_objects", "algorithm"]));
-    let borders = fields["crossovers"].as_array().unwrap();
+fn assert_tuning(tuning: &Value, source: &str) {
+    assert_keys(tuning, &["schema", "source", "extrapolated", "warnings", "scenario", "steps", "crossovers", "costs"]);
+    assert!(tuning.get("model").is_some());
+    assert_eq!((&tuning["schema"], &tuning["source"]), (&"tuning/1".into(), &source.into()));
+    assert_eq!((&tuning["scenario"], &tuning["steps"][0]["from_objects"]), (&"uniform".into(), &0.into()));
+    tuning["steps"].as_array().unwrap().iter().for_each(|step| assert_keys(step, &["from_objects", "algorithm"]));
+    let borders = tuning["crossovers"].as_array().unwrap();
     for border in borders {
         assert_keys(border, &["below", "above", "objects"]);
         // Two machines are too few for a border that is predicted to have an interval, corrected by samples or not.
@@ -81,20 +81,20 @@ fn train_and_predict_keep_their_contracts() {
     methods.iter().for_each(|m| assert_keys(m, &figures));
 
     let own = report(folder.path(), "own.json", &[]);
-    let out = folder.path().join("fields.json");
+    let out = folder.path().join("tuning.json");
     let mut predict = sapwise();
     predict.arg("predict").arg("--report").arg(&own).arg("--model").arg(&model).arg("--json").arg("--out").arg(&out);
-    let fields = answer(&mut predict);
-    assert_fields(&fields, "predicted");
-    assert!(fields.get("samples").is_none(), "{fields}");
+    let tuning = answer(&mut predict);
+    assert_tuning(&tuning, "predicted");
+    assert!(tuning.get("samples").is_none(), "{tuning}");
     // Of another machine no sample can be had, and whoever did not ask for none is told.
     let said = |words: &[&str]| {
         let text = success(sapwise().args(["predict", "--report"]).arg(&own).arg("--model").arg(&model).args(words));
         text.contains("No sample was taken")
     };
     assert!(said(&[]) && said(&["--samples", "3"]) && !said(&["--samples", "0"]));
-    assert_eq!(fields["model"], "model");
-    assert_eq!(serde_json::from_str::<Value>(&fs::read_to_string(&out).unwrap()).unwrap(), fields);
+    assert_eq!(tuning["model"], "model");
+    assert_eq!(serde_json::from_str::<Value>(&fs::read_to_string(&out).unwrap()).unwrap(), tuning);
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn train_draws_what_the_name_of_the_file_asks_for() {
 }
 
 #[test]
-fn measured_fields_come_from_the_report_alone() {
+fn measured_tuning_come_from_the_report_alone() {
     let folder = tempfile::tempdir().unwrap();
     let own = report(folder.path(), "own.json", &[]);
     let measured = |words: &[&str]| {
@@ -130,9 +130,9 @@ fn measured_fields_come_from_the_report_alone() {
         predict.args(["predict", "--measured", "--report"]).arg(&own).args(words);
         predict
     };
-    let fields = answer(&mut measured(&["--json"]));
-    assert_fields(&fields, "measured");
-    assert_eq!(fields["model"], Value::Null);
+    let tuning = answer(&mut measured(&["--json"]));
+    assert_tuning(&tuning, "measured");
+    assert_eq!(tuning["model"], Value::Null);
     let complaint = failure(&mut measured(&["--scenario", "slab"]), 1);
     assert!(complaint.contains("slab") && complaint.contains("it holds: uniform"), "{complaint}");
     failure(sapwise().args(["predict", "--measured"]), 2);
@@ -153,7 +153,7 @@ fn run_keeps_its_contract() {
     let folder = tempfile::tempdir().unwrap();
     let elsewhere = report(folder.path(), "other.json", &[("/hardware/machine/physical_id", "00000000000000cc".into())]);
     let mut run = sapwise();
-    run.args(["run", "fragmentation", "--objects", "300", "--frames", "30", "--repeats", "2", "--json", "--fields"]);
+    run.args(["run", "fragmentation", "--objects", "300", "--frames", "30", "--repeats", "2", "--json", "--tuning"]);
     let told = answer(run.arg(&elsewhere));
     let keys = [
         "scenario",
@@ -185,17 +185,17 @@ fn run_keeps_its_contract() {
 }
 
 #[test]
-fn run_refuses_fields_and_reports_of_other_revisions() {
+fn run_refuses_tuning_and_reports_of_other_revisions() {
     let folder = tempfile::tempdir().unwrap();
     let method = REPORT["algorithms"][0]["id"].as_str().unwrap().split('@').next().unwrap().to_owned();
     let old = report(folder.path(), "old.json", &[("/algorithms/0/revision", 999_999.into())]);
     let own = report(folder.path(), "own.json", &[]);
-    let mut fields = answer(sapwise().args(["predict", "--measured", "--json", "--report"]).arg(own));
-    fields["costs"][0]["revision"] = 999_999.into();
+    let mut tuning = answer(sapwise().args(["predict", "--measured", "--json", "--report"]).arg(own));
+    tuning["costs"][0]["revision"] = 999_999.into();
     let stale = folder.path().join("stale.json");
-    fs::write(&stale, fields.to_string()).unwrap();
+    fs::write(&stale, tuning.to_string()).unwrap();
     for (file, name) in [(&old, "old.json"), (&stale, "stale.json")] {
-        let complaint = failure(sapwise().args(["run", "uniform", "--fields"]).arg(file), 1);
+        let complaint = failure(sapwise().args(["run", "uniform", "--tuning"]).arg(file), 1);
         for text in [name, &method, "999999", "probe again"] {
             assert!(complaint.contains(text), "{text} is missing: {complaint}");
         }
@@ -206,19 +206,19 @@ fn run_refuses_fields_and_reports_of_other_revisions() {
 fn samples_on_this_machine_correct_the_prediction_and_are_listed() {
     let sampled = |k: &str| answer(sapwise().args(["predict", "--no-gpus", "--json", "--samples", k]));
     let pure = sampled("0");
-    assert_fields(&pure, "predicted");
+    assert_tuning(&pure, "predicted");
     assert!(pure.get("samples").is_none(), "{pure}");
-    let fields = sampled("3");
-    assert_fields(&fields, "learned");
-    assert_eq!(fields["model"], pure["model"]);
-    let samples = fields["samples"].as_array().unwrap();
+    let tuning = sampled("3");
+    assert_tuning(&tuning, "learned");
+    assert_eq!(tuning["model"], pure["model"]);
+    let samples = tuning["samples"].as_array().unwrap();
     assert!((1..=3).contains(&samples.len()), "{samples:?}");
     for sample in samples {
         assert_keys(sample, &["algorithm", "objects", "predicted_ns", "measured_ns"]);
         assert!(sample["measured_ns"].as_f64().unwrap() >= 1.0, "{sample}");
     }
-    assert!(fields["interval_basis"].as_str().unwrap().contains("no interval can be claimed"), "{fields}");
-    let read = sapwise::json::fields(&fields.to_string()).unwrap();
+    assert!(tuning["interval_basis"].as_str().unwrap().contains("no interval can be claimed"), "{tuning}");
+    let read = sapwise::json::tuning(&tuning.to_string()).unwrap();
     assert_eq!((read.source, read.samples.len()), (sapwise::Source::Learned, samples.len()));
     let text = success(sapwise().args(["predict", "--no-gpus", "--samples", "1"]));
     assert!(text.contains("samples by which the prediction was corrected"), "{text}");

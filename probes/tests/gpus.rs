@@ -45,8 +45,8 @@ fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
     path
 }
 
-fn ids(fields: &Value) -> Vec<&str> {
-    fields["costs"].as_array().unwrap().iter().map(|c| c["algorithm"].as_str().unwrap()).collect()
+fn ids(tuning: &Value) -> Vec<&str> {
+    tuning["costs"].as_array().unwrap().iter().map(|c| c["algorithm"].as_str().unwrap()).collect()
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn adapters_are_listed_with_what_bounds_them_and_every_algorithm_on_them() {
         }
         assert!(adapter["refused"].is_string() || adapter["limits"]["binding_bytes"].as_u64() > Some(0), "{adapter}");
         assert!(text.contains(adapter["name"].as_str().unwrap()), "{text}");
-        let id = format!("strips@gpu{}", adapter["index"]);
+        let id = format!("grid-sap@gpu{}", adapter["index"]);
         let algorithm = answer["algorithms"].as_array().unwrap().iter().find(|a| a["id"] == id.as_str()).unwrap();
         assert_eq!(algorithm["available"], algorithm["reason"].is_null());
     }
@@ -137,8 +137,8 @@ fn a_model_of_gpus_predicts_the_gpus_of_a_report() {
         let mut command = sapwise();
         answer(command.args(["predict", "--json", "--model"]).arg(&model).arg("--report").arg(report).args(words))
     };
-    let fields = predict(&own, &[]);
-    assert!(ids(&fields).contains(&"brute@gpu0") && ids(&fields).contains(&"brute@gpu1"), "{fields}");
+    let tuning = predict(&own, &[]);
+    assert!(ids(&tuning).contains(&"brute@gpu0") && ids(&tuning).contains(&"brute@gpu1"), "{tuning}");
     assert!(ids(&predict(&own, &["--no-gpus"])).iter().all(|id| id.contains("@cpu")));
     // The same machine with a program in place of its GPUs.
     let programs = made_up(folder.path(), "programs.json", |report| {
@@ -147,14 +147,14 @@ fn a_model_of_gpus_predicts_the_gpus_of_a_report() {
         }
     });
     assert!(ids(&predict(&programs, &[])).iter().all(|id| id.contains("@cpu")));
-    let fields = predict(&programs, &["--software-gpus"]);
-    assert!(ids(&fields).contains(&"brute@gpu0"), "{fields}");
-    assert_eq!(fields["extrapolated"], true);
-    assert!(fields["warnings"].to_string().contains("trained on discrete GPUs only"), "{fields}");
+    let tuning = predict(&programs, &["--software-gpus"]);
+    assert!(ids(&tuning).contains(&"brute@gpu0"), "{tuning}");
+    assert_eq!(tuning["extrapolated"], true);
+    assert!(tuning["warnings"].to_string().contains("trained on discrete GPUs only"), "{tuning}");
 }
 
 #[test]
-fn measured_fields_leave_out_programs_that_act_as_gpus() {
+fn measured_tuning_leave_out_programs_that_act_as_gpus() {
     let folder = tempfile::tempdir().unwrap();
     let programs = made_up(folder.path(), "programs.json", |report| {
         report["hardware"]["gpus"][0]["gpu"]["kind"] = "software".into();
@@ -166,18 +166,18 @@ fn measured_fields_leave_out_programs_that_act_as_gpus() {
 }
 
 #[test]
-fn fields_for_a_gpu_that_is_not_here_are_told_and_run_on_the_rest() {
+fn tuning_for_a_gpu_that_is_not_here_are_told_and_run_on_the_rest() {
     let folder = tempfile::tempdir().unwrap();
     let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
-    let fields = json!({
-        "schema": "fields/1", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
-        "steps": [step(0, "brute@cpu1"), step(100, "strips@gpu99")], "crossovers": [], "interval_basis": "", "costs": []
+    let tuning = json!({
+        "schema": "tuning/1", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
+        "steps": [step(0, "brute@cpu1"), step(100, "grid-sap@gpu99")], "crossovers": [], "interval_basis": "", "costs": []
     });
-    let path = folder.path().join("fields.json");
-    fs::write(&path, fields.to_string()).unwrap();
+    let path = folder.path().join("tuning.json");
+    fs::write(&path, tuning.to_string()).unwrap();
     let complaint = String::from_utf8(sapwise().arg("check").arg(&path).output().unwrap().stdout).unwrap();
-    assert!(complaint.contains("strips@gpu99 can't run here: this machine has no gpu99"), "{complaint}");
-    let run = ["run", "uniform", "--objects", "200", "--frames", "3", "--repeats", "1", "--json", "--fields"];
+    assert!(complaint.contains("grid-sap@gpu99 can't run here: this machine has no gpu99"), "{complaint}");
+    let run = ["run", "uniform", "--objects", "200", "--frames", "3", "--repeats", "1", "--json", "--tuning"];
     let told = answer(sapwise().args(run).arg(&path));
     assert!(told["warnings"].to_string().contains("this machine has no gpu99"), "{told}");
     assert_eq!(told["decisions"][0]["algorithm"], "brute@cpu1");
@@ -247,6 +247,6 @@ fn a_driver_that_crashes_costs_the_gpus_and_a_remark() {
     let without = report(with_it().args(TINY).arg("--no-gpus"));
     assert!(!without.remarks.iter().any(|r| r.contains("signal") || r.contains("GPU")), "{:?}", without.remarks);
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
-    let complaint = failure(with_it().arg("pairs").arg(&boxes).args(["--algorithm", "strips@gpu0"]), 2);
+    let complaint = failure(with_it().arg("pairs").arg(&boxes).args(["--algorithm", "grid-sap@gpu0"]), 2);
     assert!(complaint.contains("ended by signal 6"), "{complaint}");
 }

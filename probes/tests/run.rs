@@ -1,4 +1,4 @@
-//! `sapwise run` from the outside: streams, fields of other machines, traces, pictures, wrong usage.
+//! `sapwise run` from the outside: streams, tuning of other machines, traces, pictures, wrong usage.
 
 mod common;
 
@@ -11,24 +11,24 @@ fn answer(command: &mut assert_cmd::Command) -> Value {
     serde_json::from_str(&success(command)).unwrap()
 }
 
-/// Fields that run the first algorithm below that many objects and the second from there on.
+/// Tuning that run the first algorithm below that many objects and the second from there on.
 fn steps(folder: &Path, first: &str, border: u32, second: &str) -> PathBuf {
     let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
-    let fields = json!({
-        "schema": "fields/1", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
+    let tuning = json!({
+        "schema": "tuning/1", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
         "steps": [step(0, first), step(border, second)], "crossovers": [], "interval_basis": "", "costs": []
     });
     let path = folder.join("steps.json");
-    fs::write(&path, fields.to_string()).unwrap();
+    fs::write(&path, tuning.to_string()).unwrap();
     path
 }
 
-/// Fields with the costs of strips on one thread, and on so many.
+/// Tuning with the costs of strips on one thread, and on so many.
 fn costs(folder: &Path, threads: u32) -> PathBuf {
-    let (one, many) = ("strips@cpu1".to_owned(), format!("strips@cpu{threads}"));
+    let (one, many) = ("grid-sap@cpu1".to_owned(), format!("grid-sap@cpu{threads}"));
     let devices: Value = answer(sapwise().args(["devices", "--no-gpus", "--json"]));
-    let own = devices["algorithms"].as_array().unwrap().iter().find(|a| a["id"] == "strips@cpu1").unwrap();
-    let mut fixture: Value = serde_json::from_str(include_str!("../../tests/fixtures/fields-1.json")).unwrap();
+    let own = devices["algorithms"].as_array().unwrap().iter().find(|a| a["id"] == "grid-sap@cpu1").unwrap();
+    let mut fixture: Value = serde_json::from_str(include_str!("../../tests/fixtures/tuning-1.json")).unwrap();
     let curve = fixture["costs"][0]["curve"].clone();
     let cost = |id: &str| json!({"algorithm": id, "revision": own["revision"], "curve": curve, "spread_ln": 0.1});
     fixture["costs"] = json!([cost(&one), cost(&many)]);
@@ -39,24 +39,24 @@ fn costs(folder: &Path, threads: u32) -> PathBuf {
     path
 }
 
-fn run(scene: impl AsRef<std::ffi::OsStr>, fields: &Path, words: &[&str]) -> assert_cmd::Command {
+fn run(scene: impl AsRef<std::ffi::OsStr>, tuning: &Path, words: &[&str]) -> assert_cmd::Command {
     let mut command = sapwise();
-    command.arg("run").arg(scene).arg("--fields").arg(fields).args(words);
+    command.arg("run").arg(scene).arg("--tuning").arg(tuning).args(words);
     command
 }
 
 #[test]
 fn a_recorded_scene_is_run_and_searched_like_the_scene() {
     let folder = tempfile::tempdir().unwrap();
-    let fields = steps(folder.path(), "brute@cpu1", 20, "strips@cpu1");
+    let tuning = steps(folder.path(), "brute@cpu1", 20, "grid-sap@cpu1");
     let stream = folder.path().join("stream.npy");
     let scene = ["--objects", "300", "--frames", "90", "--repeats", "1", "--json", "--record"];
-    let recorded = answer(run("fragmentation", &fields, &scene).arg(&stream));
-    let again = answer(&mut run(&stream, &fields, &["--repeats", "1", "--json"]));
+    let recorded = answer(run("fragmentation", &tuning, &scene).arg(&stream));
+    let again = answer(&mut run(&stream, &tuning, &["--repeats", "1", "--json"]));
     assert_eq!((&again["scenario"], &again["frames"]), (&"stream.npy".into(), &90.into()));
     assert_eq!((&again["objects"], &again["decisions"]), (&recorded["objects"], &recorded["decisions"]));
     assert!(again["decisions"].as_array().unwrap().len() > 1, "{again}");
-    let few = answer(&mut run(&stream, &fields, &["--repeats", "1", "--frames", "7", "--json"]));
+    let few = answer(&mut run(&stream, &tuning, &["--repeats", "1", "--frames", "7", "--json"]));
     assert_eq!(few["frames"], 7);
     // `pairs` sees as many boxes in each frame: none of the absent ones has a pair, or is refused.
     let pairs = answer(sapwise().arg("pairs").arg(&stream).arg("--json"));
@@ -66,9 +66,9 @@ fn a_recorded_scene_is_run_and_searched_like_the_scene() {
 #[test]
 fn a_run_tells_its_figures_by_parts() {
     let folder = tempfile::tempdir().unwrap();
-    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
     let words = ["--objects", "200", "--frames", "30", "--repeats", "4", "--after", "10,20", "--json"];
-    let told = answer(&mut run("fragmentation", &fields, &words));
+    let told = answer(&mut run("fragmentation", &tuning, &words));
     let parts = told["parts"].as_array().unwrap();
     let range = |p: &Value| (p["from_frame"].as_u64().unwrap(), p["to_frame"].as_u64().unwrap());
     assert_eq!(parts.iter().map(range).collect::<Vec<_>>(), [(0, 9), (10, 19), (20, 29)]);
@@ -86,27 +86,27 @@ fn a_run_tells_its_figures_by_parts() {
     let largest = &told["best_at_largest"];
     assert_eq!(largest["objects"], told["objects"]["max"]);
     assert!(told["total_ms"]["fixed"].get(largest["algorithm"].as_str().unwrap()).is_some(), "{told}");
-    let text = success(&mut run("uniform", &fields, &["--objects", "50", "--frames", "3", "--repeats", "1"]));
+    let text = success(&mut run("uniform", &tuning, &["--objects", "50", "--frames", "3", "--repeats", "1"]));
     for needed in ["One repeat: the oracle has the least time", "Without learning.", "written down by hand"] {
         assert!(text.contains(needed), "{needed}: {text}");
     }
 }
 
 #[test]
-fn fields_of_another_machine_are_taken_and_what_it_lacks_is_told() {
+fn tuning_of_another_machine_are_taken_and_what_it_lacks_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
-    let too_many = format!("strips@cpu{}", cores + 1);
-    let fields = costs(folder.path(), cores + 1);
+    let too_many = format!("grid-sap@cpu{}", cores + 1);
+    let tuning = costs(folder.path(), cores + 1);
     let small = ["--objects", "200", "--frames", "5", "--repeats", "2", "--json"];
-    let told = answer(&mut run("uniform", &fields, &small));
-    assert_eq!(told["fields"]["too_many_threads"], json!([too_many]));
+    let told = answer(&mut run("uniform", &tuning, &small));
+    assert_eq!(told["tuning"]["too_many_threads"], json!([too_many]));
     assert!(told["warnings"].to_string().contains(&too_many), "{told}");
     assert_eq!((&told["learning"], &told["exploring"]), (&true.into(), &true.into()));
     assert!(told["total_ms"]["fixed"].get(&too_many).is_none(), "{told}");
-    let without = answer(run("uniform", &fields, &small).arg("--no-learning"));
+    let without = answer(run("uniform", &tuning, &small).arg("--no-learning"));
     assert_eq!((&without["learning"], &without["exploring"]), (&false.into(), &false.into()));
-    let without = answer(run("uniform", &fields, &small).arg("--no-exploring"));
+    let without = answer(run("uniform", &tuning, &small).arg("--no-exploring"));
     assert_eq!((&without["learning"], &without["exploring"]), (&true.into(), &false.into()));
 }
 
@@ -115,19 +115,19 @@ fn a_prediction_without_samples_is_told_as_such() {
     let words =
         ["run", "uniform", "--samples", "0", "--no-gpus", "--objects", "100", "--frames", "3", "--repeats", "2", "--json"];
     let told = answer(sapwise().args(words));
-    assert_eq!((&told["source"], &told["fields"]["from"]), (&"predicted".into(), &"prediction".into()));
-    assert_eq!(told["fields"]["samples"], 0);
+    assert_eq!((&told["source"], &told["tuning"]["from"]), (&"predicted".into(), &"prediction".into()));
+    assert_eq!(told["tuning"]["samples"], 0);
 }
 
 #[test]
 fn a_co_runner_is_told_with_what_it_reached() {
     let folder = tempfile::tempdir().unwrap();
-    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
     let words = ["--objects", "500", "--frames", "20", "--repeats", "2", "--co-runner", "10:1", "--json"];
-    let told = answer(&mut run("uniform", &fields, &words));
+    let told = answer(&mut run("uniform", &tuning, &words));
     let own = &told["co_runner"];
     assert_eq!((&own["from_frame"], &own["threads"]), (&10.into(), &1.into()));
-    assert!(own["slowdown"].as_f64().unwrap() > 0.0 && own["slowdown_of"]["strips@cpu1"].as_f64().unwrap() > 0.0, "{own}");
+    assert!(own["slowdown"].as_f64().unwrap() > 0.0 && own["slowdown_of"]["grid-sap@cpu1"].as_f64().unwrap() > 0.0, "{own}");
     let parts = told["parts"].as_array().unwrap();
     assert_eq!((parts.len(), &parts[1]["from_frame"]), (2, &10.into()));
 }
@@ -135,12 +135,12 @@ fn a_co_runner_is_told_with_what_it_reached() {
 #[test]
 fn every_frame_is_traced_and_drawn() {
     let folder = tempfile::tempdir().unwrap();
-    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
     let file = |name: &str| folder.path().join(name);
     let words = ["--objects", "200", "--frames", "12", "--repeats", "2"];
     let both = |trace: &str, plot: &str| {
         let text =
-            success(run("fragmentation", &fields, &words).arg("--trace").arg(file(trace)).arg("--plot").arg(file(plot)));
+            success(run("fragmentation", &tuning, &words).arg("--trace").arg(file(trace)).arg("--plot").arg(file(plot)));
         assert!(text.contains(trace) && text.contains(plot), "{text}");
     };
     both("a.csv", "a.svg");
@@ -151,7 +151,7 @@ fn every_frame_is_traced_and_drawn() {
     let json: Value = serde_json::from_str(&fs::read_to_string(file("a.json")).unwrap()).unwrap();
     assert_eq!(json["frames"].as_array().unwrap().len(), 12);
     let svg = fs::read_to_string(file("a.svg")).unwrap();
-    for needed in ["1 core: ", "Made by: sapwise run fragmentation --fields steps.json", "written down by hand"] {
+    for needed in ["1 core: ", "Made by: sapwise run fragmentation --tuning steps.json", "written down by hand"] {
         assert!(svg.contains(needed), "{needed}");
     }
     // The folder is of this machine alone.
@@ -162,7 +162,7 @@ fn every_frame_is_traced_and_drawn() {
 #[test]
 fn what_can_not_be_run_is_refused_with_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
-    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
     let good = [0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0];
     let nan = [f32::NAN; 6];
     let file = |name: &str, shape: &str, rows: &[[f32; 6]]| npy(folder.path(), name, "<f4", shape, rows.as_flattened());
@@ -178,7 +178,7 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
         (file("none.npy", "0, 5, 6", &[]), &[], 1, &["none.npy has no frames", "--record"]),
         (empty, &[], 1, &["empty.npy", "empty"]),
         (folder.path().join("absent.npy"), &[], 1, &["absent.npy"]),
-        (fields.clone(), &[], 1, &["steps.json", "no .npy file"]),
+        (tuning.clone(), &[], 1, &["steps.json", "no .npy file"]),
         ("unifrom".into(), &[], 2, &["no scenario", "uniform", "name a file"]),
         (scene.clone(), &["--frames", "3"], 2, &["--frames 3", "2 frames"]),
         (scene.clone(), &["--objects", "3"], 2, &["--objects", "stream"]),
@@ -187,16 +187,16 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
         ("uniform".into(), &["--plot", "a.pdf"], 2, &["a.pdf", ".svg or .png"]),
     ];
     for (scene, words, status, needed) in cases {
-        let complaint = failure(&mut run(&scene, &fields, words), status);
+        let complaint = failure(&mut run(&scene, &tuning, words), status);
         assert!(needed.iter().all(|text| complaint.contains(text)), "{scene:?} {words:?}: {complaint}");
     }
     let nowhere = folder.path().join("missing").join("a.svg");
-    let complaint = failure(run("uniform", &fields, &[]).arg("--plot").arg(&nowhere), 1);
+    let complaint = failure(run("uniform", &tuning, &[]).arg("--plot").arg(&nowhere), 1);
     assert!(complaint.contains("a.svg") && complaint.contains("no such folder"), "{complaint}");
     for words in [["--co-runner", "x"], ["--samples", "3"], ["--trace", "a.txt"]] {
-        failure(&mut run("uniform", &fields, &words), 2);
+        failure(&mut run("uniform", &tuning, &words), 2);
     }
-    let complaint = failure(run(&scene, &fields, &[]).arg("--trace").arg(folder.path().join("steps.json")), 2);
+    let complaint = failure(run(&scene, &tuning, &[]).arg("--trace").arg(folder.path().join("steps.json")), 2);
     assert!(complaint.contains("steps.json"), "{complaint}");
 }
 
@@ -205,12 +205,12 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
 fn an_interrupt_ends_the_co_runner_and_keeps_the_repeats_that_are_complete() {
     use std::io::Read;
     let folder = tempfile::tempdir().unwrap();
-    let fields = steps(folder.path(), "brute@cpu1", 60, "strips@cpu1");
+    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
     let trace = folder.path().join("trace.csv");
     // More repeats than it lives for; the first is over in a hundredth of a second.
     let words = ["--objects", "30", "--frames", "40", "--repeats", "1000", "--co-runner", "1:1", "--seed", "3", "--json"];
     let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
-    command.args(["run", "uniform", "--fields"]).arg(&fields).args(words).arg("--trace").arg(&trace);
+    command.args(["run", "uniform", "--tuning"]).arg(&tuning).args(words).arg("--trace").arg(&trace);
     let mut child = command.stdout(std::process::Stdio::piped()).spawn().unwrap();
     // A child that has no handler yet ends at once, without an answer: then it is tried again, later.
     let mut wait = std::time::Duration::from_millis(200);

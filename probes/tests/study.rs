@@ -85,7 +85,7 @@ fn figures_come_from_the_reports_that_they_name() {
             r["taken"].starts_with("simd: avx2") && r["algorithm"] == algorithm && r["objects"].starts_with("1000")
         })
     };
-    let strips = own("strips@cpu1").unwrap();
+    let strips = own("grid-sap@cpu1").unwrap();
     assert_eq!((strips["pairs"].as_str(), strips["reports"].split(' ').count()), ("2", 4), "{strips:?}");
     assert_eq!(strips["verdict"], "cannot be told from these machines");
     let proof = rows(&out.join("tables/restrictions.csv"));

@@ -48,7 +48,7 @@ fn main() -> ExitCode {
 
 /// A program whose algorithm has the name of one of ours.
 fn clash() -> ExitCode {
-    sapwise_cli::Command::new().with("strips", 1, || unreachable!("it was refused")).run()
+    sapwise_cli::Command::new().with("grid-sap", 1, || unreachable!("it was refused")).run()
 }
 
 /// A program whose algorithm finds as many pairs as it has threads, whatever the boxes.
@@ -119,10 +119,10 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let of_user = fitted["methods"].as_array().unwrap().iter().find(|m| m["method"] == "bvh").expect("a cost of bvh");
     assert_eq!((&of_user["revision"], &of_user["backend"]), (&1.into(), &"cpu".into()));
 
-    let fields = file("fields.json");
+    let tuning = file("tuning.json");
     let predict = |mut command: Command| {
         let words = ["predict", "--json", "--report"];
-        success(command.args(words).arg(&report).arg("--model").arg(&model).arg("--out").arg(&fields))
+        success(command.args(words).arg(&report).arg("--model").arg(&model).arg("--out").arg(&tuning))
     };
     // The plain command predicts ours, and says what it can't choose.
     let plain: Value = serde_json::from_str(&predict(sapwise())).unwrap();
@@ -133,14 +133,14 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     assert!(own["costs"].as_array().unwrap().iter().any(|c| c["algorithm"] == "bvh@cpu1"), "{own}");
     assert!(!own["warnings"].to_string().contains("bvh"), "{}", own["warnings"]);
 
-    let run = ["run", "uniform", "--json", "--objects", "200", "--frames", "20", "--repeats", "1", "--fields"];
-    let told: Value = serde_json::from_str(&success(user().args(run).arg(&fields))).unwrap();
+    let run = ["run", "uniform", "--json", "--objects", "200", "--frames", "20", "--repeats", "1", "--tuning"];
+    let told: Value = serde_json::from_str(&success(user().args(run).arg(&tuning))).unwrap();
     assert!(told["total_ms"]["fixed"]["bvh@cpu1"].as_f64().unwrap() > 0.0, "{told}");
-    let complaint = failure(sapwise().args(run).arg(&fields), 1);
+    let complaint = failure(sapwise().args(run).arg(&tuning), 1);
     assert!(complaint.contains("is stale: bvh is not in this build"), "{complaint}");
 
-    check_names_a_number_of_threads_that_it_can_not_be_made_on(&fields);
-    for path in [&report, &model, &fields] {
+    check_names_a_number_of_threads_that_it_can_not_be_made_on(&tuning);
+    for path in [&report, &model, &tuning] {
         success(user().arg("check").arg(path));
         let told = sapwise().arg("check").arg(path).output().unwrap();
         let text = String::from_utf8(told.stdout).unwrap();
@@ -148,9 +148,9 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     }
 }
 
-fn check_names_a_number_of_threads_that_it_can_not_be_made_on(fields: &Path) {
-    let other = fields.with_file_name("two-threads.json");
-    fs::write(&other, fs::read_to_string(fields).unwrap().replace("bvh@cpu1", "bvh@cpu2")).unwrap();
+fn check_names_a_number_of_threads_that_it_can_not_be_made_on(tuning: &Path) {
+    let other = tuning.with_file_name("two-threads.json");
+    fs::write(&other, fs::read_to_string(tuning).unwrap().replace("bvh@cpu1", "bvh@cpu2")).unwrap();
     let told = user().arg("check").arg(&other).output().unwrap();
     let text = String::from_utf8(told.stdout).unwrap();
     assert!(told.status.code() == Some(1) && text.contains("bvh@cpu2") && !text.contains("stale"), "{text}");
@@ -214,6 +214,6 @@ fn one_on_several_threads_gets_their_number() {
 fn names_that_clash_are_refused_before_anything_is_done() {
     for words in [&["devices"][..], &["--help"], &["part", "gpus"]] {
         let complaint = failure(program("clash").args(words), 1);
-        assert!(complaint.contains("\"strips\" is the name of a method of Sapwise"), "{words:?}: {complaint}");
+        assert!(complaint.contains("\"grid-sap\" is the name of a method of Sapwise"), "{words:?}: {complaint}");
     }
 }

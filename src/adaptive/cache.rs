@@ -1,4 +1,4 @@
-//! Fields kept from one start of a program to the next.
+//! Tuning kept from one start of a program to the next.
 //!
 //! A file for each [`Key`]. It is written beside its place and renamed, so that two processes at once leave one whole file; what
 //! was cut off by a crash of the machine can't be read and is replaced.
@@ -6,7 +6,7 @@
 use super::options::Cache;
 use crate::measure::{fnv1a, machine};
 use crate::schema_tag::schema_tag;
-use crate::{AlgorithmId, Fields, GpuIdentity, Machine, Model, Registry, json, usable_cores};
+use crate::{AlgorithmId, Tuning, GpuIdentity, Machine, Model, Registry, json, usable_cores};
 use etcetera::BaseStrategy;
 use std::fs;
 use std::io::{ErrorKind, Write};
@@ -27,13 +27,13 @@ const LONGEST_BYTES: u64 = 16 << 20;
 pub(crate) struct Cached {
     /// Always `cache/1`.
     schema: CacheSchema,
-    /// What the fields hold for.
+    /// What the tuning holds for.
     key: Key,
-    /// The fields, predicted or learned.
-    fields: Fields,
+    /// The tuning, predicted or learned.
+    tuning: Tuning,
 }
 
-/// All that fields depend on, in plain words. Names no host, no user and no single piece of hardware.
+/// All that tuning depends on, in plain words. Names no host, no user and no single piece of hardware.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -105,7 +105,7 @@ impl Entry {
                 .join("sapwise"),
         };
         let text = serde_json::to_string(&key).map_err(|e| e.to_string())?;
-        let file = folder.join(format!("fields-{:016x}.json", fnv1a(&text)));
+        let file = folder.join(format!("tuning-{:016x}.json", fnv1a(&text)));
         Ok(Some(Self { key, file }))
     }
 
@@ -113,11 +113,11 @@ impl Entry {
         &self.file
     }
 
-    /// The fields that are kept; `None` where there are none.
+    /// The tuning that is kept; `None` where there are none.
     ///
     /// # Errors
     /// A sentence that says why what is there can't be used.
-    pub(super) fn read(&self) -> Result<Option<Fields>, String> {
+    pub(super) fn read(&self) -> Result<Option<Tuning>, String> {
         let ignored = |why: &str| format!("{} is ignored and replaced: {why}", self.file.display());
         match fs::metadata(&self.file) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
@@ -132,18 +132,18 @@ impl Entry {
         if cached.key != self.key {
             return Err(ignored("it is of another machine, another build or another model"));
         }
-        match cached.fields.defect() {
+        match cached.tuning.defect() {
             Some(defect) => Err(ignored(&defect)),
-            None => Ok(Some(cached.fields)),
+            None => Ok(Some(cached.tuning)),
         }
     }
 
-    /// Keeps fields in place of those that are there.
+    /// Keeps tuning in place of those that are there.
     ///
     /// # Errors
     /// A sentence that says why they can't be kept.
-    pub(super) fn write(&self, fields: Fields) -> Result<(), String> {
-        let cached = Cached { schema: CacheSchema, key: self.key.clone(), fields };
+    pub(super) fn write(&self, tuning: Tuning) -> Result<(), String> {
+        let cached = Cached { schema: CacheSchema, key: self.key.clone(), tuning };
         let text = json::write(&cached).map_err(|e| e.to_string())?;
         self.replace(&text).map_err(|e| format!("{} can't be written: {e}", self.file.display()))
     }

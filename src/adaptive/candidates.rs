@@ -1,8 +1,8 @@
 //! The algorithms to choose from, and what runs them.
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Fields, Pairs, Registry};
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Tuning, Pairs, Registry};
 
-/// An algorithm of the fields.
+/// An algorithm of the tuning.
 pub(super) struct Candidate {
     pub(super) id: AlgorithmId,
     /// Its position among the instances; `None` once it failed, or where it can't run.
@@ -40,9 +40,9 @@ impl Instance {
     }
 }
 
-/// What runs the algorithms of some fields, and why the last of those that can't run can't.
+/// What runs the algorithms of some tuning, and why the last of those that can't run can't.
 pub(super) struct Made {
-    /// In the order of [`Fields::algorithms`].
+    /// In the order of [`Tuning::algorithms`].
     pub(super) candidates: Vec<Candidate>,
     pub(super) instances: Vec<Instance>,
     pub(super) failure: Option<Error>,
@@ -51,7 +51,7 @@ pub(super) struct Made {
 impl Made {
     /// Of each candidate where it finds what the frame before left: one number for all that share it. `None` where nothing is kept.
     pub(super) fn kept(&self) -> Vec<Option<usize>> {
-        let keeps = |c: &Candidate| c.instance.filter(|&k| self.instances[k].algorithm.keeps_work());
+        let keeps = |c: &Candidate| c.instance.filter(|&k| self.instances[k].algorithm.is_incremental());
         self.candidates.iter().map(keeps).collect()
     }
 
@@ -60,15 +60,15 @@ impl Made {
         self.candidates.iter().map(|c| c.instance.is_some()).collect()
     }
 
-    pub(super) fn of(fields: &Fields, registry: &Registry) -> Self {
-        let ids = fields.algorithms();
+    pub(super) fn of(tuning: &Tuning, registry: &Registry) -> Self {
+        let ids = tuning.algorithms();
         let mut made = Self {
             candidates: ids.iter().map(|&id| Candidate { id: id.clone(), instance: None }).collect(),
             instances: Vec::new(),
             failure: None,
         };
         let stale = |id: &AlgorithmId| {
-            let cost = fields.costs.iter().find(|c| c.algorithm == *id);
+            let cost = tuning.costs.iter().find(|c| c.algorithm == *id);
             cost.and_then(|c| registry.mismatch(id, c.revision)).map_or(Ok(()), Err)
         };
         for (k, &id) in ids.iter().enumerate() {

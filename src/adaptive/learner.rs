@@ -1,7 +1,7 @@
 //! What the frames that were run tell about the cost of every algorithm.
 //!
 //! The natural logarithm of measured over predicted time is taken to be the sum of two parts. The *regime* is shared: a factor for each
-//! class of processor (a clock that throttles, fields of another machine); beside that for each number of threads or GPUs one, and one
+//! class of processor (a clock that throttles, tuning of another machine); beside that for each number of threads or GPUs one, and one
 //! on what a call costs (cores that moved apart, a core that is taken); and for all algorithms that keep the same from frame to frame
 //! one. The *own* part of an algorithm is a curve over the number of objects. A Kalman filter follows both: the regime with all its
 //! covariances, which takes a dozen numbers, the own parts each by itself. [`Posterior`](crate::Posterior) knows more and takes some 50
@@ -11,13 +11,13 @@ use super::place::{KNOTS, Place, View};
 use super::tally::Tally;
 use crate::{AlgorithmCost, BackendClass};
 
-/// Standard deviations before anything was observed. Fields of another machine are off by a factor of several for all algorithms at once, and
+/// Standard deviations before anything was observed. Tuning of another machine are off by a factor of several for all algorithms at once, and
 /// a core that is taken doubles the time of those that use it.
 const CLASS_LN: f64 = 0.8;
 const KEPT_LN: f64 = 0.5;
 const WIDTH_LN: f64 = 0.2;
 const CALL_LN: f64 = 0.7;
-/// The least of an own part: fields that were measured a minute ago are off by this in the next scene.
+/// The least of an own part: tuning that was measured a minute ago are off by this in the next scene.
 const OWN_LN: f64 = 0.15;
 
 /// Frames after which what was observed counts for half. In a hundred frames a class may change by 15 %, what keeping saves by 25 %, a width
@@ -351,7 +351,7 @@ fn unobserve(covariance: &mut [f64], before: &[f64]) {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Part {
     Class(BackendClass),
-    /// Of those that keep the same: a scene may spare them more or less of their work than those that the fields were made from.
+    /// Of those that keep the same: a scene may spare them more or less of their work than those that the tuning was made from.
     Kept(usize),
     /// Of a number of threads or GPUs: on all of the cost, and on its calls.
     Width(BackendClass, u32),

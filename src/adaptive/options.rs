@@ -15,11 +15,11 @@ pub struct Options {
     /// [`Adaptive::set_exploring`](crate::Adaptive::set_exploring). On by default.
     pub exploring: bool,
     /// Whether all that takes time happens on a thread of its own, so that the constructor returns at once: looking for GPUs, reading
-    /// the cache, measuring, predicting, making the algorithms. Until it is done [`Fields::usual`](crate::Fields::usual) decides.
+    /// the cache, measuring, predicting, making the algorithms. Until it is done [`Tuning::usual`](crate::Tuning::usual) decides.
     /// On by default. A program that shows a loading screen turns it off: what is measured while its other threads work is off by
     /// what they take, which can't be told from a slower machine, and is kept until [`save`](crate::Adaptive::save) has better.
     pub background: bool,
-    /// Where fields are kept from one start to the next. The user's cache folder by default.
+    /// Where tuning is kept from one start to the next. The user's cache folder by default.
     pub cache: Cache,
     /// The algorithms to choose from: the program's own, its thread pool ([`Registry::use_pool`]), its GPUs
     /// (`Registry::add_gpus`). `None`, the default: ours on all usable cores with
@@ -33,7 +33,7 @@ pub struct Options {
     pub probe_limit: Duration,
 }
 
-/// Where fields are kept from one start to the next.
+/// Where tuning is kept from one start to the next.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Cache {
     /// The folder `sapwise` in the user's cache folder: `$XDG_CACHE_HOME` or `~/.cache`, `~/Library/Caches`, `%LOCALAPPDATA%`.

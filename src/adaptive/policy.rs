@@ -6,7 +6,7 @@ use super::place::{Place, View};
 use super::price::{Expected, Kind, Prices};
 use super::tally::{Predicted, Tally};
 use crate::cost::Counts;
-use crate::{Fields, Load};
+use crate::{Tuning, Load};
 
 /// By number of objects alone, the algorithm of before stays while its own step is within this share.
 const STEP_SLACK: f64 = 0.05;
@@ -21,7 +21,7 @@ const HORIZON: f64 = 300.0;
 /// Chooses, and learns from what the choices cost.
 #[derive(Debug, Clone)]
 pub(super) struct Policy {
-    fields: Fields,
+    tuning: Tuning,
     /// Candidates that can run.
     usable: Vec<bool>,
     /// The candidate of each step.
@@ -35,7 +35,7 @@ pub(super) struct Policy {
     settled: Option<usize>,
     ran: Option<usize>,
     /// What each candidate is expected to cost under the present load, in the mean over its frames with all waits and by kinds of frames, and
-    /// what the fields say of it without correction.
+    /// what the tuning says of it without correction.
     mean_ns: Vec<f64>,
     expected: Vec<Expected>,
     predicted: Vec<Predicted>,
@@ -50,11 +50,11 @@ pub(super) struct Policy {
 impl Policy {
     /// `kept` gives for each candidate where it finds what the frame before left, if a frame is cheaper for it after one that was alike: one
     /// number for all that share it.
-    pub(super) fn new(fields: Fields, kept: &[Option<usize>], usable: Vec<bool>) -> Self {
+    pub(super) fn new(tuning: Tuning, kept: &[Option<usize>], usable: Vec<bool>) -> Self {
         let count = usable.len();
-        let learner = (!fields.costs.is_empty()).then(|| Learner::new(&fields.costs, kept));
-        let ids = fields.algorithms();
-        let steps = fields.steps.iter().filter_map(|s| ids.iter().position(|id| **id == s.algorithm)).collect();
+        let learner = (!tuning.costs.is_empty()).then(|| Learner::new(&tuning.costs, kept));
+        let ids = tuning.algorithms();
+        let steps = tuning.steps.iter().filter_map(|s| ids.iter().position(|id| **id == s.algorithm)).collect();
         Self {
             steps,
             learner,
@@ -71,13 +71,13 @@ impl Policy {
             saved_ns: vec![0.0; count],
             frame: 0,
             explored_at: 0,
-            fields,
+            tuning,
             usable,
         }
     }
 
-    pub(super) fn fields(&self) -> &Fields {
-        &self.fields
+    pub(super) fn tuning(&self) -> &Tuning {
+        &self.tuning
     }
 
     pub(super) fn set_learning(&mut self, learns: bool) {
@@ -109,7 +109,7 @@ impl Policy {
 
     /// Whether the number of objects alone decides.
     pub(super) fn is_by_count(&self) -> bool {
-        self.fields.costs.is_empty()
+        self.tuning.costs.is_empty()
     }
 
     /// Other instances take the place of those of before.
@@ -120,7 +120,7 @@ impl Policy {
         self.tally = Tally::default();
         if !self.prices.remade(kept) {
             self.prices = Prices::new(kept);
-            self.learner = self.learner.is_some().then(|| Learner::new(&self.fields.costs, kept));
+            self.learner = self.learner.is_some().then(|| Learner::new(&self.tuning.costs, kept));
         }
     }
 
@@ -160,7 +160,7 @@ impl Policy {
         self.log2_objects = counts.log2_objects();
         let place = Place::of(self.log2_objects);
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
-        for (k, cost) in self.fields.costs.iter().enumerate() {
+        for (k, cost) in self.tuning.costs.iter().enumerate() {
             let ns = cost.curve.cost_of(&counts);
             let alone_ns = cost.curve.otherwise_of(&counts).unwrap_or(ns).max(ns);
             let predicted = Predicted { ns, calls_ns: cost.curve.calls_of(&counts).min(ns) };
@@ -263,7 +263,7 @@ impl Policy {
 
     /// The step that holds at this number of objects, or the nearest below or above that can run.
     fn choose_by_count(&mut self, objects: u32) -> Option<Choice> {
-        let steps = &self.fields.steps;
+        let steps = &self.tuning.steps;
         let split = steps.partition_point(|s| s.from_objects <= objects);
         let (below, above) = self.steps.split_at(split);
         let chosen = below.iter().rev().chain(above).copied().find(|&k| self.usable[k])?;

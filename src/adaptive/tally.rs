@@ -11,7 +11,7 @@ const OCTAVES: f64 = 0.5;
 /// What counts of a frame, at most: so many times what the dearest kind of frame is expected to cost. The rest is another program's.
 const MOST_OVER: f64 = 2.0;
 
-/// What the fields say of a frame, without any correction, in nanoseconds: all of it, and the calls in it.
+/// What the tuning says of a frame, without any correction, in nanoseconds: all of it, and the calls in it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Predicted {
     pub(super) ns: f64,
@@ -35,7 +35,7 @@ fn share(part: f64, whole: f64) -> f64 {
 pub(super) struct Tally {
     pub(super) candidate: usize,
     pub(super) frames: u32,
-    /// Real time, and time that the fields predict without any correction, in nanoseconds.
+    /// Real time, and time that the tuning predict without any correction, in nanoseconds.
     pub(super) real_ns: f64,
     pub(super) predicted_ns: f64,
     calls_ns: f64,

@@ -3,11 +3,11 @@ mod learning;
 use super::*;
 use crate::{AlgorithmCost, CostCurve, CostTerm, Scenario, Scene, Term};
 
-fn fields(costs: &[(&str, f64, f64)]) -> Fields {
-    fields_of([Term::Call, Term::Objects], costs)
+fn tuning(costs: &[(&str, f64, f64)]) -> Tuning {
+    tuning_of([Term::Call, Term::Objects], costs)
 }
 
-fn fields_of(terms: [Term; 2], costs: &[(&str, f64, f64)]) -> Fields {
+fn tuning_of(terms: [Term; 2], costs: &[(&str, f64, f64)]) -> Tuning {
     let costs = costs.iter().map(|&(id, first, second)| AlgorithmCost {
         algorithm: id.parse().unwrap(),
         revision: revision(id),
@@ -18,12 +18,12 @@ fn fields_of(terms: [Term; 2], costs: &[(&str, f64, f64)]) -> Fields {
         spread_ln: 0.0,
     });
     let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
-    Fields::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
+    Tuning::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
 }
 
 /// Over algorithms whose costs are made up: what their frames really take is to change nothing.
-fn fixed(fields: Fields) -> Adaptive {
-    let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
+fn fixed(tuning: Tuning) -> Adaptive {
+    let mut adaptive = Adaptive::new(tuning, &Registry::with_cores(1)).unwrap();
     adaptive.set_learning(false);
     adaptive
 }
@@ -47,9 +47,9 @@ fn chosen(adaptive: &mut Adaptive, objects: usize) -> (String, Reason) {
 #[test]
 fn it_switches_at_the_border_and_not_within_the_hysteresis() {
     // 10 n = 1000 + 5 n at n = 200.
-    let fields = fields(&[("brute@cpu1", 0.0, 10.0), ("strips@cpu1", 1000.0, 5.0)]);
-    let mut adaptive = fixed(fields);
-    let (brute, strips) = ("brute@cpu1".to_owned(), "strips@cpu1".to_owned());
+    let tuning = tuning(&[("brute@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 1000.0, 5.0)]);
+    let mut adaptive = fixed(tuning);
+    let (brute, strips) = ("brute@cpu1".to_owned(), "grid-sap@cpu1".to_owned());
     assert_eq!(chosen(&mut adaptive, 100), (brute.clone(), Reason::First));
     assert_eq!(chosen(&mut adaptive, 150), (brute.clone(), Reason::Stayed));
     assert_eq!(chosen(&mut adaptive, 205), (brute.clone(), Reason::Hysteresis));
@@ -65,15 +65,15 @@ fn it_switches_at_the_border_and_not_within_the_hysteresis() {
 #[test]
 fn hand_written_thresholds_decide_by_count() {
     let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
-    let steps = vec![step(0, "brute@cpu1"), step(64, "sweep@cpu1"), step(1000, "strips@cpu1")];
-    let fields = Fields::from_steps(steps).unwrap();
-    let mut adaptive = Adaptive::new(fields, &Registry::with_cores(1)).unwrap();
+    let steps = vec![step(0, "brute@cpu1"), step(64, "sap@cpu1"), step(1000, "grid-sap@cpu1")];
+    let tuning = Tuning::from_steps(steps).unwrap();
+    let mut adaptive = Adaptive::new(tuning, &Registry::with_cores(1)).unwrap();
     assert_eq!(chosen(&mut adaptive, 10).0, "brute@cpu1");
     assert_eq!(chosen(&mut adaptive, 65), ("brute@cpu1".to_owned(), Reason::Hysteresis));
-    assert_eq!(chosen(&mut adaptive, 90), ("sweep@cpu1".to_owned(), Reason::Switched));
+    assert_eq!(chosen(&mut adaptive, 90), ("sap@cpu1".to_owned(), Reason::Switched));
     assert_eq!(chosen(&mut adaptive, 10), ("brute@cpu1".to_owned(), Reason::Switched));
     // Near a border, but not one of brute force's.
-    assert_eq!(chosen(&mut adaptive, 1000), ("strips@cpu1".to_owned(), Reason::Switched));
+    assert_eq!(chosen(&mut adaptive, 1000), ("grid-sap@cpu1".to_owned(), Reason::Switched));
 }
 
 /// Works for a few frames, then is lost as a GPU can be.
@@ -95,8 +95,8 @@ impl BroadPhase for Fragile {
 fn a_lost_algorithm_is_replaced_within_the_frame() {
     let mut registry = Registry::with_cores(1);
     registry.add("fragile@gpu0".parse().unwrap(), 1, || Ok(Box::new(Fragile(2))));
-    let fields = fields(&[("fragile@gpu0", 1.0, 0.0), ("brute@cpu1", 2.0, 1.0)]);
-    let mut adaptive = Adaptive::new(fields, &registry).unwrap();
+    let tuning = tuning(&[("fragile@gpu0", 1.0, 0.0), ("brute@cpu1", 2.0, 1.0)]);
+    let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
     assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu0");
     assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu0");
     let mut pairs = Pairs::new();
@@ -109,9 +109,9 @@ fn a_lost_algorithm_is_replaced_within_the_frame() {
 #[test]
 fn unknown_algorithms_are_skipped_and_none_at_all_is_an_error() {
     let registry = Registry::with_cores(1);
-    let mixed = fields(&[("octree@cpu1", 0.0, 0.1), ("brute@cpu1", 0.0, 1.0)]);
+    let mixed = tuning(&[("octree@cpu1", 0.0, 0.1), ("brute@cpu1", 0.0, 1.0)]);
     assert_eq!(chosen(&mut Adaptive::new(mixed, &registry).unwrap(), 20).0, "brute@cpu1");
-    assert!(Adaptive::new(fields(&[("octree@cpu1", 0.0, 0.1)]), &registry).is_err());
+    assert!(Adaptive::new(tuning(&[("octree@cpu1", 0.0, 0.1)]), &registry).is_err());
 }
 
 /// The algorithm and the estimate of `moved` in each of so many frames of a scene.
@@ -128,23 +128,23 @@ fn course(adaptive: &mut Adaptive, scenario: Scenario, frames: usize) -> Vec<(St
 }
 
 /// 40 n, and 15 n + 100 n moved.
-fn strips_or_verlet() -> Adaptive {
-    let fields = fields_of([Term::Objects, Term::Moved], &[("strips@cpu1", 40.0, 0.0), ("verlet@cpu1", 15.0, 100.0)]);
-    fixed(fields)
+fn grid_sap_or_pair_cache() -> Adaptive {
+    let tuning = tuning_of([Term::Objects, Term::Moved], &[("grid-sap@cpu1", 40.0, 0.0), ("pair-cache@cpu1", 15.0, 100.0)]);
+    fixed(tuning)
 }
 
 #[test]
 fn from_the_second_frame_on_it_knows_how_far_boxes_move() {
     for (scenario, algorithm, least, most) in [
-        (Scenario::Uniform, "verlet@cpu1", 0.03, 0.05),
-        (Scenario::Resting, "verlet@cpu1", 0.0, 0.01),
-        (Scenario::Fast, "strips@cpu1", 0.9, 1.0),
+        (Scenario::Uniform, "pair-cache@cpu1", 0.03, 0.05),
+        (Scenario::Resting, "pair-cache@cpu1", 0.0, 0.01),
+        (Scenario::Fast, "grid-sap@cpu1", 0.9, 1.0),
     ] {
-        let course = course(&mut strips_or_verlet(), scenario, 70);
-        assert_eq!(course[0], ("strips@cpu1".to_owned(), 1.0), "{scenario}");
+        let course = course(&mut grid_sap_or_pair_cache(), scenario, 70);
+        assert_eq!(course[0], ("grid-sap@cpu1".to_owned(), 1.0), "{scenario}");
         for (k, (chosen, moved)) in course.iter().enumerate().skip(1) {
             assert!((least..=most).contains(moved), "{scenario}: {moved}");
-            // A frame for what the start of `verlet` costs to be saved.
+            // A frame for what the start of `pair-cache` costs to be saved.
             assert!(k < 2 || chosen == algorithm, "{scenario}, frame {k}: {chosen}");
         }
     }
@@ -168,17 +168,17 @@ fn samples_until(adaptive: &mut Adaptive, scene: &mut Scene, algorithm: &str) ->
 
 #[test]
 fn a_change_of_how_far_boxes_move_is_seen_within_two_samples() {
-    let mut adaptive = strips_or_verlet();
-    assert_eq!(course(&mut adaptive, Scenario::Uniform, 50)[49].0, "verlet@cpu1");
-    assert!(samples_until(&mut adaptive, &mut Scenario::Fast.start(2000, 1), "strips@cpu1") <= 2);
+    let mut adaptive = grid_sap_or_pair_cache();
+    assert_eq!(course(&mut adaptive, Scenario::Uniform, 50)[49].0, "pair-cache@cpu1");
+    assert!(samples_until(&mut adaptive, &mut Scenario::Fast.start(2000, 1), "grid-sap@cpu1") <= 2);
     // Another number of boxes is sampled when a few times the price of that has passed, and the frame after tells.
-    assert!(samples_until(&mut adaptive, &mut Scenario::Resting.start(500, 1), "verlet@cpu1") <= 2);
+    assert!(samples_until(&mut adaptive, &mut Scenario::Resting.start(500, 1), "pair-cache@cpu1") <= 2);
     assert!(adaptive.last_decision().unwrap().load.moved <= 0.01);
 }
 
 #[test]
 fn deciding_before_a_frame_does_not_make_it_look_at_rest() {
-    let mut adaptive = strips_or_verlet();
+    let mut adaptive = grid_sap_or_pair_cache();
     let mut scene = Scenario::Fast.start(2000, 1);
     for _ in 0..70 {
         adaptive.decide(scene.boxes());
@@ -190,7 +190,7 @@ fn deciding_before_a_frame_does_not_make_it_look_at_rest() {
 
 #[test]
 fn it_keeps_work_when_any_of_its_algorithms_does() {
-    assert!(strips_or_verlet().keeps_work());
-    let without = fields(&[("strips@cpu1", 1.0, 1.0), ("brute@cpu1", 1.0, 2.0)]);
-    assert!(!Adaptive::new(without, &Registry::with_cores(1)).unwrap().keeps_work());
+    assert!(grid_sap_or_pair_cache().is_incremental());
+    let without = tuning(&[("grid-sap@cpu1", 1.0, 1.0), ("brute@cpu1", 1.0, 2.0)]);
+    assert!(!Adaptive::new(without, &Registry::with_cores(1)).unwrap().is_incremental());
 }

@@ -1,4 +1,4 @@
-//! From nothing to fields of this machine: the cache, else a measurement and a prediction.
+//! From nothing to tuning of this machine: the cache, else a measurement and a prediction.
 
 use super::Adaptive;
 use super::cache::{Entry, Key};
@@ -7,7 +7,7 @@ use super::options::Options;
 use super::place::objects_of;
 use crate::hardware::parameter;
 use crate::{
-    AlgorithmId, Displacement, Error, Fields, GpuHardware, Hardware, Load, Model, Parameter, Registry, Scenario, measure,
+    AlgorithmId, Displacement, Error, Tuning, GpuHardware, Hardware, Load, Model, Parameter, Registry, Scenario, measure,
 };
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,42 +16,42 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-/// Objects of the slice that the fields show: four sizes a decade from ten to a hundred thousand, in quarters of a decade. Larger
+/// Objects of the slice that the tuning shows: four sizes a decade from ten to a hundred thousand, in quarters of a decade. Larger
 /// scenes take longer to make than a program has time for.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=20;
 
 /// Seed of the scenes of the slice.
 const SEED: u64 = 1;
 
-/// How an [`Adaptive`] came to its fields.
+/// How an [`Adaptive`] came to its tuning.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Setup {
-    /// Where the fields came from.
+    /// Where the tuning came from.
     pub origin: Origin,
     /// What went otherwise than it should have, in words: an unreadable cache, a GPU that can't be measured. Nothing of it keeps frames
     /// from being run.
     pub remarks: Vec<String>,
-    /// From the call of the constructor until the algorithms of the fields were ready, in seconds.
+    /// From the call of the constructor until the algorithms of the tuning was ready, in seconds.
     pub seconds: f64,
     /// The file of the cache, where there is one to be.
     pub file: Option<PathBuf>,
 }
 
-/// Where the fields of an [`Adaptive`] came from.
+/// Where the tuning of an [`Adaptive`] came from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Origin {
     /// The program gave them: [`Adaptive::new`].
     #[default]
     Given,
-    /// They are on their way; the usual fields decide meanwhile. Looked for at every frame.
+    /// They are on their way; the usual tuning decides meanwhile. Looked for at every frame.
     Awaited,
     /// From the cache.
     Cached,
     /// From a measurement of the hardware and a prediction.
     Probed,
-    /// [`Fields::usual`] for good, since there was no prediction: the remarks say why.
+    /// [`Tuning::usual`] for good, since there was no prediction: the remarks say why.
     Usual,
 }
 
@@ -71,7 +71,7 @@ impl std::error::Error for SaveError {}
 #[derive(Debug, Default)]
 pub(super) struct Start {
     setup: Setup,
-    /// The place in the cache of fields that hold for this machine.
+    /// The place in the cache of tuning that holds for this machine.
     entry: Option<Entry>,
     awaited: Option<Arc<Handover>>,
 }
@@ -84,12 +84,12 @@ struct Handover {
     slot: Mutex<Option<Arrival>>,
 }
 
-/// What becomes of the usual fields.
+/// What becomes of the usual tuning.
 struct Arrival {
     setup: Setup,
     entry: Option<Entry>,
     /// `None`: the usual ones stay.
-    fields: Option<(Fields, Made)>,
+    tuning: Option<(Tuning, Made)>,
 }
 
 impl fmt::Debug for Arrival {
@@ -99,10 +99,10 @@ impl fmt::Debug for Arrival {
 }
 
 impl Adaptive {
-    /// An adaptive broad phase with the fields of this machine: those that an earlier start has kept, else predicted from
+    /// An adaptive broad phase with the tuning of this machine: those that an earlier start has kept, else predicted from
     /// its hardware parameters, which are measured in at most two seconds, and kept for the next start.
     ///
-    /// In the background, which is the default, it returns at once, with [`Fields::usual`] for the first frames; see
+    /// In the background, which is the default, it returns at once, with [`Tuning::usual`] for the first frames; see
     /// [`Options::background`]. The thread that measures ends by itself, whether this is dropped before or not. What is kept
     /// holds for this machine, its drivers, this version of the library, its algorithms and the model; a change of any of
     /// them measures anew. A cache that can't be read or written keeps nothing from working: [`setup`](Self::setup) tells.
@@ -110,7 +110,7 @@ impl Adaptive {
     /// Uses no network and no global state.
     ///
     /// # Errors
-    /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when not even one algorithm of the usual fields can be made.
+    /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when not even one algorithm of the usual tuning can be made.
     pub fn for_this_machine(options: &Options) -> Result<Self, Error> {
         let began = Instant::now();
         let mut adaptive = if options.background {
@@ -119,10 +119,10 @@ impl Adaptive {
             let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry(true)));
             let arrival = arrive(options, &registry, began, || true);
             // Only where there is no prediction: to make algorithms takes memory, and on GPUs time.
-            let Arrival { setup, entry, fields } = arrival;
-            let mut adaptive = match fields {
-                Some((fields, made)) => Self::with(fields, made),
-                None => Self::new(Fields::usual(&registry), &registry)?,
+            let Arrival { setup, entry, tuning } = arrival;
+            let mut adaptive = match tuning {
+                Some((tuning, made)) => Self::with(tuning, made),
+                None => Self::new(Tuning::usual(&registry), &registry)?,
             };
             adaptive.start = Start { setup, entry, awaited: None };
             adaptive
@@ -132,7 +132,7 @@ impl Adaptive {
         Ok(adaptive)
     }
 
-    /// Where its fields came from, what went wrong on the way and how long it took.
+    /// Where its tuning came from, what went wrong on the way and how long it took.
     #[must_use]
     pub fn setup(&self) -> &Setup {
         &self.start.setup
@@ -147,9 +147,9 @@ impl Adaptive {
             return Err(SaveError(
                 match self.start.setup.origin {
                     Origin::Given => {
-                        "the fields were given by the program; write `Adaptive::learned` to a file with `json::write`"
+                        "the tuning was given by the program; write `Adaptive::learned` to a file with `json::write`"
                     }
-                    Origin::Awaited => "the fields of this machine are not there yet; save at the end of the session",
+                    Origin::Awaited => "the tuning of this machine are not there yet; save at the end of the session",
                     Origin::Usual => "nothing was predicted that could have been corrected; `Adaptive::setup` says why",
                     Origin::Cached | Origin::Probed => {
                         "there is no cache to keep it in; `Adaptive::setup` and the options say why"
@@ -168,20 +168,20 @@ impl Adaptive {
         let Some(arrival) = handover.slot.lock().unwrap_or_else(PoisonError::into_inner).take() else { return };
         self.start.setup = arrival.setup;
         self.start.entry = arrival.entry;
-        if let Some((fields, made)) = arrival.fields {
-            self.adopt(fields, made);
+        if let Some((tuning, made)) = arrival.tuning {
+            self.adopt(tuning, made);
         }
     }
 }
 
-/// Usual fields at once, and a thread that fills the handover.
+/// Usual tuning at once, and a thread that fills the handover.
 fn in_background(options: &Options, began: Instant) -> Result<Adaptive, Error> {
     let mut adaptive = match &options.registry {
-        Some(registry) => Adaptive::new(Fields::usual(registry), registry)?,
+        Some(registry) => Adaptive::new(Tuning::usual(registry), registry)?,
         None => {
             // Without the GPUs, whose drivers take tens of milliseconds to load.
             let registry = usual_registry(false);
-            Adaptive::new(Fields::usual(&registry), &registry)?
+            Adaptive::new(Tuning::usual(&registry), &registry)?
         }
     };
     let handover = Arc::new(Handover::default());
@@ -193,8 +193,8 @@ fn in_background(options: &Options, began: Instant) -> Result<Adaptive, Error> {
             arrive(&options, &registry, began, || Arc::strong_count(&filled) > 1)
         }));
         let arrival = made.unwrap_or_else(|_| {
-            let remarks = vec!["the thread in the background panicked: the usual fields stay".to_owned()];
-            Arrival { setup: Setup { remarks, ..usual(began) }, entry: None, fields: None }
+            let remarks = vec!["the thread in the background panicked: the usual tuning stays".to_owned()];
+            Arrival { setup: Setup { remarks, ..usual(began) }, entry: None, tuning: None }
         });
         *filled.slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(arrival);
         filled.ready.store(true, Ordering::Release);
@@ -205,7 +205,7 @@ fn in_background(options: &Options, began: Instant) -> Result<Adaptive, Error> {
             Start { setup, entry: None, awaited: Some(handover) }
         }
         Err(e) => {
-            let remarks = vec![format!("no thread can be started in the background ({e}): the usual fields stay")];
+            let remarks = vec![format!("no thread can be started in the background ({e}): the usual tuning stays")];
             Start { setup: Setup { remarks, ..usual(began) }, ..Start::default() }
         }
     };
@@ -229,28 +229,28 @@ fn usual(began: Instant) -> Setup {
     Setup { origin: Origin::Usual, seconds: began.elapsed().as_secs_f64(), ..Setup::default() }
 }
 
-/// Fields of this machine with their algorithms, which are made only where they are still wanted.
+/// Tuning of this machine with their algorithms, which are made only where they are still wanted.
 fn arrive(options: &Options, registry: &Registry, began: Instant, wanted: impl Fn() -> bool) -> Arrival {
     let mut remarks = Vec::new();
     let found = find(options, registry, &mut remarks);
-    let made = found.filter(|_| wanted()).and_then(|(fields, origin, entry)| {
-        let made = Made::of(&fields, registry);
+    let made = found.filter(|_| wanted()).and_then(|(tuning, origin, entry)| {
+        let made = Made::of(&tuning, registry);
         if !made.instances.is_empty() {
-            return Some((fields, made, origin, entry));
+            return Some((tuning, made, origin, entry));
         }
         remarks.extend(made.failure.map(|e| format!("none of the algorithms that were predicted can be made: {e}")));
         None
     });
-    let Some((fields, made, origin, entry)) = made else {
-        return Arrival { setup: Setup { remarks, ..usual(began) }, entry: None, fields: None };
+    let Some((tuning, made, origin, entry)) = made else {
+        return Arrival { setup: Setup { remarks, ..usual(began) }, entry: None, tuning: None };
     };
     let file = entry.as_ref().map(|e| e.file().to_owned());
     let setup = Setup { origin, remarks, seconds: began.elapsed().as_secs_f64(), file };
-    Arrival { setup, entry, fields: Some((fields, made)) }
+    Arrival { setup, entry, tuning: Some((tuning, made)) }
 }
 
-/// Fields from the cache, else from a prediction, and their place in the cache. `None` where nothing can be predicted.
-fn find(options: &Options, registry: &Registry, remarks: &mut Vec<String>) -> Option<(Fields, Origin, Option<Entry>)> {
+/// Tuning from the cache, else from a prediction, and their place in the cache. `None` where nothing can be predicted.
+fn find(options: &Options, registry: &Registry, remarks: &mut Vec<String>) -> Option<(Tuning, Origin, Option<Entry>)> {
     let built_in = if options.model.is_none() { Model::built_in().map(Some) } else { Ok(None) };
     let built_in = built_in.map_err(|e| remarks.push(format!("the built-in model can't be read: {e}"))).ok()?;
     let model = options.model.as_ref().or(built_in.as_ref())?;
@@ -260,35 +260,35 @@ fn find(options: &Options, registry: &Registry, remarks: &mut Vec<String>) -> Op
         None
     });
     match entry.as_ref().map(Entry::read) {
-        Some(Ok(Some(fields))) => return Some((fields, Origin::Cached, entry)),
+        Some(Ok(Some(tuning))) => return Some((tuning, Origin::Cached, entry)),
         Some(Err(why)) => remarks.push(why),
         Some(Ok(None)) | None => {}
     }
     let hardware = hardware(options, registry, model, remarks);
-    let (fields, sound) = predict(model, hardware, &registry.available(), remarks)?;
+    let (tuning, sound) = predict(model, hardware, &registry.available(), remarks)?;
     // Another process may have been quicker, and may even have learned: what it has kept stays.
     if let Some(entry) = entry.as_ref().filter(|e| sound && !matches!(e.read(), Ok(Some(_)))) {
-        remarks.extend(entry.write(fields.clone()).err());
+        remarks.extend(entry.write(tuning.clone()).err());
     }
     // Nor may what is learned upon them take the place of a sound measurement.
-    Some((fields, Origin::Probed, entry.filter(|_| sound)))
+    Some((tuning, Origin::Probed, entry.filter(|_| sound)))
 }
 
-/// Fields from hardware, without the figures and the GPUs that can't be: what needs one of them is left out. Also whether there was none.
+/// Tuning from hardware, without the figures and the GPUs that can't be: what needs one of them is left out. Also whether there was none.
 fn predict(
     model: &Model,
     mut hardware: Hardware,
     algorithms: &[(AlgorithmId, u32)],
     remarks: &mut Vec<String>,
-) -> Option<(Fields, bool)> {
+) -> Option<(Tuning, bool)> {
     let mut dropped = hardware.drop_implausible();
     dropped.extend(hardware.gpus.iter().filter_map(GpuHardware::implausible));
     let sound = dropped.is_empty();
     remarks.extend(dropped.into_iter().map(|why| format!("{why}; it is left out, and the next start measures again")));
     let prediction = model.predict(&hardware, algorithms).map_err(|why| remarks.push(why)).ok()?;
-    let mut fields = prediction.fields(&Scenario::Uniform.to_string(), &slice());
-    fields.warnings.extend(hardware.disturbed());
-    Some((fields, sound))
+    let mut tuning = prediction.tuning(&Scenario::Uniform.to_string(), &slice());
+    tuning.warnings.extend(hardware.disturbed());
+    Some((tuning, sound))
 }
 
 /// Measures what the model reads, of the machine as the registry uses it.
@@ -354,13 +354,13 @@ mod tests {
         let hardware = Hardware { machine: Machine::default(), parameters, gpus: Vec::new(), gpu_groups: Vec::new() };
         let algorithms = Registry::with_cores(2).available();
         let mut remarks = Vec::new();
-        let (fields, sound) = predict(&model, hardware.clone(), &algorithms, &mut remarks).unwrap();
-        assert_eq!((fields.costs.len(), sound, remarks.len()), (algorithms.len(), true, 0));
+        let (tuning, sound) = predict(&model, hardware.clone(), &algorithms, &mut remarks).unwrap();
+        assert_eq!((tuning.costs.len(), sound, remarks.len()), (algorithms.len(), true, 0));
         let mut broken = hardware;
         broken.parameters.iter_mut().filter(|p| p.name == parameter::FORK_JOIN_COLD_NS).for_each(|p| p.value = Some(0.0));
-        let (fields, sound) = predict(&model, broken, &algorithms, &mut remarks).unwrap();
-        assert!(fields.costs.iter().all(|c| c.algorithm.threads() == 1) && !sound);
-        assert_eq!(fields.costs.len(), algorithms.len() / 2);
+        let (tuning, sound) = predict(&model, broken, &algorithms, &mut remarks).unwrap();
+        assert!(tuning.costs.iter().all(|c| c.algorithm.threads() == 1) && !sound);
+        assert_eq!(tuning.costs.len(), algorithms.len() / 2);
         assert!(remarks.len() == 1 && remarks[0].contains("fork_join_cold_ns is 0"), "{remarks:?}");
     }
 }

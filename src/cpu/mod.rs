@@ -8,10 +8,10 @@ mod kernel;
 mod level;
 mod sort;
 mod strip_grid;
-mod strips;
-mod sweep;
+mod grid_sap;
+mod sap;
 mod threads;
-mod verlet;
+mod pair_cache;
 mod workers;
 
 pub(crate) use kernel::each_bit;
@@ -43,7 +43,7 @@ type CreateFor = fn(&[u32], &Threads, SimdLevel) -> Result<Box<dyn BroadPhase>, 
 /// Every method, the simplest first.
 pub(crate) const METHODS: &[Method] = &[
     Method { name: "brute", revision: 2, create: brute::create, create_for: None },
-    Method { name: "sweep", revision: 2, create: sweep::create, create_for: None },
-    Method { name: "strips", revision: 2, create: strips::create, create_for: None },
-    Method { name: "verlet", revision: 1, create: verlet::create, create_for: Some(verlet::create_for) },
+    Method { name: "sap", revision: 2, create: sap::create, create_for: None },
+    Method { name: "grid-sap", revision: 2, create: grid_sap::create, create_for: None },
+    Method { name: "pair-cache", revision: 1, create: pair_cache::create, create_for: Some(pair_cache::create_for) },
 ];

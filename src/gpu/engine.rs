@@ -103,12 +103,12 @@ pub(super) struct Piece<'a> {
 }
 
 impl Engine {
-    /// `method` is `brute`, `sweep` or `strips`.
+    /// `method` is `brute`, `sap` or `grid-sap`.
     pub(super) fn new(gpu: Gpu, method: &str) -> Result<Self, String> {
         let search = match method {
             "brute" => Search::Brute(Brute::new(&gpu)?),
-            "sweep" => Search::Sorted(Box::new(Sorted::new(&gpu, false)?)),
-            "strips" => Search::Sorted(Box::new(Sorted::new(&gpu, true)?)),
+            "sap" => Search::Sorted(Box::new(Sorted::new(&gpu, false)?)),
+            "grid-sap" => Search::Sorted(Box::new(Sorted::new(&gpu, true)?)),
             other => return Err(format!("no method {other} runs on GPUs")),
         };
         let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
@@ -152,8 +152,8 @@ impl Engine {
     pub(super) fn plan(&self, objects: u32, sample: impl FnOnce() -> Sample) -> Params {
         match &self.search {
             Search::Brute(_) => Params { objects, ..Params::default() },
-            Search::Sorted(sorted) if sorted.is_strips() => Params::strips(&sample(), objects),
-            Search::Sorted(_) => Params::sweep(&sample(), objects),
+            Search::Sorted(sorted) if sorted.is_grid_sap() => Params::grid_sap(&sample(), objects),
+            Search::Sorted(_) => Params::sap(&sample(), objects),
         }
     }
 
@@ -234,7 +234,7 @@ impl Engine {
     pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), String> {
         if self.search.blocks(params.objects).1 > 0 {
             let reason = "pairs that stay on a GPU come from one submission, and brute force on so many boxes takes several";
-            return Err(format!("{} boxes are too many: {reason}; use strips", params.objects));
+            return Err(format!("{} boxes are too many: {reason}; use grid-sap", params.objects));
         }
         self.prepare(&params, false, Some(boxes))?;
         self.submit(params, None)

@@ -34,8 +34,8 @@ pub(super) mod source {
     pub(in crate::gpu) const SAMPLE: Source = &[COMMON, INPUT, include_str!("shaders/sample.wgsl")];
     pub(in crate::gpu) const SCAN: Source = &[COMMON, include_str!("shaders/scan.wgsl")];
     pub(in crate::gpu) const SORT: Source = &[COMMON, include_str!("shaders/sort.wgsl")];
-    pub(in crate::gpu) const STRIPS: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/strips.wgsl")];
-    pub(in crate::gpu) const SWEEP: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/sweep.wgsl")];
+    pub(in crate::gpu) const GRID_SAP: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/grid_sap.wgsl")];
+    pub(in crate::gpu) const SAP: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/sap.wgsl")];
     pub(in crate::gpu) const TABLE: Source = &[COMMON, include_str!("shaders/table.wgsl")];
 }
 
@@ -137,7 +137,7 @@ mod tests {
     /// Parses and validates every shader without a driver.
     #[test]
     fn every_shader_is_valid() {
-        let sources = [BRUTE, KEYS, SAMPLE, SCAN, SORT, STRIPS, SWEEP, TABLE];
+        let sources = [BRUTE, KEYS, SAMPLE, SCAN, SORT, GRID_SAP, SAP, TABLE];
         for (k, source) in sources.iter().enumerate() {
             assert_valid(&format!("shader {k}"), &source.concat());
         }

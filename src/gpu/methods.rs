@@ -13,7 +13,7 @@ struct Method {
 
 /// Every method, the simplest first.
 const METHODS: &[Method] =
-    &[Method { name: "brute", revision: 1 }, Method { name: "sweep", revision: 1 }, Method { name: "strips", revision: 1 }];
+    &[Method { name: "brute", revision: 1 }, Method { name: "sap", revision: 1 }, Method { name: "grid-sap", revision: 1 }];
 
 /// Whether a method runs on GPUs.
 pub(crate) fn has_method(name: &str) -> bool {
@@ -55,8 +55,8 @@ mod tests {
         let gpus =
             [gpu(0, GpuKind::Discrete), gpu(1, GpuKind::Integrated), gpu(2, GpuKind::Software), gpu(3, GpuKind::Software)];
         let ids = algorithms(&gpus).into_iter().map(|(id, _)| id.to_string());
-        let strips: Vec<String> = ids.filter(|id| id.starts_with("strips")).collect();
-        assert_eq!(strips, ["strips@gpu0", "strips@gpu1", "strips@gpu0+1", "strips@gpu2", "strips@gpu3", "strips@gpu2+3"]);
+        let strips: Vec<String> = ids.filter(|id| id.starts_with("grid-sap")).collect();
+        assert_eq!(strips, ["grid-sap@gpu0", "grid-sap@gpu1", "grid-sap@gpu0+1", "grid-sap@gpu2", "grid-sap@gpu3", "grid-sap@gpu2+3"]);
         assert!(algorithms(&[]).is_empty());
     }
 }

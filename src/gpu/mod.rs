@@ -5,13 +5,13 @@
 //!
 //! ```
 //! use sapwise::gpu::Gpus;
-//! use sapwise::{Aabb, Adaptive, BroadPhase, Fields, Pairs, Registry};
+//! use sapwise::{Aabb, Adaptive, BroadPhase, Tuning, Pairs, Registry};
 //!
 //! let mut registry = Registry::new();
 //! // Programs that act as GPUs, such as llvmpipe, are found too. They run on the CPU and can't beat it.
 //! registry.add_gpus(&Gpus::find().choose(|gpu| gpu.kind != sapwise::GpuKind::Software));
-//! // Fields that name a GPU use it, and what this machine lacks is left out. These name none: predict or measure some that do.
-//! let mut broad_phase = Adaptive::new(Fields::usual(&registry), &registry)?;
+//! // Tuning that name a GPU use it, and what this machine lacks is left out. These name none: predict or measure some that do.
+//! let mut broad_phase = Adaptive::new(Tuning::usual(&registry), &registry)?;
 //! let mut pairs = Pairs::new();
 //! broad_phase.find_pairs(&[Aabb::cube([0.0; 3], 0.5), Aabb::cube([0.8, 0.0, 0.0], 0.5)], &mut pairs)?;
 //! # assert_eq!(pairs.as_slice(), [(0, 1)]);
@@ -21,7 +21,7 @@
 //! Two ways through a frame, and they are not to be compared with each other:
 //!
 //! - *host-resident*: boxes in the memory of the CPU, pairs in the memory of the CPU, both transfers included. Every
-//!   [`BroadPhase`](crate::BroadPhase), `strips@gpu0` as well as `strips@cpu1`, and every figure that is not labelled.
+//!   [`BroadPhase`](crate::BroadPhase), `grid-sap@gpu0` as well as `grid-sap@cpu1`, and every figure that is not labelled.
 //! - *device-resident*: boxes in a [`wgpu::Buffer`], pairs in another: [`Resident`].
 //!
 //! Pairs come out in an order that does not depend on timing, by counting, adding up and writing; where several GPUs share a frame

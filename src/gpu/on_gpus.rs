@@ -39,7 +39,7 @@ pub(crate) struct OnGpus {
     warm: bool,
 }
 
-/// The method `brute`, `sweep` or `strips` on GPUs that are open already: from boxes in host memory to pairs in host memory.
+/// The method `brute`, `sap` or `grid-sap` on GPUs that are open already: from boxes in host memory to pairs in host memory.
 ///
 /// For programs that have opened a device of their own ([`Gpu::from_parts`](super::Gpu::from_parts)). Several GPUs share each
 /// frame; they may be several devices of one adapter.
@@ -93,7 +93,7 @@ impl OnGpus {
         let workers = Workers::new("gpu", parts.len() as u32, &Threads::default())?;
         let exponent = match id.method() {
             "brute" => 2.0,
-            "sweep" => 5.0 / 3.0,
+            "sap" => 5.0 / 3.0,
             _ => 1.0,
         };
         Ok(Box::new(Self { id: id.clone(), parts, slabs: Slabs::default(), workers, exponent, warm: false }))

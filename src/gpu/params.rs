@@ -54,13 +54,13 @@ const LARGE_LENGTHS: f64 = 16.0;
 
 impl Params {
     /// Sweeping along the axis on which the boxes of a sample spread most.
-    pub(super) fn sweep(sample: &Sample, objects: u32) -> Self {
+    pub(super) fn sap(sample: &Sample, objects: u32) -> Self {
         Self { objects, axis: sample.widest_axis() as u32, ..Self::default() }
     }
 
     /// Strips for boxes that look like the sample, with about as many slots as there are boxes. All choices cost speed at
     /// worst, never a pair.
-    pub(super) fn strips(sample: &Sample, objects: u32) -> Self {
+    pub(super) fn grid_sap(sample: &Sample, objects: u32) -> Self {
         let grid = StripGrid::plan(sample, objects as usize);
         let a = grid.axis;
         let strips = grid.strips() as f64;

@@ -28,7 +28,7 @@ pub struct ResidentPairs<'a> {
 }
 
 impl Resident {
-    /// The method `brute`, `sweep` or `strips` on an open GPU. Compiles its kernels.
+    /// The method `brute`, `sap` or `grid-sap` on an open GPU. Compiles its kernels.
     ///
     /// # Errors
     /// [`Error::UnknownAlgorithm`] for another method; [`Error::Unavailable`] when a kernel does not compile or memory is

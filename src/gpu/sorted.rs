@@ -1,4 +1,4 @@
-//! The methods that sort first: sweep and strips; see `shaders/rows.wgsl`, `sweep.wgsl` and `strips.wgsl`.
+//! The methods that sort first: sap and grid-sap; see `shaders/rows.wgsl`, `sap.wgsl` and `grid_sap.wgsl`.
 
 use super::device::Gpu;
 use super::engine::Inputs;
@@ -25,14 +25,14 @@ pub(super) struct Sorted {
     sort: Sort,
     make_keys: Kernel,
     gather: Kernel,
-    /// Strips only.
+    /// grid-sap only.
     build_table: Option<Kernel>,
     count: Kernel,
     write: Kernel,
     boxes: Storage,
     counts: Storage,
     kept: Storage,
-    /// Strips only: how far each box reaches, and where slots begin.
+    /// grid-sap only: how far each box reaches, and where slots begin.
     reach: Storage,
     table: Storage,
     bound: Option<Bindings>,
@@ -59,9 +59,9 @@ impl Sorted {
 
     pub(super) fn new(gpu: &Gpu, strips: bool) -> Result<Self, String> {
         let (rows, keys, gather) = if strips {
-            (source::STRIPS, "strip_keys", "strip_gather")
+            (source::GRID_SAP, "strip_keys", "strip_gather")
         } else {
-            (source::SWEEP, "sweep_keys", "sweep_gather")
+            (source::SAP, "sweep_keys", "sweep_gather")
         };
         Ok(Self {
             strips,
@@ -80,7 +80,7 @@ impl Sorted {
         })
     }
 
-    pub(super) fn is_strips(&self) -> bool {
+    pub(super) fn is_grid_sap(&self) -> bool {
         self.strips
     }
 

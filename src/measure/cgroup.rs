@@ -17,8 +17,8 @@ pub(super) fn memory_limit() -> Option<u64> {
 fn limit_files(membership: &str) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for line in membership.lines() {
-        let mut fields = line.splitn(3, ':');
-        let (Some(_), Some(controllers), Some(group)) = (fields.next(), fields.next(), fields.next()) else { continue };
+        let mut tuning = line.splitn(3, ':');
+        let (Some(_), Some(controllers), Some(group)) = (tuning.next(), tuning.next(), tuning.next()) else { continue };
         let (mounts, name): (&[&str], _) = if controllers.is_empty() {
             (&["/sys/fs/cgroup", "/sys/fs/cgroup/unified"], "memory.max")
         } else if controllers.split(',').any(|c| c == "memory") {

@@ -4,8 +4,8 @@ use super::curve::Figures;
 use super::fold::{Fold, LnErrors, QUANTILES};
 use super::{Model, Prediction};
 use crate::cost::Counts;
-use crate::fields::Slice;
-use crate::{AlgorithmId, CostCurve, Fields, Load, Source};
+use crate::tuning::Slice;
+use crate::{AlgorithmId, CostCurve, Tuning, Load, Source};
 
 /// Share of new machines that an interval is to hold.
 const CONFIDENCE: f64 = 0.9;
@@ -182,7 +182,7 @@ impl Evidence<'_> {
 }
 
 impl Prediction {
-    /// The fields, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
+    /// The tuning, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
     ///
     /// The interval of a border ends where 0 leaves the jackknife+ interval of the logarithm of the two costs' ratio: at each load
     /// the ratios that the folds predict, less and plus their errors on the machines that they left out, of which 90 % lie within.
@@ -192,12 +192,12 @@ impl Prediction {
     /// data", arXiv 2306.06342). The errors are those at all loads, not those near the border. With fewer than
     /// [`FEWEST_MACHINES`] machines that timed both algorithms a border has no interval.
     #[must_use]
-    pub fn fields(self, scenario: &str, loads: &[Load]) -> Fields {
+    pub fn tuning(self, scenario: &str, loads: &[Load]) -> Tuning {
         let Self { costs, extrapolated, warnings, doubt } = self;
-        let mut fields = Fields::from_costs(Source::Predicted, scenario, costs, loads);
+        let mut tuning = Tuning::from_costs(Source::Predicted, scenario, costs, loads);
         let slice = Slice::new(loads);
         let mut without = 0;
-        for border in &mut fields.crossovers {
+        for border in &mut tuning.crossovers {
             let interval = doubt.of_ratio(&border.below, &border.above).map(|band| {
                 let low = slice.reach(border.objects, false, |l| band.is_sure(l, -1.0));
                 (low, slice.reach(border.objects, true, |l| band.is_sure(l, 1.0)))
@@ -205,13 +205,13 @@ impl Prediction {
             (border.low, border.high) = interval.unzip();
             without += usize::from(interval.is_none());
         }
-        fields.interval_basis = doubt.basis(fields.crossovers.len(), without);
-        fields.model = Some(doubt.model);
-        (fields.extrapolated, fields.warnings) = (extrapolated, warnings);
-        fields
+        tuning.interval_basis = doubt.basis(tuning.crossovers.len(), without);
+        tuning.model = Some(doubt.model);
+        (tuning.extrapolated, tuning.warnings) = (extrapolated, warnings);
+        tuning
     }
 
-    /// The 90 % interval of an algorithm's time under a load, in nanoseconds, made as those of [`Prediction::fields`]. `None`
+    /// The 90 % interval of an algorithm's time under a load, in nanoseconds, made as those of [`Prediction::tuning`]. `None`
     /// where fewer than [`FEWEST_MACHINES`] machines timed its role, or it was not predicted.
     #[must_use]
     pub fn interval_ns(&self, algorithm: &AlgorithmId, load: &Load) -> Option<(f64, f64)> {

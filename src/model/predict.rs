@@ -16,7 +16,7 @@ pub struct Prediction {
     pub extrapolated: bool,
     /// What was outside, what was missing, what was left out.
     pub warnings: Vec<String>,
-    /// How sure it is, for [`Prediction::fields`].
+    /// How sure it is, for [`Prediction::tuning`].
     pub(super) doubt: Doubt,
 }
 

@@ -147,13 +147,13 @@ fn software_training_is_told_when_a_real_gpu_is_predicted() {
 fn what_a_gpu_lacks_is_told_and_costs_its_algorithms_only() {
     let model = model(vec![method(BackendClass::Gpu, Scale::GpuMemoryByte)]);
     let mut h = hardware();
-    let all = ids(&["brute@gpu0", "brute@gpu1", "brute@gpu0+1", "brute@gpu2", "sweep@gpu0", "brute@cpu1"]);
+    let all = ids(&["brute@gpu0", "brute@gpu1", "brute@gpu0+1", "brute@gpu2", "sap@gpu0", "brute@cpu1"]);
     let p = model.predict(&h, &all).unwrap();
     let told = |p: &Prediction, text: &str| p.warnings.iter().any(|w| w.contains(text));
     assert_eq!(p.costs.len(), 3, "{:?}", p.warnings);
     for text in [
         "brute@gpu2 is left out: the hardware holds no gpu2",
-        "not trained on it: sweep@gpu0, brute@cpu1",
+        "not trained on it: sap@gpu0, brute@cpu1",
         "copy_gb_per_s of gpu0 is 500.0000, outside",
         "brute@gpu0+1: the model has seen 1 GPUs at most",
         "gpu0+1: how these GPUs work together was not measured",

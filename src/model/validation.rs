@@ -46,7 +46,7 @@ pub struct MethodScore {
     /// 95th percentile over held-out reports of the same.
     #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
     pub p95_regret_in_games: Option<f64>,
-    /// Octaves between the measured and the predicted position of a border, the median over all borders between measured fields.
+    /// Octaves between the measured and the predicted position of a border, the median over all borders between measured tuning.
     /// Where the predicted curves of the two algorithms do not cross in the range of measured sizes, the distance to the end
     /// of that range beyond which they would: a lower bound. `None` for what predicts no costs.
     #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]

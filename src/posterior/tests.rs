@@ -8,7 +8,7 @@ fn cost(id: &str, call_ns: f64) -> AlgorithmCost {
 }
 
 fn costs() -> Vec<AlgorithmCost> {
-    [("brute@cpu1", 100.0), ("strips@cpu1", 300.0), ("strips@cpu2", 3e3), ("sweep@cpu8", 9e3), ("strips@gpu0", 1e5)]
+    [("brute@cpu1", 100.0), ("grid-sap@cpu1", 300.0), ("grid-sap@cpu2", 3e3), ("sap@cpu8", 9e3), ("grid-sap@gpu0", 1e5)]
         .map(|(id, ns)| cost(id, ns))
         .into()
 }

@@ -1,7 +1,7 @@
 //! The overlaps of one fixed step, and what changed since the one before.
 
 use bevy_ecs::prelude::*;
-use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Fields, Pairs, Registry};
+use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Tuning, Pairs, Registry};
 use std::sync::{Mutex, PoisonError};
 
 /// The entities that overlap, as of the last fixed step.
@@ -20,8 +20,8 @@ impl FromWorld for Overlaps {
     /// machine at hand inserts its own with [`Overlaps::new`] before it adds the plugin.
     fn from_world(_: &mut World) -> Self {
         let registry = Registry::new();
-        let adaptive = Adaptive::new(Fields::usual(&registry), &registry);
-        Self::new(adaptive.expect("the usual fields name an algorithm that runs everywhere"))
+        let adaptive = Adaptive::new(Tuning::usual(&registry), &registry);
+        Self::new(adaptive.expect("the usual tuning names an algorithm that runs everywhere"))
     }
 }
 

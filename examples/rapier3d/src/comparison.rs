@@ -1,7 +1,7 @@
 //! Sapwise beside rapier's own broad phase.
 
 use rapier3d::prelude::*;
-use sapwise::{Aabb, Adaptive, BroadPhase, Decision, Error, Fields, Filter, Membership, Pairs, Registry};
+use sapwise::{Aabb, Adaptive, BroadPhase, Decision, Error, Tuning, Filter, Membership, Pairs, Registry};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
@@ -76,7 +76,7 @@ pub struct Mismatch {
 
 impl Side {
     fn new(registry: &Registry) -> Result<Self, Error> {
-        let broad_phase = Adaptive::new(Fields::usual(registry), registry)?;
+        let broad_phase = Adaptive::new(Tuning::usual(registry), registry)?;
         let mut pairs = Pairs::new();
         pairs.set_filter(Some(Filter::default()));
         Ok(Self { broad_phase, boxes: Vec::new(), pairs })

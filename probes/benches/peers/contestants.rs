@@ -5,7 +5,7 @@ use crate::obvhs_tree::Obvhs;
 use crate::parry::{Margin, ParallelParry, Parry, Upkeep};
 use crate::rtree::Packed;
 use rayon::ThreadPool;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Fields, Pairs, Registry, SimdLevel};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Tuning, Pairs, Registry, SimdLevel};
 use std::sync::Arc;
 
 /// A side of the comparison.
@@ -47,11 +47,11 @@ impl Contestant {
     fn fixed(id: &AlgorithmId, name: String, registry: &Registry) -> Result<Self, Error> {
         let most = match id.method() {
             "brute" => 3_000,
-            "sweep" => 100_000,
+            "sap" => 100_000,
             _ => usize::MAX,
         };
         let algorithm = registry.create(id)?;
-        let keeps = algorithm.keeps_work();
+        let keeps = algorithm.is_incremental();
         let algorithm = Algorithm::Other(algorithm);
         Ok(Self { name, side: Side::Fixed, keeps, most, hopeless_frames: 0, algorithm })
     }
@@ -74,12 +74,12 @@ impl Contestant {
     }
 }
 
-/// Ours: the adaptive one over these fields, and every method that the registry lists.
+/// Ours: the adaptive one over this tuning, and every method that the registry lists.
 ///
 /// # Errors
 /// When one of them can't be made.
-pub(crate) fn ours(registry: &Registry, fields: &Fields) -> Result<Vec<Contestant>, Error> {
-    let adaptive = Algorithm::Adaptive(Box::new(Adaptive::new(fields.clone(), registry)?));
+pub(crate) fn ours(registry: &Registry, tuning: &Tuning) -> Result<Vec<Contestant>, Error> {
+    let adaptive = Algorithm::Adaptive(Box::new(Adaptive::new(tuning.clone(), registry)?));
     let mut all = vec![Contestant {
         name: "adaptive".to_owned(),
         side: Side::Adaptive,

@@ -4,28 +4,28 @@ use crate::settings::Settings;
 use rayon::ThreadPool;
 use sapwise::hardware::parameter;
 use sapwise::measure::{self, Options};
-use sapwise::{Fields, Hardware, Model, Registry, Source, json};
+use sapwise::{Tuning, Hardware, Model, Registry, Source, json};
 use std::process::Command;
 use std::sync::Arc;
 
-/// The fields for a number of threads: those of the file, or those that the built-in model predicts from hardware parameters
+/// The tuning for a number of threads: those of the file, or those that the built-in model predicts from hardware parameters
 /// that are measured now; written down by hand where nothing is timed.
 ///
 /// # Errors
 /// When the file can't be read or nothing can be predicted.
-pub(crate) fn fields(registry: &Registry, threads: u32, settings: &Settings) -> Result<Fields, String> {
-    if let Some(path) = &settings.fields {
+pub(crate) fn tuning(registry: &Registry, threads: u32, settings: &Settings) -> Result<Tuning, String> {
+    if let Some(path) = &settings.tuning {
         let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-        return json::fields(&text).map_err(|e| format!("{}: {e}", path.display()));
+        return json::tuning(&text).map_err(|e| format!("{}: {e}", path.display()));
     }
     if !settings.full {
-        return Ok(Fields::usual(registry));
+        return Ok(Tuning::usual(registry));
     }
     let hardware = measure::hardware(&Options { threads: Some(threads), ..Options::default() });
     let model = Model::built_in().map_err(|e| e.to_string())?;
     let prediction = model.predict(&hardware, &registry.available())?;
     // Where there are costs, they decide; the slice through loads is for people.
-    Ok(Fields::from_costs(Source::Predicted, "uniform", prediction.costs, &[]))
+    Ok(Tuning::from_costs(Source::Predicted, "uniform", prediction.costs, &[]))
 }
 
 /// A pool whose threads are bound to a core each, as those of a registry with `pin_threads`.

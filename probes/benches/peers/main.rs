@@ -11,7 +11,7 @@
 //! | `SAPWISE_SIZES` | numbers of objects |
 //! | `SAPWISE_THREADS` | `1`, `2` or `1,2` |
 //! | `SAPWISE_BENCH_SECONDS` | time for the timed frames of a scenario at a size |
-//! | `SAPWISE_FIELDS` | fields for ours; without, they are predicted from the hardware, which is measured first |
+//! | `SAPWISE_TUNING` | tuning for ours; without, they are predicted from the hardware, which is measured first |
 //! | `SAPWISE_BENCHMARKS` | the document that takes the tables, between its two marks; else they are printed |
 //!
 //! Method and bias stand at the head of `BENCHMARKS.md`. Prints a line for each scenario and size as soon as it is measured.
@@ -73,13 +73,13 @@ fn compare(threads: u32, settings: &Settings) -> Result<Vec<Point>, String> {
     println!("\nthreads: {threads}");
     let mut registry = Registry::with_cores(threads);
     registry.pin_threads();
-    let fields = machine::fields(&registry, threads, settings)?;
+    let tuning = machine::tuning(&registry, threads, settings)?;
     let pool = if threads > 1 { Some(machine::pinned_pool(threads as usize)?) } else { None };
     let mut points = Vec::new();
     for &scenario in settings.scenarios.iter().filter(|s| threads == 1 || **s == Scenario::Uniform) {
         let mut gone: Vec<String> = Vec::new();
         for &objects in settings.sizes.iter().filter(|n| threads == 1 || **n >= FEWEST_FOR_TWO || !settings.full) {
-            let mut all = ours(&registry, &fields).map_err(|e| e.to_string())?;
+            let mut all = ours(&registry, &tuning).map_err(|e| e.to_string())?;
             all.extend(peers(pool.as_ref()));
             all.retain(|c| !gone.contains(&c.name));
             let point = measured(all, scenario, objects, settings)?;

@@ -17,8 +17,8 @@ use std::str::FromStr;
 #[command(after_help = "\
 Examples:
   sapwise run fragmentation
-  sapwise run fragmentation --fields report.json --plot run.svg    (fields measured on this machine)
-  sapwise run fragmentation --fields elsewhere.json --after 300    (wrong fields: what learning makes of them)
+  sapwise run fragmentation --tuning report.json --plot run.svg    (tuning measured on this machine)
+  sapwise run fragmentation --tuning elsewhere.json --after 300    (wrong tuning: what learning makes of them)
   sapwise run clustered --swing 50 --frames 600                    (growing and shrinking)
   sapwise run uniform --frames 900 --co-runner 450 --trace run.csv
   sapwise run clustered --objects 50000 --frames 100 --record clustered.npy --json
@@ -28,12 +28,12 @@ pub(crate) struct Run {
     /// x y z. Rows of NaN at the end of a frame are absent boxes.
     #[arg(value_name = "SCENARIO|BOXES.npy", value_parser = super::known::scene())]
     pub(crate) scene: Scene,
-    /// Fields, or a report to measure them from; those of another machine show how learning corrects them. Without this option
+    /// Tuning, or a report to measure them from; those of another machine show how learning corrects them. Without this option
     /// they are predicted from this machine's hardware.
     #[arg(long, value_name = "T.json")]
-    pub(crate) fields: Option<PathBuf>,
+    pub(crate) tuning: Option<PathBuf>,
     /// Correct the prediction by up to this many samples before the first frame, as `predict` does. 0 is the pure prediction.
-    #[arg(long, value_name = "K", default_value_t = 8, conflicts_with = "fields", value_parser = clap::value_parser!(u32).range(0..=100))]
+    #[arg(long, value_name = "K", default_value_t = 8, conflicts_with = "tuning", value_parser = clap::value_parser!(u32).range(0..=100))]
     pub(crate) samples: u32,
     /// Let the times of the frames not correct the expected costs.
     #[arg(long)]

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// Studies how hardware shapes performance: a page with figures and tables of any set of reports.
 ///
 /// The hardware of all machines, their parameters beside their speed, which parameter matters for which algorithm and border, the paper's
-/// claims, time over objects, fields over objects and density, and how well all of it is predicted. DIR/index.html is the page; every
+/// claims, time over objects, tuning over objects and density, and how well all of it is predicted. DIR/index.html is the page; every
 /// figure is beside it as SVG, PNG and CSV, every table as CSV, and study.json says the same for machines.
 #[derive(Debug, Args)]
 #[command(after_help = "\

@@ -1,6 +1,6 @@
 //! What can be told of a file: whether it is sound, current and applicable here, and what makes it suspicious.
 
-mod fields;
+mod tuning;
 mod figures;
 mod model;
 mod privacy;
@@ -70,7 +70,7 @@ impl Here {
                         self.report(&report, bytes, &mut finding);
                     }
                     Document::Model(model) => self.model(&model, &mut finding),
-                    Document::Fields(fields) => self.fields(&fields, &mut finding),
+                    Document::Tuning(tuning) => self.tuning(&tuning, &mut finding),
                     _ => finding.notes.push("a schema that this command does not know how to check".to_owned()),
                 }
             }

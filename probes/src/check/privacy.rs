@@ -98,7 +98,7 @@ mod tests {
         assert_eq!(told("made on build-box7, at night"), Some("the name of this host"));
         for text in [
             "brute@cpu1 timed out.",
-            "strips@gpu0+1: lost",
+            "grid-sap@gpu0+1: lost",
             "Intel(R) Core(TM) i7 CPU @ 3.70GHz",
             "/sys/devices/system/cpu/cpu0/cache",
             "build-box70",

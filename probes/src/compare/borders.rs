@@ -1,9 +1,9 @@
-//! How far the borders between fields move from report to report.
+//! How far the borders between tuning move from report to report.
 
 use crate::{sweep, train};
 use sapwise::measure::statistics::{median, relative_iqr};
 use sapwise::report::{Point, Report};
-use sapwise::{AlgorithmId, Fields};
+use sapwise::{AlgorithmId, Tuning};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -37,12 +37,12 @@ const AROUND: f64 = 4.0;
 pub(super) fn borders(reports: &[&Report]) -> Vec<Border> {
     let mut found: Vec<Border> = Vec::new();
     for scenario in scenarios(reports) {
-        let all: Vec<Fields> = reports.iter().filter_map(|r| train::measured_fields(r, scenario).ok()).collect();
+        let all: Vec<Tuning> = reports.iter().filter_map(|r| train::measured_tuning(r, scenario).ok()).collect();
         // A pair can cross more than once; the k-th crossing of one report is held against the k-th of the others.
         let mut groups: BTreeMap<(AlgorithmId, AlgorithmId, usize), Vec<&sapwise::Border>> = BTreeMap::new();
-        for fields in &all {
+        for tuning in &all {
             let mut counts: BTreeMap<(&AlgorithmId, &AlgorithmId), usize> = BTreeMap::new();
-            for border in &fields.crossovers {
+            for border in &tuning.crossovers {
                 let count = counts.entry((&border.below, &border.above)).or_default();
                 groups.entry((border.below.clone(), border.above.clone(), *count)).or_default().push(border);
                 *count += 1;
@@ -125,7 +125,7 @@ mod tests {
     fn the_slope_is_the_difference_of_the_exponents() {
         let mut points = Machine::family()[0].clone().exact().report().points;
         points.retain(|p| p.scenario == "uniform");
-        let [a, b] = ["brute@cpu1", "strips@cpu1"].map(|id| id.parse::<AlgorithmId>().unwrap());
+        let [a, b] = ["brute@cpu1", "grid-sap@cpu1"].map(|id| id.parse::<AlgorithmId>().unwrap());
         for point in &mut points {
             let n = f64::from(point.load.objects);
             for timing in &mut point.timings {

@@ -1,4 +1,4 @@
-//! What is lost by using the fields that one report measured under the timings of another.
+//! What is lost by using the tuning that one report measured under the timings of another.
 
 use crate::train::{Chooser, Evidence, Profile, Yardstick, available, average, by_costs, measured_costs, usable};
 use sapwise::Report;
@@ -8,11 +8,11 @@ use serde::Serialize;
 /// Mean regrets over the points of reports, against the best at each point.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Losses {
-    /// Of the fields of a report on its own timings.
+    /// Of the tuning of a report on its own timings.
     pub(crate) own: f64,
-    /// Of the fields of every other report on them.
+    /// Of the tuning of every other report on them.
     pub(crate) others: f64,
-    /// What the fields of another report lose beyond a report's own: mean over all ordered pairs of reports.
+    /// What the tuning of another report lose beyond a report's own: mean over all ordered pairs of reports.
     pub(crate) beyond_own: f64,
     /// The largest of these.
     pub(crate) beyond_own_most: f64,

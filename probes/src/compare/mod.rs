@@ -1,4 +1,4 @@
-//! How well repeated reports of one profile of a machine agree: parameters, borders, and what the fields of one lose on another.
+//! How well repeated reports of one profile of a machine agree: parameters, borders, and what the tuning of one lose on another.
 
 mod borders;
 mod losses;

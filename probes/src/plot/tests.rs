@@ -101,7 +101,7 @@ fn told(figure: &impl Tabled, rows: usize) -> Sheet {
 
 fn curve(style: usize, values: &[(f64, f64)]) -> Curve {
     let point = |&(objects, ns): &(f64, f64)| CurvePoint { objects, ns, low_ns: 0.9 * ns, high_ns: 1.2 * ns };
-    Curve { name: format!("sweep@cpu{style}"), style, points: values.iter().map(point).collect() }
+    Curve { name: format!("sap@cpu{style}"), style, points: values.iter().map(point).collect() }
 }
 
 fn every_pair() -> Vec<(f64, f64)> {
@@ -136,8 +136,8 @@ fn curves_show_fields_and_crossovers() {
         title: format!("panel {ODD}"),
         series: vec![curve(1, &[(10.0, 1e3), (1e4, 1e7)]), curve(4, &[(10.0, 1e5), (1e4, 1e6)])],
         fields: vec![
-            Band { from: 0.0, to: 800.0, style: 1, name: "sweep@cpu1".to_owned() },
-            Band { from: 800.0, to: f64::INFINITY, style: 4, name: "sweep@cpu4".to_owned() },
+            Band { from: 0.0, to: 800.0, style: 1, name: "sap@cpu1".to_owned() },
+            Band { from: 800.0, to: f64::INFINITY, style: 4, name: "sap@cpu4".to_owned() },
         ],
         crossings: vec![Crossing { objects: 800.0, low: 700.0, high: 950.0 }],
     };
@@ -147,7 +147,7 @@ fn curves_show_fields_and_crossovers() {
     assert!(titles.iter().all(|t| svg.contains(t)), "{svg}");
     assert!(svg.contains("objects\n") && svg.contains("time of a frame (us)") && svg.contains("crossover, with"));
     // In the legend and in the row of fields.
-    assert_eq!((svg.matches("sweep@cpu1\n").count(), svg.matches("sweep@cpu4\n").count()), (2, 2), "{svg}");
+    assert_eq!((svg.matches("sap@cpu1\n").count(), svg.matches("sap@cpu4\n").count()), (2, 2), "{svg}");
     for RGBColor(r, g, b) in [1, 4].map(style::colour) {
         assert!(svg.contains(&format!("opacity=\"{}\" fill=\"#{r:02X}{g:02X}{b:02X}\"", style::FIELD)), "{svg}");
     }
@@ -155,7 +155,7 @@ fn curves_show_fields_and_crossovers() {
     assert_eq!(sheet.rows[0].cells[7], Cell::Number { value: 900.0, shown: "900".to_owned() });
     let four = Curves { title: String::new(), panels: vec![panel; 4] };
     // One legend for all, and every panel its row of fields.
-    assert_eq!(drawn(&four).0.matches("sweep@cpu1\n").count(), 5);
+    assert_eq!(drawn(&four).0.matches("sap@cpu1\n").count(), 5);
 }
 
 #[test]
@@ -179,7 +179,7 @@ fn any_curves_are_drawn() {
     }
     let many = with((0..200).map(|k| curve(k, &[(10.0, 1e3 * k as f64), (1e4, 1e6)])).collect());
     let (svg, _) = drawn(&many);
-    assert!((0..200).all(|k| svg.contains(&format!("sweep@cpu{k}\n"))));
+    assert!((0..200).all(|k| svg.contains(&format!("sap@cpu{k}\n"))));
 }
 
 #[test]
@@ -197,7 +197,7 @@ fn ratios(values: Vec<Option<RatioValue>>) -> Ratios {
     let group = |name: &str, kind, values| RatioGroup { name: name.to_owned(), kind, values };
     let machines = (0..values.len()).map(|k| format!("machine {k} {ODD}")).collect();
     let groups = vec![
-        group("strips@gpu0", RatioKind::Algorithm, values.clone()),
+        group("grid-sap@gpu0", RatioKind::Algorithm, values.clone()),
         group("clock (MHz)", RatioKind::Parameter, values.clone()),
         group(ODD, RatioKind::Parameter, vec![None; values.len()]),
     ];
@@ -209,7 +209,7 @@ fn ratios_are_beside_their_names_and_parameters_apart_from_algorithms() {
     let value = |ratio: f64| Some(RatioValue { ratio, low: Some(0.9 * ratio), high: Some(1.1 * ratio) });
     let figure = ratios(vec![value(0.5), None, value(3.0)]);
     let (svg, _) = drawn(&figure);
-    let order = ["Hardware parameters", "clock (MHz)", "Algorithms", "strips@gpu0"].map(|text| svg.find(text).unwrap());
+    let order = ["Hardware parameters", "clock (MHz)", "Algorithms", "grid-sap@gpu0"].map(|text| svg.find(text).unwrap());
     assert!(order.is_sorted(), "{order:?}");
     let needed = ["times the reference", "(the reference)", "no mark: a value is missing", ">\nmissing\n"];
     assert!(needed.iter().all(|text| svg.contains(text)), "{svg}");
@@ -288,10 +288,10 @@ fn a_matrix_tells_verdicts_by_sign_and_text() {
         vec![cell(Mark3::CannotBeTold, Some(f64::NAN), "")],
     ];
     let names = |names: [&str; 2]| names.map(str::to_owned).to_vec();
-    let columns = names(["sweep@cpu1", ODD]);
+    let columns = names(["sap@cpu1", ODD]);
     let figure = Influence { title: "Influence".to_owned(), columns, rows: names(["clock (MHz)", ODD]), cells };
     let (svg, _) = drawn(&figure);
-    let needed = ["-0.80\n", "weak\n", "?\n", "clock (MHz)\n", "sweep@cpu1\n", "not linked\n", "cannot be told", "absent"];
+    let needed = ["-0.80\n", "weak\n", "?\n", "clock (MHz)\n", "sap@cpu1\n", "not linked\n", "cannot be told", "absent"];
     assert!(needed.iter().all(|text| svg.contains(text)), "{svg}");
     assert_eq!(svg.matches(&format!("{ESCAPED}\n")).count(), 2);
     let sheet = told(&figure, 3);

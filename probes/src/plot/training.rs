@@ -114,11 +114,11 @@ mod tests {
         };
         let regrets = WAYS.iter().map(|w| (*w, vec![0.0, 0.05, 0.4])).collect();
         let held =
-            Held { times: vec![time("sweep", 2e3), time("strips", 5e6)], regrets, by_machine: true, ..Held::default() };
+            Held { times: vec![time("sap", 2e3), time("grid-sap", 5e6)], regrets, by_machine: true, ..Held::default() };
         let score = |name: &str| LearningScore { name: name.to_owned(), mean_regret: 0.05, low: 0.0, high: 0.3 };
         let of = |machines| Learning { machines, trainings: 8, methods: WAYS.iter().map(|w| score(w)).collect() };
         let svg = drawn(&held, vec![of(2), of(12)]);
-        let needed = ["sweep on the", "strips on the", "random forest", "Made by: sapwise train a.json"];
+        let needed = ["sap on the", "grid-sap on the", "random forest", "Made by: sapwise train a.json"];
         assert!(needed.iter().all(|text| svg.contains(text)), "{svg}");
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
     }

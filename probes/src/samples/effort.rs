@@ -26,7 +26,7 @@ pub(crate) struct Effort {
     /// Objects of its scene.
     pub(crate) objects: u32,
     /// Whether the algorithm keeps work from frame to frame.
-    pub(crate) keeps_work: bool,
+    pub(crate) is_incremental: bool,
 }
 
 impl Effort {
@@ -34,7 +34,7 @@ impl Effort {
     pub(crate) fn seconds(self, ns: f64) -> f64 {
         let objects = f64::from(self.objects);
         let frame = ns + objects * ADVANCE_NS;
-        let before = FIRST_FRAME + if self.keeps_work { WARM_UP as f64 } else { 0.0 };
+        let before = FIRST_FRAME + if self.is_incremental { WARM_UP as f64 } else { 0.0 };
         let timed = (FEWEST_FRAMES as f64 * frame).max(TIMED.as_nanos() as f64);
         (FIXED_NS + objects * START_NS + before * frame + timed) / 1e9
     }
@@ -48,8 +48,8 @@ impl Keepers {
     pub(super) fn find() -> Self {
         // A registry of one core makes its algorithms without threads.
         let registry = Registry::with_cores(1);
-        let keeps_work = |id: &AlgorithmId| registry.create(id).is_ok_and(|a| a.keeps_work());
-        Self(registry.entries().iter().map(|e| &e.id).filter(|id| keeps_work(id)).map(|id| id.method().to_owned()).collect())
+        let is_incremental = |id: &AlgorithmId| registry.create(id).is_ok_and(|a| a.is_incremental());
+        Self(registry.entries().iter().map(|e| &e.id).filter(|id| is_incremental(id)).map(|id| id.method().to_owned()).collect())
     }
 
     pub(super) fn contain(&self, algorithm: &AlgorithmId) -> bool {
@@ -63,11 +63,11 @@ mod tests {
 
     #[test]
     fn a_sample_of_who_keeps_work_takes_the_frames_of_its_warm_up_longer() {
-        let effort = |keeps_work| Effort { objects: 100_000, keeps_work };
+        let effort = |is_incremental| Effort { objects: 100_000, is_incremental };
         let [without, with] = [false, true].map(|k| effort(k).seconds(1e6));
         assert!((with - without - WARM_UP as f64 * 2.5e-3).abs() < 1e-9, "{with} {without}");
         let keepers = Keepers::find();
         let of = |id: &str| keepers.contain(&id.parse().unwrap());
-        assert!(of("verlet@cpu1") && of("verlet@cpu8") && !of("strips@cpu1") && !of("verlet@gpu0"));
+        assert!(of("pair-cache@cpu1") && of("pair-cache@cpu8") && !of("grid-sap@cpu1") && !of("pair-cache@gpu0"));
     }
 }

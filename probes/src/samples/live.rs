@@ -115,7 +115,7 @@ impl Live {
 impl Source for Live {
     fn effort(&self, algorithm: &AlgorithmId, load: &Load) -> Option<Effort> {
         let there = uses(algorithm).iter().all(|k| self.order.gpus.iter().any(|g| g.index == *k));
-        there.then(|| Effort { objects: load.objects, keeps_work: self.keepers.contain(algorithm) })
+        there.then(|| Effort { objects: load.objects, is_incremental: self.keepers.contain(algorithm) })
     }
 
     fn sample(&mut self, algorithm: &AlgorithmId, load: &Load) -> anyhow::Result<Answer> {

@@ -45,7 +45,7 @@ impl Source for Replay<'_> {
         if self.given.iter().any(|g| g.0 == *algorithm && g.1 == at) {
             return None;
         }
-        Some(Effort { objects: self.points[at].load.objects, keeps_work: self.keepers.contain(algorithm) })
+        Some(Effort { objects: self.points[at].load.objects, is_incremental: self.keepers.contain(algorithm) })
     }
 
     fn sample(&mut self, algorithm: &AlgorithmId, load: &Load) -> anyhow::Result<Answer> {

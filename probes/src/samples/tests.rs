@@ -13,7 +13,7 @@ struct MadeUp {
 
 impl Source for MadeUp {
     fn effort(&self, _: &AlgorithmId, load: &Load) -> Option<Effort> {
-        Some(Effort { objects: load.objects, keeps_work: false })
+        Some(Effort { objects: load.objects, is_incremental: false })
     }
 
     fn sample(&mut self, algorithm: &AlgorithmId, load: &Load) -> anyhow::Result<Answer> {
@@ -28,7 +28,7 @@ impl Source for MadeUp {
         let ratio = self.real.iter().find(|r| r.0 == *algorithm).map_or(1.0, |r| r.1);
         let cost = costs().into_iter().find(|c| c.algorithm == *algorithm).unwrap();
         let ns = cost.curve.cost_ns(load) * ratio;
-        let seconds = Effort { objects: load.objects, keeps_work: false }.seconds(ns);
+        let seconds = Effort { objects: load.objects, is_incremental: false }.seconds(ns);
         Ok(Answer::Taken(Sample { load: *load, ns, noise_ln: 0.01, seconds }))
     }
 }
@@ -37,7 +37,7 @@ fn id(text: &str) -> AlgorithmId {
     text.parse().unwrap()
 }
 
-/// `strips@cpu1` and a user's tree lie 5 % apart at every size; the GPUs gain with many objects.
+/// `grid-sap@cpu1` and a user's tree lie 5 % apart at every size; the GPUs gain with many objects.
 fn costs() -> Vec<AlgorithmCost> {
     let cost = |text: &str, call_ns: f64, object_ns: f64| {
         let terms = [(Term::Call, call_ns), (Term::Objects, object_ns)];
@@ -46,11 +46,11 @@ fn costs() -> Vec<AlgorithmCost> {
         AlgorithmCost { algorithm: id(text), revision: 1, curve, spread_ln: 0.2 }
     };
     vec![
-        cost("strips@cpu1", 100.0, 40.0),
+        cost("grid-sap@cpu1", 100.0, 40.0),
         cost("my-tree@cpu1", 105.0, 42.0),
         cost("brute@cpu1", 1e6, 400.0),
-        cost("strips@gpu0", 2e5, 10.0),
-        cost("sweep@gpu0", 2.2e5, 11.0),
+        cost("grid-sap@gpu0", 2e5, 10.0),
+        cost("sap@gpu0", 2.2e5, 11.0),
     ]
 }
 
@@ -71,9 +71,9 @@ fn cheapest(costs: &[AlgorithmCost], objects: u32) -> String {
 
 #[test]
 fn samples_go_where_the_choice_is_in_doubt_and_turn_it() {
-    let mut source = made_up(&[("strips@cpu1", 1.3), ("my-tree@cpu1", 0.9)]);
+    let mut source = made_up(&[("grid-sap@cpu1", 1.3), ("my-tree@cpu1", 0.9)]);
     let learned = learn(costs(), &Prior::ASSUMED, &slice(), &mut source, 6).unwrap();
-    assert_eq!(cheapest(&costs(), 1000), "strips@cpu1");
+    assert_eq!(cheapest(&costs(), 1000), "grid-sap@cpu1");
     assert_eq!(cheapest(&learned.costs(), 1000), "my-tree@cpu1");
     assert!(source.asked.iter().all(|a| a.0 != id("brute@cpu1")), "{:?}", source.asked);
     assert!(source.asked.len() <= 6 && source.asked.len() == learned.taken.len());
@@ -107,10 +107,10 @@ fn samples_stay_within_their_time_on_a_slow_machine() {
 #[test]
 fn who_fails_is_left_out_with_all_on_its_gpus_and_the_rest_goes_on() {
     let mut source = made_up(&[]);
-    source.failing = vec![(id("strips@gpu0"), vec![0]), (id("my-tree@cpu1"), Vec::new())];
+    source.failing = vec![(id("grid-sap@gpu0"), vec![0]), (id("my-tree@cpu1"), Vec::new())];
     let learned = learn(costs(), &Prior::ASSUMED, &slice(), &mut source, 8).unwrap();
     let left: Vec<String> = learned.costs().iter().map(|c| c.algorithm.to_string()).collect();
-    assert_eq!(left, ["strips@cpu1", "brute@cpu1"], "{:?}", learned.remarks);
+    assert_eq!(left, ["grid-sap@cpu1", "brute@cpu1"], "{:?}", learned.remarks);
     assert!(learned.remarks.len() == 2 && learned.remarks.iter().any(|r| r.contains("all on gpu0: it broke")));
     let mut source = made_up(&[]);
     source.answers = 1;

@@ -9,23 +9,23 @@
 //! - the fall-off of the last-level cache is smooth here and a kink there;
 //! - the hyper-threads of an algorithm gain something else than those of the arithmetic that is measured;
 //! - GPUs of one frame get equal shares, so that the slower one is waited for; the predictor adds their rates up;
-//! - `verlet` is the cheaper of keeping pairs and finding them by strips, which no sum of terms is.
+//! - `pair-cache` is the cheaper of keeping pairs and finding them by strips, which no sum of terms is.
 //!
 //! | method on the CPU | serial cycles | divided cycles | lane operations | cold bytes a box |
 //! |---|---|---|---|---|
 //! | `brute` | 330 + 20 n | 0.35 all pairs + 19 pairs | 6 all pairs | |
-//! | `sweep` | 1400 + 12 n | 8 n + 6 n log2 n + 0.3 axis candidates + 22 pairs | 4 axis candidates | 100, gathers |
-//! | `strips` | 2500 + 10 n | 8 n + 7 n log2 n + 0.45 strip candidates + 16 pairs | 12 strip candidates | 120, gathers |
-//! | `verlet`, keeping | 365 + 14 n | 14 n + 34 pairs + 130 moved boxes | | 56 |
-//! | `verlet`, finding | `strips` + 1500 | | | |
+//! | `sap` | 1400 + 12 n | 8 n + 6 n log2 n + 0.3 axis candidates + 22 pairs | 4 axis candidates | 100, gathers |
+//! | `grid-sap` | 2500 + 10 n | 8 n + 7 n log2 n + 0.45 strip candidates + 16 pairs | 12 strip candidates | 120, gathers |
+//! | `pair-cache`, keeping | 365 + 14 n | 14 n + 34 pairs + 130 moved boxes | | 56 |
+//! | `pair-cache`, finding | `grid-sap` + 1500 | | | |
 //!
 //! Every method with several threads pays a quarter of a cold fork and join, which grows with the logarithm of the threads.
 //!
 //! | method on GPUs | dependent dispatches | operations | bytes in the GPU's memory |
 //! |---|---|---|---|
 //! | `brute` | 5 | 20 all pairs | 60 n |
-//! | `sweep` | 40 | 25 axis candidates | 60 n + 25 n log2 n |
-//! | `strips` | 50 | 300 strip candidates | 60 n + 25 n log2 n |
+//! | `sap` | 40 | 25 axis candidates | 60 n + 25 n log2 n |
+//! | `grid-sap` | 50 | 300 strip candidates | 60 n + 25 n log2 n |
 //!
 //! Every method on GPUs pays a round trip and a read-back, 24 bytes up a box, 8 bytes down a pair, and 6 cycles a box and 4 a pair of
 //! the CPU. With several GPUs each takes an equal share of the boxes and a tenth more that lie on a border.
@@ -72,8 +72,8 @@ impl<'a> Costs<'a> {
     }
 
     fn on_cpu(&self, method: &str, threads: f64, load: &Load) -> Option<f64> {
-        if method == "verlet" {
-            let finding = self.on_cpu("strips", threads, load)? + self.cycles(1500.0);
+        if method == "pair-cache" {
+            let finding = self.on_cpu("grid-sap", threads, load)? + self.cycles(1500.0);
             return Some(self.keeping(threads, load).min(finding));
         }
         let n = f64::from(load.objects);
@@ -83,8 +83,8 @@ impl<'a> Costs<'a> {
         // Serial and divided cycles, cycles for pairs, lane operations, and cold bytes of a sorting method.
         let (serial, divided, written, lanes, cold) = match method {
             "brute" => (330.0 + 20.0 * n, 0.35 * all, 19.0, 6.0 * all, None),
-            "sweep" => (1400.0 + 12.0 * n, 8.0 * n + 6.0 * sort + 0.3 * axis, 22.0, 4.0 * axis, Some(100.0)),
-            "strips" => (2500.0 + 10.0 * n, 8.0 * n + 7.0 * sort + 0.45 * strip, 16.0, 12.0 * strip, Some(120.0)),
+            "sap" => (1400.0 + 12.0 * n, 8.0 * n + 6.0 * sort + 0.3 * axis, 22.0, 4.0 * axis, Some(100.0)),
+            "grid-sap" => (2500.0 + 10.0 * n, 8.0 * n + 7.0 * sort + 0.45 * strip, 16.0, 12.0 * strip, Some(120.0)),
             _ => return None,
         };
         let fast = self.speed_up(threads);
@@ -101,7 +101,7 @@ impl<'a> Costs<'a> {
         let divided = 14.0 * n + 34.0 * load.pairs * self.cpu.pairs + 130.0 * n * load.moved;
         let sum =
             self.cycles(365.0 + 14.0 * n) + self.cycles(divided) / self.speed_up(threads) + self.moving(n, 56.0, threads);
-        sum * self.of_method("verlet") + self.forking(threads)
+        sum * self.of_method("pair-cache") + self.forking(threads)
     }
 
     fn cycles(&self, cycles: f64) -> f64 {
@@ -150,8 +150,8 @@ impl<'a> Costs<'a> {
         let sort = n * n.max(1.0).log2();
         let (dispatches, operations, bytes) = match method {
             "brute" => (5.0, 20.0 * all, 60.0 * n),
-            "sweep" => (40.0, 25.0 * load.axis_candidates, 60.0 * n + 25.0 * sort),
-            "strips" => (50.0, 300.0 * load.strip_candidates, 60.0 * n + 25.0 * sort),
+            "sap" => (40.0, 25.0 * load.axis_candidates, 60.0 * n + 25.0 * sort),
+            "grid-sap" => (50.0, 300.0 * load.strip_candidates, 60.0 * n + 25.0 * sort),
             _ => return None,
         };
         let group = self.machine.group.filter(|_| indices.len() > 1);
@@ -208,13 +208,13 @@ mod tests {
     }
 
     #[test]
-    fn verlet_is_never_dearer_than_strips_by_more_than_its_look_and_gains_where_little_moves() {
+    fn pair_cache_is_never_dearer_than_grid_sap_by_more_than_its_look_and_gains_where_little_moves() {
         for machine in machines() {
             for n in [100, 10_000, 300_000] {
                 let (still, fast) = (load(n, 0.0), load(n, 1.0));
-                let look = ns(&machine, "strips@cpu1", &fast) * 0.5 + 10_000.0;
-                assert!(ns(&machine, "verlet@cpu1", &fast) <= ns(&machine, "strips@cpu1", &fast) + look);
-                assert!(ns(&machine, "verlet@cpu1", &still) < ns(&machine, "strips@cpu1", &still), "{n} on {machine:?}");
+                let look = ns(&machine, "grid-sap@cpu1", &fast) * 0.5 + 10_000.0;
+                assert!(ns(&machine, "pair-cache@cpu1", &fast) <= ns(&machine, "grid-sap@cpu1", &fast) + look);
+                assert!(ns(&machine, "pair-cache@cpu1", &still) < ns(&machine, "grid-sap@cpu1", &still), "{n} on {machine:?}");
             }
         }
     }
@@ -224,7 +224,7 @@ mod tests {
         let (mut pairs_of_gpus, mut paid) = (0, 0);
         for machine in machines().iter().filter(|m| m.gpus.len() >= 2 && m.gpus[0].name == m.gpus[1].name) {
             pairs_of_gpus += 1;
-            for method in ["brute", "sweep", "strips"] {
+            for method in ["brute", "sap", "grid-sap"] {
                 let cost = |gpus: &str| ns(machine, &format!("{method}@{gpus}"), &load(10_000_000, 1.0));
                 let (one, two) = (cost("gpu0"), cost("gpu0+1"));
                 assert!(two >= 0.5 * one, "{method}: {two} with two GPUs and {one} with one of {machine:?}");

@@ -204,7 +204,7 @@ mod tests {
             (98, 1.0, &[1.5, f64::INFINITY], taken(0)),
             (5000, 1.0, &[400.0, f64::INFINITY], taken(0)),
         ];
-        let outcome = outcome(&["brute@cpu1", "strips@cpu1"], &frames);
+        let outcome = outcome(&["brute@cpu1", "grid-sap@cpu1"], &frames);
         let co_runner = CoRunner { from_frame: 3, threads: None };
         let loops = [(0, 100.0), (1, 100.0), (3, 150.0), (4, 190.0)];
         let slowdown = Slowdown::new(co_runner, &loops, &outcome.frames, 2);

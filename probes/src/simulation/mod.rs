@@ -15,7 +15,7 @@ use anyhow::{Context, bail};
 use contestant::{Contestant, best};
 use samples::Samples;
 use sapwise::measure::Watch;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Fields, Pairs, Reason, Registry};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Tuning, Pairs, Reason, Registry};
 use std::time::Instant;
 
 pub(crate) use co_runner::{CoRunner, SHARE};
@@ -46,21 +46,21 @@ pub(crate) struct Course {
 /// Runs the course: in each repeat the same frames again, and at each frame every contestant, in random order: a
 /// parallel algorithm leaves threads and caches behind that the next one feels.
 ///
-/// All of them begin each repeat afresh, the adaptive module from these fields, so that frame by frame the repeats are alike: what it
+/// All of them begin each repeat afresh, the adaptive module from this tuning, so that frame by frame the repeats are alike: what it
 /// has learned by a frame, it has learned from the frames before.
 ///
 /// The pairs of all contestants are compared in the first repeat, outside the timed part.
 ///
 /// # Errors
-/// When no algorithm of the fields can run, when contestants disagree about the pairs, or on Ctrl-C before one repeat is done.
-pub(crate) fn simulate(course: &Course, fields: &Fields, registry: &Registry) -> anyhow::Result<Outcome> {
-    let mut stage = Stage::new(course, fields, registry);
+/// When no algorithm of the tuning can run, when contestants disagree about the pairs, or on Ctrl-C before one repeat is done.
+pub(crate) fn simulate(course: &Course, tuning: &Tuning, registry: &Registry) -> anyhow::Result<Outcome> {
+    let mut stage = Stage::new(course, tuning, registry);
     let progress = Progress::new((course.repeats * course.frames) as u64);
     let mut watch = Watched::begin();
     let mut done = 0;
     'repeats: for repeat in 0..course.repeats {
         progress.message(format!("{}: repeat {} of {}", course.footage.name(), repeat + 1, course.repeats));
-        let mut adaptive = stage.begin(repeat, fields, registry)?;
+        let mut adaptive = stage.begin(repeat, tuning, registry)?;
         let mut reel = course.footage.start();
         let mut co_runner = None;
         for frame in 0..course.frames {
@@ -87,11 +87,11 @@ pub(crate) fn simulate(course: &Course, fields: &Fields, registry: &Registry) ->
     Ok(stage.outcome(course, done, watch.foreign_load()))
 }
 
-/// Algorithms of the fields with more threads than the registry lists, as those of a larger machine have: the adaptive module leaves them
-/// out. Where the fields are steps it runs them all the same.
-pub(crate) fn too_wide<'a>(fields: &'a Fields, registry: &Registry) -> Vec<&'a AlgorithmId> {
+/// Algorithms of the tuning with more threads than the registry lists, as those of a larger machine have: the adaptive module leaves them
+/// out. Where the tuning is steps it runs them all the same.
+pub(crate) fn too_wide<'a>(tuning: &'a Tuning, registry: &Registry) -> Vec<&'a AlgorithmId> {
     let most = registry.entries().iter().map(|e| e.id.threads()).max().unwrap_or(1);
-    fields.algorithms().into_iter().filter(|id| !fields.costs.is_empty() && id.threads() > most).collect()
+    tuning.algorithms().into_iter().filter(|id| !tuning.costs.is_empty() && id.threads() > most).collect()
 }
 
 /// The contestants and what they have done so far.
@@ -115,7 +115,7 @@ struct Stage {
 }
 
 impl Stage {
-    fn new(course: &Course, fields: &Fields, registry: &Registry) -> Self {
+    fn new(course: &Course, tuning: &Tuning, registry: &Registry) -> Self {
         let mut contestants: Vec<Contestant> = Vec::new();
         let mut notes: Vec<String> = Vec::new();
         for (id, _) in registry.available() {
@@ -125,9 +125,9 @@ impl Stage {
                 Err(error) => notes.push(format!("{id} is left out: {error}")),
             }
         }
-        // Fields may name a number of threads that the registry doesn't list but can make.
-        let too_wide = too_wide(fields, registry);
-        for id in fields.algorithms() {
+        // Tuning may name a number of threads that the registry doesn't list but can make.
+        let too_wide = too_wide(tuning, registry);
+        for id in tuning.algorithms() {
             if !contestants.iter().any(|c| c.id == *id)
                 && !too_wide.contains(&id)
                 && let Ok(contestant) = Contestant::new(id.clone(), course.frames, registry)
@@ -153,7 +153,7 @@ impl Stage {
     }
 
     /// The adaptive module of a repeat, with everybody else as fresh as it is.
-    fn begin(&mut self, repeat: usize, fields: &Fields, registry: &Registry) -> anyhow::Result<Adaptive> {
+    fn begin(&mut self, repeat: usize, tuning: &Tuning, registry: &Registry) -> anyhow::Result<Adaptive> {
         for contestant in self.contestants.iter_mut().filter(|_| repeat > 0) {
             if let Err(error) = contestant.renew(registry) {
                 self.notes.push(format!("{} is left out from repeat {} on: {error}", contestant.id, repeat + 1));
@@ -161,7 +161,7 @@ impl Stage {
         }
         self.taken.clear();
         self.telling.clear();
-        let mut adaptive = Adaptive::new(fields.clone(), registry)?;
+        let mut adaptive = Adaptive::new(tuning.clone(), registry)?;
         adaptive.set_learning(self.learning);
         adaptive.set_exploring(self.exploring);
         Ok(adaptive)

@@ -308,7 +308,7 @@ pub(crate) mod tests {
     fn figures_follow_from_the_frames() {
         let explored = Taken { explored: true, ..taken(0) };
         let outcome = outcome(
-            &["brute@cpu1", "strips@cpu1"],
+            &["brute@cpu1", "grid-sap@cpu1"],
             &[
                 (10, 1.0, &[1.0, 4.0], taken(0)),
                 (20, 3.0, &[5.0, 2.0], taken(1)),
@@ -337,7 +337,7 @@ pub(crate) mod tests {
         let inf = f64::INFINITY;
         let frames: [(usize, f64, &[f64], Taken); 3] =
             [(10, 1.0, &[1.0, 2000.0], taken(0)), (90, 1.0, &[1.0, inf], taken(0)), (10, 1.0, &[1.0, 0.5], taken(0))];
-        let outcome = outcome(&["strips@cpu1", "brute@cpu1"], &frames);
+        let outcome = outcome(&["grid-sap@cpu1", "brute@cpu1"], &frames);
         assert_eq!((outcome.fixed_ms(0), outcome.fixed_ms(1)), (Some(3.0), None));
         let missed = Missed { first: 1, frames: 1, at_least_ms: 2000.5 };
         assert_eq!((outcome.missed(0), outcome.missed(1)), (None, Some(missed)));
@@ -366,7 +366,7 @@ pub(crate) mod tests {
     fn each_repeat_has_a_regret_of_its_own() {
         let stays = [(taken(0), None); 4];
         let fixed = vec![samples(&[10.0, 12.0, 10.0, 14.0]), samples(&[20.0; 4])];
-        let mut outcome = outcome(&["brute@cpu1", "strips@cpu1"], &[(5, 1.0, &[1.0, 2.0], taken(0))]);
+        let mut outcome = outcome(&["brute@cpu1", "grid-sap@cpu1"], &[(5, 1.0, &[1.0, 2.0], taken(0))]);
         outcome.frames = vec![Frame::new(5, samples(&[10.0, 18.0, 15.0, 14.0]), fixed, &stays)];
         outcome.oracle = Oracle::new(&outcome.frames);
         outcome.repeats = vec![vec![taken(0)]; 4];

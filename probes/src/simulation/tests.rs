@@ -4,9 +4,9 @@ use super::*;
 use crate::boxes::read_frames;
 use sapwise::{Scenario, Step};
 
-fn steps(list: &[(u32, &str)]) -> Fields {
+fn steps(list: &[(u32, &str)]) -> Tuning {
     let step = |&(from_objects, id): &(u32, &str)| Step { from_objects, algorithm: id.parse().unwrap() };
-    Fields::from_steps(list.iter().map(step).collect()).unwrap()
+    Tuning::from_steps(list.iter().map(step).collect()).unwrap()
 }
 
 fn course(scenario: Scenario, objects: usize, frames: usize, repeats: usize) -> Course {
@@ -17,8 +17,8 @@ fn course(scenario: Scenario, objects: usize, frames: usize, repeats: usize) -> 
 #[test]
 fn a_course_gives_every_total_and_the_choice_of_every_frame() {
     let registry = Registry::with_cores(1);
-    let fields = steps(&[(0, "brute@cpu1"), (100, "strips@cpu1")]);
-    let outcome = simulate(&course(Scenario::Fragmentation, 800, 300, 3), &fields, &registry).unwrap();
+    let tuning = steps(&[(0, "brute@cpu1"), (100, "grid-sap@cpu1")]);
+    let outcome = simulate(&course(Scenario::Fragmentation, 800, 300, 3), &tuning, &registry).unwrap();
     let shape = (outcome.frames.len(), outcome.repeats.len(), outcome.fixed.len(), outcome.told.len());
     assert_eq!(shape, (300, 3, registry.available().len(), 300));
     assert!(outcome.optimistic_oracle_ms() > 0.0 && outcome.best_fixed().is_some());
@@ -55,13 +55,13 @@ fn of_two_that_disagree_the_one_that_a_user_added_is_named() {
 }
 
 #[test]
-fn an_algorithm_that_only_the_fields_name_is_among_the_fixed() {
+fn an_algorithm_that_only_the_tuning_name_is_among_the_fixed() {
     let registry = Registry::with_cores(4);
-    let id: AlgorithmId = "strips@cpu3".parse().unwrap();
+    let id: AlgorithmId = "grid-sap@cpu3".parse().unwrap();
     if registry.create(&id).is_err() {
         return;
     }
-    let outcome = simulate(&course(Scenario::Uniform, 50, 2, 1), &steps(&[(0, "strips@cpu3")]), &registry).unwrap();
+    let outcome = simulate(&course(Scenario::Uniform, 50, 2, 1), &steps(&[(0, "grid-sap@cpu3")]), &registry).unwrap();
     assert_eq!(outcome.fixed.last(), Some(&id));
     assert!(outcome.last_taken().iter().all(|t| t.chosen.is_some()));
 }
@@ -98,9 +98,9 @@ fn a_recorded_stream_runs_like_the_scene_that_it_was_recorded_from() {
     let scene = course(Scenario::Fragmentation, 400, 80, 1);
     scene.footage.record(&path, 80).unwrap();
     let footage = Footage::Stream { name: "scene.npy".to_owned(), frames: read_frames(&path).unwrap() };
-    let (registry, fields) = (Registry::with_cores(1), steps(&[(0, "brute@cpu1"), (60, "strips@cpu1")]));
-    let stream = simulate(&Course { footage, ..course(Scenario::Uniform, 0, 80, 1) }, &fields, &registry).unwrap();
-    let scene = simulate(&scene, &fields, &registry).unwrap();
+    let (registry, tuning) = (Registry::with_cores(1), steps(&[(0, "brute@cpu1"), (60, "grid-sap@cpu1")]));
+    let stream = simulate(&Course { footage, ..course(Scenario::Uniform, 0, 80, 1) }, &tuning, &registry).unwrap();
+    let scene = simulate(&scene, &tuning, &registry).unwrap();
     let objects = |o: &Outcome| o.frames.iter().map(|f| f.objects).collect::<Vec<_>>();
     assert_eq!(objects(&stream), objects(&scene));
     assert_eq!((&stream.repeats, stream.switches()), (&scene.repeats, scene.switches()));

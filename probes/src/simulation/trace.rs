@@ -140,9 +140,9 @@ mod tests {
         let explored = Taken { explored: true, ..taken(0) };
         let frames: [(usize, f64, &[f64], _); 2] =
             [(10, 1.0, &[1.0, 4.0], taken(1)), (20, 3.0, &[f64::INFINITY, 2.0], explored)];
-        let mut outcome = outcome(&["strips@cpu1", "brute@gpu0+1"], &frames);
+        let mut outcome = outcome(&["grid-sap@cpu1", "brute@gpu0+1"], &frames);
         outcome.told[1].reason = Reason::Explored;
-        outcome.told[1].runner_up = Some(("sweep@cpu2".parse().unwrap(), 7e6));
+        outcome.told[1].runner_up = Some(("sap@cpu2".parse().unwrap(), 7e6));
         outcome
     }
 
@@ -156,11 +156,11 @@ mod tests {
         assert!(rows.iter().all(|r| r.len() == 16), "{text}");
         let cell = |row: usize, name: &str| rows[row][rows[0].iter().position(|n| *n == name).unwrap()];
         assert_eq!((cell(1, "objects"), cell(1, "algorithm"), cell(1, "measured_ns")), ("10", "brute@gpu0+1", ""));
-        assert_eq!((cell(1, "strips@cpu1_ns"), cell(1, "brute@gpu0+1_ns")), ("1000000", "4000000"));
-        assert_eq!((cell(2, "strips@cpu1_ns"), cell(2, "brute@gpu0+1_ns")), ("", "2000000"));
+        assert_eq!((cell(1, "grid-sap@cpu1_ns"), cell(1, "brute@gpu0+1_ns")), ("1000000", "4000000"));
+        assert_eq!((cell(2, "grid-sap@cpu1_ns"), cell(2, "brute@gpu0+1_ns")), ("", "2000000"));
         assert_eq!(
             (cell(2, "reason"), cell(2, "runner_up"), cell(2, "runner_up_ns")),
-            ("explored", "sweep@cpu2", "7000000")
+            ("explored", "sap@cpu2", "7000000")
         );
         assert_eq!((cell(2, "adaptive_ns"), cell(2, "oracle_ns")), ("3000000", "2000000"));
     }
@@ -172,7 +172,7 @@ mod tests {
         let read: serde_json::Value = serde_json::from_slice(&text).unwrap();
         let frames = read["frames"].as_array().unwrap();
         assert_eq!((frames.len(), &frames[1]["reason"]), (2, &"explored".into()));
-        assert_eq!(frames[1]["fixed_ns"], serde_json::json!({"strips@cpu1": null, "brute@gpu0+1": 2e6}));
+        assert_eq!(frames[1]["fixed_ns"], serde_json::json!({"grid-sap@cpu1": null, "brute@gpu0+1": 2e6}));
         assert_eq!(frames[0]["load"]["objects"], 0);
     }
 

@@ -5,7 +5,7 @@ use crate::plot::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
 use crate::sweep::median;
 use crate::train::{measured_fields, slice_scenario};
 use sapwise::measure::statistics::quantile;
-use sapwise::{AlgorithmId, Backend, BackendClass, Fields, Report};
+use sapwise::{AlgorithmId, Backend, BackendClass, Tuning, Report};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Machines in one picture.
@@ -161,7 +161,7 @@ fn envelope(report: &Report, scenario: &str, of: impl Fn(&AlgorithmId) -> bool) 
 }
 
 /// The steps of the slice, those in a row that are of the same side joined.
-fn bands(fields: &Fields, style: impl Fn(&AlgorithmId) -> usize, name: impl Fn(usize) -> String) -> Vec<Band> {
+fn bands(fields: &Tuning, style: impl Fn(&AlgorithmId) -> usize, name: impl Fn(usize) -> String) -> Vec<Band> {
     let mut bands: Vec<Band> = Vec::new();
     for step in &fields.steps {
         let (from, style) = (f64::from(step.from_objects), style(&step.algorithm));
@@ -179,7 +179,7 @@ fn bands(fields: &Fields, style: impl Fn(&AlgorithmId) -> usize, name: impl Fn(u
 }
 
 /// The borders between sides.
-fn crossings(fields: &Fields) -> Vec<Crossing> {
+fn crossings(fields: &Tuning) -> Vec<Crossing> {
     let apart = fields.crossovers.iter().filter(|b| side(b.below.backend()) != side(b.above.backend()));
     let crossing = |b: &sapwise::Border| {
         let (low, high) = b.interval().unwrap_or((b.objects, b.objects));

@@ -219,12 +219,12 @@ mod tests {
     #[test]
     fn algorithms_have_the_same_name_on_every_machine() {
         let named = |id: &str, threads| everywhere(&id.parse().unwrap(), threads, &[2]);
-        assert_eq!(named("strips@cpu1", 8), ["strips@cpu1"]);
-        assert_eq!(named("strips@cpu8", 8), ["strips on all cores"]);
-        assert_eq!(named("strips@cpu1", 1), ["strips@cpu1", "strips on all cores"]);
-        assert!(named("strips@cpu4", 8).is_empty() && named("strips@gpu1", 8).is_empty());
-        assert_eq!(named("strips@gpu0", 8), ["strips@gpu0"]);
-        assert_eq!(named("strips@gpu0+1", 8), ["strips on 2 GPUs"]);
-        assert_eq!(named("strips@gpu0+2", 8), ["strips on 2 GPUs (software)"]);
+        assert_eq!(named("grid-sap@cpu1", 8), ["grid-sap@cpu1"]);
+        assert_eq!(named("grid-sap@cpu8", 8), ["grid-sap on all cores"]);
+        assert_eq!(named("grid-sap@cpu1", 1), ["grid-sap@cpu1", "grid-sap on all cores"]);
+        assert!(named("grid-sap@cpu4", 8).is_empty() && named("grid-sap@gpu1", 8).is_empty());
+        assert_eq!(named("grid-sap@gpu0", 8), ["grid-sap@gpu0"]);
+        assert_eq!(named("grid-sap@gpu0+1", 8), ["grid-sap on 2 GPUs"]);
+        assert_eq!(named("grid-sap@gpu0+2", 8), ["grid-sap on 2 GPUs (software)"]);
     }
 }

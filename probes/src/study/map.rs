@@ -1,4 +1,4 @@
-//! Fields over two axes, objects and density, measured beside predicted: the map that the paper could not draw.
+//! Tuning over two axes, objects and density, measured beside predicted: the map that the paper could not draw.
 
 use super::entry::Entry;
 use crate::plot::{FieldMap, MapCell, MapPanel, MapPoint};
@@ -91,7 +91,7 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
     let count = at_measured.len();
     let panels = vec![panel("measured", by_measured, at_measured), panel("predicted", by_predicted, at_predicted)];
     let names = ids.iter().enumerate().map(|(k, id)| (id.to_string(), k)).collect();
-    let title = format!("Fields over objects and density: {}", entry.name);
+    let title = format!("Tuning over objects and density: {}", entry.name);
     let figure = FieldMap { title, names, x, y, y_name: "overlapping pairs of an object".to_owned(), panels };
     let (known, points) = (regrets.len(), count);
     let regret = (known > 0).then(|| average(&regrets));

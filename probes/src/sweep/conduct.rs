@@ -128,7 +128,7 @@ impl Sweep<'_> {
         };
         let text = serde_json::to_string(&order)?;
         let Self { plan, gpus, began, progress, found, .. } = self;
-        run_part(&["sweep", &text], time + GRACE, &mut |line| {
+        run_part(&["sap", &text], time + GRACE, &mut |line| {
             let event = match serde_json::from_str(line) {
                 Ok(event) => event,
                 // Drivers print what they like on the standard output of whoever loads them.

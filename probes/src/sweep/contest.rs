@@ -11,7 +11,7 @@ pub(super) const FEW_FRAMES: usize = 5;
 const BEATEN: f64 = 1.5;
 /// Standard errors that count as sure.
 const SURE: f64 = 3.0;
-/// Where two differ by less than this, it does not matter which is chosen: the goal for the regret of measured fields is 0.5 %.
+/// Where two differ by less than this, it does not matter which is chosen: the goal for the regret of measured tuning is 0.5 %.
 const INDIFFERENT: f64 = 0.005;
 /// Standard error of a median over the median that is good enough for a cost curve. Below it the differences between one visit
 /// to a point and the next are larger.

@@ -189,7 +189,7 @@ mod tests {
     /// Costs n^2 / 10 and 30 n, which cross at 300, and one that is far behind.
     fn course(scenario: &str, sizes: &[u32]) -> Vec<Point> {
         let costs = |n: u32| {
-            [("brute", f64::from(n) * f64::from(n) / 10.0), ("strips", 30.0 * f64::from(n)), ("sweep", 900.0 * f64::from(n))]
+            [("brute", f64::from(n) * f64::from(n) / 10.0), ("grid-sap", 30.0 * f64::from(n)), ("sap", 900.0 * f64::from(n))]
         };
         sizes.iter().map(|&n| point(scenario, n, &costs(n))).collect()
     }
@@ -203,7 +203,7 @@ mod tests {
         for visit in visits {
             assert!((100..=1000).contains(&visit.objects), "{visits:?}");
             let methods: Vec<&str> = visit.algorithms.iter().map(AlgorithmId::method).collect();
-            assert_eq!(methods, ["brute", "strips"]);
+            assert_eq!(methods, ["brute", "grid-sap"]);
         }
     }
 
@@ -212,7 +212,7 @@ mod tests {
         let sizes = [1000, 2000, 4000, 8000, 16_000];
         assert!(visits(&course("slab", &sizes), Duration::from_secs(9)).is_empty());
         let mut points = course("slab", &sizes);
-        let disturbed = points[2].timings.iter_mut().find(|t| t.algorithm.method() == "strips").unwrap();
+        let disturbed = points[2].timings.iter_mut().find(|t| t.algorithm.method() == "grid-sap").unwrap();
         disturbed.samples_ns.fill(30 * 4000 * 12);
         let visits = visits(&points, Duration::from_secs(9));
         assert!(visits["slab"].iter().any(|v| v.objects == 4000 && v.algorithms.len() >= 2), "{visits:?}");

@@ -53,20 +53,20 @@ mod tests {
 
     #[test]
     fn hopeless_and_falling_behind_leaves() {
-        assert!(out("sweep", &[(7.0, 1000), (9.0, 2000)]));
-        assert!(!out("sweep", &[(9.0, 1000)]));
-        assert!(!out("sweep", &[(50.0, 10), (20.0, 100), (9.0, 1000)]));
-        assert!(!out("sweep", &[(2.0, 1000), (7.9, 2000)]));
-        assert!(!out("sweep", &[(20.0, 10), (30.0, 18), (9.0, 1000)]));
+        assert!(out("sap", &[(7.0, 1000), (9.0, 2000)]));
+        assert!(!out("sap", &[(9.0, 1000)]));
+        assert!(!out("sap", &[(50.0, 10), (20.0, 100), (9.0, 1000)]));
+        assert!(!out("sap", &[(2.0, 1000), (7.9, 2000)]));
+        assert!(!out("sap", &[(20.0, 10), (30.0, 18), (9.0, 1000)]));
     }
 
     #[test]
     fn where_time_is_short_the_slow_leave_at_once() {
         let mut standing = Standing::default();
         assert_eq!(standing.leave_if_slow(), None);
-        standing.judge(2.0, "sweep", 10);
+        standing.judge(2.0, "sap", 10);
         assert_eq!(standing.leave_if_slow(), None);
-        standing.judge(4.0, "sweep", 18);
+        standing.judge(4.0, "sap", 18);
         assert_eq!((standing.leave_if_slow(), standing.out), (Some(4.0), true));
     }
 

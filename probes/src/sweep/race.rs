@@ -94,12 +94,12 @@ impl Race {
         let core_to_core = core_to_core_ns(&self.cores);
         // The first frame warms the buffers, the thread pools and the branch predictors, and is not counted.
         self.frame(runners, scene, |_| true, &mut mismatches);
-        let keeps_work = |r: &Runner| r.error.is_none() && r.algorithm.keeps_work();
+        let is_incremental = |r: &Runner| r.error.is_none() && r.algorithm.is_incremental();
         let mut warm_up = Duration::ZERO;
-        if runners.iter().any(keeps_work) {
+        if runners.iter().any(is_incremental) {
             let frame = || {
                 let started = Instant::now();
-                self.frame(runners, scene, keeps_work, &mut mismatches);
+                self.frame(runners, scene, is_incremental, &mut mismatches);
                 started.elapsed()
             };
             warm_up = std::iter::repeat_with(frame).take(WARM_UP).min().unwrap_or_default() * WARM_UP as u32;
@@ -315,7 +315,7 @@ mod tests {
             pairs.finish()
         }
 
-        fn keeps_work(&self) -> bool {
+        fn is_incremental(&self) -> bool {
             self.1
         }
     }

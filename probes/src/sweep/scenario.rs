@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn visits_race_only_those_who_were_asked() {
-        let algorithms: Vec<AlgorithmId> = ["brute@cpu1", "sweep@cpu1"].map(|id| id.parse().unwrap()).into();
+        let algorithms: Vec<AlgorithmId> = ["brute@cpu1", "sap@cpu1"].map(|id| id.parse().unwrap()).into();
         let visit = |objects, algorithms: &[AlgorithmId]| Visit { objects, seconds: 0.0, algorithms: algorithms.into() };
         // One alone gives no choice to be in doubt of.
         let visits = vec![visit(300, &algorithms), visit(20, &algorithms), visit(50, &algorithms[..1])];

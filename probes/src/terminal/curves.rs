@@ -3,7 +3,7 @@
 use super::{Axis, Chart, Series};
 use crate::sweep::median;
 use sapwise::report::Timing;
-use sapwise::{Fields, Load, Report};
+use sapwise::{Tuning, Load, Report};
 
 /// Curves in a chart, at most: beyond that they can't be told apart.
 const MOST: usize = 6;
@@ -14,13 +14,13 @@ const FARTHEST: f64 = 100.0;
 
 /// The predicted or fitted time of a frame over the objects of a slice, for the algorithms that hold a field and those that come next.
 ///
-/// `None` of fields without costs.
-pub(crate) fn costs(fields: &Fields, loads: &[Load]) -> Option<Chart> {
-    let all = fields.costs.iter().map(|cost| {
+/// `None` of tuning without costs.
+pub(crate) fn costs(tuning: &Tuning, loads: &[Load]) -> Option<Chart> {
+    let all = tuning.costs.iter().map(|cost| {
         let points = loads.iter().map(|load| (f64::from(load.objects), cost.curve.cost_ns(load) / 1e3)).collect();
         Series { name: cost.algorithm.to_string(), points }
     });
-    chart(&fields.scenario, &all.collect::<Vec<_>>(), "expected")
+    chart(&tuning.scenario, &all.collect::<Vec<_>>(), "expected")
 }
 
 /// The same of what a report measured in a scenario.
@@ -84,14 +84,14 @@ mod tests {
     fn the_cheapest_come_first_and_what_is_far_from_them_is_cut_off() {
         let all = vec![
             curve("brute@cpu1", &[(10.0, 2.0), (100.0, 200.0), (1000.0, 20_000.0)]),
-            curve("sweep@cpu1", &[(10.0, 3.0), (100.0, 30.0), (1000.0, 300.0)]),
-            curve("verlet@cpu1", &[(10.0, 1.0), (100.0, 10.0), (1000.0, 105.0)]),
-            curve("verlet@cpu2", &[(10.0, 9.0), (100.0, 12.0), (1000.0, 100.0)]),
-            curve("sweep@cpu2", &[]),
+            curve("sap@cpu1", &[(10.0, 3.0), (100.0, 30.0), (1000.0, 300.0)]),
+            curve("pair-cache@cpu1", &[(10.0, 1.0), (100.0, 10.0), (1000.0, 105.0)]),
+            curve("pair-cache@cpu2", &[(10.0, 9.0), (100.0, 12.0), (1000.0, 100.0)]),
+            curve("sap@cpu2", &[]),
         ];
         let chart = chart("uniform", &all, "measured").unwrap();
         let named: Vec<(&str, usize)> = chart.series.iter().map(|s| (&s.name[..], s.points.len())).collect();
-        assert_eq!(named, [("verlet@cpu1", 3), ("verlet@cpu2", 3), ("brute@cpu1", 2), ("sweep@cpu1", 3)]);
+        assert_eq!(named, [("pair-cache@cpu1", 3), ("pair-cache@cpu2", 3), ("brute@cpu1", 2), ("sap@cpu1", 3)]);
         assert!(chart.title.starts_with("uniform: measured time") && chart.across == Axis::Logarithmic);
     }
 
@@ -102,6 +102,6 @@ mod tests {
         let chart = chart("uniform", &many, "expected").unwrap();
         assert_eq!(chart.series.iter().map(|s| &s.name[..]).collect::<Vec<_>>().last(), Some(&"brute@cpu6"));
         let step = sapwise::Step { from_objects: 0, algorithm: "brute@cpu1".parse().unwrap() };
-        assert_eq!(costs(&Fields::from_steps(vec![step]).unwrap(), &[]), None);
+        assert_eq!(costs(&Tuning::from_steps(vec![step]).unwrap(), &[]), None);
     }
 }

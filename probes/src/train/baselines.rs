@@ -1,12 +1,12 @@
 //! Ways to choose an algorithm that a prediction has to beat.
 
-use super::curve::{slice, slice_fields};
+use super::curve::{slice, slice_tuning};
 use super::profile::Profile;
 use super::yardstick::{Chooser, NOT_TIMED, average};
 use super::{GPU_PARAMETERS, PARAMETERS, figure};
 use anyhow::Result;
 use sapwise::model::GPU_PREFIX;
-use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Fields, Hardware, Report};
+use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Tuning, Hardware, Report};
 
 /// The algorithms of a profile that were timed anywhere in it.
 pub(crate) fn available(profile: &Profile) -> Vec<AlgorithmId> {
@@ -32,8 +32,8 @@ pub(crate) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[Algo
 
 /// Brute force on one thread up to and including `last` objects, `above` on all threads from there on.
 ///
-/// With 64 and `strips` this is nexus, which has brute force for up to 64 colliders and a tree beyond; strips stand for the
-/// tree, being what is fastest in large scenes here. With 999 and `sweep` it is `mujoco_warp`, whose constant of 1000 bodies
+/// With 64 and `grid-sap` this is nexus, which has brute force for up to 64 colliders and a tree beyond; strips stand for the
+/// tree, being what is fastest in large scenes here. With 999 and `sap` it is `mujoco_warp`, whose constant of 1000 bodies
 /// parts two kinds of sweep after a brute force that is chosen by a count of filtered pairs, which is not known here; the
 /// constant is taken for the border between brute force and sweep. Both run on a GPU there; here both run on the CPU, which
 /// every machine has.
@@ -58,16 +58,16 @@ pub(crate) fn default_machine<'a>(
     available: &'a [AlgorithmId],
 ) -> Result<Chooser<'a>> {
     let scenario = usual(first.points.iter().map(|s| s.scenario.as_str()));
-    let fields = slice_fields(costs.to_vec(), scenario, &slice(first, scenario)?)?;
-    Ok(Box::new(move |load| fields.step(load.objects).and_then(|s| stand_in(&s.algorithm, available))))
+    let tuning = slice_tuning(costs.to_vec(), scenario, &slice(first, scenario)?)?;
+    Ok(Box::new(move |load| tuning.step(load.objects).and_then(|s| stand_in(&s.algorithm, available))))
 }
 
 /// The cheapest by cost curves; the nearest number of threads stands for one that the machine doesn't have.
 pub(crate) fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Chooser<'_> {
-    let fields = Fields::from_costs(sapwise::Source::Measured, "", costs, &[]);
+    let tuning = Tuning::from_costs(sapwise::Source::Measured, "", costs, &[]);
     Box::new(move |load| {
-        let best = fields.rank(load, |k| closest(&fields.costs[k].algorithm, available).is_some())?.best;
-        closest(&fields.costs[best].algorithm, available)
+        let best = tuning.rank(load, |k| closest(&tuning.costs[k].algorithm, available).is_some())?.best;
+        closest(&tuning.costs[best].algorithm, available)
     })
 }
 
@@ -137,13 +137,13 @@ mod tests {
 
     #[test]
     fn constants_and_substitutes_stay_within_what_is_available() {
-        let available = ids(&["brute@cpu1", "brute@cpu8", "strips@cpu1", "strips@cpu8"]);
-        let choose = frozen(64, "strips", &available);
+        let available = ids(&["brute@cpu1", "brute@cpu8", "grid-sap@cpu1", "grid-sap@cpu8"]);
+        let choose = frozen(64, "grid-sap", &available);
         let load = |objects| Load { objects, ..Load::default() };
         assert_eq!(choose(&load(64)).unwrap().to_string(), "brute@cpu1");
-        assert_eq!(choose(&load(65)).unwrap().to_string(), "strips@cpu8");
-        assert_eq!(frozen(64, "sweep", &available)(&load(100)), None);
-        assert_eq!(closest(&"strips@cpu16".parse().unwrap(), &available).unwrap().to_string(), "strips@cpu8");
+        assert_eq!(choose(&load(65)).unwrap().to_string(), "grid-sap@cpu8");
+        assert_eq!(frozen(64, "sap", &available)(&load(100)), None);
+        assert_eq!(closest(&"grid-sap@cpu16".parse().unwrap(), &available).unwrap().to_string(), "grid-sap@cpu8");
         assert_eq!(closest(&"tree@cpu1".parse().unwrap(), &available), None);
     }
 

@@ -1,11 +1,11 @@
 //! How far predicted borders lie from measured ones.
 
 use super::baselines::{closest, usual};
-use super::curve::{slice, slice_fields};
+use super::curve::{slice, slice_tuning};
 use super::profile::Profile;
-use sapwise::{AlgorithmCost, AlgorithmId, Border, Fields, Load, Source};
+use sapwise::{AlgorithmCost, AlgorithmId, Border, Tuning, Load, Source};
 
-/// The borders between the measured fields of one profile, in the scenario of its slice.
+/// The borders between the measured tuning of one profile, in the scenario of its slice.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Borders {
     loads: Vec<Load>,
@@ -17,7 +17,7 @@ impl Borders {
     pub(super) fn new(profile: &Profile, costs: &[AlgorithmCost]) -> Self {
         let scenario = usual(profile.points.iter().map(|s| s.scenario.as_str()));
         let found = slice(profile, scenario).and_then(|loads| {
-            let borders = slice_fields(costs.to_vec(), scenario, &loads)?.crossovers;
+            let borders = slice_tuning(costs.to_vec(), scenario, &loads)?.crossovers;
             Ok(Self { loads, borders })
         });
         found.unwrap_or_default()
@@ -50,12 +50,12 @@ impl Borders {
             predicted,
             crosses,
         };
-        let fields = Fields::from_costs(Source::Predicted, "", vec![below, above], &self.loads);
-        let alike = fields.crossovers.iter().filter(|b| b.below == border.below).map(|b| beside(b.objects, true));
+        let tuning = Tuning::from_costs(Source::Predicted, "", vec![below, above], &self.loads);
+        let alike = tuning.crossovers.iter().filter(|b| b.below == border.below).map(|b| beside(b.objects, true));
         if let Some(nearest) = alike.min_by(|a, b| a.octaves().total_cmp(&b.octaves())) {
             return nearest;
         }
-        let later = fields.step(border.objects as u32).is_some_and(|s| s.algorithm == border.below);
+        let later = tuning.step(border.objects as u32).is_some_and(|s| s.algorithm == border.below);
         let end = if later { self.loads.last() } else { self.loads.first() };
         beside(end.map_or(border.objects, |load| f64::from(load.objects.max(1))), false)
     }

@@ -10,7 +10,7 @@ use ndarray::Array2;
 use sapwise::crossover::{Comparison, Paired};
 use sapwise::hardware::parameter;
 use sapwise::report::{Label, Point, Report, Timed};
-use sapwise::{AlgorithmCost, AlgorithmId, Border, CostCurve, CostTerm, Fields, Knot, Load, Source};
+use sapwise::{AlgorithmCost, AlgorithmId, Border, CostCurve, CostTerm, Tuning, Knot, Load, Source};
 
 /// Distance of the knots of a correction, in octaves of the number of objects.
 const KNOT_STEP: f64 = 0.5;
@@ -19,43 +19,43 @@ const KNOT_REACH: f64 = 0.75;
 /// Points that a curve needs: below that its terms and its correction can't be told apart.
 const FEWEST_POINTS: usize = 3;
 
-/// The fields of the machine that `report` was measured on, with `steps` and `crossovers` for `scenario`.
+/// The tuning of the machine that `report` was measured on, with `steps` and `crossovers` for `scenario`.
 ///
 /// The cost curves are fitted to the points of all scenarios of the report. Intervals of crossovers come from the paired
 /// samples of `scenario` where both neighbours were timed there.
 ///
 /// # Errors
 /// When no point of `scenario`, or no algorithm, has enough timings; names the scenarios there are.
-pub(crate) fn measured_fields(report: &Report, scenario: &str) -> Result<Fields> {
-    let mut fields = profile_fields(&Profile::of("", report), scenario)?;
+pub(crate) fn measured_tuning(report: &Report, scenario: &str) -> Result<Tuning> {
+    let mut tuning = profile_tuning(&Profile::of("", report), scenario)?;
     if report.label == Label::Simulated {
-        fields.warnings.push("the report is simulated".to_owned());
+        tuning.warnings.push("the report is simulated".to_owned());
     }
     if !report.provenance.optimised {
-        fields.warnings.push("the report was timed by an unoptimised build".to_owned());
+        tuning.warnings.push("the report was timed by an unoptimised build".to_owned());
     }
-    measure_borders(&mut fields, report);
-    Ok(fields)
+    measure_borders(&mut tuning, report);
+    Ok(tuning)
 }
 
 /// The same without intervals from paired samples, which a profile does not hold.
-fn profile_fields(profile: &Profile, scenario: &str) -> Result<Fields> {
+fn profile_tuning(profile: &Profile, scenario: &str) -> Result<Tuning> {
     let loads = slice(profile, scenario)?;
     let (costs, warnings) = measured_costs(profile);
-    let mut fields = slice_fields(costs, scenario, &loads)?;
-    fields.warnings = warnings;
-    Ok(fields)
+    let mut tuning = slice_tuning(costs, scenario, &loads)?;
+    tuning.warnings = warnings;
+    Ok(tuning)
 }
 
-/// Measured fields with the slice through these loads.
+/// Measured tuning with the slice through these loads.
 ///
 /// # Errors
 /// When there are no costs.
-pub(super) fn slice_fields(costs: Vec<AlgorithmCost>, scenario: &str, loads: &[Load]) -> Result<Fields> {
+pub(super) fn slice_tuning(costs: Vec<AlgorithmCost>, scenario: &str, loads: &[Load]) -> Result<Tuning> {
     if costs.is_empty() {
         bail!("no algorithm of the report was timed at {FEWEST_POINTS} points; measure again with `sapwise probe`");
     }
-    Ok(Fields::from_costs(Source::Measured, scenario, costs, loads))
+    Ok(Tuning::from_costs(Source::Measured, scenario, costs, loads))
 }
 
 /// The loads of a scenario, ascending by objects.
@@ -176,19 +176,19 @@ fn correction(measured: &[(f64, f64)], floors: &[(f64, f64)]) -> Vec<Knot> {
 }
 
 /// Replaces the interval of each crossover by the one from paired samples, where there is one.
-fn measure_borders(fields: &mut Fields, report: &Report) {
+fn measure_borders(tuning: &mut Tuning, report: &Report) {
     let mut measured = 0;
-    for border in &mut fields.crossovers {
-        let Some((low, high)) = measured_interval(border, report, &fields.scenario) else { continue };
+    for border in &mut tuning.crossovers {
+        let Some((low, high)) = measured_interval(border, report, &tuning.scenario) else { continue };
         (border.low, border.high) = (Some(low), Some(high));
         measured += 1;
     }
     if measured > 0 {
-        let all = fields.crossovers.len();
-        fields.interval_basis = format!(
+        let all = tuning.crossovers.len();
+        tuning.interval_basis = format!(
             "{measured} of {all}: 90 % by the paired samples, from where they tell that the one below is cheaper to where they tell \
              that the one above is, or to the last size at which both were timed; the others: {}",
-            fields.interval_basis
+            tuning.interval_basis
         );
     }
 }
@@ -222,12 +222,12 @@ mod tests {
     fn choosing_by_the_curves_loses_little_and_never_what_left_the_race() {
         for machine in Machine::family() {
             let report = machine.report();
-            let fields = measured_fields(&report, "uniform").unwrap();
-            assert_eq!(fields.defect(), None);
+            let tuning = measured_tuning(&report, "uniform").unwrap();
+            assert_eq!(tuning.defect(), None);
             let profile = Profile::of("", &report);
             let mut regret = 0.0;
             for spot in &profile.points {
-                let chosen = &fields.costs[fields.rank(&spot.load, |_| true).unwrap().best].algorithm;
+                let chosen = &tuning.costs[tuning.rank(&spot.load, |_| true).unwrap().best].algorithm;
                 let ns = profile.medians(spot).find(|m| m.0 == chosen).expect("chose one that had left the race").1;
                 regret += ns / spot.best().unwrap() - 1.0;
             }
@@ -240,11 +240,11 @@ mod tests {
     fn whoever_left_the_race_stays_behind_beyond_all_sizes() {
         for machine in Machine::family() {
             let report = machine.report();
-            let fields = measured_fields(&report, "uniform").unwrap();
+            let tuning = measured_tuning(&report, "uniform").unwrap();
             for objects in [200_000.0, 1e6, 8e6] {
                 for scenario in ["uniform", "clustered"] {
-                    let best = fields.rank(&load(scenario, objects), |_| true).unwrap().best;
-                    assert_ne!(fields.costs[best].algorithm.method(), "brute");
+                    let best = tuning.rank(&load(scenario, objects), |_| true).unwrap().best;
+                    assert_ne!(tuning.costs[best].algorithm.method(), "brute");
                 }
             }
         }
@@ -280,40 +280,40 @@ mod tests {
         let mut report = Machine::family()[0].clone().exact().report();
         let from = |p: &Point| p.scenario == "clustered" && p.load.objects > 5000;
         for point in &mut report.points {
-            let one = point.timings.iter().find(|t| t.algorithm.to_string() == "strips@cpu1").unwrap().samples_ns.clone();
-            let two = point.timings.iter_mut().find(|t| t.algorithm.to_string() == "strips@cpu2").unwrap();
+            let one = point.timings.iter().find(|t| t.algorithm.to_string() == "grid-sap@cpu1").unwrap().samples_ns.clone();
+            let two = point.timings.iter_mut().find(|t| t.algorithm.to_string() == "grid-sap@cpu2").unwrap();
             let slower = if point.scenario == "clustered" && point.load.objects > 3000 { 8 } else { 1 };
             two.samples_ns = one.iter().map(|ns| ns * slower + ns / 50).collect();
         }
         for point in report.points.iter_mut().filter(|p| from(p)) {
-            point.timings.retain(|t| t.algorithm.to_string() != "strips@cpu2");
+            point.timings.retain(|t| t.algorithm.to_string() != "grid-sap@cpu2");
         }
-        let fields = measured_fields(&report, "uniform").unwrap();
+        let tuning = measured_tuning(&report, "uniform").unwrap();
         for point in report.points.iter().filter(|p| from(p)) {
-            let chosen = &fields.costs[fields.rank(&point.load, |_| true).unwrap().best].algorithm;
-            assert_ne!(chosen.to_string(), "strips@cpu2", "{:?}", point.load);
+            let chosen = &tuning.costs[tuning.rank(&point.load, |_| true).unwrap().best].algorithm;
+            assert_ne!(chosen.to_string(), "grid-sap@cpu2", "{:?}", point.load);
         }
     }
 
     #[test]
     fn borders_get_intervals_from_paired_frames() {
         let report = Machine::family()[2].report();
-        let fields = measured_fields(&report, "uniform").unwrap();
+        let tuning = measured_tuning(&report, "uniform").unwrap();
         assert!(
-            !fields.crossovers.is_empty() && fields.interval_basis.contains("paired samples"),
+            !tuning.crossovers.is_empty() && tuning.interval_basis.contains("paired samples"),
             "{}",
-            fields.interval_basis
+            tuning.interval_basis
         );
-        for b in &fields.crossovers {
+        for b in &tuning.crossovers {
             let (low, high) = b.interval().unwrap();
             assert!(low <= b.objects && b.objects <= high && high / low < 8.0, "{b:?}");
         }
     }
 
-    /// A report of `brute@cpu1` and `strips@cpu1` whose ratio is `(n / crossing) ^ 0.5` in `uniform`, and a border at 1000.
+    /// A report of `brute@cpu1` and `grid-sap@cpu1` whose ratio is `(n / crossing) ^ 0.5` in `uniform`, and a border at 1000.
     fn crossed_at(crossing: f64) -> (Report, Border) {
         let mut report = Machine::family()[0].clone().exact().report();
-        let [below, above] = ["brute@cpu1", "strips@cpu1"].map(|id| id.parse::<AlgorithmId>().unwrap());
+        let [below, above] = ["brute@cpu1", "grid-sap@cpu1"].map(|id| id.parse::<AlgorithmId>().unwrap());
         for point in &mut report.points {
             // In the other scenario they never cross.
             let to = if point.scenario == "uniform" { crossing } else { 1e9 };
@@ -358,7 +358,7 @@ mod tests {
 
     #[test]
     fn a_scenario_that_was_not_measured_is_told() {
-        let error = measured_fields(&Machine::family()[0].report(), "dunes").unwrap_err().to_string();
+        let error = measured_tuning(&Machine::family()[0].report(), "dunes").unwrap_err().to_string();
         assert!(error.contains("clustered, uniform"), "{error}");
     }
 }

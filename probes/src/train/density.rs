@@ -1,6 +1,6 @@
 //! Whether the load decides better than the number of objects, on what was measured.
 
-use super::curve::measured_fields;
+use super::curve::measured_tuning;
 use crate::document::read_report;
 use sapwise::measure::statistics::median;
 use sapwise::report::Point;
@@ -26,7 +26,7 @@ fn best(point: &Point) -> (&AlgorithmId, f64) {
 #[test]
 fn where_the_number_of_objects_alone_is_wrong_by_a_factor_of_two_the_load_is_not() {
     let report = full_report();
-    let fields = measured_fields(&report, "uniform").unwrap();
+    let tuning = measured_tuning(&report, "uniform").unwrap();
     let (mut scenes, mut by_count, mut by_load) = (0, 0.0, 0.0);
     for point in &report.points {
         // The best for as many objects in the scenario of the thresholds, which are what the number alone has to go by.
@@ -36,8 +36,8 @@ fn where_the_number_of_objects_alone_is_wrong_by_a_factor_of_two_the_load_is_not
         else {
             continue;
         };
-        let chosen = fields.rank(&point.load, |_| true).unwrap().best;
-        let right = time(point, &fields.costs[chosen].algorithm).unwrap() / least;
+        let chosen = tuning.rank(&point.load, |_| true).unwrap().best;
+        let right = time(point, &tuning.costs[chosen].algorithm).unwrap() / least;
         assert!(right < wrong, "{} at {} objects", point.scenario, point.load.objects);
         scenes += 1;
         by_count += wrong.ln();
@@ -56,7 +56,7 @@ fn two_scenes_of_as_many_boxes_get_the_algorithms_that_suit_them() {
     let of = |scenario: Scenario| {
         let point = report.points.iter().find(|p| p.scenario == scenario.name() && p.load.objects == 1778);
         let point = point.expect("the report has that point");
-        let mut adaptive = Adaptive::new(measured_fields(&report, "uniform").unwrap(), &registry).unwrap();
+        let mut adaptive = Adaptive::new(measured_tuning(&report, "uniform").unwrap(), &registry).unwrap();
         // What frames take here is another matter.
         adaptive.set_learning(false);
         let (mut scene, mut pairs) = (scenario.start(1778, 1), Pairs::new());

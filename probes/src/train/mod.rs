@@ -1,4 +1,4 @@
-//! From reports to cost curves, fields and models.
+//! From reports to cost curves, tuning and models.
 
 mod baselines;
 mod clouds;
@@ -47,7 +47,7 @@ use sapwise::model::{GPU_PREFIX, Validation};
 use sapwise::{GpuKind, Hardware, Model};
 
 pub(crate) use baselines::{available, by_costs, slice_scenario};
-pub(crate) use curve::{measured_costs, measured_fields};
+pub(crate) use curve::{measured_costs, measured_tuning};
 pub(crate) use held::{Held, HeldBorder, Time};
 pub(crate) use importance::{Effect, Importance, Interval, Verdict, importance, measured_borders};
 pub(crate) use profile::{Profile, as_at_the_points};
@@ -203,9 +203,9 @@ mod tests {
         let range = model.ranges.iter().find(|r| r.parameter == "gpu/upload_rate_gb_per_s").unwrap();
         assert_eq!((range.min, range.max), (5.0, 24.0));
         let all = |ids: &[&str]| ids.iter().map(|id| (id.parse().unwrap(), 1)).collect::<Vec<_>>();
-        let within = model.predict(&machines[1].hardware(), &all(&["strips@cpu1", "strips@gpu0", "strips@gpu0+1"])).unwrap();
+        let within = model.predict(&machines[1].hardware(), &all(&["grid-sap@cpu1", "grid-sap@gpu0", "grid-sap@gpu0+1"])).unwrap();
         assert!(within.costs.len() == 3 && !within.extrapolated, "{:?}", within.warnings);
-        let outside = model.predict(&machines[4].hardware(), &all(&["strips@gpu0"])).unwrap();
+        let outside = model.predict(&machines[4].hardware(), &all(&["grid-sap@gpu0"])).unwrap();
         let told = |text: &str| outside.warnings.iter().any(|w| w.contains(text));
         assert!(outside.extrapolated && told("upload_rate_gb_per_s of gpu0 is 50.0000"), "{:?}", outside.warnings);
     }

@@ -113,6 +113,6 @@ mod tests {
             ["direct regression: 3 to 12 of 28 to 79 borders are means"]
         );
         // A number within a word names something.
-        assert_eq!(told(&["sweep@cpu1 is slow", "sweep@cpu2 is slow", "sweep@cpu1 is slow"]).len(), 2);
+        assert_eq!(told(&["sap@cpu1 is slow", "sap@cpu2 is slow", "sap@cpu1 is slow"]).len(), 2);
     }
 }

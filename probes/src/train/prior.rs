@@ -172,7 +172,7 @@ mod tests {
     const SIZES: [f64; 8] = [4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0];
 
     fn ids() -> Vec<AlgorithmId> {
-        ["brute", "sweep", "strips"].iter().flat_map(|m| [1, 2, 8].map(|k| format!("{m}@cpu{k}").parse().unwrap())).collect()
+        ["brute", "sap", "grid-sap"].iter().flat_map(|m| [1, 2, 8].map(|k| format!("{m}@cpu{k}").parse().unwrap())).collect()
     }
 
     /// The lower triangle whose product with its transpose is `matrix`.

@@ -82,10 +82,10 @@ mod tests {
         let mut report = Machine::family_with_gpus()[1].report();
         let left = |report: &Report| {
             let profile = Profile::of("", report);
-            let own = profile.position(&"strips@gpu0".parse().unwrap()).unwrap();
+            let own = profile.position(&"grid-sap@gpu0".parse().unwrap()).unwrap();
             rows(&profile, 0).iter().any(|r| r.algorithm == own && r.floor)
         };
-        let on_gpu = |id: &sapwise::AlgorithmId| id.to_string() == "strips@gpu0";
+        let on_gpu = |id: &sapwise::AlgorithmId| id.to_string() == "grid-sap@gpu0";
         assert!(!left(&report));
         // For want of time it leaves at 500 objects.
         for point in report.points.iter_mut().filter(|p| p.load.objects > 500) {

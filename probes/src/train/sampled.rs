@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn nine_times_in_ten_lie_within_what_the_other_machines_give() {
         let mut random = Random::named(7, &[]);
-        let id: sapwise::AlgorithmId = "strips@cpu1".parse().unwrap();
+        let id: sapwise::AlgorithmId = "grid-sap@cpu1".parse().unwrap();
         let mut errors = |machines: usize, factor: f64| {
             let of = |machine: usize| {
                 let off = 0.2 * random.normal() * if machine == 0 { factor } else { 1.0 };

@@ -213,14 +213,14 @@ mod tests {
     fn old_revisions_errors_and_few_samples_are_dropped() {
         let [mut old, new] = [0, 1].map(|k| Machine::family()[k].report());
         let mut newer = new.clone();
-        newer.algorithms.iter_mut().filter(|t| t.id.method() == "strips").for_each(|t| t.revision += 1);
+        newer.algorithms.iter_mut().filter(|t| t.id.method() == "grid-sap").for_each(|t| t.revision += 1);
         old.points[0].timings[0].error = Some("out of memory".to_owned());
         old.points[0].timings[1].samples_ns.truncate(2);
         let before = old.points[0].timings.len();
-        let strips = old.points[0].timings.iter().filter(|t| t.algorithm.method() == "strips").count();
+        let strips = old.points[0].timings.iter().filter(|t| t.algorithm.method() == "grid-sap").count();
         let (profiles, notes) = usable(&[named(old), named(newer)], Evidence::Real);
-        assert!(profiles[0].algorithms.iter().all(|t| t.id.method() != "strips"));
-        let stale = profiles[1].algorithms.iter().filter(|t| t.id.method() == "strips").count();
+        assert!(profiles[0].algorithms.iter().all(|t| t.id.method() != "grid-sap"));
+        let stale = profiles[1].algorithms.iter().filter(|t| t.id.method() == "grid-sap").count();
         assert!(stale > 0 && notes.iter().all(|n| n.contains("revision")), "{notes:?}");
         assert_eq!(profiles[0].points[0].medians.len(), before - 2 - strips);
     }

@@ -281,8 +281,8 @@ pub(crate) fn gpu_truth() -> Vec<MethodModel> {
     };
     vec![
         method("brute", None, 4.0, (AllPairs, GpuOperation, 12.0)),
-        method("sweep", Some(20.0), 30.0, (AxisCandidates, GpuOperation, 15.0)),
-        method("strips", Some(25.0), 40.0, (StripCandidates, GpuOperation, 300.0)),
+        method("sap", Some(20.0), 30.0, (AxisCandidates, GpuOperation, 15.0)),
+        method("grid-sap", Some(25.0), 40.0, (StripCandidates, GpuOperation, 300.0)),
     ]
 }
 
@@ -313,14 +313,14 @@ pub(crate) fn truth() -> Vec<MethodModel> {
                 (Pairs, SharedCycle, 12.0),
             ],
         ),
-        method("sweep", &sorted(1500.0, 3.0, (AxisCandidates, SharedLane, 7.0))),
-        method("strips", &sorted(6000.0, 4.0, (StripCandidates, SharedLane, 60.0))),
+        method("sap", &sorted(1500.0, 3.0, (AxisCandidates, SharedLane, 7.0))),
+        method("grid-sap", &sorted(6000.0, 4.0, (StripCandidates, SharedLane, 60.0))),
         MethodModel {
             otherwise: sorted(7000.0, 4.4, (StripCandidates, SharedLane, 66.0))
                 .map(|(term, scale, unit)| ModelTerm { term, scale, unit })
                 .into(),
             ..method(
-                "verlet",
+                "pair-cache",
                 &[
                     (Call, Cycle, 800.0),
                     (Call, ForkJoin, 2.0),

@@ -8,27 +8,27 @@ use sapwise::{BackendClass, Term};
 fn tests(method: &str) -> &'static [Term] {
     match method {
         "brute" => &[Term::AllPairs],
-        "sweep" => &[Term::AxisCandidates],
-        "strips" => &[Term::StripCandidates],
-        // Verlet lists are tested pair by pair, and made anew in few frames.
-        "verlet" => &[],
+        "sap" => &[Term::AxisCandidates],
+        "grid-sap" => &[Term::StripCandidates],
+        // pair-cache lists are tested pair by pair, and made anew in few frames.
+        "pair-cache" => &[],
         _ => &[Term::AllPairs, Term::AxisCandidates, Term::StripCandidates],
     }
 }
 
-/// The method that another one goes over to where that is cheaper: the strips take over where boxes move too far for Verlet lists.
+/// The method that another one goes over to where that is cheaper: the strips take over where boxes move too far for pair-cache lists.
 pub(crate) fn other_way(method: &str) -> Option<&'static str> {
-    (method == "verlet").then_some("strips")
+    (method == "pair-cache").then_some("grid-sap")
 }
 
-/// Whether the boxes are sorted in every frame. Verlet lists sort them in few, or, where the strips take over, by their cells only.
+/// Whether the boxes are sorted in every frame. pair-cache lists sort them in few, or, where the strips take over, by their cells only.
 fn sorts(method: &str) -> bool {
-    !matches!(method, "brute" | "verlet")
+    !matches!(method, "brute" | "pair-cache")
 }
 
 /// Whether a frame may be cheaper where boxes move little.
-fn keeps_work(method: &str) -> bool {
-    !matches!(method, "brute" | "sweep" | "strips")
+fn is_incremental(method: &str) -> bool {
+    !matches!(method, "brute" | "sap" | "grid-sap")
 }
 
 /// The physical terms of a method over machines, for any number of threads or GPUs.
@@ -51,7 +51,7 @@ pub(crate) fn terms(method: &str, class: BackendClass) -> Vec<(Term, Scale)> {
             }
             list.extend(tests.flat_map(|&t| [(t, SharedLane), (t, SharedCycle)]));
             list.push((Pairs, SharedCycle));
-            if keeps_work(method) {
+            if is_incremental(method) {
                 list.push((Moved, SharedCycle));
             }
             list.extend([(Objects, SharedLine), (Objects, Cycle)]);
@@ -84,7 +84,7 @@ pub(crate) fn terms_of_one_machine(method: &str, class: BackendClass) -> Vec<Ter
     }
     list.extend(tests(method));
     list.push(Term::Pairs);
-    if class == BackendClass::Cpu && keeps_work(method) {
+    if class == BackendClass::Cpu && is_incremental(method) {
         list.push(Term::Moved);
     }
     list

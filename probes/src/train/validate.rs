@@ -238,8 +238,8 @@ impl<'a> Data<'a> {
                 direct_elastic_net(&fitted.crossed, &profile.hardware, &available, &mut found.notes)?,
             ),
             alone(SINGLE_BEST, baselines::single_best(&fitted.always, &available)),
-            alone("frozen constants (64)", baselines::frozen(64, "strips", &available)),
-            alone("frozen constants (1000)", baselines::frozen(999, "sweep", &available)),
+            alone("frozen constants (64)", baselines::frozen(64, "grid-sap", &available)),
+            alone("frozen constants (1000)", baselines::frozen(999, "sap", &available)),
             alone("default machine", default_machine),
             by("nearest machine", nearest, &available),
             // Its costs are those that borders are measured by.

@@ -47,7 +47,7 @@ fn next_step(files: &[Finding]) -> String {
     let first = files.first().map_or("FILE", |f| &f.file);
     match files.first().and_then(|f| f.schema) {
         Some(schema) if schema.starts_with("model/") => format!("sapwise predict --model {first}"),
-        Some(schema) if schema.starts_with("fields/") => format!("sapwise run fragmentation --fields {first}"),
+        Some(schema) if schema.starts_with("tuning/") => format!("sapwise run fragmentation --tuning {first}"),
         _ => format!("sapwise predict --report {first}"),
     }
 }

@@ -63,7 +63,7 @@ fn text(comparison: &Comparison, terminal: Terminal) -> String {
     }
     if let Some(Losses { own, others, beyond_own, beyond_own_most }) = &comparison.losses {
         text.push_str(&format!(
-            "\nMean regret of the fields of a report: {} on its own timings, {} on those of the others; beyond its own {}, at most {}\n",
+            "\nMean regret of the tuning of a report: {} on its own timings, {} on those of the others; beyond its own {}, at most {}\n",
             percent(*own),
             percent(*others),
             percent(*beyond_own),

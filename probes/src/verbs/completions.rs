@@ -57,7 +57,7 @@ mod tests {
         // These two complete the values of options, too.
         for shell in [Shell::Bash, Shell::Zsh] {
             let script = of(shell);
-            for value in ["fragmentation", "strips@cpu1", "cache"] {
+            for value in ["fragmentation", "grid-sap@cpu1", "cache"] {
                 assert!(script.contains(value), "{shell} lacks {value}");
             }
         }

@@ -14,7 +14,7 @@ use serde::Serialize;
 use std::time::Instant;
 
 /// What is run when the user names nothing.
-const DEFAULT: &str = "strips@cpu1";
+const DEFAULT: &str = "grid-sap@cpu1";
 
 /// The limit on the pairs where the free memory can't be told or is next to nothing: a small scene must pass all the same.
 const FEWEST_PAIRS: usize = 1 << 20;

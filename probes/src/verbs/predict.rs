@@ -1,4 +1,4 @@
-//! `sapwise predict`: the fields of a machine without a sweep, or from the one that its report holds.
+//! `sapwise predict`: the tuning of a machine without a sweep, or from the one that its report holds.
 
 use crate::algorithms::Algorithms;
 use crate::args::Predict;
@@ -26,13 +26,13 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     let (mut told, mut remarks) = (None, Vec::new());
     // Whether a sample gave wrong pairs.
     let mut wrong = false;
-    let mut fields = match (&model, &report) {
+    let mut tuning = match (&model, &report) {
         (None, Some(report)) => {
             let mut report = report.clone();
             arguments.gpus.restrict(&mut report);
             let report = &report;
             let scenario = arguments.scenario.map(|s| s.to_string());
-            train::measured_fields(report, scenario.as_deref().unwrap_or_else(|| train::slice_scenario(report)))?
+            train::measured_tuning(report, scenario.as_deref().unwrap_or_else(|| train::slice_scenario(report)))?
         }
         (None, None) => return Err(WrongUsage("--measured needs --report".to_owned()).into()),
         (Some(model), report) => {
@@ -71,19 +71,19 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
             }
         }
     };
-    fields.warnings.append(&mut remarks);
+    tuning.warnings.append(&mut remarks);
     if let Some(path) = &arguments.out {
-        files::write_text(path, &json::write(&fields)?)?;
+        files::write_text(path, &json::write(&tuning)?)?;
     }
     let outcome = if wrong || interrupt::requested() { Outcome::Failed } else { Outcome::Done };
     if arguments.json {
-        output::print_json(&fields)?;
+        output::print_json(&tuning)?;
         return Ok(outcome);
     }
-    text += &summary::fields(&fields, terminal);
+    text += &summary::tuning(&tuning, terminal);
     let chart = match (&slice, &report) {
-        (Some(slice), _) => terminal::costs(&fields, &slice.loads),
-        (None, report) => report.as_ref().and_then(|report| terminal::timings(report, &fields.scenario)),
+        (Some(slice), _) => terminal::costs(&tuning, &slice.loads),
+        (None, report) => report.as_ref().and_then(|report| terminal::timings(report, &tuning.scenario)),
     };
     text += &chart.and_then(|chart| chart.draw(terminal)).map(|chart| format!("\n{chart}")).unwrap_or_default();
     if report.is_some() && model.is_some() && arguments.samples > 0 {
@@ -93,8 +93,8 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         text += &format!("\n{told}\n");
     }
     text += &match &arguments.out {
-        Some(path) => format!("Written to {}. Next: sapwise run fragmentation --fields {}", path.display(), path.display()),
-        None => "Next: the same with --out fields.json, then sapwise run fragmentation --fields fields.json".to_owned(),
+        Some(path) => format!("Written to {}. Next: sapwise run fragmentation --tuning {}", path.display(), path.display()),
+        None => "Next: the same with --out tuning.json, then sapwise run fragmentation --tuning tuning.json".to_owned(),
     };
     output::print(&text)?;
     Ok(outcome)

@@ -153,8 +153,8 @@ fn borders(held: &Held, entries: &[Entry]) -> BTreeMap<String, Vec<Border>> {
     let borders = |entry: &&Entry| {
         let mut report = read_report(&entry.path).ok()?.1;
         study::keep(&mut report, |id| entry.profile.position(id).is_some());
-        let fields = train::measured_fields(&report, train::slice_scenario(&report)).ok()?;
-        Some((entry.file.clone(), fields.crossovers))
+        let tuning = train::measured_tuning(&report, train::slice_scenario(&report)).ok()?;
+        Some((entry.file.clone(), tuning.crossovers))
     };
     own.par_iter().filter_map(borders).collect()
 }

@@ -1,10 +1,10 @@
 use super::*;
 use crate::Step;
 
-/// Fields that tell which writer they are of.
-fn fields(writer: u32) -> Fields {
+/// Tuning that tell which writer they are of.
+fn tuning(writer: u32) -> Tuning {
     let step = |from_objects| Step { from_objects, algorithm: AlgorithmId::cpu("brute", 1) };
-    Fields::from_steps(std::iter::once(0).chain(1_000 * writer + 1..1_000 * writer + 200).map(step).collect()).unwrap()
+    Tuning::from_steps(std::iter::once(0).chain(1_000 * writer + 1..1_000 * writer + 200).map(step).collect()).unwrap()
 }
 
 fn key() -> Key {
@@ -27,8 +27,8 @@ fn what_is_kept_comes_back_and_nothing_else_is_left() {
     let entry = entry(&inner, key());
     assert_eq!(entry.read(), Ok(None));
     for writer in [1, 2] {
-        entry.write(fields(writer)).unwrap();
-        assert_eq!(entry.read(), Ok(Some(fields(writer))));
+        entry.write(tuning(writer)).unwrap();
+        assert_eq!(entry.read(), Ok(Some(tuning(writer))));
     }
     assert_eq!(names(&inner), [entry.file().file_name().unwrap().to_str().unwrap()]);
     assert!(Entry::new(&Cache::None, key()).unwrap().is_none());
@@ -83,7 +83,7 @@ fn every_part_of_the_key_has_a_place_of_its_own() {
 fn what_is_damaged_foreign_or_old_is_told_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let entry = entry(folder.path(), key());
-    entry.write(fields(1)).unwrap();
+    entry.write(tuning(1)).unwrap();
     let whole = fs::read_to_string(entry.file()).unwrap();
     let other_key = whole.replacen(&key().machine.physical_id, "0123456789abcdef", 1);
     let steps = whole.replacen("\"from_objects\": 0", "\"from_objects\": 7", 1);
@@ -100,8 +100,8 @@ fn what_is_damaged_foreign_or_old_is_told_and_replaced() {
         fs::write(entry.file(), text).unwrap();
         let told = entry.read().unwrap_err();
         assert!(told.contains(why), "{why}: {told}");
-        entry.write(fields(2)).unwrap();
-        assert_eq!(entry.read(), Ok(Some(fields(2))));
+        entry.write(tuning(2)).unwrap();
+        assert_eq!(entry.read(), Ok(Some(tuning(2))));
     }
     fs::write(entry.file(), [0xff; 100]).unwrap();
     assert!(entry.read().is_err());
@@ -113,7 +113,7 @@ fn a_folder_in_its_place_is_an_error_in_words() {
     let entry = entry(folder.path(), key());
     fs::create_dir_all(entry.file().join("inside")).unwrap();
     assert!(entry.read().unwrap_err().contains("it is no file"));
-    let told = entry.write(fields(1)).unwrap_err();
+    let told = entry.write(tuning(1)).unwrap_err();
     assert!(told.contains("can't be written"), "{told}");
     assert_eq!(names(folder.path()).len(), 1);
 }
@@ -122,16 +122,16 @@ fn a_folder_in_its_place_is_an_error_in_words() {
 #[test]
 fn writers_at_once_leave_a_whole_file() {
     let folder = tempfile::tempdir().unwrap();
-    entry(folder.path(), key()).write(fields(0)).unwrap();
+    entry(folder.path(), key()).write(tuning(0)).unwrap();
     std::thread::scope(|scope| {
         let writers: Vec<_> = [1, 2]
             .map(|writer| {
                 let entry = entry(folder.path(), key());
-                scope.spawn(move || (0..200).for_each(|_| entry.write(fields(writer)).unwrap()))
+                scope.spawn(move || (0..200).for_each(|_| entry.write(tuning(writer)).unwrap()))
             })
             .into();
         let entry = entry(folder.path(), key());
-        let known = [fields(0), fields(1), fields(2)];
+        let known = [tuning(0), tuning(1), tuning(2)];
         while writers.iter().any(|w| !w.is_finished()) {
             let seen = entry.read().unwrap().unwrap();
             assert!(known.contains(&seen));

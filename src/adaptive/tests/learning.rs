@@ -2,8 +2,8 @@
 
 use super::super::decision::Reason;
 use super::super::policy::Policy;
-use super::fields;
-use crate::{AlgorithmId, Fields, Load};
+use super::tuning;
+use crate::{AlgorithmId, Tuning, Load};
 
 /// What a frame of an algorithm really takes: by its position, the number of objects and the frame.
 type Truth = dyn Fn(usize, f64, usize) -> f64;
@@ -35,14 +35,14 @@ impl Chance {
     }
 }
 
-fn policy(fields: Fields) -> Policy {
-    let count = fields.costs.len();
-    Policy::new(fields, &vec![None; count], vec![true; count])
+fn policy(tuning: Tuning) -> Policy {
+    let count = tuning.costs.len();
+    Policy::new(tuning, &vec![None; count], vec![true; count])
 }
 
 /// Runs so many frames of so many objects on a machine with that truth, each frame noisy by a tenth.
 fn run(policy: &mut Policy, frames: std::ops::Range<usize>, objects: u32, truth: &Truth) -> Vec<Frame> {
-    let count = policy.fields().costs.len();
+    let count = policy.tuning().costs.len();
     let mut chance = Chance(17);
     let load = Load { objects, ..Load::default() };
     let frame = |at: usize| {
@@ -64,10 +64,10 @@ fn regret(frames: &[Frame], truth: &Truth, objects: f64) -> f64 {
 }
 
 #[test]
-fn fields_of_another_machine_are_corrected_by_the_frames_that_run() {
+fn tuning_of_another_machine_are_corrected_by_the_frames_that_run() {
     // All are three to four times dearer here, and the one that was predicted to be the cheapest is not. The third is out of reach: to try what
     // is expected to be 40 % dearer is not allowed.
-    let wrong = fields(&[("strips@cpu1", 0.0, 100.0), ("sweep@cpu1", 0.0, 110.0), ("brute@cpu1", 0.0, 140.0)]);
+    let wrong = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 0.0, 110.0), ("brute@cpu1", 0.0, 140.0)]);
     let truth = |k: usize, n: f64, _: usize| n * [390.0, 330.0, 480.0][k];
     let mut policy = policy(wrong);
     let before = run(&mut policy, 0..300, 1000, &truth);
@@ -81,8 +81,8 @@ fn fields_of_another_machine_are_corrected_by_the_frames_that_run() {
 }
 
 #[test]
-fn without_learning_wrong_fields_stay_wrong() {
-    let wrong = fields(&[("strips@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 120.0)]);
+fn without_learning_wrong_tuning_stay_wrong() {
+    let wrong = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 120.0)]);
     let truth = |k: usize, n: f64, _: usize| n * [300.0, 100.0][k];
     let mut policy = policy(wrong);
     policy.set_learning(false);
@@ -92,7 +92,7 @@ fn without_learning_wrong_fields_stay_wrong() {
 
 #[test]
 fn a_clock_that_throttles_moves_every_expectation_and_no_choice() {
-    let right = fields(&[("strips@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 130.0)]);
+    let right = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 130.0)]);
     let truth = |k: usize, n: f64, at: usize| n * [100.0, 130.0][k] * if at < 300 { 1.0 } else { 1.6 };
     let mut policy = policy(right);
     let frames = run(&mut policy, 0..600, 1000, &truth);
@@ -106,7 +106,7 @@ fn a_clock_that_throttles_moves_every_expectation_and_no_choice() {
 #[test]
 fn a_core_that_another_program_takes_is_left_and_found_again() {
     // Two threads are faster, but from frame 300 to 900 one frame in eight waits 4 ms for a core.
-    let right = fields_of_threads();
+    let right = tuning_of_threads();
     let truth = |k: usize, n: f64, at: usize| {
         let waits = k == 1 && (300..900).contains(&at) && at.is_multiple_of(8);
         n * [100.0, 60.0][k] + if waits { 4e6 } else { 0.0 }
@@ -122,15 +122,15 @@ fn a_core_that_another_program_takes_is_left_and_found_again() {
     assert!(with_two(5000..6000) > 0.9, "{}", with_two(5000..6000));
 }
 
-fn fields_of_threads() -> Fields {
-    let mut fields = fields(&[("strips@cpu1", 0.0, 100.0), ("strips@cpu2", 0.0, 60.0)]);
-    fields.costs[1].algorithm = AlgorithmId::cpu("strips", 2);
-    fields
+fn tuning_of_threads() -> Tuning {
+    let mut tuning = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("grid-sap@cpu2", 0.0, 60.0)]);
+    tuning.costs[1].algorithm = AlgorithmId::cpu("grid-sap", 2);
+    tuning
 }
 
 #[test]
 fn one_disturbed_frame_changes_no_choice() {
-    let right = fields(&[("strips@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 115.0)]);
+    let right = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 115.0)]);
     let truth = |k: usize, n: f64, at: usize| n * [100.0, 115.0][k] * if at % 150 == 149 { 50.0 } else { 1.0 };
     let frames = run(&mut policy(right), 0..900, 1000, &truth);
     let others = frames.iter().filter(|f| f.chosen != 0 && f.reason != Reason::Explored).count();
@@ -142,7 +142,7 @@ fn exploring_is_rare_bounded_and_can_be_turned_off() {
     let near = || {
         let costs: Vec<(String, f64)> = (0..8).map(|k| (format!("m{k}@cpu1"), 100.0 + 8.0 * f64::from(k))).collect();
         let costs: Vec<(&str, f64, f64)> = costs.iter().map(|(id, ns)| (id.as_str(), 0.0, *ns)).collect();
-        fields(&costs)
+        tuning(&costs)
     };
     let truth = |k: usize, n: f64, at: usize| n * (100.0 + 8.0 * ((k + at / 500) % 8) as f64);
     let frames = run(&mut policy(near()), 0..4000, 1000, &truth);
@@ -154,7 +154,7 @@ fn exploring_is_rare_bounded_and_can_be_turned_off() {
     quiet.set_exploring(false);
     assert!(run(&mut quiet, 0..4000, 1000, &truth).iter().all(|f| f.reason != Reason::Explored));
     // What could save nothing is not tried: half as dear again, and surely so.
-    let far = fields(&[("strips@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 150.0)]);
+    let far = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 150.0)]);
     let truth = |k: usize, n: f64, _: usize| n * [100.0, 150.0][k];
     assert!(run(&mut policy(far), 0..4000, 1000, &truth).iter().all(|f| f.chosen == 0));
 }
@@ -162,8 +162,8 @@ fn exploring_is_rare_bounded_and_can_be_turned_off() {
 #[test]
 fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
     // The second keeps work: its first frame costs two, and so does one in fifty of those behind it. 2 % are saved a frame.
-    let costs = fields(&[("strips@cpu1", 0.0, 100.0), ("sweep@cpu1", 0.0, 96.0)]);
-    let start = |costs: Fields| {
+    let costs = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 0.0, 96.0)]);
+    let start = |costs: Tuning| {
         let mut policy = Policy::new(costs, &[None, Some(0)], vec![true; 2]);
         policy.set_learning(false);
         policy.set_usable(1, false);
@@ -182,7 +182,7 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
     let waited = (0..100).find(|_| seldom.choose(&load(1000), 6).unwrap().reason == Reason::Switched);
     assert_eq!(waited, Some(7));
     // 100 n and 50 n + 50 000 cross at 1000: about it the load flickers by one part in a hundred.
-    let mut flicker = start(fields(&[("strips@cpu1", 0.0, 100.0), ("sweep@cpu1", 50_000.0, 50.0)]));
+    let mut flicker = start(tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 50_000.0, 50.0)]));
     for k in 0..2000 {
         let choice = flicker.choose(&load(1000 + [10, 0, 0][k % 3] - [0, 0, 12][k % 3]), 1).unwrap();
         assert_eq!(choice.chosen, 0, "frame {k}");
@@ -191,8 +191,8 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
 
 #[test]
 fn what_makes_its_work_anew_too_often_is_left_and_taken_up_again() {
-    // The first keeps work. Up to frame 600 it makes that anew in one frame of three, which the fields know nothing of.
-    let mut costs = fields(&[("sweep@cpu1", 0.0, 10.0), ("strips@cpu1", 0.0, 20.0)]);
+    // The first keeps work. Up to frame 600 it makes that anew in one frame of three, which the tuning know nothing of.
+    let mut costs = tuning(&[("sap@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 0.0, 20.0)]);
     costs.costs[0].curve.otherwise = costs.costs[1].curve.terms.clone();
     let mut policy = Policy::new(costs, &[Some(0), None], vec![true; 2]);
     policy.set_exploring(false);

@@ -94,10 +94,10 @@ fn parse_dpm(text: &str) -> Option<u64> {
 /// Domain and location, as the list of compute nodes has them, of a PCI address.
 fn parse_address(text: &str) -> Option<(u64, u64)> {
     let (rest, function) = text.rsplit_once('.')?;
-    let mut fields = rest.split(':').map(|field| u64::from_str_radix(field, 16).ok());
-    let (domain, bus, device) = (fields.next()??, fields.next()??, fields.next()??);
+    let mut numbers = rest.split(':').map(|field| u64::from_str_radix(field, 16).ok());
+    let (domain, bus, device) = (numbers.next()??, numbers.next()??, numbers.next()??);
     let function = u64::from_str_radix(function, 16).ok()?;
-    (fields.next().is_none() && bus < 256 && device < 32 && function < 8)
+    (numbers.next().is_none() && bus < 256 && device < 32 && function < 8)
         .then_some((domain, bus << 8 | device << 3 | function))
 }
 

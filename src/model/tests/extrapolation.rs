@@ -51,7 +51,7 @@ fn a_thousand_cores_are_predicted_and_told_to_be_outside() {
     assert!(told(&p, "usable_cores is 1024") && told(&p, "has seen 1 threads at most"), "{:?}", p.warnings);
     assert!(told(&p, "--samples 8") && told(&p, "sapwise probe"), "{:?}", p.warnings);
     let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
-    assert_eq!(p.fields("uniform", &loads).defect(), None);
+    assert_eq!(p.tuning("uniform", &loads).defect(), None);
     let p = both().predict(&machine(&[]), &ids(&["brute@cpu1"])).unwrap();
     assert!(!p.extrapolated && p.warnings.is_empty(), "{:?}", p.warnings);
 }
@@ -125,10 +125,10 @@ fn a_combination_that_no_machine_of_the_training_has_is_told_with_the_parameters
 }
 
 #[test]
-fn without_a_cloud_the_fields_say_that_the_joint_test_is_left_out() {
+fn without_a_cloud_the_tuning_say_that_the_joint_test_is_left_out() {
     let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
     let basis = |model: &Model, id: &str| {
-        model.predict(&machine(&[]), &ids(&[id])).unwrap().fields("uniform", &loads).interval_basis
+        model.predict(&machine(&[]), &ids(&[id])).unwrap().tuning("uniform", &loads).interval_basis
     };
     assert!(basis(&both(), "brute@cpu1").contains("told by each parameter alone"));
     let with = Model { clouds: vec![cloud()], ..both() };

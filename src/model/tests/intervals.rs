@@ -12,10 +12,10 @@ fn truth() -> Vec<MethodModel> {
         terms: vec![ModelTerm { term, scale: Scale::Cycle, unit }],
         ..method(BackendClass::Cpu, Scale::Cycle)
     };
-    vec![of("sweep", Term::Objects, 4.0), of("strips", Term::Call, 4000.0)]
+    vec![of("sap", Term::Objects, 4.0), of("grid-sap", Term::Call, 4000.0)]
 }
 
-/// One machine left out, with the cost of `sweep` higher by `shift` than in the model.
+/// One machine left out, with the cost of `sap` higher by `shift` than in the model.
 fn fold(shift: f64, error: f64) -> Fold {
     let role = |method: &str| Role { method: method.to_owned(), backend: BackendClass::Cpu, several: false };
     let errors = |method: &str, against: Vec<(u32, u32, LnErrors)>| RoleErrors {
@@ -37,7 +37,7 @@ fn fold(shift: f64, error: f64) -> Fold {
     Fold {
         machines: 1,
         methods: vec![method(sweep, shift.exp()), method(strips, 1.0)],
-        errors: vec![errors("sweep", vec![(1, 1, [error; QUANTILES.len()])]), errors("strips", Vec::new())],
+        errors: vec![errors("sap", vec![(1, 1, [error; QUANTILES.len()])]), errors("grid-sap", Vec::new())],
     }
 }
 
@@ -62,18 +62,18 @@ fn machine() -> Hardware {
 }
 
 fn prediction(model: &Model) -> Prediction {
-    model.predict(&machine(), &ids(&["sweep@cpu1", "strips@cpu1"])).unwrap()
+    model.predict(&machine(), &ids(&["sap@cpu1", "grid-sap@cpu1"])).unwrap()
 }
 
-fn fields(model: &Model) -> crate::Fields {
+fn tuning(model: &Model) -> crate::Tuning {
     let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
-    prediction(model).fields("uniform", &loads)
+    prediction(model).tuning("uniform", &loads)
 }
 
 fn border(model: &Model) -> (f64, Option<(f64, f64)>) {
-    let fields = fields(model);
-    assert_eq!((fields.defect(), fields.crossovers.len()), (None, 1));
-    (fields.crossovers[0].objects, fields.crossovers[0].interval())
+    let tuning = tuning(model);
+    assert_eq!((tuning.defect(), tuning.crossovers.len()), (None, 1));
+    (tuning.crossovers[0].objects, tuning.crossovers[0].interval())
 }
 
 #[test]
@@ -107,7 +107,7 @@ fn the_errors_of_a_machine_count_by_how_many_of_its_points_have_them() {
     let mut model = with_folds(&[0.0; 10]);
     let id = |text: &str| text.parse::<AlgorithmId>().unwrap();
     let load = Load { objects: 1000, ..Load::default() };
-    let end = |model: &Model| prediction(model).interval_ns(&id("sweep@cpu1"), &load).unwrap();
+    let end = |model: &Model| prediction(model).interval_ns(&id("sap@cpu1"), &load).unwrap();
     let (low, high) = end(&model);
     assert!(
         (low / (1000.0 * (-2.0 * ERROR).exp()) - 1.0).abs() < 1e-9
@@ -127,18 +127,18 @@ fn the_errors_of_a_machine_count_by_how_many_of_its_points_have_them() {
 fn fewer_than_ten_machines_claim_no_interval_and_say_so() {
     let model = with_folds(&SHIFTS[..9]);
     assert_eq!(border(&model).1, None);
-    let basis = fields(&model).interval_basis;
+    let basis = tuning(&model).interval_basis;
     assert!(
         basis.contains("no interval can be claimed") && basis.contains("9 physical machines") && basis.contains("takes 10"),
         "{basis}"
     );
     let load = Load { objects: 1000, ..Load::default() };
-    assert_eq!(prediction(&model).interval_ns(&"sweep@cpu1".parse().unwrap(), &load), None);
+    assert_eq!(prediction(&model).interval_ns(&"sap@cpu1".parse().unwrap(), &load), None);
     // Ten machines, of which nine timed both.
     let mut model = with_folds(&SHIFTS);
     model.folds[0].errors[0].against.clear();
     assert_eq!(border(&model).1, None);
-    let basis = fields(&model).interval_basis;
+    let basis = tuning(&model).interval_basis;
     assert!(basis.contains("jackknife+ from 10 physical machines") && basis.contains("1 of 1 borders have none"), "{basis}");
 }
 
@@ -150,7 +150,7 @@ fn a_model_from_before_there_were_folds_is_read_and_claims_no_interval() {
     for (machines, text) in [(1, "1 physical machine,"), (12, "keeps no folds; train it again")] {
         model.validation.physical_machines = machines;
         assert_eq!(border(&model).1, None);
-        assert!(fields(&model).interval_basis.contains(text), "{}", fields(&model).interval_basis);
+        assert!(tuning(&model).interval_basis.contains(text), "{}", tuning(&model).interval_basis);
     }
 }
 
@@ -171,7 +171,7 @@ fn outside_the_cloud_the_interval_widens_by_the_ratio_of_the_distances() {
     for (wide, narrow) in [(wide_low, low), (wide_high, high)] {
         assert!(((wide / 1000.0).ln() / (narrow / 1000.0).ln() / 2.0 - 1.0).abs() < 0.06, "{wide} {narrow}");
     }
-    assert!(fields(&model).interval_basis.contains("2.0 times as large"));
+    assert!(tuning(&model).interval_basis.contains("2.0 times as large"));
     // Nearer than the farthest nothing is narrower.
     model.clouds[0].parameters[0].mean_ln = 4.0_f64.ln();
     assert_eq!(border(&model).1.unwrap(), (low, high));

@@ -21,7 +21,7 @@ fn drawn(outcome: &Outcome, co_runner: Option<CoRunner>) -> String {
 fn the_best_algorithm_stands_for_each_number_of_cores_and_gpus() {
     let mut explored = taken(0);
     explored.explored = true;
-    let ids = ["brute@cpu1", "strips@cpu1", "strips@cpu2", "sweep@gpu0", "strips@gpu0+1"];
+    let ids = ["brute@cpu1", "grid-sap@cpu1", "grid-sap@cpu2", "sap@gpu0", "grid-sap@gpu0+1"];
     let both = outcome(
         &ids,
         &[
@@ -36,14 +36,14 @@ fn the_best_algorithm_stands_for_each_number_of_cores_and_gpus() {
     let gpus = Panel::new(BackendClass::Gpu, &both);
     assert_eq!(gpus.units, [(1, 3)]);
     let row = |panel: &Panel, id: &str| panel.rows()[panel.row(panel.unit(&id.parse().unwrap()))].clone();
-    let named = ["brute@cpu1", "brute@cpu2", "sweep@gpu0"].map(|id| row(&cores, id));
+    let named = ["brute@cpu1", "brute@cpu2", "sap@gpu0"].map(|id| row(&cores, id));
     assert_eq!(named, ["1 core", "2 cores", "a GPU"]);
-    assert_eq!(["brute@cpu1", "strips@gpu1"].map(|id| row(&gpus, id)), ["the CPU", "1 GPU"]);
+    assert_eq!(["brute@cpu1", "grid-sap@gpu1"].map(|id| row(&gpus, id)), ["the CPU", "1 GPU"]);
     let svg = drawn(&both, Some(CoRunner { from_frame: 1, threads: None }));
     let needed = [
-        "1 core: strips@cpu1",
-        "2 cores: strips@cpu2",
-        "1 GPU: sweep@gpu0",
+        "1 core: grid-sap@cpu1",
+        "2 cores: grid-sap@cpu2",
+        "1 GPU: sap@gpu0",
         "GPUs (slab)",
         "Cores (slab)",
         "the CPU",

@@ -35,7 +35,7 @@ pub(super) fn curves(study: &Study, folder: &mut Folder, missing: &mut Vec<Strin
 }
 
 pub(super) fn fields(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Result<Section> {
-    let mut part = Part::new("fields", "Fields over objects and density", missing);
+    let mut part = Part::new("fields", "Tuning over objects and density", missing);
     part.text(
         "The map that the paper could not draw: the number of objects alone does not decide. Cells are boxes spread evenly that move as in \
          the scenario uniform, by curves fitted to the machine's own timings on the left, and on the right predicted from its parameters by a \

@@ -53,7 +53,7 @@ fn at(objects: u32) -> Load {
 }
 
 fn algorithms() -> [AlgorithmId; 2] {
-    ["brute@cpu1", "sweep@cpu1"].map(|id| id.parse().unwrap())
+    ["brute@cpu1", "sap@cpu1"].map(|id| id.parse().unwrap())
 }
 
 fn one_term(name: &str, term: Term, unit: f64) -> MethodModel {
@@ -67,7 +67,7 @@ fn one_term(name: &str, term: Term, unit: f64) -> MethodModel {
 
 /// One unit for each of the two methods: the geometric mean over the machines.
 fn fitted(machines: &[&MadeUp]) -> Vec<MethodModel> {
-    let terms = [("brute", Term::AllPairs), ("sweep", Term::Objects)];
+    let terms = [("brute", Term::AllPairs), ("sap", Term::Objects)];
     let unit = |k: usize| {
         let ratios = machines.iter().flat_map(|m| {
             let ghz = m.hardware.value(parameter::CLOCK_MEASURED_GHZ).unwrap();
@@ -137,9 +137,9 @@ fn intervals_hold_the_times_and_the_crossings_of_nine_new_machines_in_ten() {
                 let load = at(10 << (k % 14));
                 let (low, high) = prediction.interval_ns(&ids[1], &load).unwrap();
                 times += usize::from((low..=high).contains(&new.ns(&load)[1]));
-                let fields = prediction.fields("uniform", &slice);
-                assert_eq!((fields.defect(), fields.crossovers.len()), (None, 1));
-                let (low, high) = fields.crossovers[0].interval().unwrap();
+                let tuning = prediction.tuning("uniform", &slice);
+                assert_eq!((tuning.defect(), tuning.crossovers.len()), (None, 1));
+                let (low, high) = tuning.crossovers[0].interval().unwrap();
                 crossings += usize::from((low..=high).contains(&new.crossing()));
                 widths.push((high / low).ln() / 2.0);
             }
@@ -255,11 +255,11 @@ fn ten_machines_give_ten_folds_and_nine_none() {
     assert_eq!(model.defect(), None);
     let wanted: Vec<(AlgorithmId, u32)> = profiles[2].algorithms.iter().map(|t| (t.id.clone(), t.revision)).collect();
     let slice: Vec<Load> = profiles[2].points.iter().filter(|s| s.scenario == "uniform").map(|s| s.load).collect();
-    let fields = model.predict(&profiles[2].hardware, &wanted).unwrap().fields("uniform", &slice);
-    assert!(fields.source == Source::Predicted && !fields.crossovers.is_empty());
-    let intervals: Option<Vec<(f64, f64)>> = fields.crossovers.iter().map(|b| b.interval()).collect();
-    let intervals = intervals.expect(&fields.interval_basis);
+    let tuning = model.predict(&profiles[2].hardware, &wanted).unwrap().tuning("uniform", &slice);
+    assert!(tuning.source == Source::Predicted && !tuning.crossovers.is_empty());
+    let intervals: Option<Vec<(f64, f64)>> = tuning.crossovers.iter().map(|b| b.interval()).collect();
+    let intervals = intervals.expect(&tuning.interval_basis);
     // The machines are what the model says up to 2 % of noise. Where two costs run along each other the interval is wide all the
     // same.
-    assert!(intervals.iter().any(|(low, high)| high / low < 1.5), "{:?}", fields.crossovers);
+    assert!(intervals.iter().any(|(low, high)| high / low < 1.5), "{:?}", tuning.crossovers);
 }

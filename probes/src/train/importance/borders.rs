@@ -106,19 +106,19 @@ mod tests {
     #[test]
     fn borders_are_found_and_those_that_are_not_there_lie_at_the_ends() {
         let ids: Vec<AlgorithmId> =
-            ["brute@cpu1", "brute@cpu4", "strips@cpu1", "strips@cpu4", "strips@gpu0"].map(|id| id.parse().unwrap()).into();
+            ["brute@cpu1", "brute@cpu4", "grid-sap@cpu1", "grid-sap@cpu4", "grid-sap@gpu0"].map(|id| id.parse().unwrap()).into();
         let pairs = pairs(&ids);
         let names: Vec<&str> = pairs.iter().map(|p| p.name.as_str()).collect();
-        let all = ["brute@cpu1, brute on all threads", "strips@cpu1, strips on all threads"];
-        assert_eq!(names, ["brute@cpu1, strips@cpu1", all[0], all[1], "CPU, GPU"]);
+        let all = ["brute@cpu1, brute on all threads", "grid-sap@cpu1, grid-sap on all threads"];
+        assert_eq!(names, ["brute@cpu1, grid-sap@cpu1", all[0], all[1], "CPU, GPU"]);
         let slice: Vec<Load> = (3..=13).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
         // 10 n = 1000 + 5 n at n = 200, which is 4.64 octaves above 8.
-        let costs = [cost("brute@cpu1", 0.0, 10.0), cost("strips@cpu1", 1000.0, 5.0), cost("strips@cpu4", 900.0, 1.0)];
+        let costs = [cost("brute@cpu1", 0.0, 10.0), cost("grid-sap@cpu1", 1000.0, 5.0), cost("grid-sap@cpu4", 900.0, 1.0)];
         assert!((pairs[0].octaves(&costs, &slice).unwrap() - (200.0_f64 / 8.0).log2()).abs() < 0.05);
         assert_eq!(pairs[1].octaves(&costs, &slice), None);
         // All threads are always cheaper, a GPU never is.
         assert_eq!(pairs[2].octaves(&costs, &slice), Some(0.0));
-        let gpu = [&costs[..], &[cost("strips@gpu0", 1e9, 1.0)]].concat();
+        let gpu = [&costs[..], &[cost("grid-sap@gpu0", 1e9, 1.0)]].concat();
         assert_eq!(pairs[3].octaves(&gpu, &slice), Some(10.0));
     }
 }

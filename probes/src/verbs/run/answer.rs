@@ -1,6 +1,6 @@
 //! The answer for machines.
 
-use super::fields::{From, Origin};
+use super::tuning::{From, Origin};
 use crate::simulation::{Course, Outcome, Part, SHARE};
 use sapwise::{AlgorithmId, Source};
 use serde::Serialize;
@@ -17,11 +17,11 @@ pub(super) struct Answer<'a> {
     pub(super) interrupted: bool,
     /// Median over the frames of the share of the CPU that other programs took; null where that can't be told.
     pub(super) foreign_load: Option<f64>,
-    /// Where the fields came from.
+    /// Where the tuning came from.
     source: Source,
-    fields: OfFields<'a>,
+    tuning: OfTuning<'a>,
     extrapolated: bool,
-    /// Of the fields, and of algorithms that are left out.
+    /// Of the tuning, and of algorithms that are left out.
     pub(super) warnings: Vec<String>,
     pub(super) learning: bool,
     pub(super) exploring: bool,
@@ -52,7 +52,7 @@ pub(super) struct Extent {
 }
 
 #[derive(Serialize)]
-struct OfFields<'a> {
+struct OfTuning<'a> {
     from: From,
     model: &'a Option<String>,
     /// Samples by which a prediction was corrected.
@@ -177,7 +177,7 @@ impl<'a> Answer<'a> {
         };
         let part = |p: &Part| OfPart { from_frame: p.frames.start, to_frame: p.frames.end - 1, figures: Figures::new(p) };
         let repeats = outcome.repeats.len();
-        let mut warnings = origin.fields.warnings.clone();
+        let mut warnings = origin.tuning.warnings.clone();
         warnings.extend(warnings_of(origin, &too_wide));
         Self {
             scenario: course.footage.name(),
@@ -187,15 +187,15 @@ impl<'a> Answer<'a> {
             seed: course.seed,
             interrupted: outcome.interrupted,
             foreign_load: outcome.foreign_load,
-            source: origin.fields.source,
-            fields: OfFields {
+            source: origin.tuning.source,
+            tuning: OfTuning {
                 from: origin.from,
-                model: &origin.fields.model,
-                samples: origin.fields.samples.len(),
+                model: &origin.tuning.model,
+                samples: origin.tuning.samples.len(),
                 other_machine: &origin.other_machine,
                 too_many_threads: too_wide,
             },
-            extrapolated: origin.fields.extrapolated,
+            extrapolated: origin.tuning.extrapolated,
             warnings,
             learning: course.learning,
             exploring: course.exploring,
@@ -240,14 +240,14 @@ impl Figures {
     }
 }
 
-/// What the reader should know about fields that were not made for this machine.
+/// What the reader should know about tuning that was not made for this machine.
 fn warnings_of(origin: &Origin, too_wide: &[&AlgorithmId]) -> Vec<String> {
     let mut warnings = Vec::new();
     warnings.extend(origin.other_machine.as_ref().map(|cpu| format!("the report was measured on another machine: {cpu}")));
     if !too_wide.is_empty() {
         let names: Vec<String> = too_wide.iter().map(ToString::to_string).collect();
         let names = names.join(", ");
-        warnings.push(format!("the fields name more threads than this machine has cores, which are left out: {names}"));
+        warnings.push(format!("the tuning names more threads than this machine has cores, which are left out: {names}"));
     }
     warnings
 }

@@ -1,7 +1,7 @@
 //! `sapwise run`: the in-line simulation.
 
 mod answer;
-mod fields;
+mod tuning;
 mod text;
 
 use crate::algorithms::Algorithms;
@@ -32,29 +32,29 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     check_outputs(arguments)?;
     let mut course = course(arguments)?;
     let cuts = cuts(arguments, course.frames)?;
-    let read = arguments.fields.as_deref().map(|path| fields::read(path, &registry, &arguments.gpus)).transpose()?;
+    let read = arguments.tuning.as_deref().map(|path| tuning::read(path, &registry, &arguments.gpus)).transpose()?;
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
     if let Some(path) = &arguments.record {
         course.footage.record(path, course.frames)?;
     }
-    let origin = read.map_or_else(|| fields::predicted(arguments, algorithms), Ok);
+    let origin = read.map_or_else(|| tuning::predicted(arguments, algorithms), Ok);
     // First: a prediction that was interrupted may complain of what was not measured.
     interrupt::check()?;
     let mut origin = origin?;
-    let gpu_warnings = fields::add_gpus(&mut registry, &origin.fields, &arguments.gpus)?;
-    origin.fields.warnings.extend(gpu_warnings);
+    let gpu_warnings = tuning::add_gpus(&mut registry, &origin.tuning, &arguments.gpus)?;
+    origin.tuning.warnings.extend(gpu_warnings);
     // Steps have no costs to correct.
-    course.learning &= !origin.fields.costs.is_empty();
+    course.learning &= !origin.tuning.costs.is_empty();
     course.exploring &= course.learning;
-    let hint = "none of the algorithms of the fields runs here; leave --fields out to have them predicted for this machine";
-    let mut outcome = simulate(&course, &origin.fields, &registry).map_err(|error| match error.downcast_ref() {
+    let hint = "none of the algorithms of the tuning runs here; leave --tuning out to have them predicted for this machine";
+    let mut outcome = simulate(&course, &origin.tuning, &registry).map_err(|error| match error.downcast_ref() {
         Some(sapwise::Error::Unavailable { .. } | sapwise::Error::UnknownAlgorithm { .. }) => error.context(hint),
         _ => error,
     })?;
-    origin.fields.warnings.append(&mut outcome.notes);
+    origin.tuning.warnings.append(&mut outcome.notes);
     let parts: Vec<_> = parts(&cuts, course.frames).into_iter().map(|range| outcome.part(range)).collect();
-    let answer = answer::Answer::new(&course, &outcome, &origin, too_wide(&origin.fields, &registry), &parts);
+    let answer = answer::Answer::new(&course, &outcome, &origin, too_wide(&origin.tuning, &registry), &parts);
     if let Some((path, format)) = trace {
         write_trace(path, format, &outcome)?;
     }
@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
 /// # Errors
 /// Names the file.
 fn check_outputs(arguments: &Run) -> anyhow::Result<()> {
-    let mut read: Vec<PathBuf> = arguments.fields.iter().cloned().collect();
+    let mut read: Vec<PathBuf> = arguments.tuning.iter().cloned().collect();
     if let Scene::Stream(path) = &arguments.scene {
         read.push(path.clone());
     }

@@ -1,7 +1,7 @@
 //! What a person reads at the end of a run.
 
 use super::answer::{Answer, Figures, LeftOut, Oracle, Slowed};
-use super::fields::{From, Origin};
+use super::tuning::{From, Origin};
 use crate::args::{Run, Scene};
 use crate::simulation::{Outcome, WINDOW};
 use crate::table::{count, grouped};
@@ -19,7 +19,7 @@ pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, outcom
         count(answer.repeats, "repeat")
     );
     let mut text = format!("{}\n", terminal.head(&head));
-    text += &format!("Fields: {}. {}\n\n", origin.text(), learning(answer));
+    text += &format!("Tuning: {}. {}\n\n", origin.text(), learning(answer));
     text += &totals(answer, terminal);
     for (id, LeftOut { after_frame, frames, at_least_ms }) in &answer.left_out {
         let after = after_frame.map_or("from the first on".to_owned(), |frame| format!("after frame {frame}"));
@@ -54,9 +54,9 @@ fn next_step(arguments: &Run, origin: &Origin) -> &'static str {
     match (origin.from, &arguments.plot) {
         (_, None) => "the same with --plot run.svg, which draws the decisions",
         (From::Prediction, _) => {
-            "sapwise probe --out report.json, then the same with --fields report.json, which are measured fields"
+            "sapwise probe --out report.json, then the same with --tuning report.json, which are measured tuning"
         }
-        (_, Some(_)) => "the same without --fields, to see what a prediction is worth",
+        (_, Some(_)) => "the same without --tuning, to see what a prediction is worth",
     }
 }
 
@@ -82,7 +82,7 @@ fn chart(answer: &Answer<'_>, outcome: &Outcome, terminal: Terminal) -> Chart {
     Chart { title, across: Axis::Linear, series: all }
 }
 
-/// What stands below the picture: the figures, where the fields come from, and the command that makes it again.
+/// What stands below the picture: the figures, where the tuning comes from, and the command that makes it again.
 pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> [String; 3] {
     let Figures { regret, switches, explored, .. } = answer.figures;
     let name = answer.scenario;
@@ -94,7 +94,7 @@ pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> 
             count(explored, "frame"),
             count(answer.repeats, "repeat")
         ),
-        format!("Fields: {}. {}", origin.text(), learning(answer)),
+        format!("Tuning: {}. {}", origin.text(), learning(answer)),
         format!("Made by: {}", command(arguments)),
     ]
 }
@@ -210,8 +210,8 @@ fn command(arguments: &Run) -> String {
         Scene::Scenario(scenario) => scenario.to_string(),
         Scene::Stream(path) => name(path),
     });
-    match &arguments.fields {
-        Some(path) => words.push(format!("--fields {}", name(path))),
+    match &arguments.tuning {
+        Some(path) => words.push(format!("--tuning {}", name(path))),
         None => words.push(format!("--samples {}", arguments.samples)),
     }
     words.extend(arguments.objects.map(|n| format!("--objects {n}")));
@@ -244,13 +244,13 @@ mod tests {
         };
         for words in [
             "sapwise run slab --samples 8 --repeats 6 --seed 1",
-            "sapwise run uniform --fields t.json --objects 9 --swing 3 --frames 7 --repeats 2 --seed 4 --no-gpus",
+            "sapwise run uniform --tuning t.json --objects 9 --swing 3 --frames 7 --repeats 2 --seed 4 --no-gpus",
             "sapwise run s.npy --samples 0 --repeats 1 --seed 1 --co-runner 3:2 --no-learning --no-exploring --plot p.png",
             "sapwise run mixed --samples 8 --repeats 6 --seed 1 --gpu 0 --gpu 2 --plot p.svg",
         ] {
             assert_eq!(said(words), words);
         }
-        let named = said("sapwise run /a/s.npy --fields /b/t.json --plot c/p.svg");
-        assert_eq!(named, "sapwise run s.npy --fields t.json --repeats 6 --seed 1 --plot p.svg");
+        let named = said("sapwise run /a/s.npy --tuning /b/t.json --plot c/p.svg");
+        assert_eq!(named, "sapwise run s.npy --tuning t.json --repeats 6 --seed 1 --plot p.svg");
     }
 }

@@ -15,7 +15,7 @@ use crate::{Aabb, BroadPhase, Error, Pairs};
 
 /// The method; see the module.
 #[derive(Debug)]
-struct Strips {
+struct GridSap {
     workers: Workers,
     finder: Finder,
     outputs: Outputs,
@@ -74,12 +74,12 @@ struct Task {
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("strips", threads, pools)?;
+    let workers = Workers::new("grid-sap", threads, pools)?;
     let finder = Finder::new(&workers, level);
-    Ok(Box::new(Strips { workers, finder, outputs: Outputs::default() }))
+    Ok(Box::new(GridSap { workers, finder, outputs: Outputs::default() }))
 }
 
-impl BroadPhase for Strips {
+impl BroadPhase for GridSap {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;

@@ -1,26 +1,26 @@
-//! What is told of fields.
+//! What is told of tuning.
 
 use super::{Finding, Here};
 use crate::gpus::uses;
 use crate::revisions;
-use sapwise::{AlgorithmId, Backend, Fields, GpuKind, usable_cores};
+use sapwise::{AlgorithmId, Backend, Tuning, GpuKind, usable_cores};
 
 impl Here {
-    pub(super) fn fields(&self, fields: &Fields, finding: &mut Finding) {
-        finding.schema = Some("fields/1");
+    pub(super) fn tuning(&self, tuning: &Tuning, finding: &mut Finding) {
+        finding.schema = Some("tuning/1");
         finding.set_current(
-            revisions::stale_in_fields(fields, &self.registry),
+            revisions::stale_in_tuning(tuning, &self.registry),
             "predict again, or probe again where they were measured",
         );
-        let mut wanted = fields.algorithms();
-        wanted.extend(fields.steps.iter().map(|s| &s.algorithm));
+        let mut wanted = tuning.algorithms();
+        wanted.extend(tuning.steps.iter().map(|s| &s.algorithm));
         let mut missing: Vec<String> = wanted.into_iter().filter_map(|id| self.unavailable(id)).collect();
         missing.sort_unstable();
         missing.dedup();
         finding.applicable = Some(missing.is_empty());
         finding.problems.extend(missing);
-        finding.notes.extend(self.programs(fields));
-        if fields.extrapolated {
+        finding.notes.extend(self.programs(tuning));
+        if tuning.extrapolated {
             finding.notes.push("predicted for a machine outside what the model was trained on".to_owned());
         }
     }
@@ -41,10 +41,10 @@ impl Here {
         }
     }
 
-    /// Which algorithms of fields run on programs that act as GPUs.
-    fn programs(&self, fields: &Fields) -> Vec<String> {
+    /// Which algorithms of tuning run on programs that act as GPUs.
+    fn programs(&self, tuning: &Tuning) -> Vec<String> {
         let mut notes = Vec::new();
-        for id in fields.algorithms().into_iter().filter(|id| !uses(id).is_empty()) {
+        for id in tuning.algorithms().into_iter().filter(|id| !uses(id).is_empty()) {
             let gpus = self.gpus().identities.iter().filter(|g| uses(id).contains(&g.index));
             for gpu in gpus.filter(|g| g.kind == GpuKind::Software) {
                 notes.push(format!("{id}: gpu{} is a program on the CPU here: {}", gpu.index, gpu.name));

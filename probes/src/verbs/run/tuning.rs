@@ -1,4 +1,4 @@
-//! Where the fields of a run come from.
+//! Where the tuning of a run come from.
 
 use crate::algorithms::Algorithms;
 use crate::args::Run;
@@ -10,13 +10,13 @@ use crate::verbs::predict;
 use crate::{revisions, train};
 use anyhow::{Context, bail};
 use sapwise::json::Document;
-use sapwise::{AlgorithmId, Fields, Registry, Scenario, Source, measure};
+use sapwise::{AlgorithmId, Tuning, Registry, Scenario, Source, measure};
 use serde::Serialize;
 use std::path::Path;
 
-/// The fields, and what is told about them.
+/// The tuning, and what is told about them.
 pub(super) struct Origin {
-    pub(super) fields: Fields,
+    pub(super) tuning: Tuning,
     pub(super) from: From,
     /// The processor of the other machine whose report they come from.
     pub(super) other_machine: Option<String>,
@@ -30,16 +30,16 @@ pub(super) struct Origin {
 pub(super) enum From {
     /// A model and the parameters of this machine.
     Prediction,
-    /// A fields file.
-    Fields,
+    /// A tuning file.
+    Tuning,
     /// The timings of a report.
     Report,
 }
 
 impl Origin {
-    /// Where the fields come from, in a sentence.
+    /// Where the tuning comes from, in a sentence.
     pub(super) fn text(&self) -> String {
-        let Fields { source, model, samples, .. } = &self.fields;
+        let Tuning { source, model, samples, .. } = &self.tuning;
         let model = model.as_ref().map_or(String::new(), |name| format!(" by the model {name}"));
         let corrected = match samples.len() {
             0 => String::new(),
@@ -52,16 +52,16 @@ impl Origin {
                 Some(cpu) => format!("measured on another machine ({cpu})"),
                 None => "measured on this machine".to_owned(),
             },
-            (From::Fields, Source::Default) => "from a file, written down by hand".to_owned(),
-            (From::Fields, Source::Predicted) => format!("from a file, predicted{model}"),
-            (From::Fields, Source::Measured) => "from a file, measured".to_owned(),
-            (From::Fields, Source::Learned) if samples.is_empty() => format!("from a file, learned on line{model}"),
-            (From::Fields, Source::Learned) => format!("from a file, predicted{model}{corrected}"),
+            (From::Tuning, Source::Default) => "from a file, written down by hand".to_owned(),
+            (From::Tuning, Source::Predicted) => format!("from a file, predicted{model}"),
+            (From::Tuning, Source::Measured) => "from a file, measured".to_owned(),
+            (From::Tuning, Source::Learned) if samples.is_empty() => format!("from a file, learned on line{model}"),
+            (From::Tuning, Source::Learned) => format!("from a file, predicted{model}{corrected}"),
         }
     }
 }
 
-/// Fields predicted for this machine.
+/// Tuning predicted for this machine.
 ///
 /// # Errors
 /// When no process can be started, a GPU that was asked for is not there, or the model predicts none of the algorithms.
@@ -69,15 +69,15 @@ pub(super) fn predicted(arguments: &Run, algorithms: &Algorithms) -> anyhow::Res
     let (hardware, measured) = measure_hardware(None, &arguments.gpus)?;
     let model = predict::model(None)?;
     let (usable, slice) = (&measured.usable, Slice::of(Scenario::Uniform)?);
-    let (mut fields, wrong) = match arguments.samples {
+    let (mut tuning, wrong) = match arguments.samples {
         0 => (prediction::predict(&model, &hardware, usable, &slice, algorithms)?, false),
         most => prediction::predict_and_sample(&model, &hardware, usable, &slice, algorithms, most)?,
     };
-    fields.warnings.extend(measured.remarks);
-    Ok(Origin { fields, from: From::Prediction, other_machine: None, wrong })
+    tuning.warnings.extend(measured.remarks);
+    Ok(Origin { tuning, from: From::Prediction, other_machine: None, wrong })
 }
 
-/// The fields of a file, which may be a report whose timings they are measured from.
+/// The tuning of a file, which may be a report whose timings they are measured from.
 ///
 /// # Errors
 /// When the file is neither, or tells of other revisions of the algorithms than those of this build.
@@ -87,30 +87,30 @@ pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyh
         _ => bail!("{} is stale: {}; predict again or probe again", path.display(), stale.join("; ")),
     };
     match read_document(path)? {
-        Document::Fields(fields) => {
-            fresh(revisions::stale_in_fields(&fields, registry))?;
-            Ok(Origin { fields: *fields, from: From::Fields, other_machine: None, wrong: false })
+        Document::Tuning(tuning) => {
+            fresh(revisions::stale_in_tuning(&tuning, registry))?;
+            Ok(Origin { tuning: *tuning, from: From::Tuning, other_machine: None, wrong: false })
         }
         Document::Report(mut report) => {
             choice.restrict(&mut report);
             fresh(revisions::stale_in_report(&report, registry))?;
-            let fields = train::measured_fields(&report, train::slice_scenario(&report))
-                .with_context(|| format!("{} gives no fields", path.display()))?;
+            let tuning = train::measured_tuning(&report, train::slice_scenario(&report))
+                .with_context(|| format!("{} gives no tuning", path.display()))?;
             let machine = &report.hardware.machine;
             let here = machine.physical_id == measure::machine().physical_id;
             let other_machine = (!here).then(|| machine.cpu.clone());
-            Ok(Origin { fields, from: From::Report, other_machine, wrong: false })
+            Ok(Origin { tuning, from: From::Report, other_machine, wrong: false })
         }
-        _ => bail!("{} is a model; give fields or a report, or leave --fields out to have them predicted", path.display()),
+        _ => bail!("{} is a model; give tuning or a report, or leave --tuning out to have them predicted", path.display()),
     }
 }
 
-/// Adds the algorithms on the GPUs that are taken, where the fields name any, and gives what keeps some from running.
+/// Adds the algorithms on the GPUs that are taken, where the tuning names any, and gives what keeps some from running.
 ///
 /// # Errors
 /// When no process can be started.
-pub(super) fn add_gpus(registry: &mut Registry, fields: &Fields, choice: &GpuChoice) -> anyhow::Result<Vec<String>> {
-    let mut named: Vec<&AlgorithmId> = fields.algorithms();
+pub(super) fn add_gpus(registry: &mut Registry, tuning: &Tuning, choice: &GpuChoice) -> anyhow::Result<Vec<String>> {
+    let mut named: Vec<&AlgorithmId> = tuning.algorithms();
     named.retain(|id| !gpus::uses(id).is_empty());
     if named.is_empty() {
         return Ok(Vec::new());

@@ -1,11 +1,11 @@
-//! A Verlet list: the pairs of boxes grown by a margin, kept from frame to frame.
+//! A PairCache list: the pairs of boxes grown by a margin, kept from frame to frame.
 //!
 //! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes, so a frame costs
 //! one look at each box and one test of each kept pair. A box that leaves its grown box gets a new one, and a tree of the
 //! grown boxes finds its new neighbours. After many of those the list is made anew by the strips. Where the boxes move too
 //! far for that to pay, the strips find the pairs directly and a few boxes are watched for it to end.
 //!
-//! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules; physics engines know the grown boxes as fat
+//! PairCache (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules; physics engines know the grown boxes as fat
 //! boxes.
 
 mod grown;
@@ -15,7 +15,7 @@ mod tree;
 use crate::broad_phase::check_count;
 use crate::cpu::columns::part;
 use crate::cpu::kernel::{overlap, prefetch};
-use crate::cpu::strips::Finder;
+use crate::cpu::grid_sap::Finder;
 use crate::cpu::workers::{Outputs, Workers};
 use crate::cpu::{SimdLevel, Threads};
 use crate::{Aabb, BroadPhase, Error, Pairs};
@@ -25,7 +25,7 @@ use tree::{FAR, Tree};
 
 /// The method; see the module.
 #[derive(Debug)]
-struct Verlet {
+struct PairCache {
     /// One for each number of threads that it may run on, ascending, and which of them runs it now.
     widths: Vec<Workers>,
     width: usize,
@@ -59,10 +59,10 @@ pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<
 
 /// One instance that can run on any of these numbers of threads, ascending. It begins with the least.
 pub(super) fn create_for(threads: &[u32], pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
-    let widths: Vec<Workers> = threads.iter().map(|&k| Workers::new("verlet", k, pools)).collect::<Result<_, _>>()?;
+    let widths: Vec<Workers> = threads.iter().map(|&k| Workers::new("pair-cache", k, pools)).collect::<Result<_, _>>()?;
     let widest = &widths[widths.len() - 1];
     let tasks = widest.tasks();
-    Ok(Box::new(Verlet {
+    Ok(Box::new(PairCache {
         finder: Finder::new(widest, level),
         outputs: Outputs::default(),
         motion: Motion::default(),
@@ -76,7 +76,7 @@ pub(super) fn create_for(threads: &[u32], pools: &Threads, level: SimdLevel) -> 
     }))
 }
 
-impl BroadPhase for Verlet {
+impl BroadPhase for PairCache {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;
@@ -108,7 +108,7 @@ impl BroadPhase for Verlet {
         let _ = self.grown.reserve(objects);
     }
 
-    fn keeps_work(&self) -> bool {
+    fn is_incremental(&self) -> bool {
         true
     }
 
@@ -128,7 +128,7 @@ fn most_kept(boxes: usize, tasks: usize) -> usize {
     MOST_KEPT as usize * boxes / tasks + 1024
 }
 
-impl Verlet {
+impl PairCache {
     /// Deals the kept pairs of so many tasks out to those of the present width.
     fn deal(&mut self, before: usize) {
         let Self { widths, width, kept, dealt, grown, motion, .. } = self;

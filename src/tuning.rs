@@ -10,8 +10,8 @@ use crate::{AlgorithmId, CostCurve, Load, Registry};
 pub(crate) use slice::Slice;
 
 schema_tag!(
-    /// `fields/1`.
-    pub FieldsSchema = "fields/1"
+    /// `tuning/1`.
+    pub TuningSchema = "tuning/1"
 );
 
 /// Which algorithm to run under which load, and where that knowledge came from.
@@ -21,10 +21,10 @@ schema_tag!(
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct Fields {
-    /// Always `fields/1`.
-    pub schema: FieldsSchema,
-    /// Where the fields came from.
+pub struct Tuning {
+    /// Always `tuning/1`.
+    pub schema: TuningSchema,
+    /// Where the tuning came from.
     pub source: Source,
     /// Name of the model that predicted them, whether they were corrected since or not; `None` where there was no prediction.
     pub model: Option<String>,
@@ -47,7 +47,7 @@ pub struct Fields {
     pub samples: Vec<Observation>,
 }
 
-/// Where fields came from.
+/// Where tuning came from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -58,7 +58,7 @@ pub enum Source {
     Predicted,
     /// From timings of the algorithms on this machine.
     Measured,
-    /// Predicted, then corrected by frames that were run: by samples before the first one ([`Fields::samples`]), or on line.
+    /// Predicted, then corrected by frames that were run: by samples before the first one ([`Tuning::samples`]), or on line.
     Learned,
 }
 
@@ -73,7 +73,7 @@ pub struct Step {
     pub algorithm: AlgorithmId,
 }
 
-/// A border between two neighbouring fields.
+/// A border between two neighbouring tuning.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -85,7 +85,7 @@ pub struct Border {
     /// Number of objects at which both cost the same.
     pub objects: f64,
     /// Lower end of the interval; where it may lie lower still, the least objects of the slice. `None`, like `high`, where no
-    /// interval can be claimed: [`Fields::interval_basis`] says why.
+    /// interval can be claimed: [`Tuning::interval_basis`] says why.
     pub low: Option<f64>,
     /// Upper end of the interval; where it may lie higher still, the most objects of the slice.
     pub high: Option<f64>,
@@ -148,70 +148,70 @@ impl Border {
     }
 }
 
-impl Fields {
-    /// Fields from a hand-written list of thresholds: from `objects` up, that algorithm.
+impl Tuning {
+    /// Tuning from a hand-written list of thresholds: from `objects` up, that algorithm.
     ///
     /// # Errors
     /// A sentence, when the list is empty, does not begin at 0 or is not ascending.
     pub fn from_steps(steps: Vec<Step>) -> Result<Self, String> {
-        let fields = Self { steps, ..Self::empty(Source::Default) };
-        fields.defect().map_or(Ok(fields), Err)
+        let tuning = Self { steps, ..Self::empty(Source::Default) };
+        tuning.defect().map_or(Ok(tuning), Err)
     }
 
-    /// Fields for when nothing is known about the machine: borders in objects, written down by hand.
+    /// Tuning for when nothing is known about the machine: borders in objects, written down by hand.
     ///
     /// They are the rounded borders of `uniform` on one machine (two cores of an AMD EPYC 9005 under KVM, AVX-512), with
     /// pinned threads ([`Registry::pin_threads`]) and its two cores standing for all of them. Any other machine has others: predict
-    /// or measure them. Where boxes move far `verlet` runs the strips, so that one list holds for both.
+    /// or measure them. Where boxes move far `pair-cache` runs the strips, so that one list holds for both.
     #[must_use]
     pub fn usual(registry: &Registry) -> Self {
         let step = |from_objects, method, threads| Step { from_objects, algorithm: AlgorithmId::cpu(method, threads) };
-        let mut steps = vec![step(0, "brute", 1), step(80, "verlet", 1)];
-        let parallel = registry.entries().iter().filter(|e| e.id.method() == "verlet" && e.unavailable.is_none());
+        let mut steps = vec![step(0, "brute", 1), step(80, "pair-cache", 1)];
+        let parallel = registry.entries().iter().filter(|e| e.id.method() == "pair-cache" && e.unavailable.is_none());
         if let Some(cores) = parallel.map(|e| e.id.threads()).max().filter(|&cores| cores > 1) {
-            steps.push(step(3000, "verlet", cores));
+            steps.push(step(3000, "pair-cache", cores));
         }
         Self { steps, scenario: "uniform".to_owned(), ..Self::empty(Source::Default) }
     }
 
-    /// Fields from cost curves, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
+    /// Tuning from cost curves, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
     ///
     /// The loads are interpolated between each other, so a handful per decade is enough. A field narrower than 3 % in objects may
     /// be missed. Intervals follow from the curves'
     /// `spread_ln`: where the logarithms of two costs differ by less than 1.645 standard deviations of that difference.
     #[must_use]
     pub fn from_costs(source: Source, scenario: &str, costs: Vec<AlgorithmCost>, loads: &[Load]) -> Self {
-        let mut fields = Self { scenario: scenario.to_owned(), costs, ..Self::empty(source) };
-        fields.interval_basis =
+        let mut tuning = Self { scenario: scenario.to_owned(), costs, ..Self::empty(source) };
+        tuning.interval_basis =
             "90 % of a normal distribution with the spread of measured over modelled time of the two algorithms".to_owned();
-        let spreads: Vec<f64> = fields.costs.iter().map(|c| c.spread_ln).collect();
-        fields.cut(loads, &|below, above, _| spreads[below].hypot(spreads[above]));
-        fields
+        let spreads: Vec<f64> = tuning.costs.iter().map(|c| c.spread_ln).collect();
+        tuning.cut(loads, &|below, above, _| spreads[below].hypot(spreads[above]));
+        tuning
     }
 
-    /// Fields from costs that observations have corrected, of the algorithms that `usable` admits, which is asked by position in
+    /// Tuning from costs that observations have corrected, of the algorithms that `usable` admits, which is asked by position in
     /// [`Posterior::predicted`].
     ///
-    /// As [`Fields::from_costs`], but with intervals from what is known of the ratio of two costs: what both share cancels.
+    /// As [`Tuning::from_costs`], but with intervals from what is known of the ratio of two costs: what both share cancels.
     #[must_use]
     pub fn from_posterior(scenario: &str, posterior: &Posterior, usable: impl Fn(usize) -> bool, loads: &[Load]) -> Self {
         let kept: Vec<usize> = (0..posterior.predicted().len()).filter(|&k| usable(k)).collect();
         let all = posterior.costs();
         let costs = kept.iter().map(|&k| all[k].clone()).collect();
-        let mut fields = Self { scenario: scenario.to_owned(), costs, ..Self::empty(Source::Learned) };
-        fields.interval_basis =
+        let mut tuning = Self { scenario: scenario.to_owned(), costs, ..Self::empty(Source::Learned) };
+        tuning.interval_basis =
             "90 % of a normal distribution with the spread that the samples left in the ratio of the two costs".to_owned();
-        fields.cut(loads, &|below, above, load| {
+        tuning.cut(loads, &|below, above, load| {
             let mut joint = Joint::default();
             posterior.joint(load, &mut joint);
             joint.variance_of_ratio(kept[below], kept[above]).sqrt()
         });
-        fields
+        tuning
     }
 
     fn empty(source: Source) -> Self {
         Self {
-            schema: FieldsSchema,
+            schema: TuningSchema,
             source,
             model: None,
             extrapolated: false,
@@ -225,7 +225,7 @@ impl Fields {
         }
     }
 
-    /// The algorithms that these fields may choose, in the order that [`Fields::rank`] counts them.
+    /// The algorithms that this tuning may choose, in the order that [`Tuning::rank`] counts them.
     #[must_use]
     pub fn algorithms(&self) -> Vec<&AlgorithmId> {
         if self.costs.is_empty() {
@@ -240,7 +240,7 @@ impl Fields {
         self.costs.iter().map(|c| &c.algorithm).collect()
     }
 
-    /// The cheapest algorithms under `load` among those that `usable` admits, which is asked by position in [`Fields::costs`].
+    /// The cheapest algorithms under `load` among those that `usable` admits, which is asked by position in [`Tuning::costs`].
     ///
     /// `None` when there are no cost curves or none is usable.
     #[must_use]
@@ -265,7 +265,7 @@ impl Fields {
         self.steps[..self.steps.partition_point(|s| s.from_objects <= objects)].last()
     }
 
-    /// What makes these fields unusable, if anything.
+    /// What makes this tuning unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<String> {
         if self.steps.first().is_none_or(|s| s.from_objects != 0) {

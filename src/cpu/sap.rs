@@ -11,7 +11,7 @@ use crate::{Aabb, BroadPhase, Error, Pairs};
 
 /// The method; see the module.
 #[derive(Debug)]
-struct Sweep {
+struct Sap {
     workers: Workers,
     /// Lower bound on the sweep axis in the upper half, position in the input in the lower.
     keys: Vec<u64>,
@@ -22,8 +22,8 @@ struct Sweep {
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
-    let workers = Workers::new("sweep", threads, pools)?;
-    Ok(Box::new(Sweep {
+    let workers = Workers::new("sap", threads, pools)?;
+    Ok(Box::new(Sap {
         workers,
         keys: Vec::new(),
         scratch: Vec::new(),
@@ -33,14 +33,14 @@ pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<
     }))
 }
 
-impl Sweep {
+impl Sap {
     fn resize(&mut self, objects: usize) -> Result<(), Error> {
         ensure(&mut self.keys, objects, "sort keys")?;
         self.columns.resize(objects)
     }
 }
 
-impl BroadPhase for Sweep {
+impl BroadPhase for Sap {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;

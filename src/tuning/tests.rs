@@ -1,0 +1,120 @@
+use super::*;
+use crate::{CostTerm, Term};
+
+fn cost(id: &str, terms: &[(Term, f64)], spread_ln: f64) -> AlgorithmCost {
+    let terms = terms.iter().map(|&(term, unit_ns)| CostTerm { term, unit_ns }).collect();
+    AlgorithmCost {
+        algorithm: id.parse().unwrap(),
+        revision: 1,
+        curve: CostCurve { terms, ..CostCurve::default() },
+        spread_ln,
+    }
+}
+
+fn loads() -> Vec<Load> {
+    (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect()
+}
+
+#[test]
+fn crossovers_lie_where_the_curves_cross_and_intervals_around_them() {
+    // 0.5 n (n - 1) = 100 n at n = 201; 100 n = 20 n + 80 000 at n = 1000.
+    let costs = vec![
+        cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05),
+        cost("sap@cpu1", &[(Term::Objects, 100.0)], 0.05),
+        cost("grid-sap@cpu2", &[(Term::Call, 80_000.0), (Term::Objects, 20.0)], 0.05),
+    ];
+    let tuning = Tuning::from_costs(Source::Measured, "uniform", costs, &loads());
+    assert_eq!(tuning.defect(), None);
+    let names: Vec<String> = tuning.steps.iter().map(|s| s.algorithm.to_string()).collect();
+    assert_eq!(names, ["brute@cpu1", "sap@cpu1", "grid-sap@cpu2"]);
+    assert!((tuning.crossovers[0].objects / 201.0 - 1.0).abs() < 0.02, "{:?}", tuning.crossovers);
+    assert!((tuning.crossovers[1].objects / 1000.0 - 1.0).abs() < 0.02, "{:?}", tuning.crossovers);
+    let b = &tuning.crossovers[0];
+    let (low, high) = b.interval().unwrap();
+    assert!(low < 195.0 && high > 208.0 && low > 150.0 && high < 260.0, "{b:?}");
+    assert_eq!(tuning.step(5).unwrap().algorithm.method(), "brute");
+    assert_eq!(tuning.step(u32::MAX).unwrap().algorithm.method(), "grid-sap");
+}
+
+#[test]
+fn an_interval_has_both_ends_or_none_and_holds_its_border() {
+    let costs =
+        vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sap@cpu1", &[(Term::Objects, 100.0)], 0.05)];
+    let tuning = Tuning::from_costs(Source::Measured, "uniform", costs, &loads());
+    let defect = |low, high| {
+        let mut tuning = tuning.clone();
+        (tuning.crossovers[0].low, tuning.crossovers[0].high) = (low, high);
+        tuning.defect()
+    };
+    assert_eq!((defect(None, None), defect(Some(0.0), Some(1e6))), (None, None));
+    for (low, high) in [(Some(1.0), None), (None, Some(1e6)), (Some(300.0), Some(400.0)), (Some(-1.0), Some(1e6))] {
+        assert!(defect(low, high).is_some(), "{low:?} {high:?}");
+    }
+}
+
+#[test]
+fn an_algorithm_that_never_wins_has_no_step() {
+    let costs = vec![cost("brute@cpu1", &[(Term::Objects, 2.0)], 0.0), cost("sap@cpu1", &[(Term::Objects, 1.0)], 0.0)];
+    let tuning = Tuning::from_costs(Source::Measured, "uniform", costs, &loads());
+    assert_eq!(tuning.steps.len(), 1);
+    assert!(tuning.crossovers.is_empty());
+}
+
+#[test]
+fn rank_respects_what_is_usable() {
+    let costs = vec![
+        cost("a@cpu1", &[(Term::Call, 3.0)], 0.0),
+        cost("b@cpu1", &[(Term::Call, 1.0)], 0.0),
+        cost("c@cpu1", &[(Term::Call, 2.0)], 0.0),
+    ];
+    let tuning = Tuning::from_costs(Source::Measured, "uniform", costs, &loads());
+    let load = Load::default();
+    assert_eq!(tuning.rank(&load, |_| true), Some(Ranking { best: 1, best_ns: 1.0, runner_up: Some((2, 2.0)) }));
+    assert_eq!(tuning.rank(&load, |k| k != 1), Some(Ranking { best: 2, best_ns: 2.0, runner_up: Some((0, 3.0)) }));
+    assert_eq!(tuning.rank(&load, |_| false), None);
+}
+
+#[test]
+fn the_usual_tuning_are_sound_with_any_number_of_cores() {
+    for cores in [1, 2, 6] {
+        let tuning = Tuning::usual(&Registry::with_cores(cores));
+        assert_eq!(tuning.defect(), None);
+        let steps: Vec<_> = tuning.steps.iter().map(|s| (s.from_objects, s.algorithm.to_string())).collect();
+        let (most, parallel) = (format!("pair-cache@cpu{cores}"), cores > 1 && cfg!(feature = "parallel"));
+        let mut expected = vec![(0, "brute@cpu1".to_owned()), (80, "pair-cache@cpu1".to_owned())];
+        expected.extend(parallel.then_some((3000, most)));
+        assert_eq!(steps, expected);
+    }
+}
+
+#[test]
+fn hand_written_steps_are_checked() {
+    let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
+    assert!(Tuning::from_steps(vec![step(0, "brute@cpu1"), step(64, "grid-sap@cpu1")]).is_ok());
+    assert!(Tuning::from_steps(vec![]).is_err());
+    assert!(Tuning::from_steps(vec![step(5, "brute@cpu1")]).is_err());
+    assert!(Tuning::from_steps(vec![step(0, "brute@cpu1"), step(0, "grid-sap@cpu1")]).is_err());
+}
+
+#[test]
+fn samples_narrow_the_interval_of_a_border_and_leave_out_who_failed() {
+    let costs = vec![
+        cost("grid-sap@cpu1", &[(Term::Objects, 100.0)], 0.4),
+        cost("grid-sap@cpu2", &[(Term::Call, 80_000.0), (Term::Objects, 20.0)], 0.4),
+        cost("sap@cpu1", &[(Term::Objects, 1.0)], 0.4),
+    ];
+    let mut posterior = Posterior::new(costs.clone(), &crate::Prior::ASSUMED);
+    let of = |posterior: &Posterior| Tuning::from_posterior("uniform", posterior, |k| k != 2, &loads());
+    let width = |tuning: &Tuning| {
+        let (low, high) = tuning.crossovers[0].interval().unwrap();
+        high / low
+    };
+    let before = of(&posterior);
+    for (k, ns) in [(0, 150_000.0), (1, 150_000.0)] {
+        assert!(posterior.observe(k, &Load { objects: 1000, ..Load::default() }, ns, 0.01));
+    }
+    let after = of(&posterior);
+    assert_eq!((after.source, after.defect(), after.costs.len(), after.crossovers.len()), (Source::Learned, None, 2, 1));
+    assert!(width(&after) < 0.7 * width(&before), "{} {}", width(&after), width(&before));
+    assert!((after.crossovers[0].objects / 1000.0 - 1.0).abs() < 0.15, "{:?}", after.crossovers);
+}
