@@ -1,0 +1,225 @@
+//! From nothing to tuning of this machine: the cache, else a measurement and a prediction.
+
+use super::cache::{CacheFile, Key};
+use super::options::StartOptions;
+use super::slice;
+use crate::adaptive::{Adaptive, Arrival, Handover, Instances, Keeper, Origin, Setup, Start};
+use crate::entry::Entry;
+use crate::error::Error;
+use crate::hardware::{GpuHardware, Hardware, Parameter, parameter};
+use crate::measure;
+use crate::model::Model;
+use crate::registry::Registry;
+use crate::tuning::Tuning;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::Instant;
+
+impl Adaptive {
+    /// An adaptive broad phase with the tuning of this machine: the one that an earlier start has kept, else predicted from
+    /// its hardware parameters, which are measured in at most two seconds, and kept for the next start.
+    ///
+    /// In the background, which is the default, it returns at once, with [`Tuning::usual`] for the first frames; see
+    /// [`StartOptions::background`]. The thread that measures ends by itself, whether this is dropped before or not. What is kept
+    /// holds for this machine, its drivers, this version of the library, its algorithms and the model; a change of any of
+    /// them measures anew. A cache that can't be read or written keeps nothing from working: [`setup`](Self::setup) tells.
+    ///
+    /// Uses no network and no global state.
+    ///
+    /// # Errors
+    /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when not even one algorithm of the usual tuning can be made.
+    pub fn for_this_machine(options: &StartOptions) -> Result<Self, Error> {
+        let began = Instant::now();
+        let mut adaptive = if options.background {
+            in_background(options, began)?
+        } else {
+            let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry(true)));
+            let arrival = arrive(options, &registry, began, || true);
+            // Only where there is no prediction: to make algorithms takes memory, and on GPUs time.
+            let Arrival { setup, keeper, tuning } = arrival;
+            let mut adaptive = match tuning {
+                Some((tuning, made)) => Self::with(tuning, made),
+                None => Self::new(Tuning::usual(&registry), &registry)?,
+            };
+            adaptive.set_start(Start { setup, keeper, awaited: None });
+            adaptive
+        };
+        adaptive.set_learning(options.learning);
+        adaptive.set_exploring(options.exploring);
+        Ok(adaptive)
+    }
+}
+
+/// Usual tuning at once, and a thread that fills the handover.
+fn in_background(options: &StartOptions, began: Instant) -> Result<Adaptive, Error> {
+    let mut adaptive = match &options.registry {
+        Some(registry) => Adaptive::new(Tuning::usual(registry), registry)?,
+        None => {
+            // Without the GPUs, whose drivers take tens of milliseconds to load.
+            let registry = usual_registry(false);
+            Adaptive::new(Tuning::usual(&registry), &registry)?
+        }
+    };
+    let handover = Arc::new(Handover::default());
+    let (options, filled) = (options.clone(), Arc::clone(&handover));
+    let run = move || {
+        let made = catch_unwind(AssertUnwindSafe(|| {
+            let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry(true)));
+            // The other owner is the broad phase that waits.
+            arrive(&options, &registry, began, || Arc::strong_count(&filled) > 1)
+        }));
+        let arrival = made.unwrap_or_else(|_| {
+            let remarks = vec!["the thread in the background panicked: the usual tuning stays".to_owned()];
+            Arrival { setup: Setup { remarks, ..usual(began) }, keeper: None, tuning: None }
+        });
+        filled.leave(arrival);
+    };
+    adaptive.set_start(match std::thread::Builder::new().name("sapwise-setup".to_owned()).spawn(run) {
+        Ok(_) => {
+            let setup = Setup { origin: Origin::Awaited, ..Setup::default() };
+            Start { setup, keeper: None, awaited: Some(handover) }
+        }
+        Err(e) => {
+            let remarks = vec![format!("no thread can be started in the background ({e}): the usual tuning stays")];
+            Start { setup: Setup { remarks, ..usual(began) }, ..Start::default() }
+        }
+    });
+    Ok(adaptive)
+}
+
+/// The algorithms of a program that names none.
+fn usual_registry(with_gpus: bool) -> Registry {
+    let mut registry = Registry::new();
+    registry.pin_threads();
+    #[cfg(feature = "measure-gpu")]
+    if with_gpus {
+        registry.add_gpus(&crate::gpu::Gpus::find().choose(|gpu| gpu.kind != crate::GpuKind::Software));
+    }
+    #[cfg(not(feature = "measure-gpu"))]
+    let _ = with_gpus;
+    registry
+}
+
+fn usual(began: Instant) -> Setup {
+    Setup { origin: Origin::Usual, seconds: began.elapsed().as_secs_f64(), ..Setup::default() }
+}
+
+/// Tuning of this machine with their algorithms, which are made only where they are still wanted.
+fn arrive(options: &StartOptions, registry: &Registry, began: Instant, wanted: impl Fn() -> bool) -> Arrival {
+    let mut remarks = Vec::new();
+    let found = find(options, registry, &mut remarks);
+    let made = found.filter(|_| wanted()).and_then(|(tuning, origin, file)| {
+        let mut made = Instances::of(&tuning, registry);
+        match made.failure() {
+            None => Some((tuning, made, origin, file)),
+            Some(e) => {
+                remarks.push(format!("none of the algorithms that were predicted can be made: {e:#}"));
+                None
+            }
+        }
+    });
+    let Some((tuning, made, origin, file)) = made else {
+        return Arrival { setup: Setup { remarks, ..usual(began) }, keeper: None, tuning: None };
+    };
+    let path = file.as_ref().map(|f| f.path().to_owned());
+    let setup = Setup { origin, remarks, seconds: began.elapsed().as_secs_f64(), file: path };
+    Arrival { setup, keeper: file.map(|f| Box::new(f) as Box<dyn Keeper>), tuning: Some((tuning, made)) }
+}
+
+/// Tuning from the cache, else from a prediction, and its file in the cache. `None` where nothing can be predicted.
+fn find(options: &StartOptions, registry: &Registry, remarks: &mut Vec<String>) -> Option<(Tuning, Origin, Option<CacheFile>)> {
+    let built_in = if options.model.is_none() { Model::built_in().map(Some) } else { Ok(None) };
+    let built_in = built_in.map_err(|e| remarks.push(format!("the built-in model can't be read: {e}"))).ok()?;
+    let model = options.model.as_ref().or(built_in.as_ref())?;
+    let key = Key::new(registry, model).map_err(|e| remarks.push(format!("the model can't be written: {e}"))).ok()?;
+    let file = CacheFile::new(&options.cache, key).unwrap_or_else(|why| {
+        remarks.push(why);
+        None
+    });
+    match file.as_ref().map(CacheFile::read) {
+        Some(Ok(Some(tuning))) => return Some((tuning, Origin::Cached, file)),
+        Some(Err(why)) => remarks.push(why),
+        Some(Ok(None)) | None => {}
+    }
+    let hardware = hardware(options, registry, model, remarks);
+    let (tuning, sound) = predict(model, hardware, &registry.available(), remarks)?;
+    // Another process may have been quicker, and may even have learned: what it has kept stays.
+    if let Some(file) = file.as_ref().filter(|f| sound && !matches!(f.read(), Ok(Some(_)))) {
+        remarks.extend(file.keep(tuning.clone()).err().map(with_cause));
+    }
+    // Nor may what is learned upon them take the place of a sound measurement.
+    Some((tuning, Origin::Probed, file.filter(|_| sound)))
+}
+
+/// Tuning from hardware, without the figures and the GPUs that can't be: what needs one of them is left out. Also whether there was none.
+fn predict(
+    model: &Model,
+    mut hardware: Hardware,
+    algorithms: &[Entry],
+    remarks: &mut Vec<String>,
+) -> Option<(Tuning, bool)> {
+    let mut dropped = hardware.drop_implausible();
+    dropped.extend(hardware.gpus.iter().filter_map(GpuHardware::implausible));
+    let sound = dropped.is_empty();
+    remarks.extend(dropped.into_iter().map(|why| format!("{why}; it is left out, and the next start measures again")));
+    let prediction = model.predict(&hardware, algorithms).map_err(|why| remarks.push(why)).ok()?;
+    let mut tuning = prediction.tuning(slice::SCENARIO, &slice::loads());
+    tuning.warnings.extend(hardware.disturbed());
+    Some((tuning, sound))
+}
+
+/// Measures what the model reads, of the machine as the registry uses it.
+fn hardware(options: &StartOptions, registry: &Registry, model: &Model, remarks: &mut Vec<String>) -> Hardware {
+    let threads = registry.available().iter().map(|e| e.id.threads()).max();
+    let plan = measure::Options { threads, limit: Some(options.probe_limit), ..measure::Options::default() };
+    let mut hardware = measure::hardware_for(&model.parameters(), &plan);
+    let simd = registry.simd();
+    if let Some(lanes) = hardware.parameters.iter_mut().find(|p| p.name == parameter::SIMD_LANES) {
+        *lanes = Parameter::reported(parameter::SIMD_LANES, f64::from(simd.lanes()), "the SIMD level of the registry");
+    }
+    hardware.machine.simd = simd.to_string();
+    #[cfg(feature = "measure-gpu")]
+    for index in registry.gpus().identities().map(|g| g.index) {
+        match measure::gpu(registry.gpus(), index, &plan) {
+            Ok(gpu) => hardware.gpus.push(gpu),
+            Err(why) => remarks.push(format!("gpu{index} can't be measured: {why}")),
+        }
+    }
+    #[cfg(not(feature = "measure-gpu"))]
+    let _ = remarks;
+    hardware
+}
+
+/// An error with what caused it, in one line.
+fn with_cause(error: impl std::error::Error) -> String {
+    error.source().map_or_else(|| error.to_string(), |source| format!("{error}: {source}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hardware::Machine;
+
+    #[test]
+    fn a_figure_that_can_not_be_costs_what_needs_it_and_no_more() {
+        let model = Model::built_in().unwrap();
+        let figure = |name: &&str| match *name {
+            parameter::CACHE_LLC_BYTES => Parameter::reported(name, 33_554_432.0, "test"),
+            parameter::FORK_JOIN_COLD_NS => Parameter::reported(name, 5000.0, "test"),
+            parameter::USABLE_CORES | parameter::SCALING_ALL_THREADS_RATIO => Parameter::reported(name, 2.0, "test"),
+            _ => Parameter::reported(name, 4.0, "test"),
+        };
+        let parameters = model.parameters().iter().map(figure).collect();
+        let hardware = Hardware { machine: Machine::default(), parameters, gpus: Vec::new(), gpu_groups: Vec::new() };
+        let algorithms = Registry::with_cores(2).available();
+        let mut remarks = Vec::new();
+        let (tuning, sound) = predict(&model, hardware.clone(), &algorithms, &mut remarks).unwrap();
+        assert_eq!((tuning.costs.len(), sound, remarks.len()), (algorithms.len(), true, 0));
+        let mut broken = hardware;
+        broken.parameters.iter_mut().filter(|p| p.name == parameter::FORK_JOIN_COLD_NS).for_each(|p| p.value = Some(0.0));
+        let (tuning, sound) = predict(&model, broken, &algorithms, &mut remarks).unwrap();
+        assert!(tuning.costs.iter().all(|c| c.algorithm.threads() == 1) && !sound);
+        assert_eq!(tuning.costs.len(), algorithms.len() / 2);
+        assert!(remarks.len() == 1 && remarks[0].contains("fork_join_cold_ns is 0"), "{remarks:?}");
+    }
+}
