@@ -85,7 +85,7 @@ impl Key {
             algorithms: registry.available().into_iter().map(known).collect(),
             gpus: registry.gpu_identities(),
             model: model.name.clone(),
-            model_hash: format!("{:016x}", fnv1a(&json::write_model(model)?)),
+            model_hash: format!("{:016x}", fnv1a(&json::write(model)?)),
         })
     }
 }

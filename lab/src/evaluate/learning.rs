@@ -8,7 +8,7 @@ use crate::progress::Progress;
 use crate::turns::Turns;
 use anyhow::Result;
 use rayon::prelude::*;
-use sapwise::measure::statistics::quantile;
+use sapwise::stats::quantile;
 use sapwise::model::{Learning, LearningScore};
 use std::collections::BTreeSet;
 

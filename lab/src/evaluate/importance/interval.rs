@@ -1,7 +1,7 @@
 //! A mean over machines, and how far it would differ with other machines.
 
 use crate::turns::Turns;
-use sapwise::measure::statistics::quantile;
+use sapwise::stats::quantile;
 use serde::Serialize;
 
 /// Draws of as many machines as there are, with replacement.
