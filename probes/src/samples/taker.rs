@@ -7,7 +7,8 @@ use crate::sweep::{PAIR_LIMIT, WARM_UP, add_gpus, median, next_frame};
 use crate::{child, output};
 use anyhow::Context;
 use sapwise::measure::{Watch, statistics};
-use sapwise::{Aabb, AlgorithmId, BackendClass, BroadPhase, Pairs, Registry, Scenario};
+use sapwise::{Aabb, AlgorithmId, BackendClass, BroadPhase, Pairs, Registry};
+use sapwise_scenes::Scenario;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -21,7 +22,7 @@ const IQR_OVER_DEVIATION: f64 = 1.349;
 /// When the scenario is unknown, or standard output can't be written.
 pub(crate) fn take(order: &Order, algorithms: &Algorithms) -> anyhow::Result<()> {
     let wishes = child::orders();
-    let scenario: Scenario = order.scenario.parse().map_err(anyhow::Error::msg)?;
+    let scenario: Scenario = order.scenario.parse()?;
     let mut registry = algorithms.registry(order.cores);
     registry.pin_threads();
     let remarks = add_gpus(&mut registry, &order.gpus);
