@@ -77,7 +77,7 @@ pub(crate) fn predict_and_sample(
         algorithms: prediction.costs.iter().map(|c| c.algorithm.clone()).collect(),
     };
     let disturbed: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
-    let mut live = Live::new(order, sapwise::measure::statistics::median(&disturbed));
+    let mut live = Live::new(order, sapwise::stats::median(&disturbed));
     let prior = model.prior.unwrap_or(Prior::ASSUMED);
     let learned = samples::learn(prediction.costs.clone(), &prior, loads, &mut live, most as usize)?;
     let (remarks, wrong) = live.remarks();

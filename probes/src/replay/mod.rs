@@ -298,7 +298,7 @@ impl Watched {
     }
 
     fn foreign_load(&self) -> Option<f64> {
-        sapwise::measure::statistics::median(&self.loads)
+        sapwise::stats::median(&self.loads)
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::outcome::Frame;
 use super::samples::{Samples, mean_of};
-use sapwise::measure::statistics::median;
+use sapwise::stats::median;
 
 /// Frames before and behind that may have a say in the choice ...
 const NEIGHBOURS: usize = 4;

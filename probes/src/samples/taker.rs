@@ -6,8 +6,8 @@ use crate::algorithms::Algorithms;
 use crate::sweep::{PAIR_LIMIT, WARM_UP, add_gpus, median, next_frame};
 use crate::{child, output};
 use anyhow::Context;
-use sapwise::measure::{Watch, statistics};
 use sapwise::{Aabb, AlgorithmId, BackendClass, BroadPhase, Pairs, Registry};
+use sapwise::{measure::Watch, stats};
 use sapwise_scenes::Scenario;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -102,7 +102,7 @@ impl Taker {
             samples.push(self.frame(&wish.algorithm, scene.boxes())?);
         }
         let Some(ns) = median(&samples) else { return Ok(Reply::TooSlow) };
-        let spread = statistics::relative_iqr(&samples.iter().map(|&s| s as f64).collect::<Vec<f64>>());
+        let spread = stats::relative_iqr(&samples.iter().map(|&s| s as f64).collect::<Vec<f64>>());
         // With fewer than four frames there is no range between quartiles; a tenth is what single frames differ by.
         let noise_ln = MEDIAN_OVER_MEAN * spread.map_or(0.1, |s| s / IQR_OVER_DEVIATION) / (samples.len() as f64).sqrt();
         Ok(Reply::Taken { ns, noise_ln, foreign_load: None })
