@@ -4,7 +4,7 @@ use crate::algorithms::Algorithms;
 use crate::progress::Progress;
 use crate::revisions;
 use crate::samples::{self, Live, Order, Taken};
-use crate::table::count;
+use sapwise_lab::text::count;
 use anyhow::{Context, bail};
 use sapwise::hardware::parameter;
 use sapwise::model::{ASK, FEWEST_MACHINES, Prediction};
@@ -76,7 +76,7 @@ pub(crate) fn predict_and_sample(
         algorithms: prediction.costs.iter().map(|c| c.algorithm.clone()).collect(),
     };
     let disturbed: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
-    let mut live = Live::new(order, sapwise::measure::statistics::median(&disturbed));
+    let mut live = Live::new(order, sapwise::stats::median(&disturbed));
     let prior = model.prior.unwrap_or(Prior::ASSUMED);
     let learned = samples::learn(prediction.costs.clone(), &prior, loads, &mut live, most as usize)?;
     let (remarks, wrong) = live.remarks();

@@ -5,7 +5,7 @@ use crate::args::Probe;
 use crate::date;
 use crate::gpus::uses;
 use crate::restriction;
-use sapwise::report::{Label, Point, Provenance, Restriction, Timed};
+use sapwise_lab::report::{Label, Point, Provenance, Restriction, Timed};
 use sapwise::{GpuKind, Hardware, SimdLevel, usable_cores};
 use std::time::Duration;
 
@@ -69,7 +69,7 @@ fn requested_level() -> Option<SimdLevel> {
 /// Over the points where it could be told.
 fn median_foreign_load(points: &[Point]) -> Option<f64> {
     let loads: Vec<f64> = points.iter().filter_map(|p| p.foreign_load).collect();
-    sapwise::measure::statistics::median(&loads)
+    sapwise::stats::median(&loads)
 }
 
 /// The arguments without `--out`: paths name users.
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
     use crate::args::{Arguments, Verb};
     use clap::Parser;
-    use sapwise::report::Timing;
+    use sapwise_lab::report::Timing;
     use sapwise::{GpuHardware, GpuIdentity, Load, Machine};
 
     fn probe(words: &[&str]) -> Probe {

@@ -1,7 +1,7 @@
 //! The files of a study: the page, and for each figure and table what a program or a paper takes of it.
 
 use super::answer::Answer;
-use crate::files;
+use crate::write;
 use crate::page::Block;
 use crate::plot::{Picture, Tabled};
 use crate::sheet::Sheet;
@@ -101,11 +101,11 @@ impl Folder {
         let names = self.files.iter().map(|(name, _)| name.clone()).chain([PAGE.to_owned()]).collect();
         // First, so that a study that was stopped half-way is taken for one the next time.
         let answer = Answer { files: names, ..answer };
-        files::write_text(&folder.join(ANSWER), &sapwise::json::write(&answer)?)?;
+        write::write_text(&folder.join(ANSWER), &sapwise::json::write(&answer)?)?;
         for (name, bytes) in self.files {
-            files::write_atomically(&folder.join(&name), |out| Ok(out.write_all(&bytes)?))?;
+            write::write_atomically(&folder.join(&name), |out| Ok(out.write_all(&bytes)?))?;
         }
-        files::write_text(&folder.join(PAGE), page)?;
+        write::write_text(&folder.join(PAGE), page)?;
         Ok(answer)
     }
 }

@@ -2,7 +2,6 @@
 
 use super::entry::Entry;
 use crate::sheet::{Cell, Column, Sheet};
-use crate::summary;
 use sapwise::hardware::gpu::parameter as gpu;
 use sapwise::hardware::{How, parameter};
 use sapwise::{GpuHardware, Parameter};
@@ -44,7 +43,7 @@ pub(super) fn machines(entries: &[Entry]) -> Sheet {
     columns(&mut sheet, &names);
     for (k, entry) in entries.iter().enumerate() {
         let machine = &entry.hardware.machine;
-        let mut cells = [&entry.name[..], &machine.cpu, summary::kind(entry.kind), &machine.simd].map(Cell::text).to_vec();
+        let mut cells = [&entry.name[..], &machine.cpu, crate::label_text::kind(entry.kind), &machine.simd].map(Cell::text).to_vec();
         cells.extend(names.iter().map(|name| cell(name, &entry.hardware.parameters)));
         sheet.push(cells, &[k]);
     }
@@ -98,7 +97,7 @@ fn cell(name: &str, parameters: &[Parameter]) -> Cell {
     match parameters.iter().find(|p| p.name == name) {
         None => Cell::Missing("the report does not have it".to_owned()),
         Some(Parameter { value: Some(value), .. }) => {
-            let shown = summary::value(name, *value);
+            let shown = crate::units::value(name, *value);
             // A value that can't be, such as 1e300, has hundreds of digits.
             let shown = if shown.len() > MOST_LETTERS { format!("{value:e}") } else { shown };
             Cell::Number { value: *value, shown }

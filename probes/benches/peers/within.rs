@@ -2,7 +2,7 @@
 
 use crate::contestants::Side;
 use crate::point::{Lane, Point};
-use crate::table::{digits, grid, sizes, spread};
+use sapwise_lab::text::{digits, grid, sizes, spread};
 use sapwise::{AlgorithmId, Scenario, SimdLevel};
 
 /// The fastest fixed method of ours on that many threads.

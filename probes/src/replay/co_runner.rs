@@ -166,7 +166,7 @@ fn ratio(before: &[(usize, f64)], after: &[(usize, f64)]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulation::outcome::tests::{outcome, taken};
+    use crate::replay::outcome::tests::{outcome, taken};
 
     #[test]
     fn frames_and_threads_are_read() {

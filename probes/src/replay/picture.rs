@@ -7,7 +7,7 @@ use super::legend::{Legend, Sign};
 use super::mark::Mark;
 use super::paper::Area;
 use super::style::{self, GAP, GRID, INK, SECONDARY};
-use crate::simulation::{Course, Outcome};
+use crate::replay::{Course, Outcome};
 use plotters::style::RGBColor;
 use sapwise::{AlgorithmId, BackendClass};
 

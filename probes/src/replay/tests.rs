@@ -1,7 +1,7 @@
 //! Tests of whole simulations.
 
 use super::*;
-use crate::boxes::read_frames;
+use sapwise_scenes::read_frames;
 use sapwise::{Scenario, Step};
 
 fn steps(list: &[(u32, &str)]) -> Tuning {

@@ -133,8 +133,8 @@ fn name(reason: Reason) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulation::outcome::Taken;
-    use crate::simulation::outcome::tests::{outcome, taken};
+    use crate::replay::outcome::Taken;
+    use crate::replay::outcome::tests::{outcome, taken};
 
     fn example() -> Outcome {
         let explored = Taken { explored: true, ..taken(0) };

@@ -1,54 +1,54 @@
 //! One scenario through all sizes, within its time.
 
 use super::dropout::Standing;
-use super::race::{FEWEST_FRAMES, Outcome, Race, Runner};
-use super::{Course, Event, Order, Visit, median, plan};
+use super::race::{FEWEST_FRAMES, Raced, Race, Racer};
+use super::{Schedule, Event, SweepRequest, Visit, median, plan};
 use crate::algorithms::Algorithms;
 use sapwise::gpu::Gpus;
-use sapwise::report::Point;
+use sapwise_lab::report::Point;
 use sapwise::{AlgorithmId, GpuIdentity, Registry, Scenario, Scene};
 use std::time::{Duration, Instant};
 
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
 pub(crate) const PAIR_LIMIT: usize = 32 << 20;
 
-/// Runs the algorithms of a registry along the course of an order and hands on what happens.
+/// Runs the algorithms of a registry along the schedule of an order and hands on what happens.
 ///
 /// # Errors
 /// When the scenario is unknown or `emit` fails.
 pub(crate) fn sweep(
-    order: &Order,
+    request: &SweepRequest,
     algorithms: &Algorithms,
     emit: &mut dyn FnMut(Event) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let scenario: Scenario = order.scenario.parse().map_err(anyhow::Error::msg)?;
-    let mut registry = algorithms.registry(order.cores);
+    let scenario: Scenario = request.scenario.parse().map_err(anyhow::Error::msg)?;
+    let mut registry = algorithms.registry(request.cores);
     registry.pin_threads();
-    for remark in add_gpus(&mut registry, &order.gpus) {
+    for remark in add_gpus(&mut registry, &request.gpus) {
         emit(Event::Remark(format!("{scenario}: {remark}")))?;
     }
-    let mut runners = Vec::new();
+    let mut racers = Vec::new();
     for (id, _) in registry.available() {
-        if !order.course.admits(&id) {
+        if !request.schedule.admits(&id) {
             continue;
         }
         match registry.create(&id) {
-            Ok(algorithm) => runners.push(Runner::new(id, algorithm)),
+            Ok(algorithm) => racers.push(Racer::new(id, algorithm)),
             Err(error) => emit(Event::Remark(format!("{scenario}: {id} is left out: {error}")))?,
         }
     }
     // From here on: opening a GPU takes seconds, and is not the time of any size.
-    let end = Instant::now() + Duration::try_from_secs_f64(order.seconds).unwrap_or_default();
+    let end = Instant::now() + Duration::try_from_secs_f64(request.seconds).unwrap_or_default();
     let stage = Stage {
         scenario,
-        seed: order.seed,
+        seed: request.seed,
         end,
-        race: Race::new(order.seed, PAIR_LIMIT, order.cores, order.contended),
+        race: Race::new(request.seed, PAIR_LIMIT, request.cores, request.contended),
         emit,
     };
-    match &order.course {
-        Course::Ascent(sizes) => stage.ascend(runners, sizes, order.seconds),
-        Course::Visits(visits) => stage.visit(runners, visits),
+    match &request.schedule {
+        Schedule::Ascent(sizes) => stage.ascend(racers, sizes, request.seconds),
+        Schedule::Visits(visits) => stage.visit(racers, visits),
     }
 }
 
@@ -63,9 +63,9 @@ struct Stage<'a> {
 
 impl Stage<'_> {
     /// Everyone through all sizes, until they leave the race or the time is over.
-    fn ascend(mut self, mut runners: Vec<Runner>, sizes: &[u32], seconds: f64) -> anyhow::Result<()> {
+    fn ascend(mut self, mut racers: Vec<Racer>, sizes: &[u32], seconds: f64) -> anyhow::Result<()> {
         let scenario = self.scenario;
-        let mut standings = vec![Standing::default(); runners.len()];
+        let mut standings = vec![Standing::default(); racers.len()];
         let mut before: Option<Before> = None;
         for (k, &objects) in sizes.iter().enumerate() {
             let left = self.end.saturating_duration_since(Instant::now());
@@ -78,14 +78,14 @@ impl Stage<'_> {
                         "{scenario} ends after {reached} objects: {objects} don't fit into the {seconds:.0} s that it has"
                     ));
                 }
-                keep_racing(&mut runners, &mut standings);
+                keep_racing(&mut racers, &mut standings);
                 self.remark(format!("{scenario}: for want of time only the fast go on after {reached} objects"))?;
             }
-            let outcome = self.point(&mut runners, objects, left.mul_f64(plan::share(&sizes[k..])))?;
+            let outcome = self.point(&mut racers, objects, left.mul_f64(plan::share(&sizes[k..])))?;
             let best_ns = judge(&mut standings, &outcome.point, objects);
             (self.emit)(Event::Point(Box::new(outcome.point)))?;
-            keep_racing(&mut runners, &mut standings);
-            if runners.is_empty() {
+            keep_racing(&mut racers, &mut standings);
+            if racers.is_empty() {
                 return self.remark(format!("{scenario} ends after {objects} objects: no algorithm is left"));
             }
             before = Some(Before { objects, frame: outcome.frame, warm_up: outcome.warm_up, best_ns });
@@ -94,32 +94,32 @@ impl Stage<'_> {
     }
 
     /// Single points, in the order given, until the time is over. What is left then was not promised, so nothing is said of it.
-    fn visit(mut self, mut runners: Vec<Runner>, visits: &[Visit]) -> anyhow::Result<()> {
-        let order: Vec<AlgorithmId> = runners.iter().map(|r| r.id.clone()).collect();
+    fn visit(mut self, mut racers: Vec<Racer>, visits: &[Visit]) -> anyhow::Result<()> {
+        let order: Vec<AlgorithmId> = racers.iter().map(|r| r.id.clone()).collect();
         for visit in visits {
             let left = self.end.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 break;
             }
-            let (mut racing, resting): (Vec<Runner>, Vec<Runner>) =
-                runners.into_iter().partition(|r| r.error.is_none() && visit.algorithms.contains(&r.id));
+            let (mut racing, resting): (Vec<Racer>, Vec<Racer>) =
+                racers.into_iter().partition(|r| r.error.is_none() && visit.algorithms.contains(&r.id));
             if racing.len() > 1 {
                 let time = Duration::try_from_secs_f64(visit.seconds).unwrap_or_default();
                 let outcome = self.point(&mut racing, visit.objects, time.min(left))?;
                 (self.emit)(Event::Point(Box::new(outcome.point)))?;
             }
-            runners = resting;
-            runners.append(&mut racing);
+            racers = resting;
+            racers.append(&mut racing);
             // The first of the list is what the answers of large frames are held against.
-            runners.sort_by_key(|r| order.iter().position(|id| *id == r.id));
+            racers.sort_by_key(|r| order.iter().position(|id| *id == r.id));
         }
         Ok(())
     }
 
     /// One size, with what was wrong told.
-    fn point(&mut self, runners: &mut [Runner], objects: u32, time: Duration) -> anyhow::Result<Outcome> {
+    fn point(&mut self, racers: &mut [Racer], objects: u32, time: Duration) -> anyhow::Result<Raced> {
         let mut scene = self.scenario.start(objects as usize, self.seed);
-        let mut outcome = self.race.run(runners, &mut scene, time);
+        let mut outcome = self.race.run(racers, &mut scene, time);
         for mismatch in outcome.mismatches.drain(..) {
             (self.emit)(Event::Mismatch(format!("{} at {objects} objects: {mismatch}", self.scenario)))?;
         }
@@ -189,9 +189,9 @@ fn judge(standings: &mut [Standing], point: &Point, objects: u32) -> f64 {
     best
 }
 
-fn keep_racing(runners: &mut Vec<Runner>, standings: &mut Vec<Standing>) {
+fn keep_racing(racers: &mut Vec<Racer>, standings: &mut Vec<Standing>) {
     let mut stays = standings.iter().map(|s| !s.out).collect::<Vec<_>>().into_iter();
-    runners.retain(|_| stays.next().unwrap_or(false));
+    racers.retain(|_| stays.next().unwrap_or(false));
     standings.retain(|s| !s.out);
 }
 
@@ -211,12 +211,12 @@ pub(crate) fn next_frame(scene: &mut Scene) {
 mod tests {
     use super::*;
 
-    fn order(scenario: &str, sizes: &[u32], seconds: f64) -> Order {
-        let (scenario, course) = (scenario.to_owned(), Course::Ascent(sizes.to_vec()));
-        Order { scenario, course, cores: 2, seed: 3, seconds, gpus: Vec::new(), contended: false }
+    fn order(scenario: &str, sizes: &[u32], seconds: f64) -> SweepRequest {
+        let (scenario, schedule) = (scenario.to_owned(), Schedule::Ascent(sizes.to_vec()));
+        SweepRequest { scenario, schedule, cores: 2, seed: 3, seconds, gpus: Vec::new(), contended: false }
     }
 
-    fn events(order: &Order) -> Vec<Event> {
+    fn events(request: &SweepRequest) -> Vec<Event> {
         let mut events = Vec::new();
         sweep(order, &Algorithms::default(), &mut |event| {
             events.push(event);
@@ -251,7 +251,7 @@ mod tests {
         let visit = |objects, algorithms: &[AlgorithmId]| Visit { objects, seconds: 0.0, algorithms: algorithms.into() };
         // One alone gives no choice to be in doubt of.
         let visits = vec![visit(300, &algorithms), visit(20, &algorithms), visit(50, &algorithms[..1])];
-        let order = Order { course: Course::Visits(visits), ..order("clustered", &[], 60.0) };
+        let order = SweepRequest { schedule: Schedule::Visits(visits), ..order("clustered", &[], 60.0) };
         let events = events(&order);
         let points = points(&events);
         assert_eq!(points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [300, 20]);
@@ -273,7 +273,7 @@ mod tests {
         let text = || "none such".to_owned();
         let kind = sapwise::GpuKind::Discrete;
         let gone = GpuIdentity { index: 99, name: text(), device: text(), driver: text(), api: text(), kind };
-        let order = Order { gpus: vec![gone], ..order("uniform", &[10], 1.0) };
+        let order = SweepRequest { gpus: vec![gone], ..order("uniform", &[10], 1.0) };
         let (mut points, mut remarks) = (0, Vec::new());
         sweep(&order, &Algorithms::default(), &mut |event| {
             match event {

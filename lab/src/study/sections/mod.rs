@@ -11,7 +11,6 @@ use super::ratios::Comparison;
 use super::{Study, hardware};
 use crate::page::{Block, Section};
 use crate::sheet::{Cell, Sheet};
-use crate::summary;
 use crate::table::grouped;
 use anyhow::Result;
 
@@ -111,7 +110,7 @@ pub(in crate::study) fn note(entry: &Entry) -> String {
     let gpus = if gpus.is_empty() { "no GPU".to_owned() } else { gpus.join(", ") };
     let p = &entry.provenance;
     let left_out = entry.studied.as_ref().err().map_or(String::new(), |why| format!("; timings not studied: {why}"));
-    format!("{}, {}, {gpus}; {}, {}; {}{left_out}", summary::kind(entry.kind), machine.cpu, p.date, p.version, p.command)
+    format!("{}, {}, {gpus}; {}, {}; {}{left_out}", crate::label_text::kind(entry.kind), machine.cpu, p.date, p.version, p.command)
 }
 
 fn decided(claims: &[Claim], folder: &mut Folder, missing: &mut Vec<String>) -> Result<Section> {

@@ -1,9 +1,9 @@
 //! Tests of the picture of a simulation.
 
 use super::*;
-use crate::plot::Picture;
-use crate::simulation::examples::{outcome, taken};
-use crate::simulation::{CoRunner, Footage};
+use sapwise_lab::figures::Picture;
+use crate::replay::examples::{outcome, taken};
+use crate::replay::{CoRunner, Footage};
 use sapwise::Scenario;
 
 fn course(co_runner: Option<CoRunner>) -> Course {

@@ -1,7 +1,7 @@
 //! The answer for machines.
 
 use super::tuning::{From, Origin};
-use crate::simulation::{Course, Outcome, Part, SHARE};
+use crate::replay::{Course, Outcome, Part, SHARE};
 use sapwise::{AlgorithmId, Source};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -6,10 +6,10 @@ mod text;
 
 use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
-use crate::boxes::{Frames, read_frames};
+use sapwise_scenes::{Frames, read_frames};
 use crate::exit::{Outcome, WrongUsage};
-use crate::plot::{self, Figure, Picture};
-use crate::simulation::{Course, Footage, Swing, TraceFormat, simulate, too_wide, write_trace};
+use sapwise_lab::figures::{self, Figure, Picture};
+use crate::replay::{Course, Footage, Swing, TraceFormat, simulate, too_wide, write_trace};
 use crate::terminal::Terminal;
 use crate::{files, interrupt, output};
 use anyhow::{Context, bail};

@@ -1,6 +1,6 @@
 //! Where the frames of a simulation come from.
 
-use crate::boxes::{Frames, write_frames};
+use sapwise_scenes::{Frames, write_frames};
 use crate::interrupt;
 use sapwise::{Aabb, Scenario, Scene};
 use std::path::Path;
@@ -108,7 +108,7 @@ impl Reel<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::boxes::read_frames;
+    use sapwise_scenes::read_frames;
 
     #[test]
     fn a_swing_goes_from_the_least_to_all_and_back() {

@@ -1,13 +1,13 @@
 //! The sweep as a whole: each scenario in a process of its own.
 
-use super::{Course, Event, Order, Plan, doubt};
+use super::{Schedule, Event, SweepRequest, Plan, doubt};
 use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::Progress;
-use crate::turns::Turns;
+use sapwise_scenes::Random;
 use anyhow::Context;
 use sapwise::GpuIdentity;
-use sapwise::report::Point;
+use sapwise_lab::report::Point;
 use std::time::{Duration, Instant};
 
 /// What a scenario may take beyond its time: start-up, the first scene and a last frame that was forecast too short.
@@ -46,22 +46,22 @@ pub(crate) fn conduct(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut
     let gpus = conditions.gpus.clone();
     let mut sweep = Sweep { plan, conditions, gpus, began, progress, found: Found::default() };
     for scenario in &plan.scenarios {
-        if !sweep.go(&scenario.to_string(), Course::Ascent(plan.sizes.clone()), plan.ascent, 0)? {
+        if !sweep.go(&scenario.to_string(), Schedule::Ascent(plan.sizes.clone()), plan.ascent, 0)? {
             return Ok(sweep.found);
         }
         keep(&sweep.found);
     }
-    let mut turns = Turns::new(conditions.seed);
+    let mut shuffle = Random::new(conditions.seed);
     for round in 1..=plan.rounds {
         let left = plan.total.saturating_sub(began.elapsed()) / (plan.rounds + 1 - round);
         let starts = START * plan.scenarios.len() as u32;
-        for (scenario, mut visits) in doubt::visits(&sweep.found.points, left.saturating_sub(starts)) {
+        for (scenario, mut visits) in adaptive_sampling::visits(&sweep.found.points, left.saturating_sub(starts)) {
             let time = START + Duration::from_secs_f64(visits.iter().map(|v| v.seconds).sum());
             // In random order, so that a machine that slows down does not pass for a longer time at large sizes.
-            let order = turns.order(visits.len());
+            let order = shuffle.shuffled(visits.len());
             visits = order.into_iter().map(|k| visits[k].clone()).collect();
             let before = sweep.found.points.len();
-            let goes_on = sweep.go(&scenario, Course::Visits(visits), time, u64::from(round))?;
+            let goes_on = sweep.go(&scenario, Schedule::Visits(visits), time, u64::from(round))?;
             // A round is told from the next by its sizes, which ascend in each.
             sweep.found.points[before..].sort_by_key(|p| p.load.objects);
             if !goes_on {
@@ -86,9 +86,9 @@ struct Sweep<'a> {
 
 impl Sweep<'_> {
     /// Sweeps one scenario in a process of its own. Whether the sweep goes on.
-    fn go(&mut self, scenario: &str, course: Course, time: Duration, round: u64) -> anyhow::Result<bool> {
+    fn go(&mut self, scenario: &str, schedule: Schedule, time: Duration, round: u64) -> anyhow::Result<bool> {
         self.progress.message(scenario.to_owned());
-        match self.run(scenario, course, time, round)? {
+        match self.run(scenario, schedule, time, round)? {
             Ended::Well => {}
             Ended::Interrupted => {
                 let done = self.found.points.last().map_or("before the first point".to_owned(), |p| {
@@ -112,13 +112,13 @@ impl Sweep<'_> {
         Ok(true)
     }
 
-    fn run(&mut self, scenario: &str, course: Course, time: Duration, round: u64) -> anyhow::Result<Ended> {
+    fn run(&mut self, scenario: &str, schedule: Schedule, time: Duration, round: u64) -> anyhow::Result<Ended> {
         if interrupt::requested() {
             return Ok(Ended::Interrupted);
         }
-        let order = Order {
+        let order = SweepRequest {
             scenario: scenario.to_owned(),
-            course,
+            schedule,
             cores: self.conditions.cores,
             // Another scene of the same kind: what depends on one scene alone would pass for a property of the machine.
             seed: self.conditions.seed.wrapping_add(round),
