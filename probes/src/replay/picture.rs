@@ -7,7 +7,7 @@ use super::legend::{Legend, Sign};
 use super::mark::Mark;
 use super::paper::Area;
 use super::style::{self, GAP, GRID, INK, SECONDARY};
-use crate::replay::{Course, Outcome};
+use crate::replay::{ReplaySettings, Outcome};
 use plotters::style::RGBColor;
 use sapwise::{AlgorithmId, BackendClass};
 
@@ -29,7 +29,7 @@ type Points = Vec<(usize, f64)>;
 /// GPUs on the left and cores on the right, where both ran: above the time of the best fixed algorithm on each number of them in colour and that
 /// of the adaptive module in black, then what it chose, and the number of objects below.
 pub(crate) struct Simulation<'a> {
-    pub(crate) course: &'a Course,
+    pub(crate) settings: &'a ReplaySettings,
     pub(crate) outcome: &'a Outcome,
 }
 
@@ -129,7 +129,7 @@ impl Simulation<'_> {
             entries.push((Sign::Marked(at), format!("{}: {}", panel.name(*width), self.outcome.fixed[*k])));
         }
         entries.push((Sign::Line(ADAPTIVE), "adaptive".to_owned()));
-        if self.course.co_runner.is_some() {
+        if self.settings.co_runner.is_some() {
             entries.push((Sign::Line(CO_RUNNER), "a co-runner begins".to_owned()));
         }
         Legend::new(entries, width - 2 * GAP)
@@ -161,7 +161,7 @@ impl Simulation<'_> {
         let all = || curves.iter().flatten().chain(&adaptive).map(|point| point.1);
         let (name, unit) = time_unit(all());
         let chart = Chart::new(area, frame, self.frames(), Axis::log(all().map(|ns| ns / unit), 1.5));
-        let mut title = format!("{} ({})", panel.title(), self.course.footage.name());
+        let mut title = format!("{} ({})", panel.title(), self.settings.source.name());
         if !panel.other {
             let other = if panel.class == BackendClass::Cpu { BackendClass::Gpu } else { BackendClass::Cpu };
             title += &format!("; {}", absent(other));
@@ -184,7 +184,7 @@ impl Simulation<'_> {
             }
         }
         chart.line(drawn(&adaptive), ADAPTIVE)?;
-        match self.course.co_runner {
+        match self.settings.co_runner {
             Some(co_runner) => chart.upright(co_runner.from_frame as f64, CO_RUNNER),
             None => Ok(()),
         }

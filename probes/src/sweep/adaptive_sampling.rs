@@ -1,15 +1,15 @@
-//! Where the choice is in doubt and one more visit is worth its time.
+//! Adaptive sampling: the sizes at which the choice is in doubt and one more visit is worth its time.
 //!
 //! What a wrong choice costs at a size is known up to the error of the medians there. The errors that matter are not those of the
 //! frames of one visit, which lie close together, but those from visit to visit: how fast a machine wakes threads, or what its
 //! neighbours do to its memory, stays the same for some milliseconds and then changes by half. They show where a median does not lie
 //! on a line with those of the neighbouring sizes.
 
-use super::race::WARM_UP;
-use super::{Visit, median};
+use super::request::Visit;
 use sapwise::AlgorithmId;
 use sapwise::measure::Watch;
 use sapwise_lab::report::Point;
+use sapwise_lab::sweep::{WARM_UP, median};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -145,7 +145,7 @@ fn candidate<'a>(scenario: &'a str, objects: u32, rivals: &[Rival]) -> Option<Ca
             continue;
         }
         candidate.algorithms.push(rival.id.clone());
-        // Not known here is who keeps work and needs a warm-up. Everyone gets time for it: a visit that ends early costs nothing.
+        // Not known here is which algorithms are incremental and need a warm-up. Every one gets time for it: a visit that ends early costs nothing.
         ns += rival.log.exp() * (FRAMES + WARM_UP as f64);
         if gap > 0.0 {
             candidate.worth = f64::max(candidate.worth, expected_loss(gap, error(0.0)) - expected_loss(gap, error(1.0)));

@@ -1,25 +1,21 @@
 //! One point: every algorithm on the same frames, in random order within each.
 //!
-//! An algorithm that keeps work from frame to frame has a bias in its favour here: now and then it finds everything anew, in one
-//! of 20 to 100 frames, and the median leaves those frames out. Nor does its margin settle in the frames there are: what is
-//! measured is the margin with which it begins.
+//! An incremental algorithm has a bias in its favour here: it rebuilds what it keeps once in 20 to 100 frames, and the median leaves those
+//! frames out. Nor does its margin settle in the frames there are: what is measured is the margin with which it begins.
 
 use super::contest::{Contest, FEW_FRAMES};
 use super::verify::Answer;
-use sapwise_scenes::Random;
 use sapwise::measure::{Options, Watch, core_to_core_ns};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Displacement, Load, Pairs};
 use sapwise_lab::report::{Point, Timing};
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Displacement, Load, Pairs, Scene};
+use sapwise_lab::sweep::{WARM_UP, next_frame};
+use sapwise_scenes::{Random, Scene};
 use std::time::{Duration, Instant};
 
 /// Frames at most: beyond this the error of a median falls too slowly to be worth the time.
 const MOST_FRAMES: usize = 40;
 /// Frames at least where the point's time is over.
 pub(super) const FEWEST_FRAMES: usize = 3;
-/// Frames before the samples for algorithms that keep work from frame to frame: how far boxes move is known in the second, and the
-/// shares of them that leave their grown boxes follow over some tens. Fewer would time the cheap frames after everything was found
-/// anew: at 3162 objects 11 us where the others take 34. They go on past the point's time for that reason.
-pub(crate) const WARM_UP: usize = 24;
 /// Windows that may be thrown away for each that is kept: on a machine that is always busy more would only cost time.
 const MOST_REDONE: u32 = 2;
 /// Share of a point's time in which spoiled frames are redone. After that they are kept, with the foreign load beside them.
@@ -173,7 +169,7 @@ impl Race {
     ) -> Option<u64> {
         let before = racers.iter().find_map(|r| r.answer).map(|a| a.pairs);
         self.displacement.watch(scene.boxes());
-        sapwise_scenes_next_frame(scene);
+        next_frame(scene);
         let boxes = scene.boxes();
         for turn in self.shuffle.shuffled(racers.len()) {
             let racer = &mut racers[turn];
@@ -277,7 +273,7 @@ mod tests {
         assert_eq!(racer.samples, [0, 1, 2]);
     }
 
-    /// Gives one pair too many.
+    /// Returns one pair too many.
     struct Wrong;
 
     impl BroadPhase for Wrong {
@@ -290,13 +286,13 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_answer_is_found_and_costs_only_the_one_who_gave_it() {
+    fn a_wrong_answer_is_found_and_costs_only_the_one_that_returned_it() {
         let right = || sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
         let mut racers = vec![
             Racer::new("wrong@cpu1".parse().unwrap(), Box::new(Wrong)),
             Racer::new("brute@cpu1".parse().unwrap(), right()),
         ];
-        let mut scene = sapwise::Scenario::Uniform.start(50, 1);
+        let mut scene = sapwise_scenes::Scenario::Uniform.start(50, 1);
         let outcome = Race::new(1, 1000, 1, false).run(&mut racers, &mut scene, Duration::from_millis(1));
         assert_eq!(outcome.mismatches.len(), 1);
         assert!(outcome.mismatches[0].starts_with("wrong@cpu1"), "{:?}", outcome.mismatches);
@@ -321,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn who_keeps_work_runs_some_frames_more_before_the_samples() {
+    fn an_incremental_algorithm_runs_some_frames_more_before_the_samples() {
         // One box has no pairs, so that finding none is right.
         let [without, with] = {
             let frames = [(); 2].map(|()| Arc::<AtomicUsize>::default());
@@ -329,7 +325,7 @@ mod tests {
                 Racer::new(format!("counting@cpu{}", k + 1).parse().unwrap(), Box::new(Counting(frames[k].clone(), k == 1)))
             };
             let mut racers = vec![racer(0), racer(1)];
-            let mut scene = sapwise::Scenario::Resting.start(1, 1);
+            let mut scene = sapwise_scenes::Scenario::Resting.start(1, 1);
             let outcome = Race::new(1, 1000, 1, true).run(&mut racers, &mut scene, Duration::ZERO);
             assert!(outcome.mismatches.is_empty(), "{:?}", outcome.mismatches);
             assert!((0.0..=0.06).contains(&outcome.point.load.moved));
@@ -342,7 +338,7 @@ mod tests {
     fn too_many_pairs_end_the_race_with_an_error() {
         let brute = sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
         let mut racers = vec![Racer::new("brute@cpu1".parse().unwrap(), brute)];
-        let mut scene = sapwise::Scenario::Uniform.start(500, 1);
+        let mut scene = sapwise_scenes::Scenario::Uniform.start(500, 1);
         let outcome = Race::new(1, 3, 1, false).run(&mut racers, &mut scene, Duration::from_millis(1));
         assert!(outcome.point.timings[0].error.as_ref().unwrap().contains("limit of 3"));
     }

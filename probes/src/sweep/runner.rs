@@ -1,13 +1,15 @@
-//! The sweep as a whole: each scenario in a process of its own.
+//! Runs the whole sweep: each scenario in a process of its own.
 
-use super::{Schedule, Event, SweepRequest, Plan, doubt};
+use super::adaptive_sampling;
+use super::request::{Event, Schedule, SweepRequest};
 use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::Progress;
-use sapwise_scenes::Random;
 use anyhow::Context;
 use sapwise::GpuIdentity;
 use sapwise_lab::report::Point;
+use sapwise_lab::sweep::Plan;
+use sapwise_scenes::Random;
 use std::time::{Duration, Instant};
 
 /// What a scenario may take beyond its time: start-up, the first scene and a last frame that was forecast too short.
@@ -21,7 +23,7 @@ const START: Duration = Duration::from_millis(150);
 pub(crate) struct Found {
     pub(crate) points: Vec<Point>,
     pub(crate) remarks: Vec<String>,
-    /// Whether an algorithm gave a wrong answer or a scenario ended badly.
+    /// Whether an algorithm returned a wrong answer or a scenario ended badly.
     pub(crate) failed: bool,
     /// Whether the user stopped it.
     pub(crate) interrupted: bool,
@@ -40,7 +42,7 @@ pub(crate) struct Conditions {
 ///
 /// # Errors
 /// When no process can be started. A scenario that crashes is a remark, not an error.
-pub(crate) fn conduct(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut(&Found)) -> anyhow::Result<Found> {
+pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut(&Found)) -> anyhow::Result<Found> {
     let began = Instant::now();
     let progress = Progress::new(plan.total.as_secs());
     let gpus = conditions.gpus.clone();
@@ -94,7 +96,7 @@ impl Sweep<'_> {
                 let done = self.found.points.last().map_or("before the first point".to_owned(), |p| {
                     format!("after {} at {} objects", p.scenario, p.load.objects)
                 });
-                self.found.remarks.push(format!("interrupted {done}; what was to follow is missing"));
+                self.found.remarks.push(format!("interrupted {done}; the rest is missing"));
                 self.found.interrupted = true;
                 return Ok(false);
             }
@@ -116,7 +118,7 @@ impl Sweep<'_> {
         if interrupt::requested() {
             return Ok(Ended::Interrupted);
         }
-        let order = SweepRequest {
+        let request = SweepRequest {
             scenario: scenario.to_owned(),
             schedule,
             cores: self.conditions.cores,
@@ -126,9 +128,9 @@ impl Sweep<'_> {
             gpus: self.gpus.clone(),
             contended: self.conditions.contended,
         };
-        let text = serde_json::to_string(&order)?;
+        let text = serde_json::to_string(&request)?;
         let Self { plan, gpus, began, progress, found, .. } = self;
-        run_part(&["sap", &text], time + GRACE, &mut |line| {
+        run_part(&["sweep", &text], time + GRACE, &mut |line| {
             let event = match serde_json::from_str(line) {
                 Ok(event) => event,
                 // Drivers print what they like on the standard output of whoever loads them.

@@ -3,17 +3,17 @@
 use super::*;
 use sapwise_lab::figures::Picture;
 use crate::replay::examples::{outcome, taken};
-use crate::replay::{CoRunner, Footage};
+use crate::replay::{CoRunner, FrameSource};
 use sapwise::Scenario;
 
-fn course(co_runner: Option<CoRunner>) -> Course {
-    let footage = Footage::Scene { scenario: Scenario::Slab, objects: 10, seed: 1, swing: None };
-    Course { footage, frames: 3, repeats: 1, seed: 1, learning: true, exploring: true, co_runner }
+fn settings(co_runner: Option<CoRunner>) -> ReplaySettings {
+    let source = FrameSource::Scene { scenario: Scenario::Slab, objects: 10, seed: 1, swing: None };
+    ReplaySettings { source, frames: 3, repeats: 1, seed: 1, learning: true, exploring: true, co_runner }
 }
 
 fn drawn(outcome: &Outcome, co_runner: Option<CoRunner>) -> String {
     let told = ["regret 3 %".to_owned(), "Made by: sapwise run slab".to_owned()];
-    let figure = Simulation { course: &course(co_runner), outcome };
+    let figure = Simulation { settings: &settings(co_runner), outcome };
     String::from_utf8(figure.draw(Picture::Svg, &told).unwrap()).unwrap()
 }
 
