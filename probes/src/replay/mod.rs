@@ -16,7 +16,7 @@ pub(crate) use co_runner::{CoRunner, SHARE};
 pub(crate) use frame_source::{FrameSource, Swing};
 pub(crate) use oracle::WINDOW;
 pub(crate) use outcome::{Outcome, Segment};
-pub(crate) use picture::ReplayPicture;
+pub(crate) use picture::picture;
 pub(crate) use race::{replay, too_wide};
 pub(crate) use settings::ReplaySettings;
 pub(crate) use trace::{Format as TraceFormat, write_trace};
