@@ -57,7 +57,8 @@ pub mod posterior;
 mod registry;
 pub mod report;
 mod sample;
-mod scenario;
+#[cfg(test)]
+mod scene;
 mod schema_tag;
 mod splitmix;
 // Public as `measure::statistics`; the figures of parameters in files follow from it without that feature too.
@@ -88,7 +89,6 @@ pub use posterior::{Posterior, Prior};
 pub use rayon;
 pub use registry::{Entry, Registry, usable_cores};
 pub use report::Report;
-pub use scenario::{Scenario, Scene};
 
 /// The examples of the README as tests, with the feature that the first of them needs.
 #[cfg(all(doctest, feature = "this-machine"))]

@@ -8,7 +8,8 @@ use sapwise_lab::text::count;
 use anyhow::{Context, bail};
 use sapwise::hardware::parameter;
 use sapwise::model::{ASK, FEWEST_MACHINES, Prediction};
-use sapwise::{Displacement, Tuning, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry, Scenario};
+use sapwise::{Displacement, Tuning, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry};
+use sapwise_scenes::Scenario;
 
 /// Objects of the slice that the tuning shows: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;

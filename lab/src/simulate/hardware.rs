@@ -2,7 +2,7 @@
 
 use super::machine::{TrueGpu, TrueMachine};
 use super::pairing::Build;
-use crate::random::Random;
+use sapwise_scenes::Random;
 use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, Statistic, gpu, parameter};
 use sapwise::{Hardware, Machine, Parameter};
 

@@ -2,7 +2,7 @@
 
 use super::entry::Entry;
 use crate::plot::{FieldMap, MapCell, MapPanel, MapPoint};
-use crate::random::Random;
+use sapwise_scenes::Random;
 use crate::train::{Profile, available, average, measured_costs, without};
 use anyhow::Result;
 use rayon::prelude::*;

@@ -6,14 +6,18 @@ mod text;
 
 use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
+<<<<<<< HEAD
 use sapwise_scenes::{Frames, read_frames};
+=======
+>>>>>>> scenes
 use crate::exit::{Outcome, WrongUsage};
 use sapwise_lab::figures::{self, Figure, Picture};
 use crate::replay::{ReplaySettings, FrameSource, Swing, TraceFormat, simulate, too_wide, write_trace};
 use crate::terminal::Terminal;
 use crate::{files, interrupt, output};
 use anyhow::{Context, bail};
-use sapwise::{Scenario, usable_cores};
+use sapwise::usable_cores;
+;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -143,9 +147,9 @@ fn course(arguments: &Run) -> anyhow::Result<ReplaySettings> {
 }
 
 fn read_stream(path: &Path) -> anyhow::Result<Frames> {
-    let frames = read_frames(path)?;
+    let frames = Frames::read(path)?;
     frames.check().with_context(|| format!("{} can't be run", path.display()))?;
-    if frames.len() == 0 {
+    if frames.is_empty() {
         bail!("{} has no frames; `sapwise run SCENARIO --record S.npy` shows how a stream looks", path.display());
     }
     Ok(frames)
