@@ -10,7 +10,7 @@ fn tuning(registry: &Registry) -> Tuning {
     let curve = |k: u32| CostCurve {
         terms: Term::ALL.map(|term| CostTerm { term, unit_ns: 1.0 + f64::from(k) / 100.0 }).to_vec(),
         cache_bytes: 3.2e7,
-        otherwise: Vec::new(),
+        fallback_terms: Vec::new(),
         correction: (3..=24).map(|o| Knot { log2_objects: f64::from(o), ln_factor: 0.01 * f64::from(o % 5) }).collect(),
     };
     let ids = registry.entries().iter().map(|e| (e.id.clone(), e.revision));

@@ -8,7 +8,7 @@ use crate::progress::Progress;
 use sapwise_scenes::Random;
 use anyhow::Result;
 use rayon::prelude::*;
-use sapwise::measure::statistics::quantile;
+use sapwise::stats::quantile;
 use sapwise::model::{Learning, LearningScore};
 use std::collections::BTreeSet;
 

@@ -192,7 +192,7 @@ pub(super) fn value_at_weight(values: &[(f64, f64)], weight: f64) -> Option<f64>
 
 /// Median; 0 for none.
 fn median(values: &[f64]) -> f64 {
-    sapwise::measure::statistics::median(values).unwrap_or(0.0)
+    sapwise::stats::median(values).unwrap_or(0.0)
 }
 
 #[cfg(test)]

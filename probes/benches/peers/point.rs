@@ -2,7 +2,7 @@
 
 use crate::contestants::Side;
 use sapwise_scenes::Scenario;
-use sapwise::measure::statistics::quantile;
+use sapwise::stats::quantile;
 
 /// How a contestant did.
 pub(crate) struct Lane {

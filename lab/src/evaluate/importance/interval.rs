@@ -1,6 +1,6 @@
 //! A mean over machines, and how far it would differ with other machines.
 
-use sapwise::measure::statistics::quantile;
+use sapwise::stats::quantile;
 use serde::Serialize;
 
 /// Draws of as many machines as there are, with replacement.

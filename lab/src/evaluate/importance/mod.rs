@@ -20,7 +20,7 @@ use figure::Figure;
 use judge::{Judge, Outcome, Shifts, What};
 use rayon::prelude::*;
 use sapwise::Model;
-use sapwise::measure::statistics::median;
+use sapwise::stats::median;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use verdict::FEWEST_MACHINES;
