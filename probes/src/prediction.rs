@@ -4,7 +4,7 @@ use crate::algorithms::Algorithms;
 use crate::progress::Progress;
 use crate::revisions;
 use crate::samples::{self, Live, Order, Taken};
-use crate::table::count;
+use sapwise_lab::text::count;
 use anyhow::{Context, bail};
 use sapwise::hardware::parameter;
 use sapwise::model::{ASK, FEWEST_MACHINES, Prediction};

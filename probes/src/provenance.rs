@@ -5,7 +5,7 @@ use crate::args::Probe;
 use crate::date;
 use crate::gpus::uses;
 use crate::restriction;
-use sapwise::report::{Label, Point, Provenance, Restriction, Timed};
+use sapwise_lab::report::{Label, Point, Provenance, Restriction, Timed};
 use sapwise::{GpuKind, Hardware, SimdLevel, usable_cores};
 use std::time::Duration;
 
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
     use crate::args::{Arguments, Verb};
     use clap::Parser;
-    use sapwise::report::Timing;
+    use sapwise_lab::report::Timing;
     use sapwise::{GpuHardware, GpuIdentity, Load, Machine};
 
     fn probe(words: &[&str]) -> Probe {

@@ -2,11 +2,11 @@
 
 use crate::args::Probe;
 use crate::contention::{ASSUMED_LLC_BYTES, Contended};
-use crate::document::read_document;
+use sapwise_lab::data::files::read_document;
 use anyhow::bail;
 use sapwise::hardware::{gpu, parameter};
 use sapwise::json::Document;
-use sapwise::report::{Proof, Restricted, Restriction};
+use sapwise_lab::report::{Proof, Restricted, Restriction};
 use sapwise::{GpuHardware, GpuIdentity, Hardware, SimdLevel, usable_cores};
 use std::path::PathBuf;
 use std::str::FromStr;

@@ -1,11 +1,11 @@
 //! What a person reads at the end of a probe or a prediction.
 
 use crate::gpus::GpuChoice;
-use crate::table::{bytes, columns, count, duration, grouped};
+use sapwise_lab::text::{bytes, columns, count, duration, grouped};
 use crate::terminal::{self, Terminal};
 use crate::train::{measured_tuning, slice_scenario};
 use sapwise::hardware::gpu::parameter::UNIFIED_MEMORY;
-use sapwise::report::Label;
+use sapwise_lab::report::Label;
 use sapwise::{Backend, Border, Tuning, GpuHardware, GpuIdentity, Hardware, How, Parameter, Report};
 use std::path::Path;
 
@@ -141,22 +141,6 @@ fn samples(tuning: &Tuning, terminal: Terminal) -> String {
     terminal.table(&rows)
 }
 
-/// A value with the unit that the end of its name says.
-pub(crate) fn value(name: &str, value: f64) -> String {
-    match name {
-        _ if name.ends_with("_gb_per_s") => format!("{value:.1} GB/s"),
-        _ if name.ends_with("_gflop_per_s") => format!("{value:.0} GFLOP/s"),
-        _ if name.ends_with("_g_per_s") => format!("{value:.2} G/s"),
-        _ if name == UNIFIED_MEMORY => if value > 0.0 { "yes" } else { "no" }.to_owned(),
-        _ if name.ends_with("_bytes") => bytes(value),
-        _ if name.ends_with("_ghz") => format!("{value:.2} GHz"),
-        _ if name.ends_with("_ns") && value < 1000.0 => format!("{value:.1} ns"),
-        _ if name.ends_with("_ns") => duration(value),
-        _ if name.ends_with("_ratio") => format!("{value:.2} x"),
-        _ => format!("{value}"),
-    }
-}
-
 fn scenarios(report: &Report) -> Vec<&str> {
     let mut names: Vec<&str> = Vec::new();
     for point in &report.points {
@@ -165,39 +149,4 @@ fn scenarios(report: &Report) -> Vec<&str> {
         }
     }
     names
-}
-
-/// The label as it stands in the file.
-pub(crate) fn kind(of: Label) -> &'static str {
-    label(of).split_once(':').map_or_else(|| label(of), |(kind, _)| kind)
-}
-
-/// The label as it stands in the file, and what it means.
-fn label(label: Label) -> &'static str {
-    match label {
-        Label::RealFull => "real_full: a whole machine, undisturbed",
-        Label::RealRestricted => "real_restricted: fewer cores or a lower level of vector instructions than the machine has",
-        Label::RealContended => "real_contended: other programs took part of the machine",
-        Label::RealSoftwareGpu => "real_software_gpu: the GPU is a program on the CPU",
-        Label::Simulated => "simulated: made up from a specification",
-        Label::Published => "published: parameters from a publication, without timings",
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_have_the_unit_of_their_name() {
-        assert_eq!(value("cache_l2_bytes", 2_097_152.0), "2 MiB");
-        assert_eq!(value("bandwidth_one_thread_gb_per_s", 12.345), "12.3 GB/s");
-        assert_eq!(value("latency_16_kib_ns", 1.26), "1.3 ns");
-        assert_eq!(value("fork_join_cold_ns", 12_500.0), "12.50 us");
-        assert_eq!(value("scaling_two_threads_ratio", 1.9), "1.90 x");
-        assert_eq!(value("usable_cores", 2.0), "2");
-        assert_eq!(value("arithmetic_gflop_per_s", 51_234.5), "51234 GFLOP/s");
-        assert_eq!(value("atomic_g_per_s", 0.25), "0.25 G/s");
-        assert_eq!(value("unified_memory", 1.0), "yes");
-    }
 }

@@ -4,7 +4,7 @@ mod common;
 
 use common::{failure, sapwise, success};
 use sapwise::Report;
-use sapwise::report::Restricted;
+use sapwise_lab::report::Restricted;
 use std::fs;
 use std::path::Path;
 #[cfg(unix)]

@@ -1,7 +1,7 @@
 //! The options of `sapwise run`.
 
 use crate::gpus::GpuChoice;
-use crate::simulation::CoRunner;
+use crate::replay::CoRunner;
 use clap::Args;
 use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 use crate::date;
 use sapwise::hardware::parameter;
 use sapwise::measure::Watch;
-use sapwise::report::{Label, Point, Restricted};
+use sapwise_lab::report::{Label, Point, Restricted};
 use sapwise::{GpuHardware, Hardware, How, Parameter, Report, SimdLevel};
 use std::collections::BTreeMap;
 

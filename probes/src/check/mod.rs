@@ -7,7 +7,7 @@ mod privacy;
 mod report;
 
 use crate::algorithms::Algorithms;
-use crate::document::read_document;
+use sapwise_lab::data::files::read_document;
 use crate::gpus::{Seen, look};
 use sapwise::json::Document;
 use sapwise::measure;

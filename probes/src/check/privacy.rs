@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_host_that_is_called_like_its_cpu_or_a_scenario_reveals_nothing() {
-        let mut report = crate::train::synthetic::Machine::family()[0].report();
+        let mut report = sapwise_lab::synthetic::Machine::family()[0].report();
         report.hardware.machine.cpu = "Intel(R) Core(TM) i7".to_owned();
         report.points[0].scenario = "uniform".to_owned();
         assert!(is_told_anyway(&report, "intel") && is_told_anyway(&report, "Uniform"));

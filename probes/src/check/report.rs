@@ -4,7 +4,7 @@ use super::{Finding, Here, figures, privacy};
 use crate::gpus::{difference, uses};
 use crate::{date, restriction, revisions};
 use sapwise::Report;
-use sapwise::report::Label;
+use sapwise_lab::report::Label;
 
 /// Most bytes of a report that goes into datasets/, which every clone of the repository takes along.
 const MOST_BYTES: u64 = 1_000_000;

@@ -2,7 +2,7 @@
 
 use super::Seen;
 use crate::exit::WrongUsage;
-use sapwise::report::Report;
+use sapwise_lab::report::Report;
 use sapwise::{AlgorithmId, Backend, GpuIdentity, GpuKind};
 
 /// The options of verbs that take GPUs.

@@ -4,9 +4,8 @@ use crate::args::Probe;
 use crate::contention::Contended;
 use crate::restriction::{self, LAVAPIPE_THREADS};
 use crate::sweep::Plan;
-use sapwise::report::Restricted;
-use sapwise::{GpuIdentity, GpuKind, SimdLevel};
-use sapwise_scenes::Scenario;
+use sapwise_lab::report::Restricted;
+use sapwise::{GpuIdentity, GpuKind, Scenario, SimdLevel};
 use std::path::Path;
 use std::time::Duration;
 

@@ -2,11 +2,11 @@
 
 use crate::args::Compare;
 use crate::compare::{Border, Comparison, Losses, STEEP, Spread, steady};
-use crate::document::read_reports;
+use sapwise_lab::data::files::read_reports;
 use crate::exit::Outcome;
 use crate::output;
-use crate::steadiness::Steadiness;
-use crate::table::grouped;
+use sapwise_lab::steadiness::Steadiness;
+use sapwise_lab::text::grouped;
 use crate::terminal::Terminal;
 
 pub(crate) fn run(arguments: &Compare) -> anyhow::Result<Outcome> {

@@ -6,7 +6,7 @@ use crate::exit::Outcome;
 use crate::gpus::{self, Limits, OnGpus, Seen, look};
 use crate::output;
 use crate::progress::Progress;
-use crate::table::{bytes, count};
+use sapwise_lab::text::{bytes, count};
 use crate::terminal::Terminal;
 use sapwise::{AlgorithmId, GpuIdentity, SimdLevel, usable_cores};
 use serde::Serialize;

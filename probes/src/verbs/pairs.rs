@@ -2,11 +2,15 @@
 
 use crate::algorithms::Algorithms;
 use crate::args::Pairs as Arguments;
+<<<<<<< HEAD
+use sapwise_scenes::{Frames, read_frames, write_pairs};
+=======
 use crate::files::write_atomically;
+>>>>>>> scenes
 use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::sweep::median;
-use crate::table::{count, duration, grouped};
+use sapwise_lab::text::{count, duration, grouped};
 use crate::{gpus, interrupt, output};
 use anyhow::Context;
 use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry, usable_cores};

@@ -2,7 +2,7 @@
 
 use crate::algorithms::Algorithms;
 use crate::args::Predict;
-use crate::document::read_document;
+use sapwise_lab::data::files::read_document;
 use crate::exit::{Outcome, WrongUsage};
 use crate::hardware::{self, measure_hardware};
 use crate::prediction::{self, Slice};

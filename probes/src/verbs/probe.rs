@@ -6,12 +6,12 @@ use crate::contention::contend;
 use crate::destination::Destination;
 use crate::exit::Outcome;
 use crate::hardware::{self, measure_hardware};
-use crate::steadiness::Steadiness;
+use sapwise_lab::steadiness::Steadiness;
 use crate::sweep::{self, Conditions, Found, Plan};
 use crate::terminal::Terminal;
 use crate::{child, interrupt, output, profiles, provenance, restriction, summary};
 use anyhow::Context;
-use sapwise::report::Restriction;
+use sapwise_lab::report::Restriction;
 use sapwise::{Hardware, Report, usable_cores};
 use std::time::Instant;
 
@@ -98,7 +98,7 @@ fn assemble(
     began: Instant,
 ) -> Report {
     let mut report = Report {
-        schema: sapwise::report::ReportSchema,
+        schema: sapwise_lab::report::ReportSchema,
         label: provenance::label(arguments, &found.points, hardware),
         provenance: provenance::provenance(arguments, restriction, hardware, began.elapsed()),
         hardware: hardware.clone(),

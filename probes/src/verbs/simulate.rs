@@ -1,10 +1,10 @@
 //! `sapwise simulate`: reports of machines that there are not, from published specifications.
 
 use crate::args::Simulate;
-use crate::document::{json_files, read_text};
+use sapwise_lab::data::files::{json_files, read_text};
 use crate::exit::Outcome;
 use crate::simulate::{Loads, built_in, read, simulate};
-use crate::table::count;
+use sapwise_lab::text::count;
 use crate::{files, output};
 use anyhow::{Context, bail};
 use serde::Serialize;

@@ -1,12 +1,12 @@
 //! `sapwise study`: a page with figures and tables of any set of reports.
 
 use crate::args::Study as Arguments;
-use crate::document::{read_report, report_files};
+use sapwise_lab::data::files::{read_report, report_files};
 use crate::exit::{Outcome, WrongUsage};
 use crate::output;
 use crate::progress::Progress;
 use crate::study::{self, Answer, Compared, Entry, PAGE, Study};
-use crate::table::count;
+use sapwise_lab::text::count;
 use crate::terminal::Terminal;
 use crate::train::{self, Evidence, Held, Profile, Selection};
 use anyhow::bail;

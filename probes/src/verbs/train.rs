@@ -1,9 +1,9 @@
 //! `sapwise train`: a model from reports, validated by leaving machines out.
 
 use crate::args::Train;
-use crate::document::{read_report, report_files};
+use sapwise_lab::data::files::{read_report, report_files};
 use crate::exit::{Outcome, WrongUsage};
-use crate::plot::{self, Figure, Picture};
+use sapwise_lab::figures::{self, Figure, Picture};
 use crate::progress::Progress;
 use crate::terminal::{Axis, Chart, Series, Terminal};
 use crate::train::{self, Evidence, Held, OURS, Selection, Trained};

@@ -1,7 +1,7 @@
 //! The answer for machines.
 
 use super::tuning::{From, Origin};
-use crate::simulation::{Course, Outcome, Part, SHARE};
+use crate::replay::{ReplaySettings, Outcome, Part, SHARE};
 use sapwise::{AlgorithmId, Source};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -154,7 +154,7 @@ struct Decision<'a> {
 
 impl<'a> Answer<'a> {
     pub(super) fn new(
-        course: &'a Course,
+        course: &'a ReplaySettings,
         outcome: &'a Outcome,
         origin: &'a Origin,
         too_wide: Vec<&'a AlgorithmId>,

@@ -6,9 +6,13 @@ mod text;
 
 use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
+<<<<<<< HEAD
+use sapwise_scenes::{Frames, read_frames};
+=======
+>>>>>>> scenes
 use crate::exit::{Outcome, WrongUsage};
-use crate::plot::{self, Figure, Picture};
-use crate::simulation::{Course, Footage, Swing, TraceFormat, simulate, too_wide, write_trace};
+use sapwise_lab::figures::{self, Figure, Picture};
+use crate::replay::{ReplaySettings, FrameSource, Swing, TraceFormat, simulate, too_wide, write_trace};
 use crate::terminal::Terminal;
 use crate::{files, interrupt, output};
 use anyhow::{Context, bail};
@@ -96,7 +100,7 @@ fn check_outputs(arguments: &Run) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// When the stream can't be read, holds what no algorithm takes, or is asked for what only a scenario has.
-fn course(arguments: &Run) -> anyhow::Result<Course> {
+fn course(arguments: &Run) -> anyhow::Result<ReplaySettings> {
     let asked = arguments.frames.map(|frames| frames as usize);
     let (footage, frames) = match &arguments.scene {
         Scene::Scenario(scenario) => {
@@ -107,7 +111,7 @@ fn course(arguments: &Run) -> anyhow::Result<Course> {
                 return Err(WrongUsage(format!("--swing {least}: more than the {objects} objects; raise --objects")).into());
             }
             let swing = arguments.swing.map(|least| Swing { least: least as usize, frames });
-            (Footage::Scene { scenario: *scenario, objects, seed: arguments.seed, swing }, frames)
+            (FrameSource::Scene { scenario: *scenario, objects, seed: arguments.seed, swing }, frames)
         }
         Scene::Stream(path) => {
             let wrong =
@@ -128,10 +132,10 @@ fn course(arguments: &Run) -> anyhow::Result<Course> {
                 return Err(WrongUsage(why).into());
             }
             let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-            (Footage::Stream { name, frames }, asked.unwrap_or(count))
+            (FrameSource::Stream { name, frames }, asked.unwrap_or(count))
         }
     };
-    Ok(Course {
+    Ok(ReplaySettings {
         footage,
         frames,
         repeats: arguments.repeats as usize,

@@ -3,8 +3,8 @@
 use super::answer::{Answer, Figures, LeftOut, Oracle, Slowed};
 use super::tuning::{From, Origin};
 use crate::args::{Run, Scene};
-use crate::simulation::{Outcome, WINDOW};
-use crate::table::{count, grouped};
+use crate::replay::{Outcome, WINDOW};
+use sapwise_lab::text::{count, grouped};
 use crate::terminal::{Axis, Chart, Series, Terminal};
 use sapwise::stats::quantile;
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use crate::algorithms::Algorithms;
 use crate::args::Run;
-use crate::document::read_document;
+use sapwise_lab::data::files::read_document;
 use crate::gpus::{self, GpuChoice};
 use crate::hardware::measure_hardware;
 use crate::prediction::{self, Slice};

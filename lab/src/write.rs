@@ -4,7 +4,6 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use crate::exit::WrongUsage;
 use anyhow::{Context, Result, bail};
 
 /// Writes what `write` produces to `path`, so that a reader never sees half of it.
@@ -14,7 +13,7 @@ use anyhow::{Context, Result, bail};
 ///
 /// # Errors
 /// Names `path`. The file that stood there, or its absence, is unchanged, and no temporary file is left.
-pub(crate) fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
     let result = match fs::metadata(path) {
         Ok(found) if found.is_dir() => Err(anyhow::anyhow!("it is a folder")),
         Ok(found) if !found.is_file() => write_through(path, write),
@@ -28,7 +27,7 @@ pub(crate) fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -
 ///
 /// # Errors
 /// As there.
-pub(crate) fn write_text(path: &Path, text: &str) -> Result<()> {
+pub fn write_text(path: &Path, text: &str) -> Result<()> {
     write_atomically(path, |out| Ok(out.write_all(text.as_bytes())?))
 }
 
@@ -61,25 +60,6 @@ fn buffered(file: &mut File, write: impl FnOnce(&mut dyn Write) -> Result<()>) -
     write(&mut buffer)?;
     // Dropping the buffer would write its rest too, and lose the error.
     buffer.flush()?;
-    Ok(())
-}
-
-/// Refuses to write over a file that is read, or twice into one file.
-///
-/// # Errors
-/// [`WrongUsage`] that names the file.
-pub(crate) fn refuse_overwriting(inputs: &[PathBuf], outputs: &[&PathBuf]) -> Result<()> {
-    let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let read: Vec<PathBuf> = inputs.iter().map(|path| place(path)).collect();
-    for (k, path) in outputs.iter().enumerate() {
-        let own = place(path);
-        if read.contains(&own) {
-            return Err(WrongUsage(format!("{} is a file that is read; name another", path.display())).into());
-        }
-        if outputs[..k].iter().any(|o| place(o) == own) {
-            return Err(WrongUsage(format!("{} is named for two outputs", path.display())).into());
-        }
-    }
     Ok(())
 }
 

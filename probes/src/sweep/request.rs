@@ -1,17 +1,17 @@
 //! What a sweeping process is told, and what it tells.
 
-use sapwise::report::Point;
+use sapwise_lab::report::Point;
 use sapwise::{AlgorithmId, GpuIdentity};
 use serde::{Deserialize, Serialize};
 
 /// The sweep of one scenario, as it is handed to a process of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Order {
+pub(crate) struct SweepRequest {
     /// Name of the scenario.
     pub(crate) scenario: String,
     /// The sizes.
-    pub(crate) course: Course,
+    pub(crate) schedule: Schedule,
     /// Cores that algorithms may use.
     pub(crate) cores: u32,
     /// Seed of the scenes and of the order of turns.
@@ -27,14 +27,14 @@ pub(crate) struct Order {
 /// Which sizes, and who takes part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Course {
+pub(crate) enum Schedule {
     /// Every algorithm through these numbers of objects, ascending, until it leaves the race.
     Ascent(Vec<u32>),
     /// Where the choice is in doubt, in this order.
     Visits(Vec<Visit>),
 }
 
-impl Course {
+impl Schedule {
     /// Whether an algorithm takes part anywhere.
     pub(super) fn admits(&self, id: &AlgorithmId) -> bool {
         match self {

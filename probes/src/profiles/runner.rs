@@ -4,7 +4,7 @@ use super::minutes;
 use super::profile::Profile;
 use super::there::{There, numbers};
 use crate::child::{Ended, run_verb};
-use crate::document::read_document;
+use sapwise_lab::data::files::read_document;
 use crate::progress::Progress;
 use crate::{gpus, interrupt, output, table};
 use anyhow::bail;

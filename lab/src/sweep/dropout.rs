@@ -15,16 +15,16 @@ const BRUTE_STAYS_BELOW: u32 = 3000;
 
 /// The race of one algorithm through the sizes of a scenario.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Standing {
+pub struct Standing {
     /// Its time over the best at the size before.
     before: Option<f64>,
     /// Whether it has left.
-    pub(crate) out: bool,
+    pub out: bool,
 }
 
 impl Standing {
     /// Takes the algorithm out where time is short, if it took more than [`SLOW`] times as long as the best. Gives its ratio.
-    pub(crate) fn leave_if_slow(&mut self) -> Option<f64> {
+    pub fn leave_if_slow(&mut self) -> Option<f64> {
         let slow = self.before.filter(|&ratio| ratio > SLOW);
         self.out |= slow.is_some();
         slow
@@ -33,7 +33,7 @@ impl Standing {
     /// Judges the algorithm after a size at which it took `ratio` times as long as the best.
     ///
     /// What is slow but gains on the others stays: parallel versions start far behind and win in the end.
-    pub(crate) fn judge(&mut self, ratio: f64, method: &str, objects: u32) {
+    pub fn judge(&mut self, ratio: f64, method: &str, objects: u32) {
         let grows = self.before.is_some_and(|before| ratio > before);
         let kept = method == "brute" && objects < BRUTE_STAYS_BELOW;
         self.out |= ratio > HOPELESS && grows && !kept && objects >= JUDGED_FROM;

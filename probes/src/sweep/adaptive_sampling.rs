@@ -1,15 +1,15 @@
-//! Where the choice is in doubt and one more visit is worth its time.
+//! Adaptive sampling: the sizes at which the choice is in doubt and one more visit is worth its time.
 //!
 //! What a wrong choice costs at a size is known up to the error of the medians there. The errors that matter are not those of the
 //! frames of one visit, which lie close together, but those from visit to visit: how fast a machine wakes threads, or what its
 //! neighbours do to its memory, stays the same for some milliseconds and then changes by half. They show where a median does not lie
 //! on a line with those of the neighbouring sizes.
 
-use super::race::WARM_UP;
-use super::{Visit, median};
+use super::request::Visit;
 use sapwise::AlgorithmId;
 use sapwise::measure::Watch;
-use sapwise::report::Point;
+use sapwise_lab::report::Point;
+use sapwise_lab::sweep::{WARM_UP, median};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -33,18 +33,18 @@ const NS_PER_OBJECT: f64 = 60.0;
 /// The visits of one round, by scenario, each list ascending by size: those that promise most for their time, at most one for each
 /// size, within `time`.
 pub(super) fn visits(points: &[Point], time: Duration) -> BTreeMap<String, Vec<Visit>> {
-    let mut places: Vec<Place> = scenarios(points).into_iter().flat_map(|(s, sizes)| places(s, &sizes)).collect();
-    places.retain(|p| p.worth > 0.0 && p.algorithms.len() > 1);
-    // Asks the system, so it is done once and not for each place.
+    let mut candidates: Vec<Candidate> = scenarios(points).into_iter().flat_map(|(s, sizes)| candidates(s, &sizes)).collect();
+    candidates.retain(|p| p.worth > 0.0 && p.algorithms.len() > 1);
+    // Asks the system, so it is done once and not for each candidate.
     let shortest = (Watch::begin().shortest() + START).as_secs_f64();
-    places.iter_mut().for_each(|p| p.seconds = p.seconds.max(shortest));
-    places.sort_by(|a, b| (b.worth / b.seconds).total_cmp(&(a.worth / a.seconds)));
+    candidates.iter_mut().for_each(|p| p.seconds = p.seconds.max(shortest));
+    candidates.sort_by(|a, b| (b.worth / b.seconds).total_cmp(&(a.worth / a.seconds)));
     let mut left = time.as_secs_f64();
     let mut chosen: BTreeMap<String, Vec<Visit>> = BTreeMap::new();
-    for place in places {
-        if place.seconds <= left {
-            left -= place.seconds;
-            let Place { scenario, objects, seconds, algorithms, .. } = place;
+    for candidate in candidates {
+        if candidate.seconds <= left {
+            left -= candidate.seconds;
+            let Candidate { scenario, objects, seconds, algorithms, .. } = candidate;
             chosen.entry(scenario.to_owned()).or_default().push(Visit { objects, seconds, algorithms });
         }
     }
@@ -53,7 +53,7 @@ pub(super) fn visits(points: &[Point], time: Duration) -> BTreeMap<String, Vec<V
 }
 
 /// A size of a scenario that could be visited.
-struct Place<'a> {
+struct Candidate<'a> {
     scenario: &'a str,
     objects: u32,
     /// What the visit takes off the expected regret of the choice.
@@ -80,9 +80,9 @@ fn scenarios(points: &[Point]) -> BTreeMap<&str, BTreeMap<u32, Size>> {
     scenarios
 }
 
-fn places<'a>(scenario: &'a str, sizes: &BTreeMap<u32, Size>) -> Vec<Place<'a>> {
+fn candidates<'a>(scenario: &'a str, sizes: &BTreeMap<u32, Size>) -> Vec<Candidate<'a>> {
     let list: Vec<(u32, &Size)> = sizes.iter().map(|(&n, size)| (n, size)).collect();
-    let mut places = Vec::new();
+    let mut candidates = Vec::new();
     for (k, &(objects, size)) in list.iter().enumerate() {
         let neighbours = k.checked_sub(1).and_then(|b| list.get(b)).zip(list.get(k + 1));
         let rivals: Vec<Rival> = size
@@ -94,7 +94,7 @@ fn places<'a>(scenario: &'a str, sizes: &BTreeMap<u32, Size>) -> Vec<Place<'a>> 
                 Rival { id, log, error, visits }
             })
             .collect();
-        places.extend(place(scenario, objects, &rivals));
+        candidates.extend(candidate(scenario, objects, &rivals));
     }
     for pair in list.windows(2) {
         let [(low, below), (high, above)] = [pair[0], pair[1]];
@@ -104,9 +104,9 @@ fn places<'a>(scenario: &'a str, sizes: &BTreeMap<u32, Size>) -> Vec<Place<'a>> 
         let objects = (f64::from(low) * f64::from(high)).sqrt().round() as u32;
         let known = below.keys().filter_map(|id| Some((id, between((low, below), (high, above), objects, id)?)));
         let rivals: Vec<Rival> = known.map(|(id, log)| Rival { id, log, error: USUAL_ERROR, visits: 1.0 }).collect();
-        places.extend(place(scenario, objects, &rivals));
+        candidates.extend(candidate(scenario, objects, &rivals));
     }
-    places
+    candidates
 }
 
 /// What the line through two sizes says of an algorithm at a third.
@@ -121,7 +121,7 @@ fn leader(size: &Size) -> Option<&AlgorithmId> {
     size.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0)).map(|(id, _)| id)
 }
 
-/// An algorithm at a place.
+/// An algorithm at a candidate.
 struct Rival<'a> {
     id: &'a AlgorithmId,
     log: f64,
@@ -130,9 +130,9 @@ struct Rival<'a> {
     visits: f64,
 }
 
-fn place<'a>(scenario: &'a str, objects: u32, rivals: &[Rival]) -> Option<Place<'a>> {
+fn candidate<'a>(scenario: &'a str, objects: u32, rivals: &[Rival]) -> Option<Candidate<'a>> {
     let best = rivals.iter().min_by(|a, b| a.log.total_cmp(&b.log))?;
-    let mut place = Place { scenario, objects, worth: 0.0, seconds: 0.0, algorithms: Vec::new() };
+    let mut candidate = Candidate { scenario, objects, worth: 0.0, seconds: 0.0, algorithms: Vec::new() };
     let each_frame = NS_PER_OBJECT * f64::from(objects);
     let mut ns = each_frame * (FRAMES + WARM_UP as f64);
     for rival in rivals {
@@ -144,15 +144,15 @@ fn place<'a>(scenario: &'a str, objects: u32, rivals: &[Rival]) -> Option<Place<
         if gap > CONTENDER.ln().max(POSSIBLE * error(0.0)) {
             continue;
         }
-        place.algorithms.push(rival.id.clone());
-        // Not known here is who keeps work and needs a warm-up. Everyone gets time for it: a visit that ends early costs nothing.
+        candidate.algorithms.push(rival.id.clone());
+        // Not known here is which algorithms are incremental and need a warm-up. Every one gets time for it: a visit that ends early costs nothing.
         ns += rival.log.exp() * (FRAMES + WARM_UP as f64);
         if gap > 0.0 {
-            place.worth = f64::max(place.worth, expected_loss(gap, error(0.0)) - expected_loss(gap, error(1.0)));
+            candidate.worth = f64::max(candidate.worth, expected_loss(gap, error(0.0)) - expected_loss(gap, error(1.0)));
         }
     }
-    place.seconds = ns / 1e9;
-    Some(place)
+    candidate.seconds = ns / 1e9;
+    Some(candidate)
 }
 
 /// What is lost on average by choosing the one that seems faster by `gap`, when the gap has a standard error: the unit normal loss,
@@ -166,7 +166,7 @@ fn expected_loss(gap: f64, error: f64) -> f64 {
 mod tests {
     use super::*;
     use sapwise::Load;
-    use sapwise::report::Timing;
+    use sapwise_lab::report::Timing;
 
     fn point(scenario: &str, objects: u32, ns: &[(&str, f64)]) -> Point {
         let timing = |&(id, ns): &(&str, f64)| Timing {
@@ -229,8 +229,8 @@ mod tests {
         assert!((0.25..=0.4).contains(&total(&points, 0.4)));
         let worth = |points: &[Point]| {
             let scenarios = scenarios(points);
-            let places = places("uniform", &scenarios["uniform"]);
-            places.iter().find(|p| p.objects == 290).map(|p| p.worth).unwrap()
+            let candidates = candidates("uniform", &scenarios["uniform"]);
+            candidates.iter().find(|p| p.objects == 290).map(|p| p.worth).unwrap()
         };
         let twice: Vec<Point> = points.iter().chain(&points).cloned().collect();
         assert!(worth(&twice) < 0.6 * worth(&points) && worth(&twice) > 0.0);

@@ -8,18 +8,18 @@ use std::time::Duration;
 /// It begins with an ascent: every algorithm through all sizes, for the shape of the cost curves. Rounds of visits follow, to where
 /// the choice is in doubt after what was measured before.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Plan {
+pub struct Plan {
     /// In the order of measurement.
-    pub(crate) scenarios: Vec<Scenario>,
+    pub scenarios: Vec<Scenario>,
     /// Numbers of objects in the ascent, ascending.
-    pub(crate) sizes: Vec<u32>,
+    pub sizes: Vec<u32>,
     /// Time for the ascent of each scenario. A slower machine gets fewer sizes in that time, not more time.
-    pub(crate) ascent: Duration,
+    pub ascent: Duration,
     /// Rounds of visits. Several, minutes apart: what the host does in the meantime differs, and medians over all of them are
     /// worth more than as many samples at once.
-    pub(crate) rounds: u32,
+    pub rounds: u32,
     /// Time for everything. What the ascents leave is for the visits.
-    pub(crate) total: Duration,
+    pub total: Duration,
 }
 
 /// Spread over the densities that shift the borders most: even, in blobs, and with sizes over two decades.
@@ -50,7 +50,7 @@ const ASCENT_SHARE: f64 = 0.6;
 
 impl Plan {
     /// The usual plan, with the user's scenarios and largest size where they are given.
-    pub(crate) fn new(quick: bool, scenarios: &[Scenario], max_objects: Option<u32>) -> Self {
+    pub fn new(quick: bool, scenarios: &[Scenario], max_objects: Option<u32>) -> Self {
         let (usual, objects, per_decade, rounds, total) = if quick {
             (QUICK.to_vec(), QUICK_OBJECTS, QUICK_PER_DECADE, QUICK_ROUNDS, QUICK_TOTAL)
         } else {
@@ -77,7 +77,7 @@ fn sizes(max: u32, per_decade: u32) -> Vec<u32> {
 /// Share of the time left that the first of these sizes gets.
 ///
 /// Time for a point grows with the cube root of the size: small ones need it to tell foreign load, large ones for frames.
-pub(crate) fn share(sizes_left: &[u32]) -> f64 {
+pub fn share(sizes_left: &[u32]) -> f64 {
     let weight = |n: &u32| f64::from(*n).cbrt();
     let all: f64 = sizes_left.iter().map(weight).sum();
     sizes_left.first().map_or(0.0, |first| weight(first) / all)

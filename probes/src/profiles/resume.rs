@@ -2,11 +2,11 @@
 
 use super::profile::{Profile, is_named};
 use crate::args::{Arguments, Probe, Verb};
-use crate::document::read_document;
+use sapwise_lab::data::files::read_document;
 use crate::{provenance, restriction, revisions};
 use clap::Parser;
 use sapwise::json::Document;
-use sapwise::report::Label;
+use sapwise_lab::report::Label;
 use sapwise::{GpuIdentity, Registry, Report};
 use std::path::{Path, PathBuf};
 
@@ -148,7 +148,7 @@ pub(super) fn numbers(wanted: &[GpuIdentity], now: &[GpuIdentity]) -> Result<Vec
 mod tests {
     use super::*;
     use crate::profiles::family::{Whole, family};
-    use sapwise::report::{Proof, Restricted, Restriction, Timed};
+    use sapwise_lab::report::{Proof, Restricted, Restriction, Timed};
     use sapwise::{GpuKind, SimdLevel};
 
     fn gpu(index: u32, name: &str) -> GpuIdentity {
@@ -167,7 +167,7 @@ mod tests {
     fn with_one_thread(check: impl Fn(&There, &Profile, Report, Report)) {
         let family_of = probe(&["--no-gpus"]);
         let registry = Registry::with_cores(2);
-        let mut report = crate::train::synthetic::Machine::family()[0].report();
+        let mut report = sapwise_lab::synthetic::Machine::family()[0].report();
         report.label = Label::RealRestricted;
         // Their revisions would be stale with each that changes.
         report.algorithms.clear();

@@ -1,14 +1,14 @@
-//! Where the frames of a simulation come from.
+//! Where the frames of a replay come from.
 
-use crate::files::write_atomically;
 use crate::interrupt;
 use sapwise::Aabb;
+use sapwise_lab::write::write_atomically;
 use sapwise_scenes::{FrameWriter, Frames, Scenario, Scene};
 use std::path::Path;
 
 /// A seeded scene, or a stream that was recorded.
 #[derive(Debug, Clone)]
-pub(crate) enum Footage {
+pub(crate) enum FrameSource {
     Scene { scenario: Scenario, objects: usize, seed: u64, swing: Option<Swing> },
     Stream { name: String, frames: Frames },
 }
@@ -32,13 +32,13 @@ impl Swing {
     }
 }
 
-/// A [`Footage`] at one of its frames.
-pub(crate) enum Reel<'a> {
+/// A [`FrameSource`] at one of its frames.
+pub(crate) enum Cursor<'a> {
     Scene { scene: Box<Scene>, swing: Option<Swing>, at: usize },
     Stream { frames: &'a Frames, at: usize },
 }
 
-impl Footage {
+impl FrameSource {
     /// The name of the scenario or of the file.
     pub(crate) fn name(&self) -> &str {
         match self {
@@ -48,12 +48,12 @@ impl Footage {
     }
 
     /// Begins at the first frame.
-    pub(crate) fn start(&self) -> Reel<'_> {
+    pub(crate) fn start(&self) -> Cursor<'_> {
         match self {
             Self::Scene { scenario, objects, seed, swing } => {
-                Reel::Scene { scene: Box::new(scenario.start(*objects, *seed)), swing: *swing, at: 0 }
+                Cursor::Scene { scene: Box::new(scenario.start(*objects, *seed)), swing: *swing, at: 0 }
             }
-            Self::Stream { frames, .. } => Reel::Stream { frames, at: 0 },
+            Self::Stream { frames, .. } => Cursor::Stream { frames, at: 0 },
         }
     }
 
@@ -69,25 +69,25 @@ impl Footage {
             Ok(())
         })?;
         write_atomically(path, |out| {
-            let mut stream = FrameWriter::new(out, frames, most)?;
-            self.each(frames, &mut |boxes| Ok(stream.write(boxes)?))?;
-            stream.finish()?;
+            let mut writer = FrameWriter::new(out, frames, most)?;
+            self.each(frames, &mut |boxes| Ok(writer.write(boxes)?))?;
+            writer.finish()?;
             Ok(())
         })
     }
 
     fn each(&self, frames: usize, frame: &mut dyn FnMut(&[Aabb]) -> anyhow::Result<()>) -> anyhow::Result<()> {
-        let mut reel = self.start();
+        let mut cursor = self.start();
         for _ in 0..frames {
             interrupt::check()?;
-            frame(reel.boxes())?;
-            reel.advance();
+            frame(cursor.boxes())?;
+            cursor.advance();
         }
         Ok(())
     }
 }
 
-impl Reel<'_> {
+impl Cursor<'_> {
     /// The boxes of this frame; none after the last of a stream.
     pub(crate) fn boxes(&self) -> &[Aabb] {
         match self {
@@ -118,12 +118,12 @@ mod tests {
     #[test]
     fn a_swing_goes_from_the_least_to_all_and_back() {
         let swing = Some(Swing { least: 10, frames: 41 });
-        let footage = Footage::Scene { scenario: Scenario::Clustered, objects: 1000, seed: 1, swing };
-        let mut reel = footage.start();
+        let source = FrameSource::Scene { scenario: Scenario::Clustered, objects: 1000, seed: 1, swing };
+        let mut cursor = source.start();
         let mut counts = Vec::new();
         for _ in 0..41 {
-            counts.push(reel.boxes().len());
-            reel.advance();
+            counts.push(cursor.boxes().len());
+            cursor.advance();
         }
         assert_eq!([counts[0], counts[10], counts[20], counts[30], counts[40]], [10, 100, 1000, 100, 10]);
         assert!(counts[..21].is_sorted() && counts[20..].is_sorted_by(|a, b| a >= b));
@@ -134,9 +134,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.npy");
         // The number of boxes goes up and down.
-        let scene = Footage::Scene { scenario: Scenario::Fragmentation, objects: 300, seed: 3, swing: None };
+        let scene = FrameSource::Scene { scenario: Scenario::Fragmentation, objects: 300, seed: 3, swing: None };
         scene.record(&path, 90).unwrap();
-        let stream = Footage::Stream { name: "scene.npy".to_owned(), frames: Frames::read(&path).unwrap() };
+        let stream = FrameSource::Stream { name: "scene.npy".to_owned(), frames: Frames::read(&path).unwrap() };
         let (mut first, mut second) = (scene.start(), stream.start());
         let mut counts = Vec::new();
         for frame in 0..90 {

@@ -1,13 +1,20 @@
 //! The process that takes samples.
 
-use super::effort::{FEWEST_FRAMES, TIMED};
-use super::order::{Order, Reply, Wish};
+use super::request::{Reply, SampleRequest, Session};
 use crate::algorithms::Algorithms;
-use crate::sweep::{PAIR_LIMIT, WARM_UP, add_gpus, median, next_frame};
+use crate::sweep::{PAIR_LIMIT, add_gpus};
 use crate::{child, output};
 use anyhow::Context;
+<<<<<<< HEAD:probes/src/samples/sampler.rs
+use sapwise::measure::Watch;
+use sapwise::stats::relative_iqr;
 use sapwise::{Aabb, AlgorithmId, BackendClass, BroadPhase, Pairs, Registry};
-use sapwise::{measure::Watch, stats};
+use sapwise_lab::belief::{FEWEST_FRAMES, TIMED};
+use sapwise_lab::sweep::{WARM_UP, median, next_frame};
+=======
+use sapwise::measure::{Watch, statistics};
+use sapwise::{Aabb, AlgorithmId, BackendClass, BroadPhase, Pairs, Registry};
+>>>>>>> scenes:probes/src/samples/taker.rs
 use sapwise_scenes::Scenario;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -16,28 +23,35 @@ use std::time::{Duration, Instant};
 const MEDIAN_OVER_MEAN: f64 = 1.2533;
 const IQR_OVER_DEVIATION: f64 = 1.349;
 
-/// Takes samples as long as standard input holds wishes.
+/// Takes samples as long as standard input holds requests.
 ///
 /// # Errors
 /// When the scenario is unknown, or standard output can't be written.
+<<<<<<< HEAD:probes/src/samples/sampler.rs
+pub(crate) fn sample(session: &Session, algorithms: &Algorithms) -> anyhow::Result<()> {
+    let requests = child::requests();
+    let scenario: Scenario = session.scenario.parse().map_err(anyhow::Error::msg)?;
+    let mut registry = algorithms.registry(session.cores);
+=======
 pub(crate) fn take(order: &Order, algorithms: &Algorithms) -> anyhow::Result<()> {
     let wishes = child::orders();
     let scenario: Scenario = order.scenario.parse()?;
     let mut registry = algorithms.registry(order.cores);
+>>>>>>> scenes:probes/src/samples/taker.rs
     registry.pin_threads();
-    let remarks = add_gpus(&mut registry, &order.gpus);
-    let mut taker = Taker::new(scenario, order.seed, registry);
+    let remarks = add_gpus(&mut registry, &session.gpus);
+    let mut sampler = Sampler::new(scenario, session.seed, registry);
     // A driver takes seconds to open a GPU and to compile for it, which is not the time of any sample.
-    let on_gpus = order.algorithms.iter().filter(|id| id.backend().class() == BackendClass::Gpu);
+    let on_gpus = session.algorithms.iter().filter(|id| id.backend().class() == BackendClass::Gpu);
     for id in on_gpus {
-        // Whoever can't be made says so when it is asked for.
-        let _ = taker.algorithm(id);
+        // One that can't be made says so when it is asked for.
+        let _ = sampler.algorithm(id);
     }
     output::print_json(&Reply::Ready(remarks))?;
     let watch = Watch::begin();
-    for line in wishes {
-        let wish: Wish = serde_json::from_str(&line).context("a wish that can't be read")?;
-        let mut reply = taker.fulfil(&wish);
+    for line in requests {
+        let request: SampleRequest = serde_json::from_str(&line).context("a request that can't be read")?;
+        let mut reply = sampler.answer(&request);
         if let Reply::Taken { foreign_load, .. } = &mut reply {
             *foreign_load = if watch.is_long_enough() { watch.foreign_load() } else { None };
         }
@@ -46,7 +60,7 @@ pub(crate) fn take(order: &Order, algorithms: &Algorithms) -> anyhow::Result<()>
     Ok(())
 }
 
-struct Taker {
+struct Sampler {
     scenario: Scenario,
     seed: u64,
     registry: Registry,
@@ -57,7 +71,7 @@ struct Taker {
     fingerprints: BTreeMap<u32, u64>,
 }
 
-impl Taker {
+impl Sampler {
     fn new(scenario: Scenario, seed: u64, registry: Registry) -> Self {
         let mut pairs = Pairs::new();
         pairs.set_limit(Some(PAIR_LIMIT));
@@ -73,36 +87,36 @@ impl Taker {
         self.algorithms.get_mut(id).ok_or_else(unknown)
     }
 
-    fn fulfil(&mut self, wish: &Wish) -> Reply {
-        self.timed(wish).unwrap_or_else(|error| Reply::Failed { why: error.to_string(), wrong: false })
+    fn answer(&mut self, request: &SampleRequest) -> Reply {
+        self.timed(request).unwrap_or_else(|error| Reply::Failed { why: error.to_string(), wrong: false })
     }
 
-    fn timed(&mut self, wish: &Wish) -> Result<Reply, sapwise::Error> {
-        let end = Instant::now() + Duration::try_from_secs_f64(wish.seconds).unwrap_or_default();
-        let mut scene = self.scenario.start(wish.objects as usize, self.seed);
+    fn timed(&mut self, request: &SampleRequest) -> Result<Reply, sapwise::Error> {
+        let end = Instant::now() + Duration::try_from_secs_f64(request.seconds).unwrap_or_default();
+        let mut scene = self.scenario.start(request.objects as usize, self.seed);
         next_frame(&mut scene);
         // The same frame that the pairs were counted in.
-        self.frame(&wish.algorithm, scene.boxes())?;
-        if let Some(why) = self.mismatch(wish) {
+        self.frame(&request.algorithm, scene.boxes())?;
+        if let Some(why) = self.mismatch(request) {
             return Ok(Reply::Failed { why, wrong: true });
         }
-        if self.algorithm(&wish.algorithm)?.is_incremental() {
+        if self.algorithm(&request.algorithm)?.is_incremental() {
             for _ in 0..WARM_UP {
                 if Instant::now() >= end {
                     return Ok(Reply::TooSlow);
                 }
                 next_frame(&mut scene);
-                self.frame(&wish.algorithm, scene.boxes())?;
+                self.frame(&request.algorithm, scene.boxes())?;
             }
         }
         let mut samples: Vec<u64> = Vec::new();
         let began = Instant::now();
         while (samples.len() < FEWEST_FRAMES || began.elapsed() < TIMED) && Instant::now() < end {
             next_frame(&mut scene);
-            samples.push(self.frame(&wish.algorithm, scene.boxes())?);
+            samples.push(self.frame(&request.algorithm, scene.boxes())?);
         }
         let Some(ns) = median(&samples) else { return Ok(Reply::TooSlow) };
-        let spread = stats::relative_iqr(&samples.iter().map(|&s| s as f64).collect::<Vec<f64>>());
+        let spread = relative_iqr(&samples.iter().map(|&s| s as f64).collect::<Vec<f64>>());
         // With fewer than four frames there is no range between quartiles; a tenth is what single frames differ by.
         let noise_ln = MEDIAN_OVER_MEAN * spread.map_or(0.1, |s| s / IQR_OVER_DEVIATION) / (samples.len() as f64).sqrt();
         Ok(Reply::Taken { ns, noise_ln, foreign_load: None })
@@ -121,12 +135,12 @@ impl Taker {
     }
 
     /// How the answer to the first frame differs from what others found, if it does.
-    fn mismatch(&mut self, wish: &Wish) -> Option<String> {
+    fn mismatch(&mut self, request: &SampleRequest) -> Option<String> {
         let (found, fingerprint) = (self.pairs.len() as u64, self.pairs.fingerprint());
-        if found != wish.pairs {
-            return Some(format!("wrong pairs: {found} where {} are right", wish.pairs));
+        if found != request.pairs {
+            return Some(format!("wrong pairs: {found} where {} are right", request.pairs));
         }
-        let known = *self.fingerprints.entry(wish.objects).or_insert(fingerprint);
+        let known = *self.fingerprints.entry(request.objects).or_insert(fingerprint);
         (known != fingerprint)
             .then(|| format!("wrong pairs: their fingerprint is {fingerprint:016x}, that of another algorithm {known:016x}"))
     }
@@ -148,38 +162,38 @@ mod tests {
         }
     }
 
-    fn taker() -> Taker {
+    fn sampler() -> Sampler {
         let mut registry = Registry::with_cores(1);
         registry.add("wrong@cpu1".parse().unwrap(), 1, || Ok(Box::new(Wrong)));
-        Taker::new(Scenario::Uniform, 1, registry)
+        Sampler::new(Scenario::Uniform, 1, registry)
     }
 
-    fn wish(algorithm: &str, objects: u32) -> Wish {
-        let loads = crate::prediction::loads(Scenario::Uniform, &[objects], 1).unwrap();
-        Wish { algorithm: algorithm.parse().unwrap(), objects, pairs: loads[0].pairs as u64, seconds: 5.0 }
+    fn request(algorithm: &str, objects: u32) -> SampleRequest {
+        let loads = sapwise_lab::sweep::loads(Scenario::Uniform, &[objects], 1, |_| Ok(())).unwrap();
+        SampleRequest { algorithm: algorithm.parse().unwrap(), objects, pairs: loads[0].pairs as u64, seconds: 5.0 }
     }
 
     #[test]
     fn samples_are_medians_of_right_answers() {
-        let mut taker = taker();
+        let mut sampler = sampler();
         for id in ["brute@cpu1", "pair-cache@cpu1", "sap@cpu1"] {
-            let Reply::Taken { ns, noise_ln, .. } = taker.fulfil(&wish(id, 300)) else { panic!("{id} gave no sample") };
+            let Reply::Taken { ns, noise_ln, .. } = sampler.answer(&request(id, 300)) else { panic!("{id} returned no sample") };
             assert!(ns >= 1.0 && (0.0..1.0).contains(&noise_ln), "{id}: {ns} {noise_ln}");
         }
     }
 
     #[test]
-    fn wrong_answers_unknown_algorithms_and_no_time_give_no_sample() {
-        let mut taker = taker();
+    fn wrong_answers_unknown_algorithms_and_no_time_yield_no_sample() {
+        let mut sampler = sampler();
         let failed =
             |reply: Reply| if let Reply::Failed { why, wrong } = reply { (why, wrong) } else { panic!("{reply:?}") };
-        let (why, wrong) = failed(taker.fulfil(&wish("wrong@cpu1", 300)));
+        let (why, wrong) = failed(sampler.answer(&request("wrong@cpu1", 300)));
         assert!(wrong && why.contains("wrong pairs"), "{why}");
-        let (why, wrong) = failed(taker.fulfil(&wish("octree@cpu1", 300)));
+        let (why, wrong) = failed(sampler.answer(&request("octree@cpu1", 300)));
         assert!(!wrong && why.contains("brute@cpu1"), "{why}");
-        assert_eq!(taker.fulfil(&Wish { seconds: 0.0, ..wish("brute@cpu1", 300) }), Reply::TooSlow);
+        assert_eq!(sampler.answer(&SampleRequest { seconds: 0.0, ..request("brute@cpu1", 300) }), Reply::TooSlow);
         // As many pairs as are right, but not the same.
-        taker.fingerprints.insert(300, 1);
-        assert!(failed(taker.fulfil(&wish("brute@cpu1", 300))).0.contains("fingerprint"));
+        sampler.fingerprints.insert(300, 1);
+        assert!(failed(sampler.answer(&request("brute@cpu1", 300))).0.contains("fingerprint"));
     }
 }

@@ -4,7 +4,7 @@ mod canvas;
 mod chart;
 mod curves;
 
-use crate::table::columns;
+use sapwise_lab::text::columns;
 use console::{Color, Style, Term};
 
 pub(crate) use chart::{Axis, Chart, Series};
@@ -56,7 +56,7 @@ impl Terminal {
     /// two can't be read by columns. The first two stay.
     pub(crate) fn table(self, rows: &[Vec<String>]) -> String {
         let head = rows.first().map_or(&[][..], Vec::as_slice);
-        let widths: Vec<usize> = (0..head.len()).map(|k| crate::table::width(rows, k)).collect();
+        let widths: Vec<usize> = (0..head.len()).map(|k| sapwise_lab::text::width(rows, k)).collect();
         let room = self.columns.filter(|&columns| columns > 0).unwrap_or(usize::MAX);
         let fits = |count: &usize| widths[..*count].iter().sum::<usize>() + 2 * (count - 1) <= room;
         let count = (2..=head.len()).rev().find(fits).unwrap_or(head.len().min(2));

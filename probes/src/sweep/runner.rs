@@ -1,13 +1,19 @@
-//! The sweep as a whole: each scenario in a process of its own.
+//! Runs the whole sweep: each scenario in a process of its own.
 
-use super::{Course, Event, Order, Plan, doubt};
+use super::adaptive_sampling;
+use super::request::{Event, Schedule, SweepRequest};
 use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::Progress;
+<<<<<<< HEAD:probes/src/sweep/runner.rs
+=======
 use sapwise_scenes::Random;
+>>>>>>> scenes:probes/src/sweep/conduct.rs
 use anyhow::Context;
 use sapwise::GpuIdentity;
-use sapwise::report::Point;
+use sapwise_lab::report::Point;
+use sapwise_lab::sweep::Plan;
+use sapwise_scenes::Random;
 use std::time::{Duration, Instant};
 
 /// What a scenario may take beyond its time: start-up, the first scene and a last frame that was forecast too short.
@@ -21,7 +27,7 @@ const START: Duration = Duration::from_millis(150);
 pub(crate) struct Found {
     pub(crate) points: Vec<Point>,
     pub(crate) remarks: Vec<String>,
-    /// Whether an algorithm gave a wrong answer or a scenario ended badly.
+    /// Whether an algorithm returned a wrong answer or a scenario ended badly.
     pub(crate) failed: bool,
     /// Whether the user stopped it.
     pub(crate) interrupted: bool,
@@ -40,28 +46,36 @@ pub(crate) struct Conditions {
 ///
 /// # Errors
 /// When no process can be started. A scenario that crashes is a remark, not an error.
-pub(crate) fn conduct(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut(&Found)) -> anyhow::Result<Found> {
+pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut(&Found)) -> anyhow::Result<Found> {
     let began = Instant::now();
     let progress = Progress::new(plan.total.as_secs());
     let gpus = conditions.gpus.clone();
     let mut sweep = Sweep { plan, conditions, gpus, began, progress, found: Found::default() };
     for scenario in &plan.scenarios {
-        if !sweep.go(&scenario.to_string(), Course::Ascent(plan.sizes.clone()), plan.ascent, 0)? {
+        if !sweep.go(&scenario.to_string(), Schedule::Ascent(plan.sizes.clone()), plan.ascent, 0)? {
             return Ok(sweep.found);
         }
         keep(&sweep.found);
     }
+<<<<<<< HEAD:probes/src/sweep/runner.rs
+    let mut shuffle = Random::new(conditions.seed);
+=======
     let mut random = Random::new(conditions.seed);
+>>>>>>> scenes:probes/src/sweep/conduct.rs
     for round in 1..=plan.rounds {
         let left = plan.total.saturating_sub(began.elapsed()) / (plan.rounds + 1 - round);
         let starts = START * plan.scenarios.len() as u32;
-        for (scenario, mut visits) in doubt::visits(&sweep.found.points, left.saturating_sub(starts)) {
+        for (scenario, mut visits) in adaptive_sampling::visits(&sweep.found.points, left.saturating_sub(starts)) {
             let time = START + Duration::from_secs_f64(visits.iter().map(|v| v.seconds).sum());
             // In random order, so that a machine that slows down does not pass for a longer time at large sizes.
+<<<<<<< HEAD:probes/src/sweep/runner.rs
+            let order = shuffle.shuffled(visits.len());
+=======
             let order = random.shuffled(visits.len());
+>>>>>>> scenes:probes/src/sweep/conduct.rs
             visits = order.into_iter().map(|k| visits[k].clone()).collect();
             let before = sweep.found.points.len();
-            let goes_on = sweep.go(&scenario, Course::Visits(visits), time, u64::from(round))?;
+            let goes_on = sweep.go(&scenario, Schedule::Visits(visits), time, u64::from(round))?;
             // A round is told from the next by its sizes, which ascend in each.
             sweep.found.points[before..].sort_by_key(|p| p.load.objects);
             if !goes_on {
@@ -86,15 +100,15 @@ struct Sweep<'a> {
 
 impl Sweep<'_> {
     /// Sweeps one scenario in a process of its own. Whether the sweep goes on.
-    fn go(&mut self, scenario: &str, course: Course, time: Duration, round: u64) -> anyhow::Result<bool> {
+    fn go(&mut self, scenario: &str, schedule: Schedule, time: Duration, round: u64) -> anyhow::Result<bool> {
         self.progress.message(scenario.to_owned());
-        match self.run(scenario, course, time, round)? {
+        match self.run(scenario, schedule, time, round)? {
             Ended::Well => {}
             Ended::Interrupted => {
                 let done = self.found.points.last().map_or("before the first point".to_owned(), |p| {
                     format!("after {} at {} objects", p.scenario, p.load.objects)
                 });
-                self.found.remarks.push(format!("interrupted {done}; what was to follow is missing"));
+                self.found.remarks.push(format!("interrupted {done}; the rest is missing"));
                 self.found.interrupted = true;
                 return Ok(false);
             }
@@ -112,13 +126,13 @@ impl Sweep<'_> {
         Ok(true)
     }
 
-    fn run(&mut self, scenario: &str, course: Course, time: Duration, round: u64) -> anyhow::Result<Ended> {
+    fn run(&mut self, scenario: &str, schedule: Schedule, time: Duration, round: u64) -> anyhow::Result<Ended> {
         if interrupt::requested() {
             return Ok(Ended::Interrupted);
         }
-        let order = Order {
+        let request = SweepRequest {
             scenario: scenario.to_owned(),
-            course,
+            schedule,
             cores: self.conditions.cores,
             // Another scene of the same kind: what depends on one scene alone would pass for a property of the machine.
             seed: self.conditions.seed.wrapping_add(round),
@@ -126,9 +140,9 @@ impl Sweep<'_> {
             gpus: self.gpus.clone(),
             contended: self.conditions.contended,
         };
-        let text = serde_json::to_string(&order)?;
+        let text = serde_json::to_string(&request)?;
         let Self { plan, gpus, began, progress, found, .. } = self;
-        run_part(&["sap", &text], time + GRACE, &mut |line| {
+        run_part(&["sweep", &text], time + GRACE, &mut |line| {
             let event = match serde_json::from_str(line) {
                 Ok(event) => event,
                 // Drivers print what they like on the standard output of whoever loads them.

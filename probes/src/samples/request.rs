@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// What holds for all samples, as it is handed to a process of its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Order {
+pub(crate) struct Session {
     /// Name of the scenario.
     pub(crate) scenario: String,
     /// Seed of the scenes.
@@ -19,10 +19,10 @@ pub(crate) struct Order {
     pub(crate) algorithms: Vec<AlgorithmId>,
 }
 
-/// One sample, a line of standard input.
+/// A request for one sample, a line of standard input.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Wish {
+pub(super) struct SampleRequest {
     pub(super) algorithm: AlgorithmId,
     /// Objects of the scene.
     pub(super) objects: u32,
@@ -36,9 +36,9 @@ pub(super) struct Wish {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum Reply {
-    /// GPUs are open, and wishes may come. What went wrong so far.
+    /// GPUs are open, and requests may come. What went wrong so far.
     Ready(Vec<String>),
-    /// A wish is fulfilled.
+    /// The sample was taken.
     Taken {
         /// Median over the frames.
         ns: f64,
@@ -47,11 +47,11 @@ pub(super) enum Reply {
         /// Share of the CPU that other programs have taken since the process was ready; null where that can't be told.
         foreign_load: Option<f64>,
     },
-    /// The algorithm can't run, or gave a wrong answer.
+    /// The algorithm can't run, or returned a wrong answer.
     Failed {
         /// Why.
         why: String,
-        /// Whether it gave a wrong answer.
+        /// Whether it returned a wrong answer.
         wrong: bool,
     },
     /// Not a single frame was done in time.
