@@ -19,7 +19,7 @@ impl Here {
         missing.dedup();
         finding.applicable = Some(missing.is_empty());
         finding.problems.extend(missing);
-        finding.notes.extend(self.programs(tuning));
+        finding.notes.extend(self.on_software_adapters(tuning));
         if tuning.extrapolated {
             finding.notes.push("predicted for a machine outside what the model was trained on".to_owned());
         }
@@ -41,13 +41,13 @@ impl Here {
         }
     }
 
-    /// Which algorithms of tuning run on programs that act as GPUs.
-    fn programs(&self, tuning: &Tuning) -> Vec<String> {
+    /// Which algorithms of tuning run on software adapters here.
+    fn on_software_adapters(&self, tuning: &Tuning) -> Vec<String> {
         let mut notes = Vec::new();
         for id in tuning.algorithms().into_iter().filter(|id| !uses(id).is_empty()) {
             let gpus = self.gpus().identities.iter().filter(|g| uses(id).contains(&g.index));
             for gpu in gpus.filter(|g| g.kind == GpuKind::Software) {
-                notes.push(format!("{id}: gpu{} is a program on the CPU here: {}", gpu.index, gpu.name));
+                notes.push(format!("{id}: gpu{} is a software adapter here: {}", gpu.index, gpu.name));
             }
         }
         notes

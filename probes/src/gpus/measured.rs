@@ -1,13 +1,15 @@
 //! The parameters of GPUs, each GPU and each group measured in a process of its own.
 
-use super::{GpuChoice, group_without_parameters, look, uses, without_parameters};
+use super::choice::{GpuChoice, uses};
+use super::look::look;
+use super::parameters::{group_without_parameters, without_parameters};
 use crate::child::{Ended, run_part};
 use crate::progress::Progress;
 use sapwise::{GpuGroup, GpuHardware, GpuIdentity};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 
-/// A real GPU takes seconds; a program on the CPU that acts as one may be a hundred times slower.
+/// A real GPU takes seconds; a software adapter may be a hundred times slower.
 const LIMIT: Duration = Duration::from_secs(90);
 
 /// What was found out about the GPUs of this machine.

@@ -210,6 +210,7 @@ fn keep_racing(racers: &mut Vec<Racer>, standings: &mut Vec<Standing>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::algorithms::UserAlgorithm;
 
     fn request(scenario: &str, sizes: &[u32], seconds: f64) -> SweepRequest {
         let (scenario, schedule) = (scenario.to_owned(), Schedule::Ascent(sizes.to_vec()));
@@ -292,9 +293,9 @@ mod tests {
     fn a_users_algorithm_is_timed_like_ours_and_one_that_can_not_be_made_is_named() {
         let mut algorithms = Algorithms::default();
         let brute = || Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap());
-        algorithms.add("mine", 1, false, move |_| brute()).unwrap();
-        let refused = |_| Err(sapwise::Error::OutOfMemory { what: "nodes", elements: 3 });
-        algorithms.add("huge", 1, false, refused).unwrap();
+        algorithms.add(UserAlgorithm::on_one_thread("mine", 1, brute)).unwrap();
+        let refused = || Err(sapwise::Error::OutOfMemory { what: "nodes", elements: 3 });
+        algorithms.add(UserAlgorithm::on_one_thread("huge", 1, refused)).unwrap();
         let (mut raced, mut remarks) = (Vec::new(), Vec::new());
         sweep(&request("uniform", &[10], 1.0), &algorithms, &mut |event| {
             match event {
