@@ -1,37 +1,45 @@
-//! A table of text and figures: for the page, where it sorts, and for a CSV file.
+//! Tables of text and figures: sortable ones for the page, tidy ones for CSV files.
 
-use crate::table::grouped;
+use crate::text::grouped;
 use anyhow::Context;
 use std::borrow::Cow;
 
 /// Rows under named columns.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Sheet {
-    pub(crate) columns: Vec<Column>,
-    pub(crate) rows: Vec<Row>,
+pub struct DataTable {
+    pub columns: Vec<Column>,
+    pub rows: Vec<Row>,
 }
 
 /// One column.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Column {
+pub struct Column {
     /// What a reader sees at its head.
-    pub(crate) title: String,
+    pub title: String,
     /// Its name in CSV, with the unit as the last words.
-    pub(crate) key: String,
+    pub key: String,
+}
+
+impl Column {
+    /// With what a reader sees, and its name in CSV.
+    #[must_use]
+    pub fn new(title: impl Into<String>, key: impl Into<String>) -> Self {
+        Self { title: title.into(), key: key.into() }
+    }
 }
 
 /// One row, and the reports that its figures are from.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Row {
+pub struct Row {
     /// As many as there are columns.
-    pub(crate) cells: Vec<Cell>,
+    pub cells: Vec<Cell>,
     /// Positions in the list of reports, ascending.
-    pub(crate) reports: Vec<usize>,
+    pub reports: Vec<usize>,
 }
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Cell {
+pub enum Cell {
     /// Words.
     Text(String),
     /// A figure in the unit of its column, and as a reader sees it.
@@ -40,20 +48,20 @@ pub(crate) enum Cell {
     Missing(String),
 }
 
-impl Sheet {
+impl DataTable {
     /// Without rows, under columns that are called so for a reader and in CSV.
-    pub(crate) fn new<const N: usize>(columns: [(&str, &str); N]) -> Self {
-        let columns = columns.map(|(title, key)| Column { title: title.to_owned(), key: key.to_owned() }).into();
-        Self { columns, rows: Vec::new() }
+    #[must_use]
+    pub fn new<const N: usize>(columns: [(&str, &str); N]) -> Self {
+        Self { columns: columns.map(|(title, key)| Column::new(title, key)).into(), rows: Vec::new() }
     }
 
     /// Adds a row whose figures are from these reports.
-    pub(crate) fn push(&mut self, cells: Vec<Cell>, reports: &[usize]) {
+    pub fn push(&mut self, cells: Vec<Cell>, reports: &[usize]) {
         debug_assert_eq!(cells.len(), self.columns.len());
         self.rows.push(Row { cells, reports: reports.to_vec() });
     }
 
-    /// The sheet as CSV in UTF-8: a line of keys, then the rows, as RFC 4180 has it but with bare line feeds. Figures have all their
+    /// The table as CSV in UTF-8: a line of keys, then the rows, as RFC 4180 has it but with bare line feeds. Figures have all their
     /// digits. Where rows name reports, a last column `reports` has their labels, which `labels` gives in the order of the list, with
     /// blanks between.
     ///
@@ -62,7 +70,7 @@ impl Sheet {
     ///
     /// # Errors
     /// When a row has more or fewer cells than there are columns.
-    pub(crate) fn csv(&self, labels: &[String]) -> anyhow::Result<String> {
+    pub fn csv(&self, labels: &[String]) -> anyhow::Result<String> {
         let traced = self.rows.iter().any(|r| !r.reports.is_empty());
         let mut writer = csv::Writer::from_writer(Vec::new());
         let keys = self.columns.iter().map(|c| inert(&c.key));
@@ -83,12 +91,12 @@ impl Sheet {
 
 impl Cell {
     /// Words.
-    pub(crate) fn text(text: impl Into<String>) -> Self {
+    pub fn text(text: impl Into<String>) -> Self {
         Self::Text(text.into())
     }
 
     /// A figure with so many digits after the point.
-    pub(crate) fn number(value: f64, decimals: usize) -> Self {
+    pub fn number(value: f64, decimals: usize) -> Self {
         if value.is_finite() {
             Self::Number { value, shown: format!("{value:.decimals$}") }
         } else {
@@ -96,21 +104,31 @@ impl Cell {
         }
     }
 
+    /// A figure with all its digits, for tables that are only read by programs.
+    #[must_use]
+    pub fn exact(value: f64) -> Self {
+        Self::number(value, 0).map_shown(figure)
+    }
+
     /// A figure where there is one.
-    pub(crate) fn optional(value: Option<f64>, decimals: usize, why: &str) -> Self {
+    pub fn optional(value: Option<f64>, decimals: usize, why: &str) -> Self {
         value.map_or_else(|| Self::Missing(why.to_owned()), |v| Self::number(v, decimals))
     }
 
     /// A whole number in groups of three digits.
-    pub(crate) fn count(value: u64) -> Self {
+    pub fn count(value: u64) -> Self {
         Self::Number { value: value as f64, shown: grouped(value) }
     }
 
     /// A share as a percentage; its value is the share.
-    pub(crate) fn percent(share: f64) -> Self {
-        match Self::number(share, 4) {
-            Self::Number { value, .. } => Self::Number { value, shown: format!("{:.1} %", 100.0 * share) },
-            missing => missing,
+    pub fn percent(share: f64) -> Self {
+        Self::number(share, 4).map_shown(|share| format!("{:.1} %", 100.0 * share))
+    }
+
+    fn map_shown(self, shown: impl Fn(f64) -> String) -> Self {
+        match self {
+            Self::Number { value, .. } => Self::Number { value, shown: shown(value) },
+            other => other,
         }
     }
 
@@ -124,7 +142,7 @@ impl Cell {
 }
 
 /// All digits that tell this figure from every other; nothing where it is none.
-pub(crate) fn figure(value: f64) -> String {
+pub fn figure(value: f64) -> String {
     match value.abs() {
         size if !size.is_finite() => String::new(),
         size if size == 0.0 || (1e-5..1e16).contains(&size) => value.to_string(),
@@ -145,17 +163,13 @@ fn inert(text: &str) -> Cow<'_, str> {
 mod tests {
     use super::*;
 
-    fn column(key: &str) -> Column {
-        Column { title: key.to_owned(), key: key.to_owned() }
-    }
-
     fn number(value: f64) -> Cell {
         Cell::Number { value, shown: "about".to_owned() }
     }
 
-    fn one_column(cells: Vec<Cell>) -> Sheet {
+    fn one_column(cells: Vec<Cell>) -> DataTable {
         let rows = cells.into_iter().map(|c| Row { cells: vec![c], reports: Vec::new() }).collect();
-        Sheet { columns: vec![column("x")], rows }
+        DataTable { columns: vec![Column::new("x", "x")], rows }
     }
 
     fn read(text: &str) -> Vec<Vec<String>> {
@@ -188,25 +202,25 @@ mod tests {
             let csv = one_column(vec![Cell::Text(bad.to_owned())]).csv(&[]).unwrap();
             assert_eq!(read(&csv)[1][0], format!("'{bad}"));
         }
-        let mut sheet = one_column(vec![number(-1.0)]);
-        sheet.columns[0].key = "=x".to_owned();
-        assert_eq!(sheet.csv(&[]).unwrap(), "'=x\n-1\n");
+        let mut table = one_column(vec![number(-1.0)]);
+        table.columns[0].key = "=x".to_owned();
+        assert_eq!(table.csv(&[]).unwrap(), "'=x\n-1\n");
     }
 
     #[test]
     fn a_row_names_its_reports() {
         let labels = ["R1".to_owned(), "R2".to_owned(), "=R3".to_owned()];
-        let mut sheet = one_column(vec![number(1.0), number(2.0), number(3.0)]);
-        sheet.rows[0].reports = vec![0, 1];
-        sheet.rows[2].reports = vec![2];
-        assert_eq!(sheet.csv(&labels).unwrap(), "x,reports\n1,R1 R2\n2,\n3,'=R3\n");
+        let mut table = one_column(vec![number(1.0), number(2.0), number(3.0)]);
+        table.rows[0].reports = vec![0, 1];
+        table.rows[2].reports = vec![2];
+        assert_eq!(table.csv(&labels).unwrap(), "x,reports\n1,R1 R2\n2,\n3,'=R3\n");
     }
 
     #[test]
     fn a_row_that_does_not_fit_is_an_error() {
-        let mut sheet = one_column(vec![number(1.0), number(2.0)]);
-        sheet.rows[1].cells.push(number(3.0));
-        let error = sheet.csv(&[]).unwrap_err();
+        let mut table = one_column(vec![number(1.0), number(2.0)]);
+        table.rows[1].cells.push(number(3.0));
+        let error = table.csv(&[]).unwrap_err();
         assert!(error.to_string().contains("row 2 of a table with 1 column"), "{error}");
     }
 }

@@ -3,7 +3,7 @@
 use super::Figure;
 use super::chart::{ABOVE, BELOW, Frame, LEFT, RIGHT};
 use super::legend::Legend;
-use super::paper::Area;
+use super::canvas::Area;
 use super::style::{GAP, WIDTH};
 
 /// Height of the chart with what stands around it, where it is alone.

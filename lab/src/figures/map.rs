@@ -4,52 +4,51 @@ use super::axis::Axis;
 use super::chart::{ABOVE, BELOW, Chart, Frame, Hatch, LEFT, RIGHT, fill, hatch, missing};
 use super::legend::{Legend, Sign};
 use super::mark::Mark;
-use super::paper::Area;
+use super::canvas::Area;
 use super::style::{self, GAP, INK, WIDTH};
-use super::{Figure, Tabled, tabled};
-use crate::sheet::Sheet;
+use super::Figure;
 
 /// Panels beside each other, measured beside predicted, over the number of objects and a density.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct FieldMap {
-    pub(crate) title: String,
+pub struct FieldMap {
+    pub title: String,
     /// Algorithms, each with its position in the study's list of names.
-    pub(crate) names: Vec<(String, usize)>,
+    pub names: Vec<(String, usize)>,
     /// Range of the number of objects.
-    pub(crate) x: (f64, f64),
-    pub(crate) y: (f64, f64),
+    pub x: (f64, f64),
+    pub y: (f64, f64),
     /// What the second axis is, with its unit.
-    pub(crate) y_name: String,
-    pub(crate) panels: Vec<MapPanel>,
+    pub y_name: String,
+    pub panels: Vec<MapPanel>,
 }
 
 /// One map.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct MapPanel {
-    pub(crate) title: String,
+pub struct MapPanel {
+    pub title: String,
     /// The fields, drawn light, behind the points.
-    pub(crate) grid: Vec<MapCell>,
-    pub(crate) points: Vec<MapPoint>,
+    pub grid: Vec<MapCell>,
+    pub points: Vec<MapPoint>,
 }
 
 /// A rectangle of one field.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct MapCell {
-    pub(crate) x: (f64, f64),
-    pub(crate) y: (f64, f64),
+pub struct MapCell {
+    pub x: (f64, f64),
+    pub y: (f64, f64),
     /// Position in `FieldMap::names`.
-    pub(crate) algorithm: usize,
+    pub algorithm: usize,
 }
 
 /// A frame, with the algorithm that was fastest in it or was chosen for it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct MapPoint {
-    pub(crate) x: f64,
-    pub(crate) y: f64,
+pub struct MapPoint {
+    pub x: f64,
+    pub y: f64,
     /// Position in `FieldMap::names`.
-    pub(crate) algorithm: usize,
+    pub algorithm: usize,
     /// Regret of the choice, 0.1 for 10 %; more than that gets a ring.
-    pub(crate) loss: Option<f64>,
+    pub loss: Option<f64>,
 }
 
 /// A regret over this gets a ring.
@@ -121,7 +120,7 @@ impl FieldMap {
         chart.border()?;
         for point in &panel.points {
             let Some(style) = self.style(point.algorithm) else { continue };
-            chart.mark(point.x, point.y, Mark::Ground, style::PAPER, 6)?;
+            chart.mark(point.x, point.y, Mark::Ground, style::GROUND, 6)?;
             chart.mark(point.x, point.y, style::mark(style), style::colour(style), 4)?;
             if point.is_lossy() {
                 chart.mark(point.x, point.y, Mark::Ring, INK, 9)?;
@@ -154,40 +153,5 @@ impl Figure for FieldMap {
             self.panel(area, frame, panel)?;
         }
         legend.draw(area, (GAP, bottom))
-    }
-}
-
-impl Tabled for FieldMap {
-    fn csv(&self) -> Sheet {
-        let mut rows = Vec::new();
-        for panel in &self.panels {
-            let mut row = |what: &str, algorithm: usize, figures: [f64; 6], loss: Option<f64>| {
-                let name = self.names.get(algorithm).map_or("", |name| &name.0);
-                let mut row = [&panel.title, what, name].map(tabled::text).to_vec();
-                row.extend(figures.map(tabled::figure));
-                row.push(tabled::maybe(loss, "no regret is known"));
-                rows.push(row);
-            };
-            for c in merged(&panel.grid) {
-                row("field", c.algorithm, [f64::NAN, c.x.0, c.x.1, f64::NAN, c.y.0, c.y.1], None);
-            }
-            for p in &panel.points {
-                row("frame", p.algorithm, [p.x, f64::NAN, f64::NAN, p.y, f64::NAN, f64::NAN], p.loss);
-            }
-        }
-        let [y, y_low, y_high] = ["", ", from", ", to"].map(|end| format!("{}{end}", self.y_name));
-        let columns = [
-            ("panel", "panel"),
-            ("what", "what"),
-            ("algorithm", "algorithm"),
-            ("objects", "objects"),
-            ("from objects", "low_objects"),
-            ("to objects", "high_objects"),
-            (&y, "density"),
-            (&y_low, "low_density"),
-            (&y_high, "high_density"),
-            ("regret", "regret"),
-        ];
-        tabled::sheet(&columns, rows)
     }
 }

@@ -2,10 +2,10 @@
 
 use super::Figure;
 use super::axis::{Axis, Tick, time_unit};
-use super::chart::{ABOVE, BELOW, Chart, Frame, Line, RIGHT, fill, missing};
+use super::chart::{ABOVE, BELOW, Chart, Frame, Stroke, RIGHT, fill, missing};
 use super::legend::{Legend, Sign};
 use super::mark::Mark;
-use super::paper::Area;
+use super::canvas::Area;
 use super::style::{self, GAP, GRID, INK, SECONDARY};
 use crate::text::count;
 use plotters::style::RGBColor;
@@ -56,9 +56,9 @@ pub struct ReplayPicture {
 }
 
 /// The adaptive module, the beginning of a co-runner, and the number of objects.
-const ADAPTIVE: Line = Line::solid(INK, 2);
-const CO_RUNNER: Line = Line::dashed(SECONDARY, 1);
-const COUNT: Line = Line::solid(SECONDARY, 2);
+const ADAPTIVE: Stroke = Stroke::solid(INK, 2);
+const CO_RUNNER: Stroke = Stroke::dashed(SECONDARY, 1);
+const COUNT: Stroke = Stroke::solid(SECONDARY, 2);
 
 /// One panel: a class of processors and the algorithms on it that are shown.
 struct Panel {
@@ -168,9 +168,9 @@ impl ReplayPicture {
             (Sign::Marked(at), format!("{}: {ran}", self.algorithms[k]))
         };
         let mut entries: Vec<(Sign, String)> = panel.shown.iter().enumerate().map(entry).collect();
-        entries.push((Sign::Line(ADAPTIVE), "adaptive".to_owned()));
+        entries.push((Sign::Stroke(ADAPTIVE), "adaptive".to_owned()));
         if self.co_runner_from.is_some() {
-            entries.push((Sign::Line(CO_RUNNER), "a co-runner begins".to_owned()));
+            entries.push((Sign::Stroke(CO_RUNNER), "a co-runner begins".to_owned()));
         }
         Legend::new(entries, width - 2 * GAP)
     }
@@ -213,7 +213,7 @@ impl ReplayPicture {
         chart.grid(&title, "", &format!("time of a frame ({name})"))?;
         let drawn = |points: &Points| points.iter().map(|&(at, ns)| (at as f64, ns / unit)).collect::<Vec<_>>();
         for (at, own) in curves.iter().enumerate() {
-            chart.line(drawn(own), Line::solid(style::colour(at), 2))?;
+            chart.line(drawn(own), Stroke::solid(style::colour(at), 2))?;
             // Each begins elsewhere, so that marks of curves at one height are beside each other.
             let every = own.len().div_ceil(MARKS).max(1);
             for (x, y) in drawn(own).into_iter().skip(at * every / curves.len()).step_by(every) {
@@ -258,7 +258,7 @@ impl ReplayPicture {
         }
         chart.line(line, ADAPTIVE)?;
         for &at in &self.switches {
-            chart.line([top - 1, top].map(|y| (at as f64, y as f64)), Line::solid(INK, 1))?;
+            chart.line([top - 1, top].map(|y| (at as f64, y as f64)), Stroke::solid(INK, 1))?;
         }
         for (at, _) in self.explored.iter().enumerate().filter(|(_, explored)| **explored) {
             chart.mark(at as f64, middle(top - 2), Mark::Ring, INK, 5)?;

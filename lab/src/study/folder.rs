@@ -3,8 +3,8 @@
 use super::answer::Answer;
 use crate::write;
 use crate::page::Block;
-use crate::plot::{Picture, Tabled};
-use crate::sheet::Sheet;
+use crate::figures::{Picture, Tabled};
+use crate::data_table::DataTable;
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Component, Path};
@@ -63,7 +63,7 @@ impl Folder {
     ///
     /// # Errors
     /// When a row does not fit its columns.
-    pub(super) fn table(&mut self, id: &str, caption: &str, mut sheet: Sheet) -> Result<Block> {
+    pub(super) fn table(&mut self, id: &str, caption: &str, mut sheet: DataTable) -> Result<Block> {
         let path = format!("{TABLES}/{id}.csv");
         self.files.push((path.clone(), sheet.csv(&self.labels)?.into_bytes()));
         let mut caption = caption.to_owned();
@@ -194,7 +194,7 @@ mod tests {
         .unwrap();
         prepare(&path("")).unwrap();
         let mut new = Folder::new(vec!["R1".to_owned()], "sapwise study".to_owned());
-        new.table("machines", "", Sheet::new([("a", "a")])).unwrap();
+        new.table("machines", "", DataTable::new([("a", "a")])).unwrap();
         new.write(&path(""), "<html>", Answer::default()).unwrap();
         assert!(!path("figures/old.svg").exists());
         for name in ["figures/mine.svg", "figures/mine.txt", "mine.csv", "../outside"] {

@@ -15,7 +15,7 @@ use crate::progress::Progress;
 use anyhow::Result;
 use cost::Costs;
 use machine::TrueMachine;
-use sapwise::report::{Label, Provenance, Report, ReportSchema, Timed};
+use crate::report::{Label, Provenance, Report, ReportSchema, Timed};
 use sapwise::{AlgorithmId, Registry};
 
 pub(crate) use loads::Loads;

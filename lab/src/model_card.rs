@@ -1,8 +1,8 @@
 //! The card of a model: what it was trained on and how well it did.
 
-use crate::table::count as counted;
+use crate::text::count as counted;
 use sapwise::model::{Coverage, FEWEST_MACHINES, Learning, LearningScore, MethodModel, TrainingCount, Validation};
-use sapwise::report::Label;
+use crate::report::Label;
 use sapwise::{BackendClass, Model};
 
 const COVERED: &str = "see the coverage in the validation, where there is one.";
@@ -250,7 +250,7 @@ pub(crate) fn markdown(rows: &[Vec<String>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table::columns;
+    use crate::text::columns;
     use sapwise::model::MethodScore;
 
     #[test]

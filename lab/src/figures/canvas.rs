@@ -2,7 +2,7 @@
 
 use super::Picture;
 use super::font;
-use super::style::PAPER;
+use super::style::GROUND;
 use anyhow::ensure;
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -17,10 +17,10 @@ pub(super) const PNG_UNIT: u32 = 2;
 const MOST_PIXELS: u64 = 1 << 28;
 
 /// A picture under way. Lengths are in units.
-pub(crate) type Area<'a> = DrawingArea<Paper<'a>, Shift>;
+pub(crate) type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
 
 /// Takes what is drawn in units, and text of any characters.
-pub(crate) struct Paper<'a>(Kind<'a>);
+pub(crate) struct Canvas<'a>(Kind<'a>);
 
 enum Kind<'a> {
     Svg(SVGBackend<'a>),
@@ -39,8 +39,8 @@ pub(super) fn picture(
     draw: impl FnOnce(&Area<'_>) -> anyhow::Result<()>,
 ) -> anyhow::Result<Vec<u8>> {
     let finish = |kind: Kind<'_>| {
-        let root = Paper(kind).into_drawing_area();
-        root.fill(&PAPER)?;
+        let root = Canvas(kind).into_drawing_area();
+        root.fill(&GROUND)?;
         draw(&root)?;
         anyhow::Ok(root.present()?)
     };
@@ -90,7 +90,7 @@ fn of_png(done: Result<(), DrawingErrorKind<<BitMapBackend<'_> as DrawingBackend
     })
 }
 
-impl DrawingBackend for Paper<'_> {
+impl DrawingBackend for Canvas<'_> {
     type ErrorType = io::Error;
 
     fn get_size(&self) -> (u32, u32) {

@@ -3,7 +3,7 @@
 use super::cost::Costs;
 use super::loads::Loads;
 use crate::sweep::{Standing, median};
-use sapwise::report::{Point, Timing};
+use crate::report::{Point, Timing};
 use sapwise::{AlgorithmId, Load};
 use sapwise_scenes::{Random, Scenario};
 

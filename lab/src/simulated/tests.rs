@@ -36,7 +36,7 @@ fn every_report_is_sound_complete_and_labelled() {
             assert!(!samples.is_empty() && samples.iter().all(|&n| n == samples[0] && n >= 5), "{name}: {samples:?}");
         }
         let [first, last] = [report.points.first(), report.points.iter().find(|p| p.load.objects == 300_000)];
-        let racing = |point: Option<&sapwise::report::Point>| point.unwrap().timings.len();
+        let racing = |point: Option<&crate::report::Point>| point.unwrap().timings.len();
         assert!(racing(first) == report.algorithms.len() && racing(last) < racing(first), "{name}: nobody left the race");
     }
 }
@@ -55,7 +55,7 @@ fn a_model_of_simulated_machines_has_a_course_and_a_card_that_say_so() {
         let ordered = ["default machine", "random forest"].contains(&&score.name[..]);
         assert!((score.mean_regret - of_all(&score.name)).abs() < 1e-9 || ordered, "{score:?}");
     }
-    let card = crate::card::page(&model, &[]);
+    let card = crate::model_card::page(&model, &[]);
     assert!(card.contains("Trained on simulated machines") && card.contains("| 2 machines |"), "{card}");
 }
 
