@@ -158,7 +158,7 @@ impl FromStr for Scenario {
 
 /// A text names no [`Scenario`]. Its message lists the names.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is no scenario; use one of {}", Scenario::ALL.map(Scenario::name).join(", "))]
+#[error("{0:?} is no scenario; use one of {names}", names = Scenario::ALL.map(Scenario::name).join(", "))]
 pub struct UnknownScenario(String);
 
 /// Greatest step on each axis in a frame, in edges, where objects move slowly.
