@@ -9,7 +9,7 @@ use sapwise::hardware::parameter;
 use sapwise::model::{ASK, Prediction};
 use sapwise::stats::median;
 use sapwise::{GpuIdentity, Hardware, Load, Model, Registry, Tuning};
-use sapwise_lab::data::files::{Document, read_document};
+use sapwise_lab::data::{Document, read_document};
 use sapwise_lab::belief::{Prior, Taken, learn};
 use sapwise_lab::sweep::loads;
 use sapwise_lab::text::count;

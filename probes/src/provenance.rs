@@ -7,7 +7,7 @@ use crate::gpus::uses;
 use crate::restriction;
 use sapwise::stats::median;
 use sapwise::{AlgorithmId, GpuKind, Hardware, SimdLevel, usable_cores};
-use sapwise_lab::report::{Label, Point, Provenance, Restriction, Timed};
+use sapwise_lab::report::{Label, Point, Provenance, Restriction, Timed, TimedTerm};
 use std::time::Duration;
 
 /// A machine whose other programs take more than this share of the CPU at half of the points is not undisturbed.
@@ -59,7 +59,10 @@ pub(crate) fn timed(points: &[Point], threads: Option<u32>, hardware: &Hardware,
     let raced = |id| points.iter().any(|p| p.timings.iter().any(|t| t.algorithm == id));
     let on_gpus = sapwise::gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu));
     let entries = registry.available().into_iter().chain(on_gpus);
-    let timed = |(id, revision): (AlgorithmId, u32)| Timed { terms: algorithms.terms(&id), id, revision };
+    let timed = |(id, revision): (AlgorithmId, u32)| {
+        let terms = algorithms.terms(&id).iter().map(|&(term, scale)| TimedTerm { term, scale }).collect();
+        Timed { terms, ..Timed::new(id, revision) }
+    };
     entries.filter(|(id, _)| raced(id.clone())).map(timed).collect()
 }
 

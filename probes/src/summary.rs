@@ -8,7 +8,8 @@ use sapwise_lab::label_text;
 use sapwise_lab::report::{Label, Report};
 use sapwise_lab::text::{columns, count, duration, grouped};
 use sapwise_lab::units::value;
-use sapwise_lab::{measured_tuning, slice_scenario};
+use sapwise_lab::data::usual_scenario;
+use sapwise_lab::fit::measured_tuning;
 use std::path::Path;
 
 /// The hardware, then the tuning of every scenario that was swept.
@@ -33,7 +34,7 @@ pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
 pub(crate) fn next_step(report: &Report, path: &Path) -> String {
     let path = shell::path(path);
     // A report without a sweep, or one that was interrupted early, serves for its hardware only.
-    let next = if measured_tuning(report, slice_scenario(report)).is_ok() {
+    let next = if measured_tuning(report, usual_scenario(report)).is_ok() {
         format!("sapwise run fragmentation --tuning {path}")
     } else {
         format!("sapwise predict --report {path}")

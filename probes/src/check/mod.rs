@@ -7,7 +7,7 @@ mod report;
 mod tuning;
 
 use crate::algorithms::Algorithms;
-use sapwise_lab::data::files::{Document, read_document};
+use sapwise_lab::data::{Document, read_document};
 use crate::gpus::{Seen, look};
 use sapwise::measure;
 use sapwise::{Machine, Registry, usable_cores};

@@ -11,10 +11,11 @@ use crate::terminal::Terminal;
 use crate::{interrupt, output, shell, summary};
 use anyhow::{Context, bail};
 use sapwise::json;
-use sapwise_lab::data::files::{Document, read_document};
+use sapwise_lab::data::{Document, read_document};
 use sapwise_lab::report::Report;
 use sapwise_lab::write::write_text;
-use sapwise_lab::{as_at_the_points, measured_tuning, slice_scenario};
+use sapwise_lab::data::{as_at_the_points, usual_scenario};
+use sapwise_lab::fit::measured_tuning;
 use sapwise_scenes::Scenario;
 use std::path::Path;
 
@@ -37,7 +38,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
             arguments.gpus.restrict(&mut report);
             let report = &report;
             let scenario = arguments.scenario.map(|s| s.to_string());
-            measured_tuning(report, scenario.as_deref().unwrap_or_else(|| slice_scenario(report)))?
+            measured_tuning(report, scenario.as_deref().unwrap_or_else(|| usual_scenario(report)))?
         }
         (None, None) => return Err(WrongUsage("--measured needs --report".to_owned()).into()),
         (Some(model), report) => {

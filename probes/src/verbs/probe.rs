@@ -11,8 +11,8 @@ use crate::terminal::Terminal;
 use crate::{child, interrupt, output, profiles, provenance, restriction, summary};
 use anyhow::Context;
 use sapwise::{Hardware, usable_cores};
-use sapwise_lab::data::files::write_report;
-use sapwise_lab::report::{Report, ReportSchema, Restriction};
+use sapwise_lab::data::write_report;
+use sapwise_lab::report::{Report, Restriction};
 use sapwise_lab::steadiness::Steadiness;
 use sapwise_lab::sweep::Plan;
 use std::time::Instant;
@@ -100,7 +100,6 @@ fn assemble(
     began: Instant,
 ) -> Report {
     let mut report = Report {
-        schema: ReportSchema,
         label: provenance::label(arguments, &found.points, hardware),
         provenance: provenance::provenance(arguments, restriction, hardware, began.elapsed()),
         hardware: hardware.clone(),

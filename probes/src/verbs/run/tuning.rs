@@ -2,14 +2,14 @@
 
 use crate::algorithms::Algorithms;
 use crate::args::Run;
-use sapwise_lab::data::files::read_document;
 use crate::gpus::{self, GpuChoice};
 use crate::hardware::measure_hardware;
 use crate::prediction::{self, Slice};
 use crate::revisions;
 use anyhow::{Context, bail};
-use sapwise_lab::data::files::Document;
-use sapwise::{AlgorithmId, Tuning, Registry, Source, measure};
+use sapwise::{AlgorithmId, Registry, Source, Tuning, measure};
+use sapwise_lab::data::{Document, read_document, usual_scenario};
+use sapwise_lab::fit::measured_tuning;
 use sapwise_scenes::Scenario;
 use serde::Serialize;
 use std::path::Path;
@@ -94,7 +94,7 @@ pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyh
         Document::Report(mut report) => {
             choice.restrict(&mut report);
             fresh(revisions::stale_in_report(&report, registry))?;
-            let tuning = measured_tuning(&report, slice_scenario(&report))
+            let tuning = measured_tuning(&report, usual_scenario(&report))
                 .with_context(|| format!("{} yields no tuning", path.display()))?;
             let machine = &report.hardware.machine;
             let here = machine.physical_id == measure::machine().physical_id;
