@@ -29,7 +29,7 @@ pub enum Term {
 
 /// Bounds of what a file may hold: an hour for one object, 2^64 objects, a correction by e^50. Beyond them the arithmetic of a
 /// cost would end in infinities, and an infinity less an infinity is no cost.
-pub(crate) const MOST_UNIT_NS: f64 = 3.6e12;
+pub const MOST_UNIT_NS: f64 = 3.6e12;
 const MOST_LOG2_OBJECTS: f64 = 64.0;
 const MOST_LN_FACTOR: f64 = 50.0;
 
@@ -59,23 +59,29 @@ impl Term {
 
 /// What the terms of all algorithms share under one load, worked out once for each decision.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Counts<'a> {
+pub struct Counts<'a> {
     load: &'a Load,
     objects: f64,
     log2_objects: f64,
 }
 
 impl<'a> Counts<'a> {
-    pub(crate) fn new(load: &'a Load) -> Self {
+    /// The counts under a load.
+    #[must_use]
+    pub fn new(load: &'a Load) -> Self {
         let objects = f64::from(load.objects);
         Self { load, objects, log2_objects: objects.max(1.0).log2() }
     }
 
-    pub(crate) fn log2_objects(&self) -> f64 {
+    /// Base-2 logarithm of the number of objects, 0 for none.
+    #[must_use]
+    pub fn log2_objects(&self) -> f64 {
         self.log2_objects
     }
 
-    pub(crate) fn of(&self, term: Term, cache_bytes: f64) -> f64 {
+    /// The count of operations of a term, on a machine with a last-level cache of `cache_bytes`.
+    #[must_use]
+    pub fn of(&self, term: Term, cache_bytes: f64) -> f64 {
         let n = self.objects;
         match term {
             Term::Call => 1.0,
@@ -98,10 +104,10 @@ impl<'a> Counts<'a> {
 pub struct CostCurve {
     /// Terms of the sum; none is negative.
     pub terms: Vec<CostTerm>,
-    /// Terms of another way to do the same, which the algorithm goes where this sum is the smaller one: pair-cache lists leave a frame to
-    /// the strips where boxes move too far. Empty where there is one way only.
+    /// Terms of the fallback of the algorithm, which it takes where this sum is the smaller one: `pair-cache` leaves a frame to `grid-sap` where
+    /// boxes move too far. Empty where it has none.
     #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
-    pub otherwise: Vec<CostTerm>,
+    pub fallback_terms: Vec<CostTerm>,
     /// Last-level cache of the machine, for [`Term::ColdObjects`].
     pub cache_bytes: f64,
     /// What the terms leave unexplained, ascending by `log2_objects`: the sum is multiplied by `exp(ln_factor)`,
@@ -143,10 +149,10 @@ impl CostCurve {
         if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects).exp() }
     }
 
-    /// Predicted nanoseconds of the other way, where there are two.
-    pub(crate) fn otherwise_of(&self, counts: &Counts<'_>) -> Option<f64> {
-        let ns: f64 = self.otherwise.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum();
-        (!self.otherwise.is_empty()).then(|| ns * self.ln_correction(counts.log2_objects).exp())
+    /// Predicted nanoseconds of the fallback, where there is one.
+    pub(crate) fn fallback_of(&self, counts: &Counts<'_>) -> Option<f64> {
+        let ns: f64 = self.fallback_terms.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum();
+        (!self.fallback_terms.is_empty()).then(|| ns * self.ln_correction(counts.log2_objects).exp())
     }
 
     /// What of the predicted nanoseconds is due to [`Term::Call`].
@@ -155,12 +161,12 @@ impl CostCurve {
         ns * self.ln_correction(counts.log2_objects).exp()
     }
 
-    /// The sum of the terms, of the cheaper way where there are two.
+    /// The sum of the terms, of the fallback where that is cheaper.
     fn uncorrected(&self, counts: &Counts<'_>) -> f64 {
         let sum =
             |terms: &[CostTerm]| -> f64 { terms.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum() };
         let first = sum(&self.terms);
-        if self.otherwise.is_empty() { first } else { first.min(sum(&self.otherwise)) }
+        if self.fallback_terms.is_empty() { first } else { first.min(sum(&self.fallback_terms)) }
     }
 
     /// What the cost is at least and at most under the loads of which no count is below `least` nor above `most`.
@@ -179,7 +185,8 @@ impl CostCurve {
     }
 
     /// The correction with `ln` added to it, as knots at its own places and at `octaves`, within what a file may hold.
-    pub(crate) fn corrected_by(&self, octaves: impl Iterator<Item = f64>, ln: impl Fn(f64) -> f64) -> Vec<Knot> {
+    #[must_use]
+    pub fn corrected_by(&self, octaves: impl Iterator<Item = f64>, ln: impl Fn(f64) -> f64) -> Vec<Knot> {
         let mut octaves: Vec<f64> = self.correction.iter().map(|k| k.log2_objects).chain(octaves).collect();
         octaves.sort_by(f64::total_cmp);
         octaves.dedup();
@@ -190,7 +197,9 @@ impl CostCurve {
         octaves.into_iter().map(knot).collect()
     }
 
-    pub(crate) fn ln_correction(&self, x: f64) -> f64 {
+    /// The correction at a base-2 logarithm of the number of objects, as a natural logarithm.
+    #[must_use]
+    pub fn ln_correction(&self, x: f64) -> f64 {
         let after = self.correction.partition_point(|k| k.log2_objects <= x);
         match (after.checked_sub(1).map(|k| self.correction[k]), self.correction.get(after)) {
             (Some(a), Some(b)) => {
@@ -206,7 +215,7 @@ impl CostCurve {
     /// What makes this curve unusable, if anything: a negative or non-finite figure, or knots out of order.
     #[must_use]
     pub fn defect(&self) -> Option<String> {
-        if let Some(t) = self.terms.iter().chain(&self.otherwise).find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
+        if let Some(t) = self.terms.iter().chain(&self.fallback_terms).find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
             return Some(format!("the term {:?} has {} ns a unit", t.term, t.unit_ns));
         }
         if !(self.cache_bytes.is_finite() && self.cache_bytes >= 0.0) {
@@ -217,7 +226,7 @@ impl CostCurve {
             return Some("knots of the correction that are not ascending, or beyond every measurement".to_owned());
         }
         let nothing = |terms: &[CostTerm]| terms.iter().all(|t| t.unit_ns == 0.0);
-        if nothing(&self.terms) || !self.otherwise.is_empty() && nothing(&self.otherwise) {
+        if nothing(&self.terms) || !self.fallback_terms.is_empty() && nothing(&self.fallback_terms) {
             return Some("no term above zero, so the cost is always nothing".to_owned());
         }
         None
@@ -245,16 +254,16 @@ mod tests {
     }
 
     #[test]
-    fn an_algorithm_with_two_ways_goes_the_cheaper_one() {
+    fn an_algorithm_with_a_fallback_takes_the_cheaper_one() {
         let term = |term, unit_ns| CostTerm { term, unit_ns };
         let mut curve = CostCurve {
             terms: vec![term(Term::Objects, 2.0), term(Term::Moved, 100.0)],
-            otherwise: vec![term(Term::Objects, 30.0)],
+            fallback_terms: vec![term(Term::Objects, 30.0)],
             ..CostCurve::default()
         };
         let load = |moved| Load { objects: 10, moved, ..Load::default() };
         assert_eq!([0.0, 0.25, 1.0].map(|moved| curve.cost_ns(&load(moved))), [20.0, 270.0, 300.0]);
-        curve.otherwise = vec![term(Term::Objects, 0.0)];
+        curve.fallback_terms = vec![term(Term::Objects, 0.0)];
         assert!(curve.defect().is_some());
     }
 

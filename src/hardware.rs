@@ -250,7 +250,7 @@ fn loaded(of: &str, parameters: &[Parameter]) -> Option<String> {
 fn moved(parameters: &[Parameter]) -> Option<String> {
     let distance = parameters.iter().find(|p| p.name == parameter::CORE_TO_CORE_NS)?;
     // A machine of several groups of cores differs by a factor of four; noise of the clock does not reach two.
-    let [low, high] = [0.1, 0.9].map(|q| crate::statistics::quantile(&distance.raw, q));
+    let [low, high] = [0.1, 0.9].map(|q| crate::stats::quantile(&distance.raw, q));
     let (low, high) = low.zip(high).filter(|(low, high)| *high > 2.0 * low)?;
     Some(format!(
         "a cache line took {low:.0} ns from core to core in some samples and {high:.0} ns in others: the program or the virtual CPUs were \

@@ -18,14 +18,14 @@
 //! keeps them for the next start.
 //!
 //! Where tuning comes from, in ascending order of trust: written by hand ([`Tuning::usual`], [`Tuning::from_steps`]),
-//! predicted by a [`Model`] from the parameters of the [`Hardware`], or measured, from the timings in a [`Report`]. Reports,
-//! models and tuning is files of the feature `model`; the command `sapwise` makes them.
+//! predicted by a [`Model`] from the parameters of the [`Hardware`], or measured, from the timings in a report. Models
+//! and tuning are files of the feature `model`; the command `sapwise` makes them.
 //!
 //! # Features
 //!
 //! - `parallel` (default): the algorithms on several cores, through rayon. Without it only `@cpu1`.
 //! - `gpu`: the algorithms on GPUs, through wgpu; see the module `gpu`.
-//! - `model`: reports, models and tuning as JSON; prediction.
+//! - `model`: models and tuning as JSON; prediction.
 //! - `measure`: measures the hardware parameters of this machine.
 //! - `measure-gpu`: those of its GPUs too.
 //! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and keeps the tuning for the next start.
@@ -38,10 +38,8 @@ mod broad_phase;
 mod changes;
 mod cost;
 mod cpu;
-pub mod crossover;
 mod displacement;
 mod error;
-pub mod tuning;
 mod filter;
 #[cfg(feature = "gpu")]
 pub mod gpu;
@@ -53,16 +51,14 @@ mod load;
 pub mod measure;
 pub mod model;
 mod pairs;
-pub mod posterior;
 mod registry;
-pub mod report;
 mod sample;
-mod scenario;
+#[cfg(test)]
+mod scene;
 mod schema_tag;
 mod splitmix;
-// Public as `measure::statistics`; the figures of parameters in files follow from it without that feature too.
-#[cfg_attr(not(feature = "measure"), allow(unreachable_pub, reason = "public through `measure` only"))]
-mod statistics;
+pub mod stats;
+pub mod tuning;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
@@ -71,24 +67,20 @@ pub use adaptive::{Cache, Options, Origin, SaveError, Setup};
 pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
 pub use broad_phase::BroadPhase;
 pub use changes::Changes;
-pub use cost::{CostCurve, CostTerm, Knot, Term};
+pub use cost::{CostCurve, CostTerm, Counts, Knot, MOST_UNIT_NS, Term};
 pub use cpu::SimdLevel;
-pub use crossover::{Comparison, Crossover, Paired, Position};
 pub use displacement::Displacement;
 pub use error::{BoxDefect, Error};
-pub use tuning::{AlgorithmCost, Border, Tuning, Observation, Ranking, Source, Step};
 pub use filter::{Filter, Membership};
 pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, Machine, Parameter};
 pub use load::Load;
 pub use model::Model;
 pub use pairs::{Pair, PairOrder, Pairs};
-pub use posterior::{Posterior, Prior};
 /// The version of rayon whose pools this library takes: [`Registry::use_pool`].
 #[cfg(feature = "parallel")]
 pub use rayon;
 pub use registry::{Entry, Registry, usable_cores};
-pub use report::Report;
-pub use scenario::{Scenario, Scene};
+pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, Tuning};
 
 /// The examples of the README as tests, with the feature that the first of them needs.
 #[cfg(all(doctest, feature = "this-machine"))]

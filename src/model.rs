@@ -1,31 +1,22 @@
 //! Coefficients that turn hardware parameters into cost curves.
 
-mod cloud;
 mod curve;
 mod feature;
-mod fold;
 mod gpu_set;
-mod interval;
 mod predict;
 mod scale;
-mod validation;
 
 use crate::hardware::{GpuKind, parameter};
 use crate::schema_tag::schema_tag;
-use crate::{BackendClass, Prior, Term};
+use crate::{BackendClass, Term};
 
-pub use cloud::{Cloud, CloudParameter, Place};
-use curve::Formula;
 pub use feature::Feature;
-pub use fold::{Fold, FoldMethod, LnErrors, QUANTILES, Role, RoleErrors};
-pub use interval::FEWEST_MACHINES;
 pub use predict::{ASK, Prediction};
 pub use scale::Scale;
-pub use validation::{Coverage, Learning, LearningScore, MethodScore, Validation};
 
 schema_tag!(
-    /// `model/1`.
-    pub ModelSchema = "model/1"
+    /// `model/2`.
+    pub ModelSchema = "model/2"
 );
 
 /// What stands before the name of a GPU's parameter in a [`Range`]: `gpu/upload_rate_gb_per_s`.
@@ -39,59 +30,17 @@ pub const GPU_PREFIX: &str = "gpu/";
 #[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Model {
-    /// Always `model/1`.
+    /// Always `model/2`.
     pub schema: ModelSchema,
     /// Name by which tuning refer to it.
     pub name: String,
-    /// The reports behind it, one by one. Empty where there are too many to list: then `trained_on_counts` tells them.
-    pub trained_on: Vec<TrainingReport>,
-    /// Reports of each kind, where they are too many to list.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
-    pub trained_on_counts: Vec<TrainingCount>,
+    /// Whether a report behind it is simulated, which makes its predictions no evidence of anything.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "std::ops::Not::not"))]
+    pub simulated: bool,
     /// Lowest and highest value of each hardware parameter in training; a machine outside is extrapolated.
     pub ranges: Vec<Range>,
     /// One cost model for each method on each class of processor.
     pub methods: Vec<MethodModel>,
-    /// How far costs lay from their prediction on machines that were left out. A file without it is from before samples were
-    /// taken; [`Prior::ASSUMED`] holds then.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
-    pub prior: Option<Prior>,
-    /// How well it did on what it had not seen.
-    pub validation: Validation,
-    /// The training's machines, and its GPUs, by all parameters together. None of those of which there are fewer than parameters
-    /// and two.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
-    pub clouds: Vec<Cloud>,
-    /// The fits without some of the physical machines, and their errors on them, which intervals are made of. Each physical machine
-    /// is left out of one. Empty in files from before there were intervals.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
-    pub folds: Vec<Fold>,
-}
-
-/// One report that a model was trained on.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct TrainingReport {
-    /// File name without folders.
-    pub file: String,
-    /// [`Machine::physical_id`](crate::Machine::physical_id) of its machine.
-    pub physical_id: String,
-    /// What kind of evidence it is.
-    pub label: crate::report::Label,
-}
-
-/// How many reports of one kind a model was trained on.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct TrainingCount {
-    /// What kind of evidence they are.
-    pub label: crate::report::Label,
-    /// Reports.
-    pub reports: usize,
-    /// Physical machines that they are of.
-    pub physical_machines: usize,
 }
 
 /// Where a hardware parameter lay in training.
@@ -130,9 +79,9 @@ pub struct MethodModel {
     pub max_objects: u32,
     /// The physical terms; no unit is negative.
     pub terms: Vec<ModelTerm>,
-    /// Terms of another way to do the same, where the algorithm has one: [`CostCurve::otherwise`](crate::CostCurve::otherwise).
+    /// Terms of the fallback, where the algorithm has one: [`CostCurve::fallback_terms`](crate::CostCurve::fallback_terms).
     #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
-    pub otherwise: Vec<ModelTerm>,
+    pub fallback_terms: Vec<ModelTerm>,
     /// Constant of the residual.
     pub residual_intercept: f64,
     /// Slopes of the residual on the natural logarithm of measured over modelled time.
@@ -182,25 +131,16 @@ impl Model {
     #[must_use]
     pub fn parameters(&self) -> Vec<&str> {
         let of_method = |m: &MethodModel| {
-            let scales = m.terms.iter().chain(&m.otherwise).flat_map(|t| t.scale.parameters());
+            let scales = m.terms.iter().chain(&m.fallback_terms).flat_map(|t| t.scale.parameters());
             let features = m.residual.iter().flat_map(|r| r.feature.parameters());
             let cache = (m.backend == BackendClass::Cpu).then_some(&parameter::CACHE_LLC_BYTES);
             scales.chain(features).chain(cache).copied().collect::<Vec<_>>()
         };
         let ranges = self.ranges.iter().map(|r| r.parameter.as_str()).filter(|name| !name.starts_with(GPU_PREFIX));
-        let clouds = self.clouds.iter().filter(|c| c.processor == BackendClass::Cpu);
-        let clouds = clouds.flat_map(|c| c.parameters.iter().map(|p| p.name.as_str()));
-        let mut names: Vec<&str> = self.methods.iter().flat_map(of_method).chain(ranges).chain(clouds).collect();
+        let mut names: Vec<&str> = self.methods.iter().flat_map(of_method).chain(ranges).collect();
         names.sort_unstable();
         names.dedup();
         names
-    }
-
-    /// Whether a report behind it is simulated, which makes its predictions no evidence of anything.
-    #[must_use]
-    pub fn is_simulated(&self) -> bool {
-        let mut labels = self.trained_on.iter().map(|t| t.label).chain(self.trained_on_counts.iter().map(|c| c.label));
-        labels.any(|label| label == crate::report::Label::Simulated)
     }
 
     /// What makes this model unusable, if anything.
@@ -212,18 +152,15 @@ impl Model {
         if let Some(r) = self.ranges.iter().find(|r| !(r.min.is_finite() && r.max.is_finite() && r.min <= r.max)) {
             return Some(format!("the range of {} is {} to {}", r.parameter, r.min, r.max));
         }
-        if let Some(defect) = self.prior.and_then(|p| p.defect()) {
-            return Some(defect);
-        }
         for m in &self.methods {
             let name = format!("{} on the {}", m.method, m.backend);
-            if let Some(t) = m.terms.iter().chain(&m.otherwise).find(|t| !t.scale.is_of(m.backend)) {
+            if let Some(t) = m.terms.iter().chain(&m.fallback_terms).find(|t| !t.scale.is_of(m.backend)) {
                 return Some(format!("{name}: the scale {:?} is of another processor", t.scale));
             }
             if let Some(r) = m.residual.iter().find(|r| !r.feature.is_of(m.backend)) {
                 return Some(format!("{name}: the feature {:?} is of another processor", r.feature));
             }
-            if let Some(t) = m.terms.iter().chain(&m.otherwise).find(|t| !(t.unit.is_finite() && t.unit >= 0.0)) {
+            if let Some(t) = m.terms.iter().chain(&m.fallback_terms).find(|t| !(t.unit.is_finite() && t.unit >= 0.0)) {
                 return Some(format!("{name}: the term {:?} has the unit {}", t.term, t.unit));
             }
             if m.terms.iter().all(|t| t.unit == 0.0) {
@@ -234,7 +171,7 @@ impl Model {
                 return Some(format!("{name}: a residual or spread that is not finite"));
             }
         }
-        self.clouds.iter().find_map(Cloud::defect).or_else(|| self.folds.iter().find_map(Fold::defect))
+        None
     }
 }
 

@@ -3,7 +3,6 @@
 mod slice;
 
 use crate::cost::Counts;
-use crate::posterior::{Joint, Posterior};
 use crate::schema_tag::schema_tag;
 use crate::{AlgorithmId, CostCurve, Load, Registry};
 
@@ -37,7 +36,7 @@ pub struct Tuning {
     /// The cheapest algorithm over the number of objects in that scenario, ascending: each holds until the next begins.
     pub steps: Vec<Step>,
     /// Where one step gives way to the next, in the order of `steps`.
-    pub crossovers: Vec<Border>,
+    pub crossovers: Vec<Crossover>,
     /// What `low` and `high` of the crossovers are made of, and why some have none.
     pub interval_basis: String,
     /// The cost of each algorithm. Empty: `steps` decide.
@@ -77,7 +76,7 @@ pub struct Step {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct Border {
+pub struct Crossover {
     /// The cheaper algorithm with fewer objects.
     pub below: AlgorithmId,
     /// The cheaper algorithm with more objects.
@@ -132,7 +131,7 @@ pub struct Ranking {
     pub runner_up: Option<(usize, f64)>,
 }
 
-impl Border {
+impl Crossover {
     /// Both ends of the interval, where one is claimed.
     #[must_use]
     pub fn interval(&self) -> Option<(f64, f64)> {
@@ -181,31 +180,26 @@ impl Tuning {
     /// `spread_ln`: where the logarithms of two costs differ by less than 1.645 standard deviations of that difference.
     #[must_use]
     pub fn from_costs(source: Source, scenario: &str, costs: Vec<AlgorithmCost>, loads: &[Load]) -> Self {
-        let mut tuning = Self { scenario: scenario.to_owned(), costs, ..Self::empty(source) };
+        let spreads: Vec<f64> = costs.iter().map(|c| c.spread_ln).collect();
+        let spread = |below: usize, above: usize, _: &Load| spreads[below].hypot(spreads[above]);
+        let mut tuning = Self::from_costs_with(source, scenario, costs, loads, spread);
         tuning.interval_basis =
             "90 % of a normal distribution with the spread of measured over modelled time of the two algorithms".to_owned();
-        let spreads: Vec<f64> = tuning.costs.iter().map(|c| c.spread_ln).collect();
-        tuning.cut(loads, &|below, above, _| spreads[below].hypot(spreads[above]));
         tuning
     }
 
-    /// Tuning from costs that observations have corrected, of the algorithms that `usable` admits, which is asked by position in
-    /// [`Posterior::predicted`].
-    ///
-    /// As [`Tuning::from_costs`], but with intervals from what is known of the ratio of two costs: what both share cancels.
+    /// As [`Tuning::from_costs`], with intervals from `spread`: for two positions in `costs` and a load, the standard deviation of the
+    /// logarithm of the ratio of the two costs. Say in [`Tuning::interval_basis`] what that is made of.
     #[must_use]
-    pub fn from_posterior(scenario: &str, posterior: &Posterior, usable: impl Fn(usize) -> bool, loads: &[Load]) -> Self {
-        let kept: Vec<usize> = (0..posterior.predicted().len()).filter(|&k| usable(k)).collect();
-        let all = posterior.costs();
-        let costs = kept.iter().map(|&k| all[k].clone()).collect();
-        let mut tuning = Self { scenario: scenario.to_owned(), costs, ..Self::empty(Source::Learned) };
-        tuning.interval_basis =
-            "90 % of a normal distribution with the spread that the samples left in the ratio of the two costs".to_owned();
-        tuning.cut(loads, &|below, above, load| {
-            let mut joint = Joint::default();
-            posterior.joint(load, &mut joint);
-            joint.variance_of_ratio(kept[below], kept[above]).sqrt()
-        });
+    pub fn from_costs_with(
+        source: Source,
+        scenario: &str,
+        costs: Vec<AlgorithmCost>,
+        loads: &[Load],
+        spread: impl Fn(usize, usize, &Load) -> f64,
+    ) -> Self {
+        let mut tuning = Self { scenario: scenario.to_owned(), costs, ..Self::empty(source) };
+        tuning.cut(loads, &spread);
         tuning
     }
 
@@ -317,13 +311,13 @@ impl Tuning {
             .collect();
     }
 
-    fn border(&self, slice: &Slice<'_>, below: usize, above: usize, objects: u32, spread: &dyn Fn(&Load) -> f64) -> Border {
+    fn border(&self, slice: &Slice<'_>, below: usize, above: usize, objects: u32, spread: &dyn Fn(&Load) -> f64) -> Crossover {
         let (b, a) = (&self.costs[below], &self.costs[above]);
         let doubt = |load: &Load| NORMAL_90 * spread(load);
         // Positive where the algorithm of the upper field is cheaper.
         let gain = |load: &Load| (b.curve.cost_ns(load) / a.curve.cost_ns(load)).ln();
         let objects = f64::from(objects);
-        Border {
+        Crossover {
             below: b.algorithm.clone(),
             above: a.algorithm.clone(),
             objects,

@@ -1,7 +1,7 @@
 //! Made-up machines whose costs are known exactly. TEST DATA: the reports carry a real label because training leaves
 //! simulated ones out, so none of them may leave this module's tests.
 
-use crate::random::Random;
+use sapwise_scenes::Random;
 use sapwise::hardware::gpu::parameter as of_gpu;
 use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, parameter};
 use sapwise::model::{MethodModel, ModelTerm, Scale};
@@ -256,7 +256,7 @@ fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> Me
         min_objects: 1,
         max_objects: u32::MAX,
         terms: terms.iter().map(|&(term, scale, unit)| ModelTerm { term, scale, unit }).collect(),
-        otherwise: Vec::new(),
+        fallback_terms: Vec::new(),
         residual_intercept: 0.0,
         residual: Vec::new(),
         spread_ln: 0.0,
@@ -316,7 +316,7 @@ pub(crate) fn truth() -> Vec<MethodModel> {
         method("sap", &sorted(1500.0, 3.0, (AxisCandidates, SharedLane, 7.0))),
         method("grid-sap", &sorted(6000.0, 4.0, (StripCandidates, SharedLane, 60.0))),
         MethodModel {
-            otherwise: sorted(7000.0, 4.4, (StripCandidates, SharedLane, 66.0))
+            fallback_terms: sorted(7000.0, 4.4, (StripCandidates, SharedLane, 66.0))
                 .map(|(term, scale, unit)| ModelTerm { term, scale, unit })
                 .into(),
             ..method(

@@ -1,9 +1,8 @@
 //! What one decision costs: the ranking alone, and the whole of `Adaptive::decide` with its sampled estimate.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use sapwise::{
-    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Tuning, Knot, Load, Pairs, Registry, Scenario, Source, Term,
-};
+use sapwise::{Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Tuning, Knot, Load, Pairs, Registry, Source, Term};
+use sapwise_scenes::Scenario;
 use std::hint::black_box;
 
 /// As many algorithms, terms and knots as a predicted field of a 16-core machine has.
@@ -11,7 +10,7 @@ fn tuning(registry: &Registry) -> Tuning {
     let curve = |k: u32| CostCurve {
         terms: Term::ALL.map(|term| CostTerm { term, unit_ns: 1.0 + f64::from(k) / 100.0 }).to_vec(),
         cache_bytes: 3.2e7,
-        otherwise: Vec::new(),
+        fallback_terms: Vec::new(),
         correction: (3..=24).map(|o| Knot { log2_objects: f64::from(o), ln_factor: 0.01 * f64::from(o % 5) }).collect(),
     };
     let ids = registry.entries().iter().map(|e| (e.id.clone(), e.revision));

@@ -23,7 +23,7 @@ fn fold(model: &Model, factor: f64) -> Fold {
         backend: m.backend,
         objects: (m.min_objects, m.max_objects),
         terms: m.terms.iter().map(|t| (t.term, t.scale, six(t.unit * factor))).collect(),
-        otherwise: Vec::new(),
+        fallback_terms: Vec::new(),
         intercept: six(m.residual_intercept),
         slopes: m.residual.iter().map(|r| (r.feature, six(r.slope / 100.0))).collect(),
     };

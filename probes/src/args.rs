@@ -10,7 +10,8 @@ use crate::gpus::GpuChoice;
 use crate::restriction::Lifted;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
-use sapwise::{AlgorithmId, Scenario};
+use sapwise::AlgorithmId;
+use sapwise_scenes::Scenario;
 use std::path::PathBuf;
 
 pub(crate) use run::{Run, Scene};
@@ -123,8 +124,8 @@ impl Probe {
     /// # Errors
     /// When one is unknown.
     pub(crate) fn scenarios(&self) -> Result<Vec<Scenario>, WrongUsage> {
-        let scenarios: Result<Vec<Scenario>, String> = self.scenarios.iter().map(|s| s.parse()).collect();
-        let mut scenarios = scenarios.map_err(|e| WrongUsage(format!("--scenario: {e}")))?;
+        let scenarios: Result<Vec<Scenario>, _> = self.scenarios.iter().map(|s| s.parse()).collect();
+        let mut scenarios = scenarios.map_err(|e: sapwise_scenes::UnknownScenario| WrongUsage(format!("--scenario: {e}")))?;
         let mut seen = Vec::new();
         scenarios.retain(|s| !seen.contains(s) && (seen.push(*s), true).1);
         Ok(scenarios)

@@ -28,7 +28,6 @@
 
 mod algorithms;
 mod args;
-mod boxes;
 mod card;
 mod check;
 mod child;
@@ -50,7 +49,6 @@ mod prediction;
 mod profiles;
 mod progress;
 mod provenance;
-mod random;
 mod restriction;
 mod revisions;
 mod samples;
@@ -64,7 +62,6 @@ mod sweep;
 mod table;
 mod terminal;
 mod train;
-mod turns;
 mod verbs;
 
 pub use command::Command;

@@ -8,7 +8,8 @@ use crate::table::count;
 use anyhow::{Context, bail};
 use sapwise::hardware::parameter;
 use sapwise::model::{ASK, FEWEST_MACHINES, Prediction};
-use sapwise::{Displacement, Tuning, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry, Scenario};
+use sapwise::{Displacement, Tuning, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry};
+use sapwise_scenes::Scenario;
 
 /// Objects of the slice that the tuning shows: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
@@ -76,7 +77,7 @@ pub(crate) fn predict_and_sample(
         algorithms: prediction.costs.iter().map(|c| c.algorithm.clone()).collect(),
     };
     let disturbed: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
-    let mut live = Live::new(order, sapwise::measure::statistics::median(&disturbed));
+    let mut live = Live::new(order, sapwise::stats::median(&disturbed));
     let prior = model.prior.unwrap_or(Prior::ASSUMED);
     let learned = samples::learn(prediction.costs.clone(), &prior, loads, &mut live, most as usize)?;
     let (remarks, wrong) = live.remarks();

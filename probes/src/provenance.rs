@@ -69,7 +69,7 @@ fn requested_level() -> Option<SimdLevel> {
 /// Over the points where it could be told.
 fn median_foreign_load(points: &[Point]) -> Option<f64> {
     let loads: Vec<f64> = points.iter().filter_map(|p| p.foreign_load).collect();
-    sapwise::measure::statistics::median(&loads)
+    sapwise::stats::median(&loads)
 }
 
 /// The arguments without `--out`: paths name users.

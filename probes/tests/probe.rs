@@ -88,7 +88,7 @@ fn ctrl_c_keeps_what_was_measured() {
     let out = folder.path().join("report.json");
     let mut probe = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
     probe.env_remove("SAPWISE_SIMD").args(["probe", "--max-objects", "30"]).arg("--out").arg(&out);
-    for scenario in sapwise::Scenario::ALL {
+    for scenario in sapwise_scenes::Scenario::ALL {
         probe.args(["--scenario", scenario.name()]);
     }
     let mut probe = probe.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();

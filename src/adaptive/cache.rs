@@ -13,8 +13,8 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 schema_tag!(
-    /// `cache/1`.
-    CacheSchema = "cache/1"
+    /// `cache/2`.
+    CacheSchema = "cache/2"
 );
 
 /// A file that is longer was written by something else.
@@ -25,7 +25,7 @@ const LONGEST_BYTES: u64 = 16 << 20;
 #[serde(deny_unknown_fields)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub(crate) struct Cached {
-    /// Always `cache/1`.
+    /// Always `cache/2`.
     schema: CacheSchema,
     /// What the tuning holds for.
     key: Key,
@@ -78,7 +78,7 @@ impl Key {
             algorithms: registry.available().into_iter().map(known).collect(),
             gpus: registry.gpu_identities(),
             model: model.name.clone(),
-            model_hash: format!("{:016x}", fnv1a(&json::write_model(model)?)),
+            model_hash: format!("{:016x}", fnv1a(&json::write(model)?)),
         })
     }
 }

@@ -162,7 +162,7 @@ impl Policy {
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
         for (k, cost) in self.tuning.costs.iter().enumerate() {
             let ns = cost.curve.cost_of(&counts);
-            let alone_ns = cost.curve.otherwise_of(&counts).unwrap_or(ns).max(ns);
+            let alone_ns = cost.curve.fallback_of(&counts).unwrap_or(ns).max(ns);
             let predicted = Predicted { ns, calls_ns: cost.curve.calls_of(&counts).min(ns) };
             let factor = learner.map_or(1.0, |l| l.correction_ln(k, View { place, calls: predicted.calls() }).exp());
             let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));

@@ -1,7 +1,7 @@
 //! Raw samples: what was measured, kept so that every figure can be worked out again.
 
 use super::Parameter;
-use crate::statistics;
+use crate::stats;
 
 /// How the value of a measured parameter follows from its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -22,11 +22,11 @@ impl Statistic {
     #[must_use]
     pub fn of(self, samples: &[f64]) -> Option<f64> {
         match self {
-            Self::Median => statistics::median(samples),
+            Self::Median => stats::median(samples),
             Self::FastestQuarterMedian => {
-                let fast = statistics::quantile(samples, 0.75)?;
+                let fast = stats::quantile(samples, 0.75)?;
                 let quarter: Vec<f64> = samples.iter().copied().filter(|&x| x >= fast).collect();
-                statistics::median(&quarter)
+                stats::median(&quarter)
             }
             Self::Fit => None,
         }
@@ -75,7 +75,7 @@ impl Parameter {
         if differ(self.value, value) {
             return Some(format!("the value is {}, but its raw samples give {}", told(self.value), told(value)));
         }
-        let dispersion = statistics::relative_iqr(&self.raw);
+        let dispersion = stats::relative_iqr(&self.raw);
         if differ(self.dispersion, dispersion) {
             let (here, there) = (told(self.dispersion), told(dispersion));
             return Some(format!("the dispersion is {here}, but its raw samples give {there}"));

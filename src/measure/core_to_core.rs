@@ -11,7 +11,7 @@ use core_affinity::CoreId;
 
 use super::{Options, foreign_load};
 use crate::hardware::{Parameter, parameter};
-use crate::statistics;
+use crate::stats;
 
 /// Exchanges before those that count: by then both threads run.
 const WARM_UP: u32 = 200;
@@ -62,7 +62,7 @@ fn pairs(cores: usize) -> Vec<(CoreId, CoreId)> {
 /// Infinite where no exchange came to its end.
 fn median_of(pairs: &[(CoreId, CoreId)]) -> f64 {
     let times: Vec<f64> = pairs.iter().filter_map(|&(a, b)| exchange_ns(a, b)).collect();
-    statistics::median(&times).unwrap_or(f64::INFINITY)
+    stats::median(&times).unwrap_or(f64::INFINITY)
 }
 
 /// A number that has its cache line to itself, and the neighbour that some cores fetch with it.

@@ -7,7 +7,7 @@ use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
 use crate::hardware::{How, Parameter, Statistic};
-use crate::statistics;
+use crate::stats;
 
 /// Ticks a second of `/proc/stat`: `USER_HZ`, 100 on every Linux architecture that Rust's standard library runs on.
 const TICKS_PER_SECOND: f64 = 100.0;
@@ -65,7 +65,7 @@ impl Figure {
         }
         Parameter {
             value,
-            dispersion: statistics::relative_iqr(raw),
+            dispersion: stats::relative_iqr(raw),
             samples: u32::try_from(raw.len()).unwrap_or(u32::MAX),
             spoiled: self.spoiled,
             foreign_load: self.foreign_load,

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::{Options, foreign_load};
 use crate::cpu::{Threads, Workers};
 use crate::hardware::{Parameter, parameter};
-use crate::statistics::median;
+use crate::stats::median;
 
 /// Body of a warm phase: many times the cost of a start.
 const SHORT: Duration = Duration::from_micros(20);

@@ -34,11 +34,6 @@ pub use gpu::{gpu, gpu_group};
 #[cfg(feature = "this-machine")]
 pub(crate) use identity::fnv1a;
 
-/// Median, quantiles and dispersion, as the figures of a parameter follow from its samples.
-pub mod statistics {
-    pub use crate::statistics::{median, quantile, relative_iqr};
-}
-
 /// A group of parameters that are measured together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Family {

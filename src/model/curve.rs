@@ -22,7 +22,7 @@ pub(super) struct Formula<T, R> {
     pub(super) class: BackendClass,
     pub(super) terms: T,
     /// Terms of the other way, where there is one.
-    pub(super) otherwise: T,
+    pub(super) fallback_terms: T,
     pub(super) intercept: f64,
     pub(super) residual: R,
     /// Fewest and most objects that were timed; the residual is held constant beyond.
@@ -75,7 +75,7 @@ impl<T: Iterator<Item = ModelTerm>, R: Iterator<Item = ResidualTerm>> Formula<T,
     /// # Errors
     /// Names the hardware parameter or the GPU that is missing.
     pub(super) fn curve(self, figures: &mut Figures<'_>) -> Result<CostCurve, String> {
-        let (terms, otherwise) = (figures.costs(self.terms)?, figures.costs(self.otherwise)?);
+        let (terms, fallback_terms) = (figures.costs(self.terms)?, figures.costs(self.fallback_terms)?);
         // What depends on the machine alone is added up once for all octaves.
         let (mut fixed, mut with_load, mut corrected) = (self.intercept, Vec::with_capacity(2), self.intercept != 0.0);
         for r in self.residual {
@@ -101,7 +101,7 @@ impl<T: Iterator<Item = ModelTerm>, R: Iterator<Item = ResidualTerm>> Formula<T,
             // No term of a GPU depends on the caches of the CPU.
             BackendClass::Gpu => 0.0,
         };
-        let curve = CostCurve { terms, otherwise, cache_bytes, correction };
+        let curve = CostCurve { terms, fallback_terms, cache_bytes, correction };
         curve.defect().map_or(Ok(curve), Err)
     }
 }
@@ -111,7 +111,7 @@ impl MethodModel {
         Formula {
             class: self.backend,
             terms: self.terms.iter().copied(),
-            otherwise: self.otherwise.iter().copied(),
+            fallback_terms: self.fallback_terms.iter().copied(),
             intercept: self.residual_intercept,
             residual: self.residual.iter().copied(),
             objects: (self.min_objects, self.max_objects),

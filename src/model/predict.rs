@@ -2,10 +2,9 @@
 
 use super::curve::Figures;
 use super::gpu_set::GpuSet;
-use super::interval::Doubt;
-use super::{GPU_PREFIX, MethodModel, Model, Place, Range};
+use super::{GPU_PREFIX, MethodModel, Model, Range};
 use crate::hardware::{GpuKind, Hardware};
-use crate::{AlgorithmCost, AlgorithmId, Backend, BackendClass, GpuHardware};
+use crate::{AlgorithmCost, AlgorithmId, Backend, BackendClass, GpuHardware, Load, Source, Tuning};
 
 /// Cost curves for one machine.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,9 +15,12 @@ pub struct Prediction {
     pub extrapolated: bool,
     /// What was outside, what was missing, what was left out.
     pub warnings: Vec<String>,
-    /// How sure it is, for [`Prediction::tuning`].
-    pub(super) doubt: Doubt,
+    /// Name of the model.
+    pub model: String,
 }
+
+/// Why a predicted crossover has no interval.
+const NO_INTERVALS: &str = "no interval is claimed: too few machines were measured to say how far a prediction lies from the truth on a new one";
 
 /// What to do where a machine is unlike those of training.
 pub const ASK: &str = "this machine is unlike those of training: measure a few timings with `sapwise predict --samples 8`, or all with \
@@ -30,9 +32,7 @@ impl Model {
     /// What can't be predicted is left out with a warning: a method that the model has not seen on that processor, another
     /// revision, a GPU that the hardware does not hold, a parameter that is missing or that no GPU has.
     ///
-    /// A machine is extrapolated when a parameter lies outside its [range](Range), or all together farther from the
-    /// [cloud](super::Cloud) of the training than any machine of it. The errors of training are then taken larger by the ratio of
-    /// the two distances. A model of fewer machines than parameters and two has no cloud, and only the ranges tell.
+    /// A machine is extrapolated when a parameter lies outside its [range](Range).
     ///
     /// # Errors
     /// A sentence, when no algorithm can be predicted, or a parameter of the machine has a value that no machine has.
@@ -40,13 +40,9 @@ impl Model {
         if let Some(why) = hardware.implausible() {
             return Err(why);
         }
-        let mut p = Prediction {
-            costs: Vec::new(),
-            extrapolated: false,
-            warnings: Vec::new(),
-            doubt: Doubt::new(self, self.untested(algorithms)),
-        };
-        if self.is_simulated() {
+        let mut p =
+            Prediction { costs: Vec::new(), extrapolated: false, warnings: Vec::new(), model: self.name.clone() };
+        if self.simulated {
             p.warnings.push(format!(
                 "the model {} was trained on simulated machines: what it predicts is no evidence; train on real reports",
                 self.name
@@ -54,16 +50,9 @@ impl Model {
         }
         let mut unlike =
             p.outside(self.ranges.iter().filter_map(|r| r.excess(&r.parameter, "", hardware.value(&r.parameter))));
-        let place = self.cloud(BackendClass::Cpu).map(|cloud| cloud.place(|name| hardware.value(name)));
-        unlike |= p.outside(place.as_ref().and_then(|place| place.warning("")));
-        let wider_on_cpu = place.map_or(1.0, |place| place.ratio.max(1.0));
         if self.ranges.is_empty() {
             p.outside([format!("the model {} does not say what it was trained on", self.name)]);
         }
-        let places: Vec<(u32, Place<'_>)> = self
-            .cloud(BackendClass::Gpu)
-            .map(|cloud| hardware.gpus.iter().map(|g| (g.gpu.index, cloud.place(|name| g.value(name)))).collect())
-            .unwrap_or_default();
         let mut unknown: Vec<String> = Vec::new();
         let mut gpus: Vec<u32> = Vec::new();
         for (id, revision) in algorithms {
@@ -91,15 +80,10 @@ impl Model {
                 let what = if backend.class() == BackendClass::Cpu { "threads" } else { "GPUs" };
                 p.outside([format!("{id}: the model has seen {} {what} at most", method.max_threads)]);
             }
-            let mut wider = wider_on_cpu;
             if let Backend::Gpu(indices) = backend {
                 p.outside(method.unseen_kinds(id, hardware, indices));
                 gpus.extend(indices);
-                // The CPU works for a GPU too.
-                wider =
-                    places.iter().filter(|(k, _)| indices.contains(k)).map(|(_, place)| place.ratio).fold(wider, f64::max);
             }
-            p.doubt.add(id, &self.folds, &mut figures, wider);
             let spread_ln = method.spread_ln;
             p.costs.push(AlgorithmCost { algorithm: id.clone(), revision: *revision, curve, spread_ln });
         }
@@ -111,8 +95,6 @@ impl Model {
                 let name = r.parameter.strip_prefix(GPU_PREFIX)?;
                 r.excess(name, &of, gpu.value(name))
             }));
-            let place = places.iter().find(|(k, _)| *k == gpu.gpu.index);
-            unlike |= p.outside(place.and_then(|(_, place)| place.warning(&of)));
         }
         if unlike {
             p.warnings.push(ASK.to_owned());
@@ -136,22 +118,6 @@ impl Model {
     pub fn method(&self, id: &AlgorithmId) -> Option<&MethodModel> {
         self.methods.iter().find(|m| m.method == id.method() && m.backend == id.backend().class())
     }
-
-    fn cloud(&self, processor: BackendClass) -> Option<&super::Cloud> {
-        self.clouds.iter().find(|c| c.processor == processor)
-    }
-
-    /// Which of the processors in use can't be compared with those of training in all parameters together, if any.
-    fn untested(&self, algorithms: &[(AlgorithmId, u32)]) -> Option<String> {
-        let lacks = |class| algorithms.iter().any(|a| a.0.backend().class() == class) && self.cloud(class).is_none();
-        let what = match (lacks(BackendClass::Cpu), lacks(BackendClass::Gpu)) {
-            (true, true) => "machine and its GPUs are like those of training is told by each parameter",
-            (true, false) => "machine is like those of training is told by each parameter",
-            (false, true) => "machine's GPUs are like those of training is told by each parameter",
-            (false, false) => return None,
-        };
-        Some(format!("whether this {what} alone and not by all together, for which the training holds too few"))
-    }
 }
 
 /// # Errors
@@ -161,20 +127,22 @@ fn gpus_that_are(hardware: &Hardware, backend: &Backend) -> Result<(), String> {
     indices.iter().filter_map(|&k| hardware.gpu(k)).find_map(GpuHardware::implausible).map_or(Ok(()), Err)
 }
 
-impl Place<'_> {
-    /// A warning when all parameters together lie farther from those of training than any machine of it.
-    fn warning(&self, of: &str) -> Option<String> {
-        (self.ratio > 1.0).then(|| {
-            format!(
-                "all parameters{of} together lie {:.1} times as far from those of training as any machine of it did, most by {}",
-                self.ratio,
-                self.most.join(" and ")
-            )
-        })
-    }
-}
-
 impl Prediction {
+    /// The tuning, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
+    ///
+    /// Its crossovers have no intervals: how far a prediction lies from the truth on machines never seen was not measured on enough of them.
+    #[must_use]
+    pub fn tuning(self, scenario: &str, loads: &[Load]) -> Tuning {
+        let mut tuning = Tuning::from_costs(Source::Predicted, scenario, self.costs, loads);
+        for crossover in &mut tuning.crossovers {
+            (crossover.low, crossover.high) = (None, None);
+        }
+        tuning.interval_basis = NO_INTERVALS.to_owned();
+        tuning.model = Some(self.model);
+        (tuning.extrapolated, tuning.warnings) = (self.extrapolated, self.warnings);
+        tuning
+    }
+
     /// Each of these warnings makes the prediction an extrapolation. Whether there was any.
     fn outside(&mut self, warnings: impl IntoIterator<Item = String>) -> bool {
         let before = self.warnings.len();

@@ -1,7 +1,4 @@
 mod extrapolation;
-// They read and write files.
-#[cfg(feature = "model")]
-mod intervals;
 
 use super::*;
 use crate::hardware::gpu::parameter as of_gpu;
@@ -57,7 +54,7 @@ fn method(backend: BackendClass, scale: Scale) -> MethodModel {
         min_objects: 1,
         max_objects: 1000,
         terms: vec![ModelTerm { term: Term::Call, scale, unit: 2.0 }],
-        otherwise: Vec::new(),
+        fallback_terms: Vec::new(),
         residual_intercept: 0.0,
         residual: Vec::new(),
         spread_ln: 0.1,
@@ -69,14 +66,9 @@ fn model(methods: Vec<MethodModel>) -> Model {
     Model {
         schema: ModelSchema,
         name: "test".to_owned(),
-        trained_on: Vec::new(),
-        trained_on_counts: Vec::new(),
+        simulated: false,
         ranges: vec![range(parameter::CLOCK_MEASURED_GHZ), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
         methods,
-        prior: None,
-        validation: Validation::default(),
-        clouds: Vec::new(),
-        folds: Vec::new(),
     }
 }
 
@@ -183,15 +175,6 @@ fn hardware_with_impossible_gpus_is_told() {
         assert!(defect(&|h| h.gpu_groups.push(group(gpus))).contains("no group"));
     }
     assert!(defect(&|h| h.gpu_groups = vec![group(&[0, 1]), group(&[0, 1])]).contains("twice"));
-}
-
-#[test]
-fn a_prior_that_can_not_be_is_a_defect_and_none_is_not() {
-    let with = |prior| Model { prior, ..model(vec![method(BackendClass::Cpu, Scale::Cycle)]) }.defect();
-    assert_eq!((with(None), with(Some(Prior::ASSUMED))), (None, None));
-    let mut wrong = Prior::ASSUMED;
-    wrong.cpu.length_octaves = f64::NAN;
-    assert!(with(Some(wrong)).is_some_and(|d| d.contains("prior of the CPU")));
 }
 
 /// What a scale reads: with those parameters alone it has a value for any number of threads, and without any it has none for several.

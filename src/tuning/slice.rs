@@ -212,7 +212,7 @@ mod tests {
             ];
             let knot = |k| Knot { log2_objects: f64::from(k), ln_factor: 0.4 * draw(&mut state) };
             let curve =
-                CostCurve { terms, otherwise: Vec::new(), cache_bytes: 1e6, correction: (3..=24).map(knot).collect() };
+                CostCurve { terms, fallback_terms: Vec::new(), cache_bytes: 1e6, correction: (3..=24).map(knot).collect() };
             AlgorithmCost { algorithm: format!("m{k}@cpu1").parse().unwrap(), revision: 1, curve, spread_ln: 0.1 }
         });
         let costs = costs.collect();

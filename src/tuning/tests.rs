@@ -96,25 +96,3 @@ fn hand_written_steps_are_checked() {
     assert!(Tuning::from_steps(vec![step(0, "brute@cpu1"), step(0, "grid-sap@cpu1")]).is_err());
 }
 
-#[test]
-fn samples_narrow_the_interval_of_a_border_and_leave_out_who_failed() {
-    let costs = vec![
-        cost("grid-sap@cpu1", &[(Term::Objects, 100.0)], 0.4),
-        cost("grid-sap@cpu2", &[(Term::Call, 80_000.0), (Term::Objects, 20.0)], 0.4),
-        cost("sap@cpu1", &[(Term::Objects, 1.0)], 0.4),
-    ];
-    let mut posterior = Posterior::new(costs.clone(), &crate::Prior::ASSUMED);
-    let of = |posterior: &Posterior| Tuning::from_posterior("uniform", posterior, |k| k != 2, &loads());
-    let width = |tuning: &Tuning| {
-        let (low, high) = tuning.crossovers[0].interval().unwrap();
-        high / low
-    };
-    let before = of(&posterior);
-    for (k, ns) in [(0, 150_000.0), (1, 150_000.0)] {
-        assert!(posterior.observe(k, &Load { objects: 1000, ..Load::default() }, ns, 0.01));
-    }
-    let after = of(&posterior);
-    assert_eq!((after.source, after.defect(), after.costs.len(), after.crossovers.len()), (Source::Learned, None, 2, 1));
-    assert!(width(&after) < 0.7 * width(&before), "{} {}", width(&after), width(&before));
-    assert!((after.crossovers[0].objects / 1000.0 - 1.0).abs() < 0.15, "{:?}", after.crossovers);
-}

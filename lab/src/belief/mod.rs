@@ -197,8 +197,8 @@ impl Posterior {
             (sum, parts)
         };
         let (mut sum, mut parts) = way(&curve.terms);
-        if !curve.otherwise.is_empty() {
-            let other = way(&curve.otherwise);
+        if !curve.fallback_terms.is_empty() {
+            let other = way(&curve.fallback_terms);
             if other.0 < sum {
                 (sum, parts) = other;
             }
@@ -255,7 +255,7 @@ impl Posterior {
             let own = (0..KNOTS).map(|k| FIRST_OCTAVE + OCTAVES * k as f64);
             let (knots, factors) = self.mean[a * STRIDE..][..STRIDE].split_at(KNOTS);
             cost.curve.correction = cost.curve.corrected_by(own, |log2_objects| Place::of(log2_objects).on(knots));
-            for term in cost.curve.terms.iter_mut().chain(&mut cost.curve.otherwise) {
+            for term in cost.curve.terms.iter_mut().chain(&mut cost.curve.fallback_terms) {
                 let factor = term_factor(factors[position(term.term)]);
                 term.unit_ns = (term.unit_ns * factor).min(MOST_UNIT_NS);
             }

@@ -1,7 +1,7 @@
 //! How far the borders between tuning move from report to report.
 
 use crate::{sweep, train};
-use sapwise::measure::statistics::{median, relative_iqr};
+use sapwise::stats::{median, relative_iqr};
 use sapwise::report::{Point, Report};
 use sapwise::{AlgorithmId, Tuning};
 use serde::Serialize;

@@ -106,7 +106,7 @@ fn load(report: &Report) -> Option<f64> {
     if loads.is_empty() {
         loads = report.hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
     }
-    sapwise::measure::statistics::median(&loads)
+    sapwise::stats::median(&loads)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! How far a measured parameter differs from report to report.
 
-use sapwise::measure::statistics::{quantile, relative_iqr};
+use sapwise::stats::{quantile, relative_iqr};
 use sapwise::{How, Parameter, Report};
 use serde::Serialize;
 

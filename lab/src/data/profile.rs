@@ -1,7 +1,7 @@
 //! What training keeps of a report: the hardware, and the median of each algorithm at each point.
 
 use super::direct::{Crossing, crossings};
-use sapwise::measure::statistics::median as median_of;
+use sapwise::stats::median as median_of;
 use sapwise::report::{Label, Point, Report, Timed, Timing};
 use sapwise::{AlgorithmId, Hardware, Load};
 use std::borrow::Cow;

@@ -91,7 +91,7 @@ mod tests {
     fn slower(costs: &[AlgorithmCost], id: &AlgorithmId, factor: f64) -> Vec<AlgorithmCost> {
         let mut costs = costs.to_vec();
         let own = costs.iter_mut().filter(|c| c.algorithm == *id);
-        own.flat_map(|c| c.curve.terms.iter_mut().chain(&mut c.curve.otherwise)).for_each(|t| t.unit_ns *= factor);
+        own.flat_map(|c| c.curve.terms.iter_mut().chain(&mut c.curve.fallback_terms)).for_each(|t| t.unit_ns *= factor);
         costs
     }
 

@@ -2,9 +2,10 @@
 
 use super::curve::measured_tuning;
 use crate::document::read_report;
-use sapwise::measure::statistics::median;
+use sapwise::stats::median;
 use sapwise::report::Point;
-use sapwise::{Adaptive, AlgorithmId, BroadPhase, Pairs, Registry, Report, Scenario};
+use sapwise::{Adaptive, AlgorithmId, BroadPhase, Pairs, Registry, Report};
+use sapwise_scenes::Scenario;
 use std::path::Path;
 
 /// The median time of an algorithm at a point.

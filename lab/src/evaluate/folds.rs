@@ -159,7 +159,7 @@ fn method(m: &MethodModel) -> FoldMethod {
         backend: m.backend,
         objects: (m.min_objects, m.max_objects),
         terms: m.terms.iter().map(term).collect(),
-        otherwise: m.otherwise.iter().map(term).collect(),
+        fallback_terms: m.fallback_terms.iter().map(term).collect(),
         intercept: six(m.residual_intercept - centred),
         slopes: m.residual.iter().map(|r| (r.feature, six(r.slope))).collect(),
     }

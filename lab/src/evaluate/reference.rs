@@ -8,7 +8,7 @@ use super::residual::Residuals;
 use super::robust::{HUBER, Problem, spread};
 use ndarray::{Array1, Array2};
 use sapwise::BackendClass;
-use sapwise::measure::statistics::{quantile, relative_iqr};
+use sapwise::stats::{quantile, relative_iqr};
 use sapwise::model::Feature;
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -120,7 +120,7 @@ mod tests {
     use super::super::yardstick::Yardstick;
     use super::super::{available, by_costs};
     use super::*;
-    use crate::random::Random;
+    use sapwise_scenes::Random;
 
     #[test]
     fn samples_mend_a_prediction_that_is_off_by_a_factor() {
@@ -129,7 +129,7 @@ mod tests {
         // All that works in parallel is predicted three times too fast.
         for cost in costs.iter_mut().filter(|c| c.algorithm.threads() > 1) {
             let curve = &mut cost.curve;
-            curve.terms.iter_mut().chain(&mut curve.otherwise).for_each(|t| t.unit_ns /= 3.0);
+            curve.terms.iter_mut().chain(&mut curve.fallback_terms).for_each(|t| t.unit_ns /= 3.0);
         }
         let yardstick = Yardstick::new(&profile);
         let available = available(&profile);

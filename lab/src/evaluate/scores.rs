@@ -3,7 +3,7 @@
 use super::robust::value_at_weight;
 use super::validate::SINGLE_BEST;
 use super::yardstick::Regret;
-use sapwise::measure::statistics::median;
+use sapwise::stats::median;
 use sapwise::model::MethodScore;
 use std::collections::BTreeMap;
 

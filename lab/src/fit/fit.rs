@@ -279,7 +279,7 @@ impl Design {
             min_objects: objects().min().unwrap_or(1),
             max_objects: objects().max().unwrap_or(1),
             terms: used.map(|(&(term, scale), &unit)| ModelTerm { term, scale, unit }).collect(),
-            otherwise: two_ways.zip(other).map_or_else(Vec::new, |(found, other)| {
+            fallback_terms: two_ways.zip(other).map_or_else(Vec::new, |(found, other)| {
                 other.iter().map(|t| ModelTerm { unit: t.unit * found.factor, ..*t }).collect()
             }),
             residual_intercept: intercept,

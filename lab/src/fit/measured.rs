@@ -113,17 +113,17 @@ fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64, other: Option<&CostC
         floors: rows.iter().map(|r| r.floor).collect(),
         groups: vec![0; rows.len()],
     };
-    let (units, otherwise) = match other {
+    let (units, fallback_terms) = match other {
         None => (problem.units(), Vec::new()),
         Some(other) => {
             let ns: Vec<f64> = rows.iter().map(|r| other.cost_ns(&r.load)).collect();
             let found = TwoWays::fit(&problem, &ns);
-            let otherwise = other.terms.iter().map(|t| CostTerm { unit_ns: t.unit_ns * found.factor, ..*t }).collect();
-            (found.units, otherwise)
+            let fallback_terms = other.terms.iter().map(|t| CostTerm { unit_ns: t.unit_ns * found.factor, ..*t }).collect();
+            (found.units, fallback_terms)
         }
     };
     let terms = terms.into_iter().zip(units).filter(|(_, u)| *u > 0.0).map(|(term, unit_ns)| CostTerm { term, unit_ns });
-    let mut curve = CostCurve { terms: terms.collect(), otherwise, cache_bytes, correction: Vec::new() };
+    let mut curve = CostCurve { terms: terms.collect(), fallback_terms, cache_bytes, correction: Vec::new() };
     if curve.defect().is_some() {
         return (curve, 0.0);
     }

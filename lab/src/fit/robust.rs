@@ -192,7 +192,7 @@ pub(super) fn value_at_weight(values: &[(f64, f64)], weight: f64) -> Option<f64>
 
 /// Median; 0 for none.
 fn median(values: &[f64]) -> f64 {
-    sapwise::measure::statistics::median(values).unwrap_or(0.0)
+    sapwise::stats::median(values).unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(weighted_median(vec![(1.0, 1.0), (2.0, 1.0)]), Some(1.5));
         assert!(weighted_median(vec![(1.0, 9.0), (2.0, 1.0)]).unwrap() <= 1.1);
     }
-    use crate::random::Random;
+    use sapwise_scenes::Random;
 
     fn line(ns: impl Fn(f64) -> f64) -> Problem {
         let n = |k: usize| 2.0_f64.powf(4.0 + 0.5 * k as f64);

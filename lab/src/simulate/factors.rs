@@ -3,7 +3,7 @@
 //! Each is drawn from the seed, the name of the part and its own name, so that a CPU is the same CPU in every machine. None of them
 //! stands in a report. The deviations are guesses at how far machines of equal parameters differ.
 
-use crate::random::Random;
+use sapwise_scenes::Random;
 
 /// A factor of a part: log-normal, median 1, `sigma` in natural logarithms.
 pub(super) fn factor(seed: u64, part: &str, what: &str, sigma: f64) -> f64 {

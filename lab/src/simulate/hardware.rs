@@ -2,7 +2,7 @@
 
 use super::machine::{TrueGpu, TrueMachine};
 use super::pairing::Build;
-use crate::random::Random;
+use sapwise_scenes::Random;
 use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, Statistic, gpu, parameter};
 use sapwise::{Hardware, Machine, Parameter};
 
@@ -152,8 +152,8 @@ fn found(name: &str, figure: &Figure, seed: u64, part: &str) -> Parameter {
             let samples: Vec<f64> = (0..SAMPLES).map(|_| value * random.log_normal(sigma)).collect();
             Parameter {
                 name: name.to_owned(),
-                value: sapwise::measure::statistics::median(&samples),
-                dispersion: sapwise::measure::statistics::relative_iqr(&samples),
+                value: sapwise::stats::median(&samples),
+                dispersion: sapwise::stats::relative_iqr(&samples),
                 samples: SAMPLES,
                 spoiled: 0,
                 foreign_load: None,

@@ -3,7 +3,8 @@
 use crate::prediction;
 use crate::sweep::Plan;
 use anyhow::Result;
-use sapwise::{Load, Scenario};
+use sapwise::Load;
+use sapwise_scenes::Scenario;
 
 /// Even and slow, even and fast, and in blobs: what keeping pairs is good for and what it is not, and another density.
 const SCENARIOS: [Scenario; 3] = [Scenario::Uniform, Scenario::Fast, Scenario::Clustered];

@@ -1,8 +1,7 @@
 //! Which CPU and which GPUs make a machine.
 
 use super::specification::{Cpu, Form, Gpu, Specifications};
-use crate::random::Random;
-use crate::turns::Turns;
+use sapwise_scenes::Random;
 use anyhow::{Result, bail};
 
 /// A machine that could be bought.
@@ -25,10 +24,10 @@ const DRAWS: u64 = 20;
 pub(super) fn builds(specifications: &Specifications, count: usize, seed: u64) -> Result<Vec<Build<'_>>> {
     let mut builds: Vec<Build<'_>> = Vec::new();
     let mut names: Vec<String> = Vec::new();
-    let mut turns = Turns::new(seed);
+    let mut random = Random::new(seed);
     for round in 0.. {
         let before = builds.len();
-        for k in turns.order(specifications.cpus.len()) {
+        for k in random.shuffled(specifications.cpus.len()) {
             let cpu = &specifications.cpus[k];
             let draw = |again: u64| Build::draw(cpu, &specifications.gpus, seed, round * DRAWS + again);
             let new = (0..DRAWS).map(draw).find(|b| !names.contains(&b.name()));
@@ -84,7 +83,7 @@ impl<'a> Build<'a> {
     pub(super) fn physical_id(&self) -> String {
         let parts = self.gpus.iter().map(|g| g.name.as_str());
         let words: Vec<&str> = ["simulated", &self.cpu.name].into_iter().chain(parts).collect();
-        format!("{:016x}", Random::named(0, &words).next())
+        format!("{:016x}", Random::named(0, &words).bits())
     }
 }
 

@@ -2,10 +2,10 @@
 
 use super::cost::Costs;
 use super::loads::Loads;
-use crate::random::Random;
 use crate::sweep::{Standing, median};
 use sapwise::report::{Point, Timing};
-use sapwise::{AlgorithmId, Load, Scenario};
+use sapwise::{AlgorithmId, Load};
+use sapwise_scenes::{Random, Scenario};
 
 /// Samples of a point in all, so that the report of a machine with many cores is no larger than that of others. As a real sweep
 /// has them: its time is shared by the algorithms.

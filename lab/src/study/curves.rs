@@ -4,7 +4,7 @@ use super::entry::{Entry, SOFTWARE, best_of_machines};
 use crate::plot::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
 use crate::sweep::median;
 use crate::train::{measured_fields, slice_scenario};
-use sapwise::measure::statistics::quantile;
+use sapwise::stats::quantile;
 use sapwise::{AlgorithmId, Backend, BackendClass, Tuning, Report};
 use std::collections::{BTreeMap, BTreeSet};
 

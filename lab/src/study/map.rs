@@ -2,11 +2,11 @@
 
 use super::entry::Entry;
 use crate::plot::{FieldMap, MapCell, MapPanel, MapPoint};
-use crate::random::Random;
+use sapwise_scenes::Random;
 use crate::train::{Profile, available, average, measured_costs, without};
 use anyhow::Result;
 use rayon::prelude::*;
-use sapwise::measure::statistics::median;
+use sapwise::stats::median;
 use sapwise::{Aabb, AlgorithmCost, AlgorithmId, Load};
 
 /// Cells on either axis.

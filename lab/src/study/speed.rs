@@ -1,7 +1,7 @@
 //! How much faster an algorithm is on one machine than on another.
 
 use super::entry::{Entry, Place};
-use sapwise::measure::statistics::quantile;
+use sapwise::stats::quantile;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 

@@ -4,7 +4,8 @@ use super::Scene;
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::error::Error;
 use clap::{Arg, Command};
-use sapwise::{AlgorithmId, Registry, Scenario, usable_cores};
+use sapwise::{AlgorithmId, Registry, usable_cores};
+use sapwise_scenes::Scenario;
 use std::ffi::OsStr;
 
 /// Reads values as `parser` does, with its errors, which say more than that a value is none of a list.

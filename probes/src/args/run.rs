@@ -3,7 +3,7 @@
 use crate::gpus::GpuChoice;
 use crate::simulation::CoRunner;
 use clap::Args;
-use sapwise::Scenario;
+use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 

@@ -9,7 +9,8 @@ use crate::progress::Progress;
 use crate::{gpus, interrupt, output, table};
 use anyhow::bail;
 use sapwise::json::Document;
-use sapwise::{Report, Scenario};
+use sapwise::Report;
+use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 

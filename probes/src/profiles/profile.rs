@@ -5,7 +5,8 @@ use crate::contention::Contended;
 use crate::restriction::{self, LAVAPIPE_THREADS};
 use crate::sweep::Plan;
 use sapwise::report::Restricted;
-use sapwise::{GpuIdentity, GpuKind, Scenario, SimdLevel};
+use sapwise::{GpuIdentity, GpuKind, SimdLevel};
+use sapwise_scenes::Scenario;
 use std::path::Path;
 use std::time::Duration;
 

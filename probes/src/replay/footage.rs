@@ -1,8 +1,9 @@
 //! Where the frames of a simulation come from.
 
-use crate::boxes::{Frames, write_frames};
+use crate::files::write_atomically;
 use crate::interrupt;
-use sapwise::{Aabb, Scenario, Scene};
+use sapwise::Aabb;
+use sapwise_scenes::{FrameWriter, Frames, Scenario, Scene};
 use std::path::Path;
 
 /// A seeded scene, or a stream that was recorded.
@@ -67,7 +68,12 @@ impl Footage {
             most = most.max(boxes.len());
             Ok(())
         })?;
-        write_frames(path, frames, most, |frame| self.each(frames, frame))
+        write_atomically(path, |out| {
+            let mut stream = FrameWriter::new(out, frames, most)?;
+            self.each(frames, &mut |boxes| Ok(stream.write(boxes)?))?;
+            stream.finish()?;
+            Ok(())
+        })
     }
 
     fn each(&self, frames: usize, frame: &mut dyn FnMut(&[Aabb]) -> anyhow::Result<()>) -> anyhow::Result<()> {
@@ -108,7 +114,6 @@ impl Reel<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::boxes::read_frames;
 
     #[test]
     fn a_swing_goes_from_the_least_to_all_and_back() {
@@ -131,7 +136,7 @@ mod tests {
         // The number of boxes goes up and down.
         let scene = Footage::Scene { scenario: Scenario::Fragmentation, objects: 300, seed: 3, swing: None };
         scene.record(&path, 90).unwrap();
-        let stream = Footage::Stream { name: "scene.npy".to_owned(), frames: read_frames(&path).unwrap() };
+        let stream = Footage::Stream { name: "scene.npy".to_owned(), frames: Frames::read(&path).unwrap() };
         let (mut first, mut second) = (scene.start(), stream.start());
         let mut counts = Vec::new();
         for frame in 0..90 {

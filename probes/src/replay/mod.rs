@@ -10,7 +10,7 @@ mod trace;
 
 use crate::interrupt;
 use crate::progress::Progress;
-use crate::turns::Turns;
+use sapwise_scenes::Random;
 use anyhow::{Context, bail};
 use contestant::{Contestant, best};
 use samples::Samples;
@@ -108,7 +108,7 @@ struct Stage {
     /// Times of the loop beside the frames.
     loops: Vec<(usize, f64)>,
     notes: Vec<String>,
-    turns: Turns,
+    random: Random,
     pairs: Pairs,
     learning: bool,
     exploring: bool,
@@ -145,7 +145,7 @@ impl Stage {
             told: Vec::new(),
             loops: Vec::new(),
             notes,
-            turns: Turns::new(course.seed),
+            random: Random::new(course.seed),
             pairs: Pairs::new(),
             learning: course.learning,
             exploring: course.exploring,
@@ -173,7 +173,7 @@ impl Stage {
         let best_before = best(&self.contestants, frame);
         let mut answers: Vec<(usize, u64)> = Vec::new();
         // The turn behind the last of the fixed ones is the adaptive module's.
-        for k in self.turns.order(count + 1) {
+        for k in self.random.shuffled(count + 1) {
             if self.contestants.get(k).is_some_and(|c| c.sits_out(frame, boxes.len(), best_before)) {
                 continue;
             }
@@ -298,7 +298,7 @@ impl Watched {
     }
 
     fn foreign_load(&self) -> Option<f64> {
-        sapwise::measure::statistics::median(&self.loads)
+        sapwise::stats::median(&self.loads)
     }
 }
 

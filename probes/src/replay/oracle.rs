@@ -6,7 +6,7 @@
 
 use super::outcome::Frame;
 use super::samples::{Samples, mean_of};
-use sapwise::measure::statistics::median;
+use sapwise::stats::median;
 
 /// Frames before and behind that may have a say in the choice ...
 const NEIGHBOURS: usize = 4;
@@ -183,8 +183,8 @@ mod tests {
     #[test]
     fn of_alike_algorithms_the_least_time_is_too_low_and_the_oracle_is_not() {
         // Eight algorithms that take 100 on average: numbers of a generator, spread evenly over 90 to 110.
-        let mut turns = crate::turns::Turns::new(7);
-        let mut noisy = || 90.0 + 20.0 * (turns.draw() >> 11) as f64 / (1_u64 << 53) as f64;
+        let mut random = sapwise_scenes::Random::new(7);
+        let mut noisy = || 90.0 + 20.0 * (random.bits() >> 11) as f64 / (1_u64 << 53) as f64;
         let mut all = || (0..8).map(|_| samples(&[(); 6].map(|()| noisy()))).collect();
         let frames: Vec<Frame> = (0..400).map(|_| frame_of(50, all())).collect();
         let honest = Oracle::new(&frames).total() / 400.0;

@@ -3,7 +3,7 @@
 use super::co_runner::Slowdown;
 use super::oracle::{Oracle, optimistic};
 use super::samples::Samples;
-use sapwise::measure::statistics::quantile;
+use sapwise::stats::quantile;
 use sapwise::{AlgorithmId, Load, Reason};
 use std::ops::Range;
 

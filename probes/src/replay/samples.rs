@@ -1,6 +1,6 @@
 //! Times of one contestant at one frame.
 
-use sapwise::measure::statistics::median;
+use sapwise::stats::median;
 
 /// The samples of a contestant at a frame, each with the repeat that it was taken in.
 #[derive(Debug, Clone, Default, PartialEq)]

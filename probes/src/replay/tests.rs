@@ -1,8 +1,8 @@
 //! Tests of whole simulations.
 
 use super::*;
-use crate::boxes::read_frames;
-use sapwise::{Scenario, Step};
+use sapwise::Step;
+use sapwise_scenes::{Frames, Scenario};
 
 fn steps(list: &[(u32, &str)]) -> Tuning {
     let step = |&(from_objects, id): &(u32, &str)| Step { from_objects, algorithm: id.parse().unwrap() };
@@ -97,7 +97,7 @@ fn a_recorded_stream_runs_like_the_scene_that_it_was_recorded_from() {
     let path = folder.path().join("scene.npy");
     let scene = course(Scenario::Fragmentation, 400, 80, 1);
     scene.footage.record(&path, 80).unwrap();
-    let footage = Footage::Stream { name: "scene.npy".to_owned(), frames: read_frames(&path).unwrap() };
+    let footage = Footage::Stream { name: "scene.npy".to_owned(), frames: Frames::read(&path).unwrap() };
     let (registry, tuning) = (Registry::with_cores(1), steps(&[(0, "brute@cpu1"), (60, "grid-sap@cpu1")]));
     let stream = simulate(&Course { footage, ..course(Scenario::Uniform, 0, 80, 1) }, &tuning, &registry).unwrap();
     let scene = simulate(&scene, &tuning, &registry).unwrap();

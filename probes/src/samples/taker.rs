@@ -6,8 +6,9 @@ use crate::algorithms::Algorithms;
 use crate::sweep::{PAIR_LIMIT, WARM_UP, add_gpus, median, next_frame};
 use crate::{child, output};
 use anyhow::Context;
-use sapwise::measure::{Watch, statistics};
-use sapwise::{Aabb, AlgorithmId, BackendClass, BroadPhase, Pairs, Registry, Scenario};
+use sapwise::{Aabb, AlgorithmId, BackendClass, BroadPhase, Pairs, Registry};
+use sapwise::{measure::Watch, stats};
+use sapwise_scenes::Scenario;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -21,7 +22,7 @@ const IQR_OVER_DEVIATION: f64 = 1.349;
 /// When the scenario is unknown, or standard output can't be written.
 pub(crate) fn take(order: &Order, algorithms: &Algorithms) -> anyhow::Result<()> {
     let wishes = child::orders();
-    let scenario: Scenario = order.scenario.parse().map_err(anyhow::Error::msg)?;
+    let scenario: Scenario = order.scenario.parse()?;
     let mut registry = algorithms.registry(order.cores);
     registry.pin_threads();
     let remarks = add_gpus(&mut registry, &order.gpus);
@@ -101,7 +102,7 @@ impl Taker {
             samples.push(self.frame(&wish.algorithm, scene.boxes())?);
         }
         let Some(ns) = median(&samples) else { return Ok(Reply::TooSlow) };
-        let spread = statistics::relative_iqr(&samples.iter().map(|&s| s as f64).collect::<Vec<f64>>());
+        let spread = stats::relative_iqr(&samples.iter().map(|&s| s as f64).collect::<Vec<f64>>());
         // With fewer than four frames there is no range between quartiles; a tenth is what single frames differ by.
         let noise_ln = MEDIAN_OVER_MEAN * spread.map_or(0.1, |s| s / IQR_OVER_DEVIATION) / (samples.len() as f64).sqrt();
         Ok(Reply::Taken { ns, noise_ln, foreign_load: None })

@@ -4,7 +4,7 @@ use super::{Course, Event, Order, Plan, doubt};
 use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::Progress;
-use crate::turns::Turns;
+use sapwise_scenes::Random;
 use anyhow::Context;
 use sapwise::GpuIdentity;
 use sapwise::report::Point;
@@ -51,14 +51,14 @@ pub(crate) fn conduct(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut
         }
         keep(&sweep.found);
     }
-    let mut turns = Turns::new(conditions.seed);
+    let mut random = Random::new(conditions.seed);
     for round in 1..=plan.rounds {
         let left = plan.total.saturating_sub(began.elapsed()) / (plan.rounds + 1 - round);
         let starts = START * plan.scenarios.len() as u32;
         for (scenario, mut visits) in doubt::visits(&sweep.found.points, left.saturating_sub(starts)) {
             let time = START + Duration::from_secs_f64(visits.iter().map(|v| v.seconds).sum());
             // In random order, so that a machine that slows down does not pass for a longer time at large sizes.
-            let order = turns.order(visits.len());
+            let order = random.shuffled(visits.len());
             visits = order.into_iter().map(|k| visits[k].clone()).collect();
             let before = sweep.found.points.len();
             let goes_on = sweep.go(&scenario, Course::Visits(visits), time, u64::from(round))?;

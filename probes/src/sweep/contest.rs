@@ -3,7 +3,7 @@
 //! What a probe is for is the choice between the best. One that is far behind gets the few samples that its cost curve needs;
 //! two that lie close get samples until it is clear which is faster, or that it does not matter.
 
-use sapwise::measure::statistics::{median, relative_iqr};
+use sapwise::stats::{median, relative_iqr};
 
 /// Frames at least.
 pub(super) const FEW_FRAMES: usize = 5;

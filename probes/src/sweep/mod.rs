@@ -20,5 +20,5 @@ pub(crate) use scenario::{PAIR_LIMIT, add_gpus, next_frame, sweep};
 /// The median of samples in nanoseconds. `None` without samples.
 pub(crate) fn median(samples: &[u64]) -> Option<f64> {
     let samples: Vec<f64> = samples.iter().map(|&ns| ns as f64).collect();
-    sapwise::measure::statistics::median(&samples)
+    sapwise::stats::median(&samples)
 }

@@ -1,6 +1,6 @@
 //! What a sweep measures and how long it may take.
 
-use sapwise::Scenario;
+use sapwise_scenes::Scenario;
 use std::time::Duration;
 
 /// Scenarios, sizes and time of a sweep.

@@ -6,10 +6,10 @@
 
 use super::contest::{Contest, FEW_FRAMES};
 use super::verify::Answer;
-use crate::turns::Turns;
 use sapwise::measure::{Options, Watch, core_to_core_ns};
 use sapwise::report::{Point, Timing};
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Displacement, Load, Pairs, Scene};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Displacement, Load, Pairs};
+use sapwise_scenes::{Random, Scene};
 use std::time::{Duration, Instant};
 
 /// Frames at most: beyond this the error of a median falls too slowly to be worth the time.
@@ -50,7 +50,7 @@ pub(crate) struct Race {
     /// One list for all, so that its memory is equally warm for each.
     pairs: Pairs,
     naive: Pairs,
-    turns: Turns,
+    random: Random,
     /// Of the frame before.
     displacement: Displacement,
     /// Cores that algorithms may use.
@@ -78,7 +78,7 @@ impl Race {
         Self {
             pairs,
             naive: Pairs::new(),
-            turns: Turns::new(seed),
+            random: Random::new(seed),
             displacement: Displacement::default(),
             cores: Options { threads: Some(cores), ..Options::default() },
             contended,
@@ -175,7 +175,7 @@ impl Race {
         self.displacement.watch(scene.boxes());
         super::scenario::next_frame(scene);
         let boxes = scene.boxes();
-        for turn in self.turns.order(runners.len()) {
+        for turn in self.random.shuffled(runners.len()) {
             let runner = &mut runners[turn];
             runner.answer = None;
             if runner.error.is_some() || !takes_part(runner) {
@@ -296,7 +296,7 @@ mod tests {
             Runner::new("wrong@cpu1".parse().unwrap(), Box::new(Wrong)),
             Runner::new("brute@cpu1".parse().unwrap(), right()),
         ];
-        let mut scene = sapwise::Scenario::Uniform.start(50, 1);
+        let mut scene = sapwise_scenes::Scenario::Uniform.start(50, 1);
         let outcome = Race::new(1, 1000, 1, false).run(&mut runners, &mut scene, Duration::from_millis(1));
         assert_eq!(outcome.mismatches.len(), 1);
         assert!(outcome.mismatches[0].starts_with("wrong@cpu1"), "{:?}", outcome.mismatches);
@@ -329,7 +329,7 @@ mod tests {
                 Runner::new(format!("counting@cpu{}", k + 1).parse().unwrap(), Box::new(Counting(frames[k].clone(), k == 1)))
             };
             let mut runners = vec![runner(0), runner(1)];
-            let mut scene = sapwise::Scenario::Resting.start(1, 1);
+            let mut scene = sapwise_scenes::Scenario::Resting.start(1, 1);
             let outcome = Race::new(1, 1000, 1, true).run(&mut runners, &mut scene, Duration::ZERO);
             assert!(outcome.mismatches.is_empty(), "{:?}", outcome.mismatches);
             assert!((0.0..=0.06).contains(&outcome.point.load.moved));
@@ -342,7 +342,7 @@ mod tests {
     fn too_many_pairs_end_the_race_with_an_error() {
         let brute = sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
         let mut runners = vec![Runner::new("brute@cpu1".parse().unwrap(), brute)];
-        let mut scene = sapwise::Scenario::Uniform.start(500, 1);
+        let mut scene = sapwise_scenes::Scenario::Uniform.start(500, 1);
         let outcome = Race::new(1, 3, 1, false).run(&mut runners, &mut scene, Duration::from_millis(1));
         assert!(outcome.point.timings[0].error.as_ref().unwrap().contains("limit of 3"));
     }

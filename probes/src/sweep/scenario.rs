@@ -6,7 +6,8 @@ use super::{Course, Event, Order, Visit, median, plan};
 use crate::algorithms::Algorithms;
 use sapwise::gpu::Gpus;
 use sapwise::report::Point;
-use sapwise::{AlgorithmId, GpuIdentity, Registry, Scenario, Scene};
+use sapwise::{AlgorithmId, GpuIdentity, Registry};
+use sapwise_scenes::{Scenario, Scene};
 use std::time::{Duration, Instant};
 
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
@@ -21,7 +22,7 @@ pub(crate) fn sweep(
     algorithms: &Algorithms,
     emit: &mut dyn FnMut(Event) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let scenario: Scenario = order.scenario.parse().map_err(anyhow::Error::msg)?;
+    let scenario: Scenario = order.scenario.parse()?;
     let mut registry = algorithms.registry(order.cores);
     registry.pin_threads();
     for remark in add_gpus(&mut registry, &order.gpus) {

@@ -2,7 +2,7 @@
 
 use crate::algorithms::Algorithms;
 use crate::args::Pairs as Arguments;
-use crate::boxes::{Frames, read_frames, write_pairs};
+use crate::files::write_atomically;
 use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::sweep::median;
@@ -10,6 +10,7 @@ use crate::table::{count, duration, grouped};
 use crate::{gpus, interrupt, output};
 use anyhow::Context;
 use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry, usable_cores};
+use sapwise_scenes::{Frames, write_pairs};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -39,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Res
     registry.pin_threads();
     let id = algorithm(arguments, &registry)?;
     add_gpus(&mut registry, &id)?;
-    let frames = read_frames(&arguments.boxes)?;
+    let frames = Frames::read(&arguments.boxes)?;
     interrupt::listen()?;
     let mut pairs = Pairs::new();
     pairs.set_limit(Some(arguments.limit.unwrap_or_else(|| memory_limit(id.threads()))));
@@ -49,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Res
     if let Some(path) = &arguments.out {
         let mut sorted = pairs.as_slice().to_vec();
         sorted.sort_unstable();
-        write_pairs(path, &sorted)?;
+        write_atomically(path, |out| Ok(write_pairs(out, &sorted)?))?;
     }
     let median_ns = median(&samples_ns).unwrap_or(0.0);
     let answer = Answer {

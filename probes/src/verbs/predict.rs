@@ -10,7 +10,8 @@ use crate::terminal::{self, Terminal};
 use crate::{files, interrupt, output, summary, train};
 use anyhow::{Context, bail};
 use sapwise::json::{self, Document};
-use sapwise::{Model, Report, Scenario};
+use sapwise::{Model, Report};
+use sapwise_scenes::Scenario;
 use std::path::Path;
 
 pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {

@@ -193,7 +193,7 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
 fn what_makes_its_work_anew_too_often_is_left_and_taken_up_again() {
     // The first keeps work. Up to frame 600 it makes that anew in one frame of three, which the tuning know nothing of.
     let mut costs = tuning(&[("sap@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 0.0, 20.0)]);
-    costs.costs[0].curve.otherwise = costs.costs[1].curve.terms.clone();
+    costs.costs[0].curve.fallback_terms = costs.costs[1].curve.terms.clone();
     let mut policy = Policy::new(costs, &[Some(0), None], vec![true; 2]);
     policy.set_exploring(false);
     let truth = |k: usize, n: f64, at: usize| {

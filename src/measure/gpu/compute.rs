@@ -6,7 +6,7 @@ use super::bench::{Bench, Bound, Kernel, calibrate, or_missing, per_ns, record};
 use super::fits;
 use crate::hardware::Parameter;
 use crate::hardware::gpu::parameter as p;
-use crate::statistics;
+use crate::stats;
 
 const SOURCE: &str = include_str!("shaders/compute.wgsl");
 const ATOMIC_SOURCE: &str = include_str!("shaders/atomic.wgsl");
@@ -143,7 +143,7 @@ fn units(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     let samples = figures.pop().unwrap_or_default();
     // One fit through the medians is steadier than the median of the fits.
     let medians: Vec<(u32, f64)> =
-        counts.iter().zip(&figures).filter_map(|(&n, f)| Some((n, statistics::median(&f.samples)?))).collect();
+        counts.iter().zip(&figures).filter_map(|(&n, f)| Some((n, stats::median(&f.samples)?))).collect();
     let last = counts.last().copied().unwrap_or(0);
     let Some(units) = fits::parallel_units(&medians) else {
         return Err(format!("the time shows no step up to {last} workgroups of {lanes} invocations"));

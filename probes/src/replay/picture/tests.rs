@@ -4,7 +4,7 @@ use super::*;
 use crate::plot::Picture;
 use crate::simulation::examples::{outcome, taken};
 use crate::simulation::{CoRunner, Footage};
-use sapwise::Scenario;
+use sapwise_scenes::Scenario;
 
 fn course(co_runner: Option<CoRunner>) -> Course {
     let footage = Footage::Scene { scenario: Scenario::Slab, objects: 10, seed: 1, swing: None };

@@ -6,14 +6,14 @@ mod text;
 
 use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
-use crate::boxes::{Frames, read_frames};
 use crate::exit::{Outcome, WrongUsage};
 use crate::plot::{self, Figure, Picture};
 use crate::simulation::{Course, Footage, Swing, TraceFormat, simulate, too_wide, write_trace};
 use crate::terminal::Terminal;
 use crate::{files, interrupt, output};
 use anyhow::{Context, bail};
-use sapwise::{Scenario, usable_cores};
+use sapwise::usable_cores;
+;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -143,9 +143,9 @@ fn course(arguments: &Run) -> anyhow::Result<Course> {
 }
 
 fn read_stream(path: &Path) -> anyhow::Result<Frames> {
-    let frames = read_frames(path)?;
+    let frames = Frames::read(path)?;
     frames.check().with_context(|| format!("{} can't be run", path.display()))?;
-    if frames.len() == 0 {
+    if frames.is_empty() {
         bail!("{} has no frames; `sapwise run SCENARIO --record S.npy` shows how a stream looks", path.display());
     }
     Ok(frames)

@@ -6,7 +6,7 @@ use crate::args::{Run, Scene};
 use crate::simulation::{Outcome, WINDOW};
 use crate::table::{count, grouped};
 use crate::terminal::{Axis, Chart, Series, Terminal};
-use sapwise::measure::statistics::quantile;
+use sapwise::stats::quantile;
 use std::path::Path;
 
 /// Totals, figures, what there is to say about them, and what to do next.

@@ -10,7 +10,8 @@ use crate::verbs::predict;
 use crate::{revisions, train};
 use anyhow::{Context, bail};
 use sapwise::json::Document;
-use sapwise::{AlgorithmId, Tuning, Registry, Scenario, Source, measure};
+use sapwise::{AlgorithmId, Tuning, Registry, Source, measure};
+use sapwise_scenes::Scenario;
 use serde::Serialize;
 use std::path::Path;
 

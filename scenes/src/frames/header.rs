@@ -3,9 +3,9 @@
 //! Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>. Parsed here and not by ndarray-npy 0.9,
 //! which panics on a shape such as `(0, 2**40, 2**40)` and runs out of stack on a header of ten thousand brackets.
 
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 
-use anyhow::{Context, Result, bail, ensure};
+use super::error::NpyError;
 
 /// The first bytes of every file.
 const MAGIC: &[u8] = b"\x93NUMPY";
@@ -23,36 +23,28 @@ pub(super) struct Header {
 
 impl Header {
     /// Reads the header at the beginning of a file, and nothing after it.
-    pub(super) fn read(file: &mut impl Read) -> Result<Self> {
-        let truncated = "the file ends within its header";
+    pub(super) fn read(file: &mut impl Read) -> Result<Self, NpyError> {
         let mut magic = Vec::new();
         file.take(6).read_to_end(&mut magic)?;
-        ensure!(!magic.is_empty(), "the file is empty");
-        ensure!(magic == MAGIC, "it is no .npy file: the first bytes aren't \\x93NUMPY");
-        let mut version = [0; 2];
-        file.read_exact(&mut version).context(truncated)?;
-        let length = match version[0] {
-            1 => {
-                let mut length = [0; 2];
-                file.read_exact(&mut length).context(truncated)?;
-                u64::from(u16::from_le_bytes(length))
-            }
-            2 | 3 => {
-                let mut length = [0; 4];
-                file.read_exact(&mut length).context(truncated)?;
-                u64::from(u32::from_le_bytes(length))
-            }
-            other => bail!("version {other} of the .npy format is unknown"),
+        if magic != MAGIC {
+            return Err(if magic.is_empty() { NpyError::Empty } else { NpyError::NotNpy });
+        }
+        let length = match bytes(file)? {
+            [1, _] => u64::from(u16::from_le_bytes(bytes(file)?)),
+            [2 | 3, _] => u64::from(u32::from_le_bytes(bytes(file)?)),
+            [other, _] => return Err(NpyError::Version(other)),
         };
         let mut header = Vec::new();
         file.take(length).read_to_end(&mut header)?;
-        ensure!(header.len() as u64 == length, truncated);
-        let text = str::from_utf8(&header).context("the header is no text")?;
-        Self::parse(text).context("the header is malformed")
+        if header.len() as u64 != length {
+            return Err(NpyError::CutHeader);
+        }
+        let text = str::from_utf8(&header).map_err(|e| NpyError::Header(format!("it is no text: {e}")))?;
+        Self::parse(text).map_err(NpyError::Header)
     }
 
     /// Writes the header of a file whose data begin at a multiple of 64 bytes, as numpy does. The shape has two axes or more.
-    pub(super) fn write(&self, out: &mut dyn Write) -> Result<()> {
+    pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let axes: Vec<String> = self.shape.iter().map(u64::to_string).collect();
         let order = if self.fortran_order { "True" } else { "False" };
         let descr = &self.descr;
@@ -62,13 +54,12 @@ impl Header {
         let text = format!("{dict}{}\n", " ".repeat(used.next_multiple_of(64) - used));
         out.write_all(MAGIC)?;
         out.write_all(&[1, 0])?;
-        out.write_all(&u16::try_from(text.len())?.to_le_bytes())?;
-        out.write_all(text.as_bytes())?;
-        Ok(())
+        out.write_all(&u16::try_from(text.len()).map_err(io::Error::other)?.to_le_bytes())?;
+        out.write_all(text.as_bytes())
     }
 
     /// Reads `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 6), }` with the keys in any order.
-    fn parse(text: &str) -> Result<Self> {
+    fn parse(text: &str) -> Result<Self, String> {
         let (mut descr, mut fortran_order, mut shape) = (None, None, None);
         let mut rest = after(text, '{')?;
         while !rest.starts_with('}') {
@@ -80,48 +71,59 @@ impl Header {
                     descr = Some(name.to_owned());
                     rest
                 }
-                "descr" => bail!("its elements are records, where plain float32 is needed"),
+                "descr" => return Err("its elements are records, where plain float32 is needed".to_owned()),
                 "fortran_order" => {
                     let (flag, length) = if value.starts_with("True") { (true, 4) } else { (false, 5) };
-                    ensure!(flag || value.starts_with("False"), "fortran_order is neither True nor False");
+                    if !flag && !value.starts_with("False") {
+                        return Err("fortran_order is neither True nor False".to_owned());
+                    }
                     fortran_order = Some(flag);
                     value[length..].trim_start()
                 }
                 "shape" => {
-                    let (axes, rest) = after(value, '(')?.split_once(')').context("no ) after the shape")?;
+                    let (axes, rest) = after(value, '(')?.split_once(')').ok_or("no ) after the shape")?;
                     // Python 2 wrote an L after long integers; a comma may follow the last.
                     let axes = axes.split(',').map(|axis| axis.trim().trim_end_matches('L')).filter(|axis| !axis.is_empty());
                     let axes: Result<Vec<u64>, _> = axes.map(str::parse).collect();
-                    shape = Some(axes.context("the shape holds something other than lengths")?);
+                    shape = Some(axes.map_err(|e| format!("the shape holds something other than lengths: {e}"))?);
                     rest.trim_start()
                 }
-                other => bail!("it has an unknown key {other:?}"),
+                other => return Err(format!("it has an unknown key {other:?}")),
             };
             rest = match rest.strip_prefix(',') {
                 Some(next) => next.trim_start(),
                 None => rest,
             };
         }
-        ensure!(rest[1..].trim().is_empty(), "something follows the closing brace");
+        if !rest[1..].trim().is_empty() {
+            return Err("something follows the closing brace".to_owned());
+        }
         let missing = |key| move || format!("it has no {key}");
         Ok(Self {
-            descr: descr.with_context(missing("descr"))?,
-            fortran_order: fortran_order.with_context(missing("fortran_order"))?,
-            shape: shape.with_context(missing("shape"))?,
+            descr: descr.ok_or_else(missing("descr"))?,
+            fortran_order: fortran_order.ok_or_else(missing("fortran_order"))?,
+            shape: shape.ok_or_else(missing("shape"))?,
         })
     }
 }
 
+fn bytes<const N: usize>(file: &mut impl Read) -> Result<[u8; N], NpyError> {
+    let mut bytes = [0; N];
+    file.read_exact(&mut bytes)
+        .map_err(|e| if e.kind() == io::ErrorKind::UnexpectedEof { NpyError::CutHeader } else { e.into() })?;
+    Ok(bytes)
+}
+
 /// The text after the mark that it must begin with, blanks left out.
-fn after(text: &str, mark: char) -> Result<&str> {
-    let rest = text.trim_start().strip_prefix(mark).with_context(|| format!("no {mark} where one is due"))?;
+fn after(text: &str, mark: char) -> Result<&str, String> {
+    let rest = text.trim_start().strip_prefix(mark).ok_or_else(|| format!("no {mark} where one is due"))?;
     Ok(rest.trim_start())
 }
 
 /// The quoted text that `text` must begin with, and what follows it.
-fn quoted(text: &str) -> Result<(&str, &str)> {
-    let quote = text.chars().next().filter(|c| matches!(c, '\'' | '"')).context("no quoted text where one is due")?;
-    let (inside, rest) = text[1..].split_once(quote).context("a quotation mark is missing")?;
+fn quoted(text: &str) -> Result<(&str, &str), String> {
+    let quote = text.chars().next().filter(|c| matches!(c, '\'' | '"')).ok_or("no quoted text where one is due")?;
+    let (inside, rest) = text[1..].split_once(quote).ok_or("a quotation mark is missing")?;
     Ok((inside, rest.trim_start()))
 }
 

@@ -1,8 +1,18 @@
 //! Tests of the files of boxes and pairs.
 
+use super::header::Header;
 use super::*;
 use ndarray::{Array2, Array3, ShapeBuilder};
+use ndarray_npy::WriteNpyExt;
+use std::error::Error;
+use std::fs;
 use std::path::PathBuf;
+
+/// The messages of an error and of what caused it.
+fn told(error: &dyn Error) -> String {
+    let cause = error.source().map_or_else(String::new, |source| format!(": {}", told(source)));
+    format!("{error}{cause}")
+}
 
 /// A file with version 1 of the header around `dict`, padded as numpy does.
 fn npy(dict: &str, data: &[u8]) -> Vec<u8> {
@@ -29,12 +39,12 @@ fn stored(folder: &tempfile::TempDir, bytes: &[u8]) -> PathBuf {
 #[test]
 fn one_frame_and_several_are_read_in_either_order() {
     let folder = tempfile::tempdir().unwrap();
-    let one = read_frames(&stored(&folder, &npy(&dict("<f4", "False", "(2, 6)"), &floats(12)))).unwrap();
+    let one = Frames::read(&stored(&folder, &npy(&dict("<f4", "False", "(2, 6)"), &floats(12)))).unwrap();
     assert_eq!((one.len(), one.objects()), (1, 2));
     let first: Vec<&[Aabb]> = one.iter().collect();
     assert_eq!(first[0][1], Aabb::new([6.0, 7.0, 8.0], [9.0, 10.0, 11.0]));
 
-    let three = read_frames(&stored(&folder, &npy(&dict("<f4", "False", "(3, 2, 6)"), &floats(36)))).unwrap();
+    let three = Frames::read(&stored(&folder, &npy(&dict("<f4", "False", "(3, 2, 6)"), &floats(36)))).unwrap();
     assert_eq!((three.len(), three.objects()), (3, 2));
     assert_eq!(three.iter().nth(2).unwrap()[1].min[0], 30.0);
 
@@ -46,13 +56,13 @@ fn one_frame_and_several_are_read_in_either_order() {
         let mut bytes = [Vec::new(), Vec::new()];
         c.write_npy(&mut bytes[0]).unwrap();
         fortran.write_npy(&mut bytes[1]).unwrap();
-        let [c, fortran] = bytes.map(|bytes| read_frames(&stored(&folder, &bytes)).unwrap());
+        let [c, fortran] = bytes.map(|bytes| Frames::read(&stored(&folder, &bytes)).unwrap());
         assert_eq!(c, fortran);
     }
     let flat = Array2::from_shape_fn((4, 6).f(), |(i, k)| (i * 6 + k) as f32);
     let mut bytes = Vec::new();
     flat.write_npy(&mut bytes).unwrap();
-    let flat = read_frames(&stored(&folder, &bytes)).unwrap();
+    let flat = Frames::read(&stored(&folder, &bytes)).unwrap();
     assert_eq!(flat.iter().next().unwrap()[3], Aabb::new([18.0, 19.0, 20.0], [21.0, 22.0, 23.0]));
 }
 
@@ -61,7 +71,7 @@ fn no_boxes_and_no_frames_are_legal() {
     let folder = tempfile::tempdir().unwrap();
     for (shape, frames, objects) in [("(0, 6)", 1, 0), ("(0, 5, 6)", 0, 0), ("(4, 0, 6)", 4, 0)] {
         for order in ["False", "True"] {
-            let read = read_frames(&stored(&folder, &npy(&dict("<f4", order, shape), &[]))).unwrap();
+            let read = Frames::read(&stored(&folder, &npy(&dict("<f4", order, shape), &[]))).unwrap();
             assert_eq!((read.len(), read.objects()), (frames, objects));
             assert!(read.iter().all(<[Aabb]>::is_empty));
         }
@@ -75,7 +85,7 @@ fn data_at_odd_addresses_are_read() {
         let length = u16::try_from(dict.len() + blanks).unwrap().to_le_bytes();
         let header = [dict.as_bytes(), &vec![b' '; blanks]].concat();
         let file = [b"\x93NUMPY\x01\x00", &length[..], &header, &floats(6)].concat();
-        assert_eq!(parse(&file[..], file.len() as u64).unwrap().boxes, [Aabb::new([0.0, 1.0, 2.0], [3.0, 4.0, 5.0])]);
+        assert_eq!(read::parse(&file[..], file.len() as u64).unwrap().boxes, [Aabb::new([0.0, 1.0, 2.0], [3.0, 4.0, 5.0])]);
     }
 }
 
@@ -108,33 +118,28 @@ fn bad_files_are_errors_that_name_the_file_and_the_defect() {
     ];
     for (bytes, defect) in cases {
         let path = stored(&folder, bytes);
-        let text = format!("{:#}", read_frames(&path).unwrap_err());
+        let text = told(&Frames::read(&path).unwrap_err());
         assert!(text.contains(&path.display().to_string()) && text.contains(defect), "{defect}: {text}");
     }
     for path in [folder.path(), &folder.path().join("missing.npy")] {
-        let text = format!("{:#}", read_frames(path).unwrap_err());
+        let text = told(&Frames::read(path).unwrap_err());
         assert!(text.contains(&path.display().to_string()), "{text}");
     }
 }
 
 #[test]
 fn pairs_are_written_as_numpy_writes_them() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("pairs.npy");
     for pairs in [&[][..], &[(0, 1), (2, u32::MAX)]] {
-        write_pairs(&path, pairs).unwrap();
-        let file = fs::read(&path).unwrap();
-        let mut data = &file[..];
-        let header = Header::read(&mut data).unwrap();
-        let shape = vec![pairs.len() as u64, 2];
-        assert_eq!(header, Header { descr: "<u4".into(), fortran_order: false, shape });
-        let expected: Vec<u8> = pairs.iter().flat_map(|&(a, b)| [a, b]).flat_map(u32::to_le_bytes).collect();
-        assert_eq!(data, expected);
-        assert!((file.len() - data.len()).is_multiple_of(64));
+        let mut file = Vec::new();
+        write_pairs(&mut file, pairs).unwrap();
+        let numbers = pairs.iter().flat_map(|&(a, b)| [a, b]).collect();
+        let mut expected = Vec::new();
+        Array2::from_shape_vec((pairs.len(), 2), numbers).unwrap().write_npy(&mut expected).unwrap();
+        assert_eq!(Header::read(&mut &file[..]).unwrap(), Header::read(&mut &expected[..]).unwrap());
+        let data = 8 * pairs.len();
+        assert_eq!(file[file.len() - data..], expected[expected.len() - data..]);
+        assert!((file.len() - data).is_multiple_of(64));
     }
-    let missing = folder.path().join("missing").join("pairs.npy");
-    assert!(format!("{:#}", write_pairs(&missing, &[]).unwrap_err()).contains("pairs.npy"));
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
 /// `objects` boxes, each at a place of its own.
@@ -147,11 +152,12 @@ fn a_stream_with_a_varying_number_of_boxes_comes_back_as_it_was_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("stream.npy");
     let counts = [3, 0, 5, 1];
-    write_frames(&path, counts.len(), 5, |frame| {
-        counts.iter().enumerate().try_for_each(|(at, &count)| frame(&scene(at, count)))
-    })
-    .unwrap();
-    let read = read_frames(&path).unwrap();
+    let mut writer = FrameWriter::new(fs::File::create(&path).unwrap(), counts.len(), 5).unwrap();
+    for (at, &count) in counts.iter().enumerate() {
+        writer.write(&scene(at, count)).unwrap();
+    }
+    drop(writer.finish().unwrap());
+    let read = Frames::read(&path).unwrap();
     assert_eq!((read.len(), read.objects()), (4, 5));
     for (at, &count) in counts.iter().enumerate() {
         assert_eq!(read.frame(at), scene(at, count), "frame {at}");
@@ -166,7 +172,17 @@ fn a_stream_with_a_varying_number_of_boxes_comes_back_as_it_was_written() {
     let fortran = Array3::from_shape_fn((4, 5, 6).f(), |(f, i, k)| bound(row(f, i), k));
     let mut bytes = Vec::new();
     fortran.write_npy(&mut bytes).unwrap();
-    assert_eq!(read_frames(&stored(&folder, &bytes)).unwrap(), read);
+    assert_eq!(Frames::read(&stored(&folder, &bytes)).unwrap(), read);
+}
+
+#[test]
+fn a_stream_has_as_many_frames_and_boxes_as_were_announced() {
+    let mut writer = FrameWriter::new(Vec::new(), 1, 2).unwrap();
+    assert!(writer.write(&scene(0, 3)).unwrap_err().to_string().contains("3 boxes in a stream of up to 2"));
+    writer.write(&scene(0, 2)).unwrap();
+    assert!(writer.write(&[]).is_err());
+    let writer = FrameWriter::new(Vec::new(), 2, 0).unwrap();
+    assert!(writer.finish().unwrap_err().to_string().contains("2 frames are missing"));
 }
 
 #[test]
@@ -175,9 +191,9 @@ fn absent_boxes_stand_at_the_end_of_a_frame_only() {
     let [one, nan] = [[1.0_f32; 6], [f32::NAN; 6]];
     let file = |shape: &str, rows: &[[f32; 6]]| {
         let data: Vec<u8> = rows.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
-        read_frames(&stored(&folder, &npy(&dict("<f4", "False", shape), &data)))
+        Frames::read(&stored(&folder, &npy(&dict("<f4", "False", shape), &data)))
     };
-    let text = format!("{:#}", file("(2, 3, 6)", &[one, nan, nan, one, nan, one]).unwrap_err());
+    let text = told(&file("(2, 3, 6)", &[one, nan, nan, one, nan, one]).unwrap_err());
     assert!(text.contains("frame 1: row 1 is NaN, and row 2 is not"), "{text}");
     // In a file of one frame a row of NaN is no absent box but a mistake, which the algorithms tell.
     let single = file("(2, 6)", &[one, nan]).unwrap();
