@@ -5,7 +5,7 @@ use crate::contention::{ASSUMED_LLC_BYTES, Contended};
 use sapwise_lab::data::files::read_document;
 use anyhow::bail;
 use sapwise::hardware::{gpu, parameter};
-use sapwise::json::Document;
+use sapwise_lab::data::files::Document;
 use sapwise_lab::report::{Proof, Restricted, Restriction};
 use sapwise::{GpuHardware, GpuIdentity, Hardware, SimdLevel, usable_cores};
 

@@ -5,7 +5,7 @@ use crate::args::{Arguments, Probe, Verb};
 use sapwise_lab::data::files::read_document;
 use crate::{provenance, restriction, revisions};
 use clap::Parser;
-use sapwise::json::Document;
+use sapwise_lab::data::files::Document;
 use sapwise_lab::report::Label;
 use sapwise::{GpuIdentity, Registry, Report};
 use std::path::{Path, PathBuf};

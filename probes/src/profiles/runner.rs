@@ -8,7 +8,7 @@ use sapwise_lab::data::files::read_document;
 use crate::progress::Progress;
 use crate::{gpus, interrupt, output, shell};
 use anyhow::bail;
-use sapwise::json::Document;
+use sapwise_lab::data::files::Document;
 use sapwise::Report;
 use sapwise_lab::text::columns;
 use sapwise_scenes::Scenario;

@@ -126,52 +126,10 @@ fn summary(model: &Model, held: &Held, notes: &[String], path: &Path, terminal: 
     if !model.validation.learning.is_empty() {
         text.push_str(&format!("\n{}", card::course(&model.validation.learning, model.is_simulated(), table)));
     }
-    let chart = chart(&model.validation.learning, held).draw(terminal);
-    text += &chart.map(|chart| format!("\n{chart}\n")).unwrap_or_default();
     for note in notes {
         text.push_str(&format!("{} {note}\n", terminal.warning("note:")));
     }
     let shown = path.display();
     text.push_str(&format!("\nThe model {} is in {shown}. Next: sapwise predict --model {shown}", model.name));
     text
-}
-
-/// Ways to choose in the chart at most.
-const MOST_WAYS: usize = 6;
-/// Regrets below this can't be told apart.
-const LEAST_PERCENT: f64 = 0.1;
-
-/// The regret by the number of machines; where there are too few for that, by held-out machine or profile.
-fn chart(learning: &[Learning], held: &Held) -> Chart {
-    let percent = |regret: f64| (100.0 * regret).max(LEAST_PERCENT);
-    let (title, mut series): (_, Vec<Series>) = if learning.len() > 1 {
-        let names = learning[0].methods.iter().map(|m| &m.name[..]);
-        let course = |name: &str| {
-            let name = name.to_owned();
-            let of = |l: &Learning| {
-                let score = l.methods.iter().find(|m| m.name == name)?;
-                Some((l.machines as f64, percent(score.mean_regret)))
-            };
-            let points = learning.iter().filter_map(of).collect();
-            Series { name, points }
-        };
-        ("mean regret (%) over physical machines in the training".to_owned(), names.map(course).collect())
-    } else {
-        let ranked = |name: &str, regrets: &[f64]| {
-            let mut regrets: Vec<f64> = regrets.iter().copied().map(percent).collect();
-            regrets.sort_by(f64::total_cmp);
-            let points = regrets.into_iter().enumerate().map(|(k, regret)| (k as f64 + 1.0, regret)).collect();
-            Series { name: name.to_owned(), points }
-        };
-        let unit = if held.by_machine { "machines" } else { "profiles" };
-        let title = format!("regret (%) on the held-out {unit}, of each way to choose from the least to the most");
-        (title, held.regrets.iter().map(|(name, regrets)| ranked(name, regrets)).collect())
-    };
-    // Ours first, then those that end with the least regret.
-    series.sort_by(|a, b| {
-        let last = |s: &Series| s.points.last().map_or(f64::INFINITY, |p| p.1);
-        (a.name != OURS).cmp(&(b.name != OURS)).then(last(a).total_cmp(&last(b)))
-    });
-    series.truncate(MOST_WAYS);
-    Chart { title, across: Axis::Linear, series }
 }
