@@ -1,6 +1,7 @@
 //! The algorithms of the command: ours, and those that a user's program adds.
 
 use crate::revisions;
+use sapwise::model::Scale;
 use sapwise::{AlgorithmId, Backend, BackendClass, BroadPhase, Error, Registry, Term};
 use std::sync::Arc;
 
@@ -19,7 +20,7 @@ pub struct UserAlgorithm {
     revision: u32,
     /// Whether it runs on the thread counts that ours run on, or on one thread only.
     parallel: bool,
-    terms: Vec<Term>,
+    terms: Vec<(Term, Scale)>,
     factory: Factory,
 }
 
@@ -50,19 +51,12 @@ impl UserAlgorithm {
         Self { method: method.to_owned(), revision, parallel, terms: Vec::new(), factory }
     }
 
-    /// What the time of a frame grows with: the terms that `train` fits to the timings, each with a unit of its own. Without them those that
-    /// fit most methods are used: calls, objects, sorting, cold objects, candidates on an axis and pairs.
+    /// What the time of a frame grows with, and what of the hardware it takes: `train` fits a unit for each of these terms to the timings.
+    /// Without them the terms are used that fit most methods: calls, objects, sorting, all pairs, candidates on an axis and pairs.
     ///
-    /// ```
-    /// use sapwise::{Product, Term};
-    /// # use sapwise_cli::UserAlgorithm;
-    /// # fn with_terms(tree: UserAlgorithm) -> UserAlgorithm {
-    /// // A tree visits log2 n nodes for each object.
-    /// tree.terms(&[Term::Call, Term::Objects, Term::Product(Product { objects: 1.0, log2_objects: 1.0, ..Product::ONE })])
-    /// # }
-    /// ```
+    /// `examples/bvh.rs` says that a tree takes `log2 n` steps for each object and for each pair.
     #[must_use]
-    pub fn terms(mut self, terms: &[Term]) -> Self {
+    pub fn terms(mut self, terms: &[(Term, Scale)]) -> Self {
         self.terms = terms.to_vec();
         self
     }
@@ -98,10 +92,10 @@ impl Algorithms {
         Ok(())
     }
 
-    /// The terms that a user said the cost of a method has. `None` for ours, and where the user said nothing.
-    pub(crate) fn terms(&self, id: &AlgorithmId) -> Option<Vec<Term>> {
-        let own = self.users.iter().find(|u| u.method == id.method() && id.backend().class() == BackendClass::Cpu)?;
-        (!own.terms.is_empty()).then(|| own.terms.clone())
+    /// The terms that a user said the cost of a method has. None for ours, and where the user said nothing.
+    pub(crate) fn terms(&self, id: &AlgorithmId) -> &[(Term, Scale)] {
+        let own = self.users.iter().find(|u| u.method == id.method() && id.backend().class() == BackendClass::Cpu);
+        own.map_or(&[], |u| &u.terms)
     }
 
     /// The methods of the user, each with its revision.
@@ -199,10 +193,11 @@ mod tests {
     #[test]
     fn terms_are_those_of_the_method_on_any_number_of_threads() {
         let mut algorithms = Algorithms::default();
-        algorithms.add(UserAlgorithm::on_threads("grid", 1, nothing).terms(&[Term::Call, Term::Pairs])).unwrap();
+        let terms = [(Term::Call, Scale::Cycle), (Term::Pairs, Scale::SharedCycle)];
+        algorithms.add(UserAlgorithm::on_threads("grid", 1, nothing).terms(&terms)).unwrap();
         algorithms.add(serial("tree", 1)).unwrap();
         let of = |id: &str| algorithms.terms(&id.parse().unwrap());
-        assert_eq!(of("grid@cpu4"), Some(vec![Term::Call, Term::Pairs]));
-        assert_eq!([of("tree@cpu1"), of("brute@cpu1"), of("grid@gpu0")], [None, None, None]);
+        assert_eq!(of("grid@cpu4"), terms);
+        assert!(["tree@cpu1", "brute@cpu1", "grid@gpu0"].iter().all(|id| of(id).is_empty()));
     }
 }

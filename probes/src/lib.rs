@@ -40,7 +40,7 @@ mod gpus;
 mod hardware;
 mod interrupt;
 mod output;
-mod overwriting;
+mod outputs;
 mod prediction;
 mod profiles;
 mod progress;

@@ -2,10 +2,10 @@
 
 use crate::args::Lifted;
 use crate::contention::{ASSUMED_LLC_BYTES, Contended};
-use sapwise_lab::data::files::read_document;
+use sapwise_lab::data::read_document;
 use anyhow::bail;
 use sapwise::hardware::{gpu, parameter};
-use sapwise::json::Document;
+use sapwise_lab::data::Document;
 use sapwise_lab::report::{Proof, Restricted, Restriction};
 use sapwise::{GpuHardware, GpuIdentity, Hardware, SimdLevel, usable_cores};
 

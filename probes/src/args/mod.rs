@@ -249,3 +249,25 @@ pub(crate) struct Completions {
     #[arg(value_name = "SHELL")]
     pub(crate) shell: Shell,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn every_example_of_the_help_is_understood() {
+        let command = Arguments::command();
+        let mut count = 0;
+        for verb in command.get_subcommands() {
+            let help = verb.get_after_help().map(ToString::to_string).unwrap_or_default();
+            for line in help.lines().filter_map(|line| Some(&line[line.find("sapwise ")?..])) {
+                let words = line.split(['#', '>']).next().unwrap_or_default().split("  (").next().unwrap_or_default();
+                let parsed = Arguments::try_parse_from(words.split_whitespace());
+                assert!(parsed.is_ok(), "{line}: {}", parsed.unwrap_err());
+                count += 1;
+            }
+        }
+        assert!(count >= 25, "{count}");
+    }
+}

@@ -39,11 +39,11 @@ pub(crate) enum PartKind {
     /// Takes the samples that standard input asks for, and prints an answer as JSON a line.
     Samples {
         /// What holds for all of them, as JSON.
-        order: String,
+        session: String,
     },
     /// Sweeps one scenario and prints one event as JSON a line.
     Sweep {
-        /// The order, as JSON.
-        order: String,
+        /// The request, as JSON.
+        request: String,
     },
 }

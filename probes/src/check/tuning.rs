@@ -1,9 +1,9 @@
-//! What is told of tuning.
+//! Checks of tuning.
 
 use super::{Finding, Here};
 use crate::gpus::uses;
 use crate::revisions;
-use sapwise::{AlgorithmId, Backend, Tuning, GpuKind, usable_cores};
+use sapwise::{AlgorithmId, Backend, GpuKind, Tuning, usable_cores};
 
 impl Here {
     pub(super) fn tuning(&self, tuning: &Tuning, finding: &mut Finding) {
@@ -31,13 +31,13 @@ impl Here {
             return entry.unavailable.as_ref().map(|why| format!("{id} can't run here: {why}"));
         }
         match id.backend() {
-            // The revision check has told already that the method is unknown; without costs nothing has.
+            // The revision check reports an unknown method already, but tuning without costs has no revisions.
             _ if !revisions::is_known(revisions::of(id), &self.registry) => Some(format!("{id} is not in this build")),
             // Ours can be made on any number of threads, a user's only on those that are listed.
             Backend::Cpu(threads) if *threads <= usable_cores() => self.registry.create(id).err().map(|e| e.to_string()),
             Backend::Cpu(_) => Some(format!("{id} needs more than the {} cores of this machine", usable_cores())),
             Backend::Gpu(indices) => self.gpus().lacks(indices).map(|why| format!("{id} can't run here: {why}")),
-            _ => Some(format!("{id} can't run here: this version does not know its processor")),
+            _ => Some(format!("{id} can't run here: this version does not know this kind of processor")),
         }
     }
 

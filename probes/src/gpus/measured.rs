@@ -118,7 +118,7 @@ fn part<T: DeserializeOwned>(kind: &str, which: &str, threads: Option<u32>) -> a
     })?;
     Ok(match (ended, answer) {
         (Ended::Well, Some(answer)) => Ok(answer),
-        (Ended::Well, None) => Err("the process that measured it gave no answer".to_owned()),
+        (Ended::Well, None) => Err("the process that measured it returned no answer".to_owned()),
         (Ended::Interrupted, _) => Err("interrupted while it was measured".to_owned()),
         (Ended::Badly(how), _) => Err(format!("the process that measured it {how}")),
     })

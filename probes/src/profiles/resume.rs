@@ -2,10 +2,10 @@
 
 use super::profile::{Profile, is_named};
 use crate::args::{Arguments, Probe, Verb};
-use sapwise_lab::data::files::read_document;
+use sapwise_lab::data::read_document;
 use crate::{provenance, restriction, revisions};
 use clap::Parser;
-use sapwise::json::Document;
+use sapwise_lab::data::Document;
 use sapwise_lab::report::Label;
 use sapwise::{GpuIdentity, Registry, Report};
 use std::path::{Path, PathBuf};

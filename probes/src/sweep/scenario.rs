@@ -4,16 +4,10 @@ use super::race::{FEWEST_FRAMES, Race, Raced, Racer};
 use super::request::{Event, Schedule, SweepRequest, Visit};
 use crate::algorithms::Algorithms;
 use sapwise::gpu::Gpus;
-<<<<<<< HEAD
 use sapwise::{AlgorithmId, GpuIdentity, Registry};
 use sapwise_lab::report::Point;
 use sapwise_lab::sweep::{Standing, median, share};
 use sapwise_scenes::Scenario;
-=======
-use sapwise::report::Point;
-use sapwise::{AlgorithmId, GpuIdentity, Registry};
-use sapwise_scenes::{Scenario, Scene};
->>>>>>> scenes
 use std::time::{Duration, Instant};
 
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
@@ -28,13 +22,8 @@ pub(crate) fn sweep(
     algorithms: &Algorithms,
     emit: &mut dyn FnMut(Event) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-<<<<<<< HEAD
     let scenario: Scenario = request.scenario.parse().map_err(anyhow::Error::msg)?;
     let mut registry = algorithms.registry(request.cores);
-=======
-    let scenario: Scenario = order.scenario.parse()?;
-    let mut registry = algorithms.registry(order.cores);
->>>>>>> scenes
     registry.pin_threads();
     for remark in add_gpus(&mut registry, &request.gpus) {
         emit(Event::Remark(format!("{scenario}: {remark}")))?;
