@@ -3,7 +3,7 @@
 mod common;
 
 use common::{failure, sapwise, success};
-use sapwise::report::{Label, Report};
+use sapwise_lab::report::{Label, Report};
 use std::fs;
 use std::path::Path;
 

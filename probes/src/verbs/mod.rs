@@ -4,7 +4,6 @@ mod check;
 mod compare;
 mod completions;
 mod devices;
-mod man;
 mod pairs;
 mod part;
 mod predict;
@@ -41,7 +40,6 @@ pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),
         Verb::Completions(arguments) => completions::run(&arguments),
-        Verb::Man(arguments) => man::run(&arguments),
         Verb::Part(arguments) => part::run(arguments, algorithms),
     }
 }
