@@ -30,8 +30,6 @@ use std::time::Instant;
 pub use decision::{Decision, Reason};
 pub(crate) use instances::Instances;
 #[cfg(feature = "this-machine")]
-pub(crate) use knots::objects_of;
-#[cfg(feature = "this-machine")]
 pub(crate) use setup::{Arrival, Handover, Keeper, Start};
 #[cfg(feature = "this-machine")]
 pub use setup::{Origin, SaveError, Setup};
@@ -61,7 +59,7 @@ pub struct Adaptive {
     decided: Option<usize>,
     /// How it came to its tuning.
     #[cfg(feature = "this-machine")]
-    start: setup::Start,
+    start: Start,
 }
 
 impl Adaptive {
@@ -89,7 +87,7 @@ impl Adaptive {
             prepared: 0,
             decided: None,
             #[cfg(feature = "this-machine")]
-            start: setup::Start::default(),
+            start: Start::default(),
         }
     }
 

@@ -6,7 +6,8 @@ mod custom;
 
 use common::naive;
 use custom::{ID, cost, tuning, registry};
-use sapwise::{Aabb, Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Scenario, Term};
+use sapwise::{Aabb, Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Term};
+use sapwise_scenes::Scenario;
 use std::time::Duration;
 
 /// Boxes that rest after the first frame.

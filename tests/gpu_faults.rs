@@ -4,10 +4,8 @@ mod common;
 
 use common::{Random, gpus, naive};
 use sapwise::gpu::{Gpu, Gpus, broad_phase, wgpu};
-use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, PairOrder, Pairs, Reason, Registry,
-    Scenario, Source, Term,
-};
+use sapwise::{Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, PairOrder, Pairs, Reason, Registry, Source, Term};
+use sapwise_scenes::Scenario;
 
 const METHODS: [&str; 3] = ["brute", "sap", "grid-sap"];
 

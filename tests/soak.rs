@@ -17,10 +17,8 @@ mod common;
 mod kept;
 
 use common::{Random, naive};
-use sapwise::{
-    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, PairOrder, Pairs, Reason, Registry,
-    Scenario, Source, Term,
-};
+use sapwise::{Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, PairOrder, Pairs, Reason, Registry, Source, Term};
+use sapwise_scenes::Scenario;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::collections::BTreeMap;
 use std::sync::Arc;
