@@ -54,15 +54,17 @@ mod load;
 #[cfg(feature = "measure")]
 pub mod measure;
 pub mod model;
+mod named;
 mod pair;
 mod pairs;
 mod registry;
 #[cfg(test)]
 mod scene;
-mod schema_tag;
 mod splitmix;
 pub mod stats;
 pub mod tuning;
+#[cfg(feature = "model")]
+mod wire;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
@@ -75,14 +77,17 @@ pub use calibrate::cache_schema;
 #[cfg(feature = "this-machine")]
 pub use calibrate::{Cache, StartOptions};
 pub use changes::Changes;
-pub use cost::{CostCurve, CostTerm, Counts, Knot, MOST_UNIT_NS, Term};
+pub use cost::{CostCurve, CostTerm, Counts, CurveError, Knot, MOST_UNIT_NS, Product, Term};
 pub use cpu::{SimdLevel, SimdLevelError};
 pub use entry::Entry;
 pub use error::{BoxDefect, Error, Unavailable};
 pub use filter::{Filter, Membership};
-pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, Machine, Parameter};
+pub use hardware::{
+    GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, Hardware, HardwareError, How, Machine, Parameter, ParameterId,
+};
 pub use load::{Displacement, FramePlan, Load};
 pub use model::Model;
+pub use named::UnknownName;
 pub use pair::Pair;
 pub use pairs::{PairOrder, Pairs};
 /// The version of rayon whose pools this library takes: [`Registry::use_pool`]. Its number is part of the name, because another one
@@ -90,7 +95,7 @@ pub use pairs::{PairOrder, Pairs};
 #[cfg(feature = "parallel")]
 pub use rayon as rayon1;
 pub use registry::{Registry, usable_cores};
-pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, Tuning};
+pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, Tuning, TuningError};
 
 /// The example of the README as a test, with the feature that it needs.
 #[cfg(all(doctest, feature = "this-machine"))]

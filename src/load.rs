@@ -17,8 +17,6 @@ pub(crate) use strip_grid::{Cover, StripGrid, StripSpan};
 /// The count alone is a poor switch: between uniform and clustered scenes measured borders move by a factor of five.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Load {
     /// Boxes in the frame.
     pub objects: u32,

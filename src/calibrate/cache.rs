@@ -9,31 +9,25 @@ use crate::adaptive::{Keeper, SaveError};
 use crate::algorithm::AlgorithmId;
 use crate::hardware::{GpuIdentity, Machine};
 use crate::entry::Entry;
-use crate::json;
+use crate::json::{self, Format};
 use crate::model::Model;
 use crate::registry::{Registry, usable_cores};
-use crate::schema_tag::schema_tag;
 use crate::tuning::Tuning;
 use etcetera::BaseStrategy;
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-schema_tag!(
-    /// `cache/2`.
-    CacheSchema = "cache/2"
-);
+/// How the files are read and written.
+const FORMAT: Format = Format::new("cache", 2, 0);
 
 /// A file that is longer was written by something else.
 const LONGEST_BYTES: u64 = 16 << 20;
 
 /// The file.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 struct Cached {
-    /// Always `cache/2`.
-    schema: CacheSchema,
     /// What the tuning holds for.
     key: Key,
     /// The tuning, predicted or learned.
@@ -42,8 +36,7 @@ struct Cached {
 
 /// All that tuning depends on, in plain words. Names no host, no user and no single piece of hardware.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(super) struct Key {
     /// Version of this library.
     version: String,
@@ -65,8 +58,7 @@ pub(super) struct Key {
 
 /// An algorithm that can run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 struct Known {
     /// The algorithm.
     algorithm: AlgorithmId,
@@ -75,7 +67,7 @@ struct Known {
 }
 
 impl Key {
-    pub(super) fn new(registry: &Registry, model: &Model) -> Result<Self, json::JsonError> {
+    pub(super) fn new(registry: &Registry, model: &Model) -> Result<Self, json::Error> {
         let known = |e: Entry| Known { algorithm: e.id, revision: e.revision };
         Ok(Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -85,7 +77,7 @@ impl Key {
             algorithms: registry.available().into_iter().map(known).collect(),
             gpus: registry.gpu_identities(),
             model: model.name.clone(),
-            model_hash: format!("{:016x}", fnv1a(&json::write(model)?)),
+            model_hash: format!("{:016x}", fnv1a(&json::write_model(model)?)),
         })
     }
 }
@@ -135,14 +127,11 @@ impl CacheFile {
             Ok(_) => {}
         }
         let text = fs::read_to_string(&self.path).map_err(|e| ignored(&e.to_string()))?;
-        let cached: Cached = serde_json::from_str(&text).map_err(|e| ignored(&e.to_string()))?;
+        let cached: Cached = FORMAT.read(&text).map_err(|e| ignored(&e.to_string()))?.value;
         if cached.key != self.key {
             return Err(ignored("it is of another machine, another build or another model"));
         }
-        match cached.tuning.defect() {
-            Some(defect) => Err(ignored(&defect)),
-            None => Ok(Some(cached.tuning)),
-        }
+        Ok(Some(cached.tuning))
     }
 
     fn replace(&self, text: &str) -> std::io::Result<()> {
@@ -163,8 +152,8 @@ impl CacheFile {
 
 impl Keeper for CacheFile {
     fn keep(&self, tuning: Tuning) -> Result<(), SaveError> {
-        let cached = Cached { schema: CacheSchema, key: self.key.clone(), tuning };
-        let text = json::write(&cached).map_err(|e| SaveError::Encode(e.into()))?;
+        let cached = Cached { key: self.key.clone(), tuning };
+        let text = FORMAT.write(&cached).map_err(|e| SaveError::Encode(e.into()))?;
         self.replace(&text).map_err(|source| SaveError::Write { file: self.path.clone(), source })
     }
 }
@@ -174,8 +163,8 @@ impl Keeper for CacheFile {
 /// # Errors
 /// When the schema can't be written.
 #[cfg(feature = "schema")]
-pub fn cache_schema() -> Result<(&'static str, String), json::JsonError> {
-    Ok(("cache-2.schema.json", json::write(&schemars::schema_for!(Cached))?))
+pub fn cache_schema() -> Result<(String, String), json::Error> {
+    FORMAT.json_schema::<Cached>()
 }
 
 #[cfg(test)]
