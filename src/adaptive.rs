@@ -103,7 +103,7 @@ impl Adaptive {
     /// As [`Registry::create`].
     pub fn only(algorithm: AlgorithmId, registry: &Registry) -> Result<Self, Error> {
         let steps = vec![Step { from_objects: 0, algorithm }];
-        let tuning = Tuning::from_steps(steps).map_err(|hint| Error::UnknownAlgorithm { text: String::new(), hint })?;
+        let tuning = Tuning::from_steps(steps).map_err(|e| Error::UnknownAlgorithm { text: String::new(), hint: e.to_string() })?;
         Self::new(tuning, registry)
     }
 

@@ -6,7 +6,7 @@ use crate::revisions;
 use crate::samples::{self, Live, Order, Taken};
 use crate::table::count;
 use anyhow::{Context, bail};
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::model::{ASK, FEWEST_MACHINES, Prediction};
 use sapwise::{Displacement, Tuning, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry, Scenario};
 
@@ -111,7 +111,7 @@ pub(crate) fn predict_and_sample(
 }
 
 fn cores(hardware: &Hardware) -> u32 {
-    hardware.value(parameter::USABLE_CORES).map_or(1, |k| k as u32)
+    hardware.value(ParameterId::UsableCores).map_or(1, |k| k as u32)
 }
 
 /// Costs of every algorithm of the registry and on these GPUs.

@@ -4,7 +4,7 @@ use crate::gpus::GpuChoice;
 use crate::table::{bytes, columns, count, duration, grouped};
 use crate::terminal::{self, Terminal};
 use crate::train::{measured_tuning, slice_scenario};
-use sapwise::hardware::gpu::parameter::UNIFIED_MEMORY;
+use GpuParameterId::UnifiedMemory;
 use sapwise::report::Label;
 use sapwise::{Backend, Border, Tuning, GpuHardware, GpuIdentity, Hardware, How, Parameter, Report};
 use std::path::Path;

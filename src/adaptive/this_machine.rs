@@ -4,7 +4,7 @@ use super::Adaptive;
 use super::cache::{Entry, Key};
 use super::candidates::Made;
 use super::options::Options;
-use crate::hardware::parameter;
+use crate::hardware::ParameterId;
 use crate::{
     AlgorithmId, Error, Tuning, GpuHardware, Hardware, Load, Model, Parameter, Registry, measure,
 };
@@ -311,8 +311,8 @@ fn hardware(options: &Options, registry: &Registry, model: &Model, remarks: &mut
     let plan = measure::Options { threads, limit: Some(options.probe_limit), ..measure::Options::default() };
     let mut hardware = measure::hardware_for(&model.parameters(), &plan);
     let simd = registry.simd();
-    if let Some(lanes) = hardware.parameters.iter_mut().find(|p| p.name == parameter::SIMD_LANES) {
-        *lanes = Parameter::reported(parameter::SIMD_LANES, f64::from(simd.lanes()), "the SIMD level of the registry");
+    if let Some(lanes) = hardware.parameters.iter_mut().find(|p| p.name == ParameterId::SimdLanes) {
+        *lanes = Parameter::reported(ParameterId::SimdLanes, f64::from(simd.lanes()), "the SIMD level of the registry");
     }
     hardware.machine.simd = simd.to_string();
     #[cfg(feature = "measure-gpu")]
@@ -355,9 +355,9 @@ mod tests {
     fn a_figure_that_can_not_be_costs_what_needs_it_and_no_more() {
         let model = Model::built_in().unwrap();
         let figure = |name: &&str| match *name {
-            parameter::CACHE_LLC_BYTES => Parameter::reported(name, 33_554_432.0, "test"),
-            parameter::FORK_JOIN_COLD_NS => Parameter::reported(name, 5000.0, "test"),
-            parameter::USABLE_CORES | parameter::SCALING_ALL_THREADS_RATIO => Parameter::reported(name, 2.0, "test"),
+            ParameterId::CacheLlcBytes => Parameter::reported(name, 33_554_432.0, "test"),
+            ParameterId::ForkJoinColdNs => Parameter::reported(name, 5000.0, "test"),
+            ParameterId::UsableCores | ParameterId::ScalingAllThreadsRatio => Parameter::reported(name, 2.0, "test"),
             _ => Parameter::reported(name, 4.0, "test"),
         };
         let parameters = model.parameters().iter().map(figure).collect();
@@ -367,7 +367,7 @@ mod tests {
         let (tuning, sound) = predict(&model, hardware.clone(), &algorithms, &mut remarks).unwrap();
         assert_eq!((tuning.costs.len(), sound, remarks.len()), (algorithms.len(), true, 0));
         let mut broken = hardware;
-        broken.parameters.iter_mut().filter(|p| p.name == parameter::FORK_JOIN_COLD_NS).for_each(|p| p.value = Some(0.0));
+        broken.parameters.iter_mut().filter(|p| p.name == ParameterId::ForkJoinColdNs).for_each(|p| p.value = Some(0.0));
         let (tuning, sound) = predict(&model, broken, &algorithms, &mut remarks).unwrap();
         assert!(tuning.costs.iter().all(|c| c.algorithm.threads() == 1) && !sound);
         assert_eq!(tuning.costs.len(), algorithms.len() / 2);
