@@ -31,6 +31,8 @@
 //! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and keeps the tuning for the next start.
 //! - `schema`: the JSON Schemas of the files, for tools.
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 mod aabb;
 mod adaptive;
 mod algorithm;
@@ -54,6 +56,8 @@ mod named;
 mod pairs;
 mod registry;
 mod sample;
+#[cfg(test)]
+mod scene;
 mod splitmix;
 pub mod stats;
 pub mod tuning;
@@ -73,7 +77,8 @@ pub use displacement::Displacement;
 pub use error::{BoxDefect, Error};
 pub use filter::{Filter, Membership};
 pub use hardware::{
-    GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, Hardware, HardwareError, How, Machine, Parameter, ParameterId,
+    GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, Hardware, HardwareError, How, Machine, Parameter,
+    ParameterId,
 };
 pub use load::Load;
 pub use model::Model;
@@ -85,7 +90,12 @@ pub use rayon;
 pub use registry::{Entry, Registry, usable_cores};
 pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, Tuning, TuningError};
 
-/// The examples of the README as tests, with the feature that the first of them needs.
+/// The example of the README as a test, with the feature that it needs.
 #[cfg(all(doctest, feature = "this-machine"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// The examples of the guide as tests, with the features that they need together.
+#[cfg(all(doctest, feature = "this-machine", feature = "gpu"))]
+#[doc = include_str!("../docs/guide.md")]
+struct Guide;

@@ -3,7 +3,8 @@
 mod common;
 
 use common::{Random, WORLDS, denormals, every_algorithm, large_boxes, lattice, naive};
-use sapwise::{Aabb, BoxDefect, BroadPhase, Error, PairOrder, Pairs, Scenario};
+use sapwise::{Aabb, BoxDefect, BroadPhase, Error, PairOrder, Pairs};
+use sapwise_scenes::Scenario;
 
 fn assert_all_agree(name: &str, boxes: &[Aabb], algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
     let expected = naive(boxes);

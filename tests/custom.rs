@@ -5,8 +5,9 @@ mod common;
 mod custom;
 
 use common::naive;
-use custom::{ID, cost, tuning, registry};
-use sapwise::{Aabb, Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Scenario, Term};
+use custom::{ID, cost, registry, tuning};
+use sapwise::{Aabb, Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Term};
+use sapwise_scenes::Scenario;
 use std::time::Duration;
 
 /// Boxes that rest after the first frame.

@@ -3,7 +3,8 @@
 mod common;
 
 use common::{Random, every_algorithm, naive, naive_filtered};
-use sapwise::{Aabb, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, Scenario};
+use sapwise::{Aabb, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry};
+use sapwise_scenes::Scenario;
 
 /// That many random memberships.
 fn memberships(count: usize, random: &mut Random) -> Vec<Membership> {

@@ -6,7 +6,8 @@ mod common;
 
 use common::{Random, WORLDS, denormals, gpus, large_boxes, lattice, naive, naive_filtered};
 use sapwise::gpu::{Gpus, broad_phase};
-use sapwise::{Aabb, BoxDefect, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, Scenario};
+use sapwise::{Aabb, BoxDefect, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry};
+use sapwise_scenes::Scenario;
 
 /// Every algorithm of the registry on GPUs, and each method on two devices of the first GPU.
 fn every_algorithm(gpus: &Gpus) -> Vec<(String, Box<dyn BroadPhase>)> {

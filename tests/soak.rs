@@ -18,9 +18,10 @@ mod kept;
 
 use common::{Random, naive};
 use sapwise::{
-    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, PairOrder, Pairs, Reason, Registry,
-    Scenario, Source, Term,
+    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Load, PairOrder, Pairs, Reason, Registry, Source, Term,
+    Tuning,
 };
+use sapwise_scenes::Scenario;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -1,12 +1,12 @@
-//! A table of text and figures: for the page, where it sorts, and for a CSV file.
+//! Tables of text and figures: sortable ones for the page, tidy ones for CSV files.
 
-use crate::table::grouped;
+use crate::text::grouped;
 use anyhow::Context;
 use std::borrow::Cow;
 
 /// Rows under named columns.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Sheet {
+pub(crate) struct DataTable {
     pub(crate) columns: Vec<Column>,
     pub(crate) rows: Vec<Row>,
 }
@@ -18,6 +18,14 @@ pub(crate) struct Column {
     pub(crate) title: String,
     /// Its name in CSV, with the unit as the last words.
     pub(crate) key: String,
+}
+
+impl Column {
+    /// With what a reader sees, and its name in CSV.
+    #[must_use]
+    pub(crate) fn new(title: impl Into<String>, key: impl Into<String>) -> Self {
+        Self { title: title.into(), key: key.into() }
+    }
 }
 
 /// One row, and the reports that its figures are from.
@@ -40,11 +48,11 @@ pub(crate) enum Cell {
     Missing(String),
 }
 
-impl Sheet {
+impl DataTable {
     /// Without rows, under columns that are called so for a reader and in CSV.
+    #[must_use]
     pub(crate) fn new<const N: usize>(columns: [(&str, &str); N]) -> Self {
-        let columns = columns.map(|(title, key)| Column { title: title.to_owned(), key: key.to_owned() }).into();
-        Self { columns, rows: Vec::new() }
+        Self { columns: columns.map(|(title, key)| Column::new(title, key)).into(), rows: Vec::new() }
     }
 
     /// Adds a row whose figures are from these reports.
@@ -53,7 +61,7 @@ impl Sheet {
         self.rows.push(Row { cells, reports: reports.to_vec() });
     }
 
-    /// The sheet as CSV in UTF-8: a line of keys, then the rows, as RFC 4180 has it but with bare line feeds. Figures have all their
+    /// The table as CSV in UTF-8: a line of keys, then the rows, as RFC 4180 has it but with bare line feeds. Figures have all their
     /// digits. Where rows name reports, a last column `reports` has their labels, which `labels` gives in the order of the list, with
     /// blanks between.
     ///
@@ -96,6 +104,12 @@ impl Cell {
         }
     }
 
+    /// A figure with all its digits, for tables that are only read by programs.
+    #[must_use]
+    pub(crate) fn exact(value: f64) -> Self {
+        Self::number(value, 0).map_shown(figure)
+    }
+
     /// A figure where there is one.
     pub(crate) fn optional(value: Option<f64>, decimals: usize, why: &str) -> Self {
         value.map_or_else(|| Self::Missing(why.to_owned()), |v| Self::number(v, decimals))
@@ -108,9 +122,13 @@ impl Cell {
 
     /// A share as a percentage; its value is the share.
     pub(crate) fn percent(share: f64) -> Self {
-        match Self::number(share, 4) {
-            Self::Number { value, .. } => Self::Number { value, shown: format!("{:.1} %", 100.0 * share) },
-            missing => missing,
+        Self::number(share, 4).map_shown(|share| format!("{:.1} %", 100.0 * share))
+    }
+
+    fn map_shown(self, shown: impl Fn(f64) -> String) -> Self {
+        match self {
+            Self::Number { value, .. } => Self::Number { value, shown: shown(value) },
+            other => other,
         }
     }
 
@@ -145,17 +163,13 @@ fn inert(text: &str) -> Cow<'_, str> {
 mod tests {
     use super::*;
 
-    fn column(key: &str) -> Column {
-        Column { title: key.to_owned(), key: key.to_owned() }
-    }
-
     fn number(value: f64) -> Cell {
         Cell::Number { value, shown: "about".to_owned() }
     }
 
-    fn one_column(cells: Vec<Cell>) -> Sheet {
+    fn one_column(cells: Vec<Cell>) -> DataTable {
         let rows = cells.into_iter().map(|c| Row { cells: vec![c], reports: Vec::new() }).collect();
-        Sheet { columns: vec![column("x")], rows }
+        DataTable { columns: vec![Column::new("x", "x")], rows }
     }
 
     fn read(text: &str) -> Vec<Vec<String>> {
@@ -188,25 +202,25 @@ mod tests {
             let csv = one_column(vec![Cell::Text(bad.to_owned())]).csv(&[]).unwrap();
             assert_eq!(read(&csv)[1][0], format!("'{bad}"));
         }
-        let mut sheet = one_column(vec![number(-1.0)]);
-        sheet.columns[0].key = "=x".to_owned();
-        assert_eq!(sheet.csv(&[]).unwrap(), "'=x\n-1\n");
+        let mut table = one_column(vec![number(-1.0)]);
+        table.columns[0].key = "=x".to_owned();
+        assert_eq!(table.csv(&[]).unwrap(), "'=x\n-1\n");
     }
 
     #[test]
     fn a_row_names_its_reports() {
         let labels = ["R1".to_owned(), "R2".to_owned(), "=R3".to_owned()];
-        let mut sheet = one_column(vec![number(1.0), number(2.0), number(3.0)]);
-        sheet.rows[0].reports = vec![0, 1];
-        sheet.rows[2].reports = vec![2];
-        assert_eq!(sheet.csv(&labels).unwrap(), "x,reports\n1,R1 R2\n2,\n3,'=R3\n");
+        let mut table = one_column(vec![number(1.0), number(2.0), number(3.0)]);
+        table.rows[0].reports = vec![0, 1];
+        table.rows[2].reports = vec![2];
+        assert_eq!(table.csv(&labels).unwrap(), "x,reports\n1,R1 R2\n2,\n3,'=R3\n");
     }
 
     #[test]
     fn a_row_that_does_not_fit_is_an_error() {
-        let mut sheet = one_column(vec![number(1.0), number(2.0)]);
-        sheet.rows[1].cells.push(number(3.0));
-        let error = sheet.csv(&[]).unwrap_err();
+        let mut table = one_column(vec![number(1.0), number(2.0)]);
+        table.rows[1].cells.push(number(3.0));
+        let error = table.csv(&[]).unwrap_err();
         assert!(error.to_string().contains("row 2 of a table with 1 column"), "{error}");
     }
 }

@@ -3,7 +3,7 @@
 //! A hypervisor moves the cores of a guest from one group of cores to another. What several threads gain changes with it by half, so
 //! timings from before and after are those of two machines.
 
-use sapwise::report::{Point, Report};
+use crate::report::{Point, Report};
 use serde::Serialize;
 
 /// A latency beyond this factor of the usual one is that of another placement of the cores.

@@ -1,7 +1,7 @@
 //! Made-up machines whose costs are known exactly. TEST DATA: the reports carry a real label because training leaves
 //! simulated ones out, so none of them may leave this module's tests.
 
-use crate::random::Random;
+use sapwise_scenes::Random;
 use sapwise::hardware::GpuParameterId;
 use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, ParameterId};
 use sapwise::model::{MethodModel, ModelTerm, Scale};

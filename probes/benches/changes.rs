@@ -1,7 +1,8 @@
 //! What a filter and `Changes` cost beside finding the pairs: `clustered`, forth and back through a few frames, on one core.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use sapwise::{Aabb, BroadPhase, Changes, Filter, Membership, PairOrder, Pairs, Registry, Scenario};
+use sapwise::{Aabb, BroadPhase, Changes, Filter, Membership, PairOrder, Pairs, Registry};
+use sapwise_scenes::Scenario;
 
 /// Frames that are gone through, the last as near to the last but one as the first to the second.
 const FRAMES: usize = 4;

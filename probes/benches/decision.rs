@@ -1,9 +1,8 @@
 //! What one decision costs: the ranking alone, and the whole of `Adaptive::decide` with its sampled estimate.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use sapwise::{
-    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Tuning, Knot, Load, Pairs, Registry, Scenario, Source, Term,
-};
+use sapwise::{Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Tuning, Knot, Load, Pairs, Registry, Source, Term};
+use sapwise_scenes::Scenario;
 use std::hint::black_box;
 
 /// As many algorithms, terms and knots as a predicted field of a 16-core machine has.

@@ -17,7 +17,8 @@
 //! other pairs.
 
 use sapwise::gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu};
-use sapwise::{Aabb, AlgorithmId, Backend, BroadPhase, Pairs, Registry, Scenario, usable_cores};
+use sapwise::{Aabb, AlgorithmId, Backend, BroadPhase, Pairs, Registry, usable_cores};
+use sapwise_scenes::Scenario;
 use std::hint::black_box;
 use std::io::Write;
 use std::process::ExitCode;

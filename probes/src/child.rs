@@ -104,13 +104,13 @@ fn run(
 /// A part that is told what to do line by line.
 pub(crate) struct Dialogue {
     child: EndedOnDrop,
-    orders: ChildStdin,
+    requests: ChildStdin,
     lines: Receiver<String>,
     complaints: Option<JoinHandle<String>>,
 }
 
 impl Dialogue {
-    /// Starts `sapwise part ARGUMENTS`, which must end when its standard input does ([`orders`]).
+    /// Starts `sapwise part ARGUMENTS`, which must end when its standard input does ([`requests`]).
     ///
     /// # Errors
     /// When the process can't be started.
@@ -118,15 +118,15 @@ impl Dialogue {
         let mut command = own_program()?;
         command.arg("part").args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = EndedOnDrop(command.spawn().context("a part of the measurement can't be started as a process")?);
-        let orders = child.0.stdin.take().context("a part of the measurement has no standard input")?;
+        let requests = child.0.stdin.take().context("a part of the measurement has no standard input")?;
         let answers = child.0.stdout.take().context("a part of the measurement has no standard output")?;
         let complaints = child.0.stderr.take().map(last_line);
-        Ok(Self { child, orders, lines: lines(answers), complaints })
+        Ok(Self { child, requests, lines: lines(answers), complaints })
     }
 
     /// Sends a line. One that can't be sent is not missed: [`Self::listen`] then says how the process ended.
-    pub(crate) fn tell(&mut self, order: &str) {
-        let _ = writeln!(self.orders, "{order}");
+    pub(crate) fn tell(&mut self, request: &str) {
+        let _ = writeln!(self.requests, "{request}");
     }
 
     /// Waits for a line that `read` understands, for `limit` at most; others are passed over. Without any it says how the process
@@ -167,7 +167,7 @@ impl Dialogue {
 
 /// The lines of standard input as they come, for parts that are told what to do. Ends this process when the pipe of the process
 /// that started it closes, whatever it is doing.
-pub(crate) fn orders() -> Receiver<String> {
+pub(crate) fn requests() -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {

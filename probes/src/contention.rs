@@ -1,6 +1,6 @@
 //! Other programs at work, made by ourselves: threads that take memory bandwidth or cache.
 
-use crate::turns::Turns;
+use sapwise_scenes::Random;
 use core_affinity::CoreId;
 use ParameterId::CacheLlcBytes;
 use sapwise::measure::{self, Family, Options};
@@ -131,11 +131,11 @@ fn stream(stop: &AtomicBool) {
 
 fn evict(stop: &AtomicBool, words: &[AtomicU64], seed: u64) {
     let lines = (words.len() / LINE) as u128;
-    let mut turns = Turns::new(seed);
+    let mut shuffle = Random::new(seed);
     while !stop.load(Ordering::Relaxed) {
         for _ in 0..1 << 12 {
             // The upper half of the product is even over the lines, without a division.
-            let line = (u128::from(turns.draw()) * lines) >> 64;
+            let line = (u128::from(shuffle.bits()) * lines) >> 64;
             let word = &words[line as usize * LINE];
             // Not one atomic addition: that would wait for every line, and take fewer of them. A lost count is none.
             word.store(word.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);

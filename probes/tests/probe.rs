@@ -3,7 +3,7 @@
 mod common;
 
 use common::{failure, sapwise, success};
-use sapwise::report::{Label, Report};
+use sapwise_lab::report::{Label, Report};
 use std::fs;
 use std::path::Path;
 
@@ -88,7 +88,7 @@ fn ctrl_c_keeps_what_was_measured() {
     let out = folder.path().join("report.json");
     let mut probe = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
     probe.env_remove("SAPWISE_SIMD").args(["probe", "--max-objects", "30"]).arg("--out").arg(&out);
-    for scenario in sapwise::Scenario::ALL {
+    for scenario in sapwise_scenes::Scenario::ALL {
         probe.args(["--scenario", scenario.name()]);
     }
     let mut probe = probe.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();

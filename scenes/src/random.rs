@@ -1,37 +1,59 @@
-//! Draws from a seed.
+//! Random numbers from a seed.
 
-use crate::turns::Turns;
-
-/// Deviates from the numbers of [`Turns`].
-pub(crate) struct Random(Turns);
+/// A generator of random numbers, splitmix64 of Steele, Lea and Flood (2014): the same numbers for a seed on every platform.
+///
+/// For orders, draws and simulated noise; not for cryptography.
+#[derive(Debug, Clone)]
+pub struct Random(u64);
 
 impl Random {
-    /// The draws that belong to some words: the same wherever and in whatever order they are asked for.
-    pub(crate) fn named(seed: u64, words: &[&str]) -> Self {
-        let mut state = Turns::new(seed);
+    /// The numbers that belong to a seed.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// The numbers that belong to some words and a seed: the same wherever and in whatever order they are asked for.
+    #[must_use]
+    pub fn named(seed: u64, words: &[&str]) -> Self {
+        let mut state = Self::new(seed);
         // The end of a word counts too, so that "ab", "c" is not "a", "bc".
         for byte in words.iter().flat_map(|w| w.bytes().map(u64::from).chain([256])) {
-            state = Turns::new(state.draw() ^ byte);
+            state = Self::new(state.bits() ^ byte);
         }
-        Self(state)
+        state
     }
 
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0.draw()
+    /// 64 random bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut x = self.0;
+        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        x ^ (x >> 31)
     }
 
-    /// From 0 up to, not including, 1.
-    pub(crate) fn uniform(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    /// `0..count` in a random order (Fisher and Yates). For 0 or 1 nothing is drawn.
+    pub fn shuffled(&mut self, count: usize) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..count).collect();
+        for k in (1..count).rev() {
+            order.swap(k, (self.bits() % (k as u64 + 1)) as usize);
+        }
+        order
     }
 
-    /// Normal, from twelve uniform ones: mean 0, deviation 1, nothing beyond 6.
-    pub(crate) fn normal(&mut self) -> f64 {
+    /// Uniform from 0 up to, not including, 1.
+    pub fn uniform(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Normal, from twelve uniform numbers: mean 0, standard deviation 1, nothing beyond 6.
+    pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 
-    /// Log-normal: median 1, deviation `sigma` in natural logarithms.
-    pub(crate) fn log_normal(&mut self, sigma: f64) -> f64 {
+    /// Log-normal: median 1, and standard deviation `sigma` of the natural logarithm.
+    pub fn log_normal(&mut self, sigma: f64) -> f64 {
         (sigma * self.normal()).exp()
     }
 }
@@ -41,15 +63,35 @@ mod tests {
     use super::*;
 
     #[test]
-    fn draws_belong_to_their_words() {
-        let draw = |seed, words: &[&str]| Random::named(seed, words).next();
+    fn the_numbers_are_those_of_the_reference_code() {
+        // First outputs of Vigna's C code for the seed 1234567, as its ports test them.
+        let mut random = Random::new(1_234_567);
+        let found = [(); 3].map(|()| random.bits());
+        assert_eq!(found, [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423]);
+    }
+
+    #[test]
+    fn numbers_belong_to_their_words() {
+        let draw = |seed, words: &[&str]| Random::named(seed, words).bits();
         assert_eq!(draw(1, &["ab", "c"]), draw(1, &["ab", "c"]));
         let others = [draw(2, &["ab", "c"]), draw(1, &["a", "bc"]), draw(1, &["abc"]), draw(1, &["c", "ab"])];
         assert!(others.iter().all(|&o| o != draw(1, &["ab", "c"])));
     }
 
     #[test]
-    fn deviates_have_their_mean_and_deviation() {
+    fn a_shuffle_holds_every_number_once_and_the_next_differs() {
+        let mut random = Random::new(1);
+        let orders: Vec<Vec<usize>> = (0..20).map(|_| random.shuffled(6)).collect();
+        for order in &orders {
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, [0, 1, 2, 3, 4, 5]);
+        }
+        assert!(orders.iter().any(|o| *o != orders[0]));
+    }
+
+    #[test]
+    fn normal_numbers_have_their_mean_and_deviation() {
         let mut random = Random::named(1, &[]);
         let draws: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
         let mean = draws.iter().sum::<f64>() / draws.len() as f64;

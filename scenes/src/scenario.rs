@@ -9,7 +9,7 @@ mod walk;
 use std::fmt;
 use std::str::FromStr;
 
-use crate::Aabb;
+use sapwise::Aabb;
 use drift::{Brownian, Clusters, Gravity};
 use fall::Fall;
 use fragmentation::Fragmentation;
@@ -149,15 +149,18 @@ impl fmt::Display for Scenario {
 }
 
 impl FromStr for Scenario {
-    /// A sentence that lists the names.
-    type Err = String;
+    type Err = UnknownScenario;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|s| s.name() == text).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("{text:?} is no scenario; use one of {names}")
-        })
+    fn from_str(text: &str) -> Result<Self, UnknownScenario> {
+        Self::ALL.into_iter().find(|s| s.name() == text).ok_or_else(|| UnknownScenario { text: text.to_owned() })
     }
+}
+
+/// A text names no [`Scenario`]. Its message lists the names.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{text:?} is no scenario; use one of {}", Scenario::ALL.map(Scenario::name).join(", "))]
+pub struct UnknownScenario {
+    text: String,
 }
 
 /// Greatest step on each axis in a frame, in edges, where objects move slowly.

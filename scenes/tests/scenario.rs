@@ -1,6 +1,7 @@
 //! The contract of the scenes: the same bits everywhere, always valid, and as dense as their documentation says.
 
-use sapwise::{Aabb, Scenario, Scene};
+use sapwise::Aabb;
+use sapwise_scenes::{Scenario, Scene};
 
 fn pairs_per_object(boxes: &[Aabb]) -> f64 {
     let later = |(i, a): (usize, &Aabb)| boxes[i + 1..].iter().filter(|b| a.overlaps(b)).count();
@@ -32,7 +33,7 @@ fn names_are_read_back_and_others_refused_with_a_list() {
         assert_eq!(scenario.to_string().parse(), Ok(scenario));
         assert!(!scenario.description().is_empty() && !scenario.description().contains('\n'));
     }
-    let error = "Uniform".parse::<Scenario>().unwrap_err();
+    let error = "Uniform".parse::<Scenario>().unwrap_err().to_string();
     assert!(error.contains("\"Uniform\"") && error.contains("uniform, fast,") && error.contains("free-fall"), "{error}");
 }
 

@@ -1,7 +1,8 @@
 mod learning;
 
 use super::*;
-use crate::{AlgorithmCost, CostCurve, CostTerm, Scenario, Scene, Term};
+use crate::scene::{Scenario, Scene};
+use crate::{AlgorithmCost, CostCurve, CostTerm, Term};
 
 fn tuning(costs: &[(&str, f64, f64)]) -> Tuning {
     tuning_of([Term::Call, Term::Objects], costs)
@@ -116,7 +117,7 @@ fn unknown_algorithms_are_skipped_and_none_at_all_is_an_error() {
 
 /// The algorithm and the estimate of `moved` in each of so many frames of a scene.
 fn course(adaptive: &mut Adaptive, scenario: Scenario, frames: usize) -> Vec<(String, f64)> {
-    let mut scene = scenario.start(2000, 1);
+    let mut scene = Scene::start(scenario, 2000, 1);
     let mut pairs = Pairs::new();
     let frame = |_| {
         adaptive.find_pairs(scene.boxes(), &mut pairs).unwrap();
@@ -170,16 +171,16 @@ fn samples_until(adaptive: &mut Adaptive, scene: &mut Scene, algorithm: &str) ->
 fn a_change_of_how_far_boxes_move_is_seen_within_two_samples() {
     let mut adaptive = grid_sap_or_pair_cache();
     assert_eq!(course(&mut adaptive, Scenario::Uniform, 50)[49].0, "pair-cache@cpu1");
-    assert!(samples_until(&mut adaptive, &mut Scenario::Fast.start(2000, 1), "grid-sap@cpu1") <= 2);
+    assert!(samples_until(&mut adaptive, &mut Scene::start(Scenario::Fast, 2000, 1), "grid-sap@cpu1") <= 2);
     // Another number of boxes is sampled when a few times the price of that has passed, and the frame after tells.
-    assert!(samples_until(&mut adaptive, &mut Scenario::Resting.start(500, 1), "pair-cache@cpu1") <= 2);
+    assert!(samples_until(&mut adaptive, &mut Scene::start(Scenario::Resting, 500, 1), "pair-cache@cpu1") <= 2);
     assert!(adaptive.last_decision().unwrap().load.moved <= 0.01);
 }
 
 #[test]
 fn deciding_before_a_frame_does_not_make_it_look_at_rest() {
     let mut adaptive = grid_sap_or_pair_cache();
-    let mut scene = Scenario::Fast.start(2000, 1);
+    let mut scene = Scene::start(Scenario::Fast, 2000, 1);
     for _ in 0..70 {
         adaptive.decide(scene.boxes());
         adaptive.find_pairs(scene.boxes(), &mut Pairs::new()).unwrap();

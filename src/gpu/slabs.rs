@@ -95,11 +95,11 @@ impl Members {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Scenario;
+    use crate::scene::{Scenario, Scene};
 
     #[test]
     fn slabs_hold_their_shares_and_every_pair_has_one_owner() {
-        let mut scene = Scenario::Clustered.start(3000, 5);
+        let mut scene = Scene::start(Scenario::Clustered, 3000, 5);
         scene.advance();
         let boxes = scene.boxes();
         let mut slabs = Slabs::default();

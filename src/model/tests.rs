@@ -96,8 +96,11 @@ fn several_gpus_have_the_slowest_latency_and_added_rates_within_what_was_measure
     let both = [0, 1];
     assert_eq!((ns(Scale::GpuRoundTrip, &h, &both), ns(Scale::GpuDispatch, &h, &both)), (31_000.0, 2000.0));
     assert_eq!((ns(Scale::GpuUploadByte, &h, &both), ns(Scale::GpuOperation, &h, &both)), (1.0 / 15.0, 1.0 / 1500.0));
-    let ratios =
-        [(GpuParameterId::GroupUploadRatio, 1.2), (GpuParameterId::GroupRoundTripRatio, 2.0), (GpuParameterId::GroupArithmeticRatio, 1.9)];
+    let ratios = [
+        (GpuParameterId::GroupUploadRatio, 1.2),
+        (GpuParameterId::GroupRoundTripRatio, 2.0),
+        (GpuParameterId::GroupArithmeticRatio, 1.9),
+    ];
     h.gpu_groups.push(GpuGroup { gpus: both.to_vec(), parameters: parameters(&ratios) });
     assert_eq!((ns(Scale::GpuRoundTrip, &h, &both), ns(Scale::GpuDispatch, &h, &both)), (62_000.0, 2000.0));
     // 1.2 times the fastest is less than the sum, 1.9 times the fastest is more.

@@ -2,7 +2,7 @@
 
 use crate::{sweep, train};
 use sapwise::stats::{median, relative_iqr};
-use sapwise::report::{Point, Report};
+use crate::report::{Point, Report};
 use sapwise::{AlgorithmId, Tuning};
 use serde::Serialize;
 use std::collections::BTreeMap;

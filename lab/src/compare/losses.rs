@@ -2,7 +2,7 @@
 
 use crate::train::{Chooser, Evidence, Profile, Yardstick, available, average, by_costs, measured_costs, usable};
 use sapwise::Report;
-use sapwise::report::Label;
+use crate::report::Label;
 use serde::Serialize;
 
 /// Mean regrets over the points of reports, against the best at each point.

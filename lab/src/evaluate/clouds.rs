@@ -136,7 +136,7 @@ fn inverse(mut a: Array2<f64>) -> Array2<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use sapwise_scenes::Random;
     use sapwise::hardware::ParameterId;
     use sapwise::{Machine, Parameter};
 

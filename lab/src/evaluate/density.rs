@@ -4,7 +4,8 @@ use super::curve::measured_tuning;
 use crate::document::read_report;
 use sapwise::stats::median;
 use sapwise::report::Point;
-use sapwise::{Adaptive, AlgorithmId, BroadPhase, Pairs, Registry, Report, Scenario};
+use sapwise::{Adaptive, AlgorithmId, BroadPhase, Pairs, Registry, Report};
+use sapwise_scenes::Scenario;
 use std::path::Path;
 
 /// The median time of an algorithm at a point.

@@ -5,7 +5,7 @@ use super::profile::Profile;
 use super::rows::{Row, rows};
 use super::yardstick::Chooser;
 use super::{GPU_PARAMETERS, PARAMETERS};
-use crate::turns::Turns;
+use sapwise_scenes::Random;
 use anyhow::{Context, Result};
 use sapwise::{AlgorithmId, Backend, BackendClass, Hardware, Load};
 use smartcore::ensemble::random_forest_regressor::{RandomForestRegressor, RandomForestRegressorParameters};
@@ -70,7 +70,7 @@ impl Table {
         for (key, examples) in &self.0 {
             let known: Vec<&Example> = examples.iter().filter(|e| chosen[e.profile]).collect();
             // At random: with even steps every profile would give rows of the same few sizes.
-            let order = Turns::new(SEED).order(known.len());
+            let order = Random::new(SEED).shuffled(known.len());
             let known: Vec<&Example> = order.into_iter().take(MOST_ROWS).map(|k| known[k]).collect();
             if known.len() > LEAF {
                 forests.insert(key.clone(), Forest::grow(&known)?);

@@ -5,7 +5,7 @@ use super::profile::{Profile, machines};
 use super::scores;
 use super::validate::Data;
 use crate::progress::Progress;
-use crate::turns::Turns;
+use sapwise_scenes::Random;
 use anyhow::Result;
 use rayon::prelude::*;
 use sapwise::stats::quantile;
@@ -46,12 +46,12 @@ pub(super) fn trainings(profiles: &[Profile]) -> Vec<Training> {
         let some = |&m: &usize| of_machine[m].iter().copied().step_by(of_machine[m].len().div_ceil(OF_MACHINE));
         chosen.iter().flat_map(some).collect()
     };
-    let mut turns = Turns::new(SEED);
+    let mut random = Random::new(SEED);
     let mut all = Vec::new();
     for count in MACHINES.into_iter().filter(|&k| k < machines.len()) {
         let mut drawn: BTreeSet<Vec<usize>> = BTreeSet::new();
         for _ in 0..TRAININGS {
-            let order = turns.order(machines.len());
+            let order = random.shuffled(machines.len());
             let (mut known, others) = (order[..count].to_vec(), &order[count..]);
             known.sort_unstable();
             if drawn.insert(known.clone()) {

@@ -120,7 +120,7 @@ mod tests {
     use super::super::yardstick::Yardstick;
     use super::super::{available, by_costs};
     use super::*;
-    use crate::random::Random;
+    use sapwise_scenes::Random;
 
     #[test]
     fn samples_mend_a_prediction_that_is_off_by_a_factor() {

@@ -1,15 +1,15 @@
 //! A frame with two axes, and what is drawn in it.
 
 use super::axis::{Axis, Lies};
+use super::canvas::Area;
 use super::font;
 use super::mark::{Mark, mark};
-use super::paper::Area;
 use super::style::{self, AXIS, GRID, INK, LABEL, PANEL, SECONDARY, line_height};
 use plotters::prelude::*;
 use plotters_backend::text_anchor::{HPos, VPos};
 
 /// A place in units of its area.
-pub(super) type Place = (i32, i32);
+pub(super) type Position = (i32, i32);
 
 /// A rectangle of an area.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,13 +55,13 @@ pub(super) const ABOVE: i32 = 30;
 
 /// A line: its colour, width and dashes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Line {
+pub(super) struct Stroke {
     pub(super) colour: RGBColor,
     pub(super) width: u32,
     pub(super) dashes: &'static [i32],
 }
 
-impl Line {
+impl Stroke {
     /// That of the series at a position.
     pub(super) fn of(k: usize) -> Self {
         Self { colour: style::colour(k), width: 2, dashes: style::dashes(k) }
@@ -95,12 +95,12 @@ impl<'a, 'p> Chart<'a, 'p> {
         let Frame { left, top, right, bottom } = self.frame;
         for tick in self.y.ticks(self.frame.height(), Lies::Upright) {
             let Some(y) = self.y.share(tick.value).map(|share| self.up(share)) else { continue };
-            path(self.area, &[(left, y), (right, y)], Line::solid(GRID, 1))?;
+            path(self.area, &[(left, y), (right, y)], Stroke::solid(GRID, 1))?;
             words(self.area, &tick.label, (left - 6, y), LABEL, INK, HPos::Right, VPos::Center)?;
         }
         for tick in self.x.ticks(self.frame.width(), Lies::Flat) {
             let Some(x) = self.x.share(tick.value).map(|share| self.across(share)) else { continue };
-            path(self.area, &[(x, top), (x, bottom)], Line::solid(GRID, 1))?;
+            path(self.area, &[(x, top), (x, bottom)], Stroke::solid(GRID, 1))?;
             words(self.area, &tick.label, (x, bottom + 6), LABEL, INK, HPos::Center, VPos::Top)?;
         }
         self.border()?;
@@ -122,7 +122,7 @@ impl<'a, 'p> Chart<'a, 'p> {
     pub(super) fn border(&self) -> anyhow::Result<()> {
         let Frame { left, top, right, bottom } = self.frame;
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
-        path(self.area, &corners, Line::solid(SECONDARY, 1))
+        path(self.area, &corners, Stroke::solid(SECONDARY, 1))
     }
 
     fn across(&self, share: f64) -> i32 {
@@ -134,7 +134,7 @@ impl<'a, 'p> Chart<'a, 'p> {
     }
 
     /// Where a pair of values is. `None` where one of them has no place on its axis.
-    pub(super) fn place(&self, x: f64, y: f64) -> Option<Place> {
+    pub(super) fn place(&self, x: f64, y: f64) -> Option<Position> {
         Some((self.across(self.x.share(x)?), self.up(self.y.share(y)?)))
     }
 
@@ -146,44 +146,31 @@ impl<'a, 'p> Chart<'a, 'p> {
     }
 
     /// A line through these values, in pieces where one has no place.
-    pub(super) fn line(&self, values: impl IntoIterator<Item = (f64, f64)>, line: Line) -> anyhow::Result<()> {
-        let places: Vec<Option<Place>> = values.into_iter().map(|(x, y)| self.place(x, y)).collect();
+    pub(super) fn line(&self, values: impl IntoIterator<Item = (f64, f64)>, line: Stroke) -> anyhow::Result<()> {
+        let places: Vec<Option<Position>> = values.into_iter().map(|(x, y)| self.place(x, y)).collect();
         for piece in places.split(Option::is_none) {
-            let piece: Vec<Place> = piece.iter().flatten().copied().collect();
+            let piece: Vec<Position> = piece.iter().flatten().copied().collect();
             path(self.area, &piece, line)?;
         }
         Ok(())
     }
 
-    /// The area below a line through these values.
-    pub(super) fn below(
-        &self,
-        values: impl IntoIterator<Item = (f64, f64)>,
-        colour: RGBColor,
-        alpha: f64,
-    ) -> anyhow::Result<()> {
-        let mut places: Vec<Place> = values.into_iter().filter_map(|(x, y)| self.place(x, y)).collect();
-        let (Some(first), Some(last)) = (places.first().copied(), places.last().copied()) else { return Ok(()) };
-        places.extend([(last.0, self.frame.bottom), (first.0, self.frame.bottom)]);
-        Ok(self.area.draw(&Polygon::new(places, colour.mix(alpha).filled()))?)
-    }
-
     /// A bar from one value to another above `x`.
-    pub(super) fn bar(&self, x: f64, low: f64, high: f64, line: Line) -> anyhow::Result<()> {
+    pub(super) fn bar(&self, x: f64, low: f64, high: f64, line: Stroke) -> anyhow::Result<()> {
         let ends = (self.x.share(x), self.y.end(low), self.y.end(high));
         let (Some(x), Some(low), Some(high)) = ends else { return Ok(()) };
         self.capped((self.across(x), self.up(low)), (self.across(x), self.up(high)), line)
     }
 
     /// A bar from one value to another beside `y`.
-    pub(super) fn flat_bar(&self, y: f64, low: f64, high: f64, line: Line) -> anyhow::Result<()> {
+    pub(super) fn flat_bar(&self, y: f64, low: f64, high: f64, line: Stroke) -> anyhow::Result<()> {
         let ends = (self.y.share(y), self.x.end(low), self.x.end(high));
         let (Some(y), Some(low), Some(high)) = ends else { return Ok(()) };
         self.capped((self.across(low), self.up(y)), (self.across(high), self.up(y)), line)
     }
 
     /// With short lines across its ends. One of no length would be a spot beside the mark.
-    fn capped(&self, a: Place, b: Place, line: Line) -> anyhow::Result<()> {
+    fn capped(&self, a: Position, b: Position, line: Stroke) -> anyhow::Result<()> {
         if a == b {
             return Ok(());
         }
@@ -203,13 +190,13 @@ impl<'a, 'p> Chart<'a, 'p> {
     }
 
     /// A line over the whole height.
-    pub(super) fn upright(&self, x: f64, line: Line) -> anyhow::Result<()> {
+    pub(super) fn upright(&self, x: f64, line: Stroke) -> anyhow::Result<()> {
         let Some(x) = self.x.share(x).map(|share| self.across(share)) else { return Ok(()) };
         path(self.area, &[(x, self.frame.bottom), (x, self.frame.top)], line)
     }
 
     /// Lines where the second value is the first times a factor. Both axes must be logarithmic and the same.
-    pub(super) fn factors(&self, factors: &[(f64, Line)]) -> anyhow::Result<()> {
+    pub(super) fn factors(&self, factors: &[(f64, Stroke)]) -> anyhow::Result<()> {
         let (low, high) = self.x.ends();
         for &(factor, line) in factors {
             let ends = [low.max(low / factor), high.min(high / factor)];
@@ -236,7 +223,7 @@ impl<'a, 'p> Chart<'a, 'p> {
 /// A frame with a sentence in it.
 pub(super) fn missing(area: &Area<'_>, frame: Frame, sentence: &str) -> anyhow::Result<()> {
     let Frame { left, top, right, bottom } = frame;
-    path(area, &[(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], Line::solid(GRID, 1))?;
+    path(area, &[(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], Stroke::solid(GRID, 1))?;
     let lines = font::wrapped(sentence, AXIS, frame.width() - 20, 6);
     let first = (top + bottom - (lines.len() as i32 - 1) * line_height(AXIS)) / 2;
     for (k, line) in lines.iter().enumerate() {
@@ -250,7 +237,7 @@ pub(super) fn missing(area: &Area<'_>, frame: Frame, sentence: &str) -> anyhow::
 pub(super) fn words(
     area: &Area<'_>,
     text: &str,
-    place: Place,
+    place: Position,
     size: u32,
     colour: RGBColor,
     h: HPos,
@@ -269,7 +256,7 @@ pub(super) fn fill(area: &Area<'_>, frame: Frame, colour: RGBColor, alpha: f64) 
 }
 
 /// A line through places, in strokes where it has dashes.
-pub(super) fn path(area: &Area<'_>, places: &[Place], line: Line) -> anyhow::Result<()> {
+pub(super) fn path(area: &Area<'_>, places: &[Position], line: Stroke) -> anyhow::Result<()> {
     let mut places = places.to_vec();
     // The polygon that a PNG makes of a wide line has no direction between two points at one place.
     places.dedup();
@@ -287,7 +274,7 @@ pub(super) fn path(area: &Area<'_>, places: &[Place], line: Line) -> anyhow::Res
 }
 
 /// The strokes of a dashed line; gaps go around its corners.
-fn strokes(places: &[Place], dashes: &[i32]) -> Vec<Vec<Place>> {
+fn strokes(places: &[Position], dashes: &[i32]) -> Vec<Vec<Position>> {
     let mut strokes = Vec::new();
     let (mut k, mut left) = (0, f64::from(dashes[0]));
     let mut stroke = vec![places[0]];
@@ -344,7 +331,7 @@ pub(super) fn hatch(area: &Area<'_>, frame: Frame, hatch: Hatch, colour: RGBColo
     let rising = matches!(hatch, Hatch::Rising | Hatch::Crossed | Hatch::Interval);
     let falling = matches!(hatch, Hatch::Falling | Hatch::Crossed);
     let flat = hatch == Hatch::Flat;
-    let line = Line::solid(colour, 1);
+    let line = Stroke::solid(colour, 1);
     let Frame { left, top, right, bottom } = frame;
     let first = |low: i32| low + (every - low.rem_euclid(every)) % every;
     if rising {

@@ -2,13 +2,12 @@
 //! optimal performance shaded.
 
 use super::axis::{Axis, time_unit};
-use super::chart::{ABOVE, BELOW, Chart, Frame, Hatch, LEFT, Line, RIGHT, fill, hatch, missing, path, words};
+use super::canvas::Area;
+use super::chart::{ABOVE, BELOW, Chart, Frame, Hatch, LEFT, RIGHT, Stroke, fill, hatch, missing, path, words};
 use super::legend::{Legend, Sign};
 use super::mark::mark;
-use super::paper::Area;
 use super::style::{self, GAP, INK, PANEL, SECONDARY, SMALL, WIDTH};
-use super::{Figure, Tabled, font, tabled};
-use crate::sheet::Sheet;
+use super::{Figure, font};
 use plotters_backend::text_anchor::{HPos, VPos};
 
 /// One to four panels with the same ranges of both axes.
@@ -24,7 +23,7 @@ pub(crate) struct CurvePanel {
     pub(crate) title: String,
     pub(crate) series: Vec<Curve>,
     pub(crate) fields: Vec<Band>,
-    pub(crate) crossings: Vec<Crossing>,
+    pub(crate) borders: Vec<BorderLine>,
 }
 
 /// One algorithm.
@@ -59,7 +58,7 @@ pub(crate) struct Band {
 
 /// Where the next algorithm becomes the fastest.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Crossing {
+pub(crate) struct BorderLine {
     pub(crate) objects: f64,
     /// The interval of it.
     pub(crate) low: f64,
@@ -88,8 +87,8 @@ impl Curves {
             (if curve { Sign::Curve(style) } else { Sign::Mark(style) }, name.clone())
         };
         let mut entries: Vec<(Sign, String)> = names.into_iter().map(sign).collect();
-        if self.panels.iter().any(|p| !p.crossings.is_empty()) {
-            entries.push((Sign::Interval(CROSSING), "crossover, with its interval".to_owned()));
+        if self.panels.iter().any(|p| !p.borders.is_empty()) {
+            entries.push((Sign::Interval(BORDER), "border, with its 90 % interval".to_owned()));
         }
         Legend::new(entries, WIDTH as i32 - 2 * GAP)
     }
@@ -99,8 +98,8 @@ impl Curves {
     }
 }
 
-/// The line at a crossover.
-const CROSSING: Line = Line::dashed(INK, 1);
+/// The line at a border.
+const BORDER: Stroke = Stroke::dashed(INK, 1);
 
 impl CurvePanel {
     fn draw(&self, area: &Area<'_>, frame: Frame, axes: &(Axis, Axis), unit: (&str, f64)) -> anyhow::Result<()> {
@@ -116,8 +115,8 @@ impl CurvePanel {
                 fill(area, shaded, style::colour(field.style), style::FIELD)?;
             }
         }
-        for crossing in &self.crossings {
-            if let Some(shaded) = chart.rectangle((crossing.low, crossing.high), (0.0, f64::INFINITY)) {
+        for border in &self.borders {
+            if let Some(shaded) = chart.rectangle((border.low, border.high), (0.0, f64::INFINITY)) {
                 hatch(area, shaded, Hatch::Interval, SECONDARY)?;
             }
         }
@@ -125,16 +124,16 @@ impl CurvePanel {
         for field in &self.fields {
             field.name(area, &chart)?;
         }
-        for crossing in &self.crossings {
-            chart.upright(crossing.objects, CROSSING)?;
+        for border in &self.borders {
+            chart.upright(border.objects, BORDER)?;
         }
         for curve in &self.series {
             let points: Vec<CurvePoint> = curve.points.iter().copied().filter(drawn).collect();
             let colour = style::colour(curve.style);
             for p in &points {
-                chart.bar(p.objects, p.low_ns / unit.1, p.high_ns / unit.1, Line::solid(colour, 1))?;
+                chart.bar(p.objects, p.low_ns / unit.1, p.high_ns / unit.1, Stroke::solid(colour, 1))?;
             }
-            chart.line(points.iter().map(|p| (p.objects, p.ns / unit.1)), Line::of(curve.style))?;
+            chart.line(points.iter().map(|p| (p.objects, p.ns / unit.1)), Stroke::of(curve.style))?;
             for p in &points {
                 chart.mark(p.objects, p.ns / unit.1, style::mark(curve.style), colour, 4)?;
             }
@@ -153,7 +152,7 @@ impl Band {
         let frame = Frame { top, bottom, ..below };
         fill(area, frame, style::colour(self.style), 2.0 * style::FIELD)?;
         let sides = [(frame.left, bottom), (frame.left, top), (frame.right, top), (frame.right, bottom)];
-        path(area, &sides, Line::solid(SECONDARY, 1))?;
+        path(area, &sides, Stroke::solid(SECONDARY, 1))?;
         let place = ((frame.left + frame.right) / 2, (top + bottom) / 2);
         if font::width(&self.name, SMALL) + 6 <= frame.width() {
             return words(area, &self.name, place, SMALL, INK, HPos::Center, VPos::Center);
@@ -187,48 +186,12 @@ impl Figure for Curves {
         let ns = || self.points().flat_map(|p| [p.ns, p.low_ns, p.high_ns]);
         let unit = time_unit(ns());
         let objects = self.points().map(|p| p.objects);
-        let crossings = self.panels.iter().flat_map(|p| &p.crossings).map(|c| c.objects);
-        let axes = (Axis::log(objects.chain(crossings), 1.15), Axis::log(ns().map(|ns| ns / unit.1), 1.3));
+        let borders = self.panels.iter().flat_map(|p| &p.borders).map(|b| b.objects);
+        let axes = (Axis::log(objects.chain(borders), 1.15), Axis::log(ns().map(|ns| ns / unit.1), 1.3));
         let columns = self.panels.len().min(2);
         for (panel, frame) in self.panels.iter().zip(whole.parts(self.panels.len(), columns, GAP)) {
             panel.draw(area, frame, &axes, unit)?;
         }
         legend.draw(area, (GAP, height))
-    }
-}
-
-impl Tabled for Curves {
-    fn csv(&self) -> Sheet {
-        let mut rows = Vec::new();
-        for panel in &self.panels {
-            let mut row = |kind: &str, name: &str, values: [f64; 6]| {
-                let figures = values.into_iter().map(tabled::figure);
-                rows.push([&panel.title, kind, name].map(tabled::text).into_iter().chain(figures).collect());
-            };
-            for curve in &panel.series {
-                for p in &curve.points {
-                    let none = f64::NAN;
-                    row("time", &curve.name, [p.objects, none, none, p.ns, p.low_ns, p.high_ns]);
-                }
-            }
-            for field in &panel.fields {
-                row("field", &field.name, [f64::NAN, field.from, field.to, f64::NAN, f64::NAN, f64::NAN]);
-            }
-            for c in &panel.crossings {
-                row("crossover", "", [c.objects, c.low, c.high, f64::NAN, f64::NAN, f64::NAN]);
-            }
-        }
-        let columns = [
-            ("panel", "panel"),
-            ("what", "what"),
-            ("algorithm", "algorithm"),
-            ("objects", "objects"),
-            ("from objects", "low_objects"),
-            ("to objects", "high_objects"),
-            ("time (ns)", "time_ns"),
-            ("lower quartile (ns)", "low_ns"),
-            ("upper quartile (ns)", "high_ns"),
-        ];
-        tabled::sheet(&columns, rows)
     }
 }

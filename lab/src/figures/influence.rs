@@ -1,12 +1,11 @@
 //! Which hardware parameters are linked to which algorithms and crossovers.
 
-use super::chart::{Frame, Line, Place, fill, missing, path, words};
+use super::canvas::Area;
+use super::chart::{Frame, Position, Stroke, fill, missing, path, words};
 use super::legend::{Legend, Sign};
 use super::mark::{Mark, mark};
-use super::paper::Area;
 use super::style::{self, GAP, GRID, INK, LABEL, PANEL, SECONDARY, SMALL, WIDTH, line_height};
-use super::{Figure, Tabled, font, tabled};
-use crate::sheet::Sheet;
+use super::{Figure, font};
 use plotters::element::Text;
 use plotters::style::FontTransform;
 use plotters_backend::text_anchor::{HPos, VPos};
@@ -17,14 +16,14 @@ pub(crate) struct Influence {
     pub(crate) title: String,
     pub(crate) columns: Vec<String>,
     pub(crate) rows: Vec<String>,
-    /// For each row one cell for each column; what is missing is `Mark3::Absent`.
+    /// For each row one cell for each column; what is missing is `Verdict::Absent`.
     pub(crate) cells: Vec<Vec<InfluenceCell>>,
 }
 
 /// One parameter and one algorithm or crossover.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct InfluenceCell {
-    pub(crate) verdict: Mark3,
+    pub(crate) verdict: Verdict,
     /// Signed strength, as the rank correlation.
     pub(crate) value: Option<f64>,
     /// What stands in the cell.
@@ -33,7 +32,7 @@ pub(crate) struct InfluenceCell {
 
 /// A verdict.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) enum Mark3 {
+pub(crate) enum Verdict {
     Linked,
     NotLinked,
     CannotBeTold,
@@ -70,7 +69,7 @@ impl InfluenceCell {
     }
 }
 
-impl Mark3 {
+impl Verdict {
     const ALL: [(Self, &'static str); 4] = [
         (Self::Linked, "linked"),
         (Self::NotLinked, "not linked"),
@@ -78,12 +77,8 @@ impl Mark3 {
         (Self::Absent, "absent: too few values"),
     ];
 
-    fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(verdict, _)| *verdict == self).map_or("", |(_, name)| name)
-    }
-
     /// Shade and symbol, the symbol at `place`.
-    pub(super) fn draw(self, area: &Area<'_>, frame: Frame, place: Place) -> anyhow::Result<()> {
+    pub(super) fn draw(self, area: &Area<'_>, frame: Frame, place: Position) -> anyhow::Result<()> {
         match self {
             Self::Linked => {
                 fill(area, frame, style::colour(LINKED), 0.45)?;
@@ -122,7 +117,7 @@ impl Influence {
     }
 
     fn legend(&self) -> Legend {
-        let entries = Mark3::ALL.map(|(verdict, name)| (Sign::Verdict(verdict), name.to_owned()));
+        let entries = Verdict::ALL.map(|(verdict, name)| (Sign::Verdict(verdict), name.to_owned()));
         Legend::new(entries.to_vec(), WIDTH as i32 - 2 * GAP)
     }
 
@@ -201,28 +196,6 @@ impl InfluenceCell {
         self.verdict.draw(area, frame, (middle, symbol))?;
         words(area, &text, (middle, bottom - 11), SMALL, INK, HPos::Center, VPos::Center)?;
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
-        path(area, &corners, Line::solid(GRID, 1))
-    }
-}
-
-impl Tabled for Influence {
-    fn csv(&self) -> Sheet {
-        let mut rows = Vec::new();
-        for (row, cells) in self.rows.iter().zip(&self.cells) {
-            for (column, cell) in self.columns.iter().zip(cells) {
-                let mut line = [row, column, cell.verdict.name()].map(tabled::text).to_vec();
-                line.push(tabled::maybe(cell.value, "too few values"));
-                line.push(tabled::text(&cell.text));
-                rows.push(line);
-            }
-        }
-        let columns = [
-            ("parameter", "parameter"),
-            ("algorithm or crossover", "target"),
-            ("verdict", "verdict"),
-            ("strength", "strength"),
-            ("as shown", "text"),
-        ];
-        tabled::sheet(&columns, rows)
+        path(area, &corners, Stroke::solid(GRID, 1))
     }
 }

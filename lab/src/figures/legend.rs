@@ -1,10 +1,10 @@
 //! What the series are called, in columns below a chart.
 
-use super::Mark3;
-use super::chart::{Frame, Hatch, Line, fill, hatch, path, words};
+use super::Verdict;
+use super::canvas::Area;
+use super::chart::{Frame, Hatch, Stroke, fill, hatch, path, words};
 use super::font;
 use super::mark::{Mark, mark};
-use super::paper::Area;
 use super::style::{self, INK, LABEL, SECONDARY, line_height};
 use plotters_backend::text_anchor::{HPos, VPos};
 
@@ -17,7 +17,7 @@ const ROW: i32 = line_height(LABEL) + 3;
 /// What stands before a name.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Sign {
-    /// Line and mark of the series at a position.
+    /// Stroke and mark of the series at a position.
     Curve(usize),
     /// Its mark on a line without gaps.
     Marked(usize),
@@ -26,13 +26,13 @@ pub(super) enum Sign {
     /// Its field, the colour and the lines over it, with its mark.
     Field(usize),
     /// A line that is no series.
-    Line(Line),
+    Stroke(Stroke),
     /// A line with the interval around it.
-    Interval(Line),
+    Interval(Stroke),
     /// The ring around a mark.
     Ring,
     /// A verdict in its cell.
-    Verdict(Mark3),
+    Verdict(Verdict),
     None,
 }
 
@@ -81,11 +81,11 @@ impl Sign {
         let ends = [(left, y), (right, y)];
         match self {
             Self::Curve(k) => {
-                path(area, &ends, Line::of(k))?;
+                path(area, &ends, Stroke::of(k))?;
                 area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?;
             }
             Self::Marked(k) => {
-                path(area, &ends, Line::solid(style::colour(k), 2))?;
+                path(area, &ends, Stroke::solid(style::colour(k), 2))?;
                 area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?;
             }
             Self::Mark(k) => area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?,
@@ -93,7 +93,7 @@ impl Sign {
                 let frame = Frame { left, top: y - 7, right, bottom: y + 7 };
                 fill(area, frame, style::colour(k), style::FIELD)?;
                 hatch(area, frame, Hatch::of(k), style::colour(k))?;
-                area.draw(&mark((middle, y), Mark::Ground, style::PAPER, 6))?;
+                area.draw(&mark((middle, y), Mark::Ground, style::GROUND, 6))?;
                 area.draw(&mark((middle, y), style::mark(k), style::colour(k), 4))?;
             }
             Self::Ring => area.draw(&mark((middle, y), Mark::Ring, INK, 7))?,
@@ -101,7 +101,7 @@ impl Sign {
                 verdict.draw(area, Frame { left, top: y - 9, right, bottom: y + 9 }, (middle, y))?;
             }
             Self::None => {}
-            Self::Line(line) => path(area, &ends, line)?,
+            Self::Stroke(line) => path(area, &ends, line)?,
             Self::Interval(line) => {
                 hatch(area, Frame { left, top: y - 7, right, bottom: y + 7 }, Hatch::Interval, SECONDARY)?;
                 path(area, &[(middle, y - 7), (middle, y + 7)], line)?;

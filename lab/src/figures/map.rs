@@ -1,13 +1,12 @@
 //! The map that the paper could not draw: fields of optimal performance over two axes.
 
+use super::Figure;
 use super::axis::Axis;
+use super::canvas::Area;
 use super::chart::{ABOVE, BELOW, Chart, Frame, Hatch, LEFT, RIGHT, fill, hatch, missing};
 use super::legend::{Legend, Sign};
 use super::mark::Mark;
-use super::paper::Area;
 use super::style::{self, GAP, INK, WIDTH};
-use super::{Figure, Tabled, tabled};
-use crate::sheet::Sheet;
 
 /// Panels beside each other, measured beside predicted, over the number of objects and a density.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -121,7 +120,7 @@ impl FieldMap {
         chart.border()?;
         for point in &panel.points {
             let Some(style) = self.style(point.algorithm) else { continue };
-            chart.mark(point.x, point.y, Mark::Ground, style::PAPER, 6)?;
+            chart.mark(point.x, point.y, Mark::Ground, style::GROUND, 6)?;
             chart.mark(point.x, point.y, style::mark(style), style::colour(style), 4)?;
             if point.is_lossy() {
                 chart.mark(point.x, point.y, Mark::Ring, INK, 9)?;
@@ -154,40 +153,5 @@ impl Figure for FieldMap {
             self.panel(area, frame, panel)?;
         }
         legend.draw(area, (GAP, bottom))
-    }
-}
-
-impl Tabled for FieldMap {
-    fn csv(&self) -> Sheet {
-        let mut rows = Vec::new();
-        for panel in &self.panels {
-            let mut row = |what: &str, algorithm: usize, figures: [f64; 6], loss: Option<f64>| {
-                let name = self.names.get(algorithm).map_or("", |name| &name.0);
-                let mut row = [&panel.title, what, name].map(tabled::text).to_vec();
-                row.extend(figures.map(tabled::figure));
-                row.push(tabled::maybe(loss, "no regret is known"));
-                rows.push(row);
-            };
-            for c in merged(&panel.grid) {
-                row("field", c.algorithm, [f64::NAN, c.x.0, c.x.1, f64::NAN, c.y.0, c.y.1], None);
-            }
-            for p in &panel.points {
-                row("frame", p.algorithm, [p.x, f64::NAN, f64::NAN, p.y, f64::NAN, f64::NAN], p.loss);
-            }
-        }
-        let [y, y_low, y_high] = ["", ", from", ", to"].map(|end| format!("{}{end}", self.y_name));
-        let columns = [
-            ("panel", "panel"),
-            ("what", "what"),
-            ("algorithm", "algorithm"),
-            ("objects", "objects"),
-            ("from objects", "low_objects"),
-            ("to objects", "high_objects"),
-            (&y, "density"),
-            (&y_low, "low_density"),
-            (&y_high, "high_density"),
-            ("regret", "regret"),
-        ];
-        tabled::sheet(&columns, rows)
     }
 }

@@ -1,44 +1,37 @@
-//! Pictures.
+//! Pictures of plain data, as SVG and as PNG.
 
+mod agreement;
 mod axis;
+mod canvas;
 mod chart;
-mod crossings;
 mod curves;
 mod font;
 mod influence;
-mod learning;
 mod legend;
 mod legended;
 mod map;
 mod mark;
-mod paper;
 mod ratios;
 mod regrets;
-mod simulation;
+mod replay;
 mod style;
-mod tabled;
-mod times;
 mod training;
 
-use crate::exit::WrongUsage;
-use paper::Area;
+use canvas::Area;
 use plotters::element::Text;
 use plotters::style::RGBColor;
 use plotters_backend::text_anchor::{HPos, VPos};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use style::{GAP, INK, SECONDARY, SMALL, TITLE, line_height};
 
-pub(crate) use crossings::{CrossingPair, Crossings};
-pub(crate) use curves::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
-pub(crate) use influence::{Influence, InfluenceCell, Mark3};
-pub(crate) use learning::{LearningCurve, LearningPoint, LearningWay};
+pub(crate) use agreement::{Agreement, AgreementGroup, AgreementPoint, Values};
+pub(crate) use curves::{Band, BorderLine, Curve, CurvePanel, CurvePoint, Curves};
+pub(crate) use influence::{Influence, InfluenceCell, Verdict};
 pub(crate) use map::{FieldMap, MapCell, MapPanel, MapPoint};
 pub(crate) use ratios::{RatioGroup, RatioKind, RatioValue, Ratios};
-pub(crate) use regrets::{Regrets, Way};
-pub(crate) use simulation::Simulation;
-pub(crate) use tabled::Tabled;
-pub(crate) use times::{TimePair, Times, TimesOf};
-pub(crate) use training::Training;
+pub(crate) use regrets::{Regrets, StrategyRegrets};
+pub use replay::ReplayPicture;
+pub use training::TrainingPicture;
 
 /// Lines at most of a title, and of a paragraph of a caption: a name or command of a megabyte makes no picture of a mile.
 const TITLE_LINES: usize = 3;
@@ -46,8 +39,10 @@ const CAPTION_LINES: usize = 12;
 
 /// How a picture is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Picture {
+pub enum Picture {
+    /// Lines and text, which stay sharp at every size.
     Svg,
+    /// Pixels, two for each unit of length.
     Png,
 }
 
@@ -55,22 +50,33 @@ impl Picture {
     /// What the name of a file asks for.
     ///
     /// # Errors
-    /// When it asks for neither.
-    pub(crate) fn of(path: &Path) -> Result<Self, WrongUsage> {
+    /// When it ends in neither `.svg` nor `.png`.
+    pub fn of(path: &Path) -> Result<Self, UnknownPicture> {
         match path.extension().and_then(|e| e.to_str()) {
             Some("svg") => Ok(Self::Svg),
             Some("png") => Ok(Self::Png),
-            _ => Err(WrongUsage(format!("--plot {}: name a file that ends in .svg or .png", path.display()))),
+            _ => Err(UnknownPicture { path: path.to_owned() }),
         }
     }
 }
 
+/// The name of a file that does not say which kind of picture it is.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}: name a file that ends in .svg or .png", path.display())]
+#[non_exhaustive]
+pub struct UnknownPicture {
+    /// The file.
+    pub path: PathBuf,
+}
+
 /// A picture of plain data.
-pub(crate) trait Figure {
+///
+/// Only the figures of this module can draw: the canvas is theirs.
+pub trait Figure {
     /// What stands above it; nothing where this is empty.
     fn title(&self) -> &str;
 
-    /// Width and height in units of what `draw_on` draws, without title and caption.
+    /// Width and height in units of what [`draw_on`](Self::draw_on) draws, without title and caption.
     fn size(&self) -> (u32, u32);
 
     /// Draws it from the upper left corner.
@@ -83,14 +89,14 @@ pub(crate) trait Figure {
     ///
     /// # Errors
     /// When the picture can't be drawn.
-    fn draw(&self, picture: Picture, caption: &[String]) -> anyhow::Result<Vec<u8>> {
+    fn draw(&self, format: Picture, caption: &[String]) -> anyhow::Result<Vec<u8>> {
         let (width, height) = self.size();
         let room = width as i32 - 2 * GAP;
         let title = if self.title().is_empty() { Vec::new() } else { font::wrapped(self.title(), TITLE, room, TITLE_LINES) };
         let caption: Vec<String> = caption.iter().flat_map(|text| font::wrapped(text, SMALL, room, CAPTION_LINES)).collect();
         let top = block(&title, TITLE);
         let bottom = block(&caption, SMALL);
-        paper::picture(picture, (width, top + height + bottom), |root| {
+        canvas::picture(format, (width, top + height + bottom), |root| {
             let (above, rest) = root.split_vertically(top);
             let (body, below) = rest.split_vertically(height);
             lines(&above, &title, TITLE, INK)?;

@@ -2,12 +2,11 @@
 //! speed-up of each algorithm.
 
 use super::axis::Axis;
-use super::chart::{BELOW, Chart, Frame, Line, RIGHT, fill, missing, path, words};
+use super::canvas::Area;
+use super::chart::{BELOW, Chart, Frame, RIGHT, Stroke, fill, missing, path, words};
 use super::legend::{Legend, Sign};
-use super::paper::Area;
-use super::style::{self, GAP, GRID, INK, LABEL, PANEL, PAPER, SECONDARY, WIDTH, line_height};
-use super::{Figure, Tabled, font, tabled};
-use crate::sheet::Sheet;
+use super::style::{self, GAP, GRID, GROUND, INK, LABEL, PANEL, SECONDARY, WIDTH, line_height};
+use super::{Figure, font};
 use plotters_backend::text_anchor::{HPos, VPos};
 
 /// A row for each parameter and each algorithm, a mark for each machine.
@@ -89,7 +88,7 @@ impl Ratios {
     fn legend(&self) -> Legend {
         let mut entries: Vec<(Sign, String)> =
             self.machines.iter().enumerate().map(|(k, name)| (Sign::Mark(k), name.clone())).collect();
-        entries.push((Sign::Line(REFERENCE), format!("{} (the reference)", self.reference)));
+        entries.push((Sign::Stroke(REFERENCE), format!("{} (the reference)", self.reference)));
         if self.groups.iter().any(|g| (0..self.machines.len()).any(|k| g.of(k).is_none())) {
             entries.push((Sign::None, "no mark: a value is missing".to_owned()));
         }
@@ -101,7 +100,7 @@ impl Ratios {
         let middle = top + self.row_height() / 2;
         let name = font::wrapped(&group.name, LABEL, left - 2 * GAP, 1).concat();
         words(area, &name, (left - 8, middle), LABEL, INK, HPos::Right, VPos::Center)?;
-        path(area, &[(left, top), (right, top)], Line::solid(GRID, 1))?;
+        path(area, &[(left, top), (right, top)], Stroke::solid(GRID, 1))?;
         if (0..self.machines.len()).all(|k| group.of(k).is_none()) {
             return words(area, "missing", (left + 8, middle), LABEL, SECONDARY, HPos::Left, VPos::Center);
         }
@@ -112,7 +111,7 @@ impl Ratios {
             let y = f64::from(chart.frame.bottom - y);
             let colour = style::colour(k);
             if let (Some(low), Some(high)) = (value.low, value.high) {
-                chart.flat_bar(y, low, high, Line::solid(colour, 1))?;
+                chart.flat_bar(y, low, high, Stroke::solid(colour, 1))?;
             }
             chart.mark(value.ratio, y, style::mark(k), colour, 4)?;
         }
@@ -121,7 +120,7 @@ impl Ratios {
 }
 
 /// The line at one.
-const REFERENCE: Line = Line::solid(INK, 2);
+const REFERENCE: Stroke = Stroke::solid(INK, 2);
 
 const NOTHING: &str = "there is no parameter and no algorithm that two machines have in common";
 
@@ -156,7 +155,7 @@ impl Figure for Ratios {
         let mut top = frame.top;
         for (heading, groups) in self.parts() {
             let ground = Frame { left: whole.left, top, bottom: top + HEAD, right: frame.right };
-            fill(area, ground, PAPER, 1.0)?;
+            fill(area, ground, GROUND, 1.0)?;
             fill(area, ground, GRID, 0.5)?;
             let place = (whole.left + 6, top + HEAD / 2);
             words(area, heading, place, PANEL, INK, HPos::Left, VPos::Center)?;
@@ -167,37 +166,5 @@ impl Figure for Ratios {
             }
         }
         Ok(())
-    }
-}
-
-impl Tabled for Ratios {
-    fn csv(&self) -> Sheet {
-        let mut rows = Vec::new();
-        for group in &self.groups {
-            let kind = match group.kind {
-                RatioKind::Parameter => "parameter",
-                RatioKind::Algorithm => "algorithm",
-            };
-            for (k, machine) in self.machines.iter().enumerate() {
-                let value = group.values.get(k).copied().flatten();
-                let none = "missing on one of the two machines";
-                let mut row = [kind, &group.name, machine, &self.reference].map(tabled::text).to_vec();
-                row.push(tabled::maybe(value.map(|v| v.ratio), none));
-                row.extend(
-                    [value.and_then(|v| v.low), value.and_then(|v| v.high)].map(|end| tabled::maybe(end, "no interval")),
-                );
-                rows.push(row);
-            }
-        }
-        let columns = [
-            ("what", "what"),
-            ("name", "name"),
-            ("machine", "machine"),
-            ("reference", "reference"),
-            ("ratio", "ratio"),
-            ("ratio, low end", "low_ratio"),
-            ("ratio, high end", "high_ratio"),
-        ];
-        tabled::sheet(&columns, rows)
     }
 }

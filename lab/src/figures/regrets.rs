@@ -1,29 +1,28 @@
 //! The regret on each held-out machine.
 
+use super::Figure;
 use super::axis::Axis;
-use super::chart::{Chart, Frame, Line, missing};
+use super::canvas::Area;
+use super::chart::{Chart, Frame, Stroke, missing};
 use super::legend::{Legend, Sign};
 use super::legended::Legended;
-use super::paper::Area;
 use super::style;
-use super::{Figure, Tabled, tabled};
-use crate::sheet::Sheet;
 
 /// A regret below this can't be seen on a logarithmic axis: a tenth of a percent.
 const LEAST_PERCENT: f64 = 0.1;
 
-/// For each way to choose the mean regrets from the least to the most, by itself: at 95 is the 95th percentile.
+/// For each strategy the mean regrets from the least to the most, by itself: at 95 is the 95th percentile.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Regrets {
     pub(crate) title: String,
-    /// What was left out: a physical machine, or a profile.
+    /// What was held out: a physical machine, or a profile.
     pub(crate) unit: String,
-    pub(crate) ways: Vec<Way>,
+    pub(crate) strategies: Vec<StrategyRegrets>,
 }
 
-/// A way to choose.
+/// A way to choose an algorithm.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Way {
+pub(crate) struct StrategyRegrets {
     pub(crate) name: String,
     pub(crate) style: usize,
     /// Of each unit, 0.1 for 10 %.
@@ -31,45 +30,40 @@ pub(crate) struct Way {
 }
 
 /// A regret in percent, no less than what the axis shows.
-pub(super) fn seen(regret: f64) -> f64 {
+fn seen(regret: f64) -> f64 {
     // The maximum of no number and a number is the number.
     if regret.is_nan() { f64::NAN } else { (regret * 100.0).max(LEAST_PERCENT) }
 }
 
 /// The axis for regrets in percent.
-pub(super) fn percent_axis(seen: impl Iterator<Item = f64>) -> Axis {
+fn percent_axis(seen: impl Iterator<Item = f64>) -> Axis {
     let high = seen.filter(|v| v.is_finite()).fold(1.0, f64::max);
     Axis::log([LEAST_PERCENT / 1.2, high * 1.5], 1.0)
 }
 
-/// What the axis says besides.
-pub(super) fn bottom() -> String {
-    format!("{LEAST_PERCENT} or less at the bottom")
-}
-
-const NOTHING: &str = "Nothing was left out: there is one report only.";
+const NOTHING: &str = "Nothing was held out: there is one report only.";
 
 impl Legended for Regrets {
     fn legend(&self, width: i32) -> Legend {
-        Legend::new(self.ways.iter().map(|w| (Sign::Curve(w.style), w.name.clone())).collect(), width)
+        Legend::new(self.strategies.iter().map(|s| (Sign::Curve(s.style), s.name.clone())).collect(), width)
     }
 
     fn chart(&self, area: &Area<'_>, frame: Frame, title: &str) -> anyhow::Result<()> {
-        let all = || self.ways.iter().flat_map(|w| &w.regrets).map(|r| seen(*r));
+        let all = || self.strategies.iter().flat_map(|s| &s.regrets).map(|r| seen(*r));
         if all().next().is_none() {
             return missing(area, frame, NOTHING);
         }
         let chart = Chart::new(area, frame, Axis::linear(0.0, 100.0), percent_axis(all()));
         let x_name = format!("share of the held-out {}s with no more regret (%)", self.unit);
-        chart.grid(title, &x_name, &format!("mean regret (%, {})", bottom()))?;
-        for way in &self.ways {
-            let mut regrets = way.regrets.clone();
+        chart.grid(title, &x_name, &format!("mean regret (%, {LEAST_PERCENT} or less at the bottom)"))?;
+        for strategy in &self.strategies {
+            let mut regrets = strategy.regrets.clone();
             regrets.sort_by(f64::total_cmp);
             let share = |at: usize| 100.0 * (at as f64 + 0.5) / regrets.len() as f64;
             let points: Vec<(f64, f64)> = regrets.iter().enumerate().map(|(at, r)| (share(at), seen(*r))).collect();
-            chart.line(points.iter().copied(), Line::of(way.style))?;
+            chart.line(points.iter().copied(), Stroke::of(strategy.style))?;
             for &(x, y) in points.iter().step_by(points.len().div_ceil(20).max(1)) {
-                chart.mark(x, y, style::mark(way.style), style::colour(way.style), 4)?;
+                chart.mark(x, y, style::mark(strategy.style), style::colour(strategy.style), 4)?;
             }
         }
         Ok(())
@@ -87,13 +81,5 @@ impl Figure for Regrets {
 
     fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()> {
         self.draw_alone(area)
-    }
-}
-
-impl Tabled for Regrets {
-    fn csv(&self) -> Sheet {
-        let row = |way: &Way, regret: f64| vec![tabled::text(&way.name), tabled::text(&self.unit), tabled::figure(regret)];
-        let rows = self.ways.iter().flat_map(|w| w.regrets.iter().map(move |r| row(w, *r))).collect();
-        tabled::sheet(&[("way to choose", "way"), ("left out", "left_out"), ("mean regret", "mean_regret")], rows)
     }
 }

@@ -8,7 +8,7 @@ use plotters::prelude::*;
 use plotters_backend::text_anchor::{HPos, Pos, VPos};
 
 /// The ground.
-pub(super) const PAPER: RGBColor = RGBColor(255, 255, 255);
+pub(super) const GROUND: RGBColor = RGBColor(255, 255, 255);
 /// Text, frames, and what stands for all algorithms together.
 pub(super) const INK: RGBColor = RGBColor(0, 0, 0);
 /// Captions, and lines that help to read.

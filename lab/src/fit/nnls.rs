@@ -120,7 +120,7 @@ fn length(v: ArrayView1<'_, f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use sapwise_scenes::Random;
     use ndarray::array;
 
     #[test]

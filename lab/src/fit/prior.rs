@@ -167,7 +167,7 @@ impl Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use sapwise_scenes::Random;
 
     const SIZES: [f64; 8] = [4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0];
 

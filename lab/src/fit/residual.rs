@@ -129,7 +129,7 @@ fn weighted_ridge(x: &Array2<f64>, y: &Array1<f64>, weights: &[f64], penalty: f6
 mod tests {
     use super::super::synthetic::{Machine, truth};
     use super::*;
-    use crate::random::Random;
+    use sapwise_scenes::Random;
     use linfa::traits::Predict;
     use sapwise::model::{MethodModel, ModelTerm, Scale};
     use sapwise::{Backend, BackendClass, Load, Term};

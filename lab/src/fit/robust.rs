@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(weighted_median(vec![(1.0, 1.0), (2.0, 1.0)]), Some(1.5));
         assert!(weighted_median(vec![(1.0, 9.0), (2.0, 1.0)]).unwrap() <= 1.1);
     }
-    use crate::random::Random;
+    use sapwise_scenes::Random;
 
     fn line(ns: impl Fn(f64) -> f64) -> Problem {
         let n = |k: usize| 2.0_f64.powf(4.0 + 0.5 * k as f64);

@@ -33,7 +33,7 @@ pub(super) fn triangle(a: Array2<f64>, b: &Array1<f64>) -> (Array2<f64>, Array1<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use sapwise_scenes::Random;
 
     #[test]
     fn a_triangle_has_the_lengths_and_angles_of_its_rows() {

@@ -11,7 +11,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-use crate::sheet::{Cell, Column, Row, Sheet};
+use crate::data_table::{Cell, Column, DataTable, Row};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use ids::Ids;
@@ -62,7 +62,7 @@ pub(crate) enum Block {
     /// What can't be shown, and why.
     Missing(String),
     /// A table, and the relative path of its CSV file; an empty one makes no link.
-    Table { id: String, caption: String, sheet: Sheet, csv: String },
+    Table { id: String, caption: String, table: DataTable, csv: String },
     /// An SVG with what it shows in words, and links as text and relative path.
     Figure { id: String, caption: String, svg: String, links: Vec<(String, String)>, alt: String },
 }
@@ -133,12 +133,12 @@ fn block(block: &Block, reports: &Reports<'_>, ids: &mut Ids) -> Markup {
         Block::Text(text) => html! { p { (text) } },
         Block::List(points) => html! { ul { @for point in points { li { (point) } } } },
         Block::Missing(what) => missing(what),
-        Block::Table { id, caption, sheet, csv } => {
+        Block::Table { id, caption, table, csv } => {
             let id = ids.take(id);
             html! {
                 figure.table id=(id) {
                     figcaption id={ (id) "-caption" } { (caption) " " (anchor(&id)) }
-                    (table::table(&id, sheet, reports, &|_| None))
+                    (table::table(&id, table, reports, &|_| None))
                     @if !csv.is_empty() { p.links { a href=(href(csv)) { "CSV" } } }
                 }
             }
@@ -181,7 +181,7 @@ fn sources(sources: &[Source], reports: &Reports<'_>, ids: &mut Ids) -> Markup {
             h2 id={ (REPORTS) "-title" } { "Reports " (anchor(REPORTS)) }
             figure.table id=(id) {
                 figcaption id={ (id) "-caption" } { "The files that the figures are from. Tables name them by the first column." }
-                (table::table(&id, &Sheet { columns, rows }, reports, &|row| Some(link::report(row))))
+                (table::table(&id, &DataTable { columns, rows }, reports, &|row| Some(link::report(row))))
             }
         }
     }

@@ -1,7 +1,7 @@
 //! A table that the script of the page makes sortable.
 
 use super::link::Reports;
-use crate::sheet::{Cell, Row, Sheet, figure};
+use crate::data_table::{Cell, DataTable, Row, figure};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
@@ -18,24 +18,24 @@ const WIDE: usize = 12;
 const WORDS: usize = 32;
 
 /// The table below the caption `{id}-caption`. `row_id` gives the name of a row's place, by its position.
-pub(super) fn table(id: &str, sheet: &Sheet, reports: &Reports<'_>, row_id: &dyn Fn(usize) -> Option<String>) -> Markup {
-    let traced = sheet.rows.iter().any(|r| !r.reports.is_empty());
-    let numeric: Vec<bool> = (0..sheet.columns.len()).map(|k| is_numeric(&sheet.rows, k)).collect();
-    let (tall, wide) = (sheet.rows.len() > TALL, sheet.columns.len() + usize::from(traced) > WIDE);
+pub(super) fn table(id: &str, data: &DataTable, reports: &Reports<'_>, row_id: &dyn Fn(usize) -> Option<String>) -> Markup {
+    let traced = data.rows.iter().any(|r| !r.reports.is_empty());
+    let numeric: Vec<bool> = (0..data.columns.len()).map(|k| is_numeric(&data.rows, k)).collect();
+    let (tall, wide) = (data.rows.len() > TALL, data.columns.len() + usize::from(traced) > WIDE);
     let class = [("scroll", true), ("tall", tall), ("wide", wide)].map(|(name, is)| if is { name } else { "" }).join(" ");
     html! {
         div class=(class.trim_end()) tabindex="0" role="region" aria-labelledby={ (id) "-caption" } {
-            table aria-labelledby={ (id) "-caption" } data-filter[sheet.rows.len() > FILTERED] {
+            table aria-labelledby={ (id) "-caption" } data-filter[data.rows.len() > FILTERED] {
                 thead {
                     tr {
-                        @for (column, &numeric) in sheet.columns.iter().zip(&numeric) {
+                        @for (column, &numeric) in data.columns.iter().zip(&numeric) {
                             th.n[numeric] scope="col" { (column.title) }
                         }
                         @if traced { th scope="col" { "Reports" } }
                     }
                 }
                 tbody {
-                    @for (k, row) in sheet.rows.iter().enumerate() {
+                    @for (k, row) in data.rows.iter().enumerate() {
                         tr id=[row_id(k)] {
                             @for (k, cell) in row.cells.iter().enumerate() { (self::cell(cell, k == 0)) }
                             @if traced { td.reports { (reports.links(&row.reports)) } }
@@ -44,8 +44,8 @@ pub(super) fn table(id: &str, sheet: &Sheet, reports: &Reports<'_>, row_id: &dyn
                 }
             }
         }
-        @if sheet.rows.is_empty() { p.note { "This table has no rows." } }
-        (reasons(sheet))
+        @if data.rows.is_empty() { p.note { "This table has no rows." } }
+        (reasons(data))
     }
 }
 
@@ -60,9 +60,9 @@ fn cell(cell: &Cell, heads_row: bool) -> Markup {
 }
 
 /// Why cells are empty, for print and for fingers, which no title serves.
-fn reasons(sheet: &Sheet) -> Markup {
+fn reasons(data: &DataTable) -> Markup {
     let mut reasons: BTreeMap<&str, usize> = BTreeMap::new();
-    for cell in sheet.rows.iter().flat_map(|r| &r.cells) {
+    for cell in data.rows.iter().flat_map(|r| &r.cells) {
         if let Cell::Missing(why) = cell {
             *reasons.entry(why).or_default() += 1;
         }

@@ -52,12 +52,12 @@ fn row(cells: Vec<Cell>) -> Row {
     Row { cells, reports: Vec::new() }
 }
 
-fn table_block(id: &str, sheet: Sheet) -> Block {
-    Block::Table { id: id.to_owned(), caption: format!("The table {id}"), sheet, csv: format!("tables/{id}.csv") }
+fn table_block(id: &str, table: DataTable) -> Block {
+    Block::Table { id: id.to_owned(), caption: format!("The table {id}"), table, csv: format!("tables/{id}.csv") }
 }
 
 /// A table with ties, figures whose text sorts otherwise than their values, and a missing one.
-fn small() -> Sheet {
+fn small() -> DataTable {
     let cells = [
         ("b", Some((2e6, "2.00 ms"))),
         ("a", Some((9e5, "900 us"))),
@@ -66,10 +66,10 @@ fn small() -> Sheet {
         ("c", Some((-1.0, "-1 ns"))),
     ];
     let cell = |c: Option<(f64, &str)>| c.map_or_else(missing_cell, |(value, shown)| number(value, shown));
-    Sheet { columns: columns(&["name", "time"]), rows: cells.map(|(name, c)| row(vec![text(name), cell(c)])).to_vec() }
+    DataTable { columns: columns(&["name", "time"]), rows: cells.map(|(name, c)| row(vec![text(name), cell(c)])).to_vec() }
 }
 
-fn large(rows: usize, columns: usize) -> Sheet {
+fn large(rows: usize, columns: usize) -> DataTable {
     let value = |r: usize, c: usize| ((r * 7919 + c * 104_729) % 100_003) as f64 * 1234.5;
     let cell = |r: usize, c: usize| {
         if c == 0 {
@@ -78,10 +78,10 @@ fn large(rows: usize, columns: usize) -> Sheet {
         if (r + c).is_multiple_of(11) {
             return missing_cell();
         }
-        number(value(r, c), &crate::table::duration(value(r, c)))
+        number(value(r, c), &crate::text::duration(value(r, c)))
     };
     let titles: Vec<String> = (0..columns).map(|c| format!("column {c} in ns")).collect();
-    Sheet {
+    DataTable {
         columns: titles.iter().map(|t| Column { title: t.clone(), key: t.clone() }).collect(),
         rows: (0..rows).map(|r| Row { cells: (0..columns).map(|c| cell(r, c)).collect(), reports: vec![r % 30] }).collect(),
     }
@@ -124,7 +124,7 @@ fn rich() -> Page {
             reports: vec![0, 1, 2, 7],
         })
         .collect();
-    let mut hostile = Sheet { columns: columns(&["name", HOSTILE[0], &long, "4"]), rows: hostile };
+    let mut hostile = DataTable { columns: columns(&["name", HOSTILE[0], &long, "4"]), rows: hostile };
     hostile.rows[0].reports = (0..60).step_by(2).collect();
     hostile.rows[1].reports = (0..26).collect();
     let figure = |id: &str| Block::Figure {
@@ -154,7 +154,7 @@ fn rich() -> Page {
                 vec![
                     table_block("hostile", hostile),
                     Block::Missing("no report has a GPU, so there is no crossover to show".to_owned()),
-                    table_block("empty", Sheet { columns: columns(&["a"]), rows: Vec::new() }),
+                    table_block("empty", DataTable { columns: columns(&["a"]), rows: Vec::new() }),
                     Block::Figure {
                         id: String::new(),
                         caption: String::new(),

@@ -1,8 +1,8 @@
 //! How well the crossovers are predicted from hardware parameters alone: the validation of a training as tables.
 
 use super::entry::Entry;
-use crate::plot::{CrossingPair, Crossings};
-use crate::sheet::{Cell, Sheet};
+use crate::figures::{CrossingPair, Crossings};
+use crate::data_table::{Cell, DataTable};
 use crate::train::{Held, HeldBorder, OURS};
 use sapwise::model::Validation;
 use sapwise::{AlgorithmId, Border};
@@ -17,8 +17,8 @@ const APART: &str = "predicted not to cross: an end of the sizes";
 const SAME_LN: f64 = 0.05;
 
 /// The score of every way to choose.
-pub(super) fn scores(validation: &Validation, studied: &[usize]) -> Sheet {
-    let mut sheet = Sheet::new([
+pub(super) fn scores(validation: &Validation, studied: &[usize]) -> DataTable {
+    let mut sheet = DataTable::new([
         ("way to choose", "way_to_choose"),
         ("mean regret", "mean_regret_share"),
         ("95th percentile", "p95_regret_share"),
@@ -47,11 +47,11 @@ pub(super) fn scores(validation: &Validation, studied: &[usize]) -> Sheet {
 }
 
 /// The regret of every way on each machine, or profile of the only one, that was left out.
-pub(super) fn regrets(held: &Held, entries: &[Entry]) -> Sheet {
-    let mut sheet = Sheet::new([("left out", "left_out"), ("CPU", "cpu")]);
+pub(super) fn regrets(held: &Held, entries: &[Entry]) -> DataTable {
+    let mut sheet = DataTable::new([("left out", "left_out"), ("CPU", "cpu")]);
     for (name, _) in &held.regrets {
         let key = format!("regret_{}_share", name.replace([' ', '+', '(', ')'], "_"));
-        sheet.columns.push(crate::sheet::Column { title: (*name).to_owned(), key });
+        sheet.columns.push(crate::data_table::Column { title: (*name).to_owned(), key });
     }
     for (k, unit) in held.units.iter().enumerate() {
         let is_own = |e: &Entry| e.studied.is_ok() && if held.by_machine { e.machine() == unit } else { e.file == *unit };
@@ -68,8 +68,8 @@ pub(super) fn regrets(held: &Held, entries: &[Entry]) -> Sheet {
 }
 
 /// Predicted beside measured times.
-pub(super) fn times(held: &Held, entries: &[Entry]) -> Sheet {
-    let mut sheet = Sheet::new([
+pub(super) fn times(held: &Held, entries: &[Entry]) -> DataTable {
+    let mut sheet = DataTable::new([
         ("report", "report"),
         ("method", "method"),
         ("on the", "processor"),
@@ -89,8 +89,8 @@ pub(super) fn times(held: &Held, entries: &[Entry]) -> Sheet {
 }
 
 /// How the regret falls with the number of machines in the training.
-pub(super) fn learning(validation: &Validation, studied: &[usize]) -> Sheet {
-    let mut sheet = Sheet::new([
+pub(super) fn learning(validation: &Validation, studied: &[usize]) -> DataTable {
+    let mut sheet = DataTable::new([
         ("machines", "machines"),
         ("trainings", "trainings"),
         ("way to choose", "way_to_choose"),
@@ -112,8 +112,8 @@ pub(super) fn learning(validation: &Validation, studied: &[usize]) -> Sheet {
 pub(super) type Measured = BTreeMap<String, Vec<Border>>;
 
 /// The measured borders beside the predicted ones, as a table and as a picture.
-pub(super) fn borders(held: &Held, measured: &Measured, entries: &[Entry]) -> (Sheet, Crossings) {
-    let mut sheet = Sheet::new([
+pub(super) fn borders(held: &Held, measured: &Measured, entries: &[Entry]) -> (DataTable, Crossings) {
+    let mut sheet = DataTable::new([
         ("report", "report"),
         ("below", "below"),
         ("above", "above"),

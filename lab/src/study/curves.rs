@@ -1,7 +1,7 @@
 //! Figures 4, 6 and 7 of the paper: time over objects, CPU against GPU, on 1..k GPUs, on 1..k threads.
 
 use super::entry::{Entry, SOFTWARE, best_of_machines};
-use crate::plot::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
+use crate::figures::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
 use crate::sweep::median;
 use crate::train::{measured_fields, slice_scenario};
 use sapwise::stats::quantile;
@@ -206,7 +206,7 @@ mod tests {
         let names: Vec<&str> = panel.series.iter().map(|s| s.name.as_str()).collect();
         assert!(names.len() > 1 && names[0] == "1 thread", "{names:?}");
         for point in &panel.series[0].points {
-            let of = |p: &&sapwise::report::Point| {
+            let of = |p: &&crate::report::Point| {
                 f64::from(p.load.objects) == point.objects && p.scenario == slice_scenario(&report)
             };
             let timings = report.points.iter().filter(of).flat_map(|p| &p.timings);

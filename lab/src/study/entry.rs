@@ -2,7 +2,7 @@
 
 use crate::train::{self, Profile};
 use sapwise::hardware::ParameterId;
-use sapwise::report::{Label, Provenance, Report};
+use crate::report::{Label, Provenance, Report};
 use sapwise::{AlgorithmId, Backend, BackendClass, GpuHardware, GpuKind, Hardware};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,10 @@
 //! The files of a study: the page, and for each figure and table what a program or a paper takes of it.
 
 use super::answer::Answer;
-use crate::files;
+use crate::write;
 use crate::page::Block;
-use crate::plot::{Picture, Tabled};
-use crate::sheet::Sheet;
+use crate::figures::{Picture, Tabled};
+use crate::data_table::DataTable;
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Component, Path};
@@ -63,7 +63,7 @@ impl Folder {
     ///
     /// # Errors
     /// When a row does not fit its columns.
-    pub(super) fn table(&mut self, id: &str, caption: &str, mut sheet: Sheet) -> Result<Block> {
+    pub(super) fn table(&mut self, id: &str, caption: &str, mut sheet: DataTable) -> Result<Block> {
         let path = format!("{TABLES}/{id}.csv");
         self.files.push((path.clone(), sheet.csv(&self.labels)?.into_bytes()));
         let mut caption = caption.to_owned();
@@ -101,11 +101,11 @@ impl Folder {
         let names = self.files.iter().map(|(name, _)| name.clone()).chain([PAGE.to_owned()]).collect();
         // First, so that a study that was stopped half-way is taken for one the next time.
         let answer = Answer { files: names, ..answer };
-        files::write_text(&folder.join(ANSWER), &sapwise::json::write(&answer)?)?;
+        write::write_text(&folder.join(ANSWER), &sapwise::json::write(&answer)?)?;
         for (name, bytes) in self.files {
-            files::write_atomically(&folder.join(&name), |out| Ok(out.write_all(&bytes)?))?;
+            write::write_atomically(&folder.join(&name), |out| Ok(out.write_all(&bytes)?))?;
         }
-        files::write_text(&folder.join(PAGE), page)?;
+        write::write_text(&folder.join(PAGE), page)?;
         Ok(answer)
     }
 }
@@ -194,7 +194,7 @@ mod tests {
         .unwrap();
         prepare(&path("")).unwrap();
         let mut new = Folder::new(vec!["R1".to_owned()], "sapwise study".to_owned());
-        new.table("machines", "", Sheet::new([("a", "a")])).unwrap();
+        new.table("machines", "", DataTable::new([("a", "a")])).unwrap();
         new.write(&path(""), "<html>", Answer::default()).unwrap();
         assert!(!path("figures/old.svg").exists());
         for name in ["figures/mine.svg", "figures/mine.txt", "mine.csv", "../outside"] {

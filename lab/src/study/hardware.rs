@@ -1,8 +1,7 @@
 //! Figure 9 of the paper: the hardware parameters of every machine.
 
 use super::entry::Entry;
-use crate::sheet::{Cell, Column, Sheet};
-use crate::summary;
+use crate::data_table::{Cell, Column, DataTable};
 use sapwise::hardware::GpuParameterId;
 use sapwise::hardware::{How, ParameterId};
 use sapwise::{GpuHardware, Parameter};
@@ -22,7 +21,7 @@ const PAPER: [(&str, &str); 7] = [
 ];
 
 /// The table as the paper has it, its cards first, one row a GPU. What acts as a GPU is told by its kind.
-pub(super) fn as_in_the_paper(entries: &[Entry]) -> Sheet {
+pub(super) fn as_in_the_paper(entries: &[Entry]) -> DataTable {
     let mut sheet = heads(&["GPU", "kind", "report"]);
     sheet.columns.extend(PAPER.map(|(title, key)| Column { title: title.to_owned(), key: key.to_owned() }));
     let mut gpus: Vec<(usize, &GpuHardware)> =
@@ -37,14 +36,14 @@ pub(super) fn as_in_the_paper(entries: &[Entry]) -> Sheet {
 }
 
 /// Every parameter of the machines that any of them has, one row a report.
-pub(super) fn machines(entries: &[Entry]) -> Sheet {
+pub(super) fn machines(entries: &[Entry]) -> DataTable {
     let mut sheet = heads(&["report", "CPU", "kind", "vectors"]);
     let lists = || entries.iter().map(|e| &e.hardware.parameters[..]);
     let names = present(ParameterId::ALL, lists());
     columns(&mut sheet, &names);
     for (k, entry) in entries.iter().enumerate() {
         let machine = &entry.hardware.machine;
-        let mut cells = [&entry.name[..], &machine.cpu, summary::kind(entry.kind), &machine.simd].map(Cell::text).to_vec();
+        let mut cells = [&entry.name[..], &machine.cpu, crate::label_text::kind(entry.kind), &machine.simd].map(Cell::text).to_vec();
         cells.extend(names.iter().map(|name| cell(name, &entry.hardware.parameters)));
         sheet.push(cells, &[k]);
     }
@@ -52,7 +51,7 @@ pub(super) fn machines(entries: &[Entry]) -> Sheet {
 }
 
 /// The same of the GPUs, one row each.
-pub(super) fn gpus(entries: &[Entry]) -> Sheet {
+pub(super) fn gpus(entries: &[Entry]) -> DataTable {
     let mut sheet = heads(&["GPU", "kind", "report"]);
     let lists = || entries.iter().flat_map(|e| &e.hardware.gpus).map(|g| &g.parameters[..]);
     let names = present(GpuParameterId::OF_ONE, lists());
@@ -67,9 +66,9 @@ pub(super) fn gpus(entries: &[Entry]) -> Sheet {
     sheet
 }
 
-fn heads(titles: &[&str]) -> Sheet {
+fn heads(titles: &[&str]) -> DataTable {
     let column = |title: &&str| Column { title: (*title).to_owned(), key: title.to_ascii_lowercase() };
-    Sheet { columns: titles.iter().map(column).collect(), rows: Vec::new() }
+    DataTable { columns: titles.iter().map(column).collect(), rows: Vec::new() }
 }
 
 fn gpu_heads(entry: &Entry, gpu: &GpuHardware) -> Vec<Cell> {
@@ -77,7 +76,7 @@ fn gpu_heads(entry: &Entry, gpu: &GpuHardware) -> Vec<Cell> {
     vec![Cell::text(&gpu.gpu.name), Cell::text(kind), Cell::text(&entry.name)]
 }
 
-fn columns(sheet: &mut Sheet, names: &[String]) {
+fn columns(sheet: &mut DataTable, names: &[String]) {
     sheet.columns.extend(names.iter().map(|name| Column { title: words(name), key: name.clone() }));
 }
 
@@ -98,7 +97,7 @@ fn cell(name: &str, parameters: &[Parameter]) -> Cell {
     match parameters.iter().find(|p| p.name == name) {
         None => Cell::Missing("the report does not have it".to_owned()),
         Some(Parameter { value: Some(value), .. }) => {
-            let shown = summary::value(name, *value);
+            let shown = crate::units::value(name, *value);
             // A value that can't be, such as 1e300, has hundreds of digits.
             let shown = if shown.len() > MOST_LETTERS { format!("{value:e}") } else { shown };
             Cell::Number { value: *value, shown }

@@ -1,8 +1,8 @@
 //! Tuning over two axes, objects and density, measured beside predicted: the map that the paper could not draw.
 
 use super::entry::Entry;
-use crate::plot::{FieldMap, MapCell, MapPanel, MapPoint};
-use crate::random::Random;
+use crate::figures::{FieldMap, MapCell, MapPanel, MapPoint};
+use sapwise_scenes::Random;
 use crate::train::{Profile, available, average, measured_costs, without};
 use anyhow::Result;
 use rayon::prelude::*;

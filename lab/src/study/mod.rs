@@ -16,7 +16,6 @@ mod sections;
 mod speed;
 
 use crate::page::{self, Page, Section, Source};
-use crate::summary;
 use crate::train::{Importance, Profile, Trained};
 use accuracy::Measured;
 use anyhow::Result;
@@ -100,7 +99,7 @@ fn read(label: &str, entry: &Entry) -> Read {
     Read {
         label: label.to_owned(),
         file: entry.file.clone(),
-        kind: summary::kind(entry.kind).to_owned(),
+        kind: crate::label_text::kind(entry.kind).to_owned(),
         left_out: entry.studied.clone().err(),
     }
 }

@@ -1,7 +1,7 @@
 //! Whether two figures of machines rise together: Spearman's rank correlation, with what its interval says.
 
 use crate::train::Verdict;
-use crate::turns::Turns;
+use sapwise_scenes::Random;
 
 /// Machines below which nothing is told; the interval needs four.
 pub(super) const FEWEST_MACHINES: usize = 5;
@@ -59,9 +59,9 @@ impl Rank {
 
 /// The share of orders of one side that correlate as much; the order that was found is one of them.
 fn by_orders(x: &[f64], y: &[f64], found: f64) -> f64 {
-    let mut turns = Turns::new(SEED);
+    let mut random = Random::new(SEED);
     let as_much = |_: &usize| {
-        let other: Vec<f64> = turns.order(y.len()).into_iter().map(|k| y[k]).collect();
+        let other: Vec<f64> = random.shuffled(y.len()).into_iter().map(|k| y[k]).collect();
         correlation(x, &other).is_some_and(|c| c.abs() >= found.abs() - 1e-9)
     };
     (1 + (0..ORDERS).filter(as_much).count()) as f64 / (1 + ORDERS) as f64
@@ -107,7 +107,6 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
 
     fn pairs(machines: usize, share: f64, seed: u64) -> Vec<(f64, f64)> {
         let mut random = Random::named(seed, &["rank"]);

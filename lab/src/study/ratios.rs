@@ -4,8 +4,8 @@ use super::entry::Entry;
 use super::hardware::words;
 use super::influence::parameters;
 use super::speed::{LARGE, SpeedUp, speed_ups};
-use crate::plot::{RatioGroup, RatioKind, RatioValue, Ratios};
-use crate::sheet::{Cell, Sheet};
+use crate::figures::{RatioGroup, RatioKind, RatioValue, Ratios};
+use crate::data_table::{Cell, DataTable};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Machines in one picture.
@@ -38,8 +38,8 @@ impl<'a> Comparison<'a> {
     }
 
     /// Every ratio, a row for each machine and parameter or algorithm.
-    pub(super) fn sheet(&self) -> Sheet {
-        let mut sheet = Sheet::new([
+    pub(super) fn sheet(&self) -> DataTable {
+        let mut sheet = DataTable::new([
             ("machine", "machine"),
             ("reference", "reference"),
             ("of", "of"),

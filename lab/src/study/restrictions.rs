@@ -6,7 +6,7 @@
 use super::entry::{Entry, ON_ALL_CORES};
 use super::speed::{LARGE, speed_ups};
 use crate::train::{Verdict, average};
-use sapwise::report::{Proof, Restricted};
+use crate::report::{Proof, Restricted};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Pairs of reports that a verdict needs: two drift the same way by chance in every second case.

@@ -38,13 +38,12 @@ mod rtree;
 mod settings;
 mod table;
 #[allow(unused_imports, reason = "its tests run with the command: without a harness there are none")]
-#[path = "../../src/turns.rs"]
-mod turns;
 mod within;
 
 use contestants::{at_levels, ours, peers};
 use point::Point;
-use sapwise::{Registry, Scenario};
+use sapwise::Registry;
+use sapwise_scenes::Scenario;
 use settings::Settings;
 use std::io::Write;
 use std::process::ExitCode;

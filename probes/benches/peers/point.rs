@@ -1,7 +1,7 @@
 //! What was measured of one scenario at one size.
 
 use crate::contestants::Side;
-use sapwise::Scenario;
+use sapwise_scenes::Scenario;
 use sapwise::stats::quantile;
 
 /// How a contestant did.

@@ -3,9 +3,9 @@
 use crate::contestants::Contestant;
 use crate::point::{Lane, Point};
 use crate::settings::Settings;
-use crate::turns::Turns;
 use sapwise::measure::Watch;
-use sapwise::{Aabb, Pairs, Scenario, Scene};
+use sapwise::{Aabb, Pairs};
+use sapwise_scenes::{Random, Scenario, Scene};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -40,7 +40,7 @@ struct Race {
     contestants: Vec<Contestant>,
     /// One list for all, so that its memory is equally warm for each.
     pairs: Pairs,
-    turns: Turns,
+    random: Random,
 }
 
 impl Race {
@@ -49,7 +49,7 @@ impl Race {
     fn frame(&mut self, boxes: &[Aabb], all: bool) -> Result<Vec<Option<Duration>>, String> {
         let mut taken = vec![None; self.contestants.len()];
         let mut expected: Option<u64> = None;
-        for at in self.turns.order(self.contestants.len()) {
+        for at in self.random.shuffled(self.contestants.len()) {
             let contestant = &mut self.contestants[at];
             if !(all || contestant.keeps) {
                 continue;
@@ -108,7 +108,7 @@ pub(crate) fn race(
     settings: &Settings,
 ) -> Result<Point, String> {
     let told = |e| format!("{scenario} at {objects} objects: {e}");
-    let mut race = Race { contestants, pairs: Pairs::new(), turns: Turns::new(SEED) };
+    let mut race = Race { contestants, pairs: Pairs::new(), random: Random::new(SEED) };
     race.contestants.retain(|c| objects <= c.most);
     let mut scene = scenario.start(objects, SEED);
     let warm_up = if settings.full { WARM_UP } else { WARM_UP_OF_ALL };

@@ -1,6 +1,6 @@
 //! What is measured, from the environment.
 
-use sapwise::Scenario;
+use sapwise_scenes::Scenario;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;

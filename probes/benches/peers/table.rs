@@ -3,7 +3,7 @@
 use crate::contestants::Side;
 use crate::machine;
 use crate::point::{Point, Quartiles};
-use sapwise::Scenario;
+use sapwise_scenes::Scenario;
 use std::fmt::Write;
 
 /// The goals in words.

@@ -3,7 +3,8 @@
 use crate::contestants::Side;
 use crate::point::{Lane, Point};
 use crate::table::{digits, grid, sizes, spread};
-use sapwise::{AlgorithmId, Scenario, SimdLevel};
+use sapwise::{AlgorithmId, SimdLevel};
+use sapwise_scenes::Scenario;
 
 /// The fastest fixed method of ours on that many threads.
 fn best_on(point: &Point, threads: u32) -> Option<&Lane> {

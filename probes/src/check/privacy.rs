@@ -1,6 +1,6 @@
 //! Texts of a report that tell of a person or a host.
 
-use sapwise::Report;
+use sapwise_lab::report::Report;
 use serde_json::Value;
 
 /// The beginnings of folders that are named after whoever works in them.
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_host_that_is_called_like_its_cpu_or_a_scenario_reveals_nothing() {
-        let mut report = crate::train::synthetic::Machine::family()[0].report();
+        let mut report = sapwise_lab::synthetic::Machine::family()[0].report();
         report.hardware.machine.cpu = "Intel(R) Core(TM) i7".to_owned();
         report.points[0].scenario = "uniform".to_owned();
         assert!(is_told_anyway(&report, "intel") && is_told_anyway(&report, "Uniform"));

@@ -4,7 +4,7 @@ use crate::args::Probe;
 use crate::contention::Contended;
 use crate::restriction::{self, LAVAPIPE_THREADS};
 use crate::sweep::Plan;
-use sapwise::report::Restricted;
+use sapwise_lab::report::Restricted;
 use sapwise::{GpuIdentity, GpuKind, Scenario, SimdLevel};
 use std::path::Path;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use std::time::Duration;
 /// What the hardware parameters of the CPU take, with the start of the processes.
 const HARDWARE: Duration = Duration::from_secs(8);
 
-/// What a GPU adds, and a program that acts as one.
+/// What a GPU adds, and a software adapter.
 const REAL_GPU: Duration = Duration::from_secs(8);
 const SOFTWARE_GPU: Duration = Duration::from_secs(25);
 

@@ -1,6 +1,6 @@
 //! Another program that takes a part of the CPU from a frame on, made by ourselves.
 
-use super::outcome::Frame;
+use super::frame::Frame;
 use super::samples::Samples;
 use crate::contention::Threads;
 use std::fmt;
@@ -41,7 +41,7 @@ impl FromStr for CoRunner {
         let threads = threads.map(|t| t.parse().ok().filter(|t| (1..=4096).contains(t)).ok_or(t)).transpose();
         match (frame.parse(), threads) {
             (Ok(from_frame), Ok(threads)) => Ok(Self { from_frame, threads }),
-            _ => Err(format!("{text:?} is no FRAME or FRAME:THREADS, such as 300 or 300:1, with 1 to 4096 threads")),
+            _ => Err(format!("{text:?} is not FRAME or FRAME:THREADS, such as 300 or 300:1, with 1 to 4096 threads")),
         }
     }
 }
@@ -54,7 +54,7 @@ impl fmt::Display for CoRunner {
 }
 
 impl CoRunner {
-    /// Starts the threads, each on a core of its own as long as there are some. They end when what is given back is dropped.
+    /// Starts the threads, each on a core of its own as long as there are some. They end when the returned value is dropped.
     ///
     /// # Errors
     /// When the system refuses one.
@@ -74,7 +74,7 @@ impl CoRunner {
     }
 }
 
-/// Takes that share of the core's time until it is told to stop, and gives the share that it got.
+/// Takes that share of the core's time until it is told to stop, and returns the share that it got.
 ///
 /// Its own time is that between readings of the clock that follow close upon each other, which needs no call of the system.
 fn take(stop: &AtomicBool, share: f64) -> f64 {
@@ -166,7 +166,7 @@ fn ratio(before: &[(usize, f64)], after: &[(usize, f64)]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulation::outcome::tests::{outcome, taken};
+    use crate::replay::examples::{outcome, taken};
 
     #[test]
     fn frames_and_threads_are_read() {
@@ -185,10 +185,10 @@ mod tests {
     fn no_more_than_the_share_is_taken_and_it_ends() {
         let stop = AtomicBool::new(false);
         let got = std::thread::scope(|scope| {
-            let taker = scope.spawn(|| take(&stop, 0.25));
+            let thread = scope.spawn(|| take(&stop, 0.25));
             std::thread::sleep(Duration::from_millis(300));
             stop.store(true, Ordering::Relaxed);
-            taker.join().unwrap()
+            thread.join().unwrap()
         });
         // How much less depends on what else runs on the machine.
         assert!(got > 0.0 && got < 0.3, "{got}");

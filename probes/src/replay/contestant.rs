@@ -1,4 +1,4 @@
-//! A fixed algorithm that takes part in a simulation.
+//! A fixed algorithm that takes part in a replay.
 
 use super::samples::Samples;
 use sapwise::{AlgorithmId, BroadPhase, Error, Registry};
@@ -7,7 +7,7 @@ use sapwise::{AlgorithmId, BroadPhase, Error, Registry};
 /// not timed at that frame again: its total is told, and it can't be the best. One sample alone may have been a cold one.
 const HOPELESS: f64 = 10.0;
 
-/// A fixed algorithm sits out frames with as many objects as one that takes it longer than this ...
+/// A fixed algorithm is not timed at frames with as many objects as one that takes it longer than this ...
 const TOO_LONG_NS: f64 = 1e9;
 /// ... and this many times as long as the best: a total that takes hours tells no more than the frame does.
 const TOO_SLOW: f64 = 100.0;
@@ -19,7 +19,7 @@ pub(super) struct Contestant {
     pub(super) algorithm: Option<Box<dyn BroadPhase>>,
     /// Of each frame.
     pub(super) samples: Vec<Samples>,
-    /// It sits out frames with this many objects or more.
+    /// It is not timed at frames with this many objects or more.
     too_many: usize,
 }
 
@@ -31,7 +31,7 @@ impl Contestant {
         Ok(Self { id, algorithm, samples: vec![Samples::default(); frames], too_many: usize::MAX })
     }
 
-    /// Begins afresh, without what it kept from frame to frame, unless it failed before.
+    /// Starts again without what it kept from frame to frame, unless it failed before.
     ///
     /// # Errors
     /// When it can't be made again; it takes no part any more.
@@ -44,7 +44,7 @@ impl Contestant {
     }
 
     /// Whether another sample at this frame would tell nothing. `best` is the fastest sample of all contestants there.
-    pub(super) fn sits_out(&self, frame: usize, objects: usize, best: f64) -> bool {
+    pub(super) fn is_skipped(&self, frame: usize, objects: usize, best: f64) -> bool {
         let samples = &self.samples[frame];
         self.algorithm.is_none() || objects >= self.too_many || samples.len() >= 2 && samples.fastest() > HOPELESS * best
     }
@@ -74,10 +74,10 @@ mod tests {
     }
 
     #[test]
-    fn whoever_is_hopeless_is_not_timed_again_and_one_cold_sample_is_no_proof() {
-        assert!(!timed(&[500.0]).sits_out(0, 9, 10.0));
-        assert!(!timed(&[500.0, 90.0]).sits_out(0, 9, 10.0));
-        assert!(timed(&[500.0, 110.0]).sits_out(0, 9, 10.0));
+    fn a_hopeless_one_is_not_timed_again_and_one_cold_sample_is_no_proof() {
+        assert!(!timed(&[500.0]).is_skipped(0, 9, 10.0));
+        assert!(!timed(&[500.0, 90.0]).is_skipped(0, 9, 10.0));
+        assert!(timed(&[500.0, 110.0]).is_skipped(0, 9, 10.0));
         assert_eq!(best(&[timed(&[500.0, 110.0]), timed(&[300.0])], 0), 110.0);
     }
 
@@ -86,24 +86,24 @@ mod tests {
         let too_many = |ns: f64| {
             let mut contestant = timed(&[ns]);
             contestant.judge(0, 1000, 10e6);
-            (contestant.sits_out(0, 999, 10e6), contestant.sits_out(0, 1000, 10e6))
+            (contestant.is_skipped(0, 999, 10e6), contestant.is_skipped(0, 1000, 10e6))
         };
         assert_eq!(too_many(900e6), (false, false));
         assert_eq!(too_many(1.1e9), (false, true));
         // Slow as it is, it is not far behind the best.
         let mut contestant = timed(&[1.1e9]);
         contestant.judge(0, 1000, 100e6);
-        assert!(!contestant.sits_out(0, 1000, 100e6));
+        assert!(!contestant.is_skipped(0, 1000, 100e6));
     }
 
     #[test]
-    fn whoever_failed_is_not_made_again() {
+    fn one_that_failed_is_not_made_again() {
         let registry = Registry::with_cores(1);
         let mut contestant = timed(&[1.0]);
         contestant.renew(&registry).unwrap();
         assert!(contestant.algorithm.is_some());
         contestant.algorithm = None;
         contestant.renew(&registry).unwrap();
-        assert!(contestant.algorithm.is_none() && contestant.sits_out(0, 1, 1.0));
+        assert!(contestant.algorithm.is_none() && contestant.is_skipped(0, 1, 1.0));
     }
 }

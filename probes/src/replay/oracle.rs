@@ -4,7 +4,7 @@
 //! half of the repeats and its time taken from the other half, then the other way round. A choice that noise has misled makes such an
 //! oracle too slow, never too fast; of three of them, which choose by more or fewer frames, the fastest is taken.
 
-use super::outcome::Frame;
+use super::frame::Frame;
 use super::samples::{Samples, mean_of};
 use sapwise::stats::median;
 
@@ -20,14 +20,14 @@ enum Sight {
     Frame,
     /// By the frames about it too.
     Neighbours,
-    /// By the whole course: one algorithm for all frames.
-    Course,
+    /// By all frames: one algorithm for all frames.
+    AllFrames,
     /// By all frames of a window: one algorithm for each.
     Window,
 }
 
-/// Frames of a window. An algorithm that keeps work makes it anew once in some tens of frames; an oracle for every frame takes its cheap ones
-/// and leaves that one to another.
+/// Frames of a window. An incremental algorithm rebuilds what it keeps once in some tens of frames; an oracle that chooses for every frame alone
+/// runs it in its cheap frames only, and another one in the frame of the rebuild.
 pub(crate) const WINDOW: usize = 32;
 
 /// What it runs, and how long that takes.
@@ -41,15 +41,15 @@ pub(crate) struct Oracle {
 
 impl Oracle {
     pub(super) fn new(frames: &[Frame]) -> Self {
-        let all = [Sight::Frame, Sight::Neighbours, Sight::Course].map(|sight| Self::with(frames, sight));
+        let all = [Sight::Frame, Sight::Neighbours, Sight::AllFrames].map(|sight| Self::with(frames, sight));
         let [by_frame, rest @ ..] = all;
         rest.into_iter().fold(by_frame, |best, next| if next.total() < best.total() { next } else { best })
     }
 
     /// One algorithm for each window of frames, which pays for what it keeps. Where noise misleads that choice, one for all frames.
     pub(super) fn of_windows(frames: &[Frame]) -> Self {
-        let [windows, course] = [Sight::Window, Sight::Course].map(|sight| Self::with(frames, sight));
-        if course.total() < windows.total() { course } else { windows }
+        let [windows, whole] = [Sight::Window, Sight::AllFrames].map(|sight| Self::with(frames, sight));
+        if whole.total() < windows.total() { whole } else { windows }
     }
 
     fn with(frames: &[Frame], sight: Sight) -> Self {
@@ -87,7 +87,7 @@ fn choices(frames: &[Frame], half: usize, sight: Sight) -> Vec<Option<usize>> {
         times.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
     };
     match sight {
-        Sight::Course => {
+        Sight::AllFrames => {
             let total = |k: usize| frames.iter().map(|f| f.fixed[k].of_half(half)).sum();
             vec![least(&total); frames.len()]
         }
@@ -103,7 +103,7 @@ fn choices(frames: &[Frame], half: usize, sight: Sight) -> Vec<Option<usize>> {
             .map(|at| {
                 let near = near(frames, at);
                 least(&|k| {
-                    // Whoever sat out this frame can't be run in it.
+                    // An algorithm that was not timed at this frame can't be run in it.
                     frames[at].fixed[k].of_half(half)?;
                     median(&near.iter().flat_map(|f| f.fixed[k].half(half)).collect::<Vec<_>>())
                 })
@@ -121,7 +121,7 @@ fn near(frames: &[Frame], at: usize) -> Vec<&Frame> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::outcome::tests::{frame_of, samples};
+    use crate::replay::examples::{frame_of, samples};
     use super::*;
 
     fn frame(objects: usize, fixed: &[&[f64]]) -> Frame {
@@ -183,8 +183,8 @@ mod tests {
     #[test]
     fn of_alike_algorithms_the_least_time_is_too_low_and_the_oracle_is_not() {
         // Eight algorithms that take 100 on average: numbers of a generator, spread evenly over 90 to 110.
-        let mut turns = crate::turns::Turns::new(7);
-        let mut noisy = || 90.0 + 20.0 * (turns.draw() >> 11) as f64 / (1_u64 << 53) as f64;
+        let mut random = sapwise_scenes::Random::new(7);
+        let mut noisy = || 90.0 + 20.0 * random.uniform();
         let mut all = || (0..8).map(|_| samples(&[(); 6].map(|()| noisy()))).collect();
         let frames: Vec<Frame> = (0..400).map(|_| frame_of(50, all())).collect();
         let honest = Oracle::new(&frames).total() / 400.0;
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn one_repeat_gives_the_least_time_and_whoever_sat_out_is_not_chosen() {
+    fn one_repeat_has_the_least_time_and_one_that_was_not_timed_is_not_chosen() {
         let frames = [frame(5, &[&[10.0], &[12.0], &[]]), frame(9, &[&[30.0], &[20.0], &[]])];
         let oracle = Oracle::new(&frames);
         assert_eq!(oracle.ns, [10.0, 20.0]);

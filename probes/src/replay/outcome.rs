@@ -1,94 +1,16 @@
-//! What came of a simulation, frame by frame, and the figures that follow from it.
+//! The outcome of a replay, frame by frame, and the figures that follow from it.
 
 use super::co_runner::Slowdown;
 use super::oracle::{Oracle, optimistic};
-use super::samples::Samples;
+use super::frame::{Frame, Taken, Told};
+use sapwise::AlgorithmId;
 use sapwise::stats::quantile;
-use sapwise::{AlgorithmId, Load, Reason};
 use std::ops::Range;
 
 /// Repeats below which quartiles say nothing.
 const FEWEST_FOR_QUARTILES: usize = 4;
 
-/// One frame: its samples, and the times that follow from them in nanoseconds.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Frame {
-    pub(crate) objects: usize,
-    /// The time of the adaptive module, choice included.
-    pub(crate) adaptive_ns: f64,
-    /// The same in the repeats in which it did not explore at this frame; infinite where it explored in all of them.
-    pub(crate) unexplored_ns: f64,
-    /// The time of each fixed algorithm; infinite where it sat out.
-    pub(crate) fixed_ns: Vec<f64>,
-    pub(crate) adaptive: Samples,
-    pub(crate) fixed: Vec<Samples>,
-}
-
-/// What the adaptive module ran at a frame of a repeat.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Taken {
-    /// A position among the fixed algorithms.
-    pub(crate) chosen: Option<usize>,
-    pub(crate) explored: bool,
-}
-
-/// What it told of its decision.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Told {
-    pub(crate) reason: Reason,
-    pub(crate) load: Load,
-    pub(crate) predicted_ns: Option<f64>,
-    pub(crate) measured_ns: Option<f64>,
-    pub(crate) runner_up: Option<(AlgorithmId, f64)>,
-}
-
-impl Frame {
-    /// `taken` is what ran at this frame and at the one before it, in each repeat.
-    pub(super) fn new(objects: usize, adaptive: Samples, fixed: Vec<Samples>, taken: &[(Taken, Option<Taken>)]) -> Self {
-        Self {
-            objects,
-            adaptive_ns: mean_over_kinds(&adaptive, taken),
-            unexplored_ns: mean_over_kinds(&adaptive.of(|r| !taken[r].0.explored), taken),
-            fixed_ns: fixed.iter().map(Samples::time).collect(),
-            adaptive,
-            fixed,
-        }
-    }
-}
-
-/// What a frame of the adaptive module is beside one that goes on with what ran before.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    GoesOn,
-    /// It costs more than the next one of the same algorithm.
-    Switches,
-    Explores,
-}
-
-impl Kind {
-    const ALL: [Self; 3] = [Self::GoesOn, Self::Switches, Self::Explores];
-
-    fn of(taken: Taken, before: Option<Taken>) -> Self {
-        match before {
-            _ if taken.explored => Self::Explores,
-            Some(before) if before.chosen != taken.chosen => Self::Switches,
-            _ => Self::GoesOn,
-        }
-    }
-}
-
-/// The mean of the times of each kind, weighted by the repeats in which the frame is of that kind. Infinite without samples.
-///
-/// Not one time of all repeats: that would leave out a dear frame, one that explores or switches, wherever most of the repeats have
-/// theirs at other frames.
-fn mean_over_kinds(adaptive: &Samples, taken: &[(Taken, Option<Taken>)]) -> f64 {
-    let kinds: Vec<Kind> = taken.iter().map(|&(now, before)| Kind::of(now, before)).collect();
-    let own = Kind::ALL.map(|kind| adaptive.of(|repeat| kinds[repeat] == kind));
-    let sum: f64 = own.iter().filter(|s| s.len() > 0).map(|s| s.time() * s.len() as f64).sum();
-    if adaptive.len() == 0 { f64::INFINITY } else { sum / adaptive.len() as f64 }
-}
-
-/// The outcome of a course.
+/// The outcome of a replay.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
     pub(crate) fixed: Vec<AlgorithmId>,
@@ -101,7 +23,7 @@ pub(crate) struct Outcome {
     /// What the adaptive module told of every frame of the last of these.
     pub(crate) told: Vec<Told>,
     pub(crate) interrupted: bool,
-    /// Median over the frames of the share of the CPU that other programs took. `None` where that can't be told, as in a course
+    /// Median over the frames of the share of the CPU that other programs took. `None` where that can't be told, as in a replay
     /// of milliseconds.
     pub(crate) foreign_load: Option<f64>,
     /// What the co-runner did, where there was one.
@@ -112,7 +34,7 @@ pub(crate) struct Outcome {
 
 /// The figures of some frames.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Part {
+pub(crate) struct Segment {
     pub(crate) frames: Range<usize>,
     /// Time of the adaptive module over that of the oracle, less one.
     pub(crate) regret: f64,
@@ -130,18 +52,19 @@ pub(crate) struct Part {
     pub(crate) worst_frame: Option<(f64, usize)>,
 }
 
-impl Part {
-    /// The quartiles of the regret over the repeats.
-    pub(crate) fn quartiles(&self) -> Option<[f64; 2]> {
+impl Segment {
+    /// The quartiles of the regret over the repeats, the median between them; `None` with too few repeats.
+    pub(crate) fn quartiles(&self) -> Option<[f64; 3]> {
+        let of = |q: f64| quantile(&self.of_repeats, q);
         let enough = self.of_repeats.len() >= FEWEST_FOR_QUARTILES;
-        Some([quantile(&self.of_repeats, 0.25)?, quantile(&self.of_repeats, 0.75)?]).filter(|_| enough)
+        Some([of(0.25)?, of(0.5)?, of(0.75)?]).filter(|_| enough)
     }
 }
 
-/// A fixed algorithm that was hopeless in some frames.
+/// A fixed algorithm that was not timed at some frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Missed {
-    /// The first frame that it sat out, and how many in all.
+    /// The first of these frames, and how many there are.
     pub(crate) first: usize,
     pub(crate) frames: usize,
     /// The total of the others.
@@ -163,12 +86,12 @@ impl Outcome {
         total_ms(self.frames.iter().map(|f| optimistic(&f.fixed)))
     }
 
-    /// The total of a fixed algorithm; `None` when it sat out frames.
+    /// The total of a fixed algorithm; `None` when it was not timed at all frames.
     pub(crate) fn fixed_ms(&self, k: usize) -> Option<f64> {
         Some(total_ms(self.frames.iter().map(|f| f.fixed_ns[k]))).filter(|ms| ms.is_finite())
     }
 
-    /// The frames that a fixed algorithm sat out, if any.
+    /// The frames at which a fixed algorithm was not timed, if any.
     pub(crate) fn missed(&self, k: usize) -> Option<Missed> {
         let ran = |f: &&Frame| f.fixed_ns[k].is_finite();
         let first = self.frames.iter().position(|f| !ran(&f))?;
@@ -201,6 +124,13 @@ impl Outcome {
         self.repeats.last().map_or(&[], Vec::as_slice)
     }
 
+    /// In how many frames of the last repeat each fixed algorithm ran, those that explored included.
+    pub(crate) fn frames_run(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.fixed.len()];
+        self.last_taken().iter().filter_map(|t| t.chosen).for_each(|k| counts[k] += 1);
+        counts
+    }
+
     /// The frames at which the last repeat goes on with another algorithm than before, frames that explore aside.
     pub(crate) fn switches(&self) -> Vec<usize> {
         let mut settled = None;
@@ -215,18 +145,18 @@ impl Outcome {
     }
 
     /// The figures of all frames.
-    pub(crate) fn whole(&self) -> Part {
+    pub(crate) fn whole(&self) -> Segment {
         self.part(0..self.frames.len())
     }
 
     /// The figures of some frames.
-    pub(crate) fn part(&self, range: Range<usize>) -> Part {
+    pub(crate) fn part(&self, range: Range<usize>) -> Segment {
         let frames = &self.frames[range.clone()];
         let over = |ns: f64| frames.iter().map(|f| f.adaptive_ns).sum::<f64>() / ns - 1.0;
         let oracle_ns = &self.oracle.ns[range.clone()];
         let unexplored = frames.iter().map(|f| f.unexplored_ns).zip(oracle_ns).zip(range.clone());
         let worst = unexplored.filter(|((own, _), _)| own.is_finite()).map(|((own, oracle), at)| (own / oracle, at));
-        Part {
+        Segment {
             regret: over(oracle_ns.iter().sum()),
             window_regret: over(self.windows.ns[range.clone()].iter().sum()),
             optimistic_regret: over(frames.iter().map(|f| optimistic(&f.fixed)).sum()),
@@ -257,6 +187,8 @@ fn total_ms(ns: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::replay::samples::Samples;
+    use sapwise::{Load, Reason};
 
     pub(crate) fn samples(ns: &[f64]) -> Samples {
         let mut samples = Samples::default();
@@ -318,6 +250,7 @@ pub(crate) mod tests {
         );
         assert_eq!((outcome.adaptive_ms(), outcome.oracle_ms()), (15.0, 6.5));
         assert_eq!((outcome.best_fixed(), outcome.switches()), (Some((1, 10.0)), vec![1]));
+        assert_eq!(outcome.frames_run(), [2, 2]);
         // At the two largest frames the second takes 4 ms, the first 10.5.
         assert_eq!(outcome.best_at_largest(), Some((30, 1)));
         let whole = outcome.whole();
@@ -333,7 +266,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn who_sat_out_has_no_total_and_counts_nowhere() {
+    fn one_that_was_not_timed_everywhere_has_no_total_and_counts_nowhere() {
         let inf = f64::INFINITY;
         let frames: [(usize, f64, &[f64], Taken); 3] =
             [(10, 1.0, &[1.0, 2000.0], taken(0)), (90, 1.0, &[1.0, inf], taken(0)), (10, 1.0, &[1.0, 0.5], taken(0))];
@@ -347,22 +280,6 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_dear_frame_counts_though_most_repeats_have_it_elsewhere() {
-        let explored = Taken { explored: true, ..taken(1) };
-        let stays = (taken(0), Some(taken(0)));
-        let adaptive = samples(&[10.0, 10.0, 10.0, 40.0]);
-        let fixed = || vec![samples(&[9.0; 4])];
-        let frame = Frame::new(5, adaptive.clone(), fixed(), &[stays, stays, stays, (explored, Some(taken(0)))]);
-        assert_eq!((frame.adaptive_ns, frame.unexplored_ns), (17.5, 10.0));
-        // The first frame after a switch is one of its own kind too.
-        let frame = Frame::new(5, adaptive.clone(), fixed(), &[stays, stays, stays, (taken(0), Some(taken(1)))]);
-        assert_eq!((frame.adaptive_ns, frame.unexplored_ns), (17.5, 17.5));
-        // Noise of one repeat among alike ones is no dear frame.
-        let frame = Frame::new(5, samples(&[10.0, 10.0, 10.0, 10.0, 40.0, 10.0]), fixed(), &[stays; 6]);
-        assert_eq!(frame.adaptive_ns, 10.0);
-    }
-
-    #[test]
     fn each_repeat_has_a_regret_of_its_own() {
         let stays = [(taken(0), None); 4];
         let fixed = vec![samples(&[10.0, 12.0, 10.0, 14.0]), samples(&[20.0; 4])];
@@ -372,6 +289,6 @@ pub(crate) mod tests {
         outcome.repeats = vec![vec![taken(0)]; 4];
         let whole = outcome.whole();
         assert_eq!(whole.of_repeats, [0.0, 0.5, 0.5, 0.0]);
-        assert_eq!(whole.quartiles(), Some([0.0, 0.5]));
+        assert_eq!(whole.quartiles(), Some([0.0, 0.25, 0.5]));
     }
 }

@@ -1,24 +1,24 @@
-//! Tests of whole simulations.
+//! Tests of whole replays.
 
 use super::*;
-use crate::boxes::read_frames;
-use sapwise::{Scenario, Step};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Reason, Registry, Step, Tuning};
+use sapwise_scenes::{Frames, Scenario};
 
 fn steps(list: &[(u32, &str)]) -> Tuning {
     let step = |&(from_objects, id): &(u32, &str)| Step { from_objects, algorithm: id.parse().unwrap() };
     Tuning::from_steps(list.iter().map(step).collect()).unwrap()
 }
 
-fn course(scenario: Scenario, objects: usize, frames: usize, repeats: usize) -> Course {
-    let footage = Footage::Scene { scenario, objects, seed: 1, swing: None };
-    Course { footage, frames, repeats, seed: 1, learning: true, exploring: true, co_runner: None }
+fn settings(scenario: Scenario, objects: usize, frames: usize, repeats: usize) -> ReplaySettings {
+    let source = FrameSource::Scene { scenario, objects, seed: 1, swing: None };
+    ReplaySettings { source, frames, repeats, seed: 1, learning: true, exploring: true, co_runner: None }
 }
 
 #[test]
-fn a_course_gives_every_total_and_the_choice_of_every_frame() {
+fn a_replay_has_every_total_and_the_choice_of_every_frame() {
     let registry = Registry::with_cores(1);
     let tuning = steps(&[(0, "brute@cpu1"), (100, "grid-sap@cpu1")]);
-    let outcome = simulate(&course(Scenario::Fragmentation, 800, 300, 3), &tuning, &registry).unwrap();
+    let outcome = replay(&settings(Scenario::Fragmentation, 800, 300, 3), &tuning, &registry).unwrap();
     let shape = (outcome.frames.len(), outcome.repeats.len(), outcome.fixed.len(), outcome.told.len());
     assert_eq!(shape, (300, 3, registry.available().len(), 300));
     assert!(outcome.optimistic_oracle_ms() > 0.0 && outcome.best_fixed().is_some());
@@ -48,26 +48,26 @@ fn of_two_that_disagree_the_one_that_a_user_added_is_named() {
     registry.add("mine@cpu1".parse().unwrap(), 1, || Ok(Box::new(NoPairs)));
     // Each seed has another order of turns.
     for seed in 1..=8 {
-        let course = Course { seed, ..course(Scenario::Uniform, 2000, 1, 1) };
-        let Err(error) = simulate(&course, &steps(&[(0, "brute@cpu1")]), &registry) else { panic!("took no pairs") };
-        assert!(error.to_string().starts_with("mine@cpu1 gives other pairs than brute@cpu1"), "{error}");
+        let settings = ReplaySettings { seed, ..settings(Scenario::Uniform, 2000, 1, 1) };
+        let Err(error) = replay(&settings, &steps(&[(0, "brute@cpu1")]), &registry) else { panic!("took no pairs") };
+        assert!(error.to_string().starts_with("mine@cpu1 returns other pairs than brute@cpu1"), "{error}");
     }
 }
 
 #[test]
-fn an_algorithm_that_only_the_tuning_name_is_among_the_fixed() {
+fn an_algorithm_that_only_the_tuning_names_is_among_the_fixed() {
     let registry = Registry::with_cores(4);
     let id: AlgorithmId = "grid-sap@cpu3".parse().unwrap();
     if registry.create(&id).is_err() {
         return;
     }
-    let outcome = simulate(&course(Scenario::Uniform, 50, 2, 1), &steps(&[(0, "grid-sap@cpu3")]), &registry).unwrap();
+    let outcome = replay(&settings(Scenario::Uniform, 50, 2, 1), &steps(&[(0, "grid-sap@cpu3")]), &registry).unwrap();
     assert_eq!(outcome.fixed.last(), Some(&id));
     assert!(outcome.last_taken().iter().all(|t| t.chosen.is_some()));
 }
 
 #[test]
-fn whoever_fails_takes_no_part_any_more_and_is_noted_once() {
+fn an_algorithm_that_fails_is_not_run_again_and_is_noted_once() {
     /// Fails in its third frame.
     struct Failing(u32);
     impl BroadPhase for Failing {
@@ -82,7 +82,7 @@ fn whoever_fails_takes_no_part_any_more_and_is_noted_once() {
     }
     let mut registry = Registry::with_cores(1);
     registry.add("mine@cpu1".parse().unwrap(), 1, || Ok(Box::new(Failing(0))));
-    let outcome = simulate(&course(Scenario::Uniform, 100, 4, 2), &steps(&[(0, "brute@cpu1")]), &registry).unwrap();
+    let outcome = replay(&settings(Scenario::Uniform, 100, 4, 2), &steps(&[(0, "brute@cpu1")]), &registry).unwrap();
     let own = outcome.fixed.iter().position(|id| id.method() == "mine").unwrap();
     let counts: Vec<usize> = outcome.frames.iter().map(|f| f.fixed[own].len()).collect();
     assert_eq!(counts, [1, 1, 0, 0]);
@@ -95,12 +95,12 @@ fn whoever_fails_takes_no_part_any_more_and_is_noted_once() {
 fn a_recorded_stream_runs_like_the_scene_that_it_was_recorded_from() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.npy");
-    let scene = course(Scenario::Fragmentation, 400, 80, 1);
-    scene.footage.record(&path, 80).unwrap();
-    let footage = Footage::Stream { name: "scene.npy".to_owned(), frames: read_frames(&path).unwrap() };
+    let scene = settings(Scenario::Fragmentation, 400, 80, 1);
+    scene.source.record(&path, 80).unwrap();
+    let source = FrameSource::Stream { name: "scene.npy".to_owned(), frames: Frames::read(&path).unwrap() };
     let (registry, tuning) = (Registry::with_cores(1), steps(&[(0, "brute@cpu1"), (60, "grid-sap@cpu1")]));
-    let stream = simulate(&Course { footage, ..course(Scenario::Uniform, 0, 80, 1) }, &tuning, &registry).unwrap();
-    let scene = simulate(&scene, &tuning, &registry).unwrap();
+    let stream = replay(&ReplaySettings { source, ..settings(Scenario::Uniform, 0, 80, 1) }, &tuning, &registry).unwrap();
+    let scene = replay(&scene, &tuning, &registry).unwrap();
     let objects = |o: &Outcome| o.frames.iter().map(|f| f.objects).collect::<Vec<_>>();
     assert_eq!(objects(&stream), objects(&scene));
     assert_eq!((&stream.repeats, stream.switches()), (&scene.repeats, scene.switches()));
@@ -109,8 +109,8 @@ fn a_recorded_stream_runs_like_the_scene_that_it_was_recorded_from() {
 #[test]
 fn a_co_runner_begins_at_its_frame_and_its_work_is_told() {
     let co_runner = CoRunner { from_frame: 3, threads: Some(1) };
-    let course = Course { co_runner: Some(co_runner), ..course(Scenario::Uniform, 200, 6, 2) };
-    let outcome = simulate(&course, &steps(&[(0, "brute@cpu1")]), &Registry::with_cores(1)).unwrap();
+    let settings = ReplaySettings { co_runner: Some(co_runner), ..settings(Scenario::Uniform, 200, 6, 2) };
+    let outcome = replay(&settings, &steps(&[(0, "brute@cpu1")]), &Registry::with_cores(1)).unwrap();
     let slowdown = outcome.slowdown.unwrap();
     assert_eq!(slowdown.co_runner, co_runner);
     assert!(slowdown.of_a_loop.is_some_and(|x| x > 0.0));

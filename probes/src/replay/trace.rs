@@ -1,4 +1,4 @@
-//! Every frame of a simulation in a table, to read elsewhere.
+//! Every frame of a replay in a table, to read elsewhere.
 
 use super::outcome::Outcome;
 use crate::exit::WrongUsage;
@@ -46,7 +46,7 @@ struct Row {
     runner_up_ns: Option<f64>,
     adaptive_ns: f64,
     oracle_ns: f64,
-    /// By id; null where it sat out.
+    /// By id; null where it was not timed.
     fixed_ns: BTreeMap<String, Option<f64>>,
 }
 
@@ -133,8 +133,8 @@ fn name(reason: Reason) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulation::outcome::Taken;
-    use crate::simulation::outcome::tests::{outcome, taken};
+    use crate::replay::frame::Taken;
+    use crate::replay::examples::{outcome, taken};
 
     fn example() -> Outcome {
         let explored = Taken { explored: true, ..taken(0) };

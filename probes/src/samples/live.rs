@@ -1,8 +1,6 @@
 //! Samples on this machine, taken in a process of its own.
 
-use super::effort::Keepers;
-use super::order::{Order, Reply, Wish};
-use super::{Answer, Effort, SECONDS, Sample, Source};
+use super::request::{Reply, SampleRequest, Session};
 use crate::child::{Dialogue, Ended};
 use crate::gpus::uses;
 use crate::output;
@@ -10,6 +8,7 @@ use crate::progress::Progress;
 use anyhow::Context;
 use sapwise::measure::Watch;
 use sapwise::{AlgorithmId, Load};
+use sapwise_lab::belief::{Answer, Effort, IncrementalMethods, SECONDS, Sample, SampleSource};
 use std::time::{Duration, Instant};
 
 /// Opening GPUs takes seconds where a driver compiles on its first start. Without any the process is there at once.
@@ -20,16 +19,16 @@ const ANSWERING: f64 = 0.05;
 
 /// This machine. All samples take [`SECONDS`] at most from the first one on.
 pub(crate) struct Live {
-    order: Order,
+    session: Session,
     dialogue: Option<Dialogue>,
-    keepers: Keepers,
+    incremental: IncrementalMethods,
     /// When the time is over; `None` before the first sample.
     end: Option<Instant>,
     /// Share of the CPU that other programs take, by the latest figure.
     foreign_load: Option<f64>,
     /// What the user should know.
     remarks: Vec<String>,
-    /// Whether an algorithm gave a wrong answer.
+    /// Whether an algorithm returned a wrong answer.
     wrong: bool,
     /// Of the milliseconds that all samples take at most.
     progress: Progress,
@@ -37,14 +36,14 @@ pub(crate) struct Live {
 
 impl Live {
     /// `foreign_load` is what other programs took before, which is taken to go on until a figure of the samples is there.
-    pub(crate) fn new(order: Order, foreign_load: Option<f64>) -> Self {
-        let keepers = Keepers::find();
+    pub(crate) fn new(session: Session, foreign_load: Option<f64>) -> Self {
+        let incremental = IncrementalMethods::find();
         let progress = Progress::new((SECONDS * 1e3) as u64);
-        progress.message(if order.gpus.is_empty() { "samples" } else { "opening GPUs for samples" });
-        Self { order, dialogue: None, keepers, end: None, foreign_load, remarks: Vec::new(), wrong: false, progress }
+        progress.message(if session.gpus.is_empty() { "samples" } else { "opening GPUs for samples" });
+        Self { session, dialogue: None, incremental, end: None, foreign_load, remarks: Vec::new(), wrong: false, progress }
     }
 
-    /// What the user should know of how the samples were taken, and whether an algorithm gave a wrong answer.
+    /// What the user should know of how the samples were taken, and whether an algorithm returned a wrong answer.
     pub(crate) fn remarks(mut self) -> (Vec<String>, bool) {
         if let Some(load) = self.foreign_load.filter(|&load| load > Watch::SPOILING) {
             self.remarks.push(format!(
@@ -66,8 +65,8 @@ impl Live {
             return Ok(Ok(dialogue));
         }
         loop {
-            let limit = if self.end.is_none() && !self.order.gpus.is_empty() { OPENING } else { self.left() };
-            let mut dialogue = Dialogue::begin(&["samples", &serde_json::to_string(&self.order)?])?;
+            let limit = if self.end.is_none() && !self.session.gpus.is_empty() { OPENING } else { self.left() };
+            let mut dialogue = Dialogue::begin(&["samples", &serde_json::to_string(&self.session)?])?;
             let ready = dialogue.listen(limit, |line| match serde_json::from_str(line) {
                 Ok(Reply::Ready(remarks)) => Some(remarks),
                 // Drivers print what they like on the standard output of whoever loads them.
@@ -78,9 +77,9 @@ impl Live {
                     self.remarks.extend(remarks);
                     return Ok(Ok(dialogue));
                 }
-                Err(Ended::Badly(how)) if !self.order.gpus.is_empty() => {
+                Err(Ended::Badly(how)) if !self.session.gpus.is_empty() => {
                     self.remarks.push(format!("no sample was taken on a GPU: the process that opened them {how}"));
-                    self.order.gpus.clear();
+                    self.session.gpus.clear();
                 }
                 Err(ended) => return Ok(Err(ended)),
             }
@@ -89,7 +88,7 @@ impl Live {
 
     /// What is left without these GPUs.
     fn lose(&mut self, gpus: &[u32]) {
-        self.order.gpus.retain(|g| !gpus.contains(&g.index));
+        self.session.gpus.retain(|g| !gpus.contains(&g.index));
     }
 
     fn answer(&mut self, reply: Reply, algorithm: &AlgorithmId, load: &Load, seconds: f64) -> Answer {
@@ -112,10 +111,10 @@ impl Live {
     }
 }
 
-impl Source for Live {
+impl SampleSource for Live {
     fn effort(&self, algorithm: &AlgorithmId, load: &Load) -> Option<Effort> {
-        let there = uses(algorithm).iter().all(|k| self.order.gpus.iter().any(|g| g.index == *k));
-        there.then(|| Effort { objects: load.objects, is_incremental: self.keepers.contain(algorithm) })
+        let there = uses(algorithm).iter().all(|k| self.session.gpus.iter().any(|g| g.index == *k));
+        there.then(|| Effort { objects: load.objects, is_incremental: self.incremental.contain(algorithm) })
     }
 
     fn sample(&mut self, algorithm: &AlgorithmId, load: &Load) -> anyhow::Result<Answer> {
@@ -136,8 +135,8 @@ impl Source for Live {
         if seconds <= 0.0 {
             return Ok(Answer::Over);
         }
-        let wish = Wish { algorithm: algorithm.clone(), objects: load.objects, pairs: load.pairs as u64, seconds };
-        dialogue.tell(&serde_json::to_string(&wish).context("a sample can't be asked for")?);
+        let request = SampleRequest { algorithm: algorithm.clone(), objects: load.objects, pairs: load.pairs as u64, seconds };
+        dialogue.tell(&serde_json::to_string(&request).context("a sample can't be asked for")?);
         let heard = dialogue.listen(left, |line| serde_json::from_str::<Reply>(line).ok())?;
         Ok(match heard {
             Ok(reply) => {

@@ -1,9 +1,10 @@
-//! Who of a race needs more frames, and when nobody does.
+//! Which algorithms of a race need more frames, and when none does.
 //!
 //! What a probe is for is the choice between the best. One that is far behind gets the few samples that its cost curve needs;
 //! two that lie close get samples until it is clear which is faster, or that it does not matter.
 
 use sapwise::stats::{median, relative_iqr};
+use sapwise_lab::sweep::median as median_ns;
 
 /// Frames at least.
 pub(super) const FEW_FRAMES: usize = 5;
@@ -29,7 +30,7 @@ pub(super) struct Contest {
 impl Contest {
     /// Judges lists of samples whose k-th entries belong to the same frame. Nothing is decided below [`FEW_FRAMES`].
     pub(super) fn judge(samples: &[&[u64]]) -> Self {
-        let medians: Vec<Option<f64>> = samples.iter().map(|s| super::median(s)).collect();
+        let medians: Vec<Option<f64>> = samples.iter().map(|s| median_ns(s)).collect();
         let leader = (0..samples.len()).filter(|&k| samples[k].len() >= FEW_FRAMES).min_by(|&a, &b| {
             let of = |k: usize| medians[k].unwrap_or(f64::INFINITY);
             of(a).total_cmp(&of(b))

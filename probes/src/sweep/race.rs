@@ -1,32 +1,28 @@
 //! One point: every algorithm on the same frames, in random order within each.
 //!
-//! An algorithm that keeps work from frame to frame has a bias in its favour here: now and then it finds everything anew, in one
-//! of 20 to 100 frames, and the median leaves those frames out. Nor does its margin settle in the frames there are: what is
-//! measured is the margin with which it begins.
+//! An incremental algorithm has a bias in its favour here: it rebuilds what it keeps once in 20 to 100 frames, and the median leaves those
+//! frames out. Nor does its margin settle in the frames there are: what is measured is the margin with which it begins.
 
 use super::contest::{Contest, FEW_FRAMES};
 use super::verify::Answer;
-use crate::turns::Turns;
 use sapwise::measure::{Options, Watch, core_to_core_ns};
-use sapwise::report::{Point, Timing};
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Displacement, Load, Pairs, Scene};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Displacement, Load, Pairs};
+use sapwise_lab::report::{Point, Timing};
+use sapwise_lab::sweep::{WARM_UP, next_frame};
+use sapwise_scenes::{Random, Scene};
 use std::time::{Duration, Instant};
 
 /// Frames at most: beyond this the error of a median falls too slowly to be worth the time.
 const MOST_FRAMES: usize = 40;
 /// Frames at least where the point's time is over.
 pub(super) const FEWEST_FRAMES: usize = 3;
-/// Frames before the samples for algorithms that keep work from frame to frame: how far boxes move is known in the second, and the
-/// shares of them that leave their grown boxes follow over some tens. Fewer would time the cheap frames after everything was found
-/// anew: at 3162 objects 11 us where the others take 34. They go on past the point's time for that reason.
-pub(crate) const WARM_UP: usize = 24;
 /// Windows that may be thrown away for each that is kept: on a machine that is always busy more would only cost time.
 const MOST_REDONE: u32 = 2;
 /// Share of a point's time in which spoiled frames are redone. After that they are kept, with the foreign load beside them.
 const REDO_SHARE: f64 = 2.0 / 3.0;
 
 /// An algorithm in the race.
-pub(crate) struct Runner {
+pub(crate) struct Racer {
     pub(crate) id: AlgorithmId,
     pub(crate) algorithm: Box<dyn BroadPhase>,
     /// Samples of this point.
@@ -39,7 +35,7 @@ pub(crate) struct Runner {
     answer: Option<Answer>,
 }
 
-impl Runner {
+impl Racer {
     pub(crate) fn new(id: AlgorithmId, algorithm: Box<dyn BroadPhase>) -> Self {
         Self { id, algorithm, samples: Vec::new(), error: None, rests: false, answer: None }
     }
@@ -50,7 +46,7 @@ pub(crate) struct Race {
     /// One list for all, so that its memory is equally warm for each.
     pairs: Pairs,
     naive: Pairs,
-    turns: Turns,
+    shuffle: Random,
     /// Of the frame before.
     displacement: Displacement,
     /// Cores that algorithms may use.
@@ -59,7 +55,7 @@ pub(crate) struct Race {
 }
 
 /// What a point cost beside what it found.
-pub(crate) struct Outcome {
+pub(crate) struct Raced {
     pub(crate) point: Point,
     /// Wall clock of the shortest frame in which nobody rested, everything included: a single frame that was disturbed must not
     /// cost the next size.
@@ -78,33 +74,33 @@ impl Race {
         Self {
             pairs,
             naive: Pairs::new(),
-            turns: Turns::new(seed),
+            shuffle: Random::new(seed),
             displacement: Displacement::default(),
             cores: Options { threads: Some(cores), ..Options::default() },
             contended,
         }
     }
 
-    /// Runs `runners` on frame after frame of `scene` until it is clear which is the fastest or `time` is over. Those who are surely
+    /// Runs `racers` on frame after frame of `scene` until it is clear which is the fastest or `time` is over. Those who are surely
     /// beaten rest from then on, so that their samples are the first of the point's.
-    pub(crate) fn run(&mut self, runners: &mut [Runner], scene: &mut Scene, time: Duration) -> Outcome {
+    pub(crate) fn run(&mut self, racers: &mut [Racer], scene: &mut Scene, time: Duration) -> Raced {
         let began = Instant::now();
         let mut mismatches = Vec::new();
-        runners.iter_mut().for_each(Runner::begin);
+        racers.iter_mut().for_each(Racer::begin);
         let core_to_core = core_to_core_ns(&self.cores);
         // The first frame warms the buffers, the thread pools and the branch predictors, and is not counted.
-        self.frame(runners, scene, |_| true, &mut mismatches);
-        let is_incremental = |r: &Runner| r.error.is_none() && r.algorithm.is_incremental();
+        self.frame(racers, scene, |_| true, &mut mismatches);
+        let is_incremental = |r: &Racer| r.error.is_none() && r.algorithm.is_incremental();
         let mut warm_up = Duration::ZERO;
-        if runners.iter().any(is_incremental) {
+        if racers.iter().any(is_incremental) {
             let frame = || {
                 let started = Instant::now();
-                self.frame(runners, scene, is_incremental, &mut mismatches);
+                self.frame(racers, scene, is_incremental, &mut mismatches);
                 started.elapsed()
             };
             warm_up = std::iter::repeat_with(frame).take(WARM_UP).min().unwrap_or_default() * WARM_UP as u32;
         }
-        runners.iter_mut().for_each(|r| r.samples.clear());
+        racers.iter_mut().for_each(|r| r.samples.clear());
         let mut frames = 0;
         let (mut spoiled, mut highest) = (0, None);
         let (mut windows, mut thrown) = (0, 0);
@@ -116,8 +112,8 @@ impl Race {
             let mut fresh = 0;
             while fresh == 0 || !watch.is_long_enough() {
                 let started = Instant::now();
-                pairs_before = self.frame(runners, scene, |r| !r.rests, &mut mismatches);
-                if runners.iter().all(|r| !r.rests) {
+                pairs_before = self.frame(racers, scene, |r| !r.rests, &mut mismatches);
+                if racers.iter().all(|r| !r.rests) {
                     shortest = shortest.min(started.elapsed());
                 }
                 fresh += 1;
@@ -131,8 +127,8 @@ impl Race {
                 && thrown < MOST_REDONE * (windows + 1)
                 && foreign.is_some_and(|f| f > Watch::SPOILING)
                 && spent + shortest * (fresh as u32) < time.mul_f64(REDO_SHARE);
-            for runner in runners.iter_mut() {
-                runner.keep(frames, if redo { 0 } else { kept });
+            for racer in racers.iter_mut() {
+                racer.keep(frames, if redo { 0 } else { kept });
             }
             if redo {
                 spoiled += kept as u32;
@@ -145,75 +141,75 @@ impl Race {
                 (Some(a), Some(b)) => Some(f64::max(a, b)),
                 (a, b) => a.or(b),
             };
-            let racing: Vec<usize> = (0..runners.len()).filter(|&k| runners[k].races()).collect();
-            let samples: Vec<&[u64]> = racing.iter().map(|&k| &runners[k].samples[..]).collect();
+            let racing: Vec<usize> = (0..racers.len()).filter(|&k| racers[k].races()).collect();
+            let samples: Vec<&[u64]> = racing.iter().map(|&k| &racers[k].samples[..]).collect();
             let contest = Contest::judge(&samples);
-            contest.beaten.iter().for_each(|&k| runners[racing[k]].rests = true);
+            contest.beaten.iter().for_each(|&k| racers[racing[k]].rests = true);
             let over = began.elapsed() >= time;
             let enough = frames >= FEW_FRAMES && contest.decided || frames >= FEWEST_FRAMES && over;
             if frames >= MOST_FRAMES || enough || racing.is_empty() {
                 break;
             }
         }
-        let mut point = self.point(runners, scene, pairs_before);
+        let mut point = self.point(racers, scene, pairs_before);
         point.foreign_load = highest;
         point.spoiled = spoiled;
         point.core_to_core_ns = core_to_core.and_then(|before| Some([before, core_to_core_ns(&self.cores)?]));
-        Outcome { point, frame: shortest, warm_up, mismatches }
+        Raced { point, frame: shortest, warm_up, mismatches }
     }
 
-    /// Advances the scene, times every runner that `takes_part` on the new frame and compares their answers. Returns the pairs
+    /// Advances the scene, times every racer that `takes_part` on the new frame and compares their answers. Returns the pairs
     /// of the frame before this one.
     fn frame(
         &mut self,
-        runners: &mut [Runner],
+        racers: &mut [Racer],
         scene: &mut Scene,
-        takes_part: impl Fn(&Runner) -> bool,
+        takes_part: impl Fn(&Racer) -> bool,
         mismatches: &mut Vec<String>,
     ) -> Option<u64> {
-        let before = runners.iter().find_map(|r| r.answer).map(|a| a.pairs);
+        let before = racers.iter().find_map(|r| r.answer).map(|a| a.pairs);
         self.displacement.watch(scene.boxes());
-        super::scenario::next_frame(scene);
+        next_frame(scene);
         let boxes = scene.boxes();
-        for turn in self.turns.order(runners.len()) {
-            let runner = &mut runners[turn];
-            runner.answer = None;
-            if runner.error.is_some() || !takes_part(runner) {
+        for turn in self.shuffle.shuffled(racers.len()) {
+            let racer = &mut racers[turn];
+            racer.answer = None;
+            if racer.error.is_some() || !takes_part(racer) {
                 continue;
             }
             let started = Instant::now();
-            let result = runner.algorithm.find_pairs(boxes, &mut self.pairs);
+            let result = racer.algorithm.find_pairs(boxes, &mut self.pairs);
             let elapsed = started.elapsed();
             match result {
                 // A clock that ticks slower than the frame must not give 0, which no frame takes.
                 Ok(()) => {
-                    runner.samples.push((elapsed.as_nanos() as u64).max(1));
-                    runner.answer = Some(Answer::of(&self.pairs));
+                    racer.samples.push((elapsed.as_nanos() as u64).max(1));
+                    racer.answer = Some(Answer::of(&self.pairs));
                 }
-                Err(error) => runner.fail(error.to_string()),
+                Err(error) => racer.fail(error.to_string()),
             }
         }
-        self.verify(runners, boxes, mismatches);
+        self.verify(racers, boxes, mismatches);
         before
     }
 
-    fn verify(&mut self, runners: &mut [Runner], boxes: &[Aabb], mismatches: &mut Vec<String>) {
+    fn verify(&mut self, racers: &mut [Racer], boxes: &[Aabb], mismatches: &mut Vec<String>) {
         // Without the double loop the first of the list is taken to be right: it is the simplest that is left.
-        let first = runners.iter().find_map(|r| r.answer);
+        let first = racers.iter().find_map(|r| r.answer);
         let Some(right) = Answer::naive(boxes, &mut self.naive).or(first) else { return };
-        for runner in runners.iter_mut() {
-            if let Some(mismatch) = runner.answer.and_then(|a| a.mismatch(right)) {
-                mismatches.push(format!("{}: {mismatch}", runner.id));
-                runner.fail(mismatch);
+        for racer in racers.iter_mut() {
+            if let Some(mismatch) = racer.answer.and_then(|a| a.mismatch(right)) {
+                mismatches.push(format!("{}: {mismatch}", racer.id));
+                racer.fail(mismatch);
             }
         }
     }
 
     /// What was found, without what the machine did meanwhile.
-    fn point(&self, runners: &[Runner], scene: &Scene, before: Option<u64>) -> Point {
-        let answer = runners.iter().filter(|r| r.error.is_none()).find_map(|r| r.answer);
+    fn point(&self, racers: &[Racer], scene: &Scene, before: Option<u64>) -> Point {
+        let answer = racers.iter().filter(|r| r.error.is_none()).find_map(|r| r.answer);
         let answer = answer.unwrap_or(Answer { pairs: 0, fingerprint: 0 });
-        let timings = runners.iter().map(|r| Timing {
+        let timings = racers.iter().map(|r| Timing {
             algorithm: r.id.clone(),
             samples_ns: r.samples.clone(),
             error: r.error.clone(),
@@ -231,7 +227,7 @@ impl Race {
     }
 }
 
-impl Runner {
+impl Racer {
     /// Makes it ready for a point.
     fn begin(&mut self) {
         self.samples.clear();
@@ -242,7 +238,7 @@ impl Runner {
         self.error.is_none() && !self.rests
     }
 
-    /// Of the samples from `from` on keeps this many, evenly spaced. A runner that failed or rests has none there.
+    /// Of the samples from `from` on keeps this many, evenly spaced. A racer that failed or rests has none there.
     fn keep(&mut self, from: usize, kept: usize) {
         let fresh = self.samples.len().saturating_sub(from);
         if fresh > 0 {
@@ -267,17 +263,17 @@ mod tests {
 
     #[test]
     fn samples_are_kept_from_all_over_a_window() {
-        let mut runner = Runner::new("brute@cpu1".parse().unwrap(), Box::new(Wrong));
-        runner.samples = (0..103).collect();
-        runner.keep(3, 10);
-        assert_eq!(runner.samples, [0, 1, 2, 3, 13, 23, 33, 43, 53, 63, 73, 83, 93]);
-        runner.keep(13, 5);
-        assert_eq!(runner.samples.len(), 13);
-        runner.keep(3, 0);
-        assert_eq!(runner.samples, [0, 1, 2]);
+        let mut racer = Racer::new("brute@cpu1".parse().unwrap(), Box::new(Wrong));
+        racer.samples = (0..103).collect();
+        racer.keep(3, 10);
+        assert_eq!(racer.samples, [0, 1, 2, 3, 13, 23, 33, 43, 53, 63, 73, 83, 93]);
+        racer.keep(13, 5);
+        assert_eq!(racer.samples.len(), 13);
+        racer.keep(3, 0);
+        assert_eq!(racer.samples, [0, 1, 2]);
     }
 
-    /// Gives one pair too many.
+    /// Returns one pair too many.
     struct Wrong;
 
     impl BroadPhase for Wrong {
@@ -290,14 +286,14 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_answer_is_found_and_costs_only_the_one_who_gave_it() {
+    fn a_wrong_answer_is_found_and_costs_only_the_one_that_returned_it() {
         let right = || sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
-        let mut runners = vec![
-            Runner::new("wrong@cpu1".parse().unwrap(), Box::new(Wrong)),
-            Runner::new("brute@cpu1".parse().unwrap(), right()),
+        let mut racers = vec![
+            Racer::new("wrong@cpu1".parse().unwrap(), Box::new(Wrong)),
+            Racer::new("brute@cpu1".parse().unwrap(), right()),
         ];
-        let mut scene = sapwise::Scenario::Uniform.start(50, 1);
-        let outcome = Race::new(1, 1000, 1, false).run(&mut runners, &mut scene, Duration::from_millis(1));
+        let mut scene = sapwise_scenes::Scenario::Uniform.start(50, 1);
+        let outcome = Race::new(1, 1000, 1, false).run(&mut racers, &mut scene, Duration::from_millis(1));
         assert_eq!(outcome.mismatches.len(), 1);
         assert!(outcome.mismatches[0].starts_with("wrong@cpu1"), "{:?}", outcome.mismatches);
         let timings = &outcome.point.timings;
@@ -321,16 +317,16 @@ mod tests {
     }
 
     #[test]
-    fn who_keeps_work_runs_some_frames_more_before_the_samples() {
+    fn an_incremental_algorithm_runs_some_frames_more_before_the_samples() {
         // One box has no pairs, so that finding none is right.
         let [without, with] = {
             let frames = [(); 2].map(|()| Arc::<AtomicUsize>::default());
-            let runner = |k: usize| {
-                Runner::new(format!("counting@cpu{}", k + 1).parse().unwrap(), Box::new(Counting(frames[k].clone(), k == 1)))
+            let racer = |k: usize| {
+                Racer::new(format!("counting@cpu{}", k + 1).parse().unwrap(), Box::new(Counting(frames[k].clone(), k == 1)))
             };
-            let mut runners = vec![runner(0), runner(1)];
-            let mut scene = sapwise::Scenario::Resting.start(1, 1);
-            let outcome = Race::new(1, 1000, 1, true).run(&mut runners, &mut scene, Duration::ZERO);
+            let mut racers = vec![racer(0), racer(1)];
+            let mut scene = sapwise_scenes::Scenario::Resting.start(1, 1);
+            let outcome = Race::new(1, 1000, 1, true).run(&mut racers, &mut scene, Duration::ZERO);
             assert!(outcome.mismatches.is_empty(), "{:?}", outcome.mismatches);
             assert!((0.0..=0.06).contains(&outcome.point.load.moved));
             frames.map(|f| f.load(Relaxed))
@@ -341,9 +337,9 @@ mod tests {
     #[test]
     fn too_many_pairs_end_the_race_with_an_error() {
         let brute = sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
-        let mut runners = vec![Runner::new("brute@cpu1".parse().unwrap(), brute)];
-        let mut scene = sapwise::Scenario::Uniform.start(500, 1);
-        let outcome = Race::new(1, 3, 1, false).run(&mut runners, &mut scene, Duration::from_millis(1));
+        let mut racers = vec![Racer::new("brute@cpu1".parse().unwrap(), brute)];
+        let mut scene = sapwise_scenes::Scenario::Uniform.start(500, 1);
+        let outcome = Race::new(1, 3, 1, false).run(&mut racers, &mut scene, Duration::from_millis(1));
         assert!(outcome.point.timings[0].error.as_ref().unwrap().contains("limit of 3"));
     }
 }

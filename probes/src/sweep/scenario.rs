@@ -1,59 +1,60 @@
 //! One scenario through all sizes, within its time.
 
-use super::dropout::Standing;
-use super::race::{FEWEST_FRAMES, Outcome, Race, Runner};
-use super::{Course, Event, Order, Visit, median, plan};
+use super::race::{FEWEST_FRAMES, Race, Raced, Racer};
+use super::request::{Event, Schedule, SweepRequest, Visit};
 use crate::algorithms::Algorithms;
 use sapwise::gpu::Gpus;
-use sapwise::report::Point;
-use sapwise::{AlgorithmId, GpuIdentity, Registry, Scenario, Scene};
+use sapwise::{AlgorithmId, GpuIdentity, Registry};
+use sapwise_lab::report::Point;
+use sapwise_lab::sweep::{Standing, median, share};
+use sapwise_scenes::Scenario;
 use std::time::{Duration, Instant};
 
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
 pub(crate) const PAIR_LIMIT: usize = 32 << 20;
 
-/// Runs the algorithms of a registry along the course of an order and hands on what happens.
+/// Runs the algorithms of a registry through the schedule of a request and hands on each event.
 ///
 /// # Errors
 /// When the scenario is unknown or `emit` fails.
 pub(crate) fn sweep(
-    order: &Order,
+    request: &SweepRequest,
     algorithms: &Algorithms,
     emit: &mut dyn FnMut(Event) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let scenario: Scenario = order.scenario.parse().map_err(anyhow::Error::msg)?;
-    let mut registry = algorithms.registry(order.cores);
+    let scenario: Scenario = request.scenario.parse().map_err(anyhow::Error::msg)?;
+    let mut registry = algorithms.registry(request.cores);
     registry.pin_threads();
-    for remark in add_gpus(&mut registry, &order.gpus) {
+    for remark in add_gpus(&mut registry, &request.gpus) {
         emit(Event::Remark(format!("{scenario}: {remark}")))?;
     }
-    let mut runners = Vec::new();
+    let mut racers = Vec::new();
     for (id, _) in registry.available() {
-        if !order.course.admits(&id) {
+        if !request.schedule.admits(&id) {
             continue;
         }
         match registry.create(&id) {
-            Ok(algorithm) => runners.push(Runner::new(id, algorithm)),
+            Ok(algorithm) => racers.push(Racer::new(id, algorithm)),
             Err(error) => emit(Event::Remark(format!("{scenario}: {id} is left out: {error}")))?,
         }
     }
     // From here on: opening a GPU takes seconds, and is not the time of any size.
-    let end = Instant::now() + Duration::try_from_secs_f64(order.seconds).unwrap_or_default();
-    let stage = Stage {
+    let end = Instant::now() + Duration::try_from_secs_f64(request.seconds).unwrap_or_default();
+    let own = ScenarioSweep {
         scenario,
-        seed: order.seed,
+        seed: request.seed,
         end,
-        race: Race::new(order.seed, PAIR_LIMIT, order.cores, order.contended),
+        race: Race::new(request.seed, PAIR_LIMIT, request.cores, request.contended),
         emit,
     };
-    match &order.course {
-        Course::Ascent(sizes) => stage.ascend(runners, sizes, order.seconds),
-        Course::Visits(visits) => stage.visit(runners, visits),
+    match &request.schedule {
+        Schedule::Ascent(sizes) => own.ascend(racers, sizes, request.seconds),
+        Schedule::Visits(visits) => own.visit(racers, visits),
     }
 }
 
-/// What both courses share.
-struct Stage<'a> {
+/// What both kinds of schedule share.
+struct ScenarioSweep<'a> {
     scenario: Scenario,
     seed: u64,
     end: Instant,
@@ -61,11 +62,11 @@ struct Stage<'a> {
     emit: &'a mut dyn FnMut(Event) -> anyhow::Result<()>,
 }
 
-impl Stage<'_> {
+impl ScenarioSweep<'_> {
     /// Everyone through all sizes, until they leave the race or the time is over.
-    fn ascend(mut self, mut runners: Vec<Runner>, sizes: &[u32], seconds: f64) -> anyhow::Result<()> {
+    fn ascend(mut self, mut racers: Vec<Racer>, sizes: &[u32], seconds: f64) -> anyhow::Result<()> {
         let scenario = self.scenario;
-        let mut standings = vec![Standing::default(); runners.len()];
+        let mut standings = vec![Standing::default(); racers.len()];
         let mut before: Option<Before> = None;
         for (k, &objects) in sizes.iter().enumerate() {
             let left = self.end.saturating_duration_since(Instant::now());
@@ -75,17 +76,17 @@ impl Stage<'_> {
                 let reached = before.objects;
                 if !before.leave_out_slow(&mut standings) || before.forecast(objects) > left {
                     return self.remark(format!(
-                        "{scenario} ends after {reached} objects: {objects} don't fit into the {seconds:.0} s that it has"
+                        "{scenario} ends after {reached} objects: {objects} objects would exceed its {seconds:.0} s"
                     ));
                 }
-                keep_racing(&mut runners, &mut standings);
-                self.remark(format!("{scenario}: for want of time only the fast go on after {reached} objects"))?;
+                keep_racing(&mut racers, &mut standings);
+                self.remark(format!("{scenario}: after {reached} objects only the fastest algorithms were timed, to stay within {seconds:.0} s"))?;
             }
-            let outcome = self.point(&mut runners, objects, left.mul_f64(plan::share(&sizes[k..])))?;
+            let outcome = self.point(&mut racers, objects, left.mul_f64(share(&sizes[k..])))?;
             let best_ns = judge(&mut standings, &outcome.point, objects);
             (self.emit)(Event::Point(Box::new(outcome.point)))?;
-            keep_racing(&mut runners, &mut standings);
-            if runners.is_empty() {
+            keep_racing(&mut racers, &mut standings);
+            if racers.is_empty() {
                 return self.remark(format!("{scenario} ends after {objects} objects: no algorithm is left"));
             }
             before = Some(Before { objects, frame: outcome.frame, warm_up: outcome.warm_up, best_ns });
@@ -93,33 +94,33 @@ impl Stage<'_> {
         Ok(())
     }
 
-    /// Single points, in the order given, until the time is over. What is left then was not promised, so nothing is said of it.
-    fn visit(mut self, mut runners: Vec<Runner>, visits: &[Visit]) -> anyhow::Result<()> {
-        let order: Vec<AlgorithmId> = runners.iter().map(|r| r.id.clone()).collect();
+    /// Single points, in the order given, until the time is over. Nothing is said of visits that are left then: none was promised.
+    fn visit(mut self, mut racers: Vec<Racer>, visits: &[Visit]) -> anyhow::Result<()> {
+        let order: Vec<AlgorithmId> = racers.iter().map(|r| r.id.clone()).collect();
         for visit in visits {
             let left = self.end.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 break;
             }
-            let (mut racing, resting): (Vec<Runner>, Vec<Runner>) =
-                runners.into_iter().partition(|r| r.error.is_none() && visit.algorithms.contains(&r.id));
+            let (mut racing, resting): (Vec<Racer>, Vec<Racer>) =
+                racers.into_iter().partition(|r| r.error.is_none() && visit.algorithms.contains(&r.id));
             if racing.len() > 1 {
                 let time = Duration::try_from_secs_f64(visit.seconds).unwrap_or_default();
                 let outcome = self.point(&mut racing, visit.objects, time.min(left))?;
                 (self.emit)(Event::Point(Box::new(outcome.point)))?;
             }
-            runners = resting;
-            runners.append(&mut racing);
+            racers = resting;
+            racers.append(&mut racing);
             // The first of the list is what the answers of large frames are held against.
-            runners.sort_by_key(|r| order.iter().position(|id| *id == r.id));
+            racers.sort_by_key(|r| order.iter().position(|id| *id == r.id));
         }
         Ok(())
     }
 
     /// One size, with what was wrong told.
-    fn point(&mut self, runners: &mut [Runner], objects: u32, time: Duration) -> anyhow::Result<Outcome> {
+    fn point(&mut self, racers: &mut [Racer], objects: u32, time: Duration) -> anyhow::Result<Raced> {
         let mut scene = self.scenario.start(objects as usize, self.seed);
-        let mut outcome = self.race.run(runners, &mut scene, time);
+        let mut outcome = self.race.run(racers, &mut scene, time);
         for mismatch in outcome.mismatches.drain(..) {
             (self.emit)(Event::Mismatch(format!("{} at {objects} objects: {mismatch}", self.scenario)))?;
         }
@@ -139,7 +140,7 @@ pub(crate) fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<S
     let gpus = Gpus::find();
     let (there, gone): (Vec<_>, Vec<_>) = wanted.iter().cloned().partition(|g| gpus.identities().any(|h| h == g));
     let gone = gone.into_iter().map(|g| {
-        format!("gpu{} ({}) was there when the hardware was measured and is gone; it is left out", g.index, g.name)
+        format!("gpu{} ({}) was there when the hardware was measured and is now gone; it is left out", g.index, g.name)
     });
     registry.add_gpus(&gpus.choose(|g| there.contains(g)));
     gone.collect()
@@ -189,36 +190,25 @@ fn judge(standings: &mut [Standing], point: &Point, objects: u32) -> f64 {
     best
 }
 
-fn keep_racing(runners: &mut Vec<Runner>, standings: &mut Vec<Standing>) {
+fn keep_racing(racers: &mut Vec<Racer>, standings: &mut Vec<Standing>) {
     let mut stays = standings.iter().map(|s| !s.out).collect::<Vec<_>>().into_iter();
-    runners.retain(|_| stays.next().unwrap_or(false));
+    racers.retain(|_| stays.next().unwrap_or(false));
     standings.retain(|s| !s.out);
-}
-
-/// Goes on to the next frame that has as many objects as the size says.
-///
-/// Only in `fragmentation` the number changes, and samples of different sizes can't be put together.
-pub(crate) fn next_frame(scene: &mut Scene) {
-    for _ in 0..Scenario::FRAGMENTATION_FRAMES {
-        scene.advance();
-        if scene.boxes().len() == scene.peak_objects() {
-            return;
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::algorithms::UserAlgorithm;
 
-    fn order(scenario: &str, sizes: &[u32], seconds: f64) -> Order {
-        let (scenario, course) = (scenario.to_owned(), Course::Ascent(sizes.to_vec()));
-        Order { scenario, course, cores: 2, seed: 3, seconds, gpus: Vec::new(), contended: false }
+    fn request(scenario: &str, sizes: &[u32], seconds: f64) -> SweepRequest {
+        let (scenario, schedule) = (scenario.to_owned(), Schedule::Ascent(sizes.to_vec()));
+        SweepRequest { scenario, schedule, cores: 2, seed: 3, seconds, gpus: Vec::new(), contended: false }
     }
 
-    fn events(order: &Order) -> Vec<Event> {
+    fn events(request: &SweepRequest) -> Vec<Event> {
         let mut events = Vec::new();
-        sweep(order, &Algorithms::default(), &mut |event| {
+        sweep(request, &Algorithms::default(), &mut |event| {
             events.push(event);
             Ok(())
         })
@@ -233,7 +223,7 @@ mod tests {
     #[test]
     fn every_point_has_samples_of_all_algorithms_and_the_size_asked_for() {
         for scenario in ["uniform", "fragmentation"] {
-            let events = events(&order(scenario, &[10, 300], 10.0));
+            let events = events(&request(scenario, &[10, 300], 10.0));
             let points = points(&events);
             assert_eq!(points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [10, 300], "{events:?}");
             for point in points {
@@ -251,8 +241,8 @@ mod tests {
         let visit = |objects, algorithms: &[AlgorithmId]| Visit { objects, seconds: 0.0, algorithms: algorithms.into() };
         // One alone gives no choice to be in doubt of.
         let visits = vec![visit(300, &algorithms), visit(20, &algorithms), visit(50, &algorithms[..1])];
-        let order = Order { course: Course::Visits(visits), ..order("clustered", &[], 60.0) };
-        let events = events(&order);
+        let request = SweepRequest { schedule: Schedule::Visits(visits), ..request("clustered", &[], 60.0) };
+        let events = events(&request);
         let points = points(&events);
         assert_eq!(points.iter().map(|p| p.load.objects).collect::<Vec<_>>(), [300, 20]);
         for point in points {
@@ -263,9 +253,9 @@ mod tests {
 
     #[test]
     fn a_size_that_does_not_fit_is_told() {
-        let events = events(&order("uniform", &[10, 1_000_000], 0.0));
+        let events = events(&request("uniform", &[10, 1_000_000], 0.0));
         assert_eq!(points(&events).len(), 1);
-        assert!(matches!(events.last(), Some(Event::Remark(text)) if text.contains("1000000")), "{events:?}");
+        assert!(matches!(events.last(), Some(Event::Remark(text)) if text.contains("1000000 objects would exceed")), "{events:?}");
     }
 
     #[test]
@@ -273,9 +263,9 @@ mod tests {
         let text = || "none such".to_owned();
         let kind = sapwise::GpuKind::Discrete;
         let gone = GpuIdentity { index: 99, name: text(), device: text(), driver: text(), api: text(), kind };
-        let order = Order { gpus: vec![gone], ..order("uniform", &[10], 1.0) };
+        let request = SweepRequest { gpus: vec![gone], ..request("uniform", &[10], 1.0) };
         let (mut points, mut remarks) = (0, Vec::new());
-        sweep(&order, &Algorithms::default(), &mut |event| {
+        sweep(&request, &Algorithms::default(), &mut |event| {
             match event {
                 Event::Point(_) => points += 1,
                 Event::Remark(text) => remarks.push(text),
@@ -292,11 +282,11 @@ mod tests {
     fn a_users_algorithm_is_timed_like_ours_and_one_that_can_not_be_made_is_named() {
         let mut algorithms = Algorithms::default();
         let brute = || Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap());
-        algorithms.add("mine", 1, false, move |_| brute()).unwrap();
-        let refused = |_| Err(sapwise::Error::OutOfMemory { what: "nodes", elements: 3 });
-        algorithms.add("huge", 1, false, refused).unwrap();
+        algorithms.add(UserAlgorithm::on_one_thread("mine", 1, brute)).unwrap();
+        let refused = || Err(sapwise::Error::OutOfMemory { what: "nodes", elements: 3 });
+        algorithms.add(UserAlgorithm::on_one_thread("huge", 1, refused)).unwrap();
         let (mut raced, mut remarks) = (Vec::new(), Vec::new());
-        sweep(&order("uniform", &[10], 1.0), &algorithms, &mut |event| {
+        sweep(&request("uniform", &[10], 1.0), &algorithms, &mut |event| {
             match event {
                 Event::Point(point) => raced.extend(point.timings.into_iter().map(|t| t.algorithm.to_string())),
                 Event::Remark(text) => remarks.push(text),
@@ -313,7 +303,7 @@ mod tests {
     #[test]
     fn unknown_scenarios_are_refused() {
         assert!(
-            sweep(&order("x", &[10], 1.0), &Algorithms::default(), &mut |_| Ok(()))
+            sweep(&request("x", &[10], 1.0), &Algorithms::default(), &mut |_| Ok(()))
                 .unwrap_err()
                 .to_string()
                 .contains("uniform")

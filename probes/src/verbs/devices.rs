@@ -6,7 +6,7 @@ use crate::exit::Outcome;
 use crate::gpus::{self, Limits, OnGpus, Seen, look};
 use crate::output;
 use crate::progress::Progress;
-use crate::table::{bytes, count};
+use sapwise_lab::text::{bytes, count};
 use crate::terminal::Terminal;
 use sapwise::{AlgorithmId, GpuIdentity, SimdLevel, usable_cores};
 use serde::Serialize;
@@ -110,7 +110,7 @@ fn text(answer: &Answer, no_gpus: bool, terminal: Terminal) -> String {
     if let Some(remark) = &answer.remark {
         text += &format!("\n{}", terminal.warning(&format!("{remark}.")));
     } else if answer.adapters.is_empty() && !no_gpus {
-        text += "\nNo GPU was found; everything else works on the CPU.";
+        text += "\nNo GPU was found; the algorithms on the CPU are not affected.";
     }
     text + "\nNext: sapwise predict"
 }

@@ -2,7 +2,7 @@
 
 use super::rng::{Rng, cube_root, signed3};
 use super::walk::reflect;
-use crate::Aabb;
+use sapwise::Aabb;
 
 /// Half the edge of every object here.
 const HALF: f32 = 0.5;

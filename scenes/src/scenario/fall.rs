@@ -1,7 +1,7 @@
 //! Objects that fall, pile up and are dropped again: `free-fall`.
 
 use super::rng::{Rng, cube_root};
-use crate::Aabb;
+use sapwise::Aabb;
 
 /// Frames from one drop to the next.
 const CYCLE: u64 = 240;

@@ -6,7 +6,7 @@
 use super::Scenario;
 use super::reflect;
 use super::rng::{Powers, Rng, cube_root};
-use crate::Aabb;
+use sapwise::Aabb;
 
 /// Cubes at the beginning of a cycle, or the peak where that is lower.
 const START: usize = 10;

@@ -3,6 +3,8 @@
 //! A scene must have the same bits on every platform. IEEE 754 fixes the results of those five operations, and not those of
 //! `cbrt`, `powf` or `ln`, which differ between C libraries; so they are built from the five here.
 
+use crate::random::Random;
+
 /// The generator xoshiro256++ of Blackman and Vigna (<https://prng.di.unimi.it/xoshiro256plusplus.c>), public domain.
 #[derive(Debug, Clone)]
 pub(super) struct Rng([u64; 4]);
@@ -11,10 +13,10 @@ pub(super) struct Rng([u64; 4]);
 const UNIT_21: f32 = 1.0 / 1_048_576.0;
 
 impl Rng {
-    /// A generator whose state is filled by splitmix64, as the authors of xoshiro advise.
+    /// A generator whose state is filled by splitmix64, which is what [`Random`] is, as the authors of xoshiro advise.
     pub(super) fn new(seed: u64) -> Self {
-        let mut state = seed;
-        Self([(); 4].map(|()| crate::splitmix::next(&mut state)))
+        let mut random = Random::new(seed);
+        Self([(); 4].map(|()| random.bits()))
     }
 
     /// 64 random bits.

@@ -1,7 +1,7 @@
 //! Objects that take a random step each frame: `uniform`, `fast`, `slab`, `mixed`, `resting`.
 
 use super::rng::{Powers, Rng, cube_root};
-use crate::Aabb;
+use sapwise::Aabb;
 
 /// Frames for which the same objects of `resting` stay awake.
 const AWAKE_FRAMES: u64 = 30;

@@ -227,10 +227,10 @@ fn leaving(motion: f32, margin: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Scenario;
+    use crate::scene::{Scenario, Scene};
 
     fn keeps(scenario: Scenario) -> bool {
-        let mut scene = scenario.start(2000, 1);
+        let mut scene = Scene::start(scenario, 2000, 1);
         let mut motion = Motion::default();
         motion.advise(scene.boxes());
         motion.found(2000, 1000);

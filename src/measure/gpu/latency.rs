@@ -15,7 +15,8 @@ const CHAIN: u32 = 500;
 /// The same on a program that acts as a GPU.
 const CHAIN_SOFTWARE: u32 = 50;
 
-const NAMES: [GpuParameterId; 4] = [GpuParameterId::SubmitNs, GpuParameterId::RoundTripNs, GpuParameterId::DispatchNs, GpuParameterId::ReadBackNs];
+const NAMES: [GpuParameterId; 4] =
+    [GpuParameterId::SubmitNs, GpuParameterId::RoundTripNs, GpuParameterId::DispatchNs, GpuParameterId::ReadBackNs];
 
 pub(super) fn measure(bench: &Bench<'_>) -> Vec<Parameter> {
     or_missing(&NAMES, latencies(bench))

@@ -176,7 +176,7 @@ mod tests {
     use super::super::super::synthetic::Machine;
     use super::super::{ALL_OF_CPU, PARAMETERS};
     use super::*;
-    use crate::random::Random;
+    use sapwise_scenes::Random;
     use linfa::traits::Predict;
     use sapwise::hardware::ParameterId;
 

@@ -2,7 +2,7 @@
 
 use super::super::synthetic::{Machine, gpu_truth, truth};
 use super::*;
-use crate::random::Random;
+use sapwise_scenes::Random;
 use sapwise::hardware::ParameterId;
 use sapwise::model::{Feature, ModelSchema, ModelTerm, Range, ResidualTerm, Scale, Validation};
 use sapwise::{BackendClass, Model, Parameter, Source, Term, json};

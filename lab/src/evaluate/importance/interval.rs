@@ -1,6 +1,5 @@
 //! A mean over machines, and how far it would differ with other machines.
 
-use crate::turns::Turns;
 use sapwise::stats::quantile;
 use serde::Serialize;
 
@@ -29,8 +28,8 @@ impl Interval {
         if values.is_empty() {
             return None;
         }
-        let mut turns = Turns::new(SEED);
-        let mut draw = || values[(turns.draw() % values.len() as u64) as usize];
+        let mut random = Random::new(SEED);
+        let mut draw = || values[(random.bits() % values.len() as u64) as usize];
         let mean = |sum: f64| sum / values.len() as f64;
         let means: Vec<f64> = (0..DRAWS).map(|_| mean((0..values.len()).map(|_| draw()).sum())).collect();
         Some(Self { mean: mean(values.iter().sum()), low: quantile(&means, 0.05)?, high: quantile(&means, 0.95)? })
@@ -40,7 +39,7 @@ impl Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use sapwise_scenes::Random;
 
     #[test]
     fn an_interval_of_a_mean_is_as_wide_as_that_of_a_normal_distribution() {

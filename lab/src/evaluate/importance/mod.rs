@@ -14,7 +14,7 @@ use super::partition::Partition;
 use super::profile::{Profile, machines};
 use super::yardstick::average;
 use crate::progress::Progress;
-use crate::turns::Turns;
+use sapwise_scenes::Random;
 use anyhow::{Context, Result};
 use figure::Figure;
 use judge::{Judge, Outcome, Shifts, What};
@@ -234,10 +234,10 @@ fn values(figure: Figure, profiles: &[Profile], machines: &[&str]) -> BTreeMap<u
 
 /// For each permutation the machine whose value each one gets.
 fn donors(values: &BTreeMap<usize, f64>) -> Vec<BTreeMap<usize, usize>> {
-    let mut turns = Turns::new(SEED);
+    let mut random = Random::new(SEED);
     let machines: Vec<usize> = values.keys().copied().collect();
     let one = |order: Vec<usize>| machines.iter().zip(order).map(|(&k, donor)| (k, machines[donor])).collect();
-    (0..PERMUTATIONS).map(|_| one(turns.order(machines.len()))).collect()
+    (0..PERMUTATIONS).map(|_| one(random.shuffled(machines.len()))).collect()
 }
 
 fn of_parameter(

@@ -2,7 +2,7 @@
 
 use super::Part;
 use crate::page::Section;
-use crate::plot::Training;
+use crate::figures::Training;
 use crate::study::entry::Entry;
 use crate::study::folder::Folder;
 use crate::study::{Compared, Study, accuracy, map};

@@ -2,8 +2,8 @@
 
 use super::Part;
 use crate::page::{Block, Section};
-use crate::plot::{self, InfluenceCell, Mark3};
-use crate::sheet::{Cell, Sheet};
+use crate::figures::{self, InfluenceCell, Mark3};
+use crate::data_table::{Cell, DataTable};
 use crate::study::folder::Folder;
 use crate::study::influence::{Influence, Link, On};
 use crate::study::{Study, rank, restrictions};
@@ -106,8 +106,8 @@ fn matrix(influence: &Influence, links: &[&Link]) -> plot::Influence {
     }
 }
 
-fn links_sheet(links: &[&Link], reports: &[usize]) -> Sheet {
-    let mut sheet = Sheet::new([
+fn links_sheet(links: &[&Link], reports: &[usize]) -> DataTable {
+    let mut sheet = DataTable::new([
         ("parameter", "parameter"),
         ("of", "of"),
         ("verdict", "verdict"),
@@ -168,7 +168,7 @@ pub(super) fn taken(study: &Study, folder: &mut Folder, missing: &mut Vec<String
          purpose, and in when they were measured. A verdict takes three pairs: linked where each shows 5 % or more to the same side, not \
          linked where none does. Only pairs count whose parameters show that something was taken.",
     );
-    let mut proofs = Sheet::new([
+    let mut proofs = DataTable::new([
         ("taken", "taken"),
         ("parameter", "parameter"),
         ("with over without", "ratio"),
@@ -182,7 +182,7 @@ pub(super) fn taken(study: &Study, folder: &mut Folder, missing: &mut Vec<String
         proofs.push([&heads[..], &figures, &[Cell::count(s.pairs as u64)]].concat(), &s.reports);
     }
     part.push(folder.table("restrictions", "What the parameters show of each restriction.", proofs))?;
-    let mut sheet = Sheet::new([
+    let mut sheet = DataTable::new([
         ("taken", "taken"),
         ("algorithm", "algorithm"),
         ("objects", "objects"),

@@ -10,9 +10,8 @@ use super::influence::Influence;
 use super::ratios::Comparison;
 use super::{Study, hardware};
 use crate::page::{Block, Section};
-use crate::sheet::{Cell, Sheet};
-use crate::summary;
-use crate::table::grouped;
+use crate::data_table::{Cell, DataTable};
+use crate::text::grouped;
 use anyhow::Result;
 
 /// A section that is being made. What it lacks is told on the page and at its end.
@@ -70,7 +69,7 @@ pub(in crate::study) fn all(
 pub(in crate::study) fn lead(study: &Study, influence: &Influence) -> Vec<String> {
     let count = |n: usize, what: &str| format!("{} {what}{}", grouped(n as u64), if n == 1 { "" } else { "s" });
     let studied = study.studied();
-    let simulated = studied.iter().any(|&k| study.entries[k].kind == sapwise::report::Label::Simulated);
+    let simulated = studied.iter().any(|&k| study.entries[k].kind == crate::report::Label::Simulated);
     let mut lead = vec![format!(
         "{} read, the timings of {} studied, of {}. What the paper of Avril, Gouranton and Arnaldi (ISVRI 2011) asks in its Section 6 is asked \
          of them: which hardware parameters decide how fast a broad-phase algorithm is and where another one overtakes it, and can that be \
@@ -111,12 +110,12 @@ pub(in crate::study) fn note(entry: &Entry) -> String {
     let gpus = if gpus.is_empty() { "no GPU".to_owned() } else { gpus.join(", ") };
     let p = &entry.provenance;
     let left_out = entry.studied.as_ref().err().map_or(String::new(), |why| format!("; timings not studied: {why}"));
-    format!("{}, {}, {gpus}; {}, {}; {}{left_out}", summary::kind(entry.kind), machine.cpu, p.date, p.version, p.command)
+    format!("{}, {}, {gpus}; {}, {}; {}{left_out}", crate::label_text::kind(entry.kind), machine.cpu, p.date, p.version, p.command)
 }
 
 fn decided(claims: &[Claim], folder: &mut Folder, missing: &mut Vec<String>) -> Result<Section> {
     let mut part = Part::new("claims", "What the paper says, and what became of it", missing);
-    let mut sheet = Sheet::new([
+    let mut sheet = DataTable::new([
         ("the paper says", "claim"),
         ("by its own table", "by_its_table"),
         ("because", "by_its_table_because"),

@@ -1,0 +1,29 @@
+//! What the label of a report says to a reader.
+
+use crate::report::Label;
+
+/// The label as it stands in the file.
+#[must_use]
+pub fn kind(label: Label) -> &'static str {
+    match label {
+        Label::RealFull => "real_full",
+        Label::RealRestricted => "real_restricted",
+        Label::RealContended => "real_contended",
+        Label::RealSoftwareGpu => "real_software_gpu",
+        Label::Simulated => "simulated",
+        Label::Published => "published",
+    }
+}
+
+/// What the label means.
+#[must_use]
+pub fn meaning(label: Label) -> &'static str {
+    match label {
+        Label::RealFull => "a whole machine, undisturbed",
+        Label::RealRestricted => "fewer cores or a lower level of vector instructions than the machine has",
+        Label::RealContended => "other programs took part of the machine",
+        Label::RealSoftwareGpu => "the GPU is a software adapter, which runs on the CPU",
+        Label::Simulated => "made from a specification, not measured",
+        Label::Published => "parameters from a publication, without timings",
+    }
+}

@@ -1,0 +1,78 @@
+//! Which algorithms leave the race before the largest size.
+
+/// An algorithm leaves when it takes more than this many times as long as the best.
+const HOPELESS: f64 = 8.0;
+
+/// An algorithm leaves at this ratio where the next size would not fit into the time with it: the border between the fast ones
+/// is worth more than one more point of a slow one.
+const SLOW: f64 = 3.0;
+
+/// Nobody leaves below this size: a frame costs microseconds there, and a ratio of two such times jumps from size to size.
+const JUDGED_FROM: u32 = 1000;
+
+/// The paper's method stays up to this size even when it is hopeless: its curve is what the paper's borders are made of.
+const BRUTE_STAYS_BELOW: u32 = 3000;
+
+/// The race of one algorithm through the sizes of a scenario.
+#[derive(Debug, Clone, Default)]
+pub struct Standing {
+    /// Its time over the best at the size before.
+    before: Option<f64>,
+    /// Whether it has left.
+    pub out: bool,
+}
+
+impl Standing {
+    /// Takes the algorithm out where time is short, if it took more than [`SLOW`] times as long as the best. Gives its ratio.
+    pub fn leave_if_slow(&mut self) -> Option<f64> {
+        let slow = self.before.filter(|&ratio| ratio > SLOW);
+        self.out |= slow.is_some();
+        slow
+    }
+
+    /// Judges the algorithm after a size at which it took `ratio` times as long as the best.
+    ///
+    /// What is slow but gains on the others stays: parallel versions start far behind and win in the end.
+    pub fn judge(&mut self, ratio: f64, method: &str, objects: u32) {
+        let grows = self.before.is_some_and(|before| ratio > before);
+        let kept = method == "brute" && objects < BRUTE_STAYS_BELOW;
+        self.out |= ratio > HOPELESS && grows && !kept && objects >= JUDGED_FROM;
+        self.before = Some(ratio);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn out(method: &str, course: &[(f64, u32)]) -> bool {
+        let mut standing = Standing::default();
+        course.iter().for_each(|&(ratio, objects)| standing.judge(ratio, method, objects));
+        standing.out
+    }
+
+    #[test]
+    fn hopeless_and_falling_behind_leaves() {
+        assert!(out("sap", &[(7.0, 1000), (9.0, 2000)]));
+        assert!(!out("sap", &[(9.0, 1000)]));
+        assert!(!out("sap", &[(50.0, 10), (20.0, 100), (9.0, 1000)]));
+        assert!(!out("sap", &[(2.0, 1000), (7.9, 2000)]));
+        assert!(!out("sap", &[(20.0, 10), (30.0, 18), (9.0, 1000)]));
+    }
+
+    #[test]
+    fn where_time_is_short_the_slow_leave_at_once() {
+        let mut standing = Standing::default();
+        assert_eq!(standing.leave_if_slow(), None);
+        standing.judge(2.0, "sap", 10);
+        assert_eq!(standing.leave_if_slow(), None);
+        standing.judge(4.0, "sap", 18);
+        assert_eq!((standing.leave_if_slow(), standing.out), (Some(4.0), true));
+    }
+
+    #[test]
+    fn brute_force_stays_to_three_thousand() {
+        assert!(!out("brute", &[(9.0, 562), (20.0, 1778)]));
+        assert!(out("brute", &[(9.0, 1778), (20.0, 3162)]));
+    }
+}

@@ -1,0 +1,117 @@
+//! What a sweep measures and how long it may take.
+
+use sapwise_scenes::Scenario;
+use std::time::Duration;
+
+/// Scenarios, sizes and time of a sweep.
+///
+/// It begins with an ascent: every algorithm through all sizes, for the shape of the cost curves. Rounds of visits follow, to where
+/// the choice is in doubt after what was measured before.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// In the order of measurement.
+    pub scenarios: Vec<Scenario>,
+    /// Numbers of objects in the ascent, ascending.
+    pub sizes: Vec<u32>,
+    /// Time for the ascent of each scenario. A slower machine gets fewer sizes in that time, not more time.
+    pub ascent: Duration,
+    /// Rounds of visits. Several, minutes apart: what the host does in the meantime differs, and medians over all of them are
+    /// worth more than as many samples at once.
+    pub rounds: u32,
+    /// Time for everything. What the ascents leave is for the visits.
+    pub total: Duration,
+}
+
+/// Spread over the densities that shift the borders most: even, in blobs, and with sizes over two decades.
+const QUICK: [Scenario; 3] = [Scenario::Uniform, Scenario::Clustered, Scenario::Mixed];
+const QUICK_OBJECTS: u32 = 300_000;
+const QUICK_PER_DECADE: u32 = 3;
+const QUICK_ROUNDS: u32 = 1;
+/// Of the 30 s that a quick probe may take, some are for the hardware; the rest is for starting and writing.
+const QUICK_TOTAL: Duration = Duration::from_secs(21);
+
+const FULL: [Scenario; 7] = [
+    Scenario::Uniform,
+    Scenario::Clustered,
+    Scenario::Slab,
+    Scenario::Mixed,
+    Scenario::Fast,
+    Scenario::Gravity,
+    Scenario::Fragmentation,
+];
+const FULL_OBJECTS: u32 = 1_000_000;
+const FULL_PER_DECADE: u32 = 4;
+const FULL_ROUNDS: u32 = 3;
+/// Of the 3 minutes that a probe may take.
+const FULL_TOTAL: Duration = Duration::from_secs(160);
+
+/// Share of the time for the ascents.
+const ASCENT_SHARE: f64 = 0.6;
+
+impl Plan {
+    /// The usual plan, with the user's scenarios and largest size where they are given.
+    pub fn new(quick: bool, scenarios: &[Scenario], max_objects: Option<u32>) -> Self {
+        let (usual, objects, per_decade, rounds, total) = if quick {
+            (QUICK.to_vec(), QUICK_OBJECTS, QUICK_PER_DECADE, QUICK_ROUNDS, QUICK_TOTAL)
+        } else {
+            (FULL.to_vec(), FULL_OBJECTS, FULL_PER_DECADE, FULL_ROUNDS, FULL_TOTAL)
+        };
+        let scenarios = if scenarios.is_empty() { usual.clone() } else { scenarios.to_vec() };
+        // More scenarios than usual share the time; fewer don't get more than usual each.
+        let total = total.min(total / usual.len() as u32 * scenarios.len() as u32);
+        let ascent = total.mul_f64(ASCENT_SHARE) / scenarios.len() as u32;
+        Self { scenarios, sizes: sizes(max_objects.unwrap_or(objects), per_decade), ascent, rounds, total }
+    }
+}
+
+/// So many sizes a decade from 10 up, and `max` as the last.
+fn sizes(max: u32, per_decade: u32) -> Vec<u32> {
+    let each = f64::from(per_decade);
+    let grid = (per_decade..).map(|k| 10.0_f64.powf(f64::from(k) / each).round() as u32);
+    // A size just below the last would cost as much as the last and tell nothing new.
+    let mut sizes: Vec<u32> = grid.take_while(|&n| f64::from(n) * 1.2 < f64::from(max)).collect();
+    sizes.push(max);
+    sizes
+}
+
+/// Share of the time left that the first of these sizes gets.
+///
+/// Time for a point grows with the cube root of the size: small ones need it to tell foreign load, large ones for frames.
+pub fn share(sizes_left: &[u32]) -> f64 {
+    let weight = |n: &u32| f64::from(*n).cbrt();
+    let all: f64 = sizes_left.iter().map(weight).sum();
+    sizes_left.first().map_or(0.0, |first| weight(first) / all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_even_in_the_logarithm_and_end_at_the_largest() {
+        assert_eq!(sizes(100, 4), [10, 18, 32, 56, 100]);
+        assert_eq!(sizes(10, 3), [10]);
+        assert_eq!(sizes(1_000_000, 4).len(), 21);
+        assert_eq!(&sizes(300_000, 3)[12..], [100_000, 215_443, 300_000]);
+    }
+
+    #[test]
+    fn the_plans_stay_within_their_time() {
+        for quick in [true, false] {
+            let plan = Plan::new(quick, &[], None);
+            let limit = if quick { 30 } else { 180 };
+            // Eight seconds for the hardware, starting and writing.
+            assert!(plan.total + Duration::from_secs(8) < Duration::from_secs(limit));
+            assert!(plan.ascent * (plan.scenarios.len() as u32) < plan.total);
+        }
+        let all = Plan::new(true, &Scenario::ALL, Some(100));
+        assert_eq!((all.total, all.scenarios.len()), (QUICK_TOTAL, 10));
+        assert_eq!(Plan::new(true, &[Scenario::Slab], None).total, QUICK_TOTAL / 3);
+    }
+
+    #[test]
+    fn shares_use_up_the_time() {
+        assert_eq!(share(&[1000]), 1.0);
+        assert!((share(&[1000, 8000]) - 1.0 / 3.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,155 @@
+//! Output files that are whole or absent.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+/// Writes what `write` produces to `path`, so that a reader never sees half of it.
+///
+/// The bytes go to a temporary file in the same folder, to the disk, and under their name by a rename. A link is followed.
+/// What isn't a regular file, such as `/dev/stdout` or a pipe, is written as it is: a rename would put a file in its place.
+///
+/// # Errors
+/// Names `path`. The file that stood there, or its absence, is unchanged, and no temporary file is left.
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    let result = match fs::metadata(path) {
+        Ok(found) if found.is_dir() => Err(anyhow::anyhow!("it is a folder")),
+        Ok(found) if !found.is_file() => write_through(path, write),
+        // Through a link to the file it names; where that can't be told, as for a file not yet there, the path itself.
+        _ => replace(&fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()), write),
+    };
+    result.with_context(|| format!("can't write {}", path.display()))
+}
+
+/// Writes a text, through [`write_atomically`].
+///
+/// # Errors
+/// As there.
+pub fn write_text(path: &Path, text: &str) -> Result<()> {
+    write_atomically(path, |out| Ok(out.write_all(text.as_bytes())?))
+}
+
+fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if folder.as_os_str().is_empty() => PathBuf::from("."),
+        Some(folder) => folder.to_owned(),
+        None => bail!("it names no file"),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".sapwise-").suffix(".tmp");
+    // Private otherwise, where every other program's files follow the umask.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut temporary =
+        builder.tempfile_in(&folder).with_context(|| format!("no file can be made in {}", folder.display()))?;
+    buffered(temporary.as_file_mut(), write)?;
+    // Without this a crash of the machine may leave the name with an empty file.
+    temporary.as_file().sync_all()?;
+    temporary.persist(path).map_err(|failed| failed.error)?;
+    Ok(())
+}
+
+fn write_through(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    buffered(&mut OpenOptions::new().write(true).open(path)?, write)
+}
+
+fn buffered(file: &mut File, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    let mut buffer = BufWriter::with_capacity(1 << 16, file);
+    write(&mut buffer)?;
+    // Dropping the buffer would write its rest too, and lose the error.
+    buffer.flush()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = entries.collect();
+        names.sort();
+        names
+    }
+
+    fn hello(out: &mut dyn Write) -> Result<()> {
+        Ok(out.write_all(b"hello")?)
+    }
+
+    #[test]
+    fn a_file_is_made_or_replaced_and_nothing_else_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out");
+        write_atomically(&path, |out| Ok(out.write_all(&[7; 200_000])?)).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), [7; 200_000]);
+        write_atomically(&path, hello).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"hello");
+        assert_eq!(names(folder.path()), ["out"]);
+    }
+
+    #[test]
+    fn a_failure_half_way_leaves_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out");
+        fs::write(&path, "old").unwrap();
+        let error = write_atomically(&path, |out| {
+            out.write_all(&[7; 200_000])?;
+            bail!("the disk is full")
+        })
+        .unwrap_err();
+        let text = format!("{error:#}");
+        assert!(text.contains("out") && text.contains("the disk is full"), "{text}");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["out"]);
+    }
+
+    #[test]
+    fn folders_and_missing_folders_are_errors_that_name_the_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = folder.path().join("missing").join("out");
+        for path in [folder.path(), inside.as_path(), Path::new(""), Path::new("/")] {
+            let text = format!("{:#}", write_atomically(path, hello).unwrap_err());
+            assert!(text.contains(&format!("can't write {}", path.display())), "{text}");
+        }
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_and_its_target_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (target, link) = (folder.path().join("target"), folder.path().join("link"));
+        fs::write(&target, "old").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        write_atomically(&link, hello).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&target).unwrap(), b"hello");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_without_write_permission_stays_as_it_is() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        fs::set_permissions(folder.path(), PermissionsExt::from_mode(0o555)).unwrap();
+        // A superuser may write anyway.
+        if File::create(folder.path().join("try")).is_err() {
+            assert!(write_atomically(&folder.path().join("out"), hello).is_err());
+            assert!(names(folder.path()).is_empty());
+        }
+        fs::set_permissions(folder.path(), PermissionsExt::from_mode(0o755)).unwrap();
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn devices_are_written_through_and_a_full_one_is_an_error() {
+        write_atomically(Path::new("/dev/null"), hello).unwrap();
+        let text = format!("{:#}", write_atomically(Path::new("/dev/full"), hello).unwrap_err());
+        assert!(text.contains("can't write /dev/full"), "{text}");
+        for device in ["/dev/null", "/dev/full"] {
+            assert!(!fs::metadata(device).unwrap().is_file());
+        }
+    }
+}

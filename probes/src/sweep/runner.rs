@@ -1,0 +1,156 @@
+//! Runs the whole sweep: each scenario in a process of its own.
+
+use super::adaptive_sampling;
+use super::request::{Event, Schedule, SweepRequest};
+use crate::child::{Ended, run_part};
+use crate::interrupt;
+use crate::progress::Progress;
+use anyhow::Context;
+use sapwise::GpuIdentity;
+use sapwise_lab::report::Point;
+use sapwise_lab::sweep::Plan;
+use sapwise_scenes::Random;
+use std::time::{Duration, Instant};
+
+/// What a scenario may take beyond its time: start-up, the first scene and a last frame that was forecast too short.
+const GRACE: Duration = Duration::from_secs(20);
+
+/// What the process of a scenario takes to start, threads included.
+const START: Duration = Duration::from_millis(150);
+
+/// What a sweep has found so far.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Found {
+    pub(crate) points: Vec<Point>,
+    pub(crate) remarks: Vec<String>,
+    /// Whether an algorithm returned a wrong answer or a scenario ended badly.
+    pub(crate) failed: bool,
+    /// Whether the user stopped it.
+    pub(crate) interrupted: bool,
+}
+
+/// What is the same for all scenarios of a sweep.
+pub(crate) struct Conditions {
+    pub(crate) cores: u32,
+    pub(crate) seed: u64,
+    pub(crate) contended: bool,
+    /// The GPUs to sweep.
+    pub(crate) gpus: Vec<GpuIdentity>,
+}
+
+/// Sweeps every scenario of a plan. `keep` is called after each of them, so that nothing measured is lost.
+///
+/// # Errors
+/// When no process can be started. A scenario that crashes is a remark, not an error.
+pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnMut(&Found)) -> anyhow::Result<Found> {
+    let began = Instant::now();
+    let progress = Progress::new(plan.total.as_secs());
+    let gpus = conditions.gpus.clone();
+    let mut sweep = Sweep { plan, conditions, gpus, began, progress, found: Found::default() };
+    for scenario in &plan.scenarios {
+        if !sweep.go(&scenario.to_string(), Schedule::Ascent(plan.sizes.clone()), plan.ascent, 0)? {
+            return Ok(sweep.found);
+        }
+        keep(&sweep.found);
+    }
+    let mut shuffle = Random::new(conditions.seed);
+    for round in 1..=plan.rounds {
+        let left = plan.total.saturating_sub(began.elapsed()) / (plan.rounds + 1 - round);
+        let starts = START * plan.scenarios.len() as u32;
+        for (scenario, mut visits) in adaptive_sampling::visits(&sweep.found.points, left.saturating_sub(starts)) {
+            let time = START + Duration::from_secs_f64(visits.iter().map(|v| v.seconds).sum());
+            // In random order, so that a machine that slows down does not pass for a longer time at large sizes.
+            let order = shuffle.shuffled(visits.len());
+            visits = order.into_iter().map(|k| visits[k].clone()).collect();
+            let before = sweep.found.points.len();
+            let goes_on = sweep.go(&scenario, Schedule::Visits(visits), time, u64::from(round))?;
+            // A round is told from the next by its sizes, which ascend in each.
+            sweep.found.points[before..].sort_by_key(|p| p.load.objects);
+            if !goes_on {
+                return Ok(sweep.found);
+            }
+        }
+        keep(&sweep.found);
+    }
+    Ok(sweep.found)
+}
+
+/// A sweep on its way.
+struct Sweep<'a> {
+    plan: &'a Plan,
+    conditions: &'a Conditions,
+    /// The GPUs that are still trusted.
+    gpus: Vec<GpuIdentity>,
+    began: Instant,
+    progress: Progress,
+    found: Found,
+}
+
+impl Sweep<'_> {
+    /// Sweeps one scenario in a process of its own. Whether the sweep goes on.
+    fn go(&mut self, scenario: &str, schedule: Schedule, time: Duration, round: u64) -> anyhow::Result<bool> {
+        self.progress.message(scenario.to_owned());
+        match self.run(scenario, schedule, time, round)? {
+            Ended::Well => {}
+            Ended::Interrupted => {
+                let done = self.found.points.last().map_or("before the first point".to_owned(), |p| {
+                    format!("after {} at {} objects", p.scenario, p.load.objects)
+                });
+                self.found.remarks.push(format!("interrupted {done}; the rest is missing"));
+                self.found.interrupted = true;
+                return Ok(false);
+            }
+            Ended::Badly(how) => {
+                self.found.remarks.push(format!("{scenario} is incomplete: its process {how}"));
+                self.found.failed = true;
+                // Whatever it was, a driver is the first to be suspected.
+                if !self.gpus.is_empty() {
+                    let why = "whose process did not end well";
+                    self.found.remarks.push(format!("GPUs are left out after {scenario}, {why}"));
+                    self.gpus.clear();
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    fn run(&mut self, scenario: &str, schedule: Schedule, time: Duration, round: u64) -> anyhow::Result<Ended> {
+        if interrupt::requested() {
+            return Ok(Ended::Interrupted);
+        }
+        let request = SweepRequest {
+            scenario: scenario.to_owned(),
+            schedule,
+            cores: self.conditions.cores,
+            // Another scene of the same kind: what depends on one scene alone would pass for a property of the machine.
+            seed: self.conditions.seed.wrapping_add(round),
+            seconds: time.as_secs_f64(),
+            gpus: self.gpus.clone(),
+            contended: self.conditions.contended,
+        };
+        let text = serde_json::to_string(&request)?;
+        let Self { plan, gpus, began, progress, found, .. } = self;
+        run_part(&["sweep", &text], time + GRACE, &mut |line| {
+            let event = match serde_json::from_str(line) {
+                Ok(event) => event,
+                // Drivers print what they like on the standard output of whoever loads them.
+                Err(_) if !gpus.is_empty() => return Ok(()),
+                Err(error) => return Err(error).with_context(|| format!("{scenario}: its process printed {line:?}")),
+            };
+            match event {
+                Event::Point(point) => {
+                    progress.message(format!("{scenario}: {} objects done", point.load.objects));
+                    progress.position(began.elapsed().min(plan.total).as_secs());
+                    found.points.push(*point);
+                }
+                Event::Remark(text) => found.remarks.push(text),
+                Event::Mismatch(text) => {
+                    crate::output::complain(&format!("WRONG ANSWER: {text}"));
+                    found.remarks.push(format!("WRONG ANSWER: {text}"));
+                    found.failed = true;
+                }
+            }
+            Ok(())
+        })
+    }
+}

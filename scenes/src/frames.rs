@@ -1,0 +1,75 @@
+//! Boxes and pairs as numpy reads and writes them: `.npy` files.
+//!
+//! A stream of frames with a varying number of boxes is stored as `frames x n x 6` float32 with the most boxes of any frame as `n`.
+//! Rows at the end of a frame that are NaN throughout are absent boxes.
+
+mod error;
+mod header;
+mod read;
+mod write;
+
+pub use error::{FramesError, InvalidFrame, NpyError};
+pub use write::{FrameWriter, write_pairs};
+
+use sapwise::Aabb;
+
+/// Bounds of a box: lowest x, y, z, then highest x, y, z.
+const BOUNDS: u64 = 6;
+
+/// The boxes of each frame of a recorded stream.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    /// Of all frames, one after the other.
+    boxes: Vec<Aabb>,
+    /// Where each frame ends.
+    ends: Vec<usize>,
+}
+
+impl Frames {
+    /// How many frames there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there is no frame at all. A frame without a box is one.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The most boxes that a frame has.
+    #[must_use]
+    pub fn objects(&self) -> usize {
+        self.iter().map(<[Aabb]>::len).max().unwrap_or(0)
+    }
+
+    /// The boxes of a frame; none beyond the last.
+    #[must_use]
+    pub fn frame(&self, frame: usize) -> &[Aabb] {
+        let Some(&end) = self.ends.get(frame) else { return &[] };
+        let start = frame.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.boxes[start..end]
+    }
+
+    /// The boxes of each frame in turn.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &[Aabb]> {
+        (0..self.len()).map(|frame| self.frame(frame))
+    }
+
+    /// Refuses what every algorithm refuses, before the first of them runs.
+    ///
+    /// # Errors
+    /// Names the first frame and the first box in it that no algorithm can order.
+    pub fn check(&self) -> Result<(), InvalidFrame> {
+        for (frame, boxes) in self.iter().enumerate() {
+            if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| Some((k, b.defect()?))) {
+                return Err(InvalidFrame { frame, error: sapwise::Error::InvalidBox { index, defect } });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

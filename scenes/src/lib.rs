@@ -1,0 +1,39 @@
+//! Scenes of moving boxes for tests, benchmarks and measurements of broad phases, the same bits on every platform.
+//!
+//! A [`Scenario`] is a kind of scene; with a number of objects and a seed it starts a [`Scene`], which evolves frame by frame:
+//!
+//! ```
+//! use sapwise_scenes::Scenario;
+//!
+//! let mut scene = Scenario::Clustered.start(1000, 1);
+//! scene.advance();
+//! assert_eq!((scene.boxes().len(), scene.frame()), (1000, 1));
+//! ```
+//!
+//! | scenario | what it shows | pairs per object |
+//! |---|---|---|
+//! | `uniform` | unit cubes spread evenly, moving a little | 0.4 to 0.55 |
+//! | `fast` | the same, so fast that no frame helps with the next | 0.4 to 0.55 |
+//! | `clustered` | dense Gaussian blobs of about a thousand cubes | 2.9 to 4.2 |
+//! | `slab` | a flat world, as the ground of a game is | 0.4 to 0.55 |
+//! | `mixed` | edges from 0.1 to 10, and up to four cubes as large as the world | 0.8 to 1.3, and 1 for each of those |
+//! | `resting` | `uniform` with one object in twenty awake | 0.4 to 0.55 |
+//! | `brownian` | cubes that fly straight on and now and then turn | 0.38 to 0.55 |
+//! | `free-fall` | cubes that fall onto a pile, rest, and are dropped again | 0.05 to 1.3 |
+//! | `gravity` | a dense swarm about a point that moves | 5 to 7 |
+//! | `fragmentation` | cubes that shatter and are cleared away, ten to the peak and back | 0.15 to 2.6 |
+//!
+//! `fragmentation` follows Figure 1 of Avril, Gouranton and Arnaldi (ISVRI 2011); `brownian`, `free-fall` and `gravity` follow the scenes of
+//! those names of the benchmark Broadmark. The variants of [`Scenario`] describe each in full.
+//!
+//! Boxes that a simulation recorded are read and written as `.npy` files of numpy: [`Frames`] and [`FrameWriter`].
+//!
+//! Every other random number of Sapwise's measurements, simulations and statistics comes from [`Random`], so that a seed repeats them.
+
+mod frames;
+mod random;
+mod scenario;
+
+pub use frames::{FrameWriter, Frames, FramesError, InvalidFrame, NpyError, write_pairs};
+pub use random::Random;
+pub use scenario::{Scenario, Scene, UnknownScenario};
