@@ -64,8 +64,8 @@ pub fn write(value: &impl serde::Serialize) -> Result<String, Error> {
     Ok(serde_json::to_string_pretty(value).map_err(Error::Write)? + "\n")
 }
 
-/// File names and texts of the JSON Schemas of tuning and of the engine's part of models. Those of the
-/// files in the cache have theirs in `cache_schema`.
+/// File names and texts of the JSON Schemas of tuning and of the engine's part of models. The files in the
+/// cache have theirs in `cache_schema`.
 ///
 /// # Errors
 /// When a schema can't be written.

@@ -292,7 +292,14 @@ impl Tuning {
             .collect();
     }
 
-    fn crossover(&self, slice: &Slice<'_>, below: usize, above: usize, objects: u32, spread: &dyn Fn(&Load) -> f64) -> Crossover {
+    fn crossover(
+        &self,
+        slice: &Slice<'_>,
+        below: usize,
+        above: usize,
+        objects: u32,
+        spread: &dyn Fn(&Load) -> f64,
+    ) -> Crossover {
         let (b, a) = (&self.costs[below], &self.costs[above]);
         let doubt = |load: &Load| crate::stats::NORMAL_90 * spread(load);
         // Positive where the algorithm of the upper field is cheaper.

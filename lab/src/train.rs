@@ -42,7 +42,7 @@ use crate::progress::Progress;
 use anyhow::{Result, bail};
 use fit::Designs;
 use partition::Partition;
-use sapwise::hardware::{gpu, parameter};
+use sapwise::hardware::{GpuParameterId, ParameterId};
 use sapwise::model::{GPU_PREFIX, Validation};
 use sapwise::{GpuKind, Hardware, Model};
 
@@ -57,28 +57,28 @@ pub(crate) use yardstick::{Chooser, Yardstick, average};
 
 /// Parameters by which the CPU of a machine is compared with those of the training.
 const PARAMETERS: [&str; 8] = [
-    parameter::CLOCK_MEASURED_GHZ,
-    parameter::SIMD_LANES,
-    parameter::CACHE_LLC_BYTES,
-    parameter::BANDWIDTH_ONE_THREAD_GB_PER_S,
-    parameter::BANDWIDTH_ALL_THREADS_GB_PER_S,
-    parameter::FORK_JOIN_COLD_NS,
-    parameter::SCALING_ALL_THREADS_RATIO,
-    parameter::USABLE_CORES,
+    ParameterId::ClockMeasuredGhz,
+    ParameterId::SimdLanes,
+    ParameterId::CacheLlcBytes,
+    ParameterId::BandwidthOneThreadGbPerS,
+    ParameterId::BandwidthAllThreadsGbPerS,
+    ParameterId::ForkJoinColdNs,
+    ParameterId::ScalingAllThreadsRatio,
+    ParameterId::UsableCores,
 ];
 
 /// The same of a GPU.
 const GPU_PARAMETERS: [&str; 10] = [
-    gpu::parameter::ROUND_TRIP_NS,
-    gpu::parameter::READ_BACK_NS,
-    gpu::parameter::DISPATCH_NS,
-    gpu::parameter::UPLOAD_GB_PER_S,
-    gpu::parameter::UPLOAD_RATE_GB_PER_S,
-    gpu::parameter::DOWNLOAD_GB_PER_S,
-    gpu::parameter::DOWNLOAD_RATE_GB_PER_S,
-    gpu::parameter::READ_GB_PER_S,
-    gpu::parameter::COPY_GB_PER_S,
-    gpu::parameter::ARITHMETIC_GFLOP_PER_S,
+    GpuParameterId::RoundTripNs,
+    GpuParameterId::ReadBackNs,
+    GpuParameterId::DispatchNs,
+    GpuParameterId::UploadGbPerS,
+    GpuParameterId::UploadRateGbPerS,
+    GpuParameterId::DownloadGbPerS,
+    GpuParameterId::DownloadRateGbPerS,
+    GpuParameterId::ReadGbPerS,
+    GpuParameterId::CopyGbPerS,
+    GpuParameterId::ArithmeticGflopPerS,
 ];
 
 /// A parameter of a machine by the name that it has in a model's ranges. That of a GPU is the one of the first GPU, which is a
@@ -189,7 +189,7 @@ mod tests {
         let text = json::write(&trained.model).unwrap();
         assert_eq!(json::model(&text).unwrap(), trained.model);
         assert_eq!(trained.model.ranges.len(), PARAMETERS.len());
-        let cores = trained.model.ranges.iter().find(|r| r.parameter == parameter::USABLE_CORES).unwrap();
+        let cores = trained.model.ranges.iter().find(|r| r.parameter == ParameterId::UsableCores).unwrap();
         assert_eq!((cores.min, cores.max), (2.0, 16.0));
     }
 

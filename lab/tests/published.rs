@@ -1,6 +1,6 @@
 //! The paper's three cards in `datasets/published/` hold what its Figure 9 prints.
 
-use sapwise::hardware::{How, gpu, parameter};
+use sapwise::hardware::{How, GpuParameterId, ParameterId};
 use sapwise::json;
 use sapwise::report::{Label, Report};
 use std::path::Path;
@@ -74,20 +74,20 @@ fn the_cards_hold_the_figures_of_the_paper_and_nothing_else() {
         let [up, down] = printed.transfers;
         let [processors, lanes] = printed.counts;
         let of_card = [
-            (gpu::parameter::UPLOAD_GB_PER_S, up / 1000.0),
-            (gpu::parameter::DOWNLOAD_GB_PER_S, down / 1000.0),
-            (gpu::parameter::COPY_GB_PER_S, printed.internal),
-            (gpu::parameter::MEMORY_BYTES, printed.memory * 1_048_576.0),
-            (gpu::parameter::CLOCK_GHZ, printed.clock),
-            (gpu::parameter::PROCESSORS, processors),
-            (gpu::parameter::LANES, lanes),
+            (GpuParameterId::UploadGbPerS, up / 1000.0),
+            (GpuParameterId::DownloadGbPerS, down / 1000.0),
+            (GpuParameterId::CopyGbPerS, printed.internal),
+            (GpuParameterId::MemoryBytes, printed.memory * 1_048_576.0),
+            (GpuParameterId::ClockGhz, printed.clock),
+            (GpuParameterId::Processors, processors),
+            (GpuParameterId::Lanes, lanes),
         ];
         let (cpu, cores, ghz) = printed.cpu;
         assert!(report.hardware.machine.cpu.contains(cpu), "{file}: {}", report.hardware.machine.cpu);
-        let of_cpu = [(parameter::PHYSICAL_CORES, cores), (parameter::CLOCK_REPORTED_GHZ, ghz)];
+        let of_cpu = [(ParameterId::PhysicalCores, cores), (ParameterId::ClockReportedGhz, ghz)];
         for (list, figures, names) in [
-            (&card.parameters, &of_card[..], gpu::parameter::all_names()),
-            (&report.hardware.parameters, &of_cpu[..], parameter::all_names()),
+            (&card.parameters, &of_card[..], GpuParameterId::OF_ONE),
+            (&report.hardware.parameters, &of_cpu[..], ParameterId::ALL),
         ] {
             assert_eq!(list.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), names, "{file}");
             for p in list {

@@ -66,7 +66,7 @@ impl fmt::Display for SaveError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Given => {
-                f.write_str("the tuning was given by the program; write `Adaptive::learned` to a file with `json::write`")
+                f.write_str("the tuning was given by the program; write `Adaptive::learned` to a file with `json::write_tuning`")
             }
             Self::Awaited => f.write_str("the tuning of this machine is not there yet; save at the end of the session"),
             Self::NothingPredicted => {

@@ -51,8 +51,7 @@ pub struct Product {
 
 impl Product {
     /// The empty product, 1.
-    pub const ONE: Self =
-        Self { objects: 0, log2_objects: 0, pairs: 0, axis_candidates: 0, strip_candidates: 0, moved: 0 };
+    pub const ONE: Self = Self { objects: 0, log2_objects: 0, pairs: 0, axis_candidates: 0, strip_candidates: 0, moved: 0 };
 
     /// Powers that a product may have together: more of 2^64 candidates each would end in infinities.
     pub const MOST_POWERS: u32 = 8;

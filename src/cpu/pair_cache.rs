@@ -13,8 +13,8 @@ mod motion;
 mod tree;
 
 use crate::cpu::columns::part;
-use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::grid_sap::Finder;
+use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::workers::{Outputs, Workers};
 use crate::cpu::Threads;
 use crate::cpu::level::Simd;

@@ -72,9 +72,11 @@ impl fmt::Display for Schema {
 }
 
 /// How files of a schema are read and written. The type that is read holds no key `schema`: this checks and writes it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Format {
-    schema: Schema,
+    name: &'static str,
+    major: u32,
+    minor: u32,
     /// What files of this kind were called once.
     old_name: Option<&'static str>,
     /// Keys of the outermost level that are someone else's.
@@ -91,21 +93,19 @@ impl Format {
     /// The format of a schema in the newest version that the caller knows.
     #[must_use]
     pub const fn new(name: &'static str, major: u32, minor: u32) -> Self {
-        Self { schema: Schema { name: Cow::Borrowed(name), major, minor }, old_name: None, foreign: &[] }
+        Self { name, major, minor, old_name: None, foreign: &[] }
     }
 
     /// The same for a reader to whom these keys of the outermost level mean nothing, and who does not tell them.
     #[must_use]
     pub const fn skipping(self, foreign: &'static [&'static str]) -> Self {
-        // Field by field: to drop `self` in a constant is not possible.
-        let Self { schema, old_name, .. } = self;
-        Self { schema, old_name, foreign }
+        Self { foreign, ..self }
     }
 
-    /// The schema.
+    /// The schema, as files are written.
     #[must_use]
-    pub fn schema(&self) -> &Schema {
-        &self.schema
+    pub fn schema(&self) -> Schema {
+        Schema { name: Cow::Borrowed(self.name), major: self.major, minor: self.minor }
     }
 
     /// Reads a file.
@@ -126,7 +126,7 @@ impl Format {
         let value = serde_path_to_error::deserialize(serde_ignored::Deserializer::new(&mut json, &mut note))
             .map_err(|e| Error::Data { path: e.path().to_string(), source: e.into_inner() })?;
         json.end().map_err(|source| Error::Data { path: ".".to_owned(), source })?;
-        if schema.minor <= self.schema.minor && !skipped.is_empty() {
+        if schema.minor <= self.minor && !skipped.is_empty() {
             return Err(Error::UnknownKey { path: skipped.swap_remove(0), schema });
         }
         Ok(Read { value, schema, skipped })
@@ -134,11 +134,11 @@ impl Format {
 
     /// Whether files of a schema can be read.
     fn accept(&self, found: Schema) -> Result<Schema, Error> {
-        let expected = || self.schema.clone();
-        let same_kind = found.name == self.schema.name;
-        if same_kind && found.major == self.schema.major {
+        let expected = || self.schema();
+        let same_kind = found.name == self.name;
+        if same_kind && found.major == self.major {
             Ok(found)
-        } else if found.major > 0 && (same_kind && found.major < self.schema.major || self.old_name == Some(found.name())) {
+        } else if found.major > 0 && (same_kind && found.major < self.major || self.old_name == Some(found.name())) {
             Err(Error::OldSchema { found: found.to_string(), expected: expected() })
         } else {
             Err(Error::OtherSchema { found: found.to_string(), expected: expected() })
@@ -156,7 +156,7 @@ impl Format {
             #[serde(flatten)]
             value: &'a T,
         }
-        super::write(&Tagged { schema: self.schema.to_string(), value })
+        super::write(&Tagged { schema: self.schema().to_string(), value })
     }
 
     /// File name and text of the JSON Schema of files that hold a type.
@@ -166,7 +166,7 @@ impl Format {
     #[cfg(feature = "schema")]
     pub fn json_schema<T: schemars::JsonSchema>(&self) -> Result<(String, String), Error> {
         let mut schema = schemars::schema_for!(T);
-        let tag = serde_json::json!({ "const": self.schema.to_string() });
+        let tag = serde_json::json!({ "const": self.schema().to_string() });
         let object = schema.ensure_object();
         if let Some(keys) = object.get_mut("properties").and_then(serde_json::Value::as_object_mut) {
             keys.insert("schema".to_owned(), tag);
@@ -177,7 +177,7 @@ impl Format {
         if let Some(required) = object.get_mut("required").and_then(serde_json::Value::as_array_mut) {
             required.insert(0, "schema".into());
         }
-        Ok((format!("{}-{}.schema.json", self.schema.name, self.schema.major), super::write(&schema)?))
+        Ok((format!("{}-{}.schema.json", self.name, self.major), super::write(&schema)?))
     }
 }
 

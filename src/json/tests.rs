@@ -37,10 +37,16 @@ fn an_old_schema_is_refused_with_the_command_that_converts_it() {
         tuning(&file.to_string()).unwrap_err()
     };
     let old = schema("fields/1");
-    assert!(matches!(old, Error::OldSchema { .. }) && old.to_string().contains("`sapwise convert FILE... --out DIR`"), "{old}");
+    assert!(
+        matches!(old, Error::OldSchema { .. }) && old.to_string().contains("`sapwise convert FILE... --out DIR`"),
+        "{old}"
+    );
     for other in ["model/2", "tuning/2", "tuning", "tuning/+1", "tuning/1.x", ""] {
         let error = schema(other);
-        assert!(matches!(error, Error::OtherSchema { .. }) && error.to_string().contains("\"tuning/1\""), "{other}: {error}");
+        assert!(
+            matches!(error, Error::OtherSchema { .. }) && error.to_string().contains("\"tuning/1\""),
+            "{other}: {error}"
+        );
     }
     assert!(matches!(model(r#"{"schema": "model/1"}"#), Err(Error::OldSchema { .. })));
 }

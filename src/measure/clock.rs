@@ -6,7 +6,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use super::{Options, foreign_load};
-use crate::hardware::{Parameter, Statistic, ParameterId};
+use crate::hardware::{Parameter, ParameterId, Statistic};
 
 /// Links of one timed chain: 1.4 ms at 4 GHz, short enough to fit between two interruptions, long enough for a few hundred samples
 /// at most to stand in a report.

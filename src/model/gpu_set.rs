@@ -16,9 +16,7 @@ impl<'a> GpuSet<'a> {
     /// # Errors
     /// Names the GPU that the hardware does not hold.
     pub(super) fn new(hardware: &'a Hardware, indices: &[u32]) -> Result<Self, PredictError> {
-        let one = |&k: &u32| {
-            hardware.gpu(k).ok_or(PredictError::NoGpu { index: k })
-        };
+        let one = |&k: &u32| hardware.gpu(k).ok_or(PredictError::NoGpu { index: k });
         let gpus: Vec<&GpuHardware> = indices.iter().map(one).collect::<Result<_, _>>()?;
         Ok(Self { gpus, group: hardware.gpu_group(indices) })
     }

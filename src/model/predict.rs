@@ -42,8 +42,7 @@ impl Model {
         if let Some(why) = hardware.implausible() {
             return Err(PredictError::Hardware(why));
         }
-        let mut p =
-            Prediction { costs: Vec::new(), extrapolated: false, warnings: Vec::new(), model: self.name.clone() };
+        let mut p = Prediction { costs: Vec::new(), extrapolated: false, warnings: Vec::new(), model: self.name.clone() };
         if self.simulated {
             p.warnings.push(format!(
                 "the model {} was trained on simulated machines: what it predicts is no evidence; train on real reports",
@@ -126,7 +125,11 @@ impl Model {
 /// The parameter of one of the GPUs that no GPU has.
 fn gpus_that_are(hardware: &Hardware, backend: &Backend) -> Result<(), PredictError> {
     let Backend::Gpu(indices) = backend else { return Ok(()) };
-    indices.iter().filter_map(|&k| hardware.gpu(k)).find_map(GpuHardware::implausible).map_or(Ok(()), |e| Err(PredictError::Hardware(e)))
+    indices
+        .iter()
+        .filter_map(|&k| hardware.gpu(k))
+        .find_map(GpuHardware::implausible)
+        .map_or(Ok(()), |e| Err(PredictError::Hardware(e)))
 }
 
 impl Prediction {

@@ -102,7 +102,9 @@ impl Scale {
     /// Names the hardware parameter or the GPU that is missing, or says that the scale is not one of that processor.
     pub fn nanoseconds(self, hardware: &Hardware, backend: &Backend) -> Result<f64, PredictError> {
         match backend {
-            _ if !self.is_of(backend.class()) => Err(PredictError::NotOfProcessor { backend: backend.to_string(), what: format!("scale {self}") }),
+            _ if !self.is_of(backend.class()) => {
+                Err(PredictError::NotOfProcessor { backend: backend.to_string(), what: format!("scale {self}") })
+            }
             Backend::Cpu(threads) => self.on_cpu(hardware, *threads),
             Backend::Gpu(gpus) => self.on_gpus(hardware, gpus),
         }
@@ -132,15 +134,24 @@ impl Scale {
             }
             Self::GpuDispatch => set.latency(&[GpuParameterId::DispatchNs])?,
             Self::GpuUploadByte => {
-                1.0 / set.rate(&[GpuParameterId::UploadRateGbPerS, GpuParameterId::UploadGbPerS], GpuParameterId::GroupUploadRatio)?
+                1.0 / set.rate(
+                    &[GpuParameterId::UploadRateGbPerS, GpuParameterId::UploadGbPerS],
+                    GpuParameterId::GroupUploadRatio,
+                )?
             }
             Self::GpuDownloadByte => {
-                1.0 / set.rate(&[GpuParameterId::DownloadRateGbPerS, GpuParameterId::DownloadGbPerS], GpuParameterId::GroupUploadRatio)?
+                1.0 / set.rate(
+                    &[GpuParameterId::DownloadRateGbPerS, GpuParameterId::DownloadGbPerS],
+                    GpuParameterId::GroupUploadRatio,
+                )?
             }
             Self::GpuMemoryByte => {
-                1.0 / set.rate(&[GpuParameterId::ReadGbPerS, GpuParameterId::CopyGbPerS], GpuParameterId::GroupArithmeticRatio)?
+                1.0 / set
+                    .rate(&[GpuParameterId::ReadGbPerS, GpuParameterId::CopyGbPerS], GpuParameterId::GroupArithmeticRatio)?
             }
-            Self::GpuOperation => 1.0 / set.rate(&[GpuParameterId::ArithmeticGflopPerS], GpuParameterId::GroupArithmeticRatio)?,
+            Self::GpuOperation => {
+                1.0 / set.rate(&[GpuParameterId::ArithmeticGflopPerS], GpuParameterId::GroupArithmeticRatio)?
+            }
             _ => cycle(hardware)?,
         })
     }

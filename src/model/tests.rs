@@ -3,7 +3,7 @@ mod extrapolation;
 use super::*;
 use crate::hardware::GpuParameterId;
 use crate::hardware::ParameterId;
-use crate::{AlgorithmId, Backend, GpuGroup, GpuHardware, GpuIdentity, Hardware, Load, Machine, Parameter};
+use crate::{Backend, Entry, GpuGroup, GpuHardware, GpuIdentity, Hardware, Load, Machine, Parameter};
 
 fn parameters(figures: &[(&str, f64)]) -> Vec<Parameter> {
     figures.iter().map(|&(name, value)| Parameter::reported(name, value, "test")).collect()
@@ -76,8 +76,8 @@ fn ns(scale: Scale, hardware: &Hardware, gpus: &[u32]) -> f64 {
     scale.nanoseconds(hardware, &Backend::Gpu(gpus.to_vec())).unwrap()
 }
 
-fn ids(list: &[&str]) -> Vec<(AlgorithmId, u32)> {
-    list.iter().map(|id| (id.parse().unwrap(), 1)).collect()
+fn ids(list: &[&str]) -> Vec<Entry> {
+    list.iter().map(|id| Entry::new(id.parse().unwrap(), 1)).collect()
 }
 
 #[test]
@@ -96,8 +96,11 @@ fn several_gpus_have_the_slowest_latency_and_added_rates_within_what_was_measure
     let both = [0, 1];
     assert_eq!((ns(Scale::GpuRoundTrip, &h, &both), ns(Scale::GpuDispatch, &h, &both)), (31_000.0, 2000.0));
     assert_eq!((ns(Scale::GpuUploadByte, &h, &both), ns(Scale::GpuOperation, &h, &both)), (1.0 / 15.0, 1.0 / 1500.0));
-    let ratios =
-        [(GpuParameterId::GroupUploadRatio, 1.2), (GpuParameterId::GroupRoundTripRatio, 2.0), (GpuParameterId::GroupArithmeticRatio, 1.9)];
+    let ratios = [
+        (GpuParameterId::GroupUploadRatio, 1.2),
+        (GpuParameterId::GroupRoundTripRatio, 2.0),
+        (GpuParameterId::GroupArithmeticRatio, 1.9),
+    ];
     h.gpu_groups.push(GpuGroup { gpus: both.to_vec(), parameters: parameters(&ratios) });
     assert_eq!((ns(Scale::GpuRoundTrip, &h, &both), ns(Scale::GpuDispatch, &h, &both)), (62_000.0, 2000.0));
     // 1.2 times the fastest is less than the sum, 1.9 times the fastest is more.
@@ -223,8 +226,7 @@ fn the_built_in_model_predicts_from_the_parameters_that_it_names() {
         _ => Parameter::reported(name, 4.0, "test"),
     };
     let all = Hardware { parameters: names.iter().map(figure).collect(), gpus: Vec::new(), ..hardware() };
-    let algorithms: Vec<(AlgorithmId, u32)> =
-        crate::Registry::with_cores(4).entries().iter().map(|e| (e.id.clone(), e.revision)).collect();
+    let algorithms = crate::Registry::with_cores(4).entries().to_vec();
     let prediction = model.predict(&all, &algorithms).unwrap();
     assert_eq!(prediction.costs.len(), algorithms.len(), "{:?}", prediction.warnings);
 }

@@ -137,7 +137,7 @@ fn inverse(mut a: Array2<f64>) -> Array2<f64> {
 mod tests {
     use super::*;
     use sapwise_scenes::Random;
-    use sapwise::hardware::parameter;
+    use sapwise::hardware::ParameterId;
     use sapwise::{Machine, Parameter};
 
     /// A machine whose parameters all follow one size, each with a factor of its own of 20 %.
@@ -167,13 +167,13 @@ mod tests {
         // The farthest of 30 is passed by about one new machine of 31.
         assert!((170..=200).contains(&within), "{within} of 200");
         let mut odd = machine(2000, 0.0);
-        for (name, ln) in [(parameter::USABLE_CORES, 1.5_f64), (parameter::CACHE_LLC_BYTES, -1.5)] {
+        for (name, ln) in [(ParameterId::UsableCores, 1.5_f64), (ParameterId::CacheLlcBytes, -1.5)] {
             odd.parameters.iter_mut().find(|p| p.name == name).unwrap().value = Some(ln.exp());
         }
         let place = clouds[0].place(|name| odd.value(name));
         let mut most = place.most.clone();
         most.sort_unstable();
-        assert!(place.ratio > 1.2 && most == [parameter::CACHE_LLC_BYTES, parameter::USABLE_CORES], "{place:?}");
+        assert!(place.ratio > 1.2 && most == [ParameterId::CacheLlcBytes, ParameterId::UsableCores], "{place:?}");
     }
 
     #[test]
@@ -192,7 +192,7 @@ mod tests {
     fn a_parameter_that_all_machines_share_does_not_put_others_beyond() {
         let mut all = machines(20);
         let at = |h: &mut Hardware, value: f64| {
-            h.parameters.iter_mut().find(|p| p.name == parameter::CACHE_LLC_BYTES).unwrap().value = Some(value);
+            h.parameters.iter_mut().find(|p| p.name == ParameterId::CacheLlcBytes).unwrap().value = Some(value);
         };
         all.iter_mut().for_each(|h| at(h, 3e7));
         let cloud = of(&all).remove(0);

@@ -10,22 +10,22 @@ use super::{GPU_PARAMETERS as ALL_OF_GPU, PARAMETERS as ALL_OF_CPU};
 use anyhow::Result;
 use regression::{Estimate, Regression};
 use sapwise::crossover::{Crossover, Paired, crossover};
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::model::GPU_PREFIX;
 use sapwise::report::{Point, Report, Timed};
 use sapwise::{AlgorithmId, BackendClass, Hardware};
 
 /// Parameters that a crossover is regressed on by least squares, as logarithms. Few, because there are as few rows as reports.
 const PARAMETERS: [&str; 4] = [
-    parameter::CLOCK_MEASURED_GHZ,
-    parameter::SIMD_LANES,
-    parameter::SCALING_ALL_THREADS_RATIO,
-    parameter::FORK_JOIN_COLD_NS,
+    ParameterId::ClockMeasuredGhz,
+    ParameterId::SimdLanes,
+    ParameterId::ScalingAllThreadsRatio,
+    ParameterId::ForkJoinColdNs,
 ];
 
 /// The same of a border between the CPU and a GPU, or between two methods on GPUs.
 const GPU_PARAMETERS: [&str; 4] =
-    [parameter::SCALING_ALL_THREADS_RATIO, "gpu/round_trip_ns", "gpu/upload_rate_gb_per_s", "gpu/arithmetic_gflop_per_s"];
+    [ParameterId::ScalingAllThreadsRatio, "gpu/round_trip_ns", "gpu/upload_rate_gb_per_s", "gpu/arithmetic_gflop_per_s"];
 
 /// A method on one thread or on all threads of its machine, on one GPU or on all: counts differ between machines, these do not.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

@@ -8,7 +8,7 @@ use super::terms::{other_way, terms};
 use super::two_ways::TwoWays;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::model::{Feature, MethodModel, ModelTerm, Scale};
 use sapwise::report::Label;
 use sapwise::{AlgorithmId, Backend, BackendClass, GpuKind, Hardware, Term};
@@ -335,10 +335,10 @@ fn nanoseconds(
     row: &Row,
 ) -> Result<(Vec<f64>, Vec<f64>), String> {
     let backend = id.backend();
-    let cache = hardware.value(parameter::CACHE_LLC_BYTES).filter(|c| *c > 0.0);
+    let cache = hardware.value(ParameterId::CacheLlcBytes).filter(|c| *c > 0.0);
     let cache = match backend.class() {
         BackendClass::Cpu => {
-            cache.ok_or_else(|| format!("the hardware parameter {} is missing", parameter::CACHE_LLC_BYTES))?
+            cache.ok_or_else(|| format!("the hardware parameter {} is missing", ParameterId::CacheLlcBytes))?
         }
         BackendClass::Gpu => 0.0,
     };

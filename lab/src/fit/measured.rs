@@ -8,7 +8,7 @@ use super::two_ways::TwoWays;
 use anyhow::{Result, bail};
 use ndarray::Array2;
 use sapwise::crossover::{Comparison, Paired};
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::report::{Label, Point, Report, Timed};
 use sapwise::{AlgorithmCost, AlgorithmId, Border, CostCurve, CostTerm, Tuning, Knot, Load, Source};
 
@@ -79,7 +79,7 @@ pub(super) fn slice(profile: &Profile, scenario: &str) -> Result<Vec<Load>> {
 /// The cost curve of each algorithm that was timed often enough, and a sentence for each other one.
 pub(crate) fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<String>) {
     let rows = rows(profile, 0);
-    let cache_bytes = profile.hardware.value(parameter::CACHE_LLC_BYTES).unwrap_or(0.0);
+    let cache_bytes = profile.hardware.value(ParameterId::CacheLlcBytes).unwrap_or(0.0);
     let (mut costs, mut warnings) = (Vec::new(), Vec::new());
     let mut order: Vec<(usize, &Timed)> = profile.algorithms.iter().enumerate().collect();
     // Whoever goes over to another method comes after that.

@@ -2,8 +2,8 @@
 
 use super::entry::Entry;
 use crate::data_table::{Cell, Column, DataTable};
-use sapwise::hardware::gpu::parameter as gpu;
-use sapwise::hardware::{How, parameter};
+use sapwise::hardware::GpuParameterId;
+use sapwise::hardware::{How, ParameterId};
 use sapwise::{GpuHardware, Parameter};
 
 /// Letters of a value that is sound, at most.
@@ -11,13 +11,13 @@ const MOST_LETTERS: usize = 24;
 
 /// The rows of the paper's table, in its order, with what each is called here.
 const PAPER: [(&str, &str); 7] = [
-    ("CPU to GPU (upload)", gpu::UPLOAD_GB_PER_S),
-    ("GPU to CPU (download)", gpu::DOWNLOAD_GB_PER_S),
-    ("internal GPU (copy)", gpu::COPY_GB_PER_S),
-    ("memory size", gpu::MEMORY_BYTES),
-    ("clock rate", gpu::CLOCK_GHZ),
-    ("processors", gpu::PROCESSORS),
-    ("cores (lanes)", gpu::LANES),
+    ("CPU to GPU (upload)", GpuParameterId::UploadGbPerS),
+    ("GPU to CPU (download)", GpuParameterId::DownloadGbPerS),
+    ("internal GPU (copy)", GpuParameterId::CopyGbPerS),
+    ("memory size", GpuParameterId::MemoryBytes),
+    ("clock rate", GpuParameterId::ClockGhz),
+    ("processors", GpuParameterId::Processors),
+    ("cores (lanes)", GpuParameterId::Lanes),
 ];
 
 /// The table as the paper has it, its cards first, one row a GPU. What acts as a GPU is told by its kind.
@@ -39,7 +39,7 @@ pub(super) fn as_in_the_paper(entries: &[Entry]) -> DataTable {
 pub(super) fn machines(entries: &[Entry]) -> DataTable {
     let mut sheet = heads(&["report", "CPU", "kind", "vectors"]);
     let lists = || entries.iter().map(|e| &e.hardware.parameters[..]);
-    let names = present(parameter::all_names(), lists());
+    let names = present(ParameterId::ALL, lists());
     columns(&mut sheet, &names);
     for (k, entry) in entries.iter().enumerate() {
         let machine = &entry.hardware.machine;
@@ -54,7 +54,7 @@ pub(super) fn machines(entries: &[Entry]) -> DataTable {
 pub(super) fn gpus(entries: &[Entry]) -> DataTable {
     let mut sheet = heads(&["GPU", "kind", "report"]);
     let lists = || entries.iter().flat_map(|e| &e.hardware.gpus).map(|g| &g.parameters[..]);
-    let names = present(gpu::all_names(), lists());
+    let names = present(GpuParameterId::OF_ONE, lists());
     columns(&mut sheet, &names);
     for (k, entry) in entries.iter().enumerate() {
         for gpu in &entry.hardware.gpus {

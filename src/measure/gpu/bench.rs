@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, GpuError};
 pub(super) use crate::gpu::kernel::{Bound, Kernel};
 use crate::hardware::{GpuKind, GpuParameterId, Parameter};
 use crate::measure::Options;
@@ -64,7 +64,7 @@ impl<'a> Bench<'a> {
         padded.resize(words.len().next_multiple_of(4), 0);
         let contents = bytemuck::cast_slice(&padded);
         let usage = wgpu::BufferUsages::UNIFORM;
-        self.gpu.try_make(|d| d.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })).map_err(words)
+        self.gpu.try_make(|d| d.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })).map_err(self::words)
     }
 
     /// Compiles an entry point, with constants for its overrides.
@@ -118,7 +118,7 @@ impl<'a> Bench<'a> {
 
 /// What a parameter says where a GPU failed: with the words of the driver.
 #[expect(clippy::needless_pass_by_value, reason = "for `map_err`")]
-fn words(error: GpuError) -> String {
+pub(super) fn words(error: GpuError) -> String {
     format!("{error:#}")
 }
 

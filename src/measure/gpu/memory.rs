@@ -54,7 +54,8 @@ fn bandwidths(bench: &Bench<'_>, free_bytes: Option<u64>) -> Result<Vec<Paramete
         Job::of(bench, target, bytes, writing(bench, &write, &buffers.data, bytes)?)?,
     ];
     let copies = calibrate(target, MOST_DISPATCHES, |count| buffers.copy(bench, bytes, count))?;
-    let sets: Vec<Result<u64, String>> = GpuParameterId::READS.map(|(kib, _)| set(u64::from(kib) << 10, bytes, bench)).into();
+    let sets: Vec<Result<u64, String>> =
+        GpuParameterId::READS.map(|(kib, _)| set(u64::from(kib) << 10, bytes, bench)).into();
     // Each pass over a small set reads it again and again, so that a dispatch fills the GPU.
     let pass = bench.pick(64 << 20, 4 << 20).min(bytes);
     // The largest set may be the one that is read already.

@@ -80,7 +80,8 @@ impl Load {
 
 fn limits(bench: &Bench<'_>) -> Vec<Parameter> {
     let limits = bench.gpu.limits();
-    let told = |id: GpuParameterId, value: u64, limit: &str| Parameter::reported(id, value as f64, &format!("wgpu limit {limit}"));
+    let told =
+        |id: GpuParameterId, value: u64, limit: &str| Parameter::reported(id, value as f64, &format!("wgpu limit {limit}"));
     vec![
         told(
             GpuParameterId::WorkgroupInvocations,
@@ -158,9 +159,9 @@ fn processors(
     let kfd = sysfs.and_then(Sysfs::compute);
     let told = |id: GpuParameterId, (count, source): (u32, &str)| Parameter::reported(id, f64::from(count), source);
     let or_why = |id: GpuParameterId, found: Option<(u32, &str)>, nvml: Option<&Result<u32, String>>| match (found, nvml) {
-        (Some(found), _) => told(name, found),
-        (None, Some(Err(why))) => Parameter::missing(name, why),
-        _ => Parameter::missing(name, unknown(info)),
+        (Some(found), _) => told(id, found),
+        (None, Some(Err(why))) => Parameter::missing(id, why),
+        _ => Parameter::missing(id, unknown(info)),
     };
     let units = nvml.map(|nvml| &nvml.processors);
     let by_nvml = |count: Option<&Result<u32, String>>, source: &'static str| Some((*count?.as_ref().ok()?, source));

@@ -178,12 +178,12 @@ mod tests {
     use super::*;
     use sapwise_scenes::Random;
     use linfa::traits::Predict;
-    use sapwise::hardware::parameter;
+    use sapwise::hardware::ParameterId;
 
     /// Machines and a border that goes down with their lanes.
     fn power_law() -> (Vec<Hardware>, Vec<f64>) {
         let machines: Vec<Hardware> = Machine::family().iter().map(Machine::hardware).collect();
-        let values = machines.iter().map(|h| 5.0 - 0.7 * h.value(parameter::SIMD_LANES).unwrap().ln()).collect();
+        let values = machines.iter().map(|h| 5.0 - 0.7 * h.value(ParameterId::SimdLanes).unwrap().ln()).collect();
         (machines, values)
     }
 

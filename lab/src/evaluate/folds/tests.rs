@@ -3,7 +3,7 @@
 use super::super::synthetic::{Machine, gpu_truth, truth};
 use super::*;
 use sapwise_scenes::Random;
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::model::{Feature, ModelSchema, ModelTerm, Range, ResidualTerm, Scale, Validation};
 use sapwise::{BackendClass, Model, Parameter, Source, Term, json};
 
@@ -19,9 +19,9 @@ impl MadeUp {
     fn new(seed: u64, k: usize) -> Self {
         let mut random = Random::named(seed, &["machine", &k.to_string()]);
         let figures = [
-            (parameter::USABLE_CORES, 1.0),
-            (parameter::CLOCK_MEASURED_GHZ, 3.0 * random.log_normal(0.2)),
-            (parameter::CACHE_LLC_BYTES, 3e7),
+            (ParameterId::UsableCores, 1.0),
+            (ParameterId::ClockMeasuredGhz, 3.0 * random.log_normal(0.2)),
+            (ParameterId::CacheLlcBytes, 3e7),
         ];
         let parameters = figures.map(|(name, value)| Parameter::reported(name, value, "test")).into();
         let machine = sapwise::Machine { physical_id: format!("{k:016x}"), ..sapwise::Machine::default() };
@@ -37,7 +37,7 @@ impl MadeUp {
     /// Nanoseconds of brute and of sweep, which cross at about 160 objects.
     fn ns(&self, load: &Load) -> [f64; 2] {
         let bend = (0.1 * (f64::from(load.objects).ln() + self.phase).sin()).exp();
-        let ghz = self.hardware.value(parameter::CLOCK_MEASURED_GHZ).unwrap();
+        let ghz = self.hardware.value(ParameterId::ClockMeasuredGhz).unwrap();
         let exact = [0.5 * Term::AllPairs.count(load, 0.0), 40.0 * f64::from(load.objects) * bend];
         [0, 1].map(|k| self.factors[k] * exact[k] / ghz)
     }
@@ -70,7 +70,7 @@ fn fitted(machines: &[&MadeUp]) -> Vec<MethodModel> {
     let terms = [("brute", Term::AllPairs), ("sap", Term::Objects)];
     let unit = |k: usize| {
         let ratios = machines.iter().flat_map(|m| {
-            let ghz = m.hardware.value(parameter::CLOCK_MEASURED_GHZ).unwrap();
+            let ghz = m.hardware.value(ParameterId::ClockMeasuredGhz).unwrap();
             sizes().map(move |n| (m.ns(&at(n))[k] * ghz / terms[k].1.count(&at(n), 0.0)).ln())
         });
         let ratios: Vec<f64> = ratios.collect();
@@ -84,7 +84,7 @@ fn sizes() -> impl Iterator<Item = u32> {
 }
 
 fn model(methods: Vec<MethodModel>, folds: Vec<Fold>, machines: usize) -> Model {
-    let range = Range { parameter: parameter::CLOCK_MEASURED_GHZ.to_owned(), min: 1.0, max: 9.0 };
+    let range = Range { parameter: ParameterId::ClockMeasuredGhz.to_owned(), min: 1.0, max: 9.0 };
     Model {
         schema: ModelSchema,
         name: "test".to_owned(),

@@ -2,7 +2,7 @@ use super::super::synthetic::Machine;
 use super::*;
 use crate::simulate;
 use sapwise::Hardware;
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 
 fn simulated(machines: usize) -> Vec<Profile> {
     let loads = simulate::Loads::of_a_sweep(1, Some(30_000)).unwrap();
@@ -14,7 +14,7 @@ fn simulated(machines: usize) -> Vec<Profile> {
 fn what_the_timings_were_made_of_is_linked_and_what_they_were_not_is_not() {
     let found = importance(&simulated(12)).unwrap();
     let of = |name: &str| found.parameters.iter().find(|p| p.parameter == name).unwrap();
-    let fork_join = of(parameter::FORK_JOIN_COLD_NS);
+    let fork_join = of(ParameterId::ForkJoinColdNs);
     for border in fork_join.borders.iter().filter(|b| b.border.ends_with("on all threads")) {
         assert_eq!(border.error_rise_octaves.verdict, Verdict::Linked, "{border:#?}");
     }
@@ -22,7 +22,7 @@ fn what_the_timings_were_made_of_is_linked_and_what_they_were_not_is_not() {
     for border in fork_join.borders.iter().filter(|b| !b.border.contains("all threads") && !b.border.contains("GPU")) {
         assert_eq!(border.permuted_moves_octaves.unwrap().high, 0.0, "{border:#?}");
     }
-    let memory = of(parameter::MEMORY_BYTES);
+    let memory = of(ParameterId::MemoryBytes);
     assert!(memory.deviation_octaves > 0.3, "{memory:?}");
     let effects = memory.borders.iter().map(|b| &b.error_rise_octaves).chain([&memory.regret_rise]);
     effects.for_each(|e| assert_eq!(e.verdict, Verdict::NotLinked, "{e:?}"));
@@ -56,7 +56,7 @@ fn every_parameter_that_a_cost_depends_on_is_looked_at() {
             let name = other.parameters[p].name.clone();
             other.parameters[p].value = other.parameters[p].value.map(|v| v * 1.7);
             // Where the latency between cores is missing, the warm fork and join stands for it.
-            let known = looked_at.contains(&name) || name == parameter::FORK_JOIN_WARM_NS;
+            let known = looked_at.contains(&name) || name == ParameterId::ForkJoinWarmNs;
             assert!(known || costs(profile, &other) == before, "{name}");
         }
     }
