@@ -15,6 +15,8 @@ mod price;
 mod tally;
 #[cfg(feature = "this-machine")]
 mod this_machine;
+#[cfg(feature = "this-machine")]
+mod uniform;
 
 use crate::{Aabb, AlgorithmId, BroadPhase, Error, Tuning, Load, Pairs, Registry, Source, Step};
 use candidates::{Candidate, Instance, Made};

@@ -31,6 +31,8 @@
 //! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and keeps the tuning for the next start.
 //! - `schema`: the JSON Schemas of the files, for tools.
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 mod aabb;
 mod adaptive;
 mod algorithm;
@@ -82,7 +84,12 @@ pub use rayon;
 pub use registry::{Entry, Registry, usable_cores};
 pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, Tuning};
 
-/// The examples of the README as tests, with the feature that the first of them needs.
+/// The example of the README as a test, with the feature that it needs.
 #[cfg(all(doctest, feature = "this-machine"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// The examples of the guide as tests, with the features that they need together.
+#[cfg(all(doctest, feature = "this-machine", feature = "gpu"))]
+#[doc = include_str!("../docs/guide.md")]
+struct Guide;

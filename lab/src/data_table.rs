@@ -6,40 +6,40 @@ use std::borrow::Cow;
 
 /// Rows under named columns.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct DataTable {
-    pub columns: Vec<Column>,
-    pub rows: Vec<Row>,
+pub(crate) struct DataTable {
+    pub(crate) columns: Vec<Column>,
+    pub(crate) rows: Vec<Row>,
 }
 
 /// One column.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
+pub(crate) struct Column {
     /// What a reader sees at its head.
-    pub title: String,
+    pub(crate) title: String,
     /// Its name in CSV, with the unit as the last words.
-    pub key: String,
+    pub(crate) key: String,
 }
 
 impl Column {
     /// With what a reader sees, and its name in CSV.
     #[must_use]
-    pub fn new(title: impl Into<String>, key: impl Into<String>) -> Self {
+    pub(crate) fn new(title: impl Into<String>, key: impl Into<String>) -> Self {
         Self { title: title.into(), key: key.into() }
     }
 }
 
 /// One row, and the reports that its figures are from.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Row {
+pub(crate) struct Row {
     /// As many as there are columns.
-    pub cells: Vec<Cell>,
+    pub(crate) cells: Vec<Cell>,
     /// Positions in the list of reports, ascending.
-    pub reports: Vec<usize>,
+    pub(crate) reports: Vec<usize>,
 }
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Cell {
+pub(crate) enum Cell {
     /// Words.
     Text(String),
     /// A figure in the unit of its column, and as a reader sees it.
@@ -51,12 +51,12 @@ pub enum Cell {
 impl DataTable {
     /// Without rows, under columns that are called so for a reader and in CSV.
     #[must_use]
-    pub fn new<const N: usize>(columns: [(&str, &str); N]) -> Self {
+    pub(crate) fn new<const N: usize>(columns: [(&str, &str); N]) -> Self {
         Self { columns: columns.map(|(title, key)| Column::new(title, key)).into(), rows: Vec::new() }
     }
 
     /// Adds a row whose figures are from these reports.
-    pub fn push(&mut self, cells: Vec<Cell>, reports: &[usize]) {
+    pub(crate) fn push(&mut self, cells: Vec<Cell>, reports: &[usize]) {
         debug_assert_eq!(cells.len(), self.columns.len());
         self.rows.push(Row { cells, reports: reports.to_vec() });
     }
@@ -70,7 +70,7 @@ impl DataTable {
     ///
     /// # Errors
     /// When a row has more or fewer cells than there are columns.
-    pub fn csv(&self, labels: &[String]) -> anyhow::Result<String> {
+    pub(crate) fn csv(&self, labels: &[String]) -> anyhow::Result<String> {
         let traced = self.rows.iter().any(|r| !r.reports.is_empty());
         let mut writer = csv::Writer::from_writer(Vec::new());
         let keys = self.columns.iter().map(|c| inert(&c.key));
@@ -91,12 +91,12 @@ impl DataTable {
 
 impl Cell {
     /// Words.
-    pub fn text(text: impl Into<String>) -> Self {
+    pub(crate) fn text(text: impl Into<String>) -> Self {
         Self::Text(text.into())
     }
 
     /// A figure with so many digits after the point.
-    pub fn number(value: f64, decimals: usize) -> Self {
+    pub(crate) fn number(value: f64, decimals: usize) -> Self {
         if value.is_finite() {
             Self::Number { value, shown: format!("{value:.decimals$}") }
         } else {
@@ -106,22 +106,22 @@ impl Cell {
 
     /// A figure with all its digits, for tables that are only read by programs.
     #[must_use]
-    pub fn exact(value: f64) -> Self {
+    pub(crate) fn exact(value: f64) -> Self {
         Self::number(value, 0).map_shown(figure)
     }
 
     /// A figure where there is one.
-    pub fn optional(value: Option<f64>, decimals: usize, why: &str) -> Self {
+    pub(crate) fn optional(value: Option<f64>, decimals: usize, why: &str) -> Self {
         value.map_or_else(|| Self::Missing(why.to_owned()), |v| Self::number(v, decimals))
     }
 
     /// A whole number in groups of three digits.
-    pub fn count(value: u64) -> Self {
+    pub(crate) fn count(value: u64) -> Self {
         Self::Number { value: value as f64, shown: grouped(value) }
     }
 
     /// A share as a percentage; its value is the share.
-    pub fn percent(share: f64) -> Self {
+    pub(crate) fn percent(share: f64) -> Self {
         Self::number(share, 4).map_shown(|share| format!("{:.1} %", 100.0 * share))
     }
 
@@ -142,7 +142,7 @@ impl Cell {
 }
 
 /// All digits that tell this figure from every other; nothing where it is none.
-pub fn figure(value: f64) -> String {
+pub(crate) fn figure(value: f64) -> String {
     match value.abs() {
         size if !size.is_finite() => String::new(),
         size if size == 0.0 || (1e-5..1e16).contains(&size) => value.to_string(),

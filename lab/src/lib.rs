@@ -25,6 +25,7 @@
 
 pub mod belief;
 pub mod compare;
+pub mod convert;
 pub mod data;
 pub mod data_table;
 pub mod evaluate;

@@ -3,23 +3,36 @@
 //! ```sh
 //! bvh() { cargo run --release -p sapwise-cli --example bvh -- "$@"; }
 //! bvh probe --no-gpus --out bvh.json                      # times it beside ours, and verifies every answer
-//! bvh train bvh.json --out with-bvh.json                  # fits its cost beside those of ours
-//! bvh predict --model with-bvh.json --out tuning.json     # where it pays on this machine
-//! bvh run fragmentation --tuning tuning.json              # what choosing it is worth
+//! bvh train bvh.json --out with-bvh.json                  # fits its cost, with terms of its own, beside those of ours
+//! bvh predict --model with-bvh.json --out tuning.json     # where it is the fastest on this machine
+//! bvh run fragmentation --tuning tuning.json              # what choosing it saves
 //! ```
 //!
 //! The manifest of a program outside of this repository needs `sapwise` and `sapwise-cli`.
 
 use parry3d::bounding_volume::Aabb as Bounds;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
-use sapwise::{Aabb, BroadPhase, Error, Pairs};
+use sapwise::model::Scale;
+use sapwise::{Aabb, BroadPhase, Error, Pairs, Product, Term};
+use sapwise_cli::{Command, UserAlgorithm};
 use std::process::ExitCode;
 
 /// Visible to the test of this example, which is a command with the same `main`.
 pub(crate) fn main() -> ExitCode {
     // The name stands in reports, models and tuning. The 1 is the revision: count it up whenever `find_pairs` gets faster or slower, so
-    // that what was measured before is told to be stale. An algorithm on several threads is added by `with_threads`.
-    sapwise_cli::Command::new().with("bvh", 1, || Ok(Box::new(Tree::default()))).run()
+    // that what was measured before is known to be stale. An algorithm on several threads is made by `UserAlgorithm::on_threads`.
+    let tree = UserAlgorithm::on_one_thread("bvh", 1, || Ok(Box::new(Tree::default())));
+    Command::new().with(tree.terms(&terms())).run()
+}
+
+/// What a frame's time consists of: a tree visits about log2 n nodes to move an object and to find a pair. No grid method has such terms.
+fn terms() -> [(Term, Scale); 4] {
+    [
+        (Term::Call, Scale::Cycle),
+        (Term::Objects, Scale::Cycle),
+        (Term::Product(Product::ONE.objects(1).log2_objects(1)), Scale::Cycle),
+        (Term::Product(Product::ONE.pairs(1).log2_objects(1)), Scale::Cycle),
+    ]
 }
 
 /// A tree that is kept from frame to frame, as rapier keeps it.

@@ -1,11 +1,66 @@
 //! The algorithms of the command: ours, and those that a user's program adds.
 
 use crate::revisions;
-use sapwise::{AlgorithmId, Backend, BackendClass, BroadPhase, Error, Registry};
+use sapwise::model::Scale;
+use sapwise::{AlgorithmId, Backend, BackendClass, BroadPhase, Error, Registry, Term};
 use std::sync::Arc;
 
-/// Makes an instance of a user's algorithm on that many threads.
-type Make = Arc<dyn Fn(u32) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync>;
+/// Creates an instance of a user's algorithm on that many threads.
+type Factory = Arc<dyn Fn(u32) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync>;
+
+/// An algorithm that a user's program adds to the command.
+///
+/// `method` is 1 to 32 of `a-z`, `0-9`, `-` and `_`, beginning with a letter, and no name of ours. Count `revision` up whenever its speed
+/// changes: reports and models of other revisions are stale then. The factory is called in each process that runs the algorithm, and its error
+/// leaves the algorithm out with a remark. One with kernels of several vector widths asks
+/// [`SimdLevel::in_use`](sapwise::SimdLevel::in_use), so that a probe with `SAPWISE_SIMD` restricts it as well.
+#[derive(Clone)]
+pub struct UserAlgorithm {
+    method: String,
+    revision: u32,
+    /// Whether it runs on the thread counts that ours run on, or on one thread only.
+    parallel: bool,
+    terms: Vec<(Term, Scale)>,
+    factory: Factory,
+}
+
+impl UserAlgorithm {
+    /// An algorithm that runs on the calling thread alone, as `method@cpu1`.
+    #[must_use]
+    pub fn on_one_thread(
+        method: &str,
+        revision: u32,
+        factory: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
+    ) -> Self {
+        Self::new(method, revision, false, Arc::new(move |_| factory()))
+    }
+
+    /// An algorithm that runs on several threads: the factory is called with their number, the calling one included. It is listed, as ours
+    /// are, on 1, 2, 4, ... threads and on all that the machine has or `--threads` allows. The command pins our threads to cores; those of a
+    /// user's algorithm it leaves alone.
+    #[must_use]
+    pub fn on_threads(
+        method: &str,
+        revision: u32,
+        factory: impl Fn(u32) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
+    ) -> Self {
+        Self::new(method, revision, true, Arc::new(factory))
+    }
+
+    fn new(method: &str, revision: u32, parallel: bool, factory: Factory) -> Self {
+        Self { method: method.to_owned(), revision, parallel, terms: Vec::new(), factory }
+    }
+
+    /// What the time of a frame grows with, and what of the hardware it takes: `train` fits a unit for each of these terms to the timings.
+    /// Without them the terms are used that fit most methods: calls, objects, sorting, all pairs, candidates on an axis and pairs.
+    ///
+    /// `examples/bvh.rs` says that a tree takes `log2 n` steps for each object and for each pair.
+    #[must_use]
+    pub fn terms(mut self, terms: &[(Term, Scale)]) -> Self {
+        self.terms = terms.to_vec();
+        self
+    }
+}
 
 /// What a registry of the command holds beside the algorithms on GPUs.
 ///
@@ -14,41 +69,38 @@ type Make = Arc<dyn Fn(u32) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync>
 /// different ones.
 #[derive(Default)]
 pub(crate) struct Algorithms {
-    users: Vec<User>,
-}
-
-/// A user's algorithm.
-struct User {
-    method: String,
-    revision: u32,
-    /// Whether it runs on the thread counts that ours run on, or on one thread only.
-    parallel: bool,
-    make: Make,
+    users: Vec<UserAlgorithm>,
 }
 
 impl Algorithms {
     /// Adds a user's algorithm.
     ///
     /// # Errors
-    /// A sentence, when the name is no method name, is that of a method of ours, or was given before.
-    pub(crate) fn add(
-        &mut self,
-        method: &str,
-        revision: u32,
-        parallel: bool,
-        make: impl Fn(u32) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
-    ) -> Result<(), String> {
+    /// A sentence, when the name is no method name, is that of a method of ours, or was added before.
+    pub(crate) fn add(&mut self, algorithm: UserAlgorithm) -> Result<(), String> {
+        let method = &algorithm.method;
         AlgorithmId::new(method, Backend::Cpu(1)).map_err(|e| e.to_string())?;
         // Timings and models are told apart by the name, so a second algorithm under it would pass for the first.
         let ours = Registry::with_cores(1);
         if [BackendClass::Cpu, BackendClass::Gpu].iter().any(|&class| revisions::is_known((class, method), &ours)) {
             return Err(format!("{method:?} is the name of a method of Sapwise; give your algorithm another name"));
         }
-        if self.users.iter().any(|u| u.method == method) {
+        if self.users.iter().any(|u| u.method == *method) {
             return Err(format!("two algorithms are called {method:?}; give one of them another name"));
         }
-        self.users.push(User { method: method.to_owned(), revision, parallel, make: Arc::new(make) });
+        self.users.push(algorithm);
         Ok(())
+    }
+
+    /// The terms that a user said the cost of a method has. None for ours, and where the user said nothing.
+    pub(crate) fn terms(&self, id: &AlgorithmId) -> &[(Term, Scale)] {
+        let own = self.users.iter().find(|u| u.method == id.method() && id.backend().class() == BackendClass::Cpu);
+        own.map_or(&[], |u| &u.terms)
+    }
+
+    /// The methods of the user, each with its revision.
+    pub(crate) fn users(&self) -> impl Iterator<Item = (&str, u32)> {
+        self.users.iter().map(|u| (u.method.as_str(), u.revision))
     }
 
     /// Ours on 1, 2, 4, ... and `cores` threads, then the user's.
@@ -61,8 +113,8 @@ impl Algorithms {
             for &threads in counts.iter().filter(|&&k| k == 1 || user.parallel) {
                 // The name was accepted on one thread, and the counts are those of ids.
                 let Ok(id) = AlgorithmId::new(&user.method, Backend::Cpu(threads)) else { continue };
-                let make = Arc::clone(&user.make);
-                registry.add(id, user.revision, move || make(threads));
+                let factory = Arc::clone(&user.factory);
+                registry.add(id, user.revision, move || factory(threads));
             }
         }
         registry
@@ -87,6 +139,10 @@ mod tests {
         Ok(Box::new(Nothing))
     }
 
+    fn serial(method: &str, revision: u32) -> UserAlgorithm {
+        UserAlgorithm::on_one_thread(method, revision, || nothing(1))
+    }
+
     #[test]
     fn names_of_ours_names_given_twice_and_what_is_no_name_are_refused() {
         let mut algorithms = Algorithms::default();
@@ -97,18 +153,18 @@ mod tests {
             ("tree@cpu1", "is no method name"),
             ("", "is no method name"),
         ] {
-            let told = algorithms.add(name, 1, false, nothing).unwrap_err();
+            let told = algorithms.add(serial(name, 1)).unwrap_err();
             assert!(told.contains(why), "{name}: {told}");
         }
-        algorithms.add("tree", 1, false, nothing).unwrap();
-        assert!(algorithms.add("tree", 2, true, nothing).unwrap_err().contains("two algorithms"));
+        algorithms.add(serial("tree", 1)).unwrap();
+        assert!(algorithms.add(UserAlgorithm::on_threads("tree", 2, nothing)).unwrap_err().contains("two algorithms"));
     }
 
     #[test]
     fn a_serial_one_is_listed_once_and_a_parallel_one_as_often_as_ours() {
         let mut algorithms = Algorithms::default();
-        algorithms.add("tree", 3, false, nothing).unwrap();
-        algorithms.add("grid", 4, true, nothing).unwrap();
+        algorithms.add(serial("tree", 3)).unwrap();
+        algorithms.add(UserAlgorithm::on_threads("grid", 4, nothing)).unwrap();
         let registry = algorithms.registry(6);
         let counts = |method: &str| -> Vec<(u32, u32)> {
             let all = registry.available().into_iter();
@@ -127,10 +183,21 @@ mod tests {
             4 => nothing(threads),
             _ => Err(Error::OutOfMemory { what: "threads", elements: threads as usize }),
         };
-        algorithms.add("grid", 1, true, only_four).unwrap();
+        algorithms.add(UserAlgorithm::on_threads("grid", 1, only_four)).unwrap();
         let registry = algorithms.registry(4);
         assert!(registry.create(&"grid@cpu4".parse().unwrap()).is_ok());
         let Err(error) = registry.create(&"grid@cpu2".parse().unwrap()) else { panic!("made for another count") };
         assert!(error.to_string().contains("no memory for 2 threads"), "{error}");
+    }
+
+    #[test]
+    fn terms_are_those_of_the_method_on_any_number_of_threads() {
+        let mut algorithms = Algorithms::default();
+        let terms = [(Term::Call, Scale::Cycle), (Term::Pairs, Scale::SharedCycle)];
+        algorithms.add(UserAlgorithm::on_threads("grid", 1, nothing).terms(&terms)).unwrap();
+        algorithms.add(serial("tree", 1)).unwrap();
+        let of = |id: &str| algorithms.terms(&id.parse().unwrap());
+        assert_eq!(of("grid@cpu4"), terms);
+        assert!(["tree@cpu1", "brute@cpu1", "grid@gpu0"].iter().all(|id| of(id).is_empty()));
     }
 }

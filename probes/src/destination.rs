@@ -2,7 +2,7 @@
 
 use crate::output;
 use anyhow::{Context, bail};
-use sapwise::Report;
+use sapwise_lab::report::Report;
 use std::path::{Path, PathBuf};
 
 /// Where the report goes without `--out`.
@@ -34,7 +34,7 @@ impl Destination {
     /// Writes the report as it is by now, so that even a power cut costs one scenario only.
     pub(crate) fn save_unfinished(&self, report: &Report) {
         if let Err(error) = write(&self.0, report) {
-            output::complain(&format!("warning: {error:#}; measuring goes on"));
+            output::complain(&format!("warning: {error:#}; the measurement continues"));
         }
     }
 
@@ -53,6 +53,6 @@ impl Destination {
 }
 
 fn write(path: &Path, report: &Report) -> anyhow::Result<()> {
-    let text = sapwise::json::write_report(report)?;
-    crate::files::write_text(path, &text)
+    let text = sapwise_lab::data::write_report(report)?;
+    sapwise_lab::write::write_text(path, &text)
 }

@@ -1,6 +1,7 @@
 //! Ctrl-C and SIGTERM: the first asks the verb to stop and keep what it has, the second ends the program at once.
 
 use anyhow::Context;
+use sapwise_lab::progress::Interrupted;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
@@ -18,7 +19,7 @@ pub(crate) fn listen() -> anyhow::Result<()> {
             // Child processes notice the closed pipe and end too.
             std::process::exit(ENDED_BY_SIGINT);
         }
-        crate::output::complain("interrupted: about to stop; once more to end at once");
+        crate::output::complain("interrupted: about to stop; press Ctrl-C again to end at once");
     })
     .context("Ctrl-C can't be caught")
 }
@@ -38,5 +39,5 @@ pub(crate) fn requested() -> bool {
 /// # Errors
 /// When a signal has come since [`listen`].
 pub(crate) fn check() -> anyhow::Result<()> {
-    if requested() { Err(anyhow::anyhow!("interrupted before the end; nothing was written")) } else { Ok(()) }
+    if requested() { Err(Interrupted.into()) } else { Ok(()) }
 }

@@ -21,47 +21,38 @@
 //! }
 //!
 //! // The last step of `main`.
-//! let status = sapwise_cli::Command::new().with("double-loop", 1, || Ok(Box::new(DoubleLoop))).run();
+//! let double_loop = sapwise_cli::UserAlgorithm::on_one_thread("double-loop", 1, || Ok(Box::new(DoubleLoop)));
+//! let status = sapwise_cli::Command::new().with(double_loop).run();
 //! ```
 //!
 //! `examples/bvh.rs` is such a program with the tree of parry3d.
 
 mod algorithms;
 mod args;
-mod card;
 mod check;
 mod child;
 mod command;
-mod compare;
 mod contention;
 mod date;
 mod destination;
-mod document;
 mod exit;
-mod files;
 mod gpus;
 mod hardware;
 mod interrupt;
 mod output;
-mod page;
-mod plot;
+mod outputs;
 mod prediction;
 mod profiles;
 mod progress;
 mod provenance;
+mod replay;
 mod restriction;
 mod revisions;
 mod samples;
-mod sheet;
-mod simulate;
-mod simulation;
-mod steadiness;
-mod study;
+mod shell;
 mod summary;
 mod sweep;
-mod table;
 mod terminal;
-mod train;
 mod verbs;
 
-pub use command::Command;
+pub use command::{Command, UserAlgorithm};

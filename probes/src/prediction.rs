@@ -2,14 +2,19 @@
 
 use crate::algorithms::Algorithms;
 use crate::progress::Progress;
-use crate::revisions;
-use crate::samples::{self, Live, Order, Taken};
-use sapwise_lab::text::count;
-use anyhow::{Context, bail};
+use crate::samples::{Live, Session};
+use crate::{interrupt, revisions};
+use anyhow::bail;
 use sapwise::hardware::parameter;
-use sapwise::model::{ASK, FEWEST_MACHINES, Prediction};
-use sapwise::{Displacement, Tuning, GpuIdentity, Hardware, Load, Model, Pairs, Prior, Registry};
+use sapwise::model::{ASK, Prediction};
+use sapwise::stats::median;
+use sapwise::{GpuIdentity, Hardware, Load, Model, Registry, Tuning};
+use sapwise_lab::data::{Document, read_document};
+use sapwise_lab::belief::{Prior, Taken, learn};
+use sapwise_lab::sweep::loads;
+use sapwise_lab::text::count;
 use sapwise_scenes::Scenario;
+use std::path::Path;
 
 /// Objects of the slice that the tuning shows: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
@@ -28,10 +33,28 @@ impl Slice {
     /// The loads of a scenario, with the pairs that it really has.
     ///
     /// # Errors
-    /// As [`loads`].
+    /// When the pairs can't be found for want of memory, and on Ctrl-C.
     pub(crate) fn of(scenario: Scenario) -> anyhow::Result<Self> {
         let sizes: Vec<u32> = SLICE.map(|quarter| 10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32).collect();
-        Ok(Self { scenario, loads: loads(scenario, &sizes, SEED)? })
+        let progress = Progress::new(sizes.iter().map(|&n| u64::from(n)).sum());
+        progress.message(format!("pairs of the scenario {scenario}"));
+        let done = |objects: u32| {
+            progress.advance(u64::from(objects));
+            interrupt::check()
+        };
+        Ok(Self { scenario, loads: loads(scenario, &sizes, SEED, done)? })
+    }
+}
+
+/// The model in a file, or the one that is built in.
+///
+/// # Errors
+/// When the file is no sound model.
+pub(crate) fn model(path: Option<&Path>) -> anyhow::Result<Model> {
+    let Some(path) = path else { return Ok(Model::built_in()?) };
+    match read_document(path)? {
+        Document::Model(model) => Ok(*model),
+        _ => bail!("{} is no model; make one with `sapwise train`", path.display()),
     }
 }
 
@@ -48,11 +71,11 @@ pub(crate) fn predict(
 ) -> anyhow::Result<Tuning> {
     let registry = algorithms.registry(cores(hardware));
     let mut tuning = prediction(model, hardware, gpus, &registry)?.tuning(&slice.scenario.to_string(), &slice.loads);
-    tuning.warnings.extend(revisions::unknown_to(&registry, model));
+    tuning.warnings.extend(unknown(algorithms, &registry, model));
     Ok(tuning)
 }
 
-/// Predicts the tuning of this machine and corrects them by up to `most` samples. Also gives whether an algorithm gave a wrong answer.
+/// Predicts the tuning of this machine and corrects it by up to `most` samples. Also returns whether an algorithm returned a wrong answer.
 ///
 /// Whatever keeps samples from being taken, Ctrl-C too, is a warning: the prediction stays.
 ///
@@ -69,7 +92,7 @@ pub(crate) fn predict_and_sample(
     let registry = algorithms.registry(cores(hardware));
     let mut prediction = prediction(model, hardware, gpus, &registry)?;
     let Slice { scenario, loads } = slice;
-    let order = Order {
+    let session = Session {
         scenario: scenario.to_string(),
         seed: SEED,
         cores: cores(hardware),
@@ -77,38 +100,54 @@ pub(crate) fn predict_and_sample(
         algorithms: prediction.costs.iter().map(|c| c.algorithm.clone()).collect(),
     };
     let disturbed: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
-    let mut live = Live::new(order, sapwise::stats::median(&disturbed));
+    let mut live = Live::new(session, median(&disturbed));
     let prior = model.prior.unwrap_or(Prior::ASSUMED);
-    let learned = samples::learn(prediction.costs.clone(), &prior, loads, &mut live, most as usize)?;
+    let learned = learn(prediction.costs.clone(), &prior, loads, &mut live, most as usize)?;
     let (remarks, wrong) = live.remarks();
     if !learned.usable.contains(&true) {
-        bail!("no algorithm is left: {}; the pure prediction is had by --samples 0", learned.remarks.join("; "));
+        bail!("every algorithm failed: {}; --samples 0 predicts without samples", learned.remarks.join("; "));
     }
     let mut usable = learned.usable.iter();
     prediction.costs.retain(|_| usable.next() == Some(&true));
     let mut tuning = prediction.tuning(&scenario.to_string(), loads);
-    tuning.warnings.extend(revisions::unknown_to(&registry, model));
+    tuning.warnings.extend(unknown(algorithms, &registry, model));
     // Without any sample the posterior is the prior, whose spread is that of machines left out and not of the model.
     if !learned.taken.is_empty() {
-        let corrected = Tuning::from_posterior(&scenario.to_string(), &learned.posterior, |k| learned.usable[k], loads);
-        let samples = learned.taken.iter().map(Taken::observation).collect();
-        let Tuning { model: name, extrapolated, warnings, interval_basis, .. } = tuning;
-        tuning = Tuning { model: name, extrapolated, warnings, samples, ..corrected };
+        let mut corrected = learned.tuning(&scenario.to_string(), loads);
+        corrected.model = tuning.model.take();
+        corrected.extrapolated = tuning.extrapolated;
+        corrected.samples = learned.taken.iter().map(Taken::observation).collect();
         // What asked for samples has got them.
-        tuning.warnings.retain(|w| w != ASK);
-        // What the prior says of a machine never seen was told by too few others to be claimed of this one, sampled or not.
-        if model.validation.physical_machines < FEWEST_MACHINES as usize {
-            tuning.crossovers.iter_mut().for_each(|b| (b.low, b.high) = (None, None));
-            tuning.interval_basis = interval_basis;
-        }
+        corrected.warnings = std::mem::take(&mut tuning.warnings);
+        corrected.warnings.retain(|w| w != ASK);
+        // The prior rests on too few machines for an interval on one that was never measured, sampled or not.
+        corrected.crossovers.iter_mut().for_each(|c| (c.low, c.high) = (None, None));
+        corrected.interval_basis = std::mem::take(&mut tuning.interval_basis);
+        tuning = corrected;
     }
     tuning.warnings.extend(remarks);
     tuning.warnings.extend(learned.remarks);
-    if crate::interrupt::requested() {
+    if interrupt::requested() {
         let taken = count(learned.taken.len(), "sample");
         tuning.warnings.push(format!("interrupted after {taken}: the prediction is corrected by those only"));
     }
     Ok((tuning, wrong))
+}
+
+/// The methods of the model that this build lacks, and the user's methods that the model lacks.
+fn unknown(algorithms: &Algorithms, registry: &Registry, model: &Model) -> Vec<String> {
+    let mut warnings = revisions::unknown_to(registry, model);
+    for (method, _) in algorithms.users() {
+        let id = format!("{method}@cpu1").parse();
+        if id.is_ok_and(|id| model.method(&id).is_none()) {
+            warnings.push(format!(
+                "{method} is not predicted: the model {} was trained on reports without it. Measure it with this program: `probe --out own.json`, \
+                 `train own.json --out own-model.json`, then `predict --model own-model.json`",
+                model.name
+            ));
+        }
+    }
+    warnings
 }
 
 fn cores(hardware: &Hardware) -> u32 {
@@ -120,33 +159,6 @@ fn prediction(model: &Model, hardware: &Hardware, gpus: &[GpuIdentity], registry
     let mut known = registry.available();
     known.extend(sapwise::gpu::algorithms(gpus));
     model.predict(hardware, &known).map_err(anyhow::Error::msg)
-}
-
-/// The load of a scenario's second frame at each of some sizes, with the pairs that it really has.
-///
-/// # Errors
-/// When the pairs can't be found, for want of memory, and on Ctrl-C.
-pub(crate) fn loads(scenario: Scenario, sizes: &[u32], seed: u64) -> anyhow::Result<Vec<Load>> {
-    let registry = Registry::with_cores(1);
-    let mut counter = registry.create(&"grid-sap@cpu1".parse()?)?;
-    let mut pairs = Pairs::new();
-    let mut displacement = Displacement::default();
-    let mut loads = Vec::new();
-    let progress = Progress::new(sizes.iter().map(|&n| u64::from(n)).sum());
-    progress.message(format!("pairs of the scenario {scenario}"));
-    for &objects in sizes {
-        crate::interrupt::check()?;
-        let mut scene = scenario.start(objects as usize, seed);
-        displacement.watch(scene.boxes());
-        crate::sweep::next_frame(&mut scene);
-        counter
-            .find_pairs(scene.boxes(), &mut pairs)
-            .with_context(|| format!("the pairs of {scenario} at {objects} objects"))?;
-        let moved = displacement.moved(scene.boxes());
-        loads.push(Load::estimate(scene.boxes(), Some(pairs.len() as f64), moved));
-        progress.advance(u64::from(objects));
-    }
-    Ok(loads)
 }
 
 #[cfg(test)]

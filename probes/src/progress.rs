@@ -1,6 +1,8 @@
 //! A progress bar on standard error for whatever takes over a second.
 
+use crate::interrupt;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use sapwise_lab::progress::Interrupted;
 use std::fmt::{self, Write};
 use std::io::IsTerminal;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -11,7 +13,7 @@ use std::time::{Duration, Instant};
 /// Nothing is drawn before this: work that is done by then needs no bar.
 const DELAY: Duration = Duration::from_secs(1);
 
-/// The bar is drawn anew this often while nothing is said to be done, so that the seconds go on.
+/// The bar is drawn again this often while no step is done, so that the seconds go on.
 const TICK: Duration = Duration::from_secs(1);
 
 /// What the bar shows. The time left follows from how fast the steps were done of late.
@@ -60,8 +62,8 @@ impl Progress {
         self.bar.set_message(text.into());
     }
 
-    /// Does what usually takes that many milliseconds, each of which is a step. Until it is done the bar goes on with the time: one that
-    /// stood still would tell more and more time left.
+    /// Does what usually takes that many milliseconds, each of which is a step. Until it is done the bar moves with the time: one that
+    /// stood still would show more and more time left.
     pub(crate) fn during<T>(&self, usual_ms: u64, work: impl FnOnce() -> T) -> T {
         let set = |underway| *self.underway.lock().unwrap_or_else(PoisonError::into_inner) = underway;
         let from = self.bar.position();
@@ -97,12 +99,12 @@ impl Progress {
 fn left(state: &ProgressState, out: &mut dyn Write) {
     let written: fmt::Result =
         if state.pos() == 0 { Ok(()) } else { write!(out, ", {:#} left", HumanDuration(state.eta())) };
-    // A bar has nobody to tell that it can't be written.
+    // A bar that can't be written has no one to report it to.
     let _ = written;
 }
 
-/// A thread that shows the bar after the delay: whoever does the work may wait for a driver then, and say nothing. Without a thread there
-/// is no bar.
+/// A thread that shows the bar after the delay: the thread that does the work may be waiting for a driver then. Without a thread there is no
+/// bar.
 fn show_later(bar: ProgressBar, underway: Arc<Mutex<Option<Underway>>>) -> Option<(Sender<()>, JoinHandle<()>)> {
     let (alive, ended) = channel();
     let show = move || {
@@ -119,6 +121,25 @@ fn show_later(bar: ProgressBar, underway: Arc<Mutex<Option<Underway>>>) -> Optio
     };
     let thread = std::thread::Builder::new().name("progress".to_owned()).spawn(show).ok()?;
     Some((alive, thread))
+}
+
+impl sapwise_lab::progress::Progress for Progress {
+    fn start(&self, steps: u64) {
+        self.bar.set_position(0);
+        self.bar.set_length(steps);
+    }
+
+    fn advance(&self, steps: u64) {
+        Self::advance(self, steps);
+    }
+
+    fn message(&self, text: &str) {
+        Self::message(self, text);
+    }
+
+    fn check(&self) -> Result<(), Interrupted> {
+        if interrupt::requested() { Err(Interrupted) } else { Ok(()) }
+    }
 }
 
 impl Drop for Progress {

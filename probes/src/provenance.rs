@@ -5,8 +5,9 @@ use crate::args::Probe;
 use crate::date;
 use crate::gpus::uses;
 use crate::restriction;
-use sapwise_lab::report::{Label, Point, Provenance, Restriction, Timed};
-use sapwise::{GpuKind, Hardware, SimdLevel, usable_cores};
+use sapwise::stats::median;
+use sapwise::{AlgorithmId, GpuKind, Hardware, SimdLevel, usable_cores};
+use sapwise_lab::report::{Label, Point, Provenance, Restriction, Timed, TimedTerm};
 use std::time::Duration;
 
 /// A machine whose other programs take more than this share of the CPU at half of the points is not undisturbed.
@@ -58,10 +59,14 @@ pub(crate) fn timed(points: &[Point], threads: Option<u32>, hardware: &Hardware,
     let raced = |id| points.iter().any(|p| p.timings.iter().any(|t| t.algorithm == id));
     let on_gpus = sapwise::gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu));
     let entries = registry.available().into_iter().chain(on_gpus);
-    entries.filter(|(id, _)| raced(id.clone())).map(|(id, revision)| Timed { id, revision }).collect()
+    let timed = |(id, revision): (AlgorithmId, u32)| {
+        let terms = algorithms.terms(&id).iter().map(|&(term, scale)| TimedTerm { term, scale }).collect();
+        Timed { terms, ..Timed::new(id, revision) }
+    };
+    entries.filter(|(id, _)| raced(id.clone())).map(timed).collect()
 }
 
-/// `None` for a wrong variable too: the program has refused it before it came here.
+/// `None` for a wrong variable too: the program has refused it before.
 fn requested_level() -> Option<SimdLevel> {
     SimdLevel::requested().ok().flatten()
 }
@@ -69,7 +74,7 @@ fn requested_level() -> Option<SimdLevel> {
 /// Over the points where it could be told.
 fn median_foreign_load(points: &[Point]) -> Option<f64> {
     let loads: Vec<f64> = points.iter().filter_map(|p| p.foreign_load).collect();
-    sapwise::stats::median(&loads)
+    median(&loads)
 }
 
 /// The arguments without `--out`: paths name users.
@@ -157,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_swept_program_that_acts_as_a_gpu_is_labelled() {
+    fn a_swept_software_adapter_is_labelled() {
         let timing = |samples_ns: Vec<u64>| Timing { algorithm: "brute@gpu0".parse().unwrap(), samples_ns, error: None };
         let swept = [Point { timings: vec![timing(vec![1, 2, 3])], ..point(None) }];
         let failed = [Point { timings: vec![timing(Vec::new())], ..point(None) }];

@@ -1,15 +1,13 @@
 //! What is taken from a machine for a report, and the proof that its parameters show it.
 
-use crate::args::Probe;
+use crate::args::Lifted;
 use crate::contention::{ASSUMED_LLC_BYTES, Contended};
-use sapwise_lab::data::files::read_document;
+use sapwise_lab::data::read_document;
 use anyhow::bail;
 use sapwise::hardware::{gpu, parameter};
-use sapwise::json::Document;
+use sapwise_lab::data::Document;
 use sapwise_lab::report::{Proof, Restricted, Restriction};
 use sapwise::{GpuHardware, GpuIdentity, Hardware, SimdLevel, usable_cores};
-use std::path::PathBuf;
-use std::str::FromStr;
 
 /// The variable that sets the threads of lavapipe.
 pub(crate) const LAVAPIPE_THREADS: &str = "LP_NUM_THREADS";
@@ -17,23 +15,6 @@ pub(crate) const LAVAPIPE_THREADS: &str = "LP_NUM_THREADS";
 /// A parameter shows a restriction when it differs by this share of its value without. Smaller differences come by themselves
 /// from one run to the next.
 const SHOWN: f64 = 0.1;
-
-/// A report of the machine from which one thing less was taken, as `KIND=R.json`.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Lifted {
-    pub(crate) kind: Restricted,
-    pub(crate) report: PathBuf,
-}
-
-impl FromStr for Lifted {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (kind, path) = text.split_once('=').ok_or("give it as KIND=R.json")?;
-        let kind = serde_json::from_value(kind.into()).map_err(|e| e.to_string())?;
-        Ok(Self { kind, report: path.into() })
-    }
-}
 
 /// The hardware of a report from which one thing less was taken.
 pub(crate) type Reference = (Restricted, Hardware);
@@ -61,16 +42,21 @@ pub(crate) fn gpu_threads(hardware: &Hardware) -> Option<u32> {
     hardware.gpus.iter().any(|g| is_lavapipe(&g.gpu)).then_some(told)
 }
 
-/// What these arguments and this environment take from the machine, if anything.
-pub(crate) fn restriction(arguments: &Probe, hardware: &Hardware, references: &[Reference]) -> Option<Restriction> {
+/// What a limit on the threads, contention and the environment take from the machine, if anything.
+pub(crate) fn restriction(
+    threads: Option<u32>,
+    contended: Option<Contended>,
+    hardware: &Hardware,
+    references: &[Reference],
+) -> Option<Restriction> {
     let mut kinds = Vec::new();
-    if arguments.threads.is_some_and(|k| k < usable_cores()) {
+    if threads.is_some_and(|k| k < usable_cores()) {
         kinds.push(Restricted::Threads);
     }
     if SimdLevel::in_use() < SimdLevel::detected() {
         kinds.push(Restricted::Simd);
     }
-    kinds.extend(arguments.contended.map(contention));
+    kinds.extend(contended.map(contention));
     // One thread for each core is what it takes by itself.
     if gpu_threads(hardware).is_some_and(|k| k < usable_cores()) {
         kinds.push(Restricted::GpuThreads);
@@ -309,12 +295,5 @@ mod tests {
                 "the restriction gpu_threads does not show: arithmetic_gflop_per_s of gpu1 is 146.0000 with it and 147.0000 without"
             ]
         );
-    }
-
-    #[test]
-    fn a_kind_and_a_file_are_read_from_one_word() {
-        let lifted: Lifted = "contended_cache=a=b.json".parse().unwrap();
-        assert_eq!(lifted, Lifted { kind: Restricted::ContendedCache, report: "a=b.json".into() });
-        assert!("threads".parse::<Lifted>().is_err() && "cores=a.json".parse::<Lifted>().is_err());
     }
 }

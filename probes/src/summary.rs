@@ -1,15 +1,18 @@
 //! What a person reads at the end of a probe or a prediction.
 
 use crate::gpus::GpuChoice;
-use sapwise_lab::text::{bytes, columns, count, duration, grouped};
-use crate::terminal::{self, Terminal};
-use crate::train::{measured_tuning, slice_scenario};
-use sapwise::hardware::gpu::parameter::UNIFIED_MEMORY;
-use sapwise_lab::report::Label;
-use sapwise::{Backend, Border, Tuning, GpuHardware, GpuIdentity, Hardware, How, Parameter, Report};
+use crate::shell;
+use crate::terminal::Terminal;
+use sapwise::{Backend, Crossover, GpuHardware, GpuIdentity, Hardware, How, Parameter, Tuning};
+use sapwise_lab::label_text;
+use sapwise_lab::report::{Label, Report};
+use sapwise_lab::text::{columns, count, duration, grouped};
+use sapwise_lab::units::value;
+use sapwise_lab::data::usual_scenario;
+use sapwise_lab::fit::measured_tuning;
 use std::path::Path;
 
-/// The hardware, then the tuning of every scenario that was swept, and the timings of one of them as curves where there is room.
+/// The hardware, then the tuning of every scenario that was swept.
 pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
     let mut text = hardware(&report.hardware, terminal);
     for scenario in scenarios(report) {
@@ -18,10 +21,8 @@ pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
             Err(why) => text.push_str(&format!("\n{scenario}: no tuning: {why:#}\n")),
         }
     }
-    let chart = terminal::timings(report, slice_scenario(report)).and_then(|chart| chart.draw(terminal));
-    text += &chart.map(|chart| format!("\n{chart}")).unwrap_or_default();
     if report.label != Label::RealFull {
-        text.push_str(&format!("\nThis report is labelled {}.\n", label(report.label)));
+        text.push_str(&format!("\nThis report is labelled {}: {}.\n", label_text::kind(report.label), label_text::meaning(report.label)));
     }
     for remark in &report.remarks {
         text.push_str(&format!("\n{} {remark}\n", terminal.warning("remark:")));
@@ -31,14 +32,14 @@ pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
 
 /// What to do with a report that was written.
 pub(crate) fn next_step(report: &Report, path: &Path) -> String {
-    let path = path.display();
+    let path = shell::path(path);
     // A report without a sweep, or one that was interrupted early, serves for its hardware only.
-    let next = if measured_tuning(report, slice_scenario(report)).is_ok() {
-        format!("sapwise run fragmentation --tuning {path}, or sapwise train {path} --out model.json")
+    let next = if measured_tuning(report, usual_scenario(report)).is_ok() {
+        format!("sapwise run fragmentation --tuning {path}")
     } else {
         format!("sapwise predict --report {path}")
     };
-    format!("\nThe report is in {path}. Next: {next}")
+    format!("\nThe report is in {path}.\nNext: {next}")
 }
 
 /// The parameters of a machine, of each of its GPUs and of their groups, as tables.
@@ -62,8 +63,8 @@ pub(crate) fn hardware(hardware: &Hardware, terminal: Terminal) -> String {
     text
 }
 
-/// What is told of GPUs after a measurement, if anything: that there is none, or which were not taken. What went wrong is
-/// told with the remarks.
+/// A sentence on GPUs after a measurement, if there is need for one: that none was found, or which were not used. Failures are among the
+/// remarks.
 pub(crate) fn gpus_left_out(
     choice: &GpuChoice,
     hardware: &Hardware,
@@ -71,7 +72,7 @@ pub(crate) fn gpus_left_out(
     remarks: &[String],
 ) -> Option<String> {
     let none = !choice.no_gpus && hardware.gpus.is_empty() && left_out.is_empty() && remarks.is_empty();
-    none.then(|| "No GPU was found; everything else works on the CPU.".to_owned()).or_else(|| choice.tell(left_out))
+    none.then(|| "No GPU was found; the algorithms on the CPU are not affected.".to_owned()).or_else(|| choice.tell(left_out))
 }
 
 /// Parameters as a table. Those that are missing for the same reason share a row.
@@ -106,15 +107,15 @@ fn parameters(parameters: &[Parameter], terminal: Terminal) -> String {
 pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
     let mut rows = Vec::new();
     for step in &tuning.steps {
-        // The first step begins at 0 without a border.
-        let border = tuning.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
-        let interval = border.and_then(Border::interval).map_or(String::new(), |(low, high)| {
+        // The first step begins at 0 without a crossover.
+        let crossover = tuning.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
+        let interval = crossover.and_then(Crossover::interval).map_or(String::new(), |(low, high)| {
             format!("{} to {}", grouped(low.round() as u64), grouped(high.round() as u64))
         });
         let from = format!("  from {}", grouped(u64::from(step.from_objects)));
         rows.push(vec![from, step.algorithm.to_string(), interval]);
     }
-    let told = |b: &Border| b.interval().is_some();
+    let told = |b: &Crossover| b.interval().is_some();
     let with = if tuning.crossovers.iter().any(told) { ", with 90 % intervals" } else { "" };
     let head = format!("{}: the fastest algorithm by number of objects{with}", tuning.scenario);
     let mut text = format!("{}\n", terminal.head(&head));
@@ -123,7 +124,7 @@ pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
         text.push_str(&format!("  {}\n", tuning.interval_basis));
     }
     if !tuning.samples.is_empty() {
-        text.push_str(&format!("\nsamples by which the prediction was corrected\n{}", samples(tuning, terminal)));
+        text.push_str(&format!("\nSamples that correct the prediction\n{}", samples(tuning, terminal)));
     }
     for warning in &tuning.warnings {
         text.push_str(&format!("  {} {warning}\n", terminal.warning("warning:")));

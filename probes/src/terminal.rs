@@ -1,17 +1,7 @@
 //! What standard output is, and so what can be shown on it.
 
-mod canvas;
-mod chart;
-mod curves;
-
-use sapwise_lab::text::columns;
-use console::{Color, Style, Term};
-
-pub(crate) use chart::{Axis, Chart, Series};
-pub(crate) use curves::{costs, timings};
-
-/// Below this many columns there is no room for a plot.
-const NARROWEST: usize = 80;
+use sapwise_lab::text::{columns, width};
+use console::{Style, Term};
 
 /// Standard output where it is a terminal, or where it is none.
 ///
@@ -22,13 +12,11 @@ pub(crate) struct Terminal {
     pub(crate) columns: Option<usize>,
     /// Whether text may be coloured or bold.
     pub(crate) colour: bool,
-    /// Whether it shows more than ASCII.
-    pub(crate) unicode: bool,
 }
 
 impl Terminal {
     /// No terminal.
-    pub(crate) const NONE: Self = Self { columns: None, colour: false, unicode: false };
+    pub(crate) const NONE: Self = Self { columns: None, colour: false };
 
     /// What standard output is.
     pub(crate) fn of_standard_output() -> Self {
@@ -42,12 +30,7 @@ impl Terminal {
         let refused = is("NO_COLOR", |value| !value.is_empty()) || is("TERM", |value| value == "dumb");
         // An empty NO_COLOR refuses nothing, though the library takes it for one that does; on Windows it turns colours on, too.
         let colour = !refused && (cfg!(unix) || out.features().colors_supported());
-        Self { columns: Some(columns), colour, unicode: supports_unicode::supports_unicode() }
-    }
-
-    /// Columns for a plot, where there is room for one.
-    pub(crate) fn plot_columns(self) -> Option<usize> {
-        self.columns.filter(|&columns| columns >= NARROWEST)
+        Self { columns: Some(columns), colour }
     }
 
     /// A table whose first row is its head.
@@ -56,7 +39,7 @@ impl Terminal {
     /// two can't be read by columns. The first two stay.
     pub(crate) fn table(self, rows: &[Vec<String>]) -> String {
         let head = rows.first().map_or(&[][..], Vec::as_slice);
-        let widths: Vec<usize> = (0..head.len()).map(|k| sapwise_lab::text::width(rows, k)).collect();
+        let widths: Vec<usize> = (0..head.len()).map(|k| width(rows, k)).collect();
         let room = self.columns.filter(|&columns| columns > 0).unwrap_or(usize::MAX);
         let fits = |count: &usize| widths[..*count].iter().sum::<usize>() + 2 * (count - 1) <= room;
         let count = (2..=head.len()).rev().find(fits).unwrap_or(head.len().min(2));
@@ -97,24 +80,17 @@ impl Terminal {
         self.styled(text, Style::new().red().bold())
     }
 
-    /// Text in the colour of a series of a chart.
-    fn series(self, k: usize, text: &str) -> String {
-        // Those of the sixteen that read on black and on white, whatever the user made of them.
-        const COLOURS: [Color; 6] = [Color::Green, Color::Magenta, Color::Cyan, Color::Red, Color::Blue, Color::Yellow];
-        self.styled(text, Style::new().fg(COLOURS[k % COLOURS.len()]))
-    }
-
     fn styled(self, text: &str, style: Style) -> String {
         if self.colour { style.force_styling(true).apply_to(text).to_string() } else { text.to_owned() }
     }
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
 
-    /// A terminal that shows all there is.
-    pub(crate) const WIDE: Terminal = Terminal { columns: Some(200), colour: true, unicode: true };
+    /// A terminal with colours.
+    const WIDE: Terminal = Terminal { columns: Some(200), colour: true };
 
     fn rows() -> Vec<Vec<String>> {
         [["parameter", "value", "how"], ["clock", "3.2 GHz", "measured, 12 samples"]]
@@ -134,13 +110,11 @@ pub(crate) mod tests {
 
     #[test]
     fn columns_without_room_are_left_out_and_named() {
-        let of = |columns| Terminal { columns: Some(columns), colour: false, unicode: false }.table(&rows());
+        let of = |columns| Terminal { columns: Some(columns), colour: false }.table(&rows());
         let narrow = "parameter  value\nclock      3.2 GHz\nNo room for: how; a wider terminal or a file has them.\n";
         assert_eq!(of(40), columns(&rows()));
         assert_eq!([of(39), of(5)], [narrow, narrow]);
         // One that does not tell its width may be wide.
         assert_eq!(of(0), columns(&rows()));
-        assert_eq!((Terminal { columns: Some(79), ..WIDE }.plot_columns(), WIDE.plot_columns()), (None, Some(200)));
-        assert_eq!(Terminal::NONE.plot_columns(), None);
     }
 }

@@ -8,7 +8,7 @@ use std::fs;
 #[test]
 fn every_verb_has_help_with_an_example() {
     let all = success(sapwise().arg("--help"));
-    for verb in ["predict", "devices", "probe", "run", "train", "pairs", "check", "compare", "simulate", "schema"] {
+    for verb in ["predict", "devices", "probe", "run", "train", "study", "pairs", "check", "compare", "simulate", "schema"] {
         assert!(all.contains(verb), "{verb}");
         let help = success(sapwise().args([verb, "--help"]));
         assert!(help.contains("Example") && help.contains(&format!("sapwise {verb}")), "{verb}: {help}");
@@ -60,7 +60,7 @@ fn devices_lists_algorithms_and_says_when_there_is_no_adapter() {
     assert_eq!((&brute["available"], &brute["reason"]), (&true.into(), &serde_json::Value::Null));
     assert!(brute["revision"].as_u64().unwrap() >= 1);
     let text = success(without_adapters(&mut sapwise()).arg("devices"));
-    assert!(text.contains("brute@cpu1") && text.contains("No GPU was found; everything else works on the CPU."), "{text}");
+    assert!(text.contains("brute@cpu1") && text.contains("No GPU was found; the algorithms on the CPU are not affected."), "{text}");
     let text = success(sapwise().args(["devices", "--no-gpus"]));
     assert!(text.contains("brute@cpu1") && !text.contains("GPU") && !text.contains("@gpu"), "{text}");
 }
@@ -181,7 +181,7 @@ fn schema_writes_a_file_for_every_kind() {
     let told = success(sapwise().args(["schema", "--json", "--out"]).arg(folder.path().join("new")));
     let told: serde_json::Value = serde_json::from_str(&told).unwrap();
     assert_eq!(told["files"].as_array().unwrap().len(), 4);
-    for name in ["report-1", "model-1", "tuning-1", "cache-1"] {
+    for name in ["report-2", "model-2", "tuning-1", "cache-2"] {
         let text = fs::read_to_string(folder.path().join("new").join(format!("{name}.schema.json"))).unwrap();
         let schema: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert!(schema["properties"]["schema"].is_object() || schema["$defs"].is_object(), "{text}");

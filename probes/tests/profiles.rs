@@ -3,7 +3,7 @@
 mod common;
 
 use common::{failure, sapwise, success};
-use sapwise::Report;
+use sapwise_lab::Report;
 use sapwise_lab::report::Restricted;
 use std::fs;
 use std::path::Path;
@@ -127,7 +127,7 @@ fn after_ctrl_c_the_same_command_goes_on() {
         let ended = family.wait_with_output().unwrap();
         let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
         assert_eq!(ended.status.code(), Some(1), "{complaint}");
-        assert!(complaint.contains("the same command goes on from there"), "{complaint}");
+        assert!(complaint.contains("the same command resumes there"), "{complaint}");
         String::from_utf8_lossy(&ended.stdout).into_owned()
     };
     let text = until("full");
@@ -141,7 +141,7 @@ fn after_ctrl_c_the_same_command_goes_on() {
     };
     label("real_contended");
     let listed = success(tiny(&out).arg("--dry-run"));
-    assert!(!listed.contains("is there"), "{listed}");
+    assert!(!listed.contains("complete"), "{listed}");
     label("real_full");
     let before = fs::read(&full[0]).unwrap();
     assert_eq!(read(&full[0]).provenance.restriction, None);
@@ -153,14 +153,14 @@ fn after_ctrl_c_the_same_command_goes_on() {
         return;
     }
     let text = until(&second);
-    assert!(text.contains("was there"), "{text}");
+    assert!(text.contains("was complete"), "{text}");
     assert_eq!(fs::read(&full[0]).unwrap(), before, "a report that was there is another now");
     let restricted = read(&reports(&out, &second)[0]);
     let restriction = restricted.provenance.restriction.unwrap();
     assert!(restriction.proof.iter().any(|p| p.kind == restriction.kinds[0]), "{restriction:?}");
     let listed = success(tiny(&out).arg("--dry-run"));
-    assert!(listed.contains("is there"), "{listed}");
+    assert!(listed.contains("complete"), "{listed}");
     // What was measured by another command is not what is asked for.
     let listed = success(tiny(&out).args(["--seed", "2", "--dry-run"]));
-    assert!(!listed.contains("is there"), "{listed}");
+    assert!(!listed.contains("complete"), "{listed}");
 }

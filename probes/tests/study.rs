@@ -176,7 +176,7 @@ fn files_that_are_no_reports_are_told_beside_those_that_are() {
     let path = folder.path();
     let reports = path.join("reports");
     fs::create_dir(&reports).unwrap();
-    changed(&reports, "future.json", |r| r["schema"] = json!("report/2"));
+    changed(&reports, "future.json", |r| r["schema"] = json!("report/3"));
     changed(&reports, "odd <b>&'; =1+1 é.json", |_| {});
     fs::write(reports.join("cut.json"), "{\"schema\": ").unwrap();
     fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/default.json"), reports.join("model.json")).unwrap();
@@ -186,7 +186,7 @@ fn files_that_are_no_reports_are_told_beside_those_that_are() {
     let ended = command.output().unwrap();
     let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
     assert_eq!(ended.status.code(), Some(0), "{complaint}");
-    for (name, why) in [("future.json", "report/2"), ("cut.json", "EOF"), ("model.json", "is no report")] {
+    for (name, why) in [("future.json", "report/3"), ("cut.json", "EOF"), ("model.json", "is no report")] {
         assert!(complaint.lines().any(|l| l.contains(name) && l.contains(why)), "{name}: {complaint}");
     }
     let page = fs::read_to_string(out.join("index.html")).unwrap();

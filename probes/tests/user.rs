@@ -10,6 +10,7 @@ mod common;
 use assert_cmd::Command;
 use common::{failure, npy, sapwise, success};
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs};
+use sapwise_cli::UserAlgorithm;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -48,7 +49,7 @@ fn main() -> ExitCode {
 
 /// A program whose algorithm has the name of one of ours.
 fn clash() -> ExitCode {
-    sapwise_cli::Command::new().with("grid-sap", 1, || unreachable!("it was refused")).run()
+    sapwise_cli::Command::new().with(UserAlgorithm::on_one_thread("grid-sap", 1, || unreachable!("it was refused"))).run()
 }
 
 /// A program whose algorithm finds as many pairs as it has threads, whatever the boxes.
@@ -61,7 +62,7 @@ fn on_threads() -> ExitCode {
             pairs.finish()
         }
     }
-    sapwise_cli::Command::new().with_threads("threads", 1, |threads| Ok(Box::new(Threads(threads)))).run()
+    sapwise_cli::Command::new().with(UserAlgorithm::on_threads("threads", 1, |threads| Ok(Box::new(Threads(threads))))).run()
 }
 
 fn program(name: &str) -> Command {
@@ -108,6 +109,9 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
         .map(|t| (t["id"].as_str().unwrap(), t["revision"].as_u64().unwrap()))
         .collect();
     assert!(swept.contains(&("bvh@cpu1", 1)) && swept.iter().any(|t| t.0 == "brute@cpu1"), "{swept:?}");
+    let timed = told["algorithms"].as_array().unwrap().iter().find(|t| t["id"] == "bvh@cpu1").unwrap();
+    assert_eq!(timed["terms"].as_array().unwrap().len(), 4, "{timed}");
+    assert!(told["algorithms"].as_array().unwrap().iter().all(|t| t["id"] == "bvh@cpu1" || t.get("terms").is_none()), "{told}");
     let points = told["points"].as_array().unwrap();
     let timings = points.iter().flat_map(|p| p["timings"].as_array().unwrap());
     let own: Vec<&Value> = timings.filter(|t| t["algorithm"] == "bvh@cpu1").collect();
@@ -118,6 +122,8 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let fitted = read(&model);
     let of_user = fitted["methods"].as_array().unwrap().iter().find(|m| m["method"] == "bvh").expect("a cost of bvh");
     assert_eq!((&of_user["revision"], &of_user["backend"]), (&1.into(), &"cpu".into()));
+    let own = |key: &str| of_user["terms"].to_string().contains(key);
+    assert!(own("product") && !own("strip_candidates"), "{}", of_user["terms"]);
 
     let tuning = file("tuning.json");
     let predict = |mut command: Command| {
@@ -132,6 +138,9 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let own: Value = serde_json::from_str(&predict(user())).unwrap();
     assert!(own["costs"].as_array().unwrap().iter().any(|c| c["algorithm"] == "bvh@cpu1"), "{own}");
     assert!(!own["warnings"].to_string().contains("bvh"), "{}", own["warnings"]);
+    // The built-in model does not know it, and says what to do.
+    let built_in = success(user().args(["predict", "--json", "--report"]).arg(&report));
+    assert!(built_in.contains("bvh is not predicted") && built_in.contains("own-model.json"), "{built_in}");
 
     let run = ["run", "uniform", "--json", "--objects", "200", "--frames", "20", "--repeats", "1", "--tuning"];
     let told: Value = serde_json::from_str(&success(user().args(run).arg(&tuning))).unwrap();

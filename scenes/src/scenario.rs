@@ -152,14 +152,16 @@ impl FromStr for Scenario {
     type Err = UnknownScenario;
 
     fn from_str(text: &str) -> Result<Self, UnknownScenario> {
-        Self::ALL.into_iter().find(|s| s.name() == text).ok_or_else(|| UnknownScenario(text.to_owned()))
+        Self::ALL.into_iter().find(|s| s.name() == text).ok_or_else(|| UnknownScenario { text: text.to_owned() })
     }
 }
 
 /// A text names no [`Scenario`]. Its message lists the names.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is no scenario; use one of {}", Scenario::ALL.map(Scenario::name).join(", "))]
-pub struct UnknownScenario(String);
+#[error("{text:?} is no scenario; use one of {}", Scenario::ALL.map(Scenario::name).join(", "))]
+pub struct UnknownScenario {
+    text: String,
+}
 
 /// Greatest step on each axis in a frame, in edges, where objects move slowly.
 const STEP: f32 = 0.05;

@@ -10,18 +10,18 @@ use super::style::{self, GAP, INK, SECONDARY, WIDTH};
 
 /// Both axes are logarithmic and the same; on the diagonal a prediction is right.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Agreement {
+pub(crate) struct Agreement {
     /// What stands above it.
-    pub title: String,
+    pub(crate) title: String,
     /// What the values are.
-    pub values: Values,
+    pub(crate) values: Values,
     /// Points that share a mark and a name in the legend.
-    pub groups: Vec<AgreementGroup>,
+    pub(crate) groups: Vec<AgreementGroup>,
 }
 
 /// What is predicted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Values {
+pub(crate) enum Values {
     /// Times of a frame in nanoseconds.
     #[default]
     TimesNs,
@@ -31,24 +31,24 @@ pub enum Values {
 
 /// Points with one name.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct AgreementGroup {
+pub(crate) struct AgreementGroup {
     /// What the legend calls them.
-    pub name: String,
+    pub(crate) name: String,
     /// Position among the series: gives colour and mark.
-    pub style: usize,
+    pub(crate) style: usize,
     /// The points.
-    pub points: Vec<AgreementPoint>,
+    pub(crate) points: Vec<AgreementPoint>,
 }
 
 /// One value.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct AgreementPoint {
+pub(crate) struct AgreementPoint {
     /// The measured value.
-    pub measured: f64,
+    pub(crate) measured: f64,
     /// The predicted value.
-    pub predicted: f64,
+    pub(crate) predicted: f64,
     /// The interval of the measured value, drawn as a bar.
-    pub interval: Option<(f64, f64)>,
+    pub(crate) interval: Option<(f64, f64)>,
 }
 
 /// Width and height of the chart, with what stands beside it; the names have the rest of the width.
@@ -102,8 +102,7 @@ impl Agreement {
 
 impl Legended for Agreement {
     fn legend(&self, width: i32) -> Legend {
-        let mut entries: Vec<(Sign, String)> =
-            self.groups.iter().map(|g| (Sign::Mark(g.style), g.name.clone())).collect();
+        let mut entries: Vec<(Sign, String)> = self.groups.iter().map(|g| (Sign::Mark(g.style), g.name.clone())).collect();
         let lines = [(EXACT, "the prediction is right"), (TWICE, "it is off by a factor of two")];
         entries.extend(lines.map(|(stroke, name)| (Sign::Stroke(stroke), name.to_owned())));
         let without = self.points().count() - self.drawn().count();

@@ -1,9 +1,9 @@
 //! A frame with two axes, and what is drawn in it.
 
 use super::axis::{Axis, Lies};
+use super::canvas::Area;
 use super::font;
 use super::mark::{Mark, mark};
-use super::canvas::Area;
 use super::style::{self, AXIS, GRID, INK, LABEL, PANEL, SECONDARY, line_height};
 use plotters::prelude::*;
 use plotters_backend::text_anchor::{HPos, VPos};
@@ -153,19 +153,6 @@ impl<'a, 'p> Chart<'a, 'p> {
             path(self.area, &piece, line)?;
         }
         Ok(())
-    }
-
-    /// The area below a line through these values.
-    pub(super) fn below(
-        &self,
-        values: impl IntoIterator<Item = (f64, f64)>,
-        colour: RGBColor,
-        alpha: f64,
-    ) -> anyhow::Result<()> {
-        let mut places: Vec<Position> = values.into_iter().filter_map(|(x, y)| self.place(x, y)).collect();
-        let (Some(first), Some(last)) = (places.first().copied(), places.last().copied()) else { return Ok(()) };
-        places.extend([(last.0, self.frame.bottom), (first.0, self.frame.bottom)]);
-        Ok(self.area.draw(&Polygon::new(places, colour.mix(alpha).filled()))?)
     }
 
     /// A bar from one value to another above `x`.

@@ -2,67 +2,67 @@
 //! optimal performance shaded.
 
 use super::axis::{Axis, time_unit};
-use super::chart::{ABOVE, BELOW, Chart, Frame, Hatch, LEFT, Stroke, RIGHT, fill, hatch, missing, path, words};
+use super::canvas::Area;
+use super::chart::{ABOVE, BELOW, Chart, Frame, Hatch, LEFT, RIGHT, Stroke, fill, hatch, missing, path, words};
 use super::legend::{Legend, Sign};
 use super::mark::mark;
-use super::canvas::Area;
 use super::style::{self, GAP, INK, PANEL, SECONDARY, SMALL, WIDTH};
 use super::{Figure, font};
 use plotters_backend::text_anchor::{HPos, VPos};
 
 /// One to four panels with the same ranges of both axes.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Curves {
-    pub title: String,
-    pub panels: Vec<CurvePanel>,
+pub(crate) struct Curves {
+    pub(crate) title: String,
+    pub(crate) panels: Vec<CurvePanel>,
 }
 
 /// The curves of one machine or class of processors.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct CurvePanel {
-    pub title: String,
-    pub series: Vec<Curve>,
-    pub fields: Vec<Band>,
-    pub borders: Vec<BorderLine>,
+pub(crate) struct CurvePanel {
+    pub(crate) title: String,
+    pub(crate) series: Vec<Curve>,
+    pub(crate) fields: Vec<Band>,
+    pub(crate) borders: Vec<BorderLine>,
 }
 
 /// One algorithm.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Curve {
-    pub name: String,
+pub(crate) struct Curve {
+    pub(crate) name: String,
     /// Position in the study's list of names: gives colour, mark and dashes.
-    pub style: usize,
-    pub points: Vec<CurvePoint>,
+    pub(crate) style: usize,
+    pub(crate) points: Vec<CurvePoint>,
 }
 
 /// The time of a frame at one number of objects.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct CurvePoint {
-    pub objects: f64,
-    pub ns: f64,
+pub(crate) struct CurvePoint {
+    pub(crate) objects: f64,
+    pub(crate) ns: f64,
     /// Quartiles, drawn as a bar.
-    pub low_ns: f64,
-    pub high_ns: f64,
+    pub(crate) low_ns: f64,
+    pub(crate) high_ns: f64,
 }
 
 /// A field of optimal performance.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Band {
+pub(crate) struct Band {
     /// Numbers of objects; the ends may be infinite.
-    pub from: f64,
-    pub to: f64,
+    pub(crate) from: f64,
+    pub(crate) to: f64,
     /// Of its algorithm.
-    pub style: usize,
-    pub name: String,
+    pub(crate) style: usize,
+    pub(crate) name: String,
 }
 
 /// Where the next algorithm becomes the fastest.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct BorderLine {
-    pub objects: f64,
+pub(crate) struct BorderLine {
+    pub(crate) objects: f64,
     /// The interval of it.
-    pub low: f64,
-    pub high: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
 }
 
 /// Height of the row of fields above a panel.

@@ -1,9 +1,9 @@
 //! Which hardware parameters are linked to which algorithms and crossovers.
 
-use super::chart::{Frame, Stroke, Position, fill, missing, path, words};
+use super::canvas::Area;
+use super::chart::{Frame, Position, Stroke, fill, missing, path, words};
 use super::legend::{Legend, Sign};
 use super::mark::{Mark, mark};
-use super::canvas::Area;
 use super::style::{self, GAP, GRID, INK, LABEL, PANEL, SECONDARY, SMALL, WIDTH, line_height};
 use super::{Figure, font};
 use plotters::element::Text;
@@ -12,27 +12,27 @@ use plotters_backend::text_anchor::{HPos, VPos};
 
 /// A matrix of verdicts: a row for each parameter, a column for each algorithm or crossover.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Influence {
-    pub title: String,
-    pub columns: Vec<String>,
-    pub rows: Vec<String>,
+pub(crate) struct Influence {
+    pub(crate) title: String,
+    pub(crate) columns: Vec<String>,
+    pub(crate) rows: Vec<String>,
     /// For each row one cell for each column; what is missing is `Verdict::Absent`.
-    pub cells: Vec<Vec<InfluenceCell>>,
+    pub(crate) cells: Vec<Vec<InfluenceCell>>,
 }
 
 /// One parameter and one algorithm or crossover.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct InfluenceCell {
-    pub verdict: Verdict,
+pub(crate) struct InfluenceCell {
+    pub(crate) verdict: Verdict,
     /// Signed strength, as the rank correlation.
-    pub value: Option<f64>,
+    pub(crate) value: Option<f64>,
     /// What stands in the cell.
-    pub text: String,
+    pub(crate) text: String,
 }
 
 /// A verdict.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Verdict {
+pub(crate) enum Verdict {
     Linked,
     NotLinked,
     CannotBeTold,

@@ -1,9 +1,9 @@
 //! Figures of one chart whose legend stands below it, alone or as a part of another figure.
 
 use super::Figure;
+use super::canvas::Area;
 use super::chart::{ABOVE, BELOW, Frame, LEFT, RIGHT};
 use super::legend::Legend;
-use super::canvas::Area;
 use super::style::{GAP, WIDTH};
 
 /// Height of the chart with what stands around it, where it is alone.

@@ -1,54 +1,54 @@
 //! The map that the paper could not draw: fields of optimal performance over two axes.
 
+use super::Figure;
 use super::axis::Axis;
+use super::canvas::Area;
 use super::chart::{ABOVE, BELOW, Chart, Frame, Hatch, LEFT, RIGHT, fill, hatch, missing};
 use super::legend::{Legend, Sign};
 use super::mark::Mark;
-use super::canvas::Area;
 use super::style::{self, GAP, INK, WIDTH};
-use super::Figure;
 
 /// Panels beside each other, measured beside predicted, over the number of objects and a density.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct FieldMap {
-    pub title: String,
+pub(crate) struct FieldMap {
+    pub(crate) title: String,
     /// Algorithms, each with its position in the study's list of names.
-    pub names: Vec<(String, usize)>,
+    pub(crate) names: Vec<(String, usize)>,
     /// Range of the number of objects.
-    pub x: (f64, f64),
-    pub y: (f64, f64),
+    pub(crate) x: (f64, f64),
+    pub(crate) y: (f64, f64),
     /// What the second axis is, with its unit.
-    pub y_name: String,
-    pub panels: Vec<MapPanel>,
+    pub(crate) y_name: String,
+    pub(crate) panels: Vec<MapPanel>,
 }
 
 /// One map.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct MapPanel {
-    pub title: String,
+pub(crate) struct MapPanel {
+    pub(crate) title: String,
     /// The fields, drawn light, behind the points.
-    pub grid: Vec<MapCell>,
-    pub points: Vec<MapPoint>,
+    pub(crate) grid: Vec<MapCell>,
+    pub(crate) points: Vec<MapPoint>,
 }
 
 /// A rectangle of one field.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct MapCell {
-    pub x: (f64, f64),
-    pub y: (f64, f64),
+pub(crate) struct MapCell {
+    pub(crate) x: (f64, f64),
+    pub(crate) y: (f64, f64),
     /// Position in `FieldMap::names`.
-    pub algorithm: usize,
+    pub(crate) algorithm: usize,
 }
 
 /// A frame, with the algorithm that was fastest in it or was chosen for it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct MapPoint {
-    pub x: f64,
-    pub y: f64,
+pub(crate) struct MapPoint {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
     /// Position in `FieldMap::names`.
-    pub algorithm: usize,
+    pub(crate) algorithm: usize,
     /// Regret of the choice, 0.1 for 10 %; more than that gets a ring.
-    pub loss: Option<f64>,
+    pub(crate) loss: Option<f64>,
 }
 
 /// A regret over this gets a ring.

@@ -24,12 +24,12 @@ use plotters_backend::text_anchor::{HPos, VPos};
 use std::path::{Path, PathBuf};
 use style::{GAP, INK, SECONDARY, SMALL, TITLE, line_height};
 
-pub use agreement::{Agreement, AgreementGroup, AgreementPoint, Values};
-pub use curves::{Band, BorderLine, Curve, CurvePanel, CurvePoint, Curves};
-pub use influence::{Influence, InfluenceCell, Verdict};
-pub use map::{FieldMap, MapCell, MapPanel, MapPoint};
-pub use ratios::{RatioGroup, RatioKind, RatioValue, Ratios};
-pub use regrets::{Regrets, StrategyRegrets};
+pub(crate) use agreement::{Agreement, AgreementGroup, AgreementPoint, Values};
+pub(crate) use curves::{Band, BorderLine, Curve, CurvePanel, CurvePoint, Curves};
+pub(crate) use influence::{Influence, InfluenceCell, Verdict};
+pub(crate) use map::{FieldMap, MapCell, MapPanel, MapPoint};
+pub(crate) use ratios::{RatioGroup, RatioKind, RatioValue, Ratios};
+pub(crate) use regrets::{Regrets, StrategyRegrets};
 pub use replay::ReplayPicture;
 pub use training::TrainingPicture;
 

@@ -2,36 +2,36 @@
 //! speed-up of each algorithm.
 
 use super::axis::Axis;
-use super::chart::{BELOW, Chart, Frame, Stroke, RIGHT, fill, missing, path, words};
-use super::legend::{Legend, Sign};
 use super::canvas::Area;
-use super::style::{self, GAP, GRID, INK, LABEL, PANEL, GROUND, SECONDARY, WIDTH, line_height};
+use super::chart::{BELOW, Chart, Frame, RIGHT, Stroke, fill, missing, path, words};
+use super::legend::{Legend, Sign};
+use super::style::{self, GAP, GRID, GROUND, INK, LABEL, PANEL, SECONDARY, WIDTH, line_height};
 use super::{Figure, font};
 use plotters_backend::text_anchor::{HPos, VPos};
 
 /// A row for each parameter and each algorithm, a mark for each machine.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Ratios {
-    pub title: String,
+pub(crate) struct Ratios {
+    pub(crate) title: String,
     /// Name of the machine that the ratios are to.
-    pub reference: String,
+    pub(crate) reference: String,
     /// The others: their positions give colours and marks.
-    pub machines: Vec<String>,
-    pub groups: Vec<RatioGroup>,
+    pub(crate) machines: Vec<String>,
+    pub(crate) groups: Vec<RatioGroup>,
 }
 
 /// One row.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RatioGroup {
-    pub name: String,
-    pub kind: RatioKind,
+pub(crate) struct RatioGroup {
+    pub(crate) name: String,
+    pub(crate) kind: RatioKind,
     /// One for each machine, `None` where one of the two values is missing.
-    pub values: Vec<Option<RatioValue>>,
+    pub(crate) values: Vec<Option<RatioValue>>,
 }
 
 /// What a ratio is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RatioKind {
+pub(crate) enum RatioKind {
     /// The value of a hardware parameter over that of the reference.
     Parameter,
     /// The time of an algorithm on the reference over that on the machine.
@@ -40,10 +40,10 @@ pub enum RatioKind {
 
 /// A ratio with its interval.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct RatioValue {
-    pub ratio: f64,
-    pub low: Option<f64>,
-    pub high: Option<f64>,
+pub(crate) struct RatioValue {
+    pub(crate) ratio: f64,
+    pub(crate) low: Option<f64>,
+    pub(crate) high: Option<f64>,
 }
 
 /// Height of the line above each of the two parts.

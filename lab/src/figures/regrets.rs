@@ -1,32 +1,32 @@
 //! The regret on each held-out machine.
 
+use super::Figure;
 use super::axis::Axis;
+use super::canvas::Area;
 use super::chart::{Chart, Frame, Stroke, missing};
 use super::legend::{Legend, Sign};
 use super::legended::Legended;
-use super::canvas::Area;
 use super::style;
-use super::Figure;
 
 /// A regret below this can't be seen on a logarithmic axis: a tenth of a percent.
 const LEAST_PERCENT: f64 = 0.1;
 
 /// For each strategy the mean regrets from the least to the most, by itself: at 95 is the 95th percentile.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Regrets {
-    pub title: String,
+pub(crate) struct Regrets {
+    pub(crate) title: String,
     /// What was held out: a physical machine, or a profile.
-    pub unit: String,
-    pub strategies: Vec<StrategyRegrets>,
+    pub(crate) unit: String,
+    pub(crate) strategies: Vec<StrategyRegrets>,
 }
 
 /// A way to choose an algorithm.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct StrategyRegrets {
-    pub name: String,
-    pub style: usize,
+pub(crate) struct StrategyRegrets {
+    pub(crate) name: String,
+    pub(crate) style: usize,
     /// Of each unit, 0.1 for 10 %.
-    pub regrets: Vec<f64>,
+    pub(crate) regrets: Vec<f64>,
 }
 
 /// A regret in percent, no less than what the axis shows.

@@ -2,10 +2,10 @@
 
 use super::Figure;
 use super::axis::{Axis, Tick, time_unit};
-use super::chart::{ABOVE, BELOW, Chart, Frame, Stroke, RIGHT, fill, missing};
+use super::canvas::Area;
+use super::chart::{ABOVE, BELOW, Chart, Frame, RIGHT, Stroke, fill, missing};
 use super::legend::{Legend, Sign};
 use super::mark::Mark;
-use super::canvas::Area;
 use super::style::{self, GAP, GRID, INK, SECONDARY};
 use crate::text::count;
 use plotters::style::RGBColor;

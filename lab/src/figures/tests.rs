@@ -290,11 +290,8 @@ fn borders(points: Vec<AgreementPoint>) -> Agreement {
 
 #[test]
 fn predictions_are_drawn_where_both_values_are_known() {
-    let point = |measured: f64, predicted| AgreementPoint {
-        measured,
-        predicted,
-        interval: Some((0.8 * measured, 1.3 * measured)),
-    };
+    let point =
+        |measured: f64, predicted| AgreementPoint { measured, predicted, interval: Some((0.8 * measured, 1.3 * measured)) };
     let (svg, _) = drawn(&borders(vec![point(100.0, 150.0), point(1e5, 3e4), point(f64::INFINITY, 10.0)]));
     let needed = ["measured border (objects)", "predicted border (objects)", "factor of two", "1 without a position"];
     assert!(needed.iter().all(|text| svg.contains(text)), "{svg}");
@@ -312,12 +309,12 @@ fn predictions_are_drawn_where_both_values_are_known() {
 
 #[test]
 fn the_figures_of_a_training_stand_alone() {
-    let points = every_pair().into_iter().map(|(measured, predicted)| AgreementPoint { measured, predicted, interval: None });
+    let points =
+        every_pair().into_iter().map(|(measured, predicted)| AgreementPoint { measured, predicted, interval: None });
     let group = AgreementGroup { name: format!("sap {ODD}"), style: 3, points: points.collect() };
     let times = Agreement { title: "Times".to_owned(), values: Values::TimesNs, groups: vec![group] };
     let strategy = StrategyRegrets { name: format!("strategy {ODD}"), style: 1, regrets: AWKWARD.to_vec() };
-    let regrets =
-        Regrets { title: "Regrets".to_owned(), unit: "physical machine".to_owned(), strategies: vec![strategy] };
+    let regrets = Regrets { title: "Regrets".to_owned(), unit: "physical machine".to_owned(), strategies: vec![strategy] };
     let units = ["measured time of a frame (", "share of the held-out physical machines"];
     let figures: [&dyn Figure; 2] = [&times, &regrets];
     for (figure, unit) in figures.into_iter().zip(units) {

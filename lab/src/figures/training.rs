@@ -17,9 +17,9 @@ const STRATEGIES: [&str; 6] = [OURS, "random forest", "nearest machine", "direct
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrainingPicture {
     /// Predicted and measured times of a frame.
-    pub times: Agreement,
+    pub(crate) times: Agreement,
     /// The regrets of some strategies.
-    pub regrets: Regrets,
+    pub(crate) regrets: Regrets,
 }
 
 impl TrainingPicture {
@@ -37,8 +37,7 @@ fn times(held_out: &HeldOut) -> Agreement {
     methods.dedup();
     let of = |(style, (class, method)): (usize, (BackendClass, &str))| {
         let is_own = |t: &&Time| (t.algorithm.backend().class(), t.algorithm.method()) == (class, method);
-        let point =
-            |t: &Time| AgreementPoint { measured: t.measured_ns, predicted: t.predicted_ns, interval: None };
+        let point = |t: &Time| AgreementPoint { measured: t.measured_ns, predicted: t.predicted_ns, interval: None };
         let points = held_out.times.iter().filter(is_own).map(point).collect();
         AgreementGroup { name: format!("{method} on the {class}"), style, points }
     };

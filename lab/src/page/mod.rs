@@ -11,7 +11,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-use crate::data_table::{Cell, Column, Row, DataTable};
+use crate::data_table::{Cell, Column, DataTable, Row};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use ids::Ids;

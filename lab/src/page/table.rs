@@ -1,7 +1,7 @@
 //! A table that the script of the page makes sortable.
 
 use super::link::Reports;
-use crate::data_table::{Cell, Row, DataTable, figure};
+use crate::data_table::{Cell, DataTable, Row, figure};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 

@@ -1,6 +1,5 @@
 //! Values that the command knows: a shell completes them, and the help lists them.
 
-use super::Scene;
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::error::Error;
 use clap::{Arg, Command};
@@ -41,9 +40,9 @@ pub(super) fn scenario_name() -> impl TypedValueParser<Value = String> {
     Known { parser: StringValueParser::new(), values: scenarios }
 }
 
-/// A scenario or a file.
-pub(super) fn scene() -> impl TypedValueParser<Value = Scene> {
-    Known { parser: |text: &str| text.parse::<Scene>(), values: scenarios }
+/// A value that may be a scenario, read by `parser`.
+pub(super) fn scenario_or<P: TypedValueParser>(parser: P) -> impl TypedValueParser<Value = P::Value> {
+    Known { parser, values: scenarios }
 }
 
 /// An algorithm. Those of GPUs and of a user's program are taken as well; a shell that completes them would have to load drivers.

@@ -1,5 +1,6 @@
 //! The options of `sapwise run`.
 
+use super::known;
 use crate::gpus::GpuChoice;
 use crate::replay::CoRunner;
 use clap::Args;
@@ -7,35 +8,34 @@ use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Runs a scenario, or a recorded stream of boxes, with the adaptive module and with every fixed algorithm, and says what the choice
-/// was worth.
+/// Runs a scenario, or a recorded stream of boxes, with the adaptive module and with every fixed algorithm, and compares their times.
 ///
-/// All of them run on the same frames in turn, so that a machine that slows down slows all of them, and begin every repeat afresh. Times
-/// are medians over the repeats. They are compared with an oracle that runs the best algorithm of every frame, chosen by one half
-/// of the repeats and timed in the other: the least of many noisy times would be less than any algorithm takes.
+/// All of them run on the same frames in turn, so that a machine that slows down slows all of them, and start every repeat without what
+/// they kept. Times are medians over the repeats. They are compared with an oracle that runs the best algorithm of every frame, chosen on
+/// one half of the repeats and timed on the other: the minimum of many noisy times would be less than any algorithm takes.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   sapwise run fragmentation
-  sapwise run fragmentation --tuning report.json --plot run.svg    (tuning measured on this machine)
-  sapwise run fragmentation --tuning elsewhere.json --after 300    (wrong tuning: what learning makes of them)
-  sapwise run clustered --swing 50 --frames 600                    (growing and shrinking)
+  sapwise run fragmentation --tuning report.json --plot run.svg    # tuning measured on this machine
+  sapwise run fragmentation --tuning elsewhere.json --after 300    # tuning of another machine, corrected by learning
+  sapwise run clustered --swing 50 --frames 600                    # the number of objects grows and shrinks
   sapwise run uniform --frames 900 --co-runner 450 --trace run.csv
   sapwise run clustered --objects 50000 --frames 100 --record clustered.npy --json
-  sapwise run clustered.npy --samples 0 --no-learning              (the pure prediction, on a recorded stream)")]
+  sapwise run clustered.npy --samples 0 --no-learning              # the pure prediction, on a recorded stream")]
 pub(crate) struct Run {
-    /// The scenario; or a stream of your own frames, NumPy's format, 32-bit floats of shape frames x n x 6, each box min x y z, max
-    /// x y z. Rows of NaN at the end of a frame are absent boxes.
-    #[arg(value_name = "SCENARIO|BOXES.npy", value_parser = super::known::scene())]
+    /// The scenario; or a stream of your own frames: an .npy file of 32-bit floats of shape frames x n x 6, each row a box: min x y z, max x
+    /// y z. Rows of NaN at the end of a frame are absent boxes.
+    #[arg(value_name = "SCENARIO|BOXES.npy", value_parser = known::scenario_or(|text: &str| text.parse::<Scene>()))]
     pub(crate) scene: Scene,
-    /// Tuning, or a report to measure them from; those of another machine show how learning corrects them. Without this option
-    /// they are predicted from this machine's hardware.
+    /// A tuning file, or a report to compute tuning from. Tuning of another machine shows how learning corrects it. Without this option
+    /// tuning is predicted from this machine's hardware.
     #[arg(long, value_name = "T.json")]
     pub(crate) tuning: Option<PathBuf>,
     /// Correct the prediction by up to this many samples before the first frame, as `predict` does. 0 is the pure prediction.
     #[arg(long, value_name = "K", default_value_t = 8, conflicts_with = "tuning", value_parser = clap::value_parser!(u32).range(0..=100))]
     pub(crate) samples: u32,
-    /// Let the times of the frames not correct the expected costs.
+    /// Do not correct the expected costs by the times of the frames.
     #[arg(long)]
     pub(crate) no_learning: bool,
     /// Never run another algorithm than the cheapest to learn what it costs.
@@ -44,7 +44,7 @@ pub(crate) struct Run {
     /// Objects; in fragmentation the largest number of them. Without this option 20 000. A stream has its own.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub(crate) objects: Option<u32>,
-    /// Let the number of objects go from this one up to all and back over the frames.
+    /// Let the number of objects grow from this one up to --objects and back over the frames.
     #[arg(long, value_name = "LEAST", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub(crate) swing: Option<u32>,
     /// Frames. Without this option 200, in fragmentation one cycle of 600, of a stream all.
@@ -53,15 +53,15 @@ pub(crate) struct Run {
     /// How often the whole simulation is run. With one, the oracle has the least time of every frame.
     #[arg(long, value_name = "R", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) repeats: u32,
-    /// Seed of the scenario and of the order of turns.
+    /// Seed of the scene and of the order in which algorithms run.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Tell the figures before and from this frame on apart; several with commas between. Without this option 300, the frames that
+    /// Show the figures before this frame and from it on apart; several with commas between. Without this option 300, the frames that
     /// learning may take, and the frame of the co-runner.
     #[arg(long, value_name = "FRAME", value_delimiter = ',')]
     pub(crate) after: Vec<usize>,
-    /// From this frame on let threads that run beside it, one for each core or so many, take three eighths of the CPU, so that
-    /// everything takes 1.6 times as long. What was reached is told.
+    /// From this frame on run threads, one for each core or THREADS, that take three eighths of the CPU, so that everything takes about 1.6
+    /// times as long. The slowdown that was reached is printed.
     #[arg(long, value_name = "FRAME[:THREADS]")]
     pub(crate) co_runner: Option<CoRunner>,
     #[command(flatten)]
@@ -69,11 +69,12 @@ pub(crate) struct Run {
     /// Write the frames as a stream before they are run. `run` and `pairs` read it.
     #[arg(long, value_name = "S.npy")]
     pub(crate) record: Option<PathBuf>,
-    /// Where a table goes with a row a frame: load, decision, expected and measured times, the time of every algorithm. CSV or JSON
-    /// by its ending.
+    /// Where a table goes with one row per frame: load, decision, expected and measured times, the time of every algorithm. CSV or JSON by
+    /// its ending.
     #[arg(long, value_name = "T.csv")]
     pub(crate) trace: Option<PathBuf>,
-    /// Where a picture goes of the costs on each number of GPUs and cores, the decisions and the objects. SVG or PNG by its ending.
+    /// Where a picture goes: the times of the algorithms, which of them ran in which frame, and the number of objects. SVG or PNG by its
+    /// ending.
     #[arg(long, value_name = "P.svg")]
     pub(crate) plot: Option<PathBuf>,
     /// One JSON object on standard output instead of a table.
@@ -95,7 +96,7 @@ impl FromStr for Scene {
         let path = Path::new(text);
         match text.parse() {
             Ok(scenario) => Ok(Self::Scenario(scenario)),
-            // A file that is missing or of another format is told by whoever reads it.
+            // A file that is missing or of another format is reported by the code that reads it.
             Err(_) if path.extension().is_some_and(|e| e == "npy") || path.exists() => Ok(Self::Stream(path.to_owned())),
             Err(why) => Err(format!("{why}; or name a file of boxes, as `--record S.npy` writes it")),
         }

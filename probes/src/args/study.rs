@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 /// Studies how hardware shapes performance: a page with figures and tables of any set of reports.
 ///
-/// The hardware of all machines, their parameters beside their speed, which parameter matters for which algorithm and border, the paper's
-/// claims, time over objects, tuning over objects and density, and how well all of it is predicted. DIR/index.html is the page; every
-/// figure is beside it as SVG, PNG and CSV, every table as CSV, and study.json says the same for machines.
+/// The page shows the hardware of all machines, their parameters beside their speed, which parameter matters for which algorithm and
+/// crossover, the paper's claims, time over objects, tuning over objects and density, and how well all of it is predicted. DIR/index.html
+/// is the page; every figure is beside it as SVG, PNG and CSV, every table as CSV, and study.json is a summary for programs.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -15,7 +15,7 @@ Examples:
   sapwise study reports/ --out pair --reference reports/a.json --machine reports/b.json
   sapwise study --simulated simulated datasets/published --out simulated-study")]
 pub(crate) struct Study {
-    /// Reports, or folders whose *.json files are reports. What can't be read is told on the page.
+    /// Reports, or folders whose *.json files are reports. Files that can't be read are named on the page.
     #[arg(required = true, value_name = "REPORT")]
     pub(crate) reports: Vec<PathBuf>,
     /// The folder that the study goes to: new, empty, or that of an earlier study, whose files it replaces.
@@ -24,7 +24,7 @@ pub(crate) struct Study {
     /// Study simulated reports instead of real ones; the two are never mixed.
     #[arg(long)]
     pub(crate) simulated: bool,
-    /// The report that others are held against. Without this option the first one of a whole machine.
+    /// The report that others are compared with. Without this option the first one of a whole machine.
     #[arg(long, value_name = "REPORT")]
     pub(crate) reference: Option<PathBuf>,
     /// A report to draw; may be given several times. Without this option each machine is drawn by the report that has most of it, and of

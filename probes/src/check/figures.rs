@@ -1,13 +1,13 @@
-//! Figures of a report that can't be, and those that are hardly what they seem.
+//! Figures of a report that are impossible, doubtful or suspicious.
 
 use crate::date;
 use sapwise::hardware::parameter;
 use sapwise::measure::Watch;
-use sapwise_lab::report::{Label, Point, Restricted};
-use sapwise::{GpuHardware, Hardware, How, Parameter, Report, SimdLevel};
+use sapwise::{GpuHardware, Hardware, How, Parameter, SimdLevel};
+use sapwise_lab::report::{Label, Point, Report, Restricted};
 use std::collections::BTreeMap;
 
-/// What several threads may seem to gain over their number, by a clock that rises in between.
+/// How far several threads may exceed their number, by a clock that rises between two measurements.
 const SCALING_TOLERANCE: f64 = 1.1;
 
 /// Share of the points with foreign load that is worth a word.
@@ -58,16 +58,26 @@ fn impossible_parameter(report: &Report, of: &str, p: &Parameter) -> Option<Stri
     if p.name == parameter::USABLE_CORES && value.fract() != 0.0 {
         return Some(format!("{name} is {value}"));
     }
-    // A disturbed thread alone makes several look better than they are.
-    let disturbed = report.label == Label::RealContended || p.foreign_load.is_some_and(|load| load > Watch::SPOILING);
+    // A disturbed measurement of one thread alone makes several look better than they are: that is a doubt.
+    if report.label == Label::RealContended || is_disturbed(p) {
+        return None;
+    }
+    scaling_beyond_threads(&report.hardware, p).map(|what| format!("{what}{of}"))
+}
+
+fn is_disturbed(p: &Parameter) -> bool {
+    p.foreign_load.is_some_and(|load| load > Watch::SPOILING)
+}
+
+/// What several threads gain over one, where that is more than their number.
+fn scaling_beyond_threads(hardware: &Hardware, p: &Parameter) -> Option<String> {
     let threads = match p.name.as_str() {
-        parameter::SCALING_TWO_THREADS_RATIO => Some(2.0),
-        parameter::SCALING_ALL_THREADS_RATIO => report.hardware.value(parameter::USABLE_CORES),
-        _ => None,
+        parameter::SCALING_TWO_THREADS_RATIO => 2.0,
+        parameter::SCALING_ALL_THREADS_RATIO => hardware.value(parameter::USABLE_CORES)?,
+        _ => return None,
     };
-    let most = threads.filter(|_| !disturbed)?;
-    (value > most * SCALING_TOLERANCE)
-        .then(|| format!("{name} is {value:.2}, and {most} threads can't do more than {most} times"))
+    let value = p.value.filter(|value| *value > threads * SCALING_TOLERANCE)?;
+    Some(format!("{} is {value:.2}, and {threads} threads can't be more than {threads} times as fast as one", p.name))
 }
 
 fn impossible_provenance(report: &Report) -> Vec<String> {
@@ -163,12 +173,12 @@ fn rounds(points: &[Point]) -> Vec<String> {
     found
 }
 
-/// What a maintainer should ask about, one sentence each.
-pub(super) fn suspicious(report: &Report) -> Vec<String> {
-    let mut found = Vec::new();
+/// Why the figures of a report should not be relied on, one sentence each: disturbed points, and a scaling that no machine has.
+pub(crate) fn doubts(report: &Report) -> Vec<String> {
+    let mut found = hardware_doubts(&report.hardware);
     let loads: Vec<f64> = report.points.iter().filter_map(|p| p.foreign_load).collect();
     let disturbed = loads.iter().filter(|&&load| load > Watch::SPOILING).count();
-    // What the user wanted is not foreign; what made the label all the same is.
+    // Contention that the user asked for is not foreign; what made the label without it is.
     let wanted = report.provenance.command.contains("--contended");
     if !wanted && disturbed as f64 > DISTURBED_SHARE * loads.len() as f64 {
         let share = disturbed as f64 / loads.len() as f64 * 100.0;
@@ -180,6 +190,19 @@ pub(super) fn suspicious(report: &Report) -> Vec<String> {
             loads.len()
         ));
     }
+    found
+}
+
+/// The same of hardware parameters alone.
+pub(crate) fn hardware_doubts(hardware: &Hardware) -> Vec<String> {
+    let own = hardware.parameters.iter();
+    let beyond = own.filter_map(|p| scaling_beyond_threads(hardware, p));
+    beyond.map(|what| format!("{what}; other programs disturbed the measurement of one thread: measure again with nothing else running")).collect()
+}
+
+/// What a maintainer should ask about, one sentence each.
+pub(super) fn suspicious(report: &Report) -> Vec<String> {
+    let mut found = Vec::new();
     let wide = |(of, p): &(String, &Parameter)| {
         let dispersion = p.dispersion.filter(|&d| d > WIDE)?;
         Some(format!("{}{of} ({:.0} %)", p.name, dispersion * 100.0))

@@ -1,20 +1,21 @@
-//! What can be told of a file: whether it is sound, current and applicable here, and what makes it suspicious.
+//! Checks of a file: whether it is sound, current and applicable here, and what makes it doubtful.
 
-mod tuning;
 mod figures;
 mod model;
 mod privacy;
 mod report;
+mod tuning;
 
 use crate::algorithms::Algorithms;
-use sapwise_lab::data::files::read_document;
+use sapwise_lab::data::{Document, read_document};
 use crate::gpus::{Seen, look};
-use sapwise::json::Document;
 use sapwise::measure;
 use sapwise::{Machine, Registry, usable_cores};
 use serde::Serialize;
 use std::cell::OnceCell;
 use std::path::Path;
+
+pub(crate) use figures::{doubts, hardware_doubts};
 
 /// What is known about one file.
 #[derive(Debug, Serialize)]
@@ -30,11 +31,13 @@ pub(crate) struct Finding {
     pub(crate) applicable: Option<bool>,
     /// What makes the file fail.
     pub(crate) problems: Vec<String>,
-    /// What the user should know beside.
+    /// What makes its figures doubtful, though it is readable and complete.
+    pub(crate) doubts: Vec<String>,
+    /// What else the user should know.
     pub(crate) notes: Vec<String>,
 }
 
-/// What files are held against.
+/// What files are checked against.
 pub(crate) struct Here {
     registry: Registry,
     machine: Machine,
@@ -48,7 +51,7 @@ impl Here {
         Self { registry: algorithms.registry(usable_cores()), machine: measure::machine(), gpus: OnceCell::new() }
     }
 
-    /// Reads a file and tells what is known about it.
+    /// Reads a file and checks it.
     pub(crate) fn look_at(&self, path: &Path) -> Finding {
         let mut finding = Finding {
             file: path.display().to_string(),
@@ -57,6 +60,7 @@ impl Here {
             current: None,
             applicable: None,
             problems: Vec::new(),
+            doubts: Vec::new(),
             notes: Vec::new(),
         };
         match read_document(path) {

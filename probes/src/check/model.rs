@@ -1,4 +1,4 @@
-//! What is told of a model.
+//! Checks of a model.
 
 use super::{Finding, Here};
 use crate::revisions;
@@ -8,7 +8,7 @@ use sapwise::{BackendClass, How, Model, Parameter, usable_cores};
 
 impl Here {
     pub(super) fn model(&self, model: &Model, finding: &mut Finding) {
-        finding.schema = Some("model/1");
+        finding.schema = Some("model/2");
         let used = model.methods.iter().map(|m| ((m.backend, m.method.as_str()), m.revision));
         finding.set_current(revisions::stale(used, &self.registry), "train it again on new reports");
         finding.applicable = Some(finding.current == Some(true));

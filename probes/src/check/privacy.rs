@@ -1,6 +1,6 @@
 //! Texts of a report that tell of a person or a host.
 
-use sapwise::Report;
+use sapwise_lab::report::Report;
 use serde_json::Value;
 
 /// The beginnings of folders that are named after whoever works in them.

@@ -1,10 +1,9 @@
-//! What is told of a report.
+//! Checks of a report.
 
 use super::{Finding, Here, figures, privacy};
 use crate::gpus::{difference, uses};
 use crate::{date, restriction, revisions};
-use sapwise::Report;
-use sapwise_lab::report::Label;
+use sapwise_lab::report::{Label, Report};
 
 /// Most bytes of a report that goes into datasets/, which every clone of the repository takes along.
 const MOST_BYTES: u64 = 1_000_000;
@@ -14,7 +13,7 @@ const MOST_BYTES_EACH: u64 = 125_000;
 
 impl Here {
     pub(super) fn report(&self, report: &Report, bytes: u64, finding: &mut Finding) {
-        finding.schema = Some("report/1");
+        finding.schema = Some("report/2");
         finding.set_current(revisions::stale_in_report(report, &self.registry), "probe again");
         let impossible = figures::impossible(report);
         finding.sound = impossible.is_empty();
@@ -24,7 +23,7 @@ impl Here {
         if bytes > most {
             finding
                 .problems
-                .push(format!("it has {bytes} bytes, and {most} are the most for what it holds; measure fewer scenarios"));
+                .push(format!("it has {bytes} bytes, more than the {most} that a report of so many algorithms may have; measure fewer scenarios"));
         }
         let same = report.hardware.machine.physical_id == self.machine.physical_id;
         let other_gpus = if same { self.other_gpus(report) } else { Vec::new() };
@@ -44,6 +43,7 @@ impl Here {
         if date::is_day(&report.provenance.date) && report.provenance.date > date::today() {
             finding.notes.push(format!("its date is to come: {}", report.provenance.date));
         }
+        finding.doubts.extend(figures::doubts(report));
         finding.notes.extend(figures::suspicious(report));
         let not_shown = report.provenance.restriction.as_ref().map_or(Vec::new(), restriction::not_shown);
         finding.notes.extend(report.remarks.iter().filter(|r| !not_shown.contains(r)).map(|r| format!("remark: {r}")));

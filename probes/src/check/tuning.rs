@@ -1,9 +1,9 @@
-//! What is told of tuning.
+//! Checks of tuning.
 
 use super::{Finding, Here};
 use crate::gpus::uses;
 use crate::revisions;
-use sapwise::{AlgorithmId, Backend, Tuning, GpuKind, usable_cores};
+use sapwise::{AlgorithmId, Backend, GpuKind, Tuning, usable_cores};
 
 impl Here {
     pub(super) fn tuning(&self, tuning: &Tuning, finding: &mut Finding) {
@@ -19,7 +19,7 @@ impl Here {
         missing.dedup();
         finding.applicable = Some(missing.is_empty());
         finding.problems.extend(missing);
-        finding.notes.extend(self.programs(tuning));
+        finding.notes.extend(self.on_software_adapters(tuning));
         if tuning.extrapolated {
             finding.notes.push("predicted for a machine outside what the model was trained on".to_owned());
         }
@@ -31,23 +31,23 @@ impl Here {
             return entry.unavailable.as_ref().map(|why| format!("{id} can't run here: {why}"));
         }
         match id.backend() {
-            // The revision check has told already that the method is unknown; without costs nothing has.
+            // The revision check reports an unknown method already, but tuning without costs has no revisions.
             _ if !revisions::is_known(revisions::of(id), &self.registry) => Some(format!("{id} is not in this build")),
             // Ours can be made on any number of threads, a user's only on those that are listed.
             Backend::Cpu(threads) if *threads <= usable_cores() => self.registry.create(id).err().map(|e| e.to_string()),
             Backend::Cpu(_) => Some(format!("{id} needs more than the {} cores of this machine", usable_cores())),
             Backend::Gpu(indices) => self.gpus().lacks(indices).map(|why| format!("{id} can't run here: {why}")),
-            _ => Some(format!("{id} can't run here: this version does not know its processor")),
+            _ => Some(format!("{id} can't run here: this version does not know this kind of processor")),
         }
     }
 
-    /// Which algorithms of tuning run on programs that act as GPUs.
-    fn programs(&self, tuning: &Tuning) -> Vec<String> {
+    /// Which algorithms of tuning run on software adapters here.
+    fn on_software_adapters(&self, tuning: &Tuning) -> Vec<String> {
         let mut notes = Vec::new();
         for id in tuning.algorithms().into_iter().filter(|id| !uses(id).is_empty()) {
             let gpus = self.gpus().identities.iter().filter(|g| uses(id).contains(&g.index));
             for gpu in gpus.filter(|g| g.kind == GpuKind::Software) {
-                notes.push(format!("{id}: gpu{} is a program on the CPU here: {}", gpu.index, gpu.name));
+                notes.push(format!("{id}: gpu{} is a software adapter here: {}", gpu.index, gpu.name));
             }
         }
         notes

@@ -1,6 +1,6 @@
 //! Which GPUs a verb takes.
 
-use super::Seen;
+use super::look::Seen;
 use crate::exit::WrongUsage;
 use sapwise_lab::report::Report;
 use sapwise::{AlgorithmId, Backend, GpuIdentity, GpuKind};
@@ -8,13 +8,13 @@ use sapwise::{AlgorithmId, Backend, GpuIdentity, GpuKind};
 /// The options of verbs that take GPUs.
 #[derive(Debug, Clone, Default, PartialEq, Eq, clap::Args)]
 pub(crate) struct GpuChoice {
-    /// Leave out every GPU, and load no driver.
+    /// Use no GPU, and load no driver.
     #[arg(long, conflicts_with = "software_gpus")]
     pub(crate) no_gpus: bool,
-    /// Take programs that act as GPUs too, such as llvmpipe and SwiftShader. They run on the CPU and can't beat it.
+    /// Use software adapters too, such as llvmpipe and SwiftShader. They run on the CPU and are slower than its own algorithms.
     #[arg(long)]
     pub(crate) software_gpus: bool,
-    /// Take this GPU only, as `sapwise devices` numbers it, a program too; may be given several times.
+    /// Use this GPU only, as `sapwise devices` numbers it, even if it is a software adapter; may be given several times.
     #[arg(long = "gpu", value_name = "N", conflicts_with_all = ["no_gpus", "software_gpus"])]
     pub(crate) only: Vec<u32>,
 }
@@ -40,7 +40,7 @@ impl GpuChoice {
         }
     }
 
-    /// Takes what is not wanted out of the timings of a report; its hardware stays as it is.
+    /// Removes GPUs that are not wanted from the timings of a report; its hardware stays as it is.
     pub(crate) fn restrict(&self, report: &mut Report) {
         let wanted: Vec<u32> = report.hardware.gpus.iter().filter(|g| self.takes(&g.gpu)).map(|g| g.gpu.index).collect();
         let stays = |id: &AlgorithmId| uses(id).iter().all(|k| wanted.contains(k));
@@ -54,12 +54,9 @@ impl GpuChoice {
             return None;
         }
         let names: Vec<String> = left_out.iter().map(|g| format!("gpu{} ({})", g.index, g.name)).collect();
-        let (verb, what, them) = match names.len() {
-            1 => ("is", "a program", "it"),
-            _ => ("are", "programs", "them"),
-        };
+        let (verb, what) = if names.len() == 1 { ("is", "a software adapter") } else { ("are", "software adapters") };
         let names = names.join(", ");
-        Some(format!("{names} {verb} {what} on the CPU that can't beat it; --software-gpus takes {them} in all the same."))
+        Some(format!("Not used: {names} {verb} {what}, slower than the CPU. Use --software-gpus to measure it anyway."))
     }
 }
 
@@ -95,20 +92,20 @@ mod tests {
     }
 
     #[test]
-    fn programs_are_taken_only_when_asked_for() {
-        let (real, program) = (gpu(0, GpuKind::Integrated), gpu(1, GpuKind::Software));
-        let takes = |c: GpuChoice| (c.takes(&real), c.takes(&program));
+    fn software_adapters_are_used_only_when_asked_for() {
+        let (real, software) = (gpu(0, GpuKind::Integrated), gpu(1, GpuKind::Software));
+        let takes = |c: GpuChoice| (c.takes(&real), c.takes(&software));
         assert_eq!(takes(GpuChoice::default()), (true, false));
         assert_eq!(takes(GpuChoice { software_gpus: true, ..GpuChoice::default() }), (true, true));
         assert_eq!(takes(GpuChoice { no_gpus: true, ..GpuChoice::default() }), (false, false));
         let second = GpuChoice { only: vec![1], ..GpuChoice::default() };
         assert_eq!((takes(second.clone()), second.tell(std::slice::from_ref(&real))), ((false, true), None));
         let seen = |identities| Seen { identities, remark: None };
-        assert!(second.check(&seen(vec![real.clone(), program.clone()])).is_ok());
+        assert!(second.check(&seen(vec![real.clone(), software.clone()])).is_ok());
         let complaint = second.check(&seen(vec![real.clone()])).unwrap_err().to_string();
         assert_eq!(complaint, "--gpu: this machine has no gpu1, only gpu0 (X)");
         assert!(GpuChoice::default().check(&seen(Vec::new())).is_ok());
-        assert!(GpuChoice::default().tell(&[program]).unwrap().contains("gpu1 (X) is a program"));
+        assert!(GpuChoice::default().tell(&[software]).unwrap().contains("gpu1 (X) is a software adapter"));
         assert_eq!(GpuChoice::default().tell(&[]), None);
     }
 

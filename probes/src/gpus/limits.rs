@@ -55,7 +55,7 @@ pub(crate) fn limits(index: u32) -> anyhow::Result<Result<Limits, String>> {
     })?;
     Ok(match (ended, limits) {
         (Ended::Well, Some(limits)) => Ok(limits),
-        (Ended::Well, None) => Err("the process that opened it gave no answer".to_owned()),
+        (Ended::Well, None) => Err("the process that opened it returned no answer".to_owned()),
         (Ended::Interrupted, _) => Err("interrupted while it was opened".to_owned()),
         (Ended::Badly(how), _) => Err(format!("the process that opened it {how}")),
     })

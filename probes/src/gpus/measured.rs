@@ -1,13 +1,15 @@
 //! The parameters of GPUs, each GPU and each group measured in a process of its own.
 
-use super::{GpuChoice, group_without_parameters, look, uses, without_parameters};
+use super::choice::{GpuChoice, uses};
+use super::look::look;
+use super::parameters::{group_without_parameters, without_parameters};
 use crate::child::{Ended, run_part};
 use crate::progress::Progress;
 use sapwise::{GpuGroup, GpuHardware, GpuIdentity};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 
-/// A real GPU takes seconds; a program on the CPU that acts as one may be a hundred times slower.
+/// A real GPU takes seconds; a software adapter may be a hundred times slower.
 const LIMIT: Duration = Duration::from_secs(90);
 
 /// What was found out about the GPUs of this machine.
@@ -116,7 +118,7 @@ fn part<T: DeserializeOwned>(kind: &str, which: &str, threads: Option<u32>) -> a
     })?;
     Ok(match (ended, answer) {
         (Ended::Well, Some(answer)) => Ok(answer),
-        (Ended::Well, None) => Err("the process that measured it gave no answer".to_owned()),
+        (Ended::Well, None) => Err("the process that measured it returned no answer".to_owned()),
         (Ended::Interrupted, _) => Err("interrupted while it was measured".to_owned()),
         (Ended::Badly(how), _) => Err(format!("the process that measured it {how}")),
     })

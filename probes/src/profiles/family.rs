@@ -52,7 +52,7 @@ pub(super) fn family(whole: &Whole, quick: bool) -> Vec<Profile> {
             }
         }
     }
-    // Programs and cards don't work together.
+    // Software adapters and cards don't work together.
     let (programs, cards): (Vec<_>, Vec<_>) = whole.gpus.iter().cloned().partition(|g| g.kind == GpuKind::Software);
     let both = programs.len() > 1 && cards.len() > 1;
     for (gpus, of) in [(cards, ""), (programs, if both { "software-" } else { "" })] {

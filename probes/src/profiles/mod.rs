@@ -1,25 +1,28 @@
-//! `sapwise probe --profiles`: the family of reports of one machine, each profile measured by a process of its own.
+//! `sapwise probe --profiles`: the profiles of one machine, each measured by a process of its own.
 
-mod conduct;
 mod family;
+mod minutes;
 mod profile;
+mod resume;
+mod runner;
 mod slug;
-mod there;
 
 use crate::algorithms::Algorithms;
 use crate::args::Probe;
 use crate::exit::{Outcome, WrongUsage};
 use crate::restriction::LAVAPIPE_THREADS;
-use crate::{gpus, interrupt, output, table};
+use crate::{gpus, interrupt, output};
 use anyhow::Context;
-use conduct::{Conduct, End};
 use family::{Whole, family};
+use minutes::minutes;
 use profile::Profile;
+use resume::Existing;
+use runner::{End, ProfileRunner};
 use sapwise::{GpuIdentity, SimdLevel, measure, usable_cores};
 use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use there::There;
+
 
 /// Where the reports go without `--out`.
 const DEFAULT: &str = "reports";
@@ -43,21 +46,21 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     let stem = profile::machine_stem(&machine.cpu, cores);
     let registry = algorithms.registry(cores);
     let (folder, stem, physical_id) = (folder.as_path(), stem.as_str(), machine.physical_id.as_str());
-    let there = There { folder, stem, physical_id, registry: &registry, family: arguments };
-    let done: Vec<Option<PathBuf>> = family.iter().map(|p| there.find(p)).collect();
+    let existing = Existing { folder, stem, physical_id, registry: &registry, family: arguments };
+    let done: Vec<Option<PathBuf>> = family.iter().map(|p| existing.find(p)).collect();
     if arguments.dry_run {
         output::print(&listing(&family, &done, arguments, &scenarios, stem))?;
         return Ok(Outcome::Done);
     }
     take_files(folder)?;
     interrupt::listen()?;
-    let mut conduct = Conduct::new(&family, done, &there, &scenarios);
-    let end = conduct.run()?;
-    let failed = conduct.failed();
-    output::print(&conduct.summary())?;
+    let mut runner = ProfileRunner::new(&family, done, &existing, &scenarios);
+    let end = runner.run()?;
+    let failed = runner.failed();
+    output::print(&runner.summary())?;
     if end == End::Interrupted {
         anyhow::bail!(
-            "interrupted: the complete profiles are in {}; the same command goes on from there, and measures the one that was stopped anew",
+            "interrupted: the complete profiles are in {}; the same command resumes there, and measures the interrupted profile again",
             folder.display()
         );
     }
@@ -97,28 +100,8 @@ fn listing(family: &[Profile], done: &[Option<PathBuf>], arguments: &Probe, scen
         let numbers: Vec<u32> = profile.gpus.iter().map(|g| g.index).collect();
         let variables = profile.variables().into_iter().map(|(name, value)| format!("{name}={value} ")).collect::<String>();
         let command = format!("{variables}sapwise {}", profile.arguments(arguments, &numbers).join(" "));
-        let time = if done.is_some() { "is there".to_owned() } else { minutes(time) };
+        let time = if done.is_some() { "complete".to_owned() } else { minutes(time) };
         rows.push(vec![format!("{stem}-{}", profile.name), time, command]);
     }
-    format!("{}\n{} profiles, about {} at most.", table::columns(&rows), family.len(), minutes(left))
-}
-
-/// A time for people who plan their day by it.
-fn minutes(time: Duration) -> String {
-    match time.as_secs() {
-        seconds @ 0..100 => format!("{seconds} s"),
-        seconds @ 100..6000 => format!("{} min", seconds.div_ceil(60)),
-        seconds => format!("{} h {:02} min", seconds / 3600, seconds % 3600 / 60),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_have_a_unit_that_suits_them() {
-        let told = [0, 99, 100, 5999, 6000, 7325].map(|s| minutes(Duration::from_secs(s)));
-        assert_eq!(told, ["0 s", "99 s", "2 min", "100 min", "1 h 40 min", "2 h 02 min"]);
-    }
+    format!("{}\n{} profiles, about {} at most.", columns(&rows), family.len(), minutes(left))
 }

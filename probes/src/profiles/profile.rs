@@ -12,7 +12,7 @@ use std::time::Duration;
 /// What the hardware parameters of the CPU take, with the start of the processes.
 const HARDWARE: Duration = Duration::from_secs(8);
 
-/// What a GPU adds, and a program that acts as one.
+/// What a GPU adds, and a software adapter.
 const REAL_GPU: Duration = Duration::from_secs(8);
 const SOFTWARE_GPU: Duration = Duration::from_secs(25);
 

@@ -1,17 +1,17 @@
-//! What a folder holds already.
+//! Which profiles a folder holds already, so that a measurement resumes where it was stopped.
 
 use super::profile::{Profile, is_named};
 use crate::args::{Arguments, Probe, Verb};
-use sapwise_lab::data::files::read_document;
+use sapwise_lab::data::read_document;
 use crate::{provenance, restriction, revisions};
 use clap::Parser;
-use sapwise::json::Document;
+use sapwise_lab::data::Document;
 use sapwise_lab::report::Label;
 use sapwise::{GpuIdentity, Registry, Report};
 use std::path::{Path, PathBuf};
 
-/// What reports are held against.
-pub(super) struct There<'a> {
+/// A folder, and what its reports are compared with.
+pub(super) struct Existing<'a> {
     pub(super) folder: &'a Path,
     /// The beginning of all file names.
     pub(super) stem: &'a str,
@@ -21,7 +21,7 @@ pub(super) struct There<'a> {
     pub(super) family: &'a Probe,
 }
 
-impl There<'_> {
+impl Existing<'_> {
     /// Where a report that is measured today goes.
     pub(super) fn path(&self, profile: &Profile) -> PathBuf {
         self.folder.join(format!("{}-{}--{}.json", self.stem, profile.name, crate::date::today()))
@@ -164,7 +164,7 @@ mod tests {
     }
 
     /// A report of another command in the place of the profile `1t`, and one of the same.
-    fn with_one_thread(check: impl Fn(&There, &Profile, Report, Report)) {
+    fn with_one_thread(check: impl Fn(&Existing, &Profile, Report, Report)) {
         let family_of = probe(&["--no-gpus"]);
         let registry = Registry::with_cores(2);
         let mut report = sapwise_lab::synthetic::Machine::family()[0].report();
@@ -187,22 +187,22 @@ mod tests {
         report.provenance.gpu_threads = None;
         let physical_id = report.hardware.machine.physical_id.clone();
         let folder = Path::new("reports");
-        let there = There { folder, stem: "x-2c", physical_id: &physical_id, registry: &registry, family: &family_of };
+        let existing = Existing { folder, stem: "x-2c", physical_id: &physical_id, registry: &registry, family: &family_of };
         let whole = Whole { cores: 2, level: SimdLevel::Portable, gpus: Vec::new() };
         let profile = family(&whole, false).into_iter().find(|p| p.name == "1t").unwrap();
         let mut own = report.clone();
-        own.provenance.command = there.command(&profile, &[]).unwrap();
+        own.provenance.command = existing.command(&profile, &[]).unwrap();
         report.provenance.command = "probe --quick --no-gpus --threads 1 --seed 1".to_owned();
-        check(&there, &profile, report, own);
+        check(&existing, &profile, report, own);
     }
 
     #[test]
     fn a_good_report_of_another_command_stays_and_one_with_a_flaw_does_not() {
-        with_one_thread(|there, profile, other, own| {
+        with_one_thread(|existing, profile, other, own| {
             let keeps = |change: &dyn Fn(&mut Report)| {
                 let mut report = other.clone();
                 change(&mut report);
-                there.keeps(&report, profile)
+                existing.keeps(&report, profile)
             };
             assert_eq!(keeps(&|_| {}).as_deref(), Some("it was measured by another command"));
             assert_eq!(keeps(&|r| r.remarks.push("unfinished: going on".to_owned())), None);
@@ -216,24 +216,24 @@ mod tests {
                 r.provenance.command += " --contended=memory";
             };
             assert!(keeps(&contended).is_some());
-            assert_eq!(there.keeps(&own, profile), None);
+            assert_eq!(existing.keeps(&own, profile), None);
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("x-2c-1t--2026-11-21.json");
-            assert_eq!(there.obstacle(&path, profile), None);
+            assert_eq!(existing.obstacle(&path, profile), None);
             std::fs::write(&path, sapwise::json::write_report(&other).unwrap()).unwrap();
-            let told = there.obstacle(&path, profile).unwrap();
+            let told = existing.obstacle(&path, profile).unwrap();
             assert!(told.contains("another command; name another folder with --out"), "{told}");
             std::fs::write(&path, "{}").unwrap();
-            assert!(there.obstacle(&path, profile).unwrap().contains("is no report of this machine"));
+            assert!(existing.obstacle(&path, profile).unwrap().contains("is no report of this machine"));
         });
     }
 
     #[test]
     fn a_report_that_other_programs_disturbed_is_measured_again() {
-        with_one_thread(|there, profile, _, mut own| {
-            assert_eq!(there.lack(&own, profile), None);
+        with_one_thread(|existing, profile, _, mut own| {
+            assert_eq!(existing.lack(&own, profile), None);
             own.label = Label::RealContended;
-            assert_eq!(there.lack(&own, profile).as_deref(), Some("other programs disturbed it"));
+            assert_eq!(existing.lack(&own, profile).as_deref(), Some("other programs disturbed it"));
         });
     }
 

@@ -1,15 +1,16 @@
 //! The measurement of one profile after the other.
 
-use super::minutes;
+use super::minutes::minutes;
 use super::profile::Profile;
-use super::there::{There, numbers};
+use super::resume::{Existing, numbers};
 use crate::child::{Ended, run_verb};
-use sapwise_lab::data::files::read_document;
+use sapwise_lab::data::read_document;
 use crate::progress::Progress;
-use crate::{gpus, interrupt, output, table};
+use crate::{gpus, interrupt, output, shell};
 use anyhow::bail;
-use sapwise::json::Document;
+use sapwise_lab::data::Document;
 use sapwise::Report;
+use sapwise_lab::text::columns;
 use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -17,7 +18,7 @@ use std::time::{Duration, Instant};
 /// A probe ends by itself long before this; a process that does not hangs in a driver.
 const LIMIT: Duration = Duration::from_secs(3600);
 
-/// What has become of a profile.
+/// The state of a profile.
 #[derive(Debug, Clone, PartialEq)]
 enum State {
     /// Its turn has not come.
@@ -30,36 +31,36 @@ enum State {
     Failed(String, Option<PathBuf>),
 }
 
-/// How the conduct ended.
+/// How it ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
     Complete,
     Interrupted,
 }
 
-/// A family on its way.
-pub(super) struct Conduct<'a> {
+/// Measures a family.
+pub(super) struct ProfileRunner<'a> {
     family: &'a [Profile],
     states: Vec<State>,
-    there: &'a There<'a>,
+    existing: &'a Existing<'a>,
     /// The most that each should take.
     times: Vec<Duration>,
 }
 
-impl<'a> Conduct<'a> {
+impl<'a> ProfileRunner<'a> {
     /// `done` holds the reports that are there, in the order of the family.
     pub(super) fn new(
         family: &'a [Profile],
         done: Vec<Option<PathBuf>>,
-        there: &'a There<'a>,
+        existing: &'a Existing<'a>,
         scenarios: &[Scenario],
     ) -> Self {
         let states = done.into_iter().map(|path| path.map_or(State::Waiting, State::Found)).collect();
-        let times = family.iter().map(|p| p.time(scenarios, there.family.max_objects)).collect();
-        Self { family, states, there, times }
+        let times = family.iter().map(|p| p.time(scenarios, existing.family.max_objects)).collect();
+        Self { family, states, existing, times }
     }
 
-    /// Measures whatever waits.
+    /// Measures every profile that waits.
     ///
     /// # Errors
     /// When no process can be started.
@@ -89,8 +90,8 @@ impl<'a> Conduct<'a> {
     fn measure(&self, k: usize, before: Duration, progress: &Progress) -> anyhow::Result<Option<State>> {
         let profile = &self.family[k];
         let failed = |why: String| Ok(Some(State::Failed(why, None)));
-        let path = self.there.path(profile);
-        if let Some(why) = self.there.obstacle(&path, profile) {
+        let path = self.existing.path(profile);
+        if let Some(why) = self.existing.obstacle(&path, profile) {
             return failed(why);
         }
         let now = if profile.gpus.is_empty() { Vec::new() } else { gpus::look()?.identities };
@@ -100,7 +101,7 @@ impl<'a> Conduct<'a> {
         };
         // Under its own name it is not there before it is complete.
         let unfinished = path.with_extension("json.unfinished");
-        let mut arguments = profile.arguments(self.there.family, &numbers);
+        let mut arguments = profile.arguments(self.existing.family, &numbers);
         arguments.push("--leashed".to_owned());
         for kind in profile.kinds() {
             if let Some(reference) = self.report_of(&profile.lifted(kind)) {
@@ -131,7 +132,7 @@ impl<'a> Conduct<'a> {
         if let Err(error) = std::fs::rename(&unfinished, &path) {
             return failed(format!("{} can't be renamed: {error}", unfinished.display()));
         }
-        Ok(Some(match self.there.lack(&report, profile) {
+        Ok(Some(match self.existing.lack(&report, profile) {
             Some(lack) => State::Failed(lack, Some(path)),
             None => State::Measured { path, time: began.elapsed() },
         }))
@@ -151,14 +152,14 @@ impl<'a> Conduct<'a> {
         self.states.iter().any(|s| matches!(s, State::Failed(..)))
     }
 
-    /// What has become of each profile.
+    /// The state of each profile.
     pub(super) fn summary(&self) -> String {
         let mut rows = vec![["profile", "report", ""].map(str::to_owned).to_vec()];
         for (profile, state) in self.family.iter().zip(&self.states) {
             let shown = |path: &Path| path.display().to_string();
             let (report, remark) = match state {
                 State::Waiting => ("-".to_owned(), "not measured yet".to_owned()),
-                State::Found(path) => (shown(path), "was there".to_owned()),
+                State::Found(path) => (shown(path), "was complete".to_owned()),
                 State::Measured { path, time } => (shown(path), format!("measured in {}", minutes(*time))),
                 State::Failed(why, path) => (path.as_deref().map_or("-".to_owned(), shown), format!("FAILED: {why}")),
             };
@@ -167,13 +168,12 @@ impl<'a> Conduct<'a> {
         let failed = self.states.iter().filter(|s| matches!(s, State::Failed(..))).count();
         let waiting = self.states.iter().filter(|s| **s == State::Waiting).count();
         let good = self.states.len() - failed - waiting;
-        let mut text = format!("{}\n{good} of {} profiles are there", table::columns(&rows), self.states.len());
+        let mut text = format!("{}\n{good} of {} profiles are complete", columns(&rows), self.states.len());
         if failed > 0 {
             text += &format!(", {failed} failed; the same command measures those again");
         }
         if good == self.states.len() {
-            let folder = self.there.folder.display();
-            text += &format!(". Next: sapwise check {folder}/*.json, or sapwise train {folder} --out model.json");
+            text += &format!(".\nNext: sapwise train {} --out model.json", shell::path(self.existing.folder));
         }
         text
     }

@@ -5,16 +5,11 @@ use crate::algorithms::Algorithms;
 use crate::sweep::{PAIR_LIMIT, add_gpus};
 use crate::{child, output};
 use anyhow::Context;
-<<<<<<< HEAD:probes/src/samples/sampler.rs
 use sapwise::measure::Watch;
 use sapwise::stats::relative_iqr;
 use sapwise::{Aabb, AlgorithmId, BackendClass, BroadPhase, Pairs, Registry};
 use sapwise_lab::belief::{FEWEST_FRAMES, TIMED};
 use sapwise_lab::sweep::{WARM_UP, median, next_frame};
-=======
-use sapwise::measure::{Watch, statistics};
-use sapwise::{Aabb, AlgorithmId, BackendClass, BroadPhase, Pairs, Registry};
->>>>>>> scenes:probes/src/samples/taker.rs
 use sapwise_scenes::Scenario;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -27,17 +22,10 @@ const IQR_OVER_DEVIATION: f64 = 1.349;
 ///
 /// # Errors
 /// When the scenario is unknown, or standard output can't be written.
-<<<<<<< HEAD:probes/src/samples/sampler.rs
 pub(crate) fn sample(session: &Session, algorithms: &Algorithms) -> anyhow::Result<()> {
     let requests = child::requests();
     let scenario: Scenario = session.scenario.parse().map_err(anyhow::Error::msg)?;
     let mut registry = algorithms.registry(session.cores);
-=======
-pub(crate) fn take(order: &Order, algorithms: &Algorithms) -> anyhow::Result<()> {
-    let wishes = child::orders();
-    let scenario: Scenario = order.scenario.parse()?;
-    let mut registry = algorithms.registry(order.cores);
->>>>>>> scenes:probes/src/samples/taker.rs
     registry.pin_threads();
     let remarks = add_gpus(&mut registry, &session.gpus);
     let mut sampler = Sampler::new(scenario, session.seed, registry);

@@ -6,14 +6,9 @@
 use super::contest::{Contest, FEW_FRAMES};
 use super::verify::Answer;
 use sapwise::measure::{Options, Watch, core_to_core_ns};
-<<<<<<< HEAD
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Displacement, Load, Pairs};
 use sapwise_lab::report::{Point, Timing};
 use sapwise_lab::sweep::{WARM_UP, next_frame};
-=======
-use sapwise::report::{Point, Timing};
-use sapwise::{Aabb, AlgorithmId, BroadPhase, Displacement, Load, Pairs};
->>>>>>> scenes
 use sapwise_scenes::{Random, Scene};
 use std::time::{Duration, Instant};
 
@@ -51,11 +46,7 @@ pub(crate) struct Race {
     /// One list for all, so that its memory is equally warm for each.
     pairs: Pairs,
     naive: Pairs,
-<<<<<<< HEAD
     shuffle: Random,
-=======
-    random: Random,
->>>>>>> scenes
     /// Of the frame before.
     displacement: Displacement,
     /// Cores that algorithms may use.
@@ -83,11 +74,7 @@ impl Race {
         Self {
             pairs,
             naive: Pairs::new(),
-<<<<<<< HEAD
             shuffle: Random::new(seed),
-=======
-            random: Random::new(seed),
->>>>>>> scenes
             displacement: Displacement::default(),
             cores: Options { threads: Some(cores), ..Options::default() },
             contended,
@@ -184,17 +171,10 @@ impl Race {
         self.displacement.watch(scene.boxes());
         next_frame(scene);
         let boxes = scene.boxes();
-<<<<<<< HEAD
         for turn in self.shuffle.shuffled(racers.len()) {
             let racer = &mut racers[turn];
             racer.answer = None;
             if racer.error.is_some() || !takes_part(racer) {
-=======
-        for turn in self.random.shuffled(runners.len()) {
-            let runner = &mut runners[turn];
-            runner.answer = None;
-            if runner.error.is_some() || !takes_part(runner) {
->>>>>>> scenes
                 continue;
             }
             let started = Instant::now();
@@ -313,11 +293,7 @@ mod tests {
             Racer::new("brute@cpu1".parse().unwrap(), right()),
         ];
         let mut scene = sapwise_scenes::Scenario::Uniform.start(50, 1);
-<<<<<<< HEAD
         let outcome = Race::new(1, 1000, 1, false).run(&mut racers, &mut scene, Duration::from_millis(1));
-=======
-        let outcome = Race::new(1, 1000, 1, false).run(&mut runners, &mut scene, Duration::from_millis(1));
->>>>>>> scenes
         assert_eq!(outcome.mismatches.len(), 1);
         assert!(outcome.mismatches[0].starts_with("wrong@cpu1"), "{:?}", outcome.mismatches);
         let timings = &outcome.point.timings;
@@ -348,15 +324,9 @@ mod tests {
             let racer = |k: usize| {
                 Racer::new(format!("counting@cpu{}", k + 1).parse().unwrap(), Box::new(Counting(frames[k].clone(), k == 1)))
             };
-<<<<<<< HEAD
             let mut racers = vec![racer(0), racer(1)];
             let mut scene = sapwise_scenes::Scenario::Resting.start(1, 1);
             let outcome = Race::new(1, 1000, 1, true).run(&mut racers, &mut scene, Duration::ZERO);
-=======
-            let mut runners = vec![runner(0), runner(1)];
-            let mut scene = sapwise_scenes::Scenario::Resting.start(1, 1);
-            let outcome = Race::new(1, 1000, 1, true).run(&mut runners, &mut scene, Duration::ZERO);
->>>>>>> scenes
             assert!(outcome.mismatches.is_empty(), "{:?}", outcome.mismatches);
             assert!((0.0..=0.06).contains(&outcome.point.load.moved));
             frames.map(|f| f.load(Relaxed))
@@ -367,15 +337,9 @@ mod tests {
     #[test]
     fn too_many_pairs_end_the_race_with_an_error() {
         let brute = sapwise::Registry::new().create(&"brute@cpu1".parse().unwrap()).unwrap();
-<<<<<<< HEAD
         let mut racers = vec![Racer::new("brute@cpu1".parse().unwrap(), brute)];
         let mut scene = sapwise_scenes::Scenario::Uniform.start(500, 1);
         let outcome = Race::new(1, 3, 1, false).run(&mut racers, &mut scene, Duration::from_millis(1));
-=======
-        let mut runners = vec![Runner::new("brute@cpu1".parse().unwrap(), brute)];
-        let mut scene = sapwise_scenes::Scenario::Uniform.start(500, 1);
-        let outcome = Race::new(1, 3, 1, false).run(&mut runners, &mut scene, Duration::from_millis(1));
->>>>>>> scenes
         assert!(outcome.point.timings[0].error.as_ref().unwrap().contains("limit of 3"));
     }
 }

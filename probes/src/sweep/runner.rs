@@ -5,10 +5,6 @@ use super::request::{Event, Schedule, SweepRequest};
 use crate::child::{Ended, run_part};
 use crate::interrupt;
 use crate::progress::Progress;
-<<<<<<< HEAD:probes/src/sweep/runner.rs
-=======
-use sapwise_scenes::Random;
->>>>>>> scenes:probes/src/sweep/conduct.rs
 use anyhow::Context;
 use sapwise::GpuIdentity;
 use sapwise_lab::report::Point;
@@ -57,22 +53,14 @@ pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnM
         }
         keep(&sweep.found);
     }
-<<<<<<< HEAD:probes/src/sweep/runner.rs
     let mut shuffle = Random::new(conditions.seed);
-=======
-    let mut random = Random::new(conditions.seed);
->>>>>>> scenes:probes/src/sweep/conduct.rs
     for round in 1..=plan.rounds {
         let left = plan.total.saturating_sub(began.elapsed()) / (plan.rounds + 1 - round);
         let starts = START * plan.scenarios.len() as u32;
         for (scenario, mut visits) in adaptive_sampling::visits(&sweep.found.points, left.saturating_sub(starts)) {
             let time = START + Duration::from_secs_f64(visits.iter().map(|v| v.seconds).sum());
             // In random order, so that a machine that slows down does not pass for a longer time at large sizes.
-<<<<<<< HEAD:probes/src/sweep/runner.rs
             let order = shuffle.shuffled(visits.len());
-=======
-            let order = random.shuffled(visits.len());
->>>>>>> scenes:probes/src/sweep/conduct.rs
             visits = order.into_iter().map(|k| visits[k].clone()).collect();
             let before = sweep.found.points.len();
             let goes_on = sweep.go(&scenario, Schedule::Visits(visits), time, u64::from(round))?;

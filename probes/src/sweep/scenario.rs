@@ -4,16 +4,10 @@ use super::race::{FEWEST_FRAMES, Race, Raced, Racer};
 use super::request::{Event, Schedule, SweepRequest, Visit};
 use crate::algorithms::Algorithms;
 use sapwise::gpu::Gpus;
-<<<<<<< HEAD
 use sapwise::{AlgorithmId, GpuIdentity, Registry};
 use sapwise_lab::report::Point;
 use sapwise_lab::sweep::{Standing, median, share};
 use sapwise_scenes::Scenario;
-=======
-use sapwise::report::Point;
-use sapwise::{AlgorithmId, GpuIdentity, Registry};
-use sapwise_scenes::{Scenario, Scene};
->>>>>>> scenes
 use std::time::{Duration, Instant};
 
 /// Most pairs in a frame, 8 bytes each: 256 MB, and as much again in the threads of an algorithm.
@@ -28,13 +22,8 @@ pub(crate) fn sweep(
     algorithms: &Algorithms,
     emit: &mut dyn FnMut(Event) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-<<<<<<< HEAD
     let scenario: Scenario = request.scenario.parse().map_err(anyhow::Error::msg)?;
     let mut registry = algorithms.registry(request.cores);
-=======
-    let scenario: Scenario = order.scenario.parse()?;
-    let mut registry = algorithms.registry(order.cores);
->>>>>>> scenes
     registry.pin_threads();
     for remark in add_gpus(&mut registry, &request.gpus) {
         emit(Event::Remark(format!("{scenario}: {remark}")))?;
@@ -210,6 +199,7 @@ fn keep_racing(racers: &mut Vec<Racer>, standings: &mut Vec<Standing>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::algorithms::UserAlgorithm;
 
     fn request(scenario: &str, sizes: &[u32], seconds: f64) -> SweepRequest {
         let (scenario, schedule) = (scenario.to_owned(), Schedule::Ascent(sizes.to_vec()));
@@ -292,9 +282,9 @@ mod tests {
     fn a_users_algorithm_is_timed_like_ours_and_one_that_can_not_be_made_is_named() {
         let mut algorithms = Algorithms::default();
         let brute = || Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap());
-        algorithms.add("mine", 1, false, move |_| brute()).unwrap();
-        let refused = |_| Err(sapwise::Error::OutOfMemory { what: "nodes", elements: 3 });
-        algorithms.add("huge", 1, false, refused).unwrap();
+        algorithms.add(UserAlgorithm::on_one_thread("mine", 1, brute)).unwrap();
+        let refused = || Err(sapwise::Error::OutOfMemory { what: "nodes", elements: 3 });
+        algorithms.add(UserAlgorithm::on_one_thread("huge", 1, refused)).unwrap();
         let (mut raced, mut remarks) = (Vec::new(), Vec::new());
         sweep(&request("uniform", &[10], 1.0), &algorithms, &mut |event| {
             match event {

@@ -4,9 +4,9 @@ use crate::algorithms::Algorithms;
 use crate::args::Check;
 use crate::check::{Finding, Here};
 use crate::exit::Outcome;
-use crate::output;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
+use crate::{output, shell};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -38,26 +38,34 @@ pub(crate) fn run(arguments: &Check, algorithms: &Algorithms) -> anyhow::Result<
     Ok(if failed { Outcome::Failed } else { Outcome::Done })
 }
 
-/// What to do with the files: about those that failed, else with the first of them.
+/// The next command to try: for the first file with a problem, else for the first of all.
 fn next_step(files: &[Finding]) -> String {
-    if files.iter().any(|f| !f.problems.is_empty()) {
-        return "each problem says what is wrong; `sapwise probe --out R.json`, `train` or `predict` makes such a file anew"
-            .to_owned();
-    }
-    let first = files.first().map_or("FILE", |f| &f.file);
-    match files.first().and_then(|f| f.schema) {
-        Some(schema) if schema.starts_with("model/") => format!("sapwise predict --model {first}"),
-        Some(schema) if schema.starts_with("tuning/") => format!("sapwise run fragmentation --tuning {first}"),
-        _ => format!("sapwise predict --report {first}"),
+    let bad = files.iter().find(|f| !f.problems.is_empty());
+    let Some(file) = bad.or(files.first()) else { return "sapwise predict".to_owned() };
+    let (name, schema) = (shell::quoted(&file.file), file.schema.unwrap_or(""));
+    match (bad.is_some(), schema.split('/').next()) {
+        (true, Some("model")) => "sapwise predict".to_owned(),
+        (true, Some("tuning")) => "sapwise predict --out tuning.json".to_owned(),
+        (true, _) => "sapwise probe --out report.json".to_owned(),
+        (false, Some("model")) => format!("sapwise predict --model {name}"),
+        (false, Some("tuning")) => format!("sapwise run fragmentation --tuning {name}"),
+        (false, _) => format!("sapwise study {name} --out study"),
     }
 }
 
 fn text(finding: &Finding, terminal: Terminal) -> String {
-    let state = if finding.problems.is_empty() { terminal.good("good") } else { terminal.bad("BAD") };
+    let state = match (&finding.problems[..], &finding.doubts[..]) {
+        ([], []) => terminal.good("good"),
+        ([], _) => terminal.warning("DOUBTFUL"),
+        _ => terminal.bad("BAD"),
+    };
     let schema = finding.schema.map_or(String::new(), |s| format!(" {s}"));
     let mut text = format!("{}:{schema} {state}", finding.file);
     for problem in &finding.problems {
         text.push_str(&format!("\n  {} {problem}", terminal.bad("problem:")));
+    }
+    for doubt in &finding.doubts {
+        text.push_str(&format!("\n  {} {doubt}", terminal.warning("doubt:")));
     }
     for note in &finding.notes {
         text.push_str(&format!("\n  {} {note}", terminal.warning("note:")));

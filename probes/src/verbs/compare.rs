@@ -1,16 +1,17 @@
 //! `sapwise compare`: how well repeated reports of one machine agree.
 
 use crate::args::Compare;
-use crate::compare::{Border, Comparison, Losses, STEEP, Spread, steady};
-use sapwise_lab::data::files::read_reports;
 use crate::exit::Outcome;
-use crate::output;
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+use crate::{output, shell};
+use sapwise_lab::compare::{Comparison, CrossoverSpread, Losses, STEEP, Spread, steady};
+use sapwise_lab::data::read_reports;
 use sapwise_lab::steadiness::Steadiness;
 use sapwise_lab::text::grouped;
-use crate::terminal::Terminal;
 
 pub(crate) fn run(arguments: &Compare) -> anyhow::Result<Outcome> {
-    let mut reports = read_reports(&arguments.reports)?;
+    let mut reports = read_reports(&arguments.reports, &Progress::new(0))?;
     let mut left_out = Vec::new();
     if arguments.steady {
         let all = reports.len();
@@ -28,9 +29,9 @@ pub(crate) fn run(arguments: &Compare) -> anyhow::Result<Outcome> {
     } else {
         let told = left_out
             .iter()
-            .map(|name| format!("{name} is left out: the cores were elsewhere, moved, or where they were is not known\n"));
-        let reports: Vec<String> = arguments.reports.iter().map(|path| path.display().to_string()).collect();
-        let next = format!("\nNext: sapwise train {} --out model.json", reports.join(" "));
+            .map(|name| format!("{name} is left out: its cores were elsewhere or moved, or where they were is unknown\n"));
+        let reports: Vec<String> = arguments.reports.iter().map(|path| shell::path(path)).collect();
+        let next = format!("\nNext: sapwise study {} --out study", reports.join(" "));
         output::print(&(told.collect::<String>() + &text(&comparison, Terminal::of_standard_output()) + &next))?;
     }
     Ok(Outcome::Done)

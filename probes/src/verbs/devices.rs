@@ -110,7 +110,7 @@ fn text(answer: &Answer, no_gpus: bool, terminal: Terminal) -> String {
     if let Some(remark) = &answer.remark {
         text += &format!("\n{}", terminal.warning(&format!("{remark}.")));
     } else if answer.adapters.is_empty() && !no_gpus {
-        text += "\nNo GPU was found; everything else works on the CPU.";
+        text += "\nNo GPU was found; the algorithms on the CPU are not affected.";
     }
     text + "\nNext: sapwise predict"
 }

@@ -3,8 +3,8 @@
 mod check;
 mod compare;
 mod completions;
+mod convert;
 mod devices;
-mod man;
 mod pairs;
 mod part;
 mod predict;
@@ -36,12 +36,12 @@ pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome
         Verb::Train(arguments) => train::run(&arguments),
         Verb::Study(arguments) => study::run(&arguments),
         Verb::Pairs(arguments) => pairs::run(&arguments, algorithms),
+        Verb::Convert(arguments) => convert::run(&arguments),
         Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments, algorithms),
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),
         Verb::Completions(arguments) => completions::run(&arguments),
-        Verb::Man(arguments) => man::run(&arguments),
         Verb::Part(arguments) => part::run(arguments, algorithms),
     }
 }

@@ -2,18 +2,14 @@
 
 use crate::algorithms::Algorithms;
 use crate::args::Pairs as Arguments;
-<<<<<<< HEAD
-use sapwise_scenes::{Frames, read_frames, write_pairs};
-=======
-use crate::files::write_atomically;
->>>>>>> scenes
 use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
-use crate::sweep::median;
-use sapwise_lab::text::{count, duration, grouped};
-use crate::{gpus, interrupt, output};
+use crate::{gpus, interrupt, output, shell};
 use anyhow::Context;
 use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry, usable_cores};
+use sapwise_lab::sweep::median;
+use sapwise_lab::text::{count, duration, grouped};
+use sapwise_lab::write::write_atomically;
 use sapwise_scenes::{Frames, write_pairs};
 use serde::Serialize;
 use std::time::Instant;
@@ -21,7 +17,7 @@ use std::time::Instant;
 /// What is run when the user names nothing.
 const DEFAULT: &str = "grid-sap@cpu1";
 
-/// The limit on the pairs where the free memory can't be told or is next to nothing: a small scene must pass all the same.
+/// The limit on the pairs where the free memory is unknown or next to nothing: a small scene must pass all the same.
 const FEWEST_PAIRS: usize = 1 << 20;
 
 /// The answer for machines.
@@ -156,15 +152,15 @@ fn text(answer: &Answer, median_ns: f64) -> String {
     )
 }
 
-/// What tells more of the same boxes.
+/// The next command to try.
 fn next_step(arguments: &Arguments, frames: usize) -> String {
-    let boxes = arguments.boxes.display();
-    match (&arguments.out, frames) {
+    let boxes = shell::path(&arguments.boxes);
+    let written = arguments.out.as_ref().map(|path| format!("\nWritten to {}.", path.display())).unwrap_or_default();
+    let next = match (&arguments.out, frames) {
         // A stream of one frame shows no choice.
-        (_, 2..) => format!("\nNext: sapwise run {boxes}"),
-        (None, _) => format!("\nNext: sapwise pairs {boxes} --out pairs.npy"),
-        (Some(path), _) => {
-            format!("\nWritten to {}. Next: the same with --algorithm ID, as `sapwise devices` lists them", path.display())
-        }
-    }
+        (_, 2..) => format!("sapwise run {boxes}"),
+        (None, _) => format!("sapwise pairs {boxes} --out pairs.npy"),
+        (Some(_), _) => "sapwise devices".to_owned(),
+    };
+    format!("{written}\nNext: {next}")
 }

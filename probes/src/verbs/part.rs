@@ -3,13 +3,13 @@
 use crate::algorithms::Algorithms;
 use crate::args::{Part, PartKind};
 use crate::exit::{Outcome, WrongUsage};
-use crate::sweep::{Order, sweep};
+use crate::sweep::{SweepRequest, sweep};
 use crate::{child, gpus, output, samples};
 use sapwise::Backend;
 use sapwise::measure::{self, Family, Options};
 
 pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
-    // Whoever takes samples reads orders from the pipe of which the others await the end only.
+    // The sampler reads requests from the pipe; the other parts only wait for its end.
     if !matches!(arguments.part, PartKind::Samples { .. }) {
         child::end_with_parent();
     }
@@ -27,13 +27,13 @@ pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Ou
             gpus::print_group(&indices, &Options { threads, ..Options::default() })?;
         }
         PartKind::GpuGroup { gpus, .. } => return Err(WrongUsage(format!("{gpus} is no group of GPUs")).into()),
-        PartKind::Samples { order } => {
-            let order = serde_json::from_str(&order).map_err(|e| WrongUsage(format!("the order: {e}")))?;
-            samples::take(&order, algorithms)?;
+        PartKind::Samples { session } => {
+            let session = serde_json::from_str(&session).map_err(|e| WrongUsage(format!("the session: {e}")))?;
+            samples::sample(&session, algorithms)?;
         }
-        PartKind::Sweep { order } => {
-            let order: Order = serde_json::from_str(&order).map_err(|e| WrongUsage(format!("the order: {e}")))?;
-            sweep(&order, algorithms, &mut |event| output::print_json(&event))?;
+        PartKind::Sweep { request } => {
+            let request: SweepRequest = serde_json::from_str(&request).map_err(|e| WrongUsage(format!("the request: {e}")))?;
+            sweep(&request, algorithms, &mut |event| output::print_json(&event))?;
         }
     }
     Ok(Outcome::Done)

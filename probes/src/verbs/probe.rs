@@ -6,13 +6,15 @@ use crate::contention::contend;
 use crate::destination::Destination;
 use crate::exit::Outcome;
 use crate::hardware::{self, measure_hardware};
-use sapwise_lab::steadiness::Steadiness;
-use crate::sweep::{self, Conditions, Found, Plan};
+use crate::sweep::{Conditions, Found, sweep_all};
 use crate::terminal::Terminal;
 use crate::{child, interrupt, output, profiles, provenance, restriction, summary};
 use anyhow::Context;
-use sapwise_lab::report::Restriction;
-use sapwise::{Hardware, Report, usable_cores};
+use sapwise::{Hardware, usable_cores};
+use sapwise_lab::data::write_report;
+use sapwise_lab::report::{Report, Restriction};
+use sapwise_lab::steadiness::Steadiness;
+use sapwise_lab::sweep::Plan;
 use std::time::Instant;
 
 pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
@@ -32,13 +34,13 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     let contention = contention.context("the threads for --contended can't be started")?;
     let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
     let told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
-    let restriction = restriction::restriction(arguments, &hardware, &references);
+    let restriction = restriction::restriction(arguments.threads, arguments.contended, &hardware, &references);
     let mut before = [measured.remarks, hardware.disturbed()].concat();
     before.extend(restriction.iter().flat_map(restriction::not_shown));
     let assemble = |found| assemble(arguments, algorithms, &hardware, restriction.clone(), found, began);
     let mut found = Found { remarks: before.clone(), ..Found::default() };
     if interrupt::requested() {
-        found.remarks.push("interrupted during the hardware parameters; what was to follow is missing".to_owned());
+        found.remarks.push("interrupted during the hardware parameters; the rest is missing".to_owned());
         found.interrupted = true;
     } else if let Some(plan) = &plan {
         let conditions = Conditions {
@@ -47,12 +49,12 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
             contended: arguments.contended.is_some(),
             gpus: measured.usable,
         };
-        found = sweep::conduct(plan, &conditions, &mut |so_far| {
+        found = sweep_all(plan, &conditions, &mut |so_far| {
             if let Some(destination) = &destination {
                 let mut so_far = so_far.clone();
                 so_far.remarks.splice(0..0, before.iter().cloned());
                 let mut report = assemble(so_far);
-                report.remarks.push("unfinished: the measurement was going on when this was written".to_owned());
+                report.remarks.push("unfinished: the measurement was under way when this was written".to_owned());
                 destination.save_unfinished(&report);
             }
         })?;
@@ -63,7 +65,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     let report = assemble(found);
     let saved = destination.as_ref().map(|d| d.save(&report)).transpose();
     let text = if arguments.json {
-        sapwise::json::write_report(&report)?
+        write_report(&report)?
     } else {
         let next = saved.as_ref().ok().and_then(|path| path.map(|path| summary::next_step(&report, path)));
         let told = told.map(|told| format!("\n{told}\n")).unwrap_or_default();
@@ -98,7 +100,6 @@ fn assemble(
     began: Instant,
 ) -> Report {
     let mut report = Report {
-        schema: sapwise_lab::report::ReportSchema,
         label: provenance::label(arguments, &found.points, hardware),
         provenance: provenance::provenance(arguments, restriction, hardware, began.elapsed()),
         hardware: hardware.clone(),

@@ -2,9 +2,9 @@
 
 use crate::args::Schema;
 use crate::exit::Outcome;
-use crate::files::write_text;
 use crate::output;
 use anyhow::Context;
+use sapwise_lab::write::write_text;
 use serde::Serialize;
 
 /// The answer for machines.
@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &Schema) -> anyhow::Result<Outcome> {
         output::print_json(&Answer { files })?;
     } else {
         let wrote = files.iter().map(|f| format!("wrote {f}\n")).collect::<String>();
-        output::print(&(wrote + "Next: sapwise check FILE, which looks at more than a schema can say"))?;
+        output::print(&wrote)?;
     }
     Ok(Outcome::Done)
 }

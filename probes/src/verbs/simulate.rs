@@ -1,12 +1,14 @@
-//! `sapwise simulate`: reports of machines that there are not, from published specifications.
+//! `sapwise simulate`: reports of simulated machines, from published specifications.
 
 use crate::args::Simulate;
-use sapwise_lab::data::files::{json_files, read_text};
 use crate::exit::Outcome;
-use crate::simulate::{Loads, built_in, read, simulate};
-use sapwise_lab::text::count;
-use crate::{files, output};
+use crate::progress::Progress;
+use crate::{output, shell};
 use anyhow::{Context, bail};
+use sapwise_lab::data::{json_files, read_text, write_report};
+use sapwise_lab::simulated::{Loads, built_in, read, simulate};
+use sapwise_lab::text::count;
+use sapwise_lab::write::write_text;
 use serde::Serialize;
 
 /// The answer for machines.
@@ -33,17 +35,18 @@ pub(crate) fn run(arguments: &Simulate) -> anyhow::Result<Outcome> {
     let mut written = Vec::new();
     for (name, report) in &reports {
         let path = folder.join(format!("{name}.json"));
-        files::write_text(&path, &sapwise::json::write_report(report)?)?;
+        write_text(&path, &write_report(report)?)?;
         written.push(path.display().to_string());
     }
     if arguments.json {
         output::print_json(&Answer { files: written })?;
     } else {
-        let shown = folder.display();
         output::print(&format!(
-            "Reports of {} are in {shown}. They are no evidence of accuracy.\nNext: sapwise train --simulated {shown} --out \
+            "Reports of {} are in {}. They are no evidence of accuracy.\nNext: sapwise train --simulated {} --out \
              simulated-model.json",
-            count(written.len(), "simulated machine")
+            count(written.len(), "simulated machine"),
+            folder.display(),
+            shell::path(folder)
         ))?;
     }
     Ok(Outcome::Done)

@@ -1,7 +1,7 @@
 //! `sapwise study`: a page with figures and tables of any set of reports.
 
 use crate::args::Study as Arguments;
-use sapwise_lab::data::files::{read_report, report_files};
+use sapwise_lab::data::{read_report, report_files};
 use crate::exit::{Outcome, WrongUsage};
 use crate::output;
 use crate::progress::Progress;
@@ -153,7 +153,7 @@ fn borders(held: &Held, entries: &[Entry]) -> BTreeMap<String, Vec<Border>> {
     let borders = |entry: &&Entry| {
         let mut report = read_report(&entry.path).ok()?.1;
         study::keep(&mut report, |id| entry.profile.position(id).is_some());
-        let tuning = train::measured_tuning(&report, train::slice_scenario(&report)).ok()?;
+        let tuning = train::measured_tuning(&report, train::usual_scenario(&report)).ok()?;
         Some((entry.file.clone(), tuning.crossovers))
     };
     own.par_iter().filter_map(borders).collect()

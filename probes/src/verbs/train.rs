@@ -1,16 +1,19 @@
-//! `sapwise train`: a model from reports, validated by leaving machines out.
+//! `sapwise train`: a model from reports, validated on machines that are held out.
 
 use crate::args::Train;
-use sapwise_lab::data::files::{read_report, report_files};
+use crate::check::doubts;
 use crate::exit::{Outcome, WrongUsage};
-use sapwise_lab::figures::{self, Figure, Picture};
+use crate::outputs::{picture_format, refuse_overwriting};
 use crate::progress::Progress;
-use crate::terminal::{Axis, Chart, Series, Terminal};
-use crate::train::{self, Evidence, Held, OURS, Selection, Trained};
-use crate::{card, files, interrupt, output};
+use crate::terminal::Terminal;
+use crate::{interrupt, output, shell};
 use rayon::prelude::*;
 use sapwise::Model;
-use sapwise::model::{Learning, Validation};
+use sapwise_lab::data::{Evidence, Selection, read_report, report_files};
+use sapwise_lab::evaluate::importance;
+use sapwise_lab::figures::{Figure, TrainingPicture};
+use sapwise_lab::write::{write_atomically, write_text};
+use sapwise_lab::{Trained, Training, Validation, model_card, train, write_model};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -28,60 +31,88 @@ struct Answer<'a> {
 
 pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let name = name(arguments)?;
-    let picture = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, Picture::of(path)?))).transpose()?;
+    let plot = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, picture_format(path)?))).transpose()?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let reports = report_files(&arguments.reports)?;
     let outputs = [Some(&arguments.out), arguments.card.as_ref(), arguments.plot.as_ref(), arguments.importance.as_ref()];
-    files::refuse_overwriting(&reports, &outputs.into_iter().flatten().collect::<Vec<_>>())?;
-    let selection = select(&reports, evidence)?;
-    let importance = arguments.importance.as_ref().map(|_| train::importance(&selection.clone().finish().0)).transpose()?;
-    let Trained { model, notes, held } = train::train(selection, &name)?;
-    let text = sapwise::json::write_model(&model)?;
-    files::write_text(&arguments.out, &text)?;
+    refuse_overwriting(&reports, &outputs.into_iter().flatten().collect::<Vec<_>>())?;
+    interrupt::listen()?;
+    let progress = Progress::new(reports.len() as u64);
+    let (selection, doubtful) = select(&reports, evidence, &progress)?;
+    let importance =
+        arguments.importance.as_ref().map(|_| importance(&selection.clone().finish().0, &progress)).transpose()?;
+    let Trained { model, training, mut notes, held_out } = train(selection, &name, &progress)?;
+    drop(progress);
+    notes.extend(doubtful.notes(&arguments.reports));
+    write_text(&arguments.out, &write_model(&model, &training)?)?;
     if let Some(path) = &arguments.card {
-        let mut page = card::page(&model, &notes);
+        let mut page = model_card::page(&model, &training, &notes);
         if let Some(importance) = &importance {
-            page.push_str(&format!("\n## Importance\n\n{}", importance.page(card::markdown)));
+            page.push_str(&format!("\n## Importance\n\n{}", importance.page(model_card::markdown)));
         }
-        files::write_text(path, &page)?;
+        write_text(path, &page)?;
     }
-    if let Some((path, picture)) = picture {
-        let picture = plot::Training::new(&held, &model.validation.learning)
-            .draw(picture, &caption(&model, &command(arguments, path)))?;
-        files::write_atomically(path, |out| Ok(out.write_all(&picture)?))?;
+    if let Some((path, format)) = plot {
+        let caption = caption(&model, &training, &command(arguments, path));
+        let picture = TrainingPicture::new(&held_out).draw(format, &caption)?;
+        write_atomically(path, |out| Ok(out.write_all(&picture)?))?;
     }
     if let Some((path, importance)) = arguments.importance.as_ref().zip(importance.as_ref()) {
-        files::write_text(path, &sapwise::json::write(importance)?)?;
+        write_text(path, &sapwise::json::write(importance)?)?;
     }
     if arguments.json {
-        let Model { validation, name, .. } = &model;
-        output::print_json(&Answer { validation, model: name, notes: &notes })?;
+        output::print_json(&Answer { validation: &training.validation, model: &model.name, notes: &notes })?;
     } else {
         let terminal = Terminal::of_standard_output();
         let importance = importance.map_or_else(String::new, |i| format!("{}\n", i.page(|rows| terminal.table(rows))));
         let drawn = arguments.plot.as_ref().map_or(String::new(), |path| format!("\nDrawn in {}.", path.display()));
-        output::print(&format!("{importance}{}{drawn}", summary(&model, &held, &notes, &arguments.out, terminal)))?;
+        output::print(&format!("{importance}{}", summary(&model, &training, &notes, &arguments.out, &drawn, terminal)))?;
     }
     Ok(Outcome::Done)
 }
 
+/// Reports whose figures are doubtful, with their names.
+#[derive(Default)]
+struct Doubtful(Vec<(PathBuf, Vec<String>)>);
+
+impl Doubtful {
+    /// All doubts about reports that the user named; of those in folders their number.
+    fn notes(&self, named: &[PathBuf]) -> Vec<String> {
+        let (own, in_folders): (Vec<_>, Vec<_>) = self.0.iter().partition(|(path, _)| named.contains(path));
+        let of = |(path, doubts): &(PathBuf, Vec<String>)| {
+            let path = path.display().to_string();
+            doubts.iter().map(move |doubt| format!("{path} is doubtful: {doubt}")).collect::<Vec<_>>()
+        };
+        let mut notes: Vec<String> = own.into_iter().flat_map(of).collect();
+        if !in_folders.is_empty() {
+            let (number, what) = (in_folders.len(), if in_folders.len() == 1 { "report is" } else { "reports are" });
+            notes.push(format!("{number} {what} doubtful among those in folders; `sapwise check` says why"));
+        }
+        notes
+    }
+}
+
 /// Reads the reports on all cores, some at a time, and keeps of each what is trained on.
-fn select(files: &[PathBuf], evidence: Evidence) -> anyhow::Result<Selection> {
-    let progress = Progress::new(files.len() as u64);
+fn select(files: &[PathBuf], evidence: Evidence, progress: &Progress) -> anyhow::Result<(Selection, Doubtful)> {
     progress.message("reading");
-    let mut selection = Selection::new(evidence, files.len());
-    let placed: Vec<(usize, &PathBuf)> = files.iter().enumerate().collect();
-    for some in placed.chunks(AT_A_TIME) {
+    let mut selection = Selection::new(evidence);
+    let mut doubtful = Doubtful::default();
+    for some in files.chunks(AT_A_TIME) {
         interrupt::check()?;
-        let read = |&(place, file): &(usize, &PathBuf)| {
+        let read = |file: &PathBuf| {
             let (name, report) = read_report(file)?;
-            Ok(selection.reduce(place, &name, &report))
+            Ok((doubts(&report), selection.reduce(&name, &report)))
         };
         let reduced: Vec<_> = some.par_iter().map(read).collect::<anyhow::Result<_>>()?;
-        reduced.into_iter().for_each(|r| selection.add(r));
+        for (file, (doubts, reduced)) in some.iter().zip(reduced) {
+            if reduced.is_ok() && !doubts.is_empty() {
+                doubtful.0.push((file.clone(), doubts));
+            }
+            selection.add(reduced);
+        }
         progress.advance(some.len() as u64);
     }
-    Ok(selection)
+    Ok((selection, doubtful))
 }
 
 /// The name that the user gave, or that of the file.
@@ -95,9 +126,9 @@ fn name(arguments: &Train) -> anyhow::Result<String> {
 }
 
 /// What stands below the picture.
-fn caption(model: &Model, command: &str) -> Vec<String> {
-    let simulated = if model.is_simulated() { "Simulated machines, no evidence of accuracy. " } else { "" };
-    let machines = model.validation.physical_machines;
+fn caption(model: &Model, training: &Training, command: &str) -> Vec<String> {
+    let simulated = if model.simulated { "Simulated machines, no evidence of accuracy. " } else { "" };
+    let machines = training.validation.physical_machines;
     let plural = if machines == 1 { "" } else { "s" };
     vec![format!("{simulated}{machines} physical machine{plural}."), format!("Made by: {command}")]
 }
@@ -114,64 +145,18 @@ fn command(arguments: &Train, plot: &Path) -> String {
 }
 
 /// What the columns in the summary mean, in few words.
-const COLUMNS: &str = "Regret is time over the best time, less one. In games: each number of objects as often as games are assumed to \
-have it (log-normal around\n800). Borders off by: octaves between measured and predicted borders, the median. --card explains all.\n";
+const COLUMNS: &str = "Regret is time over the best time, less one. In games: the numbers of objects weighted as games are assumed to have \
+them (log-normal around\n800). Crossovers off by: the median distance in octaves between measured and predicted crossovers. --card explains \
+every column.\n";
 
-fn summary(model: &Model, held: &Held, notes: &[String], path: &Path, terminal: Terminal) -> String {
+fn summary(model: &Model, training: &Training, notes: &[String], path: &Path, drawn: &str, terminal: Terminal) -> String {
     let table = |rows: &[Vec<String>]| terminal.table(rows);
-    let mut text = card::scores(&model.validation, table);
-    if !model.validation.methods.is_empty() {
+    let mut text = model_card::scores(&training.validation, table);
+    if !training.validation.methods.is_empty() {
         text.push_str(&format!("\n{COLUMNS}"));
     }
-    if !model.validation.learning.is_empty() {
-        text.push_str(&format!("\n{}", card::course(&model.validation.learning, model.is_simulated(), table)));
-    }
-    let chart = chart(&model.validation.learning, held).draw(terminal);
-    text += &chart.map(|chart| format!("\n{chart}\n")).unwrap_or_default();
     for note in notes {
         text.push_str(&format!("{} {note}\n", terminal.warning("note:")));
     }
-    let shown = path.display();
-    text.push_str(&format!("\nThe model {} is in {shown}. Next: sapwise predict --model {shown}", model.name));
-    text
-}
-
-/// Ways to choose in the chart at most.
-const MOST_WAYS: usize = 6;
-/// Regrets below this can't be told apart.
-const LEAST_PERCENT: f64 = 0.1;
-
-/// The regret by the number of machines; where there are too few for that, by held-out machine or profile.
-fn chart(learning: &[Learning], held: &Held) -> Chart {
-    let percent = |regret: f64| (100.0 * regret).max(LEAST_PERCENT);
-    let (title, mut series): (_, Vec<Series>) = if learning.len() > 1 {
-        let names = learning[0].methods.iter().map(|m| &m.name[..]);
-        let course = |name: &str| {
-            let name = name.to_owned();
-            let of = |l: &Learning| {
-                let score = l.methods.iter().find(|m| m.name == name)?;
-                Some((l.machines as f64, percent(score.mean_regret)))
-            };
-            let points = learning.iter().filter_map(of).collect();
-            Series { name, points }
-        };
-        ("mean regret (%) over physical machines in the training".to_owned(), names.map(course).collect())
-    } else {
-        let ranked = |name: &str, regrets: &[f64]| {
-            let mut regrets: Vec<f64> = regrets.iter().copied().map(percent).collect();
-            regrets.sort_by(f64::total_cmp);
-            let points = regrets.into_iter().enumerate().map(|(k, regret)| (k as f64 + 1.0, regret)).collect();
-            Series { name: name.to_owned(), points }
-        };
-        let unit = if held.by_machine { "machines" } else { "profiles" };
-        let title = format!("regret (%) on the held-out {unit}, of each way to choose from the least to the most");
-        (title, held.regrets.iter().map(|(name, regrets)| ranked(name, regrets)).collect())
-    };
-    // Ours first, then those that end with the least regret.
-    series.sort_by(|a, b| {
-        let last = |s: &Series| s.points.last().map_or(f64::INFINITY, |p| p.1);
-        (a.name != OURS).cmp(&(b.name != OURS)).then(last(a).total_cmp(&last(b)))
-    });
-    series.truncate(MOST_WAYS);
-    Chart { title, across: Axis::Linear, series }
+    text + &format!("\nThe model, named {:?}, is in {}.{drawn}\nNext: sapwise predict --model {}", model.name, path.display(), shell::path(path))
 }

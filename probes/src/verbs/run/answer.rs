@@ -1,7 +1,7 @@
 //! The answer for machines.
 
-use super::tuning::{From, Origin};
-use crate::replay::{ReplaySettings, Outcome, Part, SHARE};
+use super::tuning::{Origin, OriginKind};
+use crate::replay::{Outcome, ReplaySettings, SHARE, Segment};
 use sapwise::{AlgorithmId, Source};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -27,7 +27,9 @@ pub(super) struct Answer<'a> {
     pub(super) exploring: bool,
     pub(super) oracle: Oracle,
     pub(super) total_ms: Totals,
-    /// The fixed algorithms that sat out frames, by their ids.
+    /// In how many frames of the last repeat each algorithm ran, exploration included; those that never ran are left out.
+    pub(super) frames_run: BTreeMap<String, usize>,
+    /// The fixed algorithms that were not timed at all frames, by their ids.
     pub(super) left_out: BTreeMap<String, LeftOut>,
     #[serde(flatten)]
     pub(super) figures: Figures,
@@ -39,7 +41,7 @@ pub(super) struct Answer<'a> {
     /// The fixed algorithm that is the best at the frames with the most objects.
     pub(super) best_at_largest: Option<AtLargest>,
     /// The same figures of the frames between the cuts.
-    pub(super) parts: Vec<OfPart>,
+    pub(super) parts: Vec<SegmentAnswer>,
     pub(super) co_runner: Option<Slowed>,
     /// What the last repeat ran from which frame on.
     decisions: Vec<Decision<'a>>,
@@ -53,7 +55,7 @@ pub(super) struct Extent {
 
 #[derive(Serialize)]
 struct OfTuning<'a> {
-    from: From,
+    from: OriginKind,
     model: &'a Option<String>,
     /// Samples by which a prediction was corrected.
     samples: usize,
@@ -83,12 +85,12 @@ pub(super) struct Totals {
     pub(super) fixed: BTreeMap<String, f64>,
 }
 
-/// A fixed algorithm that a frame took too long.
+/// A fixed algorithm that was too slow to be timed at every frame, or failed.
 #[derive(Serialize)]
 pub(super) struct LeftOut {
-    /// The last frame before the first that it sat out; null where that is the first of all.
+    /// The last frame before the first at which it was not timed; null where that is the first of all.
     pub(super) after_frame: Option<usize>,
-    /// How many it sat out.
+    /// At how many it was not timed.
     pub(super) frames: usize,
     /// The total of the others.
     pub(super) at_least_ms: f64,
@@ -98,7 +100,9 @@ pub(super) struct LeftOut {
 #[derive(Serialize)]
 pub(super) struct Figures {
     pub(super) regret: f64,
-    /// Over the repeats; null with fewer than four.
+    /// Median of the regrets of single repeats; null with fewer than four.
+    pub(super) regret_median: Option<f64>,
+    /// Their quartiles.
     pub(super) regret_quartiles: Option<[f64; 2]>,
     /// Against the best algorithm of every 32 frames together.
     pub(super) window_regret: f64,
@@ -114,7 +118,7 @@ pub(super) struct Figures {
 }
 
 #[derive(Serialize)]
-pub(super) struct OfPart {
+pub(super) struct SegmentAnswer {
     pub(super) from_frame: usize,
     /// The last one.
     pub(super) to_frame: usize,
@@ -126,7 +130,7 @@ pub(super) struct OfPart {
 pub(super) struct AtLargest {
     pub(super) objects: usize,
     pub(super) algorithm: String,
-    /// Time of the adaptive module over its time, over all frames; null where it sat out some.
+    /// Time of the adaptive module over its time, over all frames; null where it was not timed at all of them.
     pub(super) over: Option<f64>,
 }
 
@@ -154,11 +158,11 @@ struct Decision<'a> {
 
 impl<'a> Answer<'a> {
     pub(super) fn new(
-        course: &'a ReplaySettings,
+        settings: &'a ReplaySettings,
         outcome: &'a Outcome,
         origin: &'a Origin,
         too_wide: Vec<&'a AlgorithmId>,
-        parts: &[Part],
+        segments: &[Segment],
     ) -> Self {
         let objects = || outcome.frames.iter().map(|f| f.objects);
         let whole = outcome.whole();
@@ -168,6 +172,7 @@ impl<'a> Answer<'a> {
             let after_frame = missed.first.checked_sub(1);
             Some((id, LeftOut { after_frame, frames: missed.frames, at_least_ms: missed.at_least_ms }))
         });
+        let frames_run = outcome.frames_run();
         let adaptive = outcome.adaptive_ms();
         let best = outcome.best_fixed();
         let at_largest = |(objects, k): (usize, usize)| AtLargest {
@@ -175,16 +180,16 @@ impl<'a> Answer<'a> {
             algorithm: outcome.fixed[k].to_string(),
             over: outcome.fixed_ms(k).map(|ms| adaptive / ms),
         };
-        let part = |p: &Part| OfPart { from_frame: p.frames.start, to_frame: p.frames.end - 1, figures: Figures::new(p) };
+        let segment = |p: &Segment| SegmentAnswer { from_frame: p.frames.start, to_frame: p.frames.end - 1, figures: Figures::new(p) };
         let repeats = outcome.repeats.len();
         let mut warnings = origin.tuning.warnings.clone();
         warnings.extend(warnings_of(origin, &too_wide));
         Self {
-            scenario: course.footage.name(),
+            scenario: settings.source.name(),
             frames: outcome.frames.len(),
             objects: Extent { min: objects().min().unwrap_or(0), max: objects().max().unwrap_or(0) },
             repeats,
-            seed: course.seed,
+            seed: settings.seed,
             interrupted: outcome.interrupted,
             foreign_load: outcome.foreign_load,
             source: origin.tuning.source,
@@ -197,8 +202,8 @@ impl<'a> Answer<'a> {
             },
             extrapolated: origin.tuning.extrapolated,
             warnings,
-            learning: course.learning,
-            exploring: course.exploring,
+            learning: settings.learning,
+            exploring: settings.exploring,
             oracle: if repeats > 1 { Oracle::Halves } else { Oracle::Optimistic },
             total_ms: Totals {
                 adaptive,
@@ -206,13 +211,14 @@ impl<'a> Answer<'a> {
                 optimistic_oracle: outcome.optimistic_oracle_ms(),
                 fixed: named().filter_map(|(k, id)| Some((id, outcome.fixed_ms(k)?))).collect(),
             },
+            frames_run: named().map(|(k, id)| (id, frames_run[k])).filter(|ran| ran.1 > 0).collect(),
             left_out: missed.collect(),
             figures: Figures::new(&whole),
             regret_of_repeats: whole.of_repeats,
             best_fixed: best.map_or_else(String::new, |(k, _)| outcome.fixed[k].to_string()),
             over_best_fixed: best.map_or(1.0, |(_, ms)| adaptive / ms),
             best_at_largest: outcome.best_at_largest().map(at_largest),
-            parts: parts.iter().map(part).collect(),
+            parts: segments.iter().map(segment).collect(),
             co_runner: outcome.slowdown.as_ref().map(|slowdown| Slowed {
                 from_frame: slowdown.co_runner.from_frame,
                 threads: slowdown.co_runner.threads(),
@@ -226,16 +232,17 @@ impl<'a> Answer<'a> {
 }
 
 impl Figures {
-    fn new(part: &Part) -> Self {
+    fn new(segment: &Segment) -> Self {
         Self {
-            regret: part.regret,
-            regret_quartiles: part.quartiles(),
-            window_regret: part.window_regret,
-            optimistic_regret: part.optimistic_regret,
-            switches: part.switches,
-            explored: part.explored,
-            worst_frame: part.worst_frame.map(|w| w.0),
-            worst_frame_at: part.worst_frame.map(|w| w.1),
+            regret: segment.regret,
+            regret_median: segment.quartiles().map(|[_, median, _]| median),
+            regret_quartiles: segment.quartiles().map(|[low, _, high]| [low, high]),
+            window_regret: segment.window_regret,
+            optimistic_regret: segment.optimistic_regret,
+            switches: segment.switches,
+            explored: segment.explored,
+            worst_frame: segment.worst_frame.map(|w| w.0),
+            worst_frame_at: segment.worst_frame.map(|w| w.1),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! `sapwise run`: the in-line simulation.
+//! `sapwise run`: the adaptive choice on a stream of frames, beside every fixed algorithm.
 
 mod answer;
 mod tuning;
@@ -6,18 +6,16 @@ mod text;
 
 use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
-<<<<<<< HEAD
-use sapwise_scenes::{Frames, read_frames};
-=======
->>>>>>> scenes
 use crate::exit::{Outcome, WrongUsage};
-use sapwise_lab::figures::{self, Figure, Picture};
-use crate::replay::{ReplaySettings, FrameSource, Swing, TraceFormat, simulate, too_wide, write_trace};
+use crate::replay::{FrameSource, ReplaySettings, Swing, TraceFormat, picture, replay, too_wide, write_trace};
 use crate::terminal::Terminal;
-use crate::{files, interrupt, output};
+use crate::outputs::{picture_format, refuse_overwriting};
+use crate::{interrupt, output};
 use anyhow::{Context, bail};
 use sapwise::usable_cores;
-;
+use sapwise_lab::figures::Figure;
+use sapwise_lab::write::write_atomically;
+use sapwise_scenes::{Frames, Scenario};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -32,15 +30,15 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     let mut registry = algorithms.registry(usable_cores());
     registry.pin_threads();
     let trace = arguments.trace.as_deref().map(|path| Ok::<_, WrongUsage>((path, TraceFormat::of(path)?))).transpose()?;
-    let picture = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, Picture::of(path)?))).transpose()?;
+    let plot = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, picture_format(path)?))).transpose()?;
     check_outputs(arguments)?;
-    let mut course = course(arguments)?;
-    let cuts = cuts(arguments, course.frames)?;
+    let mut settings = settings(arguments)?;
+    let cuts = cuts(arguments, settings.frames)?;
     let read = arguments.tuning.as_deref().map(|path| tuning::read(path, &registry, &arguments.gpus)).transpose()?;
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
     if let Some(path) = &arguments.record {
-        course.footage.record(path, course.frames)?;
+        settings.source.record(path, settings.frames)?;
     }
     let origin = read.map_or_else(|| tuning::predicted(arguments, algorithms), Ok);
     // First: a prediction that was interrupted may complain of what was not measured.
@@ -49,23 +47,22 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     let gpu_warnings = tuning::add_gpus(&mut registry, &origin.tuning, &arguments.gpus)?;
     origin.tuning.warnings.extend(gpu_warnings);
     // Steps have no costs to correct.
-    course.learning &= !origin.tuning.costs.is_empty();
-    course.exploring &= course.learning;
-    let hint = "none of the algorithms of the tuning runs here; leave --tuning out to have them predicted for this machine";
-    let mut outcome = simulate(&course, &origin.tuning, &registry).map_err(|error| match error.downcast_ref() {
+    settings.learning &= !origin.tuning.costs.is_empty();
+    settings.exploring &= settings.learning;
+    let hint = "none of the algorithms of the tuning runs here; leave out --tuning to predict for this machine";
+    let mut outcome = replay(&settings, &origin.tuning, &registry).map_err(|error| match error.downcast_ref() {
         Some(sapwise::Error::Unavailable { .. } | sapwise::Error::UnknownAlgorithm { .. }) => error.context(hint),
         _ => error,
     })?;
     origin.tuning.warnings.append(&mut outcome.notes);
-    let parts: Vec<_> = parts(&cuts, course.frames).into_iter().map(|range| outcome.part(range)).collect();
-    let answer = answer::Answer::new(&course, &outcome, &origin, too_wide(&origin.tuning, &registry), &parts);
+    let segments: Vec<_> = segments(&cuts, settings.frames).into_iter().map(|range| outcome.part(range)).collect();
+    let answer = answer::Answer::new(&settings, &outcome, &origin, too_wide(&origin.tuning, &registry), &segments);
     if let Some((path, format)) = trace {
         write_trace(path, format, &outcome)?;
     }
-    if let Some((path, picture)) = picture {
-        let told = text::caption(arguments, &answer, &origin);
-        let drawn = plot::Simulation { course: &course, outcome: &outcome }.draw(picture, &told)?;
-        files::write_atomically(path, |out| Ok(out.write_all(&drawn)?))?;
+    if let Some((path, format)) = plot {
+        let drawn = picture(&settings, &outcome).draw(format, &text::caption(arguments, &answer, &origin))?;
+        write_atomically(path, |out| Ok(out.write_all(&drawn)?))?;
     }
     if arguments.json {
         output::print_json(&answer)?;
@@ -93,16 +90,16 @@ fn check_outputs(arguments: &Run) -> anyhow::Result<()> {
             bail!("can't write {}: there is no such folder; make it or name another", path.display());
         }
     }
-    files::refuse_overwriting(&read, &outputs)
+    Ok(refuse_overwriting(&read, &outputs)?)
 }
 
-/// What to simulate.
+/// What to replay.
 ///
 /// # Errors
 /// When the stream can't be read, holds what no algorithm takes, or is asked for what only a scenario has.
-fn course(arguments: &Run) -> anyhow::Result<ReplaySettings> {
+fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
     let asked = arguments.frames.map(|frames| frames as usize);
-    let (footage, frames) = match &arguments.scene {
+    let (source, frames) = match &arguments.scene {
         Scene::Scenario(scenario) => {
             let objects = arguments.objects.unwrap_or(OBJECTS) as usize;
             let usual = if *scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as usize } else { FRAMES };
@@ -115,7 +112,7 @@ fn course(arguments: &Run) -> anyhow::Result<ReplaySettings> {
         }
         Scene::Stream(path) => {
             let wrong =
-                |what: &str| Err(WrongUsage(format!("{what}: {} is a stream, whose boxes are given", path.display())));
+                |what: &str| Err(WrongUsage(format!("{what}: {} is a stream, whose boxes are recorded", path.display())));
             if arguments.objects.is_some() {
                 wrong("--objects")?;
             }
@@ -136,7 +133,7 @@ fn course(arguments: &Run) -> anyhow::Result<ReplaySettings> {
         }
     };
     Ok(ReplaySettings {
-        footage,
+        source,
         frames,
         repeats: arguments.repeats as usize,
         seed: arguments.seed,
@@ -155,7 +152,7 @@ fn read_stream(path: &Path) -> anyhow::Result<Frames> {
     Ok(frames)
 }
 
-/// The frames at which a part ends and another begins, ascending.
+/// The frames at which a segment ends and another begins, ascending.
 ///
 /// # Errors
 /// When one lies outside of the run.
@@ -181,8 +178,8 @@ fn cuts(arguments: &Run, frames: usize) -> Result<Vec<usize>, WrongUsage> {
     Ok(cuts)
 }
 
-/// The parts between the cuts; none where there is no cut.
-fn parts(cuts: &[usize], frames: usize) -> Vec<Range<usize>> {
+/// The segments between the cuts; none where there is no cut.
+fn segments(cuts: &[usize], frames: usize) -> Vec<Range<usize>> {
     if cuts.is_empty() {
         return Vec::new();
     }
@@ -204,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_lie_between_the_cuts() {
+    fn segments_lie_between_the_cuts() {
         let cuts = |words: &[&str], frames| cuts(&arguments(words), frames).unwrap();
         assert_eq!(cuts(&[], 200), [0; 0]);
         assert_eq!(cuts(&[], 301), [300]);
@@ -213,8 +210,8 @@ mod tests {
         assert_eq!(cuts(&["--co-runner", "450"], 900), [450, 750]);
         assert_eq!(cuts(&["--co-runner", "0"], 900), [300]);
         assert_eq!(cuts(&["--co-runner", "450:1", "--after", "100", "--no-learning"], 900), [100, 450]);
-        assert_eq!(parts(&[20, 50], 200), [0..20, 20..50, 50..200]);
-        assert!(parts(&[], 200).is_empty());
+        assert_eq!(segments(&[20, 50], 200), [0..20, 20..50, 50..200]);
+        assert!(segments(&[], 200).is_empty());
     }
 
     #[test]

@@ -1,16 +1,17 @@
 //! What a person reads at the end of a run.
 
 use super::answer::{Answer, Figures, LeftOut, Oracle, Slowed};
-use super::tuning::{From, Origin};
+use super::tuning::{Origin, OriginKind};
 use crate::args::{Run, Scene};
-use crate::replay::{Outcome, WINDOW};
-use sapwise_lab::text::{count, grouped};
-use crate::terminal::{Axis, Chart, Series, Terminal};
+use crate::replay::WINDOW;
+use crate::shell;
+use crate::terminal::Terminal;
 use sapwise::stats::quantile;
+use sapwise_lab::text::{count, grouped};
 use std::path::Path;
 
 /// Totals, figures, what there is to say about them, and what to do next.
-pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, outcome: &Outcome, terminal: Terminal) -> String {
+pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, terminal: Terminal) -> String {
     let head = format!(
         "{}, {} of {} objects, medians of {}, verified against each other",
         answer.scenario,
@@ -23,13 +24,10 @@ pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, outcom
     text += &totals(answer, terminal);
     for (id, LeftOut { after_frame, frames, at_least_ms }) in &answer.left_out {
         let after = after_frame.map_or("from the first on".to_owned(), |frame| format!("after frame {frame}"));
-        text += &format!(
-            "{id} sat out {} {after}: it was hopeless or failed; {at_least_ms:.2} ms without them\n",
-            count(*frames, "frame")
-        );
+        let missing = count(*frames, "frame");
+        text += &format!("{id} was not timed in {missing} {after}, because it failed or was far slower than the best; {at_least_ms:.2} ms in the others\n");
     }
     text += &format!("\n{}\n", figures(answer, terminal));
-    text += &chart(answer, outcome, terminal).draw(terminal).map(|chart| format!("{chart}\n")).unwrap_or_default();
     text += &comparisons(answer);
     if let Some(slowed) = &answer.co_runner {
         text += &format!("\n{}", co_runner(slowed));
@@ -41,7 +39,7 @@ pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, outcom
         text += &format!("\n{} {warning}", terminal.warning("warning:"));
     }
     if answer.interrupted {
-        text += &format!("\n{} the repeats that were complete are shown.", terminal.warning("Interrupted:"));
+        text += &format!("\n{} only complete repeats are shown.", terminal.warning("Interrupted:"));
     }
     for (verb, path) in [("Recorded", &arguments.record), ("Traced", &arguments.trace), ("Drawn", &arguments.plot)] {
         text += &path.as_ref().map(|p| format!("\n{verb} in {}.", p.display())).unwrap_or_default();
@@ -49,47 +47,27 @@ pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, outcom
     text + &format!("\nNext: {}", next_step(arguments, origin))
 }
 
-/// What tells more than this run did.
-fn next_step(arguments: &Run, origin: &Origin) -> &'static str {
-    match (origin.from, &arguments.plot) {
-        (_, None) => "the same with --plot run.svg, which draws the decisions",
-        (From::Prediction, _) => {
-            "sapwise probe --out report.json, then the same with --tuning report.json, which are measured tuning"
-        }
-        (_, Some(_)) => "the same without --tuning, to see what a prediction is worth",
-    }
-}
-
-/// The time of a frame over the frames: the adaptive module, the oracle and the best fixed algorithm.
-fn chart(answer: &Answer<'_>, outcome: &Outcome, terminal: Terminal) -> Chart {
-    // A frame for each column, as there are no more dots to tell them apart; between them the most is shown, that no dear frame is lost.
-    let step = outcome.frames.len().div_ceil(terminal.plot_columns().unwrap_or(1)).max(1);
-    let thinned = |ns: Vec<f64>| -> Vec<(f64, f64)> {
-        let most = |some: &[f64]| some.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        ns.chunks(step).enumerate().map(|(k, some)| ((k * step) as f64, most(some) / 1e3)).collect()
+/// The next command to try.
+fn next_step(arguments: &Run, origin: &Origin) -> String {
+    let scene = match &arguments.scene {
+        Scene::Scenario(scenario) => scenario.to_string(),
+        Scene::Stream(path) => shell::path(path),
     };
-    let series = |name: &str, ns: Vec<f64>| Series { name: name.to_owned(), points: thinned(ns) };
-    let mut all = vec![
-        series("adaptive", outcome.frames.iter().map(|f| f.adaptive_ns).collect()),
-        series("oracle", outcome.oracle.ns.clone()),
-    ];
-    if let Some((best, _)) = outcome.best_fixed() {
-        let name = format!("best fixed, {}", outcome.fixed[best]);
-        all.push(series(&name, outcome.frames.iter().map(|f| f.fixed_ns[best]).collect()));
+    match (origin.from, &arguments.plot) {
+        (_, None) => shell::again(&["--plot", "run.svg"]),
+        (OriginKind::Prediction, _) => "sapwise probe --out report.json".to_owned(),
+        (_, Some(_)) => format!("sapwise run {scene}"),
     }
-    let thinning = if step > 1 { format!(", the most of every {step}") } else { String::new() };
-    let title = format!("{}: time of a frame (us) over frames{thinning}", answer.scenario);
-    Chart { title, across: Axis::Linear, series: all }
 }
 
 /// What stands below the picture: the figures, where the tuning comes from, and the command that makes it again.
 pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> [String; 3] {
-    let Figures { regret, switches, explored, .. } = answer.figures;
+    let Figures { switches, explored, .. } = answer.figures;
     let name = answer.scenario;
     [
         format!(
-            "{name}: regret {}, {switches} switch{}, {} explored; medians of {}, decisions of the last",
-            percent(regret),
+            "{name}: regret {}; {switches} switch{}, {} explored; times over {}, decisions of the last",
+            spread(&answer.figures),
             if switches == 1 { "" } else { "es" },
             count(explored, "frame"),
             count(answer.repeats, "repeat")
@@ -112,29 +90,39 @@ fn learning(answer: &Answer<'_>) -> &'static str {
     }
 }
 
+/// What each algorithm takes, and in how many frames of the last repeat it ran.
 fn totals(answer: &Answer<'_>, terminal: Terminal) -> String {
     let oracle = answer.total_ms.oracle;
-    let row = |name: &str, ms: f64| vec![name.to_owned(), format!("{ms:.2}"), format!("{:.3}", ms / oracle)];
-    let mut fixed: Vec<(&String, f64)> = answer.total_ms.fixed.iter().map(|(id, ms)| (id, *ms)).collect();
-    fixed.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let mut rows = vec![["run by", "total ms", "over the oracle"].map(str::to_owned).to_vec()];
-    rows.push(row("oracle (best at every frame)", oracle));
-    rows.push(row("adaptive", answer.total_ms.adaptive));
-    rows.extend(fixed.iter().map(|(id, ms)| row(id, *ms)));
+    let row = |name: &str, ms: Option<f64>, frames: String| {
+        let ratio = ms.map_or("-".to_owned(), |ms| format!("{:.3}", ms / oracle));
+        vec![name.to_owned(), ms.map_or("-".to_owned(), |ms| format!("{ms:.2} ms")), ratio, frames]
+    };
+    let mut names: Vec<(&String, Option<f64>)> = answer.total_ms.fixed.iter().map(|(id, ms)| (id, Some(*ms))).collect();
+    names.extend(answer.left_out.keys().map(|id| (id, None)));
+    let total = |ms: Option<f64>| ms.unwrap_or(f64::INFINITY);
+    names.sort_by(|a, b| total(a.1).total_cmp(&total(b.1)));
+    let mut rows = vec![["run by", "total", "over the oracle", "adaptive ran it in"].map(str::to_owned).to_vec()];
+    rows.push(row("oracle (best at every frame)", Some(oracle), String::new()));
+    rows.push(row("adaptive", Some(answer.total_ms.adaptive), String::new()));
+    rows.extend(names.into_iter().map(|(id, ms)| {
+        let ran = answer.frames_run.get(id).copied().unwrap_or(0);
+        row(id, ms, count(ran, "frame"))
+    }));
     terminal.table(&rows)
 }
 
-/// The figures of all frames and of each part.
+/// The figures of all frames and of each segment.
 fn figures(answer: &Answer<'_>, terminal: Terminal) -> String {
-    let head = ["frames", "regret", "middle half of repeats", "of windows", "switches", "explored", "worst frame"];
+    let head = ["frames", "regret", "median of repeats", "their quartiles", "vs windows", "switches", "frames explored", "worst frame"];
     let row = |frames: String, f: &Figures| {
-        let within = f.regret_quartiles.map_or("-".to_owned(), |[a, b]| format!("{} to {}", percent(a), percent(b)));
+        let quartiles = f.regret_quartiles.map_or("-".to_owned(), |[a, b]| format!("{} to {}", percent(a), percent(b)));
         let worst = f.worst_frame.zip(f.worst_frame_at);
         let worst = worst.map_or("-".to_owned(), |(ratio, at)| format!("{ratio:.2} times the oracle's, frame {at}"));
         vec![
             frames,
             percent(f.regret),
-            within,
+            f.regret_median.map_or("-".to_owned(), percent),
+            quartiles,
             percent(f.window_regret),
             f.switches.to_string(),
             f.explored.to_string(),
@@ -146,6 +134,25 @@ fn figures(answer: &Answer<'_>, terminal: Terminal) -> String {
     terminal.table(&rows)
 }
 
+/// A regret with the spread of the repeats.
+fn spread(figures: &Figures) -> String {
+    let repeats = figures.regret_median.zip(figures.regret_quartiles);
+    let repeats = repeats.map_or(String::new(), |(median, [low, high])| {
+        format!(" (single repeats: median {}, quartiles {} to {})", percent(median), percent(low), percent(high))
+    });
+    percent(figures.regret) + &repeats
+}
+
+/// A sentence where the regret lies outside of the quartiles of the repeats.
+fn outside(figures: &Figures) -> Option<String> {
+    let [low, high] = figures.regret_quartiles?;
+    (figures.regret < low || figures.regret > high).then(|| {
+        "The regret lies outside the quartiles of the repeats: it is computed from times over all repeats, theirs from single noisy samples. \
+         More --repeats bring the two together."
+            .to_owned()
+    })
+}
+
 fn comparisons(answer: &Answer<'_>) -> String {
     let mut lines = Vec::new();
     if !answer.best_fixed.is_empty() {
@@ -155,32 +162,35 @@ fn comparisons(answer: &Answer<'_>) -> String {
         let objects = grouped(largest.objects as u64);
         let over = match largest.over {
             Some(over) => format!("{} of the time of", times(over)),
-            None => "No total to compare with of".to_owned(),
+            None => "No total to compare with for".to_owned(),
         };
-        lines.push(format!("{over} {}, the best where there are most objects ({objects}).", largest.algorithm));
+        lines.push(format!("{over} {}, the best at the largest number of objects ({objects}).", largest.algorithm));
     }
+    lines.push(
+        "Regret is the time of the adaptive module over that of an oracle, less one. The oracle runs the best algorithm of every frame.".to_owned(),
+    );
     lines.push(format!(
-        "Of windows: against the best algorithm of every {WINDOW} frames together. One that keeps work makes it anew now and then; the oracle of \
-         every frame takes\nits cheap frames and leaves that one to another, which nobody can."
+        "Vs windows: the oracle runs one algorithm for {WINDOW} frames at a time. An incremental algorithm rebuilds its data now and then, and an \
+         oracle\nthat chooses for each frame alone avoids the frames of the rebuild, which no real choice can."
     ));
     lines.push(match answer.oracle {
         Oracle::Halves => format!(
-            "The oracle's algorithms are chosen by one half of the repeats and timed in the other. Against the least time of every \
-             frame,\nwhich luck has a part in, the regret is {}.",
+            "The oracle chooses on one half of the repeats and is timed on the other. Against the minimum of every frame, which is biased by \
+             noise,\nthe regret is {}.",
             percent(answer.figures.optimistic_regret)
         ),
         Oracle::Optimistic => {
-            "One repeat: the oracle has the least time of every frame, in which luck has a part; two or more --repeats leave it out."
-                .to_owned()
+            "One repeat: the oracle takes the minimum of every frame, which is biased by noise; two or more --repeats remove that bias.".to_owned()
         }
     });
+    lines.extend(outside(&answer.figures));
     lines.join("\n")
 }
 
 fn co_runner(slowed: &Slowed) -> String {
     let reached = match slowed.slowdown {
         Some(ratio) => format!("a loop beside the frames then took {ratio:.2} times as long"),
-        None => "no frame ran before, to compare with".to_owned(),
+        None => "no frame ran before it to compare with".to_owned(),
     };
     let own: Vec<f64> = slowed.slowdown_of.values().copied().flatten().collect();
     let range = [0.5, 0.0, 1.0].map(|q| quantile(&own, q));

@@ -1,34 +1,33 @@
-//! Where the tuning of a run come from.
+//! Where the tuning of a run comes from.
 
 use crate::algorithms::Algorithms;
 use crate::args::Run;
-use sapwise_lab::data::files::read_document;
 use crate::gpus::{self, GpuChoice};
 use crate::hardware::measure_hardware;
 use crate::prediction::{self, Slice};
-use crate::verbs::predict;
-use crate::{revisions, train};
+use crate::revisions;
 use anyhow::{Context, bail};
-use sapwise::json::Document;
-use sapwise::{AlgorithmId, Tuning, Registry, Source, measure};
+use sapwise::{AlgorithmId, Registry, Source, Tuning, measure};
+use sapwise_lab::data::{Document, read_document, usual_scenario};
+use sapwise_lab::fit::measured_tuning;
 use sapwise_scenes::Scenario;
 use serde::Serialize;
 use std::path::Path;
 
-/// The tuning, and what is told about them.
+/// The tuning, and what is said about it.
 pub(super) struct Origin {
     pub(super) tuning: Tuning,
-    pub(super) from: From,
-    /// The processor of the other machine whose report they come from.
+    pub(super) from: OriginKind,
+    /// The processor of the other machine whose report it comes from.
     pub(super) other_machine: Option<String>,
     /// An algorithm gave wrong pairs while it was sampled.
     pub(super) wrong: bool,
 }
 
-/// What they were taken from.
+/// What it was taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum From {
+pub(super) enum OriginKind {
     /// A model and the parameters of this machine.
     Prediction,
     /// A tuning file.
@@ -48,16 +47,16 @@ impl Origin {
             count => format!(", corrected by {count} samples"),
         };
         match (self.from, source) {
-            (From::Prediction, _) => format!("predicted for this machine{model}{corrected}"),
-            (From::Report, _) => match &self.other_machine {
+            (OriginKind::Prediction, _) => format!("predicted for this machine{model}{corrected}"),
+            (OriginKind::Report, _) => match &self.other_machine {
                 Some(cpu) => format!("measured on another machine ({cpu})"),
                 None => "measured on this machine".to_owned(),
             },
-            (From::Tuning, Source::Default) => "from a file, written down by hand".to_owned(),
-            (From::Tuning, Source::Predicted) => format!("from a file, predicted{model}"),
-            (From::Tuning, Source::Measured) => "from a file, measured".to_owned(),
-            (From::Tuning, Source::Learned) if samples.is_empty() => format!("from a file, learned on line{model}"),
-            (From::Tuning, Source::Learned) => format!("from a file, predicted{model}{corrected}"),
+            (OriginKind::Tuning, Source::Default) => "from a file, written by hand".to_owned(),
+            (OriginKind::Tuning, Source::Predicted) => format!("from a file, predicted{model}"),
+            (OriginKind::Tuning, Source::Measured) => "from a file, measured".to_owned(),
+            (OriginKind::Tuning, Source::Learned) if samples.is_empty() => format!("from a file, learned on line{model}"),
+            (OriginKind::Tuning, Source::Learned) => format!("from a file, predicted{model}{corrected}"),
         }
     }
 }
@@ -68,14 +67,14 @@ impl Origin {
 /// When no process can be started, a GPU that was asked for is not there, or the model predicts none of the algorithms.
 pub(super) fn predicted(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Origin> {
     let (hardware, measured) = measure_hardware(None, &arguments.gpus)?;
-    let model = predict::model(None)?;
+    let model = prediction::model(None)?;
     let (usable, slice) = (&measured.usable, Slice::of(Scenario::Uniform)?);
     let (mut tuning, wrong) = match arguments.samples {
         0 => (prediction::predict(&model, &hardware, usable, &slice, algorithms)?, false),
         most => prediction::predict_and_sample(&model, &hardware, usable, &slice, algorithms, most)?,
     };
     tuning.warnings.extend(measured.remarks);
-    Ok(Origin { tuning, from: From::Prediction, other_machine: None, wrong })
+    Ok(Origin { tuning, from: OriginKind::Prediction, other_machine: None, wrong })
 }
 
 /// The tuning of a file, which may be a report whose timings they are measured from.
@@ -90,23 +89,23 @@ pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyh
     match read_document(path)? {
         Document::Tuning(tuning) => {
             fresh(revisions::stale_in_tuning(&tuning, registry))?;
-            Ok(Origin { tuning: *tuning, from: From::Tuning, other_machine: None, wrong: false })
+            Ok(Origin { tuning: *tuning, from: OriginKind::Tuning, other_machine: None, wrong: false })
         }
         Document::Report(mut report) => {
             choice.restrict(&mut report);
             fresh(revisions::stale_in_report(&report, registry))?;
-            let tuning = train::measured_tuning(&report, train::slice_scenario(&report))
-                .with_context(|| format!("{} gives no tuning", path.display()))?;
+            let tuning = measured_tuning(&report, usual_scenario(&report))
+                .with_context(|| format!("{} yields no tuning", path.display()))?;
             let machine = &report.hardware.machine;
             let here = machine.physical_id == measure::machine().physical_id;
             let other_machine = (!here).then(|| machine.cpu.clone());
-            Ok(Origin { tuning, from: From::Report, other_machine, wrong: false })
+            Ok(Origin { tuning, from: OriginKind::Report, other_machine, wrong: false })
         }
-        _ => bail!("{} is a model; give tuning or a report, or leave --tuning out to have them predicted", path.display()),
+        _ => bail!("{} is a model; name a tuning file or a report, or leave out --tuning to predict", path.display()),
     }
 }
 
-/// Adds the algorithms on the GPUs that are taken, where the tuning names any, and gives what keeps some from running.
+/// Adds the algorithms on the GPUs that are taken, where the tuning names any, and returns what keeps some from running.
 ///
 /// # Errors
 /// When no process can be started.
@@ -128,7 +127,7 @@ pub(super) fn add_gpus(registry: &mut Registry, tuning: &Tuning, choice: &GpuCho
         warnings.extend(seen.lacks(gpus::uses(id)).map(|why| format!("{id} is left out: {why}")));
         warnings.extend(out.map(|g| match choice.only[..] {
             [] => {
-                format!("{id} is left out: gpu{} ({}) is a program on the CPU; --software-gpus takes it in", g.index, g.name)
+                format!("{id} is left out: gpu{} ({}) is a software adapter; use --software-gpus to run it", g.index, g.name)
             }
             _ => format!("{id} is left out: --gpu does not name gpu{}", g.index),
         }));

@@ -1,6 +1,7 @@
-//! Outputs that would replace what is read, or each other.
+//! Checks of output files before the work is done.
 
 use crate::exit::WrongUsage;
+use sapwise_lab::figures::Picture;
 use std::path::{Path, PathBuf};
 
 /// Refuses to write over a file that is read, or twice into one file.
@@ -20,4 +21,12 @@ pub(crate) fn refuse_overwriting(inputs: &[PathBuf], outputs: &[&PathBuf]) -> Re
         }
     }
     Ok(())
+}
+
+/// The format that the name of a picture asks for.
+///
+/// # Errors
+/// When it ends in neither `.svg` nor `.png`.
+pub(crate) fn picture_format(path: &Path) -> Result<Picture, WrongUsage> {
+    Picture::of(path).map_err(|why| WrongUsage(format!("--plot {}: {why}", path.display())))
 }

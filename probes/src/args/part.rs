@@ -1,0 +1,49 @@
+//! The arguments of the hidden verb `part`.
+
+use clap::{Args, Subcommand};
+
+/// One part of a measurement in a process of its own, so that a crash costs that part and not the run.
+#[derive(Debug, Args)]
+pub(crate) struct Part {
+    #[command(subcommand)]
+    pub(crate) part: PartKind,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum PartKind {
+    /// Prints the parameters of one family as JSON.
+    Hardware {
+        family: String,
+        #[arg(long)]
+        threads: Option<u32>,
+    },
+    /// Prints the GPUs, one as JSON a line.
+    Gpus,
+    /// Prints the algorithms on all GPUs, one as JSON a line.
+    GpuAlgorithms,
+    /// Opens a GPU and prints its limits as JSON.
+    GpuLimits { index: u32 },
+    /// Prints a GPU with its parameters as JSON.
+    Gpu {
+        index: u32,
+        #[arg(long)]
+        threads: Option<u32>,
+    },
+    /// Prints the parameters of several GPUs together as JSON.
+    GpuGroup {
+        /// As in `gpu0+1`.
+        gpus: sapwise::Backend,
+        #[arg(long)]
+        threads: Option<u32>,
+    },
+    /// Takes the samples that standard input asks for, and prints an answer as JSON a line.
+    Samples {
+        /// What holds for all of them, as JSON.
+        session: String,
+    },
+    /// Sweeps one scenario and prints one event as JSON a line.
+    Sweep {
+        /// The request, as JSON.
+        request: String,
+    },
+}

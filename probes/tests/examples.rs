@@ -1,0 +1,103 @@
+//! The examples of the help and the commands behind "Next:", run as they are printed.
+#![cfg(unix)]
+
+mod common;
+
+use common::{npy, sapwise, success};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Verbs whose examples take seconds. Those of the others measure for minutes: of them the words are parsed only.
+const SHORT: [&str; 10] =
+    ["check", "compare", "completions", "convert", "devices", "pairs", "schema", "simulate", "study", "train"];
+
+fn stored(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)
+}
+
+/// A folder with the files that examples name.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let report = |profile: &str| stored(&format!("datasets/amd-epyc-2c-{profile}--2026-11-21.json"));
+    let put = |from: &Path, to: &str| {
+        let to = folder.path().join(to);
+        fs::create_dir_all(to.parent().unwrap()).unwrap();
+        fs::copy(from, to).unwrap();
+    };
+    for name in ["report.json", "this-machine.json", "other-machine.json", "elsewhere.json", "first.json", "second.json"] {
+        put(&report("full"), name);
+    }
+    for name in ["datasets/a.json", "reports/a.json"] {
+        put(&report("full"), name);
+    }
+    for name in ["datasets/b.json", "reports/b.json"] {
+        put(&report("1t"), name);
+    }
+    for card in fs::read_dir(stored("datasets/published")).unwrap().map(|e| e.unwrap()) {
+        put(&card.path(), &format!("datasets/published/{}", card.file_name().to_string_lossy()));
+    }
+    for name in ["mine.json", "models/mine.json"] {
+        put(&stored("models/default.json"), name);
+    }
+    let boxes: Vec<f32> = (0..20).flat_map(|k| [k as f32, 0.0, 0.0, k as f32 + 1.0, 1.0, 1.0]).collect();
+    npy(folder.path(), "boxes.npy", "<f4", "20, 6", &boxes);
+    folder
+}
+
+/// Runs a line as a shell does, with the command in its path.
+fn shell(line: &str, folder: &Path) -> Output {
+    let program = assert_cmd::cargo::cargo_bin!("sapwise");
+    let path = format!("{}:{}", program.parent().unwrap().display(), std::env::var("PATH").unwrap_or_default());
+    let mut command = Command::new("sh");
+    // Where there is no folder for completions the example would need one.
+    command.env("PATH", path).env("HOME", folder).env("PROFILE", folder.join("profile")).env_remove("SAPWISE_SIMD");
+    command.args(["-c", line]).current_dir(folder).output().unwrap()
+}
+
+fn verb(line: &str) -> &str {
+    line.split(' ').nth(1).unwrap_or_default()
+}
+
+/// Runs a line to its end where that is short; else only its words are read, for which `--help` stands behind them.
+fn run(line: &str, folder: &Path) -> String {
+    let is_short = SHORT.contains(&verb(line)) || line.starts_with("sapwise predict --report");
+    let line = if is_short { line.to_owned() } else { format!("{} --help", line.split('#').next().unwrap_or_default()) };
+    let ended = shell(&line, folder);
+    let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(0), "{line}: {complaint}");
+    String::from_utf8(ended.stdout).unwrap()
+}
+
+fn verbs() -> Vec<String> {
+    let help = success(sapwise().arg("--help"));
+    let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let names = list.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help").map(str::to_owned).collect()
+}
+
+#[test]
+fn every_example_works_as_it_is_printed_and_so_does_what_is_said_to_be_next() {
+    let folder = folder();
+    fs::create_dir_all(folder.path().join(".local/share/bash-completion/completions")).unwrap();
+    for shell in [".zfunc", ".config/fish/completions", ".config/elvish"] {
+        fs::create_dir_all(folder.path().join(shell)).unwrap();
+    }
+    let verbs = verbs();
+    assert!(verbs.len() >= 12, "{verbs:?}");
+    for verb in verbs {
+        let help = success(sapwise().args([&verb, "--help"]));
+        let lines = help.lines().filter_map(|line| Some(&line[line.find("sapwise ")?..]).filter(|_| line.starts_with("  ")));
+        let examples: Vec<&str> = lines.filter(|line| line.starts_with(&format!("sapwise {verb}")) || verb == "simulate").collect();
+        assert!(!examples.is_empty(), "{verb} has no example: {help}");
+        for example in examples {
+            // What is behind two blanks on a line of completions says where it goes.
+            let example = example.split("  (").next().unwrap_or_default();
+            let text = run(example, folder.path());
+            for next in text.lines().filter_map(|line| line.trim().strip_prefix("Next: ")) {
+                assert!(next.starts_with("sapwise "), "{example}: {next}");
+                run(next, folder.path());
+            }
+        }
+    }
+}
