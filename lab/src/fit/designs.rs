@@ -266,7 +266,7 @@ impl Design {
         }
         let ln_ratios: Vec<f64> = measured.iter().map(|&k| (row(k).ns / modelled[k]).ln()).collect();
         // A point that the terms miss by far is a term that is missing, or a disturbed measurement: either way no slope.
-        let reach = 3.0 * robust_deviation(&ln_ratios).max(0.01);
+        let reach = 3.0 * robust_deviation(&ln_ratios).unwrap_or(0.0).max(0.01);
         let residuals = Residuals {
             names: Feature::of(self.class),
             features: self.features.select(Axis(0), &measured.iter().map(|&k| rows[k]).collect::<Vec<_>>()),
@@ -276,7 +276,7 @@ impl Design {
         };
         let ridge = residuals.ridge()?;
         let left: Vec<f64> = (0..measured.len()).map(|k| residuals.ln_ratios[k] - residuals.at(&ridge, k)).collect();
-        let spread_ln = robust_deviation(&left);
+        let spread_ln = robust_deviation(&left).unwrap_or(0.0);
         let used = self.terms.iter().zip(&units).filter(|(_, u)| **u > 0.0);
         let objects = || measured.iter().map(|&k| row(k).load.objects);
         let mut gpu_kinds: Vec<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();

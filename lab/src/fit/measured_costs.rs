@@ -143,7 +143,7 @@ fn curve(terms: &[Term], rows: &[&Row], cache_bytes: f64, other: Option<&CostCur
     let largest = evidence.iter().map(|r| r.0).fold(0.0, f64::max);
     evidence.extend(floors.iter().filter(|f| f.0 <= largest && f.1 > 0.0));
     curve.correction = correction(&evidence, &floors);
-    let spread_ln = robust_deviation(&residuals(&curve, rows, false).into_iter().map(|r| r.1).collect::<Vec<f64>>());
+    let spread_ln = robust_deviation(&residuals(&curve, rows, false).into_iter().map(|r| r.1).collect::<Vec<f64>>()).unwrap_or(0.0);
     (curve, spread_ln)
 }
 
