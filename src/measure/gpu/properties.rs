@@ -140,8 +140,8 @@ fn clock_parameter(
     match (nvml.map(|nvml| &nvml.clock_ghz), sysfs) {
         (Some(Ok(ghz)), _) => Parameter::reported(name, *ghz, "NVML, clock of the multiprocessors under load"),
         (_, Some((ghz, source))) => Parameter::reported(name, ghz, &format!("{source}, under load")),
-        (Some(Err(why)), None) => Parameter::missing(id, why),
-        (None, None) => Parameter::missing(id, unknown(info)),
+        (Some(Err(why)), None) => Parameter::missing(name, why),
+        (None, None) => Parameter::missing(name, unknown(info)),
     }
 }
 
