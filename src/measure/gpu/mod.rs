@@ -35,7 +35,7 @@ const WARM_UP: Duration = Duration::from_millis(50);
 ///
 /// # Errors
 /// [`Error::Unavailable`](crate::Error) when there is no such GPU or its driver refuses to open it.
-pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, Error> {
+pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, String> {
     let began = Instant::now();
     let (opened, raw) = match gpus.adapter(index) {
         Some(adapter) => (gpus.open_another(index)?, raw::query(adapter)),
@@ -70,7 +70,7 @@ pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, Er
 ///
 /// # Errors
 /// [`Error::Unavailable`](crate::Error) when there are fewer than two, or one of them can't be opened.
-pub fn gpu_group(gpus: &Gpus, indices: &[u32], options: &Options) -> Result<GpuGroup, Error> {
+pub fn gpu_group(gpus: &Gpus, indices: &[u32], options: &Options) -> Result<GpuGroup, String> {
     let mut indices = indices.to_vec();
     indices.sort_unstable();
     indices.dedup();
