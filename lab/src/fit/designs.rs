@@ -8,7 +8,7 @@ use crate::fit::terms::{fallback_method, terms};
 use crate::fit::min_of_two::MinOfTwo;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::stats::robust_deviation;
 use sapwise::model::{Feature, MethodModel, ModelTerm, Scale};
 use crate::report::Label;
@@ -349,10 +349,10 @@ fn nanoseconds(
     row: &Row,
 ) -> Result<(Vec<f64>, Vec<f64>), String> {
     let backend = id.backend();
-    let cache = hardware.value(parameter::CACHE_LLC_BYTES).filter(|c| *c > 0.0);
+    let cache = hardware.value(ParameterId::CacheLlcBytes).filter(|c| *c > 0.0);
     let cache = match backend.class() {
         BackendClass::Cpu => {
-            cache.ok_or_else(|| format!("the hardware parameter {} is missing", parameter::CACHE_LLC_BYTES))?
+            cache.ok_or_else(|| format!("the hardware parameter {} is missing", ParameterId::CacheLlcBytes))?
         }
         BackendClass::Gpu => 0.0,
     };
