@@ -25,6 +25,12 @@ pub fn median(samples: &[f64]) -> Option<f64> {
     quantile(samples, 0.5)
 }
 
+/// The mean; 0 of no values.
+#[must_use]
+pub fn mean(values: &[f64]) -> f64 {
+    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+}
+
 /// Standard deviations of a normal distribution to either side of its mean that hold 90 % of it.
 pub const NORMAL_90: f64 = 1.645;
 
@@ -114,6 +120,11 @@ mod tests {
         assert_eq!(quantile(&samples, -1.0), Some(1.0));
         assert_eq!(quantile(&samples, 2.0), Some(4.0));
         assert_eq!(quantile(&samples, f64::NAN), Some(1.0));
+    }
+
+    #[test]
+    fn means_by_hand() {
+        assert_eq!((mean(&[]), mean(&[1.0, 2.0, 6.0])), (0.0, 3.0));
     }
 
     #[test]

@@ -2,12 +2,10 @@
 //!
 //! Works on the text of a file, so that it needs no types of old versions. What is current already is refused: nothing is converted twice.
 
-use crate::Report;
-use crate::report::write_report;
-use crate::training::{StoredModel, write_model};
-use sapwise::{Tuning, json};
-use serde::de::DeserializeOwned;
-use serde_json::{Map, Value, json};
+use crate::report;
+use crate::training::{read_model, write_model};
+use sapwise::json;
+use serde_json::{Map, Value};
 
 /// The old names of the methods, and what each is called now.
 const METHODS: [(&str, &str); 3] = [("strips", "grid-sap"), ("sweep", "sap"), ("verlet", "pair-cache")];
@@ -23,6 +21,10 @@ const DROPPED: [(&str, &str); 2] = [
     ("folds", "the fits without some machines, which intervals were made of"),
 ];
 const DROPPED_OF_VALIDATION: [(&str, &str); 1] = [("learning", "the scores of trainings on fewer machines")];
+const DROPPED_OF_COVERAGE: [(&str, &str); 2] = [
+    ("crossings", "the share of crossovers within their interval"),
+    ("crossings_count", "how many crossovers there were"),
+];
 
 /// A file in its current form.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -54,7 +56,7 @@ pub enum ConvertError {
     Unknown(String),
     /// Its form is that of an old file, and what it holds is not sound.
     #[error("it is no sound {0}")]
-    Unsound(&'static str, #[source] Box<dyn std::error::Error + Send + Sync>),
+    Unsound(&'static str, #[source] Unsound),
 }
 
 /// Converts `report/1` into `report/2`, `model/1` into `model/2` and `fields/1` into `tuning/1`. No figure that is kept changes.
@@ -66,13 +68,16 @@ pub fn convert(text: &str) -> Result<Converted, ConvertError> {
     let Value::Object(mut file) = file else { return Err(ConvertError::Unknown("it is no object".to_owned())) };
     let schema = file.get("schema").and_then(Value::as_str).unwrap_or_default().to_owned();
     let mut dropped = Vec::new();
-    let (schema, write): (_, fn(Value) -> Result<String, Unsound>) = match schema.as_str() {
-        "report/1" => ("report/2", |v| Ok(write_report(&read::<Report>(v)?)?)),
+    let (schema, current): (_, fn(&str) -> Result<String, Unsound>) = match schema.as_str() {
+        "report/1" => ("report/2", |text| Ok(report::write(&report::read(text)?)?)),
         "model/1" => {
             dropped = move_training(&mut file);
-            ("model/2", |v| Ok(write_model(&read::<StoredModel>(v)?)?))
+            ("model/2", |text| {
+                let stored = read_model(text)?;
+                Ok(write_model(&stored.model, &stored.training)?)
+            })
         }
-        "fields/1" => ("tuning/1", |v| Ok(json::write(&read::<Tuning>(v)?)?)),
+        "fields/1" => ("tuning/1", |text| Ok(json::write_tuning(&json::tuning(text)?)?)),
         "cache/1" => return Err(ConvertError::Cache),
         "" => return Err(ConvertError::Unknown("it names no schema".to_owned())),
         current if ["report/", "model/", "tuning/", "cache/"].iter().any(|s| current.starts_with(s)) => {
@@ -80,18 +85,15 @@ pub fn convert(text: &str) -> Result<Converted, ConvertError> {
         }
         other => return Err(ConvertError::Unknown(format!("its schema is {other:?}"))),
     };
-    file.insert("schema".to_owned(), json!(schema));
+    file.insert("schema".to_owned(), schema.into());
     let mut file = Value::Object(file);
     rename(&mut file);
-    let text = write(file).map_err(|why| ConvertError::Unsound(schema, why))?;
+    // Read and written as any other file: what can't be read is refused here, and the keys stand in their usual order.
+    let text = current(&file.to_string()).map_err(|why| ConvertError::Unsound(schema, why))?;
     Ok(Converted { text, schema, dropped })
 }
 
 type Unsound = Box<dyn std::error::Error + Send + Sync>;
-
-fn read<T: DeserializeOwned>(file: Value) -> Result<T, Unsound> {
-    Ok(serde_json::from_value(file)?)
-}
 
 /// Puts what a model says of its training under a key of its own, and tells what is left out.
 fn move_training(model: &mut Map<String, Value>) -> Vec<String> {
@@ -105,9 +107,12 @@ fn move_training(model: &mut Map<String, Value>) -> Vec<String> {
         TRAINING.iter().filter_map(|&key| Some((key.to_owned(), model.remove(key)?))).collect();
     if let Some(validation) = training.get_mut("validation").and_then(Value::as_object_mut) {
         dropped.extend(drop_keys(validation, &DROPPED_OF_VALIDATION));
+        if let Some(coverage) = validation.get_mut("coverage").and_then(Value::as_object_mut) {
+            dropped.extend(drop_keys(coverage, &DROPPED_OF_COVERAGE));
+        }
     }
     if simulated {
-        model.insert("simulated".to_owned(), json!(true));
+        model.insert("simulated".to_owned(), true.into());
     }
     model.insert("training".to_owned(), Value::Object(training));
     dropped
