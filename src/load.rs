@@ -25,6 +25,30 @@ pub struct Load {
 }
 
 impl Load {
+    /// A frame of so many boxes of which nothing else is known: no pair, and none of them moves.
+    #[must_use]
+    pub fn of_objects(objects: u32) -> Self {
+        Self { objects, ..Self::default() }
+    }
+
+    /// The same with so many overlapping pairs.
+    #[must_use]
+    pub fn with_pairs(self, pairs: f64) -> Self {
+        Self { pairs, ..self }
+    }
+
+    /// The same with so many candidates: pairs that overlap on one axis, and those of them that share a strip.
+    #[must_use]
+    pub fn with_candidates(self, axis: f64, strip: f64) -> Self {
+        Self { axis_candidates: axis, strip_candidates: strip, ..self }
+    }
+
+    /// The same with boxes that move so far in a frame.
+    #[must_use]
+    pub fn with_moved(self, moved: f64) -> Self {
+        Self { moved, ..self }
+    }
+
     /// Estimates the load of a frame from up to 256 of its boxes, in a time that does not grow beyond 16 000 objects.
     ///
     /// `pairs` is the number of pairs of the frame before and `moved` how far the boxes have moved since, if there was one.
