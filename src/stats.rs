@@ -38,6 +38,26 @@ pub fn relative_iqr(samples: &[f64]) -> Option<f64> {
     relative.is_finite().then_some(relative)
 }
 
+/// Quantile of the normal distribution for either end of a 90 % interval.
+pub const NORMAL_95: f64 = 1.645;
+
+/// Makes the median absolute deviation of a normal distribution its standard deviation.
+pub const MAD_TO_DEVIATION: f64 = 1.4826;
+
+/// The mean; 0 of no values.
+#[must_use]
+pub fn mean(values: &[f64]) -> f64 {
+    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+}
+
+/// Standard deviation of values around their median, estimated from the median absolute deviation; 0 of no values.
+#[must_use]
+pub fn robust_deviation(values: &[f64]) -> f64 {
+    let centre = median(values).unwrap_or(0.0);
+    let distances: Vec<f64> = values.iter().map(|v| (v - centre).abs()).collect();
+    MAD_TO_DEVIATION * median(&distances).unwrap_or(0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -68,6 +88,12 @@ mod tests {
         assert_eq!(quantile(&samples, -1.0), Some(1.0));
         assert_eq!(quantile(&samples, 2.0), Some(4.0));
         assert_eq!(quantile(&samples, f64::NAN), Some(1.0));
+    }
+
+    #[test]
+    fn means_and_robust_deviations_by_hand() {
+        assert_eq!((mean(&[]), mean(&[1.0, 2.0, 6.0])), (0.0, 3.0));
+        assert_eq!((robust_deviation(&[]), robust_deviation(&[1.0, 2.0, 4.0])), (0.0, MAD_TO_DEVIATION));
     }
 
     #[test]

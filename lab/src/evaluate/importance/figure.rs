@@ -1,6 +1,6 @@
-//! The parameters of a machine that its predicted costs depend on, and what it would be with others.
+//! The parameters of a machine that its predicted costs depend on, and what it would be with another value of one.
 
-use super::super::profile::Profile;
+use crate::data::Profile;
 use sapwise::hardware::{gpu, parameter};
 use sapwise::model::GPU_PREFIX;
 use sapwise::{GpuKind, Hardware, Parameter};
@@ -52,7 +52,7 @@ impl Figure {
         if self.of_gpus { format!("{GPU_PREFIX}{}", self.names[0]) } else { self.names[0].to_owned() }
     }
 
-    /// Its value, above zero: of the machine, or of the first GPU that is no program.
+    /// Its value, above zero: of the machine, or of the first GPU that is no software adapter.
     pub(super) fn value(self, hardware: &Hardware) -> Option<f64> {
         let of = |name: &&str| match self.of_gpus {
             false => hardware.value(name),
@@ -61,26 +61,20 @@ impl Figure {
         self.names.iter().find_map(of).filter(|v| *v > 0.0)
     }
 
-    /// The hardware with `factor` times the value. All GPUs change alike, and so does what may stand for the parameter.
-    pub(super) fn times(self, hardware: &Hardware, factor: f64) -> Hardware {
-        let mut other = hardware.clone();
-        let change = |p: &mut Parameter| {
-            if self.names.contains(&p.name.as_str()) {
-                p.value = p.value.map(|v| v * factor);
-            }
-        };
-        match self.of_gpus {
-            false => other.parameters.iter_mut().for_each(change),
-            true => other.gpus.iter_mut().flat_map(|g| &mut g.parameters).for_each(change),
-        }
-        other
-    }
-
-    /// The profile as if this had been found to be `value`, where it was found at all.
+    /// The profile as if this had been found to be `value`, where it was found at all. All GPUs change alike, and so does what may stand for
+    /// the parameter.
     pub(super) fn replaced(self, profile: &Profile, value: f64) -> Profile {
         let mut other = profile.clone();
         let Some(own) = self.value(&profile.hardware) else { return other };
-        other.hardware = self.times(&profile.hardware, value / own);
+        let change = |p: &mut Parameter| {
+            if self.names.contains(&p.name.as_str()) {
+                p.value = p.value.map(|v| v * value / own);
+            }
+        };
+        match self.of_gpus {
+            false => other.hardware.parameters.iter_mut().for_each(change),
+            true => other.hardware.gpus.iter_mut().flat_map(|g| &mut g.parameters).for_each(change),
+        }
         // How far the cores lay apart at each point would tell the fork and join and the latency again.
         if self.names.iter().any(|n| [parameter::FORK_JOIN_COLD_NS, parameter::CORE_TO_CORE_NS].contains(n)) {
             other.points.iter_mut().for_each(|p| p.core_to_core_ns = None);

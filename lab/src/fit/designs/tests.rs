@@ -1,4 +1,4 @@
-use super::super::synthetic::{Machine, gpu_truth, truth};
+use crate::synthetic::{Machine, gpu_truth, truth};
 use super::*;
 
 fn profiles(machines: impl IntoIterator<Item = Machine>) -> Vec<Profile> {
@@ -38,7 +38,7 @@ fn coefficients_are_recovered_from_six_machines_and_predict_the_seventh() {
 }
 
 #[test]
-fn coefficients_on_gpus_are_recovered_and_predict_the_machine_left_out() {
+fn coefficients_on_gpus_are_recovered_and_predict_the_machine_held_out() {
     let all = profiles(Machine::family_with_gpus().into_iter().map(Machine::exact));
     let (models, notes) = fitted(&all[..7]);
     assert!(notes.is_empty() && models.len() == 7, "{notes:?}");
@@ -74,13 +74,13 @@ fn one_machine_with_a_gpu_has_a_model_of_full_rank() {
 }
 
 #[test]
-fn programs_that_act_as_gpus_serve_only_where_there_is_no_real_one() {
+fn software_adapters_serve_only_where_there_is_no_real_one() {
     let mut all = profiles(Machine::family_with_gpus().into_iter().take(3));
     let software = |p: &mut Profile| p.hardware.gpus.iter_mut().for_each(|g| g.gpu.kind = GpuKind::Software);
     software(&mut all[0]);
     let kinds = |all: &[Profile]| {
         let (models, notes) = fitted(all);
-        let told = notes.iter().any(|n| n.contains("programs that act as GPUs are left out"));
+        let told = notes.iter().any(|n| n.contains("software adapters are left out"));
         (models.into_iter().find(|m| m.backend == BackendClass::Gpu).unwrap().gpu_kinds, told)
     };
     let (found, told) = kinds(&all);

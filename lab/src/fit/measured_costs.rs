@@ -1,16 +1,17 @@
 //! The measured cost curves of one machine, from its own report.
 
-use super::profile::Profile;
-use super::robust::{Problem, spread, weighted_median};
-use super::rows::{Row, rows};
-use super::terms::{other_way, terms_of_one_machine};
-use super::two_ways::TwoWays;
+use crate::data::Profile;
+use crate::fit::robust::{Problem, weighted_median};
+use crate::fit::rows::{Row, rows};
+use crate::fit::terms::{fallback_method, terms_of_one_machine};
+use crate::fit::min_of_two::MinOfTwo;
 use anyhow::{Result, bail};
 use ndarray::Array2;
-use sapwise::crossover::{Comparison, Paired};
+use crate::paired::{PairedComparison, PairedSamples};
 use sapwise::hardware::parameter;
-use sapwise::report::{Label, Point, Report, Timed};
-use sapwise::{AlgorithmCost, AlgorithmId, Border, CostCurve, CostTerm, Tuning, Knot, Load, Source};
+use sapwise::stats::robust_deviation;
+use crate::report::{Label, Point, Report, Timed};
+use sapwise::{AlgorithmCost, AlgorithmId, CostCurve, CostTerm, Crossover, Knot, Load, Source, Term, Tuning};
 
 /// Distance of the knots of a correction, in octaves of the number of objects.
 const KNOT_STEP: f64 = 0.5;
@@ -26,7 +27,7 @@ const FEWEST_POINTS: usize = 3;
 ///
 /// # Errors
 /// When no point of `scenario`, or no algorithm, has enough timings; names the scenarios there are.
-pub(crate) fn measured_tuning(report: &Report, scenario: &str) -> Result<Tuning> {
+pub fn measured_tuning(report: &Report, scenario: &str) -> Result<Tuning> {
     let mut tuning = profile_tuning(&Profile::of("", report), scenario)?;
     if report.label == Label::Simulated {
         tuning.warnings.push("the report is simulated".to_owned());
@@ -40,7 +41,7 @@ pub(crate) fn measured_tuning(report: &Report, scenario: &str) -> Result<Tuning>
 
 /// The same without intervals from paired samples, which a profile does not hold.
 fn profile_tuning(profile: &Profile, scenario: &str) -> Result<Tuning> {
-    let loads = slice(profile, scenario)?;
+    let loads = measured_slice(profile, scenario)?;
     let (costs, warnings) = measured_costs(profile);
     let mut tuning = slice_tuning(costs, scenario, &loads)?;
     tuning.warnings = warnings;
@@ -51,7 +52,7 @@ fn profile_tuning(profile: &Profile, scenario: &str) -> Result<Tuning> {
 ///
 /// # Errors
 /// When there are no costs.
-pub(super) fn slice_tuning(costs: Vec<AlgorithmCost>, scenario: &str, loads: &[Load]) -> Result<Tuning> {
+pub fn slice_tuning(costs: Vec<AlgorithmCost>, scenario: &str, loads: &[Load]) -> Result<Tuning> {
     if costs.is_empty() {
         bail!("no algorithm of the report was timed at {FEWEST_POINTS} points; measure again with `sapwise probe`");
     }
@@ -62,10 +63,8 @@ pub(super) fn slice_tuning(costs: Vec<AlgorithmCost>, scenario: &str, loads: &[L
 ///
 /// # Errors
 /// When there are fewer than two; names the scenarios there are.
-pub(super) fn slice(profile: &Profile, scenario: &str) -> Result<Vec<Load>> {
-    let mut loads: Vec<Load> = profile.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load).collect();
-    loads.sort_by_key(|l| l.objects);
-    loads.dedup_by_key(|l| l.objects);
+pub fn measured_slice(profile: &Profile, scenario: &str) -> Result<Vec<Load>> {
+    let loads = profile.slice(scenario);
     if loads.len() < 2 {
         let mut known: Vec<&str> = profile.points.iter().map(|p| p.scenario.as_str()).collect();
         known.sort_unstable();
@@ -77,21 +76,21 @@ pub(super) fn slice(profile: &Profile, scenario: &str) -> Result<Vec<Load>> {
 }
 
 /// The cost curve of each algorithm that was timed often enough, and a sentence for each other one.
-pub(crate) fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<String>) {
+pub fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<String>) {
     let rows = rows(profile, 0);
     let cache_bytes = profile.hardware.value(parameter::CACHE_LLC_BYTES).unwrap_or(0.0);
     let (mut costs, mut warnings) = (Vec::new(), Vec::new());
     let mut order: Vec<(usize, &Timed)> = profile.algorithms.iter().enumerate().collect();
-    // Whoever goes over to another method comes after that.
-    order.sort_by_key(|(_, timed)| other_way(timed.id.method()).is_some());
+    // What falls back to another method comes after that.
+    order.sort_by_key(|(_, timed)| fallback_method(timed.id.method()).is_some());
     for (k, timed) in order {
         let own: Vec<&Row> = rows.iter().filter(|r| usize::from(r.algorithm) == k).collect();
         let points = own.iter().filter(|r| !r.floor).count();
-        let other = other_way(timed.id.method()).and_then(|other| {
+        let other = fallback_method(timed.id.method()).and_then(|other| {
             let same = |c: &&AlgorithmCost| c.algorithm.method() == other && c.algorithm.backend() == timed.id.backend();
             costs.iter().find(same).map(|c: &AlgorithmCost| c.curve.clone())
         });
-        let fitted = (points >= FEWEST_POINTS).then(|| curve(&timed.id, &own, cache_bytes, other.as_ref()));
+        let fitted = (points >= FEWEST_POINTS).then(|| curve(&terms_of(timed), &own, cache_bytes, other.as_ref()));
         match fitted.filter(|(curve, _)| curve.defect().is_none()) {
             Some((curve, spread_ln)) => {
                 costs.push(AlgorithmCost { algorithm: timed.id.clone(), revision: timed.revision, curve, spread_ln });
@@ -103,9 +102,19 @@ pub(crate) fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<Stri
     (costs, warnings)
 }
 
-/// The curve of one algorithm on one machine, and its spread. `other` is that of the algorithm that it goes over to, if it does.
-fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64, other: Option<&CostCurve>) -> (CostCurve, f64) {
-    let terms = terms_of_one_machine(id.method(), id.backend().class());
+/// What an algorithm's time consists of on one machine: the terms that its report names, else the usual ones.
+fn terms_of(timed: &Timed) -> Vec<Term> {
+    let mut terms: Vec<Term> = Vec::new();
+    for term in timed.terms.iter().map(|t| t.term) {
+        if !terms.contains(&term) {
+            terms.push(term);
+        }
+    }
+    if terms.is_empty() { terms_of_one_machine(timed.id.method(), timed.id.backend().class()) } else { terms }
+}
+
+/// The curve of one algorithm on one machine, and its spread. `other` is that of the algorithm that it falls back to, if it does.
+fn curve(terms: &[Term], rows: &[&Row], cache_bytes: f64, other: Option<&CostCurve>) -> (CostCurve, f64) {
     let problem = Problem {
         terms: Array2::from_shape_fn((rows.len(), terms.len()), |(k, j)| terms[j].count(&rows[k].load, cache_bytes)),
         ns: rows.iter().map(|r| r.ns).collect(),
@@ -117,12 +126,12 @@ fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64, other: Option<&CostC
         None => (problem.units(), Vec::new()),
         Some(other) => {
             let ns: Vec<f64> = rows.iter().map(|r| other.cost_ns(&r.load)).collect();
-            let found = TwoWays::fit(&problem, &ns);
+            let found = MinOfTwo::fit(&problem, &ns);
             let fallback_terms = other.terms.iter().map(|t| CostTerm { unit_ns: t.unit_ns * found.factor, ..*t }).collect();
             (found.units, fallback_terms)
         }
     };
-    let terms = terms.into_iter().zip(units).filter(|(_, u)| *u > 0.0).map(|(term, unit_ns)| CostTerm { term, unit_ns });
+    let terms = terms.iter().zip(units).filter(|(_, u)| *u > 0.0).map(|(&term, unit_ns)| CostTerm { term, unit_ns });
     let mut curve = CostCurve { terms: terms.collect(), fallback_terms, cache_bytes, correction: Vec::new() };
     if curve.defect().is_some() {
         return (curve, 0.0);
@@ -134,7 +143,7 @@ fn curve(id: &AlgorithmId, rows: &[&Row], cache_bytes: f64, other: Option<&CostC
     let largest = evidence.iter().map(|r| r.0).fold(0.0, f64::max);
     evidence.extend(floors.iter().filter(|f| f.0 <= largest && f.1 > 0.0));
     curve.correction = correction(&evidence, &floors);
-    let spread_ln = spread(residuals(&curve, rows, false).into_iter().map(|r| r.1).collect());
+    let spread_ln = robust_deviation(&residuals(&curve, rows, false).into_iter().map(|r| r.1).collect::<Vec<f64>>());
     (curve, spread_ln)
 }
 
@@ -198,25 +207,26 @@ fn measure_borders(tuning: &mut Tuning, report: &Report) {
 /// The border itself stays: the curves know all scenarios, and a choice by them changes there. Where the samples cross
 /// elsewhere the interval reaches from the border over their crossing, and where they don't cross to the last size. `None` where
 /// fewer than three sizes have both, or the border lies beyond them.
-fn measured_interval(border: &Border, report: &Report, scenario: &str) -> Option<(f64, f64)> {
+fn measured_interval(border: &Crossover, report: &Report, scenario: &str) -> Option<(f64, f64)> {
     let samples = |point: &'_ Point, id: &AlgorithmId| point.timings.iter().position(|t| t.algorithm == *id);
     let mut points = Vec::new();
     for point in report.points.iter().filter(|p| p.scenario == scenario) {
         let (Some(a), Some(b)) = (samples(point, &border.below), samples(point, &border.above)) else { continue };
-        points.push(Paired {
+        points.push(PairedSamples {
             objects: point.load.objects,
             first_ns: &point.timings[a].samples_ns,
             second_ns: &point.timings[b].samples_ns,
         });
     }
-    Comparison::new(&points)?.interval(border.objects, true)
+    PairedComparison::new(&points)?.interval(border.objects, true)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Machine, load};
+    use crate::synthetic::{Machine, load};
     use super::*;
-    use sapwise::report::Timing;
+    use crate::report::Timing;
+    use sapwise::BackendClass;
 
     #[test]
     fn choosing_by_the_curves_loses_little_and_never_what_left_the_race() {
@@ -265,7 +275,7 @@ mod tests {
         let mut rows: Vec<Row> = [16, 23, 32, 45].map(|n| row(n, 9000.0, false)).into();
         rows.extend([64, 1024, 16_384, 262_144].map(|n| row(n, 100.0 * f64::from(n) * 2.0, true)));
         let rows: Vec<&Row> = rows.iter().collect();
-        let (curve, _) = curve(&"brute@cpu2".parse().unwrap(), &rows, 1e6, None);
+        let (curve, _) = curve(&terms_of_one_machine("brute", BackendClass::Cpu), &rows, 1e6, None);
         assert_eq!(curve.defect(), None);
         for r in rows.iter().filter(|r| r.floor) {
             assert!(curve.cost_ns(&r.load) > 0.99 * r.ns, "{curve:?}");
@@ -311,7 +321,7 @@ mod tests {
     }
 
     /// A report of `brute@cpu1` and `grid-sap@cpu1` whose ratio is `(n / crossing) ^ 0.5` in `uniform`, and a border at 1000.
-    fn crossed_at(crossing: f64) -> (Report, Border) {
+    fn crossed_at(crossing: f64) -> (Report, Crossover) {
         let mut report = Machine::family()[0].clone().exact().report();
         let [below, above] = ["brute@cpu1", "grid-sap@cpu1"].map(|id| id.parse::<AlgorithmId>().unwrap());
         for point in &mut report.points {
@@ -326,7 +336,7 @@ mod tests {
             };
             point.timings = vec![timing(&above, 0.0), timing(&below, 0.5)];
         }
-        (report, Border { below, above, objects: 1000.0, low: Some(900.0), high: Some(1100.0) })
+        (report, Crossover { below, above, objects: 1000.0, low: Some(900.0), high: Some(1100.0) })
     }
 
     #[test]
@@ -350,10 +360,10 @@ mod tests {
         let (low, high) = measured_interval(&border, &report, "uniform").unwrap();
         assert!(low == 1000.0 && (high / f64::from(last) - 1.0).abs() < 1e-9, "{low} to {high}");
         // And a border beyond keeps the interval of the curves.
-        let beyond = Border { objects: 50_000.0, ..border };
+        let beyond = Crossover { objects: 50_000.0, ..border };
         assert_eq!(measured_interval(&beyond, &report, "uniform"), None);
         report.points.iter_mut().for_each(|p| p.timings.truncate(1));
-        assert_eq!(measured_interval(&Border { objects: 1000.0, ..beyond }, &report, "uniform"), None);
+        assert_eq!(measured_interval(&Crossover { objects: 1000.0, ..beyond }, &report, "uniform"), None);
     }
 
     #[test]

@@ -100,7 +100,7 @@ fn a_bend_at_a_cache_size_widens_the_interval_instead_of_missing_the_crossing() 
 
 #[test]
 fn one_that_is_always_cheaper_is_told_with_its_side() {
-    for (ahead, always) in [(0.05_f64, Crossover::AlwaysSecond), (-0.2, Crossover::AlwaysFirst)] {
+    for (ahead, always) in [(0.05_f64, PairedOutcome::AlwaysSecond), (-0.2, PairedOutcome::AlwaysFirst)] {
         let trials = Trials::new(&|_| ahead, USUAL, Second::Borders, 200);
         assert!(trials.found.iter().all(|c| *c == always));
     }
@@ -144,9 +144,9 @@ fn without_noise_the_crossing_is_exact_and_its_interval_too() {
     let sizes = [10_u32, 40, 160, 640, 2560];
     let samples: Vec<(Vec<u64>, Vec<u64>)> =
         sizes.iter().map(|&n| (vec![u64::from(n) * 1_000_000; 5], vec![320_000_000; 5])).collect();
-    let points: Vec<Paired<'_>> =
-        sizes.iter().zip(&samples).map(|(&objects, (a, b))| Paired { objects, first_ns: a, second_ns: b }).collect();
-    let found = crossover(&points).unwrap();
+    let points: Vec<PairedSamples<'_>> =
+        sizes.iter().zip(&samples).map(|(&objects, (a, b))| PairedSamples { objects, first_ns: a, second_ns: b }).collect();
+    let found = compare(&points).unwrap();
     let p = found.positions()[0];
     assert!((p.objects / 320.0 - 1.0).abs() < 1e-6 && p.high / p.low < 1.0 + 1e-6, "{p:?}");
 }
@@ -154,8 +154,8 @@ fn without_noise_the_crossing_is_exact_and_its_interval_too() {
 #[test]
 fn the_interval_of_a_given_border_ends_where_the_samples_tell() {
     let points = sweep(&crossing(1000.0, 1.0), USUAL, Second::Borders, 3);
-    let comparison = Comparison::new(&paired(&points)).unwrap();
-    let p = comparison.crossover().positions()[0];
+    let comparison = PairedComparison::new(&paired(&points)).unwrap();
+    let p = comparison.outcome().positions()[0];
     assert_eq!(comparison.interval(p.objects, true), Some((p.low, p.high)));
     // A border beside the crossing: from there over the crossing to its far end.
     assert_eq!(comparison.interval(200.0, true), Some((200.0, p.high)));
@@ -171,11 +171,11 @@ fn the_interval_of_a_given_border_ends_where_the_samples_tell() {
 
 #[test]
 fn too_little_gives_none_and_anything_else_an_ordered_interval() {
-    let empty = Paired { objects: 10, first_ns: &[], second_ns: &[1] };
-    assert_eq!(crossover(&[empty; 5]), None);
+    let empty = PairedSamples { objects: 10, first_ns: &[], second_ns: &[1] };
+    assert_eq!(compare(&[empty; 5]), None);
     let mut points = sweep(&crossing(1000.0, 1.0), USUAL, Second::Nothing, 1);
     points.truncate(2);
-    assert_eq!(crossover(&paired(&points)), None);
+    assert_eq!(compare(&paired(&points)), None);
     // Gaps, sizes side by side, single frames, values of any size, zeros, and no order at all.
     let mut random = Random(5);
     for _ in 0..300 {
@@ -186,9 +186,9 @@ fn too_little_gives_none_and_anything_else_an_ordered_interval() {
         };
         let lists: Vec<_> = (0..count).map(|_| (samples(), samples())).collect();
         let sizes: Vec<u32> = (0..count).map(|_| (random.uniform().powi(6) * f64::from(u32::MAX)) as u32).collect();
-        let points: Vec<Paired<'_>> =
-            sizes.iter().zip(&lists).map(|(&objects, (a, b))| Paired { objects, first_ns: a, second_ns: b }).collect();
-        for p in crossover(&points).iter().flat_map(Crossover::positions) {
+        let points: Vec<PairedSamples<'_>> =
+            sizes.iter().zip(&lists).map(|(&objects, (a, b))| PairedSamples { objects, first_ns: a, second_ns: b }).collect();
+        for p in compare(&points).iter().flat_map(PairedOutcome::positions) {
             assert!(p.low <= p.objects && p.objects <= p.high && p.low >= 0.99 && p.high < 4.4e9, "{p:?}");
         }
     }

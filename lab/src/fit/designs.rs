@@ -1,16 +1,17 @@
 //! The cost model of a method on one class of processor, shared by all machines, thread counts and GPUs.
 
-use super::profile::Profile;
-use super::residual::{Residuals, Ridge};
-use super::robust::{Problem, spread};
-use super::rows::{Row, rows};
-use super::terms::{other_way, terms};
-use super::two_ways::TwoWays;
+use crate::data::Profile;
+use crate::fit::residual::{Residuals, Ridge};
+use crate::fit::robust::Problem;
+use crate::fit::rows::{Row, rows};
+use crate::fit::terms::{fallback_method, terms};
+use crate::fit::min_of_two::MinOfTwo;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
 use sapwise::hardware::parameter;
+use sapwise::stats::robust_deviation;
 use sapwise::model::{Feature, MethodModel, ModelTerm, Scale};
-use sapwise::report::Label;
+use crate::report::Label;
 use sapwise::{AlgorithmId, Backend, BackendClass, GpuKind, Hardware, Term};
 use std::collections::BTreeMap;
 
@@ -25,17 +26,17 @@ const MOST_ROWS: usize = 6000;
 const FEWEST_OF_PROFILE: usize = 2;
 
 /// What the time of a method on a class of processor may consist of.
-pub(crate) type TermsOf = dyn Fn(&str, BackendClass) -> Vec<(Term, Scale)>;
+pub type TermsOf = dyn Fn(&str, BackendClass) -> Vec<(Term, Scale)>;
 
 /// The rows of every method with all that a fit needs of them, worked out once for all fits to parts of the profiles.
 #[derive(Debug)]
-pub(crate) struct Designs<'a> {
+pub struct Designs<'a> {
     profiles: &'a [Profile],
     /// Position of the physical machine of each profile, counted in the order of their first profiles.
     machines: Vec<usize>,
     methods: Vec<Design>,
     /// What was left out because a parameter is missing.
-    pub(crate) notes: Vec<String>,
+    pub notes: Vec<String>,
 }
 
 /// The rows of one method.
@@ -49,19 +50,19 @@ struct Design {
     values: Array2<f64>,
     /// Shape (rows, features of the class).
     features: Array2<f64>,
-    /// Terms of the method that this one goes over to, and their values; none where there is no such method.
+    /// Terms of the method that this one falls back to, and their values; none where there is no such method.
     other_terms: Vec<(Term, Scale)>,
     other_values: Array2<f64>,
 }
 
 impl<'a> Designs<'a> {
-    /// The rows of all methods with the terms that `terms` gives each.
-    pub(crate) fn new(profiles: &'a [Profile]) -> Self {
+    /// The rows of all methods, with the terms that reports name for one, else with the usual ones.
+    pub fn new(profiles: &'a [Profile]) -> Self {
         Self::with(profiles, &terms)
     }
 
-    /// The same with other terms, which tells what a term is worth.
-    pub(crate) fn with(profiles: &'a [Profile], terms: &TermsOf) -> Self {
+    /// The same with other terms in place of the usual ones, which tells what a term is worth.
+    pub fn with(profiles: &'a [Profile], terms: &TermsOf) -> Self {
         let most = (MOST_ROWS / profiles.len().max(1)).max(FEWEST_OF_PROFILE);
         let mut by_method: BTreeMap<(BackendClass, String), Vec<Row>> = BTreeMap::new();
         for (k, profile) in profiles.iter().enumerate() {
@@ -76,13 +77,13 @@ impl<'a> Designs<'a> {
         }
         let mut notes = Vec::new();
         let mut by_method: Vec<_> = by_method.into_iter().collect();
-        // Whoever goes over to another method is fitted after that.
-        by_method.sort_by_key(|((_, method), _)| other_way(method).is_some());
+        // What falls back to another method is fitted after that.
+        by_method.sort_by_key(|((_, method), _)| fallback_method(method).is_some());
         let methods = by_method
             .into_iter()
             .map(|((class, method), rows)| {
-                let own = terms(&method, class);
-                let other = other_way(&method).map_or_else(Vec::new, |other| terms(other, class));
+                let own = reported_terms(profiles, &method, class).unwrap_or_else(|| terms(&method, class));
+                let other = fallback_method(&method).map_or_else(Vec::new, |other| terms(other, class));
                 Design::new(method, class, [own, other], rows, profiles, &mut notes)
             })
             .collect();
@@ -94,17 +95,17 @@ impl<'a> Designs<'a> {
     ///
     /// # Errors
     /// When the regression of a residual fails.
-    pub(crate) fn fit(&self, chosen: &[bool]) -> Result<(Vec<MethodModel>, Vec<String>)> {
+    pub fn fit(&self, chosen: &[bool]) -> Result<(Vec<MethodModel>, Vec<String>)> {
         let (mut models, mut notes): (Vec<MethodModel>, _) = (Vec::new(), Vec::new());
         for design in &self.methods {
-            let other = other_way(&design.method)
+            let other = fallback_method(&design.method)
                 .and_then(|other| models.iter().find(|m| m.method == other && m.backend == design.class))
                 .map(|m| m.terms.clone());
             let mut rows: Vec<usize> = (0..design.rows.len()).filter(|&k| chosen[design.rows[k].profile]).collect();
             let name = design.name();
             if design.leave_out_software(&mut rows, self.profiles) {
                 notes.push(format!(
-                    "{name}: timings on programs that act as GPUs are left out, there being timings on real ones"
+                    "{name}: timings on software adapters are left out, there being timings on real GPUs"
                 ));
             }
             match design.fit(&rows, self.profiles, &self.machines, other.as_deref())? {
@@ -122,6 +123,19 @@ impl<'a> Designs<'a> {
     }
 }
 
+/// The terms that the reports name for a method, each once in the order of the first that has it; `None` where no report names any.
+fn reported_terms(profiles: &[Profile], method: &str, class: BackendClass) -> Option<Vec<(Term, Scale)>> {
+    let timed = profiles.iter().flat_map(|p| &p.algorithms);
+    let own = timed.filter(|t| t.id.method() == method && t.id.backend().class() == class).flat_map(|t| &t.terms);
+    let mut terms: Vec<(Term, Scale)> = Vec::new();
+    for term in own.map(|t| (t.term, t.scale)) {
+        if !terms.contains(&term) {
+            terms.push(term);
+        }
+    }
+    Some(terms).filter(|t| !t.is_empty())
+}
+
 /// Position of the physical machine of each profile.
 fn machines(profiles: &[Profile]) -> Vec<usize> {
     let mut known: BTreeMap<&str, usize> = BTreeMap::new();
@@ -135,7 +149,7 @@ fn machines(profiles: &[Profile]) -> Vec<usize> {
 }
 
 /// At most so many of the rows, evenly spaced, from a place that differs with `turn`.
-pub(super) fn thinned(rows: Vec<Row>, most: usize, turn: usize) -> Vec<Row> {
+pub(crate) fn thinned(rows: Vec<Row>, most: usize, turn: usize) -> Vec<Row> {
     let all = rows.len();
     if all <= most {
         return rows;
@@ -192,17 +206,17 @@ impl Design {
         profiles[row.profile].id(row.algorithm)
     }
 
-    /// Leaves out the rows on programs that act as GPUs, where others are left. They are bound by the CPU, so that what they
+    /// Leaves out the rows on software adapters, where others are left. They are bound by the CPU, so that what they
     /// share with a GPU is the interface only. Whether any was left out.
     fn leave_out_software(&self, rows: &mut Vec<usize>, profiles: &[Profile]) -> bool {
         if self.class == BackendClass::Cpu {
             return false;
         }
         let software = |&k: &usize| self.gpu_kinds(k, profiles).contains(&GpuKind::Software);
-        let (programs, real): (Vec<usize>, Vec<usize>) = rows.drain(..).partition(software);
+        let (adapters, real): (Vec<usize>, Vec<usize>) = rows.drain(..).partition(software);
         let some_real = real.iter().any(|&k| !self.rows[k].floor);
-        let some_left_out = some_real && !programs.is_empty();
-        *rows = if some_real { real } else { programs };
+        let some_left_out = some_real && !adapters.is_empty();
+        *rows = if some_real { real } else { adapters };
         some_left_out
     }
 
@@ -215,7 +229,7 @@ impl Design {
         }
     }
 
-    /// The model of some of the rows; `other` are the terms with units of the method that this one goes over to.
+    /// The model of some of the rows; `other` are the terms with units of the method that this one falls back to.
     fn fit(
         &self,
         rows: &[usize],
@@ -235,16 +249,16 @@ impl Design {
             groups: (0..rows.len()).map(|k| row(k).profile).collect(),
         };
         let other_ns = other.map(|other| self.other_ns(rows, other)).filter(|ns| ns.iter().all(|ns| *ns > 0.0));
-        let two_ways = other_ns.as_ref().map(|other_ns| TwoWays::fit(&problem, other_ns));
-        let mut units = Array1::from(two_ways.as_ref().map_or_else(|| problem.units(), |found| found.units.clone()));
+        let min_of_two = other_ns.as_ref().map(|other_ns| MinOfTwo::fit(&problem, other_ns));
+        let mut units = Array1::from(min_of_two.as_ref().map_or_else(|| problem.units(), |found| found.units.clone()));
         // Timings of one thread tell nothing of a fork and join, and without it several threads would be the best choice everywhere.
         for (unit, (column, (_, scale))) in units.iter_mut().zip(problem.terms.columns().into_iter().zip(&self.terms)) {
             if *scale == Scale::ForkJoin && column.iter().all(|v| *v == 0.0) {
                 *unit = UNSEEN_FORK_JOINS;
             }
         }
-        let modelled = match two_ways.as_ref().zip(other_ns.as_ref()) {
-            Some((two_ways, other_ns)) => two_ways.modelled(&problem, other_ns),
+        let modelled = match min_of_two.as_ref().zip(other_ns.as_ref()) {
+            Some((min_of_two, other_ns)) => min_of_two.modelled(&problem, other_ns),
             None => problem.terms.dot(&units),
         };
         if measured.iter().any(|&k| modelled[k] <= 0.0) {
@@ -252,7 +266,7 @@ impl Design {
         }
         let ln_ratios: Vec<f64> = measured.iter().map(|&k| (row(k).ns / modelled[k]).ln()).collect();
         // A point that the terms miss by far is a term that is missing, or a disturbed measurement: either way no slope.
-        let reach = 3.0 * spread(ln_ratios.clone()).max(0.01);
+        let reach = 3.0 * robust_deviation(&ln_ratios).max(0.01);
         let residuals = Residuals {
             names: Feature::of(self.class),
             features: self.features.select(Axis(0), &measured.iter().map(|&k| rows[k]).collect::<Vec<_>>()),
@@ -261,8 +275,8 @@ impl Design {
             groups: measured.iter().map(|&k| machines[row(k).profile]).collect(),
         };
         let ridge = residuals.ridge()?;
-        let left = (0..measured.len()).map(|k| residuals.ln_ratios[k] - residuals.at(&ridge, k));
-        let spread_ln = spread(left.collect());
+        let left: Vec<f64> = (0..measured.len()).map(|k| residuals.ln_ratios[k] - residuals.at(&ridge, k)).collect();
+        let spread_ln = robust_deviation(&left);
         let used = self.terms.iter().zip(&units).filter(|(_, u)| **u > 0.0);
         let objects = || measured.iter().map(|&k| row(k).load.objects);
         let mut gpu_kinds: Vec<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();
@@ -279,7 +293,7 @@ impl Design {
             min_objects: objects().min().unwrap_or(1),
             max_objects: objects().max().unwrap_or(1),
             terms: used.map(|(&(term, scale), &unit)| ModelTerm { term, scale, unit }).collect(),
-            fallback_terms: two_ways.zip(other).map_or_else(Vec::new, |(found, other)| {
+            fallback_terms: min_of_two.zip(other).map_or_else(Vec::new, |(found, other)| {
                 other.iter().map(|t| ModelTerm { unit: t.unit * found.factor, ..*t }).collect()
             }),
             residual_intercept: intercept,
@@ -288,7 +302,7 @@ impl Design {
         }))
     }
 
-    /// What the method that this one goes over to costs in some of the rows, without its residual.
+    /// What the method that this one falls back to costs in some of the rows, without its residual.
     fn other_ns(&self, rows: &[usize], other: &[ModelTerm]) -> Vec<f64> {
         let unit = |(term, scale): &(Term, Scale)| {
             other.iter().find(|t| (t.term, t.scale) == (*term, *scale)).map_or(0.0, |t| t.unit)

@@ -3,7 +3,7 @@
 //! Drawing frames anew would show the error of a median within its point only. Between points the host changes, and with it
 //! both costs by some percent; that error shows in how far medians lie from the lines, and between rounds.
 
-use super::Paired;
+use super::PairedSamples;
 
 /// A line takes part of this much to either side of its place, in natural logarithms of the size: 0.6 of a decade, over which
 /// the exponents of costs change little.
@@ -20,7 +20,7 @@ const GRID_STEP: f64 = std::f64::consts::LN_2 / 32.0;
 
 /// `ln(first / second)` over the logarithm of the size.
 #[derive(Debug, Clone)]
-pub(super) struct Ratio {
+pub struct Ratio {
     /// Ascending by place.
     medians: Vec<Median>,
     /// How far each median lies from the line at its place, in the order of the medians.
@@ -29,7 +29,7 @@ pub(super) struct Ratio {
     variances: Vec<(f64, f64)>,
     rounds: usize,
     /// Places, in natural logarithms of the objects.
-    pub(super) grid: Vec<f64>,
+    pub grid: Vec<f64>,
     /// For each place the line there.
     lines: Vec<Line>,
 }
@@ -61,8 +61,8 @@ struct Line {
 
 /// A weighted sum of medians.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Estimate {
-    pub(super) value: f64,
+pub struct Estimate {
+    pub value: f64,
     deviation: f64,
     /// Degrees of freedom of the deviation.
     freedom: f64,
@@ -70,7 +70,7 @@ pub(super) struct Estimate {
 
 impl Estimate {
     /// The value over the one that pure noise exceeds as rarely as a normal variable exceeds `quantile`.
-    pub(super) fn in_units_of(self, quantile: f64) -> f64 {
+    pub fn in_units_of(self, quantile: f64) -> f64 {
         let units = self.value / (self.deviation * student(quantile, self.freedom));
         // Without noise and exactly at a crossing nothing is told from nothing.
         if units.is_nan() { 0.0 } else { units }
@@ -80,7 +80,7 @@ impl Estimate {
 impl Ratio {
     /// `None` with fewer than three sizes that have a pair of samples. Where costs bend is told by differences beyond
     /// `distinct`, a quantile of the normal distribution.
-    pub(super) fn new(points: &[Paired<'_>], distinct: f64) -> Option<Self> {
+    pub fn new(points: &[PairedSamples<'_>], distinct: f64) -> Option<Self> {
         let (medians, rounds) = medians(points);
         let places: Vec<f64> = medians.iter().map(|m| m.at).collect();
         let mut sizes = places.clone();
@@ -125,7 +125,7 @@ impl Ratio {
     }
 
     /// The ratio at each place of the grid. Its error is that of the points and of bends, or that between rounds if it is larger.
-    pub(super) fn curve(&self) -> Vec<Estimate> {
+    pub fn curve(&self) -> Vec<Estimate> {
         let widened = |l: &Line| {
             let estimate = self.estimate(&l.weights);
             let deviation = estimate.deviation.hypot(l.bend).max(self.between_rounds(&l.weights));
@@ -136,7 +136,7 @@ impl Ratio {
 
     /// The sum of the ratio over a stretch of the grid, with the error between points and not that between rounds: a change of
     /// the host moves a crossing, which its interval tells, and would hide here what each of the rounds shows.
-    pub(super) fn area(&self, from: usize, to: usize) -> Estimate {
+    pub fn area(&self, from: usize, to: usize) -> Estimate {
         let mut total = vec![0.0; self.medians.len()];
         for Line { weights: Weights(first, weights), .. } in &self.lines[from..=to] {
             total[*first..].iter_mut().zip(weights).for_each(|(t, w)| *t += w);
@@ -171,7 +171,7 @@ impl Ratio {
 }
 
 /// The median of each point, ascending by size, and the number of rounds.
-fn medians(points: &[Paired<'_>]) -> (Vec<Median>, usize) {
+fn medians(points: &[PairedSamples<'_>]) -> (Vec<Median>, usize) {
     let mut medians = Vec::new();
     let (mut round, mut before) = (0, 0);
     for point in points.iter().filter(|p| p.objects > 0) {
@@ -298,7 +298,7 @@ mod tests {
 
     #[test]
     fn rounds_begin_where_sizes_do_not_grow() {
-        let at = |objects| Paired { objects, first_ns: &[2], second_ns: &[1] };
+        let at = |objects| PairedSamples { objects, first_ns: &[2], second_ns: &[1] };
         let (medians, rounds) = medians(&[at(10), at(30), at(90), at(30), at(50), at(50)]);
         let order: Vec<(f64, usize)> = medians.iter().map(|m| (m.at.exp().round(), m.round)).collect();
         assert_eq!(order, [(10.0, 0), (30.0, 0), (30.0, 1), (50.0, 1), (50.0, 2), (90.0, 0)]);

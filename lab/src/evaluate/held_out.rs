@@ -1,12 +1,10 @@
 //! What a picture shows of a validation.
 
-use super::crossing::Beside;
-use super::profile::Profile;
-use super::scores::{Judged, names};
-use super::validate::OURS;
-use super::yardstick::average;
-use sapwise::{AlgorithmCost, BackendClass};
-use std::collections::{BTreeMap, BTreeSet};
+use super::crossovers::ComparedCrossover;
+use super::scores::{Judged, OURS, regrets_of_units};
+use crate::data::{Profile, Spot};
+use sapwise::{AlgorithmCost, AlgorithmId, BackendClass};
+use std::collections::BTreeSet;
 
 /// Times of a profile that are kept, about.
 const TIMES_OF_PROFILE: usize = 40;
@@ -15,37 +13,43 @@ const MOST_TIMES: usize = 900;
 
 /// The held-out machines.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Held {
+pub struct HeldOut {
     /// Measured and predicted times, thinned evenly.
-    pub(crate) times: Vec<Time>,
-    /// For each way to choose the mean regret on each held-out machine, or profile where there is one machine only.
-    pub(crate) regrets: Vec<(&'static str, Vec<f64>)>,
+    pub times: Vec<Time>,
+    /// For each strategy the mean regret on each held-out machine, or profile where there is one machine only.
+    pub regrets: Vec<(&'static str, Vec<f64>)>,
     /// The machine, by its physical id, or the file of the profile that each regret of [`OURS`] is of.
-    pub(crate) units: Vec<String>,
+    pub units: Vec<String>,
     /// Whether the regrets are of machines.
-    pub(crate) by_machine: bool,
-    /// Measured borders beside the predicted ones.
-    pub(crate) borders: Vec<HeldBorder>,
+    pub by_machine: bool,
+    /// Measured crossovers beside the predicted ones.
+    pub crossovers: Vec<HeldOutCrossover>,
 }
 
-/// A border of a held-out profile.
+/// A crossover of a held-out profile.
 #[derive(Debug, Clone)]
-pub(crate) struct HeldBorder {
+pub struct HeldOutCrossover {
     /// The file of the profile.
-    pub(crate) file: String,
-    pub(crate) beside: Beside,
+    pub file: String,
+    /// Where it was measured, and where it was predicted.
+    pub compared: ComparedCrossover,
 }
 
 /// A time of an algorithm on a held-out profile.
 #[derive(Debug, Clone)]
-pub(crate) struct Time {
+pub struct Time {
     /// The file of the profile.
-    pub(crate) file: String,
-    pub(crate) objects: u32,
-    pub(crate) method: String,
-    pub(crate) class: BackendClass,
-    pub(crate) measured_ns: f64,
-    pub(crate) predicted_ns: f64,
+    pub file: String,
+    /// Objects of the frame.
+    pub objects: u32,
+    /// Its method.
+    pub method: String,
+    /// The class of processor that it ran on.
+    pub class: BackendClass,
+    /// The median over the frames.
+    pub measured_ns: f64,
+    /// What was predicted for it.
+    pub predicted_ns: f64,
 }
 
 impl Time {
@@ -61,7 +65,7 @@ impl Time {
         }
         let step = times.len().div_ceil(TIMES_OF_PROFILE).max(1);
         let time = |&(id, spot, measured_ns, cost): &_| {
-            let (id, spot, cost): (&sapwise::AlgorithmId, &super::profile::Spot, &AlgorithmCost) = (id, spot, cost);
+            let (id, spot, cost): (&AlgorithmId, &Spot, &AlgorithmCost) = (id, spot, cost);
             Self {
                 file: profile.file.clone(),
                 objects: spot.load.objects,
@@ -75,19 +79,17 @@ impl Time {
     }
 }
 
-impl Held {
-    pub(super) fn new(all: &[Judged], times: Vec<Time>, borders: Vec<HeldBorder>, by_machine: bool) -> Self {
+impl HeldOut {
+    pub(super) fn new(all: &[Judged], times: Vec<Time>, crossovers: Vec<HeldOutCrossover>, by_machine: bool) -> Self {
         let step = times.len().div_ceil(MOST_TIMES).max(1);
-        let regrets = names(all).into_iter().map(|name| {
-            let own = all.iter().filter(|j| j.name == name);
-            let mut units: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-            own.for_each(|j| units.entry(j.unit(by_machine)).or_default().push(j.regret.mean));
-            (name, units.values().map(|m| average(m)).collect())
-        });
-        let regrets = regrets.collect();
         let ours = all.iter().filter(|j| j.name == OURS);
         let units: BTreeSet<&str> = ours.map(|j| j.unit(by_machine)).collect();
-        let units = units.into_iter().map(str::to_owned).collect();
-        Self { times: times.into_iter().step_by(step).collect(), regrets, units, by_machine, borders }
+        Self {
+            times: times.into_iter().step_by(step).collect(),
+            regrets: regrets_of_units(all, by_machine),
+            units: units.into_iter().map(str::to_owned).collect(),
+            by_machine,
+            crossovers,
+        }
     }
 }

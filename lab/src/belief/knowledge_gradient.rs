@@ -1,6 +1,6 @@
 //! What an observation is worth before it is made.
 
-use super::{Posterior, Slope};
+use crate::fit::measured_costs::{Posterior, Slope};
 use crate::Load;
 use crate::cost::Counts;
 
@@ -12,7 +12,7 @@ const REACH: f64 = 5.0;
 /// The measure is the regret of choosing what is expected to be cheapest, as a natural logarithm: its mean over the loads, each
 /// counting the same. Near nought that is regret itself.
 #[derive(Debug, Clone)]
-pub struct Outlook {
+pub struct KnowledgeGradient {
     /// One for each load.
     scenes: Vec<Scene>,
     /// Covariance of each curve with the observation in question.
@@ -41,7 +41,7 @@ struct Line {
     slope: f64,
 }
 
-impl Outlook {
+impl KnowledgeGradient {
     /// The choices between the algorithms that `usable` admits, under each of `loads`.
     #[must_use]
     pub fn new(posterior: &Posterior, loads: &[Load], usable: &[bool]) -> Self {
@@ -52,14 +52,14 @@ impl Outlook {
             mean_ln: Vec::with_capacity(count),
             best: 0,
         };
-        let mut outlook = Self {
+        let mut gradient = Self {
             scenes: loads.iter().map(scene).collect(),
             with: vec![0.0; posterior.mean.len()],
             lines: Vec::with_capacity(count),
             envelope: Vec::with_capacity(count),
         };
-        outlook.refresh(posterior, usable);
-        outlook
+        gradient.refresh(posterior, usable);
+        gradient
     }
 
     /// Takes over what `posterior` expects by now.

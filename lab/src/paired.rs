@@ -11,7 +11,7 @@ use ratio::Ratio;
 
 /// Frames of two algorithms at one point. The k-th sample of both is the same frame; what has no partner is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Paired<'a> {
+pub struct PairedSamples<'a> {
     /// Objects in each frame.
     pub objects: u32,
     /// Nanoseconds of the first algorithm.
@@ -22,20 +22,20 @@ pub struct Paired<'a> {
 
 /// Which of two algorithms is cheaper at which sizes, within the sizes that were measured.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Crossover {
+pub enum PairedOutcome {
     /// One crossing.
-    At(Position),
+    At(PairedCrossing),
     /// The first is cheaper throughout, or where neither is distinguishable from the other, cheaper on average.
     AlwaysFirst,
     /// The same for the second.
     AlwaysSecond,
     /// More than one crossing, ascending by objects.
-    Several(Vec<Position>),
+    Several(Vec<PairedCrossing>),
 }
 
 /// A crossing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Position {
+pub struct PairedCrossing {
     /// Number of objects at which both cost the same.
     pub objects: f64,
     /// Lower end of the 90 % interval. Equal to the smallest measured size when the crossing may lie below it.
@@ -46,10 +46,10 @@ pub struct Position {
     pub first_below: bool,
 }
 
-impl Crossover {
+impl PairedOutcome {
     /// The crossings, ascending by objects; none when one algorithm is always cheaper.
     #[must_use]
-    pub fn positions(&self) -> &[Position] {
+    pub fn positions(&self) -> &[PairedCrossing] {
         match self {
             Self::At(position) => std::slice::from_ref(position),
             Self::Several(positions) => positions,
@@ -63,15 +63,15 @@ const INTERVAL: f64 = 1.645;
 /// The one that pure noise exceeds in one case of a hundred.
 const DISTINCT: f64 = 2.326;
 
-/// Where `first` and `second` of `points` cross. See [`Comparison`].
+/// Where `first` and `second` of `points` cross. See [`PairedComparison`].
 #[must_use]
-pub fn crossover(points: &[Paired<'_>]) -> Option<Crossover> {
-    Some(Comparison::new(points)?.crossover())
+pub fn compare(points: &[PairedSamples<'_>]) -> Option<PairedOutcome> {
+    Some(PairedComparison::new(points)?.outcome())
 }
 
 /// The costs of two algorithms beside each other, over the sizes at which both were timed.
 #[derive(Debug, Clone)]
-pub struct Comparison {
+pub struct PairedComparison {
     ratio: Ratio,
     /// `ln(first / second)` at each place of the grid.
     curve: Vec<f64>,
@@ -79,14 +79,14 @@ pub struct Comparison {
     told: Vec<f64>,
 }
 
-impl Comparison {
+impl PairedComparison {
     /// Compares the algorithms over `points`, in the order of measurement.
     ///
     /// A point whose size is not above the one before begins another round: what changed between rounds widens the intervals.
     /// Sizes may stand several times and need not be evenly spaced. Pass only points at which both were timed. `None` with
     /// fewer than three sizes that have a pair of samples above zero.
     #[must_use]
-    pub fn new(points: &[Paired<'_>]) -> Option<Self> {
+    pub fn new(points: &[PairedSamples<'_>]) -> Option<Self> {
         let ratio = Ratio::new(points, DISTINCT)?;
         let curve = ratio.curve();
         let told = curve.iter().map(|e| e.in_units_of(INTERVAL)).collect();
@@ -98,7 +98,7 @@ impl Comparison {
     /// An excursion to one side whose area could be noise in more than one case of a hundred is none: the roots around it count
     /// as one, or as none where the ratio returns to the side it came from.
     #[must_use]
-    pub fn crossover(&self) -> Crossover {
+    pub fn compare(&self) -> PairedOutcome {
         let mut held: Vec<Excursion> = Vec::new();
         for excursion in excursions(&self.curve) {
             if self.ratio.area(excursion.start, excursion.end).in_units_of(DISTINCT).abs() < 1.0 {
@@ -110,14 +110,14 @@ impl Comparison {
                 None => held.push(excursion),
             }
         }
-        let mut positions: Vec<Position> = held.windows(2).map(|w| self.position(&w[0], &w[1])).collect();
+        let mut positions: Vec<PairedCrossing> = held.windows(2).map(|w| self.position(&w[0], &w[1])).collect();
         match (positions.len(), held.first()) {
-            (0, Some(only)) if only.positive => Crossover::AlwaysSecond,
-            (0, Some(_)) => Crossover::AlwaysFirst,
-            (0, None) if self.curve.iter().sum::<f64>() > 0.0 => Crossover::AlwaysSecond,
-            (0, None) => Crossover::AlwaysFirst,
-            (1, _) => Crossover::At(positions.remove(0)),
-            _ => Crossover::Several(positions),
+            (0, Some(only)) if only.positive => PairedOutcome::AlwaysSecond,
+            (0, Some(_)) => PairedOutcome::AlwaysFirst,
+            (0, None) if self.curve.iter().sum::<f64>() > 0.0 => PairedOutcome::AlwaysSecond,
+            (0, None) => PairedOutcome::AlwaysFirst,
+            (1, _) => PairedOutcome::At(positions.remove(0)),
+            _ => PairedOutcome::Several(positions),
         }
     }
 
@@ -159,7 +159,7 @@ impl Comparison {
     }
 
     /// The one crossing between two excursions of opposite sign.
-    fn position(&self, below: &Excursion, above: &Excursion) -> Position {
+    fn position(&self, below: &Excursion, above: &Excursion) -> PairedCrossing {
         let (curve, grid) = (&self.curve, &self.ratio.grid);
         let crossed = (below.end..above.start).filter(|&k| (curve[k] > 0.0) != (curve[k + 1] > 0.0));
         let root = |k: usize| grid[k] + (grid[k + 1] - grid[k]) * curve[k] / (curve[k] - curve[k + 1]);
@@ -168,7 +168,7 @@ impl Comparison {
         let objects = roots.get(roots.len() / 2).copied().unwrap_or(grid[above.start]).exp();
         let first_below = !below.positive;
         let (low, high) = self.interval(objects, first_below).unwrap_or((objects, objects));
-        Position { objects, low, high, first_below }
+        PairedCrossing { objects, low, high, first_below }
     }
 }
 

@@ -1,15 +1,16 @@
 //! What each choice costs on a report: the regret.
 
-use super::profile::{Profile, Spot};
+use crate::data::{Profile, Spot};
+use sapwise::stats::mean;
 use sapwise::{AlgorithmId, Load};
 use std::collections::BTreeMap;
 
 /// Chooses an algorithm under a load among those that a machine has; `None` where it knows none of them.
-pub(crate) type Chooser<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
+pub type Strategy<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
 
 /// The cost of an algorithm over the best, where nothing is known of it: a guess. Who leaves the race as hopeless is slower
 /// than this, but where time is short an algorithm leaves at three times the best already.
-pub(crate) const NOT_TIMED: f64 = 10.0;
+pub const NOT_TIMED: f64 = 10.0;
 
 /// Sizes a decade that count as one when regrets are averaged.
 const PER_DECADE: f64 = 4.0;
@@ -19,13 +20,13 @@ const ROUNDS: usize = 8;
 /// colliders at which nexus leaves brute force to the 10 000 bodies of a large scene is two standard deviations to either side.
 const USUAL_OBJECTS: (f64, f64) = (2.9, 0.55);
 
-/// What each algorithm costs in each cell of a report: a quarter of a decade of a scenario.
+/// The regret table of a report: what each algorithm costs in each cell: a quarter of a decade of a scenario.
 ///
 /// A sweep goes most often to the sizes at which two algorithms lie close, where every choice costs little. Counted one by one these
-/// points would pass off any way to choose as better than it is. And the least of several medians is too low by their errors, more
+/// points would pass off any strategy as better than it is. And the least of several medians is too low by their errors, more
 /// so where more algorithms lie close: the fewer errors are left in a figure that is compared, the less a choice is charged for them.
 #[derive(Debug, Clone)]
-pub(crate) struct Yardstick {
+pub struct RegretTable {
     cells: Vec<Cell>,
     algorithms: usize,
 }
@@ -41,19 +42,19 @@ struct Cell {
     over_best: Vec<f64>,
 }
 
-/// Regret of a way to choose on one report.
+/// Regret of a strategy on one report.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Regret {
+pub struct Regret {
     /// For each cell, the mean over its points.
-    pub(crate) cells: Vec<f64>,
+    pub cells: Vec<f64>,
     /// Mean over the cells.
-    pub(crate) mean: f64,
+    pub mean: f64,
     /// Mean over the cells, weighted by how often a game has so many objects.
-    pub(crate) as_in_games: f64,
+    pub as_in_games: f64,
 }
 
-impl Yardstick {
-    pub(crate) fn new(profile: &Profile) -> Self {
+impl RegretTable {
+    pub fn new(profile: &Profile) -> Self {
         let mut groups: BTreeMap<(&str, i64), Vec<&Spot>> = BTreeMap::new();
         for spot in &profile.points {
             groups.entry((&spot.scenario, quarter(spot))).or_default().push(spot);
@@ -78,23 +79,23 @@ impl Yardstick {
         Self { cells: cells.collect(), algorithms }
     }
 
-    /// The regret of a way to choose among the algorithms of this profile.
-    pub(crate) fn regret(&self, profile: &Profile, choose: &Chooser<'_>) -> Regret {
+    /// The regret of a strategy among the algorithms of this profile.
+    pub fn regret(&self, profile: &Profile, choose: &Strategy<'_>) -> Regret {
         self.regret_in(None, profile, choose)
     }
 
     /// The same under the loads of one scenario, or of all.
-    pub(crate) fn regret_in(&self, scenario: Option<&str>, profile: &Profile, choose: &Chooser<'_>) -> Regret {
+    pub fn regret_in(&self, scenario: Option<&str>, profile: &Profile, choose: &Strategy<'_>) -> Regret {
         let of = |cell: &Cell, load: &Load| {
             let chosen = choose(load).and_then(|id| profile.position(&id));
             chosen.map_or(NOT_TIMED, |k| cell.over_best[usize::from(k)]) - 1.0
         };
         let cells = self.cells.iter().filter(|c| scenario.is_none_or(|s| c.scenario == s));
-        summed(cells, |cell| average(&cell.loads.iter().map(|load| of(cell, load)).collect::<Vec<f64>>()))
+        summed(cells, |cell| mean(&cell.loads.iter().map(|load| of(cell, load)).collect::<Vec<f64>>()))
     }
 
     /// The mean regret of choosing each algorithm always.
-    pub(crate) fn always(&self) -> Vec<f64> {
+    pub fn always(&self) -> Vec<f64> {
         (0..self.algorithms).map(|k| summed(self.cells.iter(), |cell| cell.over_best[k] - 1.0).mean).collect()
     }
 }
@@ -103,7 +104,7 @@ fn summed<'a>(cells: impl Iterator<Item = &'a Cell>, of: impl Fn(&Cell) -> f64) 
     let (regrets, weights): (Vec<f64>, Vec<f64>) = cells.map(|c| (of(c), in_games(c.decade))).unzip();
     let total: f64 = weights.iter().sum();
     let weighted: f64 = regrets.iter().zip(&weights).map(|(r, w)| r * w).sum();
-    Regret { mean: average(&regrets), as_in_games: if total > 0.0 { weighted / total } else { 0.0 }, cells: regrets }
+    Regret { mean: mean(&regrets), as_in_games: if total > 0.0 { weighted / total } else { 0.0 }, cells: regrets }
 }
 
 fn quarter(spot: &Spot) -> i64 {
@@ -133,46 +134,41 @@ fn ln_costs(spots: &[&Spot], algorithms: usize) -> Vec<Option<f64>> {
         for (spot, shared) in spots.iter().zip(&mut shared) {
             let left: Vec<f64> =
                 spot.medians.iter().map(|&(k, ns)| ns.ln() - costs[usize::from(k)].unwrap_or_default()).collect();
-            *shared = average(&left);
+            *shared = mean(&left);
         }
     }
     costs
 }
 
-/// The mean; 0 of nothing.
-pub(crate) fn average(values: &[f64]) -> f64 {
-    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::baselines::{available, by_costs};
-    use super::super::curve::measured_costs;
-    use super::super::synthetic::Machine;
+    use crate::evaluate::by_costs;
+    use crate::fit::measured_costs;
+    use crate::synthetic::Machine;
     use super::*;
 
-    fn regret(profile: &Profile, choose: &Chooser<'_>) -> Regret {
-        Yardstick::new(profile).regret(profile, choose)
+    fn regret(profile: &Profile, choose: &Strategy<'_>) -> Regret {
+        RegretTable::new(profile).regret(profile, choose)
     }
 
     #[test]
     fn what_was_not_timed_costs_what_it_did_nearby_or_ten_times_the_best() {
         let report = Machine::family()[0].report();
         let profile = Profile::of("", &report);
-        let never: Chooser<'_> = Box::new(|_| None);
+        let never: Strategy<'_> = Box::new(|_| None);
         assert!(regret(&profile, &never).cells.iter().all(|r| (r - 9.0).abs() < 1e-9));
         let mut twice = report.clone();
         let id = twice.points[0].timings[0].algorithm.clone();
         let mut again = twice.points[0].clone();
         again.timings.remove(0);
         twice.points.push(again);
-        let always: Chooser<'_> = Box::new(|_| Some(id.clone()));
+        let always: Strategy<'_> = Box::new(|_| Some(id.clone()));
         // And a size that was visited again counts once.
         let (once, twice) = (regret(&profile, &always), regret(&Profile::of("", &twice), &always));
         assert!(once.cells.iter().zip(&twice.cells).all(|(a, b)| (a - b).abs() < 1e-9));
         let place = usize::from(profile.position(&id).unwrap());
-        assert!((Yardstick::new(&profile).always()[place] - once.mean).abs() < 1e-12);
-        let available = available(&profile);
+        assert!((RegretTable::new(&profile).always()[place] - once.mean).abs() < 1e-12);
+        let available = profile.available();
         let sweep = regret(&profile, &by_costs(measured_costs(&profile).0, &available));
         assert!(sweep.mean < 0.02 && sweep.as_in_games < 0.02, "{sweep:?}");
     }

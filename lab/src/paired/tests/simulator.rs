@@ -1,37 +1,37 @@
 //! Sweeps of two algorithms whose ratio is known: noise that is partly common, outliers, drift, hosts that change.
 
-use crate::crossover::{Crossover, Paired, crossover};
+use crate::paired::{PairedOutcome, PairedSamples, compare};
 
 /// Objects and the samples of both algorithms.
-pub(super) type Timed = (u32, Vec<u64>, Vec<u64>);
+pub type Timed = (u32, Vec<u64>, Vec<u64>);
 
 /// What disturbs the timings.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Host {
+pub struct Host {
     /// Standard deviation of the logarithm of a sample, half of its variance common to both algorithms on a frame.
-    pub(super) noise: f64,
+    pub noise: f64,
     /// The same of what changes from point to point and from algorithm to algorithm, and is equal in all frames of a point.
-    pub(super) points: f64,
+    pub points: f64,
     /// By how much the logarithm of the ratio differs between the rounds.
-    pub(super) rounds: f64,
+    pub rounds: f64,
 }
 
 /// 5 % a sample, 2.5 % a point.
-pub(super) const USUAL: Host = Host { noise: 0.05, points: 0.025, rounds: 0.0 };
+pub const USUAL: Host = Host { noise: 0.05, points: 0.025, rounds: 0.0 };
 
 /// What is measured in the second round.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Second {
+pub enum Second {
     Nothing,
     /// The sizes on both sides of each change of the winner, and their geometric mean.
     Borders,
     Everything,
 }
 
-pub(super) struct Random(pub(super) u64);
+pub struct Random(pub u64);
 
 impl Random {
-    pub(super) fn uniform(&mut self) -> f64 {
+    pub fn uniform(&mut self) -> f64 {
         (crate::splitmix::next(&mut self.0) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
@@ -47,7 +47,7 @@ impl Random {
 }
 
 /// Four sizes a decade from 10 to a million, then what `second` says. `ratio` is `ln(first / second)` at a size.
-pub(super) fn sweep(ratio: &dyn Fn(f64) -> f64, host: Host, second: Second, seed: u64) -> Vec<Timed> {
+pub fn sweep(ratio: &dyn Fn(f64) -> f64, host: Host, second: Second, seed: u64) -> Vec<Timed> {
     let mut random = Random(seed);
     // Which of the rounds is the slow one for the first algorithm is chance.
     let shift = if random.uniform() < 0.5 { host.rounds / 2.0 } else { -host.rounds / 2.0 };
@@ -102,48 +102,48 @@ fn round(sizes: &[u32], ratio: &dyn Fn(f64) -> f64, host: Host, random: &mut Ran
     sizes.iter().enumerate().map(point).collect()
 }
 
-pub(super) fn paired(points: &[Timed]) -> Vec<Paired<'_>> {
-    points.iter().map(|(objects, a, b)| Paired { objects: *objects, first_ns: a, second_ns: b }).collect()
+pub fn paired(points: &[Timed]) -> Vec<PairedSamples<'_>> {
+    points.iter().map(|(objects, a, b)| PairedSamples { objects: *objects, first_ns: a, second_ns: b }).collect()
 }
 
 /// What many sweeps of the same two algorithms found.
-pub(super) struct Trials {
-    pub(super) found: Vec<Crossover>,
+pub struct Trials {
+    pub found: Vec<PairedOutcome>,
 }
 
 impl Trials {
-    pub(super) fn new(ratio: &dyn Fn(f64) -> f64, host: Host, second: Second, count: u64) -> Self {
-        let trial = |seed| crossover(&paired(&sweep(ratio, host, second, 1_000_003 * (seed + 1)))).unwrap();
+    pub fn new(ratio: &dyn Fn(f64) -> f64, host: Host, second: Second, count: u64) -> Self {
+        let trial = |seed| compare(&paired(&sweep(ratio, host, second, 1_000_003 * (seed + 1)))).unwrap();
         Self { found: (0..count).map(trial).collect() }
     }
 
     /// Share of the sweeps that found this many crossings.
-    pub(super) fn share_with(&self, crossings: usize) -> f64 {
+    pub fn share_with(&self, crossings: usize) -> f64 {
         let with = self.found.iter().filter(|c| c.positions().len() == crossings).count();
         with as f64 / self.found.len() as f64
     }
 
     /// Of the sweeps that found as many crossings as there are, the share of crossings whose interval holds the true one.
-    pub(super) fn coverage(&self, truths: &[f64]) -> f64 {
+    pub fn coverage(&self, truths: &[f64]) -> f64 {
         let holds: Vec<bool> = self.against(truths).map(|(p, t)| p.low <= t && t <= p.high).collect();
         holds.iter().filter(|h| **h).count() as f64 / holds.len() as f64
     }
 
     /// The error in octaves that a share of those crossings stays below.
-    pub(super) fn error(&self, truths: &[f64], share: f64) -> f64 {
+    pub fn error(&self, truths: &[f64], share: f64) -> f64 {
         let mut errors: Vec<f64> = self.against(truths).map(|(p, t)| (p.objects / t).log2().abs()).collect();
         errors.sort_unstable_by(f64::total_cmp);
         errors[((errors.len() - 1) as f64 * share) as usize]
     }
 
     /// The median width of their intervals, in octaves.
-    pub(super) fn width(&self, truths: &[f64]) -> f64 {
+    pub fn width(&self, truths: &[f64]) -> f64 {
         let mut widths: Vec<f64> = self.against(truths).map(|(p, _)| (p.high / p.low).log2()).collect();
         widths.sort_unstable_by(f64::total_cmp);
         widths[widths.len() / 2]
     }
 
-    fn against(&self, truths: &[f64]) -> impl Iterator<Item = (&crate::Position, f64)> {
+    fn against(&self, truths: &[f64]) -> impl Iterator<Item = (&crate::PairedCrossing, f64)> {
         let complete = self.found.iter().filter(move |c| c.positions().len() == truths.len());
         complete.flat_map(move |c| c.positions().iter().zip(truths.to_vec()))
     }

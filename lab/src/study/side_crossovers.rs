@@ -1,8 +1,7 @@
 //! Where one side of a pair of algorithms gives way to the other on a machine, by cost curves.
 
-use super::super::baselines::{available, usual};
-use super::super::curve::measured_costs;
-use super::super::profile::Profile;
+use crate::data::Profile;
+use crate::fit::measured_costs;
 use sapwise::{AlgorithmCost, AlgorithmId, Backend, BackendClass, Load};
 
 /// One side of a border: the cheapest of its algorithms counts.
@@ -11,16 +10,16 @@ struct Side(Vec<AlgorithmId>);
 
 /// Two sides of which either may be the cheaper one.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Pair {
+struct Pair {
     /// The same on every machine, whatever its number of threads.
-    pub(super) name: String,
+    name: String,
     first: Side,
     second: Side,
 }
 
 /// The pairs that a machine has among its algorithms: each two methods on one thread, each method on one thread and on all, the CPU
 /// and its GPUs.
-pub(super) fn pairs(available: &[AlgorithmId]) -> Vec<Pair> {
+fn pairs(available: &[AlgorithmId]) -> Vec<Pair> {
     let on_cpu = |id: &&AlgorithmId| id.backend().class() == BackendClass::Cpu;
     let of = |wanted: &dyn Fn(&AlgorithmId) -> bool| Side(available.iter().filter(|id| wanted(id)).cloned().collect());
     let mut methods: Vec<&str> = available.iter().filter(on_cpu).map(AlgorithmId::method).collect();
@@ -47,26 +46,17 @@ pub(super) fn pairs(available: &[AlgorithmId]) -> Vec<Pair> {
 }
 
 /// Every pair whose border was measured, by name, with the place of the border in octaves of the slice.
-pub(crate) fn measured_borders(profile: &Profile) -> Vec<(String, f64)> {
-    let (slice, measured) = (slice(profile), measured_costs(profile).0);
+pub(super) fn measured_borders(profile: &Profile) -> Vec<(String, f64)> {
+    let (slice, measured) = (profile.slice(profile.usual_scenario()), measured_costs(profile).0);
     let at = |pair: Pair| Some((pair.octaves(&measured, &slice)?, pair.name));
-    pairs(&available(profile)).into_iter().filter_map(at).map(|(octaves, name)| (name, octaves)).collect()
-}
-
-/// The loads of the slice of a profile, ascending by objects, each size once.
-pub(super) fn slice(profile: &Profile) -> Vec<Load> {
-    let scenario = usual(profile.points.iter().map(|p| p.scenario.as_str()));
-    let mut loads: Vec<Load> = profile.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load).collect();
-    loads.sort_by_key(|l| l.objects);
-    loads.dedup_by_key(|l| l.objects);
-    loads
+    pairs(&profile.available()).into_iter().filter_map(at).map(|(octaves, name)| (name, octaves)).collect()
 }
 
 impl Pair {
     /// Octaves of the slice in which the first side is the cheaper one: the distance of the border from the smallest size. Where one
     /// side is always cheaper the border counts as lying at an end of the slice, and of several borders all count. `None` where
     /// no cost of a side is known.
-    pub(super) fn octaves(&self, costs: &[AlgorithmCost], slice: &[Load]) -> Option<f64> {
+    fn octaves(&self, costs: &[AlgorithmCost], slice: &[Load]) -> Option<f64> {
         let of = |side: &Side| costs.iter().filter(|c| side.0.contains(&c.algorithm)).collect::<Vec<_>>();
         let (first, second) = (of(&self.first), of(&self.second));
         if first.is_empty() || second.is_empty() || slice.len() < 2 {
