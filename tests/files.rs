@@ -1,6 +1,6 @@
 //! Every report and model in the repository is sound, current and leads to a choice; damaged files are refused in words.
 
-use sapwise::hardware::{gpu, parameter};
+use sapwise::hardware::{GpuParameterId, ParameterId};
 use sapwise::json::{self, Document};
 use sapwise::report::Label;
 use sapwise::{AlgorithmId, BackendClass, Model, Registry, Report};
@@ -28,17 +28,17 @@ fn every_report_is_complete_and_its_label_is_true() {
         let path = path.display();
         assert!(report.provenance.optimised, "{path}");
         let names: Vec<&str> = report.hardware.parameters.iter().map(|p| p.name.as_str()).collect();
-        assert_eq!(names, parameter::all_names(), "{path}");
+        assert_eq!(names, ParameterId::ALL, "{path}");
         let restricted = report.provenance.threads.is_some() || report.provenance.simd.is_some();
         let stronger = [Label::RealContended, Label::RealSoftwareGpu].contains(&report.label);
         assert_eq!(report.label == Label::RealRestricted, restricted && !stronger, "{path}");
         for gpu in &report.hardware.gpus {
             let names: Vec<&str> = gpu.parameters.iter().map(|p| p.name.as_str()).collect();
-            assert_eq!(names, gpu::parameter::all_names(), "{path}: gpu{}", gpu.gpu.index);
+            assert_eq!(names, GpuParameterId::OF_ONE, "{path}: gpu{}", gpu.gpu.index);
         }
         for group in &report.hardware.gpu_groups {
             let names: Vec<&str> = group.parameters.iter().map(|p| p.name.as_str()).collect();
-            assert_eq!(names, gpu::parameter::GROUP, "{path}: {:?}", group.gpus);
+            assert_eq!(names, GpuParameterId::GROUP, "{path}: {:?}", group.gpus);
         }
         for point in &report.points {
             let samples: Vec<usize> =
@@ -68,7 +68,7 @@ fn the_built_in_model_knows_every_method_of_this_build_and_predicts_for_every_re
     for (path, report) in reports().into_iter().filter(|(_, r)| on_its_own(r)) {
         let trained_on = model.trained_on.iter().any(|t| path.ends_with(&t.file));
         assert!(trained_on, "{} is not in the built-in model; train it again", path.display());
-        let cores = report.hardware.value(parameter::USABLE_CORES).unwrap() as u32;
+        let cores = report.hardware.value(ParameterId::UsableCores).unwrap() as u32;
         let algorithms = algorithms(cores);
         let prediction = model.predict(&report.hardware, &algorithms).unwrap();
         assert_eq!(prediction.costs.len(), algorithms.len(), "{}: {:?}", path.display(), prediction.warnings);
@@ -84,16 +84,16 @@ fn a_machine_outside_the_training_is_told_and_a_missing_parameter_leaves_out_wha
     let set = |report: &mut Report, name: &str, value: Option<f64>| {
         report.hardware.parameters.iter_mut().find(|p| p.name == name).unwrap().value = value;
     };
-    set(&mut report, parameter::FORK_JOIN_COLD_NS, None);
+    set(&mut report, ParameterId::ForkJoinColdNs, None);
     let prediction = model.predict(&report.hardware, &algorithms).unwrap();
     assert!(prediction.costs.iter().all(|c| c.algorithm.threads() == 1));
-    assert!(prediction.warnings.iter().any(|w| w.contains(parameter::FORK_JOIN_COLD_NS)), "{:?}", prediction.warnings);
-    set(&mut report, parameter::CLOCK_MEASURED_GHZ, Some(9.0));
+    assert!(prediction.warnings.iter().any(|w| w.contains(ParameterId::ForkJoinColdNs)), "{:?}", prediction.warnings);
+    set(&mut report, ParameterId::ClockMeasuredGhz, Some(9.0));
     assert!(model.predict(&report.hardware, &algorithms).unwrap().extrapolated);
     let other_revision: Vec<_> = algorithms.iter().map(|(id, revision)| (id.clone(), revision + 1)).collect();
     let error = model.predict(&report.hardware, &other_revision).unwrap_err();
     assert!(error.contains("train on new reports"), "{error}");
-    set(&mut report, parameter::CLOCK_MEASURED_GHZ, Some(4500.0));
+    set(&mut report, ParameterId::ClockMeasuredGhz, Some(4500.0));
     let error = model.predict(&report.hardware, &algorithms).unwrap_err();
     assert!(error.contains("clock_measured_ghz is 4500"), "{error}");
 }
@@ -104,8 +104,8 @@ fn every_schema_version_stays_readable() {
     assert!(matches!(json::read(include_str!("fixtures/report-1.json")), Ok(Document::Report(_))));
     let Ok(Document::Report(report)) = json::read(include_str!("fixtures/report-1-gpu.json")) else { panic!("no report") };
     assert_eq!((report.hardware.gpus.len(), report.hardware.gpu_groups.len()), (2, 1));
-    assert_eq!(report.hardware.gpu(1).unwrap().value(gpu::parameter::DISPATCH_NS), Some(2500.0));
-    assert_eq!(report.hardware.gpu_group(&[0, 1]).unwrap().value(gpu::parameter::GROUP_UPLOAD_RATIO), Some(1.5));
+    assert_eq!(report.hardware.gpu(1).unwrap().value(GpuParameterId::DispatchNs), Some(2500.0));
+    assert_eq!(report.hardware.gpu_group(&[0, 1]).unwrap().value(GpuParameterId::GroupUploadRatio), Some(1.5));
     let text = json::write_report(&report).unwrap();
     assert!(json::report(&text).unwrap() == *report);
     assert!(

@@ -10,7 +10,7 @@
 mod common;
 
 use common::{every_algorithm, naive};
-use sapwise::{Adaptive, BroadPhase, Tuning, PairOrder, Pairs, Registry};
+use sapwise::{Adaptive, BroadPhase, PairOrder, Pairs, Registry, Tuning};
 use sapwise_scenes::Frames;
 use std::path::Path;
 

@@ -1,18 +1,19 @@
 //! One machine, one day: what was measured, and nothing that was concluded.
 
+use sapwise::json::{self, Format, Read, Schema};
 use sapwise::model::Scale;
 use sapwise::{AlgorithmId, Hardware, Load, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the key `schema` of a file says.
-pub const SCHEMA: &str = "report/2";
+/// Files of reports.
+pub const FORMAT: Format = Format::new("report", 2, 0);
 
 /// The hardware parameters of a machine and the raw timings of every algorithm on it.
 ///
 /// Facts only: cost curves, crossovers and tuning is derived from it and never stored in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct Report {
     /// What kind of evidence this is.
     pub label: Label,
@@ -49,7 +50,7 @@ pub enum Label {
 
 /// How a report was made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct Provenance {
     /// Version of the command.
     pub version: String,
@@ -77,7 +78,7 @@ pub struct Provenance {
 
 /// What was taken from a machine, and whether its parameters show it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct Restriction {
     /// Each thing that was taken, once.
     pub kinds: Vec<Restricted>,
@@ -103,7 +104,7 @@ pub enum Restricted {
 
 /// One parameter with and without a restriction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct Proof {
     /// The restriction.
     pub kind: Restricted,
@@ -122,7 +123,7 @@ pub struct Proof {
 
 /// An algorithm that was timed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct Timed {
     /// The algorithm.
     pub id: AlgorithmId,
@@ -135,7 +136,7 @@ pub struct Timed {
 
 /// One term of a time: a count of the load, and what of the hardware one of it costs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct TimedTerm {
     /// What is counted.
     pub term: Term,
@@ -145,7 +146,7 @@ pub struct TimedTerm {
 
 /// One scenario at one size: every algorithm on the same frames, in random order within each frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct Point {
     /// Name of the scenario.
     pub scenario: String,
@@ -169,7 +170,7 @@ pub struct Point {
 
 /// Raw timings of one algorithm at one point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct Timing {
     /// The algorithm.
     pub algorithm: AlgorithmId,
@@ -181,69 +182,26 @@ pub struct Timing {
     pub error: Option<String>,
 }
 
-/// Why a text is no sound report.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReportError {
-    /// It is no JSON, or not of this form.
-    #[error(transparent)]
-    Json(#[from] serde_json::Error),
-    /// A figure that can't be.
-    #[error("{0}")]
-    Defect(String),
-    /// A file of another schema.
-    #[error("the schema is {found:?}; this version reads {SCHEMA:?}{hint}", hint = if found == "report/1" { "; `sapwise convert FILE... --out DIR` makes such files of old ones" } else { "" })]
-    Schema {
-        /// What the file says.
-        found: String,
-    },
-}
-
-/// The file that holds a report: its schema, then its keys.
-#[derive(Serialize)]
-struct Written<'a> {
-    schema: &'static str,
-    #[serde(flatten)]
-    report: &'a Report,
-}
-
-/// What a file says of itself.
-fn schema(text: &str) -> Option<String> {
-    /// Only this key; the rest is skipped without being built, so hostile nesting costs nothing.
-    #[derive(Deserialize)]
-    struct Tag {
-        schema: String,
-    }
-    serde_json::from_str::<Tag>(text).ok().map(|tag| tag.schema)
-}
-
 /// Whether a text says that it is a report, of whatever version.
 #[must_use]
 pub fn is_report(text: &str) -> bool {
-    schema(text).is_some_and(|s| s.starts_with("report/"))
+    Schema::of(text).is_ok_and(|schema| schema.name() == FORMAT.schema().name())
 }
 
-/// Reads a report and checks its figures.
+/// Reads a report and checks its figures. Keys that this version does not know, in a file of a newer one, are in the answer.
 ///
 /// # Errors
-/// The line and column of the defect, the schema where it is none of ours, or the figure that can't be.
-pub fn read(text: &str) -> Result<Report, ReportError> {
-    match schema(text) {
-        Some(found) if found != SCHEMA => return Err(ReportError::Schema { found }),
-        _ => {}
-    }
-    let mut value: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text)?;
-    value.remove("schema");
-    let report = Report::deserialize(serde_json::Value::Object(value))?;
-    report.defect().map_or(Ok(report), |defect| Err(ReportError::Defect(defect)))
+/// The place of the defect, or the schema where it is none of ours.
+pub fn read(text: &str) -> Result<Read<Report>, json::Error> {
+    FORMAT.read(text)
 }
 
 /// Writes a report, one key a line.
 ///
 /// # Errors
 /// When a figure can't be written.
-pub fn write(report: &Report) -> Result<String, ReportError> {
-    Ok(serde_json::to_string_pretty(&Written { schema: SCHEMA, report })? + "\n")
+pub fn write(report: &Report) -> Result<String, json::Error> {
+    FORMAT.write(report)
 }
 
 impl Timed {

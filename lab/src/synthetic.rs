@@ -2,8 +2,8 @@
 //! simulated ones out, so none of them may leave this module's tests.
 
 use sapwise_scenes::Random;
-use sapwise::hardware::gpu::parameter as of_gpu;
-use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, parameter};
+use sapwise::hardware::GpuParameterId;
+use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, ParameterId};
 use sapwise::model::{MethodModel, ModelTerm, Scale};
 use crate::report::{Label, Point, Provenance, Report, ReportSchema, Timed, Timing};
 use sapwise::{AlgorithmId, BackendClass, Hardware, Load, Parameter, Term};
@@ -105,23 +105,23 @@ impl Machine {
 
     pub fn hardware(&self) -> Hardware {
         let figures = [
-            (parameter::USABLE_CORES, f64::from(self.cores)),
-            (parameter::CLOCK_MEASURED_GHZ, self.ghz),
-            (parameter::SIMD_LANES, self.lanes),
-            (parameter::CACHE_LLC_BYTES, self.cache_bytes),
-            (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, self.gb_per_s.0),
-            (parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, self.gb_per_s.1),
-            (parameter::CORE_TO_CORE_NS, self.fork_join_ns / 80.0),
-            (parameter::FORK_JOIN_COLD_NS, self.fork_join_ns),
-            (parameter::SCALING_TWO_THREADS_RATIO, Self::scaling(2)),
-            (parameter::SCALING_ALL_THREADS_RATIO, Self::scaling(self.cores)),
+            (ParameterId::UsableCores, f64::from(self.cores)),
+            (ParameterId::ClockMeasuredGhz, self.ghz),
+            (ParameterId::SimdLanes, self.lanes),
+            (ParameterId::CacheLlcBytes, self.cache_bytes),
+            (ParameterId::BandwidthOneThreadGbPerS, self.gb_per_s.0),
+            (ParameterId::BandwidthAllThreadsGbPerS, self.gb_per_s.1),
+            (ParameterId::CoreToCoreNs, self.fork_join_ns / 80.0),
+            (ParameterId::ForkJoinColdNs, self.fork_join_ns),
+            (ParameterId::ScalingTwoThreadsRatio, Self::scaling(2)),
+            (ParameterId::ScalingAllThreadsRatio, Self::scaling(self.cores)),
         ];
         let parameters = figures.map(measured);
         let machine = sapwise::Machine { physical_id: self.name.to_owned(), ..sapwise::Machine::default() };
         let gpus: Vec<GpuHardware> = self.gpus.iter().enumerate().map(|(k, gpu)| gpu.hardware(k as u32)).collect();
         let group = GpuGroup {
             gpus: (0..gpus.len() as u32).collect(),
-            parameters: [(of_gpu::GROUP_UPLOAD_RATIO, 1.4), (of_gpu::GROUP_ROUND_TRIP_RATIO, 1.2)].map(measured).into(),
+            parameters: [(GpuParameterId::GroupUploadRatio, 1.4), (GpuParameterId::GroupRoundTripRatio, 1.2)].map(measured).into(),
         };
         let gpu_groups = if gpus.len() > 1 { vec![group] } else { Vec::new() };
         Hardware { machine, parameters: parameters.into(), gpus, gpu_groups }
@@ -193,13 +193,13 @@ impl Gpu {
             kind: self.kind,
         };
         let figures = [
-            (of_gpu::UPLOAD_RATE_GB_PER_S, self.upload),
-            (of_gpu::DOWNLOAD_RATE_GB_PER_S, self.download),
-            (of_gpu::COPY_GB_PER_S, self.copy),
-            (of_gpu::ROUND_TRIP_NS, self.round_trip_ns),
-            (of_gpu::DISPATCH_NS, self.dispatch_ns),
-            (of_gpu::READ_BACK_NS, self.round_trip_ns / 3.0),
-            (of_gpu::ARITHMETIC_GFLOP_PER_S, self.gflop),
+            (GpuParameterId::UploadRateGbPerS, self.upload),
+            (GpuParameterId::DownloadRateGbPerS, self.download),
+            (GpuParameterId::CopyGbPerS, self.copy),
+            (GpuParameterId::RoundTripNs, self.round_trip_ns),
+            (GpuParameterId::DispatchNs, self.dispatch_ns),
+            (GpuParameterId::ReadBackNs, self.round_trip_ns / 3.0),
+            (GpuParameterId::ArithmeticGflopPerS, self.gflop),
         ];
         GpuHardware { gpu: identity, parameters: figures.map(measured).into() }
     }

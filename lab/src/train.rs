@@ -75,7 +75,7 @@ mod tests {
     use crate::report::{Label, Report};
     use crate::synthetic::Machine;
     use crate::training::{read_model, write_model};
-    use sapwise::hardware::parameter;
+    use sapwise::hardware::ParameterId;
 
     fn reports() -> Vec<(String, Report)> {
         Machine::family().iter().map(|m| (format!("{}.json", m.name), m.report())).collect()
@@ -92,7 +92,7 @@ mod tests {
         let read = read_model(&text).unwrap();
         assert_eq!((read.model, read.training), (trained.model.clone(), trained.training));
         assert_eq!(trained.model.ranges.len(), COMPARED.len());
-        let cores = trained.model.ranges.iter().find(|r| r.parameter == parameter::USABLE_CORES).unwrap();
+        let cores = trained.model.ranges.iter().find(|r| r.parameter == ParameterId::UsableCores).unwrap();
         assert_eq!((cores.min, cores.max), (2.0, 16.0));
     }
 

@@ -3,8 +3,8 @@
 use crate::belief::Prior;
 use crate::data::Profile;
 use crate::report::Label;
-use anyhow::Context;
 use sapwise::Model;
+use sapwise::json::{self, Format};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,7 +14,7 @@ const MOST_LISTED: usize = 400;
 
 /// What stands beside a model in its file, under the key `training`. Predictions don't need it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Training {
     /// The reports behind the model. Empty where they are too many.
@@ -31,7 +31,7 @@ pub struct Training {
 
 /// One report behind a model.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct TrainingReport {
     /// File name without folders.
     pub file: String,
@@ -43,7 +43,7 @@ pub struct TrainingReport {
 
 /// How many reports of one label are behind a model.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct TrainingCount {
     /// What kind of evidence they are.
     pub label: Label,
@@ -55,7 +55,7 @@ pub struct TrainingCount {
 
 /// How strategies did on machines, or profiles, that were held out of the training.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct Validation {
     /// What was held out in turn: `physical machine`, or `one of 24 groups of physical machines`; where there is one physical machine
     /// only `SIMD level and thread count`, or `profile`. The last two say little about machines never seen.
@@ -72,7 +72,7 @@ pub struct Validation {
 ///
 /// Every physical machine counts the same in regrets, however many of its reports were held out.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(deny_unknown_fields)]
 pub struct MethodScore {
     /// Name of the strategy.
     pub name: String,
@@ -170,33 +170,32 @@ impl Training {
     }
 }
 
+/// What training says of itself, read from the file of a model, whose other keys are the engine's.
+const TRAINING: Format = Format::new("model", 2, 0).skipping(&["name", "simulated", "ranges", "methods"]);
+
 /// Reads a model with what training says of itself.
 ///
 /// # Errors
 /// When the text is no sound model, or holds no sound training.
-pub fn read_model(text: &str) -> anyhow::Result<StoredModel> {
+pub fn read_model(text: &str) -> Result<StoredModel, json::Error> {
     #[derive(Deserialize)]
     struct Keys {
         training: Training,
     }
-    let model = sapwise::json::model(text)?;
-    let keys: Keys = serde_json::from_str(text).context("what training says of itself can't be read")?;
-    if let Some(defect) = keys.training.prior.and_then(|p| p.defect()) {
-        anyhow::bail!("{defect}");
-    }
-    Ok(StoredModel { model, training: keys.training })
+    let training = TRAINING.read::<Keys>(text)?.value.training;
+    Ok(StoredModel { model: json::model(text)?, training })
 }
 
 /// Writes a model with what training says of itself, one key a line.
 ///
 /// # Errors
 /// When a figure can't be written.
-pub fn write_model(model: &Model, training: &Training) -> anyhow::Result<String> {
+pub fn write_model(model: &Model, training: &Training) -> Result<String, json::Error> {
     #[derive(Serialize)]
     struct Keys<'a> {
         #[serde(flatten)]
         model: &'a Model,
         training: &'a Training,
     }
-    Ok(serde_json::to_string_pretty(&Keys { model, training })? + "\n")
+    TRAINING.write(&Keys { model, training })
 }

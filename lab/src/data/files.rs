@@ -3,7 +3,7 @@
 use crate::progress::Progress;
 use crate::report::{self, Report};
 use anyhow::{Context, bail};
-use sapwise::json;
+use sapwise::json::{self, Schema};
 use sapwise::{Model, Tuning};
 use std::fs::File;
 use std::io::Read;
@@ -31,14 +31,12 @@ pub enum Document {
 pub fn read_document(path: &Path) -> anyhow::Result<Document> {
     let text = read_text(path)?;
     let unsound = || format!("{} is no sound file", path.display());
-    if report::is_report(&text) {
-        return Ok(Document::Report(Box::new(report::read(&text).with_context(unsound)?)));
-    }
-    match json::read(&text).with_context(unsound)? {
-        json::Document::Model(model) => Ok(Document::Model(model)),
-        json::Document::Tuning(tuning) => Ok(Document::Tuning(tuning)),
-        _ => bail!("{} is a file that this version does not read", path.display()),
-    }
+    let schema = Schema::of(&text).with_context(unsound)?;
+    Ok(match schema.name() {
+        "report" => Document::Report(Box::new(report::read(&text).with_context(unsound)?.value)),
+        "model" => Document::Model(Box::new(json::model(&text).with_context(unsound)?)),
+        _ => Document::Tuning(Box::new(json::tuning(&text).with_context(unsound)?)),
+    })
 }
 
 /// The reports with their file names, of files and of the `*.json` files of folders, in the order of their names.

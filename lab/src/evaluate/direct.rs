@@ -10,21 +10,21 @@ use linfa::DatasetBase;
 use linfa::traits::Fit;
 use linfa_linear::LinearRegression;
 use ndarray::{Array1, Array2, Axis};
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::stats::mean;
 use sapwise::{AlgorithmId, BackendClass, Hardware};
 
 /// Parameters that a crossover is regressed on by least squares, as logarithms. Few, because there are as few rows as reports.
 const PARAMETERS: [&str; 4] = [
-    parameter::CLOCK_MEASURED_GHZ,
-    parameter::SIMD_LANES,
-    parameter::SCALING_ALL_THREADS_RATIO,
-    parameter::FORK_JOIN_COLD_NS,
+    ParameterId::ClockMeasuredGhz,
+    ParameterId::SimdLanes,
+    ParameterId::ScalingAllThreadsRatio,
+    ParameterId::ForkJoinColdNs,
 ];
 
 /// The same of a crossover between the CPU and a GPU, or between two methods on GPUs.
 const GPU_PARAMETERS: [&str; 4] =
-    [parameter::SCALING_ALL_THREADS_RATIO, "gpu/round_trip_ns", "gpu/upload_rate_gb_per_s", "gpu/arithmetic_gflop_per_s"];
+    [ParameterId::ScalingAllThreadsRatio, "gpu/round_trip_ns", "gpu/upload_rate_gb_per_s", "gpu/arithmetic_gflop_per_s"];
 
 /// A method on one thread or on all threads of its machine, on one GPU or on all: counts differ between machines, these do not.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -281,7 +281,7 @@ mod tests {
         // A border that goes down with the lanes.
         let machines: Vec<Hardware> = Machine::family().iter().map(Machine::hardware).collect();
         let values: Vec<f64> =
-            machines.iter().map(|h| 5.0 - 0.7 * h.value(parameter::SIMD_LANES).unwrap().ln()).collect();
+            machines.iter().map(|h| 5.0 - 0.7 * h.value(ParameterId::SimdLanes).unwrap().ln()).collect();
         let known: Vec<&Hardware> = machines[..6].iter().collect();
         let of = |count: usize| estimate(&PARAMETERS, &known[..count], &values[..count], &machines[6]).unwrap();
         let found = of(6);

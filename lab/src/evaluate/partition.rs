@@ -1,7 +1,7 @@
 //! What is held out together when a strategy is judged.
 
 use crate::data::Profile;
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use std::collections::BTreeMap;
 
 /// Machines that are held out one by one; of more, as many groups are made of them. Each costs a fit of everything.
@@ -47,7 +47,7 @@ impl Partition {
             let folds = grouped(profiles, |p| format!("{:020}", level(p, name)));
             if folds.len() > 1 { folds } else { Vec::new() }
         };
-        let folds = [by(parameter::SIMD_LANES), by(parameter::USABLE_CORES)].concat();
+        let folds = [by(ParameterId::SimdLanes), by(ParameterId::UsableCores)].concat();
         if folds.is_empty() {
             let folds = (0..profiles.len()).map(|k| vec![k]).collect();
             return Self { held_out: "profile".to_owned(), by_machine: false, folds };

@@ -8,7 +8,7 @@ use crate::fit::terms::{fallback_method, terms};
 use crate::fit::min_of_two::MinOfTwo;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::stats::robust_deviation;
 use sapwise::model::{Feature, MethodModel, ModelTerm, Scale};
 use crate::report::Label;
@@ -266,7 +266,7 @@ impl Design {
         }
         let ln_ratios: Vec<f64> = measured.iter().map(|&k| (row(k).ns / modelled[k]).ln()).collect();
         // A point that the terms miss by far is a term that is missing, or a disturbed measurement: either way no slope.
-        let reach = 3.0 * robust_deviation(&ln_ratios).max(0.01);
+        let reach = 3.0 * robust_deviation(&ln_ratios).unwrap_or(0.0).max(0.01);
         let residuals = Residuals {
             names: Feature::of(self.class),
             features: self.features.select(Axis(0), &measured.iter().map(|&k| rows[k]).collect::<Vec<_>>()),
@@ -276,7 +276,7 @@ impl Design {
         };
         let ridge = residuals.ridge()?;
         let left: Vec<f64> = (0..measured.len()).map(|k| residuals.ln_ratios[k] - residuals.at(&ridge, k)).collect();
-        let spread_ln = robust_deviation(&left);
+        let spread_ln = robust_deviation(&left).unwrap_or(0.0);
         let used = self.terms.iter().zip(&units).filter(|(_, u)| **u > 0.0);
         let objects = || measured.iter().map(|&k| row(k).load.objects);
         let mut gpu_kinds: Vec<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();
@@ -349,10 +349,10 @@ fn nanoseconds(
     row: &Row,
 ) -> Result<(Vec<f64>, Vec<f64>), String> {
     let backend = id.backend();
-    let cache = hardware.value(parameter::CACHE_LLC_BYTES).filter(|c| *c > 0.0);
+    let cache = hardware.value(ParameterId::CacheLlcBytes).filter(|c| *c > 0.0);
     let cache = match backend.class() {
         BackendClass::Cpu => {
-            cache.ok_or_else(|| format!("the hardware parameter {} is missing", parameter::CACHE_LLC_BYTES))?
+            cache.ok_or_else(|| format!("the hardware parameter {} is missing", ParameterId::CacheLlcBytes))?
         }
         BackendClass::Gpu => 0.0,
     };

@@ -8,7 +8,7 @@ use crate::fit::min_of_two::MinOfTwo;
 use anyhow::{Result, bail};
 use ndarray::Array2;
 use crate::paired::{PairedComparison, PairedSamples};
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::stats::robust_deviation;
 use crate::report::{Label, Point, Report, Timed};
 use sapwise::{AlgorithmCost, AlgorithmId, CostCurve, CostTerm, Crossover, Knot, Load, Source, Term, Tuning};
@@ -78,7 +78,7 @@ pub fn measured_slice(profile: &Profile, scenario: &str) -> Result<Vec<Load>> {
 /// The cost curve of each algorithm that was timed often enough, and a sentence for each other one.
 pub fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<String>) {
     let rows = rows(profile, 0);
-    let cache_bytes = profile.hardware.value(parameter::CACHE_LLC_BYTES).unwrap_or(0.0);
+    let cache_bytes = profile.hardware.value(ParameterId::CacheLlcBytes).unwrap_or(0.0);
     let (mut costs, mut warnings) = (Vec::new(), Vec::new());
     let mut order: Vec<(usize, &Timed)> = profile.algorithms.iter().enumerate().collect();
     // What falls back to another method comes after that.
@@ -143,7 +143,7 @@ fn curve(terms: &[Term], rows: &[&Row], cache_bytes: f64, other: Option<&CostCur
     let largest = evidence.iter().map(|r| r.0).fold(0.0, f64::max);
     evidence.extend(floors.iter().filter(|f| f.0 <= largest && f.1 > 0.0));
     curve.correction = correction(&evidence, &floors);
-    let spread_ln = robust_deviation(&residuals(&curve, rows, false).into_iter().map(|r| r.1).collect::<Vec<f64>>());
+    let spread_ln = robust_deviation(&residuals(&curve, rows, false).into_iter().map(|r| r.1).collect::<Vec<f64>>()).unwrap_or(0.0);
     (curve, spread_ln)
 }
 

@@ -120,7 +120,7 @@ impl Problem {
         let modelled = self.terms.dot(&Array1::from(units.to_vec()));
         let ratios: Vec<f64> = modelled.iter().zip(&self.ns).map(|(m, t)| (m / t).max(1e-9)).collect();
         let measured = ratios.iter().zip(&self.floors).filter(|(_, f)| !**f).map(|(q, _)| q.ln());
-        let spread = robust_deviation(&measured.collect::<Vec<f64>>()).max(SMALLEST_SPREAD);
+        let spread = robust_deviation(&measured.collect::<Vec<f64>>()).unwrap_or(0.0).max(SMALLEST_SPREAD);
         let weight = |(k, &q): (usize, &f64)| {
             let weight = self.weights[k] * to_logarithmic(q);
             if self.floors[k] {

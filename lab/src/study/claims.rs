@@ -3,7 +3,7 @@
 use super::entry::Entry;
 use super::influence::{Influence, On};
 use crate::evaluate::Verdict;
-use sapwise::hardware::gpu::parameter as gpu;
+use sapwise::hardware::GpuParameterId;
 use std::fmt;
 
 /// The speed-up from the Quadro 4600 to the 5800 that the paper prints ("1.5X much faster"). It prints no other timing in figures.
@@ -73,15 +73,15 @@ pub(super) fn cards(entries: &[Entry]) -> [Option<usize>; 3] {
 /// The claims of Section 6, in its order.
 pub(super) fn claims(entries: &[Entry], influence: &Influence) -> Vec<Claim> {
     let said = [
-        ("The clock rate of the GPU does not influence the time of the broad phase.", gpu::CLOCK_GHZ, Said::NotLinked),
-        ("The clock rate is almost the same on the three cards.", gpu::CLOCK_GHZ, Said::AlikeOnAll),
-        ("The bandwidth from CPU to GPU is almost the same on them.", gpu::UPLOAD_GB_PER_S, Said::AlikeOnAll),
-        ("The bandwidth from GPU to CPU is similar on two of them.", gpu::DOWNLOAD_GB_PER_S, Said::AlikeOnTwo),
-        ("The bandwidth from CPU to GPU does not influence it.", gpu::UPLOAD_GB_PER_S, Said::NotLinked),
-        ("The bandwidth from GPU to CPU does not influence it.", gpu::DOWNLOAD_GB_PER_S, Said::NotLinked),
-        ("The memory size of the GPU hardly influences it.", gpu::MEMORY_BYTES, Said::NotLinked),
-        ("The internal bandwidth of the GPU seems to influence it.", gpu::COPY_GB_PER_S, Said::Linked),
-        ("The number of cores of the GPU seems to influence it.", gpu::LANES, Said::Linked),
+        ("The clock rate of the GPU does not influence the time of the broad phase.", GpuParameterId::ClockGhz, Said::NotLinked),
+        ("The clock rate is almost the same on the three cards.", GpuParameterId::ClockGhz, Said::AlikeOnAll),
+        ("The bandwidth from CPU to GPU is almost the same on them.", GpuParameterId::UploadGbPerS, Said::AlikeOnAll),
+        ("The bandwidth from GPU to CPU is similar on two of them.", GpuParameterId::DownloadGbPerS, Said::AlikeOnTwo),
+        ("The bandwidth from CPU to GPU does not influence it.", GpuParameterId::UploadGbPerS, Said::NotLinked),
+        ("The bandwidth from GPU to CPU does not influence it.", GpuParameterId::DownloadGbPerS, Said::NotLinked),
+        ("The memory size of the GPU hardly influences it.", GpuParameterId::MemoryBytes, Said::NotLinked),
+        ("The internal bandwidth of the GPU seems to influence it.", GpuParameterId::CopyGbPerS, Said::Linked),
+        ("The number of cores of the GPU seems to influence it.", GpuParameterId::Lanes, Said::Linked),
     ];
     let cards = cards(entries);
     let claim = |(text, parameter, said): (&str, &str, Said)| {
@@ -139,9 +139,9 @@ fn by_reports(said: Said, parameter: &str, influence: &Influence) -> (Outcome, S
         return (Outcome::NotAsked, "it is a claim about the three cards".to_owned());
     }
     let read_instead = match parameter {
-        gpu::UPLOAD_GB_PER_S => gpu::UPLOAD_RATE_GB_PER_S,
-        gpu::DOWNLOAD_GB_PER_S => gpu::DOWNLOAD_RATE_GB_PER_S,
-        gpu::COPY_GB_PER_S => gpu::READ_GB_PER_S,
+        GpuParameterId::UploadGbPerS => GpuParameterId::UploadRateGbPerS,
+        GpuParameterId::DownloadGbPerS => GpuParameterId::DownloadRateGbPerS,
+        GpuParameterId::CopyGbPerS => GpuParameterId::ReadGbPerS,
         other => other,
     };
     let [named, read] = [parameter, read_instead].map(|name| format!("gpu/{name}"));

@@ -1,7 +1,7 @@
 //! One report of a study: what the page tells of it, and its medians.
 
 use crate::data::{Profile, figure};
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use crate::report::{Label, Provenance, Report};
 use sapwise::{AlgorithmId, Backend, BackendClass, GpuHardware, GpuKind, Hardware};
 use std::collections::BTreeMap;
@@ -73,7 +73,7 @@ impl Entry {
     pub(super) fn wholeness(&self) -> (bool, u64, u64) {
         let whole = matches!(self.kind, Label::RealFull | Label::Simulated);
         let count = |name: &str| self.hardware.value(name).map_or(0, |v| v as u64);
-        (whole, count(parameter::USABLE_CORES), count(parameter::SIMD_LANES))
+        (whole, count(ParameterId::UsableCores), count(ParameterId::SimdLanes))
     }
 
     /// The first GPU that is no software adapter.

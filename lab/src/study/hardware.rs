@@ -4,7 +4,7 @@ use super::entry::Entry;
 use crate::data_table::{Cell, Column, DataTable};
 use crate::data::{COMPARED, COMPARED_OF_GPUS};
 use crate::label_text::kind;
-use sapwise::hardware::gpu::parameter as gpu;
+use sapwise::hardware::GpuParameterId;
 use sapwise::hardware::How;
 use sapwise::{GpuHardware, Parameter};
 
@@ -13,13 +13,13 @@ const MOST_LETTERS: usize = 24;
 
 /// The rows of the paper's table, in its order, with what each is called here.
 const PAPER: [(&str, &str); 7] = [
-    ("CPU to GPU (upload)", gpu::UPLOAD_GB_PER_S),
-    ("GPU to CPU (download)", gpu::DOWNLOAD_GB_PER_S),
-    ("internal GPU (copy)", gpu::COPY_GB_PER_S),
-    ("memory size", gpu::MEMORY_BYTES),
-    ("clock rate", gpu::CLOCK_GHZ),
-    ("processors", gpu::PROCESSORS),
-    ("cores (lanes)", gpu::LANES),
+    ("CPU to GPU (upload)", GpuParameterId::UploadGbPerS),
+    ("GPU to CPU (download)", GpuParameterId::DownloadGbPerS),
+    ("internal GPU (copy)", GpuParameterId::CopyGbPerS),
+    ("memory size", GpuParameterId::MemoryBytes),
+    ("clock rate", GpuParameterId::ClockGhz),
+    ("processors", GpuParameterId::Processors),
+    ("cores (lanes)", GpuParameterId::Lanes),
 ];
 
 /// The table as the paper has it, its cards first, one row a GPU. Software adapters are told by their kind.

@@ -7,7 +7,7 @@ use super::side_crossovers::measured_crossovers;
 use crate::evaluate::{Effect, Importance, Verdict};
 use rayon::prelude::*;
 use sapwise::Backend;
-use sapwise::hardware::{gpu, parameter};
+use sapwise::hardware::{GpuParameterId, ParameterId};
 use sapwise::model::GPU_PREFIX;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -53,8 +53,8 @@ pub(super) struct Influence {
 
 /// The parameters whose ranks are taken: every one of the machine and of its first GPU that is no software adapter.
 pub(super) fn parameters() -> Vec<String> {
-    let of_gpu = gpu::parameter::all_names().into_iter().map(|name| format!("{GPU_PREFIX}{name}"));
-    parameter::all_names().into_iter().chain(of_gpu).collect()
+    let of_gpu = GpuParameterId::OF_ONE.into_iter().map(|name| format!("{GPU_PREFIX}{name}"));
+    ParameterId::ALL.into_iter().chain(of_gpu).collect()
 }
 
 impl Influence {

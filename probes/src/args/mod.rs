@@ -1,5 +1,7 @@
 //! The command line.
 
+#[cfg(test)]
+mod documents;
 mod known;
 mod part;
 mod probe;
@@ -179,7 +181,7 @@ pub(crate) struct Check {
     pub(crate) json: bool,
 }
 
-/// Writes reports, models and tuning files of before version 0.2 in the form that is read now.
+/// Writes reports, models and tuning files of older versions in the form that is read now.
 ///
 /// No figure changes. What the current form has no place for is left out, and told.
 #[derive(Debug, Args)]

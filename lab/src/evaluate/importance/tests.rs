@@ -3,7 +3,7 @@ use crate::progress::Silent;
 use crate::simulated;
 use crate::synthetic::Machine;
 use sapwise::Hardware;
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 
 fn some(machines: usize) -> Vec<Profile> {
     let loads = simulated::Loads::of_a_sweep(1, Some(30_000)).unwrap();
@@ -21,8 +21,8 @@ fn what_the_timings_were_made_of_is_linked_and_what_they_were_not_is_not() {
         assert_eq!(method.distance_rise_ln.rise.map_or(0.0, |i| i.high), 0.0, "{method:#?}");
     }
     let linked = |p: &OfParameter| p.methods.iter().filter(|m| m.distance_rise_ln.verdict == Verdict::Linked).count();
-    assert!(linked(of(parameter::CLOCK_MEASURED_GHZ)) > 0, "{:#?}", of(parameter::CLOCK_MEASURED_GHZ));
-    let memory = of(parameter::MEMORY_BYTES);
+    assert!(linked(of(ParameterId::ClockMeasuredGhz)) > 0, "{:#?}", of(ParameterId::ClockMeasuredGhz));
+    let memory = of(ParameterId::MemoryBytes);
     assert!(memory.deviation_octaves > 0.3, "{memory:?}");
     let effects = memory.methods.iter().map(|m| &m.distance_rise_ln).chain([&memory.regret_rise]);
     effects.for_each(|e| assert_eq!(e.verdict, Verdict::NotLinked, "{e:?}"));
@@ -59,7 +59,7 @@ fn every_parameter_that_a_cost_depends_on_is_looked_at() {
             let name = other.parameters[p].name.clone();
             other.parameters[p].value = other.parameters[p].value.map(|v| v * 1.7);
             // Where the latency between cores is missing, the warm fork and join stands for it.
-            let known = looked_at.contains(&name) || name == parameter::FORK_JOIN_WARM_NS;
+            let known = looked_at.contains(&name) || name == ParameterId::ForkJoinWarmNs;
             assert!(known || costs(profile, &other) == before, "{name}");
         }
     }

@@ -93,7 +93,7 @@ fn software_adapters_serve_only_where_there_is_no_real_one() {
 fn a_gpu_that_lacks_a_parameter_costs_its_own_rows_only() {
     let mut all = profiles(Machine::family_with_gpus().into_iter().take(3));
     let gpu = &mut all[1].hardware.gpus[1];
-    gpu.parameters.retain(|p| p.name != sapwise::hardware::gpu::parameter::DISPATCH_NS);
+    gpu.parameters.retain(|p| p.name != GpuParameterId::DispatchNs);
     let (models, notes) = fitted(&all);
     assert_eq!(models.len(), 7);
     assert!(notes.iter().all(|n| n.contains("dispatch_ns") && n.contains("gpu1")) && notes.len() == 3, "{notes:?}");
@@ -145,8 +145,8 @@ fn machines_count_the_same_however_many_profiles_they_have() {
 #[test]
 fn machines_that_lack_a_parameter_are_told() {
     let mut all = profiles(Machine::family().into_iter().take(2));
-    all[0].hardware.parameters.retain(|p| p.name != parameter::FORK_JOIN_COLD_NS);
+    all[0].hardware.parameters.retain(|p| p.name != ParameterId::ForkJoinColdNs);
     let (models, notes) = fitted(&all);
     assert_eq!(models.len(), 4);
-    assert!(notes.iter().any(|n| n.contains(parameter::FORK_JOIN_COLD_NS)), "{notes:?}");
+    assert!(notes.iter().any(|n| n.contains(ParameterId::ForkJoinColdNs)), "{notes:?}");
 }
