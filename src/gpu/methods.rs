@@ -16,12 +16,13 @@ const METHODS: &[Method] =
     &[Method { name: "brute", revision: 1 }, Method { name: "sap", revision: 1 }, Method { name: "grid-sap", revision: 1 }];
 
 /// Whether a method runs on GPUs.
+#[cfg(feature = "gpu")]
 pub(crate) fn has_method(name: &str) -> bool {
     METHODS.iter().any(|m| m.name == name)
 }
 
 /// Our algorithms on these GPUs with their revisions: each method on each GPU alone, and on the first two, three and so on
-/// together. Programs that act as GPUs work with each other only.
+/// together. Software adapters work with each other only.
 #[must_use]
 pub fn algorithms<'a>(gpus: impl IntoIterator<Item = &'a GpuIdentity>) -> Vec<(AlgorithmId, u32)> {
     let (software, hardware): (Vec<_>, Vec<_>) = gpus.into_iter().partition(|g| g.kind == GpuKind::Software);

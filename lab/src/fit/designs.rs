@@ -347,7 +347,7 @@ fn nanoseconds(
     let backend = id.backend();
     let cache = hardware.value(ParameterId::CacheLlcBytes).filter(|c| *c > 0.0);
     let cache = match backend.class() {
-        BackendClass::Cpu => cache.ok_or(PredictError::Missing(ParameterId::CacheLlcBytes))?,
+        BackendClass::Cpu => cache.ok_or_else(|| PredictError::Missing { parameter: ParameterId::CacheLlcBytes.to_string(), why: None })?,
         BackendClass::Gpu => 0.0,
     };
     let features = Feature::of(backend.class()).iter().map(|f| f.value(hardware, backend, &row.load));
