@@ -193,7 +193,16 @@ pub fn is_report(text: &str) -> bool {
 /// # Errors
 /// The place of the defect, or the schema where it is none of ours.
 pub fn read(text: &str) -> Result<Read<Report>, json::Error> {
-    FORMAT.read(text)
+    let read: Read<Report> = FORMAT.read(text)?;
+    match read.value.defect() {
+        Some(defect) => Err(unsound(defect)),
+        None => Ok(read),
+    }
+}
+
+/// What is wrong with the figures of a file that is well-formed.
+pub(crate) fn unsound(defect: String) -> json::Error {
+    json::Error::Data { path: ".".to_owned(), source: serde::de::Error::custom(defect) }
 }
 
 /// Writes a report, one key a line.
@@ -229,7 +238,7 @@ impl Report {
     #[must_use]
     pub fn defect(&self) -> Option<String> {
         if let Some(defect) = self.hardware.defect() {
-            return Some(defect);
+            return Some(defect.to_string());
         }
         for (k, point) in self.points.iter().enumerate() {
             let at = format!("point {k} ({} at {} objects)", point.scenario, point.load.objects);

@@ -40,9 +40,9 @@ pub struct HeldOutCrossover {
 pub struct Time {
     /// The file of the profile.
     pub file: String,
-    /// Name of the scenario.
+    /// The scenario of the frames.
     pub scenario: String,
-    /// Objects of the frame.
+    /// Their objects.
     pub objects: u32,
     /// The algorithm.
     pub algorithm: AlgorithmId,
