@@ -5,11 +5,11 @@ use crate::hardware::GpuParameterId;
 use crate::hardware::ParameterId;
 use crate::{Backend, Entry, GpuGroup, GpuHardware, GpuIdentity, Hardware, Load, Machine, Parameter};
 
-fn parameters(figures: &[(&str, f64)]) -> Vec<Parameter> {
+fn parameters<Id: Copy + AsRef<str>>(figures: &[(Id, f64)]) -> Vec<Parameter> {
     figures.iter().map(|&(name, value)| Parameter::reported(name, value, "test")).collect()
 }
 
-fn gpu(index: u32, kind: GpuKind, figures: &[(&str, f64)]) -> GpuHardware {
+fn gpu(index: u32, kind: GpuKind, figures: &[(GpuParameterId, f64)]) -> GpuHardware {
     let text = || "test".to_owned();
     let gpu = GpuIdentity { index, name: text(), device: text(), driver: text(), api: text(), kind };
     GpuHardware { gpu, parameters: parameters(figures) }
@@ -64,10 +64,9 @@ fn method(backend: BackendClass, scale: Scale) -> MethodModel {
 fn model(methods: Vec<MethodModel>) -> Model {
     let range = |parameter: &str| Range { parameter: parameter.to_owned(), min: 1.0, max: 100.0 };
     Model {
-        schema: ModelSchema,
         name: "test".to_owned(),
         simulated: false,
-        ranges: vec![range(ParameterId::ClockMeasuredGhz), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
+        ranges: vec![range(ParameterId::ClockMeasuredGhz.as_str()), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
         methods,
     }
 }
@@ -111,18 +110,18 @@ fn several_gpus_have_the_slowest_latency_and_added_rates_within_what_was_measure
 #[test]
 fn scales_and_features_of_the_other_processor_are_refused() {
     let h = hardware();
-    assert!(Scale::SharedLane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().contains("gpu0 has no scale"));
-    assert!(Scale::GpuDispatch.nanoseconds(&h, &Backend::Cpu(2)).unwrap_err().contains("cpu2 has no scale"));
+    assert!(Scale::SharedLane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().to_string().contains("gpu0 has no scale"));
+    assert!(Scale::GpuDispatch.nanoseconds(&h, &Backend::Cpu(2)).unwrap_err().to_string().contains("cpu2 has no scale"));
     let load = Load { objects: 8, ..Load::default() };
     let feature = |f: Feature, backend: Backend| f.value(&h, &backend, &load);
     assert_eq!(feature(Feature::Log2Threads, Backend::Gpu(vec![0, 1])), Ok(1.0));
     assert_eq!(feature(Feature::Log2Objects, Backend::Gpu(vec![0])), Ok(3.0));
     assert!(feature(Feature::Log2Lanes, Backend::Gpu(vec![0])).is_err());
     let wrong = model(vec![method(BackendClass::Cpu, Scale::GpuDispatch)]);
-    assert!(wrong.defect().unwrap().contains("GpuDispatch"));
+    assert!(wrong.defect().unwrap().to_string().contains("GpuDispatch"));
     let term = ResidualTerm { feature: Feature::Log2Lanes, centre: 0.0, slope: 1.0 };
     let wrong = MethodModel { residual: vec![term], ..method(BackendClass::Gpu, Scale::GpuDispatch) };
-    assert!(model(vec![wrong]).defect().unwrap().contains("Log2Lanes"));
+    assert!(model(vec![wrong]).defect().unwrap().to_string().contains("Log2Lanes"));
 }
 
 #[test]
@@ -169,7 +168,7 @@ fn hardware_with_impossible_gpus_is_told() {
     let defect = |change: &dyn Fn(&mut Hardware)| {
         let mut h = hardware();
         change(&mut h);
-        h.defect().unwrap()
+        h.defect().unwrap().to_string()
     };
     assert!(defect(&|h| h.gpus[1].parameters[0].value = Some(-1.0)).contains("gpu1"));
     assert!(defect(&|h| h.gpus[1].gpu.index = 0).contains("twice"));
