@@ -58,8 +58,8 @@ fn text(comparison: &Comparison, terminal: Terminal) -> String {
     text.push_str(&terminal.table(&std::iter::once(head).chain(rows).collect::<Vec<_>>()));
     if !comparison.borders.is_empty() {
         text.push('\n');
-        let head = ["border", "", "objects", "farthest", "IQR/median", "in its interval", "slope", "reports"];
-        let rows = comparison.borders.iter().map(border);
+        let head = ["crossover", "", "objects", "farthest", "IQR/median", "in its interval", "slope", "reports"];
+        let rows = comparison.borders.iter().map(crossover);
         text.push_str(&terminal.table(&std::iter::once(head.map(str::to_owned).to_vec()).chain(rows).collect::<Vec<_>>()));
     }
     if let Some(Losses { own, others, beyond_own, beyond_own_most }) = &comparison.losses {
@@ -84,7 +84,7 @@ fn spread(s: &Spread) -> Vec<String> {
     ]
 }
 
-fn border(b: &Border) -> Vec<String> {
+fn crossover(b: &CrossoverSpread) -> Vec<String> {
     let slope = b
         .slope
         .map_or("-".to_owned(), |slope| format!("{slope:.2} {}", if slope.abs() >= STEEP { "steep" } else { "shallow" }));
