@@ -8,8 +8,8 @@
 //! `probes/examples/bvh.rs`.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, Pairs, Registry,
-    Scenario, Source, Term,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Load, Pairs, Registry, Scenario,
+    Source, Term, Tuning,
 };
 
 /// What it is called in tuning, reports and decisions.

@@ -18,7 +18,7 @@ mod this_machine;
 #[cfg(feature = "this-machine")]
 mod uniform;
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Tuning, Load, Pairs, Registry, Source, Step};
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Load, Pairs, Registry, Source, Step, Tuning};
 use candidates::{Candidate, Instance, Made};
 use decision::Choice;
 use glance::{Glance, count};
@@ -105,7 +105,8 @@ impl Adaptive {
     /// As [`Registry::create`].
     pub fn only(algorithm: AlgorithmId, registry: &Registry) -> Result<Self, Error> {
         let steps = vec![Step { from_objects: 0, algorithm }];
-        let tuning = Tuning::from_steps(steps).map_err(|hint| Error::UnknownAlgorithm { text: String::new(), hint })?;
+        let tuning =
+            Tuning::from_steps(steps).map_err(|e| Error::UnknownAlgorithm { text: String::new(), hint: e.to_string() })?;
         Self::new(tuning, registry)
     }
 

@@ -1,112 +1,28 @@
 //! What a frame costs: a sum of terms, each a count of operations times nanoseconds per operation.
 
+mod term;
+
 use crate::Load;
+use std::fmt;
 
-/// A count of operations that grows with the load in its own way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Term {
-    /// One call: dispatch, set-up, fork and join.
-    Call,
-    /// Boxes read, checked and copied: n.
-    Objects,
-    /// Comparisons of a sort: n log2 n.
-    Sort,
-    /// Boxes whose working set does not fit the last-level cache: n times the share of it that is outside.
-    ColdObjects,
-    /// All pairs: n (n - 1) / 2.
-    AllPairs,
-    /// Pairs that overlap on the sweep axis ([`Load::axis_candidates`]).
-    AxisCandidates,
-    /// Pairs that overlap on the sweep axis within a strip ([`Load::strip_candidates`]).
-    StripCandidates,
-    /// Pairs written ([`Load::pairs`]).
-    Pairs,
-    /// Boxes times how far they move ([`Load::moved`]): boxes that leave their grown boxes grow with it.
-    Moved,
-}
+pub use term::{Counts, Product, Term};
 
-/// Bounds of what a file may hold: an hour for one object, 2^64 objects, a correction by e^50. Beyond them the arithmetic of a
-/// cost would end in infinities, and an infinity less an infinity is no cost.
+/// The most nanoseconds that one count may take: an hour for one object. Beyond these bounds the arithmetic of a cost would end in infinities,
+/// and an infinity less an infinity is no cost.
 pub const MOST_UNIT_NS: f64 = 3.6e12;
+/// 2^64 objects.
 const MOST_LOG2_OBJECTS: f64 = 64.0;
+/// A correction by e^50.
 const MOST_LN_FACTOR: f64 = 50.0;
-
-/// Bytes that an algorithm keeps in flight for each box: the box itself, its sorted copy and its key.
-const WORKING_SET_BYTES: f64 = 64.0;
-
-impl Term {
-    /// Every term.
-    pub const ALL: [Self; 9] = [
-        Self::Call,
-        Self::Objects,
-        Self::Sort,
-        Self::ColdObjects,
-        Self::AllPairs,
-        Self::AxisCandidates,
-        Self::StripCandidates,
-        Self::Pairs,
-        Self::Moved,
-    ];
-
-    /// The count of operations under a load, on a machine with a last-level cache of `cache_bytes`.
-    #[must_use]
-    pub fn count(self, load: &Load, cache_bytes: f64) -> f64 {
-        Counts::new(load).of(self, cache_bytes)
-    }
-}
-
-/// What the terms of all algorithms share under one load, worked out once for each decision.
-#[derive(Debug, Clone, Copy)]
-pub struct Counts<'a> {
-    load: &'a Load,
-    objects: f64,
-    log2_objects: f64,
-}
-
-impl<'a> Counts<'a> {
-    /// The counts under a load.
-    #[must_use]
-    pub fn new(load: &'a Load) -> Self {
-        let objects = f64::from(load.objects);
-        Self { load, objects, log2_objects: objects.max(1.0).log2() }
-    }
-
-    /// Base-2 logarithm of the number of objects, 0 for none.
-    #[must_use]
-    pub fn log2_objects(&self) -> f64 {
-        self.log2_objects
-    }
-
-    /// The count of operations of a term, on a machine with a last-level cache of `cache_bytes`.
-    #[must_use]
-    pub fn of(&self, term: Term, cache_bytes: f64) -> f64 {
-        let n = self.objects;
-        match term {
-            Term::Call => 1.0,
-            Term::Objects => n,
-            Term::Sort => n * self.log2_objects,
-            Term::ColdObjects => n * (1.0 - cache_bytes / (WORKING_SET_BYTES * n).max(1.0)).max(0.0),
-            Term::AllPairs => n * (n - 1.0).max(0.0) / 2.0,
-            Term::AxisCandidates => self.load.axis_candidates,
-            Term::StripCandidates => self.load.strip_candidates,
-            Term::Pairs => self.load.pairs,
-            Term::Moved => n * self.load.moved,
-        }
-    }
-}
 
 /// The cost of one algorithm on one machine as a function of the load.
 #[derive(Debug, Clone, PartialEq, Default)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct CostCurve {
     /// Terms of the sum; none is negative.
     pub terms: Vec<CostTerm>,
     /// Terms of the fallback of the algorithm, which it takes where this sum is the smaller one: `pair-cache` leaves a frame to `grid-sap` where
     /// boxes move too far. Empty where it has none.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub fallback_terms: Vec<CostTerm>,
     /// Last-level cache of the machine, for [`Term::ColdObjects`].
     pub cache_bytes: f64,
@@ -117,8 +33,6 @@ pub struct CostCurve {
 
 /// One term of a cost curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CostTerm {
     /// What is counted.
     pub term: Term,
@@ -128,8 +42,6 @@ pub struct CostTerm {
 
 /// One point of a correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Knot {
     /// Base-2 logarithm of the number of objects.
     pub log2_objects: f64,
@@ -137,7 +49,39 @@ pub struct Knot {
     pub ln_factor: f64,
 }
 
+impl CostTerm {
+    /// Nanoseconds for each count of a term.
+    #[must_use]
+    pub const fn new(term: Term, unit_ns: f64) -> Self {
+        Self { term, unit_ns }
+    }
+}
+
 impl CostCurve {
+    /// The sum of these terms, without a fallback or a correction, on a machine of which no cache is known.
+    #[must_use]
+    pub fn new(terms: Vec<CostTerm>) -> Self {
+        Self { terms, ..Self::default() }
+    }
+
+    /// The same with the terms of a fallback.
+    #[must_use]
+    pub fn with_fallback(self, fallback_terms: Vec<CostTerm>) -> Self {
+        Self { fallback_terms, ..self }
+    }
+
+    /// The same on a machine with a last-level cache of so many bytes.
+    #[must_use]
+    pub fn with_cache(self, cache_bytes: f64) -> Self {
+        Self { cache_bytes, ..self }
+    }
+
+    /// The same with a correction, whose knots ascend.
+    #[must_use]
+    pub fn with_correction(self, correction: Vec<Knot>) -> Self {
+        Self { correction, ..self }
+    }
+
     /// Predicted nanoseconds for a frame under `load`.
     #[must_use]
     pub fn cost_ns(&self, load: &Load) -> f64 {
@@ -146,19 +90,19 @@ impl CostCurve {
 
     pub(crate) fn cost_of(&self, counts: &Counts<'_>) -> f64 {
         let sum = self.uncorrected(counts);
-        if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects).exp() }
+        if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects()).exp() }
     }
 
     /// Predicted nanoseconds of the fallback, where there is one.
     pub(crate) fn fallback_of(&self, counts: &Counts<'_>) -> Option<f64> {
         let ns: f64 = self.fallback_terms.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum();
-        (!self.fallback_terms.is_empty()).then(|| ns * self.ln_correction(counts.log2_objects).exp())
+        (!self.fallback_terms.is_empty()).then(|| ns * self.ln_correction(counts.log2_objects()).exp())
     }
 
     /// What of the predicted nanoseconds is due to [`Term::Call`].
     pub(crate) fn calls_of(&self, counts: &Counts<'_>) -> f64 {
         let ns: f64 = self.terms.iter().filter(|t| t.term == Term::Call).map(|t| t.unit_ns).sum();
-        ns * self.ln_correction(counts.log2_objects).exp()
+        ns * self.ln_correction(counts.log2_objects()).exp()
     }
 
     /// The sum of the terms, of the fallback where that is cheaper.
@@ -176,7 +120,7 @@ impl CostCurve {
             return (low, high);
         }
         // It is linear between knots, so that its extremes lie at the ends or at the knots between them.
-        let (from, to) = (least.log2_objects, most.log2_objects);
+        let (from, to) = (least.log2_objects(), most.log2_objects());
         let (a, b) = (self.ln_correction(from), self.ln_correction(to));
         let first = self.correction.partition_point(|k| k.log2_objects <= from);
         let inner = self.correction[first..].iter().take_while(|k| k.log2_objects < to).map(|k| k.ln_factor);
@@ -212,26 +156,71 @@ impl CostCurve {
         }
     }
 
-    /// What makes this curve unusable, if anything: a negative or non-finite figure, or knots out of order.
+    /// What makes this curve unusable, if anything.
     #[must_use]
-    pub fn defect(&self) -> Option<String> {
-        if let Some(t) = self.terms.iter().chain(&self.fallback_terms).find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
-            return Some(format!("the term {:?} has {} ns a unit", t.term, t.unit_ns));
+    pub fn defect(&self) -> Option<CurveError> {
+        let terms = || self.terms.iter().chain(&self.fallback_terms);
+        if let Some(t) = terms().find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
+            return Some(CurveError::Unit { term: t.term, unit_ns: t.unit_ns });
+        }
+        if let Some(t) = terms().find(|t| matches!(t.term, Term::Product(p) if !p.is_sound())) {
+            return Some(CurveError::Powers { term: t.term });
         }
         if !(self.cache_bytes.is_finite() && self.cache_bytes >= 0.0) {
-            return Some(format!("a cache of {} bytes", self.cache_bytes));
+            return Some(CurveError::Cache { bytes: self.cache_bytes });
         }
         let bounded = |k: &Knot| k.log2_objects.abs() <= MOST_LOG2_OBJECTS && k.ln_factor.abs() <= MOST_LN_FACTOR;
         if !self.correction.iter().all(bounded) || !self.correction.is_sorted_by(|a, b| a.log2_objects < b.log2_objects) {
-            return Some("knots of the correction that are not ascending, or beyond every measurement".to_owned());
+            return Some(CurveError::Correction);
         }
         let nothing = |terms: &[CostTerm]| terms.iter().all(|t| t.unit_ns == 0.0);
         if nothing(&self.terms) || !self.fallback_terms.is_empty() && nothing(&self.fallback_terms) {
-            return Some("no term above zero, so the cost is always nothing".to_owned());
+            return Some(CurveError::Nothing);
         }
         None
     }
 }
+
+/// What makes a cost curve unusable.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum CurveError {
+    /// A negative unit, or one beyond [`MOST_UNIT_NS`].
+    Unit {
+        /// The term.
+        term: Term,
+        /// Its unit.
+        unit_ns: f64,
+    },
+    /// A product of more powers than [`Product::MOST_POWERS`].
+    Powers {
+        /// The term.
+        term: Term,
+    },
+    /// A cache of a size that none has.
+    Cache {
+        /// Its size.
+        bytes: f64,
+    },
+    /// Knots of the correction that are not ascending, or beyond every measurement.
+    Correction,
+    /// No term above zero.
+    Nothing,
+}
+
+impl fmt::Display for CurveError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unit { term, unit_ns } => write!(f, "the term {term:?} has {unit_ns} ns a unit"),
+            Self::Powers { term } => write!(f, "{term:?} has more than {} powers", Product::MOST_POWERS),
+            Self::Cache { bytes } => write!(f, "a cache of {bytes} bytes"),
+            Self::Correction => f.write_str("knots of the correction that are not ascending, or beyond every measurement"),
+            Self::Nothing => f.write_str("no term above zero, so the cost is always nothing"),
+        }
+    }
+}
+
+impl std::error::Error for CurveError {}
 
 #[cfg(test)]
 mod tests {
@@ -268,24 +257,13 @@ mod tests {
     }
 
     #[test]
-    fn cold_objects_start_where_the_cache_ends() {
-        let load = |objects| Load { objects, ..Load::default() };
-        assert_eq!(Term::ColdObjects.count(&load(1000), 64_000.0), 0.0);
-        assert_eq!(Term::ColdObjects.count(&load(2000), 64_000.0), 1000.0);
-    }
-
-    #[test]
-    fn a_scene_at_rest_has_no_moved_boxes() {
-        let load = |moved| Load { objects: 200, moved, ..Load::default() };
-        assert_eq!([0.0, 0.25, 1.0].map(|moved| Term::Moved.count(&load(moved), 0.0)), [0.0, 50.0, 200.0]);
-    }
-
-    #[test]
     fn impossible_curves_are_told() {
         let curve = |unit_ns| CostCurve { terms: vec![CostTerm { term: Term::Call, unit_ns }], ..CostCurve::default() };
         let knot = |log2_objects| Knot { log2_objects, ln_factor: 0.0 };
         let far = CostCurve { correction: vec![knot(-1e308), knot(1e308)], ..curve(1.0) };
         assert!(far.defect().is_some() && curve(1.0).defect().is_none());
+        let powers = CostCurve::new(vec![CostTerm::new(Term::Product(Product::ONE.pairs(9)), 1.0)]);
+        assert!(matches!(powers.defect(), Some(CurveError::Powers { .. })));
         assert!(curve(-1.0).defect().is_some() && curve(f64::NAN).defect().is_some() && curve(0.0).defect().is_some());
     }
 }

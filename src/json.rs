@@ -1,95 +1,81 @@
-//! Models and tuning as JSON text.
+//! Tuning and models as JSON text, and what reads and writes every file of Sapwise.
+//!
+//! The first key of each file names its schema: `tuning/1`, or `tuning/1.3` where only keys were added since. A file of a newer minor version
+//! is read, and what this version does not know in it is skipped and told; in any other file an unknown key is an error. An older
+//! schema is refused with the command that converts its files.
 
-use crate::model::ModelSchema;
-use crate::tuning::TuningSchema;
+mod error;
+mod format;
+
+pub use error::Error;
+pub use format::{Format, Schema};
+
 use crate::{Model, Tuning};
-use std::fmt;
 
-/// A file of Sapwise, whatever its schema.
+/// What was read from a file.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub enum Document {
-    /// `model/2`.
-    Model(Box<Model>),
-    /// `tuning/1`.
-    Tuning(Box<Tuning>),
+pub struct Read<T> {
+    /// What it holds.
+    pub value: T,
+    /// The schema that it names.
+    pub schema: Schema,
+    /// Keys that this version does not know, each with its place, in a file of a newer minor version. Empty for all others.
+    pub skipped: Vec<String>,
 }
 
-/// Why a text is no sound file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct JsonError(String);
-
-impl fmt::Display for JsonError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for JsonError {}
-
-impl From<serde_json::Error> for JsonError {
-    fn from(e: serde_json::Error) -> Self {
-        Self(e.to_string())
-    }
-}
-
-/// Reads any file of Sapwise by its `schema` key.
+/// Reads tuning and checks its figures.
 ///
 /// # Errors
-/// The line and column of the defect, the schema where it is none of ours, or the figure that can't be.
-pub fn read(text: &str) -> Result<Document, JsonError> {
-    /// Only this key; the rest is skipped without being built, so hostile nesting costs nothing.
-    #[derive(serde::Deserialize)]
-    struct Tag {
-        schema: String,
-    }
-    let tag: Tag = serde_json::from_str(text)?;
-    match tag.schema.as_str() {
-        ModelSchema::TEXT => model(text).map(|m| Document::Model(Box::new(m))),
-        TuningSchema::TEXT => tuning(text).map(|f| Document::Tuning(Box::new(f))),
-        other => Err(JsonError(format!(
-            "the schema is {other:?}; this version reads {:?} and {:?}",
-            ModelSchema::TEXT,
-            TuningSchema::TEXT
-        ))),
-    }
+/// As [`Format::read`].
+pub fn tuning(text: &str) -> Result<Tuning, Error> {
+    Format::TUNING.read(text).map(|read| read.value)
 }
 
-/// Reads a model and checks its figures.
+/// Reads what predicts of a model, and checks its figures.
 ///
 /// # Errors
-/// As [`read`].
-pub fn model(text: &str) -> Result<Model, JsonError> {
-    let model: Model = serde_json::from_str(text)?;
-    model.defect().map_or(Ok(model), |d| Err(JsonError(d)))
+/// As [`Format::read`].
+pub fn model(text: &str) -> Result<Model, Error> {
+    Format::MODEL.read(text).map(|read| read.value)
 }
 
-/// Reads tuning and checks their figures.
-///
-/// # Errors
-/// As [`read`].
-pub fn tuning(text: &str) -> Result<Tuning, JsonError> {
-    let tuning: Tuning = serde_json::from_str(text)?;
-    tuning.defect().map_or(Ok(tuning), |d| Err(JsonError(d)))
-}
-
-/// Writes a model or tuning, one key a line.
+/// Writes tuning, one key a line.
 ///
 /// # Errors
 /// When a figure can't be written.
-pub fn write(document: &impl serde::Serialize) -> Result<String, JsonError> {
-    Ok(serde_json::to_string_pretty(document)? + "\n")
+pub fn write_tuning(tuning: &Tuning) -> Result<String, Error> {
+    Format::TUNING.write(tuning)
 }
 
-/// File names and texts of the JSON Schemas of everything that [`read`] accepts, and of the files in the cache.
+/// Writes a model, one key a line, without what training says of itself.
+///
+/// # Errors
+/// When a figure can't be written.
+pub fn write_model(model: &Model) -> Result<String, Error> {
+    Format::MODEL.write(model)
+}
+
+/// Writes anything that is no file of a schema, one key a line.
+///
+/// # Errors
+/// When a figure can't be written.
+pub fn write(value: &impl serde::Serialize) -> Result<String, Error> {
+    Ok(serde_json::to_string_pretty(value).map_err(Error::Write)? + "\n")
+}
+
+/// File names and texts of the JSON Schemas of tuning, of the engine's part of models, and of the files in the cache.
 ///
 /// # Errors
 /// When a schema can't be written.
 #[cfg(feature = "schema")]
-pub fn schemas() -> Result<Vec<(&'static str, String)>, JsonError> {
+pub fn schemas() -> Result<Vec<(String, String)>, Error> {
     Ok(vec![
-        ("model-2.schema.json", write(&schemars::schema_for!(Model))?),
-        ("tuning-1.schema.json", write(&schemars::schema_for!(Tuning))?),
-        ("cache-2.schema.json", write(&schemars::schema_for!(crate::adaptive::cache::Cached))?),
+        Format::TUNING.json_schema::<Tuning>()?,
+        Format::MODEL.json_schema::<Model>()?,
+        crate::adaptive::cache::json_schema()?,
     ])
 }
+
+#[cfg(test)]
+mod tests;

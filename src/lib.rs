@@ -31,6 +31,8 @@
 //! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and keeps the tuning for the next start.
 //! - `schema`: the JSON Schemas of the files, for tools.
 
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 mod aabb;
 mod adaptive;
 mod algorithm;
@@ -50,15 +52,17 @@ mod load;
 #[cfg(feature = "measure")]
 pub mod measure;
 pub mod model;
+mod named;
 mod pairs;
 mod registry;
 mod sample;
 #[cfg(test)]
 mod scene;
-mod schema_tag;
 mod splitmix;
 pub mod stats;
 pub mod tuning;
+#[cfg(feature = "model")]
+mod wire;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
@@ -67,22 +71,31 @@ pub use adaptive::{Cache, Options, Origin, SaveError, Setup};
 pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
 pub use broad_phase::BroadPhase;
 pub use changes::Changes;
-pub use cost::{CostCurve, CostTerm, Counts, Knot, MOST_UNIT_NS, Term};
+pub use cost::{CostCurve, CostTerm, Counts, CurveError, Knot, MOST_UNIT_NS, Product, Term};
 pub use cpu::SimdLevel;
 pub use displacement::Displacement;
 pub use error::{BoxDefect, Error};
 pub use filter::{Filter, Membership};
-pub use hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, Hardware, How, Machine, Parameter};
+pub use hardware::{
+    GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, Hardware, HardwareError, How, Machine, Parameter,
+    ParameterId,
+};
 pub use load::Load;
 pub use model::Model;
+pub use named::UnknownName;
 pub use pairs::{Pair, PairOrder, Pairs};
 /// The version of rayon whose pools this library takes: [`Registry::use_pool`].
 #[cfg(feature = "parallel")]
 pub use rayon;
 pub use registry::{Entry, Registry, usable_cores};
-pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, Tuning};
+pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, Tuning, TuningError};
 
-/// The examples of the README as tests, with the feature that the first of them needs.
+/// The example of the README as a test, with the feature that it needs.
 #[cfg(all(doctest, feature = "this-machine"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// The examples of the guide as tests, with the features that they need together.
+#[cfg(all(doctest, feature = "this-machine", feature = "gpu"))]
+#[doc = include_str!("../docs/guide.md")]
+struct Guide;

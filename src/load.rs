@@ -8,8 +8,7 @@ use crate::sample::{Chosen, Sample};
 ///
 /// The count alone is a poor switch: between uniform and clustered scenes measured borders move by a factor of five.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Load {
     /// Boxes in the frame.
     pub objects: u32,

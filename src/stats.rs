@@ -1,4 +1,4 @@
-//! Median, quantiles and dispersion of a handful of samples.
+//! Medians, quantiles, dispersion and the normal distribution: the statistics of a handful of samples.
 //!
 //! Samples that are not a number are left out: a single failed division must not make a whole figure unknown.
 
@@ -23,6 +23,58 @@ pub fn quantile(samples: &[f64], q: f64) -> Option<f64> {
 #[must_use]
 pub fn median(samples: &[f64]) -> Option<f64> {
     quantile(samples, 0.5)
+}
+
+/// The mean; 0 of no values.
+#[must_use]
+pub fn mean(values: &[f64]) -> f64 {
+    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+}
+
+/// Standard deviations of a normal distribution to either side of its mean that hold 90 % of it.
+pub const NORMAL_90: f64 = 1.645;
+
+/// The standard deviation of a normal distribution over its median absolute deviation.
+pub const NORMAL_OVER_MAD: f64 = 1.4826;
+
+/// A standard deviation that outliers don't move: the median absolute deviation from the median, scaled for a normal distribution. `None`
+/// for no samples.
+#[must_use]
+pub fn robust_deviation(samples: &[f64]) -> Option<f64> {
+    let middle = median(samples)?;
+    let away: Vec<f64> = samples.iter().map(|x| (x - middle).abs()).collect();
+    Some(NORMAL_OVER_MAD * median(&away)?)
+}
+
+/// The density of a standard normal variable.
+#[must_use]
+pub fn normal_density(x: f64) -> f64 {
+    (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt()
+}
+
+/// The probability that a standard normal variable exceeds `x`; to 1.2e-7 of its value for an `x` that is not negative (Press and others,
+/// Numerical Recipes in C, 1992, chapter 6.2).
+#[must_use]
+pub fn normal_tail(x: f64) -> f64 {
+    if x < 0.0 {
+        return 1.0 - normal_tail(-x);
+    }
+    const SERIES: [f64; 10] = [
+        -1.265_512_23,
+        1.000_023_68,
+        0.374_091_96,
+        0.096_784_18,
+        -0.186_288_06,
+        0.278_868_07,
+        -1.135_203_98,
+        1.488_515_87,
+        -0.822_152_23,
+        0.170_872_77,
+    ];
+    let z = x / std::f64::consts::SQRT_2;
+    let t = 1.0 / (1.0 + 0.5 * z);
+    let polynomial = SERIES.iter().rev().fold(0.0, |sum, c| sum * t + c);
+    0.5 * t * (polynomial - z * z).exp()
 }
 
 /// Interquartile range over median, a dispersion without a unit.
@@ -68,6 +120,27 @@ mod tests {
         assert_eq!(quantile(&samples, -1.0), Some(1.0));
         assert_eq!(quantile(&samples, 2.0), Some(4.0));
         assert_eq!(quantile(&samples, f64::NAN), Some(1.0));
+    }
+
+    #[test]
+    fn means_by_hand() {
+        assert_eq!((mean(&[]), mean(&[1.0, 2.0, 6.0])), (0.0, 3.0));
+    }
+
+    #[test]
+    fn robust_deviations_by_hand() {
+        // Away from the median 3: 2, 1, 0, 1 and 97.
+        assert_eq!(robust_deviation(&[1.0, 2.0, 3.0, 4.0, 100.0]), Some(1.4826));
+        assert_eq!(robust_deviation(&[]), None);
+    }
+
+    #[test]
+    fn the_tail_of_the_normal_distribution_has_its_known_values() {
+        for (x, probability) in [(0.0, 0.5), (1.0, 0.158_655_254), (3.0, 0.001_349_898), (-1.0, 0.841_344_746)] {
+            assert!((normal_tail(x) / probability - 1.0).abs() < 1e-6, "{x}");
+        }
+        assert!((normal_density(0.0) - 0.398_942_28).abs() < 1e-7);
+        assert!((2.0 * normal_tail(NORMAL_90) - 0.1).abs() < 1e-4);
     }
 
     #[test]

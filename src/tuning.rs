@@ -1,28 +1,24 @@
 //! The fields of optimal performance: for each load the cheapest algorithm.
 
+mod crossover;
+mod error;
 mod slice;
 
 use crate::cost::Counts;
-use crate::schema_tag::schema_tag;
+use crate::named::named;
 use crate::{AlgorithmId, CostCurve, Load, Registry};
+use slice::Slice;
 
-pub(crate) use slice::Slice;
-
-schema_tag!(
-    /// `tuning/1`.
-    pub TuningSchema = "tuning/1"
-);
+pub use crossover::Crossover;
+pub use error::TuningError;
 
 /// Which algorithm to run under which load, and where that knowledge came from.
 ///
 /// With cost curves the choice depends on the whole [`Load`]; without them on the number of objects alone, through
 /// `steps`, as the paper does it and as a hand-written list of thresholds does.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Tuning {
-    /// Always `tuning/1`.
-    pub schema: TuningSchema,
     /// Where the tuning came from.
     pub source: Source,
     /// Name of the model that predicted them, whether they were corrected since or not; `None` where there was no prediction.
@@ -42,29 +38,27 @@ pub struct Tuning {
     /// The cost of each algorithm. Empty: `steps` decide.
     pub costs: Vec<AlgorithmCost>,
     /// The samples by which a prediction was corrected before the first frame, in the order in which they were taken.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub samples: Vec<Observation>,
 }
 
-/// Where tuning came from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Source {
-    /// Written down by hand.
-    Default,
-    /// From hardware parameters, by a model trained on reports.
-    Predicted,
-    /// From timings of the algorithms on this machine.
-    Measured,
-    /// Predicted, then corrected by frames that were run: by samples before the first one ([`Tuning::samples`]), or on line.
-    Learned,
+named! {
+    /// Where tuning came from.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[non_exhaustive]
+    pub enum Source("source of tuning") {
+        /// Written down by hand.
+        Default = "default",
+        /// From hardware parameters, by a model trained on reports.
+        Predicted = "predicted",
+        /// From timings of the algorithms on this machine.
+        Measured = "measured",
+        /// Predicted, then corrected by frames that were run: by samples before the first one ([`Tuning::samples`]), or on line.
+        Learned = "learned",
+    }
 }
 
 /// From this many objects up, this algorithm.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Step {
     /// First number of objects.
     pub from_objects: u32,
@@ -72,28 +66,9 @@ pub struct Step {
     pub algorithm: AlgorithmId,
 }
 
-/// A border between two neighbouring tuning.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub struct Crossover {
-    /// The cheaper algorithm with fewer objects.
-    pub below: AlgorithmId,
-    /// The cheaper algorithm with more objects.
-    pub above: AlgorithmId,
-    /// Number of objects at which both cost the same.
-    pub objects: f64,
-    /// Lower end of the interval; where it may lie lower still, the least objects of the slice. `None`, like `high`, where no
-    /// interval can be claimed: [`Tuning::interval_basis`] says why.
-    pub low: Option<f64>,
-    /// Upper end of the interval; where it may lie higher still, the most objects of the slice.
-    pub high: Option<f64>,
-}
-
 /// The cost of one algorithm.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct AlgorithmCost {
     /// The algorithm.
     pub algorithm: AlgorithmId,
@@ -107,8 +82,7 @@ pub struct AlgorithmCost {
 
 /// One algorithm, timed on some frames of the slice's scenario.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
 pub struct Observation {
     /// The algorithm.
     pub algorithm: AlgorithmId,
@@ -131,19 +105,27 @@ pub struct Ranking {
     pub runner_up: Option<(usize, f64)>,
 }
 
-impl Crossover {
-    /// Both ends of the interval, where one is claimed.
+impl Step {
+    /// From so many objects up, that algorithm.
     #[must_use]
-    pub fn interval(&self) -> Option<(f64, f64)> {
-        self.low.zip(self.high)
+    pub fn new(from_objects: u32, algorithm: AlgorithmId) -> Self {
+        Self { from_objects, algorithm }
     }
+}
 
-    fn is_sound(&self) -> bool {
-        match (self.low, self.high) {
-            (Some(low), Some(high)) => 0.0 <= low && low <= self.objects && self.objects <= high,
-            (None, None) => self.objects >= 0.0,
-            _ => false,
-        }
+impl AlgorithmCost {
+    /// The cost of a revision of an algorithm. `spread_ln` is the standard deviation of the natural logarithm of measured over modelled time.
+    #[must_use]
+    pub fn new(algorithm: AlgorithmId, revision: u32, curve: CostCurve, spread_ln: f64) -> Self {
+        Self { algorithm, revision, curve, spread_ln }
+    }
+}
+
+impl Observation {
+    /// An algorithm at a number of objects, predicted and measured in nanoseconds.
+    #[must_use]
+    pub fn new(algorithm: AlgorithmId, objects: u32, predicted_ns: f64, measured_ns: f64) -> Self {
+        Self { algorithm, objects, predicted_ns, measured_ns }
     }
 }
 
@@ -151,8 +133,8 @@ impl Tuning {
     /// Tuning from a hand-written list of thresholds: from `objects` up, that algorithm.
     ///
     /// # Errors
-    /// A sentence, when the list is empty, does not begin at 0 or is not ascending.
-    pub fn from_steps(steps: Vec<Step>) -> Result<Self, String> {
+    /// When the list is empty, does not begin at 0 or is not ascending.
+    pub fn from_steps(steps: Vec<Step>) -> Result<Self, TuningError> {
         let tuning = Self { steps, ..Self::empty(Source::Default) };
         tuning.defect().map_or(Ok(tuning), Err)
     }
@@ -177,7 +159,7 @@ impl Tuning {
     ///
     /// The loads are interpolated between each other, so a handful per decade is enough. A field narrower than 3 % in objects may
     /// be missed. Intervals follow from the curves'
-    /// `spread_ln`: where the logarithms of two costs differ by less than 1.645 standard deviations of that difference.
+    /// `spread_ln`: where the logarithms of two costs differ by less than [`NORMAL_90`](crate::stats::NORMAL_90) standard deviations of that difference.
     #[must_use]
     pub fn from_costs(source: Source, scenario: &str, costs: Vec<AlgorithmCost>, loads: &[Load]) -> Self {
         let spreads: Vec<f64> = costs.iter().map(|c| c.spread_ln).collect();
@@ -205,7 +187,6 @@ impl Tuning {
 
     fn empty(source: Source) -> Self {
         Self {
-            schema: TuningSchema,
             source,
             model: None,
             extrapolated: false,
@@ -261,30 +242,30 @@ impl Tuning {
 
     /// What makes this tuning unusable, if anything.
     #[must_use]
-    pub fn defect(&self) -> Option<String> {
+    pub fn defect(&self) -> Option<TuningError> {
         if self.steps.first().is_none_or(|s| s.from_objects != 0) {
-            return Some("the steps don't begin at 0 objects".to_owned());
+            return Some(TuningError::NoFirstStep);
         }
         if !self.steps.is_sorted_by(|a, b| a.from_objects < b.from_objects) {
-            return Some("the steps are not ascending".to_owned());
+            return Some(TuningError::StepOrder);
         }
-        if let Some(b) = self.crossovers.iter().find(|b| !b.is_sound()) {
-            return Some(format!("the crossover from {} to {} does not lie within its interval", b.below, b.above));
+        if let Some(c) = self.crossovers.iter().find(|c| !c.is_sound()) {
+            return Some(TuningError::Crossover { below: c.below.clone(), above: c.above.clone() });
         }
         let is_time = |ns: f64| ns.is_finite() && ns > 0.0;
         if let Some(s) = self.samples.iter().find(|s| !is_time(s.predicted_ns) || !is_time(s.measured_ns)) {
-            return Some(format!("the sample of {} at {} objects has no time above zero", s.algorithm, s.objects));
+            return Some(TuningError::Sample { algorithm: s.algorithm.clone(), objects: s.objects });
         }
         for (k, cost) in self.costs.iter().enumerate() {
-            let id = &cost.algorithm;
-            if let Some(defect) = cost.curve.defect() {
-                return Some(format!("the cost of {id}: {defect}"));
+            let algorithm = || cost.algorithm.clone();
+            if let Some(source) = cost.curve.defect() {
+                return Some(TuningError::Curve { algorithm: algorithm(), source });
             }
             if !(cost.spread_ln.is_finite() && cost.spread_ln >= 0.0) {
-                return Some(format!("the cost of {id}: a spread of {}", cost.spread_ln));
+                return Some(TuningError::Spread { algorithm: algorithm(), spread_ln: cost.spread_ln });
             }
-            if self.costs[..k].iter().any(|c| c.algorithm == *id) {
-                return Some(format!("{id} stands there twice"));
+            if self.costs[..k].iter().any(|c| c.algorithm == cost.algorithm) {
+                return Some(TuningError::Repeated { algorithm: algorithm() });
             }
         }
         None
@@ -292,15 +273,15 @@ impl Tuning {
 
     /// Notes where along the slice the cheapest algorithm changes.
     ///
-    /// `spread` gives the standard deviation of the logarithm of the ratio of two costs under a load.
+    /// `spread` returns the standard deviation of the logarithm of the ratio of two costs under a load.
     fn cut(&mut self, loads: &[Load], spread: &dyn Fn(usize, usize, &Load) -> f64) {
         let slice = Slice::new(loads);
         let steps = slice.steps(&self.costs);
-        let border = |w: &[(Load, usize)]| {
+        let crossover = |w: &[(Load, usize)]| {
             let (below, above) = (w[0].1, w[1].1);
-            self.border(&slice, below, above, w[1].0.objects, &|load| spread(below, above, load))
+            self.crossover(&slice, below, above, w[1].0.objects, &|load| spread(below, above, load))
         };
-        self.crossovers = steps.windows(2).map(border).collect();
+        self.crossovers = steps.windows(2).map(crossover).collect();
         self.steps = steps
             .iter()
             .enumerate()
@@ -311,9 +292,16 @@ impl Tuning {
             .collect();
     }
 
-    fn border(&self, slice: &Slice<'_>, below: usize, above: usize, objects: u32, spread: &dyn Fn(&Load) -> f64) -> Crossover {
+    fn crossover(
+        &self,
+        slice: &Slice<'_>,
+        below: usize,
+        above: usize,
+        objects: u32,
+        spread: &dyn Fn(&Load) -> f64,
+    ) -> Crossover {
         let (b, a) = (&self.costs[below], &self.costs[above]);
-        let doubt = |load: &Load| NORMAL_90 * spread(load);
+        let doubt = |load: &Load| crate::stats::NORMAL_90 * spread(load);
         // Positive where the algorithm of the upper field is cheaper.
         let gain = |load: &Load| (b.curve.cost_ns(load) / a.curve.cost_ns(load)).ln();
         let objects = f64::from(objects);
@@ -326,9 +314,6 @@ impl Tuning {
         }
     }
 }
-
-/// Deviations of a normal distribution to either side that hold 90 % of it.
-const NORMAL_90: f64 = 1.645;
 
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,7 @@ mod common;
 mod custom;
 
 use common::naive;
-use custom::{ID, cost, tuning, registry};
+use custom::{ID, cost, registry, tuning};
 use sapwise::{Aabb, Adaptive, BroadPhase, Error, PairOrder, Pairs, Reason, Registry, Term};
 use sapwise_scenes::Scenario;
 use std::time::Duration;

@@ -126,29 +126,29 @@ fn given_gpus_stand_under_their_numbers_once() {
 #[cfg(feature = "measure-gpu")]
 #[test]
 fn a_given_gpu_is_measured_on_its_own_device() {
-    use sapwise::hardware::gpu::parameter;
+    use sapwise::hardware::GpuParameterId;
     use sapwise::measure::{self, Options};
     let Some(gpus) = gpus() else { return };
     let (device, queue) = device(&gpus, 0);
     let given = Gpus::of([shared(0, &device, &queue)]);
     let options = Options { limit: Some(std::time::Duration::ZERO), ..Options::default() };
     let measured = measure::gpu(&given, 0, &options).unwrap();
-    assert_eq!(measured.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>(), parameter::all_names());
+    assert_eq!(measured.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>(), GpuParameterId::OF_ONE);
     for name in [
-        parameter::ROUND_TRIP_NS,
-        parameter::READ_BACK_NS,
-        parameter::DISPATCH_NS,
-        parameter::UPLOAD_GB_PER_S,
-        parameter::DOWNLOAD_GB_PER_S,
-        parameter::READ_GB_PER_S,
-        parameter::COPY_GB_PER_S,
-        parameter::ARITHMETIC_GFLOP_PER_S,
+        GpuParameterId::RoundTripNs,
+        GpuParameterId::ReadBackNs,
+        GpuParameterId::DispatchNs,
+        GpuParameterId::UploadGbPerS,
+        GpuParameterId::DownloadGbPerS,
+        GpuParameterId::ReadGbPerS,
+        GpuParameterId::CopyGbPerS,
+        GpuParameterId::ArithmeticGflopPerS,
     ] {
         // One sample under the load of other tests may well be nought.
         assert!(measured.value(name).is_some(), "{name}: {:?}", measured.parameters);
     }
     let absent = |name: &str| measured.parameters.iter().find(|p| p.name == name).unwrap().source.clone();
-    assert!(absent(parameter::ATOMIC_G_PER_S).contains("limit of time"));
+    assert!(absent(GpuParameterId::AtomicGPerS).contains("limit of time"));
     assert!(gpus.adapter(0).is_some());
     Own::new(&device, &queue).work();
 }

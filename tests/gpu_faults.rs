@@ -4,7 +4,10 @@ mod common;
 
 use common::{Random, gpus, naive};
 use sapwise::gpu::{Gpu, Gpus, broad_phase, wgpu};
-use sapwise::{Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, PairOrder, Pairs, Reason, Registry, Source, Term};
+use sapwise::{
+    Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Load, PairOrder, Pairs, Reason, Registry, Source,
+    Term, Tuning,
+};
 use sapwise_scenes::Scenario;
 
 const METHODS: [&str; 3] = ["brute", "sap", "grid-sap"];
@@ -159,7 +162,8 @@ fn frames_beyond_the_limits_of_a_device_come_in_pieces() {
     let gpu = small(&gpus, 1 << 20);
     let mut scene = Scenario::Uniform.start(100_000, 4);
     scene.advance();
-    let oracle = pairs_of(Registry::with_cores(1).create(&"grid-sap@cpu1".parse().unwrap()).unwrap().as_mut(), scene.boxes());
+    let oracle =
+        pairs_of(Registry::with_cores(1).create(&"grid-sap@cpu1".parse().unwrap()).unwrap().as_mut(), scene.boxes());
     let oracle = oracle.unwrap();
     for method in ["sap", "grid-sap"] {
         let mut algorithm = broad_phase(method, vec![gpu.clone()]).unwrap();

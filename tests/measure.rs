@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::measure::{self, Family, Options};
 use sapwise::{How, Parameter};
 
@@ -32,7 +32,7 @@ fn check(p: &Parameter) {
 fn every_parameter_once_and_in_order() {
     let hardware = measure::hardware(&brief(None));
     let names: Vec<String> = hardware.parameters.iter().map(|p| p.name.clone()).collect();
-    assert_eq!(names, parameter::all_names());
+    assert_eq!(names, ParameterId::ALL);
     hardware.parameters.iter().for_each(check);
     assert_eq!(hardware.defect(), None);
     assert!(hardware.parameters.iter().all(|p| p.source != "not measured"));
@@ -49,7 +49,7 @@ fn families_share_the_parameters_out() {
         let measured: Vec<String> = measure::family(family, &brief(Some(1))).into_iter().map(|p| p.name).collect();
         assert_eq!(measured, family.parameters());
     }
-    assert_eq!(seen, parameter::all_names().into_iter().collect());
+    assert_eq!(seen, ParameterId::ALL.into_iter().collect());
     assert!("nonsense".parse::<Family>().is_err());
 }
 
@@ -58,14 +58,14 @@ fn one_thread_is_no_parallel_machine() {
     for threads in [0, 1] {
         let hardware = measure::hardware(&brief(Some(threads)));
         hardware.parameters.iter().for_each(check);
-        assert_eq!(hardware.value(parameter::USABLE_CORES), Some(1.0));
-        assert_eq!(hardware.value(parameter::SCALING_TWO_THREADS_RATIO), None);
-        assert_eq!(hardware.value(parameter::SCALING_ALL_THREADS_RATIO), Some(1.0));
-        assert_eq!(hardware.value(parameter::FORK_JOIN_WARM_NS), None);
-        assert_eq!(hardware.value(parameter::CORE_TO_CORE_NS), None);
+        assert_eq!(hardware.value(ParameterId::UsableCores), Some(1.0));
+        assert_eq!(hardware.value(ParameterId::ScalingTwoThreadsRatio), None);
+        assert_eq!(hardware.value(ParameterId::ScalingAllThreadsRatio), Some(1.0));
+        assert_eq!(hardware.value(ParameterId::ForkJoinWarmNs), None);
+        assert_eq!(hardware.value(ParameterId::CoreToCoreNs), None);
         for [one, all] in [
-            [parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, parameter::BANDWIDTH_ALL_THREADS_GB_PER_S],
-            [parameter::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, parameter::ARITHMETIC_ALL_THREADS_GFLOP_PER_S],
+            [ParameterId::BandwidthOneThreadGbPerS, ParameterId::BandwidthAllThreadsGbPerS],
+            [ParameterId::ArithmeticOneThreadGflopPerS, ParameterId::ArithmeticAllThreadsGflopPerS],
         ] {
             assert_eq!(hardware.value(one), hardware.value(all));
         }
@@ -89,14 +89,14 @@ fn threads_can_be_lowered_but_not_raised() {
 fn assembling_fills_gaps_and_drops_strangers() {
     let measured = vec![
         Parameter::reported("nonsense", 1.0, "nobody"),
-        Parameter::reported(parameter::MEMORY_BYTES, 2.0, "first"),
-        Parameter::reported(parameter::MEMORY_BYTES, 3.0, "second"),
+        Parameter::reported(ParameterId::MemoryBytes, 2.0, "first"),
+        Parameter::reported(ParameterId::MemoryBytes, 3.0, "second"),
     ];
     let hardware = measure::assemble(measure::machine(), measured);
     let names: Vec<String> = hardware.parameters.iter().map(|p| p.name.clone()).collect();
-    assert_eq!(names, parameter::all_names());
-    assert_eq!(hardware.value(parameter::MEMORY_BYTES), Some(2.0));
-    assert!(hardware.parameters.iter().filter(|p| p.name != parameter::MEMORY_BYTES).all(|p| p.how == How::Missing));
+    assert_eq!(names, ParameterId::ALL);
+    assert_eq!(hardware.value(ParameterId::MemoryBytes), Some(2.0));
+    assert!(hardware.parameters.iter().filter(|p| p.name != ParameterId::MemoryBytes).all(|p| p.how == How::Missing));
 }
 
 #[test]

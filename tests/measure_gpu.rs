@@ -6,7 +6,7 @@ mod common;
 
 use common::gpus;
 use sapwise::gpu::Gpus;
-use sapwise::hardware::gpu::parameter;
+use sapwise::hardware::GpuParameterId;
 use sapwise::hardware::{GpuKind, Statistic};
 use sapwise::measure::{self, Options};
 use sapwise::{How, Parameter};
@@ -51,23 +51,23 @@ fn every_parameter_once_and_in_order() {
         let hardware = measure::gpu(&gpus, index, &options(true)).unwrap();
         assert_eq!(Some(&hardware.gpu), gpus.identities().nth(index as usize));
         let names: Vec<String> = hardware.parameters.iter().map(|p| p.name.clone()).collect();
-        assert_eq!(names, parameter::all_names());
+        assert_eq!(names, GpuParameterId::OF_ONE);
         hardware.parameters.iter().for_each(check);
         show(&hardware.parameters);
         // Nothing that any driver can do prevents these.
-        for name in [parameter::UPLOAD_GB_PER_S, parameter::ROUND_TRIP_NS, parameter::ARITHMETIC_GFLOP_PER_S] {
+        for name in [GpuParameterId::UploadGbPerS, GpuParameterId::RoundTripNs, GpuParameterId::ArithmeticGflopPerS] {
             assert!(hardware.value(name).is_some_and(|value| value > 0.0), "{name}");
         }
         let [all, host, device] =
-            [parameter::UPLOAD_GB_PER_S, parameter::UPLOAD_HOST_COPY_GB_PER_S, parameter::UPLOAD_DEVICE_COPY_GB_PER_S]
+            [GpuParameterId::UploadGbPerS, GpuParameterId::UploadHostCopyGbPerS, GpuParameterId::UploadDeviceCopyGbPerS]
                 .map(|name| hardware.value(name).unwrap());
         assert!(all <= host && all <= device, "{all} {host} {device}");
         if hardware.gpu.kind == GpuKind::Software {
-            for name in [parameter::CLOCK_GHZ, parameter::PROCESSORS, parameter::LANES] {
+            for name in [GpuParameterId::ClockGhz, GpuParameterId::Processors, GpuParameterId::Lanes] {
                 let p = hardware.parameters.iter().find(|p| p.name == name).unwrap();
                 assert!(p.value.is_none() && p.source.contains("program on the CPU"), "{p:?}");
             }
-            assert_eq!(hardware.value(parameter::UNIFIED_MEMORY), Some(1.0));
+            assert_eq!(hardware.value(GpuParameterId::UnifiedMemory), Some(1.0));
         }
     }
 }
@@ -83,7 +83,7 @@ fn groups_of_gpus() {
     }
     let group = measure::gpu_group(&gpus, &[1, 0, 1], &options(true)).unwrap();
     assert_eq!(group.gpus, [0, 1]);
-    assert_eq!(group.parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), parameter::GROUP);
+    assert_eq!(group.parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), GpuParameterId::GROUP);
     group.parameters.iter().for_each(check);
     assert!(group.parameters.iter().all(|p| p.value.is_some_and(|value| value > 0.0)), "{group:?}");
 }

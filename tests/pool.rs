@@ -4,7 +4,7 @@ mod common;
 
 use common::{Random, naive};
 use sapwise::rayon::{self, ThreadPool, ThreadPoolBuilder};
-use sapwise::{Aabb, Adaptive, AlgorithmId, Backend, BroadPhase, Error, Tuning, PairOrder, Pairs, Registry};
+use sapwise::{Aabb, Adaptive, AlgorithmId, Backend, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise_scenes::Scenario;
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! What must hold for any boxes at all.
 
 use proptest::prelude::*;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Displacement, Tuning, Load, PairOrder, Pairs, Registry, Step};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Displacement, Load, PairOrder, Pairs, Registry, Step, Tuning};
 
 /// Bounds that meet often, with infinities, zeros of both signs and denormals among them.
 fn bound() -> impl Strategy<Value = f32> {

@@ -17,7 +17,10 @@ mod common;
 mod kept;
 
 use common::{Random, naive};
-use sapwise::{Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Tuning, Load, PairOrder, Pairs, Reason, Registry, Source, Term};
+use sapwise::{
+    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Load, PairOrder, Pairs, Reason, Registry, Source, Term,
+    Tuning,
+};
 use sapwise_scenes::Scenario;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::collections::BTreeMap;

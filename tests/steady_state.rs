@@ -3,7 +3,10 @@
 //!
 //! One test only, because the counter sees every thread of the process.
 
-use sapwise::{Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, Changes, CostCurve, CostTerm, Error, Tuning, Filter, Load, Membership, Pairs, Registry, Source, Term};
+use sapwise::{
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, Changes, CostCurve, CostTerm, Error, Filter, Load, Membership,
+    Pairs, Registry, Source, Term, Tuning,
+};
 use sapwise_scenes::Scenario;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;

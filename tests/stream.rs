@@ -9,19 +9,21 @@
 
 mod common;
 
-use common::{every_algorithm, naive, npy_frames};
-use sapwise::{Aabb, Adaptive, BroadPhase, Tuning, PairOrder, Pairs, Registry};
+use common::{every_algorithm, naive};
+use sapwise::{Adaptive, BroadPhase, PairOrder, Pairs, Registry, Tuning};
+use sapwise_scenes::Frames;
+use std::path::Path;
 
-fn frames() -> Vec<Vec<Aabb>> {
-    npy_frames(include_bytes!("fixtures/fragments.npy"))
+fn frames() -> Frames {
+    Frames::read(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/fragments.npy"))).unwrap()
 }
 
 #[test]
 fn the_stream_is_what_this_test_takes_it_for() {
     let frames = frames();
-    let counts: Vec<usize> = frames.iter().map(Vec::len).collect();
+    let counts: Vec<usize> = frames.iter().map(<[_]>::len).collect();
     assert_eq!((counts.len(), counts[0], counts.iter().max(), counts[299]), (300, 85, Some(&155), 5));
-    assert!(frames.iter().flatten().all(|b| b.defect().is_none()));
+    assert_eq!(frames.check(), Ok(()));
     let pairs: usize = frames.iter().map(|boxes| naive(boxes).len()).sum();
     assert!(pairs > 50_000, "{pairs} pairs");
 }

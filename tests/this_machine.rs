@@ -4,8 +4,8 @@ mod common;
 
 use common::{Random, naive};
 use sapwise::{
-    Aabb, Adaptive, AlgorithmId, BroadPhase, Cache, Error, Tuning, Options, Origin, PairOrder, Pairs, Registry, Setup,
-    Source,
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Cache, Error, Options, Origin, PairOrder, Pairs, Registry, Setup, Source,
+    Tuning,
 };
 use std::fs;
 use std::path::Path;

@@ -25,6 +25,7 @@
 
 pub mod belief;
 pub mod compare;
+pub mod convert;
 pub mod data;
 pub mod data_table;
 pub mod evaluate;
@@ -51,5 +52,5 @@ pub mod write;
 pub use report::Report;
 pub use train::{Trained, train, without};
 pub use training::{
-    Coverage, MethodScore, StoredModel, Training, TrainingCount, TrainingReport, Validation, read_model, write_model,
+    MethodScore, StoredModel, Training, TrainingCount, TrainingReport, Validation, read_model, write_model,
 };

@@ -1,22 +1,20 @@
 //! One machine, one day: what was measured, and nothing that was concluded.
 
-use crate::schema_tag::schema_tag;
-use crate::{AlgorithmId, Hardware, Load};
+use sapwise::json::{self, Format, Read, Schema};
+use sapwise::model::Scale;
+use sapwise::{AlgorithmId, Hardware, Load, Term};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-schema_tag!(
-    /// `report/1`.
-    pub ReportSchema = "report/1"
-);
+/// Files of reports.
+pub const FORMAT: Format = Format::new("report", 2, 0);
 
 /// The hardware parameters of a machine and the raw timings of every algorithm on it.
 ///
 /// Facts only: cost curves, crossovers and tuning is derived from it and never stored in it.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Report {
-    /// Always `report/1`.
-    pub schema: ReportSchema,
     /// What kind of evidence this is.
     pub label: Label,
     /// How the report was made.
@@ -33,9 +31,8 @@ pub struct Report {
 }
 
 /// What kind of evidence a report is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Label {
     /// A whole machine, undisturbed.
     RealFull,
@@ -43,7 +40,7 @@ pub enum Label {
     RealRestricted,
     /// A real machine while other programs load it.
     RealContended,
-    /// A real machine whose GPU is a program on its CPU.
+    /// A real machine whose GPU is a software adapter on its CPU.
     RealSoftwareGpu,
     /// Made up from a specification. Never evidence of accuracy.
     Simulated,
@@ -52,9 +49,8 @@ pub enum Label {
 }
 
 /// How a report was made.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Provenance {
     /// Version of the command.
     pub version: String,
@@ -68,11 +64,11 @@ pub struct Provenance {
     pub threads: Option<u32>,
     /// SIMD level that was forced; `None` when it was not.
     pub simd: Option<String>,
-    /// Threads of lavapipe, a program that acts as a GPU, where `LP_NUM_THREADS` sets them and it is among the GPUs.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
+    /// Threads of lavapipe, a software adapter, where `LP_NUM_THREADS` sets them and it is among the GPUs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gpu_threads: Option<u32>,
     /// What was taken from the machine for this report; `None` where nothing was.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub restriction: Option<Restriction>,
     /// Whether the program was built with optimisation. Timings of a debug build are refused by `train`.
     pub optimised: bool,
@@ -81,9 +77,8 @@ pub struct Provenance {
 }
 
 /// What was taken from a machine, and whether its parameters show it.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Restriction {
     /// Each thing that was taken, once.
     pub kinds: Vec<Restricted>,
@@ -92,9 +87,8 @@ pub struct Restriction {
 }
 
 /// What can be taken from a machine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Restricted {
     /// Cores, by [`Provenance::threads`].
     Threads,
@@ -104,21 +98,20 @@ pub enum Restricted {
     ContendedMemory,
     /// Last-level cache, by programs beside it.
     ContendedCache,
-    /// Threads of a program that acts as a GPU, by [`Provenance::gpu_threads`].
+    /// Threads of a software adapter, by [`Provenance::gpu_threads`].
     GpuThreads,
 }
 
 /// One parameter with and without a restriction.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Proof {
     /// The restriction.
     pub kind: Restricted,
     /// Name of the parameter that must show it.
     pub parameter: String,
     /// The GPU of this report whose parameter it is; `None` for one of the CPU.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gpu: Option<u32>,
     /// Its value where this thing was not taken and all else was the same. `None` when it is missing there.
     pub without: Option<f64>,
@@ -129,20 +122,31 @@ pub struct Proof {
 }
 
 /// An algorithm that was timed.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Timed {
     /// The algorithm.
     pub id: AlgorithmId,
     /// Its revision at the time.
     pub revision: u32,
+    /// What its time consists of, where its author says so: a cost model is fitted with these terms then. Empty for the usual ones.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub terms: Vec<TimedTerm>,
+}
+
+/// One term of a time: a count of the load, and what of the hardware one of it costs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct TimedTerm {
+    /// What is counted.
+    pub term: Term,
+    /// What of the hardware one of it costs.
+    pub scale: Scale,
 }
 
 /// One scenario at one size: every algorithm on the same frames, in random order within each frame.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Point {
     /// Name of the scenario.
     pub scenario: String,
@@ -150,24 +154,23 @@ pub struct Point {
     pub load: Load,
     /// Pairs in the last frame.
     pub pairs: u64,
-    /// [`Pairs::fingerprint`](crate::Pairs::fingerprint) of the last frame, equal for every algorithm, as 16 hex digits.
+    /// [`Pairs::fingerprint`](sapwise::Pairs::fingerprint) of the last frame, equal for every algorithm, as 16 hex digits.
     pub fingerprint: String,
     /// Highest share of the CPU, 0 to 1, that other programs took while these samples were taken. `None`: can't be told.
     pub foreign_load: Option<f64>,
     /// Frames that were thrown away because foreign load spoiled them.
     pub spoiled: u32,
-    /// [`CORE_TO_CORE_NS`](crate::hardware::parameter::CORE_TO_CORE_NS) before and after the samples. A hypervisor that moves the
+    /// [`CORE_TO_CORE_NS`](sapwise::hardware::parameter::CORE_TO_CORE_NS) before and after the samples. A hypervisor that moves the
     /// cores of a guest changes it, and with it what several threads gain. Absent on one core and in old reports.
-    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub core_to_core_ns: Option<[f64; 2]>,
     /// The timings, one entry for each algorithm that was still in the race.
     pub timings: Vec<Timing>,
 }
 
 /// Raw timings of one algorithm at one point.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Timing {
     /// The algorithm.
     pub algorithm: AlgorithmId,
@@ -177,6 +180,36 @@ pub struct Timing {
     pub samples_ns: Vec<u64>,
     /// Why there are no samples, where there are none.
     pub error: Option<String>,
+}
+
+/// Whether a text says that it is a report, of whatever version.
+#[must_use]
+pub fn is_report(text: &str) -> bool {
+    Schema::of(text).is_ok_and(|schema| schema.name() == FORMAT.schema().name())
+}
+
+/// Reads a report and checks its figures. Keys that this version does not know, in a file of a newer one, are in the answer.
+///
+/// # Errors
+/// The place of the defect, or the schema where it is none of ours.
+pub fn read(text: &str) -> Result<Read<Report>, json::Error> {
+    FORMAT.read(text)
+}
+
+/// Writes a report, one key a line.
+///
+/// # Errors
+/// When a figure can't be written.
+pub fn write(report: &Report) -> Result<String, json::Error> {
+    FORMAT.write(report)
+}
+
+impl Timed {
+    /// An algorithm with the usual terms of its method.
+    #[must_use]
+    pub fn new(id: AlgorithmId, revision: u32) -> Self {
+        Self { id, revision, terms: Vec::new() }
+    }
 }
 
 impl std::fmt::Display for Restricted {

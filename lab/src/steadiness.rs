@@ -13,18 +13,20 @@ const FEW: f64 = 0.1;
 
 /// The latency between cores over the points of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(crate) struct Steadiness {
-    /// The usual latency in nanoseconds: the lower median, which is one that was measured where there are two places.
-    pub(crate) core_to_core_ns: f64,
+#[non_exhaustive]
+pub struct Steadiness {
+    /// The usual latency in nanoseconds: the lower median, which is one that was measured where there are two placements.
+    pub core_to_core_ns: f64,
     /// The least and the most.
-    pub(crate) range_ns: [f64; 2],
+    pub range_ns: [f64; 2],
     /// Share of the points before or after which it was more than half as much again, or that much less.
-    pub(crate) elsewhere: f64,
+    pub elsewhere: f64,
 }
 
 impl Steadiness {
-    /// `None` for one core, and for reports that don't tell.
-    pub(crate) fn of(report: &Report) -> Option<Self> {
+    /// The steadiness over the points of a report; `None` for one core, and for reports that don't say.
+    #[must_use]
+    pub fn of(report: &Report) -> Option<Self> {
         let all: Vec<[f64; 2]> = report.points.iter().filter_map(|p: &Point| p.core_to_core_ns).collect();
         let mut sorted = all.as_flattened().to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -37,17 +39,20 @@ impl Steadiness {
     }
 
     /// Whether the cores stayed where they were.
-    pub(crate) fn is_steady(self) -> bool {
+    #[must_use]
+    pub fn is_steady(self) -> bool {
         self.elsewhere <= FEW
     }
 
-    /// Whether two measurements found the cores in the same places.
-    pub(crate) fn is_like(self, other: Self) -> bool {
+    /// Whether two measurements found the cores in the same placement.
+    #[must_use]
+    pub fn is_like(self, other: Self) -> bool {
         self.is_steady() && other.is_steady() && alike(self.core_to_core_ns, other.core_to_core_ns)
     }
 
     /// What the reader of a report should know, if anything.
-    pub(crate) fn remark(self) -> Option<String> {
+    #[must_use]
+    pub fn remark(self) -> Option<String> {
         let Self { core_to_core_ns, range_ns: [least, most], elsewhere } = self;
         (!self.is_steady()).then(|| {
             format!(
@@ -66,7 +71,7 @@ fn alike(a: f64, b: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::synthetic::Machine;
+    use crate::synthetic::Machine;
 
     fn report(latencies: &[[f64; 2]]) -> Report {
         let mut report = Machine::family()[0].report();

@@ -1,120 +1,31 @@
-//! From reports to cost curves, tuning and models.
+//! From reports to a model that says how well it did.
 
-mod baselines;
-mod clouds;
-mod columns;
-mod crossing;
-mod curve;
-#[cfg(test)]
-mod density;
-mod direct;
-mod fit;
-mod folds;
-mod forest;
-mod held;
-mod importance;
-mod learning;
-#[cfg(test)]
-mod misspecified;
-mod model;
-mod nnls;
-mod notes;
-mod partition;
-mod prior;
-mod profile;
-#[cfg(test)]
-mod reference;
-mod residual;
-mod robust;
-mod rows;
-mod sampled;
-mod scores;
-mod selection;
-#[cfg(test)]
-pub(crate) mod synthetic;
-mod terms;
-mod triangle;
-mod two_ways;
-mod validate;
-mod yardstick;
-
+use crate::data::{Evidence, Profile, Selection};
+use crate::evaluate::{HeldOut, Partition, folded, validate};
+use crate::fit::{Designs, model};
 use crate::progress::Progress;
+use crate::training::Training;
 use anyhow::{Result, bail};
-use fit::Designs;
-use partition::Partition;
-use sapwise::hardware::{gpu, parameter};
-use sapwise::model::{GPU_PREFIX, Validation};
-use sapwise::{GpuKind, Hardware, Model};
-
-pub(crate) use baselines::{available, by_costs, slice_scenario};
-pub(crate) use curve::{measured_costs, measured_tuning};
-pub(crate) use held::{Held, HeldBorder, Time};
-pub(crate) use importance::{Effect, Importance, Interval, Verdict, importance, measured_borders};
-pub(crate) use profile::{Profile, as_at_the_points};
-pub(crate) use selection::{Selection, usable};
-pub(crate) use validate::OURS;
-pub(crate) use yardstick::{Chooser, Yardstick, average};
-
-/// Parameters by which the CPU of a machine is compared with those of the training.
-const PARAMETERS: [&str; 8] = [
-    parameter::CLOCK_MEASURED_GHZ,
-    parameter::SIMD_LANES,
-    parameter::CACHE_LLC_BYTES,
-    parameter::BANDWIDTH_ONE_THREAD_GB_PER_S,
-    parameter::BANDWIDTH_ALL_THREADS_GB_PER_S,
-    parameter::FORK_JOIN_COLD_NS,
-    parameter::SCALING_ALL_THREADS_RATIO,
-    parameter::USABLE_CORES,
-];
-
-/// The same of a GPU.
-const GPU_PARAMETERS: [&str; 10] = [
-    gpu::parameter::ROUND_TRIP_NS,
-    gpu::parameter::READ_BACK_NS,
-    gpu::parameter::DISPATCH_NS,
-    gpu::parameter::UPLOAD_GB_PER_S,
-    gpu::parameter::UPLOAD_RATE_GB_PER_S,
-    gpu::parameter::DOWNLOAD_GB_PER_S,
-    gpu::parameter::DOWNLOAD_RATE_GB_PER_S,
-    gpu::parameter::READ_GB_PER_S,
-    gpu::parameter::COPY_GB_PER_S,
-    gpu::parameter::ARITHMETIC_GFLOP_PER_S,
-];
-
-/// A parameter of a machine by the name that it has in a model's ranges. That of a GPU is the one of the first GPU, which is a
-/// discrete one where there is any; programs that act as GPUs don't count.
-pub(crate) fn figure(hardware: &Hardware, name: &str) -> Option<f64> {
-    match name.strip_prefix(GPU_PREFIX) {
-        Some(name) => hardware.gpus.iter().find(|g| g.gpu.kind != GpuKind::Software)?.value(name),
-        None => hardware.value(name),
-    }
-}
-
-/// Which reports are trained on. The two kinds are never mixed: a simulated machine shows what the cost model that made it says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Evidence {
-    /// Those of real machines.
-    Real,
-    /// Those of simulated ones.
-    Simulated,
-}
+use sapwise::Model;
 
 /// A model and what has to be said about it.
 #[derive(Debug, Clone)]
-pub(crate) struct Trained {
-    /// The model with its validation.
-    pub(crate) model: Model,
+pub struct Trained {
+    /// What predicts.
+    pub model: Model,
+    /// What it was trained on, and how well it did on what it had not seen.
+    pub training: Training,
     /// In sentences, what was left out and why, and what the validation does not say.
-    pub(crate) notes: Vec<String>,
+    pub notes: Vec<String>,
     /// What a picture shows of the validation.
-    pub(crate) held: Held,
+    pub held_out: HeldOut,
 }
 
 /// The model fitted to all profiles but those that are held out together with that of `file`, and what these are, in words.
 ///
 /// # Errors
 /// When no model can be fitted to the others, or there are none.
-pub(crate) fn without(profiles: &[Profile], file: &str) -> Result<(Model, String)> {
+pub fn without(profiles: &[Profile], file: &str) -> Result<(Model, String)> {
     let partition = Partition::new(profiles);
     let mut chosen = vec![true; profiles.len()];
     // Of one machine alone a profile is in a fold of its vectors and in one of its threads; both would tell of it.
@@ -123,19 +34,19 @@ pub(crate) fn without(profiles: &[Profile], file: &str) -> Result<(Model, String
     if !chosen.contains(&true) {
         bail!("there is no other report to predict {file} from");
     }
-    let model = model::model(profiles, &Designs::new(profiles), &chosen, "without")?.0;
+    let model = model(profiles, &Designs::new(profiles), &chosen, "without")?.0;
     Ok((model, partition.held_out))
 }
 
 /// Fits the model called `name` to what was selected of reports, and validates it.
 ///
 /// Reports of the other evidence, those without timings, of unoptimised builds and repeated ones are left out by the selection, and so are
-/// timings of revisions that are not the newest of their method. The file names stand in the model; the order of the reports matters for one
-/// baseline only, which takes the first one left in training for the default machine.
+/// timings of revisions that are not the newest of their method. The file names stand in the training; the order of the reports matters for
+/// one baseline only, which takes the first one left in training for the default machine.
 ///
 /// # Errors
-/// When no report can be used, with the reason for each and what to do; when no method can be fitted.
-pub(crate) fn train(selection: Selection, name: &str) -> Result<Trained> {
+/// When no report can be used, with the reason for each and what to do; when no method can be fitted; when the user asked to stop.
+pub fn train(selection: Selection, name: &str, progress: &dyn Progress) -> Result<Trained> {
     let evidence = selection.evidence();
     let (profiles, mut notes) = selection.finish();
     if profiles.is_empty() {
@@ -147,33 +58,24 @@ pub(crate) fn train(selection: Selection, name: &str) -> Result<Trained> {
         bail!("no report can be trained on: {why}; {next}");
     }
     let designs = Designs::new(&profiles);
-    let (mut model, left_out) = model::model(&profiles, &designs, &vec![true; profiles.len()], name)?;
-    model.clouds = clouds::clouds(profiles.iter().map(|p| (&p.hardware, model::timed_gpus(p).collect())));
-    model.folds = folds::folds(&profiles, &designs)?;
+    let (model, left_out) = model(&profiles, &designs, &vec![true; profiles.len()], name)?;
     notes.extend(designs.notes.iter().cloned());
     notes.extend(left_out);
-    let partition = Partition::new(&profiles);
-    let trainings = learning::trainings(&profiles);
-    let progress = Progress::new((partition.folds.len() + trainings.len()) as u64);
-    progress.message("validating");
-    let validated = validate::validate(&profiles, &designs, &partition, &progress)?;
+    let validated = validate(&profiles, &designs, &Partition::new(&profiles), progress)?;
     notes.extend(validated.notes);
-    progress.message("validating trainings of fewer machines");
-    let learning = learning::learning(&profiles, &trainings, &progress)?;
-    model.prior = validated.prior;
-    if let Some(defect) = model.defect() {
-        bail!("the model that was fitted can't be used: {defect}; the machines of the reports may all be alike");
-    }
-    model.validation = Validation { learning, ..validated.validation };
-    Ok(Trained { model, notes: notes::folded(notes), held: validated.held })
+    let training = Training { prior: validated.prior, validation: validated.validation, ..Training::of(&profiles) };
+    Ok(Trained { model, training, notes: folded(notes), held_out: validated.held_out })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::synthetic::Machine;
     use super::*;
-    use sapwise::report::Label;
-    use sapwise::{Report, json};
+    use crate::data::COMPARED;
+    use crate::progress::Silent;
+    use crate::report::{Label, Report};
+    use crate::synthetic::Machine;
+    use crate::training::{read_model, write_model};
+    use sapwise::hardware::ParameterId;
 
     fn reports() -> Vec<(String, Report)> {
         Machine::family().iter().map(|m| (format!("{}.json", m.name), m.report())).collect()
@@ -185,11 +87,12 @@ mod tests {
 
     #[test]
     fn a_model_is_the_same_after_json_and_knows_its_ranges() {
-        let trained = train(of(&reports()), "test").unwrap();
-        let text = json::write(&trained.model).unwrap();
-        assert_eq!(json::model(&text).unwrap(), trained.model);
-        assert_eq!(trained.model.ranges.len(), PARAMETERS.len());
-        let cores = trained.model.ranges.iter().find(|r| r.parameter == parameter::USABLE_CORES).unwrap();
+        let trained = train(of(&reports()), "test", &Silent).unwrap();
+        let text = write_model(&trained.model, &trained.training).unwrap();
+        let read = read_model(&text).unwrap();
+        assert_eq!((read.model, read.training), (trained.model.clone(), trained.training));
+        assert_eq!(trained.model.ranges.len(), COMPARED.len());
+        let cores = trained.model.ranges.iter().find(|r| r.parameter == ParameterId::UsableCores).unwrap();
         assert_eq!((cores.min, cores.max), (2.0, 16.0));
     }
 
@@ -198,8 +101,7 @@ mod tests {
         let machines = Machine::family_with_gpus();
         let reports: Vec<(String, Report)> =
             machines[..3].iter().map(|m| (format!("{}.json", m.name), m.report())).collect();
-        let model = train(of(&reports), "test").unwrap().model;
-        assert_eq!(json::model(&json::write(&model).unwrap()).unwrap(), model);
+        let model = train(of(&reports), "test", &Silent).unwrap().model;
         let range = model.ranges.iter().find(|r| r.parameter == "gpu/upload_rate_gb_per_s").unwrap();
         assert_eq!((range.min, range.max), (5.0, 24.0));
         let all = |ids: &[&str]| ids.iter().map(|id| (id.parse().unwrap(), 1)).collect::<Vec<_>>();
@@ -212,33 +114,56 @@ mod tests {
 
     #[test]
     fn one_report_gives_a_model_without_scores() {
-        let trained = train(of(&reports()[..1]), "test").unwrap();
+        let trained = train(of(&reports()[..1]), "test", &Silent).unwrap();
         assert_eq!(trained.model.methods.len(), 4);
-        assert!(trained.model.validation.methods.is_empty() && trained.model.validation.learning.is_empty());
+        assert!(trained.training.validation.methods.is_empty());
     }
 
     #[test]
     fn of_too_many_reports_the_counts_are_kept() {
         let one = reports().remove(0);
-        let profile = Profile::of("a.json", &one.1);
-        let mut profiles = vec![profile; model::MOST_LISTED + 1];
+        let mut profiles = vec![Profile::of("a.json", &one.1); 401];
         profiles.iter_mut().enumerate().for_each(|(k, p)| {
             p.file = format!("{k}.json");
             p.hardware.machine.physical_id = format!("{:016x}", k / 2);
         });
         profiles[1].label = Label::RealRestricted;
-        let designs = Designs::new(&profiles);
-        let fitted = |chosen: &[bool]| model::model(&profiles, &designs, chosen, "many").unwrap().0;
-        let mut chosen = vec![true; profiles.len()];
-        let many = fitted(&chosen);
+        let many = Training::of(&profiles);
         let counts: Vec<_> = many.trained_on_counts.iter().map(|c| (c.label, c.reports, c.physical_machines)).collect();
-        let all = model::MOST_LISTED;
-        assert_eq!(counts, [(Label::RealFull, all, all / 2 + 1), (Label::RealRestricted, 1, 1)]);
-        assert!(many.trained_on.is_empty() && !many.is_simulated());
-        assert_eq!(json::model(&json::write(&many).unwrap()).unwrap(), many);
-        chosen[0] = false;
-        let few = fitted(&chosen);
-        assert!(few.trained_on.len() == all && few.trained_on_counts.is_empty());
+        assert_eq!(counts, [(Label::RealFull, 400, 201), (Label::RealRestricted, 1, 1)]);
+        assert!(many.trained_on.is_empty() && many.reports() == 401);
+        let few = Training::of(&profiles[1..]);
+        assert!(few.trained_on.len() == 400 && few.trained_on_counts.is_empty() && few.physical_machines() == 201);
+    }
+
+    #[test]
+    fn a_users_tree_is_fitted_with_the_terms_that_its_reports_name() {
+        use crate::report::{Timed, TimedTerm, Timing};
+        use sapwise::model::Scale;
+        use sapwise::{AlgorithmId, Load, Term};
+        let id: AlgorithmId = "my-tree@cpu1".parse().unwrap();
+        // A sort of all boxes and nothing else: the usual terms of an unknown method hold it too, beside ten others.
+        let named = TimedTerm { term: Term::Sort, scale: Scale::Cycle };
+        let ns = |machine: &Machine, load: &Load| 9.0 / machine.ghz * named.term.count(load, machine.cache_bytes);
+        let reports: Vec<(String, Report)> = Machine::family()
+            .iter()
+            .map(|machine| {
+                let mut report = machine.report();
+                report.algorithms.push(Timed { terms: vec![named], ..Timed::new(id.clone(), 1) });
+                for point in &mut report.points {
+                    let samples_ns = vec![ns(machine, &point.load).round() as u64; 5];
+                    point.timings.push(Timing { algorithm: id.clone(), samples_ns, error: None });
+                }
+                (format!("{}.json", machine.name), report)
+            })
+            .collect();
+        let trained = train(of(&reports), "test", &Silent).unwrap();
+        let tree = trained.model.methods.iter().find(|m| m.method == "my-tree").unwrap();
+        assert_eq!(tree.terms.iter().map(|t| (t.term, t.scale)).collect::<Vec<_>>(), [(named.term, named.scale)]);
+        assert!((tree.terms[0].unit / 9.0 - 1.0).abs() < 0.01, "{tree:?}");
+        let costs = crate::fit::measured_costs(&Profile::of("", &reports[0].1)).0;
+        let own = costs.iter().find(|c| c.algorithm == id).unwrap();
+        assert_eq!(own.curve.terms.iter().map(|t| t.term).collect::<Vec<_>>(), [named.term]);
     }
 
     #[test]
@@ -246,7 +171,7 @@ mod tests {
         let mut report = reports().remove(0);
         report.1.provenance.optimised = false;
         for reports in [vec![], vec![report]] {
-            let error = train(of(&reports), "test").unwrap_err().to_string();
+            let error = train(of(&reports), "test", &Silent).unwrap_err().to_string();
             assert!(error.contains("sapwise probe --out"), "{error}");
         }
     }

@@ -1,7 +1,7 @@
 //! What a prediction costs from the text of a model to the tuning: reading, predicting, and cutting a slice with intervals.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::model::{Feature, Fold, FoldMethod, LnErrors, MethodModel, Role, RoleErrors};
 use sapwise::{AlgorithmId, BackendClass, Hardware, Load, Machine, Model, Parameter, Registry, json};
 use std::hint::black_box;
@@ -51,16 +51,16 @@ fn six(x: f64) -> f64 {
 /// A machine with all parameters that a report holds.
 fn machine() -> Hardware {
     let value = |name: &str| match name {
-        parameter::USABLE_CORES | parameter::PHYSICAL_CORES => f64::from(CORES),
-        parameter::CLOCK_MEASURED_GHZ | parameter::CLOCK_REPORTED_GHZ => 4.5,
-        parameter::SIMD_LANES => 16.0,
-        parameter::SCALING_TWO_THREADS_RATIO => 1.9,
-        parameter::SCALING_ALL_THREADS_RATIO => 6.5,
+        ParameterId::UsableCores | ParameterId::PhysicalCores => f64::from(CORES),
+        ParameterId::ClockMeasuredGhz | ParameterId::ClockReportedGhz => 4.5,
+        ParameterId::SimdLanes => 16.0,
+        ParameterId::ScalingTwoThreadsRatio => 1.9,
+        ParameterId::ScalingAllThreadsRatio => 6.5,
         name if name.ends_with("_bytes") => 3.3e7,
         name if name.ends_with("_ns") => 8000.0,
         _ => 45.0,
     };
-    let parameters = parameter::all_names().iter().map(|name| Parameter::reported(name, value(name), "made up")).collect();
+    let parameters = ParameterId::ALL.iter().map(|name| Parameter::reported(name, value(name), "made up")).collect();
     Hardware { machine: Machine::default(), parameters, gpus: Vec::new(), gpu_groups: Vec::new() }
 }
 

@@ -2,7 +2,7 @@
 
 use sapwise_scenes::Random;
 use core_affinity::CoreId;
-use sapwise::hardware::parameter::CACHE_LLC_BYTES;
+use ParameterId::CacheLlcBytes;
 use sapwise::measure::{self, Family, Options};
 use sapwise::usable_cores;
 use std::fmt;

@@ -5,7 +5,7 @@ use crate::progress::Progress;
 use crate::samples::{Live, Session};
 use crate::{interrupt, revisions};
 use anyhow::bail;
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::model::{ASK, Prediction};
 use sapwise::stats::median;
 use sapwise::{GpuIdentity, Hardware, Load, Model, Registry, Tuning};
@@ -152,7 +152,7 @@ fn unknown(algorithms: &Algorithms, registry: &Registry, model: &Model) -> Vec<S
 }
 
 fn cores(hardware: &Hardware) -> u32 {
-    hardware.value(parameter::USABLE_CORES).map_or(1, |k| k as u32)
+    hardware.value(ParameterId::UsableCores).map_or(1, |k| k as u32)
 }
 
 /// Costs of every algorithm of the registry and on these GPUs.

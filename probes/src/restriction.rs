@@ -4,7 +4,7 @@ use crate::args::Lifted;
 use crate::contention::{ASSUMED_LLC_BYTES, Contended};
 use sapwise_lab::data::read_document;
 use anyhow::bail;
-use sapwise::hardware::{gpu, parameter};
+use sapwise::hardware::{GpuParameterId, ParameterId};
 use sapwise_lab::data::Document;
 use sapwise_lab::report::{Proof, Restricted, Restriction};
 use sapwise::{GpuHardware, GpuIdentity, Hardware, SimdLevel, usable_cores};
@@ -81,8 +81,8 @@ pub(crate) fn contention(kind: Contended) -> Restricted {
 /// thread of one core, or a CPU with a single 512-bit port, may gain less than [`SHOWN`] from what is taken.
 fn is_required(proof: &Proof) -> bool {
     match proof.kind {
-        Restricted::Threads => proof.parameter == parameter::USABLE_CORES,
-        Restricted::Simd => proof.parameter == parameter::SIMD_LANES,
+        Restricted::Threads => proof.parameter == ParameterId::UsableCores,
+        Restricted::Simd => proof.parameter == ParameterId::SimdLanes,
         Restricted::ContendedMemory | Restricted::ContendedCache | Restricted::GpuThreads => true,
     }
 }
@@ -128,27 +128,27 @@ fn prove(kind: Restricted, without: &Hardware, with: &Hardware) -> Vec<Proof> {
     match kind {
         Restricted::Threads => {
             vec![
-                on_cpu(parameter::USABLE_CORES, Change::Fewer),
+                on_cpu(ParameterId::UsableCores, Change::Fewer),
                 first_shown([
-                    on_cpu(parameter::SCALING_ALL_THREADS_RATIO, Change::Lower),
-                    on_cpu(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, Change::Lower),
+                    on_cpu(ParameterId::ScalingAllThreadsRatio, Change::Lower),
+                    on_cpu(ParameterId::BandwidthAllThreadsGbPerS, Change::Lower),
                 ]),
             ]
         }
         Restricted::Simd => {
-            let mut proofs = vec![on_cpu(parameter::SIMD_LANES, Change::Fewer)];
-            let arithmetic = on_cpu(parameter::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, Change::Lower);
+            let mut proofs = vec![on_cpu(ParameterId::SimdLanes, Change::Fewer)];
+            let arithmetic = on_cpu(ParameterId::ArithmeticOneThreadGflopPerS, Change::Lower);
             // Old reports don't have it.
             proofs.extend(Some(arithmetic).filter(|p| p.without.is_some() || p.with.is_some()));
             proofs
         }
         // Where one thread can't saturate the memory, others at work make it slower to answer at most.
         Restricted::ContendedMemory => vec![first_shown([
-            on_cpu(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, Change::Lower),
+            on_cpu(ParameterId::BandwidthAllThreadsGbPerS, Change::Lower),
             on_cpu(&latency_of_memory(), Change::Higher),
         ])],
         Restricted::ContendedCache => {
-            let llc = with.value(parameter::CACHE_LLC_BYTES).unwrap_or(ASSUMED_LLC_BYTES);
+            let llc = with.value(ParameterId::CacheLlcBytes).unwrap_or(ASSUMED_LLC_BYTES);
             vec![on_cpu(&latency_below(llc), Change::Higher)]
         }
         Restricted::GpuThreads => with.gpus.iter().filter(|g| is_lavapipe(&g.gpu)).map(|g| on_gpu(g, without)).collect(),
@@ -168,8 +168,8 @@ fn on_gpu(with: &GpuHardware, without: &Hardware) -> Proof {
         proof(Restricted::GpuThreads, name, Some(with.gpu.index), change, values)
     };
     first_shown([
-        by(gpu::parameter::ARITHMETIC_GFLOP_PER_S, Change::Lower),
-        by(gpu::parameter::PARALLEL_UNITS, Change::Lower),
+        by(GpuParameterId::ArithmeticGflopPerS, Change::Lower),
+        by(GpuParameterId::ParallelUnits, Change::Lower),
     ])
 }
 
@@ -213,14 +213,14 @@ mod tests {
 
     #[test]
     fn a_parameter_that_hardly_differs_shows_nothing() {
-        let threads = |cores, ratio| [(parameter::USABLE_CORES, cores), (parameter::SCALING_ALL_THREADS_RATIO, ratio)];
+        let threads = |cores, ratio| [(ParameterId::UsableCores, cores), (ParameterId::ScalingAllThreadsRatio, ratio)];
         assert_eq!(shown(Restricted::Threads, &threads(4.0, 3.9), &threads(2.0, 2.0)), [true, true]);
         assert_eq!(shown(Restricted::Threads, &threads(4.0, 3.9), &threads(4.0, 3.6)), [false, false]);
         assert_eq!(shown(Restricted::Threads, &[], &threads(1.0, 1.0)), [false, false]);
-        let bandwidth = |v| [(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, v)];
+        let bandwidth = |v| [(ParameterId::BandwidthAllThreadsGbPerS, v)];
         assert_eq!(shown(Restricted::ContendedMemory, &bandwidth(50.0), &bandwidth(44.9)), [true]);
         assert_eq!(shown(Restricted::ContendedMemory, &bandwidth(50.0), &bandwidth(45.1)), [false]);
-        let both = |v, ns| [(parameter::BANDWIDTH_ALL_THREADS_GB_PER_S, v), ("latency_262144_kib_ns", ns)];
+        let both = |v, ns| [(ParameterId::BandwidthAllThreadsGbPerS, v), ("latency_262144_kib_ns", ns)];
         assert_eq!(shown(Restricted::ContendedMemory, &both(50.0, 200.0), &both(50.0, 230.0)), [true]);
         assert_eq!(shown(Restricted::ContendedMemory, &both(50.0, 200.0), &both(50.0, 210.0)), [false]);
     }
@@ -230,16 +230,16 @@ mod tests {
         assert_eq!(latency_below(32.0 * 1024.0 * 1024.0), "latency_16384_kib_ns");
         assert_eq!(latency_below(16.0 * 1024.0 * 1024.0), "latency_4096_kib_ns");
         assert_eq!(latency_below(1.0), "latency_16_kib_ns");
-        let latency = |llc, ns| [(parameter::CACHE_LLC_BYTES, llc), ("latency_16384_kib_ns", ns)];
+        let latency = |llc, ns| [(ParameterId::CacheLlcBytes, llc), ("latency_16384_kib_ns", ns)];
         assert_eq!(shown(Restricted::ContendedCache, &latency(3.3e7, 20.0), &latency(3.3e7, 23.0)), [true]);
         assert_eq!(shown(Restricted::ContendedCache, &latency(3.3e7, 20.0), &latency(3.3e7, 19.0)), [false]);
     }
 
     #[test]
     fn arithmetic_shows_fewer_lanes_where_it_is_measured() {
-        let simd = |lanes| [(parameter::SIMD_LANES, lanes)];
+        let simd = |lanes| [(ParameterId::SimdLanes, lanes)];
         assert_eq!(shown(Restricted::Simd, &simd(16.0), &simd(8.0)), [true]);
-        let both = |lanes, gflop| [(parameter::SIMD_LANES, lanes), (parameter::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, gflop)];
+        let both = |lanes, gflop| [(ParameterId::SimdLanes, lanes), (ParameterId::ArithmeticOneThreadGflopPerS, gflop)];
         assert_eq!(shown(Restricted::Simd, &both(16.0, 120.0), &both(8.0, 119.0)), [true, false]);
     }
 
@@ -250,11 +250,11 @@ mod tests {
             assert_eq!(proof.len(), 2);
             not_shown(&Restriction { kinds: vec![kind], proof })
         };
-        let threads = |cores| [(parameter::USABLE_CORES, cores), (parameter::SCALING_ALL_THREADS_RATIO, 1.0)];
+        let threads = |cores| [(ParameterId::UsableCores, cores), (ParameterId::ScalingAllThreadsRatio, 1.0)];
         assert_eq!(told(Restricted::Threads, &threads(2.0), &threads(1.0)), Vec::<String>::new());
         let same = told(Restricted::Threads, &threads(2.0), &threads(2.0));
         assert!(same.len() == 1 && same[0].contains("usable_cores is 2.0000 with it"), "{same:?}");
-        let simd = |lanes| [(parameter::SIMD_LANES, lanes), (parameter::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, 100.0)];
+        let simd = |lanes| [(ParameterId::SimdLanes, lanes), (ParameterId::ArithmeticOneThreadGflopPerS, 100.0)];
         assert_eq!(told(Restricted::Simd, &simd(16.0), &simd(8.0)), Vec::<String>::new());
         let same = told(Restricted::Simd, &simd(8.0), &simd(8.0));
         assert!(same.len() == 1 && same[0].contains("simd_lanes is 8.0000 with it"), "{same:?}");
@@ -266,7 +266,7 @@ mod tests {
             let name = "llvmpipe".to_owned();
             let text = String::new;
             let gpu = GpuIdentity { index: 0, name, device: text(), driver: text(), api: text(), kind: GpuKind::Software };
-            let parameters = [(gpu::parameter::ARITHMETIC_GFLOP_PER_S, 100.0), (gpu::parameter::PARALLEL_UNITS, units)];
+            let parameters = [(GpuParameterId::ArithmeticGflopPerS, 100.0), (GpuParameterId::ParallelUnits, units)];
             let parameters = parameters.iter().map(|(name, v)| Parameter::reported(name, *v, "test")).collect();
             Hardware { gpus: vec![GpuHardware { gpu, parameters }], ..hardware(&[]) }
         };
@@ -280,7 +280,7 @@ mod tests {
             let text = |t: &str| t.to_owned();
             let (name, driver) = (text("llvmpipe (LLVM 15)"), text("llvmpipe Mesa 22"));
             let gpu = GpuIdentity { index, name, device: text(""), driver, api: text(""), kind: GpuKind::Software };
-            let parameters = vec![Parameter::reported(gpu::parameter::ARITHMETIC_GFLOP_PER_S, gflop, "test")];
+            let parameters = vec![Parameter::reported(GpuParameterId::ArithmeticGflopPerS, gflop, "test")];
             Hardware { gpus: vec![GpuHardware { gpu, parameters }], ..hardware(&[]) }
         };
         let proofs = prove(Restricted::GpuThreads, &with_gpu(0, 147.0), &with_gpu(1, 74.0));

@@ -4,7 +4,7 @@ mod common;
 
 use common::{devices_with_a_gpu, failure, npy, sapwise, success, without_adapters};
 use sapwise::Report;
-use sapwise::hardware::gpu::parameter;
+use sapwise::hardware::GpuParameterId;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -81,11 +81,11 @@ fn programs_that_act_as_gpus_are_measured_and_swept_only_when_asked_for() {
     assert!(asked.provenance.command.contains("--software-gpus"));
     for gpu in &asked.hardware.gpus {
         let names: Vec<&str> = gpu.parameters.iter().map(|p| p.name.as_str()).collect();
-        assert_eq!(names, parameter::all_names());
+        assert_eq!(names, GpuParameterId::OF_ONE);
     }
     for group in &asked.hardware.gpu_groups {
         let names: Vec<&str> = group.parameters.iter().map(|p| p.name.as_str()).collect();
-        assert_eq!(names, parameter::GROUP);
+        assert_eq!(names, GpuParameterId::GROUP);
     }
     for algorithm in devices["algorithms"].as_array().unwrap().iter().filter(|a| a["available"] == true) {
         let timed = asked.algorithms.iter().any(|t| t.id.to_string() == algorithm["id"].as_str().unwrap());

@@ -22,7 +22,7 @@ fn a_probe_writes_a_report_that_reads_back_with_every_parameter_and_point() {
     assert!(text.contains("usable_cores") && text.contains("uniform") && text.contains("Next:"), "{text}");
     let report = read(&out);
     let names: Vec<&str> = report.hardware.parameters.iter().map(|p| p.name.as_str()).collect();
-    assert_eq!(names, sapwise::hardware::parameter::all_names());
+    assert_eq!(names, ParameterId::ALL);
     // What lies close is visited again after the ascent, and between the two.
     let sizes: Vec<u32> = report.points.iter().map(|p| p.load.objects).collect();
     assert!(sizes[..2] == [10, 20] && sizes.iter().all(|n| (10..=20).contains(n)), "{sizes:?}");

@@ -5,28 +5,22 @@
 
 use super::options::Cache;
 use crate::measure::{fnv1a, machine};
-use crate::schema_tag::schema_tag;
-use crate::{AlgorithmId, Tuning, GpuIdentity, Machine, Model, Registry, json, usable_cores};
+use crate::{AlgorithmId, GpuIdentity, Machine, Model, Registry, Tuning, json, json::Format, usable_cores};
 use etcetera::BaseStrategy;
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-schema_tag!(
-    /// `cache/2`.
-    CacheSchema = "cache/2"
-);
+/// What these files are.
+const FORMAT: Format = Format::new("cache", 2, 0);
 
 /// A file that is longer was written by something else.
 const LONGEST_BYTES: u64 = 16 << 20;
 
 /// The file.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(crate) struct Cached {
-    /// Always `cache/2`.
-    schema: CacheSchema,
     /// What the tuning holds for.
     key: Key,
     /// The tuning, predicted or learned.
@@ -35,8 +29,7 @@ pub(crate) struct Cached {
 
 /// All that tuning depends on, in plain words. Names no host, no user and no single piece of hardware.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub(super) struct Key {
     /// Version of this library.
     version: String,
@@ -58,8 +51,7 @@ pub(super) struct Key {
 
 /// An algorithm that can run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 struct Known {
     /// The algorithm.
     algorithm: AlgorithmId,
@@ -68,7 +60,7 @@ struct Known {
 }
 
 impl Key {
-    pub(super) fn new(registry: &Registry, model: &Model) -> Result<Self, json::JsonError> {
+    pub(super) fn new(registry: &Registry, model: &Model) -> Result<Self, json::Error> {
         let known = |(algorithm, revision)| Known { algorithm, revision };
         Ok(Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -78,9 +70,15 @@ impl Key {
             algorithms: registry.available().into_iter().map(known).collect(),
             gpus: registry.gpu_identities(),
             model: model.name.clone(),
-            model_hash: format!("{:016x}", fnv1a(&json::write(model)?)),
+            model_hash: format!("{:016x}", fnv1a(&json::write_model(model)?)),
         })
     }
+}
+
+/// File name and text of the JSON Schema of these files.
+#[cfg(feature = "schema")]
+pub(crate) fn json_schema() -> Result<(String, String), json::Error> {
+    FORMAT.json_schema::<Cached>()
 }
 
 /// The place of one key.
@@ -128,14 +126,11 @@ impl Entry {
             Ok(_) => {}
         }
         let text = fs::read_to_string(&self.file).map_err(|e| ignored(&e.to_string()))?;
-        let cached: Cached = serde_json::from_str(&text).map_err(|e| ignored(&e.to_string()))?;
+        let cached: Cached = FORMAT.read(&text).map_err(|e| ignored(&e.to_string()))?.value;
         if cached.key != self.key {
             return Err(ignored("it is of another machine, another build or another model"));
         }
-        match cached.tuning.defect() {
-            Some(defect) => Err(ignored(&defect)),
-            None => Ok(Some(cached.tuning)),
-        }
+        Ok(Some(cached.tuning))
     }
 
     /// Keeps tuning in place of those that are there.
@@ -143,8 +138,8 @@ impl Entry {
     /// # Errors
     /// A sentence that says why they can't be kept.
     pub(super) fn write(&self, tuning: Tuning) -> Result<(), String> {
-        let cached = Cached { schema: CacheSchema, key: self.key.clone(), tuning };
-        let text = json::write(&cached).map_err(|e| e.to_string())?;
+        let cached = Cached { key: self.key.clone(), tuning };
+        let text = FORMAT.write(&cached).map_err(|e| e.to_string())?;
         self.replace(&text).map_err(|e| format!("{} can't be written: {e}", self.file.display()))
     }
 

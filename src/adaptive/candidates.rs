@@ -1,6 +1,6 @@
 //! The algorithms to choose from, and what runs them.
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Tuning, Pairs, Registry};
+use crate::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry, Tuning};
 
 /// An algorithm of the tuning.
 pub(super) struct Candidate {

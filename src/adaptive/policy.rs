@@ -6,7 +6,7 @@ use super::place::{Place, View};
 use super::price::{Expected, Kind, Prices};
 use super::tally::{Predicted, Tally};
 use crate::cost::Counts;
-use crate::{Tuning, Load};
+use crate::{Load, Tuning};
 
 /// By number of objects alone, the algorithm of before stays while its own step is within this share.
 const STEP_SLACK: f64 = 0.05;

@@ -5,10 +5,8 @@ use super::cache::{Entry, Key};
 use super::candidates::Made;
 use super::options::Options;
 use super::uniform;
-use crate::hardware::parameter;
-use crate::{
-    AlgorithmId, Error, Tuning, GpuHardware, Hardware, Model, Parameter, Registry, measure,
-};
+use crate::hardware::ParameterId;
+use crate::{AlgorithmId, Error, GpuHardware, Hardware, Model, Parameter, Registry, Tuning, measure};
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -140,7 +138,7 @@ impl Adaptive {
             return Err(SaveError(
                 match self.start.setup.origin {
                     Origin::Given => {
-                        "the tuning was given by the program; write `Adaptive::learned` to a file with `json::write`"
+                        "the tuning was given by the program; write `Adaptive::learned` to a file with `json::write_tuning`"
                     }
                     Origin::Awaited => "the tuning of this machine are not there yet; save at the end of the session",
                     Origin::Usual => "nothing was predicted that could have been corrected; `Adaptive::setup` says why",
@@ -278,7 +276,7 @@ fn predict(
     dropped.extend(hardware.gpus.iter().filter_map(GpuHardware::implausible));
     let sound = dropped.is_empty();
     remarks.extend(dropped.into_iter().map(|why| format!("{why}; it is left out, and the next start measures again")));
-    let prediction = model.predict(&hardware, algorithms).map_err(|why| remarks.push(why)).ok()?;
+    let prediction = model.predict(&hardware, algorithms).map_err(|why| remarks.push(why.to_string())).ok()?;
     let mut tuning = prediction.tuning("uniform", &uniform::loads());
     tuning.warnings.extend(hardware.disturbed());
     Some((tuning, sound))
@@ -290,8 +288,8 @@ fn hardware(options: &Options, registry: &Registry, model: &Model, remarks: &mut
     let plan = measure::Options { threads, limit: Some(options.probe_limit), ..measure::Options::default() };
     let mut hardware = measure::hardware_for(&model.parameters(), &plan);
     let simd = registry.simd();
-    if let Some(lanes) = hardware.parameters.iter_mut().find(|p| p.name == parameter::SIMD_LANES) {
-        *lanes = Parameter::reported(parameter::SIMD_LANES, f64::from(simd.lanes()), "the SIMD level of the registry");
+    if let Some(lanes) = hardware.parameters.iter_mut().find(|p| p.name == ParameterId::SimdLanes) {
+        *lanes = Parameter::reported(ParameterId::SimdLanes, f64::from(simd.lanes()), "the SIMD level of the registry");
     }
     hardware.machine.simd = simd.to_string();
     #[cfg(feature = "measure-gpu")]
@@ -315,9 +313,9 @@ mod tests {
     fn a_figure_that_can_not_be_costs_what_needs_it_and_no_more() {
         let model = Model::built_in().unwrap();
         let figure = |name: &&str| match *name {
-            parameter::CACHE_LLC_BYTES => Parameter::reported(name, 33_554_432.0, "test"),
-            parameter::FORK_JOIN_COLD_NS => Parameter::reported(name, 5000.0, "test"),
-            parameter::USABLE_CORES | parameter::SCALING_ALL_THREADS_RATIO => Parameter::reported(name, 2.0, "test"),
+            ParameterId::CacheLlcBytes => Parameter::reported(name, 33_554_432.0, "test"),
+            ParameterId::ForkJoinColdNs => Parameter::reported(name, 5000.0, "test"),
+            ParameterId::UsableCores | ParameterId::ScalingAllThreadsRatio => Parameter::reported(name, 2.0, "test"),
             _ => Parameter::reported(name, 4.0, "test"),
         };
         let parameters = model.parameters().iter().map(figure).collect();
@@ -327,7 +325,7 @@ mod tests {
         let (tuning, sound) = predict(&model, hardware.clone(), &algorithms, &mut remarks).unwrap();
         assert_eq!((tuning.costs.len(), sound, remarks.len()), (algorithms.len(), true, 0));
         let mut broken = hardware;
-        broken.parameters.iter_mut().filter(|p| p.name == parameter::FORK_JOIN_COLD_NS).for_each(|p| p.value = Some(0.0));
+        broken.parameters.iter_mut().filter(|p| p.name == ParameterId::ForkJoinColdNs).for_each(|p| p.value = Some(0.0));
         let (tuning, sound) = predict(&model, broken, &algorithms, &mut remarks).unwrap();
         assert!(tuning.costs.iter().all(|c| c.algorithm.threads() == 1) && !sound);
         assert_eq!(tuning.costs.len(), algorithms.len() / 2);

@@ -2,16 +2,16 @@
 
 mod brute;
 mod columns;
+mod grid_sap;
 #[cfg(feature = "parallel")]
 mod helpers;
 mod kernel;
 mod level;
+mod pair_cache;
+mod sap;
 mod sort;
 mod strip_grid;
-mod grid_sap;
-mod sap;
 mod threads;
-mod pair_cache;
 mod workers;
 
 pub(crate) use kernel::each_bit;

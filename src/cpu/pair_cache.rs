@@ -14,8 +14,8 @@ mod tree;
 
 use crate::broad_phase::check_count;
 use crate::cpu::columns::part;
-use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::grid_sap::Finder;
+use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::workers::{Outputs, Workers};
 use crate::cpu::{SimdLevel, Threads};
 use crate::{Aabb, BroadPhase, Error, Pairs};

@@ -56,7 +56,10 @@ mod tests {
             [gpu(0, GpuKind::Discrete), gpu(1, GpuKind::Integrated), gpu(2, GpuKind::Software), gpu(3, GpuKind::Software)];
         let ids = algorithms(&gpus).into_iter().map(|(id, _)| id.to_string());
         let strips: Vec<String> = ids.filter(|id| id.starts_with("grid-sap")).collect();
-        assert_eq!(strips, ["grid-sap@gpu0", "grid-sap@gpu1", "grid-sap@gpu0+1", "grid-sap@gpu2", "grid-sap@gpu3", "grid-sap@gpu2+3"]);
+        assert_eq!(
+            strips,
+            ["grid-sap@gpu0", "grid-sap@gpu1", "grid-sap@gpu0+1", "grid-sap@gpu2", "grid-sap@gpu3", "grid-sap@gpu2+3"]
+        );
         assert!(algorithms(&[]).is_empty());
     }
 }

@@ -5,12 +5,12 @@ use std::time::{Duration, Instant};
 
 use super::{Options, foreign_load, pool, together};
 use crate::SimdLevel;
-use crate::hardware::{Parameter, parameter};
+use crate::hardware::{Parameter, ParameterId};
 
 /// Rounds between two looks at the clock: 0.2 ms, against which the sum at the end takes a thousandth.
 const ROUNDS: u32 = 1 << 16;
 
-const NAMES: [&str; 2] = [parameter::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, parameter::ARITHMETIC_ALL_THREADS_GFLOP_PER_S];
+const NAMES: [ParameterId; 2] = [ParameterId::ArithmeticOneThreadGflopPerS, ParameterId::ArithmeticAllThreadsGflopPerS];
 
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     let threads = options.usable_cores();

@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use super::{Options, UNDER_LIMIT, foreign_load, memory};
-use crate::hardware::{Parameter, parameter};
+use crate::hardware::{Parameter, ParameterId};
 
 /// Bytes up to which a set is walked once, untimed, before its samples. A lap of a larger one takes longer than its samples.
 const WALKED_BYTES: u64 = 64 << 20;
@@ -17,14 +17,14 @@ const BRIEF_KIB: u32 = 4096;
 
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     let sizes = reported();
-    let level = |name: &str, level: &Option<Level>| match level {
+    let level = |name: ParameterId, level: &Option<Level>| match level {
         Some(found) => Parameter::reported(name, found.bytes as f64, sizes.source),
         None => Parameter::missing(name, "neither sysfs nor CPUID tells"),
     };
     let mut parameters = vec![
-        level(parameter::CACHE_L1D_BYTES, &sizes.first_level_data),
-        level(parameter::CACHE_L2_BYTES, &sizes.second_level),
-        level(parameter::CACHE_LLC_BYTES, &sizes.last_level),
+        level(ParameterId::CacheL1dBytes, &sizes.first_level_data),
+        level(ParameterId::CacheL2Bytes, &sizes.second_level),
+        level(ParameterId::CacheLlcBytes, &sizes.last_level),
     ];
     parameters.extend(latencies(options));
     parameters
@@ -129,22 +129,22 @@ fn parse_size(text: &str) -> Option<u64> {
 fn latencies(options: &Options) -> Vec<Parameter> {
     let limit = memory::total().map_or(64 << 20, |(bytes, _)| bytes / 8);
     let slice = if options.brief { Duration::from_micros(200) } else { Duration::from_millis(3) };
-    let one = |kib: u32| {
-        let (name, bytes) = (parameter::latency_name(kib), u64::from(kib) << 10);
+    let one = |(kib, id): (u32, ParameterId)| {
+        let bytes = u64::from(kib) << 10;
         if bytes > limit {
-            return Parameter::missing(&name, "the working set exceeds an eighth of memory");
+            return Parameter::missing(id, "the working set exceeds an eighth of memory");
         }
         if options.brief && kib > BRIEF_KIB {
-            return Parameter::missing(&name, "left out of a brief run");
+            return Parameter::missing(id, "left out of a brief run");
         }
         if options.limit.is_some() {
-            return Parameter::missing(&name, UNDER_LIMIT);
+            return Parameter::missing(id, UNDER_LIMIT);
         }
         let Some(lines) = lines(bytes as usize / size_of::<Line<'_>>()) else {
-            return Parameter::missing(&name, "no memory for the working set");
+            return Parameter::missing(id, "no memory for the working set");
         };
         if link(&lines).is_none() {
-            return Parameter::missing(&name, "no memory for the order of its lines");
+            return Parameter::missing(id, "no memory for the order of its lines");
         }
         let mut at = lines.first();
         let walked = bytes <= WALKED_BYTES;
@@ -158,9 +158,9 @@ fn latencies(options: &Options) -> Vec<Parameter> {
         });
         let warm = if walked { "walked once before the first sample" } else { "too large to be walked before" };
         let method = format!("dependent loads around a random cycle of 64-byte lines, default pages; set {warm}");
-        figures.into_iter().next().unwrap_or_default().into_parameter(&name, &method)
+        figures.into_iter().next().unwrap_or_default().into_parameter(id, &method)
     };
-    parameter::LATENCY_WORKING_SETS_KIB.into_iter().map(one).collect()
+    ParameterId::LATENCIES.into_iter().map(one).collect()
 }
 
 /// A cache line that says where the next one is. An address and not an index: that would cost a cycle to scale.

@@ -6,7 +6,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use super::{Options, foreign_load};
-use crate::hardware::{Parameter, Statistic, parameter};
+use crate::hardware::{Parameter, ParameterId, Statistic};
 
 /// Links of one timed chain: 1.4 ms at 4 GHz, short enough to fit between two interruptions, long enough for a few hundred samples
 /// at most to stand in a report.
@@ -28,7 +28,7 @@ fn measured(options: &Options) -> Parameter {
     );
     // An interruption can only make a chain slower, so the fast ones show the clock. Their median and not the best:
     // the best of hundreds is a short boost.
-    figure.into_parameter_by(Statistic::FastestQuarterMedian, parameter::CLOCK_MEASURED_GHZ, &method)
+    figure.into_parameter_by(Statistic::FastestQuarterMedian, ParameterId::ClockMeasuredGhz, &method)
 }
 
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
@@ -87,7 +87,7 @@ fn ghz(cycles: u64, nanoseconds: u128) -> f64 {
 }
 
 fn reported() -> Parameter {
-    let name = parameter::CLOCK_REPORTED_GHZ;
+    let name = ParameterId::ClockReportedGhz;
     // The highest clock first, because it does not change from one second to the next.
     let path = "/sys/devices/system/cpu/cpu0/cpufreq/cpuinfo_max_freq";
     if let Some(khz) = std::fs::read_to_string(path).ok().and_then(|text| positive(&text)) {

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use core_affinity::CoreId;
 
 use super::{Options, foreign_load};
-use crate::hardware::{Parameter, parameter};
+use crate::hardware::{Parameter, ParameterId};
 use crate::stats;
 
 /// Exchanges before those that count: by then both threads run.
@@ -23,7 +23,7 @@ const PAIRS: usize = 8;
 const LIMIT: Duration = Duration::from_millis(10);
 
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
-    let name = parameter::CORE_TO_CORE_NS;
+    let name = ParameterId::CoreToCoreNs;
     let pairs = pairs(options.usable_cores());
     if pairs.is_empty() {
         return vec![Parameter::missing(name, "one usable core, or threads can't be bound to cores here")];
@@ -36,7 +36,7 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     figures.into_iter().map(|figure| figure.into_parameter(name, &method)).collect()
 }
 
-/// One figure of [`parameter::CORE_TO_CORE_NS`] over the first core with the second and with the last: the best of three, so that a
+/// One figure of [`ParameterId::CoreToCoreNs`] over the first core with the second and with the last: the best of three, so that a
 /// thread that was pushed aside does not count. Takes a millisecond or two, at most 60 where other programs hold a core.
 ///
 /// For whoever measures over minutes and wants to know whether the machine stayed the same. `None` on one core, and where threads can't

@@ -34,12 +34,12 @@ pub(super) struct Figure {
 
 impl Figure {
     /// The median of the samples as a parameter.
-    pub(super) fn into_parameter(self, name: &str, method: &str) -> Parameter {
+    pub(super) fn into_parameter(self, name: impl AsRef<str>, method: &str) -> Parameter {
         self.into_parameter_by(Statistic::Median, name, method)
     }
 
     /// What a statistic makes of the samples, as a parameter.
-    pub(super) fn into_parameter_by(self, statistic: Statistic, name: &str, method: &str) -> Parameter {
+    pub(super) fn into_parameter_by(self, statistic: Statistic, name: impl AsRef<str>, method: &str) -> Parameter {
         let raw = self.usable();
         // From the rounded samples, so that whoever reads them back gets this very value.
         let value = statistic.of(&raw);
@@ -48,7 +48,7 @@ impl Figure {
 
     /// A value that was fitted to more than these samples, which tell its dispersion only and are not kept.
     #[cfg(feature = "measure-gpu")]
-    pub(super) fn into_fitted(self, value: f64, name: &str, method: &str) -> Parameter {
+    pub(super) fn into_fitted(self, value: f64, name: impl AsRef<str>, method: &str) -> Parameter {
         let raw = self.usable();
         Parameter { statistic: Statistic::Fit, ..self.parameter(Some(value), &raw, name, method) }
     }
@@ -58,7 +58,7 @@ impl Figure {
         self.samples.iter().filter(|x| x.is_finite()).map(|&x| six_digits(x)).collect()
     }
 
-    fn parameter(&self, value: Option<f64>, raw: &[f64], name: &str, method: &str) -> Parameter {
+    fn parameter(&self, value: Option<f64>, raw: &[f64], name: impl AsRef<str>, method: &str) -> Parameter {
         let none = Parameter::missing(name, &format!("no usable sample: {method}"));
         if value.is_none() {
             return none;
@@ -85,7 +85,7 @@ fn six_digits(x: f64) -> f64 {
 /// Figures as parameters, each with its name and method.
 pub(super) fn into_parameters(
     figures: Vec<Figure>,
-    named: impl IntoIterator<Item = (&'static str, String)>,
+    named: impl IntoIterator<Item = (impl AsRef<str>, String)>,
 ) -> Vec<Parameter> {
     figures.into_iter().zip(named).map(|(figure, (name, method))| figure.into_parameter(name, &method)).collect()
 }

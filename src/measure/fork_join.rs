@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::{Options, foreign_load};
 use crate::cpu::{Threads, Workers};
-use crate::hardware::{Parameter, parameter};
+use crate::hardware::{Parameter, ParameterId};
 use crate::stats::median;
 
 /// Body of a warm phase: many times the cost of a start.
@@ -25,7 +25,7 @@ const IDLE: Duration = Duration::from_millis(2);
 /// Warm phases behind one sample.
 const PHASES: u32 = 16;
 
-const NAMES: [&str; 2] = [parameter::FORK_JOIN_WARM_NS, parameter::FORK_JOIN_COLD_NS];
+const NAMES: [ParameterId; 2] = [ParameterId::ForkJoinWarmNs, ParameterId::ForkJoinColdNs];
 
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     let threads = options.usable_cores();

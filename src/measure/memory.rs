@@ -8,7 +8,7 @@ use rayon::ThreadPool;
 
 use super::{Options, caches, cgroup, foreign_load, pool};
 use crate::SimdLevel;
-use crate::hardware::{Parameter, parameter};
+use crate::hardware::{Parameter, ParameterId};
 
 /// Bytes that STREAM counts for one element of triad: two read, one written, the line fetched before the write not counted.
 const BYTES_PER_ELEMENT: u64 = 24;
@@ -25,12 +25,12 @@ const CHUNK: usize = 65_536;
 /// Total of the last-level caches where the system reports none.
 const ASSUMED_LLC_BYTES: u64 = 64 << 20;
 
-const BANDWIDTHS: [&str; 2] = [parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, parameter::BANDWIDTH_ALL_THREADS_GB_PER_S];
+const BANDWIDTHS: [ParameterId; 2] = [ParameterId::BandwidthOneThreadGbPerS, ParameterId::BandwidthAllThreadsGbPerS];
 
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     let size = match total() {
-        Some((bytes, source)) => Parameter::reported(parameter::MEMORY_BYTES, bytes as f64, source),
-        None => Parameter::missing(parameter::MEMORY_BYTES, "neither /proc/meminfo nor sysinfo tells"),
+        Some((bytes, source)) => Parameter::reported(ParameterId::MemoryBytes, bytes as f64, source),
+        None => Parameter::missing(ParameterId::MemoryBytes, "neither /proc/meminfo nor sysinfo tells"),
     };
     let missing = |why: String| BANDWIDTHS.map(|name| Parameter::missing(name, &why)).to_vec();
     let bandwidths = triad(options).unwrap_or_else(missing);

@@ -18,13 +18,12 @@ mod memory;
 mod scaling;
 mod topology;
 
-use std::fmt;
-use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
 
-use crate::hardware::{Hardware, Machine, Parameter, parameter};
+use crate::hardware::{Hardware, Machine, Parameter, ParameterId};
+use crate::named::named;
 use foreign_load::Plan;
 
 pub use core_to_core::core_to_core_ns;
@@ -34,92 +33,48 @@ pub use gpu::{gpu, gpu_group};
 #[cfg(feature = "this-machine")]
 pub(crate) use identity::fnv1a;
 
-/// A group of parameters that are measured together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Family {
-    /// Usable cores, physical cores, SIMD lanes.
-    Topology,
-    /// The reported and the measured clock.
-    Clock,
-    /// Cache sizes, and load latencies over working sets.
-    Caches,
-    /// Memory size and triad bandwidths.
-    Memory,
-    /// Time until one core sees what another one wrote.
-    CoreToCore,
-    /// Cost of a fork and join, warm and cold.
-    ForkJoin,
-    /// Work of several threads over work of one.
-    Scaling,
-    /// Multiply-adds of one thread and of all.
-    Arithmetic,
+named! {
+    /// A group of parameters that are measured together, in the order of measurement.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    #[non_exhaustive]
+    pub enum Family("family of hardware parameters") {
+        /// Usable cores, physical cores, SIMD lanes.
+        Topology = "topology",
+        /// The reported and the measured clock.
+        Clock = "clock",
+        /// Cache sizes, and load latencies over working sets.
+        Caches = "caches",
+        /// Memory size and triad bandwidths.
+        Memory = "memory",
+        /// Time until one core sees what another one wrote.
+        CoreToCore = "core_to_core",
+        /// Cost of a fork and join, warm and cold.
+        ForkJoin = "fork_join",
+        /// Work of several threads over work of one.
+        Scaling = "scaling",
+        /// Multiply-adds of one thread and of all.
+        Arithmetic = "arithmetic",
+    }
 }
 
 impl Family {
-    /// Every family, in the order of measurement.
-    pub const ALL: [Self; 8] = [
-        Self::Topology,
-        Self::Clock,
-        Self::Caches,
-        Self::Memory,
-        Self::CoreToCore,
-        Self::ForkJoin,
-        Self::Scaling,
-        Self::Arithmetic,
-    ];
-
-    /// The name, as [`FromStr`] reads it: `topology`, `clock`, `caches`, `memory`, `core_to_core`, `fork_join`, `scaling` or
-    /// `arithmetic`.
+    /// The parameters of this family, so that a caller whose child process died can say which are missing.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub fn parameters(self) -> Vec<ParameterId> {
+        use ParameterId as P;
         match self {
-            Self::Topology => "topology",
-            Self::Clock => "clock",
-            Self::Caches => "caches",
-            Self::Memory => "memory",
-            Self::CoreToCore => "core_to_core",
-            Self::ForkJoin => "fork_join",
-            Self::Scaling => "scaling",
-            Self::Arithmetic => "arithmetic",
-        }
-    }
-
-    /// Names of the parameters of this family, so that a caller whose child process died can say which are missing.
-    #[must_use]
-    pub fn parameters(self) -> Vec<String> {
-        use parameter as p;
-        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-        match self {
-            Self::Topology => owned(&[p::USABLE_CORES, p::PHYSICAL_CORES, p::SIMD_LANES]),
-            Self::Clock => owned(&[p::CLOCK_REPORTED_GHZ, p::CLOCK_MEASURED_GHZ]),
+            Self::Topology => vec![P::UsableCores, P::PhysicalCores, P::SimdLanes],
+            Self::Clock => vec![P::ClockReportedGhz, P::ClockMeasuredGhz],
             Self::Caches => {
-                let mut names = owned(&[p::CACHE_L1D_BYTES, p::CACHE_L2_BYTES, p::CACHE_LLC_BYTES]);
-                names.extend(p::LATENCY_WORKING_SETS_KIB.map(p::latency_name));
-                names
+                let sizes = [P::CacheL1dBytes, P::CacheL2Bytes, P::CacheLlcBytes];
+                sizes.into_iter().chain(P::LATENCIES.map(|l| l.1)).collect()
             }
-            Self::Memory => owned(&[p::MEMORY_BYTES, p::BANDWIDTH_ONE_THREAD_GB_PER_S, p::BANDWIDTH_ALL_THREADS_GB_PER_S]),
-            Self::CoreToCore => owned(&[p::CORE_TO_CORE_NS]),
-            Self::ForkJoin => owned(&[p::FORK_JOIN_WARM_NS, p::FORK_JOIN_COLD_NS]),
-            Self::Scaling => owned(&[p::SCALING_TWO_THREADS_RATIO, p::SCALING_ALL_THREADS_RATIO]),
-            Self::Arithmetic => owned(&[p::ARITHMETIC_ONE_THREAD_GFLOP_PER_S, p::ARITHMETIC_ALL_THREADS_GFLOP_PER_S]),
+            Self::Memory => vec![P::MemoryBytes, P::BandwidthOneThreadGbPerS, P::BandwidthAllThreadsGbPerS],
+            Self::CoreToCore => vec![P::CoreToCoreNs],
+            Self::ForkJoin => vec![P::ForkJoinWarmNs, P::ForkJoinColdNs],
+            Self::Scaling => vec![P::ScalingTwoThreadsRatio, P::ScalingAllThreadsRatio],
+            Self::Arithmetic => vec![P::ArithmeticOneThreadGflopPerS, P::ArithmeticAllThreadsGflopPerS],
         }
-    }
-}
-
-impl fmt::Display for Family {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Family {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|family| family.name() == text).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("{text}: no such family of hardware parameters; use one of {names}")
-        })
     }
 }
 
@@ -191,10 +146,10 @@ pub fn hardware(options: &Options) -> Hardware {
 
 /// Measures those families in this process that hold one of these parameters; those of the others are missing.
 ///
-/// [`Model::parameters`](crate::Model::parameters) has the names that a prediction needs.
+/// [`Model::parameters`](crate::Model::parameters) has those that a prediction needs.
 #[must_use]
-pub fn hardware_for(parameters: &[&str], options: &Options) -> Hardware {
-    let holds = |family: &Family| family.parameters().iter().any(|name| parameters.contains(&name.as_str()));
+pub fn hardware_for(parameters: &[ParameterId], options: &Options) -> Hardware {
+    let holds = |family: &Family| family.parameters().iter().any(|id| parameters.contains(id));
     families(Family::ALL.into_iter().filter(holds).collect(), options)
 }
 
@@ -209,21 +164,16 @@ fn families(mut wanted: Vec<Family>, options: &Options) -> Hardware {
     assemble(machine(), measured.collect())
 }
 
-/// Puts parameters, in any order, into the order of a report: every name of [`parameter::all_names`] once.
+/// Puts parameters, in any order, into the order of a report: each of [`ParameterId::ALL`] once.
 ///
 /// The first of several parameters with one name is kept. A name that is absent becomes missing, and an unknown name is dropped.
 #[must_use]
 pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
-    let find = |name: String| {
-        let found = measured.iter().find(|p| p.name == name).cloned();
-        found.unwrap_or_else(|| Parameter::missing(&name, "not measured"))
+    let find = |id: ParameterId| {
+        let found = Parameter::find(&measured, id).cloned();
+        found.unwrap_or_else(|| Parameter::missing(id, "not measured"))
     };
-    Hardware {
-        machine,
-        parameters: parameter::all_names().into_iter().map(find).collect(),
-        gpus: Vec::new(),
-        gpu_groups: Vec::new(),
-    }
+    Hardware::new(machine, ParameterId::ALL.into_iter().map(find).collect())
 }
 
 /// A pool of its own, so that the figures don't depend on what the caller's global pool does meanwhile.

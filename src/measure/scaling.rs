@@ -6,7 +6,7 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use super::{Options, foreign_load, pool, together};
-use crate::hardware::{Parameter, parameter};
+use crate::hardware::{Parameter, ParameterId};
 
 /// Floats that a thread works on: 8 KiB, within every first-level cache, so that only the cores are compared and not the memory.
 const FLOATS: usize = 2048;
@@ -16,7 +16,7 @@ const PASSES: u32 = 64;
 
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     let threads = options.usable_cores();
-    let (two, all) = (parameter::SCALING_TWO_THREADS_RATIO, parameter::SCALING_ALL_THREADS_RATIO);
+    let (two, all) = (ParameterId::ScalingTwoThreadsRatio, ParameterId::ScalingAllThreadsRatio);
     if threads == 1 {
         return vec![Parameter::missing(two, "one usable core"), Parameter::reported(all, 1.0, "one usable core")];
     }

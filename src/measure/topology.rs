@@ -4,20 +4,20 @@ use std::collections::HashSet;
 
 use super::Options;
 use crate::SimdLevel;
-use crate::hardware::{Parameter, parameter};
+use crate::hardware::{Parameter, ParameterId};
 
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     let restricted = if options.threads.is_some() { ", lowered by the caller" } else { "" };
     let source = format!("std::thread::available_parallelism{restricted}");
     vec![
-        Parameter::reported(parameter::USABLE_CORES, options.usable_cores() as f64, &source),
+        Parameter::reported(ParameterId::UsableCores, options.usable_cores() as f64, &source),
         physical_cores(),
-        Parameter::reported(parameter::SIMD_LANES, f64::from(SimdLevel::in_use().lanes()), "SimdLevel::in_use"),
+        Parameter::reported(ParameterId::SimdLanes, f64::from(SimdLevel::in_use().lanes()), "SimdLevel::in_use"),
     ]
 }
 
 fn physical_cores() -> Parameter {
-    let name = parameter::PHYSICAL_CORES;
+    let name = ParameterId::PhysicalCores;
     if let Some(count) = count_sibling_lists(sibling_lists()) {
         return Parameter::reported(name, count as f64, "/sys/devices/system/cpu/cpu*/topology");
     }

@@ -1,8 +1,8 @@
 //! The cost curve of a method on a backend of a machine.
 
 use super::scale::need;
-use super::{Feature, MethodModel, ModelTerm, ResidualTerm, Scale};
-use crate::hardware::{Hardware, parameter};
+use super::{Feature, MethodModel, ModelTerm, PredictError, ResidualTerm, Scale};
+use crate::hardware::{Hardware, ParameterId};
 use crate::{Backend, BackendClass, CostCurve, CostTerm, Knot};
 
 /// Objects at which the correction of a predicted curve is tabulated: 2^3 to 2^24, every octave.
@@ -12,9 +12,9 @@ const CORRECTION_OCTAVES: std::ops::RangeInclusive<u32> = 3..=24;
 pub(super) struct Figures<'a> {
     hardware: &'a Hardware,
     backend: &'a Backend,
-    scales: Vec<(Scale, Result<f64, String>)>,
-    features: Vec<(Feature, Result<f64, String>)>,
-    cache: Option<Result<f64, String>>,
+    scales: Vec<(Scale, Result<f64, PredictError>)>,
+    features: Vec<(Feature, Result<f64, PredictError>)>,
+    cache: Option<Result<f64, PredictError>>,
 }
 
 /// What a curve is made of, of a model or of one of its folds.
@@ -34,7 +34,7 @@ impl<'a> Figures<'a> {
         Self { hardware, backend, scales: Vec::new(), features: Vec::new(), cache: None }
     }
 
-    fn nanoseconds(&mut self, scale: Scale) -> Result<f64, String> {
+    fn nanoseconds(&mut self, scale: Scale) -> Result<f64, PredictError> {
         if let Some((_, known)) = self.scales.iter().find(|s| s.0 == scale) {
             return known.clone();
         }
@@ -44,7 +44,7 @@ impl<'a> Figures<'a> {
     }
 
     /// The terms with what a unit of each takes, those of the same count together.
-    fn costs(&mut self, terms: impl Iterator<Item = ModelTerm>) -> Result<Vec<CostTerm>, String> {
+    fn costs(&mut self, terms: impl Iterator<Item = ModelTerm>) -> Result<Vec<CostTerm>, PredictError> {
         let mut costs: Vec<CostTerm> = Vec::new();
         for t in terms.filter(|t| t.unit > 0.0) {
             let unit_ns = t.unit * self.nanoseconds(t.scale)?;
@@ -56,7 +56,7 @@ impl<'a> Figures<'a> {
         Ok(costs)
     }
 
-    fn feature(&mut self, feature: Feature) -> Result<f64, String> {
+    fn feature(&mut self, feature: Feature) -> Result<f64, PredictError> {
         if let Some((_, known)) = self.features.iter().find(|f| f.0 == feature) {
             return known.clone();
         }
@@ -65,16 +65,16 @@ impl<'a> Figures<'a> {
         looked_up
     }
 
-    fn cache_bytes(&mut self) -> Result<f64, String> {
+    fn cache_bytes(&mut self) -> Result<f64, PredictError> {
         let hardware = self.hardware;
-        self.cache.get_or_insert_with(|| need(hardware, parameter::CACHE_LLC_BYTES)).clone()
+        self.cache.get_or_insert_with(|| need(hardware, ParameterId::CacheLlcBytes)).clone()
     }
 }
 
 impl<T: Iterator<Item = ModelTerm>, R: Iterator<Item = ResidualTerm>> Formula<T, R> {
     /// # Errors
     /// Names the hardware parameter or the GPU that is missing.
-    pub(super) fn curve(self, figures: &mut Figures<'_>) -> Result<CostCurve, String> {
+    pub(super) fn curve(self, figures: &mut Figures<'_>) -> Result<CostCurve, PredictError> {
         let (terms, fallback_terms) = (figures.costs(self.terms)?, figures.costs(self.fallback_terms)?);
         // What depends on the machine alone is added up once for all octaves.
         let (mut fixed, mut with_load, mut corrected) = (self.intercept, Vec::with_capacity(2), self.intercept != 0.0);
@@ -102,7 +102,7 @@ impl<T: Iterator<Item = ModelTerm>, R: Iterator<Item = ResidualTerm>> Formula<T,
             BackendClass::Gpu => 0.0,
         };
         let curve = CostCurve { terms, fallback_terms, cache_bytes, correction };
-        curve.defect().map_or(Ok(curve), Err)
+        curve.defect().map_or(Ok(curve), |e| Err(PredictError::Curve(e)))
     }
 }
 
@@ -122,7 +122,7 @@ impl MethodModel {
     ///
     /// # Errors
     /// Names the hardware parameter or the GPU that is missing, or what is wrong with the curve.
-    pub fn curve(&self, hardware: &Hardware, backend: &Backend) -> Result<CostCurve, String> {
+    pub fn curve(&self, hardware: &Hardware, backend: &Backend) -> Result<CostCurve, PredictError> {
         self.formula().curve(&mut Figures::new(hardware, backend))
     }
 }

@@ -1,25 +1,28 @@
 //! What the residual of a cost model may depend on.
 
+use super::PredictError;
 use super::scale::need;
-use crate::hardware::{Hardware, parameter};
+use crate::hardware::{Hardware, ParameterId};
+use crate::named::named;
 use crate::{Backend, BackendClass, Load};
 
-/// What a residual may depend on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Feature {
-    /// Base-2 logarithm of the number of objects.
-    Log2Objects,
-    /// Its square.
-    Log2ObjectsSquared,
-    /// Base-2 logarithm of the SIMD lanes of the CPU. Not of a GPU, whose lanes are in its arithmetic rate.
-    Log2Lanes,
-    /// Base-2 logarithm of the threads of the algorithm, or of the number of its GPUs.
-    Log2Threads,
-    /// The base-2 logarithms of the number of objects and of the threads multiplied: what threads cost a frame beyond their terms weighs
-    /// most where there are few objects. Not of a GPU.
-    Log2ObjectsTimesThreads,
+named! {
+    /// What a residual may depend on.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    #[non_exhaustive]
+    pub enum Feature("feature of a residual") {
+        /// Base-2 logarithm of the number of objects.
+        Log2Objects = "log2_objects",
+        /// Its square.
+        Log2ObjectsSquared = "log2_objects_squared",
+        /// Base-2 logarithm of the SIMD lanes of the CPU. Not of a GPU, whose lanes are in its arithmetic rate.
+        Log2Lanes = "log2_lanes",
+        /// Base-2 logarithm of the threads of the algorithm, or of the number of its GPUs.
+        Log2Threads = "log2_threads",
+        /// The base-2 logarithms of the number of objects and of the threads multiplied: what threads cost a frame beyond their terms weighs
+        /// most where there are few objects. Not of a GPU.
+        Log2ObjectsTimesThreads = "log2_objects_times_threads",
+    }
 }
 
 impl Feature {
@@ -44,9 +47,9 @@ impl Feature {
 
     /// The hardware parameters that it looks at.
     #[must_use]
-    pub fn parameters(self) -> &'static [&'static str] {
+    pub fn parameters(self) -> &'static [ParameterId] {
         match self {
-            Self::Log2Lanes => &[parameter::SIMD_LANES],
+            Self::Log2Lanes => &[ParameterId::SimdLanes],
             Self::Log2Objects | Self::Log2ObjectsSquared | Self::Log2Threads | Self::Log2ObjectsTimesThreads => &[],
         }
     }
@@ -55,7 +58,7 @@ impl Feature {
     ///
     /// # Errors
     /// Names the hardware parameter that is missing, or says that the feature is not one of that processor.
-    pub fn value(self, hardware: &Hardware, backend: &Backend, load: &Load) -> Result<f64, String> {
+    pub fn value(self, hardware: &Hardware, backend: &Backend, load: &Load) -> Result<f64, PredictError> {
         match self.of_octaves(f64::from(load.objects.max(1)).log2(), backend) {
             Some(value) => Ok(value),
             None => self.of_machine(hardware, backend),
@@ -76,11 +79,11 @@ impl Feature {
     ///
     /// # Errors
     /// Names the hardware parameter that is missing, or says that the feature is not one of that processor.
-    pub(super) fn of_machine(self, hardware: &Hardware, backend: &Backend) -> Result<f64, String> {
+    pub(super) fn of_machine(self, hardware: &Hardware, backend: &Backend) -> Result<f64, PredictError> {
         match self {
             Self::Log2Threads => Ok(f64::from(backend.width()).log2()),
-            Self::Log2Lanes if self.is_of(backend.class()) => Ok(need(hardware, parameter::SIMD_LANES)?.log2()),
-            _ => Err(format!("{backend} has no feature {self:?}")),
+            Self::Log2Lanes if self.is_of(backend.class()) => Ok(need(hardware, ParameterId::SimdLanes)?.log2()),
+            _ => Err(PredictError::NotOfProcessor { backend: backend.to_string(), what: format!("feature {self}") }),
         }
     }
 }

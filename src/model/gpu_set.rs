@@ -1,6 +1,8 @@
 //! What GPUs that work on one frame together are worth.
 
-use crate::hardware::gpu::parameter;
+use super::PredictError;
+use super::scale::above_zero;
+use crate::hardware::GpuParameterId;
 use crate::{GpuGroup, GpuHardware, Hardware};
 
 /// The GPUs of an algorithm, as the hardware describes them.
@@ -13,30 +15,28 @@ pub(super) struct GpuSet<'a> {
 impl<'a> GpuSet<'a> {
     /// # Errors
     /// Names the GPU that the hardware does not hold.
-    pub(super) fn new(hardware: &'a Hardware, indices: &[u32]) -> Result<Self, String> {
-        let one = |&k: &u32| {
-            hardware.gpu(k).ok_or_else(|| format!("the hardware holds no gpu{k}; see `sapwise devices`, then measure again"))
-        };
+    pub(super) fn new(hardware: &'a Hardware, indices: &[u32]) -> Result<Self, PredictError> {
+        let one = |&k: &u32| hardware.gpu(k).ok_or(PredictError::NoGpu { index: k });
         let gpus: Vec<&GpuHardware> = indices.iter().map(one).collect::<Result<_, _>>()?;
         Ok(Self { gpus, group: hardware.gpu_group(indices) })
     }
 
     /// Whether there are several and nobody measured how they work together.
     pub(super) fn is_unmeasured_group(&self) -> bool {
-        let ratio = |name: &&str| self.ratio(name).is_none();
-        self.gpus.len() > 1 && parameter::GROUP.iter().all(ratio)
+        let ratio = |id: GpuParameterId| self.ratio(id).is_none();
+        self.gpus.len() > 1 && GpuParameterId::GROUP.into_iter().all(ratio)
     }
 
     /// The sum of some latencies in ns, of the slowest GPU; the others wait for it.
     ///
     /// # Errors
     /// Names the parameter that is missing.
-    pub(super) fn latency(&self, names: &[&str]) -> Result<f64, String> {
+    pub(super) fn latency(&self, ids: &[GpuParameterId]) -> Result<f64, PredictError> {
         let mut slowest = 0.0_f64;
         for gpu in &self.gpus {
             let mut sum = 0.0;
-            for name in names {
-                sum += need(gpu, name)?;
+            for &id in ids {
+                sum += need(gpu, id)?;
             }
             slowest = slowest.max(sum);
         }
@@ -48,12 +48,12 @@ impl<'a> GpuSet<'a> {
     ///
     /// # Errors
     /// Names the last parameter, when a GPU has none of them.
-    pub(super) fn rate(&self, names: &[&str], ratio: &str) -> Result<f64, String> {
+    pub(super) fn rate(&self, ids: &[GpuParameterId], ratio: GpuParameterId) -> Result<f64, PredictError> {
         let (mut sum, mut fastest) = (0.0, 0.0_f64);
         for gpu in &self.gpus {
-            let found = names.iter().find_map(|name| need(gpu, name).ok());
+            let found = ids.iter().find_map(|&id| need(gpu, id).ok());
             // Of those that are missing the last one is told.
-            let rate = found.map_or_else(|| names.last().map_or(Ok(0.0), |last| need(gpu, last)), Ok)?;
+            let rate = found.map_or_else(|| ids.last().map_or(Ok(0.0), |&last| need(gpu, last)), Ok)?;
             sum += rate;
             fastest = fastest.max(rate);
         }
@@ -61,21 +61,13 @@ impl<'a> GpuSet<'a> {
     }
 
     /// A ratio of the group; `None` for one GPU, and where it was not measured.
-    pub(super) fn ratio(&self, name: &str) -> Option<f64> {
-        let ratio = self.group.filter(|_| self.gpus.len() > 1)?.value(name)?;
+    pub(super) fn ratio(&self, id: GpuParameterId) -> Option<f64> {
+        let ratio = self.group.filter(|_| self.gpus.len() > 1)?.value(id)?;
         (ratio > 0.0 && ratio.is_finite()).then_some(ratio)
     }
 }
 
 /// A parameter that must be there and above zero.
-fn need(gpu: &GpuHardware, name: &str) -> Result<f64, String> {
-    let k = gpu.gpu.index;
-    match gpu.parameters.iter().find(|p| p.name == name) {
-        Some(p) => match p.value {
-            Some(value) if value > 0.0 && value.is_finite() => Ok(value),
-            Some(value) => Err(format!("the parameter {name} of gpu{k} is {value}")),
-            None => Err(format!("the parameter {name} of gpu{k} is missing: {}", p.source)),
-        },
-        None => Err(format!("the parameter {name} of gpu{k} is missing; measure it with `sapwise probe --hardware-only`")),
-    }
+fn need(gpu: &GpuHardware, id: GpuParameterId) -> Result<f64, PredictError> {
+    above_zero(&gpu.parameters, id.as_str(), &format!(" of gpu{}", gpu.gpu.index))
 }

@@ -2,12 +2,13 @@
 
 use super::curve::Figures;
 use super::gpu_set::GpuSet;
-use super::{GPU_PREFIX, MethodModel, Model, Range};
+use super::{GPU_PREFIX, MethodModel, Model, PredictError, Range};
 use crate::hardware::{GpuKind, Hardware};
 use crate::{AlgorithmCost, AlgorithmId, Backend, BackendClass, GpuHardware, Load, Source, Tuning};
 
 /// Cost curves for one machine.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Prediction {
     /// One curve for each algorithm that could be predicted.
     pub costs: Vec<AlgorithmCost>,
@@ -20,7 +21,8 @@ pub struct Prediction {
 }
 
 /// Why a predicted crossover has no interval.
-const NO_INTERVALS: &str = "no interval is claimed: too few machines were measured to say how far a prediction lies from the truth on a new one";
+const NO_INTERVALS: &str =
+    "no interval is claimed: too few machines were measured to say how far a prediction lies from the truth on a new one";
 
 /// What to do where a machine is unlike those of training.
 pub const ASK: &str = "this machine is unlike those of training: measure a few timings with `sapwise predict --samples 8`, or all with \
@@ -35,13 +37,12 @@ impl Model {
     /// A machine is extrapolated when a parameter lies outside its [range](Range).
     ///
     /// # Errors
-    /// A sentence, when no algorithm can be predicted, or a parameter of the machine has a value that no machine has.
-    pub fn predict(&self, hardware: &Hardware, algorithms: &[(AlgorithmId, u32)]) -> Result<Prediction, String> {
+    /// When no algorithm can be predicted, or a parameter of the machine has a value that no machine has.
+    pub fn predict(&self, hardware: &Hardware, algorithms: &[(AlgorithmId, u32)]) -> Result<Prediction, PredictError> {
         if let Some(why) = hardware.implausible() {
-            return Err(why);
+            return Err(PredictError::Hardware(why));
         }
-        let mut p =
-            Prediction { costs: Vec::new(), extrapolated: false, warnings: Vec::new(), model: self.name.clone() };
+        let mut p = Prediction { costs: Vec::new(), extrapolated: false, warnings: Vec::new(), model: self.name.clone() };
         if self.simulated {
             p.warnings.push(format!(
                 "the model {} was trained on simulated machines: what it predicts is no evidence; train on real reports",
@@ -49,7 +50,7 @@ impl Model {
             ));
         }
         let mut unlike =
-            p.outside(self.ranges.iter().filter_map(|r| r.excess(&r.parameter, "", hardware.value(&r.parameter))));
+            p.outside(self.ranges.iter().filter_map(|r| r.excess(&r.parameter, "", hardware.value_named(&r.parameter))));
         if self.ranges.is_empty() {
             p.outside([format!("the model {} does not say what it was trained on", self.name)]);
         }
@@ -93,7 +94,7 @@ impl Model {
             let of = format!(" of gpu{}", gpu.gpu.index);
             unlike |= p.outside(self.ranges.iter().filter_map(|r| {
                 let name = r.parameter.strip_prefix(GPU_PREFIX)?;
-                r.excess(name, &of, gpu.value(name))
+                r.excess(name, &of, gpu.value_named(name))
             }));
         }
         if unlike {
@@ -108,7 +109,7 @@ impl Model {
             ));
         }
         if p.costs.is_empty() {
-            return Err(format!("the model {} predicts none of these algorithms: {}", self.name, p.warnings.join("; ")));
+            return Err(PredictError::Nothing { model: p.model, warnings: p.warnings });
         }
         Ok(p)
     }
@@ -122,15 +123,20 @@ impl Model {
 
 /// # Errors
 /// The parameter of one of the GPUs that no GPU has.
-fn gpus_that_are(hardware: &Hardware, backend: &Backend) -> Result<(), String> {
+fn gpus_that_are(hardware: &Hardware, backend: &Backend) -> Result<(), PredictError> {
     let Backend::Gpu(indices) = backend else { return Ok(()) };
-    indices.iter().filter_map(|&k| hardware.gpu(k)).find_map(GpuHardware::implausible).map_or(Ok(()), Err)
+    indices
+        .iter()
+        .filter_map(|&k| hardware.gpu(k))
+        .find_map(GpuHardware::implausible)
+        .map_or(Ok(()), |e| Err(PredictError::Hardware(e)))
 }
 
 impl Prediction {
     /// The tuning, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
     ///
-    /// Its crossovers have no intervals: how far a prediction lies from the truth on machines never seen was not measured on enough of them.
+    /// Its crossovers have no intervals: how far a prediction lies from the truth on machines never seen was not measured on enough of
+    /// them.
     #[must_use]
     pub fn tuning(self, scenario: &str, loads: &[Load]) -> Tuning {
         let mut tuning = Tuning::from_costs(Source::Predicted, scenario, self.costs, loads);
@@ -186,7 +192,7 @@ impl MethodModel {
         Some(match &self.gpu_kinds[..] {
             [] => format!("{id}: the model does not say which kinds of GPU it was trained on"),
             [GpuKind::Software] => {
-                format!("{id}: the model was trained on programs that act as GPUs only, and on no real GPU")
+                format!("{id}: the model was trained on software adapters only, and on no real GPU")
             }
             _ => format!("{id}: the model was trained on {} GPUs only, this one is {unseen}", seen.join(" and ")),
         })

@@ -1,50 +1,52 @@
 //! What one unit of work takes on a machine.
 
+use super::PredictError;
 use super::gpu_set::GpuSet;
-use crate::hardware::gpu::parameter as of_gpu;
-use crate::hardware::{Hardware, parameter};
+use crate::hardware::{GpuParameterId, Hardware, Parameter, ParameterId};
+use crate::named::named;
 use crate::{Backend, BackendClass};
 
-/// Nanoseconds that one unit of work takes on a machine, with `k` threads or on some of its GPUs.
-///
-/// Of several GPUs latencies are those of the slowest, because a frame is done when the last of them is. Rates are the sum of
-/// all, but no more than the rate of the fastest times the ratio that the group was measured to have; where it was not
-/// measured, the plain sum.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-pub enum Scale {
-    /// One cycle of one core: 1 / clock. Work that is not divided among threads, and what the CPU does for a GPU.
-    Cycle,
-    /// One cycle of `k` cores: 1 / (clock * measured scaling of `k` threads).
-    SharedCycle,
-    /// One lane of one cycle of `k` cores: 1 / (clock * lanes * measured scaling of `k` threads).
-    SharedLane,
-    /// One byte at the memory bandwidth of `k` threads.
-    Byte,
-    /// One fork and join of a pool that sleeps, as it does between frames; nothing with one thread.
-    ForkJoin,
-    /// One cache line of a frame, read by one of `k` cores that read at the same time: of `k` lines `k - 1` come from another core,
-    /// `core_to_core_ns` * (k - 1) / k^2. Nothing with one thread.
-    SharedLine,
-    /// One submission that is waited for, and reading back a few bytes of its result: `round_trip_ns` + `read_back_ns`, times
-    /// `group_round_trip_ratio` of several GPUs.
-    GpuRoundTrip,
-    /// One dispatch that depends on the one before it, in the same submission: `dispatch_ns`.
-    GpuDispatch,
-    /// One byte from the CPU to the GPU: 1 / `upload_rate_gb_per_s`, the slope over sizes. Where that is missing
-    /// 1 / `upload_gb_per_s`, which has the latency of 32 MiB in it. Several GPUs are limited by `group_upload_ratio`.
-    GpuUploadByte,
-    /// One byte back: 1 / `download_rate_gb_per_s`, else 1 / `download_gb_per_s`. Several GPUs are limited by
-    /// `group_upload_ratio`: both ways go over the same bus.
-    GpuDownloadByte,
-    /// One byte that a kernel moves in the GPU's memory: 1 / `read_gb_per_s`, where that is missing 1 / `copy_gb_per_s`, whose
-    /// copy command is many times faster than any kernel on programs that act as GPUs. Several GPUs are limited by
-    /// `group_arithmetic_ratio`, which tells how far they work at the same time.
-    GpuMemoryByte,
-    /// One 32-bit floating-point operation of all lanes at work: 1 / `arithmetic_gflop_per_s`. Several GPUs are limited by
-    /// `group_arithmetic_ratio`.
-    GpuOperation,
+named! {
+    /// Nanoseconds that one unit of work takes on a machine, with `k` threads or on some of its GPUs.
+    ///
+    /// Of several GPUs latencies are those of the slowest, because a frame is done when the last of them is. Rates are the sum of
+    /// all, but no more than the rate of the fastest times the ratio that the group was measured to have; where it was not
+    /// measured, the plain sum.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    #[non_exhaustive]
+    pub enum Scale("scale") {
+        /// One cycle of one core: 1 / clock. Work that is not divided among threads, and what the CPU does for a GPU.
+        Cycle = "cycle",
+        /// One cycle of `k` cores: 1 / (clock * measured scaling of `k` threads).
+        SharedCycle = "shared_cycle",
+        /// One lane of one cycle of `k` cores: 1 / (clock * lanes * measured scaling of `k` threads).
+        SharedLane = "shared_lane",
+        /// One byte at the memory bandwidth of `k` threads.
+        Byte = "byte",
+        /// One fork and join of a pool that sleeps, as it does between frames; nothing with one thread.
+        ForkJoin = "fork_join",
+        /// One cache line of a frame, read by one of `k` cores that read at the same time: of `k` lines `k - 1` come from another core,
+        /// `core_to_core_ns` * (k - 1) / k^2. Nothing with one thread.
+        SharedLine = "shared_line",
+        /// One submission that is waited for, and reading back a few bytes of its result: `round_trip_ns` + `read_back_ns`, times
+        /// `group_round_trip_ratio` of several GPUs.
+        GpuRoundTrip = "gpu_round_trip",
+        /// One dispatch that depends on the one before it, in the same submission: `dispatch_ns`.
+        GpuDispatch = "gpu_dispatch",
+        /// One byte from the CPU to the GPU: 1 / `upload_rate_gb_per_s`, the slope over sizes. Where that is missing
+        /// 1 / `upload_gb_per_s`, which has the latency of 32 MiB in it. Several GPUs are limited by `group_upload_ratio`.
+        GpuUploadByte = "gpu_upload_byte",
+        /// One byte back: 1 / `download_rate_gb_per_s`, else 1 / `download_gb_per_s`. Several GPUs are limited by
+        /// `group_upload_ratio`: both ways go over the same bus.
+        GpuDownloadByte = "gpu_download_byte",
+        /// One byte that a kernel moves in the GPU's memory: 1 / `read_gb_per_s`, where that is missing 1 / `copy_gb_per_s`, whose
+        /// copy command is many times faster than any kernel on programs that act as GPUs. Several GPUs are limited by
+        /// `group_arithmetic_ratio`, which tells how far they work at the same time.
+        GpuMemoryByte = "gpu_memory_byte",
+        /// One 32-bit floating-point operation of all lanes at work: 1 / `arithmetic_gflop_per_s`. Several GPUs are limited by
+        /// `group_arithmetic_ratio`.
+        GpuOperation = "gpu_operation",
+    }
 }
 
 impl Scale {
@@ -64,28 +66,27 @@ impl Scale {
     /// The hardware parameters of the machine that [`nanoseconds`](Self::nanoseconds) looks at; none of a scale of GPUs, whose
     /// parameters are those of the GPU.
     #[must_use]
-    pub fn parameters(self) -> &'static [&'static str] {
-        use parameter as p;
+    pub fn parameters(self) -> &'static [ParameterId] {
         match self {
-            Self::Cycle => &[p::CLOCK_MEASURED_GHZ, p::CLOCK_REPORTED_GHZ],
+            Self::Cycle => &[ParameterId::ClockMeasuredGhz, ParameterId::ClockReportedGhz],
             Self::SharedCycle => &[
-                p::CLOCK_MEASURED_GHZ,
-                p::CLOCK_REPORTED_GHZ,
-                p::USABLE_CORES,
-                p::SCALING_TWO_THREADS_RATIO,
-                p::SCALING_ALL_THREADS_RATIO,
+                ParameterId::ClockMeasuredGhz,
+                ParameterId::ClockReportedGhz,
+                ParameterId::UsableCores,
+                ParameterId::ScalingTwoThreadsRatio,
+                ParameterId::ScalingAllThreadsRatio,
             ],
             Self::SharedLane => &[
-                p::CLOCK_MEASURED_GHZ,
-                p::CLOCK_REPORTED_GHZ,
-                p::USABLE_CORES,
-                p::SCALING_TWO_THREADS_RATIO,
-                p::SCALING_ALL_THREADS_RATIO,
-                p::SIMD_LANES,
+                ParameterId::ClockMeasuredGhz,
+                ParameterId::ClockReportedGhz,
+                ParameterId::UsableCores,
+                ParameterId::ScalingTwoThreadsRatio,
+                ParameterId::ScalingAllThreadsRatio,
+                ParameterId::SimdLanes,
             ],
-            Self::Byte => &[p::BANDWIDTH_ONE_THREAD_GB_PER_S, p::BANDWIDTH_ALL_THREADS_GB_PER_S],
-            Self::ForkJoin => &[p::FORK_JOIN_COLD_NS],
-            Self::SharedLine => &[p::CORE_TO_CORE_NS, p::FORK_JOIN_WARM_NS],
+            Self::Byte => &[ParameterId::BandwidthOneThreadGbPerS, ParameterId::BandwidthAllThreadsGbPerS],
+            Self::ForkJoin => &[ParameterId::ForkJoinColdNs],
+            Self::SharedLine => &[ParameterId::CoreToCoreNs, ParameterId::ForkJoinWarmNs],
             Self::GpuRoundTrip
             | Self::GpuDispatch
             | Self::GpuUploadByte
@@ -99,56 +100,67 @@ impl Scale {
     ///
     /// # Errors
     /// Names the hardware parameter or the GPU that is missing, or says that the scale is not one of that processor.
-    pub fn nanoseconds(self, hardware: &Hardware, backend: &Backend) -> Result<f64, String> {
+    pub fn nanoseconds(self, hardware: &Hardware, backend: &Backend) -> Result<f64, PredictError> {
         match backend {
-            _ if !self.is_of(backend.class()) => Err(format!("{backend} has no scale {self:?}")),
+            _ if !self.is_of(backend.class()) => {
+                Err(PredictError::NotOfProcessor { backend: backend.to_string(), what: format!("scale {self}") })
+            }
             Backend::Cpu(threads) => self.on_cpu(hardware, *threads),
             Backend::Gpu(gpus) => self.on_gpus(hardware, gpus),
         }
     }
 
-    fn on_cpu(self, hardware: &Hardware, threads: u32) -> Result<f64, String> {
+    fn on_cpu(self, hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
         Ok(match self {
             Self::SharedCycle => cycle(hardware)? / speed_up(hardware, threads)?,
-            Self::SharedLane => cycle(hardware)? / speed_up(hardware, threads)? / need(hardware, parameter::SIMD_LANES)?,
+            Self::SharedLane => cycle(hardware)? / speed_up(hardware, threads)? / need(hardware, ParameterId::SimdLanes)?,
             Self::Byte => 1.0 / bandwidth(hardware, threads)?,
             Self::ForkJoin | Self::SharedLine if threads == 1 => 0.0,
             Self::SharedLine => {
                 let k = f64::from(threads);
                 core_to_core(hardware)? * (k - 1.0) / (k * k)
             }
-            Self::ForkJoin => need(hardware, parameter::FORK_JOIN_COLD_NS)?,
+            Self::ForkJoin => need(hardware, ParameterId::ForkJoinColdNs)?,
             _ => cycle(hardware)?,
         })
     }
 
-    fn on_gpus(self, hardware: &Hardware, indices: &[u32]) -> Result<f64, String> {
+    fn on_gpus(self, hardware: &Hardware, indices: &[u32]) -> Result<f64, PredictError> {
         let set = GpuSet::new(hardware, indices)?;
         Ok(match self {
             Self::GpuRoundTrip => {
-                let together = set.ratio(of_gpu::GROUP_ROUND_TRIP_RATIO).unwrap_or(1.0);
-                set.latency(&[of_gpu::ROUND_TRIP_NS, of_gpu::READ_BACK_NS])? * together
+                let together = set.ratio(GpuParameterId::GroupRoundTripRatio).unwrap_or(1.0);
+                set.latency(&[GpuParameterId::RoundTripNs, GpuParameterId::ReadBackNs])? * together
             }
-            Self::GpuDispatch => set.latency(&[of_gpu::DISPATCH_NS])?,
+            Self::GpuDispatch => set.latency(&[GpuParameterId::DispatchNs])?,
             Self::GpuUploadByte => {
-                1.0 / set.rate(&[of_gpu::UPLOAD_RATE_GB_PER_S, of_gpu::UPLOAD_GB_PER_S], of_gpu::GROUP_UPLOAD_RATIO)?
+                1.0 / set.rate(
+                    &[GpuParameterId::UploadRateGbPerS, GpuParameterId::UploadGbPerS],
+                    GpuParameterId::GroupUploadRatio,
+                )?
             }
             Self::GpuDownloadByte => {
-                1.0 / set.rate(&[of_gpu::DOWNLOAD_RATE_GB_PER_S, of_gpu::DOWNLOAD_GB_PER_S], of_gpu::GROUP_UPLOAD_RATIO)?
+                1.0 / set.rate(
+                    &[GpuParameterId::DownloadRateGbPerS, GpuParameterId::DownloadGbPerS],
+                    GpuParameterId::GroupUploadRatio,
+                )?
             }
             Self::GpuMemoryByte => {
-                1.0 / set.rate(&[of_gpu::READ_GB_PER_S, of_gpu::COPY_GB_PER_S], of_gpu::GROUP_ARITHMETIC_RATIO)?
+                1.0 / set
+                    .rate(&[GpuParameterId::ReadGbPerS, GpuParameterId::CopyGbPerS], GpuParameterId::GroupArithmeticRatio)?
             }
-            Self::GpuOperation => 1.0 / set.rate(&[of_gpu::ARITHMETIC_GFLOP_PER_S], of_gpu::GROUP_ARITHMETIC_RATIO)?,
+            Self::GpuOperation => {
+                1.0 / set.rate(&[GpuParameterId::ArithmeticGflopPerS], GpuParameterId::GroupArithmeticRatio)?
+            }
             _ => cycle(hardware)?,
         })
     }
 }
 
 /// One cycle in ns, of the measured clock where there is one.
-fn cycle(hardware: &Hardware) -> Result<f64, String> {
-    let measured = need(hardware, parameter::CLOCK_MEASURED_GHZ);
-    measured.or_else(|e| need(hardware, parameter::CLOCK_REPORTED_GHZ).map_err(|_| e)).map(|ghz| 1.0 / ghz)
+fn cycle(hardware: &Hardware) -> Result<f64, PredictError> {
+    let measured = need(hardware, ParameterId::ClockMeasuredGhz);
+    measured.or_else(|e| need(hardware, ParameterId::ClockReportedGhz).map_err(|_| e)).map(|ghz| 1.0 / ghz)
 }
 
 /// Cache lines that go from core to core in a warm fork and join: of twelve reports of one machine it took 15 times the latency where
@@ -156,42 +168,49 @@ fn cycle(hardware: &Hardware) -> Result<f64, String> {
 const LINES_OF_A_FORK_JOIN: f64 = 12.0;
 
 /// Latency between cores in ns; what the warm fork and join implies where it was not measured, as in reports of old versions.
-fn core_to_core(hardware: &Hardware) -> Result<f64, String> {
-    need(hardware, parameter::CORE_TO_CORE_NS)
-        .or_else(|e| need(hardware, parameter::FORK_JOIN_WARM_NS).map(|ns| ns / LINES_OF_A_FORK_JOIN).map_err(|_| e))
+fn core_to_core(hardware: &Hardware) -> Result<f64, PredictError> {
+    need(hardware, ParameterId::CoreToCoreNs)
+        .or_else(|e| need(hardware, ParameterId::ForkJoinWarmNs).map(|ns| ns / LINES_OF_A_FORK_JOIN).map_err(|_| e))
 }
 
 /// A parameter that must be there and above zero.
-pub(super) fn need(hardware: &Hardware, name: &str) -> Result<f64, String> {
-    match hardware.value(name) {
-        Some(value) if value > 0.0 && value.is_finite() => Ok(value),
-        Some(value) => Err(format!("the hardware parameter {name} is {value}")),
-        None => Err(format!("the hardware parameter {name} is missing; measure it with `sapwise probe --hardware-only`")),
+pub(super) fn need(hardware: &Hardware, id: ParameterId) -> Result<f64, PredictError> {
+    above_zero(&hardware.parameters, id.as_str(), "")
+}
+
+/// A figure of a list that must be there and above zero; `of` says whose it is.
+pub(super) fn above_zero(list: &[Parameter], name: &str, of: &str) -> Result<f64, PredictError> {
+    let parameter = || format!("{name}{of}");
+    match Parameter::find(list, name) {
+        Some(&Parameter { value: Some(value), .. }) if value > 0.0 && value.is_finite() => Ok(value),
+        Some(&Parameter { value: Some(value), .. }) => Err(PredictError::Value { parameter: parameter(), value }),
+        Some(missing) => Err(PredictError::Missing { parameter: parameter(), why: Some(missing.source.clone()) }),
+        None => Err(PredictError::Missing { parameter: parameter(), why: None }),
     }
 }
 
 /// Work of `threads` threads over work of one, interpolated on logarithmic axes between one, two and all.
-fn speed_up(hardware: &Hardware, threads: u32) -> Result<f64, String> {
+fn speed_up(hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
     if threads <= 1 {
         return Ok(1.0);
     }
-    let cores = need(hardware, parameter::USABLE_CORES)?;
-    let all = need(hardware, parameter::SCALING_ALL_THREADS_RATIO)?;
+    let cores = need(hardware, ParameterId::UsableCores)?;
+    let all = need(hardware, ParameterId::ScalingAllThreadsRatio)?;
     let k = f64::from(threads);
     if k >= cores {
         return Ok(all);
     }
-    let two = need(hardware, parameter::SCALING_TWO_THREADS_RATIO)?;
+    let two = need(hardware, ParameterId::ScalingTwoThreadsRatio)?;
     let share = if cores > 2.0 { (k / 2.0).ln() / (cores / 2.0).ln() } else { 1.0 };
     Ok((two.ln() * (1.0 - share) + all.ln() * share).exp())
 }
 
 /// Memory bandwidth of `threads` threads in GB/s, which is bytes per nanosecond.
-fn bandwidth(hardware: &Hardware, threads: u32) -> Result<f64, String> {
-    let one = need(hardware, parameter::BANDWIDTH_ONE_THREAD_GB_PER_S)?;
+fn bandwidth(hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
+    let one = need(hardware, ParameterId::BandwidthOneThreadGbPerS)?;
     if threads <= 1 {
         return Ok(one);
     }
-    let all = need(hardware, parameter::BANDWIDTH_ALL_THREADS_GB_PER_S)?;
+    let all = need(hardware, ParameterId::BandwidthAllThreadsGbPerS)?;
     Ok((one * f64::from(threads)).min(all))
 }

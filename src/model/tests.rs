@@ -1,8 +1,8 @@
 mod extrapolation;
 
 use super::*;
-use crate::hardware::gpu::parameter as of_gpu;
-use crate::hardware::parameter;
+use crate::hardware::GpuParameterId;
+use crate::hardware::ParameterId;
 use crate::{AlgorithmId, Backend, GpuGroup, GpuHardware, GpuIdentity, Hardware, Load, Machine, Parameter};
 
 fn parameters(figures: &[(&str, f64)]) -> Vec<Parameter> {
@@ -18,27 +18,27 @@ fn gpu(index: u32, kind: GpuKind, figures: &[(&str, f64)]) -> GpuHardware {
 /// A discrete GPU with all figures, and a slower one without the fitted slopes.
 fn hardware() -> Hardware {
     let fast = [
-        (of_gpu::ROUND_TRIP_NS, 20_000.0),
-        (of_gpu::READ_BACK_NS, 5000.0),
-        (of_gpu::DISPATCH_NS, 2000.0),
-        (of_gpu::UPLOAD_GB_PER_S, 9.0),
-        (of_gpu::UPLOAD_RATE_GB_PER_S, 10.0),
-        (of_gpu::DOWNLOAD_RATE_GB_PER_S, 8.0),
-        (of_gpu::COPY_GB_PER_S, 500.0),
-        (of_gpu::ARITHMETIC_GFLOP_PER_S, 1000.0),
+        (GpuParameterId::RoundTripNs, 20_000.0),
+        (GpuParameterId::ReadBackNs, 5000.0),
+        (GpuParameterId::DispatchNs, 2000.0),
+        (GpuParameterId::UploadGbPerS, 9.0),
+        (GpuParameterId::UploadRateGbPerS, 10.0),
+        (GpuParameterId::DownloadRateGbPerS, 8.0),
+        (GpuParameterId::CopyGbPerS, 500.0),
+        (GpuParameterId::ArithmeticGflopPerS, 1000.0),
     ];
     let slow = [
-        (of_gpu::ROUND_TRIP_NS, 30_000.0),
-        (of_gpu::READ_BACK_NS, 1000.0),
-        (of_gpu::DISPATCH_NS, 1000.0),
-        (of_gpu::UPLOAD_GB_PER_S, 5.0),
-        (of_gpu::DOWNLOAD_GB_PER_S, 4.0),
-        (of_gpu::READ_GB_PER_S, 250.0),
-        (of_gpu::ARITHMETIC_GFLOP_PER_S, 500.0),
+        (GpuParameterId::RoundTripNs, 30_000.0),
+        (GpuParameterId::ReadBackNs, 1000.0),
+        (GpuParameterId::DispatchNs, 1000.0),
+        (GpuParameterId::UploadGbPerS, 5.0),
+        (GpuParameterId::DownloadGbPerS, 4.0),
+        (GpuParameterId::ReadGbPerS, 250.0),
+        (GpuParameterId::ArithmeticGflopPerS, 500.0),
     ];
     Hardware {
         machine: Machine::default(),
-        parameters: parameters(&[(parameter::CLOCK_MEASURED_GHZ, 4.0)]),
+        parameters: parameters(&[(ParameterId::ClockMeasuredGhz, 4.0)]),
         gpus: vec![gpu(0, GpuKind::Discrete, &fast), gpu(1, GpuKind::Discrete, &slow)],
         gpu_groups: Vec::new(),
     }
@@ -67,7 +67,7 @@ fn model(methods: Vec<MethodModel>) -> Model {
         schema: ModelSchema,
         name: "test".to_owned(),
         simulated: false,
-        ranges: vec![range(parameter::CLOCK_MEASURED_GHZ), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
+        ranges: vec![range(ParameterId::ClockMeasuredGhz), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
         methods,
     }
 }
@@ -96,8 +96,11 @@ fn several_gpus_have_the_slowest_latency_and_added_rates_within_what_was_measure
     let both = [0, 1];
     assert_eq!((ns(Scale::GpuRoundTrip, &h, &both), ns(Scale::GpuDispatch, &h, &both)), (31_000.0, 2000.0));
     assert_eq!((ns(Scale::GpuUploadByte, &h, &both), ns(Scale::GpuOperation, &h, &both)), (1.0 / 15.0, 1.0 / 1500.0));
-    let ratios =
-        [(of_gpu::GROUP_UPLOAD_RATIO, 1.2), (of_gpu::GROUP_ROUND_TRIP_RATIO, 2.0), (of_gpu::GROUP_ARITHMETIC_RATIO, 1.9)];
+    let ratios = [
+        (GpuParameterId::GroupUploadRatio, 1.2),
+        (GpuParameterId::GroupRoundTripRatio, 2.0),
+        (GpuParameterId::GroupArithmeticRatio, 1.9),
+    ];
     h.gpu_groups.push(GpuGroup { gpus: both.to_vec(), parameters: parameters(&ratios) });
     assert_eq!((ns(Scale::GpuRoundTrip, &h, &both), ns(Scale::GpuDispatch, &h, &both)), (62_000.0, 2000.0));
     // 1.2 times the fastest is less than the sum, 1.9 times the fastest is more.
@@ -152,8 +155,8 @@ fn what_a_gpu_lacks_is_told_and_costs_its_algorithms_only() {
     ] {
         assert!(told(&p, text), "{text}: {:?}", p.warnings);
     }
-    let missing = Parameter::missing(of_gpu::COPY_GB_PER_S, "the driver crashed");
-    h.gpus[0].parameters.retain(|p| p.name != of_gpu::COPY_GB_PER_S);
+    let missing = Parameter::missing(GpuParameterId::CopyGbPerS, "the driver crashed");
+    h.gpus[0].parameters.retain(|p| p.name != GpuParameterId::CopyGbPerS);
     h.gpus[0].parameters.push(missing);
     let p = model.predict(&h, &all).unwrap();
     assert_eq!(p.costs.len(), 1);
@@ -182,9 +185,9 @@ fn hardware_with_impossible_gpus_is_told() {
 fn the_parameters_of_a_scale_are_those_that_it_reads() {
     // Four cores of which two threads use one and a half, so that every figure shows in some number of threads.
     let figure = |name: &str| match name {
-        parameter::USABLE_CORES => 4.0,
-        parameter::SCALING_TWO_THREADS_RATIO => 1.5,
-        parameter::BANDWIDTH_ALL_THREADS_GB_PER_S => 5.0,
+        ParameterId::UsableCores => 4.0,
+        ParameterId::ScalingTwoThreadsRatio => 1.5,
+        ParameterId::BandwidthAllThreadsGbPerS => 5.0,
         _ => 2.0,
     };
     let with = |names: &[&str]| {
@@ -218,8 +221,8 @@ fn the_built_in_model_predicts_from_the_parameters_that_it_names() {
     let names = model.parameters();
     assert!(names.is_sorted_by(|a, b| a < b) && !names.iter().any(|name| name.contains('/')), "{names:?}");
     let figure = |name: &&str| match *name {
-        parameter::CACHE_LLC_BYTES => Parameter::reported(name, 33_554_432.0, "test"),
-        parameter::FORK_JOIN_COLD_NS => Parameter::reported(name, 5000.0, "test"),
+        ParameterId::CacheLlcBytes => Parameter::reported(name, 33_554_432.0, "test"),
+        ParameterId::ForkJoinColdNs => Parameter::reported(name, 5000.0, "test"),
         _ => Parameter::reported(name, 4.0, "test"),
     };
     let all = Hardware { parameters: names.iter().map(figure).collect(), gpus: Vec::new(), ..hardware() };

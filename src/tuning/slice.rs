@@ -13,7 +13,7 @@ const HALVINGS: u32 = 8;
 
 /// Loads, ascending by objects, and everything between them on logarithmic axes. A place is the number of a load and the share
 /// of the way to the next.
-pub(crate) struct Slice<'a> {
+pub(super) struct Slice<'a> {
     loads: &'a [Load],
 }
 
@@ -25,7 +25,7 @@ struct Stretch {
 }
 
 impl<'a> Slice<'a> {
-    pub(crate) fn new(loads: &'a [Load]) -> Self {
+    pub(super) fn new(loads: &'a [Load]) -> Self {
         Self { loads }
     }
 
@@ -55,7 +55,7 @@ impl<'a> Slice<'a> {
     /// The number of objects from which a condition holds, looking from `objects` upwards or downwards in steps that double,
     /// then halving the last of them. The end of the slice where it holds nowhere. A short stretch in which it holds may be
     /// stepped over.
-    pub(crate) fn reach(&self, objects: f64, upwards: bool, holds: impl Fn(&Load) -> bool) -> f64 {
+    pub(super) fn reach(&self, objects: f64, upwards: bool, holds: impl Fn(&Load) -> bool) -> f64 {
         let (start, end) = (self.place(objects), if upwards { self.last() } else { 0.0 });
         let (mut not_yet, mut at, mut step) = (start, start, 0.05);
         while !holds(&self.load(at)) {
@@ -79,7 +79,7 @@ impl<'a> Slice<'a> {
     ///
     /// Halves the slice, and in each stretch keeps only the algorithms that may be the cheapest somewhere within: those whose cost
     /// can fall below what the others can't exceed. Where one is left there is nothing to look for.
-    pub(crate) fn steps(&self, costs: &[AlgorithmCost]) -> Vec<(Load, usize)> {
+    pub(super) fn steps(&self, costs: &[AlgorithmCost]) -> Vec<(Load, usize)> {
         let all: Vec<usize> = (0..costs.len()).collect();
         let mut steps = Vec::new();
         let Some(first) = self.loads.first() else { return steps };

@@ -38,8 +38,7 @@ fn crossovers_lie_where_the_curves_cross_and_intervals_around_them() {
 
 #[test]
 fn an_interval_has_both_ends_or_none_and_holds_its_border() {
-    let costs =
-        vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sap@cpu1", &[(Term::Objects, 100.0)], 0.05)];
+    let costs = vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sap@cpu1", &[(Term::Objects, 100.0)], 0.05)];
     let tuning = Tuning::from_costs(Source::Measured, "uniform", costs, &loads());
     let defect = |low, high| {
         let mut tuning = tuning.clone();
@@ -95,4 +94,3 @@ fn hand_written_steps_are_checked() {
     assert!(Tuning::from_steps(vec![step(5, "brute@cpu1")]).is_err());
     assert!(Tuning::from_steps(vec![step(0, "brute@cpu1"), step(0, "grid-sap@cpu1")]).is_err());
 }
-

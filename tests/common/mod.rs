@@ -102,27 +102,6 @@ pub(crate) fn large_boxes() -> Vec<Aabb> {
     boxes
 }
 
-/// The frames of a `.npy` array of little-endian float32 of shape frames x most boxes x 6, without the rows of NaN in which frames with
-/// fewer boxes end.
-pub(crate) fn npy_frames(file: &[u8]) -> Vec<Vec<Aabb>> {
-    let length = usize::from(u16::from_le_bytes([file[8], file[9]]));
-    let (header, data) = file[10..].split_at(length);
-    let header = str::from_utf8(header).unwrap();
-    let shape = header.split_once("'shape': (").unwrap().1.split_once(", 6)").unwrap().0;
-    let (frames, most) = shape.split_once(", ").unwrap();
-    let (frames, most): (usize, usize) = (frames.parse().unwrap(), most.parse().unwrap());
-    assert!(header.contains("'<f4'") && data.len() == frames * most * 24, "{header}");
-    let (values, _) = data.as_chunks::<4>();
-    let (rows, _) = values.as_chunks::<6>();
-    let row = |row: &[[u8; 4]; 6]| row.map(f32::from_le_bytes);
-    let absent = |r: &[f32; 6]| r.iter().all(|v| v.is_nan());
-    let frame = |rows: &[[[u8; 4]; 6]]| -> Vec<Aabb> {
-        let present = rows.iter().map(row).take_while(|r| !absent(r));
-        present.map(|r| Aabb::new([r[0], r[1], r[2]], [r[3], r[4], r[5]])).collect()
-    };
-    rows.chunks(most).map(frame).collect()
-}
-
 /// The GPUs of this machine; `None`, said aloud, where there is none and none is required.
 #[cfg(feature = "gpu")]
 pub(crate) fn gpus() -> Option<sapwise::gpu::Gpus> {

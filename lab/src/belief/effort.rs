@@ -5,10 +5,10 @@ use sapwise::{AlgorithmId, BackendClass, Registry};
 use std::time::Duration;
 
 /// Frames are timed for this long, so that a median of short ones stands on thousands, from more than one tick of the scheduler.
-pub(super) const TIMED: Duration = Duration::from_millis(15);
+pub const TIMED: Duration = Duration::from_millis(15);
 
 /// Frames that are timed at least, however long they take.
-pub(super) const FEWEST_FRAMES: usize = 3;
+pub const FEWEST_FRAMES: usize = 3;
 
 /// Time to make a scene and to advance it by a frame, for each object: what `uniform` takes on the first machine, rounded up.
 const START_NS: f64 = 60.0;
@@ -22,16 +22,16 @@ const FIRST_FRAME: f64 = 3.0;
 
 /// What a sample needs beside the frames that are timed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Effort {
+pub struct Effort {
     /// Objects of its scene.
-    pub(crate) objects: u32,
+    pub objects: u32,
     /// Whether the algorithm keeps work from frame to frame.
-    pub(crate) is_incremental: bool,
+    pub is_incremental: bool,
 }
 
 impl Effort {
     /// How long a sample will take where a frame takes `ns`.
-    pub(crate) fn seconds(self, ns: f64) -> f64 {
+    pub fn seconds(self, ns: f64) -> f64 {
         let objects = f64::from(self.objects);
         let frame = ns + objects * ADVANCE_NS;
         let before = FIRST_FRAME + if self.is_incremental { WARM_UP as f64 } else { 0.0 };
@@ -42,17 +42,17 @@ impl Effort {
 
 /// The methods on the CPU that keep work from frame to frame.
 #[derive(Debug)]
-pub(super) struct Keepers(Vec<String>);
+pub struct Keepers(Vec<String>);
 
 impl Keepers {
-    pub(super) fn find() -> Self {
+    pub fn find() -> Self {
         // A registry of one core makes its algorithms without threads.
         let registry = Registry::with_cores(1);
         let is_incremental = |id: &AlgorithmId| registry.create(id).is_ok_and(|a| a.is_incremental());
         Self(registry.entries().iter().map(|e| &e.id).filter(|id| is_incremental(id)).map(|id| id.method().to_owned()).collect())
     }
 
-    pub(super) fn contain(&self, algorithm: &AlgorithmId) -> bool {
+    pub fn contain(&self, algorithm: &AlgorithmId) -> bool {
         algorithm.backend().class() == BackendClass::Cpu && self.0.iter().any(|m| m == algorithm.method())
     }
 }

@@ -10,7 +10,7 @@ mod prior;
 use crate::cost::{Counts, MOST_UNIT_NS};
 use crate::{AlgorithmCost, CostTerm, Load, Term};
 
-pub use gain::Outlook;
+pub use gain::KnowledgeGradient;
 pub use prior::{Deviations, Part, Prior, TERMS_SHARED, width_correlation};
 
 /// Knots of each curve: 2^2 to 2^24 objects, every second octave, linear in between.

@@ -129,7 +129,7 @@ impl Deviations {
     /// Covariance of the factors that two algorithms have on the same term. A call on one thread has no fork and join, which a call on
     /// several mostly is; these share nothing.
     #[must_use]
-    pub(super) fn covariance_of_terms(&self, term: Term, a: &AlgorithmId, b: &AlgorithmId) -> f64 {
+    pub fn covariance_of_terms(&self, term: Term, a: &AlgorithmId, b: &AlgorithmId) -> f64 {
         let wide = |id: &AlgorithmId| id.backend().width() > 1;
         if term == Term::Call && wide(a) != wide(b) {
             return 0.0;

@@ -1,16 +1,16 @@
 //! Samples out of a report, as if its machine were there.
 
 use super::effort::Keepers;
-use super::{Answer, Effort, Sample, Source};
+use crate::fit::rows::{Answer, Effort, Sample, Source};
 use sapwise::{AlgorithmId, Load};
 
 /// What a report holds of one load.
 #[derive(Debug, Clone)]
-pub(crate) struct ReplayPoint {
+pub struct ReplayPoint {
     /// The load.
-    pub(crate) load: Load,
+    pub load: Load,
     /// Median times in nanoseconds.
-    pub(crate) timings: Vec<(AlgorithmId, f64)>,
+    pub timings: Vec<(AlgorithmId, f64)>,
 }
 
 /// How far away the nearest timing of an algorithm may be, in natural logarithms of objects: the sizes of a sweep are a factor of 2.2
@@ -19,14 +19,14 @@ const NEAR_LN: f64 = 0.8;
 
 /// Answers with the timing at the nearest number of objects, each of them once.
 #[derive(Debug)]
-pub(crate) struct Replay<'a> {
+pub struct Replay<'a> {
     points: &'a [ReplayPoint],
     given: Vec<(AlgorithmId, usize)>,
     keepers: Keepers,
 }
 
 impl<'a> Replay<'a> {
-    pub(crate) fn new(points: &'a [ReplayPoint]) -> Self {
+    pub fn new(points: &'a [ReplayPoint]) -> Self {
         Self { points, given: Vec::new(), keepers: Keepers::find() }
     }
 

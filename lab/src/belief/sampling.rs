@@ -7,17 +7,17 @@ mod replay;
 mod taker;
 
 use crate::gpus::uses;
-use sapwise::posterior::{Joint, Outlook};
+use crate::belief::{Joint, KnowledgeGradient};
 use sapwise::{AlgorithmCost, AlgorithmId, Load, Observation, Posterior, Prior};
 
-pub(crate) use effort::Effort;
-pub(crate) use live::Live;
-pub(crate) use order::Order;
-pub(crate) use replay::{Replay, ReplayPoint};
-pub(crate) use taker::take;
+pub use effort::Effort;
+pub use live::Live;
+pub use order::Order;
+pub use replay::{Replay, ReplayPoint};
+pub use taker::take;
 
 /// Time for all samples together.
-pub(crate) const SECONDS: f64 = 2.0;
+pub const SECONDS: f64 = 2.0;
 
 /// No sample is taken that promises less than this, as a share of a frame's time.
 const LEAST_GAIN: f64 = 1e-5;
@@ -26,7 +26,7 @@ const LEAST_GAIN: f64 = 1e-5;
 const CAUTION: f64 = 1.0;
 
 /// Where samples come from: this machine, or a report of another.
-pub(crate) trait Source {
+pub trait Source {
     /// What it takes to time an algorithm there, beside its frames. `None` where no sample can be had.
     fn effort(&self, algorithm: &AlgorithmId, load: &Load) -> Option<Effort>;
 
@@ -39,7 +39,7 @@ pub(crate) trait Source {
 
 /// What became of a sample.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Answer {
+pub enum Answer {
     /// It was taken.
     Taken(Sample),
     /// Not this one, but others may be.
@@ -57,31 +57,31 @@ pub(crate) enum Answer {
 
 /// One algorithm, timed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Sample {
+pub struct Sample {
     /// The load of the frames.
-    pub(crate) load: Load,
+    pub load: Load,
     /// Median over the frames.
-    pub(crate) ns: f64,
+    pub ns: f64,
     /// Standard deviation of the logarithm of that median.
-    pub(crate) noise_ln: f64,
+    pub noise_ln: f64,
     /// Wall clock that it took, everything included.
-    pub(crate) seconds: f64,
+    pub seconds: f64,
 }
 
 /// A sample beside what the model had predicted.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Taken {
+pub struct Taken {
     /// The algorithm.
-    pub(crate) algorithm: AlgorithmId,
+    pub algorithm: AlgorithmId,
     /// What was measured.
-    pub(crate) sample: Sample,
+    pub sample: Sample,
     /// What the model had predicted, without any sample.
-    pub(crate) predicted_ns: f64,
+    pub predicted_ns: f64,
 }
 
 impl Taken {
     /// As it stands in a file.
-    pub(crate) fn observation(&self) -> Observation {
+    pub fn observation(&self) -> Observation {
         Observation {
             algorithm: self.algorithm.clone(),
             objects: self.sample.load.objects,
@@ -93,15 +93,15 @@ impl Taken {
 
 /// Costs that samples have corrected.
 #[derive(Debug, Clone)]
-pub(crate) struct Learned {
+pub struct Learned {
     /// What is known of all algorithms.
-    pub(crate) posterior: Posterior,
+    pub posterior: Posterior,
     /// Which of them did not fail.
-    pub(crate) usable: Vec<bool>,
+    pub usable: Vec<bool>,
     /// What was sampled, in that order.
-    pub(crate) taken: Vec<Taken>,
+    pub taken: Vec<Taken>,
     /// Why algorithms were left out.
-    pub(crate) remarks: Vec<String>,
+    pub remarks: Vec<String>,
 }
 
 /// Takes up to `most` samples on loads of `slice`, each where it promises to lower the expected regret over the slice the most,
@@ -109,7 +109,7 @@ pub(crate) struct Learned {
 ///
 /// # Errors
 /// As [`Source::sample`].
-pub(crate) fn learn(
+pub fn learn(
     predicted: Vec<AlgorithmCost>,
     prior: &Prior,
     slice: &[Load],
@@ -119,11 +119,11 @@ pub(crate) fn learn(
     let mut usable = vec![true; predicted.len()];
     let mut open: Vec<(usize, usize)> = (0..predicted.len()).flat_map(|a| (0..slice.len()).map(move |at| (a, at))).collect();
     let mut posterior = Posterior::new(predicted, prior);
-    let mut outlook = Outlook::new(&posterior, slice, &usable);
+    let mut gradient = KnowledgeGradient::new(&posterior, slice, &usable);
     let mut expected = Vec::new();
     let (mut taken, mut remarks, mut left) = (Vec::new(), Vec::new(), SECONDS);
     while taken.len() < most {
-        outlook.refresh(&posterior, &usable);
+        gradient.refresh(&posterior, &usable);
         cautious_ns(&posterior, slice, &mut expected);
         // One sample may take two shares of what is left, so that the dear ones don't use up the time of the others.
         let longest = left * 2.0 / (most - taken.len() + 1) as f64;
@@ -133,7 +133,7 @@ pub(crate) fn learn(
             if effort.is_none_or(|e| e.seconds(expected[at][a]) > longest) {
                 continue;
             }
-            let gain = outlook.gain(&posterior, a, &slice[at], 0.0);
+            let gain = gradient.gain(&posterior, a, &slice[at], 0.0);
             if gain > next.map_or(LEAST_GAIN, |n| n.0) {
                 next = Some((gain, k));
             }
@@ -167,7 +167,7 @@ pub(crate) fn learn(
 
 impl Learned {
     /// The corrected costs of the algorithms that did not fail.
-    pub(crate) fn costs(&self) -> Vec<AlgorithmCost> {
+    pub fn costs(&self) -> Vec<AlgorithmCost> {
         let mut usable = self.usable.iter();
         let mut costs = self.posterior.costs();
         costs.retain(|_| usable.next() == Some(&true));

@@ -181,9 +181,9 @@ fn the_gain_of_an_observation_is_the_mean_fall_of_regret_over_what_it_may_say() 
     observe(&mut posterior, &OBSERVED[1]);
     let loads = [load(20), load(500), load(40_000)];
     let usable = [true, true, true, false, true];
-    let mut outlook = Outlook::new(&posterior, &loads, &usable);
+    let mut gradient = KnowledgeGradient::new(&posterior, &loads, &usable);
     for algorithm in 0..5 {
-        let gain = outlook.gain(&posterior, algorithm, &loads[1], 0.1);
+        let gain = gradient.gain(&posterior, algorithm, &loads[1], 0.1);
         // A sum over the surprises, each taken in. What is expected before is the mean of what is expected after.
         let mut with = vec![0.0; posterior.mean.len()];
         let (_, slope) = posterior.look(algorithm, &Counts::new(&loads[1]));

@@ -1,45 +1,48 @@
-//! How far the borders between tuning move from report to report.
+//! How far the borders between fields move from report to report.
 
-use crate::{sweep, train};
+use crate::fit::measured_tuning;
+use crate::sweep;
 use sapwise::stats::{median, relative_iqr};
 use crate::report::{Point, Report};
-use sapwise::{AlgorithmId, Tuning};
+use sapwise::{AlgorithmId, Crossover, Tuning};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// A border over several reports.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Border {
-    pub(crate) scenario: String,
-    pub(crate) below: AlgorithmId,
-    pub(crate) above: AlgorithmId,
+#[non_exhaustive]
+pub struct BorderSpread {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// The faster algorithm with fewer objects.
+    pub below: AlgorithmId,
+    /// The faster algorithm with more objects.
+    pub above: AlgorithmId,
     /// Reports that have it.
-    pub(crate) reports: usize,
+    pub reports: usize,
     /// Median of its positions, in objects.
-    pub(crate) objects: f64,
+    pub objects: f64,
     /// Largest distance of a position from the median, over the median.
-    pub(crate) spread: f64,
+    pub largest_deviation: f64,
     /// Interquartile range over median; `None` below four reports.
-    pub(crate) dispersion: Option<f64>,
-    /// Share of the reports whose own interval holds the median.
-    pub(crate) within: f64,
-    /// Exponent by which the ratio of the two costs grows with the number of objects around the border. A wrong side costs less
-    /// the nearer to 0 it is.
-    pub(crate) slope: Option<f64>,
+    pub dispersion: Option<f64>,
+    /// Share of the reports whose own 90 % interval of the border holds the median.
+    pub own_interval_holds_median: f64,
+    /// What the wrong side costs at half or at twice the objects of the border, as a share: 0.1 is 10 %. From how the ratio of the two
+    /// times grows with the number of objects around the border; `None` where fewer than three points tell it.
+    pub cost_of_factor_two: Option<f64>,
 }
 
-/// From this exponent on a border is steep: at twice its number of objects the one costs 1.4 times the other.
-pub(crate) const STEEP: f64 = 0.5;
-/// Points within this factor of a border tell its slope.
+/// Points within this factor of a border tell how steep it is.
 const AROUND: f64 = 4.0;
 
 /// The borders of every scenario that all reports have, where at least half of the reports have them.
-pub(super) fn borders(reports: &[&Report]) -> Vec<Border> {
-    let mut found: Vec<Border> = Vec::new();
+pub(super) fn borders(reports: &[&Report]) -> Vec<BorderSpread> {
+    let mut found: Vec<BorderSpread> = Vec::new();
     for scenario in scenarios(reports) {
-        let all: Vec<Tuning> = reports.iter().filter_map(|r| train::measured_tuning(r, scenario).ok()).collect();
-        // A pair can cross more than once; the k-th crossing of one report is held against the k-th of the others.
-        let mut groups: BTreeMap<(AlgorithmId, AlgorithmId, usize), Vec<&sapwise::Border>> = BTreeMap::new();
+        let all: Vec<Tuning> = reports.iter().filter_map(|r| measured_tuning(r, scenario).ok()).collect();
+        // A pair can cross more than once; the k-th crossing of one report is compared with the k-th of the others.
+        let mut groups: BTreeMap<(AlgorithmId, AlgorithmId, usize), Vec<&Crossover>> = BTreeMap::new();
         for tuning in &all {
             let mut counts: BTreeMap<(&AlgorithmId, &AlgorithmId), usize> = BTreeMap::new();
             for border in &tuning.crossovers {
@@ -48,7 +51,7 @@ pub(super) fn borders(reports: &[&Report]) -> Vec<Border> {
                 *count += 1;
             }
         }
-        let mut of_scenario: Vec<Border> = groups
+        let mut of_scenario: Vec<BorderSpread> = groups
             .into_iter()
             .filter(|(_, group)| 2 * group.len() >= reports.len())
             .filter_map(|((below, above, _), group)| border(reports, scenario, below, above, &group))
@@ -75,20 +78,20 @@ fn border(
     scenario: &str,
     below: AlgorithmId,
     above: AlgorithmId,
-    group: &[&sapwise::Border],
-) -> Option<Border> {
+    group: &[&Crossover],
+) -> Option<BorderSpread> {
     let positions: Vec<f64> = group.iter().map(|b| b.objects).collect();
     let objects = median(&positions)?;
     let holding = group.iter().filter(|b| b.interval().is_some_and(|(low, high)| (low..=high).contains(&objects))).count();
     let points = reports.iter().flat_map(|r| &r.points).filter(|p| p.scenario == scenario);
-    Some(Border {
+    Some(BorderSpread {
         scenario: scenario.to_owned(),
         reports: group.len(),
         objects,
-        spread: positions.iter().map(|p| (p / objects - 1.0).abs()).fold(0.0, f64::max),
+        largest_deviation: positions.iter().map(|p| (p / objects - 1.0).abs()).fold(0.0, f64::max),
         dispersion: relative_iqr(&positions),
-        within: holding as f64 / group.len() as f64,
-        slope: slope(points, objects, &below, &above),
+        own_interval_holds_median: holding as f64 / group.len() as f64,
+        cost_of_factor_two: slope(points, objects, &below, &above).map(|slope| slope.abs().exp2() - 1.0),
         below,
         above,
     })
@@ -119,7 +122,7 @@ fn slope<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::synthetic::Machine;
+    use crate::synthetic::Machine;
 
     #[test]
     fn the_slope_is_the_difference_of_the_exponents() {

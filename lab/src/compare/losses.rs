@@ -1,21 +1,23 @@
-//! What is lost by using the tuning that one report measured under the timings of another.
+//! What it costs to use the tuning that one report measured under the timings of another.
 
-use crate::train::{Chooser, Evidence, Profile, Yardstick, available, average, by_costs, measured_costs, usable};
-use sapwise::Report;
-use crate::report::Label;
+use crate::data::{Evidence, Profile, usable};
+use crate::evaluate::{RegretTable, Strategy, available, by_costs};
+use crate::fit::measured_costs;
+use crate::report::{Label, Report};
 use serde::Serialize;
 
 /// Mean regrets over the points of reports, against the best at each point.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Losses {
+#[non_exhaustive]
+pub struct Losses {
     /// Of the tuning of a report on its own timings.
-    pub(crate) own: f64,
+    pub own: f64,
     /// Of the tuning of every other report on them.
-    pub(crate) others: f64,
-    /// What the tuning of another report lose beyond a report's own: mean over all ordered pairs of reports.
-    pub(crate) beyond_own: f64,
+    pub others: f64,
+    /// What the tuning of another report costs beyond a report's own: mean over all ordered pairs of reports.
+    pub beyond_own: f64,
     /// The largest of these.
-    pub(crate) beyond_own_most: f64,
+    pub beyond_own_most: f64,
 }
 
 /// A simulated report is compared like a real one.
@@ -33,10 +35,10 @@ pub(super) fn losses(reports: &[(String, Report)]) -> Option<Losses> {
     let (mut own, mut others, mut beyond) = (Vec::new(), Vec::new(), Vec::new());
     for (k, judged) in profiles.iter().enumerate() {
         let available = available(judged);
-        let yardstick = Yardstick::new(judged);
+        let table = RegretTable::new(judged);
         let loss = |of: &Profile| {
-            let choose: Chooser<'_> = by_costs(measured_costs(of).0, &available);
-            yardstick.regret(judged, &choose).mean
+            let choose: Strategy<'_> = by_costs(measured_costs(of).0, &available);
+            table.regret(judged, &choose).mean
         };
         let by_own = loss(judged);
         own.push(by_own);
@@ -47,9 +49,13 @@ pub(super) fn losses(reports: &[(String, Report)]) -> Option<Losses> {
         }
     }
     Some(Losses {
-        own: average(&own),
-        others: average(&others),
-        beyond_own: average(&beyond),
+        own: mean(&own),
+        others: mean(&others),
+        beyond_own: mean(&beyond),
         beyond_own_most: beyond.iter().copied().fold(f64::NEG_INFINITY, f64::max),
     })
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }

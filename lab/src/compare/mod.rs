@@ -1,70 +1,80 @@
-//! How well repeated reports of one profile of a machine agree: parameters, borders, and what the tuning of one lose on another.
+//! How well repeated reports of one profile of a machine agree: parameters, borders, and what the tuning of one costs on another.
 
 mod borders;
+mod common;
 mod losses;
 mod parameters;
+mod text;
 
+use crate::report::{Label, Report};
 use crate::steadiness::Steadiness;
 use anyhow::{Result, bail};
-use sapwise::Report;
+use sapwise::stats::median;
 use serde::Serialize;
 
-pub(crate) use borders::{Border, STEEP};
-pub(crate) use losses::Losses;
-pub(crate) use parameters::Spread;
+pub use borders::BorderSpread;
+pub use losses::Losses;
+pub use parameters::ParameterSpread;
 
 /// What a comparison finds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Comparison {
+#[non_exhaustive]
+pub struct Comparison {
     /// Number of reports.
-    pub(crate) reports: usize,
+    pub reports: usize,
+    /// In sentences, what some of the reports lack, which is not compared.
+    pub not_compared: Vec<String>,
     /// Highest share of the CPU that other programs took at half of the points of a report; `None` where it can't be told.
-    pub(crate) foreign_load: Option<f64>,
+    pub foreign_load: Option<f64>,
     /// The latency between cores over the points of each report, where it is known.
-    pub(crate) steadiness: Vec<Option<Steadiness>>,
+    pub steadiness: Vec<Option<Steadiness>>,
     /// Every measured parameter that all reports have.
-    pub(crate) parameters: Vec<Spread>,
+    pub parameters: Vec<ParameterSpread>,
     /// Every border that lies in at least half of the reports.
-    pub(crate) borders: Vec<Border>,
+    pub borders: Vec<BorderSpread>,
     /// `None` where the reports hold no timings.
-    pub(crate) losses: Option<Losses>,
+    pub losses: Option<Losses>,
 }
 
 impl Comparison {
-    /// Compares reports, given with the names of their files.
+    /// Compares what all of the reports have, given with the names of their files. They need not be of the same command: a quick report and
+    /// a full one share scenarios and algorithms.
     ///
     /// # Errors
     /// When there are fewer than two, or two differ in machine or restriction: then what differs is not the measurement.
-    pub(crate) fn of(reports: &[(String, Report)]) -> Result<Self> {
-        let [(first_name, first), rest @ ..] = reports else { bail!("no report is given") };
+    pub fn of(reports: Vec<(String, Report)>) -> Result<Self> {
+        let [(first_name, first), rest @ ..] = &reports[..] else { bail!("no report is given") };
         if rest.is_empty() {
             bail!("one report can't be compared; give two or more of the same machine and the same restriction");
         }
         for (name, report) in rest {
             if let Some(difference) = difference(first, report) {
-                bail!(
-                    "{name} and {first_name} differ in {difference}: give reports that were made by the same command on the same machine"
-                );
+                bail!("{name} and {first_name} differ in {difference}: give reports of the same machine with the same restriction");
             }
         }
         if let Some((name, _)) = reports.iter().find(|(_, r)| is_unfinished(r)) {
             bail!("{name} was not finished; remove it and measure it again");
         }
+        let foreign_load = reports.iter().filter_map(|(_, r)| load(r)).max_by(f64::total_cmp);
+        let steadiness = reports.iter().map(|(_, r)| Steadiness::of(r)).collect();
+        let (reports, not_compared) = common::common(reports);
         let all: Vec<&Report> = reports.iter().map(|(_, report)| report).collect();
         Ok(Self {
             reports: all.len(),
-            foreign_load: all.iter().filter_map(|r| load(r)).max_by(f64::total_cmp),
-            steadiness: all.iter().map(|r| Steadiness::of(r)).collect(),
+            not_compared,
+            foreign_load,
+            steadiness,
             parameters: parameters::spreads(&all),
             borders: borders::borders(&all),
-            losses: losses::losses(reports),
+            losses: losses::losses(&reports),
         })
     }
 }
 
 /// Of reports those during which the cores of the machine stayed where they were, in the place where most of these found them, and the
 /// names of the others.
-pub(crate) fn steady(reports: Vec<(String, Report)>) -> (Vec<(String, Report)>, Vec<String>) {
+#[must_use]
+pub fn steady(reports: Vec<(String, Report)>) -> (Vec<(String, Report)>, Vec<String>) {
     let all: Vec<Steadiness> = reports.iter().filter_map(|(_, r)| Steadiness::of(r)).collect();
     let alike = |s: &Steadiness| all.iter().filter(|other| other.is_like(*s)).count();
     let Some(most) = all.iter().copied().max_by_key(|s| alike(s)) else { return (reports, Vec::new()) };
@@ -76,23 +86,19 @@ pub(crate) fn steady(reports: Vec<(String, Report)>) -> (Vec<(String, Report)>, 
 /// In what two reports differ that no measurement changes.
 fn difference(a: &Report, b: &Report) -> Option<&'static str> {
     let (x, y) = (&a.hardware.machine, &b.hardware.machine);
+    let taken = |r: &Report| r.provenance.restriction.as_ref().map_or(Vec::new(), |r| r.kinds.clone());
+    let contended = |r: &Report| r.label == Label::RealContended;
+    let gpu = |r: &Report, index: u32| r.hardware.gpus.iter().find(|g| g.gpu.index == index).map(|g| g.gpu.clone());
+    let other_gpu = |index: u32| gpu(a, index).zip(gpu(b, index)).is_some_and(|(a, b)| a != b);
     let same = [
         (x.physical_id == y.physical_id, "the physical machine"),
         (x.simd == y.simd, "the SIMD level"),
         (a.provenance.threads == b.provenance.threads, "the number of threads"),
-        (a.provenance.gpu_threads == b.provenance.gpu_threads, "the threads of a GPU that is a program"),
-        (without_seed(a) == without_seed(b), "the command"),
-        (a.hardware.gpus.iter().map(|g| &g.gpu).eq(b.hardware.gpus.iter().map(|g| &g.gpu)), "the GPUs"),
+        (a.provenance.gpu_threads == b.provenance.gpu_threads, "the threads of a software adapter"),
+        (taken(a) == taken(b) && contended(a) == contended(b), "what was taken from the machine"),
+        (!a.hardware.gpus.iter().any(|g| other_gpu(g.gpu.index)), "the GPUs"),
     ];
     same.into_iter().find(|(same, _)| !same).map(|(_, what)| what)
-}
-
-/// The words of the command; another seed is another measurement of the same.
-fn without_seed(report: &Report) -> Vec<&str> {
-    let words: Vec<&str> = report.provenance.command.split_whitespace().collect();
-    let seed = words.iter().position(|w| *w == "--seed");
-    let kept = |k: &usize| seed.is_none_or(|seed| *k != seed && *k != seed + 1);
-    (0..words.len()).filter(kept).map(|k| words[k]).collect()
 }
 
 /// Whether a report was cut short, as its remarks say.
@@ -106,13 +112,13 @@ fn load(report: &Report) -> Option<f64> {
     if loads.is_empty() {
         loads = report.hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
     }
-    sapwise::stats::median(&loads)
+    median(&loads)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::synthetic::Machine;
+    use crate::synthetic::Machine;
 
     fn named(report: Report) -> (String, Report) {
         ("r.json".to_owned(), report)
@@ -121,10 +127,10 @@ mod tests {
     #[test]
     fn the_same_report_twice_agrees_with_itself() {
         let report = Machine::family()[2].report();
-        let comparison = Comparison::of(&[named(report.clone()), named(report)]).unwrap();
+        let comparison = Comparison::of(vec![named(report.clone()), named(report)]).unwrap();
         assert!(!comparison.parameters.is_empty() && !comparison.borders.is_empty());
         assert!(comparison.parameters.iter().all(|s| s.low == s.high));
-        assert!(comparison.borders.iter().all(|b| b.spread == 0.0 && b.within == 1.0), "{:?}", comparison.borders);
+        assert!(comparison.borders.iter().all(|b| b.largest_deviation == 0.0 && b.own_interval_holds_median == 1.0), "{:?}", comparison.borders);
         let losses = comparison.losses.unwrap();
         assert!(losses.own.abs() < 0.02 && (losses.others - losses.own).abs() < 1e-12, "{losses:?}");
     }
@@ -132,20 +138,34 @@ mod tests {
     #[test]
     fn reports_of_different_machines_or_restrictions_are_refused() {
         let [a, b] = [0, 1].map(|k| Machine::family()[k].report());
-        let error = |x: &Report, y: &Report| Comparison::of(&[named(x.clone()), named(y.clone())]).unwrap_err().to_string();
+        let error = |x: &Report, y: &Report| Comparison::of(vec![named(x.clone()), named(y.clone())]).unwrap_err().to_string();
         assert!(error(&a, &b).contains("the physical machine"));
         let mut fewer = a.clone();
         fewer.provenance.threads = Some(1);
         assert!(error(&a, &fewer).contains("the number of threads"));
-        let (mut seeded, mut quick, mut cut) = (a.clone(), a.clone(), a.clone());
-        seeded.provenance.command = "probe --seed 7".to_owned();
-        quick.provenance.command = "probe --quick --seed 7".to_owned();
+        let (mut contended, mut cut) = (a.clone(), a.clone());
+        contended.label = Label::RealContended;
         cut.remarks.push("interrupted before the first point".to_owned());
-        assert!(error(&seeded, &quick).contains("the command"));
+        assert!(error(&a, &contended).contains("what was taken"));
         assert!(error(&a, &cut).contains("not finished"));
-        quick.provenance.command = "probe --seed 8".to_owned();
-        assert!(Comparison::of(&[named(seeded), named(quick)]).is_ok());
-        assert!(Comparison::of(&[named(a)]).unwrap_err().to_string().contains("two or more"));
+        assert!(Comparison::of(vec![named(a)]).unwrap_err().to_string().contains("two or more"));
+    }
+
+    #[test]
+    fn of_a_quick_and_a_full_report_what_both_have_is_compared() {
+        let full = Machine::family()[2].report();
+        let mut quick = full.clone();
+        quick.provenance.command = "probe --quick".to_owned();
+        quick.points.retain(|p| p.scenario == "uniform");
+        let sap = |id: &sapwise::AlgorithmId| id.method() == "sap";
+        quick.algorithms.retain(|t| !sap(&t.id));
+        quick.points.iter_mut().for_each(|p| p.timings.retain(|t| !sap(&t.algorithm)));
+        let all = Comparison::of(vec![("full.json".to_owned(), full), ("quick.json".to_owned(), quick)]).unwrap();
+        assert!(all.borders.iter().all(|b| b.scenario == "uniform" && b.largest_deviation == 0.0) && !all.borders.is_empty());
+        assert!(all.borders.iter().all(|b| b.below.method() != "sap" && b.above.method() != "sap"));
+        let told = all.not_compared.join("\n");
+        assert!(told.contains("quick.json lacks the scenario clustered") && told.contains("sap@cpu1"), "{told}");
+        assert!(all.losses.unwrap().beyond_own.abs() < 1e-12);
     }
 
     #[test]
@@ -173,10 +193,10 @@ mod tests {
                 timing.samples_ns.iter_mut().for_each(|ns| *ns = *ns * 3 / 2);
             }
         }
-        let comparison = Comparison::of(&[named(steady), named(changed)]).unwrap();
+        let comparison = Comparison::of(vec![named(steady), named(changed)]).unwrap();
         assert!(comparison.parameters.iter().all(|s| s.high > 1.15 * s.low));
         let moved = comparison.borders.iter().filter(|b| b.above.threads() != b.below.threads());
-        assert!(moved.map(|b| b.spread).fold(0.0, f64::max) > 0.1, "{:?}", comparison.borders);
+        assert!(moved.map(|b| b.largest_deviation).fold(0.0, f64::max) > 0.1, "{:?}", comparison.borders);
         assert!(comparison.losses.unwrap().others > 0.01);
     }
 }

@@ -1,9 +1,10 @@
 //! Reading the files of Sapwise.
 
 use crate::progress::Progress;
+use crate::report::{self, Report};
 use anyhow::{Context, bail};
-use sapwise::Report;
-use sapwise::json::Document;
+use sapwise::json::{self, Schema};
+use sapwise::{Model, Tuning};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -11,24 +12,43 @@ use std::path::{Path, PathBuf};
 /// Files larger than this are refused before they fill the memory. A full report of a machine with 64 threads has 2 MB.
 const LARGEST_BYTES: u64 = 64 << 20;
 
+/// A file of Sapwise, whatever its schema.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Document {
+    /// `report/2`.
+    Report(Box<Report>),
+    /// `model/2`.
+    Model(Box<Model>),
+    /// `tuning/1`.
+    Tuning(Box<Tuning>),
+}
+
 /// Reads a report, model or tuning file.
 ///
 /// # Errors
 /// Names the file, and the line and column or the figure that is wrong.
-pub(crate) fn read_document(path: &Path) -> anyhow::Result<Document> {
+pub fn read_document(path: &Path) -> anyhow::Result<Document> {
     let text = read_text(path)?;
-    sapwise::json::read(&text).with_context(|| format!("{} is no sound file", path.display()))
+    let unsound = || format!("{} is no sound file", path.display());
+    let schema = Schema::of(&text).with_context(unsound)?;
+    Ok(match schema.name() {
+        "report" => Document::Report(Box::new(report::read(&text).with_context(unsound)?.value)),
+        "model" => Document::Model(Box::new(json::model(&text).with_context(unsound)?)),
+        _ => Document::Tuning(Box::new(json::tuning(&text).with_context(unsound)?)),
+    })
 }
 
 /// The reports with their file names, of files and of the `*.json` files of folders, in the order of their names.
 ///
 /// # Errors
-/// As [`report_files`] and [`read_report`].
-pub(crate) fn read_reports(paths: &[PathBuf]) -> anyhow::Result<Vec<(String, Report)>> {
+/// As [`report_files`] and [`read_report`]; when the user asked to stop.
+pub fn read_reports(paths: &[PathBuf], progress: &dyn Progress) -> anyhow::Result<Vec<(String, Report)>> {
     let files = report_files(paths)?;
-    let progress = Progress::new(files.len() as u64);
+    progress.start(files.len() as u64);
     progress.message("reading");
     let read = |file: &PathBuf| {
+        progress.check()?;
         let report = read_report(file);
         progress.advance(1);
         report
@@ -40,7 +60,7 @@ pub(crate) fn read_reports(paths: &[PathBuf]) -> anyhow::Result<Vec<(String, Rep
 ///
 /// # Errors
 /// When a folder can't be read or holds no such file.
-pub(crate) fn report_files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+pub fn report_files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
     for path in paths {
         if path.is_dir() {
@@ -60,7 +80,7 @@ pub(crate) fn report_files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
 ///
 /// # Errors
 /// As [`read_document`]; when the file is no report.
-pub(crate) fn read_report(file: &Path) -> anyhow::Result<(String, Report)> {
+pub fn read_report(file: &Path) -> anyhow::Result<(String, Report)> {
     match read_document(file)? {
         Document::Report(report) => Ok((file_name(file), *report)),
         _ => bail!("{} is no report; only what `sapwise probe` wrote is taken here", file.display()),
@@ -71,7 +91,7 @@ pub(crate) fn read_report(file: &Path) -> anyhow::Result<(String, Report)> {
 ///
 /// # Errors
 /// When the folder can't be read.
-pub(crate) fn json_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+pub fn json_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let unreadable = || format!("the folder {} can't be read", folder.display());
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(unreadable)? {
@@ -92,7 +112,7 @@ fn file_name(path: &Path) -> String {
 ///
 /// # Errors
 /// Names the file, and why it can't be read.
-pub(crate) fn read_text(path: &Path) -> anyhow::Result<String> {
+pub fn read_text(path: &Path) -> anyhow::Result<String> {
     let shown = path.display();
     let file = File::open(path).with_context(|| format!("{shown} can't be opened"))?;
     if file.metadata().with_context(|| format!("{shown} can't be read"))?.is_dir() {

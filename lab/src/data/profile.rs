@@ -1,57 +1,47 @@
 //! What training keeps of a report: the hardware, and the median of each algorithm at each point.
 
-use super::direct::{Crossing, crossings};
-use sapwise::stats::median as median_of;
-use sapwise::report::{Label, Point, Report, Timed, Timing};
+use crate::report::{Label, Point, Report, Timed, Timing};
+use crate::sweep::median;
 use sapwise::{AlgorithmId, Hardware, Load};
 use std::borrow::Cow;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use crate::sweep::median;
-
 /// A report without its samples, of which thousands fit into memory.
 #[derive(Debug, Clone)]
-pub(crate) struct Profile {
+pub struct Profile {
     /// File name without folders.
-    pub(crate) file: String,
+    pub file: String,
     /// What kind of evidence it is.
-    pub(crate) label: Label,
+    pub label: Label,
     /// Without the raw samples of its parameters, its cores as far apart as at half of the points.
-    pub(crate) hardware: Hardware,
+    pub hardware: Hardware,
     /// The same as it was measured, where that differs.
-    pub(crate) measured: Option<Hardware>,
+    pub measured: Option<Hardware>,
     /// The algorithms that were timed.
-    pub(crate) algorithms: Vec<Timed>,
+    pub algorithms: Vec<Timed>,
     /// Where they were timed, in the order of the report.
-    pub(crate) points: Vec<Spot>,
-    /// Where two algorithms cross in the scenario of the slice; empty where nobody asked for it.
-    pub(crate) crossings: Vec<Crossing>,
+    pub points: Vec<Spot>,
 }
 
 /// One point of a report.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Spot {
+pub struct Spot {
     /// Name of the scenario.
-    pub(crate) scenario: String,
+    pub scenario: String,
     /// The load that an in-line choice would have estimated.
-    pub(crate) load: Load,
+    pub load: Load,
     /// Latency between cores before and after the samples, their geometric mean; `None` where it is not known.
-    pub(crate) core_to_core_ns: Option<f64>,
+    pub core_to_core_ns: Option<f64>,
     /// Position in [`Profile::algorithms`], and the median over the frames in ns.
-    pub(crate) medians: Vec<(u16, f64)>,
+    pub medians: Vec<(u16, f64)>,
 }
 
 /// A median of fewer samples says nothing about disturbed frames.
-pub(super) const FEWEST_SAMPLES: usize = 3;
+pub const FEWEST_SAMPLES: usize = 3;
 
 impl Profile {
     /// Keeps of a report what is sound. Timings with an error or too few samples go, and with them points that are empty then.
-    pub(crate) fn of(file: &str, report: &Report) -> Self {
-        Self { crossings: crossings(report), ..Self::without_crossings(file, report) }
-    }
-
-    /// The same without crossings, which take longer to find than all the rest.
-    pub(crate) fn without_crossings(file: &str, report: &Report) -> Self {
+    pub fn of(file: &str, report: &Report) -> Self {
         let mut hardware = report.hardware.clone();
         let of_gpus = hardware.gpus.iter_mut().flat_map(|g| &mut g.parameters);
         hardware.parameters.iter_mut().chain(of_gpus).for_each(|p| p.raw = Vec::new());
@@ -65,13 +55,12 @@ impl Profile {
             measured,
             algorithms: report.algorithms.clone(),
             points: points.filter(|s| !s.medians.is_empty() && s.load.objects > 0).collect(),
-            crossings: Vec::new(),
         }
     }
 
     /// The hardware with its cores as far apart as they were at a point, where that is known. Always from what was measured: a fork and
     /// join that was bounded on the way to another place does not find back.
-    pub(crate) fn hardware_at(&self, core_to_core_ns: Option<f64>) -> Cow<'_, Hardware> {
+    pub fn hardware_at(&self, core_to_core_ns: Option<f64>) -> Cow<'_, Hardware> {
         match core_to_core_ns {
             Some(ns) => Cow::Owned(self.measured.as_ref().unwrap_or(&self.hardware).with_cores_apart(ns)),
             None => Cow::Borrowed(&self.hardware),
@@ -79,34 +68,54 @@ impl Profile {
     }
 
     /// The physical machine.
-    pub(crate) fn machine(&self) -> &str {
+    pub fn machine(&self) -> &str {
         &self.hardware.machine.physical_id
     }
 
     /// An algorithm by its position.
-    pub(crate) fn id(&self, position: u16) -> &AlgorithmId {
+    pub fn id(&self, position: u16) -> &AlgorithmId {
         &self.algorithms[usize::from(position)].id
     }
 
     /// The medians of a point, in ns.
     #[cfg(test)]
-    pub(crate) fn medians<'a>(&'a self, spot: &'a Spot) -> impl Iterator<Item = (&'a AlgorithmId, f64)> {
+    pub fn medians<'a>(&'a self, spot: &'a Spot) -> impl Iterator<Item = (&'a AlgorithmId, f64)> {
         spot.medians.iter().map(|&(k, ns)| (self.id(k), ns))
     }
 
     /// These algorithms with the revisions that they were timed in, 0 of one that was not, as a model is asked for them.
-    pub(crate) fn with_revisions(&self, ids: &[AlgorithmId]) -> Vec<(AlgorithmId, u32)> {
+    pub fn with_revisions(&self, ids: &[AlgorithmId]) -> Vec<(AlgorithmId, u32)> {
         let revision = |id: &AlgorithmId| self.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);
         ids.iter().map(|id| (id.clone(), revision(id))).collect()
     }
 
+    /// The algorithms that were timed anywhere in it.
+    pub fn available(&self) -> Vec<AlgorithmId> {
+        let mut timed = vec![false; self.algorithms.len()];
+        self.points.iter().flat_map(|s| &s.medians).for_each(|m| timed[usize::from(m.0)] = true);
+        self.algorithms.iter().zip(timed).filter(|(_, timed)| *timed).map(|(t, _)| t.id.clone()).collect()
+    }
+
+    /// `uniform` where it has that scenario, else its first one.
+    pub fn usual_scenario(&self) -> &str {
+        usual(self.points.iter().map(|p| p.scenario.as_str()))
+    }
+
+    /// The loads of a scenario, ascending by objects, each size once.
+    pub fn slice(&self, scenario: &str) -> Vec<Load> {
+        let mut loads: Vec<Load> = self.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load).collect();
+        loads.sort_by_key(|l| l.objects);
+        loads.dedup_by_key(|l| l.objects);
+        loads
+    }
+
     /// Position of an algorithm among those of the report.
-    pub(crate) fn position(&self, id: &AlgorithmId) -> Option<u16> {
+    pub fn position(&self, id: &AlgorithmId) -> Option<u16> {
         self.algorithms.iter().position(|t| t.id == *id).map(|k| k as u16)
     }
 
     /// Leaves out the algorithms that `stays` does not admit, with their timings, and the points that are empty then.
-    pub(crate) fn retain(&mut self, stays: impl Fn(&Timed) -> bool) {
+    pub fn retain(&mut self, stays: impl Fn(&Timed) -> bool) {
         let kept: Vec<bool> = self.algorithms.iter().map(stays).collect();
         if kept.iter().all(|k| *k) {
             return;
@@ -119,12 +128,10 @@ impl Profile {
         self.points.retain(|s| !s.medians.is_empty());
         let mut kept = kept.into_iter();
         self.algorithms.retain(|_| kept.next() == Some(true));
-        let algorithms = &self.algorithms;
-        self.crossings.retain(|c| c.is_between(algorithms));
     }
 
     /// The same for two copies of one measurement, whatever their file names and labels; in all likelihood for no two others.
-    pub(crate) fn fingerprint(&self) -> u64 {
+    pub fn fingerprint(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         self.machine().hash(&mut hasher);
         for p in &self.hardware.parameters {
@@ -141,9 +148,9 @@ impl Profile {
 
 /// The hardware with its cores as far apart as they were at half of the points. Where a host moves them, the seconds in which the
 /// parameters were measured may have been unlike the minutes after.
-pub(crate) fn as_at_the_points(hardware: &Hardware, report: &Report) -> Hardware {
+pub fn as_at_the_points(hardware: &Hardware, report: &Report) -> Hardware {
     let apart: Vec<f64> = report.points.iter().filter_map(between_cores).collect();
-    median_of(&apart).map_or_else(|| hardware.clone(), |ns| hardware.with_cores_apart(ns))
+    sapwise::stats::median(&apart).map_or_else(|| hardware.clone(), |ns| hardware.with_cores_apart(ns))
 }
 
 /// The latency between cores at a point: the geometric mean of before and after.
@@ -151,8 +158,19 @@ fn between_cores(point: &Point) -> Option<f64> {
     point.core_to_core_ns.map(|[before, after]| (before * after).sqrt())
 }
 
+/// `uniform` where a report has it, else its first scenario.
+pub fn usual_scenario(report: &Report) -> &str {
+    usual(report.points.iter().map(|p| p.scenario.as_str()))
+}
+
+/// `uniform` where it is among the names, else the first of them.
+fn usual<'a>(mut names: impl Iterator<Item = &'a str> + Clone) -> &'a str {
+    let first = names.clone().next();
+    names.find(|n| *n == "uniform").or(first).unwrap_or("uniform")
+}
+
 /// The physical machines of profiles, each once, in order.
-pub(super) fn machines(profiles: &[Profile]) -> Vec<&str> {
+pub fn machines(profiles: &[Profile]) -> Vec<&str> {
     let mut machines: Vec<&str> = profiles.iter().map(Profile::machine).collect();
     machines.sort_unstable();
     machines.dedup();
@@ -160,7 +178,7 @@ pub(super) fn machines(profiles: &[Profile]) -> Vec<&str> {
 }
 
 /// Whether a timing has no error and enough samples.
-pub(super) fn is_sound(timing: &Timing) -> bool {
+pub fn is_sound(timing: &Timing) -> bool {
     timing.error.is_none() && timing.samples_ns.len() >= FEWEST_SAMPLES
 }
 
@@ -179,12 +197,12 @@ impl Spot {
     }
 
     /// The least median in ns; `None` of none.
-    pub(crate) fn best(&self) -> Option<f64> {
+    pub fn best(&self) -> Option<f64> {
         self.medians.iter().map(|m| m.1).min_by(f64::total_cmp)
     }
 
     /// The median of an algorithm by its position.
-    pub(crate) fn of_position(&self, algorithm: u16) -> Option<f64> {
+    pub fn of_position(&self, algorithm: u16) -> Option<f64> {
         self.medians.iter().find(|m| m.0 == algorithm).map(|m| m.1)
     }
 }

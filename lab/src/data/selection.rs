@@ -1,23 +1,34 @@
 //! Which reports are trained on, and which of their timings.
 
-use super::Evidence;
 use super::profile::{FEWEST_SAMPLES, Profile};
-use sapwise::report::{Label, Report};
+use crate::report::{Label, Report};
 use sapwise::{AlgorithmId, BackendClass};
 use std::collections::{BTreeMap, HashMap};
+
+/// Which reports are trained on. The two kinds are never mixed: a simulated machine shows what the cost model that made it says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Evidence {
+    /// Those of real machines.
+    Real,
+    /// Those of simulated ones.
+    Simulated,
+}
 
 /// What shares a revision: a method on one class of processor.
 type Key = (BackendClass, String);
 
-/// Reports that crossings are looked for in, about: a regression on a handful of parameters needs no more.
-const MOST_CROSSED: usize = 600;
+/// Why a report is not trained on.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{file} is left out: it {why}")]
+pub struct LeftOut {
+    file: String,
+    why: String,
+}
 
 /// The reports that can be trained on, gathered one by one so that none has to stay in memory.
 #[derive(Debug, Clone)]
-pub(crate) struct Selection {
+pub struct Selection {
     evidence: Evidence,
-    /// Crossings are looked for in each report whose place is a multiple of this.
-    crossed: usize,
     profiles: Vec<Profile>,
     /// File of each fingerprint.
     known: HashMap<u64, String>,
@@ -25,46 +36,41 @@ pub(crate) struct Selection {
 }
 
 impl Selection {
-    /// For about so many reports.
-    pub(crate) fn new(evidence: Evidence, reports: usize) -> Self {
-        Self {
-            evidence,
-            crossed: reports.div_ceil(MOST_CROSSED).max(1),
-            profiles: Vec::new(),
-            known: HashMap::new(),
-            notes: Vec::new(),
-        }
+    /// None so far.
+    pub fn new(evidence: Evidence) -> Self {
+        Self { evidence, profiles: Vec::new(), known: HashMap::new(), notes: Vec::new() }
     }
 
     /// All of these reports.
-    pub(crate) fn of(reports: &[(String, Report)], evidence: Evidence) -> Self {
-        let mut selection = Self::new(evidence, reports.len());
-        for (place, (file, report)) in reports.iter().enumerate() {
-            let reduced = selection.reduce(place, file, report);
-            selection.add(reduced);
+    pub fn of(reports: &[(String, Report)], evidence: Evidence) -> Self {
+        let mut selection = Self::new(evidence);
+        for (file, report) in reports {
+            selection.add(selection.reduce(file, report));
         }
         selection
     }
 
     /// Which kind it takes.
-    pub(crate) fn evidence(&self) -> Evidence {
+    pub fn evidence(&self) -> Evidence {
         self.evidence
     }
 
-    /// What of the report at a place among all can be trained on, or why nothing can. Apart from [`Selection::add`] because it is work that threads can share.
-    pub(crate) fn reduce(&self, place: usize, file: &str, report: &Report) -> Result<Profile, String> {
+    /// What of a report can be trained on, or why nothing can. Apart from [`Selection::add`] because it is work that threads can share.
+    ///
+    /// # Errors
+    /// Why the report is left out.
+    pub fn reduce(&self, file: &str, report: &Report) -> Result<Profile, LeftOut> {
         match refusal(report, self.evidence) {
-            Some(why) => Err(format!("{file} is left out: it {why}")),
-            None if place.is_multiple_of(self.crossed) => Ok(Profile::of(file, report)),
-            None => Ok(Profile::without_crossings(file, report)),
+            Some(why) => Err(LeftOut { file: file.to_owned(), why }),
+            None => Ok(Profile::of(file, report)),
         }
     }
 
     /// Adds a report that was reduced; one that holds the same measurement as an earlier one is left out.
-    pub(crate) fn add(&mut self, reduced: Result<Profile, String>) {
+    pub fn add(&mut self, reduced: Result<Profile, LeftOut>) {
         let profile = match reduced {
             Ok(profile) => profile,
-            Err(why) => return self.notes.push(why),
+            Err(left_out) => return self.notes.push(left_out.to_string()),
         };
         match self.known.get(&profile.fingerprint()) {
             Some(twin) => self.notes.push(format!("{} is left out: it holds the same measurement as {twin}", profile.file)),
@@ -76,7 +82,7 @@ impl Selection {
     }
 
     /// The profiles with the newest revision of each method only, and what was left out and why.
-    pub(crate) fn finish(mut self) -> (Vec<Profile>, Vec<String>) {
+    pub fn finish(mut self) -> (Vec<Profile>, Vec<String>) {
         let newest = newest_revisions(&self.profiles);
         let newest_of = |id: &AlgorithmId| newest.get(&key(id)).copied().unwrap_or(0);
         for profile in &mut self.profiles {
@@ -99,7 +105,7 @@ impl Selection {
 }
 
 /// The reports that can be trained on, and what was left out and why.
-pub(crate) fn usable(reports: &[(String, Report)], evidence: Evidence) -> (Vec<Profile>, Vec<String>) {
+pub fn usable(reports: &[(String, Report)], evidence: Evidence) -> (Vec<Profile>, Vec<String>) {
     Selection::of(reports, evidence).finish()
 }
 
@@ -157,7 +163,7 @@ fn newest_revisions(profiles: &[Profile]) -> BTreeMap<Key, u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::synthetic::Machine;
+    use crate::synthetic::Machine;
 
     fn named(report: Report) -> (String, Report) {
         ("a.json".to_owned(), report)

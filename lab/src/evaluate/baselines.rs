@@ -1,23 +1,15 @@
-//! Ways to choose an algorithm that a prediction has to beat.
+//! Strategies that a prediction has to beat.
 
-use super::curve::{slice, slice_tuning};
-use super::profile::Profile;
-use super::yardstick::{Chooser, NOT_TIMED, average};
-use super::{GPU_PARAMETERS, PARAMETERS, figure};
+use super::regret_table::{NOT_TIMED, Strategy};
+use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, figure};
+use crate::fit::{measured_slice, slice_tuning};
 use anyhow::Result;
 use sapwise::model::GPU_PREFIX;
-use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Tuning, Hardware, Report};
-
-/// The algorithms of a profile that were timed anywhere in it.
-pub(crate) fn available(profile: &Profile) -> Vec<AlgorithmId> {
-    let mut timed = vec![false; profile.algorithms.len()];
-    profile.points.iter().flat_map(|s| &s.medians).for_each(|m| timed[usize::from(m.0)] = true);
-    profile.algorithms.iter().zip(timed).filter(|(_, timed)| *timed).map(|(t, _)| t.id.clone()).collect()
-}
+use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Hardware, Tuning, stats};
 
 /// Always the algorithm with the least mean regret over the training profiles, given with that of each of their algorithms when it is
 /// chosen always; each profile counts the same.
-pub(crate) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId]) -> Chooser<'a> {
+pub fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId]) -> Strategy<'a> {
     let mean = |id: &AlgorithmId| {
         let of = |(profile, always): &(&Profile, &[f64])| {
             profile.position(id).map_or(NOT_TIMED - 1.0, |k| always[usize::from(k)])
@@ -37,7 +29,7 @@ pub(crate) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[Algo
 /// parts two kinds of sweep after a brute force that is chosen by a count of filtered pairs, which is not known here; the
 /// constant is taken for the border between brute force and sweep. Both run on a GPU there; here both run on the CPU, which
 /// every machine has.
-pub(crate) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Chooser<'a> {
+pub fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Strategy<'a> {
     let on_cpu = |method: &'_ str| {
         let of = |id: &&AlgorithmId| id.method() == method && id.backend().class() == BackendClass::Cpu;
         available.iter().filter(of).cloned().collect::<Vec<_>>()
@@ -52,18 +44,18 @@ pub(crate) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> C
 ///
 /// # Errors
 /// When that profile has too few timings for thresholds.
-pub(crate) fn default_machine<'a>(
+pub fn default_machine<'a>(
     first: &Profile,
     costs: &[AlgorithmCost],
     available: &'a [AlgorithmId],
-) -> Result<Chooser<'a>> {
-    let scenario = usual(first.points.iter().map(|s| s.scenario.as_str()));
-    let tuning = slice_tuning(costs.to_vec(), scenario, &slice(first, scenario)?)?;
+) -> Result<Strategy<'a>> {
+    let scenario = first.usual_scenario();
+    let tuning = slice_tuning(costs.to_vec(), scenario, &measured_slice(first, scenario)?)?;
     Ok(Box::new(move |load| tuning.step(load.objects).and_then(|s| stand_in(&s.algorithm, available))))
 }
 
 /// The cheapest by cost curves; the nearest number of threads stands for one that the machine doesn't have.
-pub(crate) fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Chooser<'_> {
+pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strategy<'_> {
     let tuning = Tuning::from_costs(sapwise::Source::Measured, "", costs, &[]);
     Box::new(move |load| {
         let best = tuning.rank(load, |k| closest(&tuning.costs[k].algorithm, available).is_some())?.best;
@@ -71,19 +63,8 @@ pub(crate) fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> 
     })
 }
 
-/// `uniform` where a report has it, else its first scenario.
-pub(crate) fn slice_scenario(report: &Report) -> &str {
-    usual(report.points.iter().map(|p| p.scenario.as_str()))
-}
-
-/// `uniform` where it is among the names, else the first of them.
-pub(super) fn usual<'a>(mut names: impl Iterator<Item = &'a str> + Clone) -> &'a str {
-    let first = names.clone().next();
-    names.find(|n| *n == "uniform").or(first).unwrap_or("uniform")
-}
-
 /// The available algorithm of the same method and class of processor whose number of threads or GPUs is nearest.
-pub(super) fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
+pub fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
     let distance = |other: &&AlgorithmId| (f64::from(other.backend().width()) / f64::from(id.backend().width())).ln().abs();
     let alike = |a: &&AlgorithmId| a.method() == id.method() && a.backend().class() == id.backend().class();
     // The same GPU first, where there are several of equal number.
@@ -99,24 +80,24 @@ fn stand_in(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> 
 
 /// What machines are compared by: logarithms of their parameters, worked out once since each is compared with all others.
 #[derive(Debug, Clone)]
-pub(super) struct Likeness(Vec<Option<f64>>);
+pub struct Likeness(Vec<Option<f64>>);
 
 impl Likeness {
-    pub(super) fn new(hardware: &Hardware) -> Self {
-        let of_gpu = GPU_PARAMETERS.map(|name| format!("{GPU_PREFIX}{name}"));
-        let names = PARAMETERS.into_iter().chain(of_gpu.iter().map(String::as_str));
+    pub fn new(hardware: &Hardware) -> Self {
+        let of_gpu = COMPARED_OF_GPUS.map(|name| format!("{GPU_PREFIX}{name}"));
+        let names = COMPARED.into_iter().chain(of_gpu.iter().map(String::as_str));
         Self(names.map(|name| figure(hardware, name).filter(|v| *v > 0.0).map(f64::ln)).collect())
     }
 }
 
 /// Position of the nearest machine, by the logarithms of the parameters that both have, over their standard deviation.
-pub(super) fn nearest(known: &[&Likeness], own: &Likeness) -> Option<usize> {
+pub fn nearest(known: &[&Likeness], own: &Likeness) -> Option<usize> {
     let mut distances = vec![0.0; known.len()];
     for (k, own) in own.0.iter().enumerate().filter_map(|(k, own)| Some((k, (*own)?))) {
         let values: Vec<Option<f64>> = known.iter().map(|other| other.0[k]).collect();
         let all: Vec<f64> = values.iter().flatten().copied().chain([own]).collect();
-        let mean = average(&all);
-        let variance = average(&all.iter().map(|v| (v - mean).powi(2)).collect::<Vec<f64>>());
+        let mean = stats::mean(&all);
+        let variance = stats::mean(&all.iter().map(|v| (v - mean).powi(2)).collect::<Vec<f64>>());
         for (distance, value) in distances.iter_mut().zip(values) {
             // What is not known is taken to be as far as machines are from each other on average.
             *distance += value.map_or(2.0, |v| if variance > 1e-12 { (v - own).powi(2) / variance } else { 0.0 });
@@ -127,7 +108,7 @@ pub(super) fn nearest(known: &[&Likeness], own: &Likeness) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::Machine;
+    use crate::synthetic::Machine;
     use super::*;
     use sapwise::Load;
 

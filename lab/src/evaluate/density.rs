@@ -1,9 +1,9 @@
 //! Whether the load decides better than the number of objects, on what was measured.
 
-use super::curve::measured_tuning;
-use crate::document::read_report;
+use crate::fit::measured_costs::measured_tuning;
+use crate::data::files::read_report;
 use sapwise::stats::median;
-use sapwise::report::Point;
+use crate::report::Point;
 use sapwise::{Adaptive, AlgorithmId, BroadPhase, Pairs, Registry, Report};
 use sapwise_scenes::Scenario;
 use std::path::Path;

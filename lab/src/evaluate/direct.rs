@@ -1,31 +1,30 @@
 //! The regression that the paper of Avril, Gouranton and Arnaldi (2011) asks for: positions of crossovers, directly from
 //! hardware parameters, and a choice by the number of objects alone. Kept as a baseline.
 
-pub(super) mod regression;
-
-use super::baselines::slice_scenario;
-use super::profile::{Profile, is_sound};
-use super::yardstick::Chooser;
-use super::{GPU_PARAMETERS as ALL_OF_GPU, PARAMETERS as ALL_OF_CPU};
-use anyhow::Result;
-use regression::{Estimate, Regression};
-use sapwise::crossover::{Crossover, Paired, crossover};
-use sapwise::hardware::parameter;
-use sapwise::model::GPU_PREFIX;
-use sapwise::report::{Point, Report, Timed};
+use super::regret_table::Strategy;
+use crate::data::{Profile, figure};
+use crate::fit::columns::Columns;
+use crate::paired::{PairedOutcome, PairedSamples, compare};
+use anyhow::{Context, Result};
+use linfa::DatasetBase;
+use linfa::traits::Fit;
+use linfa_linear::LinearRegression;
+use ndarray::{Array1, Array2, Axis};
+use sapwise::hardware::ParameterId;
+use sapwise::stats::mean;
 use sapwise::{AlgorithmId, BackendClass, Hardware};
 
 /// Parameters that a crossover is regressed on by least squares, as logarithms. Few, because there are as few rows as reports.
 const PARAMETERS: [&str; 4] = [
-    parameter::CLOCK_MEASURED_GHZ,
-    parameter::SIMD_LANES,
-    parameter::SCALING_ALL_THREADS_RATIO,
-    parameter::FORK_JOIN_COLD_NS,
+    ParameterId::ClockMeasuredGhz,
+    ParameterId::SimdLanes,
+    ParameterId::ScalingAllThreadsRatio,
+    ParameterId::ForkJoinColdNs,
 ];
 
-/// The same of a border between the CPU and a GPU, or between two methods on GPUs.
+/// The same of a crossover between the CPU and a GPU, or between two methods on GPUs.
 const GPU_PARAMETERS: [&str; 4] =
-    [parameter::SCALING_ALL_THREADS_RATIO, "gpu/round_trip_ns", "gpu/upload_rate_gb_per_s", "gpu/arithmetic_gflop_per_s"];
+    [ParameterId::ScalingAllThreadsRatio, "gpu/round_trip_ns", "gpu/upload_rate_gb_per_s", "gpu/arithmetic_gflop_per_s"];
 
 /// A method on one thread or on all threads of its machine, on one GPU or on all: counts differ between machines, these do not.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -36,49 +35,43 @@ struct Role {
     all: bool,
 }
 
-/// A measured crossover of two roles.
+/// Which of two roles is cheaper at which sizes on one machine.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Crossing {
+pub(super) struct RoleOutcome {
     first: Role,
     second: Role,
-    found: Crossover,
+    found: PairedOutcome,
 }
 
-impl Crossing {
-    /// Whether both of its methods are among these algorithms, on their class of processor.
-    pub(super) fn is_between(&self, algorithms: &[Timed]) -> bool {
-        let there =
-            |role: &Role| algorithms.iter().any(|t| t.id.method() == role.method && t.id.backend().class() == role.class);
-        there(&self.first) && there(&self.second)
-    }
-}
-
-/// The crossovers between the roles of a report in its scenario `uniform`, or its first one.
-pub(super) fn crossings(report: &Report) -> Vec<Crossing> {
-    let scenario = slice_scenario(report);
-    let points: Vec<&Point> = report.points.iter().filter(|p| p.scenario == scenario).collect();
-    let ids: Vec<AlgorithmId> = report.algorithms.iter().map(|t| t.id.clone()).collect();
+/// What is found for each two roles of a profile in its scenario `uniform`, or its first one.
+pub(super) fn role_outcomes(profile: &Profile) -> Vec<RoleOutcome> {
+    let scenario = profile.usual_scenario();
+    let ids: Vec<AlgorithmId> = profile.algorithms.iter().map(|t| t.id.clone()).collect();
     let roles = roles(&ids);
-    let mut crossings = Vec::new();
-    for (k, (a, first)) in roles.iter().enumerate() {
-        for (b, second) in &roles[k + 1..] {
-            if let Some(found) = crossover(&common(&points, first, second)) {
-                crossings.push(Crossing { first: a.clone(), second: b.clone(), found });
+    let medians = |id: &AlgorithmId| -> Vec<Option<[u64; 1]>> {
+        let own = profile.position(id);
+        let within = profile.points.iter().filter(|p| p.scenario == scenario);
+        // In picoseconds: only ratios count, and short times would lose digits as whole nanoseconds.
+        within.map(|p| p.of_position(own?).map(|ns| [(1e3 * ns).round() as u64])).collect()
+    };
+    let objects: Vec<u32> =
+        profile.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load.objects).collect();
+    let timed: Vec<Vec<Option<[u64; 1]>>> = roles.iter().map(|(_, id)| medians(id)).collect();
+    let mut outcomes = Vec::new();
+    for a in 0..roles.len() {
+        for b in a + 1..roles.len() {
+            let both = objects.iter().zip(timed[a].iter().zip(&timed[b]));
+            let points: Vec<PairedSamples<'_>> = both
+                .filter_map(|(&objects, (first, second))| {
+                    Some(PairedSamples { objects, first_ns: first.as_ref()?, second_ns: second.as_ref()? })
+                })
+                .collect();
+            if let Some(found) = compare(&points) {
+                outcomes.push(RoleOutcome { first: roles[a].0.clone(), second: roles[b].0.clone(), found });
             }
         }
     }
-    crossings
-}
-
-/// Points at which both were timed.
-fn common<'a>(points: &[&'a Point], first: &AlgorithmId, second: &AlgorithmId) -> Vec<Paired<'a>> {
-    let samples = |p: &'a Point, id: &AlgorithmId| {
-        p.timings.iter().find(|t| t.algorithm == *id && is_sound(t)).map(|t| &t.samples_ns[..])
-    };
-    let pair = |p: &&'a Point| {
-        Some(Paired { objects: p.load.objects, first_ns: samples(p, first)?, second_ns: samples(p, second)? })
-    };
-    points.iter().filter_map(pair).collect()
+    outcomes
 }
 
 /// The roles that algorithms play on a machine, in order. Of several single GPUs the first plays.
@@ -99,12 +92,12 @@ fn roles(ids: &[AlgorithmId]) -> Vec<(Role, AlgorithmId)> {
 
 /// What is predicted for a pair of roles.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Border {
+enum Prediction {
     Always { first: bool },
     At { ln_objects: f64, first_below: bool },
 }
 
-impl Border {
+impl Prediction {
     fn first_wins(self, ln_objects: f64) -> bool {
         match self {
             Self::Always { first } => first,
@@ -113,153 +106,214 @@ impl Border {
     }
 }
 
-/// The direct regression by least squares, applied to a machine: whoever wins most comparisons in pairs is chosen. Adds to
-/// `notes` how many of its borders are means because there were too few crossings for a regression, and how many rest on
-/// profiles of high leverage.
+/// The direct regression by least squares, applied to a machine: whoever wins most comparisons in pairs is chosen. `training` are profiles
+/// with what was found for their roles. Adds to `notes` how many of its crossovers are means because there were too few for a
+/// regression, and how many rest on profiles of high leverage.
 ///
 /// # Errors
 /// When linfa refuses a fit.
-pub(crate) fn direct<'a>(
-    training: &[&Profile],
+pub(super) fn direct<'a>(
+    training: &[(&Profile, &[RoleOutcome])],
     hardware: &Hardware,
     available: &[AlgorithmId],
     notes: &mut Vec<String>,
-) -> Result<Chooser<'a>> {
-    chooser(Regression::LeastSquares, training, hardware, available, notes)
-}
-
-/// [`direct`] by an elastic net on all parameters by which machines are compared, those of GPUs where a GPU takes part. Its
-/// penalty is chosen by leaving out physical machines of the training.
-///
-/// # Errors
-/// When linfa refuses a fit.
-pub(crate) fn direct_elastic_net<'a>(
-    training: &[&Profile],
-    hardware: &Hardware,
-    available: &[AlgorithmId],
-    notes: &mut Vec<String>,
-) -> Result<Chooser<'a>> {
-    chooser(Regression::ElasticNet, training, hardware, available, notes)
-}
-
-fn chooser<'a>(
-    regression: Regression,
-    training: &[&Profile],
-    hardware: &Hardware,
-    available: &[AlgorithmId],
-    notes: &mut Vec<String>,
-) -> Result<Chooser<'a>> {
+) -> Result<Strategy<'a>> {
     let roles = roles(available);
-    let mut borders = Vec::new();
+    let mut predictions = Vec::new();
     let (mut means, mut far) = (0, 0);
     for a in 0..roles.len() {
         for b in a + 1..roles.len() {
-            if let Some((border, estimate)) = border(regression, training, hardware, &roles[a].0, &roles[b].0)? {
+            if let Some((prediction, estimate)) = predict(training, hardware, &roles[a].0, &roles[b].0)? {
                 means += usize::from(estimate.is_some_and(|e| e.mean));
                 far += usize::from(estimate.is_some_and(|e| e.far_rows > 0));
-                borders.push((a, b, border));
+                predictions.push((a, b, prediction));
             }
         }
     }
-    let (name, too_few) = match regression {
-        Regression::LeastSquares => ("direct regression", "there being no more crossings than parameters"),
-        Regression::ElasticNet => ("direct elastic net", "there being fewer than three crossings"),
-    };
+    let count = predictions.len();
     if means > 0 {
-        notes.push(format!("{name}: {means} of {} borders are means, {too_few}", borders.len()));
+        notes.push(format!(
+            "direct regression: {means} of {count} borders are means, there being no more crossings than parameters"
+        ));
     }
     if far > 0 {
-        let count = borders.len();
-        notes.push(format!("{name}: {far} of {count} borders rest on a profile with over twice the mean leverage"));
+        notes.push(format!(
+            "direct regression: {far} of {count} borders rest on a profile with over twice the mean leverage"
+        ));
     }
     Ok(Box::new(move |load| {
         let ln_objects = f64::from(load.objects.max(1)).ln();
         let mut wins = vec![0; roles.len()];
-        for &(a, b, border) in &borders {
-            wins[if border.first_wins(ln_objects) { a } else { b }] += 1;
+        for &(a, b, prediction) in &predictions {
+            wins[if prediction.first_wins(ln_objects) { a } else { b }] += 1;
         }
         let most = wins.iter().max()?;
         wins.iter().position(|w| w == most).map(|k| roles[k].1.clone())
     }))
 }
 
-/// The border of a pair, and its estimate where it is regressed. `None` where no machine of the training has both.
+/// What is predicted for a pair, and the estimate behind it where it is regressed. `None` where no machine of the training has both.
 ///
-/// Where most machines have a crossing it is regressed over those, the last of several; the others are not used, which is
+/// Where most machines have a crossover it is regressed over those, the last of several; the others are not used, which is
 /// the weakness of this method. Where most have none, the more frequent winner always wins.
-fn border(
-    regression: Regression,
-    training: &[&Profile],
+fn predict(
+    training: &[(&Profile, &[RoleOutcome])],
     hardware: &Hardware,
     a: &Role,
     b: &Role,
-) -> Result<Option<(Border, Option<Estimate>)>> {
-    let found: Vec<(&Hardware, &Crossover)> = training
+) -> Result<Option<(Prediction, Option<Estimate>)>> {
+    let of_pair = |outcomes: &'_ [RoleOutcome]| outcomes.iter().position(|c| c.first == *a && c.second == *b);
+    let found: Vec<(&Hardware, &PairedOutcome)> = training
         .iter()
-        .filter_map(|t| t.crossings.iter().find(|c| c.first == *a && c.second == *b).map(|c| (&t.hardware, &c.found)))
+        .filter_map(|(profile, outcomes)| Some((&profile.hardware, &outcomes[of_pair(outcomes)?].found)))
         .collect();
     let crossed: Vec<_> = found.iter().filter_map(|(h, c)| c.positions().last().map(|p| (*h, p))).collect();
     if found.is_empty() {
         return Ok(None);
     }
     if 2 * crossed.len() <= found.len() {
-        let firsts = found.iter().filter(|(_, c)| **c == Crossover::AlwaysFirst).count();
-        let seconds = found.iter().filter(|(_, c)| **c == Crossover::AlwaysSecond).count();
-        return Ok(Some((Border::Always { first: firsts >= seconds }, None)));
+        let firsts = found.iter().filter(|(_, c)| **c == PairedOutcome::AlwaysFirst).count();
+        let seconds = found.iter().filter(|(_, c)| **c == PairedOutcome::AlwaysSecond).count();
+        return Ok(Some((Prediction::Always { first: firsts >= seconds }, None)));
     }
     let first_below = 2 * crossed.iter().filter(|(_, p)| p.first_below).count() >= crossed.len();
     let rows: Vec<_> = crossed.into_iter().filter(|(_, p)| p.first_below == first_below).collect();
     let machines: Vec<&Hardware> = rows.iter().map(|r| r.0).collect();
     let ln_objects: Vec<f64> = rows.iter().map(|r| r.1.objects.ln()).collect();
-    let names = names(regression, [a, b].iter().any(|role| role.class == BackendClass::Gpu));
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let estimate = regression.estimate(&names, &machines, &ln_objects, hardware)?;
-    Ok(Some((Border::At { ln_objects: estimate.value, first_below }, Some(estimate))))
+    let on_gpu = [a, b].iter().any(|role| role.class == BackendClass::Gpu);
+    let names = if on_gpu { GPU_PARAMETERS } else { PARAMETERS };
+    let estimate = estimate(&names, &machines, &ln_objects, hardware)?;
+    Ok(Some((Prediction::At { ln_objects: estimate.value, first_below }, Some(estimate))))
 }
 
-/// The parameters that a border is regressed on.
-fn names(regression: Regression, on_gpu: bool) -> Vec<String> {
-    let of_gpu = ALL_OF_GPU.map(|name| format!("{GPU_PREFIX}{name}"));
-    match regression {
-        Regression::LeastSquares => if on_gpu { GPU_PARAMETERS } else { PARAMETERS }.map(str::to_owned).to_vec(),
-        Regression::ElasticNet => {
-            ALL_OF_CPU.map(str::to_owned).into_iter().chain(of_gpu.into_iter().filter(|_| on_gpu)).collect()
+/// What a regression says of a machine.
+#[derive(Debug, Clone, Copy)]
+struct Estimate {
+    value: f64,
+    /// There was too little for a regression: it is the mean.
+    mean: bool,
+    /// Rows of high leverage, see [`Columns::far_rows`].
+    far_rows: usize,
+}
+
+/// Values on the logarithms of the parameters, evaluated for a machine. Parameters that are missing anywhere or say nothing of their own are
+/// not used; fewer of them where one row alone would decide a coefficient. The mean where there are not more rows than coefficients.
+///
+/// # Errors
+/// When linfa refuses a fit.
+fn estimate(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &Hardware) -> Result<Estimate> {
+    let logarithm = |h: &Hardware, name: &str| figure(h, name).filter(|v| *v > 0.0).map(f64::ln);
+    let there = |name: &&str| machines.iter().chain([&hardware]).all(|h| logarithm(h, name).is_some());
+    let names: Vec<&str> = names.iter().copied().filter(there).collect();
+    let row = |h: &Hardware| names.iter().map(|name| logarithm(h, name).unwrap_or_default()).collect::<Vec<f64>>();
+    let table = Array2::from_shape_fn((machines.len(), names.len()), |(k, j)| {
+        logarithm(machines[k], names[j]).unwrap_or_default()
+    });
+    let (line, far_rows) = Line::least_squares(&table, values)?;
+    Ok(Estimate { value: line.at(&row(hardware)), mean: line.columns.kept.is_empty(), far_rows })
+}
+
+/// A fitted linear function of a row of figures.
+#[derive(Debug, Clone)]
+pub(super) struct Line {
+    pub(super) columns: Columns,
+    /// The value where every figure is at its mean.
+    pub(super) intercept: f64,
+    /// One for each kept column, against its standardised figures.
+    pub(super) slopes: Vec<f64>,
+}
+
+impl Line {
+    /// Ordinary least squares over a table of shape (rows, figures), and how many rows have a high leverage; the mean when
+    /// there are not more rows than coefficients.
+    pub(super) fn least_squares(table: &Array2<f64>, values: &[f64]) -> Result<(Self, usize)> {
+        let columns = Columns::new(table, &vec![1.0; values.len()]);
+        if values.len() <= columns.kept.len() + 1 {
+            return Ok((Self::mean(table, values), 0));
         }
+        let columns = columns.without_lone_rows();
+        if columns.kept.is_empty() {
+            return Ok((Self::mean(table, values), 0));
+        }
+        let data = DatasetBase::new(columns.values.clone(), Array1::from(values.to_vec()));
+        let fitted = LinearRegression::new().fit(&data).context("the direct regression of crossovers failed")?;
+        let far_rows = columns.far_rows();
+        Ok((Self { columns, intercept: fitted.intercept(), slopes: fitted.params().to_vec() }, far_rows))
+    }
+
+    fn mean(table: &Array2<f64>, values: &[f64]) -> Self {
+        let columns = Columns::new(&table.select(Axis(1), &[]), &vec![1.0; values.len()]);
+        Self { columns, intercept: mean(values), slopes: Vec::new() }
+    }
+
+    /// The value at a row with as many figures as the table has.
+    pub(super) fn at(&self, figures: &[f64]) -> f64 {
+        let c = &self.columns;
+        let term = |j: usize| self.slopes[j] * (figures[c.kept[j]] - c.centres[j]) / c.scales[j];
+        self.intercept + (0..self.slopes.len()).map(term).sum::<f64>()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::baselines::available;
-    use super::super::synthetic::Machine;
-    use super::super::yardstick::Yardstick;
     use super::*;
+    use crate::evaluate::RegretTable;
+    use crate::synthetic::Machine;
+    use linfa::traits::Predict;
+    use sapwise_scenes::Random;
 
     #[test]
-    fn both_choose_better_than_nothing_on_a_machine_they_have_not_seen() {
+    fn it_chooses_better_than_nothing_on_a_machine_it_has_not_seen() {
         for machines in [Machine::family(), Machine::family_with_gpus()] {
             let profiles: Vec<Profile> = machines.into_iter().map(|m| Profile::of("", &m.report())).collect();
-            let training: Vec<&Profile> = profiles[..6].iter().collect();
-            let available = available(&profiles[6]);
-            let hardware = &profiles[6].hardware;
+            let outcomes: Vec<Vec<RoleOutcome>> = profiles.iter().map(role_outcomes).collect();
+            let training: Vec<(&Profile, &[RoleOutcome])> =
+                profiles.iter().zip(&outcomes).take(6).map(|(p, o)| (p, &o[..])).collect();
             let mut notes = Vec::new();
-            let ways = [
-                direct(&training, hardware, &available, &mut notes).unwrap(),
-                direct_elastic_net(&training, hardware, &available, &mut notes).unwrap(),
-            ];
-            for choose in &ways {
-                let regret = Yardstick::new(&profiles[6]).regret(&profiles[6], choose).mean;
-                assert!(regret < 1.0, "{regret} {notes:?}");
-            }
+            let choose = direct(&training, &profiles[6].hardware, &profiles[6].available(), &mut notes).unwrap();
+            let regret = RegretTable::new(&profiles[6]).regret(&profiles[6], &choose).mean;
+            assert!(regret < 1.0, "{regret} {notes:?}");
         }
     }
 
     #[test]
-    fn the_elastic_net_takes_the_parameters_of_gpus_where_one_takes_part() {
-        assert_eq!(names(Regression::ElasticNet, false).len(), ALL_OF_CPU.len());
-        let all = names(Regression::ElasticNet, true);
-        assert_eq!(all.len(), ALL_OF_CPU.len() + ALL_OF_GPU.len());
-        let gpu = &Machine::family_with_gpus()[0].hardware();
-        assert!(all.iter().filter(|n| n.starts_with(GPU_PREFIX)).any(|n| super::super::figure(gpu, n).is_some()));
+    fn least_squares_find_a_power_law_and_too_few_rows_give_the_mean() {
+        // A border that goes down with the lanes.
+        let machines: Vec<Hardware> = Machine::family().iter().map(Machine::hardware).collect();
+        let values: Vec<f64> =
+            machines.iter().map(|h| 5.0 - 0.7 * h.value(ParameterId::SimdLanes).unwrap().ln()).collect();
+        let known: Vec<&Hardware> = machines[..6].iter().collect();
+        let of = |count: usize| estimate(&PARAMETERS, &known[..count], &values[..count], &machines[6]).unwrap();
+        let found = of(6);
+        assert!((found.value - values[6]).abs() < 1e-6 && !found.mean, "{found:?}");
+        let found = of(3);
+        assert!((found.value - mean(&values[..3])).abs() < 1e-12 && found.mean, "{found:?}");
+    }
+
+    #[test]
+    fn a_parameter_of_one_machine_only_is_not_used() {
+        // Nine machines of which only the last has other lanes; its border is far off for another reason.
+        let mut random = Random::named(23, &[]);
+        let table = Array2::from_shape_fn((9, 2), |(k, j)| if j == 0 { random.normal() } else { f64::from(k == 8) });
+        let values: Vec<f64> = (0..9).map(|k| 5.0 + table[[k, 0]] + if k == 8 { 4.0 } else { 0.0 }).collect();
+        let (line, far_rows) = Line::least_squares(&table, &values).unwrap();
+        assert_eq!(line.columns.kept, [0]);
+        assert!(far_rows <= 1);
+    }
+
+    #[test]
+    fn plain_arithmetic_predicts_what_linfa_does() {
+        let mut random = Random::named(29, &[]);
+        let table = Array2::from_shape_fn((30, 4), |(_, j)| [3.0, 0.1, 40.0, 7.0][j] * (2.0 + random.normal()));
+        let values: Vec<f64> =
+            table.rows().into_iter().map(|r| 2.0 + 0.3 * r[0] - 5.0 * r[1] + 0.1 * random.normal()).collect();
+        let columns = Columns::new(&table, &[1.0; 30]);
+        let data = DatasetBase::new(columns.values.clone(), Array1::from(values.clone()));
+        let line = Line::least_squares(&table, &values).unwrap().0;
+        let linfa = LinearRegression::new().fit(&data).unwrap().predict(&columns.values);
+        for k in 0..30 {
+            let own = line.at(&table.row(k).to_vec());
+            assert!((own - linfa[k]).abs() < 1e-9, "{own} {}", linfa[k]);
+        }
     }
 }

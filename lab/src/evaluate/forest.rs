@@ -1,10 +1,8 @@
 //! A random forest for the time of each method: what is left to a baseline that knows no physics.
 
-use super::fit::thinned;
-use super::profile::Profile;
-use super::rows::{Row, rows};
-use super::yardstick::Chooser;
-use super::{GPU_PARAMETERS, PARAMETERS};
+use super::regret_table::Strategy;
+use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile};
+use crate::fit::{Row, rows, thinned};
 use sapwise_scenes::Random;
 use anyhow::{Context, Result};
 use sapwise::{AlgorithmId, Backend, BackendClass, Hardware, Load};
@@ -29,7 +27,7 @@ const LEAF: usize = 2;
 const SEED: u64 = 1;
 
 /// The rows of every method, worked out once for all forests.
-pub(super) struct Table(BTreeMap<Key, Vec<Example>>);
+pub struct Table(BTreeMap<Key, Vec<Example>>);
 
 struct Example {
     profile: usize,
@@ -40,7 +38,7 @@ struct Example {
 impl Table {
     /// A bound of an algorithm that had left the race counts as a time: a tree does not extrapolate, and without it whoever left
     /// at a thousand objects would be predicted to take no longer for a million.
-    pub(super) fn new(profiles: &[Profile]) -> Self {
+    pub fn new(profiles: &[Profile]) -> Self {
         let step = profiles.len().div_ceil(MOST_PROFILES).max(1);
         let most = (MOST_ROWS / profiles.len().div_ceil(step).max(1)).max(FEWEST_OF_PROFILE);
         let mut table: BTreeMap<Key, Vec<Example>> = BTreeMap::new();
@@ -65,7 +63,7 @@ impl Table {
     ///
     /// # Errors
     /// When smartcore refuses a fit.
-    pub(super) fn grow(&self, chosen: &[bool]) -> Result<Forests> {
+    pub fn grow(&self, chosen: &[bool]) -> Result<Forests> {
         let mut forests = BTreeMap::new();
         for (key, examples) in &self.0 {
             let known: Vec<&Example> = examples.iter().filter(|e| chosen[e.profile]).collect();
@@ -81,11 +79,11 @@ impl Table {
 }
 
 /// A forest for each method that was timed in the training.
-pub(super) struct Forests(BTreeMap<Key, Forest>);
+pub struct Forests(BTreeMap<Key, Forest>);
 
 impl Forests {
     /// The algorithm with the least predicted time.
-    pub(super) fn chooser<'a>(&'a self, hardware: &'a Hardware, available: &'a [AlgorithmId]) -> Chooser<'a> {
+    pub fn chooser<'a>(&'a self, hardware: &'a Hardware, available: &'a [AlgorithmId]) -> Strategy<'a> {
         Box::new(move |load| {
             let ln_ns = |id: &AlgorithmId| self.0.get(&key(id))?.ln_ns(&features(hardware, id.backend(), load));
             let costs = available.iter().filter_map(|id| Some((id, ln_ns(id)?)));
@@ -132,11 +130,11 @@ fn features(hardware: &Hardware, backend: &Backend, load: &Load) -> Vec<f64> {
         f64::from(backend.width()).ln(),
     ];
     let logarithm = |value: Option<f64>| value.filter(|v| *v > 0.0).map_or(0.0, f64::ln);
-    let of_machine = PARAMETERS.iter().map(|name| logarithm(hardware.value(name)));
+    let of_machine = COMPARED.iter().map(|name| logarithm(hardware.value(name)));
     let of_gpu = match backend {
         Backend::Gpu(indices) => {
             let gpu = indices.first().and_then(|k| hardware.gpu(*k));
-            GPU_PARAMETERS.iter().map(|name| logarithm(gpu.and_then(|g| g.value(name)))).collect()
+            COMPARED_OF_GPUS.iter().map(|name| logarithm(gpu.and_then(|g| g.value(name)))).collect()
         }
         _ => Vec::new(),
     };
@@ -145,9 +143,8 @@ fn features(hardware: &Hardware, backend: &Backend, load: &Load) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::baselines::available;
-    use super::super::synthetic::Machine;
-    use super::super::yardstick::Yardstick;
+    use crate::synthetic::Machine;
+    use crate::evaluate::regret_table::RegretTable;
     use super::*;
 
     fn profiles() -> Vec<Profile> {
@@ -158,8 +155,8 @@ mod tests {
     fn regret(profiles: &[Profile], chosen: &[bool]) -> f64 {
         let forests = Table::new(profiles).grow(chosen).unwrap();
         let held = profiles.last().unwrap();
-        let available = available(held);
-        Yardstick::new(held).regret(held, &forests.chooser(&held.hardware, &available)).mean
+        let available = held.available();
+        RegretTable::new(held).regret(held, &forests.chooser(&held.hardware, &available)).mean
     }
 
     #[test]
@@ -176,7 +173,7 @@ mod tests {
     fn whoever_left_the_race_is_not_chosen_beyond() {
         let all = profiles();
         let forests = Table::new(&all).grow(&vec![true; all.len()]).unwrap();
-        let available = available(&all[2]);
+        let available = all[2].available();
         let choose = forests.chooser(&all[2].hardware, &available);
         for spot in all[2].points.iter().filter(|s| s.load.objects > 100_000) {
             assert_ne!(choose(&spot.load).unwrap().method(), "brute", "{:?}", spot.load);

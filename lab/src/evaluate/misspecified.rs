@@ -1,14 +1,14 @@
 //! What the cost model loses where one of its physical terms is withheld, on machines that were left out.
 
-use super::baselines::{available, by_costs};
-use super::fit::{Designs, TermsOf};
-use super::model::model;
-use super::partition::Partition;
-use super::profile::Profile;
-use super::terms::terms;
-use super::yardstick::{NOT_TIMED, Yardstick, average};
+use crate::evaluate::baselines::{available, by_costs};
+use crate::fit::designs::{Designs, TermsOf};
+use crate::fit::model::model;
+use crate::evaluate::partition::Partition;
+use crate::data::Profile;
+use crate::fit::terms::terms;
+use crate::evaluate::regret_table::{NOT_TIMED, RegretTable, average};
 use crate::simulate;
-use crate::table::columns;
+use crate::text::columns;
 use rayon::prelude::*;
 use sapwise::model::{MethodModel, Scale};
 use sapwise::{AlgorithmId, Model, Term};
@@ -73,7 +73,7 @@ fn regret(profile: &Profile, model: &Model) -> f64 {
     let revision = |id: &AlgorithmId| profile.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);
     let wanted: Vec<(AlgorithmId, u32)> = available.iter().map(|id| (id.clone(), revision(id))).collect();
     model.predict(&profile.hardware, &wanted).map_or(NOT_TIMED - 1.0, |prediction| {
-        Yardstick::new(profile).regret(profile, &by_costs(prediction.costs, &available)).mean
+        RegretTable::new(profile).regret(profile, &by_costs(prediction.costs, &available)).mean
     })
 }
 

@@ -5,7 +5,7 @@ const MOST_FILES: usize = 3;
 
 /// The notes without repetition. Those that begin with the name of a file and go on alike become one that names some of the files, and
 /// those that differ in numbers alone become one with the range of each number. In the order of the first of each.
-pub(super) fn folded(notes: Vec<String>) -> Vec<String> {
+pub fn folded(notes: Vec<String>) -> Vec<String> {
     let mut kinds: Vec<Kind> = Vec::new();
     for note in notes {
         let (file, rest) = split(&note);

@@ -1,32 +1,32 @@
-//! What is left out together when a way to choose is judged.
+//! What is held out together when a strategy is judged.
 
-use super::profile::Profile;
-use sapwise::hardware::parameter;
+use crate::data::Profile;
+use sapwise::hardware::ParameterId;
 use std::collections::BTreeMap;
 
-/// Machines that are left out one by one; of more, as many groups are made of them. Each costs a fit of everything.
+/// Machines that are held out one by one; of more, as many groups are made of them. Each costs a fit of everything.
 const MOST_FOLDS: usize = 24;
 
 /// The profiles of each fold: they are judged by what was fitted to all others.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Partition {
+pub struct Partition {
     /// What a fold is, in words.
-    pub(crate) held_out: String,
+    pub held_out: String,
     /// Whether folds are of whole physical machines.
-    pub(crate) by_machine: bool,
+    pub by_machine: bool,
     /// Positions of profiles. Where one machine was restricted in several ways a profile is in one fold for each of them.
-    pub(crate) folds: Vec<Vec<usize>>,
+    pub folds: Vec<Vec<usize>>,
 }
 
 impl Partition {
     /// Each physical machine with all its profiles; of one machine alone each of its SIMD levels and each of its thread counts; of one
     /// without such restrictions each profile.
-    pub(crate) fn new(profiles: &[Profile]) -> Self {
+    pub fn new(profiles: &[Profile]) -> Self {
         Self::of_machines(profiles, MOST_FOLDS).unwrap_or_else(|| Self::of_restrictions(profiles))
     }
 
     /// At most so many folds of whole machines; `None` with fewer than two machines.
-    pub(crate) fn of_machines(profiles: &[Profile], most: usize) -> Option<Self> {
+    pub fn of_machines(profiles: &[Profile], most: usize) -> Option<Self> {
         let machines = grouped(profiles, |p| p.machine().to_owned());
         let count = machines.len();
         if count < 2 {
@@ -47,7 +47,7 @@ impl Partition {
             let folds = grouped(profiles, |p| format!("{:020}", level(p, name)));
             if folds.len() > 1 { folds } else { Vec::new() }
         };
-        let folds = [by(parameter::SIMD_LANES), by(parameter::USABLE_CORES)].concat();
+        let folds = [by(ParameterId::SimdLanes), by(ParameterId::UsableCores)].concat();
         if folds.is_empty() {
             let folds = (0..profiles.len()).map(|k| vec![k]).collect();
             return Self { held_out: "profile".to_owned(), by_machine: false, folds };
@@ -67,7 +67,7 @@ fn grouped(profiles: &[Profile], key: impl Fn(&Profile) -> String) -> Vec<Vec<us
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::Machine;
+    use crate::synthetic::Machine;
     use super::*;
 
     fn profiles(machines: &[Machine]) -> Vec<Profile> {
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn machines_are_left_out_with_all_their_profiles() {
+    fn machines_are_held_out_with_all_their_profiles() {
         let mut machines = Machine::family();
         machines[1].name = machines[0].name;
         let partition = Partition::new(&profiles(&machines));
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn of_one_machine_each_level_and_each_thread_count_is_left_out() {
+    fn of_one_machine_each_level_and_each_thread_count_is_held_out() {
         let mut machines = Machine::family();
         machines.truncate(4);
         machines.iter_mut().for_each(|m| m.name = "0000000000000001");

@@ -1,11 +1,11 @@
 //! Our fits held against those of SciPy, scikit-learn and NumPy on stored numbers: `tests/fixtures/fits.json`, which
 //! `tools/reference/fits.py` writes.
 
-use super::columns::Columns;
-use super::direct::regression::Line;
-use super::nnls::nnls;
-use super::residual::Residuals;
-use super::robust::{HUBER, Problem, spread};
+use crate::fit::columns::Columns;
+use crate::evaluate::direct::regression::Line;
+use crate::fit::nnls::nnls;
+use crate::fit::residual::Residuals;
+use crate::fit::robust::{HUBER, Problem, spread};
 use ndarray::{Array1, Array2};
 use sapwise::BackendClass;
 use sapwise::stats::{quantile, relative_iqr};

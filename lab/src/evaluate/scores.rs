@@ -1,16 +1,20 @@
-//! From regrets on held-out profiles to the scores of the ways to choose.
+//! From regrets on held-out profiles to the scores of strategies.
 
-use super::robust::value_at_weight;
-use super::validate::SINGLE_BEST;
-use super::yardstick::Regret;
-use sapwise::stats::median;
-use sapwise::model::MethodScore;
+use super::regret_table::Regret;
+use crate::fit::robust::value_at_weight;
+use crate::training::MethodScore;
+use sapwise::stats::{self, median};
 use std::collections::BTreeMap;
 
-/// A border that is predicted within so many octaves is near: a factor of 1.4.
+/// The strategy that scores are given relative to.
+pub(super) const SINGLE_BEST: &str = "single best";
+/// The strategy of `predict`.
+pub const OURS: &str = "physics + ridge";
+
+/// A crossover that is predicted within so many octaves is near: a factor of 1.4.
 const NEAR_OCTAVES: f64 = 0.5;
 
-/// How one way to choose did on one held-out profile.
+/// How one strategy did on one held-out profile.
 pub(super) struct Judged {
     pub(super) name: &'static str,
     /// The file of the profile.
@@ -18,7 +22,7 @@ pub(super) struct Judged {
     /// The physical machine.
     pub(super) machine: String,
     pub(super) regret: Regret,
-    /// Octaves between measured and predicted borders; `None` of a way that predicts no costs.
+    /// Octaves between measured and predicted crossovers; `None` of a strategy that predicts no costs.
     pub(super) crossings: Option<Vec<f64>>,
 }
 
@@ -30,9 +34,10 @@ impl Judged {
     }
 }
 
-/// The scores of every way. Every physical machine counts the same, its profiles sharing its weight.
-pub(super) fn scores(all: &[Judged]) -> Vec<MethodScore> {
-    let mut score: Vec<MethodScore> = names(all).into_iter().map(|name| score(all, name)).collect();
+/// The scores of every strategy. Every physical machine counts the same, its profiles sharing its weight.
+pub(super) fn scores(all: &[Judged], by_machine: bool) -> Vec<MethodScore> {
+    let units = regrets_of_units(all, by_machine).into_iter();
+    let mut score: Vec<MethodScore> = units.map(|(name, units)| score(all, name, &units)).collect();
     let single = score.iter().find(|s| s.name == SINGLE_BEST).map_or(0.0, |s| s.mean_regret);
     // The oracle has no regret. Where the single best has none either there is no gap to close.
     let gap = |regret: f64| if single > 0.0 { (single - regret) / single } else { 0.0 };
@@ -40,8 +45,19 @@ pub(super) fn scores(all: &[Judged]) -> Vec<MethodScore> {
     score
 }
 
-/// The names of the ways, in the order of the first profile.
-pub(super) fn names(all: &[Judged]) -> Vec<&'static str> {
+/// For each strategy, in the order of the first profile, the mean regret on each held-out machine, or profile where there is one machine
+/// only.
+pub(super) fn regrets_of_units(all: &[Judged], by_machine: bool) -> Vec<(&'static str, Vec<f64>)> {
+    let of = |name: &'static str| {
+        let mut units: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+        all.iter().filter(|j| j.name == name).for_each(|j| units.entry(j.unit(by_machine)).or_default().push(j.regret.mean));
+        (name, units.values().map(|regrets| stats::mean(regrets)).collect())
+    };
+    names(all).into_iter().map(of).collect()
+}
+
+/// The names of the strategies, in the order of the first profile.
+fn names(all: &[Judged]) -> Vec<&'static str> {
     let mut names: Vec<&str> = Vec::new();
     all.iter().for_each(|j| {
         if !names.contains(&j.name) {
@@ -51,7 +67,7 @@ pub(super) fn names(all: &[Judged]) -> Vec<&'static str> {
     names
 }
 
-fn score(all: &[Judged], name: &str) -> MethodScore {
+fn score(all: &[Judged], name: &str, units: &[f64]) -> MethodScore {
     let own: Vec<&Judged> = all.iter().filter(|j| j.name == name).collect();
     let mut profiles: BTreeMap<&str, f64> = BTreeMap::new();
     own.iter().for_each(|j| *profiles.entry(&j.machine).or_default() += 1.0);
@@ -66,6 +82,8 @@ fn score(all: &[Judged], name: &str) -> MethodScore {
     MethodScore {
         name: name.to_owned(),
         mean_regret: mean(&means),
+        least_regret: units.iter().copied().min_by(f64::total_cmp),
+        largest_regret: units.iter().copied().max_by(f64::total_cmp),
         p95_regret: percentile_95(means),
         share_over_10_percent: mean(&weighted(&over)),
         closed_gap: 0.0,
@@ -110,12 +128,14 @@ mod tests {
         // Nine profiles without regret and one with little are one machine.
         all.extend((0..9).map(|_| judged("ours", "a", 0.0)));
         all.push(judged("ours", "a", 0.1));
-        let scores = scores(&all);
+        let scores = scores(&all, true);
         let ours = scores.iter().find(|s| s.name == "ours").unwrap();
         assert!((ours.mean_regret - 0.155).abs() < 1e-12 && ours.p95_regret == 0.3, "{ours:?}");
         assert!((ours.closed_gap - 0.845).abs() < 1e-12 && (ours.share_over_10_percent - 0.275).abs() < 1e-12, "{ours:?}");
         assert!((ours.mean_regret_in_games.unwrap() - 0.0775).abs() < 1e-12 && ours.p95_regret_in_games == Some(0.15));
-        // Eleven borders are one octave off, of the others one is 0.3, one 0.1 and nine are exact.
+        // The range over machines holds the mean.
+        assert_eq!((ours.least_regret.map(|r| (100.0 * r).round()), ours.largest_regret), (Some(1.0), Some(0.3)));
+        // Eleven crossovers are one octave off, of the others one is 0.3, one 0.1 and nine are exact.
         assert!((ours.crossing_error_octaves.unwrap() - 0.65).abs() < 1e-12);
         assert_eq!(ours.crossings_within_half_octave, Some(0.5));
         assert_eq!(scores.iter().find(|s| s.name == SINGLE_BEST).unwrap().crossing_error_octaves, None);

@@ -1,7 +1,7 @@
 //! Least squares with coefficients that are not negative.
 
-use super::triangle::triangle;
-use ndarray::{Array1, Array2, ArrayView1};
+use linfa_linalg::qr::QRInto;
+use ndarray::{Array1, Array2, ArrayView1, Axis, concatenate, s};
 
 /// The share of a column that must not lie in the span of the others before it may join them.
 const INDEPENDENT: f64 = 1e-7;
@@ -12,7 +12,7 @@ const INDEPENDENT: f64 = 1e-7;
 /// Columns are scaled to length one first, since terms differ by many orders of magnitude. A column that depends linearly
 /// on those in use stays at zero, the earlier column first, so that rank-deficient input has one answer. Columns of zeros
 /// get zero. Ends after ten changes of the active set for each column, with the best admissible point so far.
-pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
+pub fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
     let columns = a.ncols();
     let lengths: Vec<f64> = a.columns().into_iter().map(|c| c.dot(&c).sqrt()).collect();
     let mut scaled = a.clone();
@@ -21,11 +21,11 @@ pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
             column /= length;
         }
     }
-    let (scaled, b) = &triangle(scaled, b);
+    let (scaled, b) = &reduced(scaled, b);
     let tolerance = 1e-12 * b.dot(b).sqrt();
     let mut x = Array1::<f64>::zeros(columns);
     let mut active: Vec<usize> = Vec::new();
-    // Columns that can't join the present active set, asked anew whenever it shrinks.
+    // Columns that can't join the present active set, asked again whenever it shrinks.
     let mut barred: Vec<bool> = lengths.iter().map(|&l| l == 0.0).collect();
     for _ in 0..10 * columns {
         let gradient = scaled.t().dot(&(b - &scaled.dot(&x)));
@@ -44,6 +44,25 @@ pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
         *value = if length > 0.0 { *value / length } else { 0.0 };
     }
     x
+}
+
+/// The same problem in as few rows as there are columns and one more: the triangle of a QR decomposition keeps every length and angle, so
+/// the solutions over any columns are the same. The search asks for dozens of those, and over tens of thousands of rows each would take a
+/// hundred times as long.
+fn reduced(a: Array2<f64>, b: &Array1<f64>) -> (Array2<f64>, Array1<f64>) {
+    let columns = a.ncols();
+    if a.nrows() <= columns + 1 {
+        return (a, b.clone());
+    }
+    let both = concatenate(Axis(1), &[a.view(), b.view().insert_axis(Axis(1))]);
+    match both.ok().and_then(|both| both.qr_into().ok()) {
+        Some(decomposed) => {
+            let triangle = decomposed.into_r();
+            (triangle.slice(s![.., ..columns]).to_owned(), triangle.column(columns).to_owned())
+        }
+        // Neither can happen: the columns are as long as the rows are many, and there are more rows than columns.
+        None => (a, b.clone()),
+    }
 }
 
 /// The column along which the error falls fastest; the first of equals.
@@ -154,6 +173,18 @@ mod tests {
                 assert!(*x >= 0.0 && *g < 1e-9 && (*x == 0.0 || g.abs() < 1e-9), "{x} {g}");
             }
         }
+    }
+
+    #[test]
+    fn fewer_rows_keep_lengths_and_angles() {
+        let mut random = Random::named(5, &[]);
+        let a = Array2::from_shape_fn((200, 4), |(_, j)| if j == 2 { 0.0 } else { random.normal() });
+        let b = Array1::from_shape_fn(200, |_| random.normal());
+        let (t, u) = reduced(a.clone(), &b);
+        assert_eq!((t.dim(), u.len()), ((5, 4), 5));
+        let off = |x: f64, y: f64| (x - y).abs() > 1e-10;
+        assert!(!a.t().dot(&a).iter().zip(&t.t().dot(&t)).any(|(x, y)| off(*x, *y)));
+        assert!(!a.t().dot(&b).iter().zip(&t.t().dot(&u)).any(|(x, y)| off(*x, *y)) && !off(b.dot(&b), u.dot(&u)));
     }
 
     #[test]

@@ -1,22 +1,23 @@
-//! How far costs lie from their prediction on machines that were left out.
+//! How far costs lie from their prediction on machines that were held out.
 
-use super::nnls::nnls;
+use crate::fit::nnls::nnls;
 use ndarray::{Array1, Array2};
-use sapwise::posterior::{Deviations, Part, TERMS_SHARED, width_correlation};
-use sapwise::{AlgorithmId, BackendClass, Prior};
+use crate::belief::{Deviations, Part, Prior, TERMS_SHARED, width_correlation};
+use sapwise::stats::mean;
+use sapwise::{AlgorithmId, BackendClass};
 use std::collections::BTreeMap;
 
 /// One timing on a machine that the model had not seen.
 #[derive(Debug, Clone)]
-pub(crate) struct HeldOut {
+pub struct TimingError {
     /// Which machine: timings of different ones are taken to be independent.
-    pub(crate) machine: usize,
+    pub machine: usize,
     /// The algorithm.
-    pub(crate) algorithm: AlgorithmId,
+    pub algorithm: AlgorithmId,
     /// Base-2 logarithm of the number of objects.
-    pub(crate) log2_objects: f64,
+    pub log2_objects: f64,
     /// Natural logarithm of measured over predicted time.
-    pub(crate) ln_ratio: f64,
+    pub ln_ratio: f64,
 }
 
 /// The assumed prior counts as much as this many machines.
@@ -41,15 +42,15 @@ const LEAST_NOISE_LN: f64 = 0.01;
 ///
 /// The mean product of two deviations on one machine is their covariance, which is linear in the variances of the parts. For each length
 /// scale these are found by least squares without negative ones; the length scale that fits best is taken.
-pub(crate) fn prior(held_out: &[HeldOut]) -> Prior {
+pub fn prior(held_out: &[TimingError]) -> Prior {
     let of = |class| {
-        let own: Vec<&HeldOut> = held_out.iter().filter(|h| h.algorithm.backend().class() == class).collect();
+        let own: Vec<&TimingError> = held_out.iter().filter(|h| h.algorithm.backend().class() == class).collect();
         deviations(&own, Prior::ASSUMED.of(class))
     };
     Prior { cpu: of(BackendClass::Cpu), gpu: of(BackendClass::Gpu) }
 }
 
-fn deviations(held_out: &[&HeldOut], assumed: &Deviations) -> Deviations {
+fn deviations(held_out: &[&TimingError], assumed: &Deviations) -> Deviations {
     let mut machines: BTreeMap<usize, BTreeMap<(&AlgorithmId, i64), Vec<f64>>> = BTreeMap::new();
     for h in held_out.iter().filter(|h| h.ln_ratio.is_finite()) {
         let bins = machines.entry(h.machine).or_default();
@@ -91,8 +92,8 @@ fn deviations(held_out: &[&HeldOut], assumed: &Deviations) -> Deviations {
 fn within<'a>(lists: impl Iterator<Item = &'a Vec<f64>>) -> Option<f64> {
     let (mut sum, mut freedom) = (0.0, 0.0);
     for list in lists {
-        let mean = super::average(list);
-        sum += list.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+        let centre = mean(list);
+        sum += list.iter().map(|v| (v - centre).powi(2)).sum::<f64>();
         freedom += list.len() as f64 - 1.0;
     }
     (freedom > 0.0).then(|| sum / freedom)
@@ -118,7 +119,7 @@ impl Moments {
             let weight = 1.0 / (bins.len() as f64).powi(2);
             let means: Vec<(&AlgorithmId, i64, f64, f64)> = bins
                 .iter()
-                .map(|(&(id, octave), list)| (id, octave, super::average(list), noise / list.len() as f64))
+                .map(|(&(id, octave), list)| (id, octave, mean(list), noise / list.len() as f64))
                 .collect();
             for (k, a) in means.iter().enumerate() {
                 for (l, b) in means.iter().enumerate() {
@@ -189,7 +190,7 @@ mod tests {
     }
 
     /// Two timings for each algorithm and size on machines that deviate as told.
-    fn made_up(truth: &Deviations, machines: usize) -> Vec<HeldOut> {
+    fn made_up(truth: &Deviations, machines: usize) -> Vec<TimingError> {
         let ids = ids();
         let at: Vec<(&AlgorithmId, f64)> = ids.iter().flat_map(|id| SIZES.map(|s| (id, s))).collect();
         let covariance: Vec<Vec<f64>> =
@@ -203,7 +204,7 @@ mod tests {
                 let curve: f64 = row.iter().zip(&draws).map(|(l, d)| l * d).sum();
                 for _ in 0..2 {
                     let ln_ratio = curve + truth.noise_ln * random.normal();
-                    all.push(HeldOut { machine, algorithm: (*id).clone(), log2_objects: *log2_objects, ln_ratio });
+                    all.push(TimingError { machine, algorithm: (*id).clone(), log2_objects: *log2_objects, ln_ratio });
                 }
             }
         }
@@ -238,10 +239,10 @@ mod tests {
     #[test]
     fn one_machine_moves_the_assumed_prior_a_little_and_none_not_at_all() {
         assert_eq!(prior(&[]), Prior::ASSUMED);
-        let silent: Vec<HeldOut> = ids()
+        let silent: Vec<TimingError> = ids()
             .into_iter()
             .flat_map(|id| {
-                SIZES.map(|log2_objects| HeldOut { machine: 0, algorithm: id.clone(), log2_objects, ln_ratio: 0.0 })
+                SIZES.map(|log2_objects| TimingError { machine: 0, algorithm: id.clone(), log2_objects, ln_ratio: 0.0 })
             })
             .collect();
         let found = prior(&silent).cpu;

@@ -1,19 +1,13 @@
 //! What the physical terms leave unexplained: a ridge regression on a few features.
 
-use super::columns::Columns;
-use super::triangle::triangle;
+use crate::fit::columns::Columns;
 use anyhow::{Context, Result};
-use linfa::DatasetBase;
-use linfa::traits::Fit;
-use linfa_elasticnet::ElasticNet;
+use linfa_linalg::cholesky::SolveCInplace;
 use ndarray::{Array1, Array2, Axis};
 use sapwise::model::{Feature, ResidualTerm};
 
 /// Penalties to choose from, against standardised features: slopes shrink by about 1 / (1 + penalty).
 const PENALTIES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
-/// Rounds of coordinate descent. linfa never stops earlier without a lasso part, because its duality gap does not close
-/// then; the two features of the size correlate by 0.99, with which the smallest penalty needs about 250 to the last digit.
-const ITERATIONS: u32 = 300;
 /// The penalty where there are too few machines to choose one by leaving them out.
 const DEFAULT_PENALTY: f64 = 0.1;
 /// Machines that it takes to choose the penalty.
@@ -24,36 +18,36 @@ const MOST_FOLDS: usize = 8;
 const SEARCH_ROWS: usize = 1500;
 
 /// Natural logarithms of measured over modelled time, and what they may depend on.
-pub(crate) struct Residuals {
+pub struct Residuals {
     /// What each column of `features` is.
-    pub(crate) names: &'static [Feature],
+    pub names: &'static [Feature],
     /// Shape (rows, names).
-    pub(crate) features: Array2<f64>,
+    pub features: Array2<f64>,
     /// One for each row.
-    pub(crate) ln_ratios: Vec<f64>,
+    pub ln_ratios: Vec<f64>,
     /// One for each row, above zero.
-    pub(crate) weights: Vec<f64>,
+    pub weights: Vec<f64>,
     /// The physical machine of each row.
-    pub(crate) groups: Vec<usize>,
+    pub groups: Vec<usize>,
 }
 
 /// A fitted residual.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Ridge {
+pub struct Ridge {
     /// The residual where every feature is at its mean.
-    pub(crate) intercept: f64,
+    pub intercept: f64,
     /// The slopes, in units of the features.
-    pub(crate) terms: Vec<ResidualTerm>,
+    pub terms: Vec<ResidualTerm>,
 }
 
 impl Residuals {
-    /// The ridge with the penalty that does best on machines that were left out of it, one after the other or of many some at a
-    /// time, or with 0.1 where there are fewer than three. Only this residual is fitted anew for that choice, not the terms
+    /// The ridge with the penalty that does best on machines that were held out of it, one after the other or of many some at a
+    /// time, or with 0.1 where there are fewer than three. Only this residual is fitted again for that choice, not the terms
     /// behind it, and of many rows some.
     ///
     /// # Errors
-    /// When linfa refuses the fit.
-    pub(crate) fn ridge(&self) -> Result<Ridge> {
+    /// When the system of a fit can't be solved.
+    pub fn ridge(&self) -> Result<Ridge> {
         let mut groups = self.groups.clone();
         groups.sort_unstable();
         groups.dedup();
@@ -85,7 +79,7 @@ impl Residuals {
     }
 
     /// The ridge of one penalty over some rows.
-    pub(super) fn fit(&self, rows: &[usize], penalty: f64) -> Result<Ridge> {
+    pub fn fit(&self, rows: &[usize], penalty: f64) -> Result<Ridge> {
         let weights: Vec<f64> = rows.iter().map(|&k| self.weights[k]).collect();
         let columns = Columns::new(&self.features.select(Axis(0), rows), &weights).without_lone_rows();
         let targets: Vec<f64> = rows.iter().map(|&k| self.ln_ratios[k]).collect();
@@ -95,7 +89,7 @@ impl Residuals {
             return Ok(Ridge { intercept, terms: Vec::new() });
         }
         let centred = targets.iter().map(|y| y - intercept).collect();
-        let slopes = weighted_ridge(&columns.values, &centred, &weights, penalty)?.hyperplane().clone();
+        let slopes = weighted_ridge(&columns.values, &centred, &weights, penalty)?;
         let term = |j: usize| ResidualTerm {
             feature: self.names[columns.kept[j]],
             centre: columns.centres[j],
@@ -105,32 +99,31 @@ impl Residuals {
     }
 
     /// A residual in one of the rows.
-    pub(crate) fn at(&self, ridge: &Ridge, row: usize) -> f64 {
+    pub fn at(&self, ridge: &Ridge, row: usize) -> f64 {
         let position = |t: &ResidualTerm| self.names.iter().position(|f| *f == t.feature);
         let value = |t: &ResidualTerm| position(t).map_or(0.0, |j| self.features[[row, j]]);
         ridge.intercept + ridge.terms.iter().map(|t| t.slope * (value(t) - t.centre)).sum::<f64>()
     }
 }
 
-/// linfa's ridge, through rows scaled by the roots of their weights, since it takes no weights. Columns and targets are
-/// centred under the weights, so that no intercept is left to fit.
-fn weighted_ridge(x: &Array2<f64>, y: &Array1<f64>, weights: &[f64], penalty: f64) -> Result<ElasticNet<f64>> {
-    let mean = weights.iter().sum::<f64>() / weights.len() as f64;
-    let roots = Array1::from_iter(weights.iter().map(|w| (w / mean).sqrt()));
-    let (x, y) = triangle(x * &roots.view().insert_axis(Axis(1)), &(y * &roots));
-    // linfa takes the mean over the rows, of which there are fewer now.
-    let fewer = (y.len() as f64 / weights.len() as f64).sqrt();
-    let data = DatasetBase::new(x * fewer, y * fewer);
-    let ridge = ElasticNet::<f64>::params().l1_ratio(0.0).penalty(penalty).with_intercept(false);
-    ridge.tolerance(1e-10).max_iterations(ITERATIONS).fit(&data).context("the ridge regression of the residual failed")
+/// The slopes that make half of the weighted mean of the squared errors plus half of the penalty times the sum of their squares least: one
+/// for each column of `x`. Columns and targets are centred under the weights, so that no intercept is left to fit.
+fn weighted_ridge(x: &Array2<f64>, y: &Array1<f64>, weights: &[f64], penalty: f64) -> Result<Array1<f64>> {
+    let total: f64 = weights.iter().sum();
+    let shares = Array1::from_iter(weights.iter().map(|w| w / total));
+    let weighted = x * &shares.insert_axis(Axis(1));
+    let mut normal = weighted.t().dot(x) + penalty * Array2::<f64>::eye(x.ncols());
+    let right = weighted.t().dot(y).insert_axis(Axis(1));
+    // Positive definite by the penalty.
+    let slopes = normal.solvec_into(right).context("the ridge regression of the residual failed")?;
+    Ok(slopes.remove_axis(Axis(1)))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Machine, truth};
+    use crate::synthetic::{Machine, truth};
     use super::*;
     use sapwise_scenes::Random;
-    use linfa::traits::Predict;
     use sapwise::model::{MethodModel, ModelTerm, Scale};
     use sapwise::{Backend, BackendClass, Load, Term};
 
@@ -152,56 +145,43 @@ mod tests {
     }
 
     #[test]
-    fn a_stored_residual_equals_the_prediction_of_linfa() {
+    fn the_slopes_are_where_the_penalised_error_is_least() {
         let data = residuals(120);
-        let all: Vec<usize> = (0..120).collect();
-        let ridge = data.fit(&all, 0.1).unwrap();
         let columns = Columns::new(&data.features, &data.weights);
-        let centred = data.ln_ratios.iter().map(|y| y - ridge.intercept).collect();
-        let linfa = weighted_ridge(&columns.values, &centred, &data.weights, 0.1).unwrap().predict(&columns.values);
-        for k in 0..120 {
-            let ours = data.at(&ridge, k);
-            assert!((ours - ridge.intercept - linfa[k]).abs() < 1e-9, "{ours} {}", linfa[k]);
-        }
+        let total: f64 = data.weights.iter().sum();
+        let mean = data.ln_ratios.iter().zip(&data.weights).map(|(y, w)| y * w).sum::<f64>() / total;
+        let centred: Array1<f64> = data.ln_ratios.iter().map(|y| y - mean).collect();
+        let slopes = weighted_ridge(&columns.values, &centred, &data.weights, 0.1).unwrap();
+        let left = &centred - &columns.values.dot(&slopes);
+        let weighted = Array1::from_iter(left.iter().zip(&data.weights).map(|(e, w)| e * w / total));
+        let gradient = columns.values.t().dot(&weighted) - 0.1 * &slopes;
+        assert!(slopes.len() == 4 && gradient.iter().all(|g| g.abs() < 1e-12), "{gradient}");
     }
 
     #[test]
-    fn the_library_evaluates_a_stored_residual_as_linfa_does() {
+    fn the_library_evaluates_a_stored_residual_as_it_was_fitted() {
         let machine = &Machine::family()[3];
         let threads = |k: usize| Backend::Cpu(1 << (k % 4));
-        let mut features = Array2::zeros((52, Feature::of(BackendClass::Cpu).len()));
-        for k in 0..52 {
-            let load = Load { objects: 1 << (4 + k % 13), ..Load::default() };
-            let values =
-                Feature::of(BackendClass::Cpu).iter().map(|f| f.value(&machine.hardware(), &threads(k), &load).unwrap());
-            features.row_mut(k).assign(&Array1::from_iter(values));
-        }
+        let load = |k: usize| Load { objects: 1 << (4 + k % 13), ..Load::default() };
+        let names = Feature::of(BackendClass::Cpu);
+        let features = Array2::from_shape_fn((52, names.len()), |(k, j)| {
+            names[j].value(&machine.hardware(), &threads(k), &load(k)).unwrap()
+        });
         let ln_ratios = features.rows().into_iter().map(|f| 0.3 - 0.05 * f[0] + 0.004 * f[1] + 0.1 * f[3]).collect();
-        let data = Residuals {
-            names: Feature::of(BackendClass::Cpu),
-            features,
-            ln_ratios,
-            weights: vec![1.0; 52],
-            groups: vec![0; 52],
-        };
+        let data = Residuals { names, features, ln_ratios, weights: vec![1.0; 52], groups: vec![0; 52] };
         let ridge = data.ridge().unwrap();
-        let columns = Columns::new(&data.features, &data.weights);
-        let centred = data.ln_ratios.iter().map(|y| y - ridge.intercept).collect();
-        let linfa = weighted_ridge(&columns.values, &centred, &data.weights, DEFAULT_PENALTY).unwrap();
-        let linfa = linfa.predict(&columns.values) + ridge.intercept;
         let terms = vec![ModelTerm { term: Term::Objects, scale: Scale::Cycle, unit: 2.0 }];
         let bare = MethodModel { terms, ..truth().remove(0) };
-        let full = MethodModel { residual_intercept: ridge.intercept, residual: ridge.terms, ..bare.clone() };
+        let full = MethodModel { residual_intercept: ridge.intercept, residual: ridge.terms.clone(), ..bare.clone() };
         for k in 0..52 {
-            let load = Load { objects: 1 << (4 + k % 13), ..Load::default() };
-            let cost = |m: &MethodModel| m.curve(&machine.hardware(), &threads(k)).unwrap().cost_ns(&load);
+            let cost = |m: &MethodModel| m.curve(&machine.hardware(), &threads(k)).unwrap().cost_ns(&load(k));
             let residual = (cost(&full) / cost(&bare)).ln();
-            assert!((residual - linfa[k]).abs() < 1e-9, "{residual} {}", linfa[k]);
+            assert!((residual - data.at(&ridge, k)).abs() < 1e-9, "{residual} {}", data.at(&ridge, k));
         }
     }
 
     #[test]
-    fn a_small_penalty_finds_the_slopes_and_a_machine_left_out_chooses_it() {
+    fn a_small_penalty_finds_the_slopes_and_a_machine_held_out_chooses_it() {
         let mut data = residuals(240);
         data.groups = (0..240).map(|k| k / 60).collect();
         let ridge = data.ridge().unwrap();

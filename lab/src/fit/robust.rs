@@ -1,21 +1,22 @@
 //! Cost terms fitted to times: non-negative, on logarithmic error, with outliers held back.
 
-use super::nnls::nnls;
+use crate::fit::nnls::nnls;
 use ndarray::{Array1, Array2, Axis};
+use sapwise::stats::robust_deviation;
 
 /// Times and the terms that should add up to them.
 #[derive(Debug, Clone)]
-pub(crate) struct Problem {
+pub struct Problem {
     /// Nanoseconds for one unit of each term, shape (rows, terms).
-    pub(crate) terms: Array2<f64>,
+    pub terms: Array2<f64>,
     /// Nanoseconds of each row, above zero.
-    pub(crate) ns: Vec<f64>,
+    pub ns: Vec<f64>,
     /// Weight of each row.
-    pub(crate) weights: Vec<f64>,
+    pub weights: Vec<f64>,
     /// Rows whose time is a lower bound and not a measurement: they count only while the sum stays below.
-    pub(crate) floors: Vec<bool>,
+    pub floors: Vec<bool>,
     /// The profile of each row.
-    pub(crate) groups: Vec<usize>,
+    pub groups: Vec<usize>,
 }
 
 /// Rounds of reweighting, at most. The units stop moving in the fourth digit after about eight.
@@ -29,9 +30,7 @@ const FAR: f64 = 0.5;
 /// Profiles that are left out of a start, at most: with many of them no single one takes the start with it.
 const MOST_STARTS: usize = 16;
 /// Residuals beyond this many standard deviations count linearly (Huber's constant for 95 % efficiency).
-pub(crate) const HUBER: f64 = 1.345;
-/// Makes the median absolute deviation of a normal distribution its standard deviation.
-const MAD_TO_SD: f64 = 1.4826;
+pub const HUBER: f64 = 1.345;
 /// A spread below this is taken for this, so that a perfect fit does not turn rounding errors into outliers.
 const SMALLEST_SPREAD: f64 = 1e-3;
 
@@ -45,7 +44,7 @@ impl Problem {
     /// Reweighting ends at the fixed point nearest to its start, and a profile whose fork and join was measured hundreds of
     /// times too long, as under contention, can take the start with it. So it starts from all profiles and from all but each
     /// one, and the end with the least error is taken.
-    pub(crate) fn units(&self) -> Vec<f64> {
+    pub fn units(&self) -> Vec<f64> {
         let profiles = self.profiles();
         if profiles.len() < 2 {
             return self.polished(self.start(None));
@@ -121,7 +120,7 @@ impl Problem {
         let modelled = self.terms.dot(&Array1::from(units.to_vec()));
         let ratios: Vec<f64> = modelled.iter().zip(&self.ns).map(|(m, t)| (m / t).max(1e-9)).collect();
         let measured = ratios.iter().zip(&self.floors).filter(|(_, f)| !**f).map(|(q, _)| q.ln());
-        let spread = spread(measured.collect()).max(SMALLEST_SPREAD);
+        let spread = robust_deviation(&measured.collect::<Vec<f64>>()).unwrap_or(0.0).max(SMALLEST_SPREAD);
         let weight = |(k, &q): (usize, &f64)| {
             let weight = self.weights[k] * to_logarithmic(q);
             if self.floors[k] {
@@ -153,15 +152,9 @@ fn to_logarithmic(q: f64) -> f64 {
     (q.ln() / (q * (q - 1.0))).min(10.0)
 }
 
-/// Standard deviation of values around their median, estimated from the median absolute deviation; 0 for none.
-pub(crate) fn spread(values: Vec<f64>) -> f64 {
-    let centre = median(&values);
-    MAD_TO_SD * median(&values.iter().map(|v| (v - centre).abs()).collect::<Vec<f64>>())
-}
-
 /// The value at which half of the weight is reached, interpolated between the middles of neighbouring weights, so that it
 /// moves without jumps as weights change. `None` of none.
-pub(crate) fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
+pub fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
     values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let half = values.iter().map(|v| v.1).sum::<f64>() / 2.0;
     let mut before: Option<(f64, f64)> = None;
@@ -181,7 +174,7 @@ pub(crate) fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
 }
 
 /// The least of values, given ascending with their weights, up to which at least this much weight is reached; `None` where all have less.
-pub(super) fn value_at_weight(values: &[(f64, f64)], weight: f64) -> Option<f64> {
+pub fn value_at_weight(values: &[(f64, f64)], weight: f64) -> Option<f64> {
     let mut passed = 0.0;
     let reached = values.iter().find(|v| {
         passed += v.1;
@@ -190,14 +183,10 @@ pub(super) fn value_at_weight(values: &[(f64, f64)], weight: f64) -> Option<f64>
     reached.map(|v| v.0)
 }
 
-/// Median; 0 for none.
-fn median(values: &[f64]) -> f64 {
-    sapwise::stats::median(values).unwrap_or(0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sapwise_scenes::Random;
 
     #[test]
     fn weighted_medians_ignore_far_values_and_follow_weights() {
@@ -207,7 +196,6 @@ mod tests {
         assert_eq!(weighted_median(vec![(1.0, 1.0), (2.0, 1.0)]), Some(1.5));
         assert!(weighted_median(vec![(1.0, 9.0), (2.0, 1.0)]).unwrap() <= 1.1);
     }
-    use sapwise_scenes::Random;
 
     fn line(ns: impl Fn(f64) -> f64) -> Problem {
         let n = |k: usize| 2.0_f64.powf(4.0 + 0.5 * k as f64);

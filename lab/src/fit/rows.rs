@@ -1,26 +1,26 @@
 //! From profiles to the rows of a regression.
 
-use super::profile::{Profile, Spot};
+use crate::data::{Profile, Spot};
 use sapwise::{BackendClass, Load};
 use std::collections::BTreeMap;
 
 /// The median time of one algorithm at one point.
 #[derive(Debug, Clone)]
-pub(crate) struct Row {
+pub struct Row {
     /// Position of the profile in the list that the rows were made from.
-    pub(crate) profile: usize,
+    pub profile: usize,
     /// Position of the algorithm in [`Profile::algorithms`].
-    pub(crate) algorithm: u16,
+    pub algorithm: u16,
     /// The load of the point.
-    pub(crate) load: Load,
+    pub load: Load,
     /// Latency between cores at the point, where it is known.
-    pub(crate) core_to_core_ns: Option<f64>,
+    pub core_to_core_ns: Option<f64>,
     /// Median over the frames.
-    pub(crate) ns: f64,
+    pub ns: f64,
     /// Time over the best of the point, of a lower bound that bound over it.
-    pub(crate) behind: f64,
+    pub behind: f64,
     /// The time is a lower bound: the algorithm had left the race before this point.
-    pub(crate) floor: bool,
+    pub floor: bool,
 }
 
 /// An algorithm that left the race is taken to be at least this many times slower than the best at larger sizes, or half as many
@@ -29,7 +29,7 @@ const LEFT_BEHIND: f64 = 2.0;
 
 /// One row for each algorithm and point, and a lower bound for each point of a scenario beyond the last at which an algorithm
 /// was timed. `position` is noted in the rows as that of the profile.
-pub(crate) fn rows(profile: &Profile, position: usize) -> Vec<Row> {
+pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
     let mut rows = Vec::new();
     for (algorithm, timed) in profile.algorithms.iter().enumerate() {
         let algorithm = algorithm as u16;
@@ -74,8 +74,8 @@ fn gains(course: &BTreeMap<u32, f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::synthetic::Machine;
-    use sapwise::report::Report;
+    use crate::synthetic::Machine;
+    use crate::report::Report;
 
     #[test]
     fn a_gpu_that_gained_when_it_left_has_no_floor_beyond() {

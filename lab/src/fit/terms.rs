@@ -10,18 +10,18 @@ fn tests(method: &str) -> &'static [Term] {
         "brute" => &[Term::AllPairs],
         "sap" => &[Term::AxisCandidates],
         "grid-sap" => &[Term::StripCandidates],
-        // pair-cache lists are tested pair by pair, and made anew in few frames.
+        // Kept pairs are tested one by one, and found again in few frames.
         "pair-cache" => &[],
         _ => &[Term::AllPairs, Term::AxisCandidates, Term::StripCandidates],
     }
 }
 
-/// The method that another one goes over to where that is cheaper: the strips take over where boxes move too far for pair-cache lists.
-pub(crate) fn other_way(method: &str) -> Option<&'static str> {
+/// The method that another one falls back to where that is cheaper: the grid takes over where boxes move too far for kept pairs.
+pub fn fallback_method(method: &str) -> Option<&'static str> {
     (method == "pair-cache").then_some("grid-sap")
 }
 
-/// Whether the boxes are sorted in every frame. pair-cache lists sort them in few, or, where the strips take over, by their cells only.
+/// Whether the boxes are sorted in every frame. `pair-cache` sorts them in few, or, where the grid takes over, by their cells only.
 fn sorts(method: &str) -> bool {
     !matches!(method, "brute" | "pair-cache")
 }
@@ -35,7 +35,7 @@ fn is_incremental(method: &str) -> bool {
 ///
 /// Of columns that can't be told apart the first one is used, so that the order matters where all machines are alike: work of
 /// the lanes before work of the cycles, divided work before serial work, the GPU's work before that of the CPU for it.
-pub(crate) fn terms(method: &str, class: BackendClass) -> Vec<(Term, Scale)> {
+pub fn terms(method: &str, class: BackendClass) -> Vec<(Term, Scale)> {
     use {Scale::*, Term::*};
     let sorts = sorts(method);
     let tests = tests(method).iter();
@@ -73,7 +73,7 @@ pub(crate) fn terms(method: &str, class: BackendClass) -> Vec<(Term, Scale)> {
 }
 
 /// The terms of a method within one machine, where everything but the load is constant.
-pub(crate) fn terms_of_one_machine(method: &str, class: BackendClass) -> Vec<Term> {
+pub fn terms_of_one_machine(method: &str, class: BackendClass) -> Vec<Term> {
     let mut list = vec![Term::Call, Term::Objects];
     if sorts(method) {
         list.push(Term::Sort);

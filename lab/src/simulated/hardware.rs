@@ -3,7 +3,7 @@
 use super::machine::{TrueGpu, TrueMachine};
 use super::pairing::Build;
 use sapwise_scenes::Random;
-use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, Statistic, gpu, parameter};
+use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, Statistic, GpuParameterId, ParameterId};
 use sapwise::{Hardware, Machine, Parameter};
 
 /// Why a parameter that probes measure is not simulated.
@@ -26,17 +26,17 @@ pub(super) fn hardware(build: &Build<'_>, machine: &TrueMachine) -> Hardware {
     let cpu = &machine.cpu;
     let spec = build.cpu;
     let mut figures = vec![
-        (parameter::USABLE_CORES.to_owned(), Reported(cpu.threads)),
-        (parameter::PHYSICAL_CORES.to_owned(), Reported(cpu.cores)),
-        (parameter::CLOCK_REPORTED_GHZ.to_owned(), Reported(spec.base_ghz)),
-        (parameter::CLOCK_MEASURED_GHZ.to_owned(), Measured(cpu.ghz, 0.005)),
-        (parameter::SIMD_LANES.to_owned(), Reported(cpu.lanes)),
-        (parameter::CACHE_L1D_BYTES.to_owned(), Reported(cpu.cache_bytes[0])),
-        (parameter::CACHE_L2_BYTES.to_owned(), Reported(cpu.cache_bytes[1])),
-        (parameter::CACHE_LLC_BYTES.to_owned(), Reported(cpu.cache_bytes[2])),
-        (parameter::MEMORY_BYTES.to_owned(), Reported(machine.memory_bytes())),
-        (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S.to_owned(), Measured(cpu.one_thread_gb_per_s, 0.05)),
-        (parameter::BANDWIDTH_ALL_THREADS_GB_PER_S.to_owned(), Measured(cpu.all_threads_gb_per_s, 0.08)),
+        (ParameterId::UsableCores.to_owned(), Reported(cpu.threads)),
+        (ParameterId::PhysicalCores.to_owned(), Reported(cpu.cores)),
+        (ParameterId::ClockReportedGhz.to_owned(), Reported(spec.base_ghz)),
+        (ParameterId::ClockMeasuredGhz.to_owned(), Measured(cpu.ghz, 0.005)),
+        (ParameterId::SimdLanes.to_owned(), Reported(cpu.lanes)),
+        (ParameterId::CacheL1dBytes.to_owned(), Reported(cpu.cache_bytes[0])),
+        (ParameterId::CacheL2Bytes.to_owned(), Reported(cpu.cache_bytes[1])),
+        (ParameterId::CacheLlcBytes.to_owned(), Reported(cpu.cache_bytes[2])),
+        (ParameterId::MemoryBytes.to_owned(), Reported(machine.memory_bytes())),
+        (ParameterId::BandwidthOneThreadGbPerS.to_owned(), Measured(cpu.one_thread_gb_per_s, 0.05)),
+        (ParameterId::BandwidthAllThreadsGbPerS.to_owned(), Measured(cpu.all_threads_gb_per_s, 0.08)),
     ];
     figures.extend(
         parameter::LATENCY_WORKING_SETS_KIB
@@ -44,10 +44,10 @@ pub(super) fn hardware(build: &Build<'_>, machine: &TrueMachine) -> Hardware {
     );
     if cpu.threads > 1.0 {
         figures.extend([
-            (parameter::FORK_JOIN_WARM_NS.to_owned(), Measured(cpu.fork_join_warm_ns, 0.4)),
-            (parameter::FORK_JOIN_COLD_NS.to_owned(), Measured(cpu.fork_join_cold_ns, 0.4)),
-            (parameter::SCALING_TWO_THREADS_RATIO.to_owned(), Measured(cpu.speed_up(2.0, cpu.second_thread), 0.01)),
-            (parameter::SCALING_ALL_THREADS_RATIO.to_owned(), Measured(cpu.speed_up(cpu.threads, cpu.second_thread), 0.02)),
+            (ParameterId::ForkJoinWarmNs.to_owned(), Measured(cpu.fork_join_warm_ns, 0.4)),
+            (ParameterId::ForkJoinColdNs.to_owned(), Measured(cpu.fork_join_cold_ns, 0.4)),
+            (ParameterId::ScalingTwoThreadsRatio.to_owned(), Measured(cpu.speed_up(2.0, cpu.second_thread), 0.01)),
+            (ParameterId::ScalingAllThreadsRatio.to_owned(), Measured(cpu.speed_up(cpu.threads, cpu.second_thread), 0.02)),
         ]);
     }
     let gpus: Vec<GpuHardware> = identities(machine)
@@ -61,7 +61,7 @@ pub(super) fn hardware(build: &Build<'_>, machine: &TrueMachine) -> Hardware {
                 ..gpu
             },
             parameters: parameters(
-                &gpu::parameter::all_names(),
+                &GpuParameterId::OF_ONE,
                 of_gpu(figures, spec.inside.is_some(), spec),
                 seed,
                 &spec.name,
@@ -70,11 +70,11 @@ pub(super) fn hardware(build: &Build<'_>, machine: &TrueMachine) -> Hardware {
         .collect();
     let group = machine.group.map(|group| {
         let figures = vec![
-            (gpu::parameter::GROUP_UPLOAD_RATIO.to_owned(), Measured(group.upload, 0.03)),
-            (gpu::parameter::GROUP_ROUND_TRIP_RATIO.to_owned(), Measured(group.round_trip, 0.03)),
-            (gpu::parameter::GROUP_ARITHMETIC_RATIO.to_owned(), Measured(group.arithmetic, 0.01)),
+            (GpuParameterId::GroupUploadRatio.to_owned(), Measured(group.upload, 0.03)),
+            (GpuParameterId::GroupRoundTripRatio.to_owned(), Measured(group.round_trip, 0.03)),
+            (GpuParameterId::GroupArithmeticRatio.to_owned(), Measured(group.arithmetic, 0.01)),
         ];
-        let names = gpu::parameter::GROUP.map(str::to_owned);
+        let names = GpuParameterId::GROUP.map(str::to_owned);
         GpuGroup { gpus: (0..gpus.len() as u32).collect(), parameters: parameters(&names, figures, seed, &cpu.name) }
     });
     Hardware {
@@ -87,7 +87,7 @@ pub(super) fn hardware(build: &Build<'_>, machine: &TrueMachine) -> Hardware {
             simd: spec.simd.level().0.to_string(),
             hypervisor: "none".to_owned(),
         },
-        parameters: parameters(&parameter::all_names(), figures, seed, &cpu.name),
+        parameters: parameters(&ParameterId::ALL, figures, seed, &cpu.name),
         gpus,
         gpu_groups: group.into_iter().collect(),
     }
@@ -107,27 +107,26 @@ pub(super) fn identities(machine: &TrueMachine) -> Vec<GpuIdentity> {
 }
 
 fn of_gpu(gpu: &TrueGpu, unified: bool, spec: &super::specification::Gpu) -> Vec<(String, Figure)> {
-    use gpu::parameter as name;
     let whole = |gb_per_s: f64| TRANSFER_BYTES / (TRANSFER_BYTES / gb_per_s + gpu.transfer_latency_ns);
     let figures = [
-        (name::UPLOAD_GB_PER_S, Measured(whole(gpu.upload_gb_per_s), 0.03)),
-        (name::UPLOAD_LATENCY_NS, Measured(gpu.transfer_latency_ns, 0.05)),
-        (name::UPLOAD_RATE_GB_PER_S, Measured(gpu.upload_gb_per_s, 0.04)),
-        (name::DOWNLOAD_GB_PER_S, Measured(whole(gpu.download_gb_per_s), 0.03)),
-        (name::DOWNLOAD_LATENCY_NS, Measured(gpu.transfer_latency_ns, 0.05)),
-        (name::DOWNLOAD_RATE_GB_PER_S, Measured(gpu.download_gb_per_s, 0.04)),
-        (name::READ_GB_PER_S, Measured(gpu.read_gb_per_s, 0.02)),
-        (name::COPY_GB_PER_S, Measured(gpu.copy_gb_per_s, 0.02)),
-        (name::MEMORY_BYTES, Reported(gpu.memory_bytes)),
-        (name::CLOCK_GHZ, Reported(spec.clock_ghz)),
-        (name::PROCESSORS, Reported(f64::from(spec.processors))),
-        (name::LANES, Reported(f64::from(spec.lanes))),
-        (name::SUBMIT_NS, Measured(gpu.submit_ns, 0.05)),
-        (name::ROUND_TRIP_NS, Measured(gpu.round_trip_ns, 0.06)),
-        (name::DISPATCH_NS, Measured(gpu.dispatch_ns, 0.03)),
-        (name::READ_BACK_NS, Measured(gpu.read_back_ns, 0.05)),
-        (name::ARITHMETIC_GFLOP_PER_S, Measured(gpu.gflop_per_s, 0.01)),
-        (name::UNIFIED_MEMORY, Reported(if unified { 1.0 } else { 0.0 })),
+        (GpuParameterId::UploadGbPerS, Measured(whole(gpu.upload_gb_per_s), 0.03)),
+        (GpuParameterId::UploadLatencyNs, Measured(gpu.transfer_latency_ns, 0.05)),
+        (GpuParameterId::UploadRateGbPerS, Measured(gpu.upload_gb_per_s, 0.04)),
+        (GpuParameterId::DownloadGbPerS, Measured(whole(gpu.download_gb_per_s), 0.03)),
+        (GpuParameterId::DownloadLatencyNs, Measured(gpu.transfer_latency_ns, 0.05)),
+        (GpuParameterId::DownloadRateGbPerS, Measured(gpu.download_gb_per_s, 0.04)),
+        (GpuParameterId::ReadGbPerS, Measured(gpu.read_gb_per_s, 0.02)),
+        (GpuParameterId::CopyGbPerS, Measured(gpu.copy_gb_per_s, 0.02)),
+        (GpuParameterId::MemoryBytes, Reported(gpu.memory_bytes)),
+        (GpuParameterId::ClockGhz, Reported(spec.clock_ghz)),
+        (GpuParameterId::Processors, Reported(f64::from(spec.processors))),
+        (GpuParameterId::Lanes, Reported(f64::from(spec.lanes))),
+        (GpuParameterId::SubmitNs, Measured(gpu.submit_ns, 0.05)),
+        (GpuParameterId::RoundTripNs, Measured(gpu.round_trip_ns, 0.06)),
+        (GpuParameterId::DispatchNs, Measured(gpu.dispatch_ns, 0.03)),
+        (GpuParameterId::ReadBackNs, Measured(gpu.read_back_ns, 0.05)),
+        (GpuParameterId::ArithmeticGflopPerS, Measured(gpu.gflop_per_s, 0.01)),
+        (GpuParameterId::UnifiedMemory, Reported(if unified { 1.0 } else { 0.0 })),
     ];
     figures.into_iter().map(|(name, figure)| (name.to_owned(), figure)).collect()
 }

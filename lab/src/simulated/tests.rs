@@ -30,7 +30,7 @@ fn every_report_is_sound_complete_and_labelled() {
         assert!(text.len() <= 200_000, "{name} has {} bytes", text.len());
         assert!(ids.insert(&report.hardware.machine.physical_id), "{name}");
         let names: Vec<&str> = report.hardware.parameters.iter().map(|p| p.name.as_str()).collect();
-        assert_eq!(names, sapwise::hardware::parameter::all_names(), "{name}");
+        assert_eq!(names, ParameterId::ALL, "{name}");
         for point in &report.points {
             let samples: Vec<usize> = point.timings.iter().map(|t| t.samples_ns.len()).collect();
             assert!(!samples.is_empty() && samples.iter().all(|&n| n == samples[0] && n >= 5), "{name}: {samples:?}");

@@ -1,10 +1,9 @@
-//! What Section 6 of the paper says of hardware parameters, held against its own table and against these machines.
+//! What Section 6 of the paper says of hardware parameters, compared with its own table and with these machines.
 
 use super::entry::Entry;
-use super::influence::{Influence, Link, On};
-use crate::train::Verdict;
-use sapwise::hardware::gpu::parameter as gpu;
-use std::collections::BTreeMap;
+use super::influence::{Influence, On};
+use crate::evaluate::Verdict;
+use sapwise::hardware::GpuParameterId;
 use std::fmt;
 
 /// The speed-up from the Quadro 4600 to the 5800 that the paper prints ("1.5X much faster"). It prints no other timing in figures.
@@ -74,15 +73,15 @@ pub(super) fn cards(entries: &[Entry]) -> [Option<usize>; 3] {
 /// The claims of Section 6, in its order.
 pub(super) fn claims(entries: &[Entry], influence: &Influence) -> Vec<Claim> {
     let said = [
-        ("The clock rate of the GPU does not influence the time of the broad phase.", gpu::CLOCK_GHZ, Said::NotLinked),
-        ("The clock rate is almost the same on the three cards.", gpu::CLOCK_GHZ, Said::AlikeOnAll),
-        ("The bandwidth from CPU to GPU is almost the same on them.", gpu::UPLOAD_GB_PER_S, Said::AlikeOnAll),
-        ("The bandwidth from GPU to CPU is similar on two of them.", gpu::DOWNLOAD_GB_PER_S, Said::AlikeOnTwo),
-        ("The bandwidth from CPU to GPU does not influence it.", gpu::UPLOAD_GB_PER_S, Said::NotLinked),
-        ("The bandwidth from GPU to CPU does not influence it.", gpu::DOWNLOAD_GB_PER_S, Said::NotLinked),
-        ("The memory size of the GPU hardly influences it.", gpu::MEMORY_BYTES, Said::NotLinked),
-        ("The internal bandwidth of the GPU seems to influence it.", gpu::COPY_GB_PER_S, Said::Linked),
-        ("The number of cores of the GPU seems to influence it.", gpu::LANES, Said::Linked),
+        ("The clock rate of the GPU does not influence the time of the broad phase.", GpuParameterId::ClockGhz, Said::NotLinked),
+        ("The clock rate is almost the same on the three cards.", GpuParameterId::ClockGhz, Said::AlikeOnAll),
+        ("The bandwidth from CPU to GPU is almost the same on them.", GpuParameterId::UploadGbPerS, Said::AlikeOnAll),
+        ("The bandwidth from GPU to CPU is similar on two of them.", GpuParameterId::DownloadGbPerS, Said::AlikeOnTwo),
+        ("The bandwidth from CPU to GPU does not influence it.", GpuParameterId::UploadGbPerS, Said::NotLinked),
+        ("The bandwidth from GPU to CPU does not influence it.", GpuParameterId::DownloadGbPerS, Said::NotLinked),
+        ("The memory size of the GPU hardly influences it.", GpuParameterId::MemoryBytes, Said::NotLinked),
+        ("The internal bandwidth of the GPU seems to influence it.", GpuParameterId::CopyGbPerS, Said::Linked),
+        ("The number of cores of the GPU seems to influence it.", GpuParameterId::Lanes, Said::Linked),
     ];
     let cards = cards(entries);
     let claim = |(text, parameter, said): (&str, &str, Said)| {
@@ -140,50 +139,49 @@ fn by_reports(said: Said, parameter: &str, influence: &Influence) -> (Outcome, S
         return (Outcome::NotAsked, "it is a claim about the three cards".to_owned());
     }
     let read_instead = match parameter {
-        gpu::UPLOAD_GB_PER_S => gpu::UPLOAD_RATE_GB_PER_S,
-        gpu::DOWNLOAD_GB_PER_S => gpu::DOWNLOAD_RATE_GB_PER_S,
-        gpu::COPY_GB_PER_S => gpu::READ_GB_PER_S,
+        GpuParameterId::UploadGbPerS => GpuParameterId::UploadRateGbPerS,
+        GpuParameterId::DownloadGbPerS => GpuParameterId::DownloadRateGbPerS,
+        GpuParameterId::CopyGbPerS => GpuParameterId::ReadGbPerS,
         other => other,
     };
     let [named, read] = [parameter, read_instead].map(|name| format!("gpu/{name}"));
-    let mut of_methods: BTreeMap<&str, &Link> = BTreeMap::new();
-    for link in &influence.links {
-        let On::Method(method) = &link.on else { continue };
-        if !method.ends_with("GPU") || ![&named, &read].contains(&&link.parameter) {
-            continue;
-        }
-        // One that predictions read says more than what they leave.
-        let kept = of_methods.entry(method).or_insert(link);
-        if kept.effect.is_none() && link.effect.is_some() {
-            *kept = link;
-        }
-    }
-    let ranks: Vec<String> = influence
-        .links
-        .iter()
+    let of_gpus = |on: &On| match on {
+        On::Method(method) => method.ends_with("GPU"),
+        On::Algorithm(name) => name.contains("gpu0"),
+        On::Border(_) | On::Choice => false,
+    };
+    let links = || influence.links.iter().filter(|l| of_gpus(&l.on));
+    let ranks: Vec<String> = links()
         .filter(|l| l.parameter == named)
-        .filter_map(|l| match &l.on {
-            On::Algorithm(name) if name.contains("gpu0") => {
-                l.rank.map(|r| format!("{name} {:+.2} ({:+.2} to {:+.2})", r.correlation, r.low, r.high))
+        .filter_map(|l| match (&l.on, l.rank) {
+            (On::Algorithm(name), Some(r)) => {
+                Some(format!("{name} {:+.2} ({:+.2} to {:+.2})", r.correlation, r.low, r.high))
             }
             _ => None,
         })
         .collect();
-    if of_methods.is_empty() {
+    // What a parameter is worth to predictions decides; of one that they do not read the ranks do.
+    let effects: Vec<Verdict> =
+        links().filter(|l| l.parameter == read).filter_map(|l| l.effect.as_ref().map(|e| e.verdict)).collect();
+    let is_read = !effects.is_empty();
+    let of_ranks = links().filter(|l| l.parameter == named).filter_map(|l| l.rank.map(|r| r.verdict));
+    let verdicts: Vec<Verdict> = if is_read { effects } else { of_ranks.collect() };
+    if verdicts.is_empty() {
         let why = format!(
-            "fewer than {} machines with a GPU, programs that act as one left out, have both the parameter and timings on it; \
-             add their reports",
+            "fewer than {} machines with a GPU, software adapters left out, have both the parameter and timings on it",
             super::rank::FEWEST_MACHINES
         );
         return (Outcome::Undecidable, why);
     }
-    let with = |verdict| of_methods.values().filter(|l| l.verdict == verdict).count();
-    let (linked, not, all) = (with(Verdict::Linked), with(Verdict::NotLinked), of_methods.len());
-    let is_read = of_methods.values().any(|l| l.effect.is_some());
-    let how = if is_read { format!("read by predictions as {read}") } else { "read by no prediction".to_owned() };
+    let with = |verdict| verdicts.iter().filter(|v| **v == verdict).count();
+    let (linked, not, all) = (with(Verdict::Linked), with(Verdict::NotLinked), verdicts.len());
+    let how = if is_read {
+        format!("predictions read it as {read}; fitted without it, predictions of held-out machines show it")
+    } else {
+        "no prediction reads it; rank correlations show it".to_owned()
+    };
     let why = format!(
-        "{how}; what it adds to predictions of machines left out: linked with {linked} and not linked with {not} of {all} methods on GPUs. \
-         Rank correlations with their times: {}",
+        "{how} linked with {linked} and not linked with {not} of {all} methods on GPUs. Rank correlations with their times: {}",
         if ranks.is_empty() { "none".to_owned() } else { ranks.join(", ") }
     );
     // More than half of the methods decide. What adds nothing to the parameters that are read may still be a cause that they stand for.

@@ -1,11 +1,14 @@
 //! Figures 4, 6 and 7 of the paper: time over objects, CPU against GPU, on 1..k GPUs, on 1..k threads.
 
 use super::entry::{Entry, SOFTWARE, best_of_machines};
-use crate::figures::{Band, Crossing, Curve, CurvePanel, CurvePoint, Curves};
+use crate::Report;
+use crate::data::usual_scenario;
+use crate::data_table::{Cell, DataTable};
+use crate::figures::{Band, BorderLine, Curve, CurvePanel, CurvePoint, Curves};
+use crate::fit::measured_tuning;
 use crate::sweep::median;
-use crate::train::{measured_fields, slice_scenario};
 use sapwise::stats::quantile;
-use sapwise::{AlgorithmId, Backend, BackendClass, Tuning, Report};
+use sapwise::{AlgorithmId, Backend, BackendClass, Crossover, Tuning};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Machines in one picture.
@@ -13,7 +16,7 @@ const MOST_PANELS: usize = 4;
 
 /// Which processors a picture compares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Compared {
+pub(super) enum Compared {
     /// One core, all cores, GPUs: Figure 4.
     CpuAndGpu,
     /// Numbers of GPUs: Figure 6.
@@ -23,7 +26,7 @@ pub(crate) enum Compared {
 }
 
 impl Compared {
-    pub(crate) const ALL: [Self; 3] = [Self::CpuAndGpu, Self::Gpus, Self::Threads];
+    pub(super) const ALL: [Self; 3] = [Self::CpuAndGpu, Self::Gpus, Self::Threads];
 
     /// Whether a report has more than one side to compare.
     fn is_in(self, entry: &Entry) -> bool {
@@ -46,7 +49,7 @@ impl Compared {
     }
 
     /// The reports that it is drawn of: of each physical machine the one that has most of it, up to four.
-    pub(crate) fn drawn(self, entries: &[Entry], wanted: &[usize]) -> Vec<usize> {
+    pub(super) fn drawn(self, entries: &[Entry], wanted: &[usize]) -> Vec<usize> {
         let among = wanted.iter().copied().filter(|&k| entries[k].studied.is_ok() && self.is_in(&entries[k]));
         let all = best_of_machines(entries, among, |e| (self.sides(e), e.wholeness()));
         // Of many machines some, evenly taken.
@@ -76,21 +79,21 @@ impl Compared {
     }
 
     /// The picture of these reports, each a panel. The time of each side is that of its fastest algorithm at each size.
-    pub(super) fn figure(self, drawn: &[(&Entry, &Report)]) -> Curves {
+    pub(super) fn figure(self, drawn: &[(usize, &Entry, &Report)]) -> Curves {
         let mut sides: BTreeSet<(BackendClass, Vec<u32>)> = BTreeSet::new();
-        for (entry, report) in drawn {
+        for (_, entry, report) in drawn {
             let ids = report.algorithms.iter().map(|t| &t.id).filter(|id| self.takes(id, entry.threads()));
             sides.extend(ids.map(|id| side(id.backend())));
         }
         let sides: Vec<_> = sides.into_iter().collect();
-        let panels = drawn.iter().map(|(entry, report)| self.panel(entry, report, &sides)).collect();
+        let panels = drawn.iter().map(|(_, entry, report)| self.panel(entry, report, &sides)).collect();
         Curves { title: self.title().to_owned(), panels }
     }
 
     fn panel(self, entry: &Entry, report: &Report, sides: &[(BackendClass, Vec<u32>)]) -> CurvePanel {
-        let (threads, programs) = (entry.threads(), entry.programs());
-        let name = |side: &(BackendClass, Vec<u32>)| name(side, &programs);
-        let scenario = slice_scenario(report).to_owned();
+        let (threads, software_gpus) = (entry.threads(), entry.software_gpus());
+        let name = |side: &(BackendClass, Vec<u32>)| name(side, &software_gpus);
+        let scenario = usual_scenario(report).to_owned();
         let own = only(report, |id| self.takes(id, threads) && entry.profile.position(id).is_some());
         let style = |id: &AlgorithmId| sides.iter().position(|s| *s == side(id.backend())).unwrap_or_default();
         let mut series: Vec<Curve> = Vec::new();
@@ -100,12 +103,12 @@ impl Compared {
                 series.push(Curve { name: name(of), style: k, points });
             }
         }
-        let (fields, crossings) = match measured_fields(&own, &scenario) {
-            Ok(fields) => (bands(&fields, style, |k| name(&sides[k])), crossings(&fields)),
+        let (fields, borders) = match measured_tuning(&own, &scenario) {
+            Ok(tuning) => (bands(&tuning, style, |k| name(&sides[k])), border_lines(&tuning)),
             // Too few sizes for curves; the points are drawn all the same.
             Err(_) => (Vec::new(), Vec::new()),
         };
-        CurvePanel { title: format!("{} ({scenario})", entry.name), series, fields, crossings }
+        CurvePanel { title: format!("{} ({scenario})", entry.name), series, fields, borders }
     }
 }
 
@@ -117,9 +120,9 @@ fn side(backend: &Backend) -> (BackendClass, Vec<u32>) {
     }
 }
 
-fn name((class, numbers): &(BackendClass, Vec<u32>), programs: &[u32]) -> String {
+fn name((class, numbers): &(BackendClass, Vec<u32>), software_gpus: &[u32]) -> String {
     match class {
-        BackendClass::Gpu if numbers.iter().any(|g| programs.contains(g)) => {
+        BackendClass::Gpu if numbers.iter().any(|g| software_gpus.contains(g)) => {
             format!("{}{SOFTWARE}", Backend::Gpu(numbers.clone()))
         }
         BackendClass::Cpu if numbers[..] == [1] => "1 thread".to_owned(),
@@ -136,7 +139,7 @@ fn only(report: &Report, takes: impl Fn(&AlgorithmId) -> bool) -> Report {
 }
 
 /// Takes all but some algorithms out of a report.
-pub(crate) fn keep(report: &mut Report, takes: impl Fn(&AlgorithmId) -> bool) {
+pub(super) fn keep(report: &mut Report, takes: impl Fn(&AlgorithmId) -> bool) {
     report.algorithms.retain(|t| takes(&t.id));
     report.points.iter_mut().for_each(|p| p.timings.retain(|t| takes(&t.algorithm)));
 }
@@ -161,9 +164,9 @@ fn envelope(report: &Report, scenario: &str, of: impl Fn(&AlgorithmId) -> bool) 
 }
 
 /// The steps of the slice, those in a row that are of the same side joined.
-fn bands(fields: &Tuning, style: impl Fn(&AlgorithmId) -> usize, name: impl Fn(usize) -> String) -> Vec<Band> {
+fn bands(tuning: &Tuning, style: impl Fn(&AlgorithmId) -> usize, name: impl Fn(usize) -> String) -> Vec<Band> {
     let mut bands: Vec<Band> = Vec::new();
-    for step in &fields.steps {
+    for step in &tuning.steps {
         let (from, style) = (f64::from(step.from_objects), style(&step.algorithm));
         match bands.last_mut() {
             Some(last) if last.style == style => {}
@@ -179,19 +182,60 @@ fn bands(fields: &Tuning, style: impl Fn(&AlgorithmId) -> usize, name: impl Fn(u
 }
 
 /// The borders between sides.
-fn crossings(fields: &Tuning) -> Vec<Crossing> {
-    let apart = fields.crossovers.iter().filter(|b| side(b.below.backend()) != side(b.above.backend()));
-    let crossing = |b: &sapwise::Border| {
+fn border_lines(tuning: &Tuning) -> Vec<BorderLine> {
+    let apart = tuning.crossovers.iter().filter(|b| side(b.below.backend()) != side(b.above.backend()));
+    let line = |b: &Crossover| {
         let (low, high) = b.interval().unwrap_or((b.objects, b.objects));
-        Crossing { objects: b.objects, low, high }
+        BorderLine { objects: b.objects, low, high }
     };
-    apart.map(crossing).collect()
+    apart.map(line).collect()
+}
+
+/// What the panels show as tables: the times, the fields and the borders. `drawn` are the reports of the panels, by position.
+pub(super) fn tables(figure: &Curves, drawn: &[(usize, &Entry, &Report)]) -> [DataTable; 3] {
+    let heads = [("machine", "machine"), ("scenario", "scenario")];
+    let mut times = DataTable::new([
+        heads[0],
+        heads[1],
+        ("on", "side"),
+        ("objects", "objects"),
+        ("median time (ns)", "median_ns"),
+        ("lower quartile (ns)", "lower_quartile_ns"),
+        ("upper quartile (ns)", "upper_quartile_ns"),
+    ]);
+    let mut fields =
+        DataTable::new([heads[0], heads[1], ("on", "side"), ("from (objects)", "from_objects"), ("to (objects)", "to_objects")]);
+    let mut borders = DataTable::new([
+        heads[0],
+        heads[1],
+        ("border (objects)", "objects"),
+        ("interval from (objects)", "low_objects"),
+        ("interval to (objects)", "high_objects"),
+    ]);
+    for (panel, (k, entry, report)) in figure.panels.iter().zip(drawn) {
+        let heads = || [&entry.name[..], usual_scenario(report)].map(Cell::text).to_vec();
+        for curve in &panel.series {
+            for p in &curve.points {
+                let figures = [p.objects, p.ns, p.low_ns, p.high_ns].map(Cell::exact);
+                times.push([heads(), vec![Cell::text(&curve.name)], figures.to_vec()].concat(), &[*k]);
+            }
+        }
+        for field in &panel.fields {
+            let figures = [field.from, field.to].map(Cell::exact);
+            fields.push([heads(), vec![Cell::text(&field.name)], figures.to_vec()].concat(), &[*k]);
+        }
+        for border in &panel.borders {
+            let figures = [border.objects, border.low, border.high].map(Cell::exact);
+            borders.push([heads(), figures.to_vec()].concat(), &[*k]);
+        }
+    }
+    [times, fields, borders]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::synthetic::Machine;
+    use crate::synthetic::Machine;
 
     fn entry(machine: &Machine) -> (Entry, Report) {
         let report = machine.report();
@@ -201,22 +245,22 @@ mod tests {
     #[test]
     fn sides_are_their_fastest_algorithm_with_the_fields_behind() {
         let (entry, report) = entry(&Machine::family()[2]);
-        let curves = Compared::Threads.figure(&[(&entry, &report)]);
+        let curves = Compared::Threads.figure(&[(0, &entry, &report)]);
         let panel = &curves.panels[0];
         let names: Vec<&str> = panel.series.iter().map(|s| s.name.as_str()).collect();
         assert!(names.len() > 1 && names[0] == "1 thread", "{names:?}");
         for point in &panel.series[0].points {
             let of = |p: &&crate::report::Point| {
-                f64::from(p.load.objects) == point.objects && p.scenario == slice_scenario(&report)
+                f64::from(p.load.objects) == point.objects && p.scenario == usual_scenario(&report)
             };
             let timings = report.points.iter().filter(of).flat_map(|p| &p.timings);
             let single = timings.filter(|t| *t.algorithm.backend() == Backend::Cpu(1));
             let least = single.filter_map(|t| median(&t.samples_ns)).min_by(f64::total_cmp).unwrap();
             assert!(point.ns <= least * 1.001 && point.low_ns <= point.ns && point.ns <= point.high_ns, "{point:?} {least}");
         }
-        // Bands follow each other, and each border between two of them is a crossing.
+        // Bands follow each other, and between two of them is a border.
         assert!(panel.fields.len() > 1 && panel.fields.windows(2).all(|w| w[0].to == w[1].from && w[0].style != w[1].style));
-        assert!(panel.crossings.len() >= panel.fields.len() - 1);
+        assert!(panel.borders.len() >= panel.fields.len() - 1);
         assert!(!Compared::Gpus.is_in(&entry) && !Compared::CpuAndGpu.is_in(&entry) && Compared::Threads.is_in(&entry));
     }
 

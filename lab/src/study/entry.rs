@@ -1,7 +1,7 @@
 //! One report of a study: what the page tells of it, and its medians.
 
-use crate::train::{self, Profile};
-use sapwise::hardware::parameter;
+use crate::data::{Profile, figure};
+use sapwise::hardware::ParameterId;
 use crate::report::{Label, Provenance, Report};
 use sapwise::{AlgorithmId, Backend, BackendClass, GpuHardware, GpuKind, Hardware};
 use std::collections::BTreeMap;
@@ -27,12 +27,12 @@ pub(crate) struct Entry {
     pub(crate) studied: Result<(), String>,
 }
 
-/// What is said of algorithms on all cores, and of GPUs that are programs.
+/// What is said of algorithms on all cores, and of GPUs that are software adapters.
 pub(super) const ON_ALL_CORES: &str = " on all cores";
 pub(super) const SOFTWARE: &str = " (software)";
 
 /// A place at which algorithms were timed: the scenario and the number of objects.
-pub(super) type Place<'a> = (&'a str, u32);
+pub(super) type PointKey<'a> = (&'a str, u32);
 
 impl Entry {
     pub(crate) fn new(path: &Path, file: &str, mut report: Report, studied: Result<(), String>) -> Self {
@@ -40,7 +40,7 @@ impl Entry {
         let of_gpus = report.hardware.gpus.iter_mut().map(|g| &mut g.gpu.name);
         let told = [&mut machine.cpu, &mut machine.simd, &mut report.provenance.command, &mut report.provenance.version];
         told.into_iter().chain(of_gpus).for_each(|text| *text = legible(text));
-        let profile = Profile::without_crossings(file, &report);
+        let profile = Profile::of(file, &report);
         let measured = profile.measured.clone();
         Self {
             path: path.to_owned(),
@@ -73,23 +73,23 @@ impl Entry {
     pub(super) fn wholeness(&self) -> (bool, u64, u64) {
         let whole = matches!(self.kind, Label::RealFull | Label::Simulated);
         let count = |name: &str| self.hardware.value(name).map_or(0, |v| v as u64);
-        (whole, count(parameter::USABLE_CORES), count(parameter::SIMD_LANES))
+        (whole, count(ParameterId::UsableCores), count(ParameterId::SimdLanes))
     }
 
-    /// The first GPU that is no program on the CPU.
+    /// The first GPU that is no software adapter.
     pub(super) fn gpu(&self) -> Option<&GpuHardware> {
         self.hardware.gpus.iter().find(|g| g.gpu.kind != GpuKind::Software)
     }
 
-    /// A parameter of the machine, or with `gpu/` before its name one of its first GPU that is no program.
+    /// A parameter of the machine, or with `gpu/` before its name one of its first GPU that is no software adapter.
     pub(super) fn value(&self, name: &str) -> Option<f64> {
-        train::figure(&self.hardware, name)
+        figure(&self.hardware, name)
     }
 
-    /// Numbers of the GPUs that are programs on the CPU.
-    pub(super) fn programs(&self) -> Vec<u32> {
-        let programs = self.hardware.gpus.iter().filter(|g| g.gpu.kind == GpuKind::Software);
-        programs.map(|g| g.gpu.index).collect()
+    /// Numbers of the GPUs that are software adapters.
+    pub(super) fn software_gpus(&self) -> Vec<u32> {
+        let software_gpus = self.hardware.gpus.iter().filter(|g| g.gpu.kind == GpuKind::Software);
+        software_gpus.map(|g| g.gpu.index).collect()
     }
 
     /// The most threads that an algorithm was timed on.
@@ -100,13 +100,13 @@ impl Entry {
 
     /// The median in ns of every algorithm at every place, the last where a place stands twice, by what the algorithm is
     /// called on every machine.
-    pub(super) fn times(&self) -> BTreeMap<String, BTreeMap<Place<'_>, f64>> {
+    pub(super) fn times(&self) -> BTreeMap<String, BTreeMap<PointKey<'_>, f64>> {
         let threads = self.threads();
-        let programs = self.programs();
-        let mut times: BTreeMap<String, BTreeMap<Place<'_>, f64>> = BTreeMap::new();
+        let software_gpus = self.software_gpus();
+        let mut times: BTreeMap<String, BTreeMap<PointKey<'_>, f64>> = BTreeMap::new();
         for spot in &self.profile.points {
             for &(k, ns) in &spot.medians {
-                for name in everywhere(self.profile.id(k), threads, &programs) {
+                for name in everywhere(self.profile.id(k), threads, &software_gpus) {
                     times.entry(name).or_default().insert((spot.scenario.as_str(), spot.load.objects), ns);
                 }
             }
@@ -115,13 +115,13 @@ impl Entry {
     }
 }
 
-/// What an algorithm is called on every machine: on one core, on all cores, which may be one, on each number of GPUs; those that are `programs`
+/// What an algorithm is called on every machine: on one core, on all cores, which may be one, on each number of GPUs; those that are `software_gpus`
 /// are told apart, since they are the CPU again. Nothing of some but not all cores.
-fn everywhere(id: &AlgorithmId, threads: u32, programs: &[u32]) -> Vec<String> {
+fn everywhere(id: &AlgorithmId, threads: u32, software_gpus: &[u32]) -> Vec<String> {
     let mut names = Vec::new();
     match id.backend() {
         Backend::Gpu(gpus) => {
-            let software = if gpus.iter().any(|g| programs.contains(g)) { SOFTWARE } else { "" };
+            let software = if gpus.iter().any(|g| software_gpus.contains(g)) { SOFTWARE } else { "" };
             match gpus[..] {
                 // The first alone, or so many together.
                 [0] => names.push(format!("{id}{software}")),

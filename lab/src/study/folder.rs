@@ -1,17 +1,18 @@
 //! The files of a study: the page, and for each figure and table what a program or a paper takes of it.
 
-use super::answer::Answer;
-use crate::write;
-use crate::page::Block;
-use crate::figures::{Picture, Tabled};
+use super::summary::{StudyFile, Summary, listed_files};
 use crate::data_table::DataTable;
+use crate::figures::{Figure, Picture};
+use crate::page::Block;
+use crate::write::{write_atomically, write_text};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Component, Path};
 
-/// The page, and what it says for machines.
-pub(crate) const PAGE: &str = "index.html";
-const ANSWER: &str = "study.json";
+/// The page.
+pub const PAGE: &str = "index.html";
+/// What it says, for programs.
+const SUMMARY: &str = "study.json";
 /// Where what is beside them goes.
 const FIGURES: &str = "figures";
 const TABLES: &str = "tables";
@@ -19,13 +20,13 @@ const TABLES: &str = "tables";
 /// Rows of a table on the page, at most: a page of a hundred thousand rows takes a browser minutes to open.
 const MOST_ROWS: usize = 400;
 
-/// Files that are to be written, by their path in the folder.
+/// Files that are to be written.
 pub(super) struct Folder {
     /// What the rows of tables call each report.
     labels: Vec<String>,
     /// What stands below every figure: the command.
     command: String,
-    files: Vec<(String, Vec<u8>)>,
+    files: Vec<(StudyFile, Vec<u8>)>,
 }
 
 impl Folder {
@@ -33,12 +34,19 @@ impl Folder {
         Self { labels, command, files: Vec::new() }
     }
 
-    /// A figure as SVG, PNG and CSV, and the block that shows it. `of` are the positions of the reports that it is from, and `told`
-    /// what it shows in words.
+    /// A figure as SVG and PNG with its data as CSV, and the block that shows it. `of` are the positions of the reports that it is from, and
+    /// `told` what it shows in words. The first of the tables is what is drawn, the others belong to it.
     ///
     /// # Errors
     /// When it can't be drawn.
-    pub(super) fn figure(&mut self, id: &str, figure: &impl Tabled, told: &str, of: &[usize]) -> Result<Block> {
+    pub(super) fn figure(
+        &mut self,
+        id: &str,
+        figure: &impl Figure,
+        told: &str,
+        of: &[usize],
+        tables: &[(&str, &DataTable)],
+    ) -> Result<Block> {
         let from = match of {
             [] => String::new(),
             _ => format!(" From {}.", self.named(of)),
@@ -48,12 +56,16 @@ impl Folder {
         let png = figure.draw(Picture::Png, &caption).with_context(|| format!("the figure {id} can't be drawn"))?;
         // On the page the caption stands below the figure, where a reader can take it.
         let text = String::from_utf8(figure.draw(Picture::Svg, &[])?)?;
-        let csv = figure.csv().csv(&self.labels)?.into_bytes();
         let mut links = Vec::new();
-        for (name, ending, bytes) in [("SVG", "svg", svg), ("PNG", "png", png), ("CSV", "csv", csv)] {
+        for (name, ending, bytes) in [("SVG", "svg", svg), ("PNG", "png", png)] {
             let path = format!("{FIGURES}/{id}.{ending}");
             links.push((name.to_owned(), path.clone()));
-            self.files.push((path, bytes));
+            self.add(path, told, bytes);
+        }
+        for (k, (name, table)) in tables.iter().enumerate() {
+            self.data(name, told, table)?;
+            let text = if k == 0 { "CSV".to_owned() } else { format!("CSV of {}", name.replace('-', " ")) };
+            links.push((text, csv_path(name)));
         }
         let alt = format!("{}. {told}", figure.title());
         Ok(Block::Figure { id: id.to_owned(), caption: caption[0].clone(), svg: text, links, alt })
@@ -63,15 +75,30 @@ impl Folder {
     ///
     /// # Errors
     /// When a row does not fit its columns.
-    pub(super) fn table(&mut self, id: &str, caption: &str, mut sheet: DataTable) -> Result<Block> {
-        let path = format!("{TABLES}/{id}.csv");
-        self.files.push((path.clone(), sheet.csv(&self.labels)?.into_bytes()));
+    pub(super) fn table(&mut self, id: &str, caption: &str, mut table: DataTable) -> Result<Block> {
+        self.data(id, caption, &table)?;
         let mut caption = caption.to_owned();
-        if sheet.rows.len() > MOST_ROWS {
-            caption += &format!(" The first {MOST_ROWS} of {} rows; the CSV has all.", sheet.rows.len());
-            sheet.rows.truncate(MOST_ROWS);
+        if table.rows.len() > MOST_ROWS {
+            caption += &format!(" The first {MOST_ROWS} of {} rows; the CSV has all.", table.rows.len());
+            table.rows.truncate(MOST_ROWS);
         }
-        Ok(Block::Table { id: id.to_owned(), caption, sheet, csv: path })
+        Ok(Block::Table { id: format!("table-{id}"), caption, table, csv: csv_path(id) })
+    }
+
+    /// A table as CSV alone. One that was written already, as the data of a figure, is not written twice.
+    ///
+    /// # Errors
+    /// When a row does not fit its columns.
+    pub(super) fn data(&mut self, id: &str, holds: &str, table: &DataTable) -> Result<()> {
+        let path = csv_path(id);
+        if !self.files.iter().any(|(file, _)| file.path == path) {
+            self.add(path, holds, table.csv(&self.labels)?.into_bytes());
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, path: String, holds: &str, bytes: Vec<u8>) {
+        self.files.push((StudyFile { path, holds: holds.to_owned() }, bytes));
     }
 
     /// Labels of reports, as many as can be read.
@@ -82,39 +109,42 @@ impl Folder {
         if more > 0 { format!("{} and {more} more", names.join(", ")) } else { names.join(", ") }
     }
 
-    /// Writes everything into a folder that [`prepare`] has seen, in place of the files of an earlier study. Gives the answer with the names
-    /// of the files.
+    /// Writes everything into a folder that [`prepare`] has seen, in place of the files of an earlier study. Returns the summary with the
+    /// list of the files.
     ///
     /// # Errors
     /// Names the file.
-    pub(super) fn write(self, folder: &Path, page: &str, answer: Answer) -> Result<Answer> {
-        if let Some(earlier) = earlier(folder)? {
-            earlier.files.iter().filter(|name| is_ours(folder, name)).for_each(|name| {
-                // One that the user has removed already is no failure.
-                let _ = fs::remove_file(folder.join(name));
-            });
+    pub(super) fn write(self, folder: &Path, page: &str, summary: Summary) -> Result<Summary> {
+        for name in earlier(folder)?.unwrap_or_default().iter().filter(|name| is_ours(folder, name)) {
+            // One that the user has removed already is no failure.
+            let _ = fs::remove_file(folder.join(name));
         }
         for part in [FIGURES, TABLES] {
             let part = folder.join(part);
             fs::create_dir_all(&part).with_context(|| format!("the folder {} can't be made", part.display()))?;
         }
-        let names = self.files.iter().map(|(name, _)| name.clone()).chain([PAGE.to_owned()]).collect();
+        let page_file = StudyFile { path: PAGE.to_owned(), holds: "The page to read".to_owned() };
+        let files = [page_file].into_iter().chain(self.files.iter().map(|(file, _)| file.clone())).collect();
         // First, so that a study that was stopped half-way is taken for one the next time.
-        let answer = Answer { files: names, ..answer };
-        write::write_text(&folder.join(ANSWER), &sapwise::json::write(&answer)?)?;
-        for (name, bytes) in self.files {
-            write::write_atomically(&folder.join(&name), |out| Ok(out.write_all(&bytes)?))?;
+        let summary = Summary { files, ..summary };
+        write_text(&folder.join(SUMMARY), &format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
+        for (file, bytes) in self.files {
+            write_atomically(&folder.join(&file.path), |out| Ok(out.write_all(&bytes)?))?;
         }
-        write::write_text(&folder.join(PAGE), page)?;
-        Ok(answer)
+        write_text(&folder.join(PAGE), page)?;
+        Ok(summary)
     }
+}
+
+fn csv_path(id: &str) -> String {
+    format!("{TABLES}/{id}.csv")
 }
 
 /// Sees that a study can be written to a folder before minutes of work: it is empty, not there, or holds an earlier study.
 ///
 /// # Errors
 /// When it holds something else, or takes no file.
-pub(crate) fn prepare(folder: &Path) -> Result<()> {
+pub fn prepare(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made", folder.display()))?;
     tempfile::tempfile_in(folder)
         .with_context(|| format!("no file can be made in {}; name another folder with --out", folder.display()))?;
@@ -125,14 +155,10 @@ pub(crate) fn prepare(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The answer of the study that a folder holds, if any.
-fn earlier(folder: &Path) -> Result<Option<Answer>> {
-    let path = folder.join(ANSWER);
-    if !path.exists() {
-        return Ok(None);
-    }
-    let text = crate::document::read_text(&path)?;
-    Ok(serde_json::from_str(&text).ok())
+/// The files of the study that a folder holds, if it holds one.
+fn earlier(folder: &Path) -> Result<Option<Vec<String>>> {
+    let path = folder.join(SUMMARY);
+    Ok(if path.exists() { listed_files(&crate::data::read_text(&path)?) } else { None })
 }
 
 /// Whether a file that `study.json` names is one that a study writes, in a folder and not behind a link. The file may come from anyone, and
@@ -153,9 +179,9 @@ fn is_ours(folder: &Path, name: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn answer(files: &[&str]) -> String {
-        let files = files.iter().map(|f| (*f).to_owned()).collect();
-        serde_json::to_string(&Answer { files, ..Answer::default() }).unwrap()
+    fn summary(files: &[&str]) -> String {
+        let file = |path: &&str| StudyFile { path: (*path).to_owned(), ..StudyFile::default() };
+        serde_json::to_string(&Summary { files: files.iter().map(file).collect(), ..Summary::default() }).unwrap()
     }
 
     #[test]
@@ -167,7 +193,7 @@ mod tests {
         let error = prepare(&new).unwrap_err().to_string();
         assert!(error.contains("not empty") && error.contains("--out"), "{error}");
         // Another program's study.json makes it no study.
-        fs::write(new.join(ANSWER), "{}").unwrap();
+        fs::write(new.join(SUMMARY), "{}").unwrap();
         assert!(prepare(&new).is_err());
         assert!(prepare(&new.join("thesis.tex")).is_err());
     }
@@ -181,8 +207,8 @@ mod tests {
             fs::write(path(name), name).unwrap();
         }
         fs::write(
-            path(ANSWER),
-            answer(&[
+            path(SUMMARY),
+            summary(&[
                 "figures/old.svg",
                 "figures/mine.txt",
                 "mine.csv",
@@ -195,12 +221,14 @@ mod tests {
         prepare(&path("")).unwrap();
         let mut new = Folder::new(vec!["R1".to_owned()], "sapwise study".to_owned());
         new.table("machines", "", DataTable::new([("a", "a")])).unwrap();
-        new.write(&path(""), "<html>", Answer::default()).unwrap();
+        new.write(&path(""), "<html>", Summary::default()).unwrap();
         assert!(!path("figures/old.svg").exists());
         for name in ["figures/mine.svg", "figures/mine.txt", "mine.csv", "../outside"] {
             assert!(path(name).exists(), "{name}");
         }
-        assert_eq!(earlier(&path("")).unwrap().unwrap().files, ["tables/machines.csv", PAGE]);
+        assert_eq!(earlier(&path("")).unwrap().unwrap(), [PAGE, "tables/machines.csv"]);
+        // The form of earlier versions is replaced too.
+        assert_eq!(listed_files(r#"{"schema":"study/1","files":["index.html"]}"#).unwrap(), [PAGE]);
         assert_eq!(fs::read_to_string(path("tables/machines.csv")).unwrap(), "a\n");
     }
 }

@@ -2,8 +2,10 @@
 
 use super::entry::Entry;
 use crate::data_table::{Cell, Column, DataTable};
-use sapwise::hardware::gpu::parameter as gpu;
-use sapwise::hardware::{How, parameter};
+use crate::data::{COMPARED, COMPARED_OF_GPUS};
+use crate::label_text::kind;
+use sapwise::hardware::GpuParameterId;
+use sapwise::hardware::How;
 use sapwise::{GpuHardware, Parameter};
 
 /// Letters of a value that is sound, at most.
@@ -11,63 +13,95 @@ const MOST_LETTERS: usize = 24;
 
 /// The rows of the paper's table, in its order, with what each is called here.
 const PAPER: [(&str, &str); 7] = [
-    ("CPU to GPU (upload)", gpu::UPLOAD_GB_PER_S),
-    ("GPU to CPU (download)", gpu::DOWNLOAD_GB_PER_S),
-    ("internal GPU (copy)", gpu::COPY_GB_PER_S),
-    ("memory size", gpu::MEMORY_BYTES),
-    ("clock rate", gpu::CLOCK_GHZ),
-    ("processors", gpu::PROCESSORS),
-    ("cores (lanes)", gpu::LANES),
+    ("CPU to GPU (upload)", GpuParameterId::UploadGbPerS),
+    ("GPU to CPU (download)", GpuParameterId::DownloadGbPerS),
+    ("internal GPU (copy)", GpuParameterId::CopyGbPerS),
+    ("memory size", GpuParameterId::MemoryBytes),
+    ("clock rate", GpuParameterId::ClockGhz),
+    ("processors", GpuParameterId::Processors),
+    ("cores (lanes)", GpuParameterId::Lanes),
 ];
 
-/// The table as the paper has it, its cards first, one row a GPU. What acts as a GPU is told by its kind.
+/// The table as the paper has it, its cards first, one row a GPU. Software adapters are told by their kind.
 pub(super) fn as_in_the_paper(entries: &[Entry]) -> DataTable {
-    let mut sheet = heads(&["GPU", "kind", "report"]);
-    sheet.columns.extend(PAPER.map(|(title, key)| Column { title: title.to_owned(), key: key.to_owned() }));
+    let mut table = heads(&["GPU", "kind", "report"]);
+    table.columns.extend(PAPER.map(|(title, key)| Column::new(title, key)));
     let mut gpus: Vec<(usize, &GpuHardware)> =
         entries.iter().enumerate().flat_map(|(k, e)| e.hardware.gpus.iter().map(move |g| (k, g))).collect();
     gpus.sort_by_key(|(k, _)| !entries[*k].is_published());
     for (k, gpu) in gpus {
         let mut cells = gpu_heads(&entries[k], gpu);
         cells.extend(PAPER.map(|(_, name)| cell(name, &gpu.parameters)));
-        sheet.push(cells, &[k]);
+        table.push(cells, &[k]);
     }
-    sheet
+    table
 }
 
-/// Every parameter of the machines that any of them has, one row a report.
+/// The parameters of the machines by which predictions compare them, one row a report.
 pub(super) fn machines(entries: &[Entry]) -> DataTable {
-    let mut sheet = heads(&["report", "CPU", "kind", "vectors"]);
-    let lists = || entries.iter().map(|e| &e.hardware.parameters[..]);
-    let names = present(parameter::all_names(), lists());
-    columns(&mut sheet, &names);
+    let mut table = heads(&["report", "CPU", "kind", "vectors"]);
+    columns(&mut table, &COMPARED);
     for (k, entry) in entries.iter().enumerate() {
         let machine = &entry.hardware.machine;
-        let mut cells = [&entry.name[..], &machine.cpu, crate::label_text::kind(entry.kind), &machine.simd].map(Cell::text).to_vec();
-        cells.extend(names.iter().map(|name| cell(name, &entry.hardware.parameters)));
-        sheet.push(cells, &[k]);
+        let mut cells = [&entry.name[..], &machine.cpu, kind(entry.kind), &machine.simd].map(Cell::text).to_vec();
+        cells.extend(COMPARED.iter().map(|name| cell(name, &entry.hardware.parameters)));
+        table.push(cells, &[k]);
     }
-    sheet
+    table
 }
 
 /// The same of the GPUs, one row each.
 pub(super) fn gpus(entries: &[Entry]) -> DataTable {
-    let mut sheet = heads(&["GPU", "kind", "report"]);
-    let lists = || entries.iter().flat_map(|e| &e.hardware.gpus).map(|g| &g.parameters[..]);
-    let names = present(gpu::all_names(), lists());
-    columns(&mut sheet, &names);
+    let mut table = heads(&["GPU", "kind", "report"]);
+    columns(&mut table, &COMPARED_OF_GPUS);
     for (k, entry) in entries.iter().enumerate() {
         for gpu in &entry.hardware.gpus {
             let mut cells = gpu_heads(entry, gpu);
-            cells.extend(names.iter().map(|name| cell(name, &gpu.parameters)));
-            sheet.push(cells, &[k]);
+            cells.extend(COMPARED_OF_GPUS.iter().map(|name| cell(name, &gpu.parameters)));
+            table.push(cells, &[k]);
         }
     }
-    sheet
+    table
+}
+
+/// Every parameter of every report, one row each.
+pub(super) fn parameters(entries: &[Entry]) -> DataTable {
+    let mut table = DataTable::new([
+        ("report", "report"),
+        ("of", "processor"),
+        ("parameter", "parameter"),
+        ("value", "value"),
+        ("interquartile range over median", "dispersion_ratio"),
+        ("samples", "samples"),
+        ("how", "how"),
+        ("source", "source"),
+    ]);
+    for (k, entry) in entries.iter().enumerate() {
+        let gpus = entry.hardware.gpus.iter().map(|g| (format!("gpu{}", g.gpu.index), &g.parameters));
+        for (of, list) in std::iter::once(("machine".to_owned(), &entry.hardware.parameters)).chain(gpus) {
+            for p in list {
+                let spread = p.dispersion.map_or_else(|| Cell::Missing("it has none".to_owned()), Cell::exact);
+                let mut cells = vec![Cell::text(&entry.name), Cell::text(&of), Cell::text(p.name.to_string())];
+                cells.extend([p.value.map_or_else(|| Cell::Missing(p.source.clone()), Cell::exact), spread]);
+                cells.extend([Cell::count(p.samples.into()), Cell::text(how(p.how)), Cell::text(&p.source)]);
+                table.push(cells, &[k]);
+            }
+        }
+    }
+    table
+}
+
+fn how(how: How) -> &'static str {
+    match how {
+        How::Measured => "measured",
+        How::Reported => "reported",
+        How::Published => "published",
+        How::Missing => "missing",
+    }
 }
 
 fn heads(titles: &[&str]) -> DataTable {
-    let column = |title: &&str| Column { title: (*title).to_owned(), key: title.to_ascii_lowercase() };
+    let column = |title: &&str| Column::new(*title, title.to_ascii_lowercase());
     DataTable { columns: titles.iter().map(column).collect(), rows: Vec::new() }
 }
 
@@ -76,8 +110,8 @@ fn gpu_heads(entry: &Entry, gpu: &GpuHardware) -> Vec<Cell> {
     vec![Cell::text(&gpu.gpu.name), Cell::text(kind), Cell::text(&entry.name)]
 }
 
-fn columns(sheet: &mut DataTable, names: &[String]) {
-    sheet.columns.extend(names.iter().map(|name| Column { title: words(name), key: name.clone() }));
+fn columns(table: &mut DataTable, names: &[&str]) {
+    table.columns.extend(names.iter().map(|name| Column::new(words(name), *name)));
 }
 
 /// A parameter's name without its unit, which stands with each value.
@@ -85,12 +119,6 @@ pub(super) fn words(name: &str) -> String {
     let units = ["_gb_per_s", "_gflop_per_s", "_g_per_s", "_bytes", "_ghz", "_ns", "_ratio"];
     let bare = units.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name);
     bare.replace(['/', '_'], " ")
-}
-
-/// Those of the names that any of the lists has a value of.
-fn present<'a>(names: Vec<String>, lists: impl Iterator<Item = &'a [Parameter]> + Clone) -> Vec<String> {
-    let has = |name: &String| lists.clone().flatten().any(|p| p.name == *name && p.value.is_some());
-    names.into_iter().filter(has).collect()
 }
 
 fn cell(name: &str, parameters: &[Parameter]) -> Cell {
@@ -103,7 +131,7 @@ fn cell(name: &str, parameters: &[Parameter]) -> Cell {
             Cell::Number { value: *value, shown }
         }
         Some(p) if p.how == How::Missing => Cell::Missing(p.source.clone()),
-        Some(_) => Cell::Missing("the report holds no value".to_owned()),
+        Some(_) => Cell::Missing("the report has no value".to_owned()),
     }
 }
 

@@ -1,12 +1,12 @@
-//! Which hardware parameters go with which algorithm and which border, by three methods.
+//! Which hardware parameters go with which algorithm and which border, by two methods.
 
 use super::entry::{Entry, representatives};
 use super::rank::{self, Rank};
 use super::speed::slownesses;
-use crate::train::{Effect, Importance, Verdict, measured_borders};
+use crate::evaluate::{Effect, Importance, Verdict, measured_crossovers};
 use rayon::prelude::*;
 use sapwise::Backend;
-use sapwise::hardware::{gpu, parameter};
+use sapwise::hardware::{GpuParameterId, ParameterId};
 use sapwise::model::GPU_PREFIX;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,7 +18,7 @@ const MOST_MACHINES: usize = 200;
 pub(super) enum On {
     /// The time of an algorithm, by what it is called on every machine.
     Algorithm(String),
-    /// The times of a method on a class of processor, on any number of threads or GPUs, over what is predicted for them.
+    /// The times of a method on a class of processor, on any number of threads or GPUs, over what is predicted for it.
     Method(String),
     /// The place of a border between two sides.
     Border(String),
@@ -36,9 +36,7 @@ pub(super) struct Link {
     pub(super) rank: Option<Rank>,
     /// What it is worth to predictions; none of what the model of this outcome does not read.
     pub(super) effect: Option<Effect>,
-    /// Between machines, of the parameter and what predictions that do not read it leave of the time; none where they read it.
-    pub(super) left: Option<Rank>,
-    /// That of the effect, of what is left, or of the ranks: the first of them that there is.
+    /// That of the effect, or else that of the ranks.
     pub(super) verdict: Verdict,
 }
 
@@ -52,10 +50,10 @@ pub(super) struct Influence {
     pub(super) reports: Vec<usize>,
 }
 
-/// The parameters whose ranks are taken: every one of the machine and of its first GPU that is no program.
+/// The parameters whose ranks are taken: every one of the machine and of its first GPU that is no software adapter.
 pub(super) fn parameters() -> Vec<String> {
-    let of_gpu = gpu::parameter::all_names().into_iter().map(|name| format!("{GPU_PREFIX}{name}"));
-    parameter::all_names().into_iter().chain(of_gpu).collect()
+    let of_gpu = GpuParameterId::OF_ONE.into_iter().map(|name| format!("{GPU_PREFIX}{name}"));
+    ParameterId::ALL.into_iter().chain(of_gpu).collect()
 }
 
 impl Influence {
@@ -66,7 +64,6 @@ impl Influence {
         // Reports of one machine alone are not many machines.
         let reports = if machines.len() > 1 { all } else { all.into_iter().take(1).collect() };
         let machines = machines.len();
-        let every: Vec<&Entry> = reports.iter().map(|&k| &entries[k]).collect();
         let step = reports.len().div_ceil(MOST_MACHINES).max(1);
         let reports: Vec<usize> = reports.iter().copied().step_by(step).collect();
         let chosen: Vec<&Entry> = reports.iter().map(|&k| &entries[k]).collect();
@@ -91,30 +88,22 @@ impl Influence {
         rank::judge(&mut ranks.iter_mut().flatten().collect::<Vec<_>>());
         let mut links: Vec<Link> =
             cells.into_iter().zip(ranks).map(|((k, on), rank)| link(&parameters[k], on.clone(), rank, importance)).collect();
-        for (name, left) in importance.iter().flat_map(|i| &i.left_ln) {
-            for parameter in &parameters {
-                let mut link = link(parameter, On::Method(name.clone()), None, importance);
-                if link.effect.is_none() {
-                    // Of every machine that was left out: these are other ones than those that ranks look at where there are many.
-                    let of = |e: &&Entry| Some((e.value(parameter)?, *left.get(e.machine())?));
-                    link.left = Rank::of(&every.iter().filter_map(of).collect::<Vec<_>>());
-                }
-                links.push(link);
-            }
+        let methods: BTreeSet<&String> =
+            importance.iter().flat_map(|i| &i.parameters).flat_map(|p| &p.methods).map(|m| &m.method).collect();
+        for method in methods {
+            links.extend(parameters.iter().map(|parameter| link(parameter, On::Method(method.clone()), None, importance)));
         }
-        rank::judge(&mut links.iter_mut().filter_map(|l| l.left.as_mut()).collect::<Vec<_>>());
-        // Ranks see what goes together, whatever the cause; the two others what a parameter adds to those that predictions read.
+        // Ranks see what goes together, whatever the cause; the effect what a parameter adds to those that predictions read.
         for link in &mut links {
-            let verdicts =
-                [link.effect.as_ref().map(|e| e.verdict), link.left.map(|r| r.verdict), link.rank.map(|r| r.verdict)];
+            let verdicts = [link.effect.as_ref().map(|e| e.verdict), link.rank.map(|r| r.verdict)];
             link.verdict = verdicts.into_iter().flatten().next().unwrap_or(Verdict::CannotBeTold);
         }
-        links.retain(|link| link.rank.is_some() || link.effect.is_some() || link.left.is_some());
+        links.retain(|link| link.rank.is_some() || link.effect.is_some());
         for of in importance.iter().flat_map(|i| &i.parameters).filter(|p| p.regret_rise.is_told()) {
             let effect = of.regret_rise.clone();
             let verdict = effect.verdict;
             let parameter = of.parameter.clone();
-            links.push(Link { parameter, on: On::Choice, rank: None, effect: Some(effect), left: None, verdict });
+            links.push(Link { parameter, on: On::Choice, rank: None, effect: Some(effect), verdict });
         }
         Self { links, machines, reports }
     }
@@ -125,21 +114,20 @@ impl Influence {
     }
 }
 
-/// Where sides give way to each other on a machine. A program that acts as a GPU is no side against the CPU.
+/// Where sides give way to each other on a machine. A software adapter is no side against the CPU.
 fn borders_of(entry: &Entry) -> BTreeMap<String, f64> {
     let mut profile = entry.profile.clone();
-    let programs = entry.programs();
-    profile.retain(|t| !matches!(t.id.backend(), Backend::Gpu(gpus) if gpus.iter().any(|g| programs.contains(g))));
-    measured_borders(&profile).into_iter().collect()
+    let software_gpus = entry.software_gpus();
+    profile.retain(|t| !matches!(t.id.backend(), Backend::Gpu(gpus) if gpus.iter().any(|g| software_gpus.contains(g))));
+    measured_crossovers(&profile).into_iter().collect()
 }
 
 fn link(parameter: &str, on: On, rank: Option<Rank>, importance: Option<&Importance>) -> Link {
     let of = importance.and_then(|i| i.parameters.iter().find(|p| p.parameter == parameter));
     let effect = of.and_then(|of| match &on {
-        On::Method(name) => of.algorithms.iter().find(|a| a.algorithm == *name).map(|a| a.distance_rise_ln.clone()),
-        On::Border(name) => of.borders.iter().find(|b| b.border == *name).map(|b| b.error_rise_octaves.clone()),
-        On::Algorithm(_) | On::Choice => None,
+        On::Method(name) => of.methods.iter().find(|m| m.method == *name).map(|m| m.distance_rise_ln.clone()),
+        On::Algorithm(_) | On::Border(_) | On::Choice => None,
     });
     let effect = effect.filter(Effect::is_told);
-    Link { parameter: parameter.to_owned(), on, rank, effect, left: None, verdict: Verdict::CannotBeTold }
+    Link { parameter: parameter.to_owned(), on, rank, effect, verdict: Verdict::CannotBeTold }
 }

@@ -1,12 +1,16 @@
 //! Tuning over two axes, objects and density, measured beside predicted: the map that the paper could not draw.
 
 use super::entry::Entry;
+use crate::data::Profile;
+use crate::data_table::{Cell, DataTable};
+use crate::evaluate::available;
 use crate::figures::{FieldMap, MapCell, MapPanel, MapPoint};
-use sapwise_scenes::Random;
-use crate::train::{Profile, available, average, measured_costs, without};
+use crate::fit::measured_costs;
+use crate::train::without;
 use anyhow::Result;
 use rayon::prelude::*;
 use sapwise::stats::median;
+use sapwise_scenes::Random;
 use sapwise::{Aabb, AlgorithmCost, AlgorithmId, Load};
 
 /// Cells on either axis.
@@ -20,7 +24,7 @@ const SEED: u64 = 1;
 /// The map of one machine, with what it says in numbers.
 pub(super) struct Map {
     pub(super) figure: FieldMap,
-    /// What was left out of the training of the prediction, in words.
+    /// What was held out of the training of the prediction, in words.
     pub(super) held_out: String,
     /// Mean regret of the predicted choices at the points where the choice was timed, how many these are, and of how many; none of none.
     pub(super) regret: Option<f64>,
@@ -30,7 +34,7 @@ pub(super) struct Map {
     pub(super) agreeing: f64,
 }
 
-/// Draws the fields of a machine by curves that were fitted to its own timings beside those that were predicted by a model that had
+/// Draws the fastest algorithms of a machine by curves that were fitted to its own timings beside those that were predicted by a model that had
 /// not seen it. Cells are boxes spread evenly that move as in the scenario of the slice; points are the scenarios that were timed.
 ///
 /// # Errors
@@ -91,11 +95,46 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
     let count = at_measured.len();
     let panels = vec![panel("measured", by_measured, at_measured), panel("predicted", by_predicted, at_predicted)];
     let names = ids.iter().enumerate().map(|(k, id)| (id.to_string(), k)).collect();
-    let title = format!("Tuning over objects and density: {}", entry.name);
+    let title = format!("Fastest algorithm over objects and density: {}", entry.name);
     let figure = FieldMap { title, names, x, y, y_name: "overlapping pairs of an object".to_owned(), panels };
     let (known, points) = (regrets.len(), count);
-    let regret = (known > 0).then(|| average(&regrets));
+    let regret = (known > 0).then(|| regrets.iter().sum::<f64>() / known as f64);
     Ok(Map { figure, held_out, regret, known, points, agreeing })
+}
+
+impl Map {
+    /// The frames that were timed, with what was fastest and what was chosen; and the cells, with what is predicted for each.
+    pub(super) fn tables(&self, report: usize) -> [DataTable; 2] {
+        let density = "overlapping pairs of an object";
+        let mut points = DataTable::new([
+            ("choice", "choice"),
+            ("algorithm", "algorithm"),
+            ("objects", "objects"),
+            (density, "pairs_per_object"),
+            ("regret", "regret_share"),
+        ]);
+        let mut cells = DataTable::new([
+            ("choice", "choice"),
+            ("algorithm", "algorithm"),
+            ("from (objects)", "from_objects"),
+            ("to (objects)", "to_objects"),
+            ("from (pairs of an object)", "from_pairs_per_object"),
+            ("to (pairs of an object)", "to_pairs_per_object"),
+        ]);
+        let name = |algorithm: usize| Cell::text(self.figure.names.get(algorithm).map_or("", |name| &name.0));
+        for panel in &self.figure.panels {
+            for p in &panel.points {
+                let regret = p.loss.map_or_else(|| Cell::Missing("the choice was not timed".to_owned()), Cell::percent);
+                let heads = [Cell::text(&panel.title), name(p.algorithm)];
+                points.push([&heads[..], &[p.x, p.y].map(Cell::exact), &[regret]].concat(), &[report]);
+            }
+            for c in &panel.grid {
+                let heads = [Cell::text(&panel.title), name(c.algorithm)];
+                cells.push([&heads[..], &[c.x.0, c.x.1, c.y.0, c.y.1].map(Cell::exact)].concat(), &[report]);
+            }
+        }
+        [points, cells]
+    }
 }
 
 /// The load of so many unit cubes spread evenly, with so many pairs an object.

@@ -11,8 +11,6 @@ const FEW: usize = 10;
 const ORDERS: usize = 20_000;
 /// Seed of these orders.
 const SEED: u64 = 1;
-/// Quantile of the normal distribution for either end of a 90 % interval.
-const INTERVAL: f64 = 1.645;
 /// A correlation within this is none that matters: it tells less than a tenth of the variance of the ranks.
 const LEAST: f64 = 0.3;
 /// A correlation of 1 has no finite transform. This one stands for it.
@@ -22,16 +20,16 @@ const FALSE_LINKS: f64 = 0.1;
 
 /// A correlation over machines.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Rank {
+pub(super) struct Rank {
     /// From -1 to 1.
-    pub(crate) correlation: f64,
+    pub(super) correlation: f64,
     /// Ends of its 90 % interval (Fisher's transform with the variance of Bonett and Wright 2000).
-    pub(crate) low: f64,
-    pub(crate) high: f64,
-    pub(crate) machines: usize,
+    pub(super) low: f64,
+    pub(super) high: f64,
+    pub(super) machines: usize,
     /// The chance of as large a correlation of figures that have nothing to do with each other.
     chance: f64,
-    pub(crate) verdict: Verdict,
+    pub(super) verdict: Verdict,
 }
 
 impl Rank {
@@ -46,11 +44,11 @@ impl Rank {
         let z = correlation.clamp(-HIGHEST, HIGHEST).atanh();
         let over = pairs.len() as f64 - 3.0;
         let error = ((1.0 + correlation * correlation / 2.0) / over).sqrt();
-        let end = |sign: f64| (z + sign * INTERVAL * error).tanh();
+        let end = |sign: f64| (z + sign * NORMAL_90 * error).tanh();
         // Without a link the variance of the transform is 1.06 over n - 3 (Fieller, Hartley and Pearson 1957).
         let chance = match pairs.len() {
             ..=FEW => by_orders(&x, &y, correlation),
-            _ => libm::erfc(z.abs() / (2.0 * 1.06 / over).sqrt()),
+            _ => 2.0 * normal_tail(z.abs() / (1.06 / over).sqrt()),
         };
         let (low, high) = (end(-1.0), end(1.0));
         Some(Self { correlation, low, high, machines: pairs.len(), chance, verdict: Verdict::CannotBeTold })
@@ -67,7 +65,7 @@ fn by_orders(x: &[f64], y: &[f64], found: f64) -> f64 {
     (1 + (0..ORDERS).filter(as_much).count()) as f64 / (1 + ORDERS) as f64
 }
 
-/// Gives the verdicts. Of those called linked a tenth is expected to be none (Benjamini and Hochberg 1995), however many are looked at.
+/// Sets the verdicts. Of those called linked a tenth is expected to be none (Benjamini and Hochberg 1995), however many are looked at.
 pub(super) fn judge(ranks: &mut [&mut Rank]) {
     let mut chances: Vec<f64> = ranks.iter().map(|r| r.chance).collect();
     chances.sort_by(f64::total_cmp);
@@ -140,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn of_few_machines_noise_gives_no_links() {
+    fn of_few_machines_noise_is_no_link() {
         for machines in [5, 6, 8] {
             let mut found: Vec<Rank> = (0..300).map(|k| Rank::of(&pairs(machines, 0.0, k)).unwrap()).collect();
             judge(&mut found.iter_mut().collect::<Vec<_>>());

@@ -38,34 +38,35 @@ impl<'a> Comparison<'a> {
     }
 
     /// Every ratio, a row for each machine and parameter or algorithm.
-    pub(super) fn sheet(&self) -> DataTable {
-        let mut sheet = DataTable::new([
+    pub(super) fn table(&self) -> DataTable {
+        let mut table = DataTable::new([
             ("machine", "machine"),
-            ("reference", "reference"),
-            ("of", "of"),
             ("what", "what"),
-            ("ratio", "ratio"),
-            ("first quartile", "ratio_first_quartile"),
-            ("third quartile", "ratio_third_quartile"),
-            ("places", "places"),
+            ("name", "name"),
+            ("ratio to the reference", "ratio"),
+            ("lower quartile", "ratio_lower_quartile"),
+            ("upper quartile", "ratio_upper_quartile"),
+            ("scenarios and sizes", "points"),
+            ("reference", "reference"),
         ]);
         let reference = &self.entries[self.reference];
         for (k, speed_ups) in &self.others {
             let machine = &self.entries[*k];
-            let heads = |of: &str, what: &str| [&machine.name[..], &reference.name[..], of, what].map(Cell::text).to_vec();
+            let heads = |what: &str, name: &str| [&machine.name[..], what, name].map(Cell::text).to_vec();
+            let reference = || vec![Cell::text(&reference.name)];
             let one = || Cell::Missing("a parameter has one value".to_owned());
             for name in parameters() {
                 let Some(ratio) = self.parameter(&name, *k) else { continue };
                 let figures = [Cell::number(ratio, 3), one(), one(), one()];
-                sheet.push([heads("parameter", &name), figures.to_vec()].concat(), &[self.reference, *k]);
+                table.push([heads("parameter", &name), figures.to_vec(), reference()].concat(), &[self.reference, *k]);
             }
             for (name, s) in speed_ups {
                 let figures = [s.median, s.low, s.high].map(|r| Cell::number(r, 3)).to_vec();
-                let cells = [heads("speed-up", name), figures, vec![Cell::count(s.places as u64)]].concat();
-                sheet.push(cells, &[self.reference, *k]);
+                let cells = [heads("speed-up", name), figures, vec![Cell::count(s.points as u64)], reference()].concat();
+                table.push(cells, &[self.reference, *k]);
             }
         }
-        sheet
+        table
     }
 
     /// The picture of some machines, and the parameters that are alike on all of them.

@@ -5,7 +5,7 @@
 
 use super::entry::{Entry, ON_ALL_CORES};
 use super::speed::{LARGE, speed_ups};
-use crate::train::{Verdict, average};
+use crate::evaluate::Verdict;
 use crate::report::{Proof, Restricted};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -106,7 +106,7 @@ pub(super) fn effects(entries: &[Entry]) -> (Vec<Effect>, Vec<Shown>) {
 /// Geometric mean, least and most of ratios whose logarithms these are.
 fn over_pairs(logs: &[f64]) -> [f64; 3] {
     let (least, most) = logs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), ln| (a.min(*ln), b.max(*ln)));
-    [average(logs), least, most].map(f64::exp)
+    [logs.iter().sum::<f64>() / logs.len() as f64, least, most].map(f64::exp)
 }
 
 /// Whether the parameters of a report show that this was taken.

@@ -2,7 +2,7 @@
 
 use crate::settings::Settings;
 use rayon::ThreadPool;
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::measure::{self, Options};
 use sapwise::{Tuning, Hardware, Model, Registry, Source, json};
 use std::process::Command;
@@ -49,7 +49,7 @@ pub(crate) fn describe() -> String {
     let topology = measure::family(measure::Family::Topology, &Options::default());
     let hardware = Hardware { machine, parameters: topology, gpus: Vec::new(), gpu_groups: Vec::new() };
     let m = &hardware.machine;
-    let cores = hardware.value(parameter::USABLE_CORES).unwrap_or(f64::NAN);
+    let cores = hardware.value(ParameterId::UsableCores).unwrap_or(f64::NAN);
     let compiler = Command::new("rustc").arg("--version").output().ok();
     let compiler = compiler.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_else(|| "rustc unknown".to_owned());
     format!(

@@ -1,5 +1,7 @@
 //! The command line.
 
+#[cfg(test)]
+mod documents;
 mod known;
 mod part;
 mod probe;
@@ -39,6 +41,7 @@ pub(crate) enum Verb {
     Study(Study),
     Pairs(Pairs),
     Check(Check),
+    Convert(Convert),
     Compare(Compare),
     Simulate(Simulate),
     Schema(Schema),
@@ -173,6 +176,23 @@ pub(crate) struct Check {
     /// The files.
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
+    /// One JSON object on standard output instead of text.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Writes reports, models and tuning files of older versions in the form that is read now.
+///
+/// No figure changes. What the current form has no place for is left out, and told.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  sapwise convert report.json model.json --out converted")]
+pub(crate) struct Convert {
+    /// The files.
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// The folder that they go to, under their names, created if missing.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
     /// One JSON object on standard output instead of text.
     #[arg(long)]
     pub(crate) json: bool,

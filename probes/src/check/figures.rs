@@ -1,7 +1,7 @@
 //! Figures of a report that are impossible, doubtful or suspicious.
 
 use crate::date;
-use sapwise::hardware::parameter;
+use sapwise::hardware::ParameterId;
 use sapwise::measure::Watch;
 use sapwise::{GpuHardware, Hardware, How, Parameter, SimdLevel};
 use sapwise_lab::report::{Label, Point, Report, Restricted};
@@ -55,7 +55,7 @@ fn impossible_parameter(report: &Report, of: &str, p: &Parameter) -> Option<Stri
     if is_rate && value == 0.0 && p.how == How::Measured {
         return Some(format!("{name} is 0"));
     }
-    if p.name == parameter::USABLE_CORES && value.fract() != 0.0 {
+    if p.name == ParameterId::UsableCores && value.fract() != 0.0 {
         return Some(format!("{name} is {value}"));
     }
     // A disturbed measurement of one thread alone makes several look better than they are: that is a doubt.
@@ -72,8 +72,8 @@ fn is_disturbed(p: &Parameter) -> bool {
 /// What several threads gain over one, where that is more than their number.
 fn scaling_beyond_threads(hardware: &Hardware, p: &Parameter) -> Option<String> {
     let threads = match p.name.as_str() {
-        parameter::SCALING_TWO_THREADS_RATIO => 2.0,
-        parameter::SCALING_ALL_THREADS_RATIO => hardware.value(parameter::USABLE_CORES)?,
+        ParameterId::ScalingTwoThreadsRatio => 2.0,
+        ParameterId::ScalingAllThreadsRatio => hardware.value(ParameterId::UsableCores)?,
         _ => return None,
     };
     let value = p.value.filter(|value| *value > threads * SCALING_TOLERANCE)?;
@@ -95,7 +95,7 @@ fn impossible_provenance(report: &Report) -> Vec<String> {
     if !provenance.seconds.is_finite() || sum_s > provenance.seconds + 0.1 {
         found.push(format!("its samples add up to {sum_s:.1} s, and it took {} s", provenance.seconds));
     }
-    if let (Some(threads), Some(cores)) = (provenance.threads, hardware.value(parameter::USABLE_CORES))
+    if let (Some(threads), Some(cores)) = (provenance.threads, hardware.value(ParameterId::UsableCores))
         && cores > f64::from(threads)
     {
         found.push(format!("usable_cores is {cores}, and the report is of {threads} threads"));
@@ -103,7 +103,7 @@ fn impossible_provenance(report: &Report) -> Vec<String> {
     if let Some(simd) = provenance.simd.as_ref().filter(|simd| **simd != hardware.machine.simd) {
         found.push(format!("{simd} was forced, and {} was in use", hardware.machine.simd));
     }
-    if let (Ok(level), Some(lanes)) = (hardware.machine.simd.parse::<SimdLevel>(), hardware.value(parameter::SIMD_LANES))
+    if let (Ok(level), Some(lanes)) = (hardware.machine.simd.parse::<SimdLevel>(), hardware.value(ParameterId::SimdLanes))
         && lanes != f64::from(level.lanes())
     {
         found.push(format!("simd_lanes is {lanes}, and {level} has {}", level.lanes()));
@@ -148,7 +148,7 @@ fn impossible_point(report: &Report, point: &Point) -> Option<String> {
         if (count == 0) != timing.error.is_some() {
             return Some(format!("{id} has {count} samples and the error {:?}", timing.error));
         }
-        let cores = report.hardware.value(parameter::USABLE_CORES).filter(|_| is_measured(report));
+        let cores = report.hardware.value(ParameterId::UsableCores).filter(|_| is_measured(report));
         if cores.is_some_and(|cores| f64::from(id.threads()) > cores) {
             return Some(format!("{id} ran on more threads than the usable cores"));
         }
@@ -220,13 +220,13 @@ fn contradictions(hardware: &Hardware) -> Vec<String> {
     let [smallest, .., largest] = parameter::LATENCY_WORKING_SETS_KIB.map(parameter::latency_name);
     // The first is at most so many times the second.
     let most = [
-        (parameter::CACHE_L1D_BYTES, parameter::CACHE_L2_BYTES, 1.0),
-        (parameter::CACHE_L2_BYTES, parameter::CACHE_LLC_BYTES, 1.0),
-        (parameter::CACHE_LLC_BYTES, parameter::MEMORY_BYTES, 1.0),
+        (ParameterId::CacheL1dBytes, ParameterId::CacheL2Bytes, 1.0),
+        (ParameterId::CacheL2Bytes, ParameterId::CacheLlcBytes, 1.0),
+        (ParameterId::CacheLlcBytes, ParameterId::MemoryBytes, 1.0),
         (&smallest, &largest, 1.0),
-        (parameter::CLOCK_MEASURED_GHZ, parameter::CLOCK_REPORTED_GHZ, 10.0),
-        (parameter::CLOCK_REPORTED_GHZ, parameter::CLOCK_MEASURED_GHZ, 10.0),
-        (parameter::FORK_JOIN_WARM_NS, parameter::FORK_JOIN_COLD_NS, 10.0),
+        (ParameterId::ClockMeasuredGhz, ParameterId::ClockReportedGhz, 10.0),
+        (ParameterId::ClockReportedGhz, ParameterId::ClockMeasuredGhz, 10.0),
+        (ParameterId::ForkJoinWarmNs, ParameterId::ForkJoinColdNs, 10.0),
     ];
     let contradicts = |(a, b, factor): &(&str, &str, f64)| {
         let (x, y) = (hardware.value(a)?, hardware.value(b)?);

@@ -38,12 +38,12 @@ pub(crate) fn print_group(indices: &[u32], options: &Options) -> anyhow::Result<
 
 /// A GPU of which nothing could be measured.
 pub(super) fn without_parameters(gpu: GpuIdentity, why: &str) -> GpuHardware {
-    let names = sapwise::hardware::gpu::parameter::all_names();
+    let names = GpuParameterId::OF_ONE;
     GpuHardware { gpu, parameters: names.iter().map(|name| Parameter::missing(name, why)).collect() }
 }
 
 /// Several GPUs that could not be measured together.
 pub(super) fn group_without_parameters(indices: &[u32], why: &str) -> GpuGroup {
-    let names = sapwise::hardware::gpu::parameter::GROUP;
+    let names = GpuParameterId::GROUP;
     GpuGroup { gpus: indices.to_vec(), parameters: names.map(|name| Parameter::missing(name, why)).into() }
 }

@@ -3,6 +3,7 @@
 mod check;
 mod compare;
 mod completions;
+mod convert;
 mod devices;
 mod pairs;
 mod part;
@@ -35,6 +36,7 @@ pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome
         Verb::Train(arguments) => train::run(&arguments),
         Verb::Study(arguments) => study::run(&arguments),
         Verb::Pairs(arguments) => pairs::run(&arguments, algorithms),
+        Verb::Convert(arguments) => convert::run(&arguments),
         Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments, algorithms),
         Verb::Simulate(arguments) => simulate::run(&arguments),

@@ -3,7 +3,7 @@
 use super::super::decision::Reason;
 use super::super::policy::Policy;
 use super::tuning;
-use crate::{AlgorithmId, Tuning, Load};
+use crate::{AlgorithmId, Load, Tuning};
 
 /// What a frame of an algorithm really takes: by its position, the number of objects and the frame.
 type Truth = dyn Fn(usize, f64, usize) -> f64;

@@ -6,7 +6,7 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 use crate::gpu::Gpu;
 pub(super) use crate::gpu::kernel::{Bound, Kernel};
-use crate::hardware::{GpuKind, Parameter};
+use crate::hardware::{GpuKind, GpuParameterId, Parameter};
 use crate::measure::Options;
 use crate::measure::foreign_load::{self, Figure, Plan};
 
@@ -147,10 +147,10 @@ pub(super) fn calibrate(
 }
 
 /// The parameters, or the same names as missing with the reason.
-pub(super) fn or_missing(names: &[&str], measured: Result<Vec<Parameter>, String>) -> Vec<Parameter> {
+pub(super) fn or_missing(ids: &[GpuParameterId], measured: Result<Vec<Parameter>, String>) -> Vec<Parameter> {
     measured.unwrap_or_else(|why| {
         let why = one_line(&why);
-        names.iter().map(|name| Parameter::missing(name, &why)).collect()
+        ids.iter().map(|id| Parameter::missing(id, &why)).collect()
     })
 }
 

@@ -4,8 +4,7 @@ use std::time::Duration;
 
 use super::bench::{Bench, Bound, Kernel, calibrate, or_missing, per_ns, record};
 use super::fits;
-use crate::hardware::Parameter;
-use crate::hardware::gpu::parameter as p;
+use crate::hardware::{GpuParameterId, Parameter};
 use crate::stats;
 
 const SOURCE: &str = include_str!("shaders/compute.wgsl");
@@ -21,12 +20,12 @@ const MOST_ROUNDS: u32 = 1 << 20;
 const MOST_GROUPS: u32 = 2048;
 
 pub(super) fn measure(bench: &Bench<'_>) -> Vec<Parameter> {
-    let mut parameters = or_missing(&[p::ARITHMETIC_GFLOP_PER_S], arithmetic(bench));
+    let mut parameters = or_missing(&[GpuParameterId::ArithmeticGflopPerS], arithmetic(bench));
     if bench.options.limit.is_some() {
         return parameters;
     }
-    parameters.extend(or_missing(&[p::ATOMIC_G_PER_S], atomics(bench)));
-    parameters.extend(or_missing(&[p::PARALLEL_UNITS], units(bench)));
+    parameters.extend(or_missing(&[GpuParameterId::AtomicGPerS], atomics(bench)));
+    parameters.extend(or_missing(&[GpuParameterId::ParallelUnits], units(bench)));
     parameters
 }
 
@@ -80,7 +79,7 @@ fn arithmetic(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     let bound = work.bind(bench, rounds)?;
     let figures = bench.collect(bench.plan(9, bench.pick(150, 250)), || Ok(vec![work.rate(bench, &bound, rounds, 1)?]))?;
     let method = "multiply-adds in eight independent chains of four lanes an invocation, each counted as two operations";
-    Ok(figures.into_iter().map(|f| f.into_parameter(p::ARITHMETIC_GFLOP_PER_S, method)).collect())
+    Ok(figures.into_iter().map(|f| f.into_parameter(GpuParameterId::ArithmeticGflopPerS, method)).collect())
 }
 
 fn atomics(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
@@ -106,7 +105,7 @@ fn atomics(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     }
     let method =
         format!("atomicAdd of 1 to {words} words in turn, neighbouring invocations to neighbouring words, result not used");
-    Ok(figures.into_iter().map(|f| f.into_parameter(p::ATOMIC_G_PER_S, &method)).collect())
+    Ok(figures.into_iter().map(|f| f.into_parameter(GpuParameterId::AtomicGPerS, &method)).collect())
 }
 
 /// Workgroups of the largest size, each of which fills a processor as far as limits let it.
@@ -153,7 +152,7 @@ fn units(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
          invocations and {bytes} bytes of shared memory; several such workgroups may share a processor",
         counts.len()
     );
-    Ok(vec![samples.into_fitted(f64::from(units), p::PARALLEL_UNITS, &method)])
+    Ok(vec![samples.into_fitted(f64::from(units), GpuParameterId::ParallelUnits, &method)])
 }
 
 /// Numbers of workgroups to time: doubling until the time has risen fourfold, then halving down to the first step, then

@@ -7,8 +7,7 @@ use super::bench::{Bench, Bound, Kernel, or_missing, record};
 use super::compute::Arithmetic;
 use super::transfer::Transfer;
 use crate::gpu::Gpu;
-use crate::hardware::Parameter;
-use crate::hardware::gpu::parameter as p;
+use crate::hardware::{GpuParameterId, Parameter};
 use crate::measure::Options;
 use crate::measure::foreign_load::{self, Figure, Plan};
 
@@ -20,9 +19,9 @@ const ROUND_TRIPS: u32 = 10;
 
 pub(super) fn measure(gpus: &[Gpu], options: &Options) -> Vec<Parameter> {
     let benches: Vec<Bench<'_>> = gpus.iter().map(|gpu| Bench::new(gpu, options)).collect();
-    let mut parameters = or_missing(&[p::GROUP_UPLOAD_RATIO], uploads(&benches));
-    parameters.extend(or_missing(&[p::GROUP_ROUND_TRIP_RATIO], round_trips(&benches)));
-    parameters.extend(or_missing(&[p::GROUP_ARITHMETIC_RATIO], arithmetic(&benches)));
+    let mut parameters = or_missing(&[GpuParameterId::GroupUploadRatio], uploads(&benches));
+    parameters.extend(or_missing(&[GpuParameterId::GroupRoundTripRatio], round_trips(&benches)));
+    parameters.extend(or_missing(&[GpuParameterId::GroupArithmeticRatio], arithmetic(&benches)));
     parameters
 }
 
@@ -44,8 +43,8 @@ fn slice(benches: &[Bench<'_>]) -> Duration {
     })
 }
 
-fn one(figures: Vec<Figure>, name: &str, method: &str) -> Vec<Parameter> {
-    figures.into_iter().map(|figure| figure.into_parameter(name, method)).collect()
+fn one(figures: Vec<Figure>, id: GpuParameterId, method: &str) -> Vec<Parameter> {
+    figures.into_iter().map(|figure| figure.into_parameter(id, method)).collect()
 }
 
 fn uploads(benches: &[Bench<'_>]) -> Result<Vec<Parameter>, String> {
@@ -57,7 +56,7 @@ fn uploads(benches: &[Bench<'_>]) -> Result<Vec<Parameter>, String> {
     let figures = foreign_load::try_collect(plan(benches, 6), || ratio(&mut jobs, run))?;
     let mib = UPLOAD_BYTES >> 20;
     let method = format!("uploads of {mib} MiB in the same time, a thread for each GPU, over the fastest one alone");
-    Ok(one(figures, p::GROUP_UPLOAD_RATIO, &method))
+    Ok(one(figures, GpuParameterId::GroupUploadRatio, &method))
 }
 
 /// Arithmetic on one GPU.
@@ -93,7 +92,7 @@ fn arithmetic(benches: &[Bench<'_>]) -> Result<Vec<Parameter>, String> {
     let run = |job: &mut Work<'_>| job.rate(time);
     let figures = foreign_load::try_collect(plan(benches, 6), || ratio(&mut jobs, run))?;
     let method = "multiply-adds in the same time, a thread for each GPU, over the fastest one alone";
-    Ok(one(figures, p::GROUP_ARITHMETIC_RATIO, method))
+    Ok(one(figures, GpuParameterId::GroupArithmeticRatio, method))
 }
 
 /// One sample: the sum of the rates of all at once over the highest of each alone.
@@ -146,7 +145,7 @@ fn round_trips(benches: &[Bench<'_>]) -> Result<Vec<Parameter>, String> {
         Ok::<_, String>(vec![together.as_secs_f64() / slowest.as_secs_f64()])
     })?;
     let method = "empty dispatch submitted to each GPU in turn by one thread, then waited for, over the slowest one alone";
-    Ok(one(figures, p::GROUP_ROUND_TRIP_RATIO, method))
+    Ok(one(figures, GpuParameterId::GroupRoundTripRatio, method))
 }
 
 #[cfg(test)]

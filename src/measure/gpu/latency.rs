@@ -4,8 +4,7 @@
 use std::time::Instant;
 
 use super::bench::{Bench, or_missing, record};
-use crate::hardware::Parameter;
-use crate::hardware::gpu::parameter as p;
+use crate::hardware::{GpuParameterId, Parameter};
 
 const SOURCE: &str = include_str!("shaders/latency.wgsl");
 
@@ -16,7 +15,8 @@ const CHAIN: u32 = 500;
 /// The same on a program that acts as a GPU.
 const CHAIN_SOFTWARE: u32 = 50;
 
-const NAMES: [&str; 4] = [p::SUBMIT_NS, p::ROUND_TRIP_NS, p::DISPATCH_NS, p::READ_BACK_NS];
+const NAMES: [GpuParameterId; 4] =
+    [GpuParameterId::SubmitNs, GpuParameterId::RoundTripNs, GpuParameterId::DispatchNs, GpuParameterId::ReadBackNs];
 
 pub(super) fn measure(bench: &Bench<'_>) -> Vec<Parameter> {
     or_missing(&NAMES, latencies(bench))

@@ -3,8 +3,7 @@
 use std::time::Duration;
 
 use super::bench::{Bench, Bound, Kernel, calibrate, or_missing, per_ns};
-use crate::hardware::Parameter;
-use crate::hardware::gpu::parameter as p;
+use crate::hardware::{GpuParameterId, Parameter};
 use crate::measure::UNDER_LIMIT;
 
 const SOURCE: &str = include_str!("shaders/memory.wgsl");
@@ -24,10 +23,9 @@ const BRIEF: u64 = 1 << 20;
 const MOST_DISPATCHES: u32 = 4096;
 
 pub(super) fn measure(bench: &Bench<'_>, free_bytes: Option<u64>) -> Vec<Parameter> {
-    let sets = p::READ_WORKING_SETS_KIB.map(p::read_name);
-    let mut names = vec![p::READ_GB_PER_S, p::WRITE_GB_PER_S, p::COPY_GB_PER_S];
-    names.extend(sets.iter().map(String::as_str));
-    or_missing(&names, bandwidths(bench, free_bytes))
+    let mut ids = vec![GpuParameterId::ReadGbPerS, GpuParameterId::WriteGbPerS, GpuParameterId::CopyGbPerS];
+    ids.extend(GpuParameterId::READS.map(|r| r.1));
+    or_missing(&ids, bandwidths(bench, free_bytes))
 }
 
 /// The largest power of two that the limits of the device and its free memory leave for one of two buffers, up to `wanted`.
@@ -56,7 +54,8 @@ fn bandwidths(bench: &Bench<'_>, free_bytes: Option<u64>) -> Result<Vec<Paramete
         Job::of(bench, target, bytes, writing(bench, &write, &buffers.data, bytes)?)?,
     ];
     let copies = calibrate(target, MOST_DISPATCHES, |count| buffers.copy(bench, bytes, count))?;
-    let sets: Vec<Result<u64, String>> = p::READ_WORKING_SETS_KIB.map(|kib| set(u64::from(kib) << 10, bytes, bench)).into();
+    let sets: Vec<Result<u64, String>> =
+        GpuParameterId::READS.map(|(kib, _)| set(u64::from(kib) << 10, bytes, bench)).into();
     // Each pass over a small set reads it again and again, so that a dispatch fills the GPU.
     let pass = bench.pick(64 << 20, 4 << 20).min(bytes);
     // The largest set may be the one that is read already.
@@ -74,22 +73,21 @@ fn bandwidths(bench: &Bench<'_>, free_bytes: Option<u64>) -> Result<Vec<Paramete
     let wall = "vectors of 16 bytes, many dispatches in one submission, by the wall clock";
     let whole = figures.first().cloned().unwrap_or_default();
     let mut figures = figures.into_iter();
-    let mut next = |name: &str, method: &str| figures.next().unwrap_or_default().into_parameter(name, method);
+    let mut next = |id: GpuParameterId, method: &str| figures.next().unwrap_or_default().into_parameter(id, method);
     let mut parameters = vec![
-        next(p::READ_GB_PER_S, &format!("kernel that reads {mib} MiB of random data, {wall}")),
-        next(p::WRITE_GB_PER_S, &format!("kernel that writes {mib} MiB, {wall}")),
+        next(GpuParameterId::ReadGbPerS, &format!("kernel that reads {mib} MiB of random data, {wall}")),
+        next(GpuParameterId::WriteGbPerS, &format!("kernel that writes {mib} MiB, {wall}")),
         next(
-            p::COPY_GB_PER_S,
+            GpuParameterId::CopyGbPerS,
             &format!("copy command from one buffer of {mib} MiB to another, read and written bytes counted"),
         ),
     ];
-    for (kib, set) in p::READ_WORKING_SETS_KIB.into_iter().zip(sets) {
-        let name = p::read_name(kib);
+    for ((kib, id), set) in GpuParameterId::READS.into_iter().zip(sets) {
         let method = format!("kernel that reads {kib} KiB of random data again and again, {wall}");
         parameters.push(match set {
-            Ok(set) if set == bytes => whole.clone().into_parameter(&name, &method),
-            Ok(_) => next(&name, &method),
-            Err(why) => Parameter::missing(&name, &why),
+            Ok(set) if set == bytes => whole.clone().into_parameter(id, &method),
+            Ok(_) => next(id, &method),
+            Err(why) => Parameter::missing(id, &why),
         });
     }
     Ok(parameters)

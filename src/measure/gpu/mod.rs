@@ -21,21 +21,20 @@ use std::time::{Duration, Instant};
 
 use super::{Options, UNDER_LIMIT};
 use crate::gpu::{Gpu, Gpus};
-use crate::hardware::gpu::parameter;
-use crate::hardware::{GpuGroup, GpuHardware, Parameter};
+use crate::hardware::{GpuGroup, GpuHardware, GpuParameterId, Parameter};
 use bench::Bench;
 
 /// How long a real GPU works before anything is timed: they clock down when idle.
 const WARM_UP: Duration = Duration::from_millis(50);
 
-/// Measures one GPU: each name of [`parameter::all_names`] once, measured, reported or missing with a reason.
+/// Measures one GPU: each of [`GpuParameterId::OF_ONE`] once, measured, reported or missing with a reason.
 ///
 /// The GPU is opened anew, so that memory and submissions of the caller don't stand in the way; but one that the program
 /// opened itself ([`Gpus::of`]) is measured as it is, and what else it does meanwhile makes it look slower. [`Options::threads`] has
 /// no effect. With [`Options::limit`] only what a cost model reads is measured.
 ///
 /// # Errors
-/// A sentence, when there is no such GPU or its driver refuses to open it.
+/// [`Error::Unavailable`](crate::Error) when there is no such GPU or its driver refuses to open it.
 pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, String> {
     let began = Instant::now();
     let (opened, raw) = match gpus.adapter(index) {
@@ -57,20 +56,20 @@ pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, St
         measured.extend(properties::measure(&bench, &raw));
     }
     let absent = if whole { "not measured" } else { UNDER_LIMIT };
-    let find = |name: String| {
-        let found = measured.iter().find(|p| p.name == name).cloned();
-        found.unwrap_or_else(|| Parameter::missing(&name, absent))
+    let find = |id: GpuParameterId| {
+        let found = Parameter::find(&measured, id).cloned();
+        found.unwrap_or_else(|| Parameter::missing(id, absent))
     };
-    let parameters = parameter::all_names().into_iter().map(find).collect();
-    Ok(GpuHardware { gpu: opened.identity().clone(), parameters })
+    let parameters = GpuParameterId::OF_ONE.into_iter().map(find).collect();
+    Ok(GpuHardware::new(opened.identity().clone(), parameters))
 }
 
-/// Measures GPUs that work at the same time: each name of [`parameter::GROUP`] once, measured or missing with a reason.
+/// Measures GPUs that work at the same time: each of [`GpuParameterId::GROUP`] once, measured or missing with a reason.
 ///
 /// The order of the numbers does not matter, and a number that stands twice counts once. Each GPU is opened anew.
 ///
 /// # Errors
-/// A sentence, when there are fewer than two, or one of them can't be opened.
+/// [`Error::Unavailable`](crate::Error) when there are fewer than two, or one of them can't be opened.
 pub fn gpu_group(gpus: &Gpus, indices: &[u32], options: &Options) -> Result<GpuGroup, String> {
     let mut indices = indices.to_vec();
     indices.sort_unstable();
@@ -86,7 +85,7 @@ pub fn gpu_group(gpus: &Gpus, indices: &[u32], options: &Options) -> Result<GpuG
             let _ = warm_up(&bench);
         }
     }
-    Ok(GpuGroup { gpus: indices, parameters: group::measure(&opened, options) })
+    Ok(GpuGroup::new(indices, group::measure(&opened, options)))
 }
 
 /// Gives a GPU work for [`WARM_UP`].

@@ -7,8 +7,7 @@ use super::compute::Arithmetic;
 use super::nvml::{self, Nvml};
 use super::raw::Raw;
 use super::sysfs::Sysfs;
-use crate::hardware::gpu::parameter as p;
-use crate::hardware::{GpuKind, Parameter};
+use crate::hardware::{GpuKind, GpuParameterId, Parameter};
 
 const SUBGROUP_SOURCE: &str = include_str!("shaders/subgroup.wgsl");
 
@@ -81,25 +80,26 @@ impl Load {
 
 fn limits(bench: &Bench<'_>) -> Vec<Parameter> {
     let limits = bench.gpu.limits();
-    let told = |name: &str, value: u64, limit: &str| Parameter::reported(name, value as f64, &format!("wgpu limit {limit}"));
+    let told =
+        |id: GpuParameterId, value: u64, limit: &str| Parameter::reported(id, value as f64, &format!("wgpu limit {limit}"));
     vec![
         told(
-            p::WORKGROUP_INVOCATIONS,
+            GpuParameterId::WorkgroupInvocations,
             limits.max_compute_invocations_per_workgroup.into(),
             "max_compute_invocations_per_workgroup",
         ),
         told(
-            p::WORKGROUP_MEMORY_BYTES,
+            GpuParameterId::WorkgroupMemoryBytes,
             limits.max_compute_workgroup_storage_size.into(),
             "max_compute_workgroup_storage_size",
         ),
-        told(p::BINDING_BYTES, limits.max_storage_buffer_binding_size, "max_storage_buffer_binding_size"),
-        told(p::BUFFER_BYTES, limits.max_buffer_size, "max_buffer_size"),
+        told(GpuParameterId::BindingBytes, limits.max_storage_buffer_binding_size, "max_storage_buffer_binding_size"),
+        told(GpuParameterId::BufferBytes, limits.max_buffer_size, "max_buffer_size"),
     ]
 }
 
 fn memory(bench: &Bench<'_>, raw: &Raw, nvml: Option<&Nvml>, sysfs: Option<&Sysfs>) -> Parameter {
-    let name = p::MEMORY_BYTES;
+    let name = GpuParameterId::MemoryBytes;
     if let Some(bytes) = nvml.and_then(|nvml| nvml.memory_bytes.as_ref().ok()) {
         return Parameter::reported(name, *bytes as f64, "NVML");
     }
@@ -133,7 +133,7 @@ fn clock_parameter(
     nvml: Option<&Nvml>,
     sysfs: Option<(f64, &'static str)>,
 ) -> Parameter {
-    let name = p::CLOCK_GHZ;
+    let name = GpuParameterId::ClockGhz;
     if bench.is_software() {
         return Parameter::missing(name, SOFTWARE);
     }
@@ -152,16 +152,16 @@ fn processors(
     nvml: Option<&Nvml>,
     sysfs: Option<&Sysfs>,
 ) -> [Parameter; 2] {
-    let names = [p::PROCESSORS, p::LANES];
+    let names = [GpuParameterId::Processors, GpuParameterId::Lanes];
     if bench.is_software() {
         return names.map(|name| Parameter::missing(name, SOFTWARE));
     }
     let kfd = sysfs.and_then(Sysfs::compute);
-    let told = |name: &str, (count, source): (u32, &str)| Parameter::reported(name, f64::from(count), source);
-    let or_why = |name: &str, found: Option<(u32, &str)>, nvml: Option<&Result<u32, String>>| match (found, nvml) {
-        (Some(found), _) => told(name, found),
-        (None, Some(Err(why))) => Parameter::missing(name, why),
-        _ => Parameter::missing(name, unknown(info)),
+    let told = |id: GpuParameterId, (count, source): (u32, &str)| Parameter::reported(id, f64::from(count), source);
+    let or_why = |id: GpuParameterId, found: Option<(u32, &str)>, nvml: Option<&Result<u32, String>>| match (found, nvml) {
+        (Some(found), _) => told(id, found),
+        (None, Some(Err(why))) => Parameter::missing(id, why),
+        _ => Parameter::missing(id, unknown(info)),
     };
     let units = nvml.map(|nvml| &nvml.processors);
     let by_nvml = |count: Option<&Result<u32, String>>, source: &'static str| Some((*count?.as_ref().ok()?, source));
@@ -169,12 +169,12 @@ fn processors(
         .processors
         .or_else(|| by_nvml(units, "NVML, CUDA cores over the cores that a multiprocessor of this capability has"))
         .or_else(|| kfd.map(|kfd| (kfd.units, "KFD, simd_count over simd_per_cu")));
-    let processors = or_why(p::PROCESSORS, found, units);
+    let processors = or_why(GpuParameterId::Processors, found, units);
     let cores = nvml.map(|nvml| &nvml.cores);
     let found = by_nvml(cores, "NVML, CUDA cores")
         .or(raw.lanes)
         .or_else(|| kfd.map(|kfd| (kfd.lanes, "KFD, 64 lanes for each compute unit")));
-    [processors, or_why(p::LANES, found, cores)]
+    [processors, or_why(GpuParameterId::Lanes, found, cores)]
 }
 
 /// Why clock and processors of a GPU of this vendor are not known.
@@ -189,7 +189,7 @@ fn unknown(info: &wgpu::AdapterInfo) -> &'static str {
 }
 
 fn subgroup(bench: &Bench<'_>, info: &wgpu::AdapterInfo) -> Parameter {
-    let name = p::SUBGROUP_LANES;
+    let name = GpuParameterId::SubgroupLanes;
     let (low, high) = (info.subgroup_min_size, info.subgroup_max_size);
     let seen = if bench.gpu.device().features().contains(wgpu::Features::SUBGROUP) {
         observe(bench)
@@ -215,7 +215,7 @@ fn observe(bench: &Bench<'_>) -> Result<u32, String> {
 }
 
 fn unified(bench: &Bench<'_>, raw: &Raw) -> Parameter {
-    let name = p::UNIFIED_MEMORY;
+    let name = GpuParameterId::UnifiedMemory;
     let told = |yes: bool, source: &str| Parameter::reported(name, f64::from(u8::from(yes)), source);
     match bench.gpu.identity().kind {
         GpuKind::Software => told(true, "a program on the CPU acts as the GPU"),

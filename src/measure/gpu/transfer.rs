@@ -8,8 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::bench::{Bench, or_missing, per_ns};
 use super::fits;
-use crate::hardware::Parameter;
-use crate::hardware::gpu::parameter as p;
+use crate::hardware::{GpuParameterId, Parameter};
 use crate::measure::foreign_load::Figure;
 use crate::splitmix;
 
@@ -22,17 +21,17 @@ const SIZES: [u64; 8] = [1 << 12, 1 << 14, 1 << 16, 1 << 18, 1 << 20, 1 << 23, T
 /// Sizes of a brief run.
 const BRIEF_SIZES: [u64; 4] = [1 << 12, 1 << 16, 1 << 20, TOTAL_BYTES];
 
-const NAMES: [&str; 10] = [
-    p::UPLOAD_GB_PER_S,
-    p::UPLOAD_HOST_COPY_GB_PER_S,
-    p::UPLOAD_DEVICE_COPY_GB_PER_S,
-    p::UPLOAD_LATENCY_NS,
-    p::UPLOAD_RATE_GB_PER_S,
-    p::DOWNLOAD_GB_PER_S,
-    p::DOWNLOAD_HOST_COPY_GB_PER_S,
-    p::DOWNLOAD_DEVICE_COPY_GB_PER_S,
-    p::DOWNLOAD_LATENCY_NS,
-    p::DOWNLOAD_RATE_GB_PER_S,
+const NAMES: [GpuParameterId; 10] = [
+    GpuParameterId::UploadGbPerS,
+    GpuParameterId::UploadHostCopyGbPerS,
+    GpuParameterId::UploadDeviceCopyGbPerS,
+    GpuParameterId::UploadLatencyNs,
+    GpuParameterId::UploadRateGbPerS,
+    GpuParameterId::DownloadGbPerS,
+    GpuParameterId::DownloadHostCopyGbPerS,
+    GpuParameterId::DownloadDeviceCopyGbPerS,
+    GpuParameterId::DownloadLatencyNs,
+    GpuParameterId::DownloadRateGbPerS,
 ];
 
 pub(super) fn measure(bench: &Bench<'_>) -> Vec<Parameter> {
@@ -236,7 +235,7 @@ mod tests {
 
     #[test]
     fn names_are_those_of_the_report() {
-        assert_eq!(p::all_names()[..NAMES.len()], NAMES);
+        assert_eq!(GpuParameterId::OF_ONE[..NAMES.len()], NAMES);
     }
 
     #[test]

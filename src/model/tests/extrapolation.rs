@@ -9,9 +9,9 @@ fn both() -> Model {
         MethodModel { gpu_kinds: vec![GpuKind::Discrete], ..method(BackendClass::Gpu, Scale::GpuDispatch) },
     ]);
     let ranges = [
-        (parameter::CLOCK_MEASURED_GHZ, 2.0, 5.0),
-        (parameter::USABLE_CORES, 2.0, 64.0),
-        (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, 8.0, 50.0),
+        (ParameterId::ClockMeasuredGhz, 2.0, 5.0),
+        (ParameterId::UsableCores, 2.0, 64.0),
+        (ParameterId::BandwidthOneThreadGbPerS, 8.0, 50.0),
     ];
     model.ranges = ranges.map(|(name, min, max)| Range { parameter: name.to_owned(), min, max }).to_vec();
     model
@@ -20,12 +20,12 @@ fn both() -> Model {
 /// A machine of eight cores with one GPU.
 fn machine(changes: &[(&str, f64)]) -> Hardware {
     let mut figures = vec![
-        (parameter::USABLE_CORES, 8.0),
-        (parameter::CLOCK_MEASURED_GHZ, 4.0),
-        (parameter::CACHE_LLC_BYTES, 3e7),
-        (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, 20.0),
-        (parameter::SCALING_TWO_THREADS_RATIO, 1.9),
-        (parameter::SCALING_ALL_THREADS_RATIO, 7.0),
+        (ParameterId::UsableCores, 8.0),
+        (ParameterId::ClockMeasuredGhz, 4.0),
+        (ParameterId::CacheLlcBytes, 3e7),
+        (ParameterId::BandwidthOneThreadGbPerS, 20.0),
+        (ParameterId::ScalingTwoThreadsRatio, 1.9),
+        (ParameterId::ScalingAllThreadsRatio, 7.0),
     ];
     for (name, value) in changes {
         if let Some(figure) = figures.iter_mut().find(|f| f.0 == *name) {
@@ -45,7 +45,7 @@ fn told(p: &Prediction, text: &str) -> bool {
 #[test]
 fn a_thousand_cores_are_predicted_and_told_to_be_outside() {
     let all = ids(&["brute@cpu1", "brute@cpu1024"]);
-    let of_a_thousand = [(parameter::USABLE_CORES, 1024.0), (parameter::SCALING_ALL_THREADS_RATIO, 700.0)];
+    let of_a_thousand = [(ParameterId::UsableCores, 1024.0), (ParameterId::ScalingAllThreadsRatio, 700.0)];
     let p = both().predict(&machine(&of_a_thousand), &all).unwrap();
     assert!(p.extrapolated && p.costs.len() == 2, "{:?}", p.warnings);
     assert!(told(&p, "usable_cores is 1024") && told(&p, "has seen 1 threads at most"), "{:?}", p.warnings);
@@ -60,12 +60,12 @@ fn a_thousand_cores_are_predicted_and_told_to_be_outside() {
 fn figures_that_no_machine_has_are_refused_by_name() {
     for (name, values) in [
         // MHz for GHz, and what a failed measurement may leave.
-        (parameter::CLOCK_MEASURED_GHZ, &[4000.0, 0.0, -4.0, f64::NAN, f64::INFINITY][..]),
+        (ParameterId::ClockMeasuredGhz, &[4000.0, 0.0, -4.0, f64::NAN, f64::INFINITY][..]),
         // TB/s for GB/s, MB/s for GB/s, and a tenth of what memory did in 1998.
-        (parameter::BANDWIDTH_ONE_THREAD_GB_PER_S, &[0.02, 20_000.0, 0.1]),
-        (parameter::CACHE_LLC_BYTES, &[3e4, 0.0]),
-        (parameter::USABLE_CORES, &[0.0, 5000.0]),
-        (parameter::SCALING_TWO_THREADS_RATIO, &[190.0]),
+        (ParameterId::BandwidthOneThreadGbPerS, &[0.02, 20_000.0, 0.1]),
+        (ParameterId::CacheLlcBytes, &[3e4, 0.0]),
+        (ParameterId::UsableCores, &[0.0, 5000.0]),
+        (ParameterId::ScalingTwoThreadsRatio, &[190.0]),
     ] {
         for &value in values {
             let error = both().predict(&machine(&[(name, value)]), &ids(&["brute@cpu1", "brute@gpu0"])).unwrap_err();
@@ -79,7 +79,7 @@ fn a_gpu_without_a_figure_or_with_one_that_no_gpu_has_costs_its_own_algorithms_o
     let all = ids(&["brute@cpu1", "brute@gpu0"]);
     let mut machine = machine(&[]);
     assert_eq!(both().predict(&machine, &all).unwrap().costs.len(), 2);
-    let dispatch = machine.gpus[0].parameters.iter().position(|p| p.name == of_gpu::DISPATCH_NS).unwrap();
+    let dispatch = machine.gpus[0].parameters.iter().position(|p| p.name == GpuParameterId::DispatchNs).unwrap();
     for (value, text) in [(None, "dispatch_ns of gpu0 is missing"), (Some(2.0), "dispatch_ns of gpu0 is 2, and no machine")]
     {
         machine.gpus[0].parameters[dispatch].value = value;

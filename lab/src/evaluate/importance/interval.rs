@@ -10,13 +10,13 @@ const SEED: u64 = 1;
 
 /// A mean over physical machines with its 90 % interval by a bootstrap over them, in the unit of what holds it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(crate) struct Interval {
+pub struct Interval {
     /// The mean over the machines.
-    pub(crate) mean: f64,
+    pub mean: f64,
     /// Lower end, the 5 % quantile of the means of the draws.
-    pub(crate) low: f64,
+    pub low: f64,
     /// Upper end, the 95 % quantile.
-    pub(crate) high: f64,
+    pub high: f64,
 }
 
 impl Interval {

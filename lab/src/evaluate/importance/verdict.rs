@@ -12,10 +12,10 @@ const LEAST_DEVIATION: f64 = 0.1;
 /// Whether a parameter and an outcome belong together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Verdict {
-    /// Predictions of machines left out are worse with the values of others, or without it.
+pub enum Verdict {
+    /// Predictions of machines held out are worse without it.
     Linked,
-    /// They are worse by less than matters either way, with the intervals as proof.
+    /// They are worse by less than matters, with the interval as proof.
     NotLinked,
     /// Neither is shown.
     CannotBeTold,
@@ -31,51 +31,43 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// How much worse an outcome is on machines left out, and what follows.
+/// How much worse an outcome is on machines held out, and what follows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Effect {
-    /// With the value of another machine; none of too few machines.
-    pub(crate) permuted: Option<Interval>,
-    /// With one value for all machines, in the training too: what no other parameter stands in for.
-    pub(crate) refitted: Option<Interval>,
+pub struct Effect {
+    /// The rise with one value of the parameter for all machines, in the training too: what no other parameter stands in for. None of too
+    /// few machines.
+    pub rise: Option<Interval>,
     /// What follows.
-    pub(crate) verdict: Verdict,
+    pub verdict: Verdict,
     /// Why it can't be told; empty where it can.
-    pub(crate) because: String,
+    pub because: String,
 }
 
 impl Effect {
     /// Whether it says anything: not of too few machines, and not where what was fitted never reads the parameter, whose values can't
     /// change anything then.
-    pub(crate) fn is_told(&self) -> bool {
-        let moves = |i: &Interval| i.low != 0.0 || i.high != 0.0;
-        self.permuted.iter().chain(&self.refitted).any(moves)
+    #[must_use]
+    pub fn is_told(&self) -> bool {
+        self.rise.is_some_and(|i| i.low != 0.0 || i.high != 0.0)
     }
 
     /// `deviation` is the standard deviation of the parameter over so many machines, in octaves; `least` what matters of the outcome.
-    pub(super) fn new(
-        permuted: Option<Interval>,
-        refitted: Option<Interval>,
-        machines: usize,
-        deviation: f64,
-        least: f64,
-    ) -> Self {
-        let enough = machines >= FEWEST_MACHINES;
-        let (Some(permuted), Some(refitted)) = (permuted.filter(|_| enough), refitted.filter(|_| enough)) else {
+    pub(super) fn new(rise: Option<Interval>, machines: usize, deviation: f64, least: f64) -> Self {
+        let Some(rise) = rise.filter(|_| machines >= FEWEST_MACHINES) else {
             let because = format!("{machines} physical machines have both; it takes {FEWEST_MACHINES}");
-            return Self { permuted: None, refitted: None, verdict: Verdict::CannotBeTold, because };
+            return Self { rise: None, verdict: Verdict::CannotBeTold, because };
         };
         let (mut verdict, mut because) = (Verdict::CannotBeTold, String::new());
         if deviation < LEAST_DEVIATION {
             because = format!("the parameter hardly varies: its standard deviation is {deviation:.3} octaves");
-        } else if permuted.high <= least && refitted.high <= least {
+        } else if rise.high <= least {
             verdict = Verdict::NotLinked;
-        } else if permuted.low > 0.0 || refitted.low > 0.0 {
+        } else if rise.low > 0.0 {
             verdict = Verdict::Linked;
         } else {
-            because = "the intervals hold zero, and more than what matters".to_owned();
+            because = "the interval holds zero, and more than what matters".to_owned();
         }
-        Self { permuted: Some(permuted), refitted: Some(refitted), verdict, because }
+        Self { rise: Some(rise), verdict, because }
     }
 }
 
@@ -84,20 +76,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn verdicts_follow_from_both_intervals() {
+    fn verdicts_follow_from_the_interval() {
         let interval = |low: f64, high: f64| Some(Interval { mean: (low + high) / 2.0, low, high });
-        let of = |permuted, refitted, machines, deviation| Effect::new(permuted, refitted, machines, deviation, 0.1);
+        let of = |rise, machines, deviation| Effect::new(rise, machines, deviation, 0.1);
         let (none, wide, above) = (interval(-0.01, 0.01), interval(-0.2, 0.5), interval(0.05, 0.5));
-        assert_eq!(of(none, none, 9, 1.0).verdict, Verdict::NotLinked);
-        assert_eq!(of(none, above, 9, 1.0).verdict, Verdict::Linked);
-        assert_eq!(of(above, wide, 9, 1.0).verdict, Verdict::Linked);
+        assert_eq!(of(none, 9, 1.0).verdict, Verdict::NotLinked);
+        assert_eq!(of(above, 9, 1.0).verdict, Verdict::Linked);
         // What is surely there and too small to matter.
-        assert_eq!(of(interval(0.01, 0.02), none, 9, 1.0).verdict, Verdict::NotLinked);
-        for (effect, word) in [
-            (of(wide, none, 9, 1.0), "hold zero"),
-            (of(above, above, 9, 0.01), "hardly varies"),
-            (of(above, above, 4, 1.0), "it takes 5"),
-        ] {
+        assert_eq!(of(interval(0.01, 0.02), 9, 1.0).verdict, Verdict::NotLinked);
+        for (effect, word) in
+            [(of(wide, 9, 1.0), "holds zero"), (of(above, 9, 0.01), "hardly varies"), (of(above, 4, 1.0), "it takes 5")]
+        {
             assert!(effect.verdict == Verdict::CannotBeTold && effect.because.contains(word), "{effect:?}");
         }
     }

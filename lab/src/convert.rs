@@ -1,0 +1,172 @@
+//! Files of before version 0.2 in the form that is read now.
+//!
+//! Works on the text of a file, so that it needs no types of old versions. What is current already is refused: nothing is converted twice.
+
+use crate::report;
+use crate::training::{read_model, write_model};
+use sapwise::json;
+use serde_json::{Map, Value};
+
+/// The old names of the methods, and what each is called now.
+const METHODS: [(&str, &str); 3] = [("strips", "grid-sap"), ("sweep", "sap"), ("verlet", "pair-cache")];
+/// Keys whose text is an algorithm or a method.
+const NAMES: [&str; 5] = ["algorithm", "id", "method", "below", "above"];
+/// Keys of the text, or the list of texts, that people read.
+const TEXTS: [&str; 4] = ["remarks", "warnings", "error", "interval_basis"];
+/// Keys of `model/1` that tell of its training.
+const TRAINING: [&str; 4] = ["trained_on", "trained_on_counts", "prior", "validation"];
+/// Keys of `model/1`, and of its validation, that have no successor, and what they held.
+const DROPPED: [(&str, &str); 2] = [
+    ("clouds", "the joint distribution of the parameters in training"),
+    ("folds", "the fits without some machines, which intervals were made of"),
+];
+const DROPPED_OF_VALIDATION: [(&str, &str); 1] = [("learning", "the scores of trainings on fewer machines")];
+const DROPPED_OF_COVERAGE: [(&str, &str); 2] = [
+    ("crossings", "the share of crossovers within their interval"),
+    ("crossings_count", "how many crossovers there were"),
+];
+
+/// A file in its current form.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Converted {
+    /// The text of the file.
+    pub text: String,
+    /// Its schema, such as `report/2`.
+    pub schema: &'static str,
+    /// What was left out, in words. Empty where all was kept.
+    pub dropped: Vec<String>,
+}
+
+/// Why a text was not converted.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConvertError {
+    /// It is no JSON.
+    #[error("it is no JSON")]
+    Json(#[source] serde_json::Error),
+    /// It is current.
+    #[error("it is {0} already; there is nothing to convert")]
+    Current(String),
+    /// A cache holds what is measured again in seconds.
+    #[error("it is a cache, which is not converted; delete it, and the next start measures again")]
+    Cache,
+    /// Another file.
+    #[error("{0}; report/1, model/1 and fields/1 are converted")]
+    Unknown(String),
+    /// Its form is that of an old file, and what it holds is not sound.
+    #[error("it is no sound {0}")]
+    Unsound(&'static str, #[source] Unsound),
+}
+
+/// Converts `report/1` into `report/2`, `model/1` into `model/2` and `fields/1` into `tuning/1`. No figure that is kept changes.
+///
+/// # Errors
+/// Where the text is of none of these schemas, is damaged, or is current already.
+pub fn convert(text: &str) -> Result<Converted, ConvertError> {
+    let file: Value = serde_json::from_str(text).map_err(ConvertError::Json)?;
+    let Value::Object(mut file) = file else { return Err(ConvertError::Unknown("it is no object".to_owned())) };
+    let schema = file.get("schema").and_then(Value::as_str).unwrap_or_default().to_owned();
+    let mut dropped = Vec::new();
+    let (schema, current): (_, fn(&str) -> Result<String, Unsound>) = match schema.as_str() {
+        "report/1" => ("report/2", |text| Ok(report::write(&report::read(text)?)?)),
+        "model/1" => {
+            dropped = move_training(&mut file);
+            ("model/2", |text| {
+                let stored = read_model(text)?;
+                Ok(write_model(&stored.model, &stored.training)?)
+            })
+        }
+        "fields/1" => ("tuning/1", |text| Ok(json::write_tuning(&json::tuning(text)?)?)),
+        "cache/1" => return Err(ConvertError::Cache),
+        "" => return Err(ConvertError::Unknown("it names no schema".to_owned())),
+        current if ["report/", "model/", "tuning/", "cache/"].iter().any(|s| current.starts_with(s)) => {
+            return Err(ConvertError::Current(schema));
+        }
+        other => return Err(ConvertError::Unknown(format!("its schema is {other:?}"))),
+    };
+    file.insert("schema".to_owned(), schema.into());
+    let mut file = Value::Object(file);
+    rename(&mut file);
+    // Read and written as any other file: what can't be read is refused here, and the keys stand in their usual order.
+    let text = current(&file.to_string()).map_err(|why| ConvertError::Unsound(schema, why))?;
+    Ok(Converted { text, schema, dropped })
+}
+
+type Unsound = Box<dyn std::error::Error + Send + Sync>;
+
+/// Puts what a model says of its training under a key of its own, and tells what is left out.
+fn move_training(model: &mut Map<String, Value>) -> Vec<String> {
+    let mut dropped = drop_keys(model, &DROPPED);
+    let simulated = |report: &Value| report.get("label").is_some_and(|label| label == "simulated");
+    let simulated = ["trained_on", "trained_on_counts"]
+        .iter()
+        .filter_map(|key| model.get(*key)?.as_array())
+        .any(|reports| reports.iter().any(simulated));
+    let mut training: Map<String, Value> =
+        TRAINING.iter().filter_map(|&key| Some((key.to_owned(), model.remove(key)?))).collect();
+    if let Some(validation) = training.get_mut("validation").and_then(Value::as_object_mut) {
+        dropped.extend(drop_keys(validation, &DROPPED_OF_VALIDATION));
+        if let Some(coverage) = validation.get_mut("coverage").and_then(Value::as_object_mut) {
+            dropped.extend(drop_keys(coverage, &DROPPED_OF_COVERAGE));
+        }
+    }
+    if simulated {
+        model.insert("simulated".to_owned(), true.into());
+    }
+    model.insert("training".to_owned(), Value::Object(training));
+    dropped
+}
+
+/// Removes keys, and tells those that were there.
+fn drop_keys(from: &mut Map<String, Value>, keys: &[(&str, &str)]) -> Vec<String> {
+    let there = keys.iter().filter(|(key, _)| from.remove(*key).is_some());
+    there.map(|(key, what)| format!("{key}: {what}")).collect()
+}
+
+/// Calls methods and keys by their current names, wherever in the file they stand.
+fn rename(value: &mut Value) {
+    match value {
+        Value::Array(items) => items.iter_mut().for_each(rename),
+        Value::Object(entries) => {
+            if let Some(terms) = entries.remove("otherwise") {
+                entries.insert("fallback_terms".to_owned(), terms);
+            }
+            for (key, value) in entries {
+                match value {
+                    Value::String(name) if NAMES.contains(&key.as_str()) => *name = renamed(name),
+                    value if TEXTS.contains(&key.as_str()) => rename_in_texts(value),
+                    value => rename(value),
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+/// The current name of a method, with whatever processor stands behind it.
+fn renamed(name: &str) -> String {
+    let (method, backend) = name.split_at(name.find('@').unwrap_or(name.len()));
+    let method = METHODS.iter().find(|m| m.0 == method).map_or(method, |m| m.1);
+    format!("{method}{backend}")
+}
+
+fn rename_in_texts(value: &mut Value) {
+    match value {
+        Value::Array(items) => items.iter_mut().for_each(rename_in_texts),
+        Value::String(text) => {
+            // An algorithm is a word with an @; the name of a method alone may be a plain word, such as "sweep".
+            let inside = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '@' || c == '+';
+            let mut words = Vec::new();
+            let mut rest = text.as_str();
+            while !rest.is_empty() {
+                let end = rest.find(|c| inside(c) != rest.starts_with(inside)).unwrap_or(rest.len());
+                let (word, after) = rest.split_at(end);
+                words.push(if word.contains('@') { renamed(word) } else { word.to_owned() });
+                rest = after;
+            }
+            *text = words.concat();
+        }
+        _ => {}
+    }
+}

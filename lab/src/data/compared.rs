@@ -1,0 +1,41 @@
+//! The parameters by which machines are compared: with each other, and with those of a training.
+
+use sapwise::hardware::{GpuParameterId, ParameterId};
+use sapwise::model::GPU_PREFIX;
+use sapwise::{GpuKind, Hardware};
+
+/// Parameters by which the CPU of a machine is compared with those of the training.
+pub const COMPARED: [ParameterId; 8] = [
+    ParameterId::ClockMeasuredGhz,
+    ParameterId::SimdLanes,
+    ParameterId::CacheLlcBytes,
+    ParameterId::BandwidthOneThreadGbPerS,
+    ParameterId::BandwidthAllThreadsGbPerS,
+    ParameterId::ForkJoinColdNs,
+    ParameterId::ScalingAllThreadsRatio,
+    ParameterId::UsableCores,
+];
+
+/// The same of a GPU.
+pub const COMPARED_OF_GPUS: [GpuParameterId; 10] = [
+    GpuParameterId::RoundTripNs,
+    GpuParameterId::ReadBackNs,
+    GpuParameterId::DispatchNs,
+    GpuParameterId::UploadGbPerS,
+    GpuParameterId::UploadRateGbPerS,
+    GpuParameterId::DownloadGbPerS,
+    GpuParameterId::DownloadRateGbPerS,
+    GpuParameterId::ReadGbPerS,
+    GpuParameterId::CopyGbPerS,
+    GpuParameterId::ArithmeticGflopPerS,
+];
+
+/// A parameter of a machine by the name that it has in a model's ranges. That of a GPU is the one of the first GPU, which is a
+/// discrete one where there is any; software adapters don't count.
+#[must_use]
+pub fn figure(hardware: &Hardware, name: &str) -> Option<f64> {
+    match name.strip_prefix(GPU_PREFIX) {
+        Some(name) => hardware.gpus.iter().find(|g| g.gpu.kind != GpuKind::Software)?.value_named(name),
+        None => hardware.value_named(name),
+    }
+}

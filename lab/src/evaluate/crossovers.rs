@@ -1,0 +1,120 @@
+//! How far predicted crossovers lie from measured ones.
+
+use super::baselines::closest;
+use crate::data::Profile;
+use crate::fit::{measured_slice, slice_tuning};
+use sapwise::{AlgorithmCost, AlgorithmId, Crossover, Tuning, Load, Source};
+
+/// The crossovers between the measured tuning of one profile, in the scenario of its slice.
+#[derive(Debug, Clone, Default)]
+pub struct MeasuredCrossovers {
+    loads: Vec<Load>,
+    crossovers: Vec<Crossover>,
+}
+
+impl MeasuredCrossovers {
+    /// By the measured costs of the profile; none where it has too few sizes or timings.
+    pub fn new(profile: &Profile, costs: &[AlgorithmCost]) -> Self {
+        let scenario = profile.usual_scenario();
+        let found = measured_slice(profile, scenario).and_then(|loads| {
+            let crossovers = slice_tuning(costs.to_vec(), scenario, &loads)?.crossovers;
+            Ok(Self { loads, crossovers })
+        });
+        found.unwrap_or_default()
+    }
+
+    /// For each crossover that both algorithms have a predicted cost for, the nearest crossing of those costs in the same direction.
+    /// Where they do not cross so within the slice, the end beyond which they would, which is the upper one where the algorithm
+    /// below the crossover is predicted to be cheaper at it. The nearest number of threads stands for one that was not predicted.
+    pub fn predicted(&self, costs: &[AlgorithmCost]) -> Vec<ComparedCrossover> {
+        let ids: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
+        let cost = |id: &AlgorithmId| {
+            let found = closest(id, &ids)?;
+            let cost = costs.iter().find(|c| c.algorithm == found)?;
+            // Under its own name, since one cost may stand for both sides.
+            Some(AlgorithmCost { algorithm: id.clone(), ..cost.clone() })
+        };
+        self.crossovers.iter().filter_map(|b| Some(self.compared(b, cost(&b.below)?, cost(&b.above)?))).collect()
+    }
+
+    /// Octaves between the two positions of each of them.
+    pub fn errors(&self, costs: &[AlgorithmCost]) -> Vec<f64> {
+        self.predicted(costs).iter().map(ComparedCrossover::octaves).collect()
+    }
+
+    fn compared(&self, crossover: &Crossover, below: AlgorithmCost, above: AlgorithmCost) -> ComparedCrossover {
+        let compared = |predicted: f64, crosses| ComparedCrossover {
+            below: crossover.below.clone(),
+            above: crossover.above.clone(),
+            measured: crossover.objects,
+            predicted,
+            crosses,
+        };
+        let tuning = Tuning::from_costs(Source::Predicted, "", vec![below, above], &self.loads);
+        let alike = tuning.crossovers.iter().filter(|b| b.below == crossover.below).map(|b| compared(b.objects, true));
+        if let Some(nearest) = alike.min_by(|a, b| a.octaves().total_cmp(&b.octaves())) {
+            return nearest;
+        }
+        let later = tuning.step(crossover.objects as u32).is_some_and(|s| s.algorithm == crossover.below);
+        let end = if later { self.loads.last() } else { self.loads.first() };
+        compared(end.map_or(crossover.objects, |load| f64::from(load.objects.max(1))), false)
+    }
+}
+
+/// A measured crossover beside the predicted one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComparedCrossover {
+    /// The cheaper one below the crossover, and the one above it.
+    pub below: AlgorithmId,
+    pub above: AlgorithmId,
+    /// Objects at the measured crossover.
+    pub measured: f64,
+    /// Objects at the predicted one; where the predicted costs do not cross, the end of the slice beyond which they would.
+    pub predicted: f64,
+    /// Whether the predicted costs cross within the slice.
+    pub crosses: bool,
+}
+
+impl ComparedCrossover {
+    /// Octaves between the two, a lower bound where the predicted costs do not cross.
+    pub fn octaves(&self) -> f64 {
+        (self.predicted / self.measured).log2().abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::fit::measured_costs;
+    use crate::synthetic::Machine;
+    use super::*;
+
+    fn slower(costs: &[AlgorithmCost], id: &AlgorithmId, factor: f64) -> Vec<AlgorithmCost> {
+        let mut costs = costs.to_vec();
+        let own = costs.iter_mut().filter(|c| c.algorithm == *id);
+        own.flat_map(|c| c.curve.terms.iter_mut().chain(&mut c.curve.fallback_terms)).for_each(|t| t.unit_ns *= factor);
+        costs
+    }
+
+    #[test]
+    fn the_measured_costs_have_no_error_and_wrong_ones_have_the_distance() {
+        let profile = Profile::of("", &Machine::family()[2].report());
+        let costs = measured_costs(&profile).0;
+        let crossovers = MeasuredCrossovers::new(&profile, &costs);
+        assert!(!crossovers.crossovers.is_empty());
+        assert!(crossovers.errors(&costs).iter().all(|e| *e < 0.03), "{:?}", crossovers.errors(&costs));
+        let crossover = crossovers.crossovers[0].clone();
+        let (first, last) = (f64::from(crossovers.loads[0].objects), f64::from(crossovers.loads.last().unwrap().objects));
+        // Who is cheaper below is said to be cheaper everywhere, and the other way round.
+        let ever = crossovers.errors(&slower(&costs, &crossover.above, 1e6))[0];
+        assert!((ever - (last / crossover.objects).log2()).abs() < 0.03, "{ever}");
+        let never = crossovers.errors(&slower(&costs, &crossover.below, 1e6))[0];
+        assert!((never - (crossover.objects / first).log2()).abs() < 0.03, "{never}");
+        // A little too slow below moves the crossover down, not away.
+        let near = crossovers.errors(&slower(&costs, &crossover.below, 1.3))[0];
+        assert!(near > 0.05 && near < never, "{near}");
+        // What is not predicted is not judged.
+        let others: Vec<AlgorithmCost> =
+            costs.iter().filter(|c| c.algorithm.method() != crossover.below.method()).cloned().collect();
+        assert!(crossovers.errors(&others).len() < crossovers.crossovers.len());
+    }
+}

@@ -1,0 +1,30 @@
+//! How well strategies choose on machines that were held out, and what hardware parameters are worth to them.
+
+mod baselines;
+mod crossovers;
+#[cfg(test)]
+mod density;
+mod direct;
+mod forest;
+mod held_out;
+mod importance;
+#[cfg(test)]
+mod misspecified;
+mod notes;
+mod partition;
+#[cfg(test)]
+mod reference;
+mod regret_table;
+mod sampled;
+mod scores;
+mod validate;
+
+pub use baselines::by_costs;
+pub use crossovers::ComparedCrossover;
+pub use held_out::{HeldOut, HeldOutCrossover, Time};
+pub use importance::{Effect, Importance, Interval, OfMethod, OfParameter, Verdict, importance};
+pub use notes::folded;
+pub use partition::Partition;
+pub use regret_table::{NOT_TIMED, Regret, RegretTable, Strategy};
+pub use scores::OURS;
+pub use validate::{Validated, validate};

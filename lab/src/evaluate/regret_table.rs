@@ -1,0 +1,195 @@
+//! What each choice costs on a report: the regret.
+
+use crate::data::{Profile, Spot};
+use sapwise::stats::mean;
+use sapwise::{AlgorithmId, Load};
+use std::collections::BTreeMap;
+
+/// Chooses an algorithm under a load among those that a machine has; `None` where it knows none of them.
+pub type Strategy<'a> = Box<dyn Fn(&Load) -> Option<AlgorithmId> + 'a>;
+
+/// The cost of an algorithm over the best, where nothing is known of it: a guess. Who leaves the race as hopeless is slower
+/// than this, but where time is short an algorithm leaves at three times the best already.
+pub const NOT_TIMED: f64 = 10.0;
+
+/// Sizes a decade that count as one when regrets are averaged.
+const PER_DECADE: f64 = 4.0;
+/// Rounds of taking means over algorithms and over points in turn; the figures of a cell stand still after a few.
+const ROUNDS: usize = 8;
+/// Base-10 logarithm of the number of objects that a game has most often, and its standard deviation: an assumption. From the 64
+/// colliders at which nexus leaves brute force to the 10 000 bodies of a large scene is two standard deviations to either side.
+const USUAL_OBJECTS: (f64, f64) = (2.9, 0.55);
+
+/// The regret table of a report: what each algorithm costs in each cell: a quarter of a decade of a scenario.
+///
+/// A sweep goes most often to the sizes at which two algorithms lie close, where every choice costs little. Counted one by one these
+/// points would pass off any strategy as better than it is. And the least of several medians is too low by their errors, more
+/// so where more algorithms lie close: the fewer errors are left in a figure that is compared, the less a choice is charged for them.
+#[derive(Debug, Clone)]
+pub struct RegretTable {
+    cells: Vec<Cell>,
+    algorithms: usize,
+}
+
+#[derive(Debug, Clone)]
+struct Cell {
+    scenario: String,
+    /// Base-10 logarithm of the number of objects.
+    decade: f64,
+    /// The loads of its points.
+    loads: Vec<Load>,
+    /// Cost over the least in the cell, for each algorithm of the profile.
+    over_best: Vec<f64>,
+}
+
+/// Regret of a strategy on one report.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Regret {
+    /// For each cell, the mean over its points.
+    pub cells: Vec<f64>,
+    /// Mean over the cells.
+    pub mean: f64,
+    /// Mean over the cells, weighted by how often a game has so many objects.
+    pub as_in_games: f64,
+}
+
+impl RegretTable {
+    pub fn new(profile: &Profile) -> Self {
+        let mut groups: BTreeMap<(&str, i64), Vec<&Spot>> = BTreeMap::new();
+        for spot in &profile.points {
+            groups.entry((&spot.scenario, quarter(spot))).or_default().push(spot);
+        }
+        let algorithms = profile.algorithms.len();
+        let costs: BTreeMap<(&str, i64), Vec<Option<f64>>> =
+            groups.iter().map(|(&at, spots)| (at, ln_costs(spots, algorithms))).collect();
+        let over_best = |at: (&str, i64), k: usize| {
+            let cell = costs.get(&at)?;
+            let least = cell.iter().flatten().copied().min_by(f64::total_cmp)?;
+            Some((cell[k]? - least).exp())
+        };
+        let cells = groups.iter().map(|(&(scenario, quarter), spots)| Cell {
+            scenario: scenario.to_owned(),
+            decade: quarter as f64 / PER_DECADE,
+            loads: spots.iter().map(|s| s.load).collect(),
+            // Who was not timed here may have been timed in the next cell: how far behind changes little from one to the other.
+            over_best: (0..algorithms)
+                .map(|k| [0, -1, 1].into_iter().find_map(|d| over_best((scenario, quarter + d), k)).unwrap_or(NOT_TIMED))
+                .collect(),
+        });
+        Self { cells: cells.collect(), algorithms }
+    }
+
+    /// The regret of a strategy among the algorithms of this profile.
+    pub fn regret(&self, profile: &Profile, choose: &Strategy<'_>) -> Regret {
+        self.regret_in(None, profile, choose)
+    }
+
+    /// The same under the loads of one scenario, or of all.
+    pub fn regret_in(&self, scenario: Option<&str>, profile: &Profile, choose: &Strategy<'_>) -> Regret {
+        let of = |cell: &Cell, load: &Load| {
+            let chosen = choose(load).and_then(|id| profile.position(&id));
+            chosen.map_or(NOT_TIMED, |k| cell.over_best[usize::from(k)]) - 1.0
+        };
+        let cells = self.cells.iter().filter(|c| scenario.is_none_or(|s| c.scenario == s));
+        summed(cells, |cell| mean(&cell.loads.iter().map(|load| of(cell, load)).collect::<Vec<f64>>()))
+    }
+
+    /// The mean regret of choosing each algorithm always.
+    pub fn always(&self) -> Vec<f64> {
+        (0..self.algorithms).map(|k| summed(self.cells.iter(), |cell| cell.over_best[k] - 1.0).mean).collect()
+    }
+}
+
+fn summed<'a>(cells: impl Iterator<Item = &'a Cell>, of: impl Fn(&Cell) -> f64) -> Regret {
+    let (regrets, weights): (Vec<f64>, Vec<f64>) = cells.map(|c| (of(c), in_games(c.decade))).unzip();
+    let total: f64 = weights.iter().sum();
+    let weighted: f64 = regrets.iter().zip(&weights).map(|(r, w)| r * w).sum();
+    Regret { mean: mean(&regrets), as_in_games: if total > 0.0 { weighted / total } else { 0.0 }, cells: regrets }
+}
+
+fn quarter(spot: &Spot) -> i64 {
+    (PER_DECADE * f64::from(spot.load.objects.max(1)).log10()).round() as i64
+}
+
+/// How often a game has a number of objects with this base-10 logarithm, in proportion.
+fn in_games(decade: f64) -> f64 {
+    (-((decade - USUAL_OBJECTS.0) / USUAL_OBJECTS.1).powi(2) / 2.0).exp()
+}
+
+/// Natural logarithm of the cost of each algorithm over the points of a cell, up to what they share: the algorithms' part of a sum of
+/// what belongs to the algorithm and what belongs to the point. Not every algorithm was timed at every point, and a point with more
+/// objects costs all of them more.
+fn ln_costs(spots: &[&Spot], algorithms: usize) -> Vec<Option<f64>> {
+    let mut costs: Vec<Option<f64>> = vec![None; algorithms];
+    let mut shared = vec![0.0; spots.len()];
+    for _ in 0..ROUNDS {
+        let mut sums = vec![(0.0, 0.0); algorithms];
+        for (spot, shared) in spots.iter().zip(&shared) {
+            for &(k, ns) in &spot.medians {
+                let sum = &mut sums[usize::from(k)];
+                *sum = (sum.0 + ns.ln() - shared, sum.1 + 1.0);
+            }
+        }
+        costs = sums.into_iter().map(|(sum, count)| (count > 0.0).then(|| sum / count)).collect();
+        for (spot, shared) in spots.iter().zip(&mut shared) {
+            let left: Vec<f64> =
+                spot.medians.iter().map(|&(k, ns)| ns.ln() - costs[usize::from(k)].unwrap_or_default()).collect();
+            *shared = mean(&left);
+        }
+    }
+    costs
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::evaluate::by_costs;
+    use crate::fit::measured_costs;
+    use crate::synthetic::Machine;
+    use super::*;
+
+    fn regret(profile: &Profile, choose: &Strategy<'_>) -> Regret {
+        RegretTable::new(profile).regret(profile, choose)
+    }
+
+    #[test]
+    fn what_was_not_timed_costs_what_it_did_nearby_or_ten_times_the_best() {
+        let report = Machine::family()[0].report();
+        let profile = Profile::of("", &report);
+        let never: Strategy<'_> = Box::new(|_| None);
+        assert!(regret(&profile, &never).cells.iter().all(|r| (r - 9.0).abs() < 1e-9));
+        let mut twice = report.clone();
+        let id = twice.points[0].timings[0].algorithm.clone();
+        let mut again = twice.points[0].clone();
+        again.timings.remove(0);
+        twice.points.push(again);
+        let always: Strategy<'_> = Box::new(|_| Some(id.clone()));
+        // And a size that was visited again counts once.
+        let (once, twice) = (regret(&profile, &always), regret(&Profile::of("", &twice), &always));
+        assert!(once.cells.iter().zip(&twice.cells).all(|(a, b)| (a - b).abs() < 1e-9));
+        let place = usize::from(profile.position(&id).unwrap());
+        assert!((RegretTable::new(&profile).always()[place] - once.mean).abs() < 1e-12);
+        let available = profile.available();
+        let sweep = regret(&profile, &by_costs(measured_costs(&profile).0, &available));
+        assert!(sweep.mean < 0.02 && sweep.as_in_games < 0.02, "{sweep:?}");
+    }
+
+    #[test]
+    fn points_with_other_algorithms_and_sizes_are_put_on_one_scale() {
+        let spot = |medians: &[(u16, f64)]| Spot {
+            scenario: String::new(),
+            load: Load { objects: 100, ..Load::default() },
+            core_to_core_ns: None,
+            medians: medians.to_vec(),
+        };
+        // The second point is three times as large and lacks the first algorithm, the third lacks the second.
+        let spots =
+            [spot(&[(0, 10.0), (1, 20.0), (2, 40.0)]), spot(&[(1, 60.0), (2, 120.0)]), spot(&[(0, 10.0), (2, 40.0)])];
+        let costs: Vec<f64> = ln_costs(&spots.iter().collect::<Vec<_>>(), 3).into_iter().flatten().collect();
+        assert!(((costs[1] - costs[0]).exp() - 2.0).abs() < 1e-3 && ((costs[2] - costs[0]).exp() - 4.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn games_weigh_a_thousand_objects_most() {
+        assert!(in_games(3.0) > in_games(2.0) && in_games(3.0) > in_games(4.0) && in_games(6.0) < 1e-6);
+    }
+}

@@ -1,0 +1,20 @@
+//! Cost terms fitted to the times of profiles.
+
+pub(crate) mod columns;
+mod designs;
+mod measured_costs;
+mod min_of_two;
+mod model;
+pub(crate) mod nnls;
+mod prior;
+pub(crate) mod residual;
+pub(crate) mod robust;
+mod rows;
+mod terms;
+
+pub use designs::{Designs, TermsOf, thinned};
+pub use measured_costs::{measured_costs, measured_tuning, measured_slice, slice_tuning};
+pub use model::{Fitted, model};
+pub use prior::{TimingError, prior};
+pub use rows::{Row, rows};
+pub use terms::{fallback_method, terms, terms_of_one_machine};

@@ -1,0 +1,201 @@
+//! What a training says of itself: what it was trained on, and how well it did on what it had not seen.
+
+use crate::belief::Prior;
+use crate::data::Profile;
+use crate::report::Label;
+use sapwise::Model;
+use sapwise::json::{self, Format};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Reports that a training lists; of more it keeps the counts. One takes 130 bytes, and the built-in model is part of the library.
+const MOST_LISTED: usize = 400;
+
+/// What stands beside a model in its file, under the key `training`. Predictions don't need it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Training {
+    /// The reports behind the model. Empty where they are too many.
+    pub trained_on: Vec<TrainingReport>,
+    /// Their numbers by label, where they are too many to be listed; else empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trained_on_counts: Vec<TrainingCount>,
+    /// How far costs lie from their prediction on machines that were held out; `None` where none was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior: Option<Prior>,
+    /// How each strategy did on what was held out.
+    pub validation: Validation,
+}
+
+/// One report behind a model.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct TrainingReport {
+    /// File name without folders.
+    pub file: String,
+    /// The physical machine.
+    pub physical_id: String,
+    /// What kind of evidence it is.
+    pub label: Label,
+}
+
+/// How many reports of one label are behind a model.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct TrainingCount {
+    /// What kind of evidence they are.
+    pub label: Label,
+    /// Reports.
+    pub reports: usize,
+    /// Physical machines that they are of.
+    pub physical_machines: usize,
+}
+
+/// How strategies did on machines, or profiles, that were held out of the training.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct Validation {
+    /// What was held out in turn: `physical machine`, or `one of 24 groups of physical machines`; where there is one physical machine
+    /// only `SIMD level and thread count`, or `profile`. The last two say little about machines never seen.
+    pub held_out: String,
+    /// Physical machines in the data.
+    pub physical_machines: usize,
+    /// Profiles, that is reports, in the data.
+    pub profiles: usize,
+    /// The strategies that were compared.
+    pub methods: Vec<MethodScore>,
+}
+
+/// The score of one strategy. Regret is the time of its choice over the time of the best, less one.
+///
+/// Every physical machine counts the same in regrets, however many of its reports were held out.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct MethodScore {
+    /// Name of the strategy.
+    pub name: String,
+    /// Regret, mean over the cells of a held-out report, each a quarter of a decade of a scenario, then over the reports.
+    pub mean_regret: f64,
+    /// Least mean regret of a held-out machine; of a held-out report, where all are of one machine. With [`MethodScore::largest_regret`] the
+    /// range around the mean. `None` in files from before this was told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least_regret: Option<f64>,
+    /// Largest mean regret of the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_regret: Option<f64>,
+    /// 95th percentile over held-out reports of their mean regret.
+    pub p95_regret: f64,
+    /// Share of all cells with a regret over 10 %.
+    pub share_over_10_percent: f64,
+    /// How much of the gap between the best single algorithm (0) and the oracle (1) it closes.
+    pub closed_gap: f64,
+    /// Regret, mean over reports as seen by games: each number of objects counts as often as games have it, which is an assumption
+    /// (log-normal around 800, two thirds of the frames within 220 to 2800). `None` in files from before this was told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_regret_in_games: Option<f64>,
+    /// 95th percentile over held-out reports of the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p95_regret_in_games: Option<f64>,
+    /// Octaves between the measured and the predicted crossover, the median over all measured ones. Where the predicted curves of the
+    /// two algorithms do not cross in the range of measured sizes, the distance to the end of that range beyond which they would: a
+    /// lower bound. `None` for what predicts no costs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crossing_error_octaves: Option<f64>,
+    /// Share of these crossovers that were predicted within half an octave.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crossings_within_half_octave: Option<f64>,
+}
+
+/// A file that holds a model: what predicts, and what training says of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredModel {
+    /// What predicts.
+    pub model: Model,
+    /// What training says of it.
+    pub training: Training,
+}
+
+impl Training {
+    /// Of these profiles, before any validation.
+    #[must_use]
+    pub fn of(profiles: &[Profile]) -> Self {
+        if profiles.len() <= MOST_LISTED {
+            let report =
+                |p: &Profile| TrainingReport { file: p.file.clone(), physical_id: p.machine().to_owned(), label: p.label };
+            return Self { trained_on: profiles.iter().map(report).collect(), ..Self::default() };
+        }
+        // By the name of the label, since labels have no order.
+        let mut kinds: BTreeMap<String, (Label, usize, BTreeSet<&str>)> = BTreeMap::new();
+        for profile in profiles {
+            let kind = kinds.entry(format!("{:?}", profile.label)).or_insert((profile.label, 0, BTreeSet::new()));
+            kind.1 += 1;
+            kind.2.insert(profile.machine());
+        }
+        let count = |(label, reports, machines): (Label, usize, BTreeSet<&str>)| TrainingCount {
+            label,
+            reports,
+            physical_machines: machines.len(),
+        };
+        Self { trained_on_counts: kinds.into_values().map(count).collect(), ..Self::default() }
+    }
+
+    /// How many reports are behind the model.
+    #[must_use]
+    pub fn reports(&self) -> usize {
+        self.trained_on.len() + self.trained_on_counts.iter().map(|c| c.reports).sum::<usize>()
+    }
+
+    /// How many physical machines these reports are of. A machine with reports of several labels counts for each of them where only the
+    /// counts are kept.
+    #[must_use]
+    pub fn physical_machines(&self) -> usize {
+        let listed: BTreeSet<&str> = self.trained_on.iter().map(|r| r.physical_id.as_str()).collect();
+        listed.len() + self.trained_on_counts.iter().map(|c| c.physical_machines).sum::<usize>()
+    }
+
+    /// How many reports of each label are behind the model, listed or counted.
+    #[must_use]
+    pub fn labels(&self) -> Vec<(Label, usize)> {
+        let mut labels: Vec<(Label, usize)> = Vec::new();
+        let listed = self.trained_on.iter().map(|r| (r.label, 1));
+        for (label, count) in listed.chain(self.trained_on_counts.iter().map(|c| (c.label, c.reports))) {
+            match labels.iter_mut().find(|l| l.0 == label) {
+                Some(known) => known.1 += count,
+                None => labels.push((label, count)),
+            }
+        }
+        labels
+    }
+}
+
+/// What training says of itself, read from the file of a model, whose other keys are the engine's.
+const TRAINING: Format = Format::new("model", 2, 0).skipping(&["name", "simulated", "ranges", "methods"]);
+
+/// Reads a model with what training says of itself.
+///
+/// # Errors
+/// When the text is no sound model, or holds no sound training.
+pub fn read_model(text: &str) -> Result<StoredModel, json::Error> {
+    #[derive(Deserialize)]
+    struct Keys {
+        training: Training,
+    }
+    let training = TRAINING.read::<Keys>(text)?.value.training;
+    Ok(StoredModel { model: json::model(text)?, training })
+}
+
+/// Writes a model with what training says of itself, one key a line.
+///
+/// # Errors
+/// When a figure can't be written.
+pub fn write_model(model: &Model, training: &Training) -> Result<String, json::Error> {
+    #[derive(Serialize)]
+    struct Keys<'a> {
+        #[serde(flatten)]
+        model: &'a Model,
+        training: &'a Training,
+    }
+    TRAINING.write(&Keys { model, training })
+}

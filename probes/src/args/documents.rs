@@ -1,0 +1,58 @@
+//! The commands in the documents are commands that this program understands.
+
+use super::Arguments;
+use clap::Parser;
+
+const DOCUMENTS: [(&str, &str); 8] = [
+    ("README.md", include_str!("../../../README.md")),
+    ("CONTRIBUTING.md", include_str!("../../../CONTRIBUTING.md")),
+    ("datasets/README.md", include_str!("../../../datasets/README.md")),
+    ("docs/guide.md", include_str!("../../../docs/guide.md")),
+    ("docs/research.md", include_str!("../../../docs/research.md")),
+    ("docs/methodology.md", include_str!("../../../docs/methodology.md")),
+    ("docs/bias.md", include_str!("../../../docs/bias.md")),
+    ("BENCHMARKS.md", include_str!("../../../BENCHMARKS.md")),
+];
+
+/// How a line of a shell calls this program. `bvh` is the example of a program with an algorithm of its own.
+const CALLS: [&str; 5] = [
+    "cargo run --release -p sapwise-cli -- ",
+    "cargo run --release -p sapwise-cli --example bvh -- ",
+    "cargo run --release -- ",
+    "sapwise ",
+    "bvh ",
+];
+
+/// The arguments of a line of a shell that calls this program.
+fn arguments(line: &str) -> Option<Vec<&str>> {
+    let words = CALLS.iter().find_map(|call| line.trim_start().strip_prefix(call))?;
+    let words = words.split([';', '|', '>', '&']).next()?.split("  #").next()?;
+    Some(std::iter::once("sapwise").chain(words.split_whitespace()).collect())
+}
+
+/// The lines within fences of shell, and what stands between backquotes outside of all fences.
+fn lines(text: &str) -> Vec<&str> {
+    let mut found = Vec::new();
+    for (k, part) in text.split("```").enumerate() {
+        match part.strip_prefix("sh\n") {
+            Some(shell) if k % 2 == 1 => found.extend(shell.lines()),
+            _ if k % 2 == 0 => found
+                .extend(part.split('`').skip(1).step_by(2).filter(|code| code.contains(" --") && !code.contains("--help"))),
+            _ => {}
+        }
+    }
+    found
+}
+
+#[test]
+fn every_command_of_the_documents_is_understood() {
+    let mut count = 0;
+    for (name, text) in DOCUMENTS {
+        for words in lines(text).into_iter().filter_map(arguments).filter(|words| *words != ["sapwise", "VERB"]) {
+            let parsed = Arguments::try_parse_from(&words);
+            assert!(parsed.is_ok(), "{name}: {}: {}", words.join(" "), parsed.unwrap_err());
+            count += 1;
+        }
+    }
+    assert!(count >= 40, "{count}");
+}

@@ -1,0 +1,210 @@
+//! What a frame consists of: counts of operations under a load.
+
+use crate::Load;
+
+/// A count of operations that grows with the load in its own way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Term {
+    /// One call: dispatch, set-up, fork and join.
+    Call,
+    /// Boxes read, checked and copied: n.
+    Objects,
+    /// Comparisons of a sort: n log2 n.
+    Sort,
+    /// Boxes whose working set does not fit the last-level cache: n times the share of it that is outside.
+    ColdObjects,
+    /// All pairs: n (n - 1) / 2.
+    AllPairs,
+    /// Pairs that overlap on the sweep axis ([`Load::axis_candidates`]).
+    AxisCandidates,
+    /// Pairs that overlap on the sweep axis within a strip ([`Load::strip_candidates`]).
+    StripCandidates,
+    /// Pairs written ([`Load::pairs`]).
+    Pairs,
+    /// Boxes times how far they move ([`Load::moved`]): boxes that leave their grown boxes grow with it.
+    Moved,
+    /// A count of a user's own algorithm.
+    Product(Product),
+}
+
+/// A product of powers of a load's figures, for the costs of algorithms that the other terms do not describe: of a tree
+/// `Product::ONE.objects(1).log2_objects(1)` and `Product::ONE.pairs(1).log2_objects(1)`.
+///
+/// No power is negative, so that no count falls when a figure rises, and all together are at most [`Product::MOST_POWERS`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+#[non_exhaustive]
+pub struct Product {
+    /// Power of the number of objects, n.
+    pub objects: u8,
+    /// Power of its base-2 logarithm, 0 for no object.
+    pub log2_objects: u8,
+    /// Power of [`Load::pairs`].
+    pub pairs: u8,
+    /// Power of [`Load::axis_candidates`].
+    pub axis_candidates: u8,
+    /// Power of [`Load::strip_candidates`].
+    pub strip_candidates: u8,
+    /// Power of [`Load::moved`], which is 0 to 1.
+    pub moved: u8,
+}
+
+impl Product {
+    /// The empty product, 1.
+    pub const ONE: Self = Self { objects: 0, log2_objects: 0, pairs: 0, axis_candidates: 0, strip_candidates: 0, moved: 0 };
+
+    /// Powers that a product may have together: more of 2^64 candidates each would end in infinities.
+    pub const MOST_POWERS: u32 = 8;
+
+    /// The same with this power of the number of objects.
+    #[must_use]
+    pub const fn objects(self, power: u8) -> Self {
+        Self { objects: power, ..self }
+    }
+
+    /// The same with this power of the base-2 logarithm of the number of objects.
+    #[must_use]
+    pub const fn log2_objects(self, power: u8) -> Self {
+        Self { log2_objects: power, ..self }
+    }
+
+    /// The same with this power of the number of pairs.
+    #[must_use]
+    pub const fn pairs(self, power: u8) -> Self {
+        Self { pairs: power, ..self }
+    }
+
+    /// The same with this power of the candidates on the sweep axis.
+    #[must_use]
+    pub const fn axis_candidates(self, power: u8) -> Self {
+        Self { axis_candidates: power, ..self }
+    }
+
+    /// The same with this power of the candidates within a strip.
+    #[must_use]
+    pub const fn strip_candidates(self, power: u8) -> Self {
+        Self { strip_candidates: power, ..self }
+    }
+
+    /// The same with this power of how far boxes move.
+    #[must_use]
+    pub const fn moved(self, power: u8) -> Self {
+        Self { moved: power, ..self }
+    }
+
+    /// Whether its powers together are at most [`Self::MOST_POWERS`].
+    pub(super) fn is_sound(&self) -> bool {
+        let Self { objects, log2_objects, pairs, axis_candidates, strip_candidates, moved } = *self;
+        let powers = [objects, log2_objects, pairs, axis_candidates, strip_candidates, moved];
+        powers.into_iter().map(u32::from).sum::<u32>() <= Self::MOST_POWERS
+    }
+
+    fn of(&self, counts: &Counts<'_>) -> f64 {
+        let load = counts.load;
+        let factors = [
+            (counts.objects, self.objects),
+            (counts.log2_objects, self.log2_objects),
+            (load.pairs, self.pairs),
+            (load.axis_candidates, self.axis_candidates),
+            (load.strip_candidates, self.strip_candidates),
+            (load.moved, self.moved),
+        ];
+        factors.into_iter().map(|(figure, power)| figure.powi(i32::from(power))).product()
+    }
+}
+
+/// Bytes that an algorithm keeps in flight for each box: the box itself, its sorted copy and its key.
+const WORKING_SET_BYTES: f64 = 64.0;
+
+impl Term {
+    /// The terms of the algorithms of this library: every one but [`Term::Product`].
+    pub const ALL: [Self; 9] = [
+        Self::Call,
+        Self::Objects,
+        Self::Sort,
+        Self::ColdObjects,
+        Self::AllPairs,
+        Self::AxisCandidates,
+        Self::StripCandidates,
+        Self::Pairs,
+        Self::Moved,
+    ];
+
+    /// The count of operations under a load, on a machine with a last-level cache of `cache_bytes`.
+    #[must_use]
+    pub fn count(self, load: &Load, cache_bytes: f64) -> f64 {
+        Counts::new(load).of(self, cache_bytes)
+    }
+}
+
+/// What the terms of all algorithms share under one load, worked out once for each decision.
+#[derive(Debug, Clone, Copy)]
+pub struct Counts<'a> {
+    load: &'a Load,
+    objects: f64,
+    log2_objects: f64,
+}
+
+impl<'a> Counts<'a> {
+    /// The counts under a load.
+    #[must_use]
+    pub fn new(load: &'a Load) -> Self {
+        let objects = f64::from(load.objects);
+        Self { load, objects, log2_objects: objects.max(1.0).log2() }
+    }
+
+    /// Base-2 logarithm of the number of objects, 0 for none.
+    #[must_use]
+    pub fn log2_objects(&self) -> f64 {
+        self.log2_objects
+    }
+
+    /// The count of operations of a term, on a machine with a last-level cache of `cache_bytes`.
+    #[must_use]
+    pub fn of(&self, term: Term, cache_bytes: f64) -> f64 {
+        let n = self.objects;
+        match term {
+            Term::Call => 1.0,
+            Term::Objects => n,
+            Term::Sort => n * self.log2_objects,
+            Term::ColdObjects => n * (1.0 - cache_bytes / (WORKING_SET_BYTES * n).max(1.0)).max(0.0),
+            Term::AllPairs => n * (n - 1.0).max(0.0) / 2.0,
+            Term::AxisCandidates => self.load.axis_candidates,
+            Term::StripCandidates => self.load.strip_candidates,
+            Term::Pairs => self.load.pairs,
+            Term::Moved => n * self.load.moved,
+            Term::Product(product) => product.of(self),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cold_objects_start_where_the_cache_ends() {
+        let load = |objects| Load { objects, ..Load::default() };
+        assert_eq!(Term::ColdObjects.count(&load(1000), 64_000.0), 0.0);
+        assert_eq!(Term::ColdObjects.count(&load(2000), 64_000.0), 1000.0);
+    }
+
+    #[test]
+    fn a_scene_at_rest_has_no_moved_boxes() {
+        let load = |moved| Load { objects: 200, moved, ..Load::default() };
+        assert_eq!([0.0, 0.25, 1.0].map(|moved| Term::Moved.count(&load(moved), 0.0)), [0.0, 50.0, 200.0]);
+    }
+
+    #[test]
+    fn products_by_hand() {
+        let load = Load { objects: 8, pairs: 5.0, axis_candidates: 3.0, strip_candidates: 2.0, moved: 0.5 };
+        let count = |product: Product| Term::Product(product).count(&load, 0.0);
+        assert_eq!(count(Product::ONE), 1.0);
+        assert_eq!(count(Product::ONE.objects(1).log2_objects(1)), Term::Sort.count(&load, 0.0));
+        assert_eq!(count(Product::ONE.pairs(1).log2_objects(2)), 5.0 * 9.0);
+        assert_eq!(count(Product::ONE.objects(2).axis_candidates(1).strip_candidates(1).moved(1)), 64.0 * 3.0 * 2.0 * 0.5);
+        let nothing = Load::default();
+        assert_eq!(Term::Product(Product::ONE.objects(1).log2_objects(1)).count(&nothing, 0.0), 0.0);
+        assert!(Product::ONE.pairs(8).is_sound() && !Product::ONE.pairs(8).moved(1).is_sound());
+    }
+}

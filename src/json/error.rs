@@ -1,0 +1,80 @@
+//! Why a text is no sound file.
+
+use super::Schema;
+use std::fmt;
+
+/// Why a text is no sound file, or why something can't be written as one.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Error {
+    /// No JSON, a key that is missing or has a value of another kind, or a figure that can't be.
+    Data {
+        /// Where: `costs[3].curve`. A dot where it is the whole text.
+        path: String,
+        /// What was wrong, with line and column.
+        source: serde_json::Error,
+    },
+    /// A key that the schema does not have.
+    UnknownKey {
+        /// The key, with its place: `costs[3].colour`.
+        path: String,
+        /// The schema.
+        schema: Schema,
+    },
+    /// Another schema than the one that was asked for.
+    OtherSchema {
+        /// What the file names.
+        found: String,
+        /// What this version reads.
+        expected: Schema,
+    },
+    /// An older version of the schema.
+    OldSchema {
+        /// What the file names.
+        found: String,
+        /// What this version reads.
+        expected: Schema,
+    },
+    /// Something that JSON can't hold.
+    Write(serde_json::Error),
+}
+
+impl Error {
+    /// Line and column of what was wrong, from 1, where it has a place.
+    #[must_use]
+    pub fn position(&self) -> Option<(usize, usize)> {
+        match self {
+            Self::Data { source, .. } => Some((source.line(), source.column())),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Data { path, source } if path == "." => source.fmt(f),
+            Self::Data { path, source } => write!(f, "{path}: {source}"),
+            Self::UnknownKey { path, schema } => write!(f, "{path} is no key of {schema}"),
+            Self::OtherSchema { found, expected } => {
+                write!(f, "the schema is {found:?}; this version reads {:?}", expected.to_string())
+            }
+            Self::OldSchema { found, expected } => write!(
+                f,
+                "the schema is {found:?}, of an older version; this one reads {:?}: convert the file with \
+                 `sapwise convert FILE... --out DIR`",
+                expected.to_string()
+            ),
+            Self::Write(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Data { source, .. } | Self::Write(source) => Some(source),
+            _ => None,
+        }
+    }
+}

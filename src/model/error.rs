@@ -1,0 +1,111 @@
+//! Why a model is unusable, and why it can't predict.
+
+use crate::cost::CurveError;
+use crate::hardware::HardwareError;
+use std::fmt;
+
+/// What makes a model unusable.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// It holds no method.
+    NoMethod,
+    /// A range whose ends are no numbers or not ascending.
+    Range {
+        /// The parameter.
+        parameter: String,
+    },
+    /// A method with something that can't be.
+    Method {
+        /// The method, with its processor.
+        method: String,
+        /// What can't be.
+        why: String,
+    },
+}
+
+impl fmt::Display for ModelError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoMethod => f.write_str("it holds no method"),
+            Self::Range { parameter } => write!(f, "the range of {parameter} has ends that are no numbers or not ascending"),
+            Self::Method { method, why } => write!(f, "{method}: {why}"),
+        }
+    }
+}
+
+impl std::error::Error for ModelError {}
+
+/// Why a model can't predict a cost.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum PredictError {
+    /// A parameter that is not there, or is there without a value.
+    Missing {
+        /// The parameter, with whose it is.
+        parameter: String,
+        /// Why, where the hardware says so.
+        why: Option<String>,
+    },
+    /// A parameter whose value is zero or no number.
+    Value {
+        /// The parameter, with whose it is.
+        parameter: String,
+        /// Its value.
+        value: f64,
+    },
+    /// A GPU that the hardware does not hold.
+    NoGpu {
+        /// Its number.
+        index: u32,
+    },
+    /// A scale or a feature of the model that this processor does not have.
+    NotOfProcessor {
+        /// The processor.
+        backend: String,
+        /// The scale or the feature.
+        what: String,
+    },
+    /// A figure that no machine has.
+    Hardware(HardwareError),
+    /// A cost curve that can't be.
+    Curve(CurveError),
+    /// None of the algorithms can be predicted.
+    Nothing {
+        /// Name of the model.
+        model: String,
+        /// Why each was left out.
+        warnings: Vec<String>,
+    },
+}
+
+impl fmt::Display for PredictError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing { parameter, why: Some(why) } => write!(f, "the parameter {parameter} is missing: {why}"),
+            Self::Missing { parameter, why: None } => {
+                write!(f, "the parameter {parameter} is missing; measure it with `sapwise probe --hardware-only`")
+            }
+            Self::Value { parameter, value } => write!(f, "the parameter {parameter} is {value}"),
+            Self::NoGpu { index } => {
+                write!(f, "the hardware holds no gpu{index}; see `sapwise devices`, then measure again")
+            }
+            Self::NotOfProcessor { backend, what } => write!(f, "{backend} has no {what}"),
+            Self::Hardware(error) => error.fmt(f),
+            Self::Curve(error) => error.fmt(f),
+            Self::Nothing { model, warnings } => {
+                write!(f, "the model {model} predicts none of these algorithms: {}", warnings.join("; "))
+            }
+        }
+    }
+}
+
+impl std::error::Error for PredictError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Hardware(error) => Some(error),
+            Self::Curve(error) => Some(error),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! What makes tuning unusable.
+
+use crate::AlgorithmId;
+use crate::cost::CurveError;
+use std::fmt;
+
+/// What makes tuning unusable.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum TuningError {
+    /// There is no step at 0 objects.
+    NoFirstStep,
+    /// The steps are not ascending.
+    StepOrder,
+    /// A crossover that does not lie within its interval, or has one end of it only.
+    Crossover {
+        /// The algorithm below it.
+        below: AlgorithmId,
+        /// The algorithm above it.
+        above: AlgorithmId,
+    },
+    /// A sample without a time above zero.
+    Sample {
+        /// The algorithm.
+        algorithm: AlgorithmId,
+        /// The number of objects.
+        objects: u32,
+    },
+    /// A cost curve that can't be.
+    Curve {
+        /// The algorithm.
+        algorithm: AlgorithmId,
+        /// What is wrong with it.
+        source: CurveError,
+    },
+    /// A spread that is negative or no number.
+    Spread {
+        /// The algorithm.
+        algorithm: AlgorithmId,
+        /// The spread.
+        spread_ln: f64,
+    },
+    /// An algorithm with two costs.
+    Repeated {
+        /// The algorithm.
+        algorithm: AlgorithmId,
+    },
+}
+
+impl fmt::Display for TuningError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoFirstStep => f.write_str("the steps don't begin at 0 objects"),
+            Self::StepOrder => f.write_str("the steps are not ascending"),
+            Self::Crossover { below, above } => {
+                write!(f, "the crossover from {below} to {above} does not lie within its interval")
+            }
+            Self::Sample { algorithm, objects } => {
+                write!(f, "the sample of {algorithm} at {objects} objects has no time above zero")
+            }
+            Self::Curve { algorithm, source } => write!(f, "the cost of {algorithm}: {source}"),
+            Self::Spread { algorithm, spread_ln } => write!(f, "the cost of {algorithm}: a spread of {spread_ln}"),
+            Self::Repeated { algorithm } => write!(f, "{algorithm} stands there twice"),
+        }
+    }
+}
+
+impl std::error::Error for TuningError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Curve { source, .. } => Some(source),
+            _ => None,
+        }
+    }
+}
