@@ -8,7 +8,7 @@ use anyhow::bail;
 use sapwise::hardware::ParameterId;
 use sapwise::model::{ASK, Prediction};
 use sapwise::stats::median;
-use sapwise::{GpuIdentity, Hardware, Load, Model, Registry, Tuning};
+use sapwise::{GpuIdentity, Hardware, Load, Model, Registry, Source, Tuning};
 use sapwise_lab::data::{Document, read_document};
 use sapwise_lab::StoredModel;
 use sapwise_lab::belief::{Prior, Taken, learn};
@@ -114,7 +114,7 @@ pub(crate) fn predict_and_sample(
     tuning.warnings.extend(unknown(algorithms, &registry, model));
     // Without any sample the posterior is the prior, whose spread is that of machines left out and not of the model.
     if !learned.taken.is_empty() {
-        let mut corrected = learned.tuning(&scenario.to_string(), loads);
+        let mut corrected = Tuning::from_costs(Source::Learned, &scenario.to_string(), learned.costs(), loads);
         corrected.model = tuning.model.take();
         corrected.extrapolated = tuning.extrapolated;
         corrected.samples = learned.taken.iter().map(Taken::observation).collect();
