@@ -1,37 +1,38 @@
 //! The in-line module: the cheapest algorithm for this frame, chosen before it runs.
 
-#[cfg(feature = "this-machine")]
-pub(crate) mod cache;
-mod candidates;
 mod decision;
-mod glance;
+mod frame_batch;
+mod instances;
+mod knots;
 mod learner;
-#[cfg(feature = "this-machine")]
-mod options;
-mod pace;
-mod place;
+mod load_tracker;
 mod policy;
-mod price;
-mod tally;
 #[cfg(feature = "this-machine")]
-mod this_machine;
-#[cfg(feature = "this-machine")]
-mod uniform;
+mod setup;
+mod switching;
+mod throttle;
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Load, Pairs, Registry, Source, Step, Tuning};
-use candidates::{Candidate, Instance, Made};
+use crate::aabb::Aabb;
+use crate::algorithm::AlgorithmId;
+use crate::broad_phase::{BroadPhase, Incremental};
+use crate::error::{Error, Unavailable};
+use crate::load::Load;
+use crate::pairs::Pairs;
+use crate::registry::Registry;
+use crate::tuning::{Source, Step, Tuning};
 use decision::Choice;
-use glance::{Glance, count};
-use pace::Pace;
+use instances::{Candidate, Instance};
+use load_tracker::LoadTracker;
 use policy::Policy;
 use std::fmt;
 use std::time::Instant;
 
 pub use decision::{Decision, Reason};
+pub(crate) use instances::Instances;
 #[cfg(feature = "this-machine")]
-pub use options::{Cache, Options};
+pub(crate) use setup::{Arrival, Handover, Keeper, Start};
 #[cfg(feature = "this-machine")]
-pub use this_machine::{Origin, SaveError, Setup};
+pub use setup::{Origin, SaveError, Setup};
 
 /// A runner-up that costs at most this much more than the choice gets its buffers ready: the next border may be near.
 const WARM_WITHIN: f64 = 1.5;
@@ -41,15 +42,14 @@ const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 
 /// A broad phase that runs whichever algorithm is expected to be cheapest for each frame.
 ///
-/// Every algorithm takes the same boxes and gives the same pairs, so a switch is invisible but for its speed. What is expected comes from
+/// Every algorithm takes the same boxes and returns the same pairs, so a switch is invisible but for its speed. What is expected comes from
 /// [`Tuning`] and, where these have cost curves, from the times of the frames that were run: [`set_learning`](Self::set_learning).
 pub struct Adaptive {
     /// In the order of [`Tuning::algorithms`].
     candidates: Vec<Candidate>,
     instances: Vec<Instance>,
     policy: Policy,
-    glance: Glance,
-    pace: Pace,
+    tracker: LoadTracker,
     choice: Option<Choice>,
     /// What the frame of `choice` took, where it was timed.
     measured_ns: Option<f64>,
@@ -59,7 +59,7 @@ pub struct Adaptive {
     decided: Option<usize>,
     /// How it came to its tuning.
     #[cfg(feature = "this-machine")]
-    start: this_machine::Start,
+    start: Start,
 }
 
 impl Adaptive {
@@ -69,33 +69,25 @@ impl Adaptive {
     /// lists: its cost says nothing about this build or this machine.
     ///
     /// # Errors
-    /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made.
+    /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when none can be made, [`Error::NoAlgorithm`] when none is named.
     pub fn new(tuning: Tuning, registry: &Registry) -> Result<Self, Error> {
-        let mut made = Made::of(&tuning, registry);
-        if made.instances.is_empty() {
-            let hint = || "this tuning name no algorithm; make them with `sapwise predict`".to_owned();
-            return Err(made
-                .failure
-                .take()
-                .unwrap_or_else(|| Error::UnknownAlgorithm { text: String::new(), hint: hint() }));
-        }
-        Ok(Self::with(tuning, made))
+        let mut made = Instances::of(&tuning, registry);
+        made.failure().map_or_else(|| Ok(Self::with(tuning, made)), Err)
     }
 
     /// Over instances that are there already.
-    fn with(tuning: Tuning, made: Made) -> Self {
+    pub(crate) fn with(tuning: Tuning, made: Instances) -> Self {
         Self {
             policy: policy(tuning, &made),
             candidates: made.candidates,
             instances: made.instances,
-            glance: Glance::default(),
-            pace: Pace::default(),
+            tracker: LoadTracker::default(),
             choice: None,
             measured_ns: None,
             prepared: 0,
             decided: None,
             #[cfg(feature = "this-machine")]
-            start: this_machine::Start::default(),
+            start: Start::default(),
         }
     }
 
@@ -105,8 +97,7 @@ impl Adaptive {
     /// As [`Registry::create`].
     pub fn only(algorithm: AlgorithmId, registry: &Registry) -> Result<Self, Error> {
         let steps = vec![Step { from_objects: 0, algorithm }];
-        let tuning =
-            Tuning::from_steps(steps).map_err(|e| Error::UnknownAlgorithm { text: String::new(), hint: e.to_string() })?;
+        let tuning = Tuning::from_steps(steps).map_err(|_| Error::NoAlgorithm)?;
         Self::new(tuning, registry)
     }
 
@@ -140,12 +131,12 @@ impl Adaptive {
         let mut costs = tuning.costs.clone();
         for (k, cost) in costs.iter_mut().enumerate() {
             let lasting = |log2_objects| learner.lasting_ln(k, log2_objects);
-            cost.curve.correction = cost.curve.corrected_by(place::octaves(), lasting);
+            cost.curve.correction = cost.curve.corrected_by(knots::octaves(), lasting);
             cost.spread_ln = learner.spread_ln(k);
         }
-        let load = self.glance.load();
+        let load = self.tracker.load();
         let like = |quarter: u32| {
-            let objects = place::objects_of(quarter);
+            let objects = knots::objects_of(quarter);
             load.rescaled(objects, load.pairs * f64::from(objects) / f64::from(load.objects.max(1)))
         };
         let loads: Vec<Load> = SLICE.map(like).collect();
@@ -159,15 +150,15 @@ impl Adaptive {
         }
     }
 
-    /// Makes every algorithm anew from this registry: one that was lost and is back, or all of them on a pool of another size. What was
+    /// Makes every algorithm again from this registry: one that was lost and is back, or all of them on a pool of another size. What was
     /// learned stays, unless algorithms that keep work came or went; what they kept from frame to frame is gone. Tuning that are still
     /// awaited from the background bring algorithms of the registry that they were asked with.
     ///
     /// # Errors
     /// As [`new`](Self::new); the algorithms of before stay then.
     pub fn revive(&mut self, registry: &Registry) -> Result<(), Error> {
-        let mut made = Made::of(self.policy.tuning(), registry);
-        if let (true, Some(error)) = (made.instances.is_empty(), made.failure.take()) {
+        let mut made = Instances::of(self.policy.tuning(), registry);
+        if let Some(error) = made.failure() {
             return Err(error);
         }
         self.policy.remade(&made.kept(), &made.usable());
@@ -175,20 +166,43 @@ impl Adaptive {
         Ok(())
     }
 
-    /// Another tuning, with an instance of each of their algorithms, take the place of those of before. The estimate of the load stays.
+    /// Takes what was made in the background, once it is there. The estimate of the load stays.
     #[cfg(feature = "this-machine")]
-    fn adopt(&mut self, tuning: Tuning, made: Made) {
+    fn take_over(&mut self) {
+        let Some((tuning, made)) = self.start.arrived() else { return };
         let before = std::mem::replace(&mut self.policy, policy(tuning, &made));
         self.policy.set_as(&before);
         self.exchange(made);
     }
 
     /// Other candidates take the place of those of before, prepared as those were. What was decided goes with them.
-    fn exchange(&mut self, made: Made) {
+    fn exchange(&mut self, made: Instances) {
         (self.candidates, self.instances) = (made.candidates, made.instances);
         self.decided = None;
         self.choice = None;
         self.prepare(self.prepared);
+    }
+
+    /// Where its tuning came from, what went wrong on the way and how long it took.
+    #[cfg(feature = "this-machine")]
+    #[must_use]
+    pub fn setup(&self) -> &Setup {
+        &self.start.setup
+    }
+
+    /// Keeps what was learned in the cache, for the next start of a program on this machine: call it at the end of a session.
+    ///
+    /// # Errors
+    /// When there is no cache to keep it in, or it can't be written.
+    #[cfg(feature = "this-machine")]
+    pub fn save(&self) -> Result<(), SaveError> {
+        self.start.save(|| self.learned())
+    }
+
+    /// Begins with what a start on this machine found.
+    #[cfg(feature = "this-machine")]
+    pub(crate) fn set_start(&mut self, start: Start) {
+        self.start = start;
     }
 
     /// What was decided for the last frame; `None` before the first.
@@ -201,7 +215,7 @@ impl Adaptive {
             runner_up: c.runner_up.map(|(k, ns)| (&self.candidates[k].id, ns)),
             reason: c.reason,
             source: if self.policy.learned().is_some() { Source::Learned } else { self.policy.tuning().source },
-            load: self.glance.load(),
+            load: self.tracker.load(),
         })
     }
 
@@ -215,17 +229,16 @@ impl Adaptive {
     }
 
     fn choose(&mut self, boxes: &[Aabb]) {
-        self.glance.look(boxes);
-        let frames = self.pace.decide(count(boxes));
-        self.choice = self.policy.choose(&self.glance.load(), frames);
+        let frames = self.tracker.decide(boxes);
+        self.choice = self.policy.choose(&self.tracker.load(), frames);
         self.measured_ns = None;
     }
 
     /// Whether the next frame needs a decision of its own.
     fn is_due(&self, boxes: &[Aabb]) -> bool {
         // By the number of objects alone a decision costs next to nothing, and is to depend on no clock.
-        let anew = self.choice.is_none() || self.policy.is_by_count();
-        anew || self.pace.is_due(count(boxes)) || self.glance.is_watching() || self.policy.is_exploring()
+        let always = self.choice.is_none() || self.policy.is_by_count();
+        always || self.tracker.is_due(boxes) || self.policy.is_exploring()
     }
 
     /// Gets the runner-up ready when its turn may come soon.
@@ -249,38 +262,41 @@ impl BroadPhase for Adaptive {
         }
         let mut started = (decided || self.is_due(boxes)).then(Instant::now);
         self.measured_ns = None;
-        if started.is_some() && !decided {
-            self.choose(boxes);
+        if !decided {
+            // What was worked out before was not for this frame.
+            self.tracker.forget_plan();
+            if started.is_some() {
+                self.choose(boxes);
+            }
         }
         loop {
             let Some(choice) = self.choice else {
                 // What the last one left is no answer.
                 pairs.clear();
-                let reason = "every algorithm of the tuning has failed".to_owned();
-                return Err(Error::Unavailable { algorithm: self.candidates[0].id.clone(), reason });
+                let algorithm = self.candidates[0].id.clone();
+                return Err(Error::Unavailable { algorithm, reason: Unavailable::AllFailed });
             };
             let candidate = &self.candidates[choice.chosen];
             let Some(instance) = candidate.instance.map(|k| &mut self.instances[k]) else {
                 // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
-                return Err(Error::Unavailable { algorithm: candidate.id.clone(), reason: "it failed before".to_owned() });
+                return Err(Error::Unavailable { algorithm: candidate.id.clone(), reason: Unavailable::FailedBefore });
             };
             let running = started.map(|_| Instant::now());
-            match instance.run(&candidate.id, boxes, pairs) {
+            match instance.run(&candidate.id, self.tracker.plan(), boxes, pairs) {
                 Ok(()) => {
-                    let usual_ns = self.pace.ran();
                     let Some((started, running)) = started.zip(running) else {
-                        self.glance.ran(boxes, pairs.overlapping(), usual_ns);
+                        self.tracker.ran(boxes, pairs.overlapping(), None);
                         return Ok(());
                     };
                     let ns = (running.elapsed().as_nanos() as f64).max(1.0);
                     self.measured_ns = Some(ns);
-                    self.glance.ran(boxes, pairs.overlapping(), ns);
+                    self.tracker.ran(boxes, pairs.overlapping(), Some(ns));
                     self.policy.ran(choice.chosen, ns);
                     let decision_ns = (!decided).then(|| started.elapsed().as_nanos() as f64 - ns);
-                    self.pace.took(decision_ns, ns);
+                    self.tracker.took(decision_ns, ns);
                     if !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis) {
                         // What began in this frame is looked at once more before it may rest.
-                        self.pace.wake();
+                        self.tracker.wake();
                     }
                     self.warm_runner_up(boxes.len());
                     return Ok(());
@@ -291,13 +307,12 @@ impl BroadPhase for Adaptive {
                     self.policy.set_usable(choice.chosen, false);
                     // The one that runs instead is told apart from what ran before.
                     started.get_or_insert_with(Instant::now);
-                    let next = self.policy.choose(&self.glance.load(), 0);
+                    let next = self.policy.choose(&self.tracker.load(), 0);
                     self.choice = next.map(|c| Choice { reason: Reason::FellBack, ..c });
                 }
                 Err(error) => {
                     // A frame that was to explore has told nothing, and the next one is to run what is cheapest.
-                    self.pace.wake();
-                    self.glance.lost();
+                    self.tracker.failed();
                     return Err(error);
                 }
             }
@@ -312,10 +327,13 @@ impl BroadPhase for Adaptive {
         }
     }
 
-    fn is_incremental(&self) -> bool {
-        self.instances.iter().any(|instance| instance.algorithm.is_incremental())
+    /// Where any of its algorithms is one.
+    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
+        if self.instances.iter().any(|instance| instance.is_incremental) { Some(self) } else { None }
     }
 }
+
+impl Incremental for Adaptive {}
 
 impl fmt::Debug for Adaptive {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -323,7 +341,7 @@ impl fmt::Debug for Adaptive {
     }
 }
 
-fn policy(tuning: Tuning, made: &Made) -> Policy {
+fn policy(tuning: Tuning, made: &Instances) -> Policy {
     Policy::new(tuning, &made.kept(), made.usable())
 }
 

@@ -1,14 +1,17 @@
-//! What every algorithm promises.
+//! What every algorithm promises, and what those do that build on the frame before.
 
-use crate::{Aabb, Error, Pairs};
+use crate::aabb::Aabb;
+use crate::error::Error;
+use crate::load::FramePlan;
+use crate::pairs::Pairs;
 
 /// Finds all pairs of overlapping boxes.
 ///
-/// Every implementation gives the same set of pairs for the same boxes: each overlapping pair once, the lower position
+/// Every implementation returns the same set of pairs for the same boxes: each overlapping pair once, the lower position
 /// first, touching boxes included. Implementations keep their buffers between calls and allocate nothing once they have
 /// seen a frame as large and as dense; but with more than one thread rayon allocates small jobs, and what `pair-cache` keeps follows
 /// its margin, so that it settles over some frames more.
-pub trait BroadPhase: Send {
+pub trait BroadPhase: Send + Sync {
     /// Replaces the content of `pairs` with the overlapping pairs of `boxes`.
     ///
     /// An implementation begins with [`Pairs::clear`], adds with [`Pairs::push`] and ends with [`Pairs::finish`].
@@ -18,6 +21,18 @@ pub trait BroadPhase: Send {
     /// [`Error::TooManyPairs`] and [`Error::OutOfMemory`] as they say. After an error the next call starts afresh.
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error>;
 
+    /// As [`find_pairs`](Self::find_pairs), with what is known of this frame already, so that it need not be worked out twice.
+    ///
+    /// The plan may change how fast the pairs are found and in which order, never which. An algorithm that has no use for it leaves
+    /// this as it is.
+    ///
+    /// # Errors
+    /// As [`find_pairs`](Self::find_pairs).
+    fn find_pairs_with(&mut self, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        let _ = plan;
+        self.find_pairs(boxes, pairs)
+    }
+
     /// Gets ready for frames of up to `objects` boxes, so that the first of them costs no more than the next.
     ///
     /// Called ahead of a switch to this algorithm. Cheap when there is nothing to do; doing nothing is allowed.
@@ -25,17 +40,27 @@ pub trait BroadPhase: Send {
         let _ = objects;
     }
 
-    /// Whether a frame is cheaper after one that was alike. Whoever times it has to run some frames first.
-    fn is_incremental(&self) -> bool {
-        false
+    /// This algorithm as one that builds on the frame before, if it is one: `Some(self)`.
+    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
+        None
     }
+}
 
-    /// Runs on so many threads from the next frame on, with all that it keeps. False where it can't, and then nothing changes.
+/// An algorithm whose frame is cheaper after one that was alike. Time it after some frames, not on the first.
+pub trait Incremental: BroadPhase {
+    /// Runs on so many threads from the next frame on, with all that it keeps. `false` where it can't, and then nothing changes.
     ///
-    /// One instance for several numbers of threads is had from [`Registry::create_for`](crate::Registry::create_for).
+    /// One instance for several numbers of threads comes from [`Registry::create_family`](crate::Registry::create_family).
     fn set_threads(&mut self, threads: u32) -> bool {
         let _ = threads;
         false
+    }
+}
+
+impl dyn BroadPhase {
+    /// Whether a frame is cheaper after one that was alike.
+    pub fn is_incremental(&mut self) -> bool {
+        self.as_incremental().is_some()
     }
 }
 

@@ -1,6 +1,6 @@
 //! What began and what ended between two frames.
 
-use crate::Pairs;
+use crate::pairs::Pairs;
 use crate::error::Error;
 
 /// Follows pairs from frame to frame by ids of the caller's: which began, which ended, and all there are.
@@ -208,7 +208,7 @@ fn reserve<T>(list: &mut Vec<T>, more: usize) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Pair;
+    use crate::pair::Pair;
 
     fn pairs(of: &[Pair]) -> Pairs {
         let mut pairs = Pairs::new();

@@ -1,6 +1,6 @@
 //! Which of the overlapping pairs a caller wants.
 
-use crate::Pair;
+use crate::pair::Pair;
 
 /// What a box may collide with: groups and masks, as in most physics engines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

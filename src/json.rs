@@ -64,17 +64,14 @@ pub fn write(value: &impl serde::Serialize) -> Result<String, Error> {
     Ok(serde_json::to_string_pretty(value).map_err(Error::Write)? + "\n")
 }
 
-/// File names and texts of the JSON Schemas of tuning, of the engine's part of models, and of the files in the cache.
+/// File names and texts of the JSON Schemas of tuning and of the engine's part of models. The files in the
+/// cache have theirs in `cache_schema`.
 ///
 /// # Errors
 /// When a schema can't be written.
 #[cfg(feature = "schema")]
 pub fn schemas() -> Result<Vec<(String, String)>, Error> {
-    Ok(vec![
-        Format::TUNING.json_schema::<Tuning>()?,
-        Format::MODEL.json_schema::<Model>()?,
-        crate::adaptive::cache::json_schema()?,
-    ])
+    Ok(vec![Format::TUNING.json_schema::<Tuning>()?, Format::MODEL.json_schema::<Model>()?])
 }
 
 #[cfg(test)]

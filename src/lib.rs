@@ -37,10 +37,12 @@ mod aabb;
 mod adaptive;
 mod algorithm;
 mod broad_phase;
+#[cfg(feature = "this-machine")]
+mod calibrate;
 mod changes;
 mod cost;
 mod cpu;
-mod displacement;
+mod entry;
 mod error;
 mod filter;
 #[cfg(feature = "gpu")]
@@ -53,9 +55,9 @@ mod load;
 pub mod measure;
 pub mod model;
 mod named;
+mod pair;
 mod pairs;
 mod registry;
-mod sample;
 #[cfg(test)]
 mod scene;
 mod splitmix;
@@ -67,27 +69,32 @@ mod wire;
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
 #[cfg(feature = "this-machine")]
-pub use adaptive::{Cache, Options, Origin, SaveError, Setup};
+pub use adaptive::{Origin, SaveError, Setup};
 pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
-pub use broad_phase::BroadPhase;
+pub use broad_phase::{BroadPhase, Incremental};
+#[cfg(feature = "schema")]
+pub use calibrate::cache_schema;
+#[cfg(feature = "this-machine")]
+pub use calibrate::{Cache, StartOptions};
 pub use changes::Changes;
 pub use cost::{CostCurve, CostTerm, Counts, CurveError, Knot, MOST_UNIT_NS, Product, Term};
-pub use cpu::SimdLevel;
-pub use displacement::Displacement;
-pub use error::{BoxDefect, Error};
+pub use cpu::{SimdLevel, SimdLevelError};
+pub use entry::Entry;
+pub use error::{BoxDefect, Error, Unavailable};
 pub use filter::{Filter, Membership};
 pub use hardware::{
-    GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, Hardware, HardwareError, How, Machine, Parameter,
-    ParameterId,
+    GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, Hardware, HardwareError, How, Machine, Parameter, ParameterId,
 };
-pub use load::Load;
+pub use load::{Displacement, FramePlan, Load};
 pub use model::Model;
 pub use named::UnknownName;
-pub use pairs::{Pair, PairOrder, Pairs};
-/// The version of rayon whose pools this library takes: [`Registry::use_pool`].
+pub use pair::Pair;
+pub use pairs::{PairOrder, Pairs};
+/// The version of rayon whose pools this library takes: [`Registry::use_pool`]. Its number is part of the name, because another one
+/// would be other types: a release of this library that takes a newer rayon exports it under a new name, and is a breaking one.
 #[cfg(feature = "parallel")]
-pub use rayon;
-pub use registry::{Entry, Registry, usable_cores};
+pub use rayon as rayon1;
+pub use registry::{Registry, usable_cores};
 pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, Tuning, TuningError};
 
 /// The example of the README as a test, with the feature that it needs.

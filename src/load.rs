@@ -1,8 +1,16 @@
 //! What is known about a frame before it runs.
 
-use crate::Aabb;
-use crate::cpu::StripGrid;
-use crate::sample::{Chosen, Sample};
+mod displacement;
+mod plan;
+mod sample;
+mod strip_grid;
+
+use crate::aabb::Aabb;
+
+pub use displacement::Displacement;
+pub use plan::FramePlan;
+pub(crate) use sample::{Chosen, Sample};
+pub(crate) use strip_grid::{Cover, StripGrid, StripSpan};
 
 /// The figures of a frame that decide what each algorithm costs, all known from a sample and the frame before.
 ///
@@ -25,13 +33,42 @@ pub struct Load {
 }
 
 impl Load {
+    /// A frame of so many boxes of which nothing else is known: no pair, and none of them moves.
+    #[must_use]
+    pub fn of_objects(objects: u32) -> Self {
+        Self { objects, ..Self::default() }
+    }
+
+    /// The same with so many overlapping pairs.
+    #[must_use]
+    pub fn with_pairs(self, pairs: f64) -> Self {
+        Self { pairs, ..self }
+    }
+
+    /// The same with so many candidates: pairs that overlap on one axis, and those of them that share a strip.
+    #[must_use]
+    pub fn with_candidates(self, axis: f64, strip: f64) -> Self {
+        Self { axis_candidates: axis, strip_candidates: strip, ..self }
+    }
+
+    /// The same with boxes that move so far in a frame.
+    #[must_use]
+    pub fn with_moved(self, moved: f64) -> Self {
+        Self { moved, ..self }
+    }
+
     /// Estimates the load of a frame from up to 256 of its boxes, in a time that does not grow beyond 16 000 objects.
     ///
     /// `pairs` is the number of pairs of the frame before and `moved` how far the boxes have moved since, if there was one.
     #[must_use]
     pub fn estimate(boxes: &[Aabb], pairs: Option<f64>, moved: Option<f64>) -> Self {
+        Self::planned(boxes, pairs, moved).0
+    }
+
+    /// As [`estimate`](Self::estimate), with the plan of the frame that follows from the same sample.
+    pub(crate) fn planned(boxes: &[Aabb], pairs: Option<f64>, moved: Option<f64>) -> (Self, FramePlan) {
         let chosen = Chosen::from(boxes);
-        let sample = Sample::statistics(&chosen);
+        let (plan, sample, grid) = FramePlan::seen(&chosen, boxes.len());
         let n = boxes.len() as f64;
         let all = n * (n - 1.0).max(0.0) / 2.0;
         let axis = sample.widest_axis();
@@ -41,14 +78,13 @@ impl Load {
         // Independence of the axes is wrong for clusters, but the frame before corrects it from the second frame on.
         let independent = shares.iter().product::<f64>() * all;
         let pairs = pairs.unwrap_or(independent);
-        let grid = StripGrid::plan(&sample, boxes.len());
         let strip_candidates = if grid.strips() == 1 {
             axis_candidates
         } else {
             strip_share(&chosen, &grid, shares[axis], pairs / independent.max(1.0)) * all
         };
         let strip_candidates = strip_candidates.max(pairs).min(axis_candidates.max(pairs));
-        Self { objects: boxes.len() as u32, axis_candidates, strip_candidates, pairs, moved: moved.unwrap_or(1.0) }
+        (Self { objects: boxes.len() as u32, axis_candidates, strip_candidates, pairs, moved: moved.unwrap_or(1.0) }, plan)
     }
 
     /// The load of a frame that looks and moves like this one but has another number of objects and pairs.

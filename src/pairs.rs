@@ -4,11 +4,11 @@ mod fill;
 
 use crate::error::Error;
 use crate::filter::Filter;
+use crate::pair::Pair;
 use crate::splitmix::mix;
 use std::sync::Arc;
 
-/// Two positions in the input, the lower one first.
-pub type Pair = (u32, u32);
+pub(crate) use fill::each_bit;
 
 /// The order in which a caller wants the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

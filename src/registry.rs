@@ -1,34 +1,35 @@
 //! The algorithms that this machine can run.
 
-use crate::algorithm::MOST_THREADS;
-use crate::cpu::{self, SimdLevel, Threads};
-use crate::{AlgorithmId, Backend, BroadPhase, Error};
+use crate::algorithm::{AlgorithmId, Backend, MOST_THREADS, ParseIdError};
+use crate::broad_phase::BroadPhase;
+use crate::cpu::{self, Create, Method, Simd, SimdLevel, Threads};
+use crate::entry::Entry;
+use crate::error::{Error, Unavailable};
 use std::fmt;
+use std::sync::Arc;
 
 /// Makes an instance of an algorithm.
 type Factory = Box<dyn Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync>;
+/// Makes an instance of an algorithm that runs on any of some numbers of threads, ascending.
+type FamilyFactory = Arc<dyn Fn(&[u32]) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync>;
 
 /// All algorithms that are known, each with the reason when it can't run here.
 ///
 /// Starts with ours and is open: what a user adds is swept, modelled and chosen like the rest.
 pub struct Registry {
     entries: Vec<Entry>,
-    factories: Vec<Option<Factory>>,
+    makers: Vec<Maker>,
     threads: Threads,
     simd: SimdLevel,
     #[cfg(feature = "gpu")]
     gpus: crate::gpu::Gpus,
 }
 
-/// One algorithm of a registry.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Entry {
-    /// The algorithm.
-    pub id: AlgorithmId,
-    /// Counts up when its speed changes; timings of other revisions are stale.
-    pub revision: u32,
-    /// Why it can't run here, if it can't.
-    pub unavailable: Option<String>,
+/// What makes the algorithm of an entry.
+enum Maker {
+    Ours,
+    One(Factory),
+    Family(FamilyFactory),
 }
 
 impl Registry {
@@ -43,7 +44,7 @@ impl Registry {
     pub fn with_cores(cores: u32) -> Self {
         let mut registry = Self {
             entries: Vec::new(),
-            factories: Vec::new(),
+            makers: Vec::new(),
             threads: Threads::default(),
             simd: SimdLevel::in_use(),
             #[cfg(feature = "gpu")]
@@ -51,12 +52,9 @@ impl Registry {
         };
         for method in cpu::METHODS {
             for threads in thread_counts(cores) {
-                registry.entries.push(Entry {
-                    id: AlgorithmId::cpu(method.name, threads),
-                    revision: method.revision,
-                    unavailable: registry.threads.unavailable(threads),
-                });
-                registry.factories.push(None);
+                let unavailable = registry.threads.unavailable(threads);
+                let entry = Entry::new(AlgorithmId::cpu(method.name, threads), method.revision);
+                registry.set(Entry { unavailable, ..entry }, Maker::Ours);
             }
         }
         registry
@@ -69,18 +67,43 @@ impl Registry {
         revision: u32,
         factory: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
     ) {
-        let entry = Entry { id, revision, unavailable: None };
-        let factory: Option<Factory> = Some(Box::new(factory));
-        match self.entries.iter().position(|e| e.id == entry.id) {
-            Some(at) => {
-                self.entries[at] = entry;
-                self.factories[at] = factory;
-            }
+        self.set(Entry::new(id, revision), Maker::One(Box::new(factory)));
+    }
+
+    /// Adds an [incremental](crate::Incremental) algorithm of the user's that runs on any of these numbers of threads of the CPU and
+    /// takes along what it keeps from one to the next, or replaces those with the same ids.
+    ///
+    /// `factory` gets the numbers of threads that are wanted, ascending; what it makes takes each of them in
+    /// [`Incremental::set_threads`](crate::Incremental::set_threads), and begins with the least.
+    ///
+    /// # Errors
+    /// As [`AlgorithmId::new`]; nothing was added then.
+    pub fn add_family(
+        &mut self,
+        method: &str,
+        threads: &[u32],
+        revision: u32,
+        factory: impl Fn(&[u32]) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static,
+    ) -> Result<(), ParseIdError> {
+        let ids = threads.iter().map(|&k| AlgorithmId::new(method, Backend::Cpu(k))).collect::<Result<Vec<_>, _>>()?;
+        let factory: FamilyFactory = Arc::new(factory);
+        ids.into_iter().for_each(|id| self.set(Entry::new(id, revision), Maker::Family(Arc::clone(&factory))));
+        Ok(())
+    }
+
+    /// Puts an entry in the place of the one with the same id, or behind all.
+    fn set(&mut self, entry: Entry, maker: Maker) {
+        match self.position(&entry.id) {
+            Some(at) => (self.entries[at], self.makers[at]) = (entry, maker),
             None => {
                 self.entries.push(entry);
-                self.factories.push(factory);
+                self.makers.push(maker);
             }
         }
+    }
+
+    fn position(&self, id: &AlgorithmId) -> Option<usize> {
+        self.entries.iter().position(|e| e.id == *id)
     }
 
     /// Adds our algorithms on these GPUs: on each of them, and on the first two, three and so on together. They take the place of
@@ -91,15 +114,14 @@ impl Registry {
     pub fn add_gpus(&mut self, gpus: &crate::gpu::Gpus) {
         self.gpus = gpus.clone();
         // GPUs that were added before and are not among these go; what the user added stays.
-        let stays = |k: usize| self.factories[k].is_some() || !matches!(self.entries[k].id.backend(), Backend::Gpu(_));
+        let stays = |k: usize| !matches!((&self.makers[k], self.entries[k].id.backend()), (Maker::Ours, Backend::Gpu(_)));
         let stays: Vec<bool> = (0..self.entries.len()).map(stays).collect();
-        let (mut entry, mut factory) = (stays.iter(), stays.iter());
+        let (mut entry, mut maker) = (stays.iter(), stays.iter());
         self.entries.retain(|_| entry.next() == Some(&true));
-        self.factories.retain(|_| factory.next() == Some(&true));
-        for (id, revision) in crate::gpu::algorithms(gpus.identities()) {
-            if !self.entries.iter().any(|e| e.id == id) {
-                self.entries.push(Entry { id, revision, unavailable: None });
-                self.factories.push(None);
+        self.makers.retain(|_| maker.next() == Some(&true));
+        for entry in crate::gpu::algorithms(gpus.identities()) {
+            if self.position(&entry.id).is_none() {
+                self.set(entry, Maker::Ours);
             }
         }
     }
@@ -129,33 +151,33 @@ impl Registry {
     /// threads than the pool has. Each phase of a frame is a scope of rayon, with rayon's rules: it ends when the pool has come
     /// to its jobs, so a thread of the pool must not wait for the one that calls, and a caller that is one of them may run
     /// other jobs of the pool meanwhile. [Pinning](Self::pin_threads) does not apply: where the pool's threads run is the
-    /// program's business. The version of rayon is [the one that this library exports](crate::rayon).
+    /// program's business. The pool is of [the version of rayon](crate::rayon1) that this library exports.
     ///
     /// ```
-    /// use sapwise::{Registry, rayon};
+    /// use sapwise::{Registry, rayon1 as rayon};
     /// use std::sync::Arc;
     ///
     /// let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(3).build()?);
     /// let mut registry = Registry::with_cores(8);
     /// registry.use_pool(Arc::clone(&pool));
-    /// let most = registry.available().iter().map(|(id, _)| id.threads()).max();
+    /// let most = registry.available().iter().map(|e| e.id.threads()).max();
     /// assert_eq!(most, Some(4));
     /// # Ok::<(), rayon::ThreadPoolBuildError>(())
     /// ```
     #[cfg(feature = "parallel")]
-    pub fn use_pool(&mut self, pool: std::sync::Arc<rayon::ThreadPool>) {
+    pub fn use_pool(&mut self, pool: Arc<rayon::ThreadPool>) {
         self.threads = Threads::of(pool);
         let most = self.threads.most().unwrap_or(1);
         for method in cpu::METHODS {
             let wider = |e: &Entry| e.id.method() == method.name && matches!(*e.id.backend(), Backend::Cpu(k) if k > most);
             let id = AlgorithmId::cpu(method.name, most);
-            if let Some(at) = self.entries.iter().position(wider).filter(|_| !self.entries.iter().any(|e| e.id == id)) {
-                self.entries.insert(at, Entry { id, revision: method.revision, unavailable: None });
-                self.factories.insert(at, None);
+            if let Some(at) = self.entries.iter().position(wider).filter(|_| self.position(&id).is_none()) {
+                self.entries.insert(at, Entry::new(id, method.revision));
+                self.makers.insert(at, Maker::Ours);
             }
         }
-        for (entry, factory) in self.entries.iter_mut().zip(&self.factories) {
-            if let (&Backend::Cpu(threads), None) = (entry.id.backend(), factory) {
+        for (entry, maker) in self.entries.iter_mut().zip(&self.makers) {
+            if let (&Backend::Cpu(threads), Maker::Ours) = (entry.id.backend(), maker) {
                 entry.unavailable = self.threads.unavailable(threads);
             }
         }
@@ -167,10 +189,10 @@ impl Registry {
         &self.entries
     }
 
-    /// The algorithms that can run here, with their revisions.
+    /// The algorithms that can run here.
     #[must_use]
-    pub fn available(&self) -> Vec<(AlgorithmId, u32)> {
-        self.entries.iter().filter(|e| e.unavailable.is_none()).map(|e| (e.id.clone(), e.revision)).collect()
+    pub fn available(&self) -> Vec<Entry> {
+        self.entries.iter().filter(|e| e.unavailable.is_none()).cloned().collect()
     }
 
     /// The SIMD level that algorithms use.
@@ -208,10 +230,10 @@ impl Registry {
         let most = same.clone().map(|e| e.id.threads()).max();
         match same.clone().find(|e| e.id == *id).or(same.clone().next()) {
             Some(known) if known.revision != revision => {
-                unavailable(format!("its cost is of revision {revision}, this build has {}; predict again", known.revision))
+                unavailable(Unavailable::OtherRevision { cost: revision, build: known.revision })
             }
             Some(_) if most.is_some_and(|most| id.threads() > most) => {
-                unavailable(format!("it has {} threads, more than this machine has cores", id.threads()))
+                unavailable(Unavailable::TooFewCores { threads: id.threads() })
             }
             _ => None,
         }
@@ -223,13 +245,17 @@ impl Registry {
     /// # Errors
     /// [`Error::UnknownAlgorithm`] and [`Error::Unavailable`].
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
-        if let Some(factory) = self.entries.iter().position(|e| e.id == *id).and_then(|at| self.factories[at].as_ref()) {
-            return factory();
+        match self.position(id).map(|at| &self.makers[at]) {
+            Some(Maker::One(factory)) => return factory(),
+            Some(Maker::Family(factory)) => return factory(&[id.threads()]),
+            Some(Maker::Ours) | None => {}
         }
-        let method = cpu::METHODS.iter().find(|m| m.name == id.method());
-        match (method, id.backend()) {
+        match (ours(id), id.backend()) {
             (Some(method), &Backend::Cpu(threads)) => match self.threads.unavailable(threads) {
-                None => (method.create)(threads, &self.threads, self.simd),
+                None => match method.create {
+                    Create::OneWidth(create) => create(threads, &self.threads, Simd::at_most(self.simd)),
+                    Create::AnyWidth(create) => create(&[threads], &self.threads, Simd::at_most(self.simd)),
+                },
                 Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
             },
             #[cfg(feature = "gpu")]
@@ -241,31 +267,62 @@ impl Registry {
         }
     }
 
-    /// One instance for all of `ids`, which takes what it keeps along from one number of threads to the next
-    /// ([`BroadPhase::set_threads`]). `None` where they are not of one method of ours, on the CPU, that keeps something; then each
-    /// is [created](Self::create) by itself.
+    /// One instance for all of `ids`, which takes along what it keeps from one number of threads to the next by
+    /// [`Incremental::set_threads`](crate::Incremental::set_threads). `None` where they are not one incremental method on several
+    /// numbers of threads, ours or [added as a family](Self::add_family); then each is [created](Self::create) by itself.
     ///
     /// # Errors
     /// As [`create`](Self::create).
-    pub fn create_for(&self, ids: &[&AlgorithmId]) -> Option<Result<Box<dyn BroadPhase>, Error>> {
-        let first = ids.first()?;
-        let create_for = cpu::METHODS.iter().find(|m| m.name == first.method())?.create_for?;
-        let mut threads = Vec::with_capacity(ids.len());
-        for id in ids {
-            let replaced = || self.entries.iter().zip(&self.factories).any(|(e, f)| e.id == **id && f.is_some());
-            match id.backend() {
-                &Backend::Cpu(k)
-                    if id.method() == first.method() && self.threads.unavailable(k).is_none() && !replaced() =>
-                {
-                    threads.push(k);
-                }
-                _ => return None,
-            }
+    pub fn create_family(&self, ids: &[&AlgorithmId]) -> Result<Option<Box<dyn BroadPhase>>, Error> {
+        let Some((first, rest)) = ids.split_first() else { return Ok(None) };
+        let Some(family) = self.family(first) else { return Ok(None) };
+        if !rest.iter().all(|id| id.method() == first.method() && self.family(id).is_some_and(|f| f.is(&family))) {
+            return Ok(None);
         }
+        let mut threads: Vec<u32> = ids.iter().map(|id| id.threads()).collect();
         threads.sort_unstable();
         threads.dedup();
-        Some(create_for(&threads, &self.threads, self.simd))
+        match family {
+            Family::Ours(create) => create(&threads, &self.threads, Simd::at_most(self.simd)),
+            Family::Users(factory) => factory(&threads),
+        }
+        .map(Some)
     }
+
+    /// The family of an algorithm that can run here, if it has one.
+    fn family(&self, id: &AlgorithmId) -> Option<Family<'_>> {
+        let &Backend::Cpu(threads) = id.backend() else { return None };
+        match self.position(id).map(|at| &self.makers[at]) {
+            Some(Maker::One(_)) => None,
+            Some(Maker::Family(factory)) => Some(Family::Users(factory)),
+            Some(Maker::Ours) | None => match ours(id)?.create {
+                Create::AnyWidth(create) if self.threads.unavailable(threads).is_none() => Some(Family::Ours(create)),
+                _ => None,
+            },
+        }
+    }
+}
+
+/// What makes one instance for several numbers of threads.
+enum Family<'a> {
+    Ours(fn(&[u32], &Threads, Simd) -> Result<Box<dyn BroadPhase>, Error>),
+    Users(&'a FamilyFactory),
+}
+
+impl Family<'_> {
+    /// Whether two algorithms of one method are of the same family.
+    fn is(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Ours(_), Self::Ours(_)) => true,
+            (Self::Users(a), Self::Users(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+}
+
+/// The method of ours of this name on the CPU.
+fn ours(id: &AlgorithmId) -> Option<&'static Method> {
+    cpu::METHODS.iter().find(|m| m.name == id.method())
 }
 
 impl Default for Registry {
@@ -295,7 +352,9 @@ fn thread_counts(cores: u32) -> impl Iterator<Item = u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Aabb, Pairs};
+    use crate::aabb::Aabb;
+    use crate::broad_phase::Incremental;
+    use crate::pairs::Pairs;
 
     #[test]
     fn thread_counts_double_up_to_all() {
@@ -324,6 +383,44 @@ mod tests {
         assert_eq!(registry.entries().len(), ours + 1);
         assert_eq!(registry.entries()[ours].revision, 8);
         assert!(registry.create(&id).is_ok());
+    }
+
+    /// Runs on as many threads as it was told last.
+    struct Wide(Vec<u32>, u32);
+
+    impl BroadPhase for Wide {
+        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+            pairs.clear();
+            pairs.finish()
+        }
+
+        fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
+            Some(self)
+        }
+    }
+
+    impl Incremental for Wide {
+        fn set_threads(&mut self, threads: u32) -> bool {
+            self.1 = threads;
+            self.0.contains(&threads)
+        }
+    }
+
+    #[test]
+    fn a_family_is_one_instance_on_any_of_its_numbers_of_threads() {
+        let mut registry = Registry::with_cores(1);
+        registry.add_family("mine", &[1, 2, 4], 3, |threads| Ok(Box::new(Wide(threads.to_vec(), 1)))).unwrap();
+        assert!(registry.add_family("Mine", &[1], 3, |_| unreachable!()).is_err());
+        let ids: Vec<AlgorithmId> = ["mine@cpu4", "mine@cpu1", "brute@cpu1", "mine@cpu2"].map(|t| t.parse().unwrap()).into();
+        let mut family = registry.create_family(&[&ids[0], &ids[1]]).unwrap().unwrap();
+        let incremental = family.as_incremental().unwrap();
+        assert_eq!([1, 2, 4].map(|k| incremental.set_threads(k)), [true, false, true]);
+        assert!(registry.create_family(&[&ids[1], &ids[2]]).unwrap().is_none());
+        assert!(registry.create_family(&[]).unwrap().is_none());
+        assert!(registry.create(&ids[3]).unwrap().is_incremental());
+        // One that was replaced is no longer of the family.
+        registry.add(ids[3].clone(), 1, || Ok(Box::new(Nothing)));
+        assert!(registry.create_family(&[&ids[0], &ids[3]]).unwrap().is_none());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Measures what the adaptive module is worth on this machine: its regret against the best algorithm of every frame, with tuning that was
-# measured, predicted, or are of another machine, and beside another program.
+# Measures what the adaptive choice is worth on this machine: its regret against the best algorithm of every frame, with a tuning that was
+# measured, predicted, or measured on another machine, and beside another program.
 #
 #     tools/in-line.sh [DIR] [OTHER.json]
 #

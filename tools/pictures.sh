@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the pictures of the README anew: those of the study from datasets/, and one of a run on this machine, which takes a minute and
-# should find nothing else running.
+# Draws the pictures of the README and of docs/ again: those of the study from datasets/, and one of a run on this machine, which takes a
+# minute and needs an idle machine.
 #
 #   tools/pictures.sh [DIR]    into DIR, without it into pictures/
 set -euo pipefail

@@ -1,6 +1,8 @@
 //! What was decided for a frame, and why.
 
-use crate::{AlgorithmId, Load, Source};
+use crate::algorithm::AlgorithmId;
+use crate::load::Load;
+use crate::tuning::Source;
 
 /// Why an algorithm was chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +24,7 @@ pub enum Reason {
 
 /// The last decision and what it rested on.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Decision<'a> {
     /// The algorithm that ran.
     pub algorithm: &'a AlgorithmId,

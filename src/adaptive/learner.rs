@@ -4,12 +4,12 @@
 //! class of processor (a clock that throttles, tuning of another machine); beside that for each number of threads or GPUs one, and one
 //! on what a call costs (cores that moved apart, a core that is taken); and for all algorithms that keep the same from frame to frame
 //! one. The *own* part of an algorithm is a curve over the number of objects. A Kalman filter follows both: the regime with all its
-//! covariances, which takes a dozen numbers, the own parts each by itself. [`Posterior`](crate::Posterior) knows more and takes some 50
-//! microseconds for an observation, longer than most frames.
+//! covariances, which takes a dozen numbers, the own parts each by itself.
 
-use super::place::{KNOTS, Place, View};
-use super::tally::Tally;
-use crate::{AlgorithmCost, BackendClass};
+use super::knots::{KNOTS, KnotPosition, View};
+use super::frame_batch::FrameBatch;
+use crate::algorithm::BackendClass;
+use crate::tuning::AlgorithmCost;
 
 /// Standard deviations before anything was observed. Tuning of another machine are off by a factor of several for all algorithms at once, and
 /// a core that is taken doubles the time of those that use it.
@@ -27,7 +27,7 @@ const KEPT_FRAMES: f64 = 400.0;
 const WIDTH_FRAMES: f64 = 800.0;
 const OWN_FRAMES: f64 = 6000.0;
 
-/// Share of each frame in the mean time that frames of a width wait for other programs, and tallies of an algorithm before its frames count
+/// Share of each frame in the mean time that frames of a width wait for other programs, and batches of an algorithm before its frames count
 /// for that: until then what is dearer than expected was expected wrongly.
 const WAIT_SHARE: f64 = 1.0 / 128.0;
 const KNOWN: u32 = 4;
@@ -72,7 +72,7 @@ struct Algorithm {
     noise: f64,
     /// Where in the list of waits its width stands, and how often it was observed.
     wait: usize,
-    tallies: u32,
+    batches: u32,
     /// Surprises in a row, counted with their sign.
     run: i32,
 }
@@ -100,8 +100,8 @@ type Slopes = [(usize, f64); PARTS];
 
 impl Algorithm {
     /// The own part.
-    fn own_ln(&self, place: Place) -> f64 {
-        place.knots().iter().map(|&(k, weight)| weight * self.own[k].mean).sum()
+    fn own_ln(&self, position: KnotPosition) -> f64 {
+        position.knots().iter().map(|&(k, weight)| weight * self.own[k].mean).sum()
     }
 }
 
@@ -117,10 +117,10 @@ impl Own {
 impl Learner {
     /// `kept` as [`Policy::new`](super::policy::Policy::new) has it.
     pub(super) fn new(costs: &[AlgorithmCost], kept: &[Option<usize>]) -> Self {
-        let mut parts: Vec<Part> = Vec::new();
-        let mut place = |part: Part| {
-            parts.iter().position(|p| *p == part).unwrap_or_else(|| {
-                parts.push(part);
+        let mut parts: Vec<Factor> = Vec::new();
+        let mut at = |factor: Factor| {
+            parts.iter().position(|p| *p == factor).unwrap_or_else(|| {
+                parts.push(factor);
                 parts.len() - 1
             })
         };
@@ -132,21 +132,21 @@ impl Learner {
                 widths.push(width_of);
             }
             let width = (backend.width() > 1).then(|| {
-                let all = place(Part::Width(backend.class(), backend.width()));
+                let all = at(Factor::Width(backend.class(), backend.width()));
                 // Always next to each other: no other adds one in between.
-                place(Part::Calls(backend.class(), backend.width()));
+                at(Factor::Calls(backend.class(), backend.width()));
                 all
             });
             let before = cost.spread_ln.max(OWN_LN).powi(2);
             Algorithm {
-                class: place(Part::Class(backend.class())),
-                kept: kept.map(|at| place(Part::Kept(at))),
+                class: at(Factor::Class(backend.class())),
+                kept: kept.map(|work| at(Factor::Kept(work))),
                 width,
                 before,
                 own: [Own { mean: 0.0, variance: before, at: 0 }; KNOTS],
                 noise: NOISE_LN.powi(2),
                 wait: widths.iter().position(|w| *w == width_of).unwrap_or(0),
-                tallies: 0,
+                batches: 0,
                 run: 0,
             }
         });
@@ -167,7 +167,7 @@ impl Learner {
         }
     }
 
-    /// Tallies that were observed.
+    /// Batches that were observed.
     pub(super) fn observed(&self) -> u64 {
         self.observed
     }
@@ -194,7 +194,7 @@ impl Learner {
 
     /// Whether an algorithm was observed often enough to tell a frame that waited from one that was expected wrongly.
     pub(super) fn knows(&self, algorithm: usize) -> bool {
-        self.algorithms[algorithm].tallies >= KNOWN
+        self.algorithms[algorithm].batches >= KNOWN
     }
 
     /// Takes in that a frame took so many nanoseconds more than any of its kind is expected to, or none.
@@ -208,12 +208,12 @@ impl Learner {
     /// Expected natural logarithm of real over predicted time, waits left out.
     pub(super) fn correction_ln(&self, algorithm: usize, view: View) -> f64 {
         let a = &self.algorithms[algorithm];
-        self.regime(a, view).0 + a.own_ln(view.place)
+        self.regime(a, view).0 + a.own_ln(view.position)
     }
 
-    fn own_variance(&self, algorithm: usize, place: Place) -> f64 {
+    fn own_variance(&self, algorithm: usize, position: KnotPosition) -> f64 {
         let a = &self.algorithms[algorithm];
-        place.knots().iter().map(|&(k, weight)| weight * a.own[k].variance_at(self.frame, a.before)).sum()
+        position.knots().iter().map(|&(k, weight)| weight * a.own[k].variance_at(self.frame, a.before)).sum()
     }
 
     /// Variance of the logarithm of the ratio of two costs.
@@ -229,23 +229,23 @@ impl Learner {
             .flat_map(|&(i, x)| weights.iter().map(move |&(j, y)| (i, j, x * y)))
             .map(|(i, j, weight)| weight * self.covariance[i * size + j])
             .sum();
-        shared.max(0.0) + self.own_variance(a, of_a.place) + self.own_variance(b, of_b.place)
+        shared.max(0.0) + self.own_variance(a, of_a.position) + self.own_variance(b, of_b.position)
     }
 
     /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction.
-    pub(super) fn observe(&mut self, tally: &Tally, frame: u64) {
-        let algorithm = tally.candidate;
-        let place = Place::of(tally.log2_objects());
-        let view = View { place, calls: tally.calls() };
-        let surprise = (tally.real_ns / tally.predicted_ns).ln() - self.correction_ln(algorithm, view);
+    pub(super) fn observe(&mut self, batch: &FrameBatch, frame: u64) {
+        let algorithm = batch.candidate;
+        let position = KnotPosition::of(batch.log2_objects());
+        let view = View { position, calls: batch.calls() };
+        let surprise = (batch.real_ns / batch.predicted_ns).ln() - self.correction_ln(algorithm, view);
         if !surprise.is_finite() {
             return;
         }
         self.pass(frame);
         self.observed += 1;
-        self.algorithms[algorithm].tallies = self.algorithms[algorithm].tallies.saturating_add(1);
+        self.algorithms[algorithm].batches = self.algorithms[algorithm].batches.saturating_add(1);
         // Frames in a row are alike, so that many of them tell less than as many that were far apart.
-        let worth = if tally.cold { COLD_WORTH[usize::from(surprise < 0.0)] } else { f64::from(tally.frames).powf(ALIKE) };
+        let worth = if batch.cold { COLD_WORTH[usize::from(surprise < 0.0)] } else { f64::from(batch.frames).powf(ALIKE) };
         let size = self.mean.len();
         let (_, regime) = self.regime(&self.algorithms[algorithm], view);
         let Self { algorithms, mean, covariance, with, frame, .. } = self;
@@ -253,13 +253,13 @@ impl Learner {
         for (i, w) in with.iter_mut().enumerate() {
             *w = regime.iter().map(|&(k, weight)| weight * covariance[i * size + k]).sum();
         }
-        for (k, _) in place.knots() {
+        for (k, _) in position.knots() {
             let own = &mut a.own[k];
             own.variance = own.variance_at(*frame, a.before);
             own.at = *frame;
         }
         let of_regime: f64 = regime.iter().map(|&(k, weight)| weight * with[k]).sum();
-        let of_own: f64 = place.knots().iter().map(|&(k, weight)| weight * weight * a.own[k].variance).sum();
+        let of_own: f64 = position.knots().iter().map(|&(k, weight)| weight * weight * a.own[k].variance).sum();
         let variance = of_regime.max(0.0) + of_own + a.noise / worth;
         let most = MOST_SURPRISE * variance.sqrt();
         let error = surprise.clamp(-most, most);
@@ -276,7 +276,7 @@ impl Learner {
         a.noise = a.noise.max(LEAST_NOISE_LN.powi(2));
         if a.run.unsigned_abs() >= NO_ACCIDENT {
             a.run = 0;
-            return self.doubt_all(algorithm, place, surprise);
+            return self.doubt_all(algorithm, position, surprise);
         }
         let gain = error / variance;
         for (m, w) in mean.iter_mut().zip(&*with) {
@@ -287,7 +287,7 @@ impl Learner {
                 covariance[i * size + j] -= with[i] * with[j] / variance;
             }
         }
-        for (k, weight) in place.knots() {
+        for (k, weight) in position.knots() {
             let own = &mut a.own[k];
             let with = weight * own.variance;
             own.mean += with * gain;
@@ -316,10 +316,10 @@ impl Learner {
 
     /// What was observed holds no longer: the next frames count as if they were the first. And what the regime has not explained until now is
     /// more likely the algorithm's own.
-    fn doubt_all(&mut self, algorithm: usize, place: Place, surprise: f64) {
+    fn doubt_all(&mut self, algorithm: usize, position: KnotPosition, surprise: f64) {
         unobserve(&mut self.covariance, &self.before);
         let a = &mut self.algorithms[algorithm];
-        for (k, _) in place.knots() {
+        for (k, _) in position.knots() {
             a.own[k].variance = a.before.max(surprise * surprise);
         }
     }
@@ -328,7 +328,7 @@ impl Learner {
     /// the algorithm's own.
     pub(super) fn lasting_ln(&self, algorithm: usize, log2_objects: f64) -> f64 {
         let a = &self.algorithms[algorithm];
-        self.mean[a.class] + a.own_ln(Place::of(log2_objects))
+        self.mean[a.class] + a.own_ln(KnotPosition::of(log2_objects))
     }
 
     /// Standard deviation of the logarithm of a frame's time around the corrected cost: the root of the mean over the knots.
@@ -349,7 +349,7 @@ fn unobserve(covariance: &mut [f64], before: &[f64]) {
 
 /// A part of the regime.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
+enum Factor {
     Class(BackendClass),
     /// Of those that keep the same: a scene may spare them more or less of their work than those that the tuning was made from.
     Kept(usize),
@@ -358,7 +358,7 @@ enum Part {
     Calls(BackendClass, u32),
 }
 
-impl Part {
+impl Factor {
     fn deviation(self) -> f64 {
         match self {
             Self::Class(_) => CLASS_LN,

@@ -1,12 +1,13 @@
 //! Which algorithm runs the next frame: the cheapest by all that is known, seldom another one to learn what it costs.
 
 use super::decision::{Choice, Reason};
+use super::frame_batch::{FrameBatch, Predicted};
+use super::knots::{KnotPosition, View};
 use super::learner::Learner;
-use super::place::{Place, View};
-use super::price::{Expected, Kind, Prices};
-use super::tally::{Predicted, Tally};
+use super::switching::{Expected, Kind, SwitchingCosts};
 use crate::cost::Counts;
-use crate::{Load, Tuning};
+use crate::load::Load;
+use crate::tuning::Tuning;
 
 /// By number of objects alone, the algorithm of before stays while its own step is within this share.
 const STEP_SLACK: f64 = 0.05;
@@ -30,7 +31,7 @@ pub(super) struct Policy {
     learner: Option<Learner>,
     learns: bool,
     explores: bool,
-    prices: Prices,
+    switching: SwitchingCosts,
     /// The candidate that runs unless one explores, and what ran last.
     settled: Option<usize>,
     ran: Option<usize>,
@@ -40,7 +41,7 @@ pub(super) struct Policy {
     expected: Vec<Expected>,
     predicted: Vec<Predicted>,
     log2_objects: f64,
-    tally: Tally,
+    batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
     frame: u64,
@@ -60,14 +61,14 @@ impl Policy {
             learner,
             learns: true,
             explores: true,
-            prices: Prices::new(kept),
+            switching: SwitchingCosts::new(kept),
             settled: None,
             ran: None,
             mean_ns: vec![f64::INFINITY; count],
             expected: vec![Expected { built_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
             predicted: vec![Predicted::default(); count],
             log2_objects: 0.0,
-            tally: Tally::default(),
+            batch: FrameBatch::default(),
             saved_ns: vec![0.0; count],
             frame: 0,
             explored_at: 0,
@@ -115,11 +116,11 @@ impl Policy {
     /// Other instances take the place of those of before.
     pub(super) fn remade(&mut self, kept: &[Option<usize>], usable: &[bool]) {
         (0..usable.len()).for_each(|k| self.set_usable(k, usable[k]));
-        // A frame with them is a first one, and begins a tally of its own.
+        // A frame with them is a first one, and begins a batch of its own.
         self.ran = None;
-        self.tally = Tally::default();
-        if !self.prices.remade(kept) {
-            self.prices = Prices::new(kept);
+        self.batch = FrameBatch::default();
+        if !self.switching.remade(kept) {
+            self.switching = SwitchingCosts::new(kept);
             self.learner = self.learner.is_some().then(|| Learner::new(&self.tuning.costs, kept));
         }
     }
@@ -128,7 +129,7 @@ impl Policy {
     pub(super) fn choose(&mut self, load: &Load, frames: u32) -> Option<Choice> {
         if let Some(ran) = self.ran.filter(|_| frames > 0) {
             // All frames since it was decided on.
-            self.prices.went_on(ran, self.frame + u64::from(frames) - 1);
+            self.switching.went_on(ran, self.frame + u64::from(frames) - 1);
         }
         self.frame += u64::from(frames);
         if self.is_by_count() {
@@ -158,25 +159,25 @@ impl Policy {
     fn expect(&mut self, load: &Load) {
         let counts = Counts::new(load);
         self.log2_objects = counts.log2_objects();
-        let place = Place::of(self.log2_objects);
+        let position = KnotPosition::of(self.log2_objects);
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
         for (k, cost) in self.tuning.costs.iter().enumerate() {
             let ns = cost.curve.cost_of(&counts);
             let alone_ns = cost.curve.fallback_of(&counts).unwrap_or(ns).max(ns);
             let predicted = Predicted { ns, calls_ns: cost.curve.calls_of(&counts).min(ns) };
-            let factor = learner.map_or(1.0, |l| l.correction_ln(k, View { place, calls: predicted.calls() }).exp());
+            let factor = learner.map_or(1.0, |l| l.correction_ln(k, View { position, calls: predicted.calls() }).exp());
             let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));
             self.predicted[k] = predicted;
             self.expected[k] = Expected { built_ns: ns * factor, alone_ns: alone_ns * factor };
-            self.mean_ns[k] = self.prices.mean_ns(k, self.frame, self.expected[k]) + wait_ns;
+            self.mean_ns[k] = self.switching.mean_ns(k, self.frame, self.expected[k]) + wait_ns;
         }
     }
 
     /// What the first frame of a candidate costs beside the mean of its frames.
-    fn price_ns(&self, candidate: usize) -> f64 {
+    fn switch_ns(&self, candidate: usize) -> f64 {
         let expected = self.expected[candidate];
-        let first_ns = self.prices.first_ns(candidate, self.frame, expected);
-        (first_ns - self.prices.mean_ns(candidate, self.frame, expected)).max(0.0)
+        let first_ns = self.switching.first_ns(candidate, self.frame, expected);
+        (first_ns - self.switching.mean_ns(candidate, self.frame, expected)).max(0.0)
     }
 
     fn cheapest(&self, among: impl Fn(usize) -> bool) -> Option<usize> {
@@ -197,7 +198,7 @@ impl Policy {
         if best == settled {
             return (settled, Reason::Stayed);
         }
-        let paid = |k: usize| self.mean_ns[k] < now && self.saved_ns[k] >= self.price_ns(k);
+        let paid = |k: usize| self.mean_ns[k] < now && self.saved_ns[k] >= self.switch_ns(k);
         self.cheapest(paid).map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
     }
 
@@ -207,11 +208,11 @@ impl Policy {
         if self.frame < self.explored_at + EXPLORE_EVERY {
             return None;
         }
-        let place = Place::of(self.log2_objects);
-        let view = |k: usize| (k, View { place, calls: self.predicted[k].calls() });
+        let position = KnotPosition::of(self.log2_objects);
+        let view = |k: usize| (k, View { position, calls: self.predicted[k].calls() });
         let now = self.mean_ns[settled];
         let worth = |k: usize| {
-            let first = self.mean_ns[k] + self.price_ns(k);
+            let first = self.mean_ns[k] + self.switch_ns(k);
             if k == settled || !self.usable[k] || first > MOST_DEARER * now {
                 return None;
             }
@@ -233,26 +234,26 @@ impl Policy {
         let entered = self.ran != Some(candidate);
         self.ran = Some(candidate);
         let expected = self.expected[candidate];
-        let kind = self.prices.ran(candidate, entered, self.frame, ns, expected, self.learns);
+        let kind = self.switching.ran(candidate, entered, self.frame, ns, expected, self.learns);
         let Some(learner) = self.learner.as_mut().filter(|_| self.learns) else { return };
-        if !self.tally.takes(candidate, self.log2_objects) {
-            if self.tally.frames > 0 {
-                learner.observe(&self.tally, self.frame);
+        if !self.batch.takes(candidate, self.log2_objects) {
+            if self.batch.frames > 0 {
+                learner.observe(&self.batch, self.frame);
             }
-            self.tally = self.tally.next(candidate);
+            self.batch = self.batch.next(candidate);
         }
         let first_of_many = kind == Kind::First && self.settled == Some(candidate);
-        if kind != Kind::Anew && !first_of_many {
+        if kind != Kind::Rebuilt && !first_of_many {
             // Until it is known what is dear, all of a frame counts.
             let known = learner.knows(candidate);
-            let dearest_ns = if known { self.prices.anew_ns(candidate, expected) } else { f64::INFINITY };
-            self.tally.cold = entered;
-            let waited_ns = self.tally.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns);
+            let dearest_ns = if known { self.switching.rebuild_ns(candidate, expected) } else { f64::INFINITY };
+            self.batch.cold = entered;
+            let waited_ns = self.batch.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns);
             learner.waited(candidate, waited_ns, self.frame);
         }
-        if self.tally.is_full() {
-            learner.observe(&self.tally, self.frame);
-            self.tally = self.tally.next(candidate);
+        if self.batch.is_full() {
+            learner.observe(&self.batch, self.frame);
+            self.batch = self.batch.next(candidate);
         }
     }
 

@@ -1,11 +1,14 @@
 //! Every one of the n (n - 1) / 2 pairs tested on three axes, as in the paper.
 
-use crate::broad_phase::check_count;
 use crate::cpu::columns::Columns;
 use crate::cpu::kernel::brute_rows;
 use crate::cpu::workers::{Outputs, Workers};
-use crate::cpu::{SimdLevel, Threads};
-use crate::{Aabb, BroadPhase, Error, Pairs};
+use crate::cpu::Threads;
+use crate::cpu::level::Simd;
+use crate::aabb::Aabb;
+use crate::broad_phase::{BroadPhase, check_count};
+use crate::error::Error;
+use crate::pairs::Pairs;
 
 /// The method; see the module.
 #[derive(Debug)]
@@ -13,12 +16,12 @@ struct Brute {
     workers: Workers,
     columns: Columns,
     outputs: Outputs,
-    level: SimdLevel,
+    simd: Simd,
 }
 
-pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
+pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
     let workers = Workers::new("brute", threads, pools)?;
-    Ok(Box::new(Brute { workers, columns: Columns::default(), outputs: Outputs::default(), level }))
+    Ok(Box::new(Brute { workers, columns: Columns::default(), outputs: Outputs::default(), simd }))
 }
 
 impl BroadPhase for Brute {
@@ -26,7 +29,7 @@ impl BroadPhase for Brute {
         pairs.clear();
         check_count(boxes.len())?;
         self.columns.resize(boxes.len())?;
-        let Self { workers, columns, outputs, level } = self;
+        let Self { workers, columns, outputs, simd } = self;
         workers.check(boxes)?;
         workers.fill(columns.as_mut(), |first, mut part| {
             for at in 0..part.len() {
@@ -34,7 +37,7 @@ impl BroadPhase for Brute {
             }
         });
         outputs.find(workers, pairs, |k, parts, list| {
-            brute_rows(*level, columns, row(columns.len(), k, parts)..row(columns.len(), k + 1, parts), list);
+            brute_rows(*simd, columns, row(columns.len(), k, parts)..row(columns.len(), k + 1, parts), list);
         });
         pairs.finish()
     }

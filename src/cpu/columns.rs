@@ -1,13 +1,14 @@
 //! Boxes turned into columns, so that one vector instruction tests several of them.
 
-use crate::{Aabb, Error};
+use crate::aabb::Aabb;
+use crate::error::Error;
 use std::ops::Range;
 
 /// Readable boxes behind the last one: the widest vector may start at any box and run past the end.
 const PADDING: usize = 16;
 
 /// Boxes as eight columns: three lower bounds, three upper bounds, positions in the input, and for a strip
-/// [`Cover::begins`](crate::cpu::strip_grid::Cover::begins).
+/// [`Cover::begins`](crate::load::Cover::begins).
 ///
 /// Axis 0 is the sweep axis, whichever axis of the input that is.
 #[derive(Debug, Default)]

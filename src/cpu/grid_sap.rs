@@ -4,14 +4,16 @@
 //! a box touches. Phase two, several tasks a thread: each strip gathers its bins from all threads, sorts them along the
 //! sweep axis and sweeps. Boxes much larger than a cell stand in no bin; each strip tests those that cross it.
 
-use crate::broad_phase::check_count;
 use crate::cpu::columns::{Columns, ensure, order_key, part};
 use crate::cpu::kernel::{All, InStrip, Query, query_rows, sweep_rows};
-use crate::cpu::strip_grid::{Cover, Place, StripGrid};
 use crate::cpu::workers::{Outputs, Workers};
-use crate::cpu::{SimdLevel, Threads};
-use crate::sample::Sample;
-use crate::{Aabb, BroadPhase, Error, Pairs};
+use crate::cpu::Threads;
+use crate::cpu::level::Simd;
+use crate::load::{Cover, FramePlan, StripGrid, StripSpan};
+use crate::aabb::Aabb;
+use crate::broad_phase::{BroadPhase, check_count};
+use crate::error::Error;
+use crate::pairs::Pairs;
 
 /// The method; see the module.
 #[derive(Debug)]
@@ -27,7 +29,7 @@ pub(super) struct Finder {
     bins: Vec<Bins>,
     large: Large,
     tasks: Vec<Task>,
-    level: SimdLevel,
+    simd: Simd,
 }
 
 /// What one thread makes of its share of the boxes.
@@ -35,8 +37,8 @@ pub(super) struct Finder {
 struct Bins {
     /// Where the bin of each strip begins in `entries`; one more than there are strips.
     starts: Vec<u32>,
-    /// Where each box of the share goes.
-    places: Vec<Place>,
+    /// The strips in which each box of the share stands.
+    spans: Vec<StripSpan>,
     entries: Vec<Entry>,
     /// Positions in the input of the boxes kept apart; only the first `large_count` are of this frame.
     large: Vec<u32>,
@@ -73,18 +75,23 @@ struct Task {
     error: Option<Error>,
 }
 
-pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
+pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
     let workers = Workers::new("grid-sap", threads, pools)?;
-    let finder = Finder::new(&workers, level);
+    let finder = Finder::new(&workers, simd);
     Ok(Box::new(GridSap { workers, finder, outputs: Outputs::default() }))
 }
 
 impl BroadPhase for GridSap {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        self.find_pairs_with(&FramePlan::default(), boxes, pairs)
+    }
+
+    fn find_pairs_with(&mut self, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;
         let Self { workers, finder, outputs } = self;
-        outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists))?;
+        let grid = plan.grid(boxes);
+        outputs.collect(workers, pairs, |lists| finder.find(workers, &grid, boxes, lists))?;
         pairs.finish()
     }
 
@@ -95,29 +102,34 @@ impl BroadPhase for GridSap {
 
 impl Finder {
     /// Memory for any workers that have no more threads than these.
-    pub(super) fn new(workers: &Workers, level: SimdLevel) -> Self {
+    pub(super) fn new(workers: &Workers, simd: Simd) -> Self {
         let bins = (0..workers.threads()).map(|_| Bins::default()).collect();
         let tasks = (0..workers.tasks()).map(|_| Task::default()).collect();
-        Self { bins, large: Large::default(), tasks, level }
+        Self { bins, large: Large::default(), tasks, simd }
     }
 
     /// Adds the pairs to `lists`, one for each task of `workers`; in each of them those that are near in space are near.
-    pub(super) fn find(&mut self, workers: &Workers, boxes: &[Aabb], lists: &mut [Pairs]) -> Result<(), Error> {
-        let grid = StripGrid::plan(&Sample::of(boxes), boxes.len());
-        let Self { bins, large, tasks, level } = self;
+    pub(super) fn find(
+        &mut self,
+        workers: &Workers,
+        grid: &StripGrid,
+        boxes: &[Aabb],
+        lists: &mut [Pairs],
+    ) -> Result<(), Error> {
+        let Self { bins, large, tasks, simd } = self;
         let threads = workers.threads();
         let (bins, tasks) = (&mut bins[..threads], &mut tasks[..workers.tasks()]);
         workers.each(bins, |k, bin| {
             let share = part(boxes.len(), k, threads);
-            bin.error = bin.fill(&grid, boxes, share).err();
+            bin.error = bin.fill(grid, boxes, share).err();
         });
         bins.iter_mut().find_map(|b| b.error.take()).map_or(Ok(()), Err)?;
-        large.gather(&grid, boxes, bins)?;
+        large.gather(grid, boxes, bins)?;
         let (bins, large, strips, count) = (&*bins, &*large, grid.strips(), tasks.len());
         workers.each_with(tasks, lists, |k, task, list| {
             let strips = balanced(bins, strips, k, count)..balanced(bins, strips, k + 1, count);
             let rows = part(large.covers.len(), k, count);
-            task.error = task.find(bins, large, &grid, strips, rows, *level, list).err();
+            task.error = task.find(bins, large, grid, strips, rows, *simd, list).err();
         });
         tasks.iter_mut().find_map(|t| t.error.take()).map_or(Ok(()), Err)
     }
@@ -153,7 +165,7 @@ impl Bins {
         let share = &boxes[share];
         let strips = grid.strips();
         ensure(&mut self.starts, strips + 1, "strips")?;
-        ensure(&mut self.places, share.len(), "boxes in strips")?;
+        ensure(&mut self.spans, share.len(), "boxes in strips")?;
         // The axes are constants in each of the three, so that no index is computed.
         match grid.axis {
             0 => self.count::<0>(grid, share, first)?,
@@ -174,8 +186,8 @@ impl Bins {
         }
         ensure(&mut self.entries, total as usize, "boxes in strips")?;
         let entries = &mut self.entries[..total as usize];
-        for ((&place, b), id) in self.places.iter().zip(share).zip(first as u32..) {
-            grid.each_strip(place, |strip, begins| {
+        for ((&span, b), id) in self.spans.iter().zip(share).zip(first as u32..) {
+            grid.each_strip(span, |strip, begins| {
                 let at = &mut starts[strip];
                 entries[*at as usize] = Entry { bounds: *b, id, begins };
                 *at += 1;
@@ -187,22 +199,22 @@ impl Bins {
         Ok(())
     }
 
-    /// Finds the place of each box and counts how many go into each bin.
+    /// Finds the strips of each box and counts how many go into each bin.
     fn count<const AXIS: usize>(&mut self, grid: &StripGrid, share: &[Aabb], first: usize) -> Result<(), Error> {
         let starts = &mut self.starts[..=grid.strips()];
         starts.fill(0);
         self.large_count = 0;
-        for ((b, place), k) in share.iter().zip(&mut self.places).zip(first..) {
+        for ((b, span), k) in share.iter().zip(&mut self.spans).zip(first..) {
             if let Some(defect) = b.defect() {
                 return Err(Error::InvalidBox { index: k, defect });
             }
-            *place = grid.place::<AXIS>(b);
-            if *place == Place::APART {
+            *span = grid.span::<AXIS>(b);
+            if *span == StripSpan::APART {
                 ensure(&mut self.large, self.large_count + 1, "large boxes")?;
                 self.large[self.large_count] = k as u32;
                 self.large_count += 1;
             }
-            grid.each_strip(*place, |strip, _| starts[strip] += 1);
+            grid.each_strip(*span, |strip, _| starts[strip] += 1);
         }
         Ok(())
     }
@@ -245,18 +257,18 @@ impl Task {
         grid: &StripGrid,
         strips: std::ops::Range<usize>,
         large_rows: std::ops::Range<usize>,
-        level: SimdLevel,
+        simd: Simd,
         pairs: &mut Pairs,
     ) -> Result<(), Error> {
         for strip in strips {
             self.sort(bins, strip, grid.axis)?;
             let boxes = self.columns.len();
-            sweep_rows::<InStrip>(level, &self.columns, 0..boxes, pairs);
+            sweep_rows::<InStrip>(simd, &self.columns, 0..boxes, pairs);
             if !large.covers.is_empty() && boxes > 0 {
-                self.query_large(large, grid.cell(strip), level, pairs)?;
+                self.query_large(large, grid.cell(strip), simd, pairs)?;
             }
         }
-        sweep_rows::<All>(level, &large.columns, large_rows, pairs);
+        sweep_rows::<All>(simd, &large.columns, large_rows, pairs);
         Ok(())
     }
 
@@ -289,7 +301,7 @@ impl Task {
     }
 
     /// Tests the large boxes that cross a strip against the boxes in it.
-    fn query_large(&mut self, large: &Large, cell: [u32; 2], level: SimdLevel, pairs: &mut Pairs) -> Result<(), Error> {
+    fn query_large(&mut self, large: &Large, cell: [u32; 2], simd: Simd, pairs: &mut Pairs) -> Result<(), Error> {
         let Self { columns, ends, .. } = self;
         ensure(ends, columns.len(), "ends of boxes")?;
         let ends = &mut ends[..columns.len()];
@@ -308,7 +320,7 @@ impl Task {
             };
             // No row before this one ends late enough to be hit.
             let start = ends.partition_point(|&end| end < query.low[0]);
-            query_rows(level, columns, start, &query, pairs);
+            query_rows(simd, columns, start, &query, pairs);
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! The threads that help the calling one, and where they run.
 
-use crate::cpu::threads::build_pool;
+use crate::error::Unavailable;
 use core_affinity::CoreId;
 use std::cell::Cell;
 use std::sync::Arc;
@@ -35,8 +35,8 @@ impl Helpers {
     /// `count` helpers, each bound to a core of its own where that is wanted and there is one more core than that.
     ///
     /// # Errors
-    /// The reason, when the system refuses the threads.
-    pub(crate) fn new(count: u32, pinned: bool) -> Result<Self, String> {
+    /// [`Unavailable::ThreadsRefused`].
+    pub(crate) fn new(count: u32, pinned: bool) -> Result<Self, Unavailable> {
         let mut cores = if pinned { core_affinity::get_core_ids().unwrap_or_default() } else { Vec::new() };
         cores.truncate(count as usize + 1);
         let seats = (cores.len() > count as usize).then(|| Seats {
@@ -86,6 +86,24 @@ impl Helpers {
             SEAT.set(Some(free));
         }
     }
+}
+
+/// A pool of `threads` threads, each bound to a core of its own, from core number `first` on, where that is wanted and there
+/// are enough.
+///
+/// # Errors
+/// [`Unavailable::ThreadsRefused`].
+pub(crate) fn build_pool(threads: u32, first: usize, pinned: bool) -> Result<rayon::ThreadPool, Unavailable> {
+    let cores = if pinned { core_affinity::get_core_ids().unwrap_or_default() } else { Vec::new() };
+    let bind = move |k: usize| {
+        if let Some(&core) = cores.get(first + k).filter(|_| cores.len() >= first + threads as usize) {
+            // A refusal leaves the thread to the scheduler, as without pinning.
+            core_affinity::set_for_current(core);
+        }
+    };
+    let named = move |k| format!("sapwise-{threads}-{k}");
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).thread_name(named).start_handler(bind);
+    builder.build().map_err(|e| Unavailable::ThreadsRefused { threads, message: e.to_string() })
 }
 
 /// The core on which this thread runs now; a number that no core has where the system does not tell.

@@ -9,9 +9,11 @@ mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-use crate::cpu::SimdLevel;
+use crate::cpu::level::Simd;
 use crate::cpu::columns::Columns;
-use crate::{Aabb, Pair, Pairs};
+use crate::aabb::Aabb;
+use crate::pair::Pair;
+use crate::pairs::{Pairs, each_bit};
 use std::ops::Range;
 
 /// What [`SimdLevel::Portable`] stands for: the vectors that every CPU of the target has.
@@ -24,51 +26,51 @@ use portable::Portable as Baseline;
 /// Tests every row of `rows` against the rows behind it until one begins beyond its end on the sweep axis, and adds the pairs.
 ///
 /// The columns must ascend by lower bound on the sweep axis.
-pub(crate) fn sweep_rows<R: Rows>(level: SimdLevel, columns: &Columns, rows: Range<usize>, pairs: &mut Pairs) {
+pub(crate) fn sweep_rows<R: Rows>(simd: Simd, columns: &Columns, rows: Range<usize>, pairs: &mut Pairs) {
     let view = View::new(columns);
-    match level {
-        // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
+    match simd {
+        // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx512 => unsafe { x86::sweep_avx512::<R>(&view, rows, pairs) },
+        Simd::Avx512(proof) => unsafe { x86::sweep_avx512::<R>(proof, &view, rows, pairs) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx2 => unsafe { x86::sweep_avx2::<R>(&view, rows, pairs) },
-        _ => sweep::<_, R>(Baseline, &view, rows, pairs),
+        Simd::Avx2(proof) => unsafe { x86::sweep_avx2::<R>(proof, &view, rows, pairs) },
+        Simd::Portable => sweep::<_, R>(Baseline, &view, rows, pairs),
     }
 }
 
 /// Tests every row of `rows` against all rows behind it, on all three axes, and adds the pairs.
-pub(crate) fn brute_rows(level: SimdLevel, columns: &Columns, rows: Range<usize>, pairs: &mut Pairs) {
+pub(crate) fn brute_rows(simd: Simd, columns: &Columns, rows: Range<usize>, pairs: &mut Pairs) {
     let view = View::new(columns);
-    match level {
-        // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
+    match simd {
+        // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx512 => unsafe { x86::brute_avx512(&view, rows, pairs) },
+        Simd::Avx512(proof) => unsafe { x86::brute_avx512(proof, &view, rows, pairs) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx2 => unsafe { x86::brute_avx2(&view, rows, pairs) },
-        _ => brute(Baseline, &view, rows, pairs),
+        Simd::Avx2(proof) => unsafe { x86::brute_avx2(proof, &view, rows, pairs) },
+        Simd::Portable => brute(Baseline, &view, rows, pairs),
     }
 }
 
 /// Tests one box against the rows of a strip from `start` on until one begins beyond its end on the sweep axis, and adds
 /// the pairs that this strip reports.
-pub(crate) fn query_rows(level: SimdLevel, columns: &Columns, start: usize, query: &Query, pairs: &mut Pairs) {
+pub(crate) fn query_rows(simd: Simd, columns: &Columns, start: usize, query: &Query, pairs: &mut Pairs) {
     let view = View::new(columns);
-    match level {
-        // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
+    match simd {
+        // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx512 => unsafe { x86::query_avx512(&view, start, query, pairs) },
+        Simd::Avx512(proof) => unsafe { x86::query_avx512(proof, &view, start, query, pairs) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx2 => unsafe { x86::query_avx2(&view, start, query, pairs) },
-        _ => query_from(Baseline, &view, start, query, pairs),
+        Simd::Avx2(proof) => unsafe { x86::query_avx2(proof, &view, start, query, pairs) },
+        Simd::Portable => query_from(Baseline, &view, start, query, pairs),
     }
 }
 
 /// What the rows of a sweep are.
 pub(crate) trait Rows {
-    /// Whether a pair counts only where both bits of [`Cover::begins`](crate::cpu::strip_grid::Cover::begins) are set in either box.
+    /// Whether a pair counts only where both bits of [`Cover::begins`](crate::load::Cover::begins) are set in either box.
     const IN_STRIP: bool;
 }
 
@@ -133,7 +135,7 @@ trait Lanes: Copy {
     /// which of those overlap it on the other two axes too.
     ///
     /// # Safety
-    /// `at <= view.len`, and the CPU has the instructions.
+    /// `at <= view.len`, and the calling function has the instructions enabled.
     unsafe fn reach_and_hits(self, view: &View<'_>, at: usize, query: &Query) -> (u32, u32);
     /// Rows `at..at + COUNT` that end on the sweep axis no earlier than the box begins.
     ///
@@ -141,7 +143,7 @@ trait Lanes: Copy {
     /// As above.
     unsafe fn ends_after(self, view: &View<'_>, at: usize, low: f32) -> u32;
     /// Those of `hits` whose pair with the box that this strip has to report; see
-    /// [`Cover::begins`](crate::cpu::strip_grid::Cover::begins).
+    /// [`Cover::begins`](crate::load::Cover::begins).
     ///
     /// # Safety
     /// As above.
@@ -237,29 +239,6 @@ fn query_from<L: Lanes>(lanes: L, view: &View<'_>, start: usize, query: &Query, 
             break;
         }
         at += L::COUNT;
-    }
-}
-
-/// Four cell numbers along two axes, which take turns: `cells` held between 0 and `last`, NaN at 0, without their fractions.
-#[inline(always)]
-pub(crate) fn cell_numbers(cells: [f32; 4], last: [f32; 2]) -> [u32; 4] {
-    let mut at = [0.0_f32; 4];
-    for k in 0..4 {
-        // Comparisons in this order send NaN to 0, and compilers make vectors of them.
-        let last = if last[k % 2] < 65_535.0 { last[k % 2] } else { 65_535.0 };
-        let cell = if cells[k] > 0.0 { cells[k] } else { 0.0 };
-        at[k] = if cell < last { cell } else { last };
-    }
-    // SAFETY: each is no NaN and at most 65 535. One below 0 is not in `last`, which counts cells.
-    at.map(|cell| unsafe { cell.max(0.0).to_int_unchecked::<i32>() } as u32)
-}
-
-/// The positions of the bits of a mask, ascending.
-#[inline(always)]
-pub(crate) fn each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
-    while mask != 0 {
-        f(mask.trailing_zeros() as usize);
-        mask &= mask - 1;
     }
 }
 

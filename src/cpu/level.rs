@@ -1,11 +1,14 @@
-//! Which vector instructions the algorithms use.
+//! Which vector instructions the algorithms use, and the proof that this CPU has them.
 
 use std::fmt;
 use std::str::FromStr;
-use std::sync::OnceLock;
+
+/// The environment variable that [`SimdLevel::in_use`] reads.
+const VARIABLE: &str = "SAPWISE_SIMD";
 
 /// A set of vector instructions. A higher level needs everything that the lower ones need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum SimdLevel {
     /// What every CPU of the target has: SSE2 on x86-64, elsewhere what the compiler makes of plain Rust.
     Portable,
@@ -15,6 +18,24 @@ pub enum SimdLevel {
     Avx512,
 }
 
+/// Why a SIMD level can't be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SimdLevelError {
+    /// No level has this name.
+    Unknown {
+        /// The text that was given.
+        text: String,
+    },
+    /// This CPU lacks the level.
+    Unsupported {
+        /// The level that was asked for.
+        level: SimdLevel,
+        /// The highest level that this CPU has.
+        detected: SimdLevel,
+    },
+}
+
 impl SimdLevel {
     /// Every level, ascending.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
@@ -22,45 +43,33 @@ impl SimdLevel {
     /// The highest level that this CPU has.
     #[must_use]
     pub fn detected() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx512f") {
-                return Self::Avx512;
-            }
-            if is_x86_feature_detected!("avx2") {
-                return Self::Avx2;
-            }
-        }
-        Self::Portable
+        Simd::at_most(Self::Avx512).level()
     }
 
     /// The level in use: the detected one, or a lower one that the environment variable `SAPWISE_SIMD` names.
     ///
-    /// Read once per process. A level that the CPU lacks falls back to the detected one, and a name that is no level is
-    /// ignored: a library can't refuse to load. [`SimdLevel::requested`] is for programs that want to refuse.
+    /// The variable is read whenever this is called, once for each [`Registry`](crate::Registry) that is made. A level that the CPU
+    /// lacks falls back to the detected one, and a name that is no level is ignored: a library can't refuse to load.
+    /// [`SimdLevel::requested`] is for programs that want to refuse.
     #[must_use]
     pub fn in_use() -> Self {
-        static LEVEL: OnceLock<SimdLevel> = OnceLock::new();
-        *LEVEL.get_or_init(|| match Self::requested() {
-            Ok(Some(level)) => level.min(Self::detected()),
+        match Self::requested() {
+            Ok(Some(level)) => level,
             Ok(None) | Err(_) => Self::detected(),
-        })
+        }
     }
 
     /// What `SAPWISE_SIMD` asks for, if anything.
     ///
     /// # Errors
-    /// A sentence, when the variable holds no level or one that this CPU lacks.
-    pub fn requested() -> Result<Option<Self>, String> {
-        match std::env::var("SAPWISE_SIMD") {
+    /// When the variable holds no level, or one that this CPU lacks.
+    pub fn requested() -> Result<Option<Self>, SimdLevelError> {
+        match std::env::var(VARIABLE) {
             Err(_) => Ok(None),
             Ok(text) if text.is_empty() => Ok(None),
             Ok(text) => {
-                let level: Self = text.parse()?;
-                if level > Self::detected() {
-                    return Err(format!("SAPWISE_SIMD={level}: this CPU offers {} at most", Self::detected()));
-                }
-                Ok(Some(level))
+                let (level, detected) = (text.parse()?, Self::detected());
+                if level > detected { Err(SimdLevelError::Unsupported { level, detected }) } else { Ok(Some(level)) }
             }
         }
     }
@@ -87,12 +96,76 @@ impl fmt::Display for SimdLevel {
 }
 
 impl FromStr for SimdLevel {
-    type Err = String;
+    type Err = SimdLevelError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL
-            .into_iter()
-            .find(|level| level.to_string() == text)
-            .ok_or_else(|| format!("SAPWISE_SIMD={text}: no such level; use portable, avx2 or avx512"))
+    fn from_str(text: &str) -> Result<Self, SimdLevelError> {
+        let named = |level: &Self| level.to_string() == text;
+        Self::ALL.into_iter().find(named).ok_or_else(|| SimdLevelError::Unknown { text: text.to_owned() })
+    }
+}
+
+impl fmt::Display for SimdLevelError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown { text } => write!(f, "{VARIABLE}={text}: no such level; use portable, avx2 or avx512"),
+            Self::Unsupported { level, detected } => write!(f, "{VARIABLE}={level}: this CPU offers {detected} at most"),
+        }
+    }
+}
+
+impl std::error::Error for SimdLevelError {}
+
+/// The level that a kernel runs at. A level above the lowest is a proof that this CPU has its instructions: only
+/// [`Simd::at_most`], which asks the CPU, can make one. The kernels' `unsafe` rests on that.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Simd {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
+}
+
+/// This CPU has AVX2.
+#[cfg(target_arch = "x86_64")]
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Avx2(());
+
+/// This CPU has AVX-512F.
+#[cfg(target_arch = "x86_64")]
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Avx512(());
+
+impl Simd {
+    /// The highest level that this CPU has and that is not above `level`.
+    #[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables, reason = "there is one level only"))]
+    pub(crate) fn at_most(level: SimdLevel) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if level >= SimdLevel::Avx512 && is_x86_feature_detected!("avx512f") {
+                return Self::Avx512(Avx512(()));
+            }
+            if level >= SimdLevel::Avx2 && is_x86_feature_detected!("avx2") {
+                return Self::Avx2(Avx2(()));
+            }
+        }
+        Self::Portable
+    }
+
+    /// Which level it is.
+    pub(crate) fn level(self) -> SimdLevel {
+        match self {
+            Self::Portable => SimdLevel::Portable,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => SimdLevel::Avx2,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => SimdLevel::Avx512,
+        }
+    }
+
+    /// Every level that this CPU has, ascending.
+    #[cfg(test)]
+    pub(crate) fn every() -> impl Iterator<Item = Self> {
+        SimdLevel::ALL.into_iter().filter(|&level| level <= SimdLevel::detected()).map(Self::at_most)
     }
 }

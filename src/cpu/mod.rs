@@ -10,40 +10,44 @@ mod level;
 mod pair_cache;
 mod sap;
 mod sort;
-mod strip_grid;
 mod threads;
 mod workers;
 
-pub(crate) use kernel::each_bit;
-pub use level::SimdLevel;
-pub(crate) use strip_grid::StripGrid;
-pub(crate) use threads::Threads;
 #[cfg(feature = "measure")]
-pub(crate) use threads::build_pool;
+pub(crate) use helpers::build_pool;
+pub(crate) use level::Simd;
+pub use level::{SimdLevel, SimdLevelError};
+pub(crate) use threads::Threads;
 #[cfg(any(feature = "gpu", feature = "measure"))]
 pub(crate) use workers::Workers;
 
-use crate::{BroadPhase, Error};
+use crate::broad_phase::BroadPhase;
+use crate::error::Error;
 
-/// A method of ours: one row here puts it into every test, probe, sweep and plot.
+/// A method of ours: one row here puts it into every test, probe, sweep and figure.
 pub(crate) struct Method {
     /// The part of the id before the `@`.
     pub(crate) name: &'static str,
     /// Counts up when its speed changes.
     pub(crate) revision: u32,
-    /// Makes an instance that runs on that many threads at that SIMD level.
+    /// Makes an instance.
     pub(crate) create: Create,
-    /// Makes one that runs on any of some numbers of threads, where what it keeps from frame to frame is worth taking along.
-    pub(crate) create_for: Option<CreateFor>,
 }
 
-type Create = fn(u32, &Threads, SimdLevel) -> Result<Box<dyn BroadPhase>, Error>;
-type CreateFor = fn(&[u32], &Threads, SimdLevel) -> Result<Box<dyn BroadPhase>, Error>;
+/// How a method makes an instance at a SIMD level.
+#[derive(Clone, Copy)]
+pub(crate) enum Create {
+    /// One that runs on that many threads.
+    OneWidth(fn(u32, &Threads, Simd) -> Result<Box<dyn BroadPhase>, Error>),
+    /// An [incremental](crate::Incremental) one that runs on any of these numbers of threads, ascending, and takes along what it
+    /// keeps. It begins with the least.
+    AnyWidth(fn(&[u32], &Threads, Simd) -> Result<Box<dyn BroadPhase>, Error>),
+}
 
 /// Every method, the simplest first.
 pub(crate) const METHODS: &[Method] = &[
-    Method { name: "brute", revision: 2, create: brute::create, create_for: None },
-    Method { name: "sap", revision: 2, create: sap::create, create_for: None },
-    Method { name: "grid-sap", revision: 2, create: grid_sap::create, create_for: None },
-    Method { name: "pair-cache", revision: 1, create: pair_cache::create, create_for: Some(pair_cache::create_for) },
+    Method { name: "brute", revision: 2, create: Create::OneWidth(brute::create) },
+    Method { name: "sap", revision: 2, create: Create::OneWidth(sap::create) },
+    Method { name: "grid-sap", revision: 2, create: Create::OneWidth(grid_sap::create) },
+    Method { name: "pair-cache", revision: 1, create: Create::AnyWidth(pair_cache::create) },
 ];

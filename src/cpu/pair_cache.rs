@@ -1,24 +1,28 @@
-//! A PairCache list: the pairs of boxes grown by a margin, kept from frame to frame.
+//! A Verlet list: the pairs of boxes grown by a margin, kept from frame to frame.
 //!
 //! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes, so a frame costs
 //! one look at each box and one test of each kept pair. A box that leaves its grown box gets a new one, and a tree of the
-//! grown boxes finds its new neighbours. After many of those the list is made anew by the strips. Where the boxes move too
-//! far for that to pay, the strips find the pairs directly and a few boxes are watched for it to end.
+//! grown boxes finds its new neighbours. After many of those the list is made again by the grid. Where the boxes move too
+//! far for that to pay, the grid finds the pairs directly and a few boxes are watched for it to end.
 //!
-//! PairCache (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules; physics engines know the grown boxes as fat
+//! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules; physics engines know the grown boxes as fat
 //! boxes.
 
 mod grown;
 mod motion;
 mod tree;
 
-use crate::broad_phase::check_count;
 use crate::cpu::columns::part;
 use crate::cpu::grid_sap::Finder;
 use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::workers::{Outputs, Workers};
-use crate::cpu::{SimdLevel, Threads};
-use crate::{Aabb, BroadPhase, Error, Pairs};
+use crate::cpu::Threads;
+use crate::cpu::level::Simd;
+use crate::aabb::Aabb;
+use crate::broad_phase::{BroadPhase, Incremental, check_count};
+use crate::error::Error;
+use crate::load::{FramePlan, Sample, StripGrid};
+use crate::pairs::Pairs;
 use grown::{Grown, Margin, Share};
 use motion::{Advice, MOST_KEPT, Motion};
 use tree::{FAR, Tree};
@@ -53,21 +57,17 @@ enum Kept {
     Not,
 }
 
-pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
-    create_for(&[threads], pools, level)
-}
-
 /// One instance that can run on any of these numbers of threads, ascending. It begins with the least.
-pub(super) fn create_for(threads: &[u32], pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
+pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
     let widths: Vec<Workers> = threads.iter().map(|&k| Workers::new("pair-cache", k, pools)).collect::<Result<_, _>>()?;
     let widest = &widths[widths.len() - 1];
     let tasks = widest.tasks();
     Ok(Box::new(PairCache {
-        finder: Finder::new(widest, level),
+        finder: Finder::new(widest, simd),
         outputs: Outputs::default(),
         motion: Motion::default(),
-        grown: Grown::new(level),
-        tree: Tree::new(level),
+        grown: Grown::new(simd),
+        tree: Tree::new(simd),
         shares: (0..tasks).map(|_| Share::default()).collect(),
         kept: (0..tasks).map(|_| Pairs::new()).collect(),
         dealt: Pairs::new(),
@@ -78,12 +78,16 @@ pub(super) fn create_for(threads: &[u32], pools: &Threads, level: SimdLevel) -> 
 
 impl BroadPhase for PairCache {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        self.find_pairs_with(&FramePlan::default(), boxes, pairs)
+    }
+
+    fn find_pairs_with(&mut self, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;
-        let kept = match self.motion.advise(boxes) {
+        let kept = match self.motion.advise(plan, boxes) {
             Advice::Scratch => Kept::Not,
             Advice::Keep(margin) => {
-                let kept = self.keep(boxes, margin, pairs);
+                let kept = self.keep(plan, boxes, margin, pairs);
                 if kept != Ok(Kept::Well) {
                     // What is known of the grown boxes may be half of this frame and half of the one before.
                     self.grown.forget();
@@ -96,7 +100,8 @@ impl BroadPhase for PairCache {
             pairs.clear();
             let Self { widths, width, finder, outputs, .. } = self;
             let workers = &widths[*width];
-            outputs.collect(workers, pairs, |lists| finder.find(workers, boxes, lists))?;
+            let grid = plan.grid(boxes);
+            outputs.collect(workers, pairs, |lists| finder.find(workers, &grid, boxes, lists))?;
         }
         self.motion.found(boxes.len(), pairs.overlapping());
         pairs.finish()
@@ -108,10 +113,12 @@ impl BroadPhase for PairCache {
         let _ = self.grown.reserve(objects);
     }
 
-    fn is_incremental(&self) -> bool {
-        true
+    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
+        Some(self)
     }
+}
 
+impl Incremental for PairCache {
     fn set_threads(&mut self, threads: u32) -> bool {
         let Some(width) = self.widths.iter().position(|w| w.threads() == threads as usize) else { return false };
         if width != self.width {
@@ -147,28 +154,30 @@ impl PairCache {
             dealt.as_slice()[share].iter().for_each(|&(i, j)| list.push(i, j));
         }
         if !(dealt.is_complete() && kept.iter().all(Pairs::is_complete)) {
-            // Without memory for them the next frame makes them anew, and tells if it has none either.
+            // Without memory for them the next frame makes them again, and tells if it has none either.
             grown.forget();
             motion.interrupt();
         }
     }
 
     /// Finds the pairs among the kept ones, as far as those can be kept.
-    fn keep(&mut self, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
+    fn keep(&mut self, plan: &FramePlan, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
         let Self { widths, width, finder, outputs, motion, grown, tree, shares, kept, .. } = self;
         let workers = &widths[*width];
         let (shares, kept) = (&mut shares[..workers.tasks()], &mut kept[..workers.tasks()]);
         let changes = grown.check(workers, boxes, margin, shares)?;
-        let anew = motion.wants_anew(boxes.len(), &changes);
-        if anew {
-            grown.grow_all(workers, boxes, motion.renew(boxes), shares);
-            tree.build(workers, grown.as_slice())?;
+        let rebuilt = motion.wants_rebuild(boxes.len(), &changes);
+        if rebuilt {
+            grown.grow_all(workers, boxes, motion.renew(plan, boxes), shares);
+            let sample = Sample::of(grown.as_slice());
+            tree.build(workers, grown.as_slice(), &sample)?;
             let most = most_kept(boxes.len(), kept.len());
             for list in kept.iter_mut() {
                 list.clear();
                 list.set_limit(Some(most));
             }
-            finder.find(workers, grown.as_slice(), kept)?;
+            let grid = StripGrid::plan(&sample, boxes.len());
+            finder.find(workers, &grid, grown.as_slice(), kept)?;
             if !kept.iter_mut().all(|list| list.is_complete() && list.reserve_some_more().is_ok()) {
                 return Ok(Kept::Not);
             }
@@ -188,7 +197,7 @@ impl PairCache {
                         [i, j].iter().filter_map(|&id| boxes.get(id as usize)).for_each(|b| prefetch(&b.min));
                     }
                 };
-                if changes.left == 0 || anew {
+                if changes.left == 0 || rebuilt {
                     list.extend_where(kept.as_slice(), fetch, overlap);
                     return;
                 }
@@ -205,7 +214,7 @@ impl PairCache {
             Ok(())
         })?;
         let total = kept.iter().map(Pairs::len).sum();
-        let pays = motion.learn(boxes.len(), &changes, total, anew);
+        let pays = motion.learn(boxes.len(), &changes, total, rebuilt);
         Ok(match (kept.iter().all(Pairs::is_complete), pays) {
             (false, _) => Kept::Not,
             (true, false) => Kept::Dearly,

@@ -1,13 +1,16 @@
 //! Sort on the axis of greatest variance, then sweep along it. From scratch every frame, as in the paper.
 
-use crate::broad_phase::check_count;
 use crate::cpu::columns::{Columns, ensure, order_key};
 use crate::cpu::kernel::{All, sweep_rows};
 use crate::cpu::sort::sort;
 use crate::cpu::workers::{Outputs, Workers};
-use crate::cpu::{SimdLevel, Threads};
-use crate::sample::Sample;
-use crate::{Aabb, BroadPhase, Error, Pairs};
+use crate::cpu::Threads;
+use crate::cpu::level::Simd;
+use crate::load::FramePlan;
+use crate::aabb::Aabb;
+use crate::broad_phase::{BroadPhase, check_count};
+use crate::error::Error;
+use crate::pairs::Pairs;
 
 /// The method; see the module.
 #[derive(Debug)]
@@ -18,10 +21,10 @@ struct Sap {
     scratch: Vec<u64>,
     columns: Columns,
     outputs: Outputs,
-    level: SimdLevel,
+    simd: Simd,
 }
 
-pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<Box<dyn BroadPhase>, Error> {
+pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
     let workers = Workers::new("sap", threads, pools)?;
     Ok(Box::new(Sap {
         workers,
@@ -29,7 +32,7 @@ pub(super) fn create(threads: u32, pools: &Threads, level: SimdLevel) -> Result<
         scratch: Vec::new(),
         columns: Columns::default(),
         outputs: Outputs::default(),
-        level,
+        simd,
     }))
 }
 
@@ -42,11 +45,15 @@ impl Sap {
 
 impl BroadPhase for Sap {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        self.find_pairs_with(&FramePlan::default(), boxes, pairs)
+    }
+
+    fn find_pairs_with(&mut self, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;
         self.resize(boxes.len())?;
-        let axis = Sample::of(boxes).widest_axis();
-        let Self { workers, keys, scratch, columns, outputs, level } = self;
+        let axis = plan.sample(boxes).widest_axis();
+        let Self { workers, keys, scratch, columns, outputs, simd } = self;
         workers.check(boxes)?;
         workers.map(boxes, &mut keys[..boxes.len()], |id, b| u64::from(order_key(b.min[axis])) << 32 | id as u64);
         sort(workers, keys, scratch, boxes.len())?;
@@ -56,7 +63,7 @@ impl BroadPhase for Sap {
                 part.set(at, &boxes[id as usize], axis, id);
             }
         });
-        outputs.find_rows(workers, columns.len(), pairs, |rows, list| sweep_rows::<All>(*level, columns, rows, list));
+        outputs.find_rows(workers, columns.len(), pairs, |rows, list| sweep_rows::<All>(*simd, columns, rows, list));
         pairs.finish()
     }
 

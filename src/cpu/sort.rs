@@ -1,6 +1,6 @@
 //! Sorts keys on all threads: each part on its own, then parts merged two by two.
 
-use crate::Error;
+use crate::error::Error;
 use crate::cpu::columns::ensure;
 use crate::cpu::workers::Workers;
 

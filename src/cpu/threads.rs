@@ -2,6 +2,7 @@
 
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
+use crate::error::Unavailable;
 #[cfg(feature = "parallel")]
 use std::{
     collections::BTreeMap,
@@ -53,20 +54,20 @@ impl Threads {
     }
 
     /// Why an algorithm can't have `threads` threads, if it can't.
-    pub(crate) fn unavailable(&self, threads: u32) -> Option<String> {
+    pub(crate) fn unavailable(&self, threads: u32) -> Option<Unavailable> {
         if threads > 1 && !cfg!(feature = "parallel") {
-            return Some("built without the feature `parallel`".to_owned());
+            return Some(Unavailable::NotParallel);
         }
         let most = self.most().filter(|&most| threads > most)?;
-        Some(format!("the pool that the program gave has {} threads, with the calling one {most}", most - 1))
+        Some(Unavailable::PoolTooSmall { pool: most - 1 })
     }
 
     /// A pool of `count` threads that help a caller. More than `count` where the program gave one.
     ///
     /// # Errors
-    /// The reason, when the system refuses the threads.
+    /// [`Unavailable::ThreadsRefused`].
     #[cfg(feature = "parallel")]
-    pub(crate) fn helpers(&self, count: u32) -> Result<Arc<Helpers>, String> {
+    pub(crate) fn helpers(&self, count: u32) -> Result<Arc<Helpers>, Unavailable> {
         if let Some((_, given)) = &self.given {
             return Ok(Arc::clone(given));
         }
@@ -78,23 +79,4 @@ impl Threads {
         pools.insert(count, Arc::clone(&pool));
         Ok(pool)
     }
-}
-
-/// A pool of `threads` threads, each bound to a core of its own, from core number `first` on, where that is wanted and there
-/// are enough.
-///
-/// # Errors
-/// The reason, when the system refuses the threads.
-#[cfg(feature = "parallel")]
-pub(crate) fn build_pool(threads: u32, first: usize, pinned: bool) -> Result<rayon::ThreadPool, String> {
-    let cores = if pinned { core_affinity::get_core_ids().unwrap_or_default() } else { Vec::new() };
-    let bind = move |k: usize| {
-        if let Some(&core) = cores.get(first + k).filter(|_| cores.len() >= first + threads as usize) {
-            // A refusal leaves the thread to the scheduler, as without pinning.
-            core_affinity::set_for_current(core);
-        }
-    };
-    let named = move |k| format!("sapwise-{threads}-{k}");
-    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).thread_name(named).start_handler(bind);
-    builder.build().map_err(|e| format!("{threads} threads can't be started: {e}"))
 }

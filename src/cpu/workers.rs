@@ -1,12 +1,14 @@
 //! How a frame is spread over threads: phases of independent tasks, each with its own memory.
 
 #[cfg(feature = "parallel")]
-use crate::AlgorithmId;
+use crate::algorithm::AlgorithmId;
 use crate::cpu::Threads;
 use crate::cpu::columns::{ColumnsMut, part};
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
-use crate::{Aabb, Error, Pairs};
+use crate::aabb::Aabb;
+use crate::error::Error;
+use crate::pairs::Pairs;
 #[cfg(feature = "parallel")]
 use std::sync::{
     Arc, Mutex, PoisonError,

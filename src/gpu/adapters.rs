@@ -1,6 +1,7 @@
 //! The GPUs of this machine, found or given by the program: numbered, opened once and shared.
 
 use super::device::Gpu;
+use crate::error::{GpuError, GpuErrorKind};
 use crate::hardware::{GpuIdentity, GpuKind};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -15,7 +16,7 @@ struct Found {
     identity: GpuIdentity,
     /// `None` of a GPU that the program opened itself.
     adapter: Option<wgpu::Adapter>,
-    opened: Mutex<Option<Result<Gpu, String>>>,
+    opened: Mutex<Option<Result<Gpu, GpuError>>>,
 }
 
 impl Gpus {
@@ -48,7 +49,7 @@ impl Gpus {
     /// queues. Of two with one number the first is taken.
     ///
     /// ```no_run
-    /// use sapwise::gpu::{Gpu, Gpus, wgpu};
+    /// use sapwise::gpu::{Gpu, Gpus, wgpu30 as wgpu};
     /// use sapwise::{GpuIdentity, Registry};
     ///
     /// fn registry(device: &wgpu::Device, queue: &wgpu::Queue) -> Registry {
@@ -115,21 +116,22 @@ impl Gpus {
         self.found(index)?.adapter.as_ref()
     }
 
-    /// Opens a GPU, or gives the one that is open already.
+    /// Opens a GPU, or returns the one that is open already.
     ///
-    /// One that was lost or could not be opened stays so until GPUs are looked for anew.
+    /// One that was lost or could not be opened stays so until GPUs are looked for again.
     ///
     /// # Errors
-    /// A sentence, when there is no such GPU or its driver refuses.
-    pub fn open(&self, index: u32) -> Result<Gpu, String> {
+    /// [`GpuErrorKind::NotFound`], when there is no such GPU or its driver refuses.
+    pub fn open(&self, index: u32) -> Result<Gpu, GpuError> {
         let Some(found) = self.found(index) else {
-            return Err(match self.len() {
+            let text = match self.len() {
                 0 => "no GPU was found; install a Vulkan driver, or leave GPUs out".to_owned(),
                 _ => {
                     let there: Vec<String> = self.identities().map(|g| format!("gpu{}", g.index)).collect();
                     format!("there is no gpu{index}, only {}; see `sapwise devices`", there.join(", "))
                 }
-            });
+            };
+            return Err(GpuError::new(GpuErrorKind::NotFound, text));
         };
         // A panic in a driver while the lock was held leaves the slot as it was.
         let mut slot = found.opened.lock().unwrap_or_else(PoisonError::into_inner);
@@ -140,15 +142,17 @@ impl Gpus {
     ///
     /// # Errors
     /// As [`open`](Self::open), and of a GPU that the program opened itself.
-    pub fn open_another(&self, index: u32) -> Result<Gpu, String> {
-        self.found(index).ok_or_else(|| format!("there is no gpu{index}"))?.open()
+    pub fn open_another(&self, index: u32) -> Result<Gpu, GpuError> {
+        let none = || GpuError::new(GpuErrorKind::NotFound, format!("there is no gpu{index}"));
+        self.found(index).ok_or_else(none)?.open()
     }
 }
 
 impl Found {
-    fn open(&self) -> Result<Gpu, String> {
+    fn open(&self) -> Result<Gpu, GpuError> {
         let Some(adapter) = &self.adapter else {
-            return Err(format!("gpu{} is the program's own device, which can't be opened anew", self.identity.index));
+            let text = format!("gpu{} is the program's own device, which can't be opened again", self.identity.index);
+            return Err(GpuError::new(GpuErrorKind::NotFound, text));
         };
         Gpu::open(adapter, self.identity.clone())
     }

@@ -1,9 +1,10 @@
 //! Every box against every other; see `shaders/brute.wgsl`.
 
 use super::device::Gpu;
-use super::engine::Inputs;
+use super::inputs::Inputs;
 use super::kernel::{Bound, Kernel, source};
 use super::output::Output;
+use crate::error::GpuError;
 use crate::hardware::GpuKind;
 
 /// Boxes of a tile.
@@ -27,7 +28,7 @@ impl Brute {
     /// The kernel numbers tile pairs in 32 bits.
     pub(super) const MOST_OBJECTS: usize = 1 << 22;
 
-    pub(super) fn new(gpu: &Gpu) -> Result<Self, String> {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         let software = gpu.identity().kind == GpuKind::Software;
         Ok(Self {
             count: Kernel::new(gpu, source::BRUTE, "count")?,
@@ -48,7 +49,7 @@ impl Brute {
         self.most
     }
 
-    pub(super) fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), String> {
+    pub(super) fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
         let common = [(0, inputs.params), (1, inputs.boxes), (2, inputs.ids)];
         let count = [common.as_slice(), &[(3, inputs.header), (4, output.sums())]].concat();
         let write = [common.as_slice(), &[(4, output.sums()), (5, output.pairs())]].concat();

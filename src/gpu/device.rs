@@ -1,5 +1,6 @@
 //! An open GPU: device, queue, limits, and what went wrong with it.
 
+use crate::error::{GpuError, GpuErrorKind};
 use crate::hardware::GpuIdentity;
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// The longest that a submission may take before its GPU counts as lost, unless it is set otherwise. Drivers of desktops give up after 2 to 10 s; a
-/// program on the CPU that acts as a GPU may be a thousand times slower than a real one.
+/// software adapter may be a thousand times slower than a real one.
 const WAIT_LIMIT: Duration = Duration::from_secs(60);
 
 /// An open GPU. Clones share it.
@@ -28,7 +29,7 @@ struct Shared {
 
 impl Gpu {
     /// Opens an adapter with all of its limits.
-    pub(super) fn open(adapter: &wgpu::Adapter, identity: GpuIdentity) -> Result<Self, String> {
+    pub(super) fn open(adapter: &wgpu::Adapter, identity: GpuIdentity) -> Result<Self, GpuError> {
         let limits = adapter.limits();
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("sapwise"),
@@ -39,7 +40,7 @@ impl Gpu {
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|e| format!("gpu{} can't be opened: {e}", identity.index))?;
+            .map_err(|e| GpuError::caused(GpuErrorKind::NotFound, format!("gpu{} can't be opened", identity.index), e))?;
         Ok(Self::from_parts(device, queue, identity))
     }
 
@@ -68,8 +69,8 @@ impl Gpu {
         Duration::from_millis(self.shared.wait_limit_ms.load(Ordering::Relaxed))
     }
 
-    /// Submits, and gives what the device has against it. Without the scope it would count as a fault of the GPU.
-    pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> Result<wgpu::SubmissionIndex, String> {
+    /// Submits, and returns what the device has against it. Without the scope it would count as a fault of the GPU.
+    pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> Result<wgpu::SubmissionIndex, GpuError> {
         self.check()?;
         self.try_make(|_| self.shared.queue.submit([encoder.finish()]))
     }
@@ -114,8 +115,8 @@ impl Gpu {
     /// Waits for a submission, at most as long as the [limit](Self::set_wait_limit), and calls back what was mapped before it.
     ///
     /// # Errors
-    /// A sentence, when the device was lost or takes too long. It counts as lost from then on.
-    pub fn wait(&self, submission: wgpu::SubmissionIndex) -> Result<(), String> {
+    /// [`GpuErrorKind::Lost`], when the device was lost or takes too long. It counts as lost from then on.
+    pub fn wait(&self, submission: wgpu::SubmissionIndex) -> Result<(), GpuError> {
         self.wait_for(Some(submission))
     }
 
@@ -123,11 +124,11 @@ impl Gpu {
     ///
     /// # Errors
     /// As [`wait`](Self::wait).
-    pub fn wait_all(&self) -> Result<(), String> {
+    pub fn wait_all(&self) -> Result<(), GpuError> {
         self.wait_for(None)
     }
 
-    fn wait_for(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), String> {
+    fn wait_for(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), GpuError> {
         let limit = self.wait_limit();
         let poll = wgpu::PollType::Wait { submission_index, timeout: Some(limit) };
         if let Err(error) = self.shared.device.poll(poll) {
@@ -147,16 +148,16 @@ impl Gpu {
     /// `Err` once the GPU can't be used any more.
     ///
     /// # Errors
-    /// A sentence that says what happened.
-    pub fn check(&self) -> Result<(), String> {
-        self.fault().map_or(Ok(()), Err)
+    /// [`GpuErrorKind::Lost`] says what happened.
+    pub fn check(&self) -> Result<(), GpuError> {
+        self.fault().map_or(Ok(()), |text| Err(GpuError::new(GpuErrorKind::Lost, text)))
     }
 
-    /// Runs `make` and gives what it made, or the error of the device: out of memory, invalid, internal.
+    /// Runs `make` and returns what it made, or the error of the device: out of memory, invalid, internal.
     ///
     /// # Errors
-    /// The device's own words.
-    pub fn try_make<T>(&self, make: impl FnOnce(&wgpu::Device) -> T) -> Result<T, String> {
+    /// [`GpuErrorKind::Refused`], with the error of the device as its source.
+    pub fn try_make<T>(&self, make: impl FnOnce(&wgpu::Device) -> T) -> Result<T, GpuError> {
         let device = &self.shared.device;
         let filters = [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Validation];
         let scopes = filters.map(|filter| device.push_error_scope(filter));
@@ -166,7 +167,7 @@ impl Gpu {
         for scope in scopes.into_iter().rev() {
             error = pollster::block_on(scope.pop()).or(error);
         }
-        error.map_or(Ok(made), |e| Err(e.to_string()))
+        error.map_or(Ok(made), |e| Err(GpuError::caused(GpuErrorKind::Refused, "the device refuses", e)))
     }
 }
 

@@ -4,14 +4,16 @@ mod collect;
 
 use super::brute::Brute;
 use super::device::Gpu;
+use super::inputs::Inputs;
 use super::output::{Output, PAIR};
 use super::params::{Header, Params};
 use super::sampler::{self, Sampler};
 use super::sorted::Sorted;
 use super::storage::{Storage, largest};
 use super::transfer::Transfer;
-use crate::Aabb;
-use crate::sample::Sample;
+use crate::aabb::Aabb;
+use crate::error::{GpuError, GpuErrorKind};
+use crate::load::Sample;
 
 /// Bytes of a box.
 const BOX: u64 = size_of::<Aabb>() as u64;
@@ -24,15 +26,6 @@ const PAIRS_AT: u64 = 16;
 const MOST_DOWNLOAD: u64 = 64 << 20;
 /// Pairs beyond those of the frame before that come back with the header. If there are more, a second submission gets them.
 const SPARE_PAIRS: u64 = 256;
-
-/// The buffers that every method reads.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Inputs<'a> {
-    pub(super) params: &'a wgpu::Buffer,
-    pub(super) boxes: &'a wgpu::Buffer,
-    pub(super) ids: &'a wgpu::Buffer,
-    pub(super) header: &'a wgpu::Buffer,
-}
 
 /// A method on a GPU with all its buffers.
 #[derive(Debug)]
@@ -104,12 +97,12 @@ pub(super) struct Piece<'a> {
 
 impl Engine {
     /// `method` is `brute`, `sap` or `grid-sap`.
-    pub(super) fn new(gpu: Gpu, method: &str) -> Result<Self, String> {
+    pub(super) fn new(gpu: Gpu, method: &str) -> Result<Self, GpuError> {
         let search = match method {
             "brute" => Search::Brute(Brute::new(&gpu)?),
             "sap" => Search::Sorted(Box::new(Sorted::new(&gpu, false)?)),
             "grid-sap" => Search::Sorted(Box::new(Sorted::new(&gpu, true)?)),
-            other => return Err(format!("no method {other} runs on GPUs")),
+            other => return Err(GpuError::new(GpuErrorKind::NotFound, format!("no method {other} runs on GPUs"))),
         };
         let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         Ok(Self {
@@ -130,7 +123,7 @@ impl Engine {
     }
 
     /// As [`new`](Self::new), for boxes that are on the GPU and pairs that stay there.
-    pub(super) fn resident(gpu: Gpu, method: &str) -> Result<Self, String> {
+    pub(super) fn resident(gpu: Gpu, method: &str) -> Result<Self, GpuError> {
         let mut engine = Self::new(gpu, method)?;
         engine.sampler = Some(Sampler::new(&engine.gpu)?);
         engine.download.ensure(&engine.gpu, PAIRS_AT + sampler::BYTES)?;
@@ -157,18 +150,18 @@ impl Engine {
         }
     }
 
-    /// Makes room for the frame, and binds the kernels anew where a buffer is another one now. `external`: boxes that are on
+    /// Makes room for the frame, and binds the kernels again where a buffer is another one now. `external`: boxes that are on
     /// the GPU already.
-    pub(super) fn prepare(&mut self, params: &Params, ids: bool, external: Option<&wgpu::Buffer>) -> Result<(), String> {
+    pub(super) fn prepare(&mut self, params: &Params, ids: bool, external: Option<&wgpu::Buffer>) -> Result<(), GpuError> {
         let prepared = self.make_room(params, ids, external);
         if prepared.is_err() {
-            // Some buffers may be new, some given back: everything is bound anew before it is used again.
+            // Some buffers may be new, some given back: everything is bound again before it is used again.
             self.bound_to = None;
         }
         prepared
     }
 
-    fn make_room(&mut self, params: &Params, ids: bool, external: Option<&wgpu::Buffer>) -> Result<(), String> {
+    fn make_room(&mut self, params: &Params, ids: bool, external: Option<&wgpu::Buffer>) -> Result<(), GpuError> {
         self.gpu.check()?;
         let gpu = &self.gpu;
         let n = u64::from(params.objects);
@@ -198,7 +191,7 @@ impl Engine {
         Ok(())
     }
 
-    fn bind(&mut self, boxes: &wgpu::Buffer) -> Result<(), String> {
+    fn bind(&mut self, boxes: &wgpu::Buffer) -> Result<(), GpuError> {
         self.bound_to = None;
         let inputs = Inputs { params: self.params.buffer(), boxes, ids: self.ids.buffer(), header: self.header.buffer() };
         self.output.bind(&self.gpu, inputs.params, inputs.header)?;
@@ -225,23 +218,24 @@ impl Engine {
     }
 
     /// Submits a piece and does not wait for it: several GPUs work at once.
-    pub(super) fn start(&mut self, piece: Piece<'_>, params: Params) -> Result<(), String> {
+    pub(super) fn start(&mut self, piece: Piece<'_>, params: Params) -> Result<(), GpuError> {
         self.prepare(&params, piece.ids.is_some(), None)?;
         self.submit(params, Some(piece))
     }
 
     /// As [`start`](Self::start), with boxes that are on the GPU already, and pairs that stay there.
-    pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), String> {
+    pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), GpuError> {
         if self.search.blocks(params.objects).1 > 0 {
             let reason = "pairs that stay on a GPU come from one submission, and brute force on so many boxes takes several";
-            return Err(format!("{} boxes are too many: {reason}; use grid-sap", params.objects));
+            let text = format!("{} boxes are too many: {reason}; use grid-sap", params.objects);
+            return Err(GpuError::new(GpuErrorKind::Limit, text));
         }
         self.prepare(&params, false, Some(boxes))?;
         self.submit(params, None)
     }
 
     /// `None`: the boxes are on the GPU.
-    fn submit(&mut self, mut params: Params, piece: Option<Piece<'_>>) -> Result<(), String> {
+    fn submit(&mut self, mut params: Params, piece: Option<Piece<'_>>) -> Result<(), GpuError> {
         let (blocks, tile_pairs_left) = self.search.blocks(params.objects);
         params.blocks = blocks;
         params.capacity = self.output.capacity();
@@ -311,13 +305,13 @@ impl Engine {
         }
     }
 
-    /// Bytes of a glance at boxes that are on the GPU.
+    /// Bytes of a sample of boxes that are on the GPU.
     fn sample_bytes(&self) -> u64 {
         if self.sampler.is_some() { sampler::BYTES } else { 0 }
     }
 
     /// Looks at boxes that are on the GPU, without a frame.
-    pub(super) fn look(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Sample, String> {
+    pub(super) fn look(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Sample, GpuError> {
         let params = Params { objects, ..Params::default() };
         self.prepare(&params, false, Some(boxes))?;
         self.set(&params);
@@ -328,14 +322,14 @@ impl Engine {
         self.seen()
     }
 
-    /// What the glance of the last submission saw.
-    fn seen(&self) -> Result<Sample, String> {
+    /// What the sampler of the last submission saw.
+    fn seen(&self) -> Result<Sample, GpuError> {
         let view = self.download.readable(&self.gpu, PAIRS_AT..PAIRS_AT + sampler::BYTES)?;
         Ok(Sample::of_all(bytemuck::cast_slice(&view)))
     }
 
     /// Submits, and asks for the first `bytes` of the download.
-    fn submit_mapped(&self, encoder: wgpu::CommandEncoder, bytes: u64) -> Result<wgpu::SubmissionIndex, String> {
+    fn submit_mapped(&self, encoder: wgpu::CommandEncoder, bytes: u64) -> Result<wgpu::SubmissionIndex, GpuError> {
         self.download.unmap();
         let submission = self.gpu.submit(encoder)?;
         self.download.ask(bytes);

@@ -1,6 +1,7 @@
 //! Kernels: compiled once, bound to buffers, dispatched.
 
 use super::device::Gpu;
+use crate::error::GpuError;
 
 /// An entry point of a shader, compiled for one GPU.
 #[derive(Debug)]
@@ -43,16 +44,16 @@ impl Kernel {
     /// Compiles an entry point. The layout of its buffers follows from the shader.
     ///
     /// # Errors
-    /// The compiler's words.
-    pub(super) fn new(gpu: &Gpu, source: source::Source, entry: &'static str) -> Result<Self, String> {
+    /// With the compiler's words as their source.
+    pub(super) fn new(gpu: &Gpu, source: source::Source, entry: &'static str) -> Result<Self, GpuError> {
         Self::compile(gpu, source.concat(), entry, &[])
     }
 
     /// As [`new`](Self::new), from any text, with constants for its overrides.
     ///
     /// # Errors
-    /// The compiler's words.
-    pub(crate) fn compile(gpu: &Gpu, text: String, entry: &'static str, constants: &[(&str, f64)]) -> Result<Self, String> {
+    /// With the compiler's words as their source.
+    pub(crate) fn compile(gpu: &Gpu, text: String, entry: &'static str, constants: &[(&str, f64)]) -> Result<Self, GpuError> {
         let pipeline = gpu.try_make(|device| {
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(entry),
@@ -71,7 +72,7 @@ impl Kernel {
                 cache: None,
             })
         });
-        let pipeline = pipeline.map_err(|e| format!("the kernel {entry} does not compile: {e}"))?;
+        let pipeline = pipeline.map_err(|e| e.of(format!("the kernel {entry} does not compile")))?;
         Ok(Self { pipeline, label: entry })
     }
 
@@ -79,7 +80,7 @@ impl Kernel {
     ///
     /// # Errors
     /// When they are not those of the shader.
-    pub(crate) fn bind(&self, gpu: &Gpu, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound, String> {
+    pub(crate) fn bind(&self, gpu: &Gpu, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound, GpuError> {
         let most_bound = gpu.limits().max_storage_buffer_binding_size & !3;
         let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
             .iter()
@@ -147,7 +148,7 @@ mod tests {
     fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
         let Some(gpu) = crate::gpu::first_for_tests() else { return };
         for text in ["fn no(", "@compute @workgroup_size(1) fn other() {}"] {
-            let error = super::Kernel::compile(&gpu, text.to_owned(), "entry", &[]).unwrap_err();
+            let error = super::Kernel::compile(&gpu, text.to_owned(), "entry", &[]).unwrap_err().to_string();
             assert!(error.contains("entry does not compile"), "{error}");
         }
         assert_eq!(gpu.fault(), None);

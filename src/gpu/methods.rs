@@ -1,7 +1,8 @@
 //! Which methods run on GPUs, and on which GPUs together.
 
+use crate::algorithm::{AlgorithmId, Backend};
 use crate::hardware::{GpuIdentity, GpuKind};
-use crate::{AlgorithmId, Backend};
+use crate::entry::Entry;
 
 /// A method on GPUs: one row here puts it into every test, probe, sweep and plot.
 struct Method {
@@ -20,10 +21,10 @@ pub(crate) fn has_method(name: &str) -> bool {
     METHODS.iter().any(|m| m.name == name)
 }
 
-/// Our algorithms on these GPUs with their revisions: each method on each GPU alone, and on the first two, three and so on
-/// together. Programs that act as GPUs work with each other only.
+/// Our algorithms on these GPUs: each method on each GPU alone, and on the first two, three and so on
+/// together. Software adapters work with each other only.
 #[must_use]
-pub fn algorithms<'a>(gpus: impl IntoIterator<Item = &'a GpuIdentity>) -> Vec<(AlgorithmId, u32)> {
+pub fn algorithms<'a>(gpus: impl IntoIterator<Item = &'a GpuIdentity>) -> Vec<Entry> {
     let (software, hardware): (Vec<_>, Vec<_>) = gpus.into_iter().partition(|g| g.kind == GpuKind::Software);
     let mut sets: Vec<Vec<u32>> = Vec::new();
     for class in [hardware, software] {
@@ -33,7 +34,7 @@ pub fn algorithms<'a>(gpus: impl IntoIterator<Item = &'a GpuIdentity>) -> Vec<(A
     }
     let on = |set: &Vec<u32>| {
         let set = set.clone();
-        METHODS.iter().filter_map(move |m| Some((AlgorithmId::new(m.name, Backend::Gpu(set.clone())).ok()?, m.revision)))
+        METHODS.iter().filter_map(move |m| Some(Entry::new(AlgorithmId::new(m.name, Backend::Gpu(set.clone())).ok()?, m.revision)))
     };
     sets.iter().flat_map(on).collect()
 }
@@ -54,7 +55,7 @@ mod tests {
         };
         let gpus =
             [gpu(0, GpuKind::Discrete), gpu(1, GpuKind::Integrated), gpu(2, GpuKind::Software), gpu(3, GpuKind::Software)];
-        let ids = algorithms(&gpus).into_iter().map(|(id, _)| id.to_string());
+        let ids = algorithms(&gpus).into_iter().map(|entry| entry.id.to_string());
         let strips: Vec<String> = ids.filter(|id| id.starts_with("grid-sap")).collect();
         assert_eq!(
             strips,

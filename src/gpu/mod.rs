@@ -5,12 +5,12 @@
 //!
 //! ```
 //! use sapwise::gpu::Gpus;
-//! use sapwise::{Aabb, Adaptive, BroadPhase, Tuning, Pairs, Registry};
+//! use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Registry, Tuning};
 //!
 //! let mut registry = Registry::new();
-//! // Programs that act as GPUs, such as llvmpipe, are found too. They run on the CPU and can't beat it.
+//! // Software adapters, such as llvmpipe, are found too. They run on the CPU and can't beat it.
 //! registry.add_gpus(&Gpus::find().choose(|gpu| gpu.kind != sapwise::GpuKind::Software));
-//! // Tuning that name a GPU use it, and what this machine lacks is left out. These name none: predict or measure some that do.
+//! // A tuning that names a GPU uses it, and what this machine lacks is left out. This one names none: predict or measure one that does.
 //! let mut broad_phase = Adaptive::new(Tuning::usual(&registry), &registry)?;
 //! let mut pairs = Pairs::new();
 //! broad_phase.find_pairs(&[Aabb::cube([0.0; 3], 0.5), Aabb::cube([0.8, 0.0, 0.0], 0.5)], &mut pairs)?;
@@ -22,7 +22,7 @@
 //!
 //! - *host-resident*: boxes in the memory of the CPU, pairs in the memory of the CPU, both transfers included. Every
 //!   [`BroadPhase`](crate::BroadPhase), `grid-sap@gpu0` as well as `grid-sap@cpu1`, and every figure that is not labelled.
-//! - *device-resident*: boxes in a [`wgpu::Buffer`], pairs in another: [`Resident`].
+//! - *device-resident*: boxes in a [`wgpu30::Buffer`], pairs in another: [`Resident`].
 //!
 //! Pairs come out in an order that does not depend on timing, by counting, adding up and writing; where several GPUs share a frame
 //! it follows their shares, which follow their measured speeds. [`PairOrder::Canonical`](crate::PairOrder) is the same everywhere.
@@ -35,6 +35,7 @@ mod adapters;
 mod brute;
 mod device;
 mod engine;
+mod inputs;
 pub(crate) mod kernel;
 mod methods;
 mod on_gpus;
@@ -51,11 +52,13 @@ mod transfer;
 pub use adapters::Gpus;
 #[cfg(test)]
 pub(crate) use adapters::first_for_tests;
+pub use crate::error::{GpuError, GpuErrorKind};
 pub use device::Gpu;
 pub use methods::algorithms;
 pub(crate) use methods::has_method;
 pub(crate) use on_gpus::OnGpus;
 pub use on_gpus::broad_phase;
 pub use resident::{Resident, ResidentPairs};
-/// The version of wgpu whose buffers and devices this library takes.
-pub use wgpu;
+/// The version of wgpu whose buffers and devices this library takes. Its number is part of the name, because another one would be
+/// other types: a release of this library that takes a newer wgpu exports it under a new name, and is a breaking one.
+pub use wgpu as wgpu30;

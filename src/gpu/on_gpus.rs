@@ -3,11 +3,14 @@
 use super::adapters::Gpus;
 use super::engine::{Engine, Piece};
 use super::slabs::{Members, Slabs};
-use super::storage::Failure;
-use crate::broad_phase::check_count;
+use super::storage::{Failure, unavailable};
+use crate::aabb::Aabb;
+use crate::algorithm::{AlgorithmId, Backend, ParseIdError};
+use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::{Threads, Workers};
-use crate::sample::Sample;
-use crate::{Aabb, AlgorithmId, Backend, BroadPhase, Error, Pairs};
+use crate::error::{Error, GpuError};
+use crate::load::{FramePlan, Sample};
+use crate::pairs::Pairs;
 use std::time::Instant;
 
 /// Most boxes in a frame: the numbers of boxes have 31 bits on a GPU, and one more says who owns a pair.
@@ -30,7 +33,7 @@ const SMALLEST_WORK: f64 = 20_000.0;
 #[derive(Debug)]
 pub(crate) struct OnGpus {
     id: AlgorithmId,
-    parts: Vec<Part>,
+    parts: Vec<Share>,
     slabs: Slabs,
     workers: Workers,
     /// By how much the work of a GPU grows with the logarithm of its boxes.
@@ -51,14 +54,14 @@ pub fn broad_phase(method: &str, gpus: Vec<super::Gpu>) -> Result<Box<dyn BroadP
     let mut indices: Vec<u32> = gpus.iter().map(|g| g.identity().index).collect();
     indices.sort_unstable();
     indices.dedup();
-    let unknown = |e: crate::ParseIdError| Error::UnknownAlgorithm { text: method.to_owned(), hint: e.to_string() };
+    let unknown = |e: ParseIdError| Error::UnknownAlgorithm { text: method.to_owned(), hint: e.to_string() };
     let id = AlgorithmId::new(method, Backend::Gpu(indices)).map_err(unknown)?;
     OnGpus::on(&id, gpus)
 }
 
 /// One GPU and what it works on.
 #[derive(Debug)]
-struct Part {
+struct Share {
     engine: Engine,
     members: Members,
     pairs: Pairs,
@@ -74,21 +77,21 @@ struct Part {
 impl OnGpus {
     /// The algorithm `id`, whose backend is a list of GPUs. Compiles its kernels.
     pub(crate) fn create(id: &AlgorithmId, gpus: &Gpus) -> Result<Box<dyn BroadPhase>, Error> {
-        let unavailable = |reason| Error::Unavailable { algorithm: id.clone(), reason };
-        let Backend::Gpu(indices) = id.backend() else { return Err(unavailable("it is not on a GPU".to_owned())) };
-        let opened = indices.iter().map(|&k| gpus.open(k)).collect::<Result<Vec<_>, String>>();
-        Self::on(id, opened.map_err(unavailable)?)
+        let Backend::Gpu(indices) = id.backend() else {
+            return Err(Error::Unavailable { algorithm: id.clone(), reason: "it is not on a GPU".into() });
+        };
+        let opened = indices.iter().map(|&k| gpus.open(k)).collect::<Result<Vec<_>, GpuError>>();
+        Self::on(id, opened.map_err(|e| unavailable(id, e))?)
     }
 
     /// The same on open GPUs, which may be the same one several times.
     pub(crate) fn on(id: &AlgorithmId, gpus: Vec<super::Gpu>) -> Result<Box<dyn BroadPhase>, Error> {
-        let unavailable = |reason| Error::Unavailable { algorithm: id.clone(), reason };
         let part = |gpu| {
             let engine = Engine::new(gpu, id.method())?;
             let (members, pairs) = (Members::default(), Pairs::new());
-            Ok(Part { engine, members, pairs, speed: None, work: 0.0, began: None, failure: None, full: false })
+            Ok(Share { engine, members, pairs, speed: None, work: 0.0, began: None, failure: None, full: false })
         };
-        let parts = gpus.into_iter().map(part).collect::<Result<Vec<_>, String>>().map_err(unavailable)?;
+        let parts = gpus.into_iter().map(part).collect::<Result<Vec<_>, GpuError>>().map_err(|e| unavailable(id, e))?;
         // A pool of its own, without pinning: its threads wait for drivers, whose own threads must find a core.
         let workers = Workers::new("gpu", parts.len() as u32, &Threads::default())?;
         let exponent = match id.method() {
@@ -100,8 +103,8 @@ impl OnGpus {
     }
 
     /// All boxes at once on the one GPU that there is.
-    fn whole(part: &mut Part, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Failure> {
-        let params = part.engine.plan(boxes.len() as u32, || Sample::of(boxes));
+    fn whole(part: &mut Share, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Failure> {
+        let params = part.engine.plan(boxes.len() as u32, || plan.sample(boxes));
         part.engine.start(Piece { boxes, ids: None }, params)?;
         part.engine.finish(pairs)
     }
@@ -135,7 +138,7 @@ impl OnGpus {
     }
 }
 
-impl Part {
+impl Share {
     fn start(&mut self, slabs: &Slabs, slab: usize, boxes: &[Aabb], exponent: f64) {
         self.began.get_or_insert_with(Instant::now);
         self.failure = None;
@@ -176,13 +179,17 @@ fn shares(speeds: impl Iterator<Item = Option<f64>>, exponent: f64) -> Vec<f64> 
 }
 
 /// The failure to report: a fault of a GPU first, because the frame is then to be run elsewhere.
-fn worst(parts: &mut [Part]) -> Option<Failure> {
+fn worst(parts: &mut [Share]) -> Option<Failure> {
     let failures: Vec<Failure> = parts.iter_mut().filter_map(|p| p.failure.take()).collect();
     failures.iter().find(|f| matches!(f, Failure::Gpu(_))).or(failures.first()).cloned()
 }
 
 impl BroadPhase for OnGpus {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        self.find_pairs_with(&FramePlan::default(), boxes, pairs)
+    }
+
+    fn find_pairs_with(&mut self, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;
         self.warm |= boxes.len() > 1;
@@ -190,15 +197,14 @@ impl BroadPhase for OnGpus {
             Aabb::check(boxes, 0)?;
             return pairs.finish();
         }
-        let algorithm = &self.id;
         if boxes.len() > MOST_OBJECTS {
-            let reason = format!("{} boxes are more than the {MOST_OBJECTS} that a GPU can number", boxes.len());
-            return Err(Error::Unavailable { algorithm: algorithm.clone(), reason });
+            let text = format!("{} boxes are more than the {MOST_OBJECTS} that a GPU can number", boxes.len());
+            return Err(Failure::limit(text).of(&self.id));
         }
         let found = match self.parts.as_mut_slice() {
-            [part] if boxes.len() <= part.engine.most_objects() => Self::whole(part, boxes, pairs),
+            [part] if boxes.len() <= part.engine.most_objects() => Self::whole(part, plan, boxes, pairs),
             parts => {
-                let sample = Sample::of(boxes);
+                let sample = plan.sample(boxes);
                 let room: usize = parts.iter().map(|p| p.engine.most_objects()).sum();
                 let mut rounds = boxes.len().div_ceil(room.max(1)).max(1);
                 let found = loop {
@@ -208,7 +214,7 @@ impl BroadPhase for OnGpus {
                         Ok(false) if rounds < MOST_ROUNDS => rounds *= 2,
                         Ok(false) => {
                             let reason = "too many boxes reach through too much of the scene to be cut into pieces";
-                            break Err(Failure::Gpu(reason.to_owned()));
+                            break Err(Failure::limit(reason));
                         }
                         // A slab knows its own first invalid box; which is the first of all only the whole frame tells.
                         Err(Failure::Frame(error @ Error::InvalidBox { .. })) => {
@@ -223,8 +229,7 @@ impl BroadPhase for OnGpus {
         };
         match found {
             Ok(()) => pairs.finish(),
-            Err(Failure::Frame(error)) => Err(error),
-            Err(Failure::Gpu(reason)) => Err(Error::Unavailable { algorithm: self.id.clone(), reason }),
+            Err(failure) => Err(failure.of(&self.id)),
         }
     }
 

@@ -3,6 +3,7 @@
 use super::device::Gpu;
 use super::kernel::{Bound, Kernel, source};
 use super::storage::{Storage, largest};
+use crate::error::GpuError;
 
 /// Bytes of a pair.
 pub(super) const PAIR: u64 = 8;
@@ -17,7 +18,7 @@ pub(super) struct Output {
 }
 
 impl Output {
-    pub(super) fn new(gpu: &Gpu) -> Result<Self, String> {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         Ok(Self {
             positions: Kernel::new(gpu, source::SCAN, "positions")?,
             sums: Storage::new(gpu, "counts of pairs")?,
@@ -27,12 +28,12 @@ impl Output {
     }
 
     /// Makes room for the counts of `blocks` blocks. Whether a buffer is another one now.
-    pub(super) fn ensure_blocks(&mut self, gpu: &Gpu, blocks: u32) -> Result<bool, String> {
+    pub(super) fn ensure_blocks(&mut self, gpu: &Gpu, blocks: u32) -> Result<bool, GpuError> {
         self.sums.ensure(gpu, (u64::from(blocks) + 1) * 4)
     }
 
     /// Makes room for that many pairs, or for as many as the GPU allows in one buffer. Whether the buffer is another one now.
-    pub(super) fn ensure_pairs(&mut self, gpu: &Gpu, pairs: u64) -> Result<bool, String> {
+    pub(super) fn ensure_pairs(&mut self, gpu: &Gpu, pairs: u64) -> Result<bool, GpuError> {
         let most = largest(gpu, wgpu::BufferUsages::STORAGE) / PAIR * PAIR;
         self.pairs.ensure(gpu, (pairs * PAIR).min(most))
     }
@@ -50,7 +51,7 @@ impl Output {
         self.pairs.buffer()
     }
 
-    pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer, header: &wgpu::Buffer) -> Result<(), String> {
+    pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer, header: &wgpu::Buffer) -> Result<(), GpuError> {
         self.bound = Some(self.positions.bind(gpu, &[(0, params), (3, header), (4, self.sums.buffer())])?);
         Ok(())
     }

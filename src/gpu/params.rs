@@ -1,7 +1,6 @@
 //! The parameters of a frame, as the kernels see them.
 
-use crate::cpu::StripGrid;
-use crate::sample::Sample;
+use crate::load::{Sample, StripGrid};
 
 /// `Params` of `shaders/common.wgsl`, field by field.
 #[derive(Debug, Clone, Copy, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]

@@ -1,14 +1,15 @@
-//! A glance at boxes that are on a GPU; see `shaders/sample.wgsl`.
+//! A look at boxes that are on a GPU; see `shaders/sample.wgsl`.
 
 use super::device::Gpu;
 use super::kernel::{Bound, Kernel, source};
 use super::storage::Storage;
-use crate::Aabb;
+use crate::error::GpuError;
+use crate::aabb::Aabb;
 
 /// Boxes looked at.
 const BOXES: usize = 256;
 
-/// Bytes that a glance brings back.
+/// Bytes that a look brings back.
 pub(super) const BYTES: u64 = (BOXES * size_of::<Aabb>()) as u64;
 
 /// The kernel and where it puts the boxes.
@@ -20,13 +21,13 @@ pub(super) struct Sampler {
 }
 
 impl Sampler {
-    pub(super) fn new(gpu: &Gpu) -> Result<Self, String> {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         let mut boxes = Storage::new(gpu, "sample")?;
         boxes.ensure(gpu, BYTES)?;
         Ok(Self { kernel: Kernel::new(gpu, source::SAMPLE, "sample")?, boxes, bound: None })
     }
 
-    pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer, boxes: &wgpu::Buffer) -> Result<(), String> {
+    pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer, boxes: &wgpu::Buffer) -> Result<(), GpuError> {
         self.bound = Some(self.kernel.bind(gpu, &[(0, params), (1, boxes), (4, self.boxes.buffer())])?);
         Ok(())
     }

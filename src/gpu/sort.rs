@@ -3,6 +3,7 @@
 use super::device::Gpu;
 use super::kernel::{Bound, Kernel, source};
 use super::storage::Storage;
+use crate::error::GpuError;
 use wgpu::util::DeviceExt;
 
 /// Bits of a digit, and values that it has.
@@ -28,7 +29,7 @@ pub(super) struct Sort {
 }
 
 impl Sort {
-    pub(super) fn new(gpu: &Gpu) -> Result<Self, String> {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         let digit = |pass: u32| {
             let contents = [pass * DIGIT_BITS, u32::from(pass == 0), 0, 0];
             gpu.try_make(|device| {
@@ -55,7 +56,7 @@ impl Sort {
     }
 
     /// Makes room for that many keys. Whether a buffer is another one now.
-    pub(super) fn ensure(&mut self, gpu: &Gpu, objects: u32) -> Result<bool, String> {
+    pub(super) fn ensure(&mut self, gpu: &Gpu, objects: u32) -> Result<bool, GpuError> {
         let mut grown = false;
         for list in self.keys.iter_mut().chain(&mut self.values) {
             grown |= list.ensure(gpu, u64::from(objects) * 4)?;
@@ -64,7 +65,7 @@ impl Sort {
         Ok(self.counts.ensure(gpu, counts)? | grown)
     }
 
-    pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer) -> Result<(), String> {
+    pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer) -> Result<(), GpuError> {
         self.passes.clear();
         for (pass, digit) in self.digits.iter().enumerate() {
             let (from, to) = (pass % 2, (pass + 1) % 2);

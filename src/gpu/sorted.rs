@@ -1,12 +1,13 @@
 //! The methods that sort first: sap and grid-sap; see `shaders/rows.wgsl`, `sap.wgsl` and `grid_sap.wgsl`.
 
 use super::device::Gpu;
-use super::engine::Inputs;
+use super::inputs::Inputs;
 use super::kernel::{Bound, Kernel, source};
 use super::output::Output;
 use super::params::Params;
 use super::sort::Sort;
 use super::storage::Storage;
+use crate::error::GpuError;
 
 /// Rows of one block, and boxes of one workgroup of the other kernels.
 const ROWS: u32 = 64;
@@ -57,7 +58,7 @@ impl Sorted {
     /// The pairs of a block of rows are counted in 32 bits.
     pub(super) const MOST_OBJECTS: usize = 1 << 26;
 
-    pub(super) fn new(gpu: &Gpu, strips: bool) -> Result<Self, String> {
+    pub(super) fn new(gpu: &Gpu, strips: bool) -> Result<Self, GpuError> {
         let (rows, keys, gather) = if strips {
             (source::GRID_SAP, "strip_keys", "strip_gather")
         } else {
@@ -89,7 +90,7 @@ impl Sorted {
     }
 
     /// Makes room for that many boxes. Whether a buffer is another one now.
-    pub(super) fn ensure(&mut self, gpu: &Gpu, params: &Params) -> Result<bool, String> {
+    pub(super) fn ensure(&mut self, gpu: &Gpu, params: &Params) -> Result<bool, GpuError> {
         let n = u64::from(params.objects);
         let mut grown = self.sort.ensure(gpu, params.objects)?;
         grown |= self.boxes.ensure(gpu, n * SORTED_BOX)?;
@@ -103,14 +104,14 @@ impl Sorted {
         Ok(grown)
     }
 
-    pub(super) fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), String> {
+    pub(super) fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
         let Inputs { params, boxes, ids, header } = *inputs;
         self.sort.bind(gpu, params)?;
         let mut make_keys = vec![(0, params), (1, boxes), (3, header), (4, self.sort.unsorted()), (2, ids)];
         if self.strips {
             make_keys.push((7, self.reach.buffer()));
         }
-        let side = |side: usize| -> Result<Side, String> {
+        let side = |side: usize| -> Result<Side, GpuError> {
             let (keys, order) = self.sort.sorted(side);
             let mut gather = vec![(0, params), (1, boxes), (2, ids), (5, order), (6, self.boxes.buffer())];
             let mut rows = vec![

@@ -1,24 +1,46 @@
 //! Buffers on a GPU that grow and stay.
 
 use super::device::Gpu;
+use crate::algorithm::AlgorithmId;
+use crate::error::{Error, GpuError, GpuErrorKind, Unavailable};
 
 /// What a frame can fail with on a GPU, apart from what is wrong with the frame itself.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Failure {
-    /// The GPU can't do it: lost, out of memory, beyond its limits. In a sentence.
-    Gpu(String),
+    /// The GPU can't do it: lost, out of memory, beyond its limits.
+    Gpu(GpuError),
     /// The frame is at fault, or the memory of the host.
-    Frame(crate::Error),
+    Frame(Error),
 }
 
-impl From<String> for Failure {
-    fn from(text: String) -> Self {
-        Self::Gpu(text)
+impl Failure {
+    /// More than a GPU, or one submission to it, can take.
+    pub(super) fn limit(text: impl Into<String>) -> Self {
+        Self::Gpu(GpuError::new(GpuErrorKind::Limit, text))
+    }
+
+    /// The error of an algorithm.
+    pub(super) fn of(self, algorithm: &AlgorithmId) -> Error {
+        match self {
+            Self::Frame(error) => error,
+            Self::Gpu(error) => unavailable(algorithm, error),
+        }
     }
 }
 
-impl From<crate::Error> for Failure {
-    fn from(error: crate::Error) -> Self {
+/// An algorithm that a GPU can't run.
+pub(super) fn unavailable(algorithm: &AlgorithmId, error: GpuError) -> Error {
+    Error::Unavailable { algorithm: algorithm.clone(), reason: Unavailable::Gpu(error) }
+}
+
+impl From<GpuError> for Failure {
+    fn from(error: GpuError) -> Self {
+        Self::Gpu(error)
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
         Self::Frame(error)
     }
 }
@@ -38,12 +60,12 @@ const SMALLEST: u64 = 256;
 
 impl Storage {
     /// A buffer that kernels read and write, and that can be copied from and to.
-    pub(super) fn new(gpu: &Gpu, label: &'static str) -> Result<Self, String> {
+    pub(super) fn new(gpu: &Gpu, label: &'static str) -> Result<Self, GpuError> {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         Self::with_usage(gpu, label, usage)
     }
 
-    pub(super) fn with_usage(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages) -> Result<Self, String> {
+    pub(super) fn with_usage(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages) -> Result<Self, GpuError> {
         Ok(Self { label, usage, buffer: create(gpu, label, usage, SMALLEST)?, bytes: SMALLEST })
     }
 
@@ -59,14 +81,15 @@ impl Storage {
     ///
     /// # Errors
     /// When the GPU has no such memory, or no buffer may be as large.
-    pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<bool, String> {
+    pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<bool, GpuError> {
         if bytes <= self.bytes {
             return Ok(false);
         }
         let most = largest(gpu, self.usage);
         if bytes > most {
             let index = gpu.identity().index;
-            return Err(format!("{bytes} bytes for {} are more than the {most} that gpu{index} allows", self.label));
+            let text = format!("{bytes} bytes for {} are more than the {most} that gpu{index} allows", self.label);
+            return Err(GpuError::new(GpuErrorKind::Limit, text));
         }
         // A quarter more than asked for, so that a growing scene grows the buffer a few times in all.
         let wanted = (bytes + bytes / 4).next_multiple_of(256).min(most);
@@ -87,12 +110,12 @@ pub(super) fn largest(gpu: &Gpu, usage: wgpu::BufferUsages) -> u64 {
     limits.max_buffer_size.min(binding) & !3
 }
 
-fn create(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, bytes: u64) -> Result<wgpu::Buffer, String> {
+fn create(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
     gpu.check()?;
     let descriptor =
         wgpu::BufferDescriptor { label: Some(label), size: bytes.next_multiple_of(4), usage, mapped_at_creation: false };
     gpu.try_make(|device| device.create_buffer(&descriptor))
-        .map_err(|e| format!("gpu{} has no memory of {bytes} bytes for {label}: {e}", gpu.identity().index))
+        .map_err(|e| e.of(format!("gpu{} has no memory of {bytes} bytes for {label}", gpu.identity().index)))
 }
 
 #[cfg(test)]
@@ -107,9 +130,9 @@ mod tests {
         let mut storage = Storage::new(&gpu, "trial").unwrap();
         let possible = storage.usage;
         storage.usage |= wgpu::BufferUsages::BLAS_INPUT;
-        let error = storage.ensure(&gpu, 1 << 20).unwrap_err();
+        let error = storage.ensure(&gpu, 1 << 20).unwrap_err().to_string();
         assert!(error.contains("trial") && error.contains("gpu0"), "{error}");
-        assert!(storage.ensure(&gpu, 1 << 62).unwrap_err().contains("more than"));
+        assert!(storage.ensure(&gpu, 1 << 62).unwrap_err().to_string().contains("more than"));
         assert_eq!(gpu.fault(), None);
         storage.usage = possible;
         assert_eq!(storage.ensure(&gpu, 100), Ok(true), "the buffer before was given back");

@@ -2,6 +2,7 @@
 
 use super::device::Gpu;
 use super::storage::Storage;
+use crate::error::{GpuError, GpuErrorKind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Instant;
@@ -19,18 +20,24 @@ const UNMAPPED: u8 = 0;
 const ASKED: u8 = 1;
 const MAPPED: u8 = 2;
 
+const NOT_MAPPED: &str = "the driver refuses to map memory";
+
+fn unmapped(source: impl std::error::Error + Send + Sync + 'static) -> GpuError {
+    GpuError::caused(GpuErrorKind::Refused, NOT_MAPPED, source)
+}
+
 impl Transfer {
     /// Memory that the CPU writes.
-    pub(super) fn upload(gpu: &Gpu) -> Result<Self, String> {
+    pub(super) fn upload(gpu: &Gpu) -> Result<Self, GpuError> {
         Self::new(gpu, "upload", wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC, wgpu::MapMode::Write)
     }
 
     /// Memory that the CPU reads.
-    pub(super) fn download(gpu: &Gpu) -> Result<Self, String> {
+    pub(super) fn download(gpu: &Gpu) -> Result<Self, GpuError> {
         Self::new(gpu, "download", wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, wgpu::MapMode::Read)
     }
 
-    fn new(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, mode: wgpu::MapMode) -> Result<Self, String> {
+    fn new(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, mode: wgpu::MapMode) -> Result<Self, GpuError> {
         Ok(Self { storage: Storage::with_usage(gpu, label, usage)?, mode, state: Arc::default() })
     }
 
@@ -42,7 +49,7 @@ impl Transfer {
         self.storage.bytes()
     }
 
-    pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<(), String> {
+    pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<(), GpuError> {
         if bytes > self.storage.bytes() {
             self.unmap();
             self.storage.ensure(gpu, bytes)?;
@@ -63,31 +70,31 @@ impl Transfer {
     }
 
     /// The mapped memory, for the CPU to write. Waits for the mapping where it was not asked for ahead.
-    pub(super) fn writable(&self, gpu: &Gpu, bytes: u64) -> Result<wgpu::BufferViewMut, String> {
+    pub(super) fn writable(&self, gpu: &Gpu, bytes: u64) -> Result<wgpu::BufferViewMut, GpuError> {
         if self.state.load(Ordering::Acquire) != MAPPED {
             self.ask(self.bytes());
             gpu.wait_all()?;
         }
         self.mapped(gpu)?;
-        self.storage.buffer().get_mapped_range_mut(0..bytes).map_err(|e| e.to_string())
+        self.storage.buffer().get_mapped_range_mut(0..bytes).map_err(unmapped)
     }
 
     /// The mapped memory, for the CPU to read.
-    pub(super) fn readable(&self, gpu: &Gpu, bytes: std::ops::Range<u64>) -> Result<wgpu::BufferView, String> {
+    pub(super) fn readable(&self, gpu: &Gpu, bytes: std::ops::Range<u64>) -> Result<wgpu::BufferView, GpuError> {
         self.mapped(gpu)?;
-        self.storage.buffer().get_mapped_range(bytes).map_err(|e| e.to_string())
+        self.storage.buffer().get_mapped_range(bytes).map_err(unmapped)
     }
 
     /// After a wait for the GPU. Where several threads wait for one GPU, another one may have taken the news of this mapping and
     /// be about to pass it on.
-    fn mapped(&self, gpu: &Gpu) -> Result<(), String> {
+    fn mapped(&self, gpu: &Gpu) -> Result<(), GpuError> {
         let start = Instant::now();
         while self.state.load(Ordering::Acquire) == ASKED && start.elapsed() < gpu.wait_limit() {
-            gpu.device().poll(wgpu::PollType::Poll).map_err(|e| e.to_string())?;
+            gpu.device().poll(wgpu::PollType::Poll).map_err(unmapped)?;
             std::thread::yield_now();
         }
         let mapped = self.state.load(Ordering::Acquire) == MAPPED;
-        mapped.then_some(()).ok_or_else(|| "the driver refuses to map memory".to_owned())
+        mapped.then_some(()).ok_or_else(|| GpuError::new(GpuErrorKind::Refused, NOT_MAPPED))
     }
 
     /// Hands the memory back to the GPU.

@@ -4,7 +4,7 @@ use super::curve::Figures;
 use super::gpu_set::GpuSet;
 use super::{GPU_PREFIX, MethodModel, Model, PredictError, Range};
 use crate::hardware::{GpuKind, Hardware};
-use crate::{AlgorithmCost, AlgorithmId, Backend, BackendClass, GpuHardware, Load, Source, Tuning};
+use crate::{AlgorithmCost, AlgorithmId, Backend, BackendClass, Entry, GpuHardware, Load, Source, Tuning};
 
 /// Cost curves for one machine.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +29,7 @@ pub const ASK: &str = "this machine is unlike those of training: measure a few t
                    `sapwise probe`";
 
 impl Model {
-    /// Predicts the cost curves of `algorithms`, given with the revisions that will run, on a machine.
+    /// Predicts the cost curves of `algorithms` in the revisions that will run, on a machine.
     ///
     /// What can't be predicted is left out with a warning: a method that the model has not seen on that processor, another
     /// revision, a GPU that the hardware does not hold, a parameter that is missing or that no GPU has.
@@ -38,7 +38,7 @@ impl Model {
     ///
     /// # Errors
     /// When no algorithm can be predicted, or a parameter of the machine has a value that no machine has.
-    pub fn predict(&self, hardware: &Hardware, algorithms: &[(AlgorithmId, u32)]) -> Result<Prediction, PredictError> {
+    pub fn predict(&self, hardware: &Hardware, algorithms: &[Entry]) -> Result<Prediction, PredictError> {
         if let Some(why) = hardware.implausible() {
             return Err(PredictError::Hardware(why));
         }
@@ -56,7 +56,7 @@ impl Model {
         }
         let mut unknown: Vec<String> = Vec::new();
         let mut gpus: Vec<u32> = Vec::new();
-        for (id, revision) in algorithms {
+        for Entry { id, revision, .. } in algorithms {
             let backend = id.backend();
             let Some(method) = self.method(id) else {
                 unknown.push(id.to_string());

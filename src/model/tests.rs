@@ -3,7 +3,7 @@ mod extrapolation;
 use super::*;
 use crate::hardware::GpuParameterId;
 use crate::hardware::ParameterId;
-use crate::{AlgorithmId, Backend, GpuGroup, GpuHardware, GpuIdentity, Hardware, Load, Machine, Parameter};
+use crate::{Backend, Entry, GpuGroup, GpuHardware, GpuIdentity, Hardware, Load, Machine, Parameter};
 
 fn parameters(figures: &[(&str, f64)]) -> Vec<Parameter> {
     figures.iter().map(|&(name, value)| Parameter::reported(name, value, "test")).collect()
@@ -76,8 +76,8 @@ fn ns(scale: Scale, hardware: &Hardware, gpus: &[u32]) -> f64 {
     scale.nanoseconds(hardware, &Backend::Gpu(gpus.to_vec())).unwrap()
 }
 
-fn ids(list: &[&str]) -> Vec<(AlgorithmId, u32)> {
-    list.iter().map(|id| (id.parse().unwrap(), 1)).collect()
+fn ids(list: &[&str]) -> Vec<Entry> {
+    list.iter().map(|id| Entry::new(id.parse().unwrap(), 1)).collect()
 }
 
 #[test]
@@ -226,8 +226,7 @@ fn the_built_in_model_predicts_from_the_parameters_that_it_names() {
         _ => Parameter::reported(name, 4.0, "test"),
     };
     let all = Hardware { parameters: names.iter().map(figure).collect(), gpus: Vec::new(), ..hardware() };
-    let algorithms: Vec<(AlgorithmId, u32)> =
-        crate::Registry::with_cores(4).entries().iter().map(|e| (e.id.clone(), e.revision)).collect();
+    let algorithms = crate::Registry::with_cores(4).entries().to_vec();
     let prediction = model.predict(&all, &algorithms).unwrap();
     assert_eq!(prediction.costs.len(), algorithms.len(), "{:?}", prediction.warnings);
 }

@@ -1,11 +1,20 @@
 //! How our algorithms write pairs: in blocks, past a filter, from lists of their tasks.
 
-use super::{Pair, Pairs};
-use crate::cpu::each_bit;
+use super::Pairs;
 use crate::error::Error;
+use crate::pair::Pair;
 
 /// Pairs that are fetched together, then tested together: few enough for the first-level cache, enough for memory to answer.
 const SIFTED_TOGETHER: usize = 64;
+
+/// The positions of the bits of a mask, ascending.
+#[inline(always)]
+pub(crate) fn each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
+    while mask != 0 {
+        f(mask.trailing_zeros() as usize);
+        mask &= mask - 1;
+    }
+}
 
 impl Pairs {
     /// Adds `id` paired with each of `others` whose bit is set in `mask`.

@@ -18,7 +18,7 @@ pub(crate) fn run(arguments: &Schema) -> anyhow::Result<Outcome> {
     let folder = &arguments.out;
     std::fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made", folder.display()))?;
     let mut files = Vec::new();
-    for (name, text) in sapwise::json::schemas()? {
+    for (name, text) in sapwise::json::schemas()?.into_iter().chain([sapwise::cache_schema()?]) {
         let path = folder.join(name);
         write_text(&path, &text)?;
         files.push(path.display().to_string());

@@ -1,7 +1,7 @@
 //! Whether boxes are valid and lie within others: many at a time, at every SIMD level.
 
-use crate::Aabb;
-use crate::cpu::SimdLevel;
+use crate::aabb::Aabb;
+use crate::cpu::level::Simd;
 
 /// Boxes that are looked at together. Eight have 48 bounds, which is three vectors of 16 and six of eight.
 pub(crate) const BLOCK: usize = 8;
@@ -11,19 +11,19 @@ pub(crate) const BLOCK: usize = 8;
 ///
 /// `outer` is as long as `boxes`.
 pub(crate) fn each_doubtful_block(
-    level: SimdLevel,
+    simd: Simd,
     boxes: &[Aabb],
     outer: &mut [Aabb],
     doubtful: impl FnMut(usize, &mut [Aabb]),
 ) {
-    match level {
-        // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
+    match simd {
+        // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx512 => unsafe { x86::blocks_avx512(boxes, outer, doubtful) },
+        Simd::Avx512(_) => unsafe { x86::blocks_avx512(boxes, outer, doubtful) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx2 => unsafe { x86::blocks_avx2(boxes, outer, doubtful) },
-        _ => blocks(boxes, outer, all_within, doubtful),
+        Simd::Avx2(_) => unsafe { x86::blocks_avx2(boxes, outer, doubtful) },
+        Simd::Portable => blocks(boxes, outer, all_within, doubtful),
     }
 }
 
@@ -131,13 +131,13 @@ mod tests {
     #[test]
     fn every_level_finds_every_block_with_a_box_that_is_invalid_or_reaches_out() {
         let outer = vec![Aabb::new([-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]); 21];
-        for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
+        for simd in Simd::every() {
             let doubtful = |boxes: &[Aabb]| {
                 let mut found = Vec::new();
-                each_doubtful_block(level, boxes, &mut outer.clone(), |at, block| found.push((at, block.len())));
+                each_doubtful_block(simd, boxes, &mut outer.clone(), |at, block| found.push((at, block.len())));
                 found
             };
-            assert_eq!(doubtful(&outer), [], "{level}");
+            assert_eq!(doubtful(&outer), [], "{simd:?}");
             for at in 0..21 {
                 for bound in 0..6 {
                     for wrong in [f32::NAN, 1.0e9, -1.0e9] {
@@ -145,7 +145,7 @@ mod tests {
                         let b = &mut boxes[at];
                         *(if bound < 3 { &mut b.min[bound] } else { &mut b.max[bound - 3] }) = wrong;
                         let expected = (at / 8 * 8, if at < 16 { 8 } else { 5 });
-                        assert_eq!(doubtful(&boxes), [expected], "{level}: box {at}, bound {bound}, {wrong}");
+                        assert_eq!(doubtful(&boxes), [expected], "{simd:?}: box {at}, bound {bound}, {wrong}");
                     }
                 }
             }

@@ -1,8 +1,9 @@
 //! Sixteen boxes as columns, tested together against one.
 
-use super::{each_bit, prefetch};
-use crate::Aabb;
-use crate::cpu::SimdLevel;
+use super::prefetch;
+use crate::aabb::Aabb;
+use crate::cpu::level::Simd;
+use crate::pairs::each_bit;
 
 /// Boxes in a node.
 pub(crate) const LANES: usize = 16;
@@ -67,15 +68,15 @@ impl Node {
 /// Lane k of node n in a level above contains node 16 n + k of the level below. The last level that has nodes is the top.
 /// `far`: the nodes are likely not in the cache, and are asked for ahead.
 #[inline]
-pub(crate) fn each_overlapping(level: SimdLevel, levels: &[Vec<Node>], far: bool, b: &Aabb, found: impl FnMut(usize)) {
-    match level {
-        // SAFETY: `SimdLevel::in_use` and the tests hand out only levels that this CPU has.
+pub(crate) fn each_overlapping(simd: Simd, levels: &[Vec<Node>], far: bool, b: &Aabb, found: impl FnMut(usize)) {
+    match simd {
+        // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx512 => unsafe { x86::walk_avx512(levels, far, b, found) },
+        Simd::Avx512(_) => unsafe { x86::walk_avx512(levels, far, b, found) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx2 => unsafe { x86::walk_avx2(levels, far, b, found) },
-        _ => walk(levels, far, b, Node::overlapping, found),
+        Simd::Avx2(_) => unsafe { x86::walk_avx2(levels, far, b, found) },
+        Simd::Portable => walk(levels, far, b, Node::overlapping, found),
     }
 }
 
@@ -172,12 +173,12 @@ mod tests {
         let queries = (0..60).map(|k| Aabb::cube([(k % 34) as f32, (k % 13) as f32, (k % 11) as f32], 0.1 * k as f32));
         for query in queries.chain([infinite]) {
             let expected: Vec<usize> = (0..boxes.len()).filter(|&k| boxes[k].overlaps(&query)).collect();
-            for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
+            for simd in Simd::every() {
                 let mut found = Vec::new();
-                each_overlapping(level, &levels, true, &query, |k| found.push(k));
+                each_overlapping(simd, &levels, true, &query, |k| found.push(k));
                 // Lanes that hold nothing overlap infinite bounds: the caller knows how many there are.
                 found.retain(|&k| k < boxes.len());
-                assert_eq!(found, expected, "{level}");
+                assert_eq!(found, expected, "{simd:?}");
             }
         }
     }

@@ -1,7 +1,9 @@
 //! SSE2, which every x86-64 CPU has, AVX2 and AVX-512.
 
 use super::{Lanes, Query, Rows, View, brute, query_from, sweep};
-use crate::{Pair, Pairs};
+use crate::cpu::level::{Avx2, Avx512};
+use crate::pair::Pair;
+use crate::pairs::Pairs;
 use std::arch::x86_64::*;
 use std::mem::offset_of;
 use std::ops::Range;
@@ -9,12 +11,6 @@ use std::ops::Range;
 /// Eight rows in two vectors.
 #[derive(Clone, Copy)]
 pub(super) struct Sse2;
-
-#[derive(Clone, Copy)]
-struct Avx2;
-
-#[derive(Clone, Copy)]
-struct Avx512;
 
 impl Lanes for Sse2 {
     const COUNT: usize = 8;
@@ -55,7 +51,7 @@ impl Lanes for Avx2 {
 
     #[inline(always)]
     unsafe fn reach_and_hits(self, view: &View<'_>, at: usize, query: &Query) -> (u32, u32) {
-        // SAFETY: every column has 16 values behind `view.len >= at`, and the caller has AVX2.
+        // SAFETY: every column has 16 values behind `view.len >= at`; `self` is the proof of AVX2.
         unsafe {
             let load = |column: &[f32]| _mm256_loadu_ps(column.as_ptr().add(at));
             let below = |column, bound| _mm256_cmp_ps::<_CMP_LE_OQ>(load(column), _mm256_set1_ps(bound));
@@ -83,7 +79,7 @@ impl Lanes for Avx512 {
 
     #[inline(always)]
     unsafe fn reach_and_hits(self, view: &View<'_>, at: usize, query: &Query) -> (u32, u32) {
-        // SAFETY: every column has 16 values behind `view.len >= at`, and the caller has AVX-512F.
+        // SAFETY: every column has 16 values behind `view.len >= at`; `self` is the proof of AVX-512F.
         unsafe {
             let load = |column: &[f32]| _mm512_loadu_ps(column.as_ptr().add(at));
             // Each comparison on its own: masked by the one before, they would wait for one another.
@@ -136,31 +132,31 @@ impl Lanes for Avx512 {
 }
 
 #[target_feature(enable = "avx2")]
-pub(super) fn sweep_avx2<R: Rows>(view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
-    sweep::<_, R>(Avx2, view, rows, pairs);
+pub(super) fn sweep_avx2<R: Rows>(proof: Avx2, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+    sweep::<_, R>(proof, view, rows, pairs);
 }
 
 #[target_feature(enable = "avx2")]
-pub(super) fn brute_avx2(view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
-    brute(Avx2, view, rows, pairs);
+pub(super) fn brute_avx2(proof: Avx2, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+    brute(proof, view, rows, pairs);
 }
 
 #[target_feature(enable = "avx2")]
-pub(super) fn query_avx2(view: &View<'_>, start: usize, query: &Query, pairs: &mut Pairs) {
-    query_from(Avx2, view, start, query, pairs);
+pub(super) fn query_avx2(proof: Avx2, view: &View<'_>, start: usize, query: &Query, pairs: &mut Pairs) {
+    query_from(proof, view, start, query, pairs);
 }
 
 #[target_feature(enable = "avx512f")]
-pub(super) fn sweep_avx512<R: Rows>(view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
-    sweep::<_, R>(Avx512, view, rows, pairs);
+pub(super) fn sweep_avx512<R: Rows>(proof: Avx512, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+    sweep::<_, R>(proof, view, rows, pairs);
 }
 
 #[target_feature(enable = "avx512f")]
-pub(super) fn brute_avx512(view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
-    brute(Avx512, view, rows, pairs);
+pub(super) fn brute_avx512(proof: Avx512, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+    brute(proof, view, rows, pairs);
 }
 
 #[target_feature(enable = "avx512f")]
-pub(super) fn query_avx512(view: &View<'_>, start: usize, query: &Query, pairs: &mut Pairs) {
-    query_from(Avx512, view, start, query, pairs);
+pub(super) fn query_avx512(proof: Avx512, view: &View<'_>, start: usize, query: &Query, pairs: &mut Pairs) {
+    query_from(proof, view, start, query, pairs);
 }

@@ -1,11 +1,12 @@
 //! The grown boxes: who has left theirs, and a new one for whoever has.
 
-use super::tree::Tree;
-use crate::cpu::SimdLevel;
+use super::tree::{NOTHING, Tree};
+use crate::cpu::level::Simd;
 use crate::cpu::columns::ensure;
 use crate::cpu::kernel::contain::{each_doubtful_block, within};
 use crate::cpu::workers::Workers;
-use crate::{Aabb, Error};
+use crate::aabb::Aabb;
+use crate::error::Error;
 use std::ops::Range;
 
 /// Every box grown by a margin, in the order of the input.
@@ -15,7 +16,7 @@ pub(super) struct Grown {
     len: usize,
     /// Bit k of word w is set when box 64 w + k got a new grown box in this frame, or is gone.
     dirty: Vec<u64>,
-    level: SimdLevel,
+    simd: Simd,
 }
 
 /// How much a box is grown on each side: a share of its mean edge.
@@ -49,19 +50,16 @@ pub(super) struct Changes {
     pub(super) gone: Range<usize>,
 }
 
-/// Contains no box, not even an infinite one: whatever has no grown box yet is seen to have left it.
-pub(super) const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-
 impl Grown {
-    pub(super) fn new(level: SimdLevel) -> Self {
-        Self { boxes: Vec::new(), len: 0, dirty: Vec::new(), level }
+    pub(super) fn new(simd: Simd) -> Self {
+        Self { boxes: Vec::new(), len: 0, dirty: Vec::new(), simd }
     }
 
     pub(super) fn as_slice(&self) -> &[Aabb] {
         &self.boxes[..self.len]
     }
 
-    /// Forgets all grown boxes: the next frame makes every one anew.
+    /// Forgets all grown boxes: the next frame makes every one again.
     pub(super) fn forget(&mut self) {
         self.len = 0;
     }
@@ -100,12 +98,12 @@ impl Grown {
             (share.far_away, share.error) = (0, None);
             share.left.clear();
         }
-        let level = self.level;
+        let simd = self.simd;
         let grown = (&mut self.boxes[..self.len], size);
         let dirty = (&mut self.dirty[..self.len.div_ceil(64)], size / 64);
         workers.each_share(shares, grown, dirty, |k, share, grown, dirty| {
             let first = k * size;
-            share.error = share.check(&boxes[first..first + grown.len()], grown, dirty, first, margin, level).err();
+            share.error = share.check(&boxes[first..first + grown.len()], grown, dirty, first, margin, simd).err();
         });
         shares.iter_mut().find_map(|s| s.error.take()).map_or(Ok(()), Err)?;
         // Kept pairs of boxes that are gone go with the pairs of those that left.
@@ -163,11 +161,11 @@ impl Share {
         dirty: &mut [u64],
         first: usize,
         margin: Margin,
-        level: SimdLevel,
+        simd: Simd,
     ) -> Result<(), Error> {
         dirty.fill(0);
         let mut invalid = None;
-        each_doubtful_block(level, boxes, grown, |at, block| {
+        each_doubtful_block(simd, boxes, grown, |at, block| {
             for (k, grown) in block.iter_mut().enumerate() {
                 let b = &boxes[at + k];
                 if within(b, grown) {

@@ -1,8 +1,8 @@
 //! Whether keeping pairs pays, and with which margin.
 
 use super::grown::{Changes, Margin};
-use crate::sample::Sample;
-use crate::{Aabb, Displacement};
+use crate::aabb::Aabb;
+use crate::load::{Displacement, FramePlan};
 
 /// Costs of the parts of a frame in nanoseconds, on the machine in `datasets/`. Only their ratios matter here, and only for
 /// the choice of a margin: they need not be those of the machine at hand.
@@ -67,7 +67,7 @@ struct Keeping {
     /// Share of the boxes that leave in a frame and kept pairs for each box, averaged over the last [`LEARNING`] frames.
     leaving: f32,
     kept: f32,
-    /// Boxes that left since all were made anew, over all boxes.
+    /// Boxes that left since all were made again, over all boxes.
     left: f32,
     /// Frames since keeping began.
     frames: u32,
@@ -81,9 +81,9 @@ impl Default for Motion {
 
 impl Motion {
     /// What to do about this frame.
-    pub(super) fn advise(&mut self, boxes: &[Aabb]) -> Advice {
+    pub(super) fn advise(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Advice {
         if self.keeping.is_none() {
-            self.keeping = self.begin(boxes);
+            self.keeping = self.begin(plan, boxes);
             self.displacement.watch(boxes);
         }
         self.keeping.map_or(Advice::Scratch, |k| Advice::Keep(k.margin))
@@ -106,17 +106,17 @@ impl Motion {
         self.keeping = None;
     }
 
-    /// Whether the kept pairs are to be found anew in this frame, in which boxes left as `changes` says.
-    pub(super) fn wants_anew(&self, objects: usize, changes: &Changes) -> bool {
+    /// Whether the kept pairs are to be found again in this frame, in which boxes left as `changes` says.
+    pub(super) fn wants_rebuild(&self, objects: usize, changes: &Changes) -> bool {
         let Some(keeping) = self.keeping else { return false };
         let left = changes.left as f32 / objects.max(1) as f32;
         // Pairs of boxes that left are found at a higher price and stand apart from their neighbours in space.
         left > 0.2 || keeping.left + worn(objects, changes) > 1.5
     }
 
-    /// The margin with which all boxes are grown anew: the scene may have changed its sizes since the last time.
-    pub(super) fn renew(&mut self, boxes: &[Aabb]) -> Margin {
-        let longest_edge = longest_edge(boxes);
+    /// The margin with which all boxes are grown again: the scene may have changed its sizes since the last time.
+    pub(super) fn renew(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Margin {
+        let longest_edge = longest_edge(plan, boxes);
         self.keeping.as_mut().map_or(Margin { share: MARGINS[0], longest_edge }, |keeping| {
             keeping.margin.longest_edge = longest_edge;
             keeping.margin
@@ -125,18 +125,18 @@ impl Motion {
 
     /// Learns from a frame in which boxes left as `changes` says and `kept` pairs were tested. `false` when keeping does not pay
     /// any more.
-    pub(super) fn learn(&mut self, objects: usize, changes: &Changes, kept: usize, anew: bool) -> bool {
+    pub(super) fn learn(&mut self, objects: usize, changes: &Changes, kept: usize, rebuilt: bool) -> bool {
         let far = far(objects);
         let scratch = scratch(far, self.density);
         let Some(k) = &mut self.keeping else { return false };
         let share = |count: usize| count as f32 / objects.max(1) as f32;
         let (left, kept) = (share(changes.left), share(kept));
         let leaving = if left > 0.0 { cost::AGAIN + self::left(far, kept) * left } else { 0.0 };
-        let work = if anew { 1.5 * self::scratch(far, kept) } else { leaving };
+        let work = if rebuilt { 1.5 * self::scratch(far, kept) } else { leaving };
         let now = tests(far, kept) + work;
         k.cost += (now - k.cost) / 16.0;
         k.kept += (kept - k.kept) / LEARNING;
-        if anew {
+        if rebuilt {
             k.left = 0.0;
         } else {
             k.left += worn(objects, changes);
@@ -159,13 +159,19 @@ impl Motion {
         k.cost < scratch
     }
 
+    /// How far the boxes moved since the frame before; `None` in the first frame.
+    fn moved(&self, plan: &FramePlan, boxes: &[Aabb]) -> Option<f64> {
+        // Of the pairs, too, nothing is known before the second frame, whoever knows how far boxes moved.
+        if self.displacement.is_watching() { plan.moved().or_else(|| self.displacement.moved(boxes)) } else { None }
+    }
+
     /// Begins to keep pairs if that promises to pay.
-    fn begin(&mut self, boxes: &[Aabb]) -> Option<Keeping> {
+    fn begin(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Option<Keeping> {
         if self.pause > 0 {
             self.pause -= 1;
             return None;
         }
-        let motion = self.displacement.moved(boxes)? as f32;
+        let motion = self.moved(plan, boxes)? as f32;
         let far = far(boxes.len());
         let scratch = scratch(far, self.density);
         let cost = |m: f32| {
@@ -175,7 +181,7 @@ impl Motion {
         let best = MARGINS.into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
         let kept = self.density * (1.0 + 2.0 * best).powi(3);
         (cost(best) < scratch && kept < MOST_KEPT).then(|| Keeping {
-            margin: Margin { share: best, longest_edge: longest_edge(boxes) },
+            margin: Margin { share: best, longest_edge: longest_edge(plan, boxes) },
             cost: cost(best),
             leaving: leaving(motion, best),
             kept,
@@ -186,8 +192,8 @@ impl Motion {
 }
 
 /// Mean edges count as no longer than four times that which nine boxes in ten don't exceed.
-fn longest_edge(boxes: &[Aabb]) -> f32 {
-    4.0 * (Sample::of(boxes).extent.iter().sum::<f64>() / 3.0) as f32
+fn longest_edge(plan: &FramePlan, boxes: &[Aabb]) -> f32 {
+    4.0 * (plan.sample(boxes).extent.iter().sum::<f64>() / 3.0) as f32
 }
 
 /// How much of the order in space is lost, as a share of the boxes that left. One that went far widens every node above its leaf,
@@ -269,7 +275,7 @@ mod tests {
             (0..1000)
                 .take_while(|_| {
                     motion.learn(1000, &changes, 1000, false);
-                    !motion.wants_anew(1000, &changes)
+                    !motion.wants_rebuild(1000, &changes)
                 })
                 .count()
         };

@@ -1,22 +1,25 @@
 //! A tree of the grown boxes with 16 children a node, for the boxes that get a new one.
 //!
 //! Sixteen boxes that are near in space share a leaf. A box that moves widens the nodes above its leaf and never changes
-//! its leaf, so the tree gets worse until it is made anew.
+//! its leaf, so the tree gets worse until it is made again.
 
-use super::grown::NOTHING;
-use crate::cpu::SimdLevel;
+use crate::cpu::level::Simd;
 use crate::cpu::columns::{ensure, part};
 use crate::cpu::kernel::node::{LANES, Node, each_overlapping};
 use crate::cpu::sort::sort;
 use crate::cpu::workers::Workers;
-use crate::sample::Sample;
-use crate::{Aabb, Error};
+use crate::load::Sample;
+use crate::aabb::Aabb;
+use crate::error::Error;
 
 /// Boxes that move in one phase on all threads; fewer are moved in less time than a phase takes.
 const SMALLEST_SPLIT: usize = 1024;
 
 /// Boxes from which on what belongs to them is likely not in the second-level cache: 1.2 MB of boxes, and as much in the tree.
 pub(super) const FAR: usize = 50_000;
+
+/// Contains no box, not even an infinite one: whatever has no grown box yet is seen to have left it.
+pub(super) const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
 
 /// In place of a box that is gone. No box has this number: there are at most so many.
 const GONE: u32 = u32::MAX;
@@ -38,11 +41,11 @@ pub(super) struct Tree {
     /// How many moved; the keys are theirs.
     moved: usize,
     scratch: Vec<u64>,
-    level: SimdLevel,
+    simd: Simd,
 }
 
 impl Tree {
-    pub(super) fn new(level: SimdLevel) -> Self {
+    pub(super) fn new(simd: Simd) -> Self {
         Self {
             ids: Vec::new(),
             places: 0,
@@ -51,15 +54,15 @@ impl Tree {
             keys: Vec::new(),
             moved: 0,
             scratch: Vec::new(),
-            level,
+            simd,
         }
     }
 
-    /// Makes the tree of these boxes.
-    pub(super) fn build(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<(), Error> {
+    /// Makes the tree of these boxes, which look like the sample.
+    pub(super) fn build(&mut self, workers: &Workers, boxes: &[Aabb], sample: &Sample) -> Result<(), Error> {
         ensure(&mut self.keys, boxes.len(), "sort keys")?;
         let keys = &mut self.keys[..boxes.len()];
-        let curve = Curve::over(&Sample::of(boxes));
+        let curve = Curve::over(sample);
         workers.map(boxes, keys, |id, b| u64::from(curve.key(b)) << 32 | id as u64);
         sort(workers, &mut self.keys, &mut self.scratch, boxes.len())?;
         ensure(&mut self.ids, boxes.len(), "boxes in a tree")?;
@@ -173,7 +176,7 @@ impl Tree {
     #[inline]
     pub(super) fn overlapping(&self, bounds: &Aabb, mut found: impl FnMut(u32)) {
         let far = self.places > FAR;
-        each_overlapping(self.level, &self.levels, far, bounds, |place| {
+        each_overlapping(self.simd, &self.levels, far, bounds, |place| {
             // Lanes that hold nothing, and those of boxes that are gone, overlap infinite bounds.
             if place < self.places && self.ids[place] != GONE {
                 found(self.ids[place]);

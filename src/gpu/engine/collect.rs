@@ -4,9 +4,10 @@ use super::{Engine, Frame, PAIRS_AT, Search, Step};
 use crate::gpu::output::PAIR;
 use crate::gpu::params::{Header, Params};
 use crate::gpu::sorted::CANDIDATES;
+use crate::error::{BoxDefect, Error, GpuError};
 use crate::gpu::storage::Failure;
-use crate::sample::Sample;
-use crate::{BoxDefect, Error, Pairs};
+use crate::load::Sample;
+use crate::pairs::Pairs;
 use std::mem::offset_of;
 
 impl Engine {
@@ -32,14 +33,14 @@ impl Engine {
         Ok(())
     }
 
-    /// Waits for what was started and gives the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer), and
+    /// Waits for what was started and returns the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer), and
     /// what the boxes look like.
     pub(in crate::gpu) fn finish_resident(&mut self) -> Result<(u32, Sample), Failure> {
         let Some(mut frame) = self.frame.take() else { return Ok((0, Sample::default())) };
         let header = self.header_of(&frame)?;
         if header.more != 0 {
             let reason = format!("a box has more than {CANDIDATES} candidates, which takes several submissions");
-            return Err(Failure::Gpu(format!("{reason}, and pairs that stay on gpu{} come from one", self.index())));
+            return Err(Failure::limit(format!("{reason}, and pairs that stay on gpu{} come from one", self.index())));
         }
         let total = header.total();
         let sample = self.seen()?;
@@ -47,7 +48,7 @@ impl Engine {
         if total > u64::from(self.output.capacity()) {
             self.grow(&mut frame, total)?;
             if total > u64::from(self.output.capacity()) {
-                return Err(Failure::Gpu(format!("{total} pairs don't fit into one buffer of gpu{}", self.index())));
+                return Err(Failure::limit(format!("{total} pairs don't fit into one buffer of gpu{}", self.index())));
             }
             self.rewrite(&frame.params)?;
         }
@@ -84,7 +85,7 @@ impl Engine {
         }
         if total > u64::from(u32::MAX) {
             let reason = format!("{total} pairs are more than the 2^32 that gpu{} can number", self.index());
-            return Err(Failure::Gpu(format!("{reason}; set a limit on the pairs, and no filter")));
+            return Err(Failure::limit(format!("{reason}; set a limit on the pairs, and no filter")));
         }
         self.download.ensure(&self.gpu, PAIRS_AT + total.min(self.downloadable()) * PAIR)?;
         if total > u64::from(self.output.capacity()) {
@@ -113,7 +114,7 @@ impl Engine {
     }
 
     /// A larger list of pairs, if the GPU has one.
-    fn grow(&mut self, frame: &mut Frame, total: u64) -> Result<(), String> {
+    fn grow(&mut self, frame: &mut Frame, total: u64) -> Result<(), GpuError> {
         let Some(boxes) = self.bound_to.clone() else { return Ok(()) };
         if self.output.ensure_pairs(&self.gpu, total)? {
             self.bind(&boxes)?;
@@ -123,7 +124,7 @@ impl Engine {
     }
 
     /// Writes the window of `params` into the list of pairs. Nothing is counted again.
-    fn rewrite(&self, params: &Params) -> Result<(), String> {
+    fn rewrite(&self, params: &Params) -> Result<(), GpuError> {
         self.set(params);
         let mut encoder = self.encoder();
         self.record(&mut encoder, params, Step::Write);
@@ -137,7 +138,7 @@ impl Engine {
     }
 
     /// Goes on with the tile pairs, or the candidates of rows, that are left.
-    fn go_on(&mut self, frame: Frame) -> Result<Frame, String> {
+    fn go_on(&mut self, frame: Frame) -> Result<Frame, GpuError> {
         let mut params = frame.params;
         match &self.search {
             Search::Brute(_) => {

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, GpuError};
 pub(super) use crate::gpu::kernel::{Bound, Kernel};
 use crate::hardware::{GpuKind, GpuParameterId, Parameter};
 use crate::measure::Options;
@@ -48,7 +48,7 @@ impl<'a> Bench<'a> {
     pub(super) fn buffer(&self, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, String> {
         let mapped_at_creation = usage.contains(wgpu::BufferUsages::MAP_WRITE);
         let descriptor = wgpu::BufferDescriptor { label: Some("sapwise measure"), size: bytes, usage, mapped_at_creation };
-        self.gpu.try_make(|device| device.create_buffer(&descriptor))
+        self.gpu.try_make(|device| device.create_buffer(&descriptor)).map_err(words)
     }
 
     /// A buffer that kernels write, and that is copied from and to.
@@ -64,17 +64,17 @@ impl<'a> Bench<'a> {
         padded.resize(words.len().next_multiple_of(4), 0);
         let contents = bytemuck::cast_slice(&padded);
         let usage = wgpu::BufferUsages::UNIFORM;
-        self.gpu.try_make(|d| d.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage }))
+        self.gpu.try_make(|d| d.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })).map_err(self::words)
     }
 
     /// Compiles an entry point, with constants for its overrides.
     pub(super) fn kernel(&self, source: &str, entry: &'static str, constants: &[(&str, f64)]) -> Result<Kernel, String> {
-        Kernel::compile(self.gpu, source.to_owned(), entry, constants)
+        Kernel::compile(self.gpu, source.to_owned(), entry, constants).map_err(words)
     }
 
     /// A kernel with its buffers, each with its binding number. Only those that the entry point uses may be named.
     pub(super) fn bind(&self, kernel: &Kernel, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound, String> {
-        kernel.bind(self.gpu, buffers)
+        kernel.bind(self.gpu, buffers).map_err(words)
     }
 
     /// Records commands and submits them.
@@ -88,7 +88,7 @@ impl<'a> Bench<'a> {
     pub(super) fn time(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<Duration, String> {
         let start = Instant::now();
         let submission = self.submit(record);
-        self.gpu.wait(submission)?;
+        self.gpu.wait(submission).map_err(words)?;
         Ok(start.elapsed())
     }
 
@@ -107,13 +107,19 @@ impl<'a> Bench<'a> {
     pub(super) fn read_word(&self, buffer: &wgpu::Buffer, staging: &wgpu::Buffer) -> Result<u32, String> {
         let submission = self.submit(|encoder| encoder.copy_buffer_to_buffer(buffer, 0, staging, 0, 4));
         staging.slice(..).map_async(wgpu::MapMode::Read, |_| {});
-        self.gpu.wait(submission)?;
+        self.gpu.wait(submission).map_err(words)?;
         let view = staging.slice(..).get_mapped_range().map_err(|e| e.to_string())?;
         let word = view.first_chunk().map(|bytes| u32::from_le_bytes(*bytes));
         drop(view);
         staging.unmap();
         word.ok_or_else(|| "a mapping came without its bytes".to_owned())
     }
+}
+
+/// What a parameter says where a GPU failed: with the words of the driver.
+#[expect(clippy::needless_pass_by_value, reason = "for `map_err`")]
+pub(super) fn words(error: GpuError) -> String {
+    format!("{error:#}")
 }
 
 /// Records a pass of `count` dispatches.

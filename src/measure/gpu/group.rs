@@ -3,7 +3,7 @@
 use std::sync::Barrier;
 use std::time::{Duration, Instant};
 
-use super::bench::{Bench, Bound, Kernel, or_missing, record};
+use super::bench::{Bench, Bound, Kernel, or_missing, record, words};
 use super::compute::Arithmetic;
 use super::transfer::Transfer;
 use crate::gpu::Gpu;
@@ -137,7 +137,7 @@ fn round_trips(benches: &[Bench<'_>]) -> Result<Vec<Parameter>, String> {
                 .map(|(bench, bound)| bench.submit(|encoder| record(bound, encoder, 1, 1)))
                 .collect();
             for (bench, submission) in benches.iter().zip(submissions) {
-                bench.gpu.wait(submission)?;
+                bench.gpu.wait(submission).map_err(words)?;
             }
             together += start.elapsed();
         }

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::bench::{Bench, or_missing, record};
+use super::bench::{Bench, or_missing, record, words};
 use crate::hardware::{GpuParameterId, Parameter};
 
 const SOURCE: &str = include_str!("shaders/latency.wgsl");
@@ -34,7 +34,7 @@ fn latencies(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
             let start = Instant::now();
             let submission = bench.submit(|encoder| record(&empty, encoder, 1, 1));
             let submit = start.elapsed();
-            bench.gpu.wait(submission)?;
+            bench.gpu.wait(submission).map_err(words)?;
             let round_trip = start.elapsed();
             let one = bench.time_dispatches(&step, 1, 1)?;
             let long = bench.time_dispatches(&step, 1, 1 + chain)?;

@@ -20,7 +20,7 @@ mod transfer;
 use std::time::{Duration, Instant};
 
 use super::{Options, UNDER_LIMIT};
-use crate::gpu::{Gpu, Gpus};
+use crate::gpu::{Gpu, GpuError, GpuErrorKind, Gpus};
 use crate::hardware::{GpuGroup, GpuHardware, GpuParameterId, Parameter};
 use bench::Bench;
 
@@ -34,8 +34,8 @@ const WARM_UP: Duration = Duration::from_millis(50);
 /// no effect. With [`Options::limit`] only what a cost model reads is measured.
 ///
 /// # Errors
-/// [`Error::Unavailable`](crate::Error) when there is no such GPU or its driver refuses to open it.
-pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, String> {
+/// [`GpuErrorKind::NotFound`] when there is no such GPU or its driver refuses to open it.
+pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, GpuError> {
     let began = Instant::now();
     let (opened, raw) = match gpus.adapter(index) {
         Some(adapter) => (gpus.open_another(index)?, raw::query(adapter)),
@@ -69,13 +69,13 @@ pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, St
 /// The order of the numbers does not matter, and a number that stands twice counts once. Each GPU is opened anew.
 ///
 /// # Errors
-/// [`Error::Unavailable`](crate::Error) when there are fewer than two, or one of them can't be opened.
-pub fn gpu_group(gpus: &Gpus, indices: &[u32], options: &Options) -> Result<GpuGroup, String> {
+/// [`GpuErrorKind::NotFound`] when there are fewer than two, or one of them can't be opened.
+pub fn gpu_group(gpus: &Gpus, indices: &[u32], options: &Options) -> Result<GpuGroup, GpuError> {
     let mut indices = indices.to_vec();
     indices.sort_unstable();
     indices.dedup();
     if indices.len() < 2 {
-        return Err("a group needs two GPUs or more".to_owned());
+        return Err(GpuError::new(GpuErrorKind::NotFound, "a group needs two GPUs or more"));
     }
     let opened = indices.iter().map(|&index| gpus.open_another(index)).collect::<Result<Vec<Gpu>, _>>()?;
     for gpu in &opened {

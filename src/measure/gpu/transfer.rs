@@ -6,7 +6,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::bench::{Bench, or_missing, per_ns};
+use super::bench::{Bench, or_missing, per_ns, words};
 use super::fits;
 use crate::hardware::{GpuParameterId, Parameter};
 use crate::measure::foreign_load::Figure;
@@ -181,7 +181,7 @@ impl<'a> Transfer<'a> {
         let submission = self.bench.submit(|encoder| encoder.copy_buffer_to_buffer(&self.up, 0, &self.device, 0, bytes));
         // Mapped as a whole: the next transfer may be larger.
         self.up.slice(..).map_async(wgpu::MapMode::Write, |_| {});
-        self.bench.gpu.wait(submission)?;
+        self.bench.gpu.wait(submission).map_err(words)?;
         Ok(Times { host, device: start.elapsed().saturating_sub(host) })
     }
 
@@ -190,7 +190,7 @@ impl<'a> Transfer<'a> {
         let start = Instant::now();
         let submission = self.bench.submit(|encoder| encoder.copy_buffer_to_buffer(&self.device, 0, &self.down, 0, bytes));
         self.down.slice(..bytes).map_async(wgpu::MapMode::Read, |_| {});
-        self.bench.gpu.wait(submission)?;
+        self.bench.gpu.wait(submission).map_err(words)?;
         let view = self.down.slice(..bytes).get_mapped_range().map_err(|e| e.to_string())?;
         let device = start.elapsed();
         self.received.get_mut(..bytes as usize).ok_or("more bytes than there are")?.copy_from_slice(&view);

@@ -5,13 +5,20 @@
 
 use super::options::Cache;
 use crate::measure::{fnv1a, machine};
-use crate::{AlgorithmId, GpuIdentity, Machine, Model, Registry, Tuning, json, json::Format, usable_cores};
+use crate::adaptive::{Keeper, SaveError};
+use crate::algorithm::AlgorithmId;
+use crate::hardware::{GpuIdentity, Machine};
+use crate::entry::Entry;
+use crate::json::{self, Format};
+use crate::model::Model;
+use crate::registry::{Registry, usable_cores};
+use crate::tuning::Tuning;
 use etcetera::BaseStrategy;
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// What these files are.
+/// How the files are read and written.
 const FORMAT: Format = Format::new("cache", 2, 0);
 
 /// A file that is longer was written by something else.
@@ -20,7 +27,7 @@ const LONGEST_BYTES: u64 = 16 << 20;
 /// The file.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
-pub(crate) struct Cached {
+struct Cached {
     /// What the tuning holds for.
     key: Key,
     /// The tuning, predicted or learned.
@@ -61,7 +68,7 @@ struct Known {
 
 impl Key {
     pub(super) fn new(registry: &Registry, model: &Model) -> Result<Self, json::Error> {
-        let known = |(algorithm, revision)| Known { algorithm, revision };
+        let known = |e: Entry| Known { algorithm: e.id, revision: e.revision };
         Ok(Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             machine: Machine { simd: registry.simd().to_string(), ..machine() },
@@ -75,21 +82,15 @@ impl Key {
     }
 }
 
-/// File name and text of the JSON Schema of these files.
-#[cfg(feature = "schema")]
-pub(crate) fn json_schema() -> Result<(String, String), json::Error> {
-    FORMAT.json_schema::<Cached>()
-}
-
-/// The place of one key.
+/// The file of one key.
 #[derive(Debug)]
-pub(super) struct Entry {
+pub(super) struct CacheFile {
     key: Key,
-    file: PathBuf,
+    path: PathBuf,
 }
 
-impl Entry {
-    /// The place of a key; `None` where nothing is to be kept.
+impl CacheFile {
+    /// The file of a key; `None` where nothing is to be kept.
     ///
     /// # Errors
     /// A sentence, when the user has no cache folder.
@@ -103,21 +104,21 @@ impl Entry {
                 .join("sapwise"),
         };
         let text = serde_json::to_string(&key).map_err(|e| e.to_string())?;
-        let file = folder.join(format!("tuning-{:016x}.json", fnv1a(&text)));
-        Ok(Some(Self { key, file }))
+        let path = folder.join(format!("tuning-{:016x}.json", fnv1a(&text)));
+        Ok(Some(Self { key, path }))
     }
 
-    pub(super) fn file(&self) -> &Path {
-        &self.file
+    pub(super) fn path(&self) -> &Path {
+        &self.path
     }
 
-    /// The tuning that is kept; `None` where there are none.
+    /// The tuning that is kept; `None` where there is none.
     ///
     /// # Errors
     /// A sentence that says why what is there can't be used.
     pub(super) fn read(&self) -> Result<Option<Tuning>, String> {
-        let ignored = |why: &str| format!("{} is ignored and replaced: {why}", self.file.display());
-        match fs::metadata(&self.file) {
+        let ignored = |why: &str| format!("{} is ignored and replaced: {why}", self.path.display());
+        match fs::metadata(&self.path) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(ignored(&e.to_string())),
             // To open a pipe would wait for whoever writes to it.
@@ -125,7 +126,7 @@ impl Entry {
             Ok(found) if found.len() > LONGEST_BYTES => return Err(ignored("it is too long")),
             Ok(_) => {}
         }
-        let text = fs::read_to_string(&self.file).map_err(|e| ignored(&e.to_string()))?;
+        let text = fs::read_to_string(&self.path).map_err(|e| ignored(&e.to_string()))?;
         let cached: Cached = FORMAT.read(&text).map_err(|e| ignored(&e.to_string()))?.value;
         if cached.key != self.key {
             return Err(ignored("it is of another machine, another build or another model"));
@@ -133,18 +134,8 @@ impl Entry {
         Ok(Some(cached.tuning))
     }
 
-    /// Keeps tuning in place of those that are there.
-    ///
-    /// # Errors
-    /// A sentence that says why they can't be kept.
-    pub(super) fn write(&self, tuning: Tuning) -> Result<(), String> {
-        let cached = Cached { key: self.key.clone(), tuning };
-        let text = FORMAT.write(&cached).map_err(|e| e.to_string())?;
-        self.replace(&text).map_err(|e| format!("{} can't be written: {e}", self.file.display()))
-    }
-
     fn replace(&self, text: &str) -> std::io::Result<()> {
-        let folder = self.file.parent().unwrap_or(Path::new("."));
+        let folder = self.path.parent().unwrap_or(Path::new("."));
         fs::create_dir_all(folder)?;
         let mut builder = tempfile::Builder::new();
         builder.prefix(".sapwise-").suffix(".tmp");
@@ -152,11 +143,28 @@ impl Entry {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let mut temporary = builder.tempfile_in(folder)?;
-        // Not forced to the disk, which may take longer than measuring anew what a crash of the machine cuts off.
+        // Not forced to the disk, which may take longer than measuring again what a crash of the machine cuts off.
         temporary.write_all(text.as_bytes())?;
-        temporary.persist(&self.file).map_err(|failed| failed.error)?;
+        temporary.persist(&self.path).map_err(|failed| failed.error)?;
         Ok(())
     }
+}
+
+impl Keeper for CacheFile {
+    fn keep(&self, tuning: Tuning) -> Result<(), SaveError> {
+        let cached = Cached { key: self.key.clone(), tuning };
+        let text = FORMAT.write(&cached).map_err(|e| SaveError::Encode(e.into()))?;
+        self.replace(&text).map_err(|source| SaveError::Write { file: self.path.clone(), source })
+    }
+}
+
+/// The JSON Schema of the files in the cache: name and text.
+///
+/// # Errors
+/// When the schema can't be written.
+#[cfg(feature = "schema")]
+pub fn cache_schema() -> Result<(String, String), json::Error> {
+    FORMAT.json_schema::<Cached>()
 }
 
 #[cfg(test)]

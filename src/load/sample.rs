@@ -1,6 +1,6 @@
 //! A glance at a frame: what a few hundred of its boxes tell about all of them.
 
-use crate::Aabb;
+use crate::aabb::Aabb;
 
 /// Boxes looked at, at most. 256 boxes give 32 640 pairs: an axis on which 1 % of the pairs overlap is then known to
 /// about 10 %.

@@ -6,7 +6,7 @@
 /// Frames that are added up where an algorithm runs on, and right after it began.
 const MOST: u32 = 16;
 const FEWEST: u32 = 2;
-/// Octaves of objects over which a tally goes at most.
+/// Octaves of objects over which a batch goes at most.
 const OCTAVES: f64 = 0.5;
 /// What counts of a frame, at most: so many times what the dearest kind of frame is expected to cost. The rest is another program's.
 const MOST_OVER: f64 = 2.0;
@@ -32,7 +32,7 @@ fn share(part: f64, whole: f64) -> f64 {
 
 /// The sum over some frames in a row.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Tally {
+pub(super) struct FrameBatch {
     pub(super) candidate: usize,
     pub(super) frames: u32,
     /// Real time, and time that the tuning predict without any correction, in nanoseconds.
@@ -46,7 +46,7 @@ pub(super) struct Tally {
     room: u32,
 }
 
-impl Tally {
+impl FrameBatch {
     /// Mean logarithm of the number of objects.
     pub(super) fn log2_objects(&self) -> f64 {
         self.log2_objects / f64::from(self.frames.max(1))
@@ -67,7 +67,7 @@ impl Tally {
         self.frames > 0 && self.frames >= self.room
     }
 
-    /// Adds a frame, of which no more counts than `dearest_ns` allows. Gives the rest.
+    /// Adds a frame, of which no more counts than `dearest_ns` allows. Returns the rest.
     pub(super) fn add(&mut self, ns: f64, predicted: Predicted, log2_objects: f64, dearest_ns: f64) -> f64 {
         let counted = ns.min(MOST_OVER * dearest_ns);
         self.frames += 1;
@@ -90,22 +90,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tallies_grow_while_an_algorithm_runs_on_and_begin_small_with_another() {
+    fn batches_grow_while_an_algorithm_runs_on_and_begin_small_with_another() {
         let predicted = Predicted { ns: 100.0, calls_ns: 50.0 };
-        let mut tally = Tally::default();
+        let mut batch = FrameBatch::default();
         let mut full = Vec::new();
         for frame in 0..60 {
             let candidate = usize::from(frame >= 50);
-            // Twice the objects from frame 55 on: another tally, with more room than the one before.
+            // Twice the objects from frame 55 on: another batch, with more room than the one before.
             let log2_objects = if frame < 55 { 10.0 } else { 11.0 };
-            if !tally.takes(candidate, log2_objects) {
-                tally = tally.next(candidate);
+            if !batch.takes(candidate, log2_objects) {
+                batch = batch.next(candidate);
             }
-            tally.add(150.0, predicted, log2_objects, 200.0);
-            if tally.is_full() {
-                assert_eq!((tally.real_ns, tally.calls()), (150.0 * f64::from(tally.frames), 0.5));
-                full.push((frame, tally.frames));
-                tally = tally.next(candidate);
+            batch.add(150.0, predicted, log2_objects, 200.0);
+            if batch.is_full() {
+                assert_eq!((batch.real_ns, batch.calls()), (150.0 * f64::from(batch.frames), 0.5));
+                full.push((frame, batch.frames));
+                batch = batch.next(candidate);
             }
         }
         assert_eq!(full, [(1, 2), (5, 4), (13, 8), (29, 16), (45, 16), (51, 2)]);
@@ -113,8 +113,8 @@ mod tests {
 
     #[test]
     fn what_other_programs_took_is_given_back() {
-        let mut tally = Tally::default().next(0);
-        assert_eq!(tally.add(1000.0, Predicted { ns: 0.0, calls_ns: 0.0 }, 3.0, 100.0), 800.0);
-        assert_eq!((tally.real_ns, tally.calls()), (200.0, 0.0));
+        let mut batch = FrameBatch::default().next(0);
+        assert_eq!(batch.add(1000.0, Predicted { ns: 0.0, calls_ns: 0.0 }, 3.0, 100.0), 800.0);
+        assert_eq!((batch.real_ns, batch.calls()), (200.0, 0.0));
     }
 }

@@ -1,17 +1,26 @@
 //! The algorithms to choose from, and what runs them.
 
-use crate::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry, Tuning};
+use crate::aabb::Aabb;
+use crate::algorithm::AlgorithmId;
+use crate::broad_phase::BroadPhase;
+use crate::error::{Error, Unavailable};
+use crate::load::FramePlan;
+use crate::pairs::Pairs;
+use crate::registry::Registry;
+use crate::tuning::Tuning;
 
 /// An algorithm of the tuning.
-pub(super) struct Candidate {
+pub(crate) struct Candidate {
     pub(super) id: AlgorithmId,
     /// Its position among the instances; `None` once it failed, or where it can't run.
     pub(super) instance: Option<usize>,
 }
 
 /// Runs one candidate, or several that differ in their number of threads only and share what they keep from frame to frame.
-pub(super) struct Instance {
+pub(crate) struct Instance {
     pub(super) algorithm: Box<dyn BroadPhase>,
+    /// Whether it builds on the frame before.
+    pub(super) is_incremental: bool,
     /// Where several share it, on how many threads it runs.
     threads: Option<u32>,
     /// Objects that its buffers are ready for.
@@ -19,39 +28,44 @@ pub(super) struct Instance {
 }
 
 impl Instance {
-    fn alone(algorithm: Box<dyn BroadPhase>) -> Self {
-        Self { algorithm, threads: None, ready: 0 }
+    fn new(mut algorithm: Box<dyn BroadPhase>, threads: Option<u32>) -> Self {
+        let is_incremental = algorithm.is_incremental();
+        Self { algorithm, is_incremental, threads, ready: 0 }
     }
 
-    pub(super) fn run(&mut self, id: &AlgorithmId, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+    pub(super) fn run(
+        &mut self,
+        id: &AlgorithmId,
+        plan: &FramePlan,
+        boxes: &[Aabb],
+        pairs: &mut Pairs,
+    ) -> Result<(), Error> {
         let wanted = id.threads();
         if self.threads.is_some_and(|threads| threads != wanted) {
-            if !self.algorithm.set_threads(wanted) {
-                return Err(Error::Unavailable {
-                    algorithm: id.clone(),
-                    reason: format!("it can't run on {wanted} threads"),
-                });
+            if !self.algorithm.as_incremental().is_some_and(|algorithm| algorithm.set_threads(wanted)) {
+                let reason = Unavailable::FixedThreads { wanted };
+                return Err(Error::Unavailable { algorithm: id.clone(), reason });
             }
             self.threads = Some(wanted);
         }
-        self.algorithm.find_pairs(boxes, pairs)?;
+        self.algorithm.find_pairs_with(plan, boxes, pairs)?;
         self.ready = self.ready.max(boxes.len());
         Ok(())
     }
 }
 
 /// What runs the algorithms of some tuning, and why the last of those that can't run can't.
-pub(super) struct Made {
+pub(crate) struct Instances {
     /// In the order of [`Tuning::algorithms`].
     pub(super) candidates: Vec<Candidate>,
     pub(super) instances: Vec<Instance>,
     pub(super) failure: Option<Error>,
 }
 
-impl Made {
+impl Instances {
     /// Of each candidate where it finds what the frame before left: one number for all that share it. `None` where nothing is kept.
     pub(super) fn kept(&self) -> Vec<Option<usize>> {
-        let keeps = |c: &Candidate| c.instance.filter(|&k| self.instances[k].algorithm.is_incremental());
+        let keeps = |c: &Candidate| c.instance.filter(|&k| self.instances[k].is_incremental);
         self.candidates.iter().map(keeps).collect()
     }
 
@@ -60,7 +74,13 @@ impl Made {
         self.candidates.iter().map(|c| c.instance.is_some()).collect()
     }
 
-    pub(super) fn of(tuning: &Tuning, registry: &Registry) -> Self {
+    /// Why none of the algorithms can run; `None` where one can.
+    pub(crate) fn failure(&mut self) -> Option<Error> {
+        if self.instances.is_empty() { Some(self.failure.take().unwrap_or(Error::NoAlgorithm)) } else { None }
+    }
+
+    /// Makes the algorithms of a tuning, those that differ in their number of threads only as one where they can be.
+    pub(crate) fn of(tuning: &Tuning, registry: &Registry) -> Self {
         let ids = tuning.algorithms();
         let mut made = Self {
             candidates: ids.iter().map(|&id| Candidate { id: id.clone(), instance: None }).collect(),
@@ -86,18 +106,19 @@ impl Made {
                 alike && runs(other) && stale(other).is_ok()
             };
             let family: Vec<&AlgorithmId> = ids.iter().copied().filter(kin).collect();
-            if let Some(Ok(algorithm)) = registry.create_for(&family).filter(|_| family.contains(&id)) {
+            let whole = if family.contains(&id) { registry.create_family(&family).ok().flatten() } else { None };
+            if let Some(algorithm) = whole {
                 for candidate in made.candidates.iter_mut().filter(|c| family.contains(&&c.id)) {
                     candidate.instance = Some(made.instances.len());
                 }
                 // On none of them yet, so that the first frame sets it.
-                made.instances.push(Instance { threads: Some(0), ..Instance::alone(algorithm) });
+                made.instances.push(Instance::new(algorithm, Some(0)));
                 continue;
             }
             match registry.create(id) {
                 Ok(algorithm) => {
                     made.candidates[k].instance = Some(made.instances.len());
-                    made.instances.push(Instance::alone(algorithm));
+                    made.instances.push(Instance::new(algorithm, None));
                 }
                 Err(why) => made.failure = Some(why),
             }

@@ -11,7 +11,7 @@ const FEWEST: u32 = 16;
 
 /// Counts the frames until the next decision.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Pace {
+pub(super) struct DecisionThrottle {
     /// Objects at the last decision, and frames since.
     objects: u32,
     frames: u32,
@@ -21,25 +21,25 @@ pub(super) struct Pace {
     frame_ns: f64,
 }
 
-impl Pace {
-    /// Whether a frame with so many objects is to be decided on anew.
+impl DecisionThrottle {
+    /// Whether a frame with so many objects is to be decided on again.
     pub(super) fn is_due(&self, objects: u32) -> bool {
         self.frames >= self.rest || objects.abs_diff(self.objects) > (self.objects / CHANGE).max(FEWEST)
     }
 
-    /// Counts a frame. Gives about how long frames take now, in nanoseconds.
+    /// Counts a frame. Returns about how long frames take now, in nanoseconds.
     pub(super) fn ran(&mut self) -> f64 {
         self.frames = self.frames.saturating_add(1);
         self.frame_ns
     }
 
-    /// Begins a decision; gives the frames that ran since the last one.
+    /// Begins a decision; returns the number of frames that ran since the last one.
     pub(super) fn decide(&mut self, objects: u32) -> u32 {
         self.objects = objects;
         std::mem::take(&mut self.frames)
     }
 
-    /// The next frame is to be decided on anew.
+    /// The next frame is to be decided on again.
     pub(super) fn wake(&mut self) {
         self.rest = 0;
     }

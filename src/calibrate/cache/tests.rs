@@ -1,5 +1,6 @@
 use super::*;
-use crate::Step;
+use crate::adaptive::Keeper;
+use crate::tuning::Step;
 
 /// Tuning that tell which writer they are of.
 fn tuning(writer: u32) -> Tuning {
@@ -11,8 +12,8 @@ fn key() -> Key {
     Key::new(&Registry::with_cores(2), &Model::built_in().unwrap()).unwrap()
 }
 
-fn entry(folder: &Path, key: Key) -> Entry {
-    Entry::new(&Cache::Folder(folder.to_owned()), key).unwrap().unwrap()
+fn entry(folder: &Path, key: Key) -> CacheFile {
+    CacheFile::new(&Cache::Folder(folder.to_owned()), key).unwrap().unwrap()
 }
 
 fn names(folder: &Path) -> Vec<String> {
@@ -27,15 +28,15 @@ fn what_is_kept_comes_back_and_nothing_else_is_left() {
     let entry = entry(&inner, key());
     assert_eq!(entry.read(), Ok(None));
     for writer in [1, 2] {
-        entry.write(tuning(writer)).unwrap();
+        entry.keep(tuning(writer)).unwrap();
         assert_eq!(entry.read(), Ok(Some(tuning(writer))));
     }
-    assert_eq!(names(&inner), [entry.file().file_name().unwrap().to_str().unwrap()]);
-    assert!(Entry::new(&Cache::None, key()).unwrap().is_none());
+    assert_eq!(names(&inner), [entry.path().file_name().unwrap().to_str().unwrap()]);
+    assert!(CacheFile::new(&Cache::None, key()).unwrap().is_none());
 }
 
 #[test]
-fn every_part_of_the_key_has_a_place_of_its_own() {
+fn every_part_of_the_key_has_a_file_of_its_own() {
     let folder = Path::new("nowhere");
     let gpu = GpuIdentity {
         index: 0,
@@ -43,7 +44,7 @@ fn every_part_of_the_key_has_a_place_of_its_own() {
         device: "1:2".to_owned(),
         driver: "1.0".to_owned(),
         api: "vulkan".to_owned(),
-        kind: crate::GpuKind::Discrete,
+        kind: crate::hardware::GpuKind::Discrete,
     };
     let with_gpu = Key { gpus: vec![gpu.clone()], ..key() };
     let new_driver = Key { gpus: vec![GpuIdentity { driver: "1.1".to_owned(), ..gpu }], ..key() };
@@ -52,7 +53,7 @@ fn every_part_of_the_key_has_a_place_of_its_own() {
     let mut pinned = Registry::with_cores(2);
     pinned.pin_threads();
     let mut slow = Registry::with_cores(2);
-    slow.limit_simd(crate::SimdLevel::Portable);
+    slow.limit_simd(crate::cpu::SimdLevel::Portable);
     let mut model = Model::built_in().unwrap();
     model.methods[0].terms[0].unit *= 2.0;
     let of = |registry: &Registry| Key::new(registry, &Model::built_in().unwrap()).unwrap();
@@ -68,52 +69,52 @@ fn every_part_of_the_key_has_a_place_of_its_own() {
         Key { usable_cores: key().usable_cores + 1, ..key() },
         Key { machine: Machine { physical_id: "0".to_owned(), ..key().machine }, ..key() },
     ];
-    if crate::SimdLevel::in_use() > crate::SimdLevel::Portable {
+    if crate::cpu::SimdLevel::in_use() > crate::cpu::SimdLevel::Portable {
         keys.push(of(&slow));
     }
     let count = keys.len();
-    let mut files: Vec<PathBuf> = keys.into_iter().map(|key| entry(folder, key).file).collect();
+    let mut files: Vec<PathBuf> = keys.into_iter().map(|key| entry(folder, key).path).collect();
     files.sort();
     files.dedup();
     assert_eq!(files.len(), count);
-    assert_eq!(entry(folder, key()).file, entry(folder, key()).file);
+    assert_eq!(entry(folder, key()).path, entry(folder, key()).path);
 }
 
 #[test]
 fn what_is_damaged_foreign_or_old_is_told_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let entry = entry(folder.path(), key());
-    entry.write(tuning(1)).unwrap();
-    let whole = fs::read_to_string(entry.file()).unwrap();
+    entry.keep(tuning(1)).unwrap();
+    let whole = fs::read_to_string(entry.path()).unwrap();
     let other_key = whole.replacen(&key().machine.physical_id, "0123456789abcdef", 1);
     let steps = whole.replacen("\"from_objects\": 0", "\"from_objects\": 7", 1);
     for (text, why) in [
         ("", "EOF"),
         (&whole[..whole.len() / 2], "EOF"),
         (&whole[..whole.len() - 2], "EOF"),
-        (&whole.replacen("cache/1", "cache/0", 1), "this version reads \"cache/1\""),
+        (&whole.replacen("cache/2", "cache/1", 1), "this version reads \"cache/2\""),
         (&whole.replacen("\"key\"", "\"host\": \"x\",\n  \"key\"", 1), "unknown field `host`"),
         (&other_key, "another machine"),
         (&steps, "don't begin at 0"),
     ] {
         assert_ne!(text, whole);
-        fs::write(entry.file(), text).unwrap();
+        fs::write(entry.path(), text).unwrap();
         let told = entry.read().unwrap_err();
         assert!(told.contains(why), "{why}: {told}");
-        entry.write(tuning(2)).unwrap();
+        entry.keep(tuning(2)).unwrap();
         assert_eq!(entry.read(), Ok(Some(tuning(2))));
     }
-    fs::write(entry.file(), [0xff; 100]).unwrap();
+    fs::write(entry.path(), [0xff; 100]).unwrap();
     assert!(entry.read().is_err());
 }
 
 #[test]
-fn a_folder_in_its_place_is_an_error_in_words() {
+fn a_folder_in_its_place_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let entry = entry(folder.path(), key());
-    fs::create_dir_all(entry.file().join("inside")).unwrap();
+    fs::create_dir_all(entry.path().join("inside")).unwrap();
     assert!(entry.read().unwrap_err().contains("it is no file"));
-    let told = entry.write(tuning(1)).unwrap_err();
+    let told = entry.keep(tuning(1)).unwrap_err();
     assert!(told.contains("can't be written"), "{told}");
     assert_eq!(names(folder.path()).len(), 1);
 }
@@ -122,12 +123,12 @@ fn a_folder_in_its_place_is_an_error_in_words() {
 #[test]
 fn writers_at_once_leave_a_whole_file() {
     let folder = tempfile::tempdir().unwrap();
-    entry(folder.path(), key()).write(tuning(0)).unwrap();
+    entry(folder.path(), key()).keep(tuning(0)).unwrap();
     std::thread::scope(|scope| {
         let writers: Vec<_> = [1, 2]
             .map(|writer| {
                 let entry = entry(folder.path(), key());
-                scope.spawn(move || (0..200).for_each(|_| entry.write(tuning(writer)).unwrap()))
+                scope.spawn(move || (0..200).for_each(|_| entry.keep(tuning(writer)).unwrap()))
             })
             .into();
         let entry = entry(folder.path(), key());

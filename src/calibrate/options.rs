@@ -1,13 +1,21 @@
 //! What a program may ask of the start of an adaptive broad phase.
 
-use crate::{Model, Registry};
+use crate::model::Model;
+use crate::registry::Registry;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// How [`Adaptive::for_this_machine`](crate::Adaptive::for_this_machine) goes about it. The default is what most engines want.
+///
+/// ```
+/// use sapwise::{Cache, StartOptions};
+///
+/// let options = StartOptions::new().background(false).cache(Cache::None);
+/// ```
 #[derive(Debug, Clone)]
-pub struct Options {
+#[non_exhaustive]
+pub struct StartOptions {
     /// Whether the times of frames correct the predicted costs: [`Adaptive::set_learning`](crate::Adaptive::set_learning). On by
     /// default.
     pub learning: bool,
@@ -23,18 +31,19 @@ pub struct Options {
     pub cache: Cache,
     /// The algorithms to choose from: the program's own, its thread pool ([`Registry::use_pool`]), its GPUs
     /// (`Registry::add_gpus`). `None`, the default: ours on all usable cores with
-    /// [pinned threads](Registry::pin_threads), and with the feature `measure-gpu` on every GPU that is no program on the CPU.
+    /// [pinned threads](Registry::pin_threads), and with the feature `measure-gpu` on every GPU that is no software adapter.
     pub registry: Option<Arc<Registry>>,
     /// The model that predicts, for a program with algorithms of its own, which the built-in one does not know. `None`, the
     /// default: [`Model::built_in`].
     pub model: Option<Model>,
     /// The longest that the hardware may be measured, a sample more or less, and each GPU once more. Two seconds by default; where
-    /// other programs work meanwhile less than one gives figures that are far off. What is had in the time is used.
+    /// other programs work meanwhile less than one returns figures that are far off. What is had in the time is used.
     pub probe_limit: Duration,
 }
 
 /// Where tuning is kept from one start to the next.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Cache {
     /// The folder `sapwise` in the user's cache folder: `$XDG_CACHE_HOME` or `~/.cache`, `~/Library/Caches`, `%LOCALAPPDATA%`.
     #[default]
@@ -45,8 +54,10 @@ pub enum Cache {
     None,
 }
 
-impl Default for Options {
-    fn default() -> Self {
+impl StartOptions {
+    /// What most engines want.
+    #[must_use]
+    pub fn new() -> Self {
         Self {
             learning: true,
             exploring: true,
@@ -56,5 +67,53 @@ impl Default for Options {
             model: None,
             probe_limit: Duration::from_secs(2),
         }
+    }
+
+    /// The same with [`learning`](Self::learning) on or off.
+    #[must_use]
+    pub fn learning(self, learning: bool) -> Self {
+        Self { learning, ..self }
+    }
+
+    /// The same with [`exploring`](Self::exploring) on or off.
+    #[must_use]
+    pub fn exploring(self, exploring: bool) -> Self {
+        Self { exploring, ..self }
+    }
+
+    /// The same in the [`background`](Self::background) or not.
+    #[must_use]
+    pub fn background(self, background: bool) -> Self {
+        Self { background, ..self }
+    }
+
+    /// The same with its tuning [kept](Self::cache) there.
+    #[must_use]
+    pub fn cache(self, cache: Cache) -> Self {
+        Self { cache, ..self }
+    }
+
+    /// The same over the algorithms of this [`registry`](Self::registry).
+    #[must_use]
+    pub fn registry(self, registry: Arc<Registry>) -> Self {
+        Self { registry: Some(registry), ..self }
+    }
+
+    /// The same with predictions of this [`model`](Self::model).
+    #[must_use]
+    pub fn model(self, model: Model) -> Self {
+        Self { model: Some(model), ..self }
+    }
+
+    /// The same with another [`probe_limit`](Self::probe_limit).
+    #[must_use]
+    pub fn probe_limit(self, probe_limit: Duration) -> Self {
+        Self { probe_limit, ..self }
+    }
+}
+
+impl Default for StartOptions {
+    fn default() -> Self {
+        Self::new()
     }
 }

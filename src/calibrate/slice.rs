@@ -1,8 +1,11 @@
 //! The slice of loads over which the tuning of this machine is shown.
 
-use crate::Load;
+use crate::load::Load;
 
-/// Loads of the second frame of the scenario `uniform`, seed 1, with as many pairs as its density lets expect, at four numbers of objects a
+/// The scenario of the slice.
+pub(super) const SCENARIO: &str = "uniform";
+
+/// Loads of the second frame of that scenario, seed 1, with as many pairs as its density lets expect, at four numbers of objects a
 /// decade: objects, candidates on the sweep axis, candidates in the strips, pairs, and how far boxes move.
 ///
 /// They are data, since a program that starts has no time to make scenes of a hundred thousand boxes.
@@ -28,12 +31,8 @@ const LOADS: [(u32, f64, f64, f64, f64); 17] = [
 
 /// Loads of the scenario `uniform`, from ten to a hundred thousand objects.
 pub(super) fn loads() -> Vec<Load> {
-    let load = |(objects, axis_candidates, strip_candidates, pairs, moved)| Load {
-        objects,
-        axis_candidates,
-        strip_candidates,
-        pairs,
-        moved,
+    let load = |(objects, axis, strip, pairs, moved)| {
+        Load::of_objects(objects).with_candidates(axis, strip).with_pairs(pairs).with_moved(moved)
     };
     LOADS.map(load).to_vec()
 }
@@ -41,7 +40,7 @@ pub(super) fn loads() -> Vec<Load> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Displacement;
+    use crate::load::Displacement;
     use crate::scene::{Scenario, Scene};
 
     #[test]

@@ -1,8 +1,7 @@
 //! The grid of strips: cells over the two axes across the sweep.
 
-use crate::Aabb;
-use crate::cpu::kernel::cell_numbers;
-use crate::sample::Sample;
+use super::sample::Sample;
+use crate::aabb::Aabb;
 use std::ops::RangeInclusive;
 
 /// Boxes that a strip holds on average. Their columns take 28 bytes each, so that a strip fits the first-level cache
@@ -37,14 +36,14 @@ pub(crate) struct StripGrid {
 
 /// The strips in which a box stands, packed: the first of them, and how many more cells it covers on each grid axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Place(u32);
+pub(crate) struct StripSpan(u32);
 
-impl Place {
+impl StripSpan {
     /// In no strip: the box is large.
     pub(crate) const APART: Self = Self(u32::MAX);
 }
 
-/// More cells than this beyond the first, on either axis, don't fit into a place.
+/// More cells than this beyond the first, on either axis, don't fit into a span.
 const MOST_MORE: u32 = 0x7f;
 
 /// The cells that a box covers, ends included.
@@ -110,7 +109,7 @@ impl StripGrid {
 
     /// The strips in which a box stands, on the sweep axis `AXIS`, which is the grid's.
     #[inline(always)]
-    pub(crate) fn place<const AXIS: usize>(&self, b: &Aabb) -> Place {
+    pub(crate) fn span<const AXIS: usize>(&self, b: &Aabb) -> StripSpan {
         let [u, v] = [(AXIS + 1) % 3, (AXIS + 2) % 3];
         let large = (b.max[AXIS] - b.min[AXIS] > self.large[0])
             | (b.max[u] - b.min[u] > self.large[1])
@@ -121,21 +120,21 @@ impl StripGrid {
         let (more_x, more_y) = (x1 - x, y1 - y);
         // The sizes allow for few more cells; bounds so far out that their cells are rounded could give many.
         if large | (more_x | more_y > MOST_MORE) {
-            return Place::APART;
+            return StripSpan::APART;
         }
-        Place((y * self.cells[0] + x) | more_x << 16 | more_y << 24)
+        StripSpan((y * self.cells[0] + x) | more_x << 16 | more_y << 24)
     }
 
-    /// Calls `f` for each strip of a place, with [`Cover::begins`] there.
+    /// Calls `f` for each strip of a span, with [`Cover::begins`] there.
     #[inline(always)]
-    pub(crate) fn each_strip(&self, place: Place, mut f: impl FnMut(usize, u32)) {
-        let Place(packed) = place;
+    pub(crate) fn each_strip(&self, span: StripSpan, mut f: impl FnMut(usize, u32)) {
+        let StripSpan(packed) = span;
         let first = (packed & 0xffff) as usize;
         if packed <= 0xffff {
             // Most boxes stand in one strip.
             return f(first, 3);
         }
-        if place == Place::APART {
+        if span == StripSpan::APART {
             return;
         }
         let row = self.cells[0] as usize;
@@ -152,6 +151,20 @@ impl StripGrid {
     fn cell_of(&self, d: usize, bound: f32) -> u32 {
         (((bound - self.origin[d]) * self.inverse_width[d]) as u32).min(self.cells[d] - 1)
     }
+}
+
+/// Four cell numbers along two axes, which take turns: `cells` held between 0 and `last`, NaN at 0, without their fractions.
+#[inline(always)]
+fn cell_numbers(cells: [f32; 4], last: [f32; 2]) -> [u32; 4] {
+    let mut at = [0.0_f32; 4];
+    for k in 0..4 {
+        // Comparisons in this order send NaN to 0, and compilers make vectors of them.
+        let last = if last[k % 2] < 65_535.0 { last[k % 2] } else { 65_535.0 };
+        let cell = if cells[k] > 0.0 { cells[k] } else { 0.0 };
+        at[k] = if cell < last { cell } else { last };
+    }
+    // SAFETY: each is no NaN and at most 65 535. One below 0 is not in `last`, which counts cells.
+    at.map(|cell| unsafe { cell.max(0.0).to_int_unchecked::<i32>() } as u32)
 }
 
 impl Cover {
@@ -202,12 +215,12 @@ mod tests {
         for low in bounds {
             for high in bounds.into_iter().filter(|&h| h >= low) {
                 let b = Aabb::new([1.0, low, low * 0.5], [2.0, high, high * 0.5]);
-                let (place, cover) = (grid.place::<0>(&b), grid.cover(&b));
+                let (span, cover) = (grid.span::<0>(&b), grid.cover(&b));
                 let mut strips = Vec::new();
-                grid.each_strip(place, |strip, begins| strips.push((grid.cell(strip), begins)));
+                grid.each_strip(span, |strip, begins| strips.push((grid.cell(strip), begins)));
                 let expected = cover.rows().flat_map(|y| cover.columns().map(move |x| [x, y]));
                 let expected: Vec<_> = expected.map(|cell| (cell, cover.begins(cell))).collect();
-                assert!(place == Place::APART || strips == expected, "{b:?}: {strips:?}");
+                assert!(span == StripSpan::APART || strips == expected, "{b:?}: {strips:?}");
             }
         }
         assert_eq!((cells[0], cells[8]), (0, grid.cells[0] - 1));

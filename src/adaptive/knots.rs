@@ -1,4 +1,4 @@
-//! Where a cost curve is looked at.
+//! Where the correction of a cost curve has its knots.
 
 /// Knots of an own curve: 2^3 to 2^21 objects, every second octave, linear in between and constant beyond.
 pub(super) const KNOTS: usize = 10;
@@ -7,12 +7,12 @@ const OCTAVES: f64 = 2.0;
 
 /// A number of objects among the knots.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct KnotPosition {
     knot: usize,
     share: f64,
 }
 
-impl Place {
+impl KnotPosition {
     pub(super) fn of(log2_objects: f64) -> Self {
         let at = ((log2_objects - FIRST_OCTAVE) / OCTAVES).clamp(0.0, (KNOTS - 1) as f64);
         let knot = (at as usize).min(KNOTS - 2);
@@ -28,7 +28,7 @@ impl Place {
 /// Where an algorithm is looked at: the number of objects, and the share of its predicted cost that calls have.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View {
-    pub(super) place: Place,
+    pub(super) position: KnotPosition,
     pub(super) calls: f64,
 }
 

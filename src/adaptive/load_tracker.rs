@@ -1,6 +1,8 @@
-//! The load of the next frame, from a sample now and then and from the frame before in between.
+//! The load of the next frame: from a sample now and then, from the frame before in between; and when to decide by it.
 
-use crate::{Aabb, Displacement, Load};
+use super::throttle::DecisionThrottle;
+use crate::aabb::Aabb;
+use crate::load::{Displacement, FramePlan, Load};
 use std::time::Instant;
 
 /// Share of the frames' time that samples may take where the number of objects holds still ...
@@ -11,25 +13,28 @@ const SHARE_OF_DRIFT: f64 = 0.1;
 
 /// A sample that the system interrupts looks dear. Taken at its word it would put off the next one for seconds of frames, over
 /// which a change of the scene goes unseen.
-const PRICE_RISES: f64 = 2.0;
+const COST_RISES: f64 = 2.0;
 
 /// Samples are at least this many frames apart where nothing drifts: what `moved` tells changes slowly.
 const SAMPLE_EVERY: u32 = 32;
 
 /// Keeps the estimate of the load up to date.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Glance {
+pub(super) struct LoadTracker {
     load: Load,
+    /// What was worked out about the next frame.
+    plan: FramePlan,
     /// Objects when the load was sampled, and frames and their time since.
     sampled: u32,
     age: u32,
     passed_ns: f64,
-    /// What a sample takes: the last one, but at most `PRICE_RISES` times what the one before was taken to be.
-    price_ns: f64,
+    /// What a sample takes: the last one, but at most `COST_RISES` times what the one before was taken to be.
+    sample_ns: f64,
     displacement: Displacement,
     watching: Watching,
     /// Objects and pairs of the frame before.
     before: Option<(u32, u64)>,
+    throttle: DecisionThrottle,
 }
 
 /// How far the boxes move is found out in the frame after each sample.
@@ -44,37 +49,53 @@ enum Watching {
     Begun,
 }
 
-impl Glance {
+impl LoadTracker {
     /// The load that was estimated last.
     pub(super) fn load(&self) -> Load {
         self.load
     }
 
-    /// Whether the next frame has to be looked at because of the frame before it: how far boxes moved shows in no other.
-    pub(super) fn is_watching(&self) -> bool {
-        self.watching == Watching::Begun
+    /// What was worked out about the frame that is to run.
+    pub(super) fn plan(&self) -> &FramePlan {
+        &self.plan
     }
 
-    /// Brings the load up to date: sampled where that pays, else scaled from the last sample.
-    pub(super) fn look(&mut self, boxes: &[Aabb]) {
+    /// The next frame is another one than the last that was decided on.
+    pub(super) fn forget_plan(&mut self) {
+        self.plan.forget();
+    }
+
+    /// Whether the next frame is to be decided on again: how far boxes moved shows in no other than the one after a sample.
+    pub(super) fn is_due(&self, boxes: &[Aabb]) -> bool {
+        self.throttle.is_due(count(boxes)) || self.watching == Watching::Begun
+    }
+
+    /// Brings the load up to date: sampled where that pays, else scaled from the last sample. Returns the number of frames that ran
+    /// since the last time.
+    pub(super) fn decide(&mut self, boxes: &[Aabb]) -> u32 {
         let objects = count(boxes);
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
         let mut moved = self.before.map(|_| self.load.moved);
+        self.plan.forget();
         if self.watching == Watching::Begun {
             moved = Some(self.displacement.moved(boxes).unwrap_or(1.0));
+            self.plan = FramePlan::default().with_moved(moved);
             self.watching = Watching::Done;
         }
-        if self.is_due(objects) {
+        if self.is_sample_due(objects) {
             let started = Instant::now();
-            self.load = Load::estimate(boxes, pairs, moved);
+            let (load, plan) = Load::planned(boxes, pairs, moved);
             let took = started.elapsed().as_nanos() as f64;
-            self.price_ns = if self.price_ns > 0.0 { took.min(self.price_ns * PRICE_RISES) } else { took };
+            self.load = load;
+            self.plan = plan.with_moved(self.plan.moved());
+            self.sample_ns = if self.sample_ns > 0.0 { took.min(self.sample_ns * COST_RISES) } else { took };
             self.watching = Watching::Due;
             (self.sampled, self.age, self.passed_ns) = (objects, 0, 0.0);
-            return;
+        } else {
+            self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
+            self.load.moved = moved.unwrap_or(self.load.moved);
         }
-        self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
-        self.load.moved = moved.unwrap_or(self.load.moved);
+        self.throttle.decide(objects)
     }
 
     /// Frames since the last sample.
@@ -83,19 +104,21 @@ impl Glance {
         self.age
     }
 
-    fn is_due(&self, objects: u32) -> bool {
+    fn is_sample_due(&self, objects: u32) -> bool {
         let (now, then) = (f64::from(objects.max(1)), f64::from(self.sampled.max(1)));
         let ratio = (now / then).max(then / now);
         let drift = ratio - 1.0;
         let rested = self.age >= SAMPLE_EVERY || drift > 1.0 / 16.0;
-        self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.price_ns
+        self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.sample_ns
     }
 
-    /// Takes in a frame that was run: its overlapping pairs, those that a filter kept out included, and about how long it took.
-    pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: f64) {
+    /// Takes in a frame that was run: its overlapping pairs, those that a filter kept out included, and how long it took in nanoseconds,
+    /// where it was timed.
+    pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: Option<f64>) {
+        let usual_ns = self.throttle.ran();
         self.before = Some((count(boxes), pairs));
         self.age = self.age.saturating_add(1);
-        self.passed_ns += ns;
+        self.passed_ns += ns.unwrap_or(usual_ns);
         // Not while looking: a frame may be looked at twice before it runs, and it has not moved in between.
         if self.watching == Watching::Due {
             self.displacement.watch(boxes);
@@ -103,15 +126,26 @@ impl Glance {
         }
     }
 
-    /// After a frame that gave no pairs nothing is known of the one before.
-    pub(super) fn lost(&mut self) {
+    /// What a decision took, where that is known, and its frame, in nanoseconds.
+    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64) {
+        self.throttle.took(decision_ns, frame_ns);
+    }
+
+    /// The next frame is to be decided on again.
+    pub(super) fn wake(&mut self) {
+        self.throttle.wake();
+    }
+
+    /// After a frame that failed nothing is known of the one before, and the next one is decided on again.
+    pub(super) fn failed(&mut self) {
         self.before = None;
         self.watching = Watching::Done;
+        self.wake();
     }
 }
 
 /// Boxes of a frame; an algorithm refuses more than this can tell.
-pub(super) fn count(boxes: &[Aabb]) -> u32 {
+fn count(boxes: &[Aabb]) -> u32 {
     u32::try_from(boxes.len()).unwrap_or(u32::MAX)
 }
 

@@ -1,6 +1,6 @@
 //! How far boxes move from one frame to the next.
 
-use crate::Aabb;
+use crate::aabb::Aabb;
 use crate::splitmix::mix;
 
 /// Boxes watched. Their mean displacement is known to about an eighth of the standard deviation over all boxes.
@@ -37,6 +37,11 @@ impl Displacement {
             let id = first + (mix(k as u64) % (end - first) as u64) as usize;
             *watched = (id as u32, boxes[id]);
         }
+    }
+
+    /// Whether any box is remembered.
+    pub(crate) fn is_watching(&self) -> bool {
+        self.watching > 0
     }
 
     /// How far the watched boxes have moved since, 0 to 1: the mean over them of the greatest displacement of a bound, in mean

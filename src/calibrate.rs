@@ -1,0 +1,10 @@
+//! From nothing to a tuning of this machine: [`Adaptive::for_this_machine`](crate::Adaptive::for_this_machine).
+
+mod cache;
+mod for_this_machine;
+mod options;
+mod slice;
+
+#[cfg(feature = "schema")]
+pub use cache::cache_schema;
+pub use options::{Cache, StartOptions};

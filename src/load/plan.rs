@@ -1,0 +1,51 @@
+//! What is known of a frame before its pairs are searched.
+
+use super::sample::{Chosen, Sample};
+use super::strip_grid::StripGrid;
+use crate::aabb::Aabb;
+
+/// What was worked out about a frame to choose an algorithm, handed on to the one that runs it:
+/// [`BroadPhase::find_pairs_with`](crate::BroadPhase::find_pairs_with).
+///
+/// An algorithm works out itself what is not known. The default knows nothing.
+#[derive(Debug, Clone, Default)]
+pub struct FramePlan {
+    seen: Option<(Sample, StripGrid)>,
+    moved: Option<f64>,
+}
+
+impl FramePlan {
+    /// The sample of a frame and the grid laid for it.
+    pub(super) fn seen(chosen: &Chosen, objects: usize) -> (Self, Sample, StripGrid) {
+        let sample = Sample::statistics(chosen);
+        let grid = StripGrid::plan(&sample, objects);
+        (Self { seen: Some((sample, grid)), moved: None }, sample, grid)
+    }
+
+    /// The same plan of a frame in which the boxes moved so far.
+    pub(crate) fn with_moved(self, moved: Option<f64>) -> Self {
+        Self { moved, ..self }
+    }
+
+    /// Knows nothing from now on.
+    pub(crate) fn forget(&mut self) {
+        self.seen = None;
+        self.moved = None;
+    }
+
+    /// How far the boxes moved since the frame before, where that is known: [`Displacement::moved`](crate::Displacement::moved).
+    #[must_use]
+    pub fn moved(&self) -> Option<f64> {
+        self.moved
+    }
+
+    /// The sample of this frame.
+    pub(crate) fn sample(&self, boxes: &[Aabb]) -> Sample {
+        self.seen.map_or_else(|| Sample::of(boxes), |(sample, _)| sample)
+    }
+
+    /// The grid for this frame.
+    pub(crate) fn grid(&self, boxes: &[Aabb]) -> StripGrid {
+        self.seen.map_or_else(|| StripGrid::plan(&Sample::of(boxes), boxes.len()), |(_, grid)| grid)
+    }
+}
