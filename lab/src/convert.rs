@@ -69,7 +69,7 @@ pub fn convert(text: &str) -> Result<Converted, ConvertError> {
     let schema = file.get("schema").and_then(Value::as_str).unwrap_or_default().to_owned();
     let mut dropped = Vec::new();
     let (schema, current): (_, fn(&str) -> Result<String, Unsound>) = match schema.as_str() {
-        "report/1" => ("report/2", |text| Ok(report::write(&report::read(text)?)?)),
+        "report/1" => ("report/2", |text| Ok(report::write(&report::read(text)?.value)?)),
         "model/1" => {
             dropped = move_training(&mut file);
             ("model/2", |text| {

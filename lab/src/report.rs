@@ -1,13 +1,13 @@
 //! One machine, one day: what was measured, and nothing that was concluded.
 
-use sapwise::json::{self, Format, Read, Schema};
+mod text;
+
+pub use text::{FORMAT, is_report, read, write};
+
 use sapwise::model::Scale;
 use sapwise::{AlgorithmId, Hardware, Load, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// Files of reports.
-pub const FORMAT: Format = Format::new("report", 2, 0);
 
 /// The hardware parameters of a machine and the raw timings of every algorithm on it.
 ///
@@ -182,28 +182,6 @@ pub struct Timing {
     pub error: Option<String>,
 }
 
-/// Whether a text says that it is a report, of whatever version.
-#[must_use]
-pub fn is_report(text: &str) -> bool {
-    Schema::of(text).is_ok_and(|schema| schema.name() == FORMAT.schema().name())
-}
-
-/// Reads a report and checks its figures. Keys that this version does not know, in a file of a newer one, are in the answer.
-///
-/// # Errors
-/// The place of the defect, or the schema where it is none of ours.
-pub fn read(text: &str) -> Result<Read<Report>, json::Error> {
-    FORMAT.read(text)
-}
-
-/// Writes a report, one key a line.
-///
-/// # Errors
-/// When a figure can't be written.
-pub fn write(report: &Report) -> Result<String, json::Error> {
-    FORMAT.write(report)
-}
-
 impl Timed {
     /// An algorithm with the usual terms of its method.
     #[must_use]
@@ -229,7 +207,7 @@ impl Report {
     #[must_use]
     pub fn defect(&self) -> Option<String> {
         if let Some(defect) = self.hardware.defect() {
-            return Some(defect);
+            return Some(defect.to_string());
         }
         for (k, point) in self.points.iter().enumerate() {
             let at = format!("point {k} ({} at {} objects)", point.scenario, point.load.objects);
