@@ -2,7 +2,7 @@
 
 use crate::belief::Prior;
 use crate::data::Profile;
-use crate::report::Label;
+use crate::report::{Label, unsound};
 use sapwise::Model;
 use sapwise::json::{self, Format};
 use schemars::JsonSchema;
@@ -183,6 +183,9 @@ pub fn read_model(text: &str) -> Result<StoredModel, json::Error> {
         training: Training,
     }
     let training = TRAINING.read::<Keys>(text)?.value.training;
+    if let Some(defect) = training.prior.and_then(|p| p.defect()) {
+        return Err(unsound(defect));
+    }
     Ok(StoredModel { model: json::model(text)?, training })
 }
 

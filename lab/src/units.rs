@@ -1,7 +1,7 @@
 //! Figures of hardware parameters with their units.
 
 use crate::text::{bytes, duration};
-use sapwise::GpuParameterId;
+use sapwise::hardware::GpuParameterId;
 
 /// A value with the unit that the end of its parameter's name says.
 pub fn value(name: &str, value: f64) -> String {

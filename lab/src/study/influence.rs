@@ -3,7 +3,8 @@
 use super::entry::{Entry, representatives};
 use super::rank::{self, Rank};
 use super::speed::slownesses;
-use crate::evaluate::{Effect, Importance, Verdict, measured_crossovers};
+use super::side_crossovers::measured_crossovers;
+use crate::evaluate::{Effect, Importance, Verdict};
 use rayon::prelude::*;
 use sapwise::Backend;
 use sapwise::hardware::{GpuParameterId, ParameterId};

@@ -3,7 +3,6 @@
 use super::entry::Entry;
 use crate::data::Profile;
 use crate::data_table::{Cell, DataTable};
-use crate::evaluate::available;
 use crate::figures::{FieldMap, MapCell, MapPanel, MapPoint};
 use crate::fit::measured_costs;
 use crate::train::without;
@@ -43,7 +42,7 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
     let profile = &entry.profile;
     let (model, held_out) = without(profiles, &profile.file)?;
     let measured = measured_costs(profile).0;
-    let ids = available(profile);
+    let ids = profile.available();
     let predicted = model.predict(&profile.hardware, &profile.with_revisions(&ids)).map_err(anyhow::Error::msg)?.costs;
     let density = |load: &Load| load.pairs / f64::from(load.objects.max(1));
     let places: Vec<(f64, f64)> =
@@ -153,13 +152,10 @@ fn spread_evenly(objects: f64, pairs_of_object: f64, moved: f64) -> Load {
     // A world that grows with its objects: each is next to as many as before, and shares an axis with as many as its cross-section holds,
     // which grows with the power 2/3 and not 1 as in `Load::rescaled`, whose world stays.
     let growth = f64::from(objects) / f64::from(few);
-    Load {
-        objects,
-        axis_candidates: load.axis_candidates * growth.powf(5.0 / 3.0),
-        strip_candidates: load.strip_candidates * growth,
-        pairs: load.pairs * growth,
-        moved,
-    }
+    Load::of_objects(objects)
+        .with_candidates(load.axis_candidates * growth.powf(5.0 / 3.0), load.strip_candidates * growth)
+        .with_pairs(load.pairs * growth)
+        .with_moved(moved)
 }
 
 #[cfg(test)]
