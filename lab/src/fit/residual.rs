@@ -171,8 +171,10 @@ mod tests {
         let data = Residuals { names, features, ln_ratios, weights: vec![1.0; 52], groups: vec![0; 52] };
         let ridge = data.ridge().unwrap();
         let terms = vec![ModelTerm { term: Term::Objects, scale: Scale::Cycle, unit: 2.0 }];
-        let bare = MethodModel { terms, ..truth().remove(0) };
-        let full = MethodModel { residual_intercept: ridge.intercept, residual: ridge.terms.clone(), ..bare.clone() };
+        let mut bare = truth().remove(0);
+        bare.terms = terms;
+        let mut full = bare.clone();
+        (full.residual_intercept, full.residual) = (ridge.intercept, ridge.terms.clone());
         for k in 0..52 {
             let cost = |m: &MethodModel| m.curve(&machine.hardware(), &threads(k)).unwrap().cost_ns(&load(k));
             let residual = (cost(&full) / cost(&bare)).ln();
