@@ -53,7 +53,7 @@ impl Own {
         self.queue.submit([encoder.finish()]);
         let (mapped, told) = std::sync::mpsc::channel();
         self.back.slice(..).map_async(wgpu::MapMode::Read, move |result| mapped.send(result).unwrap());
-        // Whoever polls the device first calls back, so that another thread's wait may have done it.
+        // The first that polls the device calls back, so that another thread's wait may have done it.
         self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
         told.recv().unwrap().unwrap();
         assert!(*self.back.slice(..).get_mapped_range().unwrap() == *sent, "the program's own work went wrong");
