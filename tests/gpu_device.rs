@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Random, gpus, naive};
-use sapwise::gpu::{Gpu, Gpus, wgpu};
+use sapwise::gpu::{Gpu, Gpus, wgpu30 as wgpu};
 use sapwise::{Aabb, BroadPhase, GpuIdentity, PairOrder, Pairs, Registry};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -76,7 +76,7 @@ fn ours_and_the_programs_own_work_share_a_queue() {
         let (device, queue) = device(&gpus, index);
         let mut registry = Registry::with_cores(1);
         registry.add_gpus(&Gpus::of([shared(index, &device, &queue)]));
-        let ids = registry.available().into_iter().map(|(id, _)| id).filter(|id| id.to_string().contains("@gpu"));
+        let ids = registry.available().into_iter().map(|e| e.id).filter(|id| id.to_string().contains("@gpu"));
         let mut algorithms: Vec<_> = ids.map(|id| (id.to_string(), registry.create(&id).unwrap())).collect();
         assert_eq!(algorithms.len(), 3);
         let mut own = Own::new(&device, &queue);
@@ -117,9 +117,9 @@ fn given_gpus_stand_under_their_numbers_once() {
     assert!(given.adapter(0).is_none() && Gpus::of([]).is_empty());
     // The very device, and no other one.
     assert_eq!(given.open(2).unwrap().device(), &device);
-    let told = given.open_another(2).unwrap_err();
+    let told = given.open_another(2).unwrap_err().to_string();
     assert!(told.contains("gpu2 is the program's own device"), "{told}");
-    assert!(given.open(1).unwrap_err().contains("only gpu0, gpu2"));
+    assert!(given.open(1).unwrap_err().to_string().contains("only gpu0, gpu2"));
 }
 
 /// A program's device can be measured as it is, and within a limit: then all that predictions read is there.
@@ -147,7 +147,7 @@ fn a_given_gpu_is_measured_on_its_own_device() {
         // One sample under the load of other tests may well be nought.
         assert!(measured.value(name).is_some(), "{name}: {:?}", measured.parameters);
     }
-    let absent = |name: &str| measured.parameters.iter().find(|p| p.name == name).unwrap().source.clone();
+    let absent = |id: GpuParameterId| measured.parameters.iter().find(|p| p.name == id.as_str()).unwrap().source.clone();
     assert!(absent(GpuParameterId::AtomicGPerS).contains("limit of time"));
     assert!(gpus.adapter(0).is_some());
     Own::new(&device, &queue).work();

@@ -90,7 +90,7 @@ struct OnGpu {
 const GPU: &str = "mock@gpu0";
 
 fn lost() -> Error {
-    Error::Unavailable { algorithm: GPU.parse().unwrap(), reason: "the device is lost".to_owned() }
+    Error::Unavailable { algorithm: GPU.parse().unwrap(), reason: "the device is lost".into() }
 }
 
 impl BroadPhase for OnGpu {
@@ -122,12 +122,8 @@ fn tuning() -> Tuning {
     let cost = |id: &str, call: f64, object: f64| {
         let of_method = registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method())));
         let term = |term, unit_ns| CostTerm { term, unit_ns };
-        AlgorithmCost {
-            algorithm: id.parse().unwrap(),
-            revision: of_method.map_or(1, |e| e.revision),
-            curve: CostCurve { terms: vec![term(Term::Call, call), term(Term::Objects, object)], ..CostCurve::default() },
-            spread_ln: 0.3,
-        }
+        let curve = CostCurve::new(vec![term(Term::Call, call), term(Term::Objects, object)]);
+        AlgorithmCost::new(id.parse().unwrap(), of_method.map_or(1, |e| e.revision), curve, 0.3)
     };
     let costs = vec![
         cost("brute@cpu1", 100.0, 60.0),
@@ -139,7 +135,7 @@ fn tuning() -> Tuning {
         cost("pair-cache@cpu3", 5000.0, 14.0),
         cost("grid-sap@cpu4", 5500.0, 11.0),
     ];
-    let loads: Vec<Load> = (0..12).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    let loads: Vec<Load> = (0..12).map(|k| Load::of_objects(1 << k)).collect();
     Tuning::from_costs(Source::Default, "fragmentation", costs, &loads)
 }
 

@@ -55,7 +55,7 @@ fn costs() -> Vec<AlgorithmCost> {
 }
 
 fn slice() -> Vec<Load> {
-    (2..=12).map(|k| Load { objects: 10_u32.pow(k / 2) * if k % 2 == 0 { 1 } else { 3 }, ..Load::default() }).collect()
+    (2..=12).map(|k| Load::of_objects(10_u32.pow(k / 2) * if k % 2 == 0 { 1 } else { 3 })).collect()
 }
 
 fn made_up(real: &[(&str, f64)]) -> MadeUp {
@@ -64,7 +64,7 @@ fn made_up(real: &[(&str, f64)]) -> MadeUp {
 }
 
 fn cheapest(costs: &[AlgorithmCost], objects: u32) -> String {
-    let load = Load { objects, ..Load::default() };
+    let load = Load::of_objects(objects);
     let best = costs.iter().min_by(|a, b| a.curve.cost_ns(&load).total_cmp(&b.curve.cost_ns(&load)));
     best.unwrap().algorithm.to_string()
 }

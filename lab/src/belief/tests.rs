@@ -21,7 +21,7 @@ fn straight() -> Prior {
 }
 
 fn load(objects: u32) -> Load {
-    Load { objects, ..Load::default() }
+    Load::of_objects(objects)
 }
 
 /// Algorithm, objects, real over predicted time, noise.
@@ -239,7 +239,7 @@ fn what_is_learned_of_a_count_holds_for_loads_that_have_more_or_less_of_it() {
         cost.curve.terms.push(CostTerm { term: Term::Pairs, unit_ns: 50.0 });
     }
     let mut posterior = Posterior::new(all, &Prior::ASSUMED);
-    let with = |pairs: f64| Load { pairs, ..load(1000) };
+    let with = |pairs: f64| load(1000).with_pairs(pairs);
     // Twice as long as predicted where there are pairs, as predicted where there are none.
     for _ in 0..20 {
         for (pairs, ratio) in [(0.0, 1.0), (10_000.0, 2.0)] {

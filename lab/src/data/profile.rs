@@ -2,7 +2,7 @@
 
 use crate::report::{Label, Point, Report, Timed, Timing};
 use crate::sweep::median;
-use sapwise::{AlgorithmId, Hardware, Load};
+use sapwise::{AlgorithmId, Entry, Hardware, Load};
 use std::borrow::Cow;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -84,9 +84,9 @@ impl Profile {
     }
 
     /// These algorithms with the revisions that they were timed in, 0 of one that was not, as a model is asked for them.
-    pub fn with_revisions(&self, ids: &[AlgorithmId]) -> Vec<(AlgorithmId, u32)> {
+    pub fn with_revisions(&self, ids: &[AlgorithmId]) -> Vec<Entry> {
         let revision = |id: &AlgorithmId| self.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);
-        ids.iter().map(|id| (id.clone(), revision(id))).collect()
+        ids.iter().map(|id| Entry::new(id.clone(), revision(id))).collect()
     }
 
     /// The algorithms that were timed anywhere in it.

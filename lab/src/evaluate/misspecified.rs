@@ -71,7 +71,7 @@ fn mean_regrets(profiles: &[Profile], partition: &Partition, terms: &TermsOf) ->
 fn regret(profile: &Profile, model: &Model) -> f64 {
     let available = available(profile);
     let revision = |id: &AlgorithmId| profile.algorithms.iter().find(|t| t.id == *id).map_or(0, |t| t.revision);
-    let wanted: Vec<(AlgorithmId, u32)> = available.iter().map(|id| (id.clone(), revision(id))).collect();
+    let wanted: Vec<sapwise::Entry> = available.iter().map(|id| sapwise::Entry::new(id.clone(), revision(id))).collect();
     model.predict(&profile.hardware, &wanted).map_or(NOT_TIMED - 1.0, |prediction| {
         RegretTable::new(profile).regret(profile, &by_costs(prediction.costs, &available)).mean
     })

@@ -41,14 +41,14 @@ pub(crate) fn simulate(
         let hardware = hardware::hardware(&build, &machine);
         let mut algorithms = Registry::with_cores(build.cpu.threads).available();
         algorithms.extend(sapwise::gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu)));
-        let ids: Vec<AlgorithmId> = algorithms.iter().map(|(id, _)| id.clone()).collect();
+        let ids: Vec<AlgorithmId> = algorithms.iter().map(|e| e.id.clone()).collect();
         let points = race::race(&Costs::new(&machine), &ids, loads, seed, &name);
         let report = Report {
             schema: ReportSchema,
             label: Label::Simulated,
             provenance: provenance(&specifications.date, seed),
             hardware,
-            algorithms: algorithms.into_iter().map(|(id, revision)| Timed { id, revision }).collect(),
+            algorithms: algorithms.into_iter().map(|e| Timed { id: e.id, revision: e.revision }).collect(),
             points,
             remarks: vec!["simulated: no machine was measured, and no algorithm has run".to_owned()],
         };

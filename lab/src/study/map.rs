@@ -153,13 +153,10 @@ fn spread_evenly(objects: f64, pairs_of_object: f64, moved: f64) -> Load {
     // A world that grows with its objects: each is next to as many as before, and shares an axis with as many as its cross-section holds,
     // which grows with the power 2/3 and not 1 as in `Load::rescaled`, whose world stays.
     let growth = f64::from(objects) / f64::from(few);
-    Load {
-        objects,
-        axis_candidates: load.axis_candidates * growth.powf(5.0 / 3.0),
-        strip_candidates: load.strip_candidates * growth,
-        pairs: load.pairs * growth,
-        moved,
-    }
+    Load::of_objects(objects)
+        .with_candidates(load.axis_candidates * growth.powf(5.0 / 3.0), load.strip_candidates * growth)
+        .with_pairs(load.pairs * growth)
+        .with_moved(moved)
 }
 
 #[cfg(test)]
