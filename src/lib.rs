@@ -47,6 +47,10 @@ mod error;
 mod filter;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+// Without the feature only which algorithms there are: reports name them, and nothing of them can run.
+#[cfg(not(feature = "gpu"))]
+#[path = "gpu/methods.rs"]
+pub mod gpu;
 pub mod hardware;
 #[cfg(feature = "model")]
 pub mod json;
@@ -101,8 +105,3 @@ pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, T
 #[cfg(all(doctest, feature = "this-machine"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
-
-/// The examples of the guide as tests, with the features that they need together.
-#[cfg(all(doctest, feature = "this-machine", feature = "gpu"))]
-#[doc = include_str!("../docs/guide.md")]
-struct Guide;
