@@ -1,13 +1,14 @@
 //! One machine, one day: what was measured, and nothing that was concluded.
 
-use sapwise::json::{self, Format, Read, Schema};
+mod text;
+
+pub(crate) use text::unsound;
+pub use text::{FORMAT, is_report, read, write};
+
 use sapwise::model::Scale;
 use sapwise::{AlgorithmId, Hardware, Load, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// Files of reports.
-pub const FORMAT: Format = Format::new("report", 2, 0);
 
 /// The hardware parameters of a machine and the raw timings of every algorithm on it.
 ///
@@ -180,37 +181,6 @@ pub struct Timing {
     pub samples_ns: Vec<u64>,
     /// Why there are no samples, where there are none.
     pub error: Option<String>,
-}
-
-/// Whether a text says that it is a report, of whatever version.
-#[must_use]
-pub fn is_report(text: &str) -> bool {
-    Schema::of(text).is_ok_and(|schema| schema.name() == FORMAT.schema().name())
-}
-
-/// Reads a report and checks its figures. Keys that this version does not know, in a file of a newer one, are in the answer.
-///
-/// # Errors
-/// The place of the defect, or the schema where it is none of ours.
-pub fn read(text: &str) -> Result<Read<Report>, json::Error> {
-    let read: Read<Report> = FORMAT.read(text)?;
-    match read.value.defect() {
-        Some(defect) => Err(unsound(defect)),
-        None => Ok(read),
-    }
-}
-
-/// What is wrong with the figures of a file that is well-formed.
-pub(crate) fn unsound(defect: String) -> json::Error {
-    json::Error::Data { path: ".".to_owned(), source: serde::de::Error::custom(defect) }
-}
-
-/// Writes a report, one key a line.
-///
-/// # Errors
-/// When a figure can't be written.
-pub fn write(report: &Report) -> Result<String, json::Error> {
-    FORMAT.write(report)
 }
 
 impl Timed {

@@ -57,7 +57,7 @@ const FIGURE_9: [Printed; 3] = [
 
 fn report(file: &str) -> Report {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../datasets/published");
-    report::read(&std::fs::read_to_string(folder.join(file)).unwrap()).unwrap()
+    report::read(&std::fs::read_to_string(folder.join(file)).unwrap()).unwrap().value
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::entry::{Entry, representatives};
 use super::rank::{self, Rank};
 use super::speed::slownesses;
-use super::side_crossovers::measured_borders;
+use super::side_crossovers::measured_crossovers;
 use crate::evaluate::{Effect, Importance, Verdict};
 use rayon::prelude::*;
 use sapwise::Backend;
@@ -120,7 +120,7 @@ fn borders_of(entry: &Entry) -> BTreeMap<String, f64> {
     let mut profile = entry.profile.clone();
     let software_gpus = entry.software_gpus();
     profile.retain(|t| !matches!(t.id.backend(), Backend::Gpu(gpus) if gpus.iter().any(|g| software_gpus.contains(g))));
-    measured_borders(&profile).into_iter().collect()
+    measured_crossovers(&profile).into_iter().collect()
 }
 
 fn link(parameter: &str, on: On, rank: Option<Rank>, importance: Option<&Importance>) -> Link {
