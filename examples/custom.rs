@@ -8,14 +8,14 @@
 //! `probes/examples/bvh.rs`.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Load, Pairs, Registry, Scenario,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs, Registry, Scenario,
     Source, Term, Tuning,
 };
 
 /// What it is called in tuning, reports and decisions.
 pub(crate) const ID: &str = "rested@cpu1";
 
-/// Gives the pairs of the frame before where no box has changed, and leaves other frames to another algorithm.
+/// Returns the pairs of the frame before where no box has changed, and leaves other frames to another algorithm.
 pub(crate) struct Rested {
     other: Box<dyn BroadPhase>,
     before: Vec<Aabb>,
@@ -44,11 +44,13 @@ impl BroadPhase for Rested {
         pairs.finish()
     }
 
-    /// A frame is cheaper after one that was alike.
-    fn is_incremental(&self) -> bool {
-        true
+    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
+        Some(self)
     }
 }
+
+/// A frame is cheaper after one that was alike.
+impl Incremental for Rested {}
 
 /// A registry of ours with [`Rested`] in it, which leaves frames to `other`.
 pub(crate) fn registry(other: &'static str) -> Registry {
@@ -71,7 +73,7 @@ pub(crate) fn cost(registry: &Registry, id: &str, terms: &[(Term, f64)]) -> Algo
 
 /// Tuning from these costs, with the borders of scenes from 10 to a million objects.
 pub(crate) fn tuning(costs: Vec<AlgorithmCost>) -> Tuning {
-    let load = |k: u32| Load { objects: 10_u32.pow(k), ..Load::default() };
+    let load = |k: u32| Load::of_objects(10_u32.pow(k));
     Tuning::from_costs(Source::Default, "", costs, &(1..=6).map(load).collect::<Vec<Load>>())
 }
 

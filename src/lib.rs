@@ -105,8 +105,3 @@ pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, T
 #[cfg(all(doctest, feature = "this-machine"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
-
-/// The examples of the guide as tests, with the features that they need together.
-#[cfg(all(doctest, feature = "this-machine", feature = "gpu"))]
-#[doc = include_str!("../docs/guide.md")]
-struct Guide;

@@ -11,9 +11,9 @@ fn the_built_in_model_knows_every_method_of_this_build() {
     }
     #[cfg(feature = "gpu")]
     {
-        use sapwise::{GpuIdentity, GpuKind};
+        use sapwise::{Entry, GpuIdentity, GpuKind};
         let gpus = [0, 1].map(|index| GpuIdentity::new(index, "made up", GpuKind::Software));
-        for (id, revision) in sapwise::gpu::algorithms(&gpus) {
+        for Entry { id, revision, .. } in sapwise::gpu::algorithms(&gpus) {
             assert_eq!(model.method(&id).map(|m| m.revision), Some(revision), "{id}: train on new reports");
         }
     }
@@ -27,7 +27,7 @@ fn every_schema_version_stays_readable() {
     assert!(json::model(&json::write_model(&model).unwrap()).unwrap() == model);
     let tuning = json::tuning(include_str!("fixtures/tuning-1.json")).unwrap();
     assert_eq!(json::tuning(&json::write_tuning(&tuning).unwrap()).unwrap(), tuning);
-    let ranking = tuning.rank(&Load { objects: 10, ..Default::default() }, |_| true).unwrap();
+    let ranking = tuning.rank(&Load::of_objects(10), |_| true).unwrap();
     assert_eq!(tuning.costs[ranking.best].algorithm.to_string(), "brute@cpu1");
 }
 

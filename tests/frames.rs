@@ -12,13 +12,13 @@ fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
     for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
         let mut registry = Registry::with_cores(3);
         registry.limit_simd(level);
-        for (id, _) in registry.available() {
+        for id in registry.available().into_iter().map(|e| e.id) {
             if id.threads() != 2 {
                 all.push((format!("{id} at {level}"), registry.create(&id).unwrap()));
             }
         }
         let ids = ["pair-cache@cpu1", "pair-cache@cpu2", "pair-cache@cpu3"].map(|id| id.parse().unwrap());
-        if let Some(Ok(all_widths)) = registry.create_for(&ids.each_ref()) {
+        if let Ok(Some(all_widths)) = registry.create_family(&ids.each_ref()) {
             all.push((format!("pair_cache on changing threads at {level}"), Box::new(Roaming(all_widths, Random(7)))));
         }
     }
@@ -30,7 +30,8 @@ struct Roaming(Box<dyn BroadPhase>, Random);
 
 impl BroadPhase for Roaming {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        assert!(self.0.set_threads(1 + (self.1.next() * 3.0) as u32) && !self.0.set_threads(4));
+        let incremental = self.0.as_incremental().unwrap();
+        assert!(incremental.set_threads(1 + (self.1.next() * 3.0) as u32) && !incremental.set_threads(4));
         self.0.find_pairs(boxes, pairs)
     }
 }
@@ -59,7 +60,7 @@ fn wander(boxes: &mut [Aabb], step: f32, random: &mut Random) {
 fn no_kept_pair_is_lost_on_the_way_from_many_threads_to_one() {
     let registry = Registry::with_cores(8);
     let ids = ["pair-cache@cpu1", "pair-cache@cpu8"].map(|id| id.parse().unwrap());
-    let Some(Ok(mut pair_cache)) = registry.create_for(&ids.each_ref()) else {
+    let Ok(Some(mut pair_cache)) = registry.create_family(&ids.each_ref()) else {
         // Built without threads.
         return;
     };
@@ -69,7 +70,7 @@ fn no_kept_pair_is_lost_on_the_way_from_many_threads_to_one() {
     let mut boxes = random.cubes(400, [11.0; 3], 0.5);
     let middle = boxes[0].min;
     for frame in 0..400 {
-        assert!(pair_cache.set_threads(if frame % 3 == 2 { 1 } else { 8 }));
+        assert!(pair_cache.as_incremental().unwrap().set_threads(if frame % 3 == 2 { 1 } else { 8 }));
         for (k, b) in boxes.iter_mut().enumerate() {
             // Towards each other until they are crowded, and a few that leave their grown box in every frame.
             let pull = if frame < 330 { 0.006 } else { 0.0 };

@@ -13,7 +13,7 @@ use sapwise_scenes::Scenario;
 fn every_algorithm(gpus: &Gpus) -> Vec<(String, Box<dyn BroadPhase>)> {
     let mut registry = Registry::with_cores(1);
     registry.add_gpus(gpus);
-    let ids = registry.available().into_iter().map(|(id, _)| id).filter(|id| id.to_string().contains("@gpu"));
+    let ids = registry.available().into_iter().map(|e| e.id).filter(|id| id.to_string().contains("@gpu"));
     let mut all: Vec<(String, Box<dyn BroadPhase>)> =
         ids.map(|id| (id.to_string(), registry.create(&id).unwrap())).collect();
     for method in ["brute", "sap", "grid-sap"] {
@@ -231,7 +231,7 @@ fn the_order_is_the_same_in_every_run() {
     let mut registry = Registry::with_cores(1);
     registry.add_gpus(&gpus);
     // Where several GPUs share a frame the cuts follow their measured speeds, and the order follows the cuts.
-    for (id, _) in registry.available().into_iter().filter(|(id, _)| id.to_string().contains("@gpu")) {
+    for id in registry.available().into_iter().map(|e| e.id).filter(|id| id.to_string().contains("@gpu")) {
         if id.to_string().contains('+') {
             continue;
         }

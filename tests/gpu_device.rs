@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Random, gpus, naive};
-use sapwise::gpu::{Gpu, Gpus, wgpu};
+use sapwise::gpu::{Gpu, Gpus, wgpu30 as wgpu};
 use sapwise::{Aabb, BroadPhase, GpuIdentity, PairOrder, Pairs, Registry};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -76,7 +76,7 @@ fn ours_and_the_programs_own_work_share_a_queue() {
         let (device, queue) = device(&gpus, index);
         let mut registry = Registry::with_cores(1);
         registry.add_gpus(&Gpus::of([shared(index, &device, &queue)]));
-        let ids = registry.available().into_iter().map(|(id, _)| id).filter(|id| id.to_string().contains("@gpu"));
+        let ids = registry.available().into_iter().map(|e| e.id).filter(|id| id.to_string().contains("@gpu"));
         let mut algorithms: Vec<_> = ids.map(|id| (id.to_string(), registry.create(&id).unwrap())).collect();
         assert_eq!(algorithms.len(), 3);
         let mut own = Own::new(&device, &queue);
@@ -119,7 +119,7 @@ fn given_gpus_stand_under_their_numbers_once() {
     assert_eq!(given.open(2).unwrap().device(), &device);
     let told = given.open_another(2).unwrap_err();
     assert!(told.contains("gpu2 is the program's own device"), "{told}");
-    assert!(given.open(1).unwrap_err().contains("only gpu0, gpu2"));
+    assert!(given.open(1).unwrap_err().to_string().contains("only gpu0, gpu2"));
 }
 
 /// A program's device can be measured as it is, and within a limit: then all that predictions read is there.

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Random, gpus, naive};
-use sapwise::gpu::{Gpu, Gpus, broad_phase, wgpu};
+use sapwise::gpu::{Gpu, Gpus, broad_phase, wgpu30 as wgpu};
 use sapwise::{
     Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Load, PairOrder, Pairs, Reason, Registry, Source,
     Term, Tuning,
@@ -41,7 +41,7 @@ fn tuning(costs: &[(&str, f64)]) -> Tuning {
         curve: CostCurve { terms: vec![CostTerm { term: Term::Call, unit_ns: ns }], ..CostCurve::default() },
         spread_ln: 0.0,
     };
-    let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    let loads: Vec<Load> = (0..16).map(|k| Load::of_objects(1 << k)).collect();
     Tuning::from_costs(Source::Measured, "uniform", costs.iter().map(cost).collect(), &loads)
 }
 
@@ -152,7 +152,7 @@ fn a_gpu_that_is_gone_leaves_the_cpu() {
     let boxes = Random(2).cubes(500, [9.0; 3], 0.5);
     assert!(pairs_of(&mut adaptive, &boxes).unwrap() == naive(&boxes));
     assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "grid-sap@cpu1");
-    assert!(Gpus::none().open(0).unwrap_err().contains("no GPU was found"));
+    assert!(Gpus::none().open(0).unwrap_err().to_string().contains("no GPU was found"));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Random, gpus, naive};
-use sapwise::gpu::{Gpu, Resident, wgpu};
+use sapwise::gpu::{Gpu, Resident, wgpu30 as wgpu};
 use sapwise::{Aabb, BoxDefect, Error, Pair};
 
 fn buffer(gpu: &Gpu, boxes: &[Aabb], usage: wgpu::BufferUsages) -> wgpu::Buffer {

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Random, naive};
-use sapwise::rayon::{self, ThreadPool, ThreadPoolBuilder};
+use sapwise::rayon1::{self as rayon, ThreadPool, ThreadPoolBuilder};
 use sapwise::{Aabb, Adaptive, AlgorithmId, Backend, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise_scenes::Scenario;
 use std::sync::Arc;
@@ -96,7 +96,7 @@ fn more_threads_than_the_pool_has_are_unavailable_with_a_reason() {
     assert_eq!((counts(&registry, true), counts(&registry, false)), (vec![1, 2, 4, 5], vec![8]));
     for text in ["brute@cpu8", "pair-cache@cpu6"] {
         let Err(Error::Unavailable { reason, .. }) = registry.create(&text.parse().unwrap()) else { panic!("made {text}") };
-        assert!(reason.contains("has 4 threads, with the calling one 5"), "{reason}");
+        assert!(reason.to_string().contains("has 4 threads, with the calling one 5"), "{reason}");
     }
     registry.use_pool(self::pool(1));
     assert_eq!((counts(&registry, true), counts(&registry, false)), (vec![1, 2], vec![4, 5, 8]));

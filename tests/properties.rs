@@ -19,7 +19,7 @@ fn valid_box() -> impl Strategy<Value = Aabb> {
 
 fn registry() -> (Registry, Vec<AlgorithmId>) {
     let registry = Registry::with_cores(2);
-    let ids = registry.available().into_iter().map(|(id, _)| id).collect();
+    let ids = registry.available().into_iter().map(|e| e.id).collect();
     (registry, ids)
 }
 

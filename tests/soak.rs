@@ -90,7 +90,7 @@ struct OnGpu {
 const GPU: &str = "mock@gpu0";
 
 fn lost() -> Error {
-    Error::Unavailable { algorithm: GPU.parse().unwrap(), reason: "the device is lost".to_owned() }
+    Error::Unavailable { algorithm: GPU.parse().unwrap(), reason: "the device is lost".into() }
 }
 
 impl BroadPhase for OnGpu {
@@ -139,7 +139,7 @@ fn tuning() -> Tuning {
         cost("pair-cache@cpu3", 5000.0, 14.0),
         cost("grid-sap@cpu4", 5500.0, 11.0),
     ];
-    let loads: Vec<Load> = (0..12).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    let loads: Vec<Load> = (0..12).map(|k| Load::of_objects(1 << k)).collect();
     Tuning::from_costs(Source::Default, "fragmentation", costs, &loads)
 }
 

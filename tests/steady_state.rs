@@ -93,7 +93,7 @@ fn tuning(registry: &Registry) -> Tuning {
         },
         spread_ln: 0.0,
     };
-    let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    let loads: Vec<Load> = (0..16).map(|k| Load::of_objects(1 << k)).collect();
     let costs = vec![cost("brute@cpu1", 0.0, 60.0), cost("sap@cpu1", 5_000.0, 30.0), cost("grid-sap@cpu1", 30_000.0, 10.0)];
     Tuning::from_costs(Source::Measured, "uniform", costs, &loads)
 }
@@ -102,7 +102,7 @@ fn tuning(registry: &Registry) -> Tuning {
 fn a_steady_state_allocates_nothing() {
     const FRAMES: usize = 40;
     let registry = Registry::with_cores(4);
-    for (id, _) in registry.available() {
+    for id in registry.available().into_iter().map(|e| e.id) {
         let mut algorithm = registry.create(&id).unwrap();
         for scenario in [Scenario::Uniform, Scenario::Mixed, Scenario::Gravity, Scenario::Fragmentation] {
             // Half of them with all extras, and each algorithm with and without.
@@ -162,7 +162,7 @@ fn idle_candidates() -> (Adaptive, Arc<AtomicUsize>) {
         curve: CostCurve { terms: vec![CostTerm { term: Term::Call, unit_ns: 10_000.0 }], ..CostCurve::default() },
         spread_ln: 0.1,
     });
-    let loads = [Load { objects: 10, ..Load::default() }, Load { objects: 1000, ..Load::default() }];
+    let loads = [Load::of_objects(10), Load::of_objects(1000)];
     let tuning = Tuning::from_costs(Source::Predicted, "uniform", costs.collect(), &loads);
     (Adaptive::new(tuning, &registry).unwrap(), turns)
 }

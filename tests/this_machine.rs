@@ -4,7 +4,7 @@ mod common;
 
 use common::{Random, naive};
 use sapwise::{
-    Aabb, Adaptive, AlgorithmId, BroadPhase, Cache, Error, Options, Origin, PairOrder, Pairs, Registry, Setup, Source,
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Cache, Error, Origin, PairOrder, Pairs, Registry, Setup, Source, StartOptions,
     Tuning,
 };
 use std::fs;
@@ -15,17 +15,15 @@ use std::time::Duration;
 
 /// Measures as briefly as it can: what comes out is not looked at. On one core, whose figures can't be spoiled beyond belief by the other
 /// tests.
-fn options(folder: &Path) -> Options {
-    Options {
-        background: false,
-        cache: Cache::Folder(folder.to_owned()),
-        registry: Some(Arc::new(Registry::with_cores(1))),
-        probe_limit: Duration::ZERO,
-        ..Options::default()
-    }
+fn options(folder: &Path) -> StartOptions {
+    StartOptions::new()
+        .background(false)
+        .cache(Cache::Folder(folder.to_owned()))
+        .registry(Arc::new(Registry::with_cores(1)))
+        .probe_limit(Duration::ZERO)
 }
 
-fn start(options: &Options) -> Adaptive {
+fn start(options: &StartOptions) -> Adaptive {
     Adaptive::for_this_machine(options).unwrap()
 }
 
@@ -86,7 +84,7 @@ fn the_second_start_takes_what_the_first_has_kept() {
     // Other algorithms have another tuning, in a file of their own.
     let mut more = Registry::with_cores(1);
     more.add("mine@cpu1".parse().unwrap(), 1, || Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap()));
-    let other = Options { registry: Some(Arc::new(more)), ..options(folder.path()) };
+    let other = options(folder.path()).registry(Arc::new(more));
     assert_eq!(origin(&start(&other)), Origin::Probed);
     assert_eq!(origin(&start(&other)), Origin::Cached);
     assert_eq!(names(folder.path()).len(), 2);
@@ -103,7 +101,7 @@ fn what_was_learned_is_there_at_the_next_start() {
     first.save().unwrap();
     let second = start(&options(folder.path()));
     assert_eq!((origin(&second), second.tuning()), (Origin::Cached, &learned));
-    let mut third = start(&Options { learning: false, ..options(folder.path()) });
+    let mut third = start(&options(folder.path()).learning(false));
     learn(&mut third, &boxes);
     assert_eq!(third.learned(), learned);
 }
@@ -113,7 +111,7 @@ fn a_damaged_file_is_told_replaced_and_harmless() {
     let folder = tempfile::tempdir().unwrap();
     let file = start(&options(folder.path())).setup().file.clone().unwrap();
     let whole = fs::read_to_string(&file).unwrap();
-    for text in ["", "{}", &whole[..whole.len() / 2], &whole.replace("cache/1", "cache/0")] {
+    for text in ["", "{}", &whole[..whole.len() / 2], &whole.replace("cache/2", "cache/1")] {
         fs::write(&file, text).unwrap();
         let mut again = start(&options(folder.path()));
         assert_eq!(origin(&again), Origin::Probed);
@@ -126,7 +124,7 @@ fn a_damaged_file_is_told_replaced_and_harmless() {
 #[test]
 fn no_cache_a_folder_in_its_place_and_a_file_in_the_folders_place_keep_nothing_from_working() {
     let folder = tempfile::tempdir().unwrap();
-    let works = |options: &Options, remarks: &[&str]| {
+    let works = |options: &StartOptions, remarks: &[&str]| {
         let mut adaptive = start(options);
         assert_eq!(origin(&adaptive), Origin::Probed);
         let told = &adaptive.setup().remarks;
@@ -134,7 +132,7 @@ fn no_cache_a_folder_in_its_place_and_a_file_in_the_folders_place_keep_nothing_f
         frame(&mut adaptive, &boxes(200));
         adaptive
     };
-    let none = works(&Options { cache: Cache::None, ..options(folder.path()) }, &[]);
+    let none = works(&options(folder.path()).cache(Cache::None), &[]);
     assert!(none.save().unwrap_err().to_string().contains("no cache"));
     let file = start(&options(folder.path())).setup().file.clone().unwrap();
     fs::remove_file(&file).unwrap();
@@ -182,7 +180,7 @@ fn starts_at_once_share_a_folder() {
 #[test]
 fn the_background_takes_over_between_frames() {
     let folder = tempfile::tempdir().unwrap();
-    let background = Options { background: true, exploring: false, ..options(folder.path()) };
+    let background = options(folder.path()).background(true).exploring(false);
     let mut first = start(&background);
     // The flag is only looked at when a frame runs.
     assert_eq!((origin(&first), first.tuning().source), (Origin::Awaited, Source::Default));
@@ -208,7 +206,7 @@ fn the_background_takes_over_between_frames() {
 #[test]
 fn switches_outlast_the_background() {
     let folder = tempfile::tempdir().unwrap();
-    let mut adaptive = start(&Options { background: true, ..options(folder.path()) });
+    let mut adaptive = start(&options(folder.path()).background(true));
     adaptive.set_learning(false);
     frames_until_it_came(&mut adaptive);
     assert_eq!(origin(&adaptive), Origin::Probed);
@@ -220,7 +218,7 @@ fn switches_outlast_the_background() {
 fn what_is_dropped_while_it_waits_ends_by_itself_and_is_kept() {
     let folder = tempfile::tempdir().unwrap();
     let registry = Arc::new(Registry::with_cores(1));
-    drop(start(&Options { background: true, registry: Some(Arc::clone(&registry)), ..options(folder.path()) }));
+    drop(start(&options(folder.path()).background(true).registry(Arc::clone(&registry))));
     // The thread lets go of the registry when it ends.
     while Arc::strong_count(&registry) > 1 {
         std::thread::yield_now();
@@ -229,19 +227,19 @@ fn what_is_dropped_while_it_waits_ends_by_itself_and_is_kept() {
 }
 
 /// A registry whose `grid-sap@cpu1` is made by `make`.
-fn with_grid_sap(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static) -> Option<Arc<Registry>> {
+fn with_grid_sap(make: impl Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync + 'static) -> Arc<Registry> {
     let mut registry = Registry::with_cores(1);
     let strips: AlgorithmId = "grid-sap@cpu1".parse().unwrap();
     let revision = registry.entries().iter().find(|e| e.id == strips).unwrap().revision;
     registry.add(strips, revision, make);
-    Some(Arc::new(registry))
+    Arc::new(registry)
 }
 
 #[test]
 fn a_panic_in_the_background_is_a_remark() {
     let folder = tempfile::tempdir().unwrap();
     let registry = with_grid_sap(|| panic!("as the test wants"));
-    let mut adaptive = start(&Options { background: true, registry, ..options(folder.path()) });
+    let mut adaptive = start(&options(folder.path()).background(true).registry(registry));
     frames_until_it_came(&mut adaptive);
     assert_eq!((origin(&adaptive), adaptive.tuning().source), (Origin::Usual, Source::Default));
     assert!(
@@ -264,7 +262,7 @@ fn algorithms_are_made_off_the_calling_thread() {
         MADE.fetch_add(1, Relaxed);
         Registry::with_cores(1).create(&"grid-sap@cpu1".parse().unwrap())
     });
-    let mut adaptive = start(&Options { background: true, registry, ..options(folder.path()) });
+    let mut adaptive = start(&options(folder.path()).background(true).registry(registry));
     frames_until_it_came(&mut adaptive);
     assert_eq!((origin(&adaptive), MADE.load(Relaxed)), (Origin::Probed, 1), "{:?}", adaptive.setup());
 }
@@ -275,7 +273,7 @@ fn a_model_that_knows_nothing_here_leaves_the_usual_tuning() {
     let mut model = sapwise::Model::built_in().unwrap();
     model.methods.iter_mut().for_each(|m| m.revision += 1);
     for background in [false, true] {
-        let mut adaptive = start(&Options { model: Some(model.clone()), background, ..options(folder.path()) });
+        let mut adaptive = start(&options(folder.path()).model(model.clone()).background(background));
         frames_until_it_came(&mut adaptive);
         assert_eq!(origin(&adaptive), Origin::Usual);
         assert!(adaptive.setup().remarks[0].contains("predicts none"), "{:?}", adaptive.setup());
@@ -288,7 +286,9 @@ fn a_model_that_knows_nothing_here_leaves_the_usual_tuning() {
 fn a_program_that_names_no_algorithms_gets_all_of_ours() {
     let folder = tempfile::tempdir().unwrap();
     for background in [true, false] {
-        let mut adaptive = start(&Options { registry: None, background, ..options(folder.path()) });
+        let mut options = options(folder.path()).background(background);
+        options.registry = None;
+        let mut adaptive = start(&options);
         frames_until_it_came(&mut adaptive);
         assert!([Origin::Probed, Origin::Cached].contains(&origin(&adaptive)), "{:?}", adaptive.setup());
         let known: Vec<String> = adaptive.tuning().algorithms().iter().map(ToString::to_string).collect();
@@ -303,8 +303,8 @@ fn a_program_that_names_no_algorithms_gets_all_of_ours() {
 #[cfg(feature = "measure-gpu")]
 #[test]
 fn a_program_brings_its_pool_and_its_gpu() {
-    use sapwise::gpu::{Gpu, Gpus, wgpu};
-    use sapwise::{GpuIdentity, rayon};
+    use sapwise::gpu::{Gpu, Gpus, wgpu30 as wgpu};
+    use sapwise::{GpuIdentity, rayon1 as rayon};
     let Some(gpus) = common::gpus() else { return };
     let folder = tempfile::tempdir().unwrap();
     let opened = gpus.adapter(0).unwrap().request_device(&wgpu::DeviceDescriptor::default());
@@ -313,7 +313,7 @@ fn a_program_brings_its_pool_and_its_gpu() {
     let mut registry = Registry::with_cores(1);
     registry.use_pool(Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap()));
     registry.add_gpus(&Gpus::of([Gpu::from_parts(device, queue, identity.clone())]));
-    let options = Options { background: true, registry: Some(Arc::new(registry)), ..options(folder.path()) };
+    let options = options(folder.path()).background(true).registry(Arc::new(registry));
     let mut first = start(&options);
     frames_until_it_came(&mut first);
     assert_eq!(origin(&first), Origin::Probed);
@@ -339,14 +339,14 @@ fn a_program_brings_its_pool_and_its_gpu() {
 #[ignore = "a process that the_users_folder_is_shared_by_processes starts, with variables of its own"]
 fn a_process_of_the_user() {
     let Some(folder) = std::env::var_os("XDG_CACHE_HOME") else {
-        let mut adaptive = start(&Options { cache: Cache::User, ..options(Path::new("")) });
+        let mut adaptive = start(&options(Path::new("")).cache(Cache::User));
         frame(&mut adaptive, &boxes(200));
         assert_eq!(origin(&adaptive), Origin::Probed);
         let told = &adaptive.setup().remarks;
         assert!(told.iter().any(|r| r.contains("/dev/null/.cache/sapwise") && r.contains("can't be written")), "{told:?}");
         return;
     };
-    let mut adaptive = start(&Options { cache: Cache::User, ..options(Path::new("")) });
+    let mut adaptive = start(&options(Path::new("")).cache(Cache::User));
     let file = adaptive.setup().file.clone().unwrap();
     assert_eq!(file.parent().unwrap(), Path::new(&folder).join("sapwise"));
     for _ in 0..20 {

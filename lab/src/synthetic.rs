@@ -243,7 +243,7 @@ pub(crate) fn load(scenario: &str, n: f64) -> Load {
         "uniform" => (0.3 * n.powf(5.0 / 3.0), 4.0 * n, 1.0 * n, 0.04),
         _ => (0.8 * n.powf(1.7), 3.0 * n.powf(1.25), 1.2 * n.powf(1.2), n.powf(-0.2)),
     };
-    Load { objects: n as u32, axis_candidates: axis, strip_candidates: strip, pairs, moved }
+    Load::of_objects(n as u32).with_candidates(axis, strip).with_pairs(pairs).with_moved(moved)
 }
 
 fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> MethodModel {

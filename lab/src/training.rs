@@ -2,7 +2,7 @@
 
 use crate::belief::Prior;
 use crate::data::Profile;
-use crate::report::{Label, unsound};
+use crate::report::Label;
 use sapwise::Model;
 use sapwise::json::{self, Format};
 use schemars::JsonSchema;
@@ -184,7 +184,7 @@ pub fn read_model(text: &str) -> Result<StoredModel, json::Error> {
     }
     let training = TRAINING.read::<Keys>(text)?.value.training;
     if let Some(defect) = training.prior.and_then(|p| p.defect()) {
-        return Err(unsound(defect));
+        return Err(json::Error::Data { path: "training.prior".to_owned(), source: serde::de::Error::custom(defect) });
     }
     Ok(StoredModel { model: json::model(text)?, training })
 }

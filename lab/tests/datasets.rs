@@ -1,7 +1,7 @@
 //! Every report in the repository is sound and current, its label is true, and the built-in model leads to a choice on its machine.
 
 use sapwise::hardware::{GpuParameterId, ParameterId};
-use sapwise::{AlgorithmId, BackendClass, Hardware, Model, Registry};
+use sapwise::{BackendClass, Entry, Hardware, Model, Registry};
 use sapwise_lab::report::{self, Label, Report};
 use sapwise_lab::{Training, read_model};
 use std::path::{Path, PathBuf};
@@ -24,8 +24,8 @@ fn training() -> Training {
 }
 
 /// Our algorithms on a machine of that many cores, also those that this build lacks a feature for.
-fn algorithms(cores: u32) -> Vec<(AlgorithmId, u32)> {
-    Registry::with_cores(cores).entries().iter().map(|e| (e.id.clone(), e.revision)).collect()
+fn algorithms(cores: u32) -> Vec<Entry> {
+    Registry::with_cores(cores).entries().to_vec()
 }
 
 #[test]

@@ -20,14 +20,14 @@ fn tuning(registry: &Registry) -> Tuning {
         curve: curve(k),
         spread_ln: 0.05,
     });
-    let loads: Vec<Load> = (3..20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
+    let loads: Vec<Load> = (3..20).map(|k| Load::of_objects(1 << k)).collect();
     Tuning::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
 }
 
 fn decision(c: &mut Criterion) {
     let registry = Registry::with_cores(16);
     let tuning = tuning(&registry);
-    let load = Load { objects: 12_345, axis_candidates: 1e6, strip_candidates: 1e5, pairs: 6e3, moved: 1.0 };
+    let load = Load::of_objects(12_345).with_candidates(1e6, 1e5).with_pairs(6e3).with_moved(1.0);
     c.bench_function(&format!("rank {} algorithms", tuning.costs.len()), |b| {
         b.iter(|| tuning.rank(black_box(&load), |_| true));
     });

@@ -16,7 +16,7 @@
 //! bench` passes, only the smallest size is run, to see that all is well. Exit status 1 when a contestant failed or found
 //! other pairs.
 
-use sapwise::gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu};
+use sapwise::gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu30 as wgpu};
 use sapwise::{Aabb, AlgorithmId, Backend, BroadPhase, Pairs, Registry, usable_cores};
 use sapwise_scenes::Scenario;
 use std::hint::black_box;

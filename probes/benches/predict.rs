@@ -69,8 +69,7 @@ fn predict(c: &mut Criterion) {
     let model = json::model(&text).expect("a sound model");
     assert!(Feature::of(BackendClass::Cpu).len() == 4 && model.folds.len() == 10);
     let hardware = machine();
-    let algorithms: Vec<(AlgorithmId, u32)> =
-        Registry::with_cores(CORES).entries().iter().map(|e| (e.id.clone(), e.revision)).collect();
+    let algorithms = Registry::with_cores(CORES).entries().to_vec();
     let loads: Vec<Load> = (4..=24).map(|k| load(10.0_f64.powf(f64::from(k) / 4.0).round())).collect();
     let prediction = model.predict(&hardware, &algorithms).expect("known methods");
     let tuning = prediction.clone().tuning("uniform", &loads);
@@ -96,7 +95,7 @@ fn predict(c: &mut Criterion) {
 
 /// Loads like those of `uniform`.
 fn load(n: f64) -> Load {
-    Load { objects: n as u32, axis_candidates: 0.3 * n.powf(5.0 / 3.0), strip_candidates: 4.0 * n, pairs: n, moved: 0.04 }
+    Load::of_objects(n as u32).with_candidates(0.3 * n.powf(5.0 / 3.0), 4.0 * n).with_pairs(n).with_moved(0.04)
 }
 
 criterion_group!(benches, predict);

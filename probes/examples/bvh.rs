@@ -13,7 +13,7 @@
 use parry3d::bounding_volume::Aabb as Bounds;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use sapwise::model::Scale;
-use sapwise::{Aabb, BroadPhase, Error, Pairs, Product, Term};
+use sapwise::{Aabb, BroadPhase, Error, Incremental, Pairs, Product, Term};
 use sapwise_cli::{Command, UserAlgorithm};
 use std::process::ExitCode;
 
@@ -58,10 +58,12 @@ impl BroadPhase for Tree {
     }
 
     /// The tree of the frame before makes this frame cheaper, so a probe lets some frames pass before it takes samples.
-    fn is_incremental(&self) -> bool {
-        true
+    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
+        Some(self)
     }
 }
+
+impl Incremental for Tree {}
 
 impl Tree {
     /// Brings the tree from the boxes of the frame before to these.

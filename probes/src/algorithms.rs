@@ -106,7 +106,7 @@ impl Algorithms {
     /// Ours on 1, 2, 4, ... and `cores` threads, then the user's.
     pub(crate) fn registry(&self, cores: u32) -> Registry {
         let mut registry = Registry::with_cores(cores);
-        let mut counts: Vec<u32> = registry.available().iter().map(|(id, _)| id.threads()).collect();
+        let mut counts: Vec<u32> = registry.available().iter().map(|e| e.id.threads()).collect();
         counts.sort_unstable();
         counts.dedup();
         for user in &self.users {
@@ -168,7 +168,7 @@ mod tests {
         let registry = algorithms.registry(6);
         let counts = |method: &str| -> Vec<(u32, u32)> {
             let all = registry.available().into_iter();
-            all.filter(|(id, _)| id.method() == method).map(|(id, revision)| (id.threads(), revision)).collect()
+            all.filter(|e| e.id.method() == method).map(|e| (e.id.threads(), e.revision)).collect()
         };
         assert_eq!(counts("tree"), [(1, 3)]);
         assert_eq!(counts("grid"), [(1, 4), (2, 4), (4, 4), (6, 4)]);

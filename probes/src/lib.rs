@@ -56,3 +56,8 @@ mod terminal;
 mod verbs;
 
 pub use command::{Command, UserAlgorithm};
+
+/// The examples of the guide as tests: here are all features of the library that they need.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/guide.md")]
+struct Guide;

@@ -6,7 +6,7 @@ use crate::date;
 use crate::gpus::uses;
 use crate::restriction;
 use sapwise::stats::median;
-use sapwise::{AlgorithmId, GpuKind, Hardware, SimdLevel, usable_cores};
+use sapwise::{AlgorithmId, Entry, GpuKind, Hardware, SimdLevel, usable_cores};
 use sapwise_lab::report::{Label, Point, Provenance, Restriction, Timed, TimedTerm};
 use std::time::Duration;
 
@@ -59,11 +59,11 @@ pub(crate) fn timed(points: &[Point], threads: Option<u32>, hardware: &Hardware,
     let raced = |id| points.iter().any(|p| p.timings.iter().any(|t| t.algorithm == id));
     let on_gpus = sapwise::gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu));
     let entries = registry.available().into_iter().chain(on_gpus);
-    let timed = |(id, revision): (AlgorithmId, u32)| {
+    let timed = |Entry { id, revision, .. }: Entry| {
         let terms = algorithms.terms(&id).iter().map(|&(term, scale)| TimedTerm { term, scale }).collect();
         Timed { terms, ..Timed::new(id, revision) }
     };
-    entries.filter(|(id, _)| raced(id.clone())).map(timed).collect()
+    entries.filter(|e| raced(e.id.clone())).map(timed).collect()
 }
 
 /// `None` for a wrong variable too: the program has refused it before.

@@ -42,7 +42,7 @@ pub(crate) fn stale<'a>(used: impl Iterator<Item = (Key<'a>, u32)>, registry: &R
         let name = name((class, method));
         // Every thread count of a method has the same revision, and a machine with other counts has other ids.
         let own = registry.entries().iter().find(|e| of(&e.id) == (class, method)).map(|e| e.revision);
-        let ours = own.or_else(|| on_gpus.iter().find(|(id, _)| of(id) == (class, method)).map(|(_, revision)| *revision));
+        let ours = own.or_else(|| on_gpus.iter().find(|e| of(&e.id) == (class, method)).map(|e| e.revision));
         match ours {
             Some(ours) if ours == revision => {}
             Some(ours) => stale.push(format!("{name} has revision {revision} there and {ours} in this build")),
@@ -57,7 +57,7 @@ pub(crate) fn stale<'a>(used: impl Iterator<Item = (Key<'a>, u32)>, registry: &R
 /// Whether this build has a method on that class of processor.
 pub(crate) fn is_known(key: Key<'_>, registry: &Registry) -> bool {
     let on_gpus = sapwise::gpu::algorithms(std::iter::once(&any_gpu()));
-    registry.entries().iter().any(|e| of(&e.id) == key) || on_gpus.iter().any(|(id, _)| of(id) == key)
+    registry.entries().iter().any(|e| of(&e.id) == key) || on_gpus.iter().any(|e| of(&e.id) == key)
 }
 
 /// A GPU that there need not be.
@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn revisions_count_on_cpu_and_gpu_apart_and_without_any_gpu() {
         let registry = Registry::with_cores(1);
-        let on_gpu = sapwise::gpu::algorithms(std::iter::once(&any_gpu()))[0].1;
+        let on_gpu = sapwise::gpu::algorithms(std::iter::once(&any_gpu()))[0].revision;
         let key = |class| (class, "brute");
         assert_eq!(stale(std::iter::once((key(BackendClass::Gpu), on_gpu)), &registry), Vec::<String>::new());
         let told = stale(std::iter::once((key(BackendClass::Gpu), 999)), &registry);

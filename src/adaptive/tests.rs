@@ -84,7 +84,7 @@ impl BroadPhase for Fragile {
     fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         if self.0 == 0 {
             let algorithm = "fragile@gpu0".parse().unwrap();
-            return Err(Error::Unavailable { algorithm, reason: "lost".to_owned() });
+            return Err(Error::Unavailable { algorithm, reason: "lost".into() });
         }
         self.0 -= 1;
         pairs.clear();

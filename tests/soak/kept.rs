@@ -2,7 +2,7 @@
 
 use super::{Machine, Tally, below, life, registry};
 use crate::common::Random;
-use sapwise::{Adaptive, Cache, Options, Origin};
+use sapwise::{Adaptive, Cache, Origin, StartOptions};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,14 +27,12 @@ impl Kept {
         let cache = self.folder.path().join(if occupied { "occupied/cache" } else { "cache" });
         // A file where the folder should be: it can be neither read nor made, as on a disk that can't be written.
         fs::write(self.folder.path().join("occupied"), "").unwrap();
-        let options = Options {
-            background: below(random, 4) == 0,
-            cache: Cache::Folder(cache),
-            registry: Some(Arc::new(registry(machine.cores, &machine.slot))),
+        let options = StartOptions::new()
+            .background(below(random, 4) == 0)
+            .cache(Cache::Folder(cache))
+            .registry(Arc::new(registry(machine.cores, &machine.slot)))
             // As briefly as it can: what comes out is not looked at.
-            probe_limit: Duration::ZERO,
-            ..Options::default()
-        };
+            .probe_limit(Duration::ZERO);
         let mut adaptive = Adaptive::for_this_machine(&options).unwrap();
         life(&mut adaptive, &mut machine, frames, random, tally);
         // The thread in the background still has its memory.

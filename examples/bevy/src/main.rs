@@ -72,7 +72,7 @@ fn drift(mut all: Query<(&mut Transform, &mut Velocity)>) {
 
 fn report(
     mut course: ResMut<Course>,
-    mut overlaps: ResMut<Overlaps>,
+    overlaps: Res<Overlaps>,
     mut begun: MessageReader<OverlapBegun>,
     mut ended: MessageReader<OverlapEnded>,
     all: Query<&BoxCollider>,

@@ -1,14 +1,12 @@
 //! The overlaps of one fixed step, and what changed since the one before.
 
 use bevy_ecs::prelude::*;
-use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Tuning, Pairs, Registry};
-use std::sync::{Mutex, PoisonError};
+use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Pairs, Registry, Tuning};
 
 /// The entities that overlap, as of the last fixed step.
 #[derive(Resource)]
 pub struct Overlaps {
-    /// An algorithm need not be `Sync`, which a resource must be. Behind `ResMut` the lock is never waited for.
-    broad_phase: Mutex<Adaptive>,
+    broad_phase: Adaptive,
     entities: Vec<Entity>,
     boxes: Vec<Aabb>,
     pairs: Pairs,
@@ -30,7 +28,7 @@ impl Overlaps {
     #[must_use]
     pub fn new(broad_phase: Adaptive) -> Self {
         Self {
-            broad_phase: Mutex::new(broad_phase),
+            broad_phase,
             entities: Vec::new(),
             boxes: Vec::new(),
             pairs: Pairs::new(),
@@ -58,13 +56,13 @@ impl Overlaps {
 
     /// The algorithm that found them; `None` before the first step.
     #[must_use]
-    pub fn algorithm(&mut self) -> Option<String> {
-        self.adaptive().last_decision().map(|d| d.algorithm.to_string())
+    pub fn algorithm(&self) -> Option<String> {
+        self.broad_phase.last_decision().map(|d| d.algorithm.to_string())
     }
 
     /// The broad phase, for what it tells and for what it is told.
     pub fn adaptive(&mut self) -> &mut Adaptive {
-        self.broad_phase.get_mut().unwrap_or_else(PoisonError::into_inner)
+        &mut self.broad_phase
     }
 
     pub(crate) fn find(&mut self, colliders: impl Iterator<Item = (Entity, Aabb)>) -> Result<(), BevyError> {
@@ -74,8 +72,7 @@ impl Overlaps {
             self.entities.push(entity);
             self.boxes.push(b);
         }
-        let broad_phase = self.broad_phase.get_mut().unwrap_or_else(PoisonError::into_inner);
-        match broad_phase.find_pairs(&self.boxes, &mut self.pairs) {
+        match self.broad_phase.find_pairs(&self.boxes, &mut self.pairs) {
             Ok(()) => {}
             Err(error @ Error::InvalidBox { index, .. }) => {
                 return Err(format!("entity {}: {error}", self.entities[index]).into());

@@ -120,7 +120,7 @@ mod tests {
     fn constants_and_substitutes_stay_within_what_is_available() {
         let available = ids(&["brute@cpu1", "brute@cpu8", "grid-sap@cpu1", "grid-sap@cpu8"]);
         let choose = frozen(64, "grid-sap", &available);
-        let load = |objects| Load { objects, ..Load::default() };
+        let load = Load::of_objects;
         assert_eq!(choose(&load(64)).unwrap().to_string(), "brute@cpu1");
         assert_eq!(choose(&load(65)).unwrap().to_string(), "grid-sap@cpu8");
         assert_eq!(frozen(64, "sap", &available)(&load(100)), None);

@@ -177,7 +177,7 @@ mod tests {
     fn points_with_other_algorithms_and_sizes_are_put_on_one_scale() {
         let spot = |medians: &[(u16, f64)]| Spot {
             scenario: String::new(),
-            load: Load { objects: 100, ..Load::default() },
+            load: Load::of_objects(100),
             core_to_core_ns: None,
             medians: medians.to_vec(),
         };

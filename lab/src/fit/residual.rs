@@ -162,7 +162,7 @@ mod tests {
     fn the_library_evaluates_a_stored_residual_as_it_was_fitted() {
         let machine = &Machine::family()[3];
         let threads = |k: usize| Backend::Cpu(1 << (k % 4));
-        let load = |k: usize| Load { objects: 1 << (4 + k % 13), ..Load::default() };
+        let load = |k: usize| Load::of_objects(1 << (4 + k % 13));
         let names = Feature::of(BackendClass::Cpu);
         let features = Array2::from_shape_fn((52, names.len()), |(k, j)| {
             names[j].value(&machine.hardware(), &threads(k), &load(k)).unwrap()

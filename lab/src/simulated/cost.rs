@@ -180,7 +180,7 @@ mod tests {
 
     fn load(objects: u32, moved: f64) -> Load {
         let n = f64::from(objects);
-        Load { objects, axis_candidates: 0.3 * n.powf(5.0 / 3.0), strip_candidates: 4.0 * n, pairs: 0.5 * n, moved }
+        Load::of_objects(objects).with_candidates(0.3 * n.powf(5.0 / 3.0), 4.0 * n).with_pairs(0.5 * n).with_moved(moved)
     }
 
     fn machines() -> Vec<TrueMachine> {
@@ -199,7 +199,7 @@ mod tests {
             let mut ids = sapwise::Registry::with_cores(machine.cpu.threads as u32).available();
             let gpus = super::super::hardware::identities(&machine);
             ids.extend(sapwise::gpu::algorithms(&gpus));
-            for (id, _) in ids {
+            for id in ids.into_iter().map(|e| e.id) {
                 let costs = Costs::new(&machine);
                 let course = [10, 1000, 100_000].map(|n| costs.frame_ns(&id, &load(n, 0.04)).unwrap());
                 assert!(course[0] > 0.0 && course.is_sorted() && course[2].is_finite(), "{id} on {machine:?}: {course:?}");
@@ -243,7 +243,7 @@ mod tests {
             let costs = Costs::new(machine);
             let load = load(n, 1.0);
             let ns = |id: &AlgorithmId| costs.frame_ns(id, &load).unwrap();
-            ids.into_iter().map(|(id, _)| id).min_by(|a, b| ns(a).total_cmp(&ns(b))).unwrap()
+            ids.into_iter().map(|e| e.id).min_by(|a, b| ns(a).total_cmp(&ns(b))).unwrap()
         };
         let machines = machines();
         assert!(machines.iter().all(|m| best(m, 10).to_string() == "brute@cpu1"));

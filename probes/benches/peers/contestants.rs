@@ -50,7 +50,7 @@ impl Contestant {
             "sap" => 100_000,
             _ => usize::MAX,
         };
-        let algorithm = registry.create(id)?;
+        let mut algorithm = registry.create(id)?;
         let keeps = algorithm.is_incremental();
         let algorithm = Algorithm::Other(algorithm);
         Ok(Self { name, side: Side::Fixed, keeps, most, hopeless_frames: 0, algorithm })
@@ -88,7 +88,7 @@ pub(crate) fn ours(registry: &Registry, tuning: &Tuning) -> Result<Vec<Contestan
         hopeless_frames: 0,
         algorithm: adaptive,
     }];
-    for (id, _) in registry.available() {
+    for id in registry.available().into_iter().map(|e| e.id) {
         all.push(Contestant::fixed(&id, id.to_string(), registry)?);
     }
     Ok(all)
@@ -103,7 +103,7 @@ pub(crate) fn at_levels() -> Result<Vec<Contestant>, Error> {
     for level in SimdLevel::ALL.into_iter().filter(|level| *level <= SimdLevel::in_use()) {
         let mut registry = Registry::with_cores(1);
         registry.limit_simd(level);
-        for (id, _) in registry.available() {
+        for id in registry.available().into_iter().map(|e| e.id) {
             all.push(Contestant::fixed(&id, format!("{id} {level}"), &registry)?);
         }
     }

@@ -47,6 +47,6 @@ pub(super) fn scenario_or<P: TypedValueParser>(parser: P) -> impl TypedValuePars
 
 /// An algorithm. Those of GPUs and of a user's program are taken as well; a shell that completes them would have to load drivers.
 pub(super) fn algorithm() -> impl TypedValueParser<Value = AlgorithmId> {
-    let ours = || Registry::with_cores(usable_cores()).available().into_iter().map(|(id, _)| id.to_string()).collect();
+    let ours = || Registry::with_cores(usable_cores()).available().into_iter().map(|e| e.id.to_string()).collect();
     Known { parser: |text: &str| text.parse::<AlgorithmId>(), values: ours }
 }

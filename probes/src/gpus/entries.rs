@@ -26,7 +26,7 @@ pub(crate) fn print_entries() -> anyhow::Result<()> {
     let gpus = Gpus::find();
     let mut registry = Registry::with_cores(1);
     registry.add_gpus(&gpus);
-    for (id, _) in sapwise::gpu::algorithms(gpus.identities()) {
+    for id in sapwise::gpu::algorithms(gpus.identities()).into_iter().map(|e| e.id) {
         let unavailable = registry.create(&id).err().map(|e| e.to_string());
         crate::output::print_json(&OnGpus { id, unavailable })?;
     }

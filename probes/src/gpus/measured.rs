@@ -83,7 +83,7 @@ impl Measured {
     /// Every set of several GPUs that our algorithms run on.
     fn measure_groups(&mut self, threads: Option<u32>) -> anyhow::Result<()> {
         let mut sets: Vec<Vec<u32>> =
-            sapwise::gpu::algorithms(&self.usable).iter().map(|(id, _)| uses(id).to_vec()).filter(|s| s.len() > 1).collect();
+            sapwise::gpu::algorithms(&self.usable).iter().map(|e| uses(&e.id).to_vec()).filter(|s| s.len() > 1).collect();
         sets.dedup();
         for set in sets {
             if self.groups.iter().any(|g| g.gpus == set) {

@@ -91,7 +91,7 @@ impl Replay {
     fn new(settings: &ReplaySettings, tuning: &Tuning, registry: &Registry) -> Self {
         let mut contestants: Vec<Contestant> = Vec::new();
         let mut notes: Vec<String> = Vec::new();
-        for (id, _) in registry.available() {
+        for id in registry.available().into_iter().map(|e| e.id) {
             match Contestant::new(id.clone(), settings.frames, registry) {
                 Ok(contestant) => contestants.push(contestant),
                 // A driver may refuse at any time, and so may a user's algorithm; the replay continues without it.

@@ -75,7 +75,7 @@ fn an_algorithm_that_fails_is_not_run_again_and_is_noted_once() {
             self.0 += 1;
             if self.0 > 2 {
                 let algorithm = "mine@cpu1".parse().unwrap();
-                return Err(Error::Unavailable { algorithm, reason: "it was lost".to_owned() });
+                return Err(Error::Unavailable { algorithm, reason: "it was lost".into() });
             }
             Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap())?.find_pairs(boxes, pairs)
         }

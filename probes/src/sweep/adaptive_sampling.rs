@@ -176,7 +176,7 @@ mod tests {
         };
         Point {
             scenario: scenario.to_owned(),
-            load: Load { objects, ..Load::default() },
+            load: Load::of_objects(objects),
             pairs: 0,
             fingerprint: String::new(),
             foreign_load: None,

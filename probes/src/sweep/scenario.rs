@@ -29,7 +29,7 @@ pub(crate) fn sweep(
         emit(Event::Remark(format!("{scenario}: {remark}")))?;
     }
     let mut racers = Vec::new();
-    for (id, _) in registry.available() {
+    for id in registry.available().into_iter().map(|e| e.id) {
         if !request.schedule.admits(&id) {
             continue;
         }

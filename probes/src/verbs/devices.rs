@@ -91,8 +91,8 @@ fn algorithms(seen: &Seen, adapters: &[Adapter], known: &Algorithms) -> anyhow::
     };
     let registry = known.registry(usable_cores());
     let mut list: Vec<Algorithm> =
-        registry.entries().iter().map(|e| algorithm(&e.id, e.revision, e.unavailable.clone())).collect();
-    for (id, revision) in sapwise::gpu::algorithms(&seen.identities) {
+        registry.entries().iter().map(|e| algorithm(&e.id, e.revision, e.unavailable.as_ref().map(|why| format!("{why:#}")))).collect();
+    for sapwise::Entry { id, revision, .. } in sapwise::gpu::algorithms(&seen.identities) {
         list.push(algorithm(&id, revision, refused(&id).or_else(|| entry(&id))));
     }
     Ok(list)

@@ -27,7 +27,7 @@ use sapwise::SimdLevel;
 pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     // The library falls back to the detected level where the variable is wrong. Here that would label a measurement with a
     // level that it was not taken at.
-    SimdLevel::requested().map_err(WrongUsage)?;
+    SimdLevel::requested().map_err(|e| WrongUsage(e.to_string()))?;
     match verb {
         Verb::Predict(arguments) => predict::run(&arguments, algorithms),
         Verb::Devices(arguments) => devices::run(&arguments, algorithms),

@@ -88,8 +88,8 @@ fn algorithm(arguments: &Arguments, registry: &Registry) -> anyhow::Result<Algor
         return Ok(id.clone());
     }
     let available = registry.available();
-    let usual = available.iter().find(|(id, _)| id.to_string() == DEFAULT).or(available.last());
-    Ok(usual.context("this build has no algorithm that runs here")?.0.clone())
+    let usual = available.iter().find(|e| e.id.to_string() == DEFAULT).or(available.last());
+    Ok(usual.context("this build has no algorithm that runs here")?.id.clone())
 }
 
 /// Adds the algorithms on GPUs where one is asked for.

@@ -63,7 +63,7 @@ fn made_up(real: &[(&str, f64)]) -> MadeUp {
 }
 
 fn cheapest(costs: &[AlgorithmCost], objects: u32) -> String {
-    let load = Load { objects, ..Load::default() };
+    let load = Load::of_objects(objects);
     let best = costs.iter().min_by(|a, b| a.curve.cost_ns(&load).total_cmp(&b.curve.cost_ns(&load)));
     best.unwrap().algorithm.to_string()
 }
