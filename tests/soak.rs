@@ -122,12 +122,8 @@ fn tuning() -> Tuning {
     let cost = |id: &str, call: f64, object: f64| {
         let of_method = registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method())));
         let term = |term, unit_ns| CostTerm { term, unit_ns };
-        AlgorithmCost {
-            algorithm: id.parse().unwrap(),
-            revision: of_method.map_or(1, |e| e.revision),
-            curve: CostCurve { terms: vec![term(Term::Call, call), term(Term::Objects, object)], ..CostCurve::default() },
-            spread_ln: 0.3,
-        }
+        let curve = CostCurve::new(vec![term(Term::Call, call), term(Term::Objects, object)]);
+        AlgorithmCost::new(id.parse().unwrap(), of_method.map_or(1, |e| e.revision), curve, 0.3)
     };
     let costs = vec![
         cost("brute@cpu1", 100.0, 60.0),
