@@ -35,11 +35,9 @@ fn revision(id: &str) -> u32 {
 
 /// Tuning in which each algorithm costs that much a frame.
 fn tuning(costs: &[(&str, f64)]) -> Tuning {
-    let cost = |&(id, ns): &(&str, f64)| AlgorithmCost {
-        algorithm: id.parse().unwrap(),
-        revision: revision(id),
-        curve: CostCurve { terms: vec![CostTerm { term: Term::Call, unit_ns: ns }], ..CostCurve::default() },
-        spread_ln: 0.0,
+    let cost = |&(id, ns): &(&str, f64)| {
+        let curve = CostCurve::new(vec![CostTerm::new(Term::Call, ns)]);
+        AlgorithmCost::new(id.parse().unwrap(), revision(id), curve, 0.0)
     };
     let loads: Vec<Load> = (0..16).map(|k| Load::of_objects(1 << k)).collect();
     Tuning::from_costs(Source::Measured, "uniform", costs.iter().map(cost).collect(), &loads)
