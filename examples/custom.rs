@@ -8,9 +8,10 @@
 //! `probes/examples/bvh.rs`.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs, Registry, Scenario,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs, Registry,
     Source, Term, Tuning,
 };
+use sapwise_scenes::Scenario;
 
 /// What it is called in tuning, reports and decisions.
 pub(crate) const ID: &str = "rested@cpu1";
@@ -68,7 +69,7 @@ pub(crate) fn cost(registry: &Registry, id: &str, terms: &[(Term, f64)]) -> Algo
     let algorithm: AlgorithmId = id.parse().expect("a method and a backend");
     let revision = registry.entries().iter().find(|e| e.id == algorithm).map_or(1, |e| e.revision);
     let terms = terms.iter().map(|&(term, unit_ns)| CostTerm { term, unit_ns }).collect();
-    AlgorithmCost { algorithm, revision, curve: CostCurve { terms, ..CostCurve::default() }, spread_ln: 0.5 }
+    AlgorithmCost::new(algorithm, revision, CostCurve::new(terms), 0.5)
 }
 
 /// Tuning from these costs, with the borders of scenes from 10 to a million objects.

@@ -47,6 +47,10 @@ mod error;
 mod filter;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+// Without the feature only which algorithms there are: reports name them, and nothing of them can run.
+#[cfg(not(feature = "gpu"))]
+#[path = "gpu/methods.rs"]
+pub mod gpu;
 pub mod hardware;
 #[cfg(feature = "model")]
 pub mod json;

@@ -122,12 +122,8 @@ fn tuning() -> Tuning {
     let cost = |id: &str, call: f64, object: f64| {
         let of_method = registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method())));
         let term = |term, unit_ns| CostTerm { term, unit_ns };
-        AlgorithmCost {
-            algorithm: id.parse().unwrap(),
-            revision: of_method.map_or(1, |e| e.revision),
-            curve: CostCurve { terms: vec![term(Term::Call, call), term(Term::Objects, object)], ..CostCurve::default() },
-            spread_ln: 0.3,
-        }
+        let curve = CostCurve::new(vec![term(Term::Call, call), term(Term::Objects, object)]);
+        AlgorithmCost::new(id.parse().unwrap(), of_method.map_or(1, |e| e.revision), curve, 0.3)
     };
     let costs = vec![
         cost("brute@cpu1", 100.0, 60.0),
@@ -167,7 +163,7 @@ fn below(random: &mut Random, most: u64) -> u64 {
     (f64::from(random.next()) * most as f64) as u64
 }
 
-/// A machine whose GPU comes and goes, and whose cores the program may use so many of.
+/// A machine whose GPU comes and goes, and whose cores the program may use this many of.
 struct Machine {
     slot: Arc<Slot>,
     cores: u32,
@@ -262,7 +258,7 @@ fn life(adaptive: &mut Adaptive, machine: &mut Machine, frames: u64, random: &mu
     }
 }
 
-/// Bytes in use once the threads of the last start have ended; or so many milliseconds later, where they are more than ever.
+/// Bytes in use once the threads of the last start have ended; or this many milliseconds later, where they are more than ever.
 fn live_bytes(lowest: isize) -> isize {
     for _ in 0..50 {
         if LIVE.load(Relaxed) <= lowest {

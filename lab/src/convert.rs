@@ -20,10 +20,9 @@ const DROPPED: [(&str, &str); 2] = [
     ("clouds", "the joint distribution of the parameters in training"),
     ("folds", "the fits without some machines, which intervals were made of"),
 ];
-const DROPPED_OF_VALIDATION: [(&str, &str); 1] = [("learning", "the scores of trainings on fewer machines")];
-const DROPPED_OF_COVERAGE: [(&str, &str); 2] = [
-    ("crossings", "the share of crossovers within their interval"),
-    ("crossings_count", "how many crossovers there were"),
+const DROPPED_OF_VALIDATION: [(&str, &str); 2] = [
+    ("learning", "the scores of trainings on fewer machines"),
+    ("coverage", "how often intervals over machines held the measured time"),
 ];
 
 /// A file in its current form.
@@ -107,9 +106,6 @@ fn move_training(model: &mut Map<String, Value>) -> Vec<String> {
         TRAINING.iter().filter_map(|&key| Some((key.to_owned(), model.remove(key)?))).collect();
     if let Some(validation) = training.get_mut("validation").and_then(Value::as_object_mut) {
         dropped.extend(drop_keys(validation, &DROPPED_OF_VALIDATION));
-        if let Some(coverage) = validation.get_mut("coverage").and_then(Value::as_object_mut) {
-            dropped.extend(drop_keys(coverage, &DROPPED_OF_COVERAGE));
-        }
     }
     if simulated {
         model.insert("simulated".to_owned(), true.into());

@@ -72,7 +72,7 @@ similar parameters. `full sweep` has measured the held-out machine itself, and i
 #[must_use]
 pub fn page(model: &Model, training: &Training, notes: &[String]) -> String {
     let mut text = format!("# The model {}\n\nMade by `sapwise train`; this page is generated with it.\n", model.name);
-    if model.is_simulated() {
+    if model.simulated {
         text.push_str(SIMULATED);
     }
     text.push_str(USE);

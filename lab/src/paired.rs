@@ -1,4 +1,4 @@
-//! Where one algorithm overtakes another, from timings of both on the same frames.
+//! Paired comparisons: where one algorithm overtakes another, from timings of both on the same frames.
 //!
 //! For each point the median over frames of `ln(first / second)` is taken, lines are fitted through nearby medians over the
 //! logarithm of the size, and their roots are the crossings. Pairing frame by frame cancels what disturbed both, the median
@@ -8,6 +8,7 @@
 mod ratio;
 
 use ratio::Ratio;
+use sapwise::stats::NORMAL_90;
 
 /// Frames of two algorithms at one point. The k-th sample of both is the same frame; what has no partner is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,9 +59,7 @@ impl PairedOutcome {
     }
 }
 
-/// Quantile of the normal distribution for either end of a 90 % interval.
-const INTERVAL: f64 = 1.645;
-/// The one that pure noise exceeds in one case of a hundred.
+/// Quantile of the normal distribution that pure noise exceeds in one case of a hundred.
 const DISTINCT: f64 = 2.326;
 
 /// Where `first` and `second` of `points` cross. See [`PairedComparison`].
@@ -89,7 +88,7 @@ impl PairedComparison {
     pub fn new(points: &[PairedSamples<'_>]) -> Option<Self> {
         let ratio = Ratio::new(points, DISTINCT)?;
         let curve = ratio.curve();
-        let told = curve.iter().map(|e| e.in_units_of(INTERVAL)).collect();
+        let told = curve.iter().map(|e| e.in_units_of(NORMAL_90)).collect();
         Some(Self { ratio, curve: curve.iter().map(|e| e.value).collect(), told })
     }
 
@@ -98,7 +97,7 @@ impl PairedComparison {
     /// An excursion to one side whose area could be noise in more than one case of a hundred is none: the roots around it count
     /// as one, or as none where the ratio returns to the side it came from.
     #[must_use]
-    pub fn compare(&self) -> PairedOutcome {
+    pub fn outcome(&self) -> PairedOutcome {
         let mut held: Vec<Excursion> = Vec::new();
         for excursion in excursions(&self.curve) {
             if self.ratio.area(excursion.start, excursion.end).in_units_of(DISTINCT).abs() < 1.0 {

@@ -10,30 +10,30 @@ use sapwise::{AlgorithmId, BackendClass, Hardware, Load, Parameter, Term};
 
 /// A machine of the made-up family.
 #[derive(Debug, Clone)]
-pub struct Machine {
-    pub name: &'static str,
-    pub ghz: f64,
-    pub lanes: f64,
-    pub cores: u32,
-    pub cache_bytes: f64,
-    pub gb_per_s: (f64, f64),
-    pub fork_join_ns: f64,
-    pub gpus: Vec<Gpu>,
+pub(crate) struct Machine {
+    pub(crate) name: &'static str,
+    pub(crate) ghz: f64,
+    pub(crate) lanes: f64,
+    pub(crate) cores: u32,
+    pub(crate) cache_bytes: f64,
+    pub(crate) gb_per_s: (f64, f64),
+    pub(crate) fork_join_ns: f64,
+    pub(crate) gpus: Vec<Gpu>,
     /// Standard deviation of the logarithm of a sample.
-    pub noise: f64,
-    pub frames: usize,
+    pub(crate) noise: f64,
+    pub(crate) frames: usize,
 }
 
 /// A made-up GPU: latencies in ns, rates in GB/s, and thousands of millions of operations a second.
 #[derive(Debug, Clone)]
-pub struct Gpu {
-    pub kind: GpuKind,
-    pub round_trip_ns: f64,
-    pub dispatch_ns: f64,
-    pub upload: f64,
-    pub download: f64,
-    pub copy: f64,
-    pub gflop: f64,
+pub(crate) struct Gpu {
+    pub(crate) kind: GpuKind,
+    pub(crate) round_trip_ns: f64,
+    pub(crate) dispatch_ns: f64,
+    pub(crate) upload: f64,
+    pub(crate) download: f64,
+    pub(crate) copy: f64,
+    pub(crate) gflop: f64,
 }
 
 const fn gpu(kind: GpuKind, latencies: (f64, f64), transfers: (f64, f64), copy: f64, gflop: f64) -> Gpu {
@@ -59,7 +59,7 @@ fn machine(name: &'static str, ghz: f64, lanes: f64, cores: u32, mib: f64, gb: (
 
 impl Machine {
     /// Seven machines, from a small laptop to a server.
-    pub fn family() -> Vec<Self> {
+    pub(crate) fn family() -> Vec<Self> {
         vec![
             machine("0000000000000001", 2.4, 8.0, 2, 4.0, (9.0, 14.0), 2500.0),
             machine("0000000000000002", 3.1, 4.0, 4, 8.0, (11.0, 20.0), 4000.0),
@@ -73,7 +73,7 @@ impl Machine {
 
     /// Eight machines, all but the last of the family, each with one GPU and two of them with a second one; the eighth is the
     /// first again with the GPU of a server.
-    pub fn family_with_gpus() -> Vec<Self> {
+    pub(crate) fn family_with_gpus() -> Vec<Self> {
         use GpuKind::{Discrete, Integrated};
         let gpus = [
             vec![gpu(Integrated, (60e3, 3e3), (9.0, 6.0), 40.0, 800.0)],
@@ -93,7 +93,7 @@ impl Machine {
         machines.into_iter().zip(gpus).map(|(m, gpus)| Self { gpus, ..m }).collect()
     }
 
-    pub fn exact(mut self) -> Self {
+    pub(crate) fn exact(mut self) -> Self {
         self.noise = 0.0;
         self
     }
@@ -103,7 +103,7 @@ impl Machine {
         1.0 + 0.85 * f64::from(k - 1)
     }
 
-    pub fn hardware(&self) -> Hardware {
+    pub(crate) fn hardware(&self) -> Hardware {
         let figures = [
             (ParameterId::UsableCores, f64::from(self.cores)),
             (ParameterId::ClockMeasuredGhz, self.ghz),
@@ -129,7 +129,7 @@ impl Machine {
 
     /// A full sweep: 23 sizes from 16 to 700 000 objects of two scenarios; from 500 objects up whoever is eight times slower than
     /// the best leaves the race, on a GPU only whoever doesn't gain.
-    pub fn report(&self) -> Report {
+    pub(crate) fn report(&self) -> Report {
         let hardware = self.hardware();
         let mut random = Random::named(u64::from(self.cores) * 1000 + self.ghz.to_bits() % 997, &[]);
         let threads = (0..).map(|k| 1 << k).take_while(|&k| k < self.cores).chain([self.cores]);
@@ -238,7 +238,7 @@ fn point(scenario: &str, load: Load, timings: Vec<Timing>) -> Point {
 }
 
 /// Loads like those of a constant density that moves little, and of clusters of growing density that move less and less.
-pub fn load(scenario: &str, n: f64) -> Load {
+pub(crate) fn load(scenario: &str, n: f64) -> Load {
     let (axis, strip, pairs, moved) = match scenario {
         "uniform" => (0.3 * n.powf(5.0 / 3.0), 4.0 * n, 1.0 * n, 0.04),
         _ => (0.8 * n.powf(1.7), 3.0 * n.powf(1.25), 1.2 * n.powf(1.2), n.powf(-0.2)),
@@ -264,7 +264,7 @@ fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> Me
 }
 
 /// The costs on GPUs that the reports are made from.
-pub fn gpu_truth() -> Vec<MethodModel> {
+pub(crate) fn gpu_truth() -> Vec<MethodModel> {
     use {Scale::*, Term::*};
     let method = |name: &str, sort: Option<f64>, dispatches: f64, tests: (Term, Scale, f64)| {
         let mut terms = vec![
@@ -287,7 +287,7 @@ pub fn gpu_truth() -> Vec<MethodModel> {
 }
 
 /// The costs on the CPU that the reports are made from.
-pub fn truth() -> Vec<MethodModel> {
+pub(crate) fn truth() -> Vec<MethodModel> {
     use {Scale::*, Term::*};
     let method = |name: &str, terms: &[(Term, Scale, f64)]| method(name, BackendClass::Cpu, terms);
     let sorted = |call, join, tests| {

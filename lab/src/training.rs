@@ -183,6 +183,9 @@ pub fn read_model(text: &str) -> Result<StoredModel, json::Error> {
         training: Training,
     }
     let training = TRAINING.read::<Keys>(text)?.value.training;
+    if let Some(defect) = training.prior.and_then(|p| p.defect()) {
+        return Err(json::Error::Data { path: "training.prior".to_owned(), source: serde::de::Error::custom(defect) });
+    }
     Ok(StoredModel { model: json::model(text)?, training })
 }
 

@@ -1,7 +1,7 @@
 //! Figures of hardware parameters with their units.
 
 use crate::text::{bytes, duration};
-use GpuParameterId::UnifiedMemory;
+use sapwise::hardware::GpuParameterId;
 
 /// A value with the unit that the end of its parameter's name says.
 pub fn value(name: &str, value: f64) -> String {
@@ -9,7 +9,7 @@ pub fn value(name: &str, value: f64) -> String {
         _ if name.ends_with("_gb_per_s") => format!("{value:.1} GB/s"),
         _ if name.ends_with("_gflop_per_s") => format!("{value:.0} GFLOP/s"),
         _ if name.ends_with("_g_per_s") => format!("{value:.2} G/s"),
-        _ if name == UNIFIED_MEMORY => if value > 0.0 { "yes" } else { "no" }.to_owned(),
+        _ if name == GpuParameterId::UnifiedMemory.as_str() => if value > 0.0 { "yes" } else { "no" }.to_owned(),
         _ if name.ends_with("_bytes") => bytes(value),
         _ if name.ends_with("_ghz") => format!("{value:.2} GHz"),
         _ if name.ends_with("_ns") && value < 1000.0 => format!("{value:.1} ns"),

@@ -121,7 +121,7 @@ impl CacheFile {
         match fs::metadata(&self.path) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(ignored(&e.to_string())),
-            // To open a pipe would wait for whoever writes to it.
+            // To open a pipe would wait for its writer.
             Ok(found) if !found.is_file() => return Err(ignored("it is no file")),
             Ok(found) if found.len() > LONGEST_BYTES => return Err(ignored("it is too long")),
             Ok(_) => {}

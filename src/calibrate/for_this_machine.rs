@@ -21,8 +21,8 @@ impl Adaptive {
     ///
     /// In the background, which is the default, it returns at once, with [`Tuning::usual`] for the first frames; see
     /// [`StartOptions::background`]. The thread that measures ends by itself, whether this is dropped before or not. What is kept
-    /// holds for this machine, its drivers, this version of the library, its algorithms and the model; a change of any of
-    /// them measures anew. A cache that can't be read or written keeps nothing from working: [`setup`](Self::setup) tells.
+    /// holds for this machine, its drivers, this version of the library, its algorithms and the model; after a change of any of
+    /// them the next start measures again. A cache that can't be read or written keeps nothing from working: [`setup`](Self::setup) tells.
     ///
     /// Uses no network and no global state.
     ///

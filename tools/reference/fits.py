@@ -74,16 +74,6 @@ def weighted_ridge(random, penalty):
     return dict(penalty=penalty, x=x.tolist(), weights=weights.tolist(), y=y.tolist(), fitted=fitted.tolist())
 
 
-def elastic_net(random, rows, penalty):
-    x = random.normal(size=(rows, 6))
-    x[:, 3] = x[:, 0] + 0.3 * x[:, 3]
-    x = few_digits(x * [1, 2, 0.1, 1, 5, 1] + 3)
-    y = few_digits(8 + x[:, 0] - 0.4 * x[:, 1] + 0.3 * random.normal(size=rows))
-    net = ElasticNet(alpha=penalty, l1_ratio=0.5, tol=1e-13, max_iter=1_000_000)
-    net.fit(standardised(x, numpy.ones(rows)), y)
-    return dict(penalty=penalty, x=x.tolist(), y=y.tolist(), intercept=float(net.intercept_), slopes=net.coef_.tolist())
-
-
 def ordinary(random, rows):
     x = few_digits(random.normal(size=(rows, 4)) * [0.4, 0.7, 1.1, 0.6] + [1, 2, 1.5, 8])
     y = few_digits(6 - 0.7 * x[:, 1] + 0.4 * x[:, 3] + 0.2 * random.normal(size=rows))
@@ -167,7 +157,6 @@ def main():
         versions=versions,
         nnls=list(non_negative_problems(random[0])),
         ridge=[weighted_ridge(random[1], penalty) for penalty in (0.03, 0.3)],
-        elastic_net=[elastic_net(random[2], rows, penalty) for rows, penalty in ((24, 0.03), (24, 0.5), (5, 0.1))],
         least_squares=[ordinary(random[3], rows) for rows in (7, 20)],
         robust=list(robust_problems(random[4])),
         quantiles=[quantiles(numpy.exp(random[5].normal(size=count)) * 1e4) for count in (4, 5, 12, 31)],

@@ -25,7 +25,7 @@ const FIRST_FRAME: f64 = 3.0;
 pub struct Effort {
     /// Objects of its scene.
     pub objects: u32,
-    /// Whether the algorithm keeps work from frame to frame.
+    /// Whether the algorithm is incremental.
     pub is_incremental: bool,
 }
 
@@ -40,11 +40,11 @@ impl Effort {
     }
 }
 
-/// The methods on the CPU that keep work from frame to frame.
+/// The incremental methods on the CPU.
 #[derive(Debug)]
-pub struct Keepers(Vec<String>);
+pub struct IncrementalMethods(Vec<String>);
 
-impl Keepers {
+impl IncrementalMethods {
     pub fn find() -> Self {
         // A registry of one core makes its algorithms without threads.
         let registry = Registry::with_cores(1);
@@ -62,12 +62,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sample_of_who_keeps_work_takes_the_frames_of_its_warm_up_longer() {
+    fn a_sample_of_an_incremental_algorithm_takes_the_frames_of_its_warm_up_longer() {
         let effort = |is_incremental| Effort { objects: 100_000, is_incremental };
         let [without, with] = [false, true].map(|k| effort(k).seconds(1e6));
         assert!((with - without - WARM_UP as f64 * 2.5e-3).abs() < 1e-9, "{with} {without}");
-        let keepers = Keepers::find();
-        let of = |id: &str| keepers.contain(&id.parse().unwrap());
+        let methods = IncrementalMethods::find();
+        let of = |id: &str| methods.contain(&id.parse().unwrap());
         assert!(of("pair-cache@cpu1") && of("pair-cache@cpu8") && !of("grid-sap@cpu1") && !of("pair-cache@gpu0"));
     }
 }

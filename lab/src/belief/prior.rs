@@ -1,13 +1,14 @@
 //! How far costs on a new machine lie from their prediction, before anything was run on it.
 
-use crate::{AlgorithmId, Backend, BackendClass, Term};
+use sapwise::{AlgorithmId, Backend, BackendClass, Term};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// How far real costs lie from predicted ones on machines that a model has not seen, for each class of processor.
 ///
 /// All figures are natural logarithms of real over predicted time. The classes are taken to be independent of each other.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Prior {
     /// Of algorithms on the CPU.
     pub cpu: Deviations,
@@ -16,9 +17,8 @@ pub struct Prior {
 }
 
 /// The parts that the deviation of an algorithm is the sum of, and the noise of one observation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Deviations {
     /// What all algorithms on this class of processor share.
     pub shared: Part,
@@ -38,9 +38,8 @@ pub struct Deviations {
 }
 
 /// One part of a deviation, as a function of the number of objects.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Part {
     /// Standard deviation of what is the same at every number of objects.
     pub constant_ln: f64,
@@ -126,12 +125,12 @@ impl Deviations {
         sum
     }
 
-    /// Covariance of the factors that two algorithms have on the same term. A call on one thread has no fork and join, which a call on
+    /// Covariance of the factors that two algorithms have on the same term, `None` being a product. A call on one thread has no fork and join, which a call on
     /// several mostly is; these share nothing.
     #[must_use]
-    pub fn covariance_of_terms(&self, term: Term, a: &AlgorithmId, b: &AlgorithmId) -> f64 {
+    pub(super) fn covariance_of_terms(&self, term: Option<Term>, a: &AlgorithmId, b: &AlgorithmId) -> f64 {
         let wide = |id: &AlgorithmId| id.backend().width() > 1;
-        if term == Term::Call && wide(a) != wide(b) {
+        if term == Some(Term::Call) && wide(a) != wide(b) {
             return 0.0;
         }
         self.term_ln.powi(2) * if a.method() == b.method() { 1.0 } else { TERMS_SHARED }

@@ -1,7 +1,7 @@
 //! Samples out of a report, as if its machine were there.
 
-use super::effort::Keepers;
-use crate::fit::rows::{Answer, Effort, Sample, Source};
+use super::effort::{Effort, IncrementalMethods};
+use super::sampling::{Answer, Sample, Source};
 use sapwise::{AlgorithmId, Load};
 
 /// What a report holds of one load.
@@ -22,12 +22,12 @@ const NEAR_LN: f64 = 0.8;
 pub struct Replay<'a> {
     points: &'a [ReplayPoint],
     given: Vec<(AlgorithmId, usize)>,
-    keepers: Keepers,
+    incremental: IncrementalMethods,
 }
 
 impl<'a> Replay<'a> {
     pub fn new(points: &'a [ReplayPoint]) -> Self {
-        Self { points, given: Vec::new(), keepers: Keepers::find() }
+        Self { points, given: Vec::new(), incremental: IncrementalMethods::find() }
     }
 
     /// Position of the point nearest to a load at which the algorithm was timed.
@@ -45,7 +45,7 @@ impl Source for Replay<'_> {
         if self.given.iter().any(|g| g.0 == *algorithm && g.1 == at) {
             return None;
         }
-        Some(Effort { objects: self.points[at].load.objects, is_incremental: self.keepers.contain(algorithm) })
+        Some(Effort { objects: self.points[at].load.objects, is_incremental: self.incremental.contain(algorithm) })
     }
 
     fn sample(&mut self, algorithm: &AlgorithmId, load: &Load) -> anyhow::Result<Answer> {

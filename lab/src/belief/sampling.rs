@@ -1,20 +1,10 @@
 //! A handful of samples: which algorithm to time at which size, and what that tells about all of them.
 
-mod effort;
-mod live;
-mod order;
-mod replay;
-mod taker;
-
-use crate::gpus::uses;
-use crate::belief::{Joint, KnowledgeGradient};
-use sapwise::{AlgorithmCost, AlgorithmId, Load, Observation, Posterior, Prior};
-
-pub use effort::Effort;
-pub use live::Live;
-pub use order::Order;
-pub use replay::{Replay, ReplayPoint};
-pub use taker::take;
+use super::effort::Effort;
+use super::knowledge_gradient::KnowledgeGradient;
+use super::posterior::{Joint, Posterior};
+use super::prior::Prior;
+use sapwise::{AlgorithmCost, AlgorithmId, Backend, Load, Observation};
 
 /// Time for all samples together.
 pub const SECONDS: f64 = 2.0;
@@ -82,12 +72,7 @@ pub struct Taken {
 impl Taken {
     /// As it stands in a file.
     pub fn observation(&self) -> Observation {
-        Observation {
-            algorithm: self.algorithm.clone(),
-            objects: self.sample.load.objects,
-            predicted_ns: self.predicted_ns,
-            measured_ns: self.sample.ns,
-        }
+        Observation::new(self.algorithm.clone(), self.sample.load.objects, self.predicted_ns, self.sample.ns)
     }
 }
 
@@ -146,7 +131,7 @@ pub fn learn(
             Answer::Skipped => {}
             Answer::Failed { why, gpus } => {
                 for (other, usable) in posterior.predicted().iter().zip(&mut usable) {
-                    let lost = uses(&other.algorithm).iter().any(|k| gpus.contains(k));
+                    let lost = matches!(other.algorithm.backend(), Backend::Gpu(used) if used.iter().any(|k| gpus.contains(k)));
                     *usable &= !lost && other.algorithm != algorithm;
                 }
                 open.retain(|o| usable[o.0]);

@@ -1,9 +1,10 @@
 //! What it costs to use the tuning that one report measured under the timings of another.
 
 use crate::data::{Evidence, Profile, usable};
-use crate::evaluate::{RegretTable, Strategy, available, by_costs};
+use crate::evaluate::{RegretTable, Strategy, by_costs};
 use crate::fit::measured_costs;
 use crate::report::{Label, Report};
+use sapwise::stats::mean;
 use serde::Serialize;
 
 /// Mean regrets over the points of reports, against the best at each point.
@@ -34,7 +35,7 @@ pub(super) fn losses(reports: &[(String, Report)]) -> Option<Losses> {
     }
     let (mut own, mut others, mut beyond) = (Vec::new(), Vec::new(), Vec::new());
     for (k, judged) in profiles.iter().enumerate() {
-        let available = available(judged);
+        let available = judged.available();
         let table = RegretTable::new(judged);
         let loss = |of: &Profile| {
             let choose: Strategy<'_> = by_costs(measured_costs(of).0, &available);
@@ -54,8 +55,4 @@ pub(super) fn losses(reports: &[(String, Report)]) -> Option<Losses> {
         beyond_own: mean(&beyond),
         beyond_own_most: beyond.iter().copied().fold(f64::NEG_INFINITY, f64::max),
     })
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }

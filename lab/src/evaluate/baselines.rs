@@ -84,9 +84,9 @@ pub struct Likeness(Vec<Option<f64>>);
 
 impl Likeness {
     pub fn new(hardware: &Hardware) -> Self {
-        let of_gpu = COMPARED_OF_GPUS.map(|name| format!("{GPU_PREFIX}{name}"));
-        let names = COMPARED.into_iter().chain(of_gpu.iter().map(String::as_str));
-        Self(names.map(|name| figure(hardware, name).filter(|v| *v > 0.0).map(f64::ln)).collect())
+        let of_gpus = COMPARED_OF_GPUS.iter().map(|id| format!("{GPU_PREFIX}{id}"));
+        let names = COMPARED.iter().map(ToString::to_string).chain(of_gpus);
+        Self(names.map(|name| figure(hardware, &name).filter(|v| *v > 0.0).map(f64::ln)).collect())
     }
 }
 

@@ -32,7 +32,7 @@ impl MeasuredCrossovers {
             let found = closest(id, &ids)?;
             let cost = costs.iter().find(|c| c.algorithm == found)?;
             // Under its own name, since one cost may stand for both sides.
-            Some(AlgorithmCost { algorithm: id.clone(), ..cost.clone() })
+            Some(AlgorithmCost::new(id.clone(), cost.revision, cost.curve.clone(), cost.spread_ln))
         };
         self.crossovers.iter().filter_map(|b| Some(self.compared(b, cost(&b.below)?, cost(&b.above)?))).collect()
     }

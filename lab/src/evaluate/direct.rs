@@ -16,15 +16,15 @@ use sapwise::{AlgorithmId, BackendClass, Hardware};
 
 /// Parameters that a crossover is regressed on by least squares, as logarithms. Few, because there are as few rows as reports.
 const PARAMETERS: [&str; 4] = [
-    ParameterId::ClockMeasuredGhz,
-    ParameterId::SimdLanes,
-    ParameterId::ScalingAllThreadsRatio,
-    ParameterId::ForkJoinColdNs,
+    ParameterId::ClockMeasuredGhz.as_str(),
+    ParameterId::SimdLanes.as_str(),
+    ParameterId::ScalingAllThreadsRatio.as_str(),
+    ParameterId::ForkJoinColdNs.as_str(),
 ];
 
 /// The same of a crossover between the CPU and a GPU, or between two methods on GPUs.
 const GPU_PARAMETERS: [&str; 4] =
-    [ParameterId::ScalingAllThreadsRatio, "gpu/round_trip_ns", "gpu/upload_rate_gb_per_s", "gpu/arithmetic_gflop_per_s"];
+    [ParameterId::ScalingAllThreadsRatio.as_str(), "gpu/round_trip_ns", "gpu/upload_rate_gb_per_s", "gpu/arithmetic_gflop_per_s"];
 
 /// A method on one thread or on all threads of its machine, on one GPU or on all: counts differ between machines, these do not.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

@@ -130,11 +130,11 @@ fn features(hardware: &Hardware, backend: &Backend, load: &Load) -> Vec<f64> {
         f64::from(backend.width()).ln(),
     ];
     let logarithm = |value: Option<f64>| value.filter(|v| *v > 0.0).map_or(0.0, f64::ln);
-    let of_machine = COMPARED.iter().map(|name| logarithm(hardware.value(name)));
+    let of_machine = COMPARED.iter().map(|id| logarithm(hardware.value(*id)));
     let of_gpu = match backend {
         Backend::Gpu(indices) => {
             let gpu = indices.first().and_then(|k| hardware.gpu(*k));
-            COMPARED_OF_GPUS.iter().map(|name| logarithm(gpu.and_then(|g| g.value(name)))).collect()
+            COMPARED_OF_GPUS.iter().map(|id| logarithm(gpu.and_then(|g| g.value(*id)))).collect()
         }
         _ => Vec::new(),
     };

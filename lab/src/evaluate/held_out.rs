@@ -3,7 +3,7 @@
 use super::crossovers::ComparedCrossover;
 use super::scores::{Judged, OURS, regrets_of_units};
 use crate::data::{Profile, Spot};
-use sapwise::{AlgorithmCost, AlgorithmId, BackendClass};
+use sapwise::{AlgorithmCost, AlgorithmId};
 use std::collections::BTreeSet;
 
 /// Times of a profile that are kept, about.
@@ -40,12 +40,12 @@ pub struct HeldOutCrossover {
 pub struct Time {
     /// The file of the profile.
     pub file: String,
-    /// Objects of the frame.
+    /// The scenario of the frames.
+    pub scenario: String,
+    /// Their objects.
     pub objects: u32,
-    /// Its method.
-    pub method: String,
-    /// The class of processor that it ran on.
-    pub class: BackendClass,
+    /// The algorithm.
+    pub algorithm: AlgorithmId,
     /// The median over the frames.
     pub measured_ns: f64,
     /// What was predicted for it.
@@ -68,9 +68,9 @@ impl Time {
             let (id, spot, cost): (&AlgorithmId, &Spot, &AlgorithmCost) = (id, spot, cost);
             Self {
                 file: profile.file.clone(),
+                scenario: spot.scenario.clone(),
                 objects: spot.load.objects,
-                method: id.method().to_owned(),
-                class: id.backend().class(),
+                algorithm: id.clone(),
                 measured_ns,
                 predicted_ns: cost.curve.cost_ns(&spot.load),
             }

@@ -26,5 +26,5 @@ pub use importance::{Effect, Importance, Interval, OfMethod, OfParameter, Verdic
 pub use notes::folded;
 pub use partition::Partition;
 pub use regret_table::{NOT_TIMED, Regret, RegretTable, Strategy};
-pub use scores::OURS;
+pub use scores::{OURS, SINGLE_BEST};
 pub use validate::{Validated, validate};

@@ -42,9 +42,9 @@ impl Partition {
     }
 
     fn of_restrictions(profiles: &[Profile]) -> Self {
-        let level = |p: &Profile, name: &str| p.hardware.value(name).map_or(0, |v| v as u64);
-        let by = |name: &str| {
-            let folds = grouped(profiles, |p| format!("{:020}", level(p, name)));
+        let level = |p: &Profile, id: ParameterId| p.hardware.value(id).map_or(0, |v| v as u64);
+        let by = |id: ParameterId| {
+            let folds = grouped(profiles, |p| format!("{:020}", level(p, id)));
             if folds.len() > 1 { folds } else { Vec::new() }
         };
         let folds = [by(ParameterId::SimdLanes), by(ParameterId::UsableCores)].concat();

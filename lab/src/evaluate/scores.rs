@@ -7,7 +7,7 @@ use sapwise::stats::{self, median};
 use std::collections::BTreeMap;
 
 /// The strategy that scores are given relative to.
-pub(super) const SINGLE_BEST: &str = "single best";
+pub const SINGLE_BEST: &str = "single best";
 /// The strategy of `predict`.
 pub const OURS: &str = "physics + ridge";
 

@@ -183,8 +183,8 @@ impl<'a> Data<'a> {
         fold.iter().for_each(|&k| chosen[k] = false);
         let models = match model(self.profiles, self.designs, &chosen, "validation") {
             Ok((model, _)) => {
-                let bare = |m: &MethodModel| MethodModel { residual: Vec::new(), residual_intercept: 0.0, ..m.clone() };
-                let physics = Model { methods: model.methods.iter().map(bare).collect(), ..model.clone() };
+                let mut physics = model.clone();
+                physics.methods = model.methods.iter().map(MethodModel::without_residual).collect();
                 Some((model, physics))
             }
             Err(why) => {

@@ -10,7 +10,7 @@ use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
 use sapwise::hardware::ParameterId;
 use sapwise::stats::robust_deviation;
-use sapwise::model::{Feature, MethodModel, ModelTerm, Scale};
+use sapwise::model::{Feature, MethodModel, ModelTerm, PredictError, Scale};
 use crate::report::Label;
 use sapwise::{AlgorithmId, Backend, BackendClass, GpuKind, Hardware, Term};
 use std::collections::BTreeMap;
@@ -182,11 +182,11 @@ impl Design {
                     kept.push(row);
                 }
                 // A profile may hold several GPUs, of which one lacks a parameter.
-                Err(why) if told.contains(&(row.profile, why.clone())) => {}
+                Err(why) if told.contains(&(row.profile, why.to_string())) => {}
                 Err(why) => {
                     let what = if class == BackendClass::Cpu { &method } else { &id.to_string() };
                     notes.push(format!("{} is left out for {what}: {why}", profile.file));
-                    told.push((row.profile, why));
+                    told.push((row.profile, why.to_string()));
                 }
             }
         }
@@ -284,22 +284,18 @@ impl Design {
         gpu_kinds.dedup();
         let Ridge { intercept, terms } = ridge;
         let width = |&k: &usize| self.id(rows[k], profiles).backend().width();
-        Ok(Some(MethodModel {
-            method: self.method.clone(),
-            backend: self.class,
-            revision: profiles[row(*first).profile].algorithms[usize::from(row(*first).algorithm)].revision,
-            max_threads: measured.iter().map(width).max().unwrap_or(1),
-            gpu_kinds,
-            min_objects: objects().min().unwrap_or(1),
-            max_objects: objects().max().unwrap_or(1),
-            terms: used.map(|(&(term, scale), &unit)| ModelTerm { term, scale, unit }).collect(),
-            fallback_terms: min_of_two.zip(other).map_or_else(Vec::new, |(found, other)| {
-                other.iter().map(|t| ModelTerm { unit: t.unit * found.factor, ..*t }).collect()
-            }),
-            residual_intercept: intercept,
-            residual: terms,
-            spread_ln,
-        }))
+        let revision = profiles[row(*first).profile].algorithms[usize::from(row(*first).algorithm)].revision;
+        let mut model = MethodModel::new(&self.method, self.class, revision);
+        model.max_threads = measured.iter().map(width).max().unwrap_or(1);
+        model.gpu_kinds = gpu_kinds;
+        model.min_objects = objects().min().unwrap_or(1);
+        model.max_objects = objects().max().unwrap_or(1);
+        model.terms = used.map(|(&(term, scale), &unit)| ModelTerm { term, scale, unit }).collect();
+        if let Some((found, other)) = min_of_two.zip(other) {
+            model.fallback_terms = other.iter().map(|t| ModelTerm { unit: t.unit * found.factor, ..*t }).collect();
+        }
+        (model.residual_intercept, model.residual, model.spread_ln) = (intercept, terms, spread_ln);
+        Ok(Some(model))
     }
 
     /// What the method that this one falls back to costs in some of the rows, without its residual.
@@ -347,20 +343,18 @@ fn nanoseconds(
     hardware: &Hardware,
     id: &AlgorithmId,
     row: &Row,
-) -> Result<(Vec<f64>, Vec<f64>), String> {
+) -> Result<(Vec<f64>, Vec<f64>), PredictError> {
     let backend = id.backend();
     let cache = hardware.value(ParameterId::CacheLlcBytes).filter(|c| *c > 0.0);
     let cache = match backend.class() {
-        BackendClass::Cpu => {
-            cache.ok_or_else(|| format!("the hardware parameter {} is missing", ParameterId::CacheLlcBytes))?
-        }
+        BackendClass::Cpu => cache.ok_or_else(|| PredictError::Missing { parameter: ParameterId::CacheLlcBytes.to_string(), why: None })?,
         BackendClass::Gpu => 0.0,
     };
     let features = Feature::of(backend.class()).iter().map(|f| f.value(hardware, backend, &row.load));
     // The residual needs its parameters even where no term does.
-    let features = features.collect::<Result<Vec<f64>, String>>()?;
+    let features = features.collect::<Result<Vec<f64>, PredictError>>()?;
     let one = |&(term, scale): &(Term, Scale)| Ok(term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?);
-    Ok((terms.iter().map(one).collect::<Result<_, String>>()?, features))
+    Ok((terms.iter().map(one).collect::<Result<_, PredictError>>()?, features))
 }
 
 #[cfg(test)]

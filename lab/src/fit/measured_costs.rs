@@ -93,7 +93,7 @@ pub fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<String>) {
         let fitted = (points >= FEWEST_POINTS).then(|| curve(&terms_of(timed), &own, cache_bytes, other.as_ref()));
         match fitted.filter(|(curve, _)| curve.defect().is_none()) {
             Some((curve, spread_ln)) => {
-                costs.push(AlgorithmCost { algorithm: timed.id.clone(), revision: timed.revision, curve, spread_ln });
+                costs.push(AlgorithmCost::new(timed.id.clone(), timed.revision, curve, spread_ln));
             }
             None => warnings.push(format!("{} has no cost curve: it was timed at {points} points only", timed.id)),
         }
@@ -132,7 +132,7 @@ fn curve(terms: &[Term], rows: &[&Row], cache_bytes: f64, other: Option<&CostCur
         }
     };
     let terms = terms.iter().zip(units).filter(|(_, u)| *u > 0.0).map(|(&term, unit_ns)| CostTerm { term, unit_ns });
-    let mut curve = CostCurve { terms: terms.collect(), fallback_terms, cache_bytes, correction: Vec::new() };
+    let mut curve = CostCurve::new(terms.collect()).with_fallback(fallback_terms).with_cache(cache_bytes);
     if curve.defect().is_some() {
         return (curve, 0.0);
     }

@@ -12,9 +12,10 @@ pub(crate) mod robust;
 mod rows;
 mod terms;
 
-pub use designs::{Designs, TermsOf, thinned};
+pub use designs::{Designs, TermsOf};
+pub(crate) use designs::thinned;
 pub use measured_costs::{measured_costs, measured_tuning, measured_slice, slice_tuning};
-pub use model::{Fitted, model};
+pub use model::model;
 pub use prior::{TimingError, prior};
 pub use rows::{Row, rows};
 pub use terms::{fallback_method, terms, terms_of_one_machine};

@@ -4,7 +4,7 @@ use super::designs::Designs;
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile};
 use crate::report::Label;
 use anyhow::{Result, bail};
-use sapwise::model::{GPU_PREFIX, ModelSchema, Range};
+use sapwise::model::{GPU_PREFIX, Range};
 use sapwise::{Backend, GpuHardware, Model};
 
 /// A model of the chosen profiles, and in sentences what was left out and why.
@@ -19,15 +19,10 @@ pub fn model(
 ) -> Result<(Model, Vec<String>)> {
     let (methods, notes) = designs.fit(chosen)?;
     let profiles: Vec<&Profile> = profiles.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
-    let model = Model {
-        schema: ModelSchema,
-        name: name.to_owned(),
-        simulated: profiles.iter().any(|p| p.label == Label::Simulated),
-        ranges: ranges(&profiles),
-        methods,
-    };
+    let mut model = Model::new(name, methods, ranges(&profiles));
+    model.simulated = profiles.iter().any(|p| p.label == Label::Simulated);
     if let Some(defect) = model.defect() {
-        bail!("no model could be fitted: {}", [vec![defect], notes].concat().join("; "));
+        bail!("no model could be fitted: {}", [vec![defect.to_string()], notes].concat().join("; "));
     }
     Ok((model, notes))
 }
@@ -36,7 +31,7 @@ pub fn model(
 fn ranges(profiles: &[&Profile]) -> Vec<Range> {
     let machine = COMPARED
         .into_iter()
-        .filter_map(|name| range(name.to_owned(), profiles.iter().filter_map(|p| p.hardware.value(name)).collect()));
+        .filter_map(|name| range(name.to_string(), profiles.iter().filter_map(|p| p.hardware.value(name)).collect()));
     let timed: Vec<&GpuHardware> = profiles.iter().flat_map(|p| timed_gpus(p)).collect();
     let gpus = COMPARED_OF_GPUS
         .into_iter()

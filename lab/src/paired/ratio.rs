@@ -1,9 +1,10 @@
 //! The ratio of two costs over the sizes: lines through nearby medians, and their errors.
 //!
-//! Drawing frames anew would show the error of a median within its point only. Between points the host changes, and with it
+//! Drawing frames again would show the error of a median within its point only. Between points the host changes, and with it
 //! both costs by some percent; that error shows in how far medians lie from the lines, and between rounds.
 
 use super::PairedSamples;
+use sapwise::stats::{median, robust_deviation};
 
 /// A line takes part of this much to either side of its place, in natural logarithms of the size: 0.6 of a decade, over which
 /// the exponents of costs change little.
@@ -20,7 +21,7 @@ const GRID_STEP: f64 = std::f64::consts::LN_2 / 32.0;
 
 /// `ln(first / second)` over the logarithm of the size.
 #[derive(Debug, Clone)]
-pub struct Ratio {
+pub(super) struct Ratio {
     /// Ascending by place.
     medians: Vec<Median>,
     /// How far each median lies from the line at its place, in the order of the medians.
@@ -29,7 +30,7 @@ pub struct Ratio {
     variances: Vec<(f64, f64)>,
     rounds: usize,
     /// Places, in natural logarithms of the objects.
-    pub grid: Vec<f64>,
+    pub(super) grid: Vec<f64>,
     /// For each place the line there.
     lines: Vec<Line>,
 }
@@ -61,8 +62,8 @@ struct Line {
 
 /// A weighted sum of medians.
 #[derive(Debug, Clone, Copy)]
-pub struct Estimate {
-    pub value: f64,
+pub(super) struct Estimate {
+    pub(super) value: f64,
     deviation: f64,
     /// Degrees of freedom of the deviation.
     freedom: f64,
@@ -70,7 +71,7 @@ pub struct Estimate {
 
 impl Estimate {
     /// The value over the one that pure noise exceeds as rarely as a normal variable exceeds `quantile`.
-    pub fn in_units_of(self, quantile: f64) -> f64 {
+    pub(super) fn in_units_of(self, quantile: f64) -> f64 {
         let units = self.value / (self.deviation * student(quantile, self.freedom));
         // Without noise and exactly at a crossing nothing is told from nothing.
         if units.is_nan() { 0.0 } else { units }
@@ -80,7 +81,7 @@ impl Estimate {
 impl Ratio {
     /// `None` with fewer than three sizes that have a pair of samples. Where costs bend is told by differences beyond
     /// `distinct`, a quantile of the normal distribution.
-    pub fn new(points: &[PairedSamples<'_>], distinct: f64) -> Option<Self> {
+    pub(super) fn new(points: &[PairedSamples<'_>], distinct: f64) -> Option<Self> {
         let (medians, rounds) = medians(points);
         let places: Vec<f64> = medians.iter().map(|m| m.at).collect();
         let mut sizes = places.clone();
@@ -125,7 +126,7 @@ impl Ratio {
     }
 
     /// The ratio at each place of the grid. Its error is that of the points and of bends, or that between rounds if it is larger.
-    pub fn curve(&self) -> Vec<Estimate> {
+    pub(super) fn curve(&self) -> Vec<Estimate> {
         let widened = |l: &Line| {
             let estimate = self.estimate(&l.weights);
             let deviation = estimate.deviation.hypot(l.bend).max(self.between_rounds(&l.weights));
@@ -136,7 +137,7 @@ impl Ratio {
 
     /// The sum of the ratio over a stretch of the grid, with the error between points and not that between rounds: a change of
     /// the host moves a crossing, which its interval tells, and would hide here what each of the rounds shows.
-    pub fn area(&self, from: usize, to: usize) -> Estimate {
+    pub(super) fn area(&self, from: usize, to: usize) -> Estimate {
         let mut total = vec![0.0; self.medians.len()];
         for Line { weights: Weights(first, weights), .. } in &self.lines[from..=to] {
             total[*first..].iter_mut().zip(weights).for_each(|(t, w)| *t += w);
@@ -176,17 +177,15 @@ fn medians(points: &[PairedSamples<'_>]) -> (Vec<Median>, usize) {
     let (mut round, mut before) = (0, 0);
     for point in points.iter().filter(|p| p.objects > 0) {
         let pairs = point.first_ns.iter().zip(point.second_ns).filter(|(a, b)| **a > 0 && **b > 0);
-        let mut ratios: Vec<f64> = pairs.map(|(&a, &b)| (a as f64 / b as f64).ln()).collect();
+        let ratios: Vec<f64> = pairs.map(|(&a, &b)| (a as f64 / b as f64).ln()).collect();
         if ratios.is_empty() {
             continue;
         }
         round += usize::from(point.objects <= before);
         before = point.objects;
-        let value = median(&mut ratios);
-        ratios.iter_mut().for_each(|r| *r = (*r - value).abs());
-        // 1.4826 makes the median absolute deviation of a normal distribution its standard deviation, and 1.2533 that of a mean
-        // that of a median.
-        let deviation = 1.2533 * 1.4826 * median(&mut ratios);
+        let (Some(value), Some(spread)) = (median(&ratios), robust_deviation(&ratios)) else { continue };
+        // That of a mean times this is that of a median.
+        let deviation = 1.2533 * spread;
         let variance = deviation * deviation / ratios.len() as f64;
         medians.push(Median { at: f64::from(point.objects).ln(), round, value, variance });
     }
@@ -264,12 +263,6 @@ fn student(z: f64, freedom: f64) -> f64 {
     let second = ((5.0 * s + 16.0) * s + 3.0) / 96.0;
     let third = (((3.0 * s + 19.0) * s + 17.0) * s - 15.0) / 384.0;
     z * (1.0 + (first + (second + third / f) / f) / f)
-}
-
-/// Median of at least one value; sorts them.
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    (values[(values.len() - 1) / 2] + values[values.len() / 2]) / 2.0
 }
 
 #[cfg(test)]

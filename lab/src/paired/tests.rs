@@ -177,7 +177,7 @@ fn too_little_gives_none_and_anything_else_an_ordered_interval() {
     points.truncate(2);
     assert_eq!(compare(&paired(&points)), None);
     // Gaps, sizes side by side, single frames, values of any size, zeros, and no order at all.
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     for _ in 0..300 {
         let count = 3 + (random.uniform() * 9.0) as usize;
         let mut samples = || {

@@ -3,7 +3,7 @@
 use super::machine::{TrueGpu, TrueMachine};
 use super::pairing::Build;
 use sapwise_scenes::Random;
-use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, Statistic, GpuParameterId, ParameterId};
+use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, ParameterId, Statistic};
 use sapwise::{Hardware, Machine, Parameter};
 
 /// Why a parameter that probes measure is not simulated.
@@ -26,89 +26,72 @@ pub(super) fn hardware(build: &Build<'_>, machine: &TrueMachine) -> Hardware {
     let cpu = &machine.cpu;
     let spec = build.cpu;
     let mut figures = vec![
-        (ParameterId::UsableCores.to_owned(), Reported(cpu.threads)),
-        (ParameterId::PhysicalCores.to_owned(), Reported(cpu.cores)),
-        (ParameterId::ClockReportedGhz.to_owned(), Reported(spec.base_ghz)),
-        (ParameterId::ClockMeasuredGhz.to_owned(), Measured(cpu.ghz, 0.005)),
-        (ParameterId::SimdLanes.to_owned(), Reported(cpu.lanes)),
-        (ParameterId::CacheL1dBytes.to_owned(), Reported(cpu.cache_bytes[0])),
-        (ParameterId::CacheL2Bytes.to_owned(), Reported(cpu.cache_bytes[1])),
-        (ParameterId::CacheLlcBytes.to_owned(), Reported(cpu.cache_bytes[2])),
-        (ParameterId::MemoryBytes.to_owned(), Reported(machine.memory_bytes())),
-        (ParameterId::BandwidthOneThreadGbPerS.to_owned(), Measured(cpu.one_thread_gb_per_s, 0.05)),
-        (ParameterId::BandwidthAllThreadsGbPerS.to_owned(), Measured(cpu.all_threads_gb_per_s, 0.08)),
+        (ParameterId::UsableCores, Reported(cpu.threads)),
+        (ParameterId::PhysicalCores, Reported(cpu.cores)),
+        (ParameterId::ClockReportedGhz, Reported(spec.base_ghz)),
+        (ParameterId::ClockMeasuredGhz, Measured(cpu.ghz, 0.005)),
+        (ParameterId::SimdLanes, Reported(cpu.lanes)),
+        (ParameterId::CacheL1dBytes, Reported(cpu.cache_bytes[0])),
+        (ParameterId::CacheL2Bytes, Reported(cpu.cache_bytes[1])),
+        (ParameterId::CacheLlcBytes, Reported(cpu.cache_bytes[2])),
+        (ParameterId::MemoryBytes, Reported(machine.memory_bytes())),
+        (ParameterId::BandwidthOneThreadGbPerS, Measured(cpu.one_thread_gb_per_s, 0.05)),
+        (ParameterId::BandwidthAllThreadsGbPerS, Measured(cpu.all_threads_gb_per_s, 0.08)),
     ];
-    figures.extend(
-        parameter::LATENCY_WORKING_SETS_KIB
-            .map(|kib| (parameter::latency_name(kib), Measured(cpu.latency_of(f64::from(kib) * 1024.0), 0.04))),
-    );
+    figures.extend(ParameterId::LATENCIES.map(|(kib, id)| (id, Measured(cpu.latency_of(f64::from(kib) * 1024.0), 0.04))));
     if cpu.threads > 1.0 {
         figures.extend([
-            (ParameterId::ForkJoinWarmNs.to_owned(), Measured(cpu.fork_join_warm_ns, 0.4)),
-            (ParameterId::ForkJoinColdNs.to_owned(), Measured(cpu.fork_join_cold_ns, 0.4)),
-            (ParameterId::ScalingTwoThreadsRatio.to_owned(), Measured(cpu.speed_up(2.0, cpu.second_thread), 0.01)),
-            (ParameterId::ScalingAllThreadsRatio.to_owned(), Measured(cpu.speed_up(cpu.threads, cpu.second_thread), 0.02)),
+            (ParameterId::ForkJoinWarmNs, Measured(cpu.fork_join_warm_ns, 0.4)),
+            (ParameterId::ForkJoinColdNs, Measured(cpu.fork_join_cold_ns, 0.4)),
+            (ParameterId::ScalingTwoThreadsRatio, Measured(cpu.speed_up(2.0, cpu.second_thread), 0.01)),
+            (ParameterId::ScalingAllThreadsRatio, Measured(cpu.speed_up(cpu.threads, cpu.second_thread), 0.02)),
         ]);
     }
     let gpus: Vec<GpuHardware> = identities(machine)
         .into_iter()
         .zip(&machine.gpus)
         .zip(&build.gpus)
-        .map(|((gpu, figures), spec)| GpuHardware {
-            gpu: GpuIdentity {
-                device: format!("{}:0000", spec.vendor),
-                kind: if spec.inside.is_some() { GpuKind::Integrated } else { GpuKind::Discrete },
-                ..gpu
-            },
-            parameters: parameters(
-                &GpuParameterId::OF_ONE,
-                of_gpu(figures, spec.inside.is_some(), spec),
-                seed,
-                &spec.name,
-            ),
+        .map(|((gpu, figures), spec)| {
+            let kind = if spec.inside.is_some() { GpuKind::Integrated } else { GpuKind::Discrete };
+            let identity = GpuIdentity::new(gpu.index, gpu.name, kind);
+            let identity = identity.with_driver(format!("{}:0000", spec.vendor), gpu.driver, gpu.api);
+            let figures = of_gpu(figures, spec.inside.is_some(), spec);
+            GpuHardware::new(identity, parameters(&GpuParameterId::OF_ONE, &figures, seed, &spec.name))
         })
         .collect();
     let group = machine.group.map(|group| {
-        let figures = vec![
-            (GpuParameterId::GroupUploadRatio.to_owned(), Measured(group.upload, 0.03)),
-            (GpuParameterId::GroupRoundTripRatio.to_owned(), Measured(group.round_trip, 0.03)),
-            (GpuParameterId::GroupArithmeticRatio.to_owned(), Measured(group.arithmetic, 0.01)),
+        let figures = [
+            (GpuParameterId::GroupUploadRatio, Measured(group.upload, 0.03)),
+            (GpuParameterId::GroupRoundTripRatio, Measured(group.round_trip, 0.03)),
+            (GpuParameterId::GroupArithmeticRatio, Measured(group.arithmetic, 0.01)),
         ];
-        let names = GpuParameterId::GROUP.map(str::to_owned);
-        GpuGroup { gpus: (0..gpus.len() as u32).collect(), parameters: parameters(&names, figures, seed, &cpu.name) }
+        let parameters = parameters(&GpuParameterId::GROUP, &figures, seed, &cpu.name);
+        GpuGroup::new((0..gpus.len() as u32).collect(), parameters)
     });
-    Hardware {
-        machine: Machine {
-            physical_id: build.physical_id(),
-            cpu: format!("{} (simulated)", spec.name),
-            vendor: spec.vendor.clone(),
-            arch: spec.arch.clone(),
-            os: "linux".to_owned(),
-            simd: spec.simd.level().0.to_string(),
-            hypervisor: "none".to_owned(),
-        },
-        parameters: parameters(&ParameterId::ALL, figures, seed, &cpu.name),
-        gpus,
-        gpu_groups: group.into_iter().collect(),
-    }
+    let mut machine = Machine::of(build.physical_id());
+    machine.cpu = format!("{} (simulated)", spec.name);
+    machine.vendor.clone_from(&spec.vendor);
+    machine.arch.clone_from(&spec.arch);
+    machine.os = "linux".to_owned();
+    machine.simd = spec.simd.level().0.to_string();
+    machine.hypervisor = "none".to_owned();
+    Hardware::new(machine, parameters(&ParameterId::ALL, &figures, seed, &cpu.name))
+        .with_gpus(gpus)
+        .with_gpu_groups(group.into_iter().collect())
 }
 
 /// The GPUs by their numbers, in the order of the machine. Their kinds stand in [`hardware`] only; here all are cards.
 pub(super) fn identities(machine: &TrueMachine) -> Vec<GpuIdentity> {
-    let identity = |(k, gpu): (usize, &TrueGpu)| GpuIdentity {
-        index: k as u32,
-        name: format!("{} (simulated)", gpu.name),
-        device: String::new(),
-        driver: "simulated".to_owned(),
-        api: "vulkan".to_owned(),
-        kind: GpuKind::Discrete,
+    let identity = |(k, gpu): (usize, &TrueGpu)| {
+        let identity = GpuIdentity::new(k as u32, format!("{} (simulated)", gpu.name), GpuKind::Discrete);
+        identity.with_driver("", "simulated", "vulkan")
     };
     machine.gpus.iter().enumerate().map(identity).collect()
 }
 
-fn of_gpu(gpu: &TrueGpu, unified: bool, spec: &super::specification::Gpu) -> Vec<(String, Figure)> {
+fn of_gpu(gpu: &TrueGpu, unified: bool, spec: &super::specification::Gpu) -> Vec<(GpuParameterId, Figure)> {
     let whole = |gb_per_s: f64| TRANSFER_BYTES / (TRANSFER_BYTES / gb_per_s + gpu.transfer_latency_ns);
-    let figures = [
+    vec![
         (GpuParameterId::UploadGbPerS, Measured(whole(gpu.upload_gb_per_s), 0.03)),
         (GpuParameterId::UploadLatencyNs, Measured(gpu.transfer_latency_ns, 0.05)),
         (GpuParameterId::UploadRateGbPerS, Measured(gpu.upload_gb_per_s, 0.04)),
@@ -127,41 +110,37 @@ fn of_gpu(gpu: &TrueGpu, unified: bool, spec: &super::specification::Gpu) -> Vec
         (GpuParameterId::ReadBackNs, Measured(gpu.read_back_ns, 0.05)),
         (GpuParameterId::ArithmeticGflopPerS, Measured(gpu.gflop_per_s, 0.01)),
         (GpuParameterId::UnifiedMemory, Reported(if unified { 1.0 } else { 0.0 })),
-    ];
-    figures.into_iter().map(|(name, figure)| (name.to_owned(), figure)).collect()
+    ]
 }
 
-/// The parameters of these names, in their order; those without a figure are missing.
-fn parameters(names: &[String], figures: Vec<(String, Figure)>, seed: u64, part: &str) -> Vec<Parameter> {
-    let one = |name: &String| match figures.iter().find(|f| f.0 == *name) {
-        Some((_, figure)) => found(name, figure, seed, part),
-        None => Parameter::missing(name, NOT_SIMULATED),
+/// These parameters in their order; those without a figure are missing.
+fn parameters<Id: Copy + PartialEq + AsRef<str>>(
+    ids: &[Id],
+    figures: &[(Id, Figure)],
+    seed: u64,
+    component: &str,
+) -> Vec<Parameter> {
+    let one = |id: &Id| match figures.iter().find(|f| f.0 == *id) {
+        Some((_, figure)) => found(id.as_ref(), figure, seed, component),
+        None => Parameter::missing(id, NOT_SIMULATED),
     };
-    names.iter().map(one).collect()
+    ids.iter().map(one).collect()
 }
 
 /// Samples behind a measured figure.
 const SAMPLES: u32 = 16;
 
-fn found(name: &str, figure: &Figure, seed: u64, part: &str) -> Parameter {
+fn found(name: &str, figure: &Figure, seed: u64, component: &str) -> Parameter {
     match *figure {
         Reported(value) => Parameter::reported(name, value, "simulated: from the specification"),
         Measured(value, sigma) => {
-            let mut random = Random::named(seed, &[part, "measured", name]);
+            let mut random = Random::named(seed, &[component, "measured", name]);
             let samples: Vec<f64> = (0..SAMPLES).map(|_| value * random.log_normal(sigma)).collect();
-            Parameter {
-                name: name.to_owned(),
-                value: sapwise::stats::median(&samples),
-                dispersion: sapwise::stats::relative_iqr(&samples),
-                samples: SAMPLES,
-                spoiled: 0,
-                foreign_load: None,
-                how: How::Measured,
-                source: "simulated: from the specification, with the noise of a measurement".to_owned(),
-                statistic: Statistic::Median,
-                // A simulated report shows what a measurement would give; nobody has to check how it came about.
-                raw: Vec::new(),
-            }
+            let source = "simulated: from the specification, with the noise of a measurement";
+            let mut parameter = Parameter::from_samples(name, Statistic::Median, samples, source);
+            // A simulated report shows what a measurement would find; nobody has to check how it came about.
+            parameter.raw.clear();
+            parameter
         }
     }
 }

@@ -10,7 +10,7 @@ const SCENARIOS: [Scenario; 3] = [Scenario::Uniform, Scenario::Fast, Scenario::C
 
 /// The scenarios of a sweep, each with the load of its frame at every size.
 #[derive(Debug, Clone)]
-pub(crate) struct Loads(pub(super) Vec<(Scenario, Vec<Load>)>);
+pub struct Loads(pub(super) Vec<(Scenario, Vec<Load>)>);
 
 impl Loads {
     /// The loads at the sizes of a quick sweep, up to `max_objects` where that is given. The scenes are made and their pairs counted; nothing
@@ -18,7 +18,7 @@ impl Loads {
     ///
     /// # Errors
     /// When the pairs of a scene can't be found.
-    pub(crate) fn of_a_sweep(seed: u64, max_objects: Option<u32>) -> Result<Self> {
+    pub fn of_a_sweep(seed: u64, max_objects: Option<u32>) -> Result<Self> {
         let plan = Plan::new(true, &SCENARIOS, max_objects);
         let of = |&scenario: &Scenario| Ok((scenario, sweep::loads(scenario, &plan.sizes, seed, |_| Ok(()))?));
         Ok(Self(plan.scenarios.iter().map(of).collect::<Result<_>>()?))

@@ -15,47 +15,48 @@ use crate::progress::Progress;
 use anyhow::Result;
 use cost::Costs;
 use machine::TrueMachine;
-use crate::report::{Label, Provenance, Report, ReportSchema, Timed};
+use crate::report::{Label, Provenance, Report, Timed};
 use sapwise::{AlgorithmId, Registry};
 
-pub(crate) use loads::Loads;
-pub(crate) use specification::{Specifications, built_in, read};
+pub use loads::Loads;
+pub use specification::{Specifications, built_in, read};
 
-/// So many machines made from specifications, each with the name of its file less the ending. The same arguments give the same
+/// So many machines made from specifications, each with the name of its file less the ending. The same arguments make the same
 /// reports.
 ///
 /// # Errors
-/// When the specifications make fewer different machines.
-pub(crate) fn simulate(
+/// When the specifications make fewer different machines; when the user asked to stop.
+pub fn simulate(
     specifications: &Specifications,
     machines: usize,
     loads: &Loads,
     seed: u64,
+    progress: &dyn Progress,
 ) -> Result<Vec<(String, Report)>> {
     let builds = pairing::builds(specifications, machines, seed)?;
-    let progress = Progress::new(builds.len() as u64);
+    progress.start(builds.len() as u64);
     let report = |build: pairing::Build<'_>| {
+        progress.check()?;
         let machine = TrueMachine::new(&build, seed);
         let name = build.name();
-        progress.message(format!("sweep: {name}"));
+        progress.message(&format!("sweep: {name}"));
         let hardware = hardware::hardware(&build, &machine);
         let mut algorithms = Registry::with_cores(build.cpu.threads).available();
         algorithms.extend(sapwise::gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu)));
         let ids: Vec<AlgorithmId> = algorithms.iter().map(|e| e.id.clone()).collect();
         let points = race::race(&Costs::new(&machine), &ids, loads, seed, &name);
         let report = Report {
-            schema: ReportSchema,
             label: Label::Simulated,
             provenance: provenance(&specifications.date, seed),
             hardware,
-            algorithms: algorithms.into_iter().map(|e| Timed { id: e.id, revision: e.revision }).collect(),
+            algorithms: algorithms.into_iter().map(|e| Timed::new(e.id, e.revision)).collect(),
             points,
             remarks: vec!["simulated: no machine was measured, and no algorithm has run".to_owned()],
         };
         progress.advance(1);
-        (name, report)
+        Ok((name, report))
     };
-    Ok(builds.into_iter().map(report).collect())
+    builds.into_iter().map(report).collect()
 }
 
 fn provenance(date: &str, seed: u64) -> Provenance {

@@ -6,15 +6,17 @@ use serde::Deserialize;
 /// A file of specifications, with where each was found.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Specifications {
+pub struct Specifications {
     /// Always `specifications/1`.
     #[expect(dead_code, reason = "read to refuse other schemas")]
     schema: Schema,
     /// Day on which the file was last changed, as `yyyy-mm-dd`. The simulated reports bear it, so that they don't depend on the day
     /// on which they are made.
-    pub(crate) date: String,
-    pub(crate) cpus: Vec<Cpu>,
-    pub(crate) gpus: Vec<Gpu>,
+    pub date: String,
+    /// The CPUs.
+    pub cpus: Vec<Cpu>,
+    /// The GPUs.
+    pub gpus: Vec<Gpu>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -26,74 +28,74 @@ enum Schema {
 /// A CPU. Of several cores all are alike: those with two kinds of core are not in the file.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Cpu {
-    pub(crate) name: String,
+pub struct Cpu {
+    pub name: String,
     /// As in `cpuid`; on other architectures the designer of the cores.
-    pub(crate) vendor: String,
+    pub vendor: String,
     /// As in `std::env::consts::ARCH`.
-    pub(crate) arch: String,
-    pub(crate) form: Form,
+    pub arch: String,
+    pub form: Form,
     /// Year in which it came out.
-    pub(crate) year: u32,
-    pub(crate) cores: u32,
+    pub year: u32,
+    pub cores: u32,
     /// Threads of all cores.
-    pub(crate) threads: u32,
-    pub(crate) base_ghz: f64,
+    pub threads: u32,
+    pub base_ghz: f64,
     /// Highest clock of one core.
-    pub(crate) boost_ghz: f64,
-    pub(crate) simd: Simd,
+    pub boost_ghz: f64,
+    pub simd: Simd,
     /// First-level data cache of one core.
-    pub(crate) l1d_bytes: f64,
+    pub l1d_bytes: f64,
     /// Second-level cache that one core sees.
-    pub(crate) l2_bytes: f64,
+    pub l2_bytes: f64,
     /// Last-level cache; where it comes in parts that not all cores share, that of all parts, but of second-level caches one part.
-    pub(crate) llc_bytes: f64,
+    pub llc_bytes: f64,
     /// Of all memory channels.
-    pub(crate) memory_gb_per_s: f64,
+    pub memory_gb_per_s: f64,
     /// Title of the page or list, and what follows from it.
-    pub(crate) source: String,
+    pub source: String,
 }
 
 /// A GPU: a card, or a part of a CPU.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Gpu {
-    pub(crate) name: String,
+pub struct Gpu {
+    pub name: String,
     /// PCI vendor.
-    pub(crate) vendor: String,
-    pub(crate) form: Form,
+    pub vendor: String,
+    pub form: Form,
     /// Year in which it came out.
-    pub(crate) year: u32,
+    pub year: u32,
     /// 32-bit multiply-adds that can start in one cycle.
-    pub(crate) lanes: u32,
+    pub lanes: u32,
     /// Multiprocessors, compute units, execution units.
-    pub(crate) processors: u32,
+    pub processors: u32,
     /// The base clock of a card for a desktop, the highest of one for a server or within a CPU.
-    pub(crate) clock_ghz: f64,
+    pub clock_ghz: f64,
     /// What a card has of its own. `None` within a CPU.
     #[serde(default)]
-    pub(crate) card: Option<Card>,
+    pub card: Option<Card>,
     /// The CPU that it is part of. `None` for a card.
     #[serde(default)]
-    pub(crate) inside: Option<String>,
+    pub inside: Option<String>,
     /// As of a CPU.
-    pub(crate) source: String,
+    pub source: String,
 }
 
 /// Memory and bus of a card.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Card {
-    pub(crate) memory_bytes: f64,
-    pub(crate) memory_gb_per_s: f64,
-    pub(crate) pcie_generation: u32,
-    pub(crate) pcie_lanes: u32,
+pub struct Card {
+    pub memory_bytes: f64,
+    pub memory_gb_per_s: f64,
+    pub pcie_generation: u32,
+    pub pcie_lanes: u32,
 }
 
 /// What a part is made for. Cards go into machines of their own form; those for desktops into servers too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Form {
+pub enum Form {
     Laptop,
     Desktop,
     Server,
@@ -104,7 +106,7 @@ pub(crate) enum Form {
 /// The widest vector instructions of a CPU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Simd {
+pub enum Simd {
     Sse2,
     Neon,
     Avx,
@@ -114,7 +116,7 @@ pub(crate) enum Simd {
 
 impl Simd {
     /// The level that our algorithms use, and its 32-bit lanes. AVX without AVX2 has no integer comparisons of its width.
-    pub(crate) fn level(self) -> (sapwise::SimdLevel, u32) {
+    pub fn level(self) -> (sapwise::SimdLevel, u32) {
         match self {
             Self::Sse2 | Self::Neon | Self::Avx => (sapwise::SimdLevel::Portable, 4),
             Self::Avx2 => (sapwise::SimdLevel::Avx2, 8),
@@ -133,7 +135,7 @@ const BUILT_IN: &str = include_str!("specifications.json");
 ///
 /// # Errors
 /// As [`read`], which a test rules out.
-pub(crate) fn built_in() -> Result<Specifications> {
+pub fn built_in() -> Result<Specifications> {
     read(BUILT_IN).context("the built-in specifications can't be used; please report this")
 }
 
@@ -141,7 +143,7 @@ pub(crate) fn built_in() -> Result<Specifications> {
 ///
 /// # Errors
 /// The line and column, or the entry and what is wrong with it.
-pub(crate) fn read(text: &str) -> Result<Specifications> {
+pub fn read(text: &str) -> Result<Specifications> {
     let read: Specifications = serde_json::from_str(text).context("no file of specifications/1")?;
     if read.cpus.is_empty() || read.cpus.len() > MOST || read.gpus.len() > MOST {
         bail!("{} CPUs and {} GPUs: one CPU is needed, and {MOST} of each is the most", read.cpus.len(), read.gpus.len());

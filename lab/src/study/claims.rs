@@ -84,12 +84,12 @@ pub(super) fn claims(entries: &[Entry], influence: &Influence) -> Vec<Claim> {
         ("The number of cores of the GPU seems to influence it.", GpuParameterId::Lanes, Said::Linked),
     ];
     let cards = cards(entries);
-    let claim = |(text, parameter, said): (&str, &str, Said)| {
+    let claim = |(text, parameter, said): (&str, GpuParameterId, Said)| {
         let value = |card: Option<usize>| entries[card?].gpu()?.value(parameter);
         let values = cards.map(value);
         Claim {
             text: text.to_owned(),
-            parameter: parameter.to_owned(),
+            parameter: parameter.to_string(),
             by_its_table: by_its_table(said, values),
             by_reports: by_reports(said, parameter, influence),
             cards: cards.iter().flatten().copied().collect(),
@@ -134,7 +134,7 @@ fn by_its_table(said: Said, values: [Option<f64>; 3]) -> (Outcome, String) {
 }
 
 /// By what the parameter, or the one that predictions read in its place, adds to the predicted times of each method on GPUs.
-fn by_reports(said: Said, parameter: &str, influence: &Influence) -> (Outcome, String) {
+fn by_reports(said: Said, parameter: GpuParameterId, influence: &Influence) -> (Outcome, String) {
     if matches!(said, Said::AlikeOnAll | Said::AlikeOnTwo) {
         return (Outcome::NotAsked, "it is a claim about the three cards".to_owned());
     }

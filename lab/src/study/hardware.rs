@@ -12,7 +12,7 @@ use sapwise::{GpuHardware, Parameter};
 const MOST_LETTERS: usize = 24;
 
 /// The rows of the paper's table, in its order, with what each is called here.
-const PAPER: [(&str, &str); 7] = [
+const PAPER: [(&str, GpuParameterId); 7] = [
     ("CPU to GPU (upload)", GpuParameterId::UploadGbPerS),
     ("GPU to CPU (download)", GpuParameterId::DownloadGbPerS),
     ("internal GPU (copy)", GpuParameterId::CopyGbPerS),
@@ -83,21 +83,12 @@ pub(super) fn parameters(entries: &[Entry]) -> DataTable {
                 let spread = p.dispersion.map_or_else(|| Cell::Missing("it has none".to_owned()), Cell::exact);
                 let mut cells = vec![Cell::text(&entry.name), Cell::text(&of), Cell::text(p.name.to_string())];
                 cells.extend([p.value.map_or_else(|| Cell::Missing(p.source.clone()), Cell::exact), spread]);
-                cells.extend([Cell::count(p.samples.into()), Cell::text(how(p.how)), Cell::text(&p.source)]);
+                cells.extend([Cell::count(p.samples.into()), Cell::text(p.how.to_string()), Cell::text(&p.source)]);
                 table.push(cells, &[k]);
             }
         }
     }
     table
-}
-
-fn how(how: How) -> &'static str {
-    match how {
-        How::Measured => "measured",
-        How::Reported => "reported",
-        How::Published => "published",
-        How::Missing => "missing",
-    }
 }
 
 fn heads(titles: &[&str]) -> DataTable {
@@ -110,8 +101,8 @@ fn gpu_heads(entry: &Entry, gpu: &GpuHardware) -> Vec<Cell> {
     vec![Cell::text(&gpu.gpu.name), Cell::text(kind), Cell::text(&entry.name)]
 }
 
-fn columns(table: &mut DataTable, names: &[&str]) {
-    table.columns.extend(names.iter().map(|name| Column::new(words(name), *name)));
+fn columns<Id: AsRef<str>>(table: &mut DataTable, ids: &[Id]) {
+    table.columns.extend(ids.iter().map(|id| Column::new(words(id.as_ref()), id.as_ref())));
 }
 
 /// A parameter's name without its unit, which stands with each value.
@@ -121,7 +112,8 @@ pub(super) fn words(name: &str) -> String {
     bare.replace(['/', '_'], " ")
 }
 
-fn cell(name: &str, parameters: &[Parameter]) -> Cell {
+fn cell(id: impl AsRef<str>, parameters: &[Parameter]) -> Cell {
+    let name = id.as_ref();
     match parameters.iter().find(|p| p.name == name) {
         None => Cell::Missing("the report does not have it".to_owned()),
         Some(Parameter { value: Some(value), .. }) => {

@@ -3,7 +3,8 @@
 use super::entry::{Entry, representatives};
 use super::rank::{self, Rank};
 use super::speed::slownesses;
-use crate::evaluate::{Effect, Importance, Verdict, measured_crossovers};
+use super::side_crossovers::measured_crossovers;
+use crate::evaluate::{Effect, Importance, Verdict};
 use rayon::prelude::*;
 use sapwise::Backend;
 use sapwise::hardware::{GpuParameterId, ParameterId};
@@ -53,7 +54,7 @@ pub(super) struct Influence {
 /// The parameters whose ranks are taken: every one of the machine and of its first GPU that is no software adapter.
 pub(super) fn parameters() -> Vec<String> {
     let of_gpu = GpuParameterId::OF_ONE.into_iter().map(|name| format!("{GPU_PREFIX}{name}"));
-    ParameterId::ALL.into_iter().chain(of_gpu).collect()
+    ParameterId::ALL.into_iter().map(String::from).chain(of_gpu).collect()
 }
 
 impl Influence {

@@ -3,7 +3,6 @@
 use super::entry::Entry;
 use crate::data::Profile;
 use crate::data_table::{Cell, DataTable};
-use crate::evaluate::available;
 use crate::figures::{FieldMap, MapCell, MapPanel, MapPoint};
 use crate::fit::measured_costs;
 use crate::train::without;
@@ -43,7 +42,7 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
     let profile = &entry.profile;
     let (model, held_out) = without(profiles, &profile.file)?;
     let measured = measured_costs(profile).0;
-    let ids = available(profile);
+    let ids = profile.available();
     let predicted = model.predict(&profile.hardware, &profile.with_revisions(&ids)).map_err(anyhow::Error::msg)?.costs;
     let density = |load: &Load| load.pairs / f64::from(load.objects.max(1));
     let places: Vec<(f64, f64)> =

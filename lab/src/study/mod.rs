@@ -12,6 +12,7 @@ mod rank;
 mod ratios;
 mod restrictions;
 mod sections;
+mod side_crossovers;
 mod sources;
 mod speed;
 mod summary;

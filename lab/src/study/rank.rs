@@ -1,6 +1,7 @@
 //! Whether two figures of machines rise together: Spearman's rank correlation, with what its interval says.
 
-use crate::train::Verdict;
+use crate::evaluate::Verdict;
+use sapwise::stats::{NORMAL_90, normal_tail};
 use sapwise_scenes::Random;
 
 /// Machines below which nothing is told; the interval needs four.

@@ -46,7 +46,7 @@ fn pairs(available: &[AlgorithmId]) -> Vec<Pair> {
 }
 
 /// Every pair whose border was measured, by name, with the place of the border in octaves of the slice.
-pub(super) fn measured_borders(profile: &Profile) -> Vec<(String, f64)> {
+pub(super) fn measured_crossovers(profile: &Profile) -> Vec<(String, f64)> {
     let (slice, measured) = (profile.slice(profile.usual_scenario()), measured_costs(profile).0);
     let at = |pair: Pair| Some((pair.octaves(&measured, &slice)?, pair.name));
     pairs(&profile.available()).into_iter().filter_map(at).map(|(octaves, name)| (name, octaves)).collect()

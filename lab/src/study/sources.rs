@@ -66,7 +66,7 @@ impl Sources {
         let Self { files, names, .. } = self;
         progress.start(files.len() as u64);
         progress.message("reading");
-        let mut found = Read { entries: Vec::new(), selection: Selection::new(evidence, files.len()), unreadable: Vec::new() };
+        let mut found = Read { entries: Vec::new(), selection: Selection::new(evidence), unreadable: Vec::new() };
         let placed: Vec<(usize, &PathBuf)> = files.iter().enumerate().collect();
         for some in placed.chunks(AT_A_TIME) {
             progress.check()?;
@@ -74,8 +74,8 @@ impl Sources {
                 // By the name that the page has, which is no path of this machine.
                 Err(why) => (place, Err(why.root_cause().to_string().replace(&file.display().to_string(), &names[place]))),
                 Ok((_, report)) => {
-                    let reduced = found.selection.reduce(place, &names[place], &report);
-                    let studied = reduced.as_ref().map(|_| ()).map_err(Clone::clone);
+                    let reduced = found.selection.reduce(&names[place], &report);
+                    let studied = reduced.as_ref().map(|_| ()).map_err(ToString::to_string);
                     (place, Ok((Entry::new(file, &names[place], report, studied), reduced)))
                 }
             };

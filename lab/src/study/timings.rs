@@ -25,7 +25,7 @@ pub(super) fn write(entries: &[Entry], folder: &mut Folder) -> Result<()> {
     ]);
     for (k, entry) in entries.iter().enumerate().filter(|(_, e)| e.studied.is_ok()) {
         for spot in &entry.profile.points {
-            for (id, ns) in entry.profile.medians(spot) {
+            for (id, ns) in spot.medians.iter().map(|&(k, ns)| (entry.profile.id(k), ns)) {
                 let on_gpus = id.backend().class() == BackendClass::Gpu;
                 let (threads, gpus) = if on_gpus { (0, id.backend().width()) } else { (id.threads(), 0) };
                 let words = [&entry.name, &spot.scenario, &id.to_string(), id.method(), &id.backend().class().to_string()];

@@ -1,7 +1,7 @@
 //! The loads of a scenario over sizes, with the pairs that it really has.
 
 use anyhow::Context;
-use sapwise::{BroadPhase, Displacement, Load, Pairs, Registry};
+use sapwise::{Displacement, Load, Pairs, Registry};
 use sapwise_scenes::{Scenario, Scene};
 
 /// Advances to the next frame that has as many objects as the size says.

@@ -130,7 +130,7 @@ pub(super) fn record(bound: &Bound, encoder: &mut wgpu::CommandEncoder, groups: 
     }
 }
 
-/// How much work takes about `target`: from 1 up, at most `most`. `run` does so much work and gives its time.
+/// How much work takes about `target`: from 1 up, at most `most`. `run` does this much work and returns its time.
 ///
 /// The first run of a kernel may compile it, so the smallest amount runs twice.
 pub(super) fn calibrate(
@@ -172,7 +172,7 @@ pub(super) fn one_line(text: &str) -> String {
 
 /// Seconds of work per second become billions with this: amounts a nanosecond.
 pub(super) fn per_ns(amount: f64, time: Duration) -> f64 {
-    // A clock that did not move gives infinity, which is no usable sample.
+    // A clock that did not move yields infinity, which is no usable sample.
     amount / (time.as_secs_f64() * 1e9)
 }
 

@@ -27,24 +27,24 @@ impl Figure {
     /// whatever is found of that is an error of the method. How several GPUs work together is not among them: few machines have
     /// several.
     pub(super) const ALL: [Self; 18] = [
-        of_machine(&[ParameterId::ClockMeasuredGhz, ParameterId::ClockReportedGhz]),
-        of_machine(&[ParameterId::SimdLanes]),
-        of_machine(&[ParameterId::CacheLlcBytes]),
-        of_machine(&[ParameterId::BandwidthOneThreadGbPerS]),
-        of_machine(&[ParameterId::BandwidthAllThreadsGbPerS]),
-        of_machine(&[ParameterId::ForkJoinColdNs]),
-        of_machine(&[ParameterId::CoreToCoreNs, ParameterId::ForkJoinWarmNs]),
-        of_machine(&[ParameterId::ScalingTwoThreadsRatio]),
-        of_machine(&[ParameterId::ScalingAllThreadsRatio]),
-        of_machine(&[ParameterId::UsableCores]),
-        of_machine(&[ParameterId::MemoryBytes]),
-        of_gpus(&[GpuParameterId::RoundTripNs]),
-        of_gpus(&[GpuParameterId::ReadBackNs]),
-        of_gpus(&[GpuParameterId::DispatchNs]),
-        of_gpus(&[GpuParameterId::UploadRateGbPerS, GpuParameterId::UploadGbPerS]),
-        of_gpus(&[GpuParameterId::DownloadRateGbPerS, GpuParameterId::DownloadGbPerS]),
-        of_gpus(&[GpuParameterId::ReadGbPerS, GpuParameterId::CopyGbPerS]),
-        of_gpus(&[GpuParameterId::ArithmeticGflopPerS]),
+        of_machine(&[ParameterId::ClockMeasuredGhz.as_str(), ParameterId::ClockReportedGhz.as_str()]),
+        of_machine(&[ParameterId::SimdLanes.as_str()]),
+        of_machine(&[ParameterId::CacheLlcBytes.as_str()]),
+        of_machine(&[ParameterId::BandwidthOneThreadGbPerS.as_str()]),
+        of_machine(&[ParameterId::BandwidthAllThreadsGbPerS.as_str()]),
+        of_machine(&[ParameterId::ForkJoinColdNs.as_str()]),
+        of_machine(&[ParameterId::CoreToCoreNs.as_str(), ParameterId::ForkJoinWarmNs.as_str()]),
+        of_machine(&[ParameterId::ScalingTwoThreadsRatio.as_str()]),
+        of_machine(&[ParameterId::ScalingAllThreadsRatio.as_str()]),
+        of_machine(&[ParameterId::UsableCores.as_str()]),
+        of_machine(&[ParameterId::MemoryBytes.as_str()]),
+        of_gpus(&[GpuParameterId::RoundTripNs.as_str()]),
+        of_gpus(&[GpuParameterId::ReadBackNs.as_str()]),
+        of_gpus(&[GpuParameterId::DispatchNs.as_str()]),
+        of_gpus(&[GpuParameterId::UploadRateGbPerS.as_str(), GpuParameterId::UploadGbPerS.as_str()]),
+        of_gpus(&[GpuParameterId::DownloadRateGbPerS.as_str(), GpuParameterId::DownloadGbPerS.as_str()]),
+        of_gpus(&[GpuParameterId::ReadGbPerS.as_str(), GpuParameterId::CopyGbPerS.as_str()]),
+        of_gpus(&[GpuParameterId::ArithmeticGflopPerS.as_str()]),
     ];
 
     /// The name of the parameter, as it stands in the ranges of a model.
@@ -55,8 +55,8 @@ impl Figure {
     /// Its value, above zero: of the machine, or of the first GPU that is no software adapter.
     pub(super) fn value(self, hardware: &Hardware) -> Option<f64> {
         let of = |name: &&str| match self.of_gpus {
-            false => hardware.value(name),
-            true => hardware.gpus.iter().find(|g| g.gpu.kind != GpuKind::Software)?.value(name),
+            false => hardware.value_named(name),
+            true => hardware.gpus.iter().find(|g| g.gpu.kind != GpuKind::Software)?.value_named(name),
         };
         self.names.iter().find_map(of).filter(|v| *v > 0.0)
     }
@@ -76,7 +76,7 @@ impl Figure {
             true => other.hardware.gpus.iter_mut().flat_map(|g| &mut g.parameters).for_each(change),
         }
         // How far the cores lay apart at each point would tell the fork and join and the latency again.
-        if self.names.iter().any(|n| [ParameterId::ForkJoinColdNs, ParameterId::CoreToCoreNs].contains(n)) {
+        if self.names.iter().any(|n| [ParameterId::ForkJoinColdNs.as_str(), ParameterId::CoreToCoreNs.as_str()].contains(n)) {
             other.points.iter_mut().for_each(|p| p.core_to_core_ns = None);
         }
         other

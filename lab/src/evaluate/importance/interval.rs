@@ -1,6 +1,7 @@
 //! A mean over machines, and how far it would differ with other machines.
 
 use sapwise::stats::quantile;
+use sapwise_scenes::Random;
 use serde::Serialize;
 
 /// Draws of as many machines as there are, with replacement.
@@ -39,7 +40,6 @@ impl Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sapwise_scenes::Random;
 
     #[test]
     fn an_interval_of_a_mean_is_as_wide_as_that_of_a_normal_distribution() {

@@ -1,54 +1,38 @@
 //! Sweeps of two algorithms whose ratio is known: noise that is partly common, outliers, drift, hosts that change.
 
 use crate::paired::{PairedOutcome, PairedSamples, compare};
+pub(super) use sapwise_scenes::Random;
 
 /// Objects and the samples of both algorithms.
-pub type Timed = (u32, Vec<u64>, Vec<u64>);
+pub(super) type Timed = (u32, Vec<u64>, Vec<u64>);
 
 /// What disturbs the timings.
 #[derive(Debug, Clone, Copy)]
-pub struct Host {
+pub(super) struct Host {
     /// Standard deviation of the logarithm of a sample, half of its variance common to both algorithms on a frame.
-    pub noise: f64,
+    pub(super) noise: f64,
     /// The same of what changes from point to point and from algorithm to algorithm, and is equal in all frames of a point.
-    pub points: f64,
+    pub(super) points: f64,
     /// By how much the logarithm of the ratio differs between the rounds.
-    pub rounds: f64,
+    pub(super) rounds: f64,
 }
 
 /// 5 % a sample, 2.5 % a point.
-pub const USUAL: Host = Host { noise: 0.05, points: 0.025, rounds: 0.0 };
+pub(super) const USUAL: Host = Host { noise: 0.05, points: 0.025, rounds: 0.0 };
 
 /// What is measured in the second round.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Second {
+pub(super) enum Second {
     Nothing,
     /// The sizes on both sides of each change of the winner, and their geometric mean.
     Borders,
     Everything,
 }
 
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn uniform(&mut self) -> f64 {
-        (crate::splitmix::next(&mut self.0) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Standard normal (Box and Muller).
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-
-    fn below(&mut self, bound: usize) -> usize {
-        (self.uniform() * bound as f64) as usize
-    }
-}
 
 /// Four sizes a decade from 10 to a million, then what `second` says. `ratio` is `ln(first / second)` at a size.
-pub fn sweep(ratio: &dyn Fn(f64) -> f64, host: Host, second: Second, seed: u64) -> Vec<Timed> {
-    let mut random = Random(seed);
+pub(super) fn sweep(ratio: &dyn Fn(f64) -> f64, host: Host, second: Second, seed: u64) -> Vec<Timed> {
+    let mut random = Random::new(seed);
     // Which of the rounds is the slow one for the first algorithm is chance.
     let shift = if random.uniform() < 0.5 { host.rounds / 2.0 } else { -host.rounds / 2.0 };
     let sizes: Vec<u32> = (4..=24).map(|k| 10.0_f64.powf(f64::from(k) / 4.0).round() as u32).collect();
@@ -102,42 +86,42 @@ fn round(sizes: &[u32], ratio: &dyn Fn(f64) -> f64, host: Host, random: &mut Ran
     sizes.iter().enumerate().map(point).collect()
 }
 
-pub fn paired(points: &[Timed]) -> Vec<PairedSamples<'_>> {
+pub(super) fn paired(points: &[Timed]) -> Vec<PairedSamples<'_>> {
     points.iter().map(|(objects, a, b)| PairedSamples { objects: *objects, first_ns: a, second_ns: b }).collect()
 }
 
 /// What many sweeps of the same two algorithms found.
-pub struct Trials {
-    pub found: Vec<PairedOutcome>,
+pub(super) struct Trials {
+    pub(super) found: Vec<PairedOutcome>,
 }
 
 impl Trials {
-    pub fn new(ratio: &dyn Fn(f64) -> f64, host: Host, second: Second, count: u64) -> Self {
+    pub(super) fn new(ratio: &dyn Fn(f64) -> f64, host: Host, second: Second, count: u64) -> Self {
         let trial = |seed| compare(&paired(&sweep(ratio, host, second, 1_000_003 * (seed + 1)))).unwrap();
         Self { found: (0..count).map(trial).collect() }
     }
 
     /// Share of the sweeps that found this many crossings.
-    pub fn share_with(&self, crossings: usize) -> f64 {
+    pub(super) fn share_with(&self, crossings: usize) -> f64 {
         let with = self.found.iter().filter(|c| c.positions().len() == crossings).count();
         with as f64 / self.found.len() as f64
     }
 
     /// Of the sweeps that found as many crossings as there are, the share of crossings whose interval holds the true one.
-    pub fn coverage(&self, truths: &[f64]) -> f64 {
+    pub(super) fn coverage(&self, truths: &[f64]) -> f64 {
         let holds: Vec<bool> = self.against(truths).map(|(p, t)| p.low <= t && t <= p.high).collect();
         holds.iter().filter(|h| **h).count() as f64 / holds.len() as f64
     }
 
     /// The error in octaves that a share of those crossings stays below.
-    pub fn error(&self, truths: &[f64], share: f64) -> f64 {
+    pub(super) fn error(&self, truths: &[f64], share: f64) -> f64 {
         let mut errors: Vec<f64> = self.against(truths).map(|(p, t)| (p.objects / t).log2().abs()).collect();
         errors.sort_unstable_by(f64::total_cmp);
         errors[((errors.len() - 1) as f64 * share) as usize]
     }
 
     /// The median width of their intervals, in octaves.
-    pub fn width(&self, truths: &[f64]) -> f64 {
+    pub(super) fn width(&self, truths: &[f64]) -> f64 {
         let mut widths: Vec<f64> = self.against(truths).map(|(p, _)| (p.high / p.low).log2()).collect();
         widths.sort_unstable_by(f64::total_cmp);
         widths[widths.len() / 2]

@@ -122,7 +122,7 @@ fn links_table(links: &[&Link], reports: &[usize]) -> DataTable {
         let few = "fewer than five machines have both, or one of both is the same on all";
         let unread = "predictions of this do not read it, or too few machines have it";
         let rank = |of: fn(&rank::Rank) -> f64| Cell::optional(link.rank.as_ref().map(of), 2, few);
-        let refitted = link.effect.as_ref().and_then(|e| e.refitted);
+        let refitted = link.effect.as_ref().and_then(|e| e.rise);
         let rise = |of: fn(Interval) -> f64| Cell::optional(refitted.map(of), 4, unread);
         let verdict = |of: Option<Verdict>, none: &str| {
             of.map_or_else(|| Cell::Missing(none.to_owned()), |verdict| Cell::text(verdict.to_string()))

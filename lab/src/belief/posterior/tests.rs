@@ -1,10 +1,10 @@
 use super::*;
-use crate::{AlgorithmId, CostCurve, CostTerm, Term};
+use crate::belief::{Deviations, KnowledgeGradient, Part, width_correlation};
+use sapwise::{AlgorithmId, CostCurve};
 
 fn cost(id: &str, call_ns: f64) -> AlgorithmCost {
     let terms = vec![CostTerm { term: Term::Call, unit_ns: call_ns }, CostTerm { term: Term::Objects, unit_ns: 2.0 }];
-    let curve = CostCurve { terms, ..CostCurve::default() };
-    AlgorithmCost { algorithm: id.parse().unwrap(), revision: 1, curve, spread_ln: 0.3 }
+    AlgorithmCost::new(id.parse().unwrap(), 1, CostCurve::new(terms), 0.3)
 }
 
 fn costs() -> Vec<AlgorithmCost> {

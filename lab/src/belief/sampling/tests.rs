@@ -42,8 +42,7 @@ fn costs() -> Vec<AlgorithmCost> {
     let cost = |text: &str, call_ns: f64, object_ns: f64| {
         let terms = [(Term::Call, call_ns), (Term::Objects, object_ns)];
         let terms = terms.map(|(term, unit_ns)| CostTerm { term, unit_ns }).into();
-        let curve = CostCurve { terms, ..CostCurve::default() };
-        AlgorithmCost { algorithm: id(text), revision: 1, curve, spread_ln: 0.2 }
+        AlgorithmCost::new(id(text), 1, CostCurve::new(terms), 0.2)
     };
     vec![
         cost("grid-sap@cpu1", 100.0, 40.0),
