@@ -63,10 +63,13 @@ fn method(backend: BackendClass, scale: Scale) -> MethodModel {
 fn model(methods: Vec<MethodModel>) -> Model {
     let range = |parameter: &str| Range { parameter: parameter.to_owned(), min: 1.0, max: 100.0 };
     Model {
-        schema: ModelSchema,
         name: "test".to_owned(),
         simulated: false,
-        ranges: vec![range(ParameterId::ClockMeasuredGhz.as_str()), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
+        ranges: vec![
+            range(ParameterId::ClockMeasuredGhz.as_str()),
+            range("gpu/upload_gb_per_s"),
+            range("gpu/copy_gb_per_s"),
+        ],
         methods,
     }
 }
@@ -110,7 +113,9 @@ fn several_gpus_have_the_slowest_latency_and_added_rates_within_what_was_measure
 #[test]
 fn scales_and_features_of_the_other_processor_are_refused() {
     let h = hardware();
-    assert!(Scale::SharedLane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().to_string().contains("gpu0 has no scale"));
+    assert!(
+        Scale::SharedLane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().to_string().contains("gpu0 has no scale")
+    );
     assert!(Scale::GpuDispatch.nanoseconds(&h, &Backend::Cpu(2)).unwrap_err().to_string().contains("cpu2 has no scale"));
     let load = Load { objects: 8, ..Load::default() };
     let feature = |f: Feature, backend: Backend| f.value(&h, &backend, &load);
