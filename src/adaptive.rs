@@ -55,7 +55,7 @@ pub struct Adaptive {
     measured_ns: Option<f64>,
     /// The most objects that were to be prepared for.
     prepared: usize,
-    /// [`decide`](Self::decide) was called for a frame of so many boxes that has not run yet.
+    /// [`decide`](Self::decide) was called for a frame of this many boxes that has not run yet.
     decided: Option<usize>,
     /// How it came to its tuning.
     #[cfg(feature = "this-machine")]
@@ -122,7 +122,7 @@ impl Adaptive {
     }
 
     /// The tuning corrected by what was learned of the machine and of each algorithm, with the slice of scenes like the present one. What
-    /// passes is left out: another program on a core, cores that moved apart, how much this scene spares algorithms that keep work. Those
+    /// passes is left out: another program on a core, cores that moved apart, how much this scene spares incremental algorithms. Those
     /// that it began with where nothing was learned.
     #[must_use]
     pub fn learned(&self) -> Tuning {
@@ -151,8 +151,8 @@ impl Adaptive {
     }
 
     /// Makes every algorithm again from this registry: one that was lost and is back, or all of them on a pool of another size. What was
-    /// learned stays, unless algorithms that keep work came or went; what they kept from frame to frame is gone. Tuning that are still
-    /// awaited from the background bring algorithms of the registry that they were asked with.
+    /// learned stays, unless incremental algorithms came or went; what they kept from frame to frame is gone. A tuning that is still
+    /// awaited from the background brings algorithms of the registry that they were asked with.
     ///
     /// # Errors
     /// As [`new`](Self::new); the algorithms of before stay then.

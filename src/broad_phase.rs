@@ -48,7 +48,7 @@ pub trait BroadPhase: Send + Sync {
 
 /// An algorithm whose frame is cheaper after one that was alike. Time it after some frames, not on the first.
 pub trait Incremental: BroadPhase {
-    /// Runs on so many threads from the next frame on, with all that it keeps. `false` where it can't, and then nothing changes.
+    /// Runs on this many threads from the next frame on, with all that it keeps. `false` where it can't, and then nothing changes.
     ///
     /// One instance for several numbers of threads comes from [`Registry::create_family`](crate::Registry::create_family).
     fn set_threads(&mut self, threads: u32) -> bool {

@@ -70,7 +70,7 @@ impl CostCurve {
         Self { fallback_terms, ..self }
     }
 
-    /// The same on a machine with a last-level cache of so many bytes.
+    /// The same on a machine with a last-level cache of this many bytes.
     #[must_use]
     pub fn with_cache(self, cache_bytes: f64) -> Self {
         Self { cache_bytes, ..self }

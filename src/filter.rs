@@ -44,7 +44,7 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// A filter that gives each box, by its position, one of `memberships`.
+    /// A filter in which each box, by its position, has one of `memberships`.
     #[must_use]
     pub fn new(memberships: Vec<Membership>) -> Self {
         Self { memberships }
@@ -58,7 +58,7 @@ impl Filter {
         of(a).wants(of(b))
     }
 
-    /// Brings the wanted ones of `pairs` to its head, in their order, and gives their number.
+    /// Brings the wanted ones of `pairs` to its head, in their order, and returns their number.
     pub(crate) fn keep_wanted(&self, pairs: &mut [Pair]) -> usize {
         let mut kept = 0;
         for at in 0..pairs.len() {

@@ -33,19 +33,19 @@ pub struct Load {
 }
 
 impl Load {
-    /// A frame of so many boxes of which nothing else is known: no pair, and none of them moves.
+    /// A frame of this many boxes of which nothing else is known: no pair, and none of them moves.
     #[must_use]
     pub fn of_objects(objects: u32) -> Self {
         Self { objects, ..Self::default() }
     }
 
-    /// The same with so many overlapping pairs.
+    /// The same with this many overlapping pairs.
     #[must_use]
     pub fn with_pairs(self, pairs: f64) -> Self {
         Self { pairs, ..self }
     }
 
-    /// The same with so many candidates: pairs that overlap on one axis, and those of them that share a strip.
+    /// The same with this many candidates: pairs that overlap on one axis, and those of them that share a strip.
     #[must_use]
     pub fn with_candidates(self, axis: f64, strip: f64) -> Self {
         Self { axis_candidates: axis, strip_candidates: strip, ..self }

@@ -106,7 +106,7 @@ pub struct Ranking {
 }
 
 impl Step {
-    /// From so many objects up, that algorithm.
+    /// From this many objects up, that algorithm.
     #[must_use]
     pub fn new(from_objects: u32, algorithm: AlgorithmId) -> Self {
         Self { from_objects, algorithm }

@@ -1,4 +1,4 @@
-//! Courses of frames that resemble one another, for the algorithms that keep work from frame to frame: every algorithm
+//! Courses of frames that resemble one another, for incremental algorithms: every algorithm
 //! against the naive oracle in every frame, whatever happens between two of them.
 
 mod common;

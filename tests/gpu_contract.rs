@@ -42,7 +42,7 @@ fn random_boxes_of_every_small_count() {
     }
 }
 
-/// Every scenario at the sizes where blocks and tiles begin and end. Brute force on a program that acts as a GPU takes up to a
+/// Every scenario at the sizes where blocks and tiles begin and end. Brute force on a software adapter takes up to a
 /// minute at the large ones: those are left to [`every_algorithm_on_every_scenario_at_every_size`].
 #[test]
 fn every_scenario_at_the_edges_of_blocks() {
@@ -61,7 +61,7 @@ fn every_scenario_at_the_edges_of_blocks() {
 }
 
 #[test]
-#[ignore = "takes an hour on a program that acts as a GPU; tools/real-gpu.sh runs it on real ones"]
+#[ignore = "takes an hour on a software adapter; tools/real-gpu.sh runs it on real ones"]
 fn every_algorithm_on_every_scenario_at_every_size() {
     let Some(gpus) = gpus() else { return };
     let mut algorithms = every_algorithm(&gpus);

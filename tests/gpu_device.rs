@@ -53,7 +53,7 @@ impl Own {
         self.queue.submit([encoder.finish()]);
         let (mapped, told) = std::sync::mpsc::channel();
         self.back.slice(..).map_async(wgpu::MapMode::Read, move |result| mapped.send(result).unwrap());
-        // Whoever polls the device first calls back, so that another thread's wait may have done it.
+        // The first that polls the device calls back, so that another thread's wait may have done it.
         self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
         told.recv().unwrap().unwrap();
         assert!(*self.back.slice(..).get_mapped_range().unwrap() == *sent, "the program's own work went wrong");
@@ -147,7 +147,7 @@ fn a_given_gpu_is_measured_on_its_own_device() {
         // One sample under the load of other tests may well be nought.
         assert!(measured.value(name).is_some(), "{name}: {:?}", measured.parameters);
     }
-    let absent = |name: GpuParameterId| measured.parameters.iter().find(|p| p.name == name).unwrap().source.clone();
+    let absent = |id: GpuParameterId| measured.parameters.iter().find(|p| p.name == id.as_str()).unwrap().source.clone();
     assert!(absent(GpuParameterId::AtomicGPerS).contains("limit of time"));
     assert!(gpus.adapter(0).is_some());
     Own::new(&device, &queue).work();

@@ -35,8 +35,8 @@ fn revision(id: &str) -> u32 {
 
 /// Tuning in which each algorithm costs that much a frame.
 fn tuning(costs: &[(&str, f64)]) -> Tuning {
-    let cost = |&(id, ns): &(&str, f64)| {
-        let curve = CostCurve::new(vec![CostTerm { term: Term::Call, unit_ns: ns }]);
+    let cost = |&(id, unit_ns): &(&str, f64)| {
+        let curve = CostCurve::new(vec![CostTerm { term: Term::Call, unit_ns }]);
         AlgorithmCost::new(id.parse().unwrap(), revision(id), curve, 0.0)
     };
     let loads: Vec<Load> = (0..16).map(|k| Load::of_objects(1 << k)).collect();

@@ -19,7 +19,7 @@ fn check(p: &Parameter) {
     assert!(p.dispersion.is_none_or(|dispersion| dispersion.is_finite() && dispersion >= 0.0), "{p:?}");
     assert!(p.dispersion.is_none() || p.samples >= 4, "{p:?}");
     assert!(p.foreign_load.is_none_or(|share| (0.0..=1.0).contains(&share)), "{p:?}");
-    // Whoever has the raw samples can work out the value, and they stay few enough for a file.
+    // The value follows from the raw samples, which stay few enough for a file.
     assert_eq!(p.raw.is_empty(), p.how != How::Measured, "{p:?}");
     assert!(p.raw.len() <= 700, "{p:?}");
     assert!(p.how != How::Measured || p.recomputed() == p.value, "{p:?}");

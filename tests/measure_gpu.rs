@@ -23,7 +23,7 @@ fn check(p: &Parameter) {
     assert!(p.value.is_none_or(|value| value.is_finite() && value >= 0.0), "{p:?}");
     assert!(p.dispersion.is_none() || p.samples >= 4, "{p:?}");
     assert!(p.foreign_load.is_none_or(|share| (0.0..=1.0).contains(&share)), "{p:?}");
-    // Whoever has the raw samples can work out the value, and they stay few enough for a file.
+    // The value follows from the raw samples, which stay few enough for a file.
     let kept = p.how == How::Measured && p.statistic != Statistic::Fit;
     assert_eq!(p.raw.is_empty(), !kept, "{p:?}");
     assert!(p.raw.len() <= 1000, "{p:?}");

@@ -163,7 +163,7 @@ fn below(random: &mut Random, most: u64) -> u64 {
     (f64::from(random.next()) * most as f64) as u64
 }
 
-/// A machine whose GPU comes and goes, and whose cores the program may use so many of.
+/// A machine whose GPU comes and goes, and whose cores the program may use this many of.
 struct Machine {
     slot: Arc<Slot>,
     cores: u32,
@@ -258,7 +258,7 @@ fn life(adaptive: &mut Adaptive, machine: &mut Machine, frames: u64, random: &mu
     }
 }
 
-/// Bytes in use once the threads of the last start have ended; or so many milliseconds later, where they are more than ever.
+/// Bytes in use once the threads of the last start have ended; or this many milliseconds later, where they are more than ever.
 fn live_bytes(lowest: isize) -> isize {
     for _ in 0..50 {
         if LIVE.load(Relaxed) <= lowest {

@@ -86,8 +86,8 @@ fn allocations(scenario: Scenario, objects: usize, frames: usize, run: &mut dyn 
 fn tuning(registry: &Registry) -> Tuning {
     let cost = |id: &str, call: f64, object: f64| {
         let revision = registry.entries().iter().find(|e| e.id.to_string() == id).unwrap().revision;
-        let terms = vec![CostTerm { term: Term::Call, unit_ns: call }, CostTerm { term: Term::Objects, unit_ns: object }];
-        AlgorithmCost::new(id.parse().unwrap(), revision, CostCurve::new(terms), 0.0)
+        let terms = [(Term::Call, call), (Term::Objects, object)].map(|(term, unit_ns)| CostTerm { term, unit_ns });
+        AlgorithmCost::new(id.parse().unwrap(), revision, CostCurve::new(terms.to_vec()), 0.0)
     };
     let loads: Vec<Load> = (0..16).map(|k| Load::of_objects(1 << k)).collect();
     let costs = vec![cost("brute@cpu1", 0.0, 60.0), cost("sap@cpu1", 5_000.0, 30.0), cost("grid-sap@cpu1", 30_000.0, 10.0)];
@@ -152,10 +152,8 @@ fn idle_candidates() -> (Adaptive, Arc<AtomicUsize>) {
         let (shared, turns) = (Arc::clone(&shared), Arc::clone(&turns));
         registry.add(id.clone(), 1, move || Ok(Box::new(Idle(k, Arc::clone(&shared), Arc::clone(&turns), 3))));
     }
-    let costs = ids.into_iter().map(|algorithm| {
-        let terms = vec![CostTerm { term: Term::Call, unit_ns: 10_000.0 }];
-        AlgorithmCost::new(algorithm, 1, CostCurve::new(terms), 0.1)
-    });
+    let curve = CostCurve::new(vec![CostTerm { term: Term::Call, unit_ns: 10_000.0 }]);
+    let costs = ids.into_iter().map(|algorithm| AlgorithmCost::new(algorithm, 1, curve.clone(), 0.1));
     let loads = [Load::of_objects(10), Load::of_objects(1000)];
     let tuning = Tuning::from_costs(Source::Predicted, "uniform", costs.collect(), &loads);
     (Adaptive::new(tuning, &registry).unwrap(), turns)

@@ -2,6 +2,7 @@
 
 mod text;
 
+pub(crate) use text::unsound;
 pub use text::{FORMAT, is_report, read, write};
 
 use sapwise::model::Scale;

@@ -1,6 +1,6 @@
 //! Frames of one algorithm, added up until they tell its cost.
 //!
-//! An algorithm that keeps work runs cheap frames for a while and then a dear one, in which it looks anew. What counts is their mean, so that
+//! An incremental algorithm runs cheap frames for a while and then an expensive one, in which it rebuilds. What counts is their mean, so that
 //! frames are added up before they are compared with what was expected.
 
 /// Frames that are added up where an algorithm runs on, and right after it began.
@@ -8,7 +8,7 @@ const MOST: u32 = 16;
 const FEWEST: u32 = 2;
 /// Octaves of objects over which a batch goes at most.
 const OCTAVES: f64 = 0.5;
-/// What counts of a frame, at most: so many times what the dearest kind of frame is expected to cost. The rest is another program's.
+/// What counts of a frame, at most: this many times what the dearest kind of frame is expected to cost. The rest is another program's.
 const MOST_OVER: f64 = 2.0;
 
 /// What the tuning says of a frame, without any correction, in nanoseconds: all of it, and the calls in it.

@@ -37,7 +37,7 @@ pub(super) fn octaves() -> impl Iterator<Item = f64> {
     (0..KNOTS).map(|k| FIRST_OCTAVE + OCTAVES * k as f64)
 }
 
-/// Objects so many quarters of a decade above one.
+/// Objects this many quarters of a decade above one.
 pub(super) fn objects_of(quarter: u32) -> u32 {
     10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32
 }

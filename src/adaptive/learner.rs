@@ -6,8 +6,8 @@
 //! one. The *own* part of an algorithm is a curve over the number of objects. A Kalman filter follows both: the regime with all its
 //! covariances, which takes a dozen numbers, the own parts each by itself.
 
-use super::knots::{KNOTS, KnotPosition, View};
 use super::frame_batch::FrameBatch;
+use super::knots::{KNOTS, KnotPosition, View};
 use crate::algorithm::BackendClass;
 use crate::tuning::AlgorithmCost;
 
@@ -35,7 +35,7 @@ const KNOWN: u32 = 4;
 /// The noise of a frame is learned for each algorithm; it starts here, and is never believed to be less.
 const NOISE_LN: f64 = 0.1;
 const LEAST_NOISE_LN: f64 = 0.02;
-/// Of so many frames in a row the mean is as noisy as of this power of their number far apart.
+/// Of this many frames in a row the mean is as noisy as of this power of their number far apart.
 const ALIKE: f64 = 0.7;
 /// And the frame with which an algorithm begins as this part of one where it was slower than expected, for its threads may have slept or met
 /// another program; where it was faster, that was no accident.
@@ -43,7 +43,7 @@ const COLD_WORTH: [f64; 2] = [0.02, 0.5];
 /// Share of each new deviation in the noise.
 const NOISE_SHARE: f64 = 1.0 / 8.0;
 
-/// A surprise counts as no more than so many standard deviations: frames whose threads waited for a core take fifty times as long.
+/// A surprise counts as no more than this many standard deviations: frames whose threads waited for a core take fifty times as long.
 const MOST_SURPRISE: f64 = 3.0;
 /// This many of them in a row, all to the same side, are no accident: the machine or the scene has changed.
 const NO_ACCIDENT: u32 = 3;
@@ -197,7 +197,7 @@ impl Learner {
         self.algorithms[algorithm].batches >= KNOWN
     }
 
-    /// Takes in that a frame took so many nanoseconds more than any of its kind is expected to, or none.
+    /// Takes in that a frame took this many nanoseconds more than any of its kind is expected to, or none.
     pub(super) fn waited(&mut self, algorithm: usize, ns: f64, frame: u64) {
         if self.knows(algorithm) {
             let before = self.wait_ns(algorithm, frame);

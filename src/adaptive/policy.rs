@@ -16,7 +16,7 @@ const STEP_SLACK: f64 = 0.05;
 const MOST_DEARER: f64 = 1.3;
 /// Frames between two that explore, at least.
 const EXPLORE_EVERY: u64 = 60;
-/// What is found out is taken to be of use for so many frames: five seconds of a game.
+/// What is found out is taken to be of use for this many frames: five seconds of a game.
 const HORIZON: f64 = 300.0;
 
 /// Chooses, and learns from what the choices cost.
@@ -49,7 +49,7 @@ pub(super) struct Policy {
 }
 
 impl Policy {
-    /// `kept` gives for each candidate where it finds what the frame before left, if a frame is cheaper for it after one that was alike: one
+    /// `kept` says for each candidate where it finds what the frame before left, if a frame is cheaper for it after one that was alike: one
     /// number for all that share it.
     pub(super) fn new(tuning: Tuning, kept: &[Option<usize>], usable: Vec<bool>) -> Self {
         let count = usable.len();

@@ -115,7 +115,7 @@ fn unknown_algorithms_are_skipped_and_none_at_all_is_an_error() {
     assert!(Adaptive::new(tuning(&[("octree@cpu1", 0.0, 0.1)]), &registry).is_err());
 }
 
-/// The algorithm and the estimate of `moved` in each of so many frames of a scene.
+/// The algorithm and the estimate of `moved` in each of this many frames of a scene.
 fn course(adaptive: &mut Adaptive, scenario: Scenario, frames: usize) -> Vec<(String, f64)> {
     let mut scene = Scene::start(scenario, 2000, 1);
     let mut pairs = Pairs::new();

@@ -22,7 +22,7 @@ pub(super) struct DecisionThrottle {
 }
 
 impl DecisionThrottle {
-    /// Whether a frame with so many objects is to be decided on again.
+    /// Whether a frame with this many objects is to be decided on again.
     pub(super) fn is_due(&self, objects: u32) -> bool {
         self.frames >= self.rest || objects.abs_diff(self.objects) > (self.objects / CHANGE).max(FEWEST)
     }

@@ -4,12 +4,12 @@
 //! was cut off by a crash of the machine can't be read and is replaced.
 
 use super::options::Cache;
-use crate::measure::{fnv1a, machine};
 use crate::adaptive::{Keeper, SaveError};
 use crate::algorithm::AlgorithmId;
-use crate::hardware::{GpuIdentity, Machine};
 use crate::entry::Entry;
+use crate::hardware::{GpuIdentity, Machine};
 use crate::json::{self, Format};
+use crate::measure::{fnv1a, machine};
 use crate::model::Model;
 use crate::registry::{Registry, usable_cores};
 use crate::tuning::Tuning;
@@ -121,7 +121,7 @@ impl CacheFile {
         match fs::metadata(&self.path) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(ignored(&e.to_string())),
-            // To open a pipe would wait for whoever writes to it.
+            // To open a pipe would wait for its writer.
             Ok(found) if !found.is_file() => return Err(ignored("it is no file")),
             Ok(found) if found.len() > LONGEST_BYTES => return Err(ignored("it is too long")),
             Ok(_) => {}

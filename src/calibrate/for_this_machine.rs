@@ -21,8 +21,8 @@ impl Adaptive {
     ///
     /// In the background, which is the default, it returns at once, with [`Tuning::usual`] for the first frames; see
     /// [`StartOptions::background`]. The thread that measures ends by itself, whether this is dropped before or not. What is kept
-    /// holds for this machine, its drivers, this version of the library, its algorithms and the model; a change of any of
-    /// them measures anew. A cache that can't be read or written keeps nothing from working: [`setup`](Self::setup) tells.
+    /// holds for this machine, its drivers, this version of the library, its algorithms and the model; after a change of any of
+    /// them the next start measures again. A cache that can't be read or written keeps nothing from working: [`setup`](Self::setup) tells.
     ///
     /// Uses no network and no global state.
     ///
@@ -127,7 +127,11 @@ fn arrive(options: &StartOptions, registry: &Registry, began: Instant, wanted: i
 }
 
 /// Tuning from the cache, else from a prediction, and its file in the cache. `None` where nothing can be predicted.
-fn find(options: &StartOptions, registry: &Registry, remarks: &mut Vec<String>) -> Option<(Tuning, Origin, Option<CacheFile>)> {
+fn find(
+    options: &StartOptions,
+    registry: &Registry,
+    remarks: &mut Vec<String>,
+) -> Option<(Tuning, Origin, Option<CacheFile>)> {
     let built_in = if options.model.is_none() { Model::built_in().map(Some) } else { Ok(None) };
     let built_in = built_in.map_err(|e| remarks.push(format!("the built-in model can't be read: {e}"))).ok()?;
     let model = options.model.as_ref().or(built_in.as_ref())?;

@@ -1,4 +1,4 @@
-//! A Verlet list: the pairs of boxes grown by a margin, kept from frame to frame.
+//! The pairs of boxes grown by a margin, kept from frame to frame.
 //!
 //! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes, so a frame costs
 //! one look at each box and one test of each kept pair. A box that leaves its grown box gets a new one, and a tree of the
@@ -12,14 +12,14 @@ mod grown;
 mod motion;
 mod tree;
 
+use crate::aabb::Aabb;
+use crate::broad_phase::{BroadPhase, Incremental, check_count};
+use crate::cpu::Threads;
 use crate::cpu::columns::part;
 use crate::cpu::grid_sap::Finder;
 use crate::cpu::kernel::{overlap, prefetch};
-use crate::cpu::workers::{Outputs, Workers};
-use crate::cpu::Threads;
 use crate::cpu::level::Simd;
-use crate::aabb::Aabb;
-use crate::broad_phase::{BroadPhase, Incremental, check_count};
+use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
 use crate::load::{FramePlan, Sample, StripGrid};
 use crate::pairs::Pairs;
@@ -130,13 +130,13 @@ impl Incremental for PairCache {
     }
 }
 
-/// Kept pairs of a task, at most, when there are so many boxes and tasks.
+/// Kept pairs of a task, at most, when there are this many boxes and tasks.
 fn most_kept(boxes: usize, tasks: usize) -> usize {
     MOST_KEPT as usize * boxes / tasks + 1024
 }
 
 impl PairCache {
-    /// Deals the kept pairs of so many tasks out to those of the present width.
+    /// Deals the kept pairs of this many tasks out to those of the present width.
     fn deal(&mut self, before: usize) {
         let Self { widths, width, kept, dealt, grown, motion, .. } = self;
         let tasks = widths[*width].tasks();

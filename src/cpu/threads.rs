@@ -1,4 +1,4 @@
-//! Thread pools, shared by all algorithms of the same width, or the one pool that a program gives.
+//! Thread pools, shared by all algorithms of the same width, or the one pool of the program's.
 
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;

@@ -1,12 +1,12 @@
 //! How a frame is spread over threads: phases of independent tasks, each with its own memory.
 
+use crate::aabb::Aabb;
 #[cfg(feature = "parallel")]
 use crate::algorithm::AlgorithmId;
 use crate::cpu::Threads;
 use crate::cpu::columns::{ColumnsMut, part};
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
-use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::pairs::Pairs;
 #[cfg(feature = "parallel")]
@@ -63,7 +63,7 @@ impl Workers {
         if self.threads == 1 { 1 } else { self.threads * TASKS_PER_THREAD }
     }
 
-    /// One phase: gives out the tasks one by one to the caller and to its helpers. Returns when all are done.
+    /// One phase: hands out the tasks one by one to the caller and to its helpers. Returns when all are done.
     ///
     /// The caller works too instead of sleeping: waking a thread takes tens of microseconds, which a frame would pay twice.
     #[cfg_attr(not(feature = "parallel"), expect(clippy::unused_self, reason = "without threads nobody helps"))]
@@ -146,7 +146,7 @@ impl Workers {
         });
     }
 
-    /// Elements in a part of a list of so many.
+    /// Elements in a part of a list of this many.
     fn part_of(&self, len: usize) -> usize {
         if self.threads == 1 { len.max(1) } else { (len / self.tasks()).max(SMALLEST_FILL) }
     }

@@ -11,7 +11,7 @@ use crate::hardware::GpuKind;
 const TILE: u32 = 128;
 
 /// Tile pairs of one submission. A driver of a desktop gives up on one that takes seconds; these take tens of milliseconds
-/// on a GPU of two hundred thousand million tests a second, and seconds on a program that acts as one.
+/// on a GPU of two hundred thousand million tests a second, and seconds on a software adapter.
 const MOST_TILE_PAIRS: u32 = 1 << 19;
 const MOST_TILE_PAIRS_SOFTWARE: u32 = 1 << 17;
 

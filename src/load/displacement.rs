@@ -54,7 +54,7 @@ impl Displacement {
         let (mut moves, mut edges) = ([(0.0, 0.0); WATCHED], [0.0; WATCHED]);
         let mut count = 0;
         for (id, before) in &self.watched[..self.watching] {
-            // Invalid boxes are told by whoever finds the pairs; here they would make a ratio negative.
+            // The algorithm that finds the pairs reports invalid boxes; here they would make a ratio negative.
             let valid = |b: &&Aabb| b.defect().is_none() && before.defect().is_none();
             if let Some(now) = boxes.get(*id as usize).filter(valid) {
                 edges[count] = mean_edge(now);
@@ -74,7 +74,7 @@ impl Displacement {
 /// The greatest displacement of a bound.
 fn greatest(before: &Aabb, now: &Aabb) -> f32 {
     let bound = |a: usize| (now.min[a] - before.min[a]).abs().max((now.max[a] - before.max[a]).abs());
-    // An infinite bound that stays where it is gives NaN, which `max` passes over.
+    // An infinite bound that stays where it is yields NaN, which `max` passes over.
     (0..3).map(bound).fold(0.0, f32::max)
 }
 

@@ -36,7 +36,7 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
 
 /// Multiply-adds at one SIMD level.
 struct Kernel {
-    /// Runs so many rounds, each a multiply-add of every lane of every chain, and returns the sum of the lanes.
+    /// Runs this many rounds, each a multiply-add of every lane of every chain, and returns the sum of the lanes.
     run: fn(u32) -> f32,
     chains: u32,
     lanes: u32,
@@ -133,7 +133,7 @@ macro_rules! chains {
                 *chain = $step(*chain, factor, summand);
             }
         }
-        // SAFETY: both are so many floats one behind the other, and every pattern of bits is a float.
+        // SAFETY: both are this many floats one behind the other, and every pattern of bits is a float.
         let lanes: [f32; $chains * $lanes] = unsafe { std::mem::transmute(chains) };
         lanes.iter().sum()
     }};

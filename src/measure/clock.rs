@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn both_chains_are_plausible() {
         for ghz in [chain_ghz(), multiplication_ghz()] {
-            // The multiplication may take up to five cycles, and a loaded machine gives half its time: only a broken chain is outside.
+            // The multiplication may take up to five cycles, and a loaded machine has half its time: only a broken chain is outside.
             assert!((0.01..10.0).contains(&ghz), "{ghz}");
         }
     }

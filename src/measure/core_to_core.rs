@@ -39,7 +39,7 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
 /// One figure of [`ParameterId::CoreToCoreNs`] over the first core with the second and with the last: the best of three, so that a
 /// thread that was pushed aside does not count. Takes a millisecond or two, at most 60 where other programs hold a core.
 ///
-/// For whoever measures over minutes and wants to know whether the machine stayed the same. `None` on one core, and where threads can't
+/// For a measurement of minutes, to see whether the machine stayed the same. `None` on one core, and where threads can't
 /// be bound to cores or don't come to run.
 #[must_use]
 pub fn core_to_core_ns(options: &Options) -> Option<f64> {

@@ -41,7 +41,7 @@ impl Figure {
     /// What a statistic makes of the samples, as a parameter.
     pub(super) fn into_parameter_by(self, statistic: Statistic, name: impl AsRef<str>, method: &str) -> Parameter {
         let raw = self.usable();
-        // From the rounded samples, so that whoever reads them back gets this very value.
+        // From the rounded samples, so that a reader computes this very value.
         let value = statistic.of(&raw);
         Parameter { statistic, raw: raw.clone(), ..self.parameter(value, &raw, name, method) }
     }
@@ -53,7 +53,7 @@ impl Figure {
         Parameter { statistic: Statistic::Fit, ..self.parameter(Some(value), &raw, name, method) }
     }
 
-    /// What is a number, in as many digits as are kept. A failed division, or a clock that did not move, gives none.
+    /// What is a number, in as many digits as are kept. A failed division, or a clock that did not move, yields none.
     fn usable(&self) -> Vec<f64> {
         self.samples.iter().filter(|x| x.is_finite()).map(|&x| six_digits(x)).collect()
     }
@@ -90,7 +90,7 @@ pub(super) fn into_parameters(
     figures.into_iter().zip(named).map(|(figure, (name, method))| figure.into_parameter(name, &method)).collect()
 }
 
-/// Calls `sample` in windows until enough clean samples are there or the time is over; each call gives one value per figure.
+/// Calls `sample` in windows until enough clean samples are there or the time is over; each call returns one value per figure.
 ///
 /// Where too few clean samples were got in time, the least spoiled windows are kept too, and `foreign_load` says so.
 pub(super) fn collect(plan: Plan, mut sample: impl FnMut() -> Vec<f64>) -> Vec<Figure> {

@@ -4,7 +4,7 @@ use super::caches;
 use crate::SimdLevel;
 use crate::hardware::Machine;
 
-/// Text that the operating system or the CPU gives; empty where it gives none.
+/// Text that the operating system or the CPU reports; empty where it reports none.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 struct Cpu {
     brand: String,

@@ -189,7 +189,7 @@ impl Arrays {
     }
 
     fn gb_per_s(&self, start: Instant) -> f64 {
-        // Bytes a nanosecond are gigabytes a second. A clock that did not move gives infinity, which is no usable sample.
+        // Bytes a nanosecond are gigabytes a second. A clock that did not move yields infinity, which is no usable sample.
         (self.elements() * BYTES_PER_ELEMENT) as f64 / start.elapsed().as_nanos() as f64
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! One file per family of parameters. Samples are taken in windows; a window in which other programs took more than 5 % of the
 //! CPU is thrown away and repeated while time is left (Linux; elsewhere foreign load is not known). Every loop has a
-//! time limit, so a slow or loaded machine gives fewer samples, not a longer run.
+//! time limit, so a slow or loaded machine takes fewer samples, not a longer run.
 
 mod arithmetic;
 mod caches;

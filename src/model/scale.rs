@@ -40,7 +40,7 @@ named! {
         /// `group_upload_ratio`: both ways go over the same bus.
         GpuDownloadByte = "gpu_download_byte",
         /// One byte that a kernel moves in the GPU's memory: 1 / `read_gb_per_s`, where that is missing 1 / `copy_gb_per_s`, whose
-        /// copy command is many times faster than any kernel on programs that act as GPUs. Several GPUs are limited by
+        /// copy command is many times faster than any kernel on software adapters. Several GPUs are limited by
         /// `group_arithmetic_ratio`, which tells how far they work at the same time.
         GpuMemoryByte = "gpu_memory_byte",
         /// One 32-bit floating-point operation of all lanes at work: 1 / `arithmetic_gflop_per_s`. Several GPUs are limited by

@@ -17,7 +17,7 @@ pub(super) const PNG_UNIT: u32 = 2;
 const MOST_PIXELS: u64 = 1 << 28;
 
 /// A picture under way. Lengths are in units.
-pub type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
+pub(crate) type Area<'a> = DrawingArea<Canvas<'a>, Shift>;
 
 /// Takes what is drawn in units, and text of any characters.
 pub struct Canvas<'a>(Kind<'a>);

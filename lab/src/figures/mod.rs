@@ -62,7 +62,7 @@ impl Picture {
 
 /// The name of a file that does not say which kind of picture it is.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}: name a file that ends in .svg or .png", path.display())]
+#[error("name a file that ends in .svg or .png")]
 #[non_exhaustive]
 pub struct UnknownPicture {
     /// The file.

@@ -13,7 +13,9 @@ pub struct Specifications {
     /// Day on which the file was last changed, as `yyyy-mm-dd`. The simulated reports bear it, so that they don't depend on the day
     /// on which they are made.
     pub date: String,
+    /// The CPUs.
     pub cpus: Vec<Cpu>,
+    /// The GPUs.
     pub gpus: Vec<Gpu>,
 }
 

@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &Simulate) -> anyhow::Result<Outcome> {
     };
     let machines = arguments.machines.map_or(specifications.cpus.len(), |n| n as usize);
     let loads = Loads::of_a_sweep(arguments.seed, None)?;
-    let reports = simulate(&specifications, machines, &loads, arguments.seed)?;
+    let reports = simulate(&specifications, machines, &loads, arguments.seed, &Progress::new(0))?;
     std::fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made", folder.display()))?;
     let mut written = Vec::new();
     for (name, report) in &reports {

@@ -67,7 +67,7 @@ pub(super) struct Brownian {
 impl Brownian {
     /// Greatest speed on each axis, in edges per frame.
     const SPEED: f32 = 0.1;
-    /// One object in so many draws a new velocity in a frame; a power of two.
+    /// One object in this many draws a new velocity in a frame; a power of two.
     const CHANGE: u64 = 64;
 
     /// Objects at random places with random velocities.

@@ -17,7 +17,7 @@ pub(super) struct Walk {
     step: f32,
     /// Objects at the head of the list that never move.
     fixed: usize,
-    /// One object in so many moves in a frame.
+    /// One object in this many moves in a frame.
     sparsity: usize,
 }
 

@@ -40,7 +40,7 @@ fn policy(tuning: Tuning) -> Policy {
     Policy::new(tuning, &vec![None; count], vec![true; count])
 }
 
-/// Runs so many frames of so many objects on a machine with that truth, each frame noisy by a tenth.
+/// Runs this many frames of this many objects on a machine with that truth, each frame noisy by a tenth.
 fn run(policy: &mut Policy, frames: std::ops::Range<usize>, objects: u32, truth: &Truth) -> Vec<Frame> {
     let count = policy.tuning().costs.len();
     let mut chance = Chance(17);
@@ -161,7 +161,7 @@ fn exploring_is_rare_bounded_and_can_be_turned_off() {
 
 #[test]
 fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
-    // The second keeps work: its first frame costs two, and so does one in fifty of those behind it. 2 % are saved a frame.
+    // The second is incremental: its first frame costs two, and so does one in fifty of those behind it. 2 % are saved a frame.
     let costs = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 0.0, 96.0)]);
     let start = |costs: Tuning| {
         let mut policy = Policy::new(costs, &[None, Some(0)], vec![true; 2]);
@@ -191,16 +191,16 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
 
 #[test]
 fn what_makes_its_work_anew_too_often_is_left_and_taken_up_again() {
-    // The first keeps work. Up to frame 600 it makes that anew in one frame of three, which the tuning know nothing of.
+    // The first is incremental. Up to frame 600 it rebuilds in one frame of three, which the tuning knows nothing of.
     let mut costs = tuning(&[("sap@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 0.0, 20.0)]);
     costs.costs[0].curve.fallback_terms = costs.costs[1].curve.terms.clone();
     let mut policy = Policy::new(costs, &[Some(0), None], vec![true; 2]);
     policy.set_exploring(false);
     let truth = |k: usize, n: f64, at: usize| {
-        let anew = at < 600 && at.is_multiple_of(3);
+        let rebuilds = at < 600 && at.is_multiple_of(3);
         n * if k == 1 {
             20.0
-        } else if anew {
+        } else if rebuilds {
             45.0
         } else {
             10.0

@@ -1,11 +1,11 @@
-//! The grown boxes: who has left theirs, and a new one for whoever has.
+//! The grown boxes: which boxes have left theirs, and new ones for these.
 
 use super::tree::{NOTHING, Tree};
-use crate::cpu::level::Simd;
+use crate::aabb::Aabb;
 use crate::cpu::columns::ensure;
 use crate::cpu::kernel::contain::{each_doubtful_block, within};
+use crate::cpu::level::Simd;
 use crate::cpu::workers::Workers;
-use crate::aabb::Aabb;
 use crate::error::Error;
 use std::ops::Range;
 
@@ -75,7 +75,7 @@ impl Grown {
         self.len.div_ceil(tasks).next_multiple_of(64).max(64)
     }
 
-    /// One phase: gives a new grown box to every box that is not within its own.
+    /// One phase: makes a new grown box for every box that is not within its own.
     ///
     /// # Errors
     /// [`Error::InvalidBox`]; what is known of the grown boxes is then of no use.

@@ -161,7 +161,7 @@ impl Motion {
 
     /// How far the boxes moved since the frame before; `None` in the first frame.
     fn moved(&self, plan: &FramePlan, boxes: &[Aabb]) -> Option<f64> {
-        // Of the pairs, too, nothing is known before the second frame, whoever knows how far boxes moved.
+        // Nothing is known of the pairs before the second frame either, even where it is known how far boxes moved.
         if self.displacement.is_watching() { plan.moved().or_else(|| self.displacement.moved(boxes)) } else { None }
     }
 
@@ -197,7 +197,7 @@ fn longest_edge(plan: &FramePlan, boxes: &[Aabb]) -> f32 {
 }
 
 /// How much of the order in space is lost, as a share of the boxes that left. One that went far widens every node above its leaf,
-/// which then costs whoever asks for what is near there.
+/// which then costs every query near there.
 fn worn(objects: usize, changes: &Changes) -> f32 {
     const FAR_AWAY: f32 = 16.0;
     (changes.left as f32 + FAR_AWAY * changes.far_away as f32) / objects.max(1) as f32
@@ -213,7 +213,7 @@ fn tests(far: f32, kept: f32) -> f32 {
     cost::BOX + far.sqrt() * cost::KEPT * kept
 }
 
-/// The cost of a box that left when each box has so many kept pairs.
+/// The cost of a box that left when each box has this many kept pairs.
 fn left(far: f32, kept: f32) -> f32 {
     far * (cost::LEFT[0] + cost::LEFT[1] * kept)
 }

@@ -3,14 +3,14 @@
 //! Sixteen boxes that are near in space share a leaf. A box that moves widens the nodes above its leaf and never changes
 //! its leaf, so the tree gets worse until it is made again.
 
-use crate::cpu::level::Simd;
+use crate::aabb::Aabb;
 use crate::cpu::columns::{ensure, part};
 use crate::cpu::kernel::node::{LANES, Node, each_overlapping};
+use crate::cpu::level::Simd;
 use crate::cpu::sort::sort;
 use crate::cpu::workers::Workers;
-use crate::load::Sample;
-use crate::aabb::Aabb;
 use crate::error::Error;
+use crate::load::Sample;
 
 /// Boxes that move in one phase on all threads; fewer are moved in less time than a phase takes.
 const SMALLEST_SPLIT: usize = 1024;
@@ -21,7 +21,7 @@ pub(super) const FAR: usize = 50_000;
 /// Contains no box, not even an infinite one: whatever has no grown box yet is seen to have left it.
 pub(super) const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
 
-/// In place of a box that is gone. No box has this number: there are at most so many.
+/// In place of a box that is gone. No box has this number: there are at most this many.
 const GONE: u32 = u32::MAX;
 
 /// See the module.
@@ -98,7 +98,7 @@ impl Tree {
         Ok(())
     }
 
-    /// Adds a box that is not in the tree. It has no bounds there before [`Tree::follow`] gives it some.
+    /// Adds a box that is not in the tree. It has no bounds there before [`Tree::follow`] sets them.
     pub(super) fn insert(&mut self, id: u32) -> Result<(), Error> {
         ensure(&mut self.ids, self.places + 1, "boxes in a tree")?;
         ensure(&mut self.place_of, id as usize + 1, "boxes in a tree")?;
@@ -185,7 +185,7 @@ impl Tree {
     }
 }
 
-/// Adds empty nodes to a level until it has so many.
+/// Adds empty nodes to a level until it has this many.
 fn grow(level: &mut Vec<Node>, nodes: usize) -> Result<(), Error> {
     if level.len() < nodes {
         let refused = |_| Error::OutOfMemory { what: "nodes of a tree", elements: nodes };

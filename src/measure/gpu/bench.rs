@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-use crate::gpu::{Gpu, GpuError};
 pub(super) use crate::gpu::kernel::{Bound, Kernel};
+use crate::gpu::{Gpu, GpuError};
 use crate::hardware::{GpuKind, GpuParameterId, Parameter};
 use crate::measure::Options;
 use crate::measure::foreign_load::{self, Figure, Plan};
@@ -64,7 +64,9 @@ impl<'a> Bench<'a> {
         padded.resize(words.len().next_multiple_of(4), 0);
         let contents = bytemuck::cast_slice(&padded);
         let usage = wgpu::BufferUsages::UNIFORM;
-        self.gpu.try_make(|d| d.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })).map_err(self::words)
+        self.gpu
+            .try_make(|d| d.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage }))
+            .map_err(self::words)
     }
 
     /// Compiles an entry point, with constants for its overrides.
@@ -130,7 +132,7 @@ pub(super) fn record(bound: &Bound, encoder: &mut wgpu::CommandEncoder, groups: 
     }
 }
 
-/// How much work takes about `target`: from 1 up, at most `most`. `run` does so much work and gives its time.
+/// How much work takes about `target`: from 1 up, at most `most`. `run` does this much work and returns its time.
 ///
 /// The first run of a kernel may compile it, so the smallest amount runs twice.
 pub(super) fn calibrate(
@@ -172,7 +174,7 @@ pub(super) fn one_line(text: &str) -> String {
 
 /// Seconds of work per second become billions with this: amounts a nanosecond.
 pub(super) fn per_ns(amount: f64, time: Duration) -> f64 {
-    // A clock that did not move gives infinity, which is no usable sample.
+    // A clock that did not move yields infinity, which is no usable sample.
     amount / (time.as_secs_f64() * 1e9)
 }
 

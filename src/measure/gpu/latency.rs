@@ -12,7 +12,7 @@ const SOURCE: &str = include_str!("shaders/latency.wgsl");
 /// most stand in a report.
 const CHAIN: u32 = 500;
 
-/// The same on a program that acts as a GPU.
+/// The same on a software adapter.
 const CHAIN_SOFTWARE: u32 = 50;
 
 const NAMES: [GpuParameterId; 4] =

@@ -29,7 +29,7 @@ const WARM_UP: Duration = Duration::from_millis(50);
 
 /// Measures one GPU: each of [`GpuParameterId::OF_ONE`] once, measured, reported or missing with a reason.
 ///
-/// The GPU is opened anew, so that memory and submissions of the caller don't stand in the way; but one that the program
+/// The GPU is opened again, so that memory and submissions of the caller don't stand in the way; but one that the program
 /// opened itself ([`Gpus::of`]) is measured as it is, and what else it does meanwhile makes it look slower. [`Options::threads`] has
 /// no effect. With [`Options::limit`] only what a cost model reads is measured.
 ///
@@ -66,7 +66,7 @@ pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, Gp
 
 /// Measures GPUs that work at the same time: each of [`GpuParameterId::GROUP`] once, measured or missing with a reason.
 ///
-/// The order of the numbers does not matter, and a number that stands twice counts once. Each GPU is opened anew.
+/// The order of the numbers does not matter, and a number that stands twice counts once. Each GPU is opened again.
 ///
 /// # Errors
 /// [`GpuErrorKind::NotFound`] when there are fewer than two, or one of them can't be opened.

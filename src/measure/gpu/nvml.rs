@@ -29,7 +29,7 @@ pub(super) fn query(pci: &str, load: impl FnOnce()) -> Nvml {
     use nvml_wrapper::enum_wrappers::device::Clock;
 
     if pci.is_empty() {
-        return Nvml::none("the driver gives no PCI address, so NVML can't be asked about this GPU");
+        return Nvml::none("the driver reports no PCI address, so NVML can't be asked about this GPU");
     }
     let library = match nvml_wrapper::Nvml::init() {
         Ok(library) => library,
@@ -55,7 +55,7 @@ pub(super) fn query(pci: &str, load: impl FnOnce()) -> Nvml {
     let clocks = (0..8).map(|_| device.clock_info(Clock::SM)).collect::<Result<Vec<_>, _>>().map_err(text);
     let clock_ghz = clocks.and_then(|mhz| match mhz.into_iter().max() {
         Some(mhz) if mhz > 0 => Ok(f64::from(mhz) / 1000.0),
-        _ => Err("NVML gives a clock of zero".to_owned()),
+        _ => Err("NVML reports a clock of zero".to_owned()),
     });
     Nvml { clock_ghz, memory_bytes, cores, processors }
 }
@@ -66,8 +66,8 @@ pub(super) fn query(_pci: &str, _load: impl FnOnce()) -> Nvml {
     Nvml::none("there is no NVML on this system")
 }
 
-/// Multiprocessors behind so many CUDA cores, by the table of the CUDA programming guide. `None` for what it does not list.
-#[cfg_attr(target_vendor = "apple", allow(dead_code, reason = "the library that gives cores does not exist there"))]
+/// Multiprocessors behind this many CUDA cores, by the table of the CUDA programming guide. `None` for what it does not list.
+#[cfg_attr(target_vendor = "apple", allow(dead_code, reason = "the library that reports cores does not exist there"))]
 fn processors(cores: u32, major: i32, minor: i32) -> Option<u32> {
     let each = match (major, minor) {
         (3, _) => 192,

@@ -38,7 +38,7 @@ impl Sysfs {
             .or_else(|| i915("gt/gt0/rps_act_freq_mhz", "i915, rps_act_freq_mhz"))
             .or_else(|| i915("gt_act_freq_mhz", "i915, gt_act_freq_mhz"))
             .or_else(|| Some((self.number("tile0/gt0/freq0/act_freq")?, "xe, act_freq")))?;
-        // Intel gives zero while it sleeps.
+        // Intel reports zero while it sleeps.
         (mhz.0 > 0).then_some((mhz.0 as f64 / 1000.0, mhz.1))
     }
 
