@@ -1,7 +1,7 @@
 //! What began and what ended between two frames.
 
-use crate::pairs::Pairs;
 use crate::error::Error;
+use crate::pairs::Pairs;
 
 /// Follows pairs from frame to frame by ids of the caller's: which began, which ended, and all there are.
 ///

@@ -137,7 +137,11 @@ impl fmt::Display for Unavailable {
         match self {
             Self::NotParallel => f.write_str("built without the feature `parallel`"),
             Self::PoolTooSmall { pool } => {
-                write!(f, "the pool that the program gave has {pool} threads, with the calling one {}", pool.saturating_add(1))
+                write!(
+                    f,
+                    "the pool that the program gave has {pool} threads, with the calling one {}",
+                    pool.saturating_add(1)
+                )
             }
             Self::TooFewCores { threads } => write!(f, "it has {threads} threads, more than this machine has cores"),
             Self::ThreadsRefused { threads, message } => write!(f, "{threads} threads can't be started: {message}"),

@@ -40,6 +40,16 @@ pub fn model(text: &str) -> Result<Model, Error> {
     Format::MODEL.read(text).map(|read| read.value)
 }
 
+impl Model {
+    /// The model that comes with this library: `models/default.json`, whose card is `models/README.md`.
+    ///
+    /// # Errors
+    /// When the file that was built in is no sound model, which the tests rule out.
+    pub fn built_in() -> Result<Self, Error> {
+        model(include_str!("../models/default.json"))
+    }
+}
+
 /// Writes tuning, one key a line.
 ///
 /// # Errors

@@ -87,7 +87,8 @@ pub use entry::Entry;
 pub use error::{BoxDefect, Error, Unavailable};
 pub use filter::{Filter, Membership};
 pub use hardware::{
-    GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, Hardware, HardwareError, How, Machine, Parameter, ParameterId,
+    GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, Hardware, HardwareError, How, Machine, Parameter,
+    ParameterId,
 };
 pub use load::{Displacement, FramePlan, Load};
 pub use model::Model;

@@ -152,15 +152,6 @@ impl Model {
         Self { name: name.into(), simulated: false, ranges, methods }
     }
 
-    /// The model that comes with this library: `models/default.json`, whose card is `models/README.md`.
-    ///
-    /// # Errors
-    /// When the file that was built in is no sound model, which the tests rule out.
-    #[cfg(feature = "model")]
-    pub fn built_in() -> Result<Self, crate::json::Error> {
-        crate::json::model(include_str!("../models/default.json"))
-    }
-
     /// The hardware parameters that a prediction looks at, those of GPUs aside, each once: for its costs, and to tell whether the machine
     /// is like those of training.
     #[must_use]

@@ -3,9 +3,9 @@
 
 use sapwise_scenes::Random;
 use sapwise::hardware::GpuParameterId;
-use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, How, ParameterId};
+use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, ParameterId};
 use sapwise::model::{MethodModel, ModelTerm, Scale};
-use crate::report::{Label, Point, Provenance, Report, ReportSchema, Timed, Timing};
+use crate::report::{Label, Point, Provenance, Report, Timed, Timing};
 use sapwise::{AlgorithmId, BackendClass, Hardware, Load, Parameter, Term};
 
 /// A machine of the made-up family.
@@ -117,14 +117,12 @@ impl Machine {
             (ParameterId::ScalingAllThreadsRatio, Self::scaling(self.cores)),
         ];
         let parameters = figures.map(measured);
-        let machine = sapwise::Machine { physical_id: self.name.to_owned(), ..sapwise::Machine::default() };
         let gpus: Vec<GpuHardware> = self.gpus.iter().enumerate().map(|(k, gpu)| gpu.hardware(k as u32)).collect();
-        let group = GpuGroup {
-            gpus: (0..gpus.len() as u32).collect(),
-            parameters: [(GpuParameterId::GroupUploadRatio, 1.4), (GpuParameterId::GroupRoundTripRatio, 1.2)].map(measured).into(),
-        };
+        let together = [(GpuParameterId::GroupUploadRatio, 1.4), (GpuParameterId::GroupRoundTripRatio, 1.2)];
+        let group = GpuGroup::new((0..gpus.len() as u32).collect(), together.map(measured).into());
         let gpu_groups = if gpus.len() > 1 { vec![group] } else { Vec::new() };
-        Hardware { machine, parameters: parameters.into(), gpus, gpu_groups }
+        let hardware = Hardware::new(sapwise::Machine::of(self.name), parameters.into());
+        hardware.with_gpus(gpus).with_gpu_groups(gpu_groups)
     }
 
     /// A full sweep: 23 sizes from 16 to 700 000 objects of two scenarios; from 500 objects up whoever is eight times slower than
@@ -169,9 +167,8 @@ impl Machine {
                 }
             }
         }
-        let algorithms = ids.into_iter().map(|(id, m)| Timed { id, revision: m.revision }).collect();
+        let algorithms = ids.into_iter().map(|(id, m)| Timed::new(id, m.revision)).collect();
         Report {
-            schema: ReportSchema,
             label: Label::RealFull,
             provenance: provenance(),
             hardware,
@@ -184,14 +181,8 @@ impl Machine {
 
 impl Gpu {
     fn hardware(&self, index: u32) -> GpuHardware {
-        let identity = GpuIdentity {
-            index,
-            name: format!("GPU of {} GFLOP/s", self.gflop),
-            device: "0000:0000".to_owned(),
-            driver: "test".to_owned(),
-            api: "vulkan".to_owned(),
-            kind: self.kind,
-        };
+        let name = format!("GPU of {} GFLOP/s", self.gflop);
+        let identity = GpuIdentity::new(index, name, self.kind).with_driver("0000:0000", "test", "vulkan");
         let figures = [
             (GpuParameterId::UploadRateGbPerS, self.upload),
             (GpuParameterId::DownloadRateGbPerS, self.download),
@@ -201,12 +192,12 @@ impl Gpu {
             (GpuParameterId::ReadBackNs, self.round_trip_ns / 3.0),
             (GpuParameterId::ArithmeticGflopPerS, self.gflop),
         ];
-        GpuHardware { gpu: identity, parameters: figures.map(measured).into() }
+        GpuHardware::new(identity, figures.map(measured).into())
     }
 }
 
-fn measured((name, value): (&str, f64)) -> Parameter {
-    Parameter { how: How::Measured, ..Parameter::reported(name, value, "test") }
+fn measured((id, value): (impl AsRef<str>, f64)) -> Parameter {
+    Parameter::measured(id, value, "test")
 }
 
 fn provenance() -> Provenance {
@@ -247,20 +238,14 @@ pub(crate) fn load(scenario: &str, n: f64) -> Load {
 }
 
 fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> MethodModel {
-    MethodModel {
-        method: name.to_owned(),
-        backend,
-        revision: 1,
-        max_threads: 16,
-        gpu_kinds: Vec::new(),
-        min_objects: 1,
-        max_objects: u32::MAX,
-        terms: terms.iter().map(|&(term, scale, unit)| ModelTerm { term, scale, unit }).collect(),
-        fallback_terms: Vec::new(),
-        residual_intercept: 0.0,
-        residual: Vec::new(),
-        spread_ln: 0.0,
-    }
+    let mut method = MethodModel::new(name, backend, 1);
+    (method.max_threads, method.min_objects, method.max_objects) = (16, 1, u32::MAX);
+    method.terms = of(terms);
+    method
+}
+
+fn of(terms: &[(Term, Scale, f64)]) -> Vec<ModelTerm> {
+    terms.iter().map(|&(term, scale, unit)| ModelTerm { term, scale, unit }).collect()
 }
 
 /// The costs on GPUs that the reports are made from.
@@ -302,6 +287,18 @@ pub(crate) fn truth() -> Vec<MethodModel> {
             (Pairs, SharedCycle, 12.0),
         ]
     };
+    let mut pair_cache = method(
+        "pair-cache",
+        &[
+            (Call, Cycle, 800.0),
+            (Call, ForkJoin, 2.0),
+            (Objects, SharedCycle, 15.0),
+            (ColdObjects, Byte, 60.0),
+            (Pairs, SharedCycle, 20.0),
+            (Moved, SharedCycle, 150.0),
+        ],
+    );
+    pair_cache.fallback_terms = of(&sorted(7000.0, 4.4, (StripCandidates, SharedLane, 66.0)));
     vec![
         method(
             "brute",
@@ -315,21 +312,6 @@ pub(crate) fn truth() -> Vec<MethodModel> {
         ),
         method("sap", &sorted(1500.0, 3.0, (AxisCandidates, SharedLane, 7.0))),
         method("grid-sap", &sorted(6000.0, 4.0, (StripCandidates, SharedLane, 60.0))),
-        MethodModel {
-            fallback_terms: sorted(7000.0, 4.4, (StripCandidates, SharedLane, 66.0))
-                .map(|(term, scale, unit)| ModelTerm { term, scale, unit })
-                .into(),
-            ..method(
-                "pair-cache",
-                &[
-                    (Call, Cycle, 800.0),
-                    (Call, ForkJoin, 2.0),
-                    (Objects, SharedCycle, 15.0),
-                    (ColdObjects, Byte, 60.0),
-                    (Pairs, SharedCycle, 20.0),
-                    (Moved, SharedCycle, 150.0),
-                ],
-            )
-        },
+        pair_cache,
     ]
 }

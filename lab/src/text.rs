@@ -1,7 +1,7 @@
 //! Text in columns.
 
 /// Rows with every column but the last padded to its widest cell, two blanks between columns.
-pub(crate) fn columns(rows: &[Vec<String>]) -> String {
+pub fn columns(rows: &[Vec<String>]) -> String {
     let count = rows.iter().map(Vec::len).max().unwrap_or(0);
     let widths: Vec<usize> = (0..count).map(|column| width(rows, column)).collect();
     let mut text = String::new();
@@ -17,7 +17,7 @@ pub(crate) fn columns(rows: &[Vec<String>]) -> String {
 }
 
 /// Characters of the widest cell of a column.
-pub(crate) fn width(rows: &[Vec<String>], column: usize) -> usize {
+pub fn width(rows: &[Vec<String>], column: usize) -> usize {
     rows.iter().filter_map(|r| r.get(column)).map(|c| c.chars().count()).max().unwrap_or(0)
 }
 

@@ -75,6 +75,7 @@ mod tests {
     use crate::report::{Label, Report};
     use crate::synthetic::Machine;
     use crate::training::{read_model, write_model};
+    use sapwise::Entry;
     use sapwise::hardware::ParameterId;
 
     fn reports() -> Vec<(String, Report)> {
@@ -104,7 +105,7 @@ mod tests {
         let model = train(of(&reports), "test", &Silent).unwrap().model;
         let range = model.ranges.iter().find(|r| r.parameter == "gpu/upload_rate_gb_per_s").unwrap();
         assert_eq!((range.min, range.max), (5.0, 24.0));
-        let all = |ids: &[&str]| ids.iter().map(|id| (id.parse().unwrap(), 1)).collect::<Vec<_>>();
+        let all = |ids: &[&str]| ids.iter().map(|id| Entry::new(id.parse().unwrap(), 1)).collect::<Vec<_>>();
         let within = model.predict(&machines[1].hardware(), &all(&["grid-sap@cpu1", "grid-sap@gpu0", "grid-sap@gpu0+1"])).unwrap();
         assert!(within.costs.len() == 3 && !within.extrapolated, "{:?}", within.warnings);
         let outside = model.predict(&machines[4].hardware(), &all(&["grid-sap@gpu0"])).unwrap();

@@ -97,7 +97,7 @@ fn a_machine_outside_the_training_is_told_and_a_missing_parameter_leaves_out_wha
     assert!(prediction.warnings.iter().any(names), "{:?}", prediction.warnings);
     set(&mut hardware, ParameterId::ClockMeasuredGhz, Some(9.0));
     assert!(model.predict(&hardware, &algorithms).unwrap().extrapolated);
-    let other_revision: Vec<_> = algorithms.iter().map(|(id, revision)| (id.clone(), revision + 1)).collect();
+    let other_revision: Vec<_> = algorithms.iter().map(|e| Entry::new(e.id.clone(), e.revision + 1)).collect();
     let error = model.predict(&hardware, &other_revision).unwrap_err().to_string();
     assert!(error.contains("train on new reports"), "{error}");
     set(&mut hardware, ParameterId::ClockMeasuredGhz, Some(4500.0));

@@ -36,7 +36,7 @@ fn study(reports: &[PathBuf], out: &Path) -> Value {
     let answer: Value = serde_json::from_str(&answer).unwrap();
     assert_eq!(answer, read(&out.join("study.json")));
     for file in answer["files"].as_array().unwrap() {
-        assert!(out.join(file.as_str().unwrap()).is_file(), "{file}");
+        assert!(out.join(file["path"].as_str().unwrap()).is_file(), "{file}");
     }
     answer
 }
@@ -65,21 +65,25 @@ fn figures_come_from_the_reports_that_they_name() {
         .map(|r| (r["label"].as_str().unwrap(), r["file"].as_str().unwrap()))
         .collect();
     let mut looked_at = 0;
-    for row in rows(&out.join("tables/machines.csv")) {
+    for row in rows(&out.join("tables/parameters.csv")).iter().filter(|r| r["processor"] == "machine") {
         let file = files[row["reports"].as_str()];
         let own = reports.iter().find(|r| r.ends_with(file)).cloned().unwrap_or_else(|| dataset("published").join(file));
-        for p in read(&own)["hardware"]["parameters"].as_array().unwrap() {
-            let Some(cell) = row.get(p["name"].as_str().unwrap()) else { continue };
-            match p["value"].as_f64() {
-                Some(value) => assert!((cell.parse::<f64>().unwrap() / value - 1.0).abs() < 1e-12, "{file} {p}"),
-                None => assert_eq!(cell, "", "{file} {p}"),
-            }
-            looked_at += 1;
+        let own = read(&own);
+        let mut parameters = own["hardware"]["parameters"].as_array().unwrap().iter();
+        let p = parameters.find(|p| p["name"] == row["parameter"].as_str()).unwrap();
+        match p["value"].as_f64() {
+            Some(value) => assert!((row["value"].parse::<f64>().unwrap() / value - 1.0).abs() < 1e-12, "{file} {p}"),
+            None => assert_eq!(row["value"], "", "{file} {p}"),
         }
+        looked_at += 1;
     }
     assert!(looked_at > 150, "{looked_at}");
+    // Every median time stands in one row, with what it is of.
+    let timings = rows(&out.join("tables/timings.csv"));
+    let named = |r: &BTreeMap<String, String>| r["algorithm"] == "grid-sap@cpu2" && r["threads"] == "2" && r["method"] == "grid-sap";
+    assert!(timings.iter().any(|r| named(r) && r["scenario"] == "uniform" && r["median_ns"].parse::<f64>().unwrap() > 0.0));
     // Vectors were taken from two threads and from one, and both reports show it; two pairs are too few for a verdict.
-    let taken = rows(&out.join("tables/taken.csv"));
+    let taken = rows(&out.join("tables/restrictions.csv"));
     let own = |algorithm: &str| {
         taken.iter().find(|r| {
             r["taken"].starts_with("simd: avx2") && r["algorithm"] == algorithm && r["objects"].starts_with("1000")
@@ -88,7 +92,7 @@ fn figures_come_from_the_reports_that_they_name() {
     let strips = own("grid-sap@cpu1").unwrap();
     assert_eq!((strips["pairs"].as_str(), strips["reports"].split(' ').count()), ("2", 4), "{strips:?}");
     assert_eq!(strips["verdict"], "cannot be told from these machines");
-    let proof = rows(&out.join("tables/restrictions.csv"));
+    let proof = rows(&out.join("tables/restriction-proofs.csv"));
     assert!(proof.iter().any(|r| r["parameter"] == "simd_lanes" && r["ratio"] == "0.5"), "{proof:?}");
     // What a single machine can't tell is said, and no link is made up.
     assert!(says(&answer, "it takes 5") && !out.join("tables/influence.csv").exists());
@@ -99,7 +103,7 @@ fn figures_come_from_the_reports_that_they_name() {
 }
 
 #[test]
-fn the_papers_claims_are_held_against_its_own_table() {
+fn the_papers_claims_are_compared_with_its_own_table() {
     let folder = tempfile::tempdir().unwrap();
     let answer = study(&[dataset("published"), stored("1t")], folder.path());
     let claims = answer["claims"].as_array().unwrap();
@@ -125,18 +129,18 @@ fn simulated_machines_are_studied_by_themselves() {
     let text = success(sapwise().args(["study", "--simulated"]).args([&machines, &stored("1t")]).arg("--out").arg(&out));
     assert!(
         text.contains(
-            "8 reports read, the timings of 7 studied; simulated machines, which are no evidence of how fast any is: 7"
+            "8 reports of 7 physical machines, 7 of them with timings that are studied."
         ),
         "{text}"
     );
     let links = rows(&out.join("tables/influence.csv"));
-    let link = |parameter: &str, of: &str| links.iter().find(|l| l["parameter"] == parameter && l["of"] == of).unwrap();
+    let link = |parameter: &str, of: &str| links.iter().find(|l| l["parameter"] == parameter && l["outcome"] == of).unwrap();
     let clock = link("clock_measured_ghz", "time of brute@cpu1");
     assert!(clock["rank_correlation"].parse::<f64>().unwrap() < 0.0, "{clock:?}");
     assert_eq!(clock["rank_machines"], "7");
     // No prediction reads the size of the memory, so none can show that it does not matter.
-    let memory = link("memory_bytes", "prediction of brute on the CPU");
-    assert!(memory["permuted_rise"].is_empty() && !memory["left_correlation"].is_empty(), "{memory:?}");
+    let memory = link("memory_bytes", "time of brute@cpu1");
+    assert!(memory["fitted_without_rise"].is_empty() && !memory["rank_correlation"].is_empty(), "{memory:?}");
     assert!(fs::read_to_string(out.join("index.html")).unwrap().contains("These machines are simulated"));
     // The other way round none of them is.
     let answer = study(&[machines, stored("1t")], &folder.path().join("real"));
@@ -214,16 +218,16 @@ fn wrong_usage_is_told_before_the_work() {
 }
 
 #[test]
-fn any_two_machines_are_set_beside_each_other() {
+fn any_two_machines_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let reports = ["full", "1t", "avx2"].map(stored);
     let out = folder.path().join("study");
     let mut command = sapwise();
     command.arg("study").args(&reports).arg("--reference").arg(&reports[2]).arg("--machine").arg(&reports[1]);
     success(command.arg("--out").arg(&out));
-    let ratios = rows(&out.join("tables/ratios.csv"));
+    let ratios = rows(&out.join("tables/figure-10-11.csv"));
     assert!(ratios.iter().all(|r| r["machine"].contains("-1t--") && r["reference"].contains("-avx2--")), "{ratios:?}");
-    let lanes = ratios.iter().find(|r| r["what"] == "simd_lanes").unwrap();
+    let lanes = ratios.iter().find(|r| r["name"] == "simd_lanes").unwrap();
     assert_eq!(lanes["ratio"], "2");
-    assert!(ratios.iter().any(|r| r["of"] == "speed-up" && !r["ratio_first_quartile"].is_empty()));
+    assert!(ratios.iter().any(|r| r["what"] == "speed-up" && !r["ratio_lower_quartile"].is_empty()));
 }

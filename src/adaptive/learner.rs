@@ -6,8 +6,8 @@
 //! one. The *own* part of an algorithm is a curve over the number of objects. A Kalman filter follows both: the regime with all its
 //! covariances, which takes a dozen numbers, the own parts each by itself.
 
-use super::knots::{KNOTS, KnotPosition, View};
 use super::frame_batch::FrameBatch;
+use super::knots::{KNOTS, KnotPosition, View};
 use crate::algorithm::BackendClass;
 use crate::tuning::AlgorithmCost;
 

@@ -65,9 +65,9 @@ pub enum SaveError {
 impl fmt::Display for SaveError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Given => {
-                f.write_str("the tuning was given by the program; write `Adaptive::learned` to a file with `json::write_tuning`")
-            }
+            Self::Given => f.write_str(
+                "the tuning was given by the program; write `Adaptive::learned` to a file with `json::write_tuning`",
+            ),
             Self::Awaited => f.write_str("the tuning of this machine is not there yet; save at the end of the session"),
             Self::NothingPredicted => {
                 f.write_str("nothing was predicted that could have been corrected; `Adaptive::setup` says why")

@@ -76,7 +76,8 @@ pub(super) enum Kind {
 impl SwitchingCosts {
     /// `kept` as [`Policy::new`](super::policy::Policy::new) has it.
     pub(super) fn new(kept: &[Option<usize>]) -> Self {
-        let cost = |&kept: &Option<usize>| SwitchingCost { kept, over: if kept.is_some() { FROM_NOTHING } else { 1.0 + COLD } };
+        let cost =
+            |&kept: &Option<usize>| SwitchingCost { kept, over: if kept.is_some() { FROM_NOTHING } else { 1.0 + COLD } };
         let works = kept.iter().flatten().max().map_or(0, |most| most + 1);
         Self { costs: kept.iter().map(cost).collect(), kept: vec![KeptWork { last: None, rebuilds: REBUILDS }; works] }
     }

@@ -4,12 +4,12 @@
 //! was cut off by a crash of the machine can't be read and is replaced.
 
 use super::options::Cache;
-use crate::measure::{fnv1a, machine};
 use crate::adaptive::{Keeper, SaveError};
 use crate::algorithm::AlgorithmId;
-use crate::hardware::{GpuIdentity, Machine};
 use crate::entry::Entry;
+use crate::hardware::{GpuIdentity, Machine};
 use crate::json::{self, Format};
+use crate::measure::{fnv1a, machine};
 use crate::model::Model;
 use crate::registry::{Registry, usable_cores};
 use crate::tuning::Tuning;

@@ -127,7 +127,11 @@ fn arrive(options: &StartOptions, registry: &Registry, began: Instant, wanted: i
 }
 
 /// Tuning from the cache, else from a prediction, and its file in the cache. `None` where nothing can be predicted.
-fn find(options: &StartOptions, registry: &Registry, remarks: &mut Vec<String>) -> Option<(Tuning, Origin, Option<CacheFile>)> {
+fn find(
+    options: &StartOptions,
+    registry: &Registry,
+    remarks: &mut Vec<String>,
+) -> Option<(Tuning, Origin, Option<CacheFile>)> {
     let built_in = if options.model.is_none() { Model::built_in().map(Some) } else { Ok(None) };
     let built_in = built_in.map_err(|e| remarks.push(format!("the built-in model can't be read: {e}"))).ok()?;
     let model = options.model.as_ref().or(built_in.as_ref())?;

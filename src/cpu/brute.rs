@@ -1,12 +1,12 @@
 //! Every one of the n (n - 1) / 2 pairs tested on three axes, as in the paper.
 
-use crate::cpu::columns::Columns;
-use crate::cpu::kernel::brute_rows;
-use crate::cpu::workers::{Outputs, Workers};
-use crate::cpu::Threads;
-use crate::cpu::level::Simd;
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
+use crate::cpu::Threads;
+use crate::cpu::columns::Columns;
+use crate::cpu::kernel::brute_rows;
+use crate::cpu::level::Simd;
+use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
 use crate::pairs::Pairs;
 

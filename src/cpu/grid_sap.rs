@@ -4,15 +4,15 @@
 //! a box touches. Phase two, several tasks a thread: each strip gathers its bins from all threads, sorts them along the
 //! sweep axis and sweeps. Boxes much larger than a cell stand in no bin; each strip tests those that cross it.
 
-use crate::cpu::columns::{Columns, ensure, order_key, part};
-use crate::cpu::kernel::{All, InStrip, Query, query_rows, sweep_rows};
-use crate::cpu::workers::{Outputs, Workers};
-use crate::cpu::Threads;
-use crate::cpu::level::Simd;
-use crate::load::{Cover, FramePlan, StripGrid, StripSpan};
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
+use crate::cpu::Threads;
+use crate::cpu::columns::{Columns, ensure, order_key, part};
+use crate::cpu::kernel::{All, InStrip, Query, query_rows, sweep_rows};
+use crate::cpu::level::Simd;
+use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
+use crate::load::{Cover, FramePlan, StripGrid, StripSpan};
 use crate::pairs::Pairs;
 
 /// The method; see the module.

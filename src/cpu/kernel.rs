@@ -9,9 +9,9 @@ mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-use crate::cpu::level::Simd;
-use crate::cpu::columns::Columns;
 use crate::aabb::Aabb;
+use crate::cpu::columns::Columns;
+use crate::cpu::level::Simd;
 use crate::pair::Pair;
 use crate::pairs::{Pairs, each_bit};
 use std::ops::Range;

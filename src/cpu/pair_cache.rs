@@ -12,14 +12,14 @@ mod grown;
 mod motion;
 mod tree;
 
+use crate::aabb::Aabb;
+use crate::broad_phase::{BroadPhase, Incremental, check_count};
+use crate::cpu::Threads;
 use crate::cpu::columns::part;
 use crate::cpu::grid_sap::Finder;
 use crate::cpu::kernel::{overlap, prefetch};
-use crate::cpu::workers::{Outputs, Workers};
-use crate::cpu::Threads;
 use crate::cpu::level::Simd;
-use crate::aabb::Aabb;
-use crate::broad_phase::{BroadPhase, Incremental, check_count};
+use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
 use crate::load::{FramePlan, Sample, StripGrid};
 use crate::pairs::Pairs;

@@ -1,15 +1,15 @@
 //! Sort on the axis of greatest variance, then sweep along it. From scratch every frame, as in the paper.
 
-use crate::cpu::columns::{Columns, ensure, order_key};
-use crate::cpu::kernel::{All, sweep_rows};
-use crate::cpu::sort::sort;
-use crate::cpu::workers::{Outputs, Workers};
-use crate::cpu::Threads;
-use crate::cpu::level::Simd;
-use crate::load::FramePlan;
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
+use crate::cpu::Threads;
+use crate::cpu::columns::{Columns, ensure, order_key};
+use crate::cpu::kernel::{All, sweep_rows};
+use crate::cpu::level::Simd;
+use crate::cpu::sort::sort;
+use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
+use crate::load::FramePlan;
 use crate::pairs::Pairs;
 
 /// The method; see the module.

@@ -1,8 +1,8 @@
 //! Sorts keys on all threads: each part on its own, then parts merged two by two.
 
-use crate::error::Error;
 use crate::cpu::columns::ensure;
 use crate::cpu::workers::Workers;
+use crate::error::Error;
 
 /// Keys that one task merges at the least; below, a task costs more than it saves.
 const SMALLEST_MERGE: usize = 4096;

@@ -1,12 +1,12 @@
 //! How a frame is spread over threads: phases of independent tasks, each with its own memory.
 
+use crate::aabb::Aabb;
 #[cfg(feature = "parallel")]
 use crate::algorithm::AlgorithmId;
 use crate::cpu::Threads;
 use crate::cpu::columns::{ColumnsMut, part};
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
-use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::pairs::Pairs;
 #[cfg(feature = "parallel")]

@@ -53,7 +53,12 @@ impl Kernel {
     ///
     /// # Errors
     /// With the compiler's words as their source.
-    pub(crate) fn compile(gpu: &Gpu, text: String, entry: &'static str, constants: &[(&str, f64)]) -> Result<Self, GpuError> {
+    pub(crate) fn compile(
+        gpu: &Gpu,
+        text: String,
+        entry: &'static str,
+        constants: &[(&str, f64)],
+    ) -> Result<Self, GpuError> {
         let pipeline = gpu.try_make(|device| {
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(entry),

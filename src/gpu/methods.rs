@@ -1,8 +1,8 @@
 //! Which methods run on GPUs, and on which GPUs together.
 
 use crate::algorithm::{AlgorithmId, Backend};
-use crate::hardware::{GpuIdentity, GpuKind};
 use crate::entry::Entry;
+use crate::hardware::{GpuIdentity, GpuKind};
 
 /// A method on GPUs: one row here puts it into every test, probe, sweep and plot.
 struct Method {
@@ -34,7 +34,9 @@ pub fn algorithms<'a>(gpus: impl IntoIterator<Item = &'a GpuIdentity>) -> Vec<En
     }
     let on = |set: &Vec<u32>| {
         let set = set.clone();
-        METHODS.iter().filter_map(move |m| Some(Entry::new(AlgorithmId::new(m.name, Backend::Gpu(set.clone())).ok()?, m.revision)))
+        METHODS
+            .iter()
+            .filter_map(move |m| Some(Entry::new(AlgorithmId::new(m.name, Backend::Gpu(set.clone())).ok()?, m.revision)))
     };
     sets.iter().flat_map(on).collect()
 }

@@ -49,10 +49,10 @@ mod sorted;
 mod storage;
 mod transfer;
 
+pub use crate::error::{GpuError, GpuErrorKind};
 pub use adapters::Gpus;
 #[cfg(test)]
 pub(crate) use adapters::first_for_tests;
-pub use crate::error::{GpuError, GpuErrorKind};
 pub use device::Gpu;
 pub use methods::algorithms;
 pub(crate) use methods::has_method;

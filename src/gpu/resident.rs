@@ -69,7 +69,9 @@ impl Resident {
         }
         if objects as usize > self.engine.most_objects() {
             let most = self.engine.most_objects();
-            return Err(Failure::limit(format!("{objects} boxes are more than the {most} that fit into its largest buffer")));
+            return Err(Failure::limit(format!(
+                "{objects} boxes are more than the {most} that fit into its largest buffer"
+            )));
         }
         if objects == 0 {
             return Ok(0);

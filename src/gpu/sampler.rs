@@ -3,8 +3,8 @@
 use super::device::Gpu;
 use super::kernel::{Bound, Kernel, source};
 use super::storage::Storage;
-use crate::error::GpuError;
 use crate::aabb::Aabb;
+use crate::error::GpuError;
 
 /// Boxes looked at.
 const BOXES: usize = 256;

@@ -1,8 +1,8 @@
 //! The paper's spatial subdivision: slabs along one axis, each with a halo, each pair owned by one slab.
 
-use crate::load::Sample;
 use crate::aabb::Aabb;
 use crate::error::Error;
+use crate::load::Sample;
 
 /// Boxes whose lower bounds place the cuts: with 4096 a slab is off by 2 % of all boxes at most, nearly always.
 const MOST_SAMPLED: usize = 4096;

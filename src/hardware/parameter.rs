@@ -350,16 +350,4 @@ mod tests {
         let all = [&GpuParameterId::OF_ONE[..], &GpuParameterId::GROUP].concat();
         assert_eq!(all, GpuParameterId::ALL);
     }
-
-    #[test]
-    fn what_a_model_reads_of_the_machine_is_marked_and_nothing_else() {
-        use crate::BackendClass;
-        use crate::model::{Feature, Scale};
-        let scales = Scale::ALL.iter().flat_map(|s| s.parameters());
-        let features = Feature::of(BackendClass::Cpu).iter().flat_map(|f| f.parameters());
-        let mut read: Vec<ParameterId> = scales.chain(features).copied().chain([ParameterId::CacheLlcBytes]).collect();
-        read.sort_unstable();
-        read.dedup();
-        assert_eq!(read, ParameterId::ALL.into_iter().filter(|id| id.quantity().read_by_model).collect::<Vec<_>>());
-    }
 }

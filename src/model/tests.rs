@@ -5,13 +5,12 @@ use crate::hardware::GpuParameterId;
 use crate::hardware::ParameterId;
 use crate::{Backend, Entry, GpuGroup, GpuHardware, GpuIdentity, Hardware, Load, Machine, Parameter};
 
-fn parameters(figures: &[(&str, f64)]) -> Vec<Parameter> {
-    figures.iter().map(|&(name, value)| Parameter::reported(name, value, "test")).collect()
+fn parameters(figures: &[(impl AsRef<str>, f64)]) -> Vec<Parameter> {
+    figures.iter().map(|(name, value)| Parameter::reported(name, *value, "test")).collect()
 }
 
-fn gpu(index: u32, kind: GpuKind, figures: &[(&str, f64)]) -> GpuHardware {
-    let text = || "test".to_owned();
-    let gpu = GpuIdentity { index, name: text(), device: text(), driver: text(), api: text(), kind };
+fn gpu(index: u32, kind: GpuKind, figures: &[(GpuParameterId, f64)]) -> GpuHardware {
+    let gpu = GpuIdentity::new(index, "test", kind);
     GpuHardware { gpu, parameters: parameters(figures) }
 }
 
@@ -64,10 +63,13 @@ fn method(backend: BackendClass, scale: Scale) -> MethodModel {
 fn model(methods: Vec<MethodModel>) -> Model {
     let range = |parameter: &str| Range { parameter: parameter.to_owned(), min: 1.0, max: 100.0 };
     Model {
-        schema: ModelSchema,
         name: "test".to_owned(),
         simulated: false,
-        ranges: vec![range(ParameterId::ClockMeasuredGhz), range("gpu/upload_gb_per_s"), range("gpu/copy_gb_per_s")],
+        ranges: vec![
+            range(ParameterId::ClockMeasuredGhz.as_str()),
+            range("gpu/upload_gb_per_s"),
+            range("gpu/copy_gb_per_s"),
+        ],
         methods,
     }
 }
@@ -111,18 +113,20 @@ fn several_gpus_have_the_slowest_latency_and_added_rates_within_what_was_measure
 #[test]
 fn scales_and_features_of_the_other_processor_are_refused() {
     let h = hardware();
-    assert!(Scale::SharedLane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().contains("gpu0 has no scale"));
-    assert!(Scale::GpuDispatch.nanoseconds(&h, &Backend::Cpu(2)).unwrap_err().contains("cpu2 has no scale"));
+    assert!(
+        Scale::SharedLane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().to_string().contains("gpu0 has no scale")
+    );
+    assert!(Scale::GpuDispatch.nanoseconds(&h, &Backend::Cpu(2)).unwrap_err().to_string().contains("cpu2 has no scale"));
     let load = Load { objects: 8, ..Load::default() };
     let feature = |f: Feature, backend: Backend| f.value(&h, &backend, &load);
     assert_eq!(feature(Feature::Log2Threads, Backend::Gpu(vec![0, 1])), Ok(1.0));
     assert_eq!(feature(Feature::Log2Objects, Backend::Gpu(vec![0])), Ok(3.0));
     assert!(feature(Feature::Log2Lanes, Backend::Gpu(vec![0])).is_err());
     let wrong = model(vec![method(BackendClass::Cpu, Scale::GpuDispatch)]);
-    assert!(wrong.defect().unwrap().contains("GpuDispatch"));
+    assert!(wrong.defect().unwrap().to_string().contains("gpu_dispatch"));
     let term = ResidualTerm { feature: Feature::Log2Lanes, centre: 0.0, slope: 1.0 };
     let wrong = MethodModel { residual: vec![term], ..method(BackendClass::Gpu, Scale::GpuDispatch) };
-    assert!(model(vec![wrong]).defect().unwrap().contains("Log2Lanes"));
+    assert!(model(vec![wrong]).defect().unwrap().to_string().contains("log2_lanes"));
 }
 
 #[test]
@@ -169,7 +173,7 @@ fn hardware_with_impossible_gpus_is_told() {
     let defect = |change: &dyn Fn(&mut Hardware)| {
         let mut h = hardware();
         change(&mut h);
-        h.defect().unwrap()
+        h.defect().unwrap().to_string()
     };
     assert!(defect(&|h| h.gpus[1].parameters[0].value = Some(-1.0)).contains("gpu1"));
     assert!(defect(&|h| h.gpus[1].gpu.index = 0).contains("twice"));
@@ -184,14 +188,14 @@ fn hardware_with_impossible_gpus_is_told() {
 #[test]
 fn the_parameters_of_a_scale_are_those_that_it_reads() {
     // Four cores of which two threads use one and a half, so that every figure shows in some number of threads.
-    let figure = |name: &str| match name {
+    let figure = |id: ParameterId| match id {
         ParameterId::UsableCores => 4.0,
         ParameterId::ScalingTwoThreadsRatio => 1.5,
         ParameterId::BandwidthAllThreadsGbPerS => 5.0,
         _ => 2.0,
     };
-    let with = |names: &[&str]| {
-        let parameters = names.iter().map(|name| Parameter::reported(name, figure(name), "test")).collect();
+    let with = |ids: &[ParameterId]| {
+        let parameters = ids.iter().map(|&id| Parameter::reported(id, figure(id), "test")).collect();
         Hardware { parameters, gpus: Vec::new(), ..hardware() }
     };
     let of_cpu = [Scale::Cycle, Scale::SharedCycle, Scale::SharedLane, Scale::Byte, Scale::ForkJoin, Scale::SharedLine];
@@ -203,29 +207,38 @@ fn the_parameters_of_a_scale_are_those_that_it_reads() {
         assert!(scale.nanoseconds(&with(&[]), &Backend::Cpu(2)).is_err());
         for name in scale.parameters() {
             // What stands in for the first shows where that one is absent.
-            let shows = |names: &[&str]| {
-                let mut other = with(names);
+            let shows = |ids: &[ParameterId]| {
+                let mut other = with(ids);
                 other.parameters.iter_mut().filter(|p| p.name == *name).for_each(|p| p.value = p.value.map(|v| 1.5 * v));
                 let on = |hardware: &Hardware, threads| scale.nanoseconds(hardware, &Backend::Cpu(threads));
-                [1, 2, 3, 8].into_iter().any(|k| on(&other, k) != on(&with(names), k))
+                [1, 2, 3, 8].into_iter().any(|k| on(&other, k) != on(&with(ids), k))
             };
             assert!(shows(scale.parameters()) || shows(&scale.parameters()[1..]), "{scale:?} does not read {name}");
         }
     }
 }
 
+#[test]
+fn what_a_model_reads_of_the_machine_is_marked_in_the_table_and_nothing_else() {
+    let scales = Scale::ALL.iter().flat_map(|s| s.parameters());
+    let features = Feature::ALL.iter().flat_map(|f| f.parameters());
+    let mut read: Vec<ParameterId> = scales.chain(features).copied().chain([ParameterId::CacheLlcBytes]).collect();
+    read.sort_unstable();
+    read.dedup();
+    assert_eq!(read, ParameterId::ALL.into_iter().filter(|id| id.quantity().read_by_model).collect::<Vec<_>>());
+}
+
 #[cfg(feature = "model")]
 #[test]
 fn the_built_in_model_predicts_from_the_parameters_that_it_names() {
     let model = Model::built_in().unwrap();
-    let names = model.parameters();
-    assert!(names.is_sorted_by(|a, b| a < b) && !names.iter().any(|name| name.contains('/')), "{names:?}");
-    let figure = |name: &&str| match *name {
-        ParameterId::CacheLlcBytes => Parameter::reported(name, 33_554_432.0, "test"),
-        ParameterId::ForkJoinColdNs => Parameter::reported(name, 5000.0, "test"),
-        _ => Parameter::reported(name, 4.0, "test"),
+    let ids = model.parameters();
+    let figure = |&id: &ParameterId| match id {
+        ParameterId::CacheLlcBytes => Parameter::reported(id, 33_554_432.0, "test"),
+        ParameterId::ForkJoinColdNs => Parameter::reported(id, 5000.0, "test"),
+        _ => Parameter::reported(id, 4.0, "test"),
     };
-    let all = Hardware { parameters: names.iter().map(figure).collect(), gpus: Vec::new(), ..hardware() };
+    let all = Hardware { parameters: ids.iter().map(figure).collect(), gpus: Vec::new(), ..hardware() };
     let algorithms = crate::Registry::with_cores(4).entries().to_vec();
     let prediction = model.predict(&all, &algorithms).unwrap();
     assert_eq!(prediction.costs.len(), algorithms.len(), "{:?}", prediction.warnings);

@@ -45,6 +45,8 @@ impl Effort {
 pub struct IncrementalMethods(Vec<String>);
 
 impl IncrementalMethods {
+    /// Those of this library.
+    #[must_use]
     pub fn find() -> Self {
         // A registry of one core makes its algorithms without threads.
         let registry = Registry::with_cores(1);
@@ -52,6 +54,8 @@ impl IncrementalMethods {
         Self(registry.entries().iter().map(|e| &e.id).filter(|id| is_incremental(id)).map(|id| id.method().to_owned()).collect())
     }
 
+    /// Whether an algorithm is one of them.
+    #[must_use]
     pub fn contain(&self, algorithm: &AlgorithmId) -> bool {
         algorithm.backend().class() == BackendClass::Cpu && self.0.iter().any(|m| m == algorithm.method())
     }

@@ -26,6 +26,8 @@ pub struct Replay<'a> {
 }
 
 impl<'a> Replay<'a> {
+    /// Of one report, by its points.
+    #[must_use]
     pub fn new(points: &'a [ReplayPoint]) -> Self {
         Self { points, given: Vec::new(), incremental: IncrementalMethods::find() }
     }

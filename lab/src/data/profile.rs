@@ -37,7 +37,7 @@ pub struct Spot {
 }
 
 /// A median of fewer samples says nothing about disturbed frames.
-pub const FEWEST_SAMPLES: usize = 3;
+pub(super) const FEWEST_SAMPLES: usize = 3;
 
 impl Profile {
     /// Keeps of a report what is sound. Timings with an error or too few samples go, and with them points that are empty then.

@@ -9,7 +9,7 @@ use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Hardware, Tuning, stats}
 
 /// Always the algorithm with the least mean regret over the training profiles, given with that of each of their algorithms when it is
 /// chosen always; each profile counts the same.
-pub fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId]) -> Strategy<'a> {
+pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId]) -> Strategy<'a> {
     let mean = |id: &AlgorithmId| {
         let of = |(profile, always): &(&Profile, &[f64])| {
             profile.position(id).map_or(NOT_TIMED - 1.0, |k| always[usize::from(k)])
@@ -29,7 +29,7 @@ pub fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId
 /// parts two kinds of sweep after a brute force that is chosen by a count of filtered pairs, which is not known here; the
 /// constant is taken for the border between brute force and sweep. Both run on a GPU there; here both run on the CPU, which
 /// every machine has.
-pub fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Strategy<'a> {
+pub(super) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Strategy<'a> {
     let on_cpu = |method: &'_ str| {
         let of = |id: &&AlgorithmId| id.method() == method && id.backend().class() == BackendClass::Cpu;
         available.iter().filter(of).cloned().collect::<Vec<_>>()
@@ -44,7 +44,7 @@ pub fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Strategy
 ///
 /// # Errors
 /// When that profile has too few timings for thresholds.
-pub fn default_machine<'a>(
+pub(super) fn default_machine<'a>(
     first: &Profile,
     costs: &[AlgorithmCost],
     available: &'a [AlgorithmId],
@@ -64,7 +64,7 @@ pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strateg
 }
 
 /// The available algorithm of the same method and class of processor whose number of threads or GPUs is nearest.
-pub fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
+pub(super) fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
     let distance = |other: &&AlgorithmId| (f64::from(other.backend().width()) / f64::from(id.backend().width())).ln().abs();
     let alike = |a: &&AlgorithmId| a.method() == id.method() && a.backend().class() == id.backend().class();
     // The same GPU first, where there are several of equal number.
@@ -80,10 +80,10 @@ fn stand_in(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> 
 
 /// What machines are compared by: logarithms of their parameters, worked out once since each is compared with all others.
 #[derive(Debug, Clone)]
-pub struct Likeness(Vec<Option<f64>>);
+pub(super) struct Likeness(Vec<Option<f64>>);
 
 impl Likeness {
-    pub fn new(hardware: &Hardware) -> Self {
+    pub(super) fn new(hardware: &Hardware) -> Self {
         let of_gpus = COMPARED_OF_GPUS.iter().map(|id| format!("{GPU_PREFIX}{id}"));
         let names = COMPARED.iter().map(ToString::to_string).chain(of_gpus);
         Self(names.map(|name| figure(hardware, &name).filter(|v| *v > 0.0).map(f64::ln)).collect())
@@ -91,7 +91,7 @@ impl Likeness {
 }
 
 /// Position of the nearest machine, by the logarithms of the parameters that both have, over their standard deviation.
-pub fn nearest(known: &[&Likeness], own: &Likeness) -> Option<usize> {
+pub(super) fn nearest(known: &[&Likeness], own: &Likeness) -> Option<usize> {
     let mut distances = vec![0.0; known.len()];
     for (k, own) in own.0.iter().enumerate().filter_map(|(k, own)| Some((k, (*own)?))) {
         let values: Vec<Option<f64>> = known.iter().map(|other| other.0[k]).collect();

@@ -7,14 +7,14 @@ use sapwise::{AlgorithmCost, AlgorithmId, Crossover, Tuning, Load, Source};
 
 /// The crossovers between the measured tuning of one profile, in the scenario of its slice.
 #[derive(Debug, Clone, Default)]
-pub struct MeasuredCrossovers {
+pub(super) struct MeasuredCrossovers {
     loads: Vec<Load>,
     crossovers: Vec<Crossover>,
 }
 
 impl MeasuredCrossovers {
     /// By the measured costs of the profile; none where it has too few sizes or timings.
-    pub fn new(profile: &Profile, costs: &[AlgorithmCost]) -> Self {
+    pub(super) fn new(profile: &Profile, costs: &[AlgorithmCost]) -> Self {
         let scenario = profile.usual_scenario();
         let found = measured_slice(profile, scenario).and_then(|loads| {
             let crossovers = slice_tuning(costs.to_vec(), scenario, &loads)?.crossovers;
@@ -26,7 +26,7 @@ impl MeasuredCrossovers {
     /// For each crossover that both algorithms have a predicted cost for, the nearest crossing of those costs in the same direction.
     /// Where they do not cross so within the slice, the end beyond which they would, which is the upper one where the algorithm
     /// below the crossover is predicted to be cheaper at it. The nearest number of threads stands for one that was not predicted.
-    pub fn predicted(&self, costs: &[AlgorithmCost]) -> Vec<ComparedCrossover> {
+    pub(super) fn predicted(&self, costs: &[AlgorithmCost]) -> Vec<ComparedCrossover> {
         let ids: Vec<AlgorithmId> = costs.iter().map(|c| c.algorithm.clone()).collect();
         let cost = |id: &AlgorithmId| {
             let found = closest(id, &ids)?;
@@ -38,7 +38,7 @@ impl MeasuredCrossovers {
     }
 
     /// Octaves between the two positions of each of them.
-    pub fn errors(&self, costs: &[AlgorithmCost]) -> Vec<f64> {
+    pub(super) fn errors(&self, costs: &[AlgorithmCost]) -> Vec<f64> {
         self.predicted(costs).iter().map(ComparedCrossover::octaves).collect()
     }
 
@@ -64,8 +64,9 @@ impl MeasuredCrossovers {
 /// A measured crossover beside the predicted one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComparedCrossover {
-    /// The cheaper one below the crossover, and the one above it.
+    /// The cheaper one below the crossover.
     pub below: AlgorithmId,
+    /// The cheaper one above it.
     pub above: AlgorithmId,
     /// Objects at the measured crossover.
     pub measured: f64,

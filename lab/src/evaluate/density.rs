@@ -1,10 +1,10 @@
 //! Whether the load decides better than the number of objects, on what was measured.
 
-use crate::fit::measured_costs::measured_tuning;
-use crate::data::files::read_report;
+use crate::data::read_report;
+use crate::fit::measured_tuning;
+use crate::report::{Point, Report};
 use sapwise::stats::median;
-use crate::report::Point;
-use sapwise::{Adaptive, AlgorithmId, BroadPhase, Pairs, Registry, Report};
+use sapwise::{Adaptive, AlgorithmId, BroadPhase, Pairs, Registry};
 use sapwise_scenes::Scenario;
 use std::path::Path;
 

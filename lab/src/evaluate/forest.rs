@@ -27,7 +27,7 @@ const LEAF: usize = 2;
 const SEED: u64 = 1;
 
 /// The rows of every method, worked out once for all forests.
-pub struct Table(BTreeMap<Key, Vec<Example>>);
+pub(super) struct Table(BTreeMap<Key, Vec<Example>>);
 
 struct Example {
     profile: usize,
@@ -38,7 +38,7 @@ struct Example {
 impl Table {
     /// A bound of an algorithm that had left the race counts as a time: a tree does not extrapolate, and without it whoever left
     /// at a thousand objects would be predicted to take no longer for a million.
-    pub fn new(profiles: &[Profile]) -> Self {
+    pub(super) fn new(profiles: &[Profile]) -> Self {
         let step = profiles.len().div_ceil(MOST_PROFILES).max(1);
         let most = (MOST_ROWS / profiles.len().div_ceil(step).max(1)).max(FEWEST_OF_PROFILE);
         let mut table: BTreeMap<Key, Vec<Example>> = BTreeMap::new();
@@ -63,7 +63,7 @@ impl Table {
     ///
     /// # Errors
     /// When smartcore refuses a fit.
-    pub fn grow(&self, chosen: &[bool]) -> Result<Forests> {
+    pub(super) fn grow(&self, chosen: &[bool]) -> Result<Forests> {
         let mut forests = BTreeMap::new();
         for (key, examples) in &self.0 {
             let known: Vec<&Example> = examples.iter().filter(|e| chosen[e.profile]).collect();
@@ -79,11 +79,11 @@ impl Table {
 }
 
 /// A forest for each method that was timed in the training.
-pub struct Forests(BTreeMap<Key, Forest>);
+pub(super) struct Forests(BTreeMap<Key, Forest>);
 
 impl Forests {
     /// The algorithm with the least predicted time.
-    pub fn chooser<'a>(&'a self, hardware: &'a Hardware, available: &'a [AlgorithmId]) -> Strategy<'a> {
+    pub(super) fn chooser<'a>(&'a self, hardware: &'a Hardware, available: &'a [AlgorithmId]) -> Strategy<'a> {
         Box::new(move |load| {
             let ln_ns = |id: &AlgorithmId| self.0.get(&key(id))?.ln_ns(&features(hardware, id.backend(), load));
             let costs = available.iter().filter_map(|id| Some((id, ln_ns(id)?)));

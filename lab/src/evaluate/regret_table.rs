@@ -54,6 +54,8 @@ pub struct Regret {
 }
 
 impl RegretTable {
+    /// Of one report.
+    #[must_use]
     pub fn new(profile: &Profile) -> Self {
         let mut groups: BTreeMap<(&str, i64), Vec<&Spot>> = BTreeMap::new();
         for spot in &profile.points {

@@ -13,15 +13,15 @@ const ALONE: f64 = 0.99;
 /// Standardised columns. linfa answers without a warning when columns depend on each other or when one row decides a
 /// coefficient, so whoever calls it goes through this first.
 #[derive(Debug, Clone)]
-pub struct Columns {
+pub(crate) struct Columns {
     /// Positions of the columns that were kept, in the given order.
-    pub kept: Vec<usize>,
+    pub(crate) kept: Vec<usize>,
     /// Mean of each kept column.
-    pub centres: Vec<f64>,
+    pub(crate) centres: Vec<f64>,
     /// Standard deviation of each kept column, above zero.
-    pub scales: Vec<f64>,
+    pub(crate) scales: Vec<f64>,
     /// The kept columns, less their mean, over their standard deviation; shape (rows, kept).
-    pub values: Array2<f64>,
+    pub(crate) values: Array2<f64>,
     /// The share of each row in the sum of the weights.
     shares: Vec<f64>,
 }
@@ -29,14 +29,14 @@ pub struct Columns {
 impl Columns {
     /// Standardises `values` of shape (rows, columns) under row weights with a sum above zero, and drops each column that
     /// does not vary, or in one row only, or is a combination of those before it.
-    pub fn new(values: &Array2<f64>, weights: &[f64]) -> Self {
+    pub(crate) fn new(values: &Array2<f64>, weights: &[f64]) -> Self {
         let varying = Self::varying(values, weights);
         let independent: Vec<usize> = varying.base().into_iter().map(|(j, _)| j).collect();
         varying.select(&independent)
     }
 
     /// The same without the test of rank, for a fit whose penalty gives one answer to columns that depend on each other too.
-    pub fn varying(values: &Array2<f64>, weights: &[f64]) -> Self {
+    pub(crate) fn varying(values: &Array2<f64>, weights: &[f64]) -> Self {
         let total: f64 = weights.iter().sum();
         let shares: Vec<f64> = weights.iter().map(|w| w / total).collect();
         let mean = |c: ArrayView1<'_, f64>| c.iter().zip(&shares).map(|(v, s)| v * s).sum::<f64>();
@@ -64,7 +64,7 @@ impl Columns {
 
     /// Drops, one after the other, the column that owes most to a row which decides a coefficient alone, until there is no
     /// such row.
-    pub fn without_lone_rows(mut self) -> Self {
+    pub(crate) fn without_lone_rows(mut self) -> Self {
         loop {
             let base = self.base();
             let leverages = self.leverages();
@@ -78,14 +78,14 @@ impl Columns {
 
     /// How many rows have a leverage above 2 p / M, twice the mean, with p coefficients, that of the mean included, and M rows.
     /// Such rows deserve a look (Hoaglin and Welsch 1978; Belsley, Kuh and Welsch, Regression Diagnostics, 1980, section 2.1).
-    pub fn far_rows(&self) -> usize {
+    pub(crate) fn far_rows(&self) -> usize {
         let limit = 2.0 * (self.kept.len() + 1) as f64 / self.values.nrows() as f64;
         self.leverages().into_iter().filter(|&h| h > limit).count()
     }
 
     /// What share of the fitted value of each row comes from its own target, in a fit with a mean: the diagonal of the hat
     /// matrix. For columns of full rank.
-    pub fn leverages(&self) -> Vec<f64> {
+    pub(crate) fn leverages(&self) -> Vec<f64> {
         let base = self.base();
         let row = |k: usize| self.shares[k] + base.iter().map(|(_, q)| q[k] * q[k]).sum::<f64>();
         (0..self.shares.len()).map(row).collect()

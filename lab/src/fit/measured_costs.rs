@@ -336,7 +336,10 @@ mod tests {
             };
             point.timings = vec![timing(&above, 0.0), timing(&below, 0.5)];
         }
-        (report, Crossover { below, above, objects: 1000.0, low: Some(900.0), high: Some(1100.0) })
+        let mut crossover = measured_tuning(&Machine::family()[0].report(), "uniform").unwrap().crossovers.remove(0);
+        (crossover.below, crossover.above) = (below, above);
+        (crossover.objects, crossover.low, crossover.high) = (1000.0, Some(900.0), Some(1100.0));
+        (report, crossover)
     }
 
     #[test]
@@ -352,7 +355,7 @@ mod tests {
 
     #[test]
     fn where_the_samples_do_not_cross_the_interval_goes_on_to_the_last_size_of_both() {
-        let (mut report, border) = crossed_at(1e9);
+        let (mut report, mut border) = crossed_at(1e9);
         assert_eq!(measured_interval(&border, &report, "uniform").unwrap().0, 1000.0);
         // Whoever left the race has no samples there.
         report.points.iter_mut().filter(|p| p.load.objects > 20_000).for_each(|p| p.timings.truncate(1));
@@ -360,10 +363,11 @@ mod tests {
         let (low, high) = measured_interval(&border, &report, "uniform").unwrap();
         assert!(low == 1000.0 && (high / f64::from(last) - 1.0).abs() < 1e-9, "{low} to {high}");
         // And a border beyond keeps the interval of the curves.
-        let beyond = Crossover { objects: 50_000.0, ..border };
-        assert_eq!(measured_interval(&beyond, &report, "uniform"), None);
+        border.objects = 50_000.0;
+        assert_eq!(measured_interval(&border, &report, "uniform"), None);
         report.points.iter_mut().for_each(|p| p.timings.truncate(1));
-        assert_eq!(measured_interval(&Crossover { objects: 1000.0, ..beyond }, &report, "uniform"), None);
+        border.objects = 1000.0;
+        assert_eq!(measured_interval(&border, &report, "uniform"), None);
     }
 
     #[test]

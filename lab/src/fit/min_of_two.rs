@@ -14,11 +14,11 @@ const FACTORS: (f64, f64) = (0.8, 1.5);
 
 /// What was fitted.
 #[derive(Debug, Clone)]
-pub struct MinOfTwo {
+pub(crate) struct MinOfTwo {
     /// Units of the terms of the algorithm's own method.
-    pub units: Vec<f64>,
+    pub(crate) units: Vec<f64>,
     /// Cost of the fallback over that of the algorithm that it is.
-    pub factor: f64,
+    pub(crate) factor: f64,
 }
 
 impl MinOfTwo {
@@ -26,7 +26,7 @@ impl MinOfTwo {
     /// that is fallen back to.
     ///
     /// A sum of the terms of both would charge every frame for both. A row that fell back is a lower bound for the own terms.
-    pub fn fit(problem: &Problem, other_ns: &[f64]) -> Self {
+    pub(crate) fn fit(problem: &Problem, other_ns: &[f64]) -> Self {
         let rows = problem.ns.len();
         let off = |k: usize, modelled: f64| (problem.ns[k] / modelled.max(1e-9)).ln().abs();
         let mut other: Vec<bool> = (0..rows).map(|k| !problem.floors[k] && off(k, other_ns[k]) < LIKE).collect();
@@ -53,7 +53,7 @@ impl MinOfTwo {
     }
 
     /// What each row costs.
-    pub fn modelled(&self, problem: &Problem, other_ns: &[f64]) -> Array1<f64> {
+    pub(crate) fn modelled(&self, problem: &Problem, other_ns: &[f64]) -> Array1<f64> {
         let mut modelled = problem.terms.dot(&Array1::from(self.units.clone()));
         modelled.iter_mut().zip(other_ns).for_each(|(first, other)| *first = first.min(self.factor * other));
         modelled

@@ -12,7 +12,7 @@ const INDEPENDENT: f64 = 1e-7;
 /// Columns are scaled to length one first, since terms differ by many orders of magnitude. A column that depends linearly
 /// on those in use stays at zero, the earlier column first, so that rank-deficient input has one answer. Columns of zeros
 /// get zero. Ends after ten changes of the active set for each column, with the best admissible point so far.
-pub fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
+pub(crate) fn nnls(a: &Array2<f64>, b: &Array1<f64>) -> Array1<f64> {
     let columns = a.ncols();
     let lengths: Vec<f64> = a.columns().into_iter().map(|c| c.dot(&c).sqrt()).collect();
     let mut scaled = a.clone();

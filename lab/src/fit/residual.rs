@@ -18,26 +18,26 @@ const MOST_FOLDS: usize = 8;
 const SEARCH_ROWS: usize = 1500;
 
 /// Natural logarithms of measured over modelled time, and what they may depend on.
-pub struct Residuals {
+pub(crate) struct Residuals {
     /// What each column of `features` is.
-    pub names: &'static [Feature],
+    pub(crate) names: &'static [Feature],
     /// Shape (rows, names).
-    pub features: Array2<f64>,
+    pub(crate) features: Array2<f64>,
     /// One for each row.
-    pub ln_ratios: Vec<f64>,
+    pub(crate) ln_ratios: Vec<f64>,
     /// One for each row, above zero.
-    pub weights: Vec<f64>,
+    pub(crate) weights: Vec<f64>,
     /// The physical machine of each row.
-    pub groups: Vec<usize>,
+    pub(crate) groups: Vec<usize>,
 }
 
 /// A fitted residual.
 #[derive(Debug, Clone, Default)]
-pub struct Ridge {
+pub(crate) struct Ridge {
     /// The residual where every feature is at its mean.
-    pub intercept: f64,
+    pub(crate) intercept: f64,
     /// The slopes, in units of the features.
-    pub terms: Vec<ResidualTerm>,
+    pub(crate) terms: Vec<ResidualTerm>,
 }
 
 impl Residuals {
@@ -47,7 +47,7 @@ impl Residuals {
     ///
     /// # Errors
     /// When the system of a fit can't be solved.
-    pub fn ridge(&self) -> Result<Ridge> {
+    pub(crate) fn ridge(&self) -> Result<Ridge> {
         let mut groups = self.groups.clone();
         groups.sort_unstable();
         groups.dedup();
@@ -79,7 +79,7 @@ impl Residuals {
     }
 
     /// The ridge of one penalty over some rows.
-    pub fn fit(&self, rows: &[usize], penalty: f64) -> Result<Ridge> {
+    pub(crate) fn fit(&self, rows: &[usize], penalty: f64) -> Result<Ridge> {
         let weights: Vec<f64> = rows.iter().map(|&k| self.weights[k]).collect();
         let columns = Columns::new(&self.features.select(Axis(0), rows), &weights).without_lone_rows();
         let targets: Vec<f64> = rows.iter().map(|&k| self.ln_ratios[k]).collect();
@@ -99,7 +99,7 @@ impl Residuals {
     }
 
     /// A residual in one of the rows.
-    pub fn at(&self, ridge: &Ridge, row: usize) -> f64 {
+    pub(crate) fn at(&self, ridge: &Ridge, row: usize) -> f64 {
         let position = |t: &ResidualTerm| self.names.iter().position(|f| *f == t.feature);
         let value = |t: &ResidualTerm| position(t).map_or(0.0, |j| self.features[[row, j]]);
         ridge.intercept + ridge.terms.iter().map(|t| t.slope * (value(t) - t.centre)).sum::<f64>()
@@ -171,8 +171,10 @@ mod tests {
         let data = Residuals { names, features, ln_ratios, weights: vec![1.0; 52], groups: vec![0; 52] };
         let ridge = data.ridge().unwrap();
         let terms = vec![ModelTerm { term: Term::Objects, scale: Scale::Cycle, unit: 2.0 }];
-        let bare = MethodModel { terms, ..truth().remove(0) };
-        let full = MethodModel { residual_intercept: ridge.intercept, residual: ridge.terms.clone(), ..bare.clone() };
+        let mut bare = truth().remove(0);
+        bare.terms = terms;
+        let mut full = bare.clone();
+        (full.residual_intercept, full.residual) = (ridge.intercept, ridge.terms.clone());
         for k in 0..52 {
             let cost = |m: &MethodModel| m.curve(&machine.hardware(), &threads(k)).unwrap().cost_ns(&load(k));
             let residual = (cost(&full) / cost(&bare)).ln();

@@ -6,17 +6,17 @@ use sapwise::stats::robust_deviation;
 
 /// Times and the terms that should add up to them.
 #[derive(Debug, Clone)]
-pub struct Problem {
+pub(crate) struct Problem {
     /// Nanoseconds for one unit of each term, shape (rows, terms).
-    pub terms: Array2<f64>,
+    pub(crate) terms: Array2<f64>,
     /// Nanoseconds of each row, above zero.
-    pub ns: Vec<f64>,
+    pub(crate) ns: Vec<f64>,
     /// Weight of each row.
-    pub weights: Vec<f64>,
+    pub(crate) weights: Vec<f64>,
     /// Rows whose time is a lower bound and not a measurement: they count only while the sum stays below.
-    pub floors: Vec<bool>,
+    pub(crate) floors: Vec<bool>,
     /// The profile of each row.
-    pub groups: Vec<usize>,
+    pub(crate) groups: Vec<usize>,
 }
 
 /// Rounds of reweighting, at most. The units stop moving in the fourth digit after about eight.
@@ -30,7 +30,7 @@ const FAR: f64 = 0.5;
 /// Profiles that are left out of a start, at most: with many of them no single one takes the start with it.
 const MOST_STARTS: usize = 16;
 /// Residuals beyond this many standard deviations count linearly (Huber's constant for 95 % efficiency).
-pub const HUBER: f64 = 1.345;
+pub(crate) const HUBER: f64 = 1.345;
 /// A spread below this is taken for this, so that a perfect fit does not turn rounding errors into outliers.
 const SMALLEST_SPREAD: f64 = 1e-3;
 
@@ -44,7 +44,7 @@ impl Problem {
     /// Reweighting ends at the fixed point nearest to its start, and a profile whose fork and join was measured hundreds of
     /// times too long, as under contention, can take the start with it. So it starts from all profiles and from all but each
     /// one, and the end with the least error is taken.
-    pub fn units(&self) -> Vec<f64> {
+    pub(crate) fn units(&self) -> Vec<f64> {
         let profiles = self.profiles();
         if profiles.len() < 2 {
             return self.polished(self.start(None));
@@ -154,7 +154,7 @@ fn to_logarithmic(q: f64) -> f64 {
 
 /// The value at which half of the weight is reached, interpolated between the middles of neighbouring weights, so that it
 /// moves without jumps as weights change. `None` of none.
-pub fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
+pub(crate) fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
     values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let half = values.iter().map(|v| v.1).sum::<f64>() / 2.0;
     let mut before: Option<(f64, f64)> = None;
@@ -174,7 +174,7 @@ pub fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
 }
 
 /// The least of values, given ascending with their weights, up to which at least this much weight is reached; `None` where all have less.
-pub fn value_at_weight(values: &[(f64, f64)], weight: f64) -> Option<f64> {
+pub(crate) fn value_at_weight(values: &[(f64, f64)], weight: f64) -> Option<f64> {
     let mut passed = 0.0;
     let reached = values.iter().find(|v| {
         passed += v.1;

@@ -89,8 +89,7 @@ mod tests {
     fn cost(id: &str, call: f64, object: f64) -> AlgorithmCost {
         let term = |term, unit_ns| CostTerm { term, unit_ns };
         let terms = vec![term(Term::Call, call), term(Term::Objects, object)];
-        let curve = CostCurve { terms, ..CostCurve::default() };
-        AlgorithmCost { algorithm: id.parse().unwrap(), revision: 1, curve, spread_ln: 0.1 }
+        AlgorithmCost::new(id.parse().unwrap(), 1, CostCurve::new(terms), 0.1)
     }
 
     #[test]

@@ -10,12 +10,7 @@ pub(crate) const BLOCK: usize = 8;
 /// the position at which the block begins.
 ///
 /// `outer` is as long as `boxes`.
-pub(crate) fn each_doubtful_block(
-    simd: Simd,
-    boxes: &[Aabb],
-    outer: &mut [Aabb],
-    doubtful: impl FnMut(usize, &mut [Aabb]),
-) {
+pub(crate) fn each_doubtful_block(simd: Simd, boxes: &[Aabb], outer: &mut [Aabb], doubtful: impl FnMut(usize, &mut [Aabb])) {
     match simd {
         // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]

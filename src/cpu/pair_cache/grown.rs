@@ -1,11 +1,11 @@
 //! The grown boxes: which boxes have left theirs, and new ones for these.
 
 use super::tree::{NOTHING, Tree};
-use crate::cpu::level::Simd;
+use crate::aabb::Aabb;
 use crate::cpu::columns::ensure;
 use crate::cpu::kernel::contain::{each_doubtful_block, within};
+use crate::cpu::level::Simd;
 use crate::cpu::workers::Workers;
-use crate::aabb::Aabb;
 use crate::error::Error;
 use std::ops::Range;
 

@@ -3,14 +3,14 @@
 //! Sixteen boxes that are near in space share a leaf. A box that moves widens the nodes above its leaf and never changes
 //! its leaf, so the tree gets worse until it is made again.
 
-use crate::cpu::level::Simd;
+use crate::aabb::Aabb;
 use crate::cpu::columns::{ensure, part};
 use crate::cpu::kernel::node::{LANES, Node, each_overlapping};
+use crate::cpu::level::Simd;
 use crate::cpu::sort::sort;
 use crate::cpu::workers::Workers;
-use crate::load::Sample;
-use crate::aabb::Aabb;
 use crate::error::Error;
+use crate::load::Sample;
 
 /// Boxes that move in one phase on all threads; fewer are moved in less time than a phase takes.
 const SMALLEST_SPLIT: usize = 1024;

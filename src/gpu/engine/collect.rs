@@ -1,10 +1,10 @@
 //! What an engine does once a frame was submitted: waiting, bringing pairs home, going on where one submission was too few.
 
 use super::{Engine, Frame, PAIRS_AT, Search, Step};
+use crate::error::{BoxDefect, Error, GpuError};
 use crate::gpu::output::PAIR;
 use crate::gpu::params::{Header, Params};
 use crate::gpu::sorted::CANDIDATES;
-use crate::error::{BoxDefect, Error, GpuError};
 use crate::gpu::storage::Failure;
 use crate::load::Sample;
 use crate::pairs::Pairs;

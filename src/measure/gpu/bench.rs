@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-use crate::gpu::{Gpu, GpuError};
 pub(super) use crate::gpu::kernel::{Bound, Kernel};
+use crate::gpu::{Gpu, GpuError};
 use crate::hardware::{GpuKind, GpuParameterId, Parameter};
 use crate::measure::Options;
 use crate::measure::foreign_load::{self, Figure, Plan};
@@ -64,7 +64,9 @@ impl<'a> Bench<'a> {
         padded.resize(words.len().next_multiple_of(4), 0);
         let contents = bytemuck::cast_slice(&padded);
         let usage = wgpu::BufferUsages::UNIFORM;
-        self.gpu.try_make(|d| d.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })).map_err(self::words)
+        self.gpu
+            .try_make(|d| d.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage }))
+            .map_err(self::words)
     }
 
     /// Compiles an entry point, with constants for its overrides.

@@ -13,12 +13,12 @@ fn both() -> Model {
         (ParameterId::UsableCores, 2.0, 64.0),
         (ParameterId::BandwidthOneThreadGbPerS, 8.0, 50.0),
     ];
-    model.ranges = ranges.map(|(name, min, max)| Range { parameter: name.to_owned(), min, max }).to_vec();
+    model.ranges = ranges.map(|(id, min, max)| Range { parameter: id.into(), min, max }).to_vec();
     model
 }
 
 /// A machine of eight cores with one GPU.
-fn machine(changes: &[(&str, f64)]) -> Hardware {
+fn machine(changes: &[(ParameterId, f64)]) -> Hardware {
     let mut figures = vec![
         (ParameterId::UsableCores, 8.0),
         (ParameterId::ClockMeasuredGhz, 4.0),
@@ -27,8 +27,8 @@ fn machine(changes: &[(&str, f64)]) -> Hardware {
         (ParameterId::ScalingTwoThreadsRatio, 1.9),
         (ParameterId::ScalingAllThreadsRatio, 7.0),
     ];
-    for (name, value) in changes {
-        if let Some(figure) = figures.iter_mut().find(|f| f.0 == *name) {
+    for (id, value) in changes {
+        if let Some(figure) = figures.iter_mut().find(|f| f.0 == *id) {
             figure.1 = *value;
         }
     }
@@ -68,8 +68,9 @@ fn figures_that_no_machine_has_are_refused_by_name() {
         (ParameterId::ScalingTwoThreadsRatio, &[190.0]),
     ] {
         for &value in values {
-            let error = both().predict(&machine(&[(name, value)]), &ids(&["brute@cpu1", "brute@gpu0"])).unwrap_err();
-            assert!(error.contains(name) && error.contains("check its unit"), "{value}: {error}");
+            let error =
+                both().predict(&machine(&[(name, value)]), &ids(&["brute@cpu1", "brute@gpu0"])).unwrap_err().to_string();
+            assert!(error.contains(name.as_str()) && error.contains("check its unit"), "{value}: {error}");
         }
     }
 }

@@ -21,8 +21,8 @@ fn what_the_timings_were_made_of_is_linked_and_what_they_were_not_is_not() {
         assert_eq!(method.distance_rise_ln.rise.map_or(0.0, |i| i.high), 0.0, "{method:#?}");
     }
     let linked = |p: &OfParameter| p.methods.iter().filter(|m| m.distance_rise_ln.verdict == Verdict::Linked).count();
-    assert!(linked(of(ParameterId::ClockMeasuredGhz)) > 0, "{:#?}", of(ParameterId::ClockMeasuredGhz));
-    let memory = of(ParameterId::MemoryBytes);
+    assert!(linked(of(ParameterId::ClockMeasuredGhz.as_str())) > 0, "{:#?}", of(ParameterId::ClockMeasuredGhz.as_str()));
+    let memory = of(ParameterId::MemoryBytes.as_str());
     assert!(memory.deviation_octaves > 0.3, "{memory:?}");
     let effects = memory.methods.iter().map(|m| &m.distance_rise_ln).chain([&memory.regret_rise]);
     effects.for_each(|e| assert_eq!(e.verdict, Verdict::NotLinked, "{e:?}"));

@@ -1,7 +1,7 @@
 use crate::synthetic::Machine;
 use super::*;
 use crate::progress::Silent;
-use crate::simulated as simulate;
+use crate::simulated;
 
 fn profiles(machines: Vec<Machine>) -> Vec<Profile> {
     machines.into_iter().map(|m| Profile::of(&format!("{}.json", m.name), &m.report())).collect()
@@ -62,8 +62,8 @@ fn the_score_counts_a_machine_once_however_many_profiles_it_has() {
 
 #[test]
 fn a_dozen_simulated_machines_predict_those_held_out_better_than_the_nearest_one_does() {
-    let loads = simulate::Loads::of_a_sweep(1, Some(30_000)).unwrap();
-    let reports = simulate::simulate(&simulate::built_in().unwrap(), 12, &loads, 1).unwrap();
+    let loads = simulated::Loads::of_a_sweep(1, Some(30_000)).unwrap();
+    let reports = simulated::simulate(&simulated::built_in().unwrap(), 12, &loads, 1, &Silent).unwrap();
     let profiles: Vec<Profile> = reports.into_iter().map(|(file, report)| Profile::of(&file, &report)).collect();
     let (validation, notes) = validated(&profiles);
     assert_eq!((validation.physical_machines, validation.held_out.as_str()), (12, "physical machine"));

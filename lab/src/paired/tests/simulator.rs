@@ -30,6 +30,10 @@ pub(super) enum Second {
 }
 
 
+fn below(random: &mut Random, bound: usize) -> usize {
+    (random.uniform() * bound as f64) as usize
+}
+
 /// Four sizes a decade from 10 to a million, then what `second` says. `ratio` is `ln(first / second)` at a size.
 pub(super) fn sweep(ratio: &dyn Fn(f64) -> f64, host: Host, second: Second, seed: u64) -> Vec<Timed> {
     let mut random = Random::new(seed);
@@ -63,10 +67,10 @@ fn around_borders(points: &[Timed]) -> Vec<u32> {
 /// 5 to 40 frames a size; one of the lists ends up to a third earlier. A drift by 10 % over the round hits both alike.
 fn round(sizes: &[u32], ratio: &dyn Fn(f64) -> f64, host: Host, random: &mut Random) -> Vec<Timed> {
     let point = |(k, &objects): (usize, &u32)| {
-        let frames = 5 + random.below(36);
+        let frames = 5 + below(random, 36);
         let mut samples = [Vec::new(), Vec::new()];
-        let lengths = [frames, (frames - random.below(frames / 3)).max(5)];
-        let longer = random.below(2);
+        let lengths = [frames, (frames - below(random, frames / 3)).max(5)];
+        let longer = below(random, 2);
         let n = f64::from(objects);
         let level = (1000.0 * n.powf(1.2)).ln() + 0.1 * k as f64 / sizes.len() as f64;
         let levels = [0.5, -0.5].map(|share| level + share * ratio(n) + host.points * random.normal());
@@ -127,7 +131,7 @@ impl Trials {
         widths[widths.len() / 2]
     }
 
-    fn against(&self, truths: &[f64]) -> impl Iterator<Item = (&crate::PairedCrossing, f64)> {
+    fn against(&self, truths: &[f64]) -> impl Iterator<Item = (&crate::paired::PairedCrossing, f64)> {
         let complete = self.found.iter().filter(move |c| c.positions().len() == truths.len());
         complete.flat_map(move |c| c.positions().iter().zip(truths.to_vec()))
     }
