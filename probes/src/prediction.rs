@@ -8,8 +8,9 @@ use anyhow::bail;
 use sapwise::hardware::ParameterId;
 use sapwise::model::{ASK, Prediction};
 use sapwise::stats::median;
-use sapwise::{GpuIdentity, Hardware, Load, Model, Registry, Tuning};
+use sapwise::{GpuIdentity, Hardware, Load, Model, Registry, Source, Tuning};
 use sapwise_lab::data::{Document, read_document};
+use sapwise_lab::StoredModel;
 use sapwise_lab::belief::{Prior, Taken, learn};
 use sapwise_lab::sweep::loads;
 use sapwise_lab::text::count;
@@ -46,14 +47,14 @@ impl Slice {
     }
 }
 
-/// The model in a file, or the one that is built in.
+/// The model in a file, or the one that is built in, with what training says of it.
 ///
 /// # Errors
 /// When the file is no sound model.
-pub(crate) fn model(path: Option<&Path>) -> anyhow::Result<Model> {
-    let Some(path) = path else { return Ok(Model::built_in()?) };
+pub(crate) fn model(path: Option<&Path>) -> anyhow::Result<StoredModel> {
+    let Some(path) = path else { return StoredModel::built_in() };
     match read_document(path)? {
-        Document::Model(model) => Ok(*model),
+        Document::Model(stored) => Ok(*stored),
         _ => bail!("{} is no model; make one with `sapwise train`", path.display()),
     }
 }
@@ -82,7 +83,7 @@ pub(crate) fn predict(
 /// # Errors
 /// As [`predict`], and when no process can be started.
 pub(crate) fn predict_and_sample(
-    model: &Model,
+    StoredModel { model, training }: &StoredModel,
     hardware: &Hardware,
     gpus: &[GpuIdentity],
     slice: &Slice,
@@ -101,7 +102,7 @@ pub(crate) fn predict_and_sample(
     };
     let disturbed: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
     let mut live = Live::new(session, median(&disturbed));
-    let prior = model.prior.unwrap_or(Prior::ASSUMED);
+    let prior = training.prior.unwrap_or(Prior::ASSUMED);
     let learned = learn(prediction.costs.clone(), &prior, loads, &mut live, most as usize)?;
     let (remarks, wrong) = live.remarks();
     if !learned.usable.contains(&true) {
@@ -113,7 +114,7 @@ pub(crate) fn predict_and_sample(
     tuning.warnings.extend(unknown(algorithms, &registry, model));
     // Without any sample the posterior is the prior, whose spread is that of machines left out and not of the model.
     if !learned.taken.is_empty() {
-        let mut corrected = learned.tuning(&scenario.to_string(), loads);
+        let mut corrected = Tuning::from_costs(Source::Learned, &scenario.to_string(), learned.costs(), loads);
         corrected.model = tuning.model.take();
         corrected.extrapolated = tuning.extrapolated;
         corrected.samples = learned.taken.iter().map(Taken::observation).collect();

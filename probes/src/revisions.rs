@@ -1,6 +1,7 @@
 //! Whether what a file tells about algorithms holds for those of this build.
 
-use sapwise::{AlgorithmId, BackendClass, Tuning, GpuIdentity, GpuKind, Model, Registry, Report};
+use sapwise::{AlgorithmId, BackendClass, GpuIdentity, GpuKind, Model, Registry, Tuning};
+use sapwise_lab::Report;
 
 /// What keeps the timings of a report from holding for this build, one sentence for each method.
 pub(crate) fn stale_in_report(report: &Report, registry: &Registry) -> Vec<String> {

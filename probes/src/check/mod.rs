@@ -73,7 +73,7 @@ impl Here {
                         let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
                         self.report(&report, bytes, &mut finding);
                     }
-                    Document::Model(model) => self.model(&model, &mut finding),
+                    Document::Model(stored) => self.model(&stored, &mut finding),
                     Document::Tuning(tuning) => self.tuning(&tuning, &mut finding),
                     _ => finding.notes.push("a schema that this command does not know how to check".to_owned()),
                 }

@@ -5,22 +5,23 @@ use crate::revisions;
 use sapwise::measure::{self, Family, Options};
 use sapwise::model::Range;
 use sapwise::{BackendClass, How, Model, Parameter, usable_cores};
+use sapwise_lab::StoredModel;
 
 impl Here {
-    pub(super) fn model(&self, model: &Model, finding: &mut Finding) {
+    pub(super) fn model(&self, StoredModel { model, training }: &StoredModel, finding: &mut Finding) {
         finding.schema = Some("model/2");
         let used = model.methods.iter().map(|m| ((m.backend, m.method.as_str()), m.revision));
         finding.set_current(revisions::stale(used, &self.registry), "train it again on new reports");
         finding.applicable = Some(finding.current == Some(true));
-        let known = model.trained_on.iter().any(|t| t.physical_id == self.machine.physical_id);
+        let known = training.trained_on.iter().any(|t| t.physical_id == self.machine.physical_id);
         finding.notes.push(if known {
             "trained on a machine like this one".to_owned()
-        } else if model.trained_on.is_empty() && !model.trained_on_counts.is_empty() {
+        } else if training.trained_on.is_empty() && !training.trained_on_counts.is_empty() {
             "trained on too many reports to tell whether a machine like this one is among them".to_owned()
         } else {
             "not trained on a machine like this one; `sapwise predict` measures whether it extrapolates here".to_owned()
         });
-        if model.is_simulated() {
+        if model.simulated {
             finding.notes.push("trained on simulated machines: no evidence of accuracy".to_owned());
         }
         let cores = usable_cores();

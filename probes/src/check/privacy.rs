@@ -83,6 +83,13 @@ fn is_address(word: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sapwise_lab::data::read_report;
+    use std::path::Path;
+
+    fn stored_report() -> Report {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/amd-epyc-2c-full--2026-11-21.json");
+        read_report(Path::new(path)).unwrap().1
+    }
 
     #[test]
     fn folders_addresses_and_this_host_are_found_and_nothing_else() {
@@ -113,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_host_that_is_called_like_its_cpu_or_a_scenario_reveals_nothing() {
-        let mut report = sapwise_lab::synthetic::Machine::family()[0].report();
+        let mut report = stored_report();
         report.hardware.machine.cpu = "Intel(R) Core(TM) i7".to_owned();
         report.points[0].scenario = "uniform".to_owned();
         assert!(is_told_anyway(&report, "intel") && is_told_anyway(&report, "Uniform"));

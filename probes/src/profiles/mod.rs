@@ -19,6 +19,7 @@ use profile::Profile;
 use resume::Existing;
 use runner::{End, ProfileRunner};
 use sapwise::{GpuIdentity, SimdLevel, measure, usable_cores};
+use sapwise_lab::text::columns;
 use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

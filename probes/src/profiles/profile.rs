@@ -3,9 +3,11 @@
 use crate::args::Probe;
 use crate::contention::Contended;
 use crate::restriction::{self, LAVAPIPE_THREADS};
-use crate::sweep::Plan;
+
 use sapwise_lab::report::Restricted;
-use sapwise::{GpuIdentity, GpuKind, Scenario, SimdLevel};
+use sapwise::{GpuIdentity, GpuKind, SimdLevel};
+use sapwise_lab::sweep::Plan;
+use sapwise_scenes::Scenario;
 use std::path::Path;
 use std::time::Duration;
 

@@ -6,8 +6,8 @@ use sapwise_lab::data::read_document;
 use crate::{provenance, restriction, revisions};
 use clap::Parser;
 use sapwise_lab::data::Document;
-use sapwise_lab::report::Label;
-use sapwise::{GpuIdentity, Registry, Report};
+use sapwise_lab::report::{Label, Report};
+use sapwise::{GpuIdentity, Registry};
 use std::path::{Path, PathBuf};
 
 /// A folder, and what its reports are compared with.
@@ -147,6 +147,12 @@ pub(super) fn numbers(wanted: &[GpuIdentity], now: &[GpuIdentity]) -> Result<Vec
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sapwise_lab::data::read_report;
+
+    fn stored_report() -> Report {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/amd-epyc-2c-full--2026-11-21.json");
+        read_report(Path::new(path)).unwrap().1
+    }
     use crate::profiles::family::{Whole, family};
     use sapwise_lab::report::{Proof, Restricted, Restriction, Timed};
     use sapwise::{GpuKind, SimdLevel};
@@ -167,7 +173,7 @@ mod tests {
     fn with_one_thread(check: impl Fn(&Existing, &Profile, Report, Report)) {
         let family_of = probe(&["--no-gpus"]);
         let registry = Registry::with_cores(2);
-        let mut report = sapwise_lab::synthetic::Machine::family()[0].report();
+        let mut report = stored_report();
         report.label = Label::RealRestricted;
         // Their revisions would be stale with each that changes.
         report.algorithms.clear();

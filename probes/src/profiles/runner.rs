@@ -9,7 +9,7 @@ use crate::progress::Progress;
 use crate::{gpus, interrupt, output, shell};
 use anyhow::bail;
 use sapwise_lab::data::Document;
-use sapwise::Report;
+use sapwise_lab::Report;
 use sapwise_lab::text::columns;
 use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};

@@ -2,8 +2,9 @@
 
 use super::outcome::Outcome;
 use crate::exit::WrongUsage;
-use crate::files::write_atomically;
+
 use sapwise::{Load, Reason};
+use sapwise_lab::write::write_atomically;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::Write;

@@ -8,7 +8,7 @@ use crate::progress::Progress;
 use anyhow::Context;
 use sapwise::measure::Watch;
 use sapwise::{AlgorithmId, Load};
-use sapwise_lab::belief::{Answer, Effort, IncrementalMethods, SECONDS, Sample, SampleSource};
+use sapwise_lab::belief::{Answer, Effort, IncrementalMethods, SECONDS, Sample, Source};
 use std::time::{Duration, Instant};
 
 /// Opening GPUs takes seconds where a driver compiles on its first start. Without any the process is there at once.
@@ -111,7 +111,7 @@ impl Live {
     }
 }
 
-impl SampleSource for Live {
+impl Source for Live {
     fn effort(&self, algorithm: &AlgorithmId, load: &Load) -> Option<Effort> {
         let there = uses(algorithm).iter().all(|k| self.session.gpus.iter().any(|g| g.index == *k));
         there.then(|| Effort { objects: load.objects, is_incremental: self.incremental.contain(algorithm) })

@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
                 wrong = sampled.1;
                 sampled.0
             } else {
-                prediction::predict(model, &hardware, &gpus, &slice, algorithms)?
+                prediction::predict(&model.model, &hardware, &gpus, &slice, algorithms)?
             }
         }
     };

@@ -2,9 +2,9 @@
 
 use crate::args::Study as Arguments;
 use crate::exit::{Outcome, WrongUsage};
-use crate::output;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
+use crate::{interrupt, output, shell};
 use sapwise_lab::data::Evidence;
 use sapwise_lab::study::{NotAmongReports, PAGE, Sources, Study, Summary, prepare};
 use sapwise_lab::text::count;
@@ -17,6 +17,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Err(why) => why,
     })?;
     prepare(&arguments.out)?;
+    interrupt::listen()?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let progress = Progress::new(0);
     let study = Study::of(&sources, evidence, command(arguments), &progress)?;
@@ -29,7 +30,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if arguments.json {
         output::print_json(&summary)?;
     } else {
-        output::print(&text(&summary, &arguments.out))?;
+        output::print(&text(&summary, &arguments.out, arguments.simulated))?;
     }
     Ok(Outcome::Done)
 }
@@ -56,28 +57,42 @@ fn command(arguments: &Arguments) -> String {
 fn shown(path: &Path) -> String {
     let last = || path.file_name().map(|n| n.to_string_lossy().into_owned());
     let text = if path.is_relative() { path.display().to_string() } else { last().unwrap_or_else(|| "/".to_owned()) };
-    let plain = |c: char| c.is_alphanumeric() || "-_./+=,@%".contains(c);
-    if text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+    shell::quoted(&text)
 }
 
-fn text(summary: &Summary, out: &Path) -> String {
+fn text(summary: &Summary, out: &Path, simulated: bool) -> String {
     let studied = summary.reports.iter().filter(|r| r.left_out.is_none()).count();
+    let machines =
+        if simulated { "simulated machines, which are no evidence of how fast any is" } else { "physical machines" };
     let mut text = format!(
-        "{} of {}, {studied} of them with timings that are studied.\n",
+        "{} read, the timings of {studied} studied; {machines}: {}\n\n",
         count(summary.reports.len(), "report"),
-        count(summary.physical_machines, "physical machine"),
+        summary.physical_machines
     );
-    summary.can_say.iter().for_each(|sentence| text.push_str(&format!("\n{sentence}\n")));
-    let mut rows = vec![["the paper says", "by these reports", "by its own table"].map(str::to_owned).to_vec()];
-    rows.extend(summary.claims.iter().map(|c| vec![c.claim.clone(), c.by_these_reports.clone(), c.by_its_table.clone()]));
+    for report in &summary.reports {
+        if let Some(why) = &report.left_out {
+            text.push_str(&format!("{} is left out: {why}\n", report.file));
+        }
+    }
+    for sentence in &summary.can_say {
+        text.push_str(&format!("{sentence}\n"));
+    }
+    let mut rows = vec![["the paper says", "by its own table", "by these reports"].map(str::to_owned).to_vec()];
+    rows.extend(summary.claims.iter().map(|c| vec![c.claim.clone(), c.by_its_table.clone(), c.by_these_reports.clone()]));
     text.push_str(&format!("\n{}", Terminal::of_standard_output().table(&rows)));
+    if let Some(ours) = summary.strategies.first() {
+        text.push_str(&format!(
+            "\nPredicted from hardware parameters, with each {} held out in turn: mean regret {:.1} %\n",
+            summary.held_out,
+            ours.mean_regret * 100.0
+        ));
+    }
     for missing in &summary.missing {
         text.push_str(&format!("\nmissing: {missing}"));
     }
-    text.push_str(&format!(
-        "\n\nThe page is {}, with {} beside it. Next: open it in a browser.",
+    text + &format!(
+        "\n\nThe page is {}, with {} files beside it. Open it in a browser.",
         out.join(PAGE).display(),
-        count(summary.files.len(), "file")
-    ));
-    text
+        summary.files.len()
+    )
 }

@@ -67,7 +67,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     if arguments.json {
         output::print_json(&answer)?;
     } else {
-        output::print(&text::text(arguments, &answer, &origin, &outcome, Terminal::of_standard_output()))?;
+        output::print(&text::text(arguments, &answer, &origin, Terminal::of_standard_output()))?;
     }
     Ok(if outcome.interrupted || origin.wrong { Outcome::Failed } else { Outcome::Done })
 }

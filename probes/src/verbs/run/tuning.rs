@@ -70,7 +70,7 @@ pub(super) fn predicted(arguments: &Run, algorithms: &Algorithms) -> anyhow::Res
     let model = prediction::model(None)?;
     let (usable, slice) = (&measured.usable, Slice::of(Scenario::Uniform)?);
     let (mut tuning, wrong) = match arguments.samples {
-        0 => (prediction::predict(&model, &hardware, usable, &slice, algorithms)?, false),
+        0 => (prediction::predict(&model.model, &hardware, usable, &slice, algorithms)?, false),
         most => prediction::predict_and_sample(&model, &hardware, usable, &slice, algorithms, most)?,
     };
     tuning.warnings.extend(measured.remarks);
