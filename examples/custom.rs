@@ -8,7 +8,7 @@
 //! `probes/examples/bvh.rs`.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs, Registry,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs, Product, Registry,
     Source, Term, Tuning,
 };
 use sapwise_scenes::Scenario;
@@ -81,10 +81,11 @@ pub(crate) fn tuning(costs: Vec<AlgorithmCost>) -> Tuning {
 #[allow(dead_code, reason = "the tests of this example have no use for its main")]
 fn main() -> Result<(), Error> {
     let registry = registry("grid-sap@cpu1");
-    // Comparing a box takes a nanosecond or so; where boxes move, it costs what the other one does, and more.
+    // Comparing a box takes a nanosecond or so, and so does a pair that is handed on; where boxes move, it costs what the other one does,
+    // and more. A product of counts makes a term of its own: here that of the pairs.
     let tuning = tuning(vec![
         cost(&registry, "grid-sap@cpu1", &[(Term::Objects, 60.0)]),
-        cost(&registry, ID, &[(Term::Objects, 2.0), (Term::Moved, 1000.0)]),
+        cost(&registry, ID, &[(Term::Objects, 2.0), (Term::Product(Product::ONE.pairs(1)), 1.0), (Term::Moved, 1000.0)]),
     ]);
     let mut adaptive = Adaptive::new(tuning, &registry)?;
     let mut scene = Scenario::Uniform.start(5000, 1);

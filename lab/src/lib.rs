@@ -54,3 +54,8 @@ pub use train::{Trained, train, without};
 pub use training::{
     MethodScore, StoredModel, Training, TrainingCount, TrainingReport, Validation, read_model, write_model,
 };
+
+/// The example of the guide for researchers as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/research.md")]
+struct Research;

@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn a_figure_that_can_not_be_costs_what_needs_it_and_no_more() {
         let model = Model::built_in().unwrap();
-        let figure = |name: &&str| match *name {
+        let figure = |&name: &ParameterId| match name {
             ParameterId::CacheLlcBytes => Parameter::reported(name, 33_554_432.0, "test"),
             ParameterId::ForkJoinColdNs => Parameter::reported(name, 5000.0, "test"),
             ParameterId::UsableCores | ParameterId::ScalingAllThreadsRatio => Parameter::reported(name, 2.0, "test"),

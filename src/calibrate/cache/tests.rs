@@ -114,7 +114,7 @@ fn a_folder_in_its_place_is_an_error() {
     let entry = entry(folder.path(), key());
     fs::create_dir_all(entry.path().join("inside")).unwrap();
     assert!(entry.read().unwrap_err().contains("it is no file"));
-    let told = entry.keep(tuning(1)).unwrap_err();
+    let told = entry.keep(tuning(1)).unwrap_err().to_string();
     assert!(told.contains("can't be written"), "{told}");
     assert_eq!(names(folder.path()).len(), 1);
 }

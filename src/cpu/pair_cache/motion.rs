@@ -238,10 +238,10 @@ mod tests {
     fn keeps(scenario: Scenario) -> bool {
         let mut scene = Scene::start(scenario, 2000, 1);
         let mut motion = Motion::default();
-        motion.advise(scene.boxes());
+        motion.advise(&FramePlan::default(), scene.boxes());
         motion.found(2000, 1000);
         scene.advance();
-        matches!(motion.advise(scene.boxes()), Advice::Keep(_))
+        matches!(motion.advise(&FramePlan::default(), scene.boxes()), Advice::Keep(_))
     }
 
     #[test]
@@ -256,19 +256,19 @@ mod tests {
         let mut motion = Motion::default();
         for pairs in [500 * 499 / 2, 1000] {
             motion.found(500, pairs);
-            motion.advise(&boxes);
-            assert_eq!(matches!(motion.advise(&boxes), Advice::Keep(_)), pairs == 1000);
+            motion.advise(&FramePlan::default(), &boxes);
+            assert_eq!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)), pairs == 1000);
         }
         motion.stop();
-        assert!((0..PAUSE[0]).all(|_| matches!(motion.advise(&boxes), Advice::Scratch)));
-        assert!(matches!(motion.advise(&boxes), Advice::Keep(_)));
+        assert!((0..PAUSE[0]).all(|_| matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Scratch)));
+        assert!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)));
     }
 
     #[test]
     fn boxes_that_go_far_wear_the_order_sooner_than_those_that_wander() {
         let mut motion = Motion::default();
         let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
-        (0..2).for_each(|_| _ = motion.advise(&boxes));
+        (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
         let frames = |far_away: usize, motion: &mut Motion| {
             let changes = Changes { left: 10, far_away, new: 0..0, gone: 0..0 };
             motion.learn(1000, &changes, 1000, true);

@@ -1,0 +1,37 @@
+//! Trains on all reports of a folder but those of one machine, and prints what choices cost on one of its reports.
+//!
+//! ```text
+//! cargo run --release -p sapwise-lab --example leave_one_out -- datasets amd-epyc-2c-full--2026-11-21.json
+//! ```
+
+use anyhow::{Context, Result};
+use sapwise_lab::data::{Evidence, Selection, read_reports};
+use sapwise_lab::evaluate::{RegretTable, by_costs};
+use sapwise_lab::progress::Silent;
+use std::path::Path;
+
+// The tests of the package call `leave_one_out`.
+#[cfg(not(test))]
+fn main() -> Result<()> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next().context("name the folder of the reports")?;
+    print!("{}", leave_one_out(Path::new(&folder), &arguments.next().context("name the report to hold out")?)?);
+    Ok(())
+}
+
+/// The regret on a report of the model that was trained without its machine, and of each algorithm when it is chosen always.
+pub(crate) fn leave_one_out(folder: &Path, file: &str) -> Result<String> {
+    let reports = read_reports(&[folder.to_owned()], &Silent)?;
+    let (profiles, _) = Selection::of(&reports, Evidence::Real).finish();
+    let profile = profiles.iter().find(|p| p.file == file).context("there is no such report to be trained on")?;
+    let (model, held_out) = sapwise_lab::without(&profiles, file)?;
+    let available = profile.available();
+    let costs = model.predict(&profile.hardware, &profile.with_revisions(&available))?.costs;
+    let table = RegretTable::new(profile);
+    let regret = table.regret(profile, &by_costs(costs, &available)).mean;
+    let mut text = format!("{file}, held out: {held_out}\n{:20} {:6.1} %\n", "the model", 100.0 * regret);
+    for (algorithm, regret) in profile.algorithms.iter().zip(table.always()) {
+        text += &format!("{:20} {:6.1} %\n", algorithm.id.to_string(), 100.0 * regret);
+    }
+    Ok(text)
+}
