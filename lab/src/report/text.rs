@@ -21,8 +21,13 @@ pub fn read(text: &str) -> Result<Read<Report>, Error> {
     let read: Read<Report> = FORMAT.read(text)?;
     match read.value.defect() {
         None => Ok(read),
-        Some(defect) => Err(Error::Data { path: ".".to_owned(), source: serde_json::Error::custom(defect) }),
+        Some(defect) => Err(unsound(defect)),
     }
+}
+
+/// What is wrong with the figures of a file that is well-formed.
+fn unsound(defect: String) -> Error {
+    Error::Data { path: ".".to_owned(), source: serde_json::Error::custom(defect) }
 }
 
 /// Writes a report: one key a line, one point a line, and the raw samples of a parameter on one line, so that a full sweep stays

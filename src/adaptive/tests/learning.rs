@@ -190,7 +190,7 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
 }
 
 #[test]
-fn what_makes_its_work_anew_too_often_is_left_and_taken_up_again() {
+fn what_rebuilds_too_often_is_left_and_taken_up_again() {
     // The first is incremental. Up to frame 600 it rebuilds in one frame of three, which the tuning knows nothing of.
     let mut costs = tuning(&[("sap@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 0.0, 20.0)]);
     costs.costs[0].curve.fallback_terms = costs.costs[1].curve.terms.clone();
