@@ -52,7 +52,7 @@ pub(crate) fn hardware(hardware: &Hardware, terminal: Terminal) -> String {
         machine.simd,
         parameters(&hardware.parameters, terminal)
     );
-    for GpuHardware { gpu, parameters: list } in &hardware.gpus {
+    for GpuHardware { gpu, parameters: list, .. } in &hardware.gpus {
         let GpuIdentity { index, name, driver, api, kind, .. } = gpu;
         text += &format!("\ngpu{index}: {name}, {kind}, {api}, {driver}\n\n{}", parameters(list, terminal));
     }
