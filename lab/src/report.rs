@@ -2,7 +2,6 @@
 
 mod text;
 
-pub(crate) use text::unsound;
 pub use text::{FORMAT, is_report, read, write};
 
 use sapwise::model::Scale;

@@ -1,12 +1,12 @@
 //! Made-up machines whose costs are known exactly. TEST DATA: the reports carry a real label because training leaves
 //! simulated ones out, so none of them may leave this module's tests.
 
-use sapwise_scenes::Random;
+use crate::report::{Label, Point, Provenance, Report, Timed, Timing};
 use sapwise::hardware::GpuParameterId;
 use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, ParameterId};
 use sapwise::model::{MethodModel, ModelTerm, Scale};
-use crate::report::{Label, Point, Provenance, Report, Timed, Timing};
 use sapwise::{AlgorithmId, BackendClass, Hardware, Load, Parameter, Term};
+use sapwise_scenes::Random;
 
 /// A machine of the made-up family.
 #[derive(Debug, Clone)]
@@ -168,14 +168,7 @@ impl Machine {
             }
         }
         let algorithms = ids.into_iter().map(|(id, m)| Timed::new(id, m.revision)).collect();
-        Report {
-            label: Label::RealFull,
-            provenance: provenance(),
-            hardware,
-            algorithms,
-            points,
-            remarks: Vec::new(),
-        }
+        Report { label: Label::RealFull, provenance: provenance(), hardware, algorithms, points, remarks: Vec::new() }
     }
 }
 

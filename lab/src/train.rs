@@ -106,7 +106,8 @@ mod tests {
         let range = model.ranges.iter().find(|r| r.parameter == "gpu/upload_rate_gb_per_s").unwrap();
         assert_eq!((range.min, range.max), (5.0, 24.0));
         let all = |ids: &[&str]| ids.iter().map(|id| Entry::new(id.parse().unwrap(), 1)).collect::<Vec<_>>();
-        let within = model.predict(&machines[1].hardware(), &all(&["grid-sap@cpu1", "grid-sap@gpu0", "grid-sap@gpu0+1"])).unwrap();
+        let within =
+            model.predict(&machines[1].hardware(), &all(&["grid-sap@cpu1", "grid-sap@gpu0", "grid-sap@gpu0+1"])).unwrap();
         assert!(within.costs.len() == 3 && !within.extrapolated, "{:?}", within.warnings);
         let outside = model.predict(&machines[4].hardware(), &all(&["grid-sap@gpu0"])).unwrap();
         let told = |text: &str| outside.warnings.iter().any(|w| w.contains(text));
@@ -114,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn one_report_gives_a_model_without_scores() {
+    fn one_report_makes_a_model_without_scores() {
         let trained = train(of(&reports()[..1]), "test", &Silent).unwrap();
         assert_eq!(trained.model.methods.len(), 4);
         assert!(trained.training.validation.methods.is_empty());

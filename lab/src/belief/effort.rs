@@ -51,7 +51,15 @@ impl IncrementalMethods {
         // A registry of one core makes its algorithms without threads.
         let registry = Registry::with_cores(1);
         let is_incremental = |id: &AlgorithmId| registry.create(id).is_ok_and(|mut a| a.is_incremental());
-        Self(registry.entries().iter().map(|e| &e.id).filter(|id| is_incremental(id)).map(|id| id.method().to_owned()).collect())
+        Self(
+            registry
+                .entries()
+                .iter()
+                .map(|e| &e.id)
+                .filter(|id| is_incremental(id))
+                .map(|id| id.method().to_owned())
+                .collect(),
+        )
     }
 
     /// Whether an algorithm is one of them.

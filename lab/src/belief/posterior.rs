@@ -232,9 +232,11 @@ impl Posterior {
                     for l in 0..STRIDE {
                         let before = match (k < KNOTS, l < KNOTS) {
                             (true, true) => apart[k.abs_diff(l)],
-                            (false, false) if k == l => {
-                                deviations.covariance_of_terms(Term::ALL.get(k - KNOTS).copied(), &one.algorithm, &other.algorithm)
-                            }
+                            (false, false) if k == l => deviations.covariance_of_terms(
+                                Term::ALL.get(k - KNOTS).copied(),
+                                &one.algorithm,
+                                &other.algorithm,
+                            ),
                             _ => 0.0,
                         };
                         back(k, l, before);

@@ -131,7 +131,8 @@ pub fn learn(
             Answer::Skipped => {}
             Answer::Failed { why, gpus } => {
                 for (other, usable) in posterior.predicted().iter().zip(&mut usable) {
-                    let lost = matches!(other.algorithm.backend(), Backend::Gpu(used) if used.iter().any(|k| gpus.contains(k)));
+                    let lost =
+                        matches!(other.algorithm.backend(), Backend::Gpu(used) if used.iter().any(|k| gpus.contains(k)));
                     *usable &= !lost && other.algorithm != algorithm;
                 }
                 open.retain(|o| usable[o.0]);

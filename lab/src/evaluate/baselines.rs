@@ -108,8 +108,8 @@ pub(super) fn nearest(known: &[&Likeness], own: &Likeness) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use crate::synthetic::Machine;
     use super::*;
+    use crate::synthetic::Machine;
     use sapwise::Load;
 
     fn ids(list: &[&str]) -> Vec<AlgorithmId> {

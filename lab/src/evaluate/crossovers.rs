@@ -3,7 +3,7 @@
 use super::baselines::closest;
 use crate::data::Profile;
 use crate::fit::{measured_slice, slice_tuning};
-use sapwise::{AlgorithmCost, AlgorithmId, Crossover, Tuning, Load, Source};
+use sapwise::{AlgorithmCost, AlgorithmId, Crossover, Load, Source, Tuning};
 
 /// The crossovers between the measured tuning of one profile, in the scenario of its slice.
 #[derive(Debug, Clone, Default)]
@@ -85,9 +85,9 @@ impl ComparedCrossover {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::fit::measured_costs;
     use crate::synthetic::Machine;
-    use super::*;
 
     fn slower(costs: &[AlgorithmCost], id: &AlgorithmId, factor: f64) -> Vec<AlgorithmCost> {
         let mut costs = costs.to_vec();

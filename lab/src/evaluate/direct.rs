@@ -23,8 +23,12 @@ const PARAMETERS: [&str; 4] = [
 ];
 
 /// The same of a crossover between the CPU and a GPU, or between two methods on GPUs.
-const GPU_PARAMETERS: [&str; 4] =
-    [ParameterId::ScalingAllThreadsRatio.as_str(), "gpu/round_trip_ns", "gpu/upload_rate_gb_per_s", "gpu/arithmetic_gflop_per_s"];
+const GPU_PARAMETERS: [&str; 4] = [
+    ParameterId::ScalingAllThreadsRatio.as_str(),
+    "gpu/round_trip_ns",
+    "gpu/upload_rate_gb_per_s",
+    "gpu/arithmetic_gflop_per_s",
+];
 
 /// A method on one thread or on all threads of its machine, on one GPU or on all: counts differ between machines, these do not.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -54,8 +58,7 @@ pub(super) fn role_outcomes(profile: &Profile) -> Vec<RoleOutcome> {
         // In picoseconds: only ratios count, and short times would lose digits as whole nanoseconds.
         within.map(|p| p.of_position(own?).map(|ns| [(1e3 * ns).round() as u64])).collect()
     };
-    let objects: Vec<u32> =
-        profile.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load.objects).collect();
+    let objects: Vec<u32> = profile.points.iter().filter(|p| p.scenario == scenario).map(|p| p.load.objects).collect();
     let timed: Vec<Vec<Option<[u64; 1]>>> = roles.iter().map(|(_, id)| medians(id)).collect();
     let mut outcomes = Vec::new();
     for a in 0..roles.len() {
@@ -106,7 +109,7 @@ impl Prediction {
     }
 }
 
-/// The direct regression by least squares, applied to a machine: whoever wins most comparisons in pairs is chosen. `training` are profiles
+/// The direct regression by least squares, applied to a machine: the winner of most comparisons in pairs is chosen. `training` are profiles
 /// with what was found for their roles. Adds to `notes` how many of its crossovers are means because there were too few for a
 /// regression, and how many rest on profiles of high leverage.
 ///
@@ -206,9 +209,8 @@ fn estimate(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &H
     let there = |name: &&str| machines.iter().chain([&hardware]).all(|h| logarithm(h, name).is_some());
     let names: Vec<&str> = names.iter().copied().filter(there).collect();
     let row = |h: &Hardware| names.iter().map(|name| logarithm(h, name).unwrap_or_default()).collect::<Vec<f64>>();
-    let table = Array2::from_shape_fn((machines.len(), names.len()), |(k, j)| {
-        logarithm(machines[k], names[j]).unwrap_or_default()
-    });
+    let table =
+        Array2::from_shape_fn((machines.len(), names.len()), |(k, j)| logarithm(machines[k], names[j]).unwrap_or_default());
     let (line, far_rows) = Line::least_squares(&table, values)?;
     Ok(Estimate { value: line.at(&row(hardware)), mean: line.columns.kept.is_empty(), far_rows })
 }
@@ -280,8 +282,7 @@ mod tests {
     fn least_squares_find_a_power_law_and_too_few_rows_give_the_mean() {
         // A border that goes down with the lanes.
         let machines: Vec<Hardware> = Machine::family().iter().map(Machine::hardware).collect();
-        let values: Vec<f64> =
-            machines.iter().map(|h| 5.0 - 0.7 * h.value(ParameterId::SimdLanes).unwrap().ln()).collect();
+        let values: Vec<f64> = machines.iter().map(|h| 5.0 - 0.7 * h.value(ParameterId::SimdLanes).unwrap().ln()).collect();
         let known: Vec<&Hardware> = machines[..6].iter().collect();
         let of = |count: usize| estimate(&PARAMETERS, &known[..count], &values[..count], &machines[6]).unwrap();
         let found = of(6);

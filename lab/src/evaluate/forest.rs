@@ -3,9 +3,9 @@
 use super::regret_table::Strategy;
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile};
 use crate::fit::{Row, rows, thinned};
-use sapwise_scenes::Random;
 use anyhow::{Context, Result};
 use sapwise::{AlgorithmId, Backend, BackendClass, Hardware, Load};
+use sapwise_scenes::Random;
 use smartcore::ensemble::random_forest_regressor::{RandomForestRegressor, RandomForestRegressorParameters};
 use smartcore::linalg::basic::matrix::DenseMatrix;
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ type Key = (BackendClass, String);
 const TREES: usize = 25;
 /// Rows that a forest is grown from, at most.
 const MOST_ROWS: usize = 1500;
-/// Profiles that forests are grown from, about, spread over all, and rows that each gives at least for a method: of a profile with a
+/// Profiles that forests are grown from, about, spread over all, and rows of each at least for a method: of a profile with a
 /// handful of rows no tree learns how time grows with the load.
 const MOST_PROFILES: usize = 400;
 const FEWEST_OF_PROFILE: usize = 15;
@@ -36,7 +36,7 @@ struct Example {
 }
 
 impl Table {
-    /// A bound of an algorithm that had left the race counts as a time: a tree does not extrapolate, and without it whoever left
+    /// A bound of an algorithm that had left the race counts as a time: a tree does not extrapolate, and without it what left
     /// at a thousand objects would be predicted to take no longer for a million.
     pub(super) fn new(profiles: &[Profile]) -> Self {
         let step = profiles.len().div_ceil(MOST_PROFILES).max(1);
@@ -143,9 +143,9 @@ fn features(hardware: &Hardware, backend: &Backend, load: &Load) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use crate::synthetic::Machine;
-    use crate::evaluate::regret_table::RegretTable;
     use super::*;
+    use crate::evaluate::regret_table::RegretTable;
+    use crate::synthetic::Machine;
 
     fn profiles() -> Vec<Profile> {
         Machine::family_with_gpus().into_iter().map(|m| Profile::of(m.name, &m.report())).collect()
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_left_the_race_is_not_chosen_beyond() {
+    fn what_left_the_race_is_not_chosen_beyond() {
         let all = profiles();
         let forests = Table::new(&all).grow(&vec![true; all.len()]).unwrap();
         let available = all[2].available();

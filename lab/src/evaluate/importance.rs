@@ -143,7 +143,8 @@ fn of_machines(profiles: &[Profile], machines: &[&str], progress: &dyn Progress)
             progress.check()?;
             let chosen: Vec<bool> = (0..profiles.len()).map(|k| !fold.contains(&k)).collect();
             let model = model(profiles, &designs, &chosen, "importance").map(|m| m.0);
-            let model = model.with_context(|| format!("no importance is told when {} is held out", profiles[fold[0]].file))?;
+            let model =
+                model.with_context(|| format!("no importance is told when {} is held out", profiles[fold[0]].file))?;
             progress.advance(1);
             Ok(fold.iter().map(|&k| (k, outcome(&profiles[k], &tables[k], &model))).collect())
         };
@@ -275,7 +276,8 @@ fn of_parameter(figure: Figure, values: &BTreeMap<usize, f64>, rises: &BTreeMap<
 impl Importance {
     /// What is to be read of it, as a table that `draw` draws, and the notes.
     pub fn page(&self, draw: impl Fn(&[Vec<String>]) -> String) -> String {
-        let mut rows = vec![["parameter", "machines", "fitted without", "choice", "linked methods"].map(str::to_owned).to_vec()];
+        let mut rows =
+            vec![["parameter", "machines", "fitted without", "choice", "linked methods"].map(str::to_owned).to_vec()];
         for p in &self.parameters {
             let linked = p.methods.iter().filter(|m| m.distance_rise_ln.verdict == Verdict::Linked);
             let linked: Vec<&str> = linked.map(|m| m.method.as_str()).collect();

@@ -67,8 +67,8 @@ fn grouped(profiles: &[Profile], key: impl Fn(&Profile) -> String) -> Vec<Vec<us
 
 #[cfg(test)]
 mod tests {
-    use crate::synthetic::Machine;
     use super::*;
+    use crate::synthetic::Machine;
 
     fn profiles(machines: &[Machine]) -> Vec<Profile> {
         machines.iter().map(|m| Profile::of("", &m.report())).collect()

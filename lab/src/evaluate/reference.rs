@@ -1,15 +1,15 @@
 //! Our fits held against those of SciPy, scikit-learn and NumPy on stored numbers: `tests/fixtures/fits.json`, which
 //! `tools/reference/fits.py` writes.
 
-use crate::fit::columns::Columns;
 use super::direct::Line;
+use crate::fit::columns::Columns;
 use crate::fit::nnls::nnls;
 use crate::fit::residual::Residuals;
 use crate::fit::robust::{HUBER, Problem};
 use ndarray::{Array1, Array2};
 use sapwise::BackendClass;
-use sapwise::stats::{quantile, relative_iqr, robust_deviation};
 use sapwise::model::Feature;
+use sapwise::stats::{quantile, relative_iqr, robust_deviation};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -188,7 +188,8 @@ fn robust_units_are_at_the_minimum_that_scipy_finds() {
         };
         let units = problem.units();
         let modelled = problem.terms.dot(&Array1::from(units.clone()));
-        let bend = HUBER * robust_deviation(&modelled.iter().zip(&problem.ns).map(|(m, t)| (m / t).ln()).collect::<Vec<_>>()).unwrap();
+        let bend = HUBER
+            * robust_deviation(&modelled.iter().zip(&problem.ns).map(|(m, t)| (m / t).ln()).collect::<Vec<_>>()).unwrap();
         assert!(near(bend / stored.bend, 1.0, BEND), "{}: {bend} {}", stored.name, stored.bend);
         let [ours, theirs] = [&units, &stored.units].map(|units| cost(&problem, stored.bend, units));
         assert!(near(theirs / stored.cost, 1.0, DIRECT), "{}: {theirs} {}", stored.name, stored.cost);

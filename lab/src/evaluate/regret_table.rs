@@ -144,10 +144,10 @@ fn ln_costs(spots: &[&Spot], algorithms: usize) -> Vec<Option<f64>> {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::evaluate::by_costs;
     use crate::fit::measured_costs;
     use crate::synthetic::Machine;
-    use super::*;
 
     fn regret(profile: &Profile, choose: &Strategy<'_>) -> Regret {
         RegretTable::new(profile).regret(profile, choose)

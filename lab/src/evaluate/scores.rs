@@ -27,7 +27,7 @@ pub(super) struct Judged {
 }
 
 impl Judged {
-    /// What one regret is told of: the machine, or the profile of the only one, which is left out more than once, with its vectors and
+    /// What one regret is told of: the machine, or the profile of the only one, which is held out more than once, with its vectors and
     /// with its threads.
     pub(super) fn unit(&self, by_machine: bool) -> &str {
         if by_machine { &self.machine } else { &self.file }

@@ -11,7 +11,7 @@ const OWN_SHARE: f64 = 0.02;
 const ALONE: f64 = 0.99;
 
 /// Standardised columns. linfa answers without a warning when columns depend on each other or when one row decides a
-/// coefficient, so whoever calls it goes through this first.
+/// coefficient, so its callers go through this first.
 #[derive(Debug, Clone)]
 pub(crate) struct Columns {
     /// Positions of the columns that were kept, in the given order.
@@ -35,7 +35,7 @@ impl Columns {
         varying.select(&independent)
     }
 
-    /// The same without the test of rank, for a fit whose penalty gives one answer to columns that depend on each other too.
+    /// The same without the test of rank, for a fit whose penalty leaves one answer for columns that depend on each other too.
     pub(crate) fn varying(values: &Array2<f64>, weights: &[f64]) -> Self {
         let total: f64 = weights.iter().sum();
         let shares: Vec<f64> = weights.iter().map(|w| w / total).collect();

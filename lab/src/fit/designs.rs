@@ -1,17 +1,17 @@
 //! The cost model of a method on one class of processor, shared by all machines, thread counts and GPUs.
 
 use crate::data::Profile;
+use crate::fit::min_of_two::MinOfTwo;
 use crate::fit::residual::{Residuals, Ridge};
 use crate::fit::robust::Problem;
 use crate::fit::rows::{Row, rows};
 use crate::fit::terms::{fallback_method, terms};
-use crate::fit::min_of_two::MinOfTwo;
+use crate::report::Label;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
 use sapwise::hardware::ParameterId;
-use sapwise::stats::robust_deviation;
 use sapwise::model::{Feature, MethodModel, ModelTerm, PredictError, Scale};
-use crate::report::Label;
+use sapwise::stats::robust_deviation;
 use sapwise::{AlgorithmId, Backend, BackendClass, GpuKind, Hardware, Term};
 use std::collections::BTreeMap;
 
@@ -19,10 +19,9 @@ use std::collections::BTreeMap;
 const FEWEST_POINTS: usize = 8;
 /// Cold forks and joins of a frame on several threads where none was timed: it forks and joins at least once.
 const UNSEEN_FORK_JOINS: f64 = 1.0;
-/// Rows of a method, about. Its dozen coefficients need no more, and a fit takes time in proportion to them: of many reports each
-/// gives a few rows, other ones than the next.
+/// Rows of a method, about. Its dozen coefficients need no more, and a fit takes time in proportion to them: of many reports each/// gives a few rows, other ones than the next.
 const MOST_ROWS: usize = 6000;
-/// Rows of a method that each profile gives at least.
+/// Rows of a method for each profile at least.
 const FEWEST_OF_PROFILE: usize = 2;
 
 /// What the time of a method on a class of processor may consist of.
@@ -104,9 +103,7 @@ impl<'a> Designs<'a> {
             let mut rows: Vec<usize> = (0..design.rows.len()).filter(|&k| chosen[design.rows[k].profile]).collect();
             let name = design.name();
             if design.leave_out_software(&mut rows, self.profiles) {
-                notes.push(format!(
-                    "{name}: timings on software adapters are left out, there being timings on real GPUs"
-                ));
+                notes.push(format!("{name}: timings on software adapters are left out, there being timings on real GPUs"));
             }
             match design.fit(&rows, self.profiles, &self.machines, other.as_deref())? {
                 Some(model) => models.push(model),
@@ -347,7 +344,9 @@ fn nanoseconds(
     let backend = id.backend();
     let cache = hardware.value(ParameterId::CacheLlcBytes).filter(|c| *c > 0.0);
     let cache = match backend.class() {
-        BackendClass::Cpu => cache.ok_or_else(|| PredictError::Missing { parameter: ParameterId::CacheLlcBytes.to_string(), why: None })?,
+        BackendClass::Cpu => {
+            cache.ok_or_else(|| PredictError::Missing { parameter: ParameterId::CacheLlcBytes.to_string(), why: None })?
+        }
         BackendClass::Gpu => 0.0,
     };
     let features = Feature::of(backend.class()).iter().map(|f| f.value(hardware, backend, &row.load));

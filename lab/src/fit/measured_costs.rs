@@ -1,16 +1,16 @@
 //! The measured cost curves of one machine, from its own report.
 
 use crate::data::Profile;
+use crate::fit::min_of_two::MinOfTwo;
 use crate::fit::robust::{Problem, weighted_median};
 use crate::fit::rows::{Row, rows};
 use crate::fit::terms::{fallback_method, terms_of_one_machine};
-use crate::fit::min_of_two::MinOfTwo;
+use crate::paired::{PairedComparison, PairedSamples};
+use crate::report::{Label, Point, Report, Timed};
 use anyhow::{Result, bail};
 use ndarray::Array2;
-use crate::paired::{PairedComparison, PairedSamples};
 use sapwise::hardware::ParameterId;
 use sapwise::stats::robust_deviation;
-use crate::report::{Label, Point, Report, Timed};
 use sapwise::{AlgorithmCost, AlgorithmId, CostCurve, CostTerm, Crossover, Knot, Load, Source, Term, Tuning};
 
 /// Distance of the knots of a correction, in octaves of the number of objects.
@@ -136,14 +136,15 @@ fn curve(terms: &[Term], rows: &[&Row], cache_bytes: f64, other: Option<&CostCur
     if curve.defect().is_some() {
         return (curve, 0.0);
     }
-    // A bound that the terms break is evidence like a measurement: whoever is hopeless in one scenario and timed on in
+    // A bound that the terms break is evidence like a measurement: what is hopeless in one scenario and timed on in
     // another would pass for cheap in both.
     let floors = residuals(&curve, rows, true);
     let mut evidence = residuals(&curve, rows, false);
     let largest = evidence.iter().map(|r| r.0).fold(0.0, f64::max);
     evidence.extend(floors.iter().filter(|f| f.0 <= largest && f.1 > 0.0));
     curve.correction = correction(&evidence, &floors);
-    let spread_ln = robust_deviation(&residuals(&curve, rows, false).into_iter().map(|r| r.1).collect::<Vec<f64>>()).unwrap_or(0.0);
+    let spread_ln =
+        robust_deviation(&residuals(&curve, rows, false).into_iter().map(|r| r.1).collect::<Vec<f64>>()).unwrap_or(0.0);
     (curve, spread_ln)
 }
 
@@ -223,9 +224,9 @@ fn measured_interval(border: &Crossover, report: &Report, scenario: &str) -> Opt
 
 #[cfg(test)]
 mod tests {
-    use crate::synthetic::{Machine, load};
     use super::*;
     use crate::report::Timing;
+    use crate::synthetic::{Machine, load};
     use sapwise::BackendClass;
 
     #[test]
@@ -247,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_left_the_race_stays_behind_beyond_all_sizes() {
+    fn what_left_the_race_stays_behind_beyond_all_sizes() {
         for machine in Machine::family() {
             let report = machine.report();
             let tuning = measured_tuning(&report, "uniform").unwrap();
@@ -285,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_left_one_scenario_is_not_cheap_there_because_of_another() {
+    fn what_left_one_scenario_is_not_cheap_there_because_of_another() {
         // On two threads as fast as on one in one scenario, and eight times slower when it left the other.
         let mut report = Machine::family()[0].clone().exact().report();
         let from = |p: &Point| p.scenario == "clustered" && p.load.objects > 5000;

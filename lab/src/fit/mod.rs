@@ -12,9 +12,9 @@ pub(crate) mod robust;
 mod rows;
 mod terms;
 
-pub use designs::{Designs, TermsOf};
 pub(crate) use designs::thinned;
-pub use measured_costs::{measured_costs, measured_tuning, measured_slice, slice_tuning};
+pub use designs::{Designs, TermsOf};
+pub use measured_costs::{measured_costs, measured_slice, measured_tuning, slice_tuning};
 pub use model::model;
 pub use prior::{TimingError, prior};
 pub use rows::{Row, rows};

@@ -11,12 +11,7 @@ use sapwise::{Backend, GpuHardware, Model};
 ///
 /// # Errors
 /// When no method could be fitted, or a regression fails.
-pub fn model(
-    profiles: &[Profile],
-    designs: &Designs<'_>,
-    chosen: &[bool],
-    name: &str,
-) -> Result<(Model, Vec<String>)> {
+pub fn model(profiles: &[Profile], designs: &Designs<'_>, chosen: &[bool], name: &str) -> Result<(Model, Vec<String>)> {
     let (methods, notes) = designs.fit(chosen)?;
     let profiles: Vec<&Profile> = profiles.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
     let mut model = Model::new(name, methods, ranges(&profiles));

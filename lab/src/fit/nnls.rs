@@ -139,8 +139,8 @@ fn length(v: ArrayView1<'_, f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sapwise_scenes::Random;
     use ndarray::array;
+    use sapwise_scenes::Random;
 
     #[test]
     fn known_solutions() {

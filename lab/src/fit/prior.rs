@@ -1,8 +1,8 @@
 //! How far costs lie from their prediction on machines that were held out.
 
+use crate::belief::{Deviations, Part, Prior, TERMS_SHARED, width_correlation};
 use crate::fit::nnls::nnls;
 use ndarray::{Array1, Array2};
-use crate::belief::{Deviations, Part, Prior, TERMS_SHARED, width_correlation};
 use sapwise::stats::mean;
 use sapwise::{AlgorithmId, BackendClass};
 use std::collections::BTreeMap;
@@ -117,10 +117,8 @@ impl Moments {
         let mut sums: BTreeMap<Kinship, (f64, f64)> = BTreeMap::new();
         for bins in machines.values() {
             let weight = 1.0 / (bins.len() as f64).powi(2);
-            let means: Vec<(&AlgorithmId, i64, f64, f64)> = bins
-                .iter()
-                .map(|(&(id, octave), list)| (id, octave, mean(list), noise / list.len() as f64))
-                .collect();
+            let means: Vec<(&AlgorithmId, i64, f64, f64)> =
+                bins.iter().map(|(&(id, octave), list)| (id, octave, mean(list), noise / list.len() as f64)).collect();
             for (k, a) in means.iter().enumerate() {
                 for (l, b) in means.iter().enumerate() {
                     let kinship = Kinship {

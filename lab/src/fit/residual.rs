@@ -12,7 +12,7 @@ const PENALTIES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
 const DEFAULT_PENALTY: f64 = 0.1;
 /// Machines that it takes to choose the penalty.
 const FEWEST_GROUPS: usize = 3;
-/// Machines that are left out one by one for that; of more, as many groups are made of them.
+/// Machines that are held out one by one for that; of more, as many groups are made of them.
 const MOST_FOLDS: usize = 8;
 /// Rows that the choice looks at: the four penalties are far apart, and each takes a fit for each fold.
 const SEARCH_ROWS: usize = 1500;
@@ -121,11 +121,11 @@ fn weighted_ridge(x: &Array2<f64>, y: &Array1<f64>, weights: &[f64], penalty: f6
 
 #[cfg(test)]
 mod tests {
-    use crate::synthetic::{Machine, truth};
     use super::*;
-    use sapwise_scenes::Random;
+    use crate::synthetic::{Machine, truth};
     use sapwise::model::{MethodModel, ModelTerm, Scale};
     use sapwise::{Backend, BackendClass, Load, Term};
+    use sapwise_scenes::Random;
 
     fn residuals(rows: usize) -> Residuals {
         let mut random = Random::named(11, &[]);

@@ -74,8 +74,8 @@ fn gains(course: &BTreeMap<u32, f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synthetic::Machine;
     use crate::report::Report;
+    use crate::synthetic::Machine;
 
     #[test]
     fn a_gpu_that_gained_when_it_left_has_no_floor_beyond() {
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_left_the_race_has_floors_beyond() {
+    fn what_left_the_race_has_floors_beyond() {
         let profile = Profile::of("", &Machine::family()[0].report());
         let rows = rows(&profile, 3);
         // Half of the rows are of the other scenario, in which it left the race at another size.

@@ -186,8 +186,11 @@ fn too_little_gives_none_and_anything_else_an_ordered_interval() {
         };
         let lists: Vec<_> = (0..count).map(|_| (samples(), samples())).collect();
         let sizes: Vec<u32> = (0..count).map(|_| (random.uniform().powi(6) * f64::from(u32::MAX)) as u32).collect();
-        let points: Vec<PairedSamples<'_>> =
-            sizes.iter().zip(&lists).map(|(&objects, (a, b))| PairedSamples { objects, first_ns: a, second_ns: b }).collect();
+        let points: Vec<PairedSamples<'_>> = sizes
+            .iter()
+            .zip(&lists)
+            .map(|(&objects, (a, b))| PairedSamples { objects, first_ns: a, second_ns: b })
+            .collect();
         for p in compare(&points).iter().flat_map(PairedOutcome::positions) {
             assert!(p.low <= p.objects && p.objects <= p.high && p.low >= 0.99 && p.high < 4.4e9, "{p:?}");
         }

@@ -26,7 +26,7 @@ pub fn read(text: &str) -> Result<Read<Report>, Error> {
 }
 
 /// What is wrong with the figures of a file that is well-formed.
-pub(crate) fn unsound(defect: String) -> Error {
+fn unsound(defect: String) -> Error {
     Error::Data { path: ".".to_owned(), source: serde_json::Error::custom(defect) }
 }
 

@@ -23,8 +23,8 @@ pub struct Interval {
 impl Interval {
     /// Of one value for each machine; `None` of no machine.
     ///
-    /// Machines are drawn and not rows: what one machine gives more of is no more evidence about others. The models are not
-    /// fitted anew to each draw, so that the interval says how far machines differ under these models.
+    /// Machines are drawn and not rows: what there is more of from one machine is no more evidence about others. The models are not
+    /// fitted again to each draw, so that the interval says how far machines differ under these models.
     pub(super) fn of(values: &[f64]) -> Option<Self> {
         if values.is_empty() {
             return None;

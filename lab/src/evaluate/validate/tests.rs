@@ -1,7 +1,7 @@
-use crate::synthetic::Machine;
 use super::*;
 use crate::progress::Silent;
 use crate::simulated;
+use crate::synthetic::Machine;
 
 fn profiles(machines: Vec<Machine>) -> Vec<Profile> {
     machines.into_iter().map(|m| Profile::of(&format!("{}.json", m.name), &m.report())).collect()
@@ -54,7 +54,7 @@ fn the_score_counts_a_machine_once_however_many_profiles_it_has() {
     many.extend_from_slice(&family[1..4]);
     let (few, many) = (validated(&profiles(family[..4].to_vec())).0, validated(&profiles(many)).0);
     assert_eq!((many.physical_machines, many.profiles), (4, 8));
-    // The repeated profiles are left out together, so that no fit sees its own machine.
+    // The repeated profiles are held out together, so that no fit sees its own machine.
     for (a, b) in few.methods.iter().zip(&many.methods).filter(|(a, _)| a.name == "full sweep" || a.name == OURS) {
         assert!((a.mean_regret - b.mean_regret).abs() < 1e-3, "{a:?} {b:?}");
     }
@@ -107,7 +107,7 @@ fn profiles_of_one_machine_are_held_out_together() {
 }
 
 #[test]
-fn one_machine_is_told_and_one_profile_gives_no_scores() {
+fn one_machine_is_told_and_one_profile_has_no_scores() {
     let mut twins = Machine::family();
     twins.truncate(2);
     twins[1].name = twins[0].name;

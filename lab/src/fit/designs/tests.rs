@@ -1,5 +1,5 @@
-use crate::synthetic::{Machine, gpu_truth, truth};
 use super::*;
+use crate::synthetic::{Machine, gpu_truth, truth};
 use sapwise::hardware::GpuParameterId;
 
 fn profiles(machines: impl IntoIterator<Item = Machine>) -> Vec<Profile> {

@@ -29,7 +29,6 @@ pub(super) enum Second {
     Everything,
 }
 
-
 fn below(random: &mut Random, bound: usize) -> usize {
     (random.uniform() * bound as f64) as usize
 }
