@@ -8,8 +8,8 @@
 //! `probes/examples/bvh.rs`.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs, Product, Registry,
-    Source, Term, Tuning,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs, Product,
+    Registry, Source, Term, Tuning,
 };
 use sapwise_scenes::Scenario;
 

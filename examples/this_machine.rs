@@ -39,7 +39,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             let expected = decision.predicted_ns.map_or("nothing".to_owned(), |ns| format!("{:.1} us", ns / 1000.0));
             let measured = decision.measured_ns.map_or("not timed".to_owned(), |ns| format!("{:.1} us", ns / 1000.0));
             let (algorithm, reason) = (decision.algorithm, decision.reason);
-            println!("{objects} objects, {} pairs: {algorithm} ({reason:?}), expected {expected}, took {measured}", pairs.len());
+            println!(
+                "{objects} objects, {} pairs: {algorithm} ({reason:?}), expected {expected}, took {measured}",
+                pairs.len()
+            );
         }
     }
     // What the frames have taught is there at the next start.

@@ -305,7 +305,7 @@ impl Registry {
 
 /// What makes one instance for several numbers of threads.
 enum Family<'a> {
-    Ours(fn(&[u32], &Threads, Simd) -> Result<Box<dyn BroadPhase>, Error>),
+    Ours(fn(&[u32], &Threads, Simd) -> cpu::Made),
     Users(&'a FamilyFactory),
 }
 

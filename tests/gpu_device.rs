@@ -131,7 +131,7 @@ fn a_given_gpu_is_measured_on_its_own_device() {
     let Some(gpus) = gpus() else { return };
     let (device, queue) = device(&gpus, 0);
     let given = Gpus::of([shared(0, &device, &queue)]);
-    let options = Options { limit: Some(std::time::Duration::ZERO), ..Options::default() };
+    let options = Options::default().with_limit(std::time::Duration::ZERO);
     let measured = measure::gpu(&given, 0, &options).unwrap();
     assert_eq!(measured.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>(), GpuParameterId::OF_ONE);
     for name in [

@@ -7,7 +7,7 @@ use sapwise::measure::{self, Family, Options};
 use sapwise::{How, Parameter};
 
 fn brief(threads: Option<u32>) -> Options {
-    Options { threads, brief: true, limit: None }
+    Options::default().with_threads(threads).brief(true)
 }
 
 /// The rules that hold for a parameter on any machine.

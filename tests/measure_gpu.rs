@@ -12,7 +12,7 @@ use sapwise::measure::{self, Options};
 use sapwise::{How, Parameter};
 
 fn options(brief: bool) -> Options {
-    Options { brief, ..Options::default() }
+    Options::default().brief(brief)
 }
 
 /// The rules that hold for a parameter on any machine.

@@ -97,6 +97,7 @@ fn parameters(parameters: &[Parameter], terminal: Terminal) -> String {
             How::Reported => "reported".to_owned(),
             How::Published => "published".to_owned(),
             How::Missing => format!("missing: {}", p.source),
+            _ => p.how.to_string(),
         };
         rows.push(vec![name, p.value.map_or("-".to_owned(), |v| value(&p.name, v)), spread, how]);
     }

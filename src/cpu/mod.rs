@@ -34,14 +34,17 @@ pub(crate) struct Method {
     pub(crate) create: Create,
 }
 
+/// An instance of a method, or why there is none.
+pub(crate) type Made = Result<Box<dyn BroadPhase>, Error>;
+
 /// How a method makes an instance at a SIMD level.
 #[derive(Clone, Copy)]
 pub(crate) enum Create {
     /// One that runs on that many threads.
-    OneWidth(fn(u32, &Threads, Simd) -> Result<Box<dyn BroadPhase>, Error>),
+    OneWidth(fn(u32, &Threads, Simd) -> Made),
     /// An [incremental](crate::Incremental) one that runs on any of these numbers of threads, ascending, and takes along what it
     /// keeps. It begins with the least.
-    AnyWidth(fn(&[u32], &Threads, Simd) -> Result<Box<dyn BroadPhase>, Error>),
+    AnyWidth(fn(&[u32], &Threads, Simd) -> Made),
 }
 
 /// Every method, the simplest first.

@@ -17,6 +17,7 @@ const METHODS: &[Method] =
     &[Method { name: "brute", revision: 1 }, Method { name: "sap", revision: 1 }, Method { name: "grid-sap", revision: 1 }];
 
 /// Whether a method runs on GPUs.
+#[cfg(feature = "gpu")]
 pub(crate) fn has_method(name: &str) -> bool {
     METHODS.iter().any(|m| m.name == name)
 }

@@ -83,6 +83,7 @@ const UNDER_LIMIT: &str = "left out of a run with a limit of time";
 
 /// What to measure with.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Options {
     /// Use no more threads than this; `None` uses every core that affinity and quota leave. 0 is taken as 1.
     pub threads: Option<u32>,
@@ -95,6 +96,24 @@ pub struct Options {
 }
 
 impl Options {
+    /// The same with at most so many threads; `None` uses every core.
+    #[must_use]
+    pub fn with_threads(self, threads: Option<u32>) -> Self {
+        Self { threads, ..self }
+    }
+
+    /// The same, brief or not.
+    #[must_use]
+    pub fn brief(self, brief: bool) -> Self {
+        Self { brief, ..self }
+    }
+
+    /// The same within a time.
+    #[must_use]
+    pub fn with_limit(self, limit: Duration) -> Self {
+        Self { limit: Some(limit), ..self }
+    }
+
     fn plan(&self, samples: usize, limit_ms: u64) -> Plan {
         let (samples, ms) = if self.brief { (4, limit_ms / 20) } else { (samples, limit_ms) };
         let limit = Duration::from_millis(ms);

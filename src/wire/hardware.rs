@@ -104,3 +104,27 @@ wire! {
         parameters: Vec<Parameter>,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{Hardware, Machine, Parameter, ParameterId};
+
+    #[test]
+    fn parameters_that_this_version_does_not_know_are_kept() {
+        let of_tomorrow = Parameter::measured("photons_per_s", 1e9, "a machine of tomorrow");
+        let known = Parameter::reported(ParameterId::UsableCores, 2.0, "test");
+        let hardware = Hardware::new(Machine::of("0123456789abcdef"), vec![known, of_tomorrow]);
+        let text = serde_json::to_string(&hardware).unwrap();
+        let read: Hardware = serde_json::from_str(&text).unwrap();
+        assert_eq!(read, hardware);
+        assert_eq!((read.value(ParameterId::UsableCores), read.value_named("photons_per_s")), (Some(2.0), Some(1e9)));
+    }
+
+    #[test]
+    fn figures_that_can_not_be_are_refused_where_a_file_is_read() {
+        let twice = vec![Parameter::reported("x_ns", 1.0, "test"); 2];
+        let text = serde_json::to_string(&Hardware::new(Machine::default(), twice)).unwrap();
+        let error = serde_json::from_str::<Hardware>(&text).unwrap_err().to_string();
+        assert!(error.contains("the parameter x_ns stands there twice"), "{error}");
+    }
+}

@@ -21,7 +21,7 @@ pub(crate) fn tuning(registry: &Registry, threads: u32, settings: &Settings) -> 
     if !settings.full {
         return Ok(Tuning::usual(registry));
     }
-    let hardware = measure::hardware(&Options { threads: Some(threads), ..Options::default() });
+    let hardware = measure::hardware(&Options::default().with_threads(Some(threads)));
     let model = Model::built_in().map_err(|e| e.to_string())?;
     let prediction = model.predict(&hardware, &registry.available())?;
     // Where there are costs, they decide; the slice through loads is for people.

@@ -37,7 +37,7 @@ impl Here {
 /// In which parameters that the system reports this machine lies outside the training. Those that take seconds to measure
 /// are left to `predict`.
 fn outside(model: &Model) -> Vec<String> {
-    let quick = Options { brief: true, ..Options::default() };
+    let quick = Options::default().brief(true);
     let families = [Family::Topology, Family::Caches].into_iter();
     let parameters: Vec<Parameter> = families.flat_map(|f| measure::family(f, &quick)).collect();
     let mut notes = Vec::new();

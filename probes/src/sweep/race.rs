@@ -78,7 +78,7 @@ impl Race {
             naive: Pairs::new(),
             shuffle: Random::new(seed),
             displacement: Displacement::default(),
-            cores: Options { threads: Some(cores), ..Options::default() },
+            cores: Options::default().with_threads(Some(cores)),
             contended,
         }
     }
