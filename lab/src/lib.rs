@@ -37,6 +37,7 @@ pub mod page;
 pub mod paired;
 pub mod progress;
 pub mod report;
+mod schemas;
 pub mod simulated;
 pub mod steadiness;
 pub mod study;
@@ -50,6 +51,7 @@ pub mod units;
 pub mod write;
 
 pub use report::Report;
+pub use schemas::schemas;
 pub use train::{Trained, train, without};
 pub use training::{
     MethodScore, StoredModel, Training, TrainingCount, TrainingReport, Validation, read_model, write_model,

@@ -45,10 +45,10 @@ const COLUMNS: &str = "
 - **mean regret**, **95th percentile**: over the held-out reports, each physical machine counting the same.
 - **in games**: the same where each number of objects counts as often as games have it. That is an assumption, not a count: log-normal
   around 800 objects, two thirds of the frames within 220 to 2800.
-- **borders off by**: octaves between the measured border of two fields in the scenario `uniform` and where the predicted costs of the
-  same two algorithms cross, the median; one octave is a factor of two in objects. Where they do not cross in the measured sizes, the
-  distance to the end of these, a lower bound. **within 1/2 octave**: the share of the borders. Both only for what predicts costs. A
-  border between two algorithms that cost nearly the same is vague and harmless: the regret tells what it costs.
+- **crossovers off by**: octaves between the measured crossover of two algorithms in the scenario `uniform` and where their predicted costs
+  cross, the median; one octave is a factor of two in objects. Where they do not cross in the measured sizes, the
+  distance to the end of these, a lower bound. **within 1/2 octave**: the share of the crossovers. Both only for what predicts costs. A
+  crossover of two algorithms that cost nearly the same is vague and harmless: the regret tells what it costs.
 - **over 10 %**: share of the points at which the choice cost a tenth more than the best, or worse.
 - **gap closed**: how much of the way from the best single algorithm (0 %) to the oracle, which always knows the best (100 %); `none`
   costs more than that single algorithm.
@@ -60,8 +60,8 @@ const STRATEGIES: &str = "
 on at most 64 of the held-out reports: the samples are of one scenario and replayed from the timings by which the choice is judged, so that they
 are as exact as these. A held-out machine is taken with its cores as far apart as they were at half of its points, which `predict` sees only
 as they are in the seconds of its measurement. `random forest` predicts each method's time from
-load and hardware parameters and knows no physics. `direct regression` is the paper's: the position of each border as a power law of
-hardware parameters, and a choice by the number of objects alone. Notes say how many of its borders are means: there were no more
+load and hardware parameters and knows no physics. `direct regression` is the paper's: the position of each crossover as a power law of
+hardware parameters, and a choice by the number of objects alone. Notes say how many of its crossovers are means: there were no more
 machines with that crossing than parameters to regress it on. `frozen constants (64)` and `(1000)` switch from brute force at the number of
 objects that engines have written down (64 colliders in nexus, 1000 bodies in mujoco_warp), `default machine` at the measured thresholds of
 the first report in the training, whatever the machine; `nearest machine` takes the measured costs of the machine of the training with the most
@@ -150,7 +150,7 @@ pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) 
         "95th percentile",
         "mean in games",
         "95th in games",
-        "borders off by",
+        "crossovers off by",
         "within 1/2 octave",
         "over 10 %",
         "gap closed",

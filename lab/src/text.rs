@@ -22,12 +22,12 @@ pub fn width(rows: &[Vec<String>], column: usize) -> usize {
 }
 
 /// A number of things, with the plural of their name but for one.
-pub(crate) fn count(number: usize, thing: &str) -> String {
+pub fn count(number: usize, thing: &str) -> String {
     format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
 }
 
 /// Nanoseconds with the unit that keeps one to three digits before the point.
-pub(crate) fn duration(ns: f64) -> String {
+pub fn duration(ns: f64) -> String {
     match ns {
         _ if ns < 1e3 => format!("{ns:.0} ns"),
         _ if ns < 1e6 => format!("{:.2} us", ns / 1e3),
@@ -37,7 +37,7 @@ pub(crate) fn duration(ns: f64) -> String {
 }
 
 /// Bytes with a binary unit.
-pub(crate) fn bytes(count: f64) -> String {
+pub fn bytes(count: f64) -> String {
     let units = ["B", "KiB", "MiB", "GiB", "TiB"];
     let mut value = count;
     let mut unit = 0;
@@ -50,7 +50,7 @@ pub(crate) fn bytes(count: f64) -> String {
 }
 
 /// A whole number with a blank between groups of three digits.
-pub(crate) fn grouped(number: u64) -> String {
+pub fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
     for (k, digit) in digits.chars().enumerate() {

@@ -189,6 +189,16 @@ pub fn read_model(text: &str) -> Result<StoredModel, json::Error> {
     Ok(StoredModel { model: json::model(text)?, training })
 }
 
+impl StoredModel {
+    /// The model that is built into the library, with what its training says of itself.
+    ///
+    /// # Errors
+    /// Never, unless the file was changed by hand.
+    pub fn built_in() -> Result<Self, json::Error> {
+        read_model(include_str!("../../models/default.json"))
+    }
+}
+
 /// Writes a model with what training says of itself, one key a line.
 ///
 /// # Errors

@@ -19,7 +19,10 @@ fn numbers(value: &Value, without: &[&str]) -> Vec<f64> {
             Value::Number(n) => into.push(n.as_f64().unwrap()),
             Value::Array(items) => items.iter().for_each(|v| collect(v, without, into)),
             Value::Object(entries) => {
-                entries.iter().filter(|(key, _)| !without.contains(&key.as_str())).for_each(|(_, v)| collect(v, without, into));
+                entries
+                    .iter()
+                    .filter(|(key, _)| !without.contains(&key.as_str()))
+                    .for_each(|(_, v)| collect(v, without, into));
             }
             _ => {}
         }
@@ -35,7 +38,8 @@ fn old_files_become_current_and_keep_every_figure() {
     for (text, schema) in OLD {
         let converted = convert(text).unwrap();
         assert_eq!(converted.schema, schema);
-        let (old, new): (Value, Value) = (serde_json::from_str(text).unwrap(), serde_json::from_str(&converted.text).unwrap());
+        let (old, new): (Value, Value) =
+            (serde_json::from_str(text).unwrap(), serde_json::from_str(&converted.text).unwrap());
         assert_eq!(new["schema"], schema);
         assert_eq!(numbers(&old, &["clouds", "folds"]), numbers(&new, &[]));
         for gone in ["strips", "sweep@", "verlet", "\"sweep\""] {
@@ -62,6 +66,14 @@ fn a_model_keeps_what_predicts_apart_from_its_training_and_loses_its_folds_aloud
 }
 
 #[test]
+fn the_score_of_a_strategy_that_is_gone_is_left_out() {
+    let text = OLD[2].0.replacen("\"direct regression\"", "\"direct elastic net\"", 1);
+    let converted = convert(&text).unwrap();
+    assert!(converted.dropped.len() == 1 && converted.dropped[0].contains("elastic net"), "{:?}", converted.dropped);
+    assert!(!converted.text.contains("elastic net"));
+}
+
+#[test]
 fn a_current_file_is_not_converted_again() {
     for (text, schema) in OLD {
         let again = convert(&convert(text).unwrap().text).unwrap_err();
@@ -71,7 +83,8 @@ fn a_current_file_is_not_converted_again() {
 
 #[test]
 fn a_fallback_and_names_in_texts_are_renamed() {
-    let text = OLD[4].0.replacen("\"cache_bytes\"", "\"otherwise\": [{\"term\": \"sort\", \"unit_ns\": 3.5}], \"cache_bytes\"", 1);
+    let text =
+        OLD[4].0.replacen("\"cache_bytes\"", "\"otherwise\": [{\"term\": \"sort\", \"unit_ns\": 3.5}], \"cache_bytes\"", 1);
     let text = text.replacen("bandwidth_one_thread_gb_per_s is", "verlet@cpu2, unlike one sweep of (sweep@gpu0+1), is", 1);
     let tuning: Value = serde_json::from_str(&convert(&text).unwrap().text).unwrap();
     assert_eq!(tuning["costs"][0]["curve"]["fallback_terms"][0]["unit_ns"], 3.5);

@@ -53,6 +53,6 @@ impl Destination {
 }
 
 fn write(path: &Path, report: &Report) -> anyhow::Result<()> {
-    let text = sapwise_lab::data::write_report(report)?;
+    let text = sapwise_lab::report::write(report)?;
     sapwise_lab::write::write_text(path, &text)
 }

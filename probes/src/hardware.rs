@@ -30,7 +30,7 @@ fn measure_cpu(threads: Option<u32>) -> anyhow::Result<Hardware> {
     let progress = Progress::new(Family::ALL.into_iter().map(usual_ms).sum());
     let mut found: Vec<Parameter> = Vec::new();
     for family in Family::ALL {
-        let name = family.name();
+        let name = family.as_str();
         progress.message(format!("hardware: {name}"));
         match progress.during(usual_ms(family), || measure_family(name, threads))? {
             Ok(parameters) => found.extend(parameters),
@@ -49,6 +49,7 @@ fn usual_ms(family: Family) -> u64 {
         Family::Memory => 1000,
         Family::CoreToCore => 200,
         Family::ForkJoin | Family::Scaling => 600,
+        _ => 500,
     }
 }
 

@@ -52,7 +52,7 @@ impl Slice {
 /// # Errors
 /// When the file is no sound model.
 pub(crate) fn model(path: Option<&Path>) -> anyhow::Result<StoredModel> {
-    let Some(path) = path else { return StoredModel::built_in() };
+    let Some(path) = path else { return Ok(StoredModel::built_in()?) };
     match read_document(path)? {
         Document::Model(stored) => Ok(*stored),
         _ => bail!("{} is no model; make one with `sapwise train`", path.display()),

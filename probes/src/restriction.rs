@@ -121,9 +121,9 @@ impl Change {
 }
 
 fn prove(kind: Restricted, without: &Hardware, with: &Hardware) -> Vec<Proof> {
-    let on_cpu = |parameter: &str, change: Change| {
+    let on_cpu = |parameter: ParameterId, change: Change| {
         let (without, with) = (without.value(parameter), with.value(parameter));
-        proof(kind, parameter, None, change, (without, with))
+        proof(kind, parameter.as_str(), None, change, (without, with))
     };
     match kind {
         Restricted::Threads => {
@@ -145,11 +145,11 @@ fn prove(kind: Restricted, without: &Hardware, with: &Hardware) -> Vec<Proof> {
         // Where one thread can't saturate the memory, others at work make it slower to answer at most.
         Restricted::ContendedMemory => vec![first_shown([
             on_cpu(ParameterId::BandwidthAllThreadsGbPerS, Change::Lower),
-            on_cpu(&latency_of_memory(), Change::Higher),
+            on_cpu(latency_of_memory(), Change::Higher),
         ])],
         Restricted::ContendedCache => {
             let llc = with.value(ParameterId::CacheLlcBytes).unwrap_or(ASSUMED_LLC_BYTES);
-            vec![on_cpu(&latency_below(llc), Change::Higher)]
+            vec![on_cpu(latency_below(llc), Change::Higher)]
         }
         Restricted::GpuThreads => with.gpus.iter().filter(|g| is_lavapipe(&g.gpu)).map(|g| on_gpu(g, without)).collect(),
     }
@@ -163,9 +163,9 @@ fn first_shown([first, second]: [Proof; 2]) -> Proof {
 fn on_gpu(with: &GpuHardware, without: &Hardware) -> Proof {
     let same = |g: &&GpuHardware| (&g.gpu.name, &g.gpu.driver) == (&with.gpu.name, &with.gpu.driver);
     let without = without.gpus.iter().find(same);
-    let by = |name: &str, change: Change| {
-        let values = (without.and_then(|g| g.value(name)), with.value(name));
-        proof(Restricted::GpuThreads, name, Some(with.gpu.index), change, values)
+    let by = |id: GpuParameterId, change: Change| {
+        let values = (without.and_then(|g| g.value(id)), with.value(id));
+        proof(Restricted::GpuThreads, id.as_str(), Some(with.gpu.index), change, values)
     };
     first_shown([
         by(GpuParameterId::ArithmeticGflopPerS, Change::Lower),
@@ -185,16 +185,16 @@ fn proof(
 }
 
 /// The latency over the largest working set there is.
-fn latency_of_memory() -> String {
-    let [.., largest] = parameter::LATENCY_WORKING_SETS_KIB;
-    parameter::latency_name(largest)
+fn latency_of_memory() -> ParameterId {
+    let [.., (_, largest)] = ParameterId::LATENCIES;
+    largest
 }
 
 /// The latency over the largest working set that fits into a last-level cache; over the smallest there is where none does.
-fn latency_below(llc_bytes: f64) -> String {
-    let sets = parameter::LATENCY_WORKING_SETS_KIB;
-    let fits = |kib: &&u32| f64::from(**kib) * 1024.0 < llc_bytes;
-    parameter::latency_name(*sets.iter().rev().find(fits).unwrap_or(&sets[0]))
+fn latency_below(llc_bytes: f64) -> ParameterId {
+    let sets = ParameterId::LATENCIES;
+    let fits = |(kib, _): &&(u32, ParameterId)| f64::from(*kib) * 1024.0 < llc_bytes;
+    sets.iter().rev().find(fits).unwrap_or(&sets[0]).1
 }
 
 #[cfg(test)]

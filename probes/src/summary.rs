@@ -52,7 +52,7 @@ pub(crate) fn hardware(hardware: &Hardware, terminal: Terminal) -> String {
         machine.simd,
         parameters(&hardware.parameters, terminal)
     );
-    for GpuHardware { gpu, parameters: list } in &hardware.gpus {
+    for GpuHardware { gpu, parameters: list, .. } in &hardware.gpus {
         let GpuIdentity { index, name, driver, api, kind, .. } = gpu;
         text += &format!("\ngpu{index}: {name}, {kind}, {api}, {driver}\n\n{}", parameters(list, terminal));
     }
@@ -97,6 +97,7 @@ fn parameters(parameters: &[Parameter], terminal: Terminal) -> String {
             How::Reported => "reported".to_owned(),
             How::Published => "published".to_owned(),
             How::Missing => format!("missing: {}", p.source),
+            _ => p.how.to_string(),
         };
         rows.push(vec![name, p.value.map_or("-".to_owned(), |v| value(&p.name, v)), spread, how]);
     }

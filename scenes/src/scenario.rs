@@ -9,11 +9,11 @@ mod walk;
 use std::fmt;
 use std::str::FromStr;
 
-use sapwise::Aabb;
 use drift::{Brownian, Clusters, Gravity};
 use fall::Fall;
 use fragmentation::Fragmentation;
 use rng::Rng;
+use sapwise::Aabb;
 use walk::{Walk, reflect};
 
 /// A kind of scene.

@@ -4,7 +4,8 @@ use crate::progress::Progress;
 use crate::report::{self, Report};
 use anyhow::{Context, bail};
 use sapwise::json::{self, Schema};
-use sapwise::{Model, Tuning};
+use crate::training::{StoredModel, read_model};
+use sapwise::Tuning;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -19,7 +20,7 @@ pub enum Document {
     /// `report/2`.
     Report(Box<Report>),
     /// `model/2`.
-    Model(Box<Model>),
+    Model(Box<StoredModel>),
     /// `tuning/1`.
     Tuning(Box<Tuning>),
 }
@@ -34,7 +35,7 @@ pub fn read_document(path: &Path) -> anyhow::Result<Document> {
     let schema = Schema::of(&text).with_context(unsound)?;
     Ok(match schema.name() {
         "report" => Document::Report(Box::new(report::read(&text).with_context(unsound)?.value)),
-        "model" => Document::Model(Box::new(json::model(&text).with_context(unsound)?)),
+        "model" => Document::Model(Box::new(read_model(&text).with_context(unsound)?)),
         _ => Document::Tuning(Box::new(json::tuning(&text).with_context(unsound)?)),
     })
 }

@@ -22,8 +22,8 @@ pub(super) fn impossible(report: &Report) -> Vec<String> {
     for (of, parameter) in parameters(&report.hardware) {
         found.extend(impossible_parameter(report, &of, parameter));
     }
-    found.extend(report.hardware.implausible());
-    found.extend(report.hardware.gpus.iter().filter_map(GpuHardware::implausible));
+    found.extend(report.hardware.implausible().map(|why| why.to_string()));
+    found.extend(report.hardware.gpus.iter().filter_map(GpuHardware::implausible).map(|why| why.to_string()));
     found.extend(impossible_provenance(report));
     for (k, point) in report.points.iter().enumerate() {
         let at = format!("point {k} ({} at {} objects)", point.scenario, point.load.objects);
@@ -71,7 +71,7 @@ fn is_disturbed(p: &Parameter) -> bool {
 
 /// What several threads gain over one, where that is more than their number.
 fn scaling_beyond_threads(hardware: &Hardware, p: &Parameter) -> Option<String> {
-    let threads = match p.name.as_str() {
+    let threads = match p.name.parse().ok()? {
         ParameterId::ScalingTwoThreadsRatio => 2.0,
         ParameterId::ScalingAllThreadsRatio => hardware.value(ParameterId::UsableCores)?,
         _ => return None,
@@ -118,8 +118,8 @@ fn impossible_provenance(report: &Report) -> Vec<String> {
         found.extend((!is_told).then(|| format!("the restriction {kind} is not in the rest of its provenance")));
     }
     for proof in provenance.restriction.iter().flat_map(|r| &r.proof) {
-        let of_gpu = |k| hardware.gpu(k).and_then(|g| g.value(&proof.parameter));
-        let own = proof.gpu.map_or_else(|| hardware.value(&proof.parameter), of_gpu);
+        let of_gpu = |k| hardware.gpu(k).and_then(|g| g.value_named(&proof.parameter));
+        let own = proof.gpu.map_or_else(|| hardware.value_named(&proof.parameter), of_gpu);
         if proof.with != own {
             let (name, with) = (&proof.parameter, proof.with);
             found.push(format!("the proof of {} has {name} as {with:?}, and the report as {own:?}", proof.kind));
@@ -217,18 +217,18 @@ pub(super) fn suspicious(report: &Report) -> Vec<String> {
 
 /// Pairs of parameters of which one may be in another unit than its name says.
 fn contradictions(hardware: &Hardware) -> Vec<String> {
-    let [smallest, .., largest] = parameter::LATENCY_WORKING_SETS_KIB.map(parameter::latency_name);
+    let [(_, smallest), .., (_, largest)] = ParameterId::LATENCIES;
     // The first is at most so many times the second.
     let most = [
         (ParameterId::CacheL1dBytes, ParameterId::CacheL2Bytes, 1.0),
         (ParameterId::CacheL2Bytes, ParameterId::CacheLlcBytes, 1.0),
         (ParameterId::CacheLlcBytes, ParameterId::MemoryBytes, 1.0),
-        (&smallest, &largest, 1.0),
+        (smallest, largest, 1.0),
         (ParameterId::ClockMeasuredGhz, ParameterId::ClockReportedGhz, 10.0),
         (ParameterId::ClockReportedGhz, ParameterId::ClockMeasuredGhz, 10.0),
         (ParameterId::ForkJoinWarmNs, ParameterId::ForkJoinColdNs, 10.0),
     ];
-    let contradicts = |(a, b, factor): &(&str, &str, f64)| {
+    let contradicts = |&(a, b, factor): &(ParameterId, ParameterId, f64)| {
         let (x, y) = (hardware.value(a)?, hardware.value(b)?);
         (x > y * factor).then(|| format!("{a} is {x} and {b} is {y}: one of them may be in another unit"))
     };

@@ -75,7 +75,7 @@ impl Here {
                     }
                     Document::Model(stored) => self.model(&stored, &mut finding),
                     Document::Tuning(tuning) => self.tuning(&tuning, &mut finding),
-                    _ => finding.notes.push("a schema that this command does not know how to check".to_owned()),
+                    _ => finding.problems.push("this version does not check files of this schema".to_owned()),
                 }
             }
         }

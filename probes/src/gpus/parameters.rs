@@ -3,7 +3,7 @@
 use anyhow::anyhow;
 use sapwise::gpu::Gpus;
 use sapwise::measure::Options;
-use sapwise::{GpuGroup, GpuHardware, GpuIdentity, Parameter};
+use sapwise::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId, Parameter};
 
 /// What the process that looks for GPUs prints: each of them in a line.
 ///
@@ -21,7 +21,7 @@ pub(crate) fn print_parameters(index: u32, options: &Options) -> anyhow::Result<
     let gpus = Gpus::find();
     let identity = gpus.identities().find(|g| g.index == index).ok_or_else(|| anyhow!("there is no gpu{index} any more"))?;
     let hardware =
-        sapwise::measure::gpu(&gpus, index, options).unwrap_or_else(|why| without_parameters(identity.clone(), &why));
+        sapwise::measure::gpu(&gpus, index, options).unwrap_or_else(|why| without_parameters(identity.clone(), &why.to_string()));
     crate::output::print_json(&hardware)
 }
 
@@ -32,18 +32,18 @@ pub(crate) fn print_parameters(index: u32, options: &Options) -> anyhow::Result<
 pub(crate) fn print_group(indices: &[u32], options: &Options) -> anyhow::Result<()> {
     let gpus = Gpus::find();
     let group =
-        sapwise::measure::gpu_group(&gpus, indices, options).unwrap_or_else(|why| group_without_parameters(indices, &why));
+        sapwise::measure::gpu_group(&gpus, indices, options).unwrap_or_else(|why| group_without_parameters(indices, &why.to_string()));
     crate::output::print_json(&group)
 }
 
 /// A GPU of which nothing could be measured.
 pub(super) fn without_parameters(gpu: GpuIdentity, why: &str) -> GpuHardware {
     let names = GpuParameterId::OF_ONE;
-    GpuHardware { gpu, parameters: names.iter().map(|name| Parameter::missing(name, why)).collect() }
+    GpuHardware::new(gpu, names.iter().map(|name| Parameter::missing(name, why)).collect())
 }
 
 /// Several GPUs that could not be measured together.
 pub(super) fn group_without_parameters(indices: &[u32], why: &str) -> GpuGroup {
     let names = GpuParameterId::GROUP;
-    GpuGroup { gpus: indices.to_vec(), parameters: names.map(|name| Parameter::missing(name, why)).into() }
+    GpuGroup::new(indices.to_vec(), names.map(|name| Parameter::missing(name, why)).into())
 }

@@ -125,7 +125,8 @@ impl Existing<'_> {
 
 /// Whether two identities are of one GPU, whatever its number.
 fn same(a: &GpuIdentity, b: &GpuIdentity) -> bool {
-    GpuIdentity { index: 0, ..a.clone() } == GpuIdentity { index: 0, ..b.clone() }
+    let named = |g: &GpuIdentity| (g.name.clone(), g.device.clone(), g.driver.clone(), g.api.clone(), g.kind);
+    named(a) == named(b)
 }
 
 /// The numbers that GPUs have now. Numbers may change with the drivers that are loaded; of several that are alike the one with

@@ -15,7 +15,7 @@ pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Ou
     }
     match arguments.part {
         PartKind::Hardware { family, threads } => {
-            let family: Family = family.parse().map_err(WrongUsage)?;
+            let family: Family = family.parse().map_err(|e: sapwise::UnknownName| WrongUsage(e.to_string()))?;
             let parameters = measure::family(family, &Options::default().with_threads(threads));
             output::print_json(&parameters)?;
         }

@@ -11,7 +11,7 @@ use crate::terminal::Terminal;
 use crate::{child, interrupt, output, profiles, provenance, restriction, summary};
 use anyhow::Context;
 use sapwise::{Hardware, usable_cores};
-use sapwise_lab::data::write_report;
+use sapwise_lab::report;
 use sapwise_lab::report::{Report, Restriction};
 use sapwise_lab::steadiness::Steadiness;
 use sapwise_lab::sweep::Plan;
@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     let report = assemble(found);
     let saved = destination.as_ref().map(|d| d.save(&report)).transpose();
     let text = if arguments.json {
-        write_report(&report)?
+        report::write(&report)?
     } else {
         let next = saved.as_ref().ok().and_then(|path| path.map(|path| summary::next_step(&report, path)));
         let told = told.map(|told| format!("\n{told}\n")).unwrap_or_default();

@@ -5,7 +5,8 @@ use crate::exit::Outcome;
 use crate::progress::Progress;
 use crate::{output, shell};
 use anyhow::{Context, bail};
-use sapwise_lab::data::{json_files, read_text, write_report};
+use sapwise_lab::data::{json_files, read_text};
+use sapwise_lab::report;
 use sapwise_lab::simulated::{Loads, built_in, read, simulate};
 use sapwise_lab::text::count;
 use sapwise_lab::write::write_text;
@@ -35,7 +36,7 @@ pub(crate) fn run(arguments: &Simulate) -> anyhow::Result<Outcome> {
     let mut written = Vec::new();
     for (name, report) in &reports {
         let path = folder.join(format!("{name}.json"));
-        write_text(&path, &write_report(report)?)?;
+        write_text(&path, &report::write(report)?)?;
         written.push(path.display().to_string());
     }
     if arguments.json {

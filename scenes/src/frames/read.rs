@@ -69,8 +69,7 @@ pub(super) fn parse(mut file: impl Read, length: u64) -> Result<Frames, NpyError
     if held > bytes {
         return Err(NpyError::Trailing { extra: held - bytes, bytes });
     }
-    let boxes =
-        if fortran_order { in_fortran_order(&mut file, frames, objects)? } else { in_c_order(&mut file, count)? };
+    let boxes = if fortran_order { in_fortran_order(&mut file, frames, objects)? } else { in_c_order(&mut file, count)? };
     // One frame has no other that could have more boxes, so that a row of NaN in it is a mistake.
     if single {
         return Ok(Frames { ends: vec![boxes.len()], boxes });
@@ -128,7 +127,8 @@ fn in_fortran_order(file: &mut impl Read, frames: usize, objects: usize) -> Resu
 
 fn element(file: &mut impl Read) -> Result<f32, NpyError> {
     let mut bytes = [0; 4];
-    file.read_exact(&mut bytes).map_err(|e| if e.kind() == io::ErrorKind::UnexpectedEof { NpyError::Changed } else { e.into() })?;
+    file.read_exact(&mut bytes)
+        .map_err(|e| if e.kind() == io::ErrorKind::UnexpectedEof { NpyError::Changed } else { e.into() })?;
     Ok(f32::from_le_bytes(bytes))
 }
 

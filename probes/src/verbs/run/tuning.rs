@@ -57,6 +57,7 @@ impl Origin {
             (OriginKind::Tuning, Source::Measured) => "from a file, measured".to_owned(),
             (OriginKind::Tuning, Source::Learned) if samples.is_empty() => format!("from a file, learned on line{model}"),
             (OriginKind::Tuning, Source::Learned) => format!("from a file, predicted{model}{corrected}"),
+            (OriginKind::Tuning, _) => "from a file".to_owned(),
         }
     }
 }
