@@ -110,7 +110,7 @@ fn spare_cores(all: Vec<CoreId>, threads: Option<u32>) -> Vec<CoreId> {
 /// The buffer of all threads that take the cache. One for all of them: however many last-level caches the machine has and
 /// whichever cores share one, the lines of those who run there come to each.
 fn words() -> Arc<[AtomicU64]> {
-    let caches = measure::family(Family::Caches, &Options { brief: true, ..Options::default() });
+    let caches = measure::family(Family::Caches, &Options::default().brief(true));
     let llc = caches.iter().find(|p| p.name == ParameterId::CacheLlcBytes).and_then(|p| p.value).unwrap_or(ASSUMED_LLC_BYTES);
     let lines = (llc * CACHE_SHARE) as usize / (LINE * size_of::<AtomicU64>());
     (0..lines.max(1) * LINE).map(|_| AtomicU64::new(0)).collect()

@@ -6,7 +6,7 @@ use crate::date;
 use crate::gpus::uses;
 use crate::restriction;
 use sapwise::stats::median;
-use sapwise::{AlgorithmId, Entry, GpuKind, Hardware, SimdLevel, usable_cores};
+use sapwise::{Entry, GpuKind, Hardware, SimdLevel, usable_cores};
 use sapwise_lab::report::{Label, Point, Provenance, Restriction, Timed, TimedTerm};
 use std::time::Duration;
 

@@ -75,6 +75,7 @@ impl Here {
                     }
                     Document::Model(stored) => self.model(&stored, &mut finding),
                     Document::Tuning(tuning) => self.tuning(&tuning, &mut finding),
+                    _ => finding.problems.push("this version does not check files of this schema".to_owned()),
                 }
             }
         }

@@ -16,15 +16,15 @@ pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Ou
     match arguments.part {
         PartKind::Hardware { family, threads } => {
             let family: Family = family.parse().map_err(|e: sapwise::UnknownName| WrongUsage(e.to_string()))?;
-            let parameters = measure::family(family, &Options { threads, ..Options::default() });
+            let parameters = measure::family(family, &Options::default().with_threads(threads));
             output::print_json(&parameters)?;
         }
         PartKind::Gpus => gpus::print_identities()?,
         PartKind::GpuAlgorithms => gpus::print_entries()?,
         PartKind::GpuLimits { index } => output::print_json(&gpus::limits_of(index)?)?,
-        PartKind::Gpu { index, threads } => gpus::print_parameters(index, &Options { threads, ..Options::default() })?,
+        PartKind::Gpu { index, threads } => gpus::print_parameters(index, &Options::default().with_threads(threads))?,
         PartKind::GpuGroup { gpus: Backend::Gpu(indices), threads } => {
-            gpus::print_group(&indices, &Options { threads, ..Options::default() })?;
+            gpus::print_group(&indices, &Options::default().with_threads(threads))?;
         }
         PartKind::GpuGroup { gpus, .. } => return Err(WrongUsage(format!("{gpus} is no group of GPUs")).into()),
         PartKind::Samples { session } => {
