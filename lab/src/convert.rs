@@ -25,6 +25,9 @@ const DROPPED_OF_VALIDATION: [(&str, &str); 2] = [
     ("coverage", "how often intervals over machines held the measured time"),
 ];
 
+/// The strategy of `model/1` that is none any more.
+const GONE: &str = "direct elastic net";
+
 /// A file in its current form.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -106,6 +109,13 @@ fn move_training(model: &mut Map<String, Value>) -> Vec<String> {
         TRAINING.iter().filter_map(|&key| Some((key.to_owned(), model.remove(key)?))).collect();
     if let Some(validation) = training.get_mut("validation").and_then(Value::as_object_mut) {
         dropped.extend(drop_keys(validation, &DROPPED_OF_VALIDATION));
+        if let Some(scores) = validation.get_mut("methods").and_then(Value::as_array_mut) {
+            let before = scores.len();
+            scores.retain(|score| score["name"] != GONE);
+            dropped.extend(
+                (scores.len() < before).then(|| format!("methods: the score of {GONE}, which is no strategy any more")),
+            );
+        }
     }
     if simulated {
         model.insert("simulated".to_owned(), true.into());

@@ -66,6 +66,14 @@ fn a_model_keeps_what_predicts_apart_from_its_training_and_loses_its_folds_aloud
 }
 
 #[test]
+fn the_score_of_a_strategy_that_is_gone_is_left_out() {
+    let text = OLD[2].0.replacen("\"direct regression\"", "\"direct elastic net\"", 1);
+    let converted = convert(&text).unwrap();
+    assert!(converted.dropped.len() == 1 && converted.dropped[0].contains("elastic net"), "{:?}", converted.dropped);
+    assert!(!converted.text.contains("elastic net"));
+}
+
+#[test]
 fn a_current_file_is_not_converted_again() {
     for (text, schema) in OLD {
         let again = convert(&convert(text).unwrap().text).unwrap_err();
