@@ -3,7 +3,7 @@
 mod common;
 
 use common::{devices_with_a_gpu, failure, npy, sapwise, success, without_adapters};
-use sapwise::Report;
+use sapwise_lab::Report;
 use sapwise::hardware::GpuParameterId;
 use serde_json::{Value, json};
 use std::fs;
@@ -17,7 +17,7 @@ fn answer(command: &mut assert_cmd::Command) -> Value {
 }
 
 fn report(command: &mut assert_cmd::Command) -> Report {
-    sapwise::json::report(&success(command)).unwrap()
+    sapwise_lab::report::read(&success(command)).unwrap().value
 }
 
 /// A made-up report of a machine with two GPUs, with what `change` does to it. Enough points for a model.
