@@ -1,7 +1,7 @@
 //! What one decision costs: the ranking alone, and the whole of `Adaptive::decide` with its sampled estimate.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use sapwise::{Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Tuning, Knot, Load, Pairs, Registry, Source, Term};
+use sapwise::{Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Knot, Load, Pairs, Registry, Source, Term, Tuning};
 use sapwise_scenes::Scenario;
 use std::hint::black_box;
 

@@ -31,7 +31,8 @@ fn predict(c: &mut Criterion) {
     let prediction = model.predict(&hardware, &algorithms).expect("known methods");
     let tuning = prediction.clone().tuning("uniform", &loads);
     let (costs, crossovers) = (prediction.costs.len(), tuning.crossovers.len());
-    let mut group = c.benchmark_group(format!("{costs} algorithms, {crossovers} crossovers, a model of {} kB", text.len() / 1000));
+    let mut group =
+        c.benchmark_group(format!("{costs} algorithms, {crossovers} crossovers, a model of {} kB", text.len() / 1000));
     group.bench_function("read the model", |b| b.iter(|| json::model(black_box(text)).expect("a sound model")));
     group.bench_function("predict", |b| b.iter(|| model.predict(black_box(&hardware), &algorithms).expect("known methods")));
     group.bench_function("tuning", |b| b.iter(|| prediction.clone().tuning("uniform", black_box(&loads))));

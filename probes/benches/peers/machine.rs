@@ -4,7 +4,7 @@ use crate::settings::Settings;
 use rayon::ThreadPool;
 use sapwise::hardware::ParameterId;
 use sapwise::measure::{self, Options};
-use sapwise::{Tuning, Hardware, Model, Registry, Source, json};
+use sapwise::{Hardware, Model, Registry, Source, Tuning, json};
 use std::process::Command;
 use std::sync::Arc;
 
