@@ -101,8 +101,8 @@ mod tests {
     use super::*;
     use crate::args::{Arguments, Verb};
     use clap::Parser;
-    use sapwise_lab::report::Timing;
     use sapwise::{GpuHardware, GpuIdentity, Load, Machine};
+    use sapwise_lab::report::Timing;
 
     fn probe(words: &[&str]) -> Probe {
         let all = ["sapwise", "probe"].iter().chain(words);
@@ -155,10 +155,8 @@ mod tests {
     }
 
     fn hardware(kind: GpuKind) -> Hardware {
-        let text = String::new;
-        let gpu = GpuIdentity { index: 0, name: text(), device: text(), driver: text(), api: text(), kind };
-        let gpus = vec![GpuHardware { gpu, parameters: Vec::new() }];
-        Hardware { machine: Machine::default(), parameters: Vec::new(), gpus, gpu_groups: Vec::new() }
+        let gpus = vec![GpuHardware::new(GpuIdentity::new(0, "", kind), Vec::new())];
+        Hardware::new(Machine::default(), Vec::new()).with_gpus(gpus)
     }
 
     #[test]

@@ -2,12 +2,12 @@
 
 use crate::args::Lifted;
 use crate::contention::{ASSUMED_LLC_BYTES, Contended};
-use sapwise_lab::data::read_document;
 use anyhow::bail;
 use sapwise::hardware::{GpuParameterId, ParameterId};
-use sapwise_lab::data::Document;
-use sapwise_lab::report::{Proof, Restricted, Restriction};
 use sapwise::{GpuHardware, GpuIdentity, Hardware, SimdLevel, usable_cores};
+use sapwise_lab::data::Document;
+use sapwise_lab::data::read_document;
+use sapwise_lab::report::{Proof, Restricted, Restriction};
 
 /// The variable that sets the threads of lavapipe.
 pub(crate) const LAVAPIPE_THREADS: &str = "LP_NUM_THREADS";
@@ -167,10 +167,7 @@ fn on_gpu(with: &GpuHardware, without: &Hardware) -> Proof {
         let values = (without.and_then(|g| g.value(id)), with.value(id));
         proof(Restricted::GpuThreads, id.as_str(), Some(with.gpu.index), change, values)
     };
-    first_shown([
-        by(GpuParameterId::ArithmeticGflopPerS, Change::Lower),
-        by(GpuParameterId::ParallelUnits, Change::Lower),
-    ])
+    first_shown([by(GpuParameterId::ArithmeticGflopPerS, Change::Lower), by(GpuParameterId::ParallelUnits, Change::Lower)])
 }
 
 fn proof(
@@ -202,12 +199,12 @@ mod tests {
     use super::*;
     use sapwise::{GpuKind, Machine, Parameter};
 
-    fn hardware(values: &[(&str, f64)]) -> Hardware {
-        let parameters = values.iter().map(|(name, value)| Parameter::reported(name, *value, "test")).collect();
-        Hardware { machine: Machine::default(), parameters, gpus: Vec::new(), gpu_groups: Vec::new() }
+    fn hardware(values: &[(ParameterId, f64)]) -> Hardware {
+        let parameters = values.iter().map(|(name, value)| Parameter::reported(*name, *value, "test")).collect();
+        Hardware::new(Machine::default(), parameters)
     }
 
-    fn shown(kind: Restricted, without: &[(&str, f64)], with: &[(&str, f64)]) -> Vec<bool> {
+    fn shown(kind: Restricted, without: &[(ParameterId, f64)], with: &[(ParameterId, f64)]) -> Vec<bool> {
         prove(kind, &hardware(without), &hardware(with)).iter().map(|p| p.shows).collect()
     }
 
@@ -220,17 +217,17 @@ mod tests {
         let bandwidth = |v| [(ParameterId::BandwidthAllThreadsGbPerS, v)];
         assert_eq!(shown(Restricted::ContendedMemory, &bandwidth(50.0), &bandwidth(44.9)), [true]);
         assert_eq!(shown(Restricted::ContendedMemory, &bandwidth(50.0), &bandwidth(45.1)), [false]);
-        let both = |v, ns| [(ParameterId::BandwidthAllThreadsGbPerS, v), ("latency_262144_kib_ns", ns)];
+        let both = |v, ns| [(ParameterId::BandwidthAllThreadsGbPerS, v), (ParameterId::Latency262144KibNs, ns)];
         assert_eq!(shown(Restricted::ContendedMemory, &both(50.0, 200.0), &both(50.0, 230.0)), [true]);
         assert_eq!(shown(Restricted::ContendedMemory, &both(50.0, 200.0), &both(50.0, 210.0)), [false]);
     }
 
     #[test]
     fn a_contended_cache_shows_in_the_latency_just_below_its_size() {
-        assert_eq!(latency_below(32.0 * 1024.0 * 1024.0), "latency_16384_kib_ns");
-        assert_eq!(latency_below(16.0 * 1024.0 * 1024.0), "latency_4096_kib_ns");
-        assert_eq!(latency_below(1.0), "latency_16_kib_ns");
-        let latency = |llc, ns| [(ParameterId::CacheLlcBytes, llc), ("latency_16384_kib_ns", ns)];
+        assert_eq!(latency_below(32.0 * 1024.0 * 1024.0), ParameterId::Latency16384KibNs);
+        assert_eq!(latency_below(16.0 * 1024.0 * 1024.0), ParameterId::Latency4096KibNs);
+        assert_eq!(latency_below(1.0), ParameterId::Latency16KibNs);
+        let latency = |llc, ns| [(ParameterId::CacheLlcBytes, llc), (ParameterId::Latency16384KibNs, ns)];
         assert_eq!(shown(Restricted::ContendedCache, &latency(3.3e7, 20.0), &latency(3.3e7, 23.0)), [true]);
         assert_eq!(shown(Restricted::ContendedCache, &latency(3.3e7, 20.0), &latency(3.3e7, 19.0)), [false]);
     }
@@ -245,7 +242,7 @@ mod tests {
 
     #[test]
     fn a_rate_that_hardly_differs_beside_a_lower_count_is_no_failure() {
-        let told = |kind, without: &[(&str, f64)], with: &[(&str, f64)]| {
+        let told = |kind, without: &[(ParameterId, f64)], with: &[(ParameterId, f64)]| {
             let proof = prove(kind, &hardware(without), &hardware(with));
             assert_eq!(proof.len(), 2);
             not_shown(&Restriction { kinds: vec![kind], proof })
@@ -264,11 +261,10 @@ mod tests {
     fn parallel_units_of_a_gpu_must_be_lower_by_more_than_they_vary() {
         let with_gpu = |units| {
             let name = "llvmpipe".to_owned();
-            let text = String::new;
-            let gpu = GpuIdentity { index: 0, name, device: text(), driver: text(), api: text(), kind: GpuKind::Software };
+            let gpu = GpuIdentity::new(0, name, GpuKind::Software);
             let parameters = [(GpuParameterId::ArithmeticGflopPerS, 100.0), (GpuParameterId::ParallelUnits, units)];
-            let parameters = parameters.iter().map(|(name, v)| Parameter::reported(name, *v, "test")).collect();
-            Hardware { gpus: vec![GpuHardware { gpu, parameters }], ..hardware(&[]) }
+            let parameters = parameters.iter().map(|(name, v)| Parameter::reported(*name, *v, "test")).collect();
+            hardware(&[]).with_gpus(vec![GpuHardware::new(gpu, parameters)])
         };
         let shows = |units| prove(Restricted::GpuThreads, &with_gpu(10.0), &with_gpu(units))[0].shows;
         assert!(shows(8.9) && !shows(9.5));
@@ -279,9 +275,9 @@ mod tests {
         let with_gpu = |index, gflop| {
             let text = |t: &str| t.to_owned();
             let (name, driver) = (text("llvmpipe (LLVM 15)"), text("llvmpipe Mesa 22"));
-            let gpu = GpuIdentity { index, name, device: text(""), driver, api: text(""), kind: GpuKind::Software };
+            let gpu = GpuIdentity::new(index, name, GpuKind::Software).with_driver("", driver, "");
             let parameters = vec![Parameter::reported(GpuParameterId::ArithmeticGflopPerS, gflop, "test")];
-            Hardware { gpus: vec![GpuHardware { gpu, parameters }], ..hardware(&[]) }
+            hardware(&[]).with_gpus(vec![GpuHardware::new(gpu, parameters)])
         };
         let proofs = prove(Restricted::GpuThreads, &with_gpu(0, 147.0), &with_gpu(1, 74.0));
         assert_eq!((proofs[0].gpu, proofs[0].without, proofs[0].shows), (Some(1), Some(147.0), true));

@@ -3,8 +3,8 @@
 mod common;
 
 use common::{devices_with_a_gpu, failure, npy, sapwise, success, without_adapters};
-use sapwise::Report;
 use sapwise::hardware::GpuParameterId;
+use sapwise_lab::Report;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ fn answer(command: &mut assert_cmd::Command) -> Value {
 }
 
 fn report(command: &mut assert_cmd::Command) -> Report {
-    sapwise::json::report(&success(command)).unwrap()
+    sapwise_lab::report::read(&success(command)).unwrap().value
 }
 
 /// A made-up report of a machine with two GPUs, with what `change` does to it. Enough points for a model.

@@ -3,6 +3,7 @@
 mod common;
 
 use common::{failure, sapwise, success};
+use sapwise::ParameterId;
 use sapwise_lab::report::{Label, Report};
 use std::fs;
 use std::path::Path;
@@ -11,7 +12,7 @@ use std::path::Path;
 const TINY: [&str; 5] = ["probe", "--scenario", "uniform", "--max-objects", "20"];
 
 fn read(path: &Path) -> Report {
-    sapwise::json::report(&fs::read_to_string(path).unwrap()).unwrap()
+    sapwise_lab::report::read(&fs::read_to_string(path).unwrap()).unwrap().value
 }
 
 #[test]
@@ -44,7 +45,7 @@ fn fewer_threads_and_contention_are_labelled_and_json_alone_writes_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = sapwise();
     command.current_dir(folder.path()).args(TINY).args(["--threads", "1", "--contended", "--json"]);
-    let report = sapwise::json::report(&success(&mut command)).unwrap();
+    let report = sapwise_lab::report::read(&success(&mut command)).unwrap().value;
     assert_eq!((report.label, report.provenance.threads), (Label::RealContended, Some(1)));
     assert!(report.algorithms.iter().all(|t| t.id.threads() == 1), "{:?}", report.algorithms);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);

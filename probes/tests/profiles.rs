@@ -30,7 +30,7 @@ fn reports(folder: &Path, profile: &str) -> Vec<PathBuf> {
 }
 
 fn read(path: &Path) -> Report {
-    sapwise::json::report(&fs::read_to_string(path).unwrap()).unwrap()
+    sapwise_lab::report::read(&fs::read_to_string(path).unwrap()).unwrap().value
 }
 
 #[test]

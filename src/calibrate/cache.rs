@@ -127,7 +127,7 @@ impl CacheFile {
             Ok(_) => {}
         }
         let text = fs::read_to_string(&self.path).map_err(|e| ignored(&e.to_string()))?;
-        let cached: Cached = FORMAT.read(&text).map_err(|e| ignored(&e.to_string()))?.value;
+        let cached: Cached = FORMAT.read(&text).map_err(|e| ignored(&told(&e)))?.value;
         if cached.key != self.key {
             return Err(ignored("it is of another machine, another build or another model"));
         }
@@ -165,6 +165,14 @@ impl Keeper for CacheFile {
 #[cfg(feature = "schema")]
 pub fn cache_schema() -> Result<(String, String), json::Error> {
     FORMAT.json_schema::<Cached>()
+}
+
+/// What is wrong with a file. An old one is not worth the command that converts files.
+fn told(error: &json::Error) -> String {
+    match error {
+        json::Error::OldSchema { found, .. } => format!("the schema {found:?} is of an older version"),
+        other => other.to_string(),
+    }
 }
 
 #[cfg(test)]

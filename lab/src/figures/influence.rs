@@ -1,10 +1,10 @@
 //! Which hardware parameters are linked to which algorithms and crossovers.
 
 use super::canvas::Area;
-use super::chart::{Frame, Position, Stroke, fill, missing, path, words};
+use super::chart::{Frame, Stroke, missing, path, words};
 use super::legend::{Legend, Sign};
-use super::mark::{Mark, mark};
-use super::style::{self, GAP, GRID, INK, LABEL, PANEL, SECONDARY, SMALL, WIDTH, line_height};
+use super::style::{self, GAP, GRID, INK, LABEL, SMALL, WIDTH, line_height};
+use super::verdict::Verdict;
 use super::{Figure, font};
 use plotters::element::Text;
 use plotters::style::FontTransform;
@@ -28,16 +28,6 @@ pub(crate) struct InfluenceCell {
     pub(crate) value: Option<f64>,
     /// What stands in the cell.
     pub(crate) text: String,
-}
-
-/// A verdict.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) enum Verdict {
-    Linked,
-    NotLinked,
-    CannotBeTold,
-    #[default]
-    Absent,
 }
 
 /// The longest name of a row and of a column is cut to these widths.
@@ -68,34 +58,6 @@ impl InfluenceCell {
         }
     }
 }
-
-impl Verdict {
-    const ALL: [(Self, &'static str); 4] = [
-        (Self::Linked, "linked"),
-        (Self::NotLinked, "not linked"),
-        (Self::CannotBeTold, "cannot be told from these machines"),
-        (Self::Absent, "absent: too few values"),
-    ];
-
-    /// Shade and symbol, the symbol at `place`.
-    pub(super) fn draw(self, area: &Area<'_>, frame: Frame, place: Position) -> anyhow::Result<()> {
-        match self {
-            Self::Linked => {
-                fill(area, frame, style::colour(LINKED), 0.45)?;
-                Ok(area.draw(&mark(place, Mark::Disc, INK, 5))?)
-            }
-            Self::NotLinked => Ok(area.draw(&mark(place, Mark::Ring, INK, 5))?),
-            Self::CannotBeTold => {
-                fill(area, frame, GRID, 0.6)?;
-                words(area, "?", place, PANEL, INK, HPos::Center, VPos::Center)
-            }
-            Self::Absent => words(area, "-", place, LABEL, SECONDARY, HPos::Center, VPos::Center),
-        }
-    }
-}
-
-/// Position of the colour of what is linked.
-const LINKED: usize = 4;
 
 impl Influence {
     fn plan(&self) -> Plan {

@@ -1,11 +1,11 @@
 //! What the series are called, in columns below a chart.
 
-use super::Verdict;
 use super::canvas::Area;
 use super::chart::{Frame, Hatch, Stroke, fill, hatch, path, words};
 use super::font;
 use super::mark::{Mark, mark};
 use super::style::{self, INK, LABEL, SECONDARY, line_height};
+use super::verdict::Verdict;
 use plotters_backend::text_anchor::{HPos, VPos};
 
 /// Width of what stands before a name, and the room behind a name.

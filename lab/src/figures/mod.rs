@@ -16,6 +16,7 @@ mod regrets;
 mod replay;
 mod style;
 mod training;
+mod verdict;
 
 use canvas::Area;
 use plotters::element::Text;
@@ -26,12 +27,13 @@ use style::{GAP, INK, SECONDARY, SMALL, TITLE, line_height};
 
 pub(crate) use agreement::{Agreement, AgreementGroup, AgreementPoint, Values};
 pub(crate) use curves::{Band, BorderLine, Curve, CurvePanel, CurvePoint, Curves};
-pub(crate) use influence::{Influence, InfluenceCell, Verdict};
+pub(crate) use influence::{Influence, InfluenceCell};
 pub(crate) use map::{FieldMap, MapCell, MapPanel, MapPoint};
 pub(crate) use ratios::{RatioGroup, RatioKind, RatioValue, Ratios};
 pub(crate) use regrets::{Regrets, StrategyRegrets};
 pub use replay::ReplayPicture;
 pub use training::TrainingPicture;
+pub(crate) use verdict::Verdict;
 
 /// Lines at most of a title, and of a paragraph of a caption: a name or command of a megabyte makes no picture of a mile.
 const TITLE_LINES: usize = 3;

@@ -41,7 +41,7 @@ fn every_report_is_sound_complete_and_labelled() {
             assert!(!samples.is_empty() && samples.iter().all(|&n| n == samples[0] && n >= 5), "{name}: {samples:?}");
         }
         let [first, last] = [own.points.first(), own.points.iter().find(|p| p.load.objects == 300_000)];
-        let racing = |point: Option<&crate::report::Point>| point.unwrap().timings.len();
+        let racing = |point: Option<&report::Point>| point.unwrap().timings.len();
         assert!(racing(first) == own.algorithms.len() && racing(last) < racing(first), "{name}: nobody left the race");
     }
 }

@@ -2,8 +2,8 @@
 
 use super::look::Seen;
 use crate::exit::WrongUsage;
-use sapwise_lab::report::Report;
 use sapwise::{AlgorithmId, Backend, GpuIdentity, GpuKind};
+use sapwise_lab::report::Report;
 
 /// The options of verbs that take GPUs.
 #[derive(Debug, Clone, Default, PartialEq, Eq, clap::Args)]
@@ -87,8 +87,7 @@ mod tests {
     use super::*;
 
     fn gpu(index: u32, kind: GpuKind) -> GpuIdentity {
-        let text = |t: &str| t.to_owned();
-        GpuIdentity { index, name: text("X"), device: text("1:2"), driver: text("d 1"), api: text("vulkan"), kind }
+        GpuIdentity::new(index, "X", kind).with_driver("1:2", "d 1", "vulkan")
     }
 
     #[test]

@@ -100,8 +100,7 @@ mod tests {
     use super::*;
 
     fn gpu(index: u32, name: &str, kind: GpuKind) -> GpuIdentity {
-        let text = String::new;
-        GpuIdentity { index, name: name.to_owned(), device: text(), driver: text(), api: text(), kind }
+        GpuIdentity::new(index, name, kind)
     }
 
     fn names(cores: u32, level: SimdLevel, gpus: &[GpuIdentity]) -> Vec<String> {

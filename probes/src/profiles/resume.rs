@@ -2,12 +2,12 @@
 
 use super::profile::{Profile, is_named};
 use crate::args::{Arguments, Probe, Verb};
-use sapwise_lab::data::read_document;
 use crate::{provenance, restriction, revisions};
 use clap::Parser;
-use sapwise_lab::data::Document;
-use sapwise_lab::report::{Label, Report};
 use sapwise::{GpuIdentity, Registry};
+use sapwise_lab::data::Document;
+use sapwise_lab::data::read_document;
+use sapwise_lab::report::{Label, Report};
 use std::path::{Path, PathBuf};
 
 /// A folder, and what its reports are compared with.
@@ -155,12 +155,11 @@ mod tests {
         read_report(Path::new(path)).unwrap().1
     }
     use crate::profiles::family::{Whole, family};
-    use sapwise_lab::report::{Proof, Restricted, Restriction, Timed};
     use sapwise::{GpuKind, SimdLevel};
+    use sapwise_lab::report::{Proof, Restricted, Restriction, Timed};
 
     fn gpu(index: u32, name: &str) -> GpuIdentity {
-        let text = String::new;
-        GpuIdentity { index, name: name.to_owned(), device: text(), driver: text(), api: text(), kind: GpuKind::Discrete }
+        GpuIdentity::new(index, name, GpuKind::Discrete)
     }
 
     fn probe(words: &[&str]) -> Probe {
@@ -216,7 +215,7 @@ mod tests {
             assert_eq!(keeps(&|r| r.label = Label::RealContended), None);
             let proof = |r: &mut Report| r.provenance.restriction.as_mut().unwrap().proof[0].shows = false;
             assert_eq!(keeps(&proof), None);
-            let stale = Timed { id: "brute@cpu1".parse().unwrap(), revision: u32::MAX };
+            let stale = Timed::new("brute@cpu1".parse().unwrap(), u32::MAX);
             assert_eq!(keeps(&|r| r.algorithms.push(stale.clone())), None);
             let contended = |r: &mut Report| {
                 r.label = Label::RealContended;
@@ -227,7 +226,7 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("x-2c-1t--2026-11-21.json");
             assert_eq!(existing.obstacle(&path, profile), None);
-            std::fs::write(&path, sapwise::json::write_report(&other).unwrap()).unwrap();
+            std::fs::write(&path, sapwise_lab::report::write(&other).unwrap()).unwrap();
             let told = existing.obstacle(&path, profile).unwrap();
             assert!(told.contains("another command; name another folder with --out"), "{told}");
             std::fs::write(&path, "{}").unwrap();

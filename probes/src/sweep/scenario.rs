@@ -255,14 +255,15 @@ mod tests {
     fn a_size_that_does_not_fit_is_told() {
         let events = events(&request("uniform", &[10, 1_000_000], 0.0));
         assert_eq!(points(&events).len(), 1);
-        assert!(matches!(events.last(), Some(Event::Remark(text)) if text.contains("1000000 objects would exceed")), "{events:?}");
+        assert!(
+            matches!(events.last(), Some(Event::Remark(text)) if text.contains("1000000 objects would exceed")),
+            "{events:?}"
+        );
     }
 
     #[test]
     fn a_gpu_that_is_gone_is_a_remark_and_the_sweep_goes_on() {
-        let text = || "none such".to_owned();
-        let kind = sapwise::GpuKind::Discrete;
-        let gone = GpuIdentity { index: 99, name: text(), device: text(), driver: text(), api: text(), kind };
+        let gone = GpuIdentity::new(99, "none such", sapwise::GpuKind::Discrete);
         let request = SweepRequest { gpus: vec![gone], ..request("uniform", &[10], 1.0) };
         let (mut points, mut remarks) = (0, Vec::new());
         sweep(&request, &Algorithms::default(), &mut |event| {
