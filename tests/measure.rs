@@ -44,7 +44,7 @@ fn families_share_the_parameters_out() {
     for family in Family::ALL {
         assert_eq!(family.as_str().parse(), Ok(family));
         for name in family.parameters() {
-            assert!(seen.insert(name.clone()), "{name} is in two families");
+            assert!(seen.insert(name), "{name} is in two families");
         }
         let measured: Vec<String> = measure::family(family, &brief(Some(1))).into_iter().map(|p| p.name).collect();
         assert_eq!(measured, family.parameters());

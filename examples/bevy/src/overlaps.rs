@@ -27,13 +27,7 @@ impl Overlaps {
     /// No overlaps yet, to be found by this broad phase.
     #[must_use]
     pub fn new(broad_phase: Adaptive) -> Self {
-        Self {
-            broad_phase,
-            entities: Vec::new(),
-            boxes: Vec::new(),
-            pairs: Pairs::new(),
-            changes: Changes::new(),
-        }
+        Self { broad_phase, entities: Vec::new(), boxes: Vec::new(), pairs: Pairs::new(), changes: Changes::new() }
     }
 
     /// All pairs of entities that overlap, each with the lower one first, sorted.

@@ -1,7 +1,7 @@
 //! Sapwise beside rapier's own broad phase.
 
 use rapier3d::prelude::*;
-use sapwise::{Aabb, Adaptive, BroadPhase, Decision, Error, Tuning, Filter, Membership, Pairs, Registry};
+use sapwise::{Aabb, Adaptive, BroadPhase, Decision, Error, Filter, Membership, Pairs, Registry, Tuning};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
