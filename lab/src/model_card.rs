@@ -95,7 +95,9 @@ pub fn page(model: &Model, training: &Training, notes: &[String]) -> String {
         rows.push(vec![name, lowest, highest]);
     }
     text.push_str(&markdown(&rows));
-    text.push_str("\n## Intervals\n\nNone are claimed: how far a prediction may be off is not known beyond the validation above.\n");
+    text.push_str(
+        "\n## Intervals\n\nNone are claimed: how far a prediction may be off is not known beyond the validation above.\n",
+    );
     if !notes.is_empty() {
         text.push_str("\n## Notes\n\n");
         notes.iter().for_each(|note| text.push_str(&format!("- {note}\n")));

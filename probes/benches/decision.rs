@@ -1,25 +1,19 @@
 //! What one decision costs: the ranking alone, and the whole of `Adaptive::decide` with its sampled estimate.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use sapwise::{Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Tuning, Knot, Load, Pairs, Registry, Source, Term};
+use sapwise::{Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Knot, Load, Pairs, Registry, Source, Term, Tuning};
 use sapwise_scenes::Scenario;
 use std::hint::black_box;
 
 /// As many algorithms, terms and knots as a predicted field of a 16-core machine has.
 fn tuning(registry: &Registry) -> Tuning {
-    let curve = |k: u32| CostCurve {
-        terms: Term::ALL.map(|term| CostTerm { term, unit_ns: 1.0 + f64::from(k) / 100.0 }).to_vec(),
-        cache_bytes: 3.2e7,
-        fallback_terms: Vec::new(),
-        correction: (3..=24).map(|o| Knot { log2_objects: f64::from(o), ln_factor: 0.01 * f64::from(o % 5) }).collect(),
+    let curve = |k: u32| {
+        let terms = Term::ALL.map(|term| CostTerm::new(term, 1.0 + f64::from(k) / 100.0)).to_vec();
+        let knot = |o: u32| Knot { log2_objects: f64::from(o), ln_factor: 0.01 * f64::from(o % 5) };
+        CostCurve::new(terms).with_cache(3.2e7).with_correction((3..=24).map(knot).collect())
     };
     let ids = registry.entries().iter().map(|e| (e.id.clone(), e.revision));
-    let costs = ids.zip(0..).map(|((algorithm, revision), k)| AlgorithmCost {
-        algorithm,
-        revision,
-        curve: curve(k),
-        spread_ln: 0.05,
-    });
+    let costs = ids.zip(0..).map(|((algorithm, revision), k)| AlgorithmCost::new(algorithm, revision, curve(k), 0.05));
     let loads: Vec<Load> = (3..20).map(|k| Load::of_objects(1 << k)).collect();
     Tuning::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
 }

@@ -88,7 +88,7 @@ fn host_resident(mut algorithm: Box<dyn BroadPhase>) -> Turn {
 
 /// From boxes on a GPU to pairs on it, as many as the host then knows. The way there and back is not timed.
 fn device_resident(gpus: &Gpus, index: u32, method: &str) -> Result<Turn, String> {
-    let gpu = gpus.open(index)?;
+    let gpu = gpus.open(index).map_err(|e| e.to_string())?;
     let mut resident = Resident::new(&gpu, method).map_err(|e| e.to_string())?;
     let mut on_gpu = None;
     Ok(Box::new(move |boxes| {
@@ -110,14 +110,14 @@ fn upload(gpu: &Gpu, boxes: &[Aabb], last: Option<wgpu::Buffer>) -> Result<wgpu:
         _ => {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
             let descriptor = wgpu::BufferDescriptor { label: Some("boxes"), size, usage, mapped_at_creation: false };
-            gpu.try_make(|device| device.create_buffer(&descriptor))?
+            gpu.try_make(|device| device.create_buffer(&descriptor)).map_err(|e| e.to_string())?
         }
     };
     for (piece, at) in boxes.chunks(1 << 20).zip(0_u64..) {
         let bytes: Vec<u8> = piece.iter().flat_map(|b| [b.min, b.max]).flatten().flat_map(f32::to_ne_bytes).collect();
         gpu.queue().write_buffer(&buffer, (at << 20) * size_of::<Aabb>() as u64, &bytes);
     }
-    gpu.wait(gpu.queue().submit([]))?;
+    gpu.wait(gpu.queue().submit([])).map_err(|e| e.to_string())?;
     Ok(buffer)
 }
 
@@ -128,12 +128,12 @@ fn download(gpu: &Gpu, found: ResidentPairs<'_>) -> Result<u64, String> {
     if size > 0 {
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
         let descriptor = wgpu::BufferDescriptor { label: Some("pairs"), size, usage, mapped_at_creation: false };
-        let copy = gpu.try_make(|device| device.create_buffer(&descriptor))?;
+        let copy = gpu.try_make(|device| device.create_buffer(&descriptor)).map_err(|e| e.to_string())?;
         let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(found.buffer, 0, &copy, 0, size);
         let submission = gpu.queue().submit([encoder.finish()]);
         copy.map_async(wgpu::MapMode::Read, .., |_| {});
-        gpu.wait(submission)?;
+        gpu.wait(submission).map_err(|e| e.to_string())?;
         let bytes = copy.get_mapped_range(..).map_err(|e| e.to_string())?;
         let number = |b: &[u8]| u32::from_ne_bytes([b[0], b[1], b[2], b[3]]);
         bytes.chunks_exact(8).for_each(|pair| pairs.push(number(&pair[..4]), number(&pair[4..])));

@@ -1,10 +1,10 @@
 //! Other programs at work, made by ourselves: threads that take memory bandwidth or cache.
 
-use sapwise_scenes::Random;
 use core_affinity::CoreId;
 use sapwise::ParameterId;
 use sapwise::measure::{self, Family, Options};
 use sapwise::usable_cores;
+use sapwise_scenes::Random;
 use std::fmt;
 use std::hint::black_box;
 use std::sync::Arc;
@@ -111,7 +111,8 @@ fn spare_cores(all: Vec<CoreId>, threads: Option<u32>) -> Vec<CoreId> {
 /// whichever cores share one, the lines of those who run there come to each.
 fn words() -> Arc<[AtomicU64]> {
     let caches = measure::family(Family::Caches, &Options::default().brief(true));
-    let llc = caches.iter().find(|p| p.name == ParameterId::CacheLlcBytes).and_then(|p| p.value).unwrap_or(ASSUMED_LLC_BYTES);
+    let llc =
+        caches.iter().find(|p| p.name == ParameterId::CacheLlcBytes).and_then(|p| p.value).unwrap_or(ASSUMED_LLC_BYTES);
     let lines = (llc * CACHE_SHARE) as usize / (LINE * size_of::<AtomicU64>());
     (0..lines.max(1) * LINE).map(|_| AtomicU64::new(0)).collect()
 }

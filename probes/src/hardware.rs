@@ -83,7 +83,9 @@ fn measure_family(name: &str, threads: Option<u32>) -> anyhow::Result<Result<Vec
         Ok(())
     })?;
     Ok(match ended {
-        Ended::Well => serde_json::from_str(&text).map_err(|e| format!("the probe {name} returned an unreadable answer: {e}")),
+        Ended::Well => {
+            serde_json::from_str(&text).map_err(|e| format!("the probe {name} returned an unreadable answer: {e}"))
+        }
         Ended::Interrupted => Err("interrupted while it was measured".to_owned()),
         Ended::Badly(how) => Err(format!("the probe {name} {how}")),
     })

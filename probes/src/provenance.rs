@@ -101,8 +101,8 @@ mod tests {
     use super::*;
     use crate::args::{Arguments, Verb};
     use clap::Parser;
-    use sapwise_lab::report::Timing;
     use sapwise::{GpuHardware, GpuIdentity, Load, Machine};
+    use sapwise_lab::report::Timing;
 
     fn probe(words: &[&str]) -> Probe {
         let all = ["sapwise", "probe"].iter().chain(words);

@@ -2,12 +2,12 @@
 
 use crate::args::Lifted;
 use crate::contention::{ASSUMED_LLC_BYTES, Contended};
-use sapwise_lab::data::read_document;
 use anyhow::bail;
 use sapwise::hardware::{GpuParameterId, ParameterId};
-use sapwise_lab::data::Document;
-use sapwise_lab::report::{Proof, Restricted, Restriction};
 use sapwise::{GpuHardware, GpuIdentity, Hardware, SimdLevel, usable_cores};
+use sapwise_lab::data::Document;
+use sapwise_lab::data::read_document;
+use sapwise_lab::report::{Proof, Restricted, Restriction};
 
 /// The variable that sets the threads of lavapipe.
 pub(crate) const LAVAPIPE_THREADS: &str = "LP_NUM_THREADS";
@@ -167,10 +167,7 @@ fn on_gpu(with: &GpuHardware, without: &Hardware) -> Proof {
         let values = (without.and_then(|g| g.value(id)), with.value(id));
         proof(Restricted::GpuThreads, id.as_str(), Some(with.gpu.index), change, values)
     };
-    first_shown([
-        by(GpuParameterId::ArithmeticGflopPerS, Change::Lower),
-        by(GpuParameterId::ParallelUnits, Change::Lower),
-    ])
+    first_shown([by(GpuParameterId::ArithmeticGflopPerS, Change::Lower), by(GpuParameterId::ParallelUnits, Change::Lower)])
 }
 
 fn proof(

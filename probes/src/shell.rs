@@ -26,6 +26,9 @@ mod tests {
 
     #[test]
     fn words_that_a_shell_would_take_apart_are_quoted() {
-        assert_eq!([quoted("a-b/c.json"), quoted("a b"), quoted("it's"), quoted("")], ["a-b/c.json", "'a b'", "'it'\\''s'", "''"]);
+        assert_eq!(
+            [quoted("a-b/c.json"), quoted("a b"), quoted("it's"), quoted("")],
+            ["a-b/c.json", "'a b'", "'it'\\''s'", "''"]
+        );
     }
 }

@@ -4,12 +4,12 @@ use crate::gpus::GpuChoice;
 use crate::shell;
 use crate::terminal::Terminal;
 use sapwise::{Backend, Crossover, GpuHardware, GpuIdentity, Hardware, How, Parameter, Tuning};
+use sapwise_lab::data::usual_scenario;
+use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::label_text;
 use sapwise_lab::report::{Label, Report};
 use sapwise_lab::text::{columns, count, duration, grouped};
 use sapwise_lab::units::value;
-use sapwise_lab::data::usual_scenario;
-use sapwise_lab::fit::measured_tuning;
 use std::path::Path;
 
 /// The hardware, then the tuning of every scenario that was swept.
@@ -22,7 +22,11 @@ pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
         }
     }
     if report.label != Label::RealFull {
-        text.push_str(&format!("\nThis report is labelled {}: {}.\n", label_text::kind(report.label), label_text::meaning(report.label)));
+        text.push_str(&format!(
+            "\nThis report is labelled {}: {}.\n",
+            label_text::kind(report.label),
+            label_text::meaning(report.label)
+        ));
     }
     for remark in &report.remarks {
         text.push_str(&format!("\n{} {remark}\n", terminal.warning("remark:")));
@@ -72,7 +76,8 @@ pub(crate) fn gpus_left_out(
     remarks: &[String],
 ) -> Option<String> {
     let none = !choice.no_gpus && hardware.gpus.is_empty() && left_out.is_empty() && remarks.is_empty();
-    none.then(|| "No GPU was found; the algorithms on the CPU are not affected.".to_owned()).or_else(|| choice.tell(left_out))
+    none.then(|| "No GPU was found; the algorithms on the CPU are not affected.".to_owned())
+        .or_else(|| choice.tell(left_out))
 }
 
 /// Parameters as a table. Those that are missing for the same reason share a row.
@@ -109,7 +114,8 @@ pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
     let mut rows = Vec::new();
     for step in &tuning.steps {
         // The first step begins at 0 without a crossover.
-        let crossover = tuning.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
+        let crossover =
+            tuning.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
         let interval = crossover.and_then(Crossover::interval).map_or(String::new(), |(low, high)| {
             format!("{} to {}", grouped(low.round() as u64), grouped(high.round() as u64))
         });

@@ -1,7 +1,7 @@
 //! What standard output is, and so what can be shown on it.
 
-use sapwise_lab::text::{columns, width};
 use console::{Style, Term};
+use sapwise_lab::text::{columns, width};
 
 /// Standard output where it is a terminal, or where it is none.
 ///

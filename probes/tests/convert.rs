@@ -42,7 +42,8 @@ fn what_is_not_converted_is_told_and_nothing_is_written_over() {
     failure(sapwise().arg("convert").args([&copy, &old("fields-1.json")]).arg("--out").arg(folder.path().join("new")), 2);
     let (first, second) = (folder.path().join("first"), folder.path().join("second"));
     success(sapwise().arg("convert").arg(&copy).arg("--out").arg(&first));
-    let again = sapwise().args(["convert", "--json"]).arg(first.join("fields-1.json")).arg(old("report-1-cut.json"));
+    let mut again = sapwise();
+    let again = again.args(["convert", "--json"]).arg(first.join("fields-1.json")).arg(old("report-1-cut.json"));
     let again = again.arg("--out").arg(&second).output().unwrap();
     assert_eq!(again.status.code(), Some(1));
     let answer: Value = serde_json::from_slice(&again.stdout).unwrap();

@@ -88,7 +88,8 @@ fn every_example_works_as_it_is_printed_and_so_does_what_is_said_to_be_next() {
     for verb in verbs {
         let help = success(sapwise().args([&verb, "--help"]));
         let lines = help.lines().filter_map(|line| Some(&line[line.find("sapwise ")?..]).filter(|_| line.starts_with("  ")));
-        let examples: Vec<&str> = lines.filter(|line| line.starts_with(&format!("sapwise {verb}")) || verb == "simulate").collect();
+        let examples: Vec<&str> =
+            lines.filter(|line| line.starts_with(&format!("sapwise {verb}")) || verb == "simulate").collect();
         assert!(!examples.is_empty(), "{verb} has no example: {help}");
         for example in examples {
             // What is behind two blanks on a line of completions says where it goes.

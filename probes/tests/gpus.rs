@@ -3,8 +3,8 @@
 mod common;
 
 use common::{devices_with_a_gpu, failure, npy, sapwise, success, without_adapters};
-use sapwise_lab::Report;
 use sapwise::hardware::GpuParameterId;
+use sapwise_lab::Report;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -90,7 +90,8 @@ fn a_run_tells_its_figures_by_parts() {
     assert_eq!(largest["objects"], told["objects"]["max"]);
     assert!(told["total_ms"]["fixed"].get(largest["algorithm"].as_str().unwrap()).is_some(), "{told}");
     let text = success(&mut run("uniform", &tuning, &["--objects", "50", "--frames", "3", "--repeats", "1"]));
-    for needed in ["One repeat: the oracle takes the minimum", "Without learning.", "written by hand", "adaptive ran it in"] {
+    for needed in ["One repeat: the oracle takes the minimum", "Without learning.", "written by hand", "adaptive ran it in"]
+    {
         assert!(text.contains(needed), "{needed}: {text}");
     }
 }

@@ -80,7 +80,8 @@ fn figures_come_from_the_reports_that_they_name() {
     assert!(looked_at > 150, "{looked_at}");
     // Every median time stands in one row, with what it is of.
     let timings = rows(&out.join("tables/timings.csv"));
-    let named = |r: &BTreeMap<String, String>| r["algorithm"] == "grid-sap@cpu2" && r["threads"] == "2" && r["method"] == "grid-sap";
+    let named =
+        |r: &BTreeMap<String, String>| r["algorithm"] == "grid-sap@cpu2" && r["threads"] == "2" && r["method"] == "grid-sap";
     assert!(timings.iter().any(|r| named(r) && r["scenario"] == "uniform" && r["median_ns"].parse::<f64>().unwrap() > 0.0));
     // Vectors were taken from two threads and from one, and both reports show it; two pairs are too few for a verdict.
     let taken = rows(&out.join("tables/restrictions.csv"));
@@ -127,12 +128,7 @@ fn simulated_machines_are_studied_by_themselves() {
     success(sapwise().args(["simulate", "--machines", "7", "--out"]).arg(&machines));
     let out = folder.path().join("study");
     let text = success(sapwise().args(["study", "--simulated"]).args([&machines, &stored("1t")]).arg("--out").arg(&out));
-    assert!(
-        text.contains(
-            "8 reports of 7 physical machines, 7 of them with timings that are studied."
-        ),
-        "{text}"
-    );
+    assert!(text.contains("8 reports of 7 physical machines, 7 of them with timings that are studied."), "{text}");
     let links = rows(&out.join("tables/influence.csv"));
     let link = |parameter: &str, of: &str| links.iter().find(|l| l["parameter"] == parameter && l["outcome"] == of).unwrap();
     let clock = link("clock_measured_ghz", "time of brute@cpu1");

@@ -111,7 +111,10 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     assert!(swept.contains(&("bvh@cpu1", 1)) && swept.iter().any(|t| t.0 == "brute@cpu1"), "{swept:?}");
     let timed = told["algorithms"].as_array().unwrap().iter().find(|t| t["id"] == "bvh@cpu1").unwrap();
     assert_eq!(timed["terms"].as_array().unwrap().len(), 4, "{timed}");
-    assert!(told["algorithms"].as_array().unwrap().iter().all(|t| t["id"] == "bvh@cpu1" || t.get("terms").is_none()), "{told}");
+    assert!(
+        told["algorithms"].as_array().unwrap().iter().all(|t| t["id"] == "bvh@cpu1" || t.get("terms").is_none()),
+        "{told}"
+    );
     let points = told["points"].as_array().unwrap();
     let timings = points.iter().flat_map(|p| p["timings"].as_array().unwrap());
     let own: Vec<&Value> = timings.filter(|t| t["algorithm"] == "bvh@cpu1").collect();

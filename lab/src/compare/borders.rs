@@ -1,9 +1,9 @@
 //! How far the borders between fields move from report to report.
 
 use crate::fit::measured_tuning;
+use crate::report::{Point, Report};
 use crate::sweep;
 use sapwise::stats::{median, relative_iqr};
-use crate::report::{Point, Report};
 use sapwise::{AlgorithmId, Crossover, Tuning};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -49,7 +49,9 @@ impl Comparison {
         }
         for (name, report) in rest {
             if let Some(difference) = difference(first, report) {
-                bail!("{name} and {first_name} differ in {difference}: give reports of the same machine with the same restriction");
+                bail!(
+                    "{name} and {first_name} differ in {difference}: give reports of the same machine with the same restriction"
+                );
             }
         }
         if let Some((name, _)) = reports.iter().find(|(_, r)| is_unfinished(r)) {
@@ -130,7 +132,11 @@ mod tests {
         let comparison = Comparison::of(vec![named(report.clone()), named(report)]).unwrap();
         assert!(!comparison.parameters.is_empty() && !comparison.borders.is_empty());
         assert!(comparison.parameters.iter().all(|s| s.low == s.high));
-        assert!(comparison.borders.iter().all(|b| b.largest_deviation == 0.0 && b.own_interval_holds_median == 1.0), "{:?}", comparison.borders);
+        assert!(
+            comparison.borders.iter().all(|b| b.largest_deviation == 0.0 && b.own_interval_holds_median == 1.0),
+            "{:?}",
+            comparison.borders
+        );
         let losses = comparison.losses.unwrap();
         assert!(losses.own.abs() < 0.02 && (losses.others - losses.own).abs() < 1e-12, "{losses:?}");
     }
@@ -138,7 +144,8 @@ mod tests {
     #[test]
     fn reports_of_different_machines_or_restrictions_are_refused() {
         let [a, b] = [0, 1].map(|k| Machine::family()[k].report());
-        let error = |x: &Report, y: &Report| Comparison::of(vec![named(x.clone()), named(y.clone())]).unwrap_err().to_string();
+        let error =
+            |x: &Report, y: &Report| Comparison::of(vec![named(x.clone()), named(y.clone())]).unwrap_err().to_string();
         assert!(error(&a, &b).contains("the physical machine"));
         let mut fewer = a.clone();
         fewer.provenance.threads = Some(1);
@@ -161,7 +168,9 @@ mod tests {
         quick.algorithms.retain(|t| !sap(&t.id));
         quick.points.iter_mut().for_each(|p| p.timings.retain(|t| !sap(&t.algorithm)));
         let all = Comparison::of(vec![("full.json".to_owned(), full), ("quick.json".to_owned(), quick)]).unwrap();
-        assert!(all.borders.iter().all(|b| b.scenario == "uniform" && b.largest_deviation == 0.0) && !all.borders.is_empty());
+        assert!(
+            all.borders.iter().all(|b| b.scenario == "uniform" && b.largest_deviation == 0.0) && !all.borders.is_empty()
+        );
         assert!(all.borders.iter().all(|b| b.below.method() != "sap" && b.above.method() != "sap"));
         let told = all.not_compared.join("\n");
         assert!(told.contains("quick.json lacks the scenario clustered") && told.contains("sap@cpu1"), "{told}");

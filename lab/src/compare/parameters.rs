@@ -1,7 +1,7 @@
 //! How far a measured parameter differs from report to report.
 
-use sapwise::stats::{quantile, relative_iqr};
 use crate::Report;
+use sapwise::stats::{quantile, relative_iqr};
 use sapwise::{How, Parameter};
 use serde::Serialize;
 

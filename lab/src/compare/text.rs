@@ -30,7 +30,16 @@ impl Comparison {
         text.push_str(&draw(&table(&head, self.parameters.iter().map(parameter))));
         if !self.borders.is_empty() {
             text.push('\n');
-            let head = ["scenario", "border", "objects", "farthest from it", "IQR/median", "held by own intervals", "error of x2 costs", "reports"];
+            let head = [
+                "scenario",
+                "border",
+                "objects",
+                "farthest from it",
+                "IQR/median",
+                "held by own intervals",
+                "error of x2 costs",
+                "reports",
+            ];
             text.push_str(&draw(&table(&head, self.borders.iter().map(border))));
             text.push_str(BORDERS);
         }

@@ -2,10 +2,10 @@
 
 use crate::progress::Progress;
 use crate::report::{self, Report};
-use anyhow::{Context, bail};
-use sapwise::json::{self, Schema};
 use crate::training::{StoredModel, read_model};
+use anyhow::{Context, bail};
 use sapwise::Tuning;
+use sapwise::json::{self, Schema};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};

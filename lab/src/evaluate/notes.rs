@@ -1,9 +1,6 @@
 //! Notes that say the same of several reports, as one.
 
-/// Files that a note names before it tells their number only.
-const MOST_FILES: usize = 3;
-
-/// The notes without repetition. Those that begin with the name of a file and go on alike become one that names some of the files, and
+/// The notes without repetition. Those that begin with the name of a file and go on alike become one that names all of the files, and
 /// those that differ in numbers alone become one with the range of each number. In the order of the first of each.
 pub fn folded(notes: Vec<String>) -> Vec<String> {
     let mut kinds: Vec<Kind> = Vec::new();
@@ -76,12 +73,7 @@ impl Kind {
         match &self.files[..] {
             [] => rest,
             [file] => format!("{file} {rest}"),
-            files if files.len() <= MOST_FILES => format!("{}: each {rest}", files.join(", ")),
-            files => {
-                let others = files.len() - MOST_FILES;
-                let more = if others == 1 { "one more" } else { &format!("{others} more") };
-                format!("{} and {more}: each {rest}", files[..MOST_FILES].join(", "))
-            }
+            files => format!("{}: each {rest}", files.join(", ")),
         }
     }
 }
@@ -101,8 +93,8 @@ mod tests {
         let files =
             ["a.json is left out: it is old", "one", "b.json is left out: it is old", "c.json is left out: it is new"];
         assert_eq!(told(&files), ["a.json, b.json: each is left out: it is old", "one", "c.json is left out: it is new"]);
-        let many: Vec<String> = (0..9).map(|k| format!("{k}.json is left out: it is old")).collect();
-        assert_eq!(folded(many), ["0.json, 1.json, 2.json and 6 more: each is left out: it is old"]);
+        let many: Vec<String> = (0..5).map(|k| format!("{k}.json is left out: it is old")).collect();
+        assert_eq!(folded(many), ["0.json, 1.json, 2.json, 3.json, 4.json: each is left out: it is old"]);
     }
 
     #[test]

@@ -214,7 +214,10 @@ mod tests {
                 let (still, fast) = (load(n, 0.0), load(n, 1.0));
                 let look = ns(&machine, "grid-sap@cpu1", &fast) * 0.5 + 10_000.0;
                 assert!(ns(&machine, "pair-cache@cpu1", &fast) <= ns(&machine, "grid-sap@cpu1", &fast) + look);
-                assert!(ns(&machine, "pair-cache@cpu1", &still) < ns(&machine, "grid-sap@cpu1", &still), "{n} on {machine:?}");
+                assert!(
+                    ns(&machine, "pair-cache@cpu1", &still) < ns(&machine, "grid-sap@cpu1", &still),
+                    "{n} on {machine:?}"
+                );
             }
         }
     }

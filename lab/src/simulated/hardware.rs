@@ -2,9 +2,9 @@
 
 use super::machine::{TrueGpu, TrueMachine};
 use super::pairing::Build;
-use sapwise_scenes::Random;
 use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, ParameterId, Statistic};
 use sapwise::{Hardware, Machine, Parameter};
+use sapwise_scenes::Random;
 
 /// Why a parameter that probes measure is not simulated.
 const NOT_SIMULATED: &str = "not simulated: no cost depends on it";

@@ -12,10 +12,10 @@ mod race;
 mod specification;
 
 use crate::progress::Progress;
+use crate::report::{Label, Provenance, Report, Timed};
 use anyhow::Result;
 use cost::Costs;
 use machine::TrueMachine;
-use crate::report::{Label, Provenance, Report, Timed};
 use sapwise::{AlgorithmId, Registry};
 
 pub use loads::Loads;

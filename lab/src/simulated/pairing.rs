@@ -1,8 +1,8 @@
 //! Which CPU and which GPUs make a machine.
 
 use super::specification::{Cpu, Form, Gpu, Specifications};
-use sapwise_scenes::Random;
 use anyhow::{Result, bail};
+use sapwise_scenes::Random;
 
 /// A machine that could be bought.
 #[derive(Debug, Clone)]

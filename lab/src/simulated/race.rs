@@ -2,8 +2,8 @@
 
 use super::cost::Costs;
 use super::loads::Loads;
-use crate::sweep::{Standing, median};
 use crate::report::{Point, Timing};
+use crate::sweep::{Standing, median};
 use sapwise::{AlgorithmId, Load};
 use sapwise_scenes::{Random, Scenario};
 

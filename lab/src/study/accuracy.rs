@@ -1,10 +1,10 @@
 //! How well times, borders and choices are predicted from hardware parameters alone: the validation of a training as tables.
 
 use super::entry::Entry;
+use crate::Validation;
 use crate::data_table::{Cell, Column, DataTable};
 use crate::evaluate::{HeldOut, HeldOutCrossover, OURS};
 use crate::figures::{Agreement, AgreementGroup, AgreementPoint, Values};
-use crate::Validation;
 use sapwise::{AlgorithmId, BackendClass, Crossover};
 use std::collections::BTreeMap;
 
@@ -64,8 +64,12 @@ pub(super) fn regrets(held_out: &HeldOut, entries: &[Entry]) -> DataTable {
             let own: Vec<usize> = (0..entries.len()).filter(|&k| is_own(&entries[k])).collect();
             let none = || Cell::Missing("this strategy was judged on some of them only".to_owned());
             let cpu = own.first().map(|&k| Cell::text(&entries[k].hardware.machine.cpu));
-            let cells =
-                vec![unit.map_or_else(none, Cell::text), cpu.unwrap_or_else(none), Cell::text(*strategy), Cell::percent(*regret)];
+            let cells = vec![
+                unit.map_or_else(none, Cell::text),
+                cpu.unwrap_or_else(none),
+                Cell::text(*strategy),
+                Cell::percent(*regret),
+            ];
             table.push(cells, &own);
         }
     }

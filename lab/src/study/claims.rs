@@ -73,7 +73,11 @@ pub(super) fn cards(entries: &[Entry]) -> [Option<usize>; 3] {
 /// The claims of Section 6, in its order.
 pub(super) fn claims(entries: &[Entry], influence: &Influence) -> Vec<Claim> {
     let said = [
-        ("The clock rate of the GPU does not influence the time of the broad phase.", GpuParameterId::ClockGhz, Said::NotLinked),
+        (
+            "The clock rate of the GPU does not influence the time of the broad phase.",
+            GpuParameterId::ClockGhz,
+            Said::NotLinked,
+        ),
         ("The clock rate is almost the same on the three cards.", GpuParameterId::ClockGhz, Said::AlikeOnAll),
         ("The bandwidth from CPU to GPU is almost the same on them.", GpuParameterId::UploadGbPerS, Said::AlikeOnAll),
         ("The bandwidth from GPU to CPU is similar on two of them.", GpuParameterId::DownloadGbPerS, Said::AlikeOnTwo),

@@ -203,8 +203,13 @@ pub(super) fn tables(figure: &Curves, drawn: &[(usize, &Entry, &Report)]) -> [Da
         ("lower quartile (ns)", "lower_quartile_ns"),
         ("upper quartile (ns)", "upper_quartile_ns"),
     ]);
-    let mut fields =
-        DataTable::new([heads[0], heads[1], ("on", "side"), ("from (objects)", "from_objects"), ("to (objects)", "to_objects")]);
+    let mut fields = DataTable::new([
+        heads[0],
+        heads[1],
+        ("on", "side"),
+        ("from (objects)", "from_objects"),
+        ("to (objects)", "to_objects"),
+    ]);
     let mut borders = DataTable::new([
         heads[0],
         heads[1],

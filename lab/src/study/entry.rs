@@ -1,8 +1,8 @@
 //! One report of a study: what the page tells of it, and its medians.
 
 use crate::data::{Profile, figure};
-use sapwise::hardware::ParameterId;
 use crate::report::{Label, Provenance, Report};
+use sapwise::hardware::ParameterId;
 use sapwise::{AlgorithmId, Backend, BackendClass, GpuHardware, GpuKind, Hardware};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

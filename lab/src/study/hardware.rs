@@ -1,8 +1,8 @@
 //! Figure 9 of the paper: the hardware parameters of every machine.
 
 use super::entry::Entry;
-use crate::data_table::{Cell, Column, DataTable};
 use crate::data::{COMPARED, COMPARED_OF_GPUS};
+use crate::data_table::{Cell, Column, DataTable};
 use crate::label_text::kind;
 use sapwise::hardware::GpuParameterId;
 use sapwise::hardware::How;

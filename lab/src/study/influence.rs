@@ -2,8 +2,8 @@
 
 use super::entry::{Entry, representatives};
 use super::rank::{self, Rank};
-use super::speed::slownesses;
 use super::side_crossovers::measured_crossovers;
+use super::speed::slownesses;
 use crate::evaluate::{Effect, Importance, Verdict};
 use rayon::prelude::*;
 use sapwise::Backend;

@@ -9,8 +9,8 @@ use crate::train::without;
 use anyhow::Result;
 use rayon::prelude::*;
 use sapwise::stats::median;
-use sapwise_scenes::Random;
 use sapwise::{Aabb, AlgorithmCost, AlgorithmId, Load};
+use sapwise_scenes::Random;
 
 /// Cells on either axis.
 const ACROSS: usize = 24;

@@ -105,19 +105,7 @@ impl Study {
         let borders = trained.as_ref().map(|t| measured_borders(&t.held_out, &entries)).unwrap_or_default();
         progress.advance(1);
         let wanted = if asked.is_empty() { representatives(&entries) } else { asked };
-        Ok(Self {
-            entries,
-            wanted,
-            reference,
-            profiles,
-            notes,
-            trained,
-            importance,
-            drawn,
-            borders,
-            unreadable,
-            command,
-        })
+        Ok(Self { entries, wanted, reference, profiles, notes, trained, importance, drawn, borders, unreadable, command })
     }
 
     /// Names of the files that can't be read, and why.

@@ -4,8 +4,8 @@ use super::entry::Entry;
 use super::hardware::words;
 use super::influence::parameters;
 use super::speed::{LARGE, SpeedUp, speed_ups};
-use crate::figures::{RatioGroup, RatioKind, RatioValue, Ratios};
 use crate::data_table::{Cell, DataTable};
+use crate::figures::{RatioGroup, RatioKind, RatioValue, Ratios};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Machines in one picture.

@@ -94,8 +94,9 @@ mod tests {
 
     #[test]
     fn borders_are_found_and_those_that_are_not_there_lie_at_the_ends() {
-        let ids: Vec<AlgorithmId> =
-            ["brute@cpu1", "brute@cpu4", "grid-sap@cpu1", "grid-sap@cpu4", "grid-sap@gpu0"].map(|id| id.parse().unwrap()).into();
+        let ids: Vec<AlgorithmId> = ["brute@cpu1", "brute@cpu4", "grid-sap@cpu1", "grid-sap@cpu4", "grid-sap@gpu0"]
+            .map(|id| id.parse().unwrap())
+            .into();
         let pairs = pairs(&ids);
         let names: Vec<&str> = pairs.iter().map(|p| p.name.as_str()).collect();
         let all = ["brute@cpu1, brute on all threads", "grid-sap@cpu1, grid-sap on all threads"];

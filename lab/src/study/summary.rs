@@ -84,7 +84,9 @@ impl Default for Summary {
     fn default() -> Self {
         Self {
             schema: SCHEMA.to_owned(),
-            about: "A summary. The figures behind it are in the files that it lists; tables/timings.csv has every median time.".to_owned(),
+            about:
+                "A summary. The figures behind it are in the files that it lists; tables/timings.csv has every median time."
+                    .to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             command: String::new(),
             reports: Vec::new(),

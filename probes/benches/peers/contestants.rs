@@ -5,7 +5,7 @@ use crate::obvhs_tree::Obvhs;
 use crate::parry::{Margin, ParallelParry, Parry, Upkeep};
 use crate::rtree::Packed;
 use rayon::ThreadPool;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Tuning, Pairs, Registry, SimdLevel};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Pairs, Registry, SimdLevel, Tuning};
 use std::sync::Arc;
 
 /// A side of the comparison.

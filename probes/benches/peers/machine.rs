@@ -4,7 +4,7 @@ use crate::settings::Settings;
 use rayon::ThreadPool;
 use sapwise::hardware::ParameterId;
 use sapwise::measure::{self, Options};
-use sapwise::{Tuning, Hardware, Model, Registry, Source, json};
+use sapwise::{Hardware, Model, Registry, Source, Tuning, json};
 use std::process::Command;
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ pub(crate) fn tuning(registry: &Registry, threads: u32, settings: &Settings) -> 
     }
     let hardware = measure::hardware(&Options::default().with_threads(Some(threads)));
     let model = Model::built_in().map_err(|e| e.to_string())?;
-    let prediction = model.predict(&hardware, &registry.available())?;
+    let prediction = model.predict(&hardware, &registry.available()).map_err(|e| e.to_string())?;
     // Where there are costs, they decide; the slice through loads is for people.
     Ok(Tuning::from_costs(Source::Predicted, "uniform", prediction.costs, &[]))
 }
@@ -47,7 +47,7 @@ pub(crate) fn pinned_pool(threads: usize) -> Result<Arc<ThreadPool>, String> {
 pub(crate) fn describe() -> String {
     let machine = measure::machine();
     let topology = measure::family(measure::Family::Topology, &Options::default());
-    let hardware = Hardware { machine, parameters: topology, gpus: Vec::new(), gpu_groups: Vec::new() };
+    let hardware = Hardware::new(machine, topology);
     let m = &hardware.machine;
     let cores = hardware.value(ParameterId::UsableCores).unwrap_or(f64::NAN);
     let compiler = Command::new("rustc").arg("--version").output().ok();

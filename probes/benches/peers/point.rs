@@ -1,8 +1,8 @@
 //! What was measured of one scenario at one size.
 
 use crate::contestants::Side;
-use sapwise_scenes::Scenario;
 use sapwise::stats::quantile;
+use sapwise_scenes::Scenario;
 
 /// How a contestant did.
 pub(crate) struct Lane {

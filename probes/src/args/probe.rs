@@ -75,7 +75,8 @@ impl Probe {
     /// When one is unknown.
     pub(crate) fn scenarios(&self) -> Result<Vec<Scenario>, WrongUsage> {
         let scenarios: Result<Vec<Scenario>, _> = self.scenarios.iter().map(|s| s.parse()).collect();
-        let mut scenarios = scenarios.map_err(|e: sapwise_scenes::UnknownScenario| WrongUsage(format!("--scenario: {e}")))?;
+        let mut scenarios =
+            scenarios.map_err(|e: sapwise_scenes::UnknownScenario| WrongUsage(format!("--scenario: {e}")))?;
         let mut seen = Vec::new();
         scenarios.retain(|s| !seen.contains(s) && (seen.push(*s), true).1);
         Ok(scenarios)

@@ -197,7 +197,13 @@ pub(crate) fn doubts(report: &Report) -> Vec<String> {
 pub(crate) fn hardware_doubts(hardware: &Hardware) -> Vec<String> {
     let own = hardware.parameters.iter();
     let beyond = own.filter_map(|p| scaling_beyond_threads(hardware, p));
-    beyond.map(|what| format!("{what}; other programs disturbed the measurement of one thread: measure again with nothing else running")).collect()
+    beyond
+        .map(|what| {
+            format!(
+                "{what}; other programs disturbed the measurement of one thread: measure again with nothing else running"
+            )
+        })
+        .collect()
 }
 
 /// What a maintainer should ask about, one sentence each.

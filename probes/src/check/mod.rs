@@ -7,10 +7,10 @@ mod report;
 mod tuning;
 
 use crate::algorithms::Algorithms;
-use sapwise_lab::data::{Document, read_document};
 use crate::gpus::{Seen, look};
 use sapwise::measure;
 use sapwise::{Machine, Registry, usable_cores};
+use sapwise_lab::data::{Document, read_document};
 use serde::Serialize;
 use std::cell::OnceCell;
 use std::path::Path;

@@ -2,8 +2,8 @@
 
 use super::look::Seen;
 use crate::exit::WrongUsage;
-use sapwise_lab::report::Report;
 use sapwise::{AlgorithmId, Backend, GpuIdentity, GpuKind};
+use sapwise_lab::report::Report;
 
 /// The options of verbs that take GPUs.
 #[derive(Debug, Clone, Default, PartialEq, Eq, clap::Args)]

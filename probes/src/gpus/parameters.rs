@@ -20,8 +20,8 @@ pub(crate) fn print_identities() -> anyhow::Result<()> {
 pub(crate) fn print_parameters(index: u32, options: &Options) -> anyhow::Result<()> {
     let gpus = Gpus::find();
     let identity = gpus.identities().find(|g| g.index == index).ok_or_else(|| anyhow!("there is no gpu{index} any more"))?;
-    let hardware =
-        sapwise::measure::gpu(&gpus, index, options).unwrap_or_else(|why| without_parameters(identity.clone(), &why.to_string()));
+    let hardware = sapwise::measure::gpu(&gpus, index, options)
+        .unwrap_or_else(|why| without_parameters(identity.clone(), &why.to_string()));
     crate::output::print_json(&hardware)
 }
 
@@ -31,8 +31,8 @@ pub(crate) fn print_parameters(index: u32, options: &Options) -> anyhow::Result<
 /// When standard output can't be written.
 pub(crate) fn print_group(indices: &[u32], options: &Options) -> anyhow::Result<()> {
     let gpus = Gpus::find();
-    let group =
-        sapwise::measure::gpu_group(&gpus, indices, options).unwrap_or_else(|why| group_without_parameters(indices, &why.to_string()));
+    let group = sapwise::measure::gpu_group(&gpus, indices, options)
+        .unwrap_or_else(|why| group_without_parameters(indices, &why.to_string()));
     crate::output::print_json(&group)
 }
 

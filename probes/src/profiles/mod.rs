@@ -24,7 +24,6 @@ use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-
 /// Where the reports go without `--out`.
 const DEFAULT: &str = "reports";
 

@@ -4,8 +4,8 @@ use crate::args::Probe;
 use crate::contention::Contended;
 use crate::restriction::{self, LAVAPIPE_THREADS};
 
-use sapwise_lab::report::Restricted;
 use sapwise::{GpuIdentity, GpuKind, SimdLevel};
+use sapwise_lab::report::Restricted;
 use sapwise_lab::sweep::Plan;
 use sapwise_scenes::Scenario;
 use std::path::Path;

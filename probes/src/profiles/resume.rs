@@ -2,12 +2,12 @@
 
 use super::profile::{Profile, is_named};
 use crate::args::{Arguments, Probe, Verb};
-use sapwise_lab::data::read_document;
 use crate::{provenance, restriction, revisions};
 use clap::Parser;
-use sapwise_lab::data::Document;
-use sapwise_lab::report::{Label, Report};
 use sapwise::{GpuIdentity, Registry};
+use sapwise_lab::data::Document;
+use sapwise_lab::data::read_document;
+use sapwise_lab::report::{Label, Report};
 use std::path::{Path, PathBuf};
 
 /// A folder, and what its reports are compared with.
@@ -155,8 +155,8 @@ mod tests {
         read_report(Path::new(path)).unwrap().1
     }
     use crate::profiles::family::{Whole, family};
-    use sapwise_lab::report::{Proof, Restricted, Restriction, Timed};
     use sapwise::{GpuKind, SimdLevel};
+    use sapwise_lab::report::{Proof, Restricted, Restriction, Timed};
 
     fn gpu(index: u32, name: &str) -> GpuIdentity {
         GpuIdentity::new(index, name, GpuKind::Discrete)

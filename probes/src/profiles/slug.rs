@@ -98,9 +98,7 @@ mod tests {
 
     #[test]
     fn gpus_of_one_kind_are_counted() {
-        let gpu = |name: &str| {
-            GpuIdentity::new(0, name, GpuKind::Other)
-        };
+        let gpu = |name: &str| GpuIdentity::new(0, name, GpuKind::Other);
         let all = ["NVIDIA H200", "NVIDIA H200", "AMD Radeon RX 7900 XTX (RADV NAVI31)", "???"];
         let programs = ["llvmpipe (LLVM 15.0.6, 256 bits)", "SwiftShader Device (Subzero)"];
         let all: Vec<GpuIdentity> = all.into_iter().chain(programs).map(gpu).collect();

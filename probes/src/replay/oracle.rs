@@ -121,8 +121,8 @@ fn near(frames: &[Frame], at: usize) -> Vec<&Frame> {
 
 #[cfg(test)]
 mod tests {
-    use crate::replay::examples::{frame_of, samples};
     use super::*;
+    use crate::replay::examples::{frame_of, samples};
 
     fn frame(objects: usize, fixed: &[&[f64]]) -> Frame {
         frame_of(objects, fixed.iter().map(|ns| samples(ns)).collect())

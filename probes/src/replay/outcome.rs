@@ -1,8 +1,8 @@
 //! The outcome of a replay, frame by frame, and the figures that follow from it.
 
 use super::co_runner::Slowdown;
-use super::oracle::{Oracle, optimistic};
 use super::frame::{Frame, Taken, Told};
+use super::oracle::{Oracle, optimistic};
 use sapwise::AlgorithmId;
 use sapwise::stats::quantile;
 use std::ops::Range;

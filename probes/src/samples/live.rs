@@ -135,7 +135,8 @@ impl Source for Live {
         if seconds <= 0.0 {
             return Ok(Answer::Over);
         }
-        let request = SampleRequest { algorithm: algorithm.clone(), objects: load.objects, pairs: load.pairs as u64, seconds };
+        let request =
+            SampleRequest { algorithm: algorithm.clone(), objects: load.objects, pairs: load.pairs as u64, seconds };
         dialogue.tell(&serde_json::to_string(&request).context("a sample can't be asked for")?);
         let heard = dialogue.listen(left, |line| serde_json::from_str::<Reply>(line).ok())?;
         Ok(match heard {

@@ -165,7 +165,9 @@ mod tests {
     fn samples_are_medians_of_right_answers() {
         let mut sampler = sampler();
         for id in ["brute@cpu1", "pair-cache@cpu1", "sap@cpu1"] {
-            let Reply::Taken { ns, noise_ln, .. } = sampler.answer(&request(id, 300)) else { panic!("{id} returned no sample") };
+            let Reply::Taken { ns, noise_ln, .. } = sampler.answer(&request(id, 300)) else {
+                panic!("{id} returned no sample")
+            };
             assert!(ns >= 1.0 && (0.0..1.0).contains(&noise_ln), "{id}: {ns} {noise_ln}");
         }
     }

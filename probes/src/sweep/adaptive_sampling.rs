@@ -33,7 +33,8 @@ const NS_PER_OBJECT: f64 = 60.0;
 /// The visits of one round, by scenario, each list ascending by size: those that promise most for their time, at most one for each
 /// size, within `time`.
 pub(super) fn visits(points: &[Point], time: Duration) -> BTreeMap<String, Vec<Visit>> {
-    let mut candidates: Vec<Candidate> = scenarios(points).into_iter().flat_map(|(s, sizes)| candidates(s, &sizes)).collect();
+    let mut candidates: Vec<Candidate> =
+        scenarios(points).into_iter().flat_map(|(s, sizes)| candidates(s, &sizes)).collect();
     candidates.retain(|p| p.worth > 0.0 && p.algorithms.len() > 1);
     // Asks the system, so it is done once and not for each candidate.
     let shortest = (Watch::begin().shortest() + START).as_secs_f64();

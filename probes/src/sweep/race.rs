@@ -211,11 +211,8 @@ impl Race {
     fn point(&self, racers: &[Racer], scene: &Scene, before: Option<u64>) -> Point {
         let answer = racers.iter().filter(|r| r.error.is_none()).find_map(|r| r.answer);
         let answer = answer.unwrap_or(Answer { pairs: 0, fingerprint: 0 });
-        let timings = racers.iter().map(|r| Timing {
-            algorithm: r.id.clone(),
-            samples_ns: r.samples.clone(),
-            error: r.error.clone(),
-        });
+        let timings =
+            racers.iter().map(|r| Timing { algorithm: r.id.clone(), samples_ns: r.samples.clone(), error: r.error.clone() });
         Point {
             scenario: scene.scenario().to_string(),
             load: Load::estimate(scene.boxes(), before.map(|pairs| pairs as f64), self.displacement.moved(scene.boxes())),

@@ -1,7 +1,7 @@
 //! What a sweeping process is told, and what it tells.
 
-use sapwise_lab::report::Point;
 use sapwise::{AlgorithmId, GpuIdentity};
+use sapwise_lab::report::Point;
 use serde::{Deserialize, Serialize};
 
 /// The sweep of one scenario, as it is handed to a process of its own.

@@ -255,7 +255,10 @@ mod tests {
     fn a_size_that_does_not_fit_is_told() {
         let events = events(&request("uniform", &[10, 1_000_000], 0.0));
         assert_eq!(points(&events).len(), 1);
-        assert!(matches!(events.last(), Some(Event::Remark(text)) if text.contains("1000000 objects would exceed")), "{events:?}");
+        assert!(
+            matches!(events.last(), Some(Event::Remark(text)) if text.contains("1000000 objects would exceed")),
+            "{events:?}"
+        );
     }
 
     #[test]

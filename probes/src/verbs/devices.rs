@@ -6,9 +6,9 @@ use crate::exit::Outcome;
 use crate::gpus::{self, Limits, OnGpus, Seen, look};
 use crate::output;
 use crate::progress::Progress;
-use sapwise_lab::text::{bytes, count};
 use crate::terminal::Terminal;
 use sapwise::{AlgorithmId, GpuIdentity, SimdLevel, usable_cores};
+use sapwise_lab::text::{bytes, count};
 use serde::Serialize;
 
 /// The answer for machines.
@@ -90,8 +90,11 @@ fn algorithms(seen: &Seen, adapters: &[Adapter], known: &Algorithms) -> anyhow::
         reason,
     };
     let registry = known.registry(usable_cores());
-    let mut list: Vec<Algorithm> =
-        registry.entries().iter().map(|e| algorithm(&e.id, e.revision, e.unavailable.as_ref().map(|why| format!("{why:#}")))).collect();
+    let mut list: Vec<Algorithm> = registry
+        .entries()
+        .iter()
+        .map(|e| algorithm(&e.id, e.revision, e.unavailable.as_ref().map(|why| format!("{why:#}"))))
+        .collect();
     for sapwise::Entry { id, revision, .. } in sapwise::gpu::algorithms(&seen.identities) {
         list.push(algorithm(&id, revision, refused(&id).or_else(|| entry(&id))));
     }

@@ -32,7 +32,8 @@ pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Ou
             samples::sample(&session, algorithms)?;
         }
         PartKind::Sweep { request } => {
-            let request: SweepRequest = serde_json::from_str(&request).map_err(|e| WrongUsage(format!("the request: {e}")))?;
+            let request: SweepRequest =
+                serde_json::from_str(&request).map_err(|e| WrongUsage(format!("the request: {e}")))?;
             sweep(&request, algorithms, &mut |event| output::print_json(&event))?;
         }
     }

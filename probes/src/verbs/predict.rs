@@ -12,10 +12,10 @@ use crate::{interrupt, output, shell, summary};
 use anyhow::{Context, bail};
 use sapwise::json;
 use sapwise_lab::data::{Document, read_document};
-use sapwise_lab::report::Report;
-use sapwise_lab::write::write_text;
 use sapwise_lab::data::{as_at_the_points, usual_scenario};
 use sapwise_lab::fit::measured_tuning;
+use sapwise_lab::report::Report;
+use sapwise_lab::write::write_text;
 use sapwise_scenes::Scenario;
 use std::path::Path;
 
@@ -72,7 +72,8 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
             };
             let slice = Slice::of(scenario)?;
             if report.is_none() && arguments.samples > 0 {
-                let sampled = prediction::predict_and_sample(model, &hardware, &gpus, &slice, algorithms, arguments.samples)?;
+                let sampled =
+                    prediction::predict_and_sample(model, &hardware, &gpus, &slice, algorithms, arguments.samples)?;
                 wrong = sampled.1;
                 sampled.0
             } else {
@@ -100,7 +101,9 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         text += &format!("\n{told}\n");
     }
     text += &match &arguments.out {
-        Some(path) => format!("Written to {}.\nNext: sapwise run fragmentation --tuning {}", path.display(), shell::path(path)),
+        Some(path) => {
+            format!("Written to {}.\nNext: sapwise run fragmentation --tuning {}", path.display(), shell::path(path))
+        }
         None => format!("Next: {}", shell::again(&["--out", "tuning.json"])),
     };
     output::print(&text)?;

@@ -158,5 +158,10 @@ fn summary(model: &Model, training: &Training, notes: &[String], path: &Path, dr
     for note in notes {
         text.push_str(&format!("{} {note}\n", terminal.warning("note:")));
     }
-    text + &format!("\nThe model, named {:?}, is in {}.{drawn}\nNext: sapwise predict --model {}", model.name, path.display(), shell::path(path))
+    text + &format!(
+        "\nThe model, named {:?}, is in {}.{drawn}\nNext: sapwise predict --model {}",
+        model.name,
+        path.display(),
+        shell::path(path)
+    )
 }

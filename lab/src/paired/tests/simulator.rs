@@ -29,6 +29,12 @@ pub(super) enum Second {
     Everything,
 }
 
+/// Standard normal by Box and Muller: with tails, which outliers are made of, and which the sum of twelve uniform numbers lacks.
+fn normal(random: &mut Random) -> f64 {
+    let radius = (-2.0 * (1.0 - random.uniform()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * random.uniform()).cos()
+}
+
 fn below(random: &mut Random, bound: usize) -> usize {
     (random.uniform() * bound as f64) as usize
 }
@@ -72,11 +78,11 @@ fn round(sizes: &[u32], ratio: &dyn Fn(f64) -> f64, host: Host, random: &mut Ran
         let longer = below(random, 2);
         let n = f64::from(objects);
         let level = (1000.0 * n.powf(1.2)).ln() + 0.1 * k as f64 / sizes.len() as f64;
-        let levels = [0.5, -0.5].map(|share| level + share * ratio(n) + host.points * random.normal());
+        let levels = [0.5, -0.5].map(|share| level + share * ratio(n) + host.points * normal(random));
         for frame in 0..frames {
-            let common = random.normal();
+            let common = normal(random);
             for a in 0..2 {
-                let noise = host.noise * 0.5_f64.sqrt() * (common + random.normal());
+                let noise = host.noise * 0.5_f64.sqrt() * (common + normal(random));
                 let outlier = if random.uniform() < 0.05 { 1.0 + 4.0 * random.uniform() } else { 1.0 };
                 if frame < lengths[a ^ longer] {
                     samples[a].push(((levels[a] + noise).exp() * outlier).round() as u64);

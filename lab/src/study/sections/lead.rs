@@ -74,7 +74,11 @@ fn prediction(study: &Study) -> Option<String> {
         beside(|m| Some(m.mean_regret)),
     );
     if let Some(games) = ours.mean_regret_in_games {
-        text += &format!("; at the sizes that games are assumed to have, {}{}", percent(games), beside(|m| m.mean_regret_in_games));
+        text += &format!(
+            "; at the sizes that games are assumed to have, {}{}",
+            percent(games),
+            beside(|m| m.mean_regret_in_games)
+        );
     }
     text.push('.');
     if let (Some(octaves), Some(near)) = (ours.crossing_error_octaves, ours.crossings_within_half_octave) {

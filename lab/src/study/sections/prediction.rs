@@ -48,7 +48,8 @@ pub(super) fn prediction(study: &Study, folder: &mut Folder, missing: &mut Vec<S
         section.lacks("no border was measured on what was held out");
     } else {
         let ends = held_out.crossovers.iter().filter(|b| !b.compared.crosses).count();
-        let twice = if held_out.by_machine { "" } else { " A report is held out twice: with its vectors and with its threads." };
+        let twice =
+            if held_out.by_machine { "" } else { " A report is held out twice: with its vectors and with its threads." };
         let told = format!(
             "Borders between fields, measured with 90 % intervals where these are known. Of {} predicted ones {ends} do not cross within the \
              sizes that were measured; the end beyond which they would stands for them, drawn apart.{twice}",

@@ -180,7 +180,8 @@ impl<'a> Answer<'a> {
             algorithm: outcome.fixed[k].to_string(),
             over: outcome.fixed_ms(k).map(|ms| adaptive / ms),
         };
-        let segment = |p: &Segment| SegmentAnswer { from_frame: p.frames.start, to_frame: p.frames.end - 1, figures: Figures::new(p) };
+        let segment =
+            |p: &Segment| SegmentAnswer { from_frame: p.frames.start, to_frame: p.frames.end - 1, figures: Figures::new(p) };
         let repeats = outcome.repeats.len();
         let mut warnings = origin.tuning.warnings.clone();
         warnings.extend(warnings_of(origin, &too_wide));

@@ -1,15 +1,15 @@
 //! `sapwise run`: the adaptive choice on a stream of frames, beside every fixed algorithm.
 
 mod answer;
-mod tuning;
 mod text;
+mod tuning;
 
 use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
 use crate::exit::{Outcome, WrongUsage};
+use crate::outputs::{picture_format, refuse_overwriting};
 use crate::replay::{FrameSource, ReplaySettings, Swing, TraceFormat, picture, replay, too_wide, write_trace};
 use crate::terminal::Terminal;
-use crate::outputs::{picture_format, refuse_overwriting};
 use crate::{interrupt, output};
 use anyhow::{Context, bail};
 use sapwise::usable_cores;

@@ -25,7 +25,9 @@ pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, termin
     for (id, LeftOut { after_frame, frames, at_least_ms }) in &answer.left_out {
         let after = after_frame.map_or("from the first on".to_owned(), |frame| format!("after frame {frame}"));
         let missing = count(*frames, "frame");
-        text += &format!("{id} was not timed in {missing} {after}, because it failed or was far slower than the best; {at_least_ms:.2} ms in the others\n");
+        text += &format!(
+            "{id} was not timed in {missing} {after}, because it failed or was far slower than the best; {at_least_ms:.2} ms in the others\n"
+        );
     }
     text += &format!("\n{}\n", figures(answer, terminal));
     text += &comparisons(answer);
@@ -113,7 +115,16 @@ fn totals(answer: &Answer<'_>, terminal: Terminal) -> String {
 
 /// The figures of all frames and of each segment.
 fn figures(answer: &Answer<'_>, terminal: Terminal) -> String {
-    let head = ["frames", "regret", "median of repeats", "their quartiles", "vs windows", "switches", "frames explored", "worst frame"];
+    let head = [
+        "frames",
+        "regret",
+        "median of repeats",
+        "their quartiles",
+        "vs windows",
+        "switches",
+        "frames explored",
+        "worst frame",
+    ];
     let row = |frames: String, f: &Figures| {
         let quartiles = f.regret_quartiles.map_or("-".to_owned(), |[a, b]| format!("{} to {}", percent(a), percent(b)));
         let worst = f.worst_frame.zip(f.worst_frame_at);
