@@ -61,6 +61,9 @@ pub enum ConvertError {
     Unsound(&'static str, #[source] Unsound),
 }
 
+/// Reads a converted text as what it is now and writes it in its own layout.
+type Rewrite = fn(&str) -> Result<String, Unsound>;
+
 /// Converts `report/1` into `report/2`, `model/1` into `model/2` and `fields/1` into `tuning/1`. No figure that is kept changes.
 ///
 /// # Errors
@@ -70,7 +73,7 @@ pub fn convert(text: &str) -> Result<Converted, ConvertError> {
     let Value::Object(mut file) = file else { return Err(ConvertError::Unknown("it is no object".to_owned())) };
     let schema = file.get("schema").and_then(Value::as_str).unwrap_or_default().to_owned();
     let mut dropped = Vec::new();
-    let (schema, current): (_, fn(&str) -> Result<String, Unsound>) = match schema.as_str() {
+    let (schema, current): (_, Rewrite) = match schema.as_str() {
         "report/1" => ("report/2", |text| Ok(report::write(&report::read(text)?.value)?)),
         "model/1" => {
             dropped = move_training(&mut file);

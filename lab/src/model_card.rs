@@ -210,7 +210,6 @@ mod tests {
             physical_machines: 1,
             profiles: 2,
             methods: vec![score("physics", 0.9), score("frozen constants (64)", -10.7)],
-            ..Validation::default()
         };
         let text = scores(&validation, markdown);
         assert!(text.contains("1 physical machine in 2 profiles") && text.contains("says little"), "{text}");
