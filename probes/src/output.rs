@@ -37,6 +37,14 @@ pub(crate) fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
     print(&serde_json::to_string(value)?)
 }
 
+/// Writes the text of a file of ours as one line of JSON to standard output.
+///
+/// # Errors
+/// As [`print()`].
+pub(crate) fn print_file(text: &str) -> anyhow::Result<()> {
+    print_json(&serde_json::from_str::<serde_json::Value>(text)?)
+}
+
 /// Writes a line to standard error. A closed standard error leaves nobody to tell, so that failure is dropped.
 pub(crate) fn complain(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");

@@ -9,8 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// Verbs whose examples take seconds. Those of the others measure for minutes: of them the words are parsed only.
-const SHORT: [&str; 10] =
-    ["check", "compare", "completions", "convert", "devices", "pairs", "schema", "simulate", "study", "train"];
+const SHORT: [&str; 9] = ["check", "compare", "completions", "devices", "pairs", "schema", "simulate", "study", "train"];
 
 fn stored(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)

@@ -21,6 +21,9 @@ const REBUILDS_SHARE: f64 = 1.0 / 32.0;
 const REBUILDS_FRAMES: f64 = 60.0;
 /// Only what is at least so much dearer than a frame that builds on the one before can be told from it.
 const TOLD_APART: f64 = 2.0;
+/// Where more than this share of the frames look like rebuilds, the expected cost is too low and not every frame a rebuild. They count as
+/// usual frames then: else nothing would ever be learned on a machine that is slower than it was predicted.
+const MOST_REBUILDS: f64 = 0.5;
 
 /// What it costs to switch to each of the candidates.
 #[derive(Debug, Clone)]
@@ -134,7 +137,8 @@ impl SwitchingCosts {
             work.rebuilds = work.rebuilds_at(frame);
             work.last = Some(frame);
             // Half-way between the two kinds, as ratios go.
-            let rebuilt = rebuild_ns > TOLD_APART * expected.built_ns && ns * ns > rebuild_ns * expected.built_ns;
+            let apart = rebuild_ns > TOLD_APART * expected.built_ns && work.rebuilds < MOST_REBUILDS;
+            let rebuilt = apart && ns * ns > rebuild_ns * expected.built_ns;
             if !first {
                 work.rebuilds += if learns { REBUILDS_SHARE * (f64::from(u8::from(rebuilt)) - work.rebuilds) } else { 0.0 };
                 kind = if rebuilt { Kind::Rebuilt } else { kind };

@@ -73,7 +73,8 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
-            Self::Data { source, .. } | Self::Write(source) => Some(source),
+            // Its text is part of this one's; what is behind it is not.
+            Self::Data { source, .. } | Self::Write(source) => source.source(),
             _ => None,
         }
     }
