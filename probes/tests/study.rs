@@ -128,7 +128,7 @@ fn simulated_machines_are_studied_by_themselves() {
     success(sapwise().args(["simulate", "--machines", "7", "--out"]).arg(&machines));
     let out = folder.path().join("study");
     let text = success(sapwise().args(["study", "--simulated"]).args([&machines, &stored("1t")]).arg("--out").arg(&out));
-    assert!(text.contains("8 reports of 7 physical machines, 7 of them with timings that are studied."), "{text}");
+    assert!(text.contains("8 reports read, the timings of 7 studied; simulated machines"), "{text}");
     let links = rows(&out.join("tables/influence.csv"));
     let link = |parameter: &str, of: &str| links.iter().find(|l| l["parameter"] == parameter && l["outcome"] == of).unwrap();
     let clock = link("clock_measured_ghz", "time of brute@cpu1");

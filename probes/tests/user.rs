@@ -125,8 +125,10 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let fitted = read(&model);
     let of_user = fitted["methods"].as_array().unwrap().iter().find(|m| m["method"] == "bvh").expect("a cost of bvh");
     assert_eq!((&of_user["revision"], &of_user["backend"]), (&1.into(), &"cpu".into()));
-    let own = |key: &str| of_user["terms"].to_string().contains(key);
-    assert!(own("product") && !own("strip_candidates"), "{}", of_user["terms"]);
+    // Of a sweep as short as this the fit may find no share of some; others than the user's are never fitted.
+    let named = |fitted: &Value| timed["terms"].as_array().unwrap().iter().any(|t| t["term"] == fitted["term"]);
+    let terms = of_user["terms"].as_array().unwrap();
+    assert!(!terms.is_empty() && terms.iter().all(named), "{terms:?}");
 
     let tuning = file("tuning.json");
     let predict = |mut command: Command| {

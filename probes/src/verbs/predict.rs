@@ -90,7 +90,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     }
     let outcome = if wrong || interrupt::requested() { Outcome::Failed } else { Outcome::Done };
     if arguments.json {
-        output::print_file(&sapwise::json::write_tuning(&tuning)?)?;
+        output::print_file(&json::write_tuning(&tuning)?)?;
         return Ok(outcome);
     }
     text += &summary::tuning(&tuning, terminal);

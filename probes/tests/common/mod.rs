@@ -30,6 +30,11 @@ pub(crate) fn devices_with_a_gpu(test: &str) -> Option<serde_json::Value> {
     Some(answer)
 }
 
+/// The remarks of a report but for the one that a host moved the cores of this machine meanwhile, which tests can't keep it from.
+pub(crate) fn remarks_but_of_moves(report: &sapwise_lab::report::Report) -> Vec<String> {
+    report.remarks.iter().filter(|r| !r.starts_with("the machine changed:")).cloned().collect()
+}
+
 /// Runs to exit status 0 and gives standard output.
 pub(crate) fn success(command: &mut Command) -> String {
     let ended = command.output().unwrap();
