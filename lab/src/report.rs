@@ -160,7 +160,7 @@ pub struct Point {
     pub foreign_load: Option<f64>,
     /// Frames that were thrown away because foreign load spoiled them.
     pub spoiled: u32,
-    /// [`CORE_TO_CORE_NS`](sapwise::hardware::parameter::CORE_TO_CORE_NS) before and after the samples. A hypervisor that moves the
+    /// [`ParameterId::CoreToCoreNs`](sapwise::ParameterId::CoreToCoreNs) before and after the samples. A hypervisor that moves the
     /// cores of a guest changes it, and with it what several threads gain. Absent on one core and in old reports.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub core_to_core_ns: Option<[f64; 2]>,

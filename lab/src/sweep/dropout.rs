@@ -23,7 +23,7 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// Takes the algorithm out where time is short, if it took more than [`SLOW`] times as long as the best. Gives its ratio.
+    /// Takes the algorithm out where time is short, if it took several times as long as the best. Returns its ratio then.
     pub fn leave_if_slow(&mut self) -> Option<f64> {
         let slow = self.before.filter(|&ratio| ratio > SLOW);
         self.out |= slow.is_some();

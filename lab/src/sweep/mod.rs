@@ -1,6 +1,6 @@
 //! What a sweep is, measured or simulated: which scenarios and sizes, under which loads, and which algorithms drop out.
 //!
-//! The command measures by these rules, and [`simulate`](crate::simulate) makes reports by the same ones.
+//! The command measures by these rules, and [`simulated`](crate::simulated) makes reports by the same ones.
 
 mod dropout;
 mod loads;

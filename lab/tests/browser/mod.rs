@@ -140,13 +140,15 @@ impl Browser {
         entries.as_array().unwrap().iter().map(|e| format!("{}: {}", e["level"], e["message"])).collect()
     }
 
-    /// The addresses that the window asked for since the last call, its page among them.
+    /// The addresses that the window asked for since the last call, its page among them. Those of the browser's own first tab, which a
+    /// slow start still loads, are none of the page's.
     pub(crate) fn requests(&self) -> Vec<String> {
         let entries = self.post("/se/log", &json!({ "type": "performance" }));
         let events = entries.as_array().unwrap().iter().map(|e| e["message"].as_str().unwrap());
         let events = events.map(|e| serde_json::from_str::<Value>(e).unwrap()["message"].take());
         let sent = events.filter(|e| e["method"] == "Network.requestWillBeSent");
-        sent.map(|e| e["params"]["request"]["url"].as_str().unwrap().to_owned()).collect()
+        let addresses = sent.map(|e| e["params"]["request"]["url"].as_str().unwrap().to_owned());
+        addresses.filter(|address| !address.starts_with("chrome://")).collect()
     }
 
     /// Elements whose text has too little contrast with what is behind it, by WCAG AA. Panics on a page that has little text.
