@@ -217,7 +217,7 @@ fn samples_on_this_machine_correct_the_prediction_and_are_listed() {
         assert_keys(sample, &["algorithm", "objects", "predicted_ns", "measured_ns"]);
         assert!(sample["measured_ns"].as_f64().unwrap() >= 1.0, "{sample}");
     }
-    assert!(tuning["interval_basis"].as_str().unwrap().contains("no interval can be claimed"), "{tuning}");
+    assert!(tuning["interval_basis"].as_str().unwrap().contains("no interval is claimed"), "{tuning}");
     let read = sapwise::json::tuning(&tuning.to_string()).unwrap();
     assert_eq!((read.source, read.samples.len()), (sapwise::Source::Learned, samples.len()));
     let text = success(sapwise().args(["predict", "--no-gpus", "--samples", "1"]));

@@ -123,12 +123,13 @@ impl Format {
             }
         };
         let mut json = serde_json::Deserializer::from_str(text);
-        let value = serde_path_to_error::deserialize(serde_ignored::Deserializer::new(&mut json, &mut note))
-            .map_err(|e| Error::Data { path: e.path().to_string(), source: e.into_inner() })?;
-        json.end().map_err(|source| Error::Data { path: ".".to_owned(), source })?;
+        let read = serde_path_to_error::deserialize(serde_ignored::Deserializer::new(&mut json, &mut note));
+        // Before what is missing: a key that is spelled wrong is both.
         if schema.minor <= self.minor && !skipped.is_empty() {
             return Err(Error::UnknownKey { path: skipped.swap_remove(0), schema });
         }
+        let value = read.map_err(|e| Error::Data { path: e.path().to_string(), source: e.into_inner() })?;
+        json.end().map_err(|source| Error::Data { path: ".".to_owned(), source })?;
         Ok(Read { value, schema, skipped })
     }
 

@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         tuning.warnings.extend(doubts(report).into_iter().map(|doubt| format!("the report is doubtful: {doubt}")));
     }
     if let Some(path) = &arguments.out {
-        write_text(path, &json::write(&tuning)?)?;
+        write_text(path, &json::write_tuning(&tuning)?)?;
     }
     let outcome = if wrong || interrupt::requested() { Outcome::Failed } else { Outcome::Done };
     if arguments.json {
