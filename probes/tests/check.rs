@@ -124,7 +124,7 @@ fn damaged_files_are_told_with_their_place_and_do_not_hide_the_others() {
         (path("empty.json", b""), "line 1 column 0"),
         (path("future.json", with("/schema", "report/3".into()).as_bytes()), "report/3"),
         (path("nested.json", nested.as_bytes()), "line 1 column"),
-        (path("deep.json", format!("{{\"schema\": \"report/2\", \"x\": {nested}}}").as_bytes()), "line 1 column"),
+        (path("deep.json", format!("{{\"schema\": \"report/2\", \"x\": {nested}}}").as_bytes()), "x is no key"),
         (path("unknown.json", good.replacen("\"label\"", "\"lable\"", 1).as_bytes()), "lable"),
         (path("zero.json", with("/points/0/timings/0/samples_ns/0", 0.into()).as_bytes()), "0 ns"),
         (path("negative.json", with("/points/0/load/pairs", (-1.0).into()).as_bytes()), "negative"),
