@@ -204,8 +204,9 @@ fn rows_of_very_many_candidates_lose_no_pair() {
     let mut row: Vec<Aabb> = (0..70_000).map(|k| Aabb::cube([k as f32, (k % 7) as f32 * 3.0, 0.0], 0.4)).collect();
     row.push(Aabb::new([-1.0, -1.0, -1.0], [80_000.0, 2.0, 1.0]));
     let hits = (0..70_000_u32).filter(|k| k % 7 == 0).count();
-    let point = [Aabb::cube([1.0; 3], 0.5); 33_000];
-    let pairs_of_point = 33_000 * 32_999 / 2;
+    // No more than that: a software adapter on two slow cores takes a second for ten million tests, and after a minute it counts as lost.
+    let point = [Aabb::cube([1.0; 3], 0.5); 12_000];
+    let pairs_of_point = 12_000 * 11_999 / 2;
     for (id, mut algorithm) in every_algorithm(&gpus).into_iter().filter(|(id, _)| !id.contains("brute")) {
         let mut pairs = Pairs::with_order(PairOrder::Canonical);
         algorithm.find_pairs(&row, &mut pairs).unwrap();
