@@ -147,8 +147,8 @@ impl Browser {
         let events = entries.as_array().unwrap().iter().map(|e| e["message"].as_str().unwrap());
         let events = events.map(|e| serde_json::from_str::<Value>(e).unwrap()["message"].take());
         let sent = events.filter(|e| e["method"] == "Network.requestWillBeSent");
-        let addresses = sent.map(|e| e["params"]["request"]["url"].as_str().unwrap().to_owned());
-        addresses.filter(|address| !address.starts_with("chrome://")).collect()
+        let of_page = sent.filter(|e| !e["params"]["documentURL"].as_str().unwrap_or_default().starts_with("chrome://"));
+        of_page.map(|e| e["params"]["request"]["url"].as_str().unwrap().to_owned()).collect()
     }
 
     /// Elements whose text has too little contrast with what is behind it, by WCAG AA. Panics on a page that has little text.
