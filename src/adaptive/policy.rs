@@ -7,6 +7,7 @@ use super::learner::Learner;
 use super::switching::{Expected, Kind, SwitchingCosts};
 use crate::cost::Counts;
 use crate::load::Load;
+use crate::stats::normal_density;
 use crate::tuning::Tuning;
 
 /// By number of objects alone, the algorithm of before stays while its own step is within this share.
@@ -296,15 +297,10 @@ fn expected_gain(ln_ratio: f64, deviation: f64) -> f64 {
     }
     let u = -ln_ratio / deviation;
     // What is saved beside what a switch without looking would save already.
-    (deviation * (density(u) + u * cumulative(u)) - (-ln_ratio).max(0.0)).max(0.0)
+    (deviation * (normal_density(u) + u * cumulative(u)) - (-ln_ratio).max(0.0)).max(0.0)
 }
 
-/// Density of the standard normal distribution.
-fn density(x: f64) -> f64 {
-    (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt()
-}
-
-/// Its cumulative distribution, to 1e-3: the logistic curve that comes closest.
+/// The cumulative distribution of the standard normal one, to 1e-3: the logistic curve that comes closest.
 fn cumulative(x: f64) -> f64 {
     1.0 / (1.0 + (-1.702 * x).exp())
 }
