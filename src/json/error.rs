@@ -70,12 +70,5 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            // Its text is part of this one's; what is behind it is not.
-            Self::Data { source, .. } | Self::Write(source) => source.source(),
-            _ => None,
-        }
-    }
-}
+// No source: the text of serde's error is part of this one's, and nothing is behind it.
+impl std::error::Error for Error {}
