@@ -4,6 +4,7 @@ mod curve;
 mod error;
 mod feature;
 mod gpu_set;
+mod needed;
 mod predict;
 mod scale;
 

@@ -1,6 +1,6 @@
 //! What the machine says of itself.
 
-use super::caches;
+use super::cache_sizes;
 use crate::SimdLevel;
 use crate::hardware::Machine;
 
@@ -16,7 +16,7 @@ struct Cpu {
 
 pub(super) fn machine() -> Machine {
     let cpu = Cpu::of_this_machine();
-    let llc = caches::reported().last_level.map_or(0, |level| level.bytes);
+    let llc = cache_sizes::reported().last_level.map_or(0, |level| level.bytes);
     Machine {
         physical_id: physical_id(&cpu, llc),
         cpu: cpu.brand,

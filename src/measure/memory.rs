@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use rayon::ThreadPool;
 
-use super::{Options, caches, cgroup, foreign_load, pool};
+use super::{Options, cache_sizes, cgroup, foreign_load, pool};
 use crate::SimdLevel;
 use crate::hardware::{Parameter, ParameterId};
 
@@ -82,7 +82,7 @@ fn array_bytes(llc: Option<u64>, memory: Option<u64>, largest: u64) -> (u64, Str
 fn triad(options: &Options) -> Result<Vec<Parameter>, String> {
     let start = Instant::now();
     let threads = options.usable_cores();
-    let llc = caches::reported().last_level.map(|level| level.bytes.saturating_mul(level.instances));
+    let llc = cache_sizes::reported().last_level.map(|level| level.bytes.saturating_mul(level.instances));
     let (array_bytes, array_choice) = if options.brief {
         (4 << 20, "three arrays of 4 MiB, brief run".to_owned())
     } else {

@@ -5,6 +5,7 @@
 //! time limit, so a slow or loaded machine takes fewer samples, not a longer run.
 
 mod arithmetic;
+mod cache_sizes;
 mod caches;
 mod cgroup;
 mod clock;

@@ -1,6 +1,6 @@
 //! The cost curve of a method on a backend of a machine.
 
-use super::scale::need;
+use super::needed::needed;
 use super::{Feature, MethodModel, ModelTerm, PredictError, ResidualTerm, Scale};
 use crate::hardware::{Hardware, ParameterId};
 use crate::{Backend, BackendClass, CostCurve, CostTerm, Knot};
@@ -67,7 +67,7 @@ impl<'a> Figures<'a> {
 
     fn cache_bytes(&mut self) -> Result<f64, PredictError> {
         let hardware = self.hardware;
-        self.cache.get_or_insert_with(|| need(hardware, ParameterId::CacheLlcBytes)).clone()
+        self.cache.get_or_insert_with(|| needed(hardware, ParameterId::CacheLlcBytes)).clone()
     }
 }
 

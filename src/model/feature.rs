@@ -1,7 +1,7 @@
 //! What the residual of a cost model may depend on.
 
 use super::PredictError;
-use super::scale::need;
+use super::needed::needed;
 use crate::hardware::{Hardware, ParameterId};
 use crate::named::named;
 use crate::{Backend, BackendClass, Load};
@@ -82,7 +82,7 @@ impl Feature {
     pub(super) fn of_machine(self, hardware: &Hardware, backend: &Backend) -> Result<f64, PredictError> {
         match self {
             Self::Log2Threads => Ok(f64::from(backend.width()).log2()),
-            Self::Log2Lanes if self.is_of(backend.class()) => Ok(need(hardware, ParameterId::SimdLanes)?.log2()),
+            Self::Log2Lanes if self.is_of(backend.class()) => Ok(needed(hardware, ParameterId::SimdLanes)?.log2()),
             _ => Err(PredictError::NotOfProcessor { backend: backend.to_string(), what: format!("feature {self}") }),
         }
     }

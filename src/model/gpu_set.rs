@@ -1,7 +1,7 @@
 //! What GPUs that work on one frame together are worth.
 
 use super::PredictError;
-use super::scale::above_zero;
+use super::needed::needed_of_gpu;
 use crate::hardware::GpuParameterId;
 use crate::{GpuGroup, GpuHardware, Hardware};
 
@@ -36,7 +36,7 @@ impl<'a> GpuSet<'a> {
         for gpu in &self.gpus {
             let mut sum = 0.0;
             for &id in ids {
-                sum += need(gpu, id)?;
+                sum += needed_of_gpu(gpu, id)?;
             }
             slowest = slowest.max(sum);
         }
@@ -51,9 +51,9 @@ impl<'a> GpuSet<'a> {
     pub(super) fn rate(&self, ids: &[GpuParameterId], ratio: GpuParameterId) -> Result<f64, PredictError> {
         let (mut sum, mut fastest) = (0.0, 0.0_f64);
         for gpu in &self.gpus {
-            let found = ids.iter().find_map(|&id| need(gpu, id).ok());
+            let found = ids.iter().find_map(|&id| needed_of_gpu(gpu, id).ok());
             // Of those that are missing the last one is told.
-            let rate = found.map_or_else(|| ids.last().map_or(Ok(0.0), |&last| need(gpu, last)), Ok)?;
+            let rate = found.map_or_else(|| ids.last().map_or(Ok(0.0), |&last| needed_of_gpu(gpu, last)), Ok)?;
             sum += rate;
             fastest = fastest.max(rate);
         }
@@ -65,9 +65,4 @@ impl<'a> GpuSet<'a> {
         let ratio = self.group.filter(|_| self.gpus.len() > 1)?.value(id)?;
         (ratio > 0.0 && ratio.is_finite()).then_some(ratio)
     }
-}
-
-/// A parameter that must be there and above zero.
-fn need(gpu: &GpuHardware, id: GpuParameterId) -> Result<f64, PredictError> {
-    above_zero(&gpu.parameters, id.as_str(), &format!(" of gpu{}", gpu.gpu.index))
 }

@@ -2,7 +2,8 @@
 
 use super::PredictError;
 use super::gpu_set::GpuSet;
-use crate::hardware::{GpuParameterId, Hardware, Parameter, ParameterId};
+use super::needed::needed;
+use crate::hardware::{GpuParameterId, Hardware, ParameterId};
 use crate::named::named;
 use crate::{Backend, BackendClass};
 
@@ -113,14 +114,14 @@ impl Scale {
     fn on_cpu(self, hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
         Ok(match self {
             Self::SharedCycle => cycle(hardware)? / speed_up(hardware, threads)?,
-            Self::SharedLane => cycle(hardware)? / speed_up(hardware, threads)? / need(hardware, ParameterId::SimdLanes)?,
+            Self::SharedLane => cycle(hardware)? / speed_up(hardware, threads)? / needed(hardware, ParameterId::SimdLanes)?,
             Self::Byte => 1.0 / bandwidth(hardware, threads)?,
             Self::ForkJoin | Self::SharedLine if threads == 1 => 0.0,
             Self::SharedLine => {
                 let k = f64::from(threads);
                 core_to_core(hardware)? * (k - 1.0) / (k * k)
             }
-            Self::ForkJoin => need(hardware, ParameterId::ForkJoinColdNs)?,
+            Self::ForkJoin => needed(hardware, ParameterId::ForkJoinColdNs)?,
             _ => cycle(hardware)?,
         })
     }
@@ -159,8 +160,8 @@ impl Scale {
 
 /// One cycle in ns, of the measured clock where there is one.
 fn cycle(hardware: &Hardware) -> Result<f64, PredictError> {
-    let measured = need(hardware, ParameterId::ClockMeasuredGhz);
-    measured.or_else(|e| need(hardware, ParameterId::ClockReportedGhz).map_err(|_| e)).map(|ghz| 1.0 / ghz)
+    let measured = needed(hardware, ParameterId::ClockMeasuredGhz);
+    measured.or_else(|e| needed(hardware, ParameterId::ClockReportedGhz).map_err(|_| e)).map(|ghz| 1.0 / ghz)
 }
 
 /// Cache lines that go from core to core in a warm fork and join: of twelve reports of one machine it took 15 times the latency where
@@ -169,24 +170,8 @@ const LINES_OF_A_FORK_JOIN: f64 = 12.0;
 
 /// Latency between cores in ns; what the warm fork and join implies where it was not measured, as in reports of old versions.
 fn core_to_core(hardware: &Hardware) -> Result<f64, PredictError> {
-    need(hardware, ParameterId::CoreToCoreNs)
-        .or_else(|e| need(hardware, ParameterId::ForkJoinWarmNs).map(|ns| ns / LINES_OF_A_FORK_JOIN).map_err(|_| e))
-}
-
-/// A parameter that must be there and above zero.
-pub(super) fn need(hardware: &Hardware, id: ParameterId) -> Result<f64, PredictError> {
-    above_zero(&hardware.parameters, id.as_str(), "")
-}
-
-/// A figure of a list that must be there and above zero; `of` says whose it is.
-pub(super) fn above_zero(list: &[Parameter], name: &str, of: &str) -> Result<f64, PredictError> {
-    let parameter = || format!("{name}{of}");
-    match Parameter::find(list, name) {
-        Some(&Parameter { value: Some(value), .. }) if value > 0.0 && value.is_finite() => Ok(value),
-        Some(&Parameter { value: Some(value), .. }) => Err(PredictError::Value { parameter: parameter(), value }),
-        Some(missing) => Err(PredictError::Missing { parameter: parameter(), why: Some(missing.source.clone()) }),
-        None => Err(PredictError::Missing { parameter: parameter(), why: None }),
-    }
+    needed(hardware, ParameterId::CoreToCoreNs)
+        .or_else(|e| needed(hardware, ParameterId::ForkJoinWarmNs).map(|ns| ns / LINES_OF_A_FORK_JOIN).map_err(|_| e))
 }
 
 /// Work of `threads` threads over work of one, interpolated on logarithmic axes between one, two and all.
@@ -194,23 +179,23 @@ fn speed_up(hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
     if threads <= 1 {
         return Ok(1.0);
     }
-    let cores = need(hardware, ParameterId::UsableCores)?;
-    let all = need(hardware, ParameterId::ScalingAllThreadsRatio)?;
+    let cores = needed(hardware, ParameterId::UsableCores)?;
+    let all = needed(hardware, ParameterId::ScalingAllThreadsRatio)?;
     let k = f64::from(threads);
     if k >= cores {
         return Ok(all);
     }
-    let two = need(hardware, ParameterId::ScalingTwoThreadsRatio)?;
+    let two = needed(hardware, ParameterId::ScalingTwoThreadsRatio)?;
     let share = if cores > 2.0 { (k / 2.0).ln() / (cores / 2.0).ln() } else { 1.0 };
     Ok((two.ln() * (1.0 - share) + all.ln() * share).exp())
 }
 
 /// Memory bandwidth of `threads` threads in GB/s, which is bytes per nanosecond.
 fn bandwidth(hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
-    let one = need(hardware, ParameterId::BandwidthOneThreadGbPerS)?;
+    let one = needed(hardware, ParameterId::BandwidthOneThreadGbPerS)?;
     if threads <= 1 {
         return Ok(one);
     }
-    let all = need(hardware, ParameterId::BandwidthAllThreadsGbPerS)?;
+    let all = needed(hardware, ParameterId::BandwidthAllThreadsGbPerS)?;
     Ok((one * f64::from(threads)).min(all))
 }
