@@ -1,6 +1,6 @@
 //! A progress bar on standard error for whatever takes over a second.
 
-use crate::interrupt;
+use crate::{interrupt, output};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use sapwise_lab::progress::Interrupted;
 use std::fmt::{self, Write};
@@ -89,6 +89,11 @@ impl Progress {
         self.bar.set_length(steps);
     }
 
+    /// Warns while the bar is out of the way.
+    pub(crate) fn warn(&self, text: &str) {
+        self.aside(|| output::warn(text));
+    }
+
     /// Prints something while the bar is out of the way.
     pub(crate) fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
         self.bar.suspend(print)
@@ -135,6 +140,10 @@ impl sapwise_lab::progress::Progress for Progress {
 
     fn message(&self, text: &str) {
         Self::message(self, text);
+    }
+
+    fn warn(&self, text: &str) {
+        Self::warn(self, text);
     }
 
     fn check(&self) -> Result<(), Interrupted> {

@@ -77,7 +77,7 @@ fn taken(arguments: &Probe) -> anyhow::Result<Vec<GpuIdentity>> {
     }
     let seen = gpus::look()?;
     arguments.gpus.check(&seen)?;
-    seen.remark.iter().for_each(|remark| output::complain(&format!("warning: {remark}")));
+    seen.remark.iter().for_each(|remark| output::warn(remark));
     let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.into_iter().partition(|g| arguments.gpus.takes(g));
     arguments.gpus.tell(&left_out).iter().for_each(|told| output::complain(told));
     Ok(taken)

@@ -180,7 +180,7 @@ impl<'a> ProfileRunner<'a> {
 }
 
 fn read(path: &Path) -> anyhow::Result<Report> {
-    match read_document(path)? {
+    match read_document(path, &output::warn)? {
         Document::Report(report) => Ok(*report),
         _ => bail!("{} is no report", path.display()),
     }
