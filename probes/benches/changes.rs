@@ -13,13 +13,13 @@ fn walk<T>(frames: &[T]) -> impl Iterator<Item = &T> + Clone {
     frames.iter().chain(back).cycle()
 }
 
-fn strips() -> Box<dyn BroadPhase> {
+fn grid_sap() -> Box<dyn BroadPhase> {
     Registry::with_cores(1).create(&"grid-sap@cpu1".parse().expect("an id")).expect("one core is enough")
 }
 
 /// Pairs of every frame.
 fn found(boxes: &[Vec<Aabb>], order: PairOrder) -> Vec<Pairs> {
-    let mut algorithm = strips();
+    let mut algorithm = grid_sap();
     let find = |boxes: &Vec<Aabb>| {
         let mut pairs = Pairs::with_order(order);
         algorithm.find_pairs(boxes, &mut pairs).expect("valid boxes");
@@ -44,7 +44,7 @@ fn changes(c: &mut Criterion) {
         let membership = |k: usize| Membership { groups: 1 << (k % 2), mask: 1 << (k / 2 % 2) | 1 << (k % 2), fixed: false };
         let filter = Filter::new((0..objects).map(|k| k.wrapping_mul(0x9e37_79b9) >> 7).map(membership).collect());
         for (name, filter) in [("find", None), ("find, filtered", Some(filter))] {
-            let (mut algorithm, mut pairs, mut frames) = (strips(), Pairs::new(), walk(&boxes));
+            let (mut algorithm, mut pairs, mut frames) = (grid_sap(), Pairs::new(), walk(&boxes));
             pairs.set_filter(filter);
             group.bench_function(BenchmarkId::new(name, objects), |b| {
                 b.iter(|| frames.next().map(|boxes| algorithm.find_pairs(boxes, &mut pairs)));

@@ -12,18 +12,18 @@ fn answer(command: &mut assert_cmd::Command) -> Value {
 }
 
 /// Tuning that run the first algorithm below that many objects and the second from there on.
-fn steps(folder: &Path, first: &str, border: u32, second: &str) -> PathBuf {
+fn steps(folder: &Path, first: &str, crossover: u32, second: &str) -> PathBuf {
     let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
     let tuning = json!({
         "schema": "tuning/1", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
-        "steps": [step(0, first), step(border, second)], "crossovers": [], "interval_basis": "", "costs": []
+        "steps": [step(0, first), step(crossover, second)], "crossovers": [], "interval_basis": "", "costs": []
     });
     let path = folder.join("steps.json");
     fs::write(&path, tuning.to_string()).unwrap();
     path
 }
 
-/// Tuning with the costs of strips on one thread, and on so many.
+/// Tuning with the costs of `grid-sap` on one thread, and on so many.
 fn costs(folder: &Path, threads: u32) -> PathBuf {
     let (one, many) = ("grid-sap@cpu1".to_owned(), format!("grid-sap@cpu{threads}"));
     let devices: Value = answer(sapwise().args(["devices", "--no-gpus", "--json"]));

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// A side of the comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// Our adaptive module.
+    /// Our adaptive choice.
     Adaptive,
     /// A method of ours that always runs.
     Fixed,

@@ -1,4 +1,4 @@
-//! The replay: frames of a seeded scene or a recorded stream, run by the adaptive module and by every fixed algorithm side by side.
+//! The replay: frames of a seeded scene or a recorded stream, run by the adaptive choice and by every fixed algorithm side by side.
 
 mod co_runner;
 mod contestant;

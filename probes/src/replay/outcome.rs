@@ -20,7 +20,7 @@ pub(crate) struct Outcome {
     pub(crate) windows: Oracle,
     /// What ran at every frame, for each repeat that all frames have; one that Ctrl-C cut short is left out.
     pub(crate) repeats: Vec<Vec<Taken>>,
-    /// What the adaptive module told of every frame of the last of these.
+    /// What the adaptive choice told of every frame of the last of these.
     pub(crate) told: Vec<Told>,
     pub(crate) interrupted: bool,
     /// Median over the frames of the share of the CPU that other programs took. `None` where that can't be told, as in a replay
@@ -36,7 +36,7 @@ pub(crate) struct Outcome {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Segment {
     pub(crate) frames: Range<usize>,
-    /// Time of the adaptive module over that of the oracle, less one.
+    /// Time of the adaptive choice over that of the oracle, less one.
     pub(crate) regret: f64,
     /// The same against the best algorithm of every window.
     pub(crate) window_regret: f64,
@@ -205,7 +205,7 @@ pub(crate) mod tests {
         Taken { chosen: Some(chosen), explored: false }
     }
 
-    /// An outcome of one repeat: objects, the adaptive module's time, those of the fixed algorithms in milliseconds, and what ran.
+    /// An outcome of one repeat: objects, the adaptive choice's time, those of the fixed algorithms in milliseconds, and what ran.
     pub(crate) fn outcome(fixed: &[&str], frames: &[(usize, f64, &[f64], Taken)]) -> Outcome {
         let mut before = None;
         let frame = |&(objects, adaptive, fixed, taken): &(usize, f64, &[f64], Taken)| {

@@ -35,7 +35,7 @@ pub(super) struct Answer<'a> {
     pub(super) figures: Figures,
     /// The regret of each repeat by itself, from single samples.
     regret_of_repeats: Vec<f64>,
-    /// The best fixed algorithm, and the time of the adaptive module over its time.
+    /// The best fixed algorithm, and the time of the adaptive choice over its time.
     pub(super) best_fixed: String,
     pub(super) over_best_fixed: f64,
     /// The fixed algorithm that is the best at the frames with the most objects.
@@ -130,7 +130,7 @@ pub(super) struct SegmentAnswer {
 pub(super) struct AtLargest {
     pub(super) objects: usize,
     pub(super) algorithm: String,
-    /// Time of the adaptive module over its time, over all frames; null where it was not timed at all of them.
+    /// Time of the adaptive choice over its time, over all frames; null where it was not timed at all of them.
     pub(super) over: Option<f64>,
 }
 

@@ -178,7 +178,7 @@ fn comparisons(answer: &Answer<'_>) -> String {
         lines.push(format!("{over} {}, the best at the largest number of objects ({objects}).", largest.algorithm));
     }
     lines.push(
-        "Regret is the time of the adaptive module over that of an oracle, less one. The oracle runs the best algorithm of every frame.".to_owned(),
+        "Regret is the time of the adaptive choice over that of an oracle, less one. The oracle runs the best algorithm of every frame.".to_owned(),
     );
     lines.push(format!(
         "Vs windows: the oracle runs one algorithm for {WINDOW} frames at a time. An incremental algorithm rebuilds its data now and then, and an \
