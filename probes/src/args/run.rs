@@ -69,8 +69,8 @@ pub(crate) struct Run {
     /// Write the frames as a stream before they are run. `run` and `pairs` read it.
     #[arg(long, value_name = "S.npy")]
     pub(crate) record: Option<PathBuf>,
-    /// Where a table goes with one row per frame: load, decision, expected and measured times, the time of every algorithm. CSV or JSON by
-    /// its ending.
+    /// Where a table goes with one row per frame: load, decision, expected and measured times, the time of every algorithm. A file that ends
+    /// in .csv.
     #[arg(long, value_name = "T.csv")]
     pub(crate) trace: Option<PathBuf>,
     /// Where a picture goes: the times of the algorithms, which of them ran in which frame, and the number of objects. SVG or PNG by its

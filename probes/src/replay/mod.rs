@@ -19,7 +19,7 @@ pub(crate) use outcome::{Outcome, Segment};
 pub(crate) use picture::picture;
 pub(crate) use race::{replay, too_wide};
 pub(crate) use settings::ReplaySettings;
-pub(crate) use trace::{Format as TraceFormat, write_trace};
+pub(crate) use trace::{check_trace, write_trace};
 
 #[cfg(test)]
 pub(crate) use outcome::tests as examples;

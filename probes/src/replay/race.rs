@@ -230,7 +230,7 @@ impl Replay {
             Frame::new(self.objects[at], own(&mut self.adaptive[at]), fixed, &taken)
         };
         let frames: Vec<Frame> = (0..settings.frames).map(frame).collect();
-        let slowdown = |own| Slowdown::new(own, &self.loops, &frames, self.contestants.len());
+        let slowdown = |own| Slowdown::new(own, &self.loops);
         Outcome {
             slowdown: settings.co_runner.map(slowdown),
             fixed: self.contestants.into_iter().map(|c| c.id).collect(),
