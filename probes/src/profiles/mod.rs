@@ -1,7 +1,6 @@
 //! `sapwise probe --profiles`: the profiles of one machine, each measured by a process of its own.
 
 mod family;
-mod minutes;
 mod profile;
 mod resume;
 mod runner;
@@ -14,7 +13,7 @@ use crate::restriction::LAVAPIPE_THREADS;
 use crate::{gpus, interrupt, output};
 use anyhow::Context;
 use family::{Whole, family};
-use minutes::minutes;
+use indicatif::HumanDuration;
 use profile::Profile;
 use resume::Existing;
 use runner::{End, ProfileRunner};
@@ -100,8 +99,8 @@ fn listing(family: &[Profile], done: &[Option<PathBuf>], arguments: &Probe, scen
         let numbers: Vec<u32> = profile.gpus.iter().map(|g| g.index).collect();
         let variables = profile.variables().into_iter().map(|(name, value)| format!("{name}={value} ")).collect::<String>();
         let command = format!("{variables}sapwise {}", profile.arguments(arguments, &numbers).join(" "));
-        let time = if done.is_some() { "complete".to_owned() } else { minutes(time) };
+        let time = if done.is_some() { "complete".to_owned() } else { HumanDuration(time).to_string() };
         rows.push(vec![format!("{stem}-{}", profile.name), time, command]);
     }
-    format!("{}\n{} profiles, about {} at most.", columns(&rows), family.len(), minutes(left))
+    format!("{}\n{} profiles, about {} at most.", columns(&rows), family.len(), HumanDuration(left))
 }
