@@ -223,3 +223,14 @@ fn samples_on_this_machine_correct_the_prediction_and_are_listed() {
     let text = success(sapwise().args(["predict", "--no-gpus", "--samples", "1"]));
     assert!(text.contains("Samples that correct the prediction"), "{text}");
 }
+
+#[test]
+fn the_card_of_the_built_in_model_is_the_one_that_training_writes() {
+    let stored = sapwise_lab::StoredModel::built_in().unwrap();
+    let written = sapwise_lab::model_card::page(&stored.model, &stored.training, &[]);
+    let card = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../models/README.md")).unwrap();
+    // The notes of a training stand in its card and not in the model.
+    let (page, _notes) = card.split_once("\n## Notes\n").unwrap();
+    let differs = page.lines().zip(written.lines()).find(|(card, written)| card != written);
+    assert!(page == written, "models/README.md differs: {differs:?}");
+}
