@@ -37,7 +37,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
             return Err(WrongUsage(format!("--profiles sets {name} itself; unset it and run this again")).into());
         }
     }
-    let scenarios = arguments.scenarios()?;
+    let scenarios = arguments.scenarios();
     let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT));
     let machine = measure::machine();
     let (cores, level) = (usable_cores(), SimdLevel::detected());
