@@ -34,7 +34,7 @@ run() {
     echo "== $name: run $*"
     "$sapwise" run "$@" --no-gpus --plot "$folder/$name.svg" --trace "$folder/$name.csv" >"$folder/$name.txt"
     grep -A 6 '^frames' "$folder/$name.txt" | sed '/^$/,$d'
-    grep -E 'of the time of|co-runner|Other programs' "$folder/$name.txt"
+    grep -E 'of the time of|ran beside it|Other programs' "$folder/$name.txt"
 }
 
 clustered=(clustered --swing 50 --frames 600)

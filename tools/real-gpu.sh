@@ -17,7 +17,7 @@
 #
 #     tools/real-gpu.sh --profiles OUT_DIR
 #
-# BIN_DIR       folder of prebuilt sapwise, gpu_bench, gpu_contract and other gpu_* tests; beside this script if they are there
+# BIN_DIR       folder of prebuilt sapwise, gpu_bench, gpu_contract and the other tests of GPUs; beside this script if they are there
 # LOADER_DEBS   folder of the .deb files of the Vulkan loader, unpacked where the system has none; BIN_DIR if not given
 # LIMIT_FACTOR  multiplies every time limit, for software GPUs and slow machines
 # SKIP          names of steps to leave out, as they are printed; every_size takes an hour on a software GPU
@@ -25,8 +25,9 @@
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-# Those that need a GPU; built as tests of the library.
-tests=(gpu_contract gpu_resident gpu_faults)
+# The tests of the library that need a GPU. Where a packed folder becomes too large, the last ones are left out.
+tests=(gpu_contract gpu_resident gpu_faults gpu_device measure_gpu)
+most_bytes=$((64 << 20))
 
 usage() {
     sed -n '2,/^set /{/^set /d; s/^# \{0,1\}//; p}' "${BASH_SOURCE[0]}" >&2
@@ -58,7 +59,7 @@ build() {
 }
 
 pack() {
-    local into=$1 name bytes
+    local into=$1 name bytes k
     mkdir -p "$into"
     into=$(cd "$into" && pwd)
     build "$into"
@@ -72,7 +73,13 @@ pack() {
         say "without apt-get the Vulkan loader is not packed; the other machine must have libvulkan.so.1"
     fi
     bytes=$(du -sb "$into" | cut -f1)
-    [ "$bytes" -lt $((64 << 20)) ] || fail "$into has $bytes bytes, more than 64 MiB"
+    # The last tests matter least there.
+    for ((k = ${#tests[@]} - 1; k > 0 && bytes >= most_bytes; k--)); do
+        say "${tests[k]} is left out: with it $into has $bytes bytes, more than 64 MiB"
+        rm "$into/${tests[k]}"
+        bytes=$(du -sb "$into" | cut -f1)
+    done
+    [ "$bytes" -lt "$most_bytes" ] || fail "$into has $bytes bytes, more than 64 MiB"
     say "$into has $bytes bytes; carry it and run real-gpu.sh OUT_DIR in it"
 }
 
@@ -176,10 +183,11 @@ done
 step every_size 180 "$bin/gpu_contract" --ignored --nocapture
 step gpu_bench 120 "$bin/gpu_bench" --bench
 [ ! -e gpu_bench.log ] || sed -n '/^[-|]/p' gpu_bench.log >bench.md
-reserve=80
+reserve=90
 step probe 300 "$bin/sapwise" probe --out report.json
 reserve=0
-step check 5 "$bin/sapwise" check report.json
+# Looks for the GPUs again, as `devices` does.
+step check 15 "$bin/sapwise" check report.json
 step predict 25 "$bin/sapwise" predict --out predicted.json
 step measured 5 "$bin/sapwise" predict --report report.json --measured --out measured.json
 step run 45 "$bin/sapwise" run fragmentation --objects 200000 --repeats 1 --tuning measured.json --plot run.svg

@@ -18,6 +18,9 @@ pub trait Progress: Sync {
     /// Says what is being done.
     fn message(&self, text: &str);
 
+    /// Tells what the user should know and what stops nothing. Called from several threads.
+    fn warn(&self, text: &str);
+
     /// Asked between steps whether to go on.
     ///
     /// # Errors
@@ -35,6 +38,8 @@ impl Progress for Silent {
     fn advance(&self, _: u64) {}
 
     fn message(&self, _: &str) {}
+
+    fn warn(&self, _: &str) {}
 
     fn check(&self) -> Result<(), Interrupted> {
         Ok(())

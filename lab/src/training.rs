@@ -178,15 +178,23 @@ const TRAINING: Format = Format::new("model", 2, 0).skipping(&["name", "simulate
 /// # Errors
 /// When the text is no sound model, or holds no sound training.
 pub fn read_model(text: &str) -> Result<StoredModel, json::Error> {
+    read_model_and_skipped(text).map(|read| read.0)
+}
+
+/// As [`read_model`], with the keys of a newer minor version that were skipped.
+pub(crate) fn read_model_and_skipped(text: &str) -> Result<(StoredModel, Vec<String>), json::Error> {
     #[derive(Deserialize)]
     struct Keys {
         training: Training,
     }
-    let training = TRAINING.read::<Keys>(text)?.value.training;
+    let json::Read { value: Keys { training }, mut skipped, .. } = TRAINING.read(text)?;
     if let Some(defect) = training.prior.and_then(|p| p.defect()) {
         return Err(json::Error::Data { path: "training.prior".to_owned(), source: serde::de::Error::custom(defect) });
     }
-    Ok(StoredModel { model: json::model(text)?, training })
+    let json::Read { value: model, skipped: in_model, .. } = Format::MODEL.read(text)?;
+    // A new key of the outermost level is unknown to both readers.
+    skipped.extend(in_model.into_iter().filter(|key| !skipped.contains(key)).collect::<Vec<_>>());
+    Ok((StoredModel { model, training }, skipped))
 }
 
 impl StoredModel {

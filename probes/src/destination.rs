@@ -34,7 +34,7 @@ impl Destination {
     /// Writes the report as it is by now, so that even a power cut costs one scenario only.
     pub(crate) fn save_unfinished(&self, report: &Report) {
         if let Err(error) = write(&self.0, report) {
-            output::complain(&format!("warning: {error:#}; the measurement continues"));
+            output::warn(&format!("{error:#}; the measurement continues"));
         }
     }
 

@@ -32,10 +32,11 @@ fn measure_cpu(threads: Option<u32>) -> anyhow::Result<Hardware> {
     for family in Family::ALL {
         let name = family.as_str();
         progress.message(format!("hardware: {name}"));
-        match progress.during(usual_ms(family), || measure_family(name, threads))? {
+        match measure_family(name, threads)? {
             Ok(parameters) => found.extend(parameters),
             Err(why) => found.extend(family.parameters().iter().map(|p| Parameter::missing(p, &why))),
         }
+        progress.advance(usual_ms(family));
     }
     Ok(measure::assemble(measure::machine(), found))
 }

@@ -50,6 +50,11 @@ pub(crate) fn complain(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
+/// Warns on standard error.
+pub(crate) fn warn(text: &str) {
+    complain(&format!("warning: {text}"));
+}
+
 /// Whether a reader such as `head` has closed standard output: it has what it wanted, so this is no failure.
 pub(crate) fn is_closed(error: &anyhow::Error) -> bool {
     error.is::<Closed>()

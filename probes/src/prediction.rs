@@ -3,7 +3,7 @@
 use crate::algorithms::Algorithms;
 use crate::progress::Progress;
 use crate::samples::{Live, Session};
-use crate::{interrupt, revisions};
+use crate::{interrupt, output, revisions};
 use anyhow::bail;
 use sapwise::hardware::ParameterId;
 use sapwise::model::{ASK, Prediction};
@@ -53,7 +53,7 @@ impl Slice {
 /// When the file is no sound model.
 pub(crate) fn model(path: Option<&Path>) -> anyhow::Result<StoredModel> {
     let Some(path) = path else { return Ok(StoredModel::built_in()?) };
-    match read_document(path)? {
+    match read_document(path, &output::warn)? {
         Document::Model(stored) => Ok(*stored),
         _ => bail!("{} is no model; make one with `sapwise train`", path.display()),
     }

@@ -1,14 +1,13 @@
 //! A progress bar on standard error for whatever takes over a second.
 
-use crate::interrupt;
+use crate::{interrupt, output};
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use sapwise_lab::progress::Interrupted;
 use std::fmt::{self, Write};
 use std::io::IsTerminal;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Nothing is drawn before this: work that is done by then needs no bar.
 const DELAY: Duration = Duration::from_secs(1);
@@ -24,25 +23,8 @@ const TEMPLATE: &str = "{bar:32} {percent:>3} % {elapsed}{left}  {wide_msg}";
 /// Where steps take unlike times their number is no share of the work: give each as many as it takes milliseconds or bytes.
 pub(crate) struct Progress {
     bar: ProgressBar,
-    underway: Arc<Mutex<Option<Underway>>>,
     /// Shows the bar after the delay, unless the sender is gone by then.
     showing: Option<(Sender<()>, JoinHandle<()>)>,
-}
-
-/// A part whose usual time is known.
-#[derive(Debug, Clone, Copy)]
-struct Underway {
-    began: Instant,
-    /// Steps that were done before.
-    from: u64,
-    usual_ms: u64,
-}
-
-impl Underway {
-    /// How far it should be by now. Not to its end, which it may not have reached.
-    fn position(self) -> u64 {
-        self.from + (self.began.elapsed().as_millis() as u64).min(self.usual_ms * 9 / 10)
-    }
 }
 
 impl Progress {
@@ -52,26 +34,13 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
             bar.set_style(style.with_key("left", left));
         }
-        let underway = Arc::default();
-        let showing = std::io::stderr().is_terminal().then(|| show_later(bar.clone(), Arc::clone(&underway))).flatten();
-        Self { bar, underway, showing }
+        let showing = std::io::stderr().is_terminal().then(|| show_later(bar.clone())).flatten();
+        Self { bar, showing }
     }
 
     /// Says what is being done.
     pub(crate) fn message(&self, text: impl Into<String>) {
         self.bar.set_message(text.into());
-    }
-
-    /// Does what usually takes that many milliseconds, each of which is a step. Until it is done the bar moves with the time: one that
-    /// stood still would show more and more time left.
-    pub(crate) fn during<T>(&self, usual_ms: u64, work: impl FnOnce() -> T) -> T {
-        let set = |underway| *self.underway.lock().unwrap_or_else(PoisonError::into_inner) = underway;
-        let from = self.bar.position();
-        set(Some(Underway { began: Instant::now(), from, usual_ms }));
-        let done = work();
-        set(None);
-        self.bar.set_position(from + usual_ms);
-        done
     }
 
     /// Some steps are done.
@@ -87,6 +56,11 @@ impl Progress {
     /// There are that many steps in all, as has turned out.
     pub(crate) fn steps(&self, steps: u64) {
         self.bar.set_length(steps);
+    }
+
+    /// Warns while the bar is out of the way.
+    pub(crate) fn warn(&self, text: &str) {
+        self.aside(|| output::warn(text));
     }
 
     /// Prints something while the bar is out of the way.
@@ -105,18 +79,14 @@ fn left(state: &ProgressState, out: &mut dyn Write) {
 
 /// A thread that shows the bar after the delay: the thread that does the work may be waiting for a driver then. Without a thread there is no
 /// bar.
-fn show_later(bar: ProgressBar, underway: Arc<Mutex<Option<Underway>>>) -> Option<(Sender<()>, JoinHandle<()>)> {
+fn show_later(bar: ProgressBar) -> Option<(Sender<()>, JoinHandle<()>)> {
     let (alive, ended) = channel();
     let show = move || {
         if ended.recv_timeout(DELAY) == Err(RecvTimeoutError::Timeout) {
             bar.set_draw_target(ProgressDrawTarget::stderr());
         }
         while ended.recv_timeout(TICK) == Err(RecvTimeoutError::Timeout) {
-            // Held while the position is set, so that the end of the part is not undone.
-            match &*underway.lock().unwrap_or_else(PoisonError::into_inner) {
-                Some(part) => bar.set_position(part.position()),
-                None => bar.tick(),
-            }
+            bar.tick();
         }
     };
     let thread = std::thread::Builder::new().name("progress".to_owned()).spawn(show).ok()?;
@@ -135,6 +105,10 @@ impl sapwise_lab::progress::Progress for Progress {
 
     fn message(&self, text: &str) {
         Self::message(self, text);
+    }
+
+    fn warn(&self, text: &str) {
+        Self::warn(self, text);
     }
 
     fn check(&self) -> Result<(), Interrupted> {

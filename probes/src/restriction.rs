@@ -2,6 +2,7 @@
 
 use crate::args::Lifted;
 use crate::contention::{ASSUMED_LLC_BYTES, Contended};
+use crate::output;
 use anyhow::bail;
 use sapwise::hardware::{GpuParameterId, ParameterId};
 use sapwise::{GpuHardware, GpuIdentity, Hardware, SimdLevel, usable_cores};
@@ -24,7 +25,7 @@ pub(crate) type Reference = (Restricted, Hardware);
 /// # Errors
 /// When a file is no sound report.
 pub(crate) fn references(lifted: &[Lifted]) -> anyhow::Result<Vec<Reference>> {
-    let read = |l: &Lifted| match read_document(&l.report)? {
+    let read = |l: &Lifted| match read_document(&l.report, &output::warn)? {
         Document::Report(report) => Ok((l.kind, report.hardware)),
         _ => bail!("{} is no report", l.report.display()),
     };

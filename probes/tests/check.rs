@@ -378,3 +378,36 @@ fn simulated_machines_train_apart_and_are_told_to_be_simulated() {
     let predicted = success(sapwise().args(["predict", "--json", "--report"]).arg(&files[0]).arg("--model").arg(&model));
     assert!(predicted.contains("trained on simulated machines"), "{predicted}");
 }
+
+#[test]
+fn keys_of_a_newer_version_are_ignored_and_told_once_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut newer = measured();
+    newer["schema"] = "report/2.9".into();
+    newer["weather"] = "rain".into();
+    for point in newer["points"].as_array_mut().unwrap() {
+        point["load"]["depth"] = 3.into();
+    }
+    let newer = write(folder.path(), "newer.json", newer.to_string());
+    let sentence = "newer.json is of report/2.9, which a newer version of sapwise wrote; ignored, because this version does not know it: \
+                    points[].load.depth, weather";
+    let (status, findings) = check(std::slice::from_ref(&newer));
+    assert!(status == 0 && findings[0]["notes"].to_string().contains(sentence), "{findings:?}");
+    let out = folder.path().join("tuning.json");
+    let mut steps = tuning(&json!([{"from_objects": 0, "algorithm": "brute@cpu1"}]));
+    steps["schema"] = "tuning/1.1".into();
+    steps["mood"] = "good".into();
+    let steps = write(folder.path(), "newer-tuning.json", steps.to_string());
+    let complaints = |words: &[&str], file: &Path| {
+        let ended = sapwise().args(words).arg(file).output().unwrap();
+        let told = String::from_utf8(ended.stderr).unwrap();
+        told.lines().filter(|line| line.starts_with("warning: ")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let measured = ["predict", "--measured", "--out", out.to_str().unwrap(), "--report"];
+    let replayed = ["run", "uniform", "--objects", "10", "--frames", "2", "--repeats", "1", "--no-gpus", "--tuning"];
+    for told in [complaints(&measured, &newer), complaints(&["train", "--out", "m.json"], &newer)] {
+        assert!(matches!(&told[..], [one] if one.ends_with(sentence)), "{told:?}");
+    }
+    let told = complaints(&replayed, &steps);
+    assert!(matches!(&told[..], [one] if one.contains("is of tuning/1.1") && one.ends_with(": mood")), "{told:?}");
+}

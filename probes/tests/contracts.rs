@@ -41,12 +41,12 @@ fn assert_tuning(tuning: &Value, source: &str) {
     assert_eq!((&tuning["schema"], &tuning["source"]), (&"tuning/1".into(), &source.into()));
     assert_eq!((&tuning["scenario"], &tuning["steps"][0]["from_objects"]), (&"uniform".into(), &0.into()));
     tuning["steps"].as_array().unwrap().iter().for_each(|step| assert_keys(step, &["from_objects", "algorithm"]));
-    let borders = tuning["crossovers"].as_array().unwrap();
-    for border in borders {
-        assert_keys(border, &["below", "above", "objects"]);
-        // Two machines are too few for a border that is predicted to have an interval, corrected by samples or not.
+    let crossovers = tuning["crossovers"].as_array().unwrap();
+    for crossover in crossovers {
+        assert_keys(crossover, &["below", "above", "objects"]);
+        // Two machines are too few for a crossover that is predicted to have an interval, corrected by samples or not.
         let claimed = source == "measured";
-        assert!(["low", "high"].iter().all(|end| border[end].is_null() != claimed), "{border}");
+        assert!(["low", "high"].iter().all(|end| crossover[end].is_null() != claimed), "{crossover}");
     }
 }
 
@@ -222,4 +222,15 @@ fn samples_on_this_machine_correct_the_prediction_and_are_listed() {
     assert_eq!((read.source, read.samples.len()), (sapwise::Source::Learned, samples.len()));
     let text = success(sapwise().args(["predict", "--no-gpus", "--samples", "1"]));
     assert!(text.contains("Samples that correct the prediction"), "{text}");
+}
+
+#[test]
+fn the_card_of_the_built_in_model_is_the_one_that_training_writes() {
+    let stored = sapwise_lab::StoredModel::built_in().unwrap();
+    let written = sapwise_lab::model_card::page(&stored.model, &stored.training, &[]);
+    let card = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../models/README.md")).unwrap();
+    // The notes of a training stand in its card and not in the model.
+    let (page, _notes) = card.split_once("\n## Notes\n").unwrap();
+    let differs = page.lines().zip(written.lines()).find(|(card, written)| card != written);
+    assert!(page == written, "models/README.md differs: {differs:?}");
 }

@@ -50,14 +50,13 @@ fn ids(tuning: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn adapters_are_listed_with_what_bounds_them_and_every_algorithm_on_them() {
+fn adapters_are_listed_with_every_algorithm_on_them() {
     let Some(answer) = devices_with_a_gpu("adapters_are_listed") else { return };
     let text = success(sapwise().arg("devices"));
     for adapter in answer["adapters"].as_array().unwrap() {
         for key in ["index", "name", "device", "driver", "api", "kind"] {
             assert!(!adapter[key].is_null(), "{key}: {adapter}");
         }
-        assert!(adapter["refused"].is_string() || adapter["limits"]["binding_bytes"].as_u64() > Some(0), "{adapter}");
         assert!(text.contains(adapter["name"].as_str().unwrap()), "{text}");
         let id = format!("grid-sap@gpu{}", adapter["index"]);
         let algorithm = answer["algorithms"].as_array().unwrap().iter().find(|a| a["id"] == id.as_str()).unwrap();

@@ -12,18 +12,18 @@ fn answer(command: &mut assert_cmd::Command) -> Value {
 }
 
 /// Tuning that run the first algorithm below that many objects and the second from there on.
-fn steps(folder: &Path, first: &str, border: u32, second: &str) -> PathBuf {
+fn steps(folder: &Path, first: &str, crossover: u32, second: &str) -> PathBuf {
     let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
     let tuning = json!({
         "schema": "tuning/1", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
-        "steps": [step(0, first), step(border, second)], "crossovers": [], "interval_basis": "", "costs": []
+        "steps": [step(0, first), step(crossover, second)], "crossovers": [], "interval_basis": "", "costs": []
     });
     let path = folder.join("steps.json");
     fs::write(&path, tuning.to_string()).unwrap();
     path
 }
 
-/// Tuning with the costs of strips on one thread, and on so many.
+/// Tuning with the costs of `grid-sap` on one thread, and on so many.
 fn costs(folder: &Path, threads: u32) -> PathBuf {
     let (one, many) = ("grid-sap@cpu1".to_owned(), format!("grid-sap@cpu{threads}"));
     let devices: Value = answer(sapwise().args(["devices", "--no-gpus", "--json"]));
@@ -75,7 +75,6 @@ fn a_run_tells_its_figures_by_parts() {
     for figures in parts.iter().chain([&told]) {
         let number = |key: &str| figures[key].as_f64().unwrap_or_else(|| panic!("{key}: {figures}"));
         assert!(number("regret") > -1.0 && number("worst_frame") > 0.0 && number("explored") == 0.0);
-        assert!(number("optimistic_regret") >= number("regret") - 1e-9, "{figures}");
         let [low, high] = [0, 1].map(|k| figures["regret_quartiles"][k].as_f64().unwrap());
         assert!(low <= number("regret_median") && number("regret_median") <= high, "{figures}");
     }
@@ -86,9 +85,6 @@ fn a_run_tells_its_figures_by_parts() {
     // Every frame was run by one of them.
     let ran = told["frames_run"].as_object().unwrap();
     assert_eq!(ran.values().map(|count| count.as_u64().unwrap()).sum::<u64>(), 30, "{told}");
-    let largest = &told["best_at_largest"];
-    assert_eq!(largest["objects"], told["objects"]["max"]);
-    assert!(told["total_ms"]["fixed"].get(largest["algorithm"].as_str().unwrap()).is_some(), "{told}");
     let text = success(&mut run("uniform", &tuning, &["--objects", "50", "--frames", "3", "--repeats", "1"]));
     for needed in ["One repeat: the oracle takes the minimum", "Without learning.", "written by hand", "adaptive ran it in"]
     {
@@ -131,7 +127,7 @@ fn a_co_runner_is_told_with_what_it_reached() {
     let told = answer(&mut run("uniform", &tuning, &words));
     let own = &told["co_runner"];
     assert_eq!((&own["from_frame"], &own["threads"]), (&10.into(), &1.into()));
-    assert!(own["slowdown"].as_f64().unwrap() > 0.0 && own["slowdown_of"]["grid-sap@cpu1"].as_f64().unwrap() > 0.0, "{own}");
+    assert!(own["slowdown"].as_f64().unwrap() > 0.0, "{own}");
     let parts = told["parts"].as_array().unwrap();
     assert_eq!((parts.len(), &parts[1]["from_frame"]), (2, &10.into()));
 }
@@ -148,12 +144,10 @@ fn every_frame_is_traced_and_drawn() {
         assert!(text.contains(trace) && text.contains(plot), "{text}");
     };
     both("a.csv", "a.svg");
-    both("a.json", "a.png");
+    both("b.csv", "a.png");
     let csv = fs::read_to_string(file("a.csv")).unwrap();
     assert_eq!(csv.lines().count(), 13);
     assert!(csv.starts_with("frame,objects,") && csv.lines().nth(1).unwrap().contains("brute@cpu1"), "{csv}");
-    let json: Value = serde_json::from_str(&fs::read_to_string(file("a.json")).unwrap()).unwrap();
-    assert_eq!(json["frames"].as_array().unwrap().len(), 12);
     let svg = fs::read_to_string(file("a.svg")).unwrap();
     for needed in ["brute@cpu1: ran in ", "Made by: sapwise run fragmentation --tuning steps.json", "written by hand"] {
         assert!(svg.contains(needed), "{needed}");

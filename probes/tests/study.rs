@@ -90,9 +90,9 @@ fn figures_come_from_the_reports_that_they_name() {
             r["taken"].starts_with("simd: avx2") && r["algorithm"] == algorithm && r["objects"].starts_with("1000")
         })
     };
-    let strips = own("grid-sap@cpu1").unwrap();
-    assert_eq!((strips["pairs"].as_str(), strips["reports"].split(' ').count()), ("2", 4), "{strips:?}");
-    assert_eq!(strips["verdict"], "cannot be told from these machines");
+    let grid_sap = own("grid-sap@cpu1").unwrap();
+    assert_eq!((grid_sap["pairs"].as_str(), grid_sap["reports"].split(' ').count()), ("2", 4), "{grid_sap:?}");
+    assert_eq!(grid_sap["verdict"], "cannot be told from these machines");
     let proof = rows(&out.join("tables/restriction-proofs.csv"));
     assert!(proof.iter().any(|r| r["parameter"] == "simd_lanes" && r["ratio"] == "0.5"), "{proof:?}");
     // What a single machine can't tell is said, and no link is made up.

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Answers of SciPy, scikit-learn and NumPy to the fits of `sapwise train`, for the tests of the command.
+"""Answers of SciPy, scikit-learn and NumPy to the fits of `sapwise train`, for the tests of the lab.
 
     python3 -m venv V && V/bin/pip install numpy scipy scikit-learn
-    V/bin/python tools/reference/fits.py > probes/tests/fixtures/fits.json
+    V/bin/python tools/reference/fits.py > lab/tests/fixtures/fits.json
 
-The stored numbers are the output of this script and are not edited; `probes/src/train/reference.rs` holds the fits in Rust
+The stored numbers are the output of this script and are not edited; `lab/src/evaluate/reference.rs` holds the fits in Rust
 against them, so that a test needs no Python. The problems are the same on every run, and the versions that gave the answers
 stand in the file. Inputs have few digits, so that both sides solve the same problem exactly as it is written.
 """
@@ -17,10 +17,10 @@ import numpy
 import scipy
 import sklearn
 from scipy.optimize import least_squares, nnls
-from sklearn.linear_model import ElasticNet, LinearRegression, Ridge
+from sklearn.linear_model import LinearRegression, Ridge
 
 SEED = 2011
-# The constants of probes/src/train/robust.rs.
+# The constants of lab/src/fit/robust.rs.
 HUBER, MAD_TO_SD, SMALLEST_SPREAD = 1.345, 1.4826, 1e-3
 
 

@@ -2,10 +2,11 @@
 
 use crate::progress::Progress;
 use crate::report::{self, Report};
-use crate::training::{StoredModel, read_model};
+use crate::training::{StoredModel, read_model_and_skipped};
 use anyhow::{Context, bail};
 use sapwise::Tuning;
-use sapwise::json::{self, Schema};
+use sapwise::json::{Format, Schema};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -25,19 +26,54 @@ pub enum Document {
     Tuning(Box<Tuning>),
 }
 
-/// Reads a report, model or tuning file.
+/// Reads a report, model or tuning file. `warn` gets a sentence where a newer version wrote keys that this one does not know.
 ///
 /// # Errors
 /// Names the file, and the line and column or the figure that is wrong.
-pub fn read_document(path: &Path) -> anyhow::Result<Document> {
+pub fn read_document(path: &Path, warn: &dyn Fn(&str)) -> anyhow::Result<Document> {
     let text = read_text(path)?;
     let unsound = || format!("{} is no sound file", path.display());
     let schema = Schema::of(&text).with_context(unsound)?;
-    Ok(match schema.name() {
-        "report" => Document::Report(Box::new(report::read(&text).with_context(unsound)?.value)),
-        "model" => Document::Model(Box::new(read_model(&text).with_context(unsound)?)),
-        _ => Document::Tuning(Box::new(json::tuning(&text).with_context(unsound)?)),
-    })
+    let (document, skipped) = match schema.name() {
+        "report" => {
+            let read = report::read(&text).with_context(unsound)?;
+            (Document::Report(Box::new(read.value)), read.skipped)
+        }
+        "model" => {
+            let (model, skipped) = read_model_and_skipped(&text).with_context(unsound)?;
+            (Document::Model(Box::new(model)), skipped)
+        }
+        _ => {
+            let read = Format::TUNING.read(&text).with_context(unsound)?;
+            (Document::Tuning(Box::new(read.value)), read.skipped)
+        }
+    };
+    if !skipped.is_empty() {
+        warn(&ignored(path, &schema, &skipped));
+    }
+    Ok(document)
+}
+
+/// Which keys of a newer version are ignored. A key that stands in each of many points is told once.
+fn ignored(path: &Path, schema: &Schema, skipped: &[String]) -> String {
+    let keys: BTreeSet<String> = skipped.iter().map(|place| without_indices(place)).collect();
+    let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
+    format!(
+        "{} is of {schema}, which a newer version of sapwise wrote; ignored, because this version does not know it: {}",
+        path.display(),
+        keys.join(", ")
+    )
+}
+
+/// A place in a file for all elements of its lists: `points[].load.depth` for `points[3].load.depth`.
+fn without_indices(place: &str) -> String {
+    let mut parts = place.split('[');
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        text.push('[');
+        text.push_str(part.trim_start_matches(|c: char| c.is_ascii_digit()));
+    }
+    text
 }
 
 /// The reports with their file names, of files and of the `*.json` files of folders, in the order of their names.
@@ -50,7 +86,7 @@ pub fn read_reports(paths: &[PathBuf], progress: &dyn Progress) -> anyhow::Resul
     progress.message("reading");
     let read = |file: &PathBuf| {
         progress.check()?;
-        let report = read_report(file);
+        let report = read_report(file, &|text| progress.warn(text));
         progress.advance(1);
         report
     };
@@ -77,12 +113,12 @@ pub fn report_files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// A report with the name of its file.
+/// A report with the name of its file. `warn` is that of [`read_document`].
 ///
 /// # Errors
 /// As [`read_document`]; when the file is no report.
-pub fn read_report(file: &Path) -> anyhow::Result<(String, Report)> {
-    match read_document(file)? {
+pub fn read_report(file: &Path, warn: &dyn Fn(&str)) -> anyhow::Result<(String, Report)> {
+    match read_document(file, warn)? {
         Document::Report(report) => Ok((file_name(file), *report)),
         _ => bail!("{} is no report; only what `sapwise probe` wrote is taken here", file.display()),
     }

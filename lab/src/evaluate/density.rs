@@ -16,7 +16,7 @@ fn time(point: &Point, id: &AlgorithmId) -> Option<f64> {
 
 fn full_report() -> Report {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../datasets/amd-epyc-2c-full--2026-11-21.json");
-    read_report(&path).unwrap().1
+    read_report(&path, &|_| ()).unwrap().1
 }
 
 fn best(point: &Point) -> (&AlgorithmId, f64) {

@@ -96,7 +96,7 @@ impl Study {
         progress.message("reading what is drawn");
         let draw = |compared: Compared| {
             let drawn = compared.drawn(&entries, &wanted);
-            let drawn = drawn.into_iter().map(|k| Ok((k, read_report(&entries[k].path)?.1))).collect::<Result<_>>();
+            let drawn = drawn.into_iter().map(|k| Ok((k, read_report(&entries[k].path, &|_| ())?.1))).collect::<Result<_>>();
             progress.advance(1);
             Ok((compared, drawn?))
         };
@@ -164,7 +164,7 @@ fn measured_borders(held_out: &HeldOut, entries: &[Entry]) -> Measured {
     let files: BTreeSet<&str> = held_out.crossovers.iter().map(|b| b.file.as_str()).collect();
     let own: Vec<&Entry> = entries.iter().filter(|e| files.contains(e.file.as_str())).collect();
     let borders = |entry: &&Entry| {
-        let mut report = read_report(&entry.path).ok()?.1;
+        let mut report = read_report(&entry.path, &|_| ()).ok()?.1;
         curves::keep(&mut report, |id| entry.profile.position(id).is_some());
         let tuning = measured_tuning(&report, crate::data::usual_scenario(&report)).ok()?;
         Some((entry.file.clone(), tuning.crossovers))

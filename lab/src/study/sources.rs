@@ -70,7 +70,7 @@ impl Sources {
         let placed: Vec<(usize, &PathBuf)> = files.iter().enumerate().collect();
         for some in placed.chunks(AT_A_TIME) {
             progress.check()?;
-            let read = |&(place, file): &(usize, &PathBuf)| match read_report(file) {
+            let read = |&(place, file): &(usize, &PathBuf)| match read_report(file, &|text| progress.warn(text)) {
                 // By the name that the page has, which is no path of this machine.
                 Err(why) => (place, Err(why.root_cause().to_string().replace(&file.display().to_string(), &names[place]))),
                 Ok((_, report)) => {

@@ -5,13 +5,13 @@ use crate::obvhs_tree::Obvhs;
 use crate::parry::{Margin, ParallelParry, Parry, Upkeep};
 use crate::rtree::Packed;
 use rayon::ThreadPool;
-use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Pairs, Registry, SimdLevel, Tuning};
+use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Pairs, Registry, Tuning};
 use std::sync::Arc;
 
 /// A side of the comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// Our adaptive module.
+    /// Our adaptive choice.
     Adaptive,
     /// A method of ours that always runs.
     Fixed,
@@ -44,7 +44,7 @@ impl Contestant {
     }
 
     /// A method of ours. Those whose time grows faster than the number of objects leave where they are far behind.
-    fn fixed(id: &AlgorithmId, name: String, registry: &Registry) -> Result<Self, Error> {
+    fn fixed(id: &AlgorithmId, registry: &Registry) -> Result<Self, Error> {
         let most = match id.method() {
             "brute" => 3_000,
             "sap" => 100_000,
@@ -53,7 +53,7 @@ impl Contestant {
         let mut algorithm = registry.create(id)?;
         let keeps = algorithm.is_incremental();
         let algorithm = Algorithm::Other(algorithm);
-        Ok(Self { name, side: Side::Fixed, keeps, most, hopeless_frames: 0, algorithm })
+        Ok(Self { name: id.to_string(), side: Side::Fixed, keeps, most, hopeless_frames: 0, algorithm })
     }
 
     /// # Errors
@@ -89,23 +89,7 @@ pub(crate) fn ours(registry: &Registry, tuning: &Tuning) -> Result<Vec<Contestan
         algorithm: adaptive,
     }];
     for id in registry.available().into_iter().map(|e| e.id) {
-        all.push(Contestant::fixed(&id, id.to_string(), registry)?);
-    }
-    Ok(all)
-}
-
-/// Every method of ours on one thread at every SIMD level of this CPU, named `method@cpu1 level`.
-///
-/// # Errors
-/// When one of them can't be made.
-pub(crate) fn at_levels() -> Result<Vec<Contestant>, Error> {
-    let mut all = Vec::new();
-    for level in SimdLevel::ALL.into_iter().filter(|level| *level <= SimdLevel::in_use()) {
-        let mut registry = Registry::with_cores(1);
-        registry.limit_simd(level);
-        for id in registry.available().into_iter().map(|e| e.id) {
-            all.push(Contestant::fixed(&id, format!("{id} {level}"), &registry)?);
-        }
+        all.push(Contestant::fixed(&id, registry)?);
     }
     Ok(all)
 }

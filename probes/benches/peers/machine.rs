@@ -4,20 +4,16 @@ use crate::settings::Settings;
 use rayon::ThreadPool;
 use sapwise::hardware::ParameterId;
 use sapwise::measure::{self, Options};
-use sapwise::{Hardware, Model, Registry, Source, Tuning, json};
+use sapwise::{Hardware, Model, Registry, Source, Tuning};
 use std::process::Command;
 use std::sync::Arc;
 
-/// The tuning for a number of threads: those of the file, or those that the built-in model predicts from hardware parameters
-/// that are measured now; written down by hand where nothing is timed.
+/// The tuning for a number of threads that the built-in model predicts from hardware parameters, which are measured now; written
+/// down by hand where nothing is timed.
 ///
 /// # Errors
-/// When the file can't be read or nothing can be predicted.
+/// When nothing can be predicted.
 pub(crate) fn tuning(registry: &Registry, threads: u32, settings: &Settings) -> Result<Tuning, String> {
-    if let Some(path) = &settings.tuning {
-        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-        return json::tuning(&text).map_err(|e| format!("{}: {e}", path.display()));
-    }
     if !settings.full {
         return Ok(Tuning::usual(registry));
     }

@@ -11,7 +11,6 @@
 //! | `SAPWISE_SIZES` | numbers of objects |
 //! | `SAPWISE_THREADS` | `1`, `2` or `1,2` |
 //! | `SAPWISE_BENCH_SECONDS` | time for the timed frames of a scenario at a size |
-//! | `SAPWISE_TUNING` | tuning for ours; without, they are predicted from the hardware, which is measured first |
 //! | `SAPWISE_BENCHMARKS` | the document that takes the tables, between its two marks; else they are printed |
 //!
 //! Method and bias stand at the head of `BENCHMARKS.md`. Prints a line for each scenario and size as soon as it is measured.
@@ -37,10 +36,8 @@ mod race;
 mod rtree;
 mod settings;
 mod table;
-#[allow(unused_imports, reason = "its tests run with the command: without a harness there are none")]
-mod within;
 
-use contestants::{at_levels, ours, peers};
+use contestants::{ours, peers};
 use point::Point;
 use sapwise::Registry;
 use sapwise_scenes::Scenario;
@@ -89,27 +86,13 @@ fn compare(threads: u32, settings: &Settings) -> Result<Vec<Point>, String> {
     Ok(points)
 }
 
-/// `uniform` on one thread at every SIMD level.
-fn compare_levels(settings: &Settings) -> Result<Vec<Point>, String> {
-    if !settings.scenarios.contains(&Scenario::Uniform) || !settings.threads.contains(&1) {
-        return Ok(Vec::new());
-    }
-    println!("\nSIMD levels, one thread:");
-    let points = settings.sizes.iter().map(|&objects| {
-        let all = at_levels().map_err(|e| e.to_string())?;
-        measured(all, Scenario::Uniform, objects, settings)
-    });
-    points.collect()
-}
-
 fn bench() -> Result<(), String> {
     let settings = Settings::from_environment()?;
     let mut compared = Vec::new();
     for &threads in &settings.threads {
         compared.push((threads, compare(threads, &settings)?));
     }
-    let levels = compare_levels(&settings)?;
-    let text = table::all(&compared) + &within::all(&compared, &levels);
+    let text = table::all(&compared);
     match &settings.document {
         Some(path) => document::put(path, &text),
         None => {

@@ -26,7 +26,7 @@ pub(crate) struct Obvhs {
 }
 
 impl Obvhs {
-    /// One that builds the tree anew in each frame, with its queries spread over the pool where there is one.
+    /// One that builds a new tree in each frame, with its queries spread over the pool where there is one.
     pub(crate) fn rebuilding(pool: Option<&Arc<ThreadPool>>) -> Self {
         let (builder, tree) = (PlocBuilder::new(), Bvh2::default());
         Self { refits: false, pool: pool.cloned(), builder, tree, bounds: Vec::new(), found: Vec::new() }

@@ -66,7 +66,7 @@ impl Race {
         Ok(taken)
     }
 
-    /// Takes those out who take too long, and gives their names.
+    /// Takes those out who take too long, and returns their names.
     fn leave_out_slow(&mut self, taken: &[Option<Duration>]) -> Vec<String> {
         let fastest = taken.iter().flatten().min().copied().unwrap_or_default();
         let hopeless = HOPELESS_FRAME.max(fastest * HOPELESS_RATIO);

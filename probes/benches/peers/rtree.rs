@@ -1,4 +1,4 @@
-//! rstar's R*-tree: packed anew in each frame. It has no threads.
+//! rstar's R*-tree: packed again in each frame. It has no threads.
 
 use rstar::{AABB, RTree, RTreeObject};
 use sapwise::{Aabb, BroadPhase, Error, Pairs};

@@ -29,8 +29,6 @@ pub(crate) struct Settings {
     pub(crate) threads: Vec<u32>,
     /// Time for the timed frames of a scenario at a size.
     pub(crate) time: Duration,
-    /// Tuning for ours; predicted from the hardware where there are none.
-    pub(crate) tuning: Option<PathBuf>,
     /// The document that holds the tables.
     pub(crate) document: Option<PathBuf>,
 }
@@ -49,7 +47,6 @@ impl Settings {
             sizes,
             threads: list("SAPWISE_THREADS")?.unwrap_or_else(|| vec![1, 2]),
             time: Duration::try_from_secs_f64(seconds).map_err(|e| format!("SAPWISE_BENCH_SECONDS: {e}"))?,
-            tuning: path("SAPWISE_TUNING"),
             document: path("SAPWISE_BENCHMARKS"),
         })
     }

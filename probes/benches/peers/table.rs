@@ -22,18 +22,18 @@ fn goal(threads: u32, objects: usize) -> Option<f64> {
 }
 
 /// Three significant digits.
-pub(crate) fn digits(value: f64) -> String {
+fn digits(value: f64) -> String {
     let whole = value.abs().log10().floor().max(-9.0) as i32 + 1;
     format!("{value:.*}", usize::try_from(3 - whole).unwrap_or(0))
 }
 
 /// Median and quartiles.
-pub(crate) fn spread([low, median, high]: Quartiles) -> String {
+fn spread([low, median, high]: Quartiles) -> String {
     format!("{} ({} to {})", digits(median), digits(low), digits(high))
 }
 
 /// 1000 as 1k, 1000000 as 1M.
-pub(crate) fn size(objects: usize) -> String {
+fn size(objects: usize) -> String {
     match objects {
         n if n >= 1_000_000 && n.is_multiple_of(1_000_000) => format!("{}M", n / 1_000_000),
         n if n >= 1_000 && n.is_multiple_of(1_000) => format!("{}k", n / 1_000),
@@ -42,7 +42,7 @@ pub(crate) fn size(objects: usize) -> String {
 }
 
 /// A table with a row for each name and a column for each size.
-pub(crate) fn grid(corner: &str, sizes: &[usize], rows: &[(String, Vec<String>)]) -> String {
+fn grid(corner: &str, sizes: &[usize], rows: &[(String, Vec<String>)]) -> String {
     let mut text = format!("| {corner} |");
     sizes.iter().for_each(|&n| text += &format!(" {} |", size(n)));
     text += "\n|---|";
@@ -55,7 +55,7 @@ pub(crate) fn grid(corner: &str, sizes: &[usize], rows: &[(String, Vec<String>)]
 }
 
 /// The sizes of some points, ascending.
-pub(crate) fn sizes(points: &[Point]) -> Vec<usize> {
+fn sizes(points: &[Point]) -> Vec<usize> {
     let mut sizes: Vec<usize> = points.iter().map(|p| p.objects).collect();
     sizes.sort_unstable();
     sizes.dedup();

@@ -21,8 +21,6 @@ pub(crate) enum PartKind {
     Gpus,
     /// Prints the algorithms on all GPUs, one as JSON a line.
     GpuAlgorithms,
-    /// Opens a GPU and prints its limits as JSON.
-    GpuLimits { index: u32 },
     /// Prints a GPU with its parameters as JSON.
     Gpu {
         index: u32,

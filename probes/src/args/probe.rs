@@ -2,7 +2,6 @@
 
 use super::known;
 use crate::contention::Contended;
-use crate::exit::WrongUsage;
 use crate::gpus::GpuChoice;
 use clap::Args;
 use sapwise_lab::report::Restricted;
@@ -51,10 +50,9 @@ pub(crate) struct Probe {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(10..=10_000_000))]
     pub(crate) max_objects: Option<u32>,
     /// Sweep this scenario instead of the usual ones; may be given several times.
-    #[arg(long = "scenario", value_name = "NAME", value_parser = known::scenario_name())]
-    pub(crate) scenarios: Vec<String>,
+    #[arg(long = "scenario", value_name = "NAME", value_parser = known::scenario())]
+    pub(crate) scenarios: Vec<Scenario>,
     /// A report from which one thing less was taken, to prove this restriction by.
-    // What is hidden says itself what it conflicts with: completions leave it out, and what they hold may name nothing that they lack.
     #[arg(long, hide = true, value_name = "KIND=R.json", conflicts_with = "profiles")]
     pub(crate) unrestricted: Vec<Lifted>,
     /// Stop as at Ctrl-C when standard input ends. For a process that starts this one.
@@ -70,16 +68,9 @@ pub(crate) struct Probe {
 
 impl Probe {
     /// The scenarios that are asked for, each once.
-    ///
-    /// # Errors
-    /// When one is unknown.
-    pub(crate) fn scenarios(&self) -> Result<Vec<Scenario>, WrongUsage> {
-        let scenarios: Result<Vec<Scenario>, _> = self.scenarios.iter().map(|s| s.parse()).collect();
-        let mut scenarios =
-            scenarios.map_err(|e: sapwise_scenes::UnknownScenario| WrongUsage(format!("--scenario: {e}")))?;
+    pub(crate) fn scenarios(&self) -> Vec<Scenario> {
         let mut seen = Vec::new();
-        scenarios.retain(|s| !seen.contains(s) && (seen.push(*s), true).1);
-        Ok(scenarios)
+        self.scenarios.iter().copied().filter(|s| !seen.contains(s) && (seen.push(*s), true).1).collect()
     }
 }
 

@@ -8,7 +8,7 @@ use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Runs a scenario, or a recorded stream of boxes, with the adaptive module and with every fixed algorithm, and compares their times.
+/// Runs a scenario, or a recorded stream of boxes, with the adaptive choice and with every fixed algorithm, and compares their times.
 ///
 /// All of them run on the same frames in turn, so that a machine that slows down slows all of them, and start every repeat without what
 /// they kept. Times are medians over the repeats. They are compared with an oracle that runs the best algorithm of every frame, chosen on
@@ -17,8 +17,8 @@ use std::str::FromStr;
 #[command(after_help = "\
 Examples:
   sapwise run fragmentation
-  sapwise run fragmentation --tuning report.json --plot run.svg    # tuning measured on this machine
-  sapwise run fragmentation --tuning elsewhere.json --after 300    # tuning of another machine, corrected by learning
+  sapwise run fragmentation --tuning report.json --plot run.svg    # a tuning that was measured on this machine
+  sapwise run fragmentation --tuning elsewhere.json --after 300    # the tuning of another machine, corrected by learning
   sapwise run clustered --swing 50 --frames 600                    # the number of objects grows and shrinks
   sapwise run uniform --frames 900 --co-runner 450 --trace run.csv
   sapwise run clustered --objects 50000 --frames 100 --record clustered.npy --json
@@ -28,8 +28,8 @@ pub(crate) struct Run {
     /// y z. Rows of NaN at the end of a frame are absent boxes.
     #[arg(value_name = "SCENARIO|BOXES.npy", value_parser = known::scenario_or(|text: &str| text.parse::<Scene>()))]
     pub(crate) scene: Scene,
-    /// A tuning file, or a report to compute tuning from. Tuning of another machine shows how learning corrects it. Without this option
-    /// tuning is predicted from this machine's hardware.
+    /// A tuning file, or a report to compute a tuning from. The tuning of another machine shows how learning corrects it. Without this option
+    /// the tuning is predicted from this machine's hardware.
     #[arg(long, value_name = "T.json")]
     pub(crate) tuning: Option<PathBuf>,
     /// Correct the prediction by up to this many samples before the first frame, as `predict` does. 0 is the pure prediction.
@@ -69,8 +69,8 @@ pub(crate) struct Run {
     /// Write the frames as a stream before they are run. `run` and `pairs` read it.
     #[arg(long, value_name = "S.npy")]
     pub(crate) record: Option<PathBuf>,
-    /// Where a table goes with one row per frame: load, decision, expected and measured times, the time of every algorithm. CSV or JSON by
-    /// its ending.
+    /// Where a table goes with one row per frame: load, decision, expected and measured times, the time of every algorithm. A file that ends
+    /// in .csv.
     #[arg(long, value_name = "T.csv")]
     pub(crate) trace: Option<PathBuf>,
     /// Where a picture goes: the times of the algorithms, which of them ran in which frame, and the number of objects. SVG or PNG by its

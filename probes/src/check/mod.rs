@@ -12,7 +12,7 @@ use sapwise::measure;
 use sapwise::{Machine, Registry, usable_cores};
 use sapwise_lab::data::{Document, read_document};
 use serde::Serialize;
-use std::cell::OnceCell;
+use std::cell::{OnceCell, RefCell};
 use std::path::Path;
 
 pub(crate) use figures::{doubts, hardware_doubts};
@@ -63,7 +63,11 @@ impl Here {
             doubts: Vec::new(),
             notes: Vec::new(),
         };
-        match read_document(path) {
+        // A note and not a line on standard error: what is told of a file belongs to the findings.
+        let newer = RefCell::new(Vec::new());
+        let read = read_document(path, &|text| newer.borrow_mut().push(text.to_owned()));
+        finding.notes.extend(newer.into_inner());
+        match read {
             Err(error) => finding.problems.push(format!("{error:#}")),
             Ok(document) => {
                 finding.sound = true;

@@ -88,7 +88,7 @@ mod tests {
 
     fn stored_report() -> Report {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/amd-epyc-2c-full--2026-11-21.json");
-        read_report(Path::new(path)).unwrap().1
+        read_report(Path::new(path), &|_| ()).unwrap().1
     }
 
     #[test]

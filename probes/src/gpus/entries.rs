@@ -33,19 +33,20 @@ pub(crate) fn print_entries() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Every algorithm on the GPUs of this machine, or why that can't be told.
+/// The algorithms that could be tried, and what kept the process from trying the others.
 ///
 /// # Errors
 /// When no process can be started.
-pub(crate) fn entries() -> anyhow::Result<Result<Vec<OnGpus>, String>> {
+pub(crate) fn entries() -> anyhow::Result<(Vec<OnGpus>, Option<String>)> {
     let mut entries: Vec<OnGpus> = Vec::new();
     let ended = run_part(&["gpu-algorithms"], LIMIT, &mut |line| {
         entries.extend(serde_json::from_str::<OnGpus>(line));
         Ok(())
     })?;
-    Ok(match ended {
-        Ended::Well => Ok(entries),
-        Ended::Interrupted => Err("interrupted while its drivers were loaded".to_owned()),
-        Ended::Badly(how) => Err(format!("the process that loaded its drivers {how}")),
-    })
+    let why = match ended {
+        Ended::Well => None,
+        Ended::Interrupted => Some("interrupted while its drivers were loaded".to_owned()),
+        Ended::Badly(how) => Some(format!("the process that loaded its drivers {how}")),
+    };
+    Ok((entries, why))
 }

@@ -1,7 +1,6 @@
 //! `sapwise probe --profiles`: the profiles of one machine, each measured by a process of its own.
 
 mod family;
-mod minutes;
 mod profile;
 mod resume;
 mod runner;
@@ -14,7 +13,7 @@ use crate::restriction::LAVAPIPE_THREADS;
 use crate::{gpus, interrupt, output};
 use anyhow::Context;
 use family::{Whole, family};
-use minutes::minutes;
+use indicatif::HumanDuration;
 use profile::Profile;
 use resume::Existing;
 use runner::{End, ProfileRunner};
@@ -38,7 +37,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
             return Err(WrongUsage(format!("--profiles sets {name} itself; unset it and run this again")).into());
         }
     }
-    let scenarios = arguments.scenarios()?;
+    let scenarios = arguments.scenarios();
     let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT));
     let machine = measure::machine();
     let (cores, level) = (usable_cores(), SimdLevel::detected());
@@ -77,7 +76,7 @@ fn taken(arguments: &Probe) -> anyhow::Result<Vec<GpuIdentity>> {
     }
     let seen = gpus::look()?;
     arguments.gpus.check(&seen)?;
-    seen.remark.iter().for_each(|remark| output::complain(&format!("warning: {remark}")));
+    seen.remark.iter().for_each(|remark| output::warn(remark));
     let (taken, left_out): (Vec<_>, Vec<_>) = seen.identities.into_iter().partition(|g| arguments.gpus.takes(g));
     arguments.gpus.tell(&left_out).iter().for_each(|told| output::complain(told));
     Ok(taken)
@@ -100,8 +99,8 @@ fn listing(family: &[Profile], done: &[Option<PathBuf>], arguments: &Probe, scen
         let numbers: Vec<u32> = profile.gpus.iter().map(|g| g.index).collect();
         let variables = profile.variables().into_iter().map(|(name, value)| format!("{name}={value} ")).collect::<String>();
         let command = format!("{variables}sapwise {}", profile.arguments(arguments, &numbers).join(" "));
-        let time = if done.is_some() { "complete".to_owned() } else { minutes(time) };
+        let time = if done.is_some() { "complete".to_owned() } else { HumanDuration(time).to_string() };
         rows.push(vec![format!("{stem}-{}", profile.name), time, command]);
     }
-    format!("{}\n{} profiles, about {} at most.", columns(&rows), family.len(), minutes(left))
+    format!("{}\n{} profiles, about {} at most.", columns(&rows), family.len(), HumanDuration(left))
 }

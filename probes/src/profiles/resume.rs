@@ -2,7 +2,7 @@
 
 use super::profile::{Profile, is_named};
 use crate::args::{Arguments, Probe, Verb};
-use crate::{provenance, restriction, revisions};
+use crate::{output, provenance, restriction, revisions};
 use clap::Parser;
 use sapwise::{GpuIdentity, Registry};
 use sapwise_lab::data::Document;
@@ -34,7 +34,7 @@ impl Existing<'_> {
         let mut found: Vec<PathBuf> = files.filter(|path| is_named(path, &stem)).collect();
         found.sort_unstable();
         found.into_iter().rev().find(|path| {
-            let Ok(Document::Report(report)) = read_document(path) else { return false };
+            let Ok(Document::Report(report)) = read_document(path, &|_| ()) else { return false };
             self.lack(&report, profile).is_none()
         })
     }
@@ -44,7 +44,7 @@ impl Existing<'_> {
         if !path.exists() {
             return None;
         }
-        match read_document(path) {
+        match read_document(path, &output::warn) {
             Ok(Document::Report(report)) if report.hardware.machine.physical_id == self.physical_id => {
                 self.keeps(&report, profile).map(|why| format!("{}: {why}; name another folder with --out", path.display()))
             }
@@ -152,7 +152,7 @@ mod tests {
 
     fn stored_report() -> Report {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/amd-epyc-2c-full--2026-11-21.json");
-        read_report(Path::new(path)).unwrap().1
+        read_report(Path::new(path), &|_| ()).unwrap().1
     }
     use crate::profiles::family::{Whole, family};
     use sapwise::{GpuKind, SimdLevel};

@@ -1,12 +1,12 @@
 //! The measurement of one profile after the other.
 
-use super::minutes::minutes;
 use super::profile::Profile;
 use super::resume::{Existing, numbers};
 use crate::child::{Ended, run_verb};
 use crate::progress::Progress;
 use crate::{gpus, interrupt, output, shell};
 use anyhow::bail;
+use indicatif::HumanDuration;
 use sapwise_lab::Report;
 use sapwise_lab::data::Document;
 use sapwise_lab::data::read_document;
@@ -160,7 +160,7 @@ impl<'a> ProfileRunner<'a> {
             let (report, remark) = match state {
                 State::Waiting => ("-".to_owned(), "not measured yet".to_owned()),
                 State::Found(path) => (shown(path), "was complete".to_owned()),
-                State::Measured { path, time } => (shown(path), format!("measured in {}", minutes(*time))),
+                State::Measured { path, time } => (shown(path), format!("measured in {}", HumanDuration(*time))),
                 State::Failed(why, path) => (path.as_deref().map_or("-".to_owned(), shown), format!("FAILED: {why}")),
             };
             rows.push(vec![profile.name.clone(), report, remark]);
@@ -180,7 +180,7 @@ impl<'a> ProfileRunner<'a> {
 }
 
 fn read(path: &Path) -> anyhow::Result<Report> {
-    match read_document(path)? {
+    match read_document(path, &output::warn)? {
         Document::Report(report) => Ok(*report),
         _ => bail!("{} is no report", path.display()),
     }

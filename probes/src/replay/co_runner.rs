@@ -1,7 +1,5 @@
 //! Another program that takes a part of the CPU from a frame on, made by ourselves.
 
-use super::frame::Frame;
-use super::samples::Samples;
 use crate::contention::Threads;
 use std::fmt;
 use std::hint::black_box;
@@ -21,9 +19,6 @@ const MEMORY: Duration = Duration::from_millis(100);
 
 /// Steps of the loop that is timed beside the frames: some 200 us.
 const STEPS: u64 = 200_000;
-
-/// Frames are alike whose numbers of objects differ by no more than this share.
-const ALIKE: f64 = 0.05;
 
 /// From which frame on, and on how many threads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,7 +105,7 @@ pub(super) fn time_a_loop() -> f64 {
     began.elapsed().as_nanos() as f64
 }
 
-/// By how much everything took longer from the frame on at which the co-runner began.
+/// By how much a loop of arithmetic took longer from the frame on at which the co-runner began.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Slowdown {
     pub(crate) co_runner: CoRunner,
@@ -119,54 +114,22 @@ pub(crate) struct Slowdown {
     /// Means and not medians: a scheduler takes the core away for milliseconds at a time, so that most short frames are as fast as
     /// before and some wait.
     pub(crate) of_a_loop: Option<f64>,
-    /// The same of every fixed algorithm, over frames that have one with as many objects on the other side.
-    pub(crate) of_fixed: Vec<Option<f64>>,
 }
 
 impl Slowdown {
     /// `loops` are the times of the loop with the frames beside which it ran.
-    pub(super) fn new(co_runner: CoRunner, loops: &[(usize, f64)], frames: &[Frame], contestants: usize) -> Self {
+    pub(super) fn new(co_runner: CoRunner, loops: &[(usize, f64)]) -> Self {
         let mean = |after: bool| {
             let times: Vec<f64> = loops.iter().filter(|l| (l.0 >= co_runner.from_frame) == after).map(|l| l.1).collect();
             (!times.is_empty()).then(|| times.iter().sum::<f64>() / times.len() as f64)
         };
-        let (before, after) = frames.split_at(co_runner.from_frame.min(frames.len()));
-        Self {
-            co_runner,
-            of_a_loop: mean(true).zip(mean(false)).map(|(after, before)| after / before),
-            of_fixed: (0..contestants).map(|k| ratio(&of(before, k), &of(after, k))).collect(),
-        }
+        Self { co_runner, of_a_loop: mean(true).zip(mean(false)).map(|(after, before)| after / before) }
     }
-}
-
-/// Objects and mean time of the frames at which an algorithm was timed, ascending by objects.
-fn of(frames: &[Frame], k: usize) -> Vec<(usize, f64)> {
-    let mut times: Vec<(usize, f64)> =
-        frames.iter().filter_map(|f| Some((f.objects, f.fixed.get(k).and_then(Samples::mean)?))).collect();
-    times.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    times
-}
-
-/// The total time of the frames after over that of alike frames before: for each the mean of those that have nearly as many objects.
-fn ratio(before: &[(usize, f64)], after: &[(usize, f64)]) -> Option<f64> {
-    let (mut slow, mut fast) = (0.0, 0.0);
-    for &(objects, ns) in after {
-        let n = objects as f64;
-        let first = before.partition_point(|b| (b.0 as f64) < n * (1.0 - ALIKE));
-        let end = before.partition_point(|b| b.0 as f64 <= n * (1.0 + ALIKE));
-        let alike = &before[first..end];
-        if !alike.is_empty() {
-            slow += ns;
-            fast += alike.iter().map(|b| b.1).sum::<f64>() / alike.len() as f64;
-        }
-    }
-    (fast > 0.0).then(|| slow / fast)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::replay::examples::{outcome, taken};
 
     #[test]
     fn frames_and_threads_are_read() {
@@ -195,22 +158,11 @@ mod tests {
     }
 
     #[test]
-    fn the_slowdown_compares_frames_with_as_many_objects() {
-        let frames: [(usize, f64, &[f64], _); 6] = [
-            (100, 1.0, &[1.0, 8.0], taken(0)),
-            (200, 1.0, &[2.0, 8.0], taken(0)),
-            (1000, 1.0, &[50.0, 8.0], taken(0)),
-            (201, 1.0, &[3.0, f64::INFINITY], taken(0)),
-            (98, 1.0, &[1.5, f64::INFINITY], taken(0)),
-            (5000, 1.0, &[400.0, f64::INFINITY], taken(0)),
-        ];
-        let outcome = outcome(&["brute@cpu1", "grid-sap@cpu1"], &frames);
-        let co_runner = CoRunner { from_frame: 3, threads: None };
-        let loops = [(0, 100.0), (1, 100.0), (3, 150.0), (4, 190.0)];
-        let slowdown = Slowdown::new(co_runner, &loops, &outcome.frames, 2);
-        assert_eq!(slowdown.of_a_loop, Some(1.7));
-        assert_eq!(slowdown.of_fixed, [Some(1.5), None]);
-        let from_the_first = CoRunner { from_frame: 0, threads: None };
-        assert_eq!(Slowdown::new(from_the_first, &loops, &outcome.frames, 2).of_a_loop, None);
+    fn the_slowdown_compares_the_frames_before_with_those_after() {
+        let slowdown = |from_frame| {
+            let loops = [(0, 100.0), (1, 100.0), (3, 150.0), (4, 190.0)];
+            Slowdown::new(CoRunner { from_frame, threads: None }, &loops).of_a_loop
+        };
+        assert_eq!((slowdown(3), slowdown(0)), (Some(1.7), None));
     }
 }

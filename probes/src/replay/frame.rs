@@ -7,7 +7,7 @@ use sapwise::{AlgorithmId, Load, Reason};
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Frame {
     pub(crate) objects: usize,
-    /// The time of the adaptive module, choice included.
+    /// The time of the adaptive choice, choice included.
     pub(crate) adaptive_ns: f64,
     /// The same in the repeats in which it did not explore at this frame; infinite where it explored in all of them.
     pub(crate) unexplored_ns: f64,
@@ -17,7 +17,7 @@ pub(crate) struct Frame {
     pub(crate) fixed: Vec<Samples>,
 }
 
-/// What the adaptive module ran at a frame of a repeat.
+/// What the adaptive choice ran at a frame of a repeat.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Taken {
     /// A position among the fixed algorithms.
@@ -49,7 +49,7 @@ impl Frame {
     }
 }
 
-/// What a frame of the adaptive module is beside one that continues with what ran before.
+/// What a frame of the adaptive choice is beside one that continues with what ran before.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Continues,

@@ -1,4 +1,4 @@
-//! The replay: frames of a seeded scene or a recorded stream, run by the adaptive module and by every fixed algorithm side by side.
+//! The replay: frames of a seeded scene or a recorded stream, run by the adaptive choice and by every fixed algorithm side by side.
 
 mod co_runner;
 mod contestant;
@@ -19,7 +19,7 @@ pub(crate) use outcome::{Outcome, Segment};
 pub(crate) use picture::picture;
 pub(crate) use race::{replay, too_wide};
 pub(crate) use settings::ReplaySettings;
-pub(crate) use trace::{Format as TraceFormat, write_trace};
+pub(crate) use trace::{check_trace, write_trace};
 
 #[cfg(test)]
 pub(crate) use outcome::tests as examples;

@@ -5,7 +5,7 @@
 //! oracle too slow, never too fast; of three of them, which choose by more or fewer frames, the fastest is taken.
 
 use super::frame::Frame;
-use super::samples::{Samples, mean_of};
+use super::samples::mean_of;
 use sapwise::stats::median;
 
 /// Frames before and behind that may have a say in the choice ...
@@ -73,11 +73,6 @@ impl Oracle {
     }
 }
 
-/// The least of the times at a frame, which luck has its part in.
-pub(super) fn optimistic(fixed: &[Samples]) -> f64 {
-    fixed.iter().map(Samples::time).fold(f64::INFINITY, f64::min)
-}
-
 /// What one half of the repeats holds for the best at each frame. With one repeat there is one half, which decides for both.
 fn choices(frames: &[Frame], half: usize, sight: Sight) -> Vec<Option<usize>> {
     let half = if frames.iter().any(|f| f.fixed.iter().any(|s| s.half(half).next().is_some())) { half } else { 1 - half };
@@ -123,6 +118,12 @@ fn near(frames: &[Frame], at: usize) -> Vec<&Frame> {
 mod tests {
     use super::*;
     use crate::replay::examples::{frame_of, samples};
+    use crate::replay::samples::Samples;
+
+    /// The least of the times at a frame, which luck has its part in.
+    fn optimistic(fixed: &[Samples]) -> f64 {
+        fixed.iter().map(Samples::time).fold(f64::INFINITY, f64::min)
+    }
 
     fn frame(objects: usize, fixed: &[&[f64]]) -> Frame {
         frame_of(objects, fixed.iter().map(|ns| samples(ns)).collect())

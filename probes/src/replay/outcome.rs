@@ -2,7 +2,7 @@
 
 use super::co_runner::Slowdown;
 use super::frame::{Frame, Taken, Told};
-use super::oracle::{Oracle, optimistic};
+use super::oracle::Oracle;
 use sapwise::AlgorithmId;
 use sapwise::stats::quantile;
 use std::ops::Range;
@@ -20,7 +20,7 @@ pub(crate) struct Outcome {
     pub(crate) windows: Oracle,
     /// What ran at every frame, for each repeat that all frames have; one that Ctrl-C cut short is left out.
     pub(crate) repeats: Vec<Vec<Taken>>,
-    /// What the adaptive module told of every frame of the last of these.
+    /// What the adaptive choice told of every frame of the last of these.
     pub(crate) told: Vec<Told>,
     pub(crate) interrupted: bool,
     /// Median over the frames of the share of the CPU that other programs took. `None` where that can't be told, as in a replay
@@ -36,12 +36,10 @@ pub(crate) struct Outcome {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Segment {
     pub(crate) frames: Range<usize>,
-    /// Time of the adaptive module over that of the oracle, less one.
+    /// Time of the adaptive choice over that of the oracle, less one.
     pub(crate) regret: f64,
     /// The same against the best algorithm of every window.
     pub(crate) window_regret: f64,
-    /// The same against the least time of every frame.
-    pub(crate) optimistic_regret: f64,
     /// The regret of each repeat by itself, from single samples.
     pub(crate) of_repeats: Vec<f64>,
     /// Changes of what runs in the last repeat, frames that explore aside.
@@ -81,11 +79,6 @@ impl Outcome {
         total_ms(self.oracle.ns.iter().copied())
     }
 
-    /// The total of the least times.
-    pub(crate) fn optimistic_oracle_ms(&self) -> f64 {
-        total_ms(self.frames.iter().map(|f| optimistic(&f.fixed)))
-    }
-
     /// The total of a fixed algorithm; `None` when it was not timed at all frames.
     pub(crate) fn fixed_ms(&self, k: usize) -> Option<f64> {
         Some(total_ms(self.frames.iter().map(|f| f.fixed_ns[k]))).filter(|ms| ms.is_finite())
@@ -101,22 +94,8 @@ impl Outcome {
 
     /// Position and total of the fixed algorithm with the smallest total.
     pub(crate) fn best_fixed(&self) -> Option<(usize, f64)> {
-        self.best_of(|_| true)
-    }
-
-    /// The same among those that `among` admits.
-    pub(crate) fn best_of(&self, among: impl Fn(&AlgorithmId) -> bool) -> Option<(usize, f64)> {
-        let own = (0..self.fixed.len()).filter(|&k| among(&self.fixed[k]));
-        own.filter_map(|k| Some((k, self.fixed_ms(k)?))).min_by(|a, b| a.1.total_cmp(&b.1))
-    }
-
-    /// The most objects of a frame, and the fixed algorithm that is the best at the frames that have as many.
-    pub(crate) fn best_at_largest(&self) -> Option<(usize, usize)> {
-        let most = self.frames.iter().map(|f| f.objects).max()?;
-        let largest = || self.frames.iter().filter(|f| f.objects == most);
-        let time = |k: usize| largest().map(|f| f.fixed_ns[k]).sum::<f64>();
-        let best = (0..self.fixed.len()).min_by(|&a, &b| time(a).total_cmp(&time(b)))?;
-        time(best).is_finite().then_some((most, best))
+        let own = (0..self.fixed.len()).filter_map(|k| Some((k, self.fixed_ms(k)?)));
+        own.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// What ran at the frames of the last repeat.
@@ -159,7 +138,6 @@ impl Outcome {
         Segment {
             regret: over(oracle_ns.iter().sum()),
             window_regret: over(self.windows.ns[range.clone()].iter().sum()),
-            optimistic_regret: over(frames.iter().map(|f| optimistic(&f.fixed)).sum()),
             of_repeats: (0..self.repeats.len()).filter_map(|repeat| self.regret_of(range.clone(), repeat)).collect(),
             switches: self.switches().iter().filter(|at| range.contains(at)).count(),
             explored: self.last_taken()[range.clone()].iter().filter(|t| t.explored).count(),
@@ -205,7 +183,7 @@ pub(crate) mod tests {
         Taken { chosen: Some(chosen), explored: false }
     }
 
-    /// An outcome of one repeat: objects, the adaptive module's time, those of the fixed algorithms in milliseconds, and what ran.
+    /// An outcome of one repeat: objects, the adaptive choice's time, those of the fixed algorithms in milliseconds, and what ran.
     pub(crate) fn outcome(fixed: &[&str], frames: &[(usize, f64, &[f64], Taken)]) -> Outcome {
         let mut before = None;
         let frame = |&(objects, adaptive, fixed, taken): &(usize, f64, &[f64], Taken)| {
@@ -251,10 +229,8 @@ pub(crate) mod tests {
         assert_eq!((outcome.adaptive_ms(), outcome.oracle_ms()), (15.0, 6.5));
         assert_eq!((outcome.best_fixed(), outcome.switches()), (Some((1, 10.0)), vec![1]));
         assert_eq!(outcome.frames_run(), [2, 2]);
-        // At the two largest frames the second takes 4 ms, the first 10.5.
-        assert_eq!(outcome.best_at_largest(), Some((30, 1)));
         let whole = outcome.whole();
-        assert!((whole.regret - (15.0 / 6.5 - 1.0)).abs() < 1e-12 && whole.regret == whole.optimistic_regret);
+        assert!((whole.regret - (15.0 / 6.5 - 1.0)).abs() < 1e-12);
         assert_eq!((whole.switches, whole.explored, whole.worst_frame), (1, 1, Some((1.5, 1))));
         assert_eq!((whole.of_repeats.len(), whole.quartiles()), (1, None));
         let part = outcome.part(2..4);
@@ -276,7 +252,6 @@ pub(crate) mod tests {
         assert_eq!((outcome.missed(0), outcome.missed(1)), (None, Some(missed)));
         // The oracle may have it where it ran all the same.
         assert_eq!((outcome.oracle_ms(), outcome.best_fixed()), (2.5, Some((0, 3.0))));
-        assert_eq!(outcome.best_at_largest(), Some((90, 0)));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The replay itself: the adaptive module and every fixed algorithm take turns at the same frames.
+//! The replay itself: the adaptive choice and every fixed algorithm take turns at the same frames.
 
 use super::co_runner::{Slowdown, time_a_loop};
 use super::contestant::{Contestant, best};
@@ -19,7 +19,7 @@ use std::time::Instant;
 /// Replays the frames: in each repeat the same frames again, and at each frame every contestant, in random order: a parallel algorithm leaves
 /// threads and caches behind that the next one feels.
 ///
-/// All of them start each repeat again without what they kept, the adaptive module from this tuning, so that frame by frame the repeats are alike: what it
+/// All of them start each repeat again without what they kept, the adaptive choice from this tuning, so that frame by frame the repeats are alike: what it
 /// has learned by a frame, it has learned from the frames before.
 ///
 /// The pairs of all contestants are compared in the first repeat, outside the timed part.
@@ -60,7 +60,7 @@ pub(crate) fn replay(settings: &ReplaySettings, tuning: &Tuning, registry: &Regi
     Ok(replay.outcome(settings, done, watch.foreign_load()))
 }
 
-/// Algorithms of the tuning with more threads than the registry lists, as those of a larger machine have: the adaptive module leaves them
+/// Algorithms of the tuning with more threads than the registry lists, as those of a larger machine have: the adaptive choice leaves them
 /// out. Where the tuning is steps it runs them all the same.
 pub(crate) fn too_wide<'a>(tuning: &'a Tuning, registry: &Registry) -> Vec<&'a AlgorithmId> {
     let most = registry.entries().iter().map(|e| e.id.threads()).max().unwrap_or(1);
@@ -72,7 +72,7 @@ struct Replay {
     contestants: Vec<Contestant>,
     adaptive: Vec<Samples>,
     objects: Vec<usize>,
-    /// What the adaptive module ran in the repeat under way, and in each one that is complete.
+    /// What the adaptive choice ran in the repeat under way, and in each one that is complete.
     taken: Vec<Taken>,
     repeats: Vec<Vec<Taken>>,
     /// The same in its own words, of the repeat under way and of the last complete one.
@@ -125,7 +125,7 @@ impl Replay {
         }
     }
 
-    /// The adaptive module of a repeat, with every contestant as fresh as it is.
+    /// The adaptive choice of a repeat, with every contestant as fresh as it is.
     fn begin(&mut self, repeat: usize, tuning: &Tuning, registry: &Registry) -> anyhow::Result<Adaptive> {
         for contestant in self.contestants.iter_mut().filter(|_| repeat > 0) {
             if let Err(error) = contestant.renew(registry) {
@@ -145,7 +145,7 @@ impl Replay {
         let count = self.contestants.len();
         let best_before = best(&self.contestants, frame);
         let mut answers: Vec<(usize, u64)> = Vec::new();
-        // The turn behind the last of the fixed ones is the adaptive module's.
+        // The turn behind the last of the fixed ones is the adaptive choice's.
         for k in self.shuffle.shuffled(count + 1) {
             if self.contestants.get(k).is_some_and(|c| c.is_skipped(frame, boxes.len(), best_before)) {
                 continue;
@@ -157,7 +157,7 @@ impl Replay {
             };
             let ns = (started.elapsed().as_nanos() as f64).max(1.0);
             if let (Err(error @ Error::Unavailable { .. }), Some(contestant)) = (&result, self.contestants.get_mut(k)) {
-                // The algorithm is at fault and not the boxes: a GPU that was lost. The adaptive module continues without it too.
+                // The algorithm is at fault and not the boxes: a GPU that was lost. The adaptive choice continues without it too.
                 self.notes.push(format!("{error}, at frame {frame}"));
                 contestant.algorithm = None;
                 continue;
@@ -192,7 +192,7 @@ impl Replay {
         Ok(())
     }
 
-    /// Notes what the adaptive module decided.
+    /// Notes what the adaptive choice decided.
     fn listen(&mut self, adaptive: &Adaptive) {
         let decision = adaptive.last_decision();
         let chosen = decision.and_then(|d| self.contestants.iter().position(|c| c.id == *d.algorithm));
@@ -213,9 +213,9 @@ impl Replay {
         self.told = std::mem::take(&mut self.telling);
     }
 
-    /// Who has a turn: one of the fixed algorithms, or the adaptive module behind the last of them.
+    /// Who has a turn: one of the fixed algorithms, or the adaptive choice behind the last of them.
     fn name(&self, turn: usize) -> String {
-        self.contestants.get(turn).map_or("the adaptive module".to_owned(), |c| c.id.to_string())
+        self.contestants.get(turn).map_or("the adaptive choice".to_owned(), |c| c.id.to_string())
     }
 
     fn outcome(mut self, settings: &ReplaySettings, done: usize, foreign_load: Option<f64>) -> Outcome {
@@ -230,7 +230,7 @@ impl Replay {
             Frame::new(self.objects[at], own(&mut self.adaptive[at]), fixed, &taken)
         };
         let frames: Vec<Frame> = (0..settings.frames).map(frame).collect();
-        let slowdown = |own| Slowdown::new(own, &self.loops, &frames, self.contestants.len());
+        let slowdown = |own| Slowdown::new(own, &self.loops);
         Outcome {
             slowdown: settings.co_runner.map(slowdown),
             fixed: self.contestants.into_iter().map(|c| c.id).collect(),

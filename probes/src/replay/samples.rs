@@ -25,10 +25,6 @@ impl Samples {
         self.0.iter().map(|s| s.1).fold(f64::INFINITY, f64::min)
     }
 
-    pub(crate) fn mean(&self) -> Option<f64> {
-        (!self.0.is_empty()).then(|| self.0.iter().map(|s| s.1).sum::<f64>() / self.0.len() as f64)
-    }
-
     /// The sample of a repeat.
     pub(crate) fn at(&self, repeat: usize) -> Option<f64> {
         self.0.iter().find(|s| s.0 == repeat).map(|s| s.1)
@@ -84,7 +80,7 @@ mod tests {
     fn a_repeat_that_was_cut_short_is_forgotten() {
         let mut cut = samples(&[10.0, 14.0, 99.0]);
         cut.cut(2);
-        assert_eq!((cut.len(), cut.time(), cut.mean(), cut.fastest()), (2, 12.0, Some(12.0), 10.0));
+        assert_eq!((cut.len(), cut.time(), cut.fastest()), (2, 12.0, 10.0));
         assert_eq!(cut.of(|repeat| repeat == 1).time(), 14.0);
     }
 }

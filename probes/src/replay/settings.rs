@@ -3,7 +3,7 @@
 use super::co_runner::CoRunner;
 use super::frame_source::FrameSource;
 
-/// The frames of a replay, how often they run, and what the adaptive module may do.
+/// The frames of a replay, how often they run, and what the adaptive choice may do.
 #[derive(Debug)]
 pub(crate) struct ReplaySettings {
     pub(crate) source: FrameSource,

@@ -21,7 +21,7 @@ fn a_replay_has_every_total_and_the_choice_of_every_frame() {
     let outcome = replay(&settings(Scenario::Fragmentation, 800, 300, 3), &tuning, &registry).unwrap();
     let shape = (outcome.frames.len(), outcome.repeats.len(), outcome.fixed.len(), outcome.told.len());
     assert_eq!(shape, (300, 3, registry.available().len(), 300));
-    assert!(outcome.optimistic_oracle_ms() > 0.0 && outcome.best_fixed().is_some());
+    assert!(outcome.best_fixed().is_some());
     assert!(!outcome.switches().is_empty());
     assert!(outcome.foreign_load.is_none_or(|load| (0.0..=1.0).contains(&load)));
     assert!(outcome.slowdown.is_none());
@@ -114,5 +114,4 @@ fn a_co_runner_begins_at_its_frame_and_its_work_is_told() {
     let slowdown = outcome.slowdown.unwrap();
     assert_eq!(slowdown.co_runner, co_runner);
     assert!(slowdown.of_a_loop.is_some_and(|x| x > 0.0));
-    assert!(slowdown.of_fixed.len() == outcome.fixed.len() && slowdown.of_fixed.iter().all(Option::is_some));
 }

@@ -2,120 +2,53 @@
 
 use super::outcome::Outcome;
 use crate::exit::WrongUsage;
-
 use sapwise::{Load, Reason};
 use sapwise_lab::write::write_atomically;
-use serde::Serialize;
-use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
-/// How the table is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Format {
-    Csv,
-    Json,
-}
-
-impl Format {
-    /// What the name of a file asks for.
-    ///
-    /// # Errors
-    /// When it asks for neither.
-    pub(crate) fn of(path: &Path) -> Result<Self, WrongUsage> {
-        match path.extension().and_then(|e| e.to_str()) {
-            Some("csv") => Ok(Self::Csv),
-            Some("json") => Ok(Self::Json),
-            _ => Err(WrongUsage(format!("--trace {}: name a file that ends in .csv or .json", path.display()))),
-        }
+/// Refuses a file whose name promises another format than the table has.
+///
+/// # Errors
+/// Says which ending it takes.
+pub(crate) fn check_trace(path: &Path) -> Result<(), WrongUsage> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("csv") => Ok(()),
+        _ => Err(WrongUsage(format!("--trace {}: name a file that ends in .csv", path.display()))),
     }
 }
 
-/// One frame. What was decided is that of the last repeat; times are those over all repeats.
-#[derive(Serialize)]
-struct Row {
-    frame: usize,
-    objects: usize,
-    load: Load,
-    /// What ran.
-    algorithm: Option<String>,
-    reason: &'static str,
-    predicted_ns: Option<f64>,
-    /// Null where the frame was not timed: short frames are not all.
-    measured_ns: Option<f64>,
-    runner_up: Option<String>,
-    runner_up_ns: Option<f64>,
-    adaptive_ns: f64,
-    oracle_ns: f64,
-    /// By id; null where it was not timed.
-    fixed_ns: BTreeMap<String, Option<f64>>,
-}
-
-/// Writes one row a frame.
+/// Writes one row a frame. What was decided is that of the last repeat; times are those over all repeats.
 ///
 /// # Errors
 /// Names the file. Nothing is left half-written.
-pub(crate) fn write_trace(path: &Path, format: Format, outcome: &Outcome) -> anyhow::Result<()> {
-    write_atomically(path, |out| match format {
-        Format::Csv => csv(out, outcome),
-        Format::Json => json(out, outcome),
-    })
-}
-
-fn rows(outcome: &Outcome) -> impl Iterator<Item = Row> {
-    let frames = outcome.frames.iter().zip(&outcome.told).zip(outcome.last_taken());
-    frames.enumerate().map(|(frame, ((f, told), taken))| {
-        let fixed = outcome.fixed.iter().map(ToString::to_string);
-        let finite = f.fixed_ns.iter().map(|ns| Some(*ns).filter(|ns| ns.is_finite()));
-        Row {
-            frame,
-            objects: f.objects,
-            load: told.load,
-            algorithm: taken.chosen.map(|k| outcome.fixed[k].to_string()),
-            reason: name(told.reason),
-            predicted_ns: told.predicted_ns,
-            measured_ns: told.measured_ns,
-            runner_up: told.runner_up.as_ref().map(|r| r.0.to_string()),
-            runner_up_ns: told.runner_up.as_ref().map(|r| r.1),
-            adaptive_ns: f.adaptive_ns,
-            oracle_ns: outcome.oracle.ns[frame],
-            fixed_ns: fixed.zip(finite).collect(),
-        }
-    })
+pub(crate) fn write_trace(path: &Path, outcome: &Outcome) -> anyhow::Result<()> {
+    write_atomically(path, |out| csv(out, outcome))
 }
 
 fn csv(out: &mut dyn Write, outcome: &Outcome) -> anyhow::Result<()> {
-    let mut ids: Vec<String> = outcome.fixed.iter().map(ToString::to_string).collect();
-    ids.sort_unstable();
-    let times: String = ids.iter().map(|id| format!(",{id}_ns")).collect();
+    let ids: Vec<String> = outcome.fixed.iter().map(ToString::to_string).collect();
+    let mut order: Vec<usize> = (0..ids.len()).collect();
+    order.sort_unstable_by_key(|&k| &ids[k]);
+    let times: String = order.iter().map(|&k| format!(",{}_ns", ids[k])).collect();
     writeln!(
         out,
         "frame,objects,axis_candidates,strip_candidates,pairs,moved,algorithm,reason,predicted_ns,measured_ns,runner_up,\
          runner_up_ns,adaptive_ns,oracle_ns{times}"
     )?;
-    let number = |ns: Option<f64>| ns.map_or(String::new(), |ns| format!("{ns}"));
-    for row in rows(outcome) {
-        let Load { axis_candidates, strip_candidates, pairs, moved, .. } = row.load;
-        write!(out, "{},{},{axis_candidates},{strip_candidates},{pairs},{moved},", row.frame, row.objects)?;
-        write!(out, "{},{},", row.algorithm.unwrap_or_default(), row.reason)?;
-        write!(out, "{},{},", number(row.predicted_ns), number(row.measured_ns))?;
-        write!(out, "{},{},", row.runner_up.unwrap_or_default(), number(row.runner_up_ns))?;
-        write!(out, "{},{}", row.adaptive_ns, row.oracle_ns)?;
-        // In the order of the ids, as in the first line.
-        row.fixed_ns.values().try_for_each(|ns| write!(out, ",{}", number(*ns)))?;
+    // Empty where a frame or an algorithm in it was not timed: short frames are not all.
+    let number = |ns: Option<f64>| ns.filter(|ns| ns.is_finite()).map_or(String::new(), |ns| format!("{ns}"));
+    let frames = outcome.frames.iter().zip(&outcome.told).zip(outcome.last_taken());
+    for (at, ((frame, told), taken)) in frames.enumerate() {
+        let Load { axis_candidates, strip_candidates, pairs, moved, .. } = told.load;
+        write!(out, "{at},{},{axis_candidates},{strip_candidates},{pairs},{moved},", frame.objects)?;
+        write!(out, "{},{},", taken.chosen.map_or("", |k| &ids[k]), name(told.reason))?;
+        write!(out, "{},{},", number(told.predicted_ns), number(told.measured_ns))?;
+        let (id, ns) = told.runner_up.as_ref().map_or((String::new(), None), |r| (r.0.to_string(), Some(r.1)));
+        write!(out, "{id},{},{},{}", number(ns), frame.adaptive_ns, outcome.oracle.ns[at])?;
+        order.iter().try_for_each(|&k| write!(out, ",{}", number(Some(frame.fixed_ns[k]))))?;
         writeln!(out)?;
     }
-    Ok(())
-}
-
-fn json(out: &mut dyn Write, outcome: &Outcome) -> anyhow::Result<()> {
-    let mut before = "{\"frames\":[";
-    for row in rows(outcome) {
-        writeln!(out, "{before}")?;
-        serde_json::to_writer(&mut *out, &row)?;
-        before = ",";
-    }
-    writeln!(out, "\n]}}")?;
     Ok(())
 }
 
@@ -164,22 +97,10 @@ mod tests {
     }
 
     #[test]
-    fn the_same_as_json_is_one_document() {
-        let mut text = Vec::new();
-        json(&mut text, &example()).unwrap();
-        let read: serde_json::Value = serde_json::from_slice(&text).unwrap();
-        let frames = read["frames"].as_array().unwrap();
-        assert_eq!((frames.len(), &frames[1]["reason"]), (2, &"explored".into()));
-        assert_eq!(frames[1]["fixed_ns"], serde_json::json!({"grid-sap@cpu1": null, "brute@gpu0+1": 2e6}));
-        assert_eq!(frames[0]["load"]["objects"], 0);
-    }
-
-    #[test]
-    fn the_name_of_the_file_says_which() {
-        assert_eq!(Format::of(Path::new("a.csv")).unwrap(), Format::Csv);
-        assert_eq!(Format::of(Path::new("b.c/a.json")).unwrap(), Format::Json);
-        for other in ["a", "a.tsv", "csv"] {
-            assert!(Format::of(Path::new(other)).unwrap_err().to_string().contains(".csv or .json"));
+    fn the_name_of_the_file_says_what_it_holds() {
+        assert!(check_trace(Path::new("b.c/a.csv")).is_ok());
+        for other in ["a", "a.tsv", "csv", "a.json"] {
+            assert!(check_trace(Path::new(other)).unwrap_err().to_string().contains(".csv"));
         }
     }
 }

@@ -64,6 +64,6 @@ pub(crate) enum Event {
     Point(Box<Point>),
     /// Something that the reader of the report should know.
     Remark(String),
-    /// An algorithm gave a wrong answer. The report is kept, and the probe has failed.
+    /// An algorithm returned a wrong answer. The report is kept, and the probe has failed.
     Mismatch(String),
 }

@@ -132,7 +132,7 @@ impl ScenarioSweep<'_> {
     }
 }
 
-/// Adds the algorithms on those of these GPUs that are still there, and gives what keeps others from running.
+/// Adds the algorithms on those of these GPUs that are still there, and returns what keeps others from running.
 pub(crate) fn add_gpus(registry: &mut Registry, wanted: &[GpuIdentity]) -> Vec<String> {
     if wanted.is_empty() {
         return Vec::new();
@@ -160,7 +160,7 @@ struct Before {
 impl Before {
     /// The time that a size takes at least.
     fn forecast(&self, objects: u32) -> Duration {
-        // Between the exponents of the strips (1) and of a sweep on one axis (5/3). Too low a forecast costs some seconds
+        // Between the exponents of `grid-sap` (1) and of a sweep on one axis (5/3). Too low a forecast costs some seconds
         // beyond the time, too high a one costs the last size.
         let growth = (f64::from(objects) / f64::from(self.objects)).powf(1.25);
         (self.warm_up + self.frame * (FEWEST_FRAMES as u32)).mul_f64(growth)
@@ -177,7 +177,7 @@ impl Before {
     }
 }
 
-/// Lets every standing know how its algorithm did, and gives the median of the best.
+/// Lets every standing know how its algorithm did, and returns the median of the best.
 fn judge(standings: &mut [Standing], point: &Point, objects: u32) -> f64 {
     let medians: Vec<Option<f64>> = point.timings.iter().map(|t| median(&t.samples_ns)).collect();
     let best = medians.iter().flatten().copied().fold(f64::INFINITY, f64::min);
@@ -239,7 +239,7 @@ mod tests {
     fn visits_race_only_those_who_were_asked() {
         let algorithms: Vec<AlgorithmId> = ["brute@cpu1", "sap@cpu1"].map(|id| id.parse().unwrap()).into();
         let visit = |objects, algorithms: &[AlgorithmId]| Visit { objects, seconds: 0.0, algorithms: algorithms.into() };
-        // One alone gives no choice to be in doubt of.
+        // With one alone no choice is in doubt.
         let visits = vec![visit(300, &algorithms), visit(20, &algorithms), visit(50, &algorithms[..1])];
         let request = SweepRequest { schedule: Schedule::Visits(visits), ..request("clustered", &[], 60.0) };
         let events = events(&request);

@@ -2,7 +2,6 @@
 
 mod check;
 mod compare;
-mod completions;
 mod convert;
 mod devices;
 mod pairs;
@@ -41,7 +40,6 @@ pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome
         Verb::Check(arguments) => check::run(&arguments, algorithms),
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),
-        Verb::Completions(arguments) => completions::run(&arguments),
         Verb::Part(arguments) => part::run(arguments, algorithms),
     }
 }

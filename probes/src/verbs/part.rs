@@ -21,7 +21,6 @@ pub(crate) fn run(arguments: Part, algorithms: &Algorithms) -> anyhow::Result<Ou
         }
         PartKind::Gpus => gpus::print_identities()?,
         PartKind::GpuAlgorithms => gpus::print_entries()?,
-        PartKind::GpuLimits { index } => output::print_json(&gpus::limits_of(index)?)?,
         PartKind::Gpu { index, threads } => gpus::print_parameters(index, &Options::default().with_threads(threads))?,
         PartKind::GpuGroup { gpus: Backend::Gpu(indices), threads } => {
             gpus::print_group(&indices, &Options::default().with_threads(threads))?;

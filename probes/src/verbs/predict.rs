@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     let mut text = String::new();
     // A sentence on GPUs for people, and their failures for the file.
     let (mut told, mut remarks) = (None, Vec::new());
-    // Whether a sample gave wrong pairs.
+    // Whether a sample returned wrong pairs.
     let mut wrong = false;
     let mut tuning = match (&model, &report) {
         (None, Some(report)) => {
@@ -111,7 +111,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
 }
 
 fn read_report(path: &Path) -> anyhow::Result<Report> {
-    match read_document(path).context("the report can't be used")? {
+    match read_document(path, &output::warn).context("the report can't be used")? {
         Document::Report(report) => Ok(*report),
         _ => bail!("{} is no report; make one with `sapwise probe --out R.json`", path.display()),
     }

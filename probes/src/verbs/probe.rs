@@ -87,7 +87,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
 /// What to sweep; `None` with `--hardware-only`.
 fn plan(arguments: &Probe) -> anyhow::Result<Option<Plan>> {
     hardware::check_threads(arguments.threads)?;
-    let scenarios = arguments.scenarios()?;
+    let scenarios = arguments.scenarios();
     Ok((!arguments.hardware_only).then(|| Plan::new(arguments.quick, &scenarios, arguments.max_objects)))
 }
 

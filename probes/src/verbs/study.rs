@@ -25,7 +25,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let summary = study.write(&arguments.out)?;
     drop(progress);
     for (name, why) in study.unreadable() {
-        output::complain(&format!("warning: {name} is left out: {why}"));
+        output::warn(&format!("{name} is left out: {why}"));
     }
     if arguments.json {
         output::print_json(&summary)?;

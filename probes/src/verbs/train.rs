@@ -100,7 +100,7 @@ fn select(files: &[PathBuf], evidence: Evidence, progress: &Progress) -> anyhow:
     for some in files.chunks(AT_A_TIME) {
         interrupt::check()?;
         let read = |file: &PathBuf| {
-            let (name, report) = read_report(file)?;
+            let (name, report) = read_report(file, &|text| progress.warn(text))?;
             Ok((doubts(&report), selection.reduce(&name, &report)))
         };
         let reduced: Vec<_> = some.par_iter().map(read).collect::<anyhow::Result<_>>()?;

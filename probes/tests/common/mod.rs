@@ -35,7 +35,7 @@ pub(crate) fn remarks_but_of_moves(report: &sapwise_lab::report::Report) -> Vec<
     report.remarks.iter().filter(|r| !r.starts_with("the machine changed:")).cloned().collect()
 }
 
-/// Runs to exit status 0 and gives standard output.
+/// Runs to exit status 0 and returns standard output.
 pub(crate) fn success(command: &mut Command) -> String {
     let ended = command.output().unwrap();
     let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
@@ -43,7 +43,7 @@ pub(crate) fn success(command: &mut Command) -> String {
     String::from_utf8(ended.stdout).unwrap()
 }
 
-/// Runs to this exit status and gives standard error, which must not be a panic.
+/// Runs to this exit status and returns standard error, which must not be a panic.
 pub(crate) fn failure(command: &mut Command, status: i32) -> String {
     let ended = command.output().unwrap();
     let complaint = String::from_utf8(ended.stderr).unwrap();

@@ -35,11 +35,9 @@ pub(super) struct Answer<'a> {
     pub(super) figures: Figures,
     /// The regret of each repeat by itself, from single samples.
     regret_of_repeats: Vec<f64>,
-    /// The best fixed algorithm, and the time of the adaptive module over its time.
+    /// The best fixed algorithm, and the time of the adaptive choice over its time.
     pub(super) best_fixed: String,
     pub(super) over_best_fixed: f64,
-    /// The fixed algorithm that is the best at the frames with the most objects.
-    pub(super) best_at_largest: Option<AtLargest>,
     /// The same figures of the frames between the cuts.
     pub(super) parts: Vec<SegmentAnswer>,
     pub(super) co_runner: Option<Slowed>,
@@ -79,8 +77,6 @@ pub(super) enum Oracle {
 pub(super) struct Totals {
     pub(super) adaptive: f64,
     pub(super) oracle: f64,
-    /// Of the least times of every frame.
-    pub(super) optimistic_oracle: f64,
     /// Of those that ran every frame.
     pub(super) fixed: BTreeMap<String, f64>,
 }
@@ -106,8 +102,6 @@ pub(super) struct Figures {
     pub(super) regret_quartiles: Option<[f64; 2]>,
     /// Against the best algorithm of every 32 frames together.
     pub(super) window_regret: f64,
-    /// Against the least times.
-    pub(super) optimistic_regret: f64,
     /// In the last repeat, frames that explore aside.
     pub(super) switches: usize,
     /// Frames that explored, in the last repeat.
@@ -126,14 +120,6 @@ pub(super) struct SegmentAnswer {
     pub(super) figures: Figures,
 }
 
-#[derive(Serialize)]
-pub(super) struct AtLargest {
-    pub(super) objects: usize,
-    pub(super) algorithm: String,
-    /// Time of the adaptive module over its time, over all frames; null where it was not timed at all of them.
-    pub(super) over: Option<f64>,
-}
-
 /// What the co-runner did.
 #[derive(Serialize)]
 pub(super) struct Slowed {
@@ -143,8 +129,6 @@ pub(super) struct Slowed {
     share: f64,
     /// Mean time after over mean time before of a loop beside the frames; null where there was no frame before.
     pub(super) slowdown: Option<f64>,
-    /// The same of the fixed algorithms, over frames with as many objects.
-    pub(super) slowdown_of: BTreeMap<String, Option<f64>>,
 }
 
 #[derive(Serialize)]
@@ -175,11 +159,6 @@ impl<'a> Answer<'a> {
         let frames_run = outcome.frames_run();
         let adaptive = outcome.adaptive_ms();
         let best = outcome.best_fixed();
-        let at_largest = |(objects, k): (usize, usize)| AtLargest {
-            objects,
-            algorithm: outcome.fixed[k].to_string(),
-            over: outcome.fixed_ms(k).map(|ms| adaptive / ms),
-        };
         let segment =
             |p: &Segment| SegmentAnswer { from_frame: p.frames.start, to_frame: p.frames.end - 1, figures: Figures::new(p) };
         let repeats = outcome.repeats.len();
@@ -209,7 +188,6 @@ impl<'a> Answer<'a> {
             total_ms: Totals {
                 adaptive,
                 oracle: outcome.oracle_ms(),
-                optimistic_oracle: outcome.optimistic_oracle_ms(),
                 fixed: named().filter_map(|(k, id)| Some((id, outcome.fixed_ms(k)?))).collect(),
             },
             frames_run: named().map(|(k, id)| (id, frames_run[k])).filter(|ran| ran.1 > 0).collect(),
@@ -218,14 +196,12 @@ impl<'a> Answer<'a> {
             regret_of_repeats: whole.of_repeats,
             best_fixed: best.map_or_else(String::new, |(k, _)| outcome.fixed[k].to_string()),
             over_best_fixed: best.map_or(1.0, |(_, ms)| adaptive / ms),
-            best_at_largest: outcome.best_at_largest().map(at_largest),
             parts: segments.iter().map(segment).collect(),
             co_runner: outcome.slowdown.as_ref().map(|slowdown| Slowed {
                 from_frame: slowdown.co_runner.from_frame,
                 threads: slowdown.co_runner.threads(),
                 share: SHARE,
                 slowdown: slowdown.of_a_loop,
-                slowdown_of: named().map(|(k, id)| (id, slowdown.of_fixed[k])).collect(),
             }),
             decisions: decisions(outcome),
         }
@@ -239,7 +215,6 @@ impl Figures {
             regret_median: segment.quartiles().map(|[_, median, _]| median),
             regret_quartiles: segment.quartiles().map(|[low, _, high]| [low, high]),
             window_regret: segment.window_regret,
-            optimistic_regret: segment.optimistic_regret,
             switches: segment.switches,
             explored: segment.explored,
             worst_frame: segment.worst_frame.map(|w| w.0),

@@ -8,7 +8,7 @@ use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
 use crate::exit::{Outcome, WrongUsage};
 use crate::outputs::{picture_format, refuse_overwriting};
-use crate::replay::{FrameSource, ReplaySettings, Swing, TraceFormat, picture, replay, too_wide, write_trace};
+use crate::replay::{FrameSource, ReplaySettings, Swing, check_trace, picture, replay, too_wide, write_trace};
 use crate::terminal::Terminal;
 use crate::{interrupt, output};
 use anyhow::{Context, bail};
@@ -29,7 +29,7 @@ const LEARNED_BY: usize = 300;
 pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     let mut registry = algorithms.registry(usable_cores());
     registry.pin_threads();
-    let trace = arguments.trace.as_deref().map(|path| Ok::<_, WrongUsage>((path, TraceFormat::of(path)?))).transpose()?;
+    arguments.trace.as_deref().map_or(Ok(()), check_trace)?;
     let plot = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, picture_format(path)?))).transpose()?;
     check_outputs(arguments)?;
     let mut settings = settings(arguments)?;
@@ -57,8 +57,8 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     origin.tuning.warnings.append(&mut outcome.notes);
     let segments: Vec<_> = segments(&cuts, settings.frames).into_iter().map(|range| outcome.part(range)).collect();
     let answer = answer::Answer::new(&settings, &outcome, &origin, too_wide(&origin.tuning, &registry), &segments);
-    if let Some((path, format)) = trace {
-        write_trace(path, format, &outcome)?;
+    if let Some(path) = &arguments.trace {
+        write_trace(path, &outcome)?;
     }
     if let Some((path, format)) = plot {
         let drawn = picture(&settings, &outcome).draw(format, &text::caption(arguments, &answer, &origin))?;

@@ -6,7 +6,6 @@ use crate::args::{Run, Scene};
 use crate::replay::WINDOW;
 use crate::shell;
 use crate::terminal::Terminal;
-use sapwise::stats::quantile;
 use sapwise_lab::text::{count, grouped};
 use std::path::Path;
 
@@ -167,29 +166,20 @@ fn outside(figures: &Figures) -> Option<String> {
 fn comparisons(answer: &Answer<'_>) -> String {
     let mut lines = Vec::new();
     if !answer.best_fixed.is_empty() {
-        lines.push(format!("{} of the time of the best fixed, {}.", times(answer.over_best_fixed), answer.best_fixed));
-    }
-    if let Some(largest) = &answer.best_at_largest {
-        let objects = grouped(largest.objects as u64);
-        let over = match largest.over {
-            Some(over) => format!("{} of the time of", times(over)),
-            None => "No total to compare with for".to_owned(),
-        };
-        lines.push(format!("{over} {}, the best at the largest number of objects ({objects}).", largest.algorithm));
+        lines.push(format!(
+            "Adaptive takes {:.3} of the time of the best fixed, {}.",
+            answer.over_best_fixed, answer.best_fixed
+        ));
     }
     lines.push(
-        "Regret is the time of the adaptive module over that of an oracle, less one. The oracle runs the best algorithm of every frame.".to_owned(),
+        "Regret is the time of the adaptive choice over that of an oracle, less one. The oracle runs the best algorithm of every frame.".to_owned(),
     );
     lines.push(format!(
         "Vs windows: the oracle runs one algorithm for {WINDOW} frames at a time. An incremental algorithm rebuilds its data now and then, and an \
          oracle\nthat chooses for each frame alone avoids the frames of the rebuild, which no real choice can."
     ));
     lines.push(match answer.oracle {
-        Oracle::Halves => format!(
-            "The oracle chooses on one half of the repeats and is timed on the other. Against the minimum of every frame, which is biased by \
-             noise,\nthe regret is {}.",
-            percent(answer.figures.optimistic_regret)
-        ),
+        Oracle::Halves => "The oracle chooses on one half of the repeats and is timed on the other.".to_owned(),
         Oracle::Optimistic => {
             "One repeat: the oracle takes the minimum of every frame, which is biased by noise; two or more --repeats remove that bias.".to_owned()
         }
@@ -203,20 +193,8 @@ fn co_runner(slowed: &Slowed) -> String {
         Some(ratio) => format!("a loop beside the frames then took {ratio:.2} times as long"),
         None => "no frame ran before it to compare with".to_owned(),
     };
-    let own: Vec<f64> = slowed.slowdown_of.values().copied().flatten().collect();
-    let range = [0.5, 0.0, 1.0].map(|q| quantile(&own, q));
-    let of_fixed = match range {
-        [Some(median), Some(least), Some(most)] => {
-            format!(",\nthe fixed algorithms {median:.2} times ({least:.2} to {most:.2}) on frames with as many objects")
-        }
-        _ => String::new(),
-    };
     let threads = count(slowed.threads as usize, "thread");
-    format!("From frame {} on {threads} ran beside it: {reached}{of_fixed}.", slowed.from_frame)
-}
-
-fn times(ratio: f64) -> String {
-    format!("Adaptive takes {ratio:.3}")
+    format!("From frame {} on {threads} ran beside it: {reached}.", slowed.from_frame)
 }
 
 fn percent(share: f64) -> String {

@@ -5,7 +5,7 @@ use crate::args::Run;
 use crate::gpus::{self, GpuChoice};
 use crate::hardware::measure_hardware;
 use crate::prediction::{self, Slice};
-use crate::revisions;
+use crate::{output, revisions};
 use anyhow::{Context, bail};
 use sapwise::{AlgorithmId, Registry, Source, Tuning, measure};
 use sapwise_lab::data::{Document, read_document, usual_scenario};
@@ -20,7 +20,7 @@ pub(super) struct Origin {
     pub(super) from: OriginKind,
     /// The processor of the other machine whose report it comes from.
     pub(super) other_machine: Option<String>,
-    /// An algorithm gave wrong pairs while it was sampled.
+    /// An algorithm returned wrong pairs while it was sampled.
     pub(super) wrong: bool,
 }
 
@@ -87,7 +87,7 @@ pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyh
         [] => Ok(()),
         _ => bail!("{} is stale: {}; predict again or probe again", path.display(), stale.join("; ")),
     };
-    match read_document(path)? {
+    match read_document(path, &output::warn)? {
         Document::Tuning(tuning) => {
             fresh(revisions::stale_in_tuning(&tuning, registry))?;
             Ok(Origin { tuning: *tuning, from: OriginKind::Tuning, other_machine: None, wrong: false })
