@@ -2,7 +2,7 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Today as `yyyy-mm-dd`. A clock that stands before 1970 returns 1970-01-01.
+/// Today as `yyyy-mm-dd`. With a clock before 1970 it is 1970-01-01.
 pub(crate) fn today() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
     civil(seconds / 86_400)
