@@ -1,13 +1,14 @@
 //! What goes with what: parameters and outcomes between machines, and what it does to take one thing from a machine.
 
-use super::SectionBuilder;
+use super::builder::SectionBuilder;
 use crate::data_table::{Cell, DataTable};
 use crate::evaluate::{Interval, Verdict};
 use crate::figures::{self, InfluenceCell};
 use crate::page::{Block, Section};
 use crate::study::folder::Folder;
 use crate::study::influence::{Influence, Link, On};
-use crate::study::{Study, rank, restrictions};
+use crate::study::material::Study;
+use crate::study::{rank, restrictions};
 use crate::text::count;
 use anyhow::Result;
 use std::collections::BTreeSet;

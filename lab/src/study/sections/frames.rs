@@ -1,12 +1,13 @@
 //! Frames: time over objects, and the fastest algorithm over objects and density.
 
-use super::SectionBuilder;
+use super::builder::SectionBuilder;
 use crate::Report;
 use crate::page::Section;
 use crate::study::curves::{self, Compared};
 use crate::study::entry::Entry;
 use crate::study::folder::Folder;
-use crate::study::{Study, map};
+use crate::study::map;
+use crate::study::material::Study;
 use anyhow::Result;
 
 pub(super) fn curves(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Result<Section> {

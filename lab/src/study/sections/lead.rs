@@ -1,8 +1,8 @@
 //! The first words of the page: what was read, and what these machines can and can't say.
 
 use crate::label_text::is_evidence;
-use crate::study::Study;
 use crate::study::influence::Influence;
+use crate::study::material::Study;
 use crate::study::rank::FEWEST_MACHINES;
 use crate::text::{count, grouped};
 

@@ -1,10 +1,11 @@
 //! How well times, borders and choices are predicted.
 
-use super::SectionBuilder;
+use super::builder::SectionBuilder;
 use crate::figures::TrainingPicture;
 use crate::page::Section;
+use crate::study::accuracy;
 use crate::study::folder::Folder;
-use crate::study::{Study, accuracy};
+use crate::study::material::Study;
 use anyhow::Result;
 
 /// What the columns and rows of the scores mean.
