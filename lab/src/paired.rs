@@ -10,16 +10,7 @@ mod ratio;
 use ratio::Ratio;
 use sapwise::stats::NORMAL_90;
 
-/// Frames of two algorithms at one point. The k-th sample of both is the same frame; what has no partner is not used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PairedSamples<'a> {
-    /// Objects in each frame.
-    pub objects: u32,
-    /// Nanoseconds of the first algorithm.
-    pub first_ns: &'a [u64],
-    /// Nanoseconds of the second algorithm.
-    pub second_ns: &'a [u64],
-}
+pub use ratio::PairedSamples;
 
 /// Which of two algorithms is cheaper at which sizes, within the sizes that were measured.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,16 +1,12 @@
 //! What a training says of itself: what it was trained on, and how well it did on what it had not seen.
 
 use crate::belief::Prior;
-use crate::data::Profile;
 use crate::report::Label;
 use sapwise::Model;
 use sapwise::json::{self, Format};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
-
-/// Reports that a training lists; of more it keeps the counts. One takes 130 bytes, and the built-in model is part of the library.
-const MOST_LISTED: usize = 400;
+use std::collections::BTreeSet;
 
 /// What stands beside a model in its file, under the key `training`. Predictions don't need it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -118,29 +114,6 @@ pub struct StoredModel {
 }
 
 impl Training {
-    /// Of these profiles, before any validation.
-    #[must_use]
-    pub fn of(profiles: &[Profile]) -> Self {
-        if profiles.len() <= MOST_LISTED {
-            let report =
-                |p: &Profile| TrainingReport { file: p.file.clone(), physical_id: p.machine().to_owned(), label: p.label };
-            return Self { trained_on: profiles.iter().map(report).collect(), ..Self::default() };
-        }
-        // By the name of the label, since labels have no order.
-        let mut kinds: BTreeMap<String, (Label, usize, BTreeSet<&str>)> = BTreeMap::new();
-        for profile in profiles {
-            let kind = kinds.entry(format!("{:?}", profile.label)).or_insert((profile.label, 0, BTreeSet::new()));
-            kind.1 += 1;
-            kind.2.insert(profile.machine());
-        }
-        let count = |(label, reports, machines): (Label, usize, BTreeSet<&str>)| TrainingCount {
-            label,
-            reports,
-            physical_machines: machines.len(),
-        };
-        Self { trained_on_counts: kinds.into_values().map(count).collect(), ..Self::default() }
-    }
-
     /// How many reports are behind the model.
     #[must_use]
     pub fn reports(&self) -> usize {

@@ -1,7 +1,10 @@
 //! Tests of all pictures, most of them with data that is not as it should be.
 
 use super::canvas::PNG_UNIT;
+use super::style::{INK, SECONDARY};
 use super::*;
+use plotters::style::RGBColor;
+use std::path::Path;
 
 /// Characters that mean something in SVG, that the font lacks, that XML forbids, and that turn text around.
 const ODD: &str = "<b>&\"it's\" é日\u{1}\u{202e}]]>";

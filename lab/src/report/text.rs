@@ -1,6 +1,6 @@
 //! Reports as JSON text.
 
-use super::Report;
+use super::record::Report;
 use sapwise::json::{Error, Format, Read, Schema};
 use serde::de::Error as _;
 
