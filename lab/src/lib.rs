@@ -39,6 +39,7 @@ pub mod progress;
 pub mod report;
 mod schemas;
 pub mod simulated;
+pub mod spread;
 pub mod steadiness;
 pub mod study;
 pub mod sweep;

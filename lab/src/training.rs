@@ -91,6 +91,12 @@ pub struct MethodScore {
     /// (log-normal around 800, two thirds of the frames within 220 to 2800). `None` in files from before this was told.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mean_regret_in_games: Option<f64>,
+    /// Least of the same of a held-out machine or report, as [`MethodScore::least_regret`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least_regret_in_games: Option<f64>,
+    /// Largest of the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_regret_in_games: Option<f64>,
     /// 95th percentile over held-out reports of the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p95_regret_in_games: Option<f64>,
@@ -102,6 +108,20 @@ pub struct MethodScore {
     /// Share of these crossovers that were predicted within half an octave.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crossings_within_half_octave: Option<f64>,
+}
+
+impl MethodScore {
+    /// Least and largest mean regret of what was held out.
+    #[must_use]
+    pub fn regret_range(&self) -> Option<[f64; 2]> {
+        Some([self.least_regret?, self.largest_regret?])
+    }
+
+    /// The same as seen by games.
+    #[must_use]
+    pub fn regret_range_in_games(&self) -> Option<[f64; 2]> {
+        Some([self.least_regret_in_games?, self.largest_regret_in_games?])
+    }
 }
 
 /// A file that holds a model: what predicts, and what training says of itself.

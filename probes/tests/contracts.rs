@@ -41,12 +41,12 @@ fn assert_tuning(tuning: &Value, source: &str) {
     assert_eq!((&tuning["schema"], &tuning["source"]), (&"tuning/1".into(), &source.into()));
     assert_eq!((&tuning["scenario"], &tuning["steps"][0]["from_objects"]), (&"uniform".into(), &0.into()));
     tuning["steps"].as_array().unwrap().iter().for_each(|step| assert_keys(step, &["from_objects", "algorithm"]));
-    let borders = tuning["crossovers"].as_array().unwrap();
-    for border in borders {
-        assert_keys(border, &["below", "above", "objects"]);
-        // Two machines are too few for a border that is predicted to have an interval, corrected by samples or not.
+    let crossovers = tuning["crossovers"].as_array().unwrap();
+    for crossover in crossovers {
+        assert_keys(crossover, &["below", "above", "objects"]);
+        // Two machines are too few for a crossover that is predicted to have an interval, corrected by samples or not.
         let claimed = source == "measured";
-        assert!(["low", "high"].iter().all(|end| border[end].is_null() != claimed), "{border}");
+        assert!(["low", "high"].iter().all(|end| crossover[end].is_null() != claimed), "{crossover}");
     }
 }
 

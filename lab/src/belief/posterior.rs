@@ -131,7 +131,7 @@ impl Posterior {
     /// Takes in that a frame under `load` took the algorithm `ns` nanoseconds. `noise_ln` is the standard deviation of that figure's
     /// logarithm, beside the noise of the prior.
     ///
-    /// Gives false, and learns nothing, where the time is no positive number, the predicted cost is none, there is no such algorithm, or the
+    /// Returns false, and learns nothing, where the time is no positive number, the predicted cost is none, there is no such algorithm, or the
     /// prior is unsound.
     pub fn observe(&mut self, algorithm: usize, load: &Load, ns: f64, noise_ln: f64) -> bool {
         if algorithm >= self.costs.len() {

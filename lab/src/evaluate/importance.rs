@@ -13,6 +13,7 @@ use super::regret_table::{NOT_TIMED, RegretTable};
 use crate::data::{Profile, machines};
 use crate::fit::{Designs, model};
 use crate::progress::Progress;
+use crate::spread;
 use anyhow::{Context, Result};
 use figure::Figure;
 use rayon::prelude::*;
@@ -46,7 +47,7 @@ pub struct Importance {
     /// Reports of them.
     pub profiles: usize,
     /// Mean regret with every parameter as it is, of these folds, each machine counting the same; none of too few machines.
-    pub mean_regret: Option<f64>,
+    pub mean_regret: Option<Interval>,
     /// In the order of a report: those of the machine, then those of its GPUs.
     pub parameters: Vec<OfParameter>,
     /// For each method on a class of processor and each physical machine the mean logarithm of measured over predicted time when it
@@ -181,7 +182,7 @@ fn of_machines(profiles: &[Profile], machines: &[&str], progress: &dyn Progress)
     found.left_ln = left(profiles, &before);
     let mut regrets = ByMachine::new();
     before.iter().enumerate().for_each(|(k, o)| regrets.entry(position(k)).or_default().push(o.regret));
-    found.mean_regret = Some(mean(&regrets.values().map(|r| mean(r)).collect::<Vec<_>>()));
+    found.mean_regret = Interval::of(&regrets.values().map(|r| mean(r)).collect::<Vec<_>>());
     let told = found.parameters.iter().map(|p| 1 + p.methods.len()).sum::<usize>();
     found.notes = vec![
         format!(
@@ -290,9 +291,9 @@ impl Importance {
         }
         let mut text = self.mean_regret.map_or_else(String::new, |regret| {
             format!(
-                "Mean regret on machines held out: {:.1} %. Percentage points that are added by one value of the parameter for all machines,\n\
-                 with 90 % intervals.\n\n",
-                regret * 100.0
+                "Mean regret on machines held out: {}. Percentage points that are added by one value of the parameter for all machines.\n\
+                 All with 90 % intervals.\n\n",
+                spread::percent(regret.mean, Some([regret.low, regret.high]), 1)
             )
         });
         text.push_str(&draw(&rows));

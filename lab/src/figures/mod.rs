@@ -21,7 +21,7 @@ mod training;
 mod verdict;
 
 pub(crate) use agreement::{Agreement, AgreementGroup, AgreementPoint, Values};
-pub(crate) use curves::{Band, BorderLine, Curve, CurvePanel, CurvePoint, Curves};
+pub(crate) use curves::{Band, CrossoverLine, Curve, CurvePanel, CurvePoint, Curves};
 pub use figure::Figure;
 pub(crate) use influence::{Influence, InfluenceCell};
 pub(crate) use map::{FieldMap, MapCell, MapPanel, MapPoint};

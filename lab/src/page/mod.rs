@@ -1,6 +1,6 @@
 //! One page of HTML to read: text, tables that sort, figures. Everything is in the file, so that it opens from disk and by mail.
 //!
-//! It knows nothing of what it shows. Whatever a caller gives is text and is escaped, save the figures, which are SVG of our own; a
+//! It knows nothing of what it shows. Whatever a caller passes is text and is escaped, save the figures, which are SVG of our own; a
 //! browser that opens the page runs and asks for nothing but the script and the style that are in it.
 
 mod content;

@@ -32,7 +32,7 @@ pub struct Study {
     /// The whole reports of the entries that are drawn.
     pub(super) drawn: Vec<(Compared, Vec<(usize, Report)>)>,
     /// The measured crossovers of reports that were held out in turn, with their intervals.
-    pub(super) borders: Measured,
+    pub(super) crossovers: Measured,
     /// Names of the files that can't be read, and why.
     unreadable: Vec<(String, String)>,
     /// The command, for captions.
@@ -76,11 +76,11 @@ impl Study {
             Ok((compared, drawn?))
         };
         let drawn = Compared::ALL.into_iter().map(draw).collect::<Result<_>>()?;
-        progress.message("borders of what was held out");
-        let borders = trained.as_ref().map(|t| measured_borders(&t.held_out, &entries)).unwrap_or_default();
+        progress.message("crossovers of what was held out");
+        let crossovers = trained.as_ref().map(|t| measured_crossovers(&t.held_out, &entries)).unwrap_or_default();
         progress.advance(1);
         let wanted = if asked.is_empty() { representatives(&entries) } else { asked };
-        Ok(Self { entries, wanted, reference, profiles, notes, trained, importance, drawn, borders, unreadable, command })
+        Ok(Self { entries, wanted, reference, profiles, notes, trained, importance, drawn, crossovers, unreadable, command })
     }
 
     /// Names of the files that can't be read, and why.
@@ -96,14 +96,14 @@ impl Study {
 }
 
 /// The measured crossovers, with intervals, of every report that was held out in turn.
-fn measured_borders(held_out: &HeldOut, entries: &[Entry]) -> Measured {
+fn measured_crossovers(held_out: &HeldOut, entries: &[Entry]) -> Measured {
     let files: BTreeSet<&str> = held_out.crossovers.iter().map(|b| b.file.as_str()).collect();
     let own: Vec<&Entry> = entries.iter().filter(|e| files.contains(e.file.as_str())).collect();
-    let borders = |entry: &&Entry| {
+    let crossovers = |entry: &&Entry| {
         let mut report = read_report(&entry.path).ok()?.1;
         curves::keep(&mut report, |id| entry.profile.position(id).is_some());
         let tuning = measured_tuning(&report, usual_scenario(&report)).ok()?;
         Some((entry.file.clone(), tuning.crossovers))
     };
-    own.par_iter().filter_map(borders).collect()
+    own.par_iter().filter_map(crossovers).collect()
 }

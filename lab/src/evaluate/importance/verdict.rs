@@ -51,7 +51,7 @@ impl Effect {
         self.rise.is_some_and(|i| i.low != 0.0 || i.high != 0.0)
     }
 
-    /// `deviation` is the standard deviation of the parameter over so many machines, in octaves; `least` what matters of the outcome.
+    /// `deviation` is the standard deviation of the parameter over `machines` machines, in octaves; `least` what matters of the outcome.
     pub(super) fn new(rise: Option<Interval>, machines: usize, deviation: f64, least: f64) -> Self {
         let Some(rise) = rise.filter(|_| machines >= FEWEST_MACHINES) else {
             let because = format!("{machines} physical machines have both; it takes {FEWEST_MACHINES}");

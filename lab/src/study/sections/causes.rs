@@ -22,7 +22,7 @@ pub(super) fn influences(
     folder: &mut Folder,
     missing: &mut Vec<String>,
 ) -> Result<Section> {
-    let mut section = SectionBuilder::new("influence", "Which parameters matter for which algorithm and border", missing);
+    let mut section = SectionBuilder::new("influence", "Which parameters matter for which algorithm and crossover", missing);
     let links: Vec<&Link> = influence.links.iter().collect();
     if links.is_empty() {
         let few = influence.machines < rank::FEWEST_MACHINES;
@@ -34,7 +34,7 @@ pub(super) fn influences(
                 rank::FEWEST_MACHINES
             )
         } else {
-            format!("no parameter and no time or border are known of {} machines, and vary", rank::FEWEST_MACHINES)
+            format!("no parameter and no time or crossover are known of {} machines, and vary", rank::FEWEST_MACHINES)
         });
         return Ok(section.section);
     }
@@ -51,7 +51,7 @@ pub(super) fn influences(
     let matrix = matrix(influence, &links);
     let all = links.iter().map(|l| l.parameter.as_str()).collect::<BTreeSet<_>>().len();
     let told = format!(
-        "{} of {all} parameters, those first that say most, against algorithms, predictions of methods, borders and the choice: the verdict, \
+        "{} of {all} parameters, those first that say most, against algorithms, predictions of methods, crossovers and the choice: the verdict, \
          and the rank correlation where there is one.",
         matrix.rows.len()
     );
@@ -67,7 +67,7 @@ fn outcome(on: &On) -> String {
     match on {
         On::Algorithm(name) => format!("time of {name}"),
         On::Method(name) => format!("prediction of {name}"),
-        On::Border(name) => format!("border {name}"),
+        On::Crossover(name) => format!("crossover {name}"),
         On::Choice => "the choice".to_owned(),
     }
 }
