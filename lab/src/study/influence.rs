@@ -90,7 +90,7 @@ impl Influence {
         let mut links: Vec<Link> =
             cells.into_iter().zip(ranks).map(|((k, on), rank)| link(&parameters[k], on.clone(), rank, importance)).collect();
         let methods: BTreeSet<&String> =
-            importance.iter().flat_map(|i| &i.parameters).flat_map(|p| &p.methods).map(|m| &m.method).collect();
+            importance.iter().flat_map(|i| &i.parameters).flat_map(|p| p.distance_rise_ln.keys()).collect();
         for method in methods {
             links.extend(parameters.iter().map(|parameter| link(parameter, On::Method(method.clone()), None, importance)));
         }
@@ -101,7 +101,7 @@ impl Influence {
         }
         links.retain(|link| link.rank.is_some() || link.effect.is_some());
         for of in importance.iter().flat_map(|i| &i.parameters).filter(|p| p.regret_rise.is_told()) {
-            let effect = of.regret_rise.clone();
+            let effect = of.regret_rise;
             let verdict = effect.verdict;
             let parameter = of.parameter.clone();
             links.push(Link { parameter, on: On::Choice, rank: None, effect: Some(effect), verdict });
@@ -126,7 +126,7 @@ fn crossovers_of(entry: &Entry) -> BTreeMap<String, f64> {
 fn link(parameter: &str, on: On, rank: Option<Rank>, importance: Option<&Importance>) -> Link {
     let of = importance.and_then(|i| i.parameters.iter().find(|p| p.parameter == parameter));
     let effect = of.and_then(|of| match &on {
-        On::Method(name) => of.methods.iter().find(|m| m.method == *name).map(|m| m.distance_rise_ln.clone()),
+        On::Method(name) => of.distance_rise_ln.get(name).copied(),
         On::Algorithm(_) | On::Crossover(_) | On::Choice => None,
     });
     let effect = effect.filter(Effect::is_told);
