@@ -51,15 +51,6 @@ pub struct Joint {
     with: Vec<f64>,
 }
 
-impl Joint {
-    /// Variance of the logarithm of the ratio of two costs.
-    #[must_use]
-    pub fn variance_of_ratio(&self, a: usize, b: usize) -> f64 {
-        let of = |i: usize, j: usize| self.covariance[i * self.mean_ln.len() + j];
-        (of(a, a) + of(b, b) - 2.0 * of(a, b)).max(0.0)
-    }
-}
-
 /// Between which knots a number of objects lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Place {

@@ -30,7 +30,6 @@ pub(crate) use ratios::{RatioGroup, RatioKind, RatioValue, Ratios};
 pub(crate) use regrets::{Regrets, StrategyRegrets};
 pub use replay::ReplayPicture;
 pub use training::TrainingPicture;
-pub(crate) use verdict::Verdict;
 
 #[cfg(test)]
 mod tests;

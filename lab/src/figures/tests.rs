@@ -3,6 +3,7 @@
 use super::canvas::PNG_UNIT;
 use super::style::{INK, SECONDARY};
 use super::*;
+use crate::evaluate::Verdict;
 use plotters::style::RGBColor;
 use std::path::Path;
 
@@ -267,11 +268,9 @@ fn any_map_is_drawn() {
 
 #[test]
 fn a_matrix_tells_verdicts_by_sign_and_text() {
-    let cell = |verdict, value, text: &str| InfluenceCell { verdict, value, text: text.to_owned() };
-    let cells = vec![
-        vec![cell(Verdict::Linked, Some(-0.8), ""), cell(Verdict::NotLinked, Some(0.05), "weak")],
-        vec![cell(Verdict::CannotBeTold, Some(f64::NAN), "")],
-    ];
+    let cell = |verdict, text: &str| InfluenceCell { verdict: Some(verdict), text: text.to_owned() };
+    let cells =
+        vec![vec![cell(Verdict::Linked, "-0.80"), cell(Verdict::NotLinked, "weak")], vec![cell(Verdict::CannotBeTold, "")]];
     let names = |names: [&str; 2]| names.map(str::to_owned).to_vec();
     let columns = names(["sap@cpu1", ODD]);
     let figure = Influence { title: "Influence".to_owned(), columns, rows: names(["clock (MHz)", ODD]), cells };

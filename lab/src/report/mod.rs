@@ -4,4 +4,4 @@ mod record;
 mod text;
 
 pub use record::{Label, Point, Proof, Provenance, Report, Restricted, Restriction, Timed, TimedTerm, Timing};
-pub use text::{FORMAT, is_report, read, write};
+pub use text::{FORMAT, read, write};

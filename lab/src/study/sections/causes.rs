@@ -85,14 +85,9 @@ fn matrix(influence: &Influence, links: &[&Link]) -> figures::Influence {
     rows.sort_by_key(|p| std::cmp::Reverse(weight(p)));
     rows.truncate(MOST_ROWS);
     let cell = |parameter: &str, on: &On| match influence.link(parameter, on) {
-        None => InfluenceCell { verdict: figures::Verdict::Absent, value: None, text: String::new() },
+        None => InfluenceCell::default(),
         Some(link) => InfluenceCell {
-            verdict: match link.verdict {
-                Verdict::Linked => figures::Verdict::Linked,
-                Verdict::NotLinked => figures::Verdict::NotLinked,
-                Verdict::CannotBeTold => figures::Verdict::CannotBeTold,
-            },
-            value: link.rank.map(|r| r.correlation),
+            verdict: Some(link.verdict),
             text: link.rank.map_or(String::new(), |r| format!("{:+.2}", r.correlation)),
         },
     };
