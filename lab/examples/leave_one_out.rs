@@ -6,8 +6,9 @@
 
 use anyhow::{Context, Result};
 use sapwise_lab::data::{Evidence, Selection, read_reports};
-use sapwise_lab::evaluate::{RegretTable, by_costs};
+use sapwise_lab::evaluate::{Regret, RegretTable, by_costs};
 use sapwise_lab::progress::Silent;
+use sapwise_lab::spread;
 use std::path::Path;
 
 // The tests of the package call `leave_one_out`.
@@ -28,10 +29,12 @@ pub(crate) fn leave_one_out(folder: &Path, file: &str) -> Result<String> {
     let available = profile.available();
     let costs = model.predict(&profile.hardware, &profile.with_revisions(&available))?.costs;
     let table = RegretTable::new(profile);
-    let regret = table.regret(profile, &by_costs(costs, &available)).mean;
-    let mut text = format!("{file}, held out: {held_out}\n{:20} {:6.1} %\n", "the model", 100.0 * regret);
+    let regret = table.regret(profile, &by_costs(costs, &available));
+    let line = |name: &str, regret: &Regret| format!("{name:20} {}\n", spread::percent(regret.mean, regret.range(), 1));
+    let mut text =
+        format!("{file}, held out: {held_out}; mean regret (least to largest of a cell)\n{}", line("the model", &regret));
     for (algorithm, regret) in profile.algorithms.iter().zip(table.always()) {
-        text += &format!("{:20} {:6.1} %\n", algorithm.id.to_string(), 100.0 * regret);
+        text += &line(&algorithm.id.to_string(), &regret);
     }
     Ok(text)
 }

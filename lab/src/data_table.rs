@@ -62,7 +62,7 @@ impl DataTable {
     }
 
     /// The table as CSV in UTF-8: a line of keys, then the rows, as RFC 4180 has it but with bare line feeds. Figures have all their
-    /// digits. Where rows name reports, a last column `reports` has their labels, which `labels` gives in the order of the list, with
+    /// digits. Where rows name reports, a last column `reports` has their labels, which `labels` holds in the order of the list, with
     /// blanks between.
     ///
     /// A spreadsheet would run a text such as `=HYPERLINK(...)` as a formula, and a report may come from anyone. A quote is put before
@@ -95,7 +95,7 @@ impl Cell {
         Self::Text(text.into())
     }
 
-    /// A figure with so many digits after the point.
+    /// A figure with `decimals` digits after the point.
     pub(crate) fn number(value: f64, decimals: usize) -> Self {
         if value.is_finite() {
             Self::Number { value, shown: format!("{value:.decimals$}") }

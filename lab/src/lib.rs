@@ -14,7 +14,7 @@
 //! let reports = read_reports(&["datasets".into()], &Silent)?;
 //! let trained = sapwise_lab::train(sapwise_lab::data::Selection::of(&reports, Evidence::Real), "mine", &Silent)?;
 //! for score in &trained.training.validation.methods {
-//!     println!("{}: {:.1} %", score.name, 100.0 * score.mean_regret);
+//!     println!("{}: {}", score.name, sapwise_lab::spread::percent(score.mean_regret, score.regret_range(), 1));
 //! }
 //! # Ok::<(), anyhow::Error>(())
 //! ```
@@ -39,6 +39,7 @@ pub mod progress;
 pub mod report;
 mod schemas;
 pub mod simulated;
+pub mod spread;
 pub mod steadiness;
 pub mod study;
 pub mod sweep;

@@ -1,6 +1,7 @@
 //! The model card: what a model was trained on and how well it did.
 
 use crate::label_text::kind;
+use crate::spread;
 use crate::text::count;
 use crate::units;
 use crate::{Training, Validation};
@@ -42,7 +43,9 @@ real machine, and `predict` warns of it.
 
 /// What the columns of the scores mean, below them.
 const COLUMNS: &str = "
-- **mean regret**, **95th percentile**: over the held-out reports, each physical machine counting the same.
+- **mean regret**, **95th percentile**: over the held-out reports, each physical machine counting the same. **least to largest**: the mean
+  regret of the held-out physical machine that was served best and of the one that was served worst; of the held-out reports where all
+  are of one machine.
 - **in games**: the same where each number of objects counts as often as games have it. That is an assumption, not a count: log-normal
   around 800 objects, two thirds of the frames within 220 to 2800.
 - **crossovers off by**: octaves between the measured crossover of two algorithms in the scenario `uniform` and where their predicted costs
@@ -148,9 +151,9 @@ pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) 
     let doubt = if *physical_machines < 2 { " This says little about machines never seen." } else { "" };
     let head = [
         "strategy",
-        "mean regret",
+        "mean regret (least to largest)",
         "95th percentile",
-        "mean in games",
+        "mean in games (least to largest)",
         "95th in games",
         "crossovers off by",
         "within 1/2 octave",
@@ -159,13 +162,14 @@ pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) 
     ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.extend(methods.iter().map(|m| {
+        let in_games = m.mean_regret_in_games;
         let known = |share: Option<f64>| share.map_or_else(|| "-".to_owned(), percent);
         let octaves = m.crossing_error_octaves.map_or_else(|| "-".to_owned(), |octaves| format!("{octaves:.2} octaves"));
         vec![
             m.name.clone(),
-            percent(m.mean_regret),
+            spread::percent(m.mean_regret, m.regret_range(), 1),
             percent(m.p95_regret),
-            known(m.mean_regret_in_games),
+            in_games.map_or_else(|| "-".to_owned(), |mean| spread::percent(mean, m.regret_range_in_games(), 1)),
             known(m.p95_regret_in_games),
             octaves,
             known(m.crossings_within_half_octave),
@@ -199,6 +203,8 @@ mod tests {
         let score = |name: &str, closed_gap| MethodScore {
             name: name.to_owned(),
             mean_regret: 0.05,
+            least_regret: Some(0.004),
+            largest_regret: Some(0.3),
             p95_regret: 0.125,
             closed_gap,
             mean_regret_in_games: Some(0.04),
@@ -213,7 +219,7 @@ mod tests {
         };
         let text = scores(&validation, markdown);
         assert!(text.contains("1 physical machine in 2 profiles") && text.contains("says little"), "{text}");
-        let row = "|---|\n| physics | 5.0 % | 12.5 % | 4.0 % | - | 0.25 octaves | - | 0.0 % | 90.0 % |";
+        let row = "|---|\n| physics | 5.0 % (0.4 to 30.0) | 12.5 % | 4.0 % | - | 0.25 octaves | - | 0.0 % | 90.0 % |";
         assert!(text.contains(row) && text.contains("| 0.0 % | none |"), "{text}");
         validation.methods.clear();
         assert_eq!(scores(&validation, columns), "1 physical machine in 2 profiles; not validated.\n");

@@ -10,16 +10,7 @@ mod ratio;
 use ratio::Ratio;
 use sapwise::stats::NORMAL_90;
 
-/// Frames of two algorithms at one point. The k-th sample of both is the same frame; what has no partner is not used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PairedSamples<'a> {
-    /// Objects in each frame.
-    pub objects: u32,
-    /// Nanoseconds of the first algorithm.
-    pub first_ns: &'a [u64],
-    /// Nanoseconds of the second algorithm.
-    pub second_ns: &'a [u64],
-}
+pub use ratio::PairedSamples;
 
 /// Which of two algorithms is cheaper at which sizes, within the sizes that were measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,9 +111,9 @@ impl PairedComparison {
         }
     }
 
-    /// The 90 % interval of a border at `objects` that was found otherwise: the sizes around it at which neither is distinctly
+    /// The 90 % interval of a crossover at `objects` that was found otherwise: the sizes around it at which neither is distinctly
     /// cheaper. Where the wrong one is at `objects`, from there over the sizes up to the crossing and around that. It ends
-    /// with the measured sizes. The first algorithm is the one below the border if `first_below`. `None` for a border beyond
+    /// with the measured sizes. The first algorithm is the one below the crossover if `first_below`. `None` for a crossover beyond
     /// the measured sizes.
     #[must_use]
     pub fn interval(&self, objects: f64, first_below: bool) -> Option<(f64, f64)> {
@@ -142,7 +133,7 @@ impl PairedComparison {
         };
         // The places around `at`, one and the same where it is a place itself.
         let (below, above) = (grid.partition_point(|g| *g <= at) - 1, grid.partition_point(|g| *g < at));
-        // On the way from the border: over where the wrong one is ahead, then over where nothing is told.
+        // On the way from the crossover: over where the wrong one is ahead, then over where nothing is told.
         let low = match (0..=above).rev().skip_while(|&k| told(k) >= 1.0).find(|&k| told(k).abs() >= 1.0) {
             None => lowest.exp(),
             Some(k) if k == above => objects,

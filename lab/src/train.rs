@@ -4,9 +4,14 @@ use crate::data::{Evidence, Profile, Selection};
 use crate::evaluate::{HeldOut, Partition, folded, validate};
 use crate::fit::{Designs, model};
 use crate::progress::Progress;
-use crate::training::Training;
+use crate::report::Label;
+use crate::training::{Training, TrainingCount, TrainingReport};
 use anyhow::{Result, bail};
 use sapwise::Model;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Reports that a training lists; of more it keeps the counts. One takes 130 bytes, and the built-in model is part of the library.
+const MOST_LISTED: usize = 400;
 
 /// A model and what has to be said about it.
 #[derive(Debug, Clone)]
@@ -63,8 +68,30 @@ pub fn train(selection: Selection, name: &str, progress: &dyn Progress) -> Resul
     notes.extend(left_out);
     let validated = validate(&profiles, &designs, &Partition::new(&profiles), progress)?;
     notes.extend(validated.notes);
-    let training = Training { prior: validated.prior, validation: validated.validation, ..Training::of(&profiles) };
+    let training = Training { prior: validated.prior, validation: validated.validation, ..behind(&profiles) };
     Ok(Trained { model, training, notes: folded(notes), held_out: validated.held_out })
+}
+
+/// What a training says of the reports behind it, before any validation.
+fn behind(profiles: &[Profile]) -> Training {
+    if profiles.len() <= MOST_LISTED {
+        let report =
+            |p: &Profile| TrainingReport { file: p.file.clone(), physical_id: p.machine().to_owned(), label: p.label };
+        return Training { trained_on: profiles.iter().map(report).collect(), ..Training::default() };
+    }
+    // By the name of the label, since labels have no order.
+    let mut kinds: BTreeMap<String, (Label, usize, BTreeSet<&str>)> = BTreeMap::new();
+    for profile in profiles {
+        let kind = kinds.entry(format!("{:?}", profile.label)).or_insert((profile.label, 0, BTreeSet::new()));
+        kind.1 += 1;
+        kind.2.insert(profile.machine());
+    }
+    let count = |(label, reports, machines): (Label, usize, BTreeSet<&str>)| TrainingCount {
+        label,
+        reports,
+        physical_machines: machines.len(),
+    };
+    Training { trained_on_counts: kinds.into_values().map(count).collect(), ..Training::default() }
 }
 
 #[cfg(test)]
@@ -72,7 +99,7 @@ mod tests {
     use super::*;
     use crate::data::COMPARED;
     use crate::progress::Silent;
-    use crate::report::{Label, Report};
+    use crate::report::Report;
     use crate::synthetic::Machine;
     use crate::training::{read_model, write_model};
     use sapwise::Entry;
@@ -130,11 +157,11 @@ mod tests {
             p.hardware.machine.physical_id = format!("{:016x}", k / 2);
         });
         profiles[1].label = Label::RealRestricted;
-        let many = Training::of(&profiles);
+        let many = behind(&profiles);
         let counts: Vec<_> = many.trained_on_counts.iter().map(|c| (c.label, c.reports, c.physical_machines)).collect();
         assert_eq!(counts, [(Label::RealFull, 400, 201), (Label::RealRestricted, 1, 1)]);
         assert!(many.trained_on.is_empty() && many.reports() == 401);
-        let few = Training::of(&profiles[1..]);
+        let few = behind(&profiles[1..]);
         assert!(few.trained_on.len() == 400 && few.trained_on_counts.is_empty() && few.physical_machines() == 201);
     }
 

@@ -1,16 +1,12 @@
 //! What a training says of itself: what it was trained on, and how well it did on what it had not seen.
 
 use crate::belief::Prior;
-use crate::data::Profile;
 use crate::report::Label;
 use sapwise::Model;
 use sapwise::json::{self, Format};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
-
-/// Reports that a training lists; of more it keeps the counts. One takes 130 bytes, and the built-in model is part of the library.
-const MOST_LISTED: usize = 400;
+use std::collections::BTreeSet;
 
 /// What stands beside a model in its file, under the key `training`. Predictions don't need it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -95,6 +91,12 @@ pub struct MethodScore {
     /// (log-normal around 800, two thirds of the frames within 220 to 2800). `None` in files from before this was told.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mean_regret_in_games: Option<f64>,
+    /// Least of the same of a held-out machine or report, as [`MethodScore::least_regret`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least_regret_in_games: Option<f64>,
+    /// Largest of the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_regret_in_games: Option<f64>,
     /// 95th percentile over held-out reports of the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p95_regret_in_games: Option<f64>,
@@ -108,6 +110,20 @@ pub struct MethodScore {
     pub crossings_within_half_octave: Option<f64>,
 }
 
+impl MethodScore {
+    /// Least and largest mean regret of what was held out.
+    #[must_use]
+    pub fn regret_range(&self) -> Option<[f64; 2]> {
+        Some([self.least_regret?, self.largest_regret?])
+    }
+
+    /// The same as seen by games.
+    #[must_use]
+    pub fn regret_range_in_games(&self) -> Option<[f64; 2]> {
+        Some([self.least_regret_in_games?, self.largest_regret_in_games?])
+    }
+}
+
 /// A file that holds a model: what predicts, and what training says of itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredModel {
@@ -118,29 +134,6 @@ pub struct StoredModel {
 }
 
 impl Training {
-    /// Of these profiles, before any validation.
-    #[must_use]
-    pub fn of(profiles: &[Profile]) -> Self {
-        if profiles.len() <= MOST_LISTED {
-            let report =
-                |p: &Profile| TrainingReport { file: p.file.clone(), physical_id: p.machine().to_owned(), label: p.label };
-            return Self { trained_on: profiles.iter().map(report).collect(), ..Self::default() };
-        }
-        // By the name of the label, since labels have no order.
-        let mut kinds: BTreeMap<String, (Label, usize, BTreeSet<&str>)> = BTreeMap::new();
-        for profile in profiles {
-            let kind = kinds.entry(format!("{:?}", profile.label)).or_insert((profile.label, 0, BTreeSet::new()));
-            kind.1 += 1;
-            kind.2.insert(profile.machine());
-        }
-        let count = |(label, reports, machines): (Label, usize, BTreeSet<&str>)| TrainingCount {
-            label,
-            reports,
-            physical_machines: machines.len(),
-        };
-        Self { trained_on_counts: kinds.into_values().map(count).collect(), ..Self::default() }
-    }
-
     /// How many reports are behind the model.
     #[must_use]
     pub fn reports(&self) -> usize {

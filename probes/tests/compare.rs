@@ -60,7 +60,11 @@ fn compare_tells_how_well_reports_agree_and_refuses_what_can_not_be_compared() {
     let steady = json(&["--steady"]);
     assert_eq!(steady["reports"], 2);
     assert!((lost(&steady, "others") - lost(&steady, "own")).abs() < 1e-12, "{}", steady["losses"]);
-    assert!(steady["borders"].as_array().unwrap().iter().all(|b| b["largest_deviation"] == 0.0), "{}", steady["borders"]);
+    assert!(
+        steady["crossovers"].as_array().unwrap().iter().all(|b| b["largest_deviation"] == 0.0),
+        "{}",
+        steady["crossovers"]
+    );
 
     let text = success(sapwise().arg("compare").args(&alike).arg(&elsewhere));
     for expected in [

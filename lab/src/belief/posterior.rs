@@ -51,15 +51,6 @@ pub struct Joint {
     with: Vec<f64>,
 }
 
-impl Joint {
-    /// Variance of the logarithm of the ratio of two costs.
-    #[must_use]
-    pub fn variance_of_ratio(&self, a: usize, b: usize) -> f64 {
-        let of = |i: usize, j: usize| self.covariance[i * self.mean_ln.len() + j];
-        (of(a, a) + of(b, b) - 2.0 * of(a, b)).max(0.0)
-    }
-}
-
 /// Between which knots a number of objects lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Place {
@@ -131,7 +122,7 @@ impl Posterior {
     /// Takes in that a frame under `load` took the algorithm `ns` nanoseconds. `noise_ln` is the standard deviation of that figure's
     /// logarithm, beside the noise of the prior.
     ///
-    /// Gives false, and learns nothing, where the time is no positive number, the predicted cost is none, there is no such algorithm, or the
+    /// Returns false, and learns nothing, where the time is no positive number, the predicted cost is none, there is no such algorithm, or the
     /// prior is unsound.
     pub fn observe(&mut self, algorithm: usize, load: &Load, ns: f64, noise_ln: f64) -> bool {
         if algorithm >= self.costs.len() {

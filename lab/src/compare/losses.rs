@@ -4,6 +4,7 @@ use crate::data::{Evidence, Profile, usable};
 use crate::evaluate::{RegretTable, Strategy, by_costs};
 use crate::fit::measured_costs;
 use crate::report::{Label, Report};
+use crate::spread::range;
 use sapwise::stats::mean;
 use serde::Serialize;
 
@@ -13,12 +14,16 @@ use serde::Serialize;
 pub struct Losses {
     /// Of the tuning of a report on its own timings.
     pub own: f64,
+    /// The least and the largest of these.
+    pub own_range: [f64; 2],
     /// Of the tuning of every other report on them.
     pub others: f64,
+    /// The least and the largest of these.
+    pub others_range: [f64; 2],
     /// What the tuning of another report costs beyond a report's own: mean over all ordered pairs of reports.
     pub beyond_own: f64,
-    /// The largest of these.
-    pub beyond_own_most: f64,
+    /// The least and the largest of these.
+    pub beyond_own_range: [f64; 2],
 }
 
 /// A simulated report is compared like a real one.
@@ -51,8 +56,10 @@ pub(super) fn losses(reports: &[(String, Report)]) -> Option<Losses> {
     }
     Some(Losses {
         own: mean(&own),
+        own_range: range(&own)?,
         others: mean(&others),
+        others_range: range(&others)?,
         beyond_own: mean(&beyond),
-        beyond_own_most: beyond.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        beyond_own_range: range(&beyond)?,
     })
 }

@@ -1,7 +1,7 @@
-//! How well repeated reports of one profile of a machine agree: parameters, borders, and what the tuning of one costs on another.
+//! How well repeated reports of one profile of a machine agree: parameters, crossovers, and what the tuning of one costs on another.
 
-mod borders;
 mod common;
+mod crossovers;
 mod losses;
 mod parameters;
 mod text;
@@ -12,7 +12,7 @@ use anyhow::{Result, bail};
 use sapwise::stats::median;
 use serde::Serialize;
 
-pub use borders::BorderSpread;
+pub use crossovers::CrossoverSpread;
 pub use losses::Losses;
 pub use parameters::ParameterSpread;
 
@@ -30,8 +30,8 @@ pub struct Comparison {
     pub steadiness: Vec<Option<Steadiness>>,
     /// Every measured parameter that all reports have.
     pub parameters: Vec<ParameterSpread>,
-    /// Every border that lies in at least half of the reports.
-    pub borders: Vec<BorderSpread>,
+    /// Every crossover that lies in at least half of the reports.
+    pub crossovers: Vec<CrossoverSpread>,
     /// `None` where the reports hold no timings.
     pub losses: Option<Losses>,
 }
@@ -67,7 +67,7 @@ impl Comparison {
             foreign_load,
             steadiness,
             parameters: parameters::spreads(&all),
-            borders: borders::borders(&all),
+            crossovers: crossovers::crossovers(&all),
             losses: losses::losses(&reports),
         })
     }
@@ -130,12 +130,12 @@ mod tests {
     fn the_same_report_twice_agrees_with_itself() {
         let report = Machine::family()[2].report();
         let comparison = Comparison::of(vec![named(report.clone()), named(report)]).unwrap();
-        assert!(!comparison.parameters.is_empty() && !comparison.borders.is_empty());
+        assert!(!comparison.parameters.is_empty() && !comparison.crossovers.is_empty());
         assert!(comparison.parameters.iter().all(|s| s.low == s.high));
         assert!(
-            comparison.borders.iter().all(|b| b.largest_deviation == 0.0 && b.own_interval_holds_median == 1.0),
+            comparison.crossovers.iter().all(|b| b.largest_deviation == 0.0 && b.own_interval_holds_median == 1.0),
             "{:?}",
-            comparison.borders
+            comparison.crossovers
         );
         let losses = comparison.losses.unwrap();
         assert!(losses.own.abs() < 0.02 && (losses.others - losses.own).abs() < 1e-12, "{losses:?}");
@@ -169,9 +169,10 @@ mod tests {
         quick.points.iter_mut().for_each(|p| p.timings.retain(|t| !sap(&t.algorithm)));
         let all = Comparison::of(vec![("full.json".to_owned(), full), ("quick.json".to_owned(), quick)]).unwrap();
         assert!(
-            all.borders.iter().all(|b| b.scenario == "uniform" && b.largest_deviation == 0.0) && !all.borders.is_empty()
+            all.crossovers.iter().all(|b| b.scenario == "uniform" && b.largest_deviation == 0.0)
+                && !all.crossovers.is_empty()
         );
-        assert!(all.borders.iter().all(|b| b.below.method() != "sap" && b.above.method() != "sap"));
+        assert!(all.crossovers.iter().all(|b| b.below.method() != "sap" && b.above.method() != "sap"));
         let told = all.not_compared.join("\n");
         assert!(told.contains("quick.json lacks the scenario clustered") && told.contains("sap@cpu1"), "{told}");
         assert!(all.losses.unwrap().beyond_own.abs() < 1e-12);
@@ -204,8 +205,8 @@ mod tests {
         }
         let comparison = Comparison::of(vec![named(steady), named(changed)]).unwrap();
         assert!(comparison.parameters.iter().all(|s| s.high > 1.15 * s.low));
-        let moved = comparison.borders.iter().filter(|b| b.above.threads() != b.below.threads());
-        assert!(moved.map(|b| b.largest_deviation).fold(0.0, f64::max) > 0.1, "{:?}", comparison.borders);
+        let moved = comparison.crossovers.iter().filter(|b| b.above.threads() != b.below.threads());
+        assert!(moved.map(|b| b.largest_deviation).fold(0.0, f64::max) > 0.1, "{:?}", comparison.crossovers);
         assert!(comparison.losses.unwrap().others > 0.01);
     }
 }

@@ -1,6 +1,7 @@
 //! A comparison as a person reads it.
 
-use super::{BorderSpread, Comparison, Losses, ParameterSpread};
+use super::{Comparison, CrossoverSpread, ParameterSpread};
+use crate::spread;
 use crate::steadiness::Steadiness;
 use crate::text::{count, grouped};
 use crate::units;
@@ -28,11 +29,11 @@ impl Comparison {
         text.push_str("\n\n");
         let head = ["parameter", "median", "IQR/median", "least to most, over the median"];
         text.push_str(&draw(&table(&head, self.parameters.iter().map(parameter))));
-        if !self.borders.is_empty() {
+        if !self.crossovers.is_empty() {
             text.push('\n');
             let head = [
                 "scenario",
-                "border",
+                "crossover",
                 "objects",
                 "farthest from it",
                 "IQR/median",
@@ -40,25 +41,25 @@ impl Comparison {
                 "error of x2 costs",
                 "reports",
             ];
-            text.push_str(&draw(&table(&head, self.borders.iter().map(border))));
-            text.push_str(BORDERS);
+            text.push_str(&draw(&table(&head, self.crossovers.iter().map(crossover))));
+            text.push_str(CROSSOVERS);
         }
-        if let Some(Losses { own, others, beyond_own, beyond_own_most }) = &self.losses {
+        if let Some(losses) = &self.losses {
+            let told = |mean: f64, range: [f64; 2]| spread::percent(mean, Some(range), 2);
             text.push_str(&format!(
-                "\nMean regret of the tuning of a report: {} on its own timings, {} on those of the others; beyond its own {}, at most {}\n",
-                percent(*own),
-                percent(*others),
-                percent(*beyond_own),
-                percent(*beyond_own_most)
+                "\nMean regret (least to largest) of the tuning of a report: {} on its own timings, {} on those of the others; beyond its own {}\n",
+                told(losses.own, losses.own_range),
+                told(losses.others, losses.others_range),
+                told(losses.beyond_own, losses.beyond_own_range)
             ));
         }
         text
     }
 }
 
-/// What the columns of the borders mean.
-const BORDERS: &str = "Objects: the median over the reports. Farthest: the largest distance of a report's border from that median. Held: the share of the \
-reports\nwhose own 90 % interval holds the median. Error of x2: what the wrong algorithm costs at half or twice the objects of the border.\n";
+/// What the columns of the crossovers mean.
+const CROSSOVERS: &str = "Objects: the median over the reports. Farthest: the largest distance of a report's crossover from that median. Held: the share of the \
+reports\nwhose own 90 % interval holds the median. Error of x2: what the wrong algorithm costs at half or twice the objects of the crossover.\n";
 
 fn table(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Vec<Vec<String>> {
     std::iter::once(head.iter().map(|&h| h.to_owned()).collect()).chain(rows).collect()
@@ -74,7 +75,7 @@ fn parameter(s: &ParameterSpread) -> Vec<String> {
     ]
 }
 
-fn border(b: &BorderSpread) -> Vec<String> {
+fn crossover(b: &CrossoverSpread) -> Vec<String> {
     vec![
         b.scenario.clone(),
         format!("{} to {}", b.below, b.above),

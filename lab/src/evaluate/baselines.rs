@@ -7,7 +7,7 @@ use anyhow::Result;
 use sapwise::model::GPU_PREFIX;
 use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Hardware, Tuning, stats};
 
-/// Always the algorithm with the least mean regret over the training profiles, given with that of each of their algorithms when it is
+/// Always the algorithm with the least mean regret over the training profiles, which come with that of each of their algorithms when it is
 /// chosen always; each profile counts the same.
 pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[AlgorithmId]) -> Strategy<'a> {
     let mean = |id: &AlgorithmId| {
@@ -27,7 +27,7 @@ pub(super) fn single_best<'a>(training: &[(&Profile, &[f64])], available: &[Algo
 /// With 64 and `grid-sap` this is nexus, which has brute force for up to 64 colliders and a tree beyond; strips stand for the
 /// tree, being what is fastest in large scenes here. With 999 and `sap` it is `mujoco_warp`, whose constant of 1000 bodies
 /// parts two kinds of sweep after a brute force that is chosen by a count of filtered pairs, which is not known here; the
-/// constant is taken for the border between brute force and sweep. Both run on a GPU there; here both run on the CPU, which
+/// constant is taken for the crossover between brute force and sweep. Both run on a GPU there; here both run on the CPU, which
 /// every machine has.
 pub(super) fn frozen<'a>(last: u32, above: &str, available: &[AlgorithmId]) -> Strategy<'a> {
     let on_cpu = |method: &'_ str| {

@@ -136,12 +136,12 @@ pub(super) fn direct<'a>(
     let count = predictions.len();
     if means > 0 {
         notes.push(format!(
-            "direct regression: {means} of {count} borders are means, there being no more crossings than parameters"
+            "direct regression: {means} of {count} crossovers are means, there being no more crossings than parameters"
         ));
     }
     if far > 0 {
         notes.push(format!(
-            "direct regression: {far} of {count} borders rest on a profile with over twice the mean leverage"
+            "direct regression: {far} of {count} crossovers rest on a profile with over twice the mean leverage"
         ));
     }
     Ok(Box::new(move |load| {
@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn least_squares_find_a_power_law_and_too_few_rows_give_the_mean() {
-        // A border that goes down with the lanes.
+        // A crossover that goes down with the lanes.
         let machines: Vec<Hardware> = Machine::family().iter().map(Machine::hardware).collect();
         let values: Vec<f64> = machines.iter().map(|h| 5.0 - 0.7 * h.value(ParameterId::SimdLanes).unwrap().ln()).collect();
         let known: Vec<&Hardware> = machines[..6].iter().collect();
@@ -293,7 +293,7 @@ mod tests {
 
     #[test]
     fn a_parameter_of_one_machine_only_is_not_used() {
-        // Nine machines of which only the last has other lanes; its border is far off for another reason.
+        // Nine machines of which only the last has other lanes; its crossover is far off for another reason.
         let mut random = Random::named(23, &[]);
         let table = Array2::from_shape_fn((9, 2), |(k, j)| if j == 0 { random.normal() } else { f64::from(k == 8) });
         let values: Vec<f64> = (0..9).map(|k| 5.0 + table[[k, 0]] + if k == 8 { 4.0 } else { 0.0 }).collect();

@@ -67,7 +67,7 @@ impl Table {
         let mut forests = BTreeMap::new();
         for (key, examples) in &self.0 {
             let known: Vec<&Example> = examples.iter().filter(|e| chosen[e.profile]).collect();
-            // At random: with even steps every profile would give rows of the same few sizes.
+            // At random: with even steps every profile would have rows of the same few sizes.
             let order = Random::new(SEED).shuffled(known.len());
             let known: Vec<&Example> = order.into_iter().take(MOST_ROWS).map(|k| known[k]).collect();
             if known.len() > LEAF {

@@ -99,10 +99,10 @@ mod tests {
 
     #[test]
     fn numbers_become_ranges() {
-        let borders = |a: u32, b: u32| format!("direct regression: {a} of {b} borders are means");
+        let crossovers = |a: u32, b: u32| format!("direct regression: {a} of {b} crossovers are means");
         assert_eq!(
-            folded(vec![borders(3, 28), borders(12, 79), borders(3, 28), borders(4, 45)]),
-            ["direct regression: 3 to 12 of 28 to 79 borders are means"]
+            folded(vec![crossovers(3, 28), crossovers(12, 79), crossovers(3, 28), crossovers(4, 45)]),
+            ["direct regression: 3 to 12 of 28 to 79 crossovers are means"]
         );
         // A number within a word names something.
         assert_eq!(told(&["sap@cpu1 is slow", "sap@cpu2 is slow", "sap@cpu1 is slow"]).len(), 2);

@@ -25,7 +25,7 @@ impl Partition {
         Self::of_machines(profiles, MOST_FOLDS).unwrap_or_else(|| Self::of_restrictions(profiles))
     }
 
-    /// At most so many folds of whole machines; `None` with fewer than two machines.
+    /// At most `most` folds of whole machines; `None` with fewer than two machines.
     pub fn of_machines(profiles: &[Profile], most: usize) -> Option<Self> {
         let machines = grouped(profiles, |p| p.machine().to_owned());
         let count = machines.len();

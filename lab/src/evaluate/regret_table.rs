@@ -1,6 +1,7 @@
 //! What each choice costs on a report: the regret.
 
 use crate::data::{Profile, Spot};
+use crate::spread::range;
 use sapwise::stats::mean;
 use sapwise::{AlgorithmId, Load};
 use std::collections::BTreeMap;
@@ -49,8 +50,16 @@ pub struct Regret {
     pub cells: Vec<f64>,
     /// Mean over the cells.
     pub mean: f64,
-    /// Mean over the cells, weighted by how often a game has so many objects.
+    /// Mean over the cells, weighted by how often a game has that number of objects.
     pub as_in_games: f64,
+}
+
+impl Regret {
+    /// The least and the largest of a cell; `None` where there is no cell.
+    #[must_use]
+    pub fn range(&self) -> Option<[f64; 2]> {
+        range(&self.cells)
+    }
 }
 
 impl RegretTable {
@@ -96,9 +105,9 @@ impl RegretTable {
         summed(cells, |cell| mean(&cell.loads.iter().map(|load| of(cell, load)).collect::<Vec<f64>>()))
     }
 
-    /// The mean regret of choosing each algorithm always.
-    pub fn always(&self) -> Vec<f64> {
-        (0..self.algorithms).map(|k| summed(self.cells.iter(), |cell| cell.over_best[k] - 1.0).mean).collect()
+    /// The regret of choosing each algorithm always.
+    pub fn always(&self) -> Vec<Regret> {
+        (0..self.algorithms).map(|k| summed(self.cells.iter(), |cell| cell.over_best[k] - 1.0)).collect()
     }
 }
 
@@ -169,7 +178,7 @@ mod tests {
         let (once, twice) = (regret(&profile, &always), regret(&Profile::of("", &twice), &always));
         assert!(once.cells.iter().zip(&twice.cells).all(|(a, b)| (a - b).abs() < 1e-9));
         let place = usize::from(profile.position(&id).unwrap());
-        assert!((RegretTable::new(&profile).always()[place] - once.mean).abs() < 1e-12);
+        assert!((RegretTable::new(&profile).always()[place].mean - once.mean).abs() < 1e-12);
         let available = profile.available();
         let sweep = regret(&profile, &by_costs(measured_costs(&profile).0, &available));
         assert!(sweep.mean < 0.02 && sweep.as_in_games < 0.02, "{sweep:?}");

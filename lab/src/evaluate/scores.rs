@@ -2,16 +2,17 @@
 
 use super::regret_table::Regret;
 use crate::fit::robust::value_at_weight;
+use crate::spread::range;
 use crate::training::MethodScore;
 use sapwise::stats::{self, median};
 use std::collections::BTreeMap;
 
-/// The strategy that scores are given relative to.
+/// The strategy that scores are relative to.
 pub const SINGLE_BEST: &str = "single best";
 /// The strategy of `predict`.
 pub const OURS: &str = "physics + ridge";
 
-/// A crossover that is predicted within so many octaves is near: a factor of 1.4.
+/// A crossover that is predicted within this many octaves is near: a factor of 1.4.
 const NEAR_OCTAVES: f64 = 0.5;
 
 /// How one strategy did on one held-out profile.
@@ -36,8 +37,7 @@ impl Judged {
 
 /// The scores of every strategy. Every physical machine counts the same, its profiles sharing its weight.
 pub(super) fn scores(all: &[Judged], by_machine: bool) -> Vec<MethodScore> {
-    let units = regrets_of_units(all, by_machine).into_iter();
-    let mut score: Vec<MethodScore> = units.map(|(name, units)| score(all, name, &units)).collect();
+    let mut score: Vec<MethodScore> = names(all).into_iter().map(|name| score(all, name, by_machine)).collect();
     let single = score.iter().find(|s| s.name == SINGLE_BEST).map_or(0.0, |s| s.mean_regret);
     // The oracle has no regret. Where the single best has none either there is no gap to close.
     let gap = |regret: f64| if single > 0.0 { (single - regret) / single } else { 0.0 };
@@ -48,12 +48,14 @@ pub(super) fn scores(all: &[Judged], by_machine: bool) -> Vec<MethodScore> {
 /// For each strategy, in the order of the first profile, the mean regret on each held-out machine, or profile where there is one machine
 /// only.
 pub(super) fn regrets_of_units(all: &[Judged], by_machine: bool) -> Vec<(&'static str, Vec<f64>)> {
-    let of = |name: &'static str| {
-        let mut units: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-        all.iter().filter(|j| j.name == name).for_each(|j| units.entry(j.unit(by_machine)).or_default().push(j.regret.mean));
-        (name, units.values().map(|regrets| stats::mean(regrets)).collect())
-    };
-    names(all).into_iter().map(of).collect()
+    names(all).into_iter().map(|name| (name, of_units(all, name, by_machine, |r| r.mean))).collect()
+}
+
+/// The mean of a regret of a strategy on each held-out machine or profile.
+fn of_units(all: &[Judged], name: &str, by_machine: bool, of: impl Fn(&Regret) -> f64) -> Vec<f64> {
+    let mut units: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    all.iter().filter(|j| j.name == name).for_each(|j| units.entry(j.unit(by_machine)).or_default().push(of(&j.regret)));
+    units.values().map(|regrets| stats::mean(regrets)).collect()
 }
 
 /// The names of the strategies, in the order of the first profile.
@@ -67,7 +69,7 @@ fn names(all: &[Judged]) -> Vec<&'static str> {
     names
 }
 
-fn score(all: &[Judged], name: &str, units: &[f64]) -> MethodScore {
+fn score(all: &[Judged], name: &str, by_machine: bool) -> MethodScore {
     let own: Vec<&Judged> = all.iter().filter(|j| j.name == name).collect();
     let mut profiles: BTreeMap<&str, f64> = BTreeMap::new();
     own.iter().for_each(|j| *profiles.entry(&j.machine).or_default() += 1.0);
@@ -79,15 +81,19 @@ fn score(all: &[Judged], name: &str, units: &[f64]) -> MethodScore {
     let crossings: Option<Vec<f64>> =
         own.iter().map(|j| j.crossings.as_deref()).collect::<Option<Vec<_>>>().map(|c| c.concat());
     let near = |c: &Vec<f64>| c.iter().filter(|e| **e <= NEAR_OCTAVES).count() as f64 / c.len() as f64;
+    let ends = range(&of_units(all, name, by_machine, |r| r.mean));
+    let ends_in_games = range(&of_units(all, name, by_machine, |r| r.as_in_games));
     MethodScore {
         name: name.to_owned(),
         mean_regret: mean(&means),
-        least_regret: units.iter().copied().min_by(f64::total_cmp),
-        largest_regret: units.iter().copied().max_by(f64::total_cmp),
+        least_regret: ends.map(|e| e[0]),
+        largest_regret: ends.map(|e| e[1]),
         p95_regret: percentile_95(means),
         share_over_10_percent: mean(&weighted(&over)),
         closed_gap: 0.0,
         mean_regret_in_games: Some(mean(&in_games)),
+        least_regret_in_games: ends_in_games.map(|e| e[0]),
+        largest_regret_in_games: ends_in_games.map(|e| e[1]),
         p95_regret_in_games: Some(percentile_95(in_games)),
         crossing_error_octaves: crossings.as_deref().and_then(median),
         crossings_within_half_octave: crossings.as_ref().filter(|c| !c.is_empty()).map(near),
@@ -135,6 +141,7 @@ mod tests {
         assert!((ours.mean_regret_in_games.unwrap() - 0.0775).abs() < 1e-12 && ours.p95_regret_in_games == Some(0.15));
         // The range over machines holds the mean.
         assert_eq!((ours.least_regret.map(|r| (100.0 * r).round()), ours.largest_regret), (Some(1.0), Some(0.3)));
+        assert_eq!(ours.regret_range_in_games().map(|r| r[1]), Some(0.15));
         // Eleven crossovers are one octave off, of the others one is 0.3, one 0.1 and nine are exact.
         assert!((ours.crossing_error_octaves.unwrap() - 0.65).abs() < 1e-12);
         assert_eq!(ours.crossings_within_half_octave, Some(0.5));

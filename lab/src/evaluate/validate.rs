@@ -13,6 +13,7 @@ use crate::belief::Prior;
 use crate::data::{Profile, machines};
 use crate::fit::{Designs, measured_costs, model};
 use crate::progress::Progress;
+use crate::spread::{percent, range};
 use crate::training::Validation;
 use anyhow::Result;
 use rayon::prelude::*;
@@ -164,7 +165,7 @@ struct Contestant<'a> {
 impl<'a> Data<'a> {
     fn new(profiles: &'a [Profile], designs: &'a Designs<'a>) -> Self {
         let regrets: Vec<RegretTable> = profiles.par_iter().map(RegretTable::new).collect();
-        let always = regrets.par_iter().map(RegretTable::always).collect();
+        let always = regrets.par_iter().map(|r| r.always().iter().map(|always| always.mean).collect()).collect();
         let costs = profiles.iter().map(|_| OnceLock::new()).collect();
         let likeness = profiles.iter().map(|p| Likeness::new(&p.hardware)).collect();
         let step = profiles.len().div_ceil(MOST_CROSSED).max(1);
@@ -294,14 +295,14 @@ impl<'a> Data<'a> {
         let found = (0..predicted.len()).into_par_iter().map(judge).collect::<Result<Vec<(Judged, f64, f64)>>>()?;
         let (without, with): (Vec<f64>, Vec<f64>) = found.iter().map(|f| (f.1, f.2)).unzip();
         let told = (!found.is_empty()).then(|| {
-            let percent = |regrets: &[f64]| format!("{:.1} %", 100.0 * mean(regrets));
+            let told = |regrets: &[f64]| percent(mean(regrets), range(regrets), 1);
             format!(
                 "{} samples replayed from the timings that judge them, on {} held-out reports: under the loads of the scenario that is \
                  sampled the mean regret falls from {} to {}, 95th percentile {:.1} %",
                 sampled::SAMPLES,
                 found.len(),
-                percent(&without),
-                percent(&with),
+                told(&without),
+                told(&with),
                 100.0 * scores::percentile_95(with.iter().map(|r| (*r, 1.0)).collect())
             )
         });

@@ -25,8 +25,8 @@ pub(crate) enum Values {
     /// Times of a frame in nanoseconds.
     #[default]
     TimesNs,
-    /// Positions of borders, in objects.
-    BordersObjects,
+    /// Positions of crossovers, in objects.
+    CrossoversObjects,
 }
 
 /// Points with one name.
@@ -34,7 +34,7 @@ pub(crate) enum Values {
 pub(crate) struct AgreementGroup {
     /// What the legend calls them.
     pub(crate) name: String,
-    /// Position among the series: gives colour and mark.
+    /// Position among the series, which decides colour and mark.
     pub(crate) style: usize,
     /// The points.
     pub(crate) points: Vec<AgreementPoint>,
@@ -60,22 +60,22 @@ impl Values {
     fn axis_name(self, what: &str, unit: &str) -> String {
         match self {
             Self::TimesNs => format!("{what} time of a frame ({unit})"),
-            Self::BordersObjects => format!("{what} border ({unit})"),
+            Self::CrossoversObjects => format!("{what} crossover ({unit})"),
         }
     }
 
     fn nothing(self) -> &'static str {
         match self {
             Self::TimesNs => "Nothing was held out: there is one report only.",
-            Self::BordersObjects => "No border was both measured and predicted.",
+            Self::CrossoversObjects => "No crossover was both measured and predicted.",
         }
     }
 
-    /// Half the width of a mark: there are many times and few borders.
+    /// Half the width of a mark: there are many times and few crossovers.
     fn mark_size(self) -> i32 {
         match self {
             Self::TimesNs => 3,
-            Self::BordersObjects => 5,
+            Self::CrossoversObjects => 5,
         }
     }
 }
@@ -119,7 +119,7 @@ impl Legended for Agreement {
         let all = || self.drawn().flat_map(|p| [p.measured, p.predicted].into_iter().chain(p.ends()));
         let (name, unit) = match self.values {
             Values::TimesNs => time_unit(all()),
-            Values::BordersObjects => ("objects", 1.0),
+            Values::CrossoversObjects => ("objects", 1.0),
         };
         let axis = Axis::log(all().map(|v| v / unit), 1.5);
         let chart = Chart::new(area, frame, axis.clone(), axis);

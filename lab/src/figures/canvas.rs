@@ -1,7 +1,7 @@
 //! What pictures are drawn on: SVG and PNG behind one type, so that a figure is drawn by one function and both look the same.
 
-use super::Picture;
 use super::font;
+use super::picture::Picture;
 use super::style::GROUND;
 use anyhow::ensure;
 use plotters::coord::Shift;

@@ -23,14 +23,14 @@ pub(crate) struct CurvePanel {
     pub(crate) title: String,
     pub(crate) series: Vec<Curve>,
     pub(crate) fields: Vec<Band>,
-    pub(crate) borders: Vec<BorderLine>,
+    pub(crate) crossovers: Vec<CrossoverLine>,
 }
 
 /// One algorithm.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Curve {
     pub(crate) name: String,
-    /// Position in the study's list of names: gives colour, mark and dashes.
+    /// Position in the study's list of names, which decides colour, mark and dashes.
     pub(crate) style: usize,
     pub(crate) points: Vec<CurvePoint>,
 }
@@ -58,7 +58,7 @@ pub(crate) struct Band {
 
 /// Where the next algorithm becomes the fastest.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct BorderLine {
+pub(crate) struct CrossoverLine {
     pub(crate) objects: f64,
     /// The interval of it.
     pub(crate) low: f64,
@@ -87,8 +87,8 @@ impl Curves {
             (if curve { Sign::Curve(style) } else { Sign::Mark(style) }, name.clone())
         };
         let mut entries: Vec<(Sign, String)> = names.into_iter().map(sign).collect();
-        if self.panels.iter().any(|p| !p.borders.is_empty()) {
-            entries.push((Sign::Interval(BORDER), "border, with its 90 % interval".to_owned()));
+        if self.panels.iter().any(|p| !p.crossovers.is_empty()) {
+            entries.push((Sign::Interval(CROSSOVER), "crossover, with its 90 % interval".to_owned()));
         }
         Legend::new(entries, WIDTH as i32 - 2 * GAP)
     }
@@ -98,8 +98,8 @@ impl Curves {
     }
 }
 
-/// The line at a border.
-const BORDER: Stroke = Stroke::dashed(INK, 1);
+/// The line at a crossover.
+const CROSSOVER: Stroke = Stroke::dashed(INK, 1);
 
 impl CurvePanel {
     fn draw(&self, area: &Area<'_>, frame: Frame, axes: &(Axis, Axis), unit: (&str, f64)) -> anyhow::Result<()> {
@@ -115,8 +115,8 @@ impl CurvePanel {
                 fill(area, shaded, style::colour(field.style), style::FIELD)?;
             }
         }
-        for border in &self.borders {
-            if let Some(shaded) = chart.rectangle((border.low, border.high), (0.0, f64::INFINITY)) {
+        for crossover in &self.crossovers {
+            if let Some(shaded) = chart.rectangle((crossover.low, crossover.high), (0.0, f64::INFINITY)) {
                 hatch(area, shaded, Hatch::Interval, SECONDARY)?;
             }
         }
@@ -124,8 +124,8 @@ impl CurvePanel {
         for field in &self.fields {
             field.name(area, &chart)?;
         }
-        for border in &self.borders {
-            chart.upright(border.objects, BORDER)?;
+        for crossover in &self.crossovers {
+            chart.upright(crossover.objects, CROSSOVER)?;
         }
         for curve in &self.series {
             let points: Vec<CurvePoint> = curve.points.iter().copied().filter(drawn).collect();
@@ -186,8 +186,8 @@ impl Figure for Curves {
         let ns = || self.points().flat_map(|p| [p.ns, p.low_ns, p.high_ns]);
         let unit = time_unit(ns());
         let objects = self.points().map(|p| p.objects);
-        let borders = self.panels.iter().flat_map(|p| &p.borders).map(|b| b.objects);
-        let axes = (Axis::log(objects.chain(borders), 1.15), Axis::log(ns().map(|ns| ns / unit.1), 1.3));
+        let crossovers = self.panels.iter().flat_map(|p| &p.crossovers).map(|b| b.objects);
+        let axes = (Axis::log(objects.chain(crossovers), 1.15), Axis::log(ns().map(|ns| ns / unit.1), 1.3));
         let columns = self.panels.len().min(2);
         for (panel, frame) in self.panels.iter().zip(whole.parts(self.panels.len(), columns, GAP)) {
             panel.draw(area, frame, &axes, unit)?;

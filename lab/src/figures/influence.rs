@@ -4,8 +4,8 @@ use super::canvas::Area;
 use super::chart::{Frame, Stroke, missing, path, words};
 use super::legend::{Legend, Sign};
 use super::style::{self, GAP, GRID, INK, LABEL, SMALL, WIDTH, line_height};
-use super::verdict::Verdict;
-use super::{Figure, font};
+use super::{Figure, font, verdict};
+use crate::evaluate::Verdict;
 use plotters::element::Text;
 use plotters::style::FontTransform;
 use plotters_backend::text_anchor::{HPos, VPos};
@@ -16,17 +16,16 @@ pub(crate) struct Influence {
     pub(crate) title: String,
     pub(crate) columns: Vec<String>,
     pub(crate) rows: Vec<String>,
-    /// For each row one cell for each column; what is missing is `Verdict::Absent`.
+    /// For each row one cell for each column; one that is missing has no verdict.
     pub(crate) cells: Vec<Vec<InfluenceCell>>,
 }
 
 /// One parameter and one algorithm or crossover.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct InfluenceCell {
-    pub(crate) verdict: Verdict,
-    /// Signed strength, as the rank correlation.
-    pub(crate) value: Option<f64>,
-    /// What stands in the cell.
+    /// `None` of too few values.
+    pub(crate) verdict: Option<Verdict>,
+    /// What stands in the cell, as the rank correlation.
     pub(crate) text: String,
 }
 
@@ -50,15 +49,6 @@ struct Plan {
     upright: Option<Vec<Vec<String>>>,
 }
 
-impl InfluenceCell {
-    fn words(&self) -> String {
-        match self.value {
-            Some(value) if self.text.is_empty() && value.is_finite() => format!("{value:+.2}"),
-            _ => self.text.clone(),
-        }
-    }
-}
-
 impl Influence {
     fn plan(&self) -> Plan {
         let names = self.rows.iter().map(|name| font::width(name, LABEL)).max().unwrap_or(0).min(ROW_NAME);
@@ -79,7 +69,10 @@ impl Influence {
     }
 
     fn legend(&self) -> Legend {
-        let entries = Verdict::ALL.map(|(verdict, name)| (Sign::Verdict(verdict), name.to_owned()));
+        let entries = verdict::ALL.map(|verdict| {
+            let name = verdict.map_or_else(|| "absent: too few values".to_owned(), |verdict| verdict.to_string());
+            (Sign::Verdict(verdict), name)
+        });
         Legend::new(entries.to_vec(), WIDTH as i32 - 2 * GAP)
     }
 
@@ -153,9 +146,9 @@ impl InfluenceCell {
     fn draw(&self, area: &Area<'_>, frame: Frame) -> anyhow::Result<()> {
         let Frame { left, top, right, bottom } = frame;
         let middle = (left + right) / 2;
-        let text = font::wrapped(&self.words(), SMALL, frame.width() - 4, 1).concat();
+        let text = font::wrapped(&self.text, SMALL, frame.width() - 4, 1).concat();
         let symbol = if text.is_empty() { (top + bottom) / 2 } else { top + 12 };
-        self.verdict.draw(area, frame, (middle, symbol))?;
+        verdict::draw(self.verdict, area, frame, (middle, symbol))?;
         words(area, &text, (middle, bottom - 11), SMALL, INK, HPos::Center, VPos::Center)?;
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
         path(area, &corners, Stroke::solid(GRID, 1))

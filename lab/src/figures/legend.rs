@@ -5,7 +5,8 @@ use super::chart::{Frame, Hatch, Stroke, fill, hatch, path, words};
 use super::font;
 use super::mark::{Mark, mark};
 use super::style::{self, INK, LABEL, SECONDARY, line_height};
-use super::verdict::Verdict;
+use super::verdict;
+use crate::evaluate::Verdict;
 use plotters_backend::text_anchor::{HPos, VPos};
 
 /// Width of what stands before a name, and the room behind a name.
@@ -32,7 +33,7 @@ pub(super) enum Sign {
     /// The ring around a mark.
     Ring,
     /// A verdict in its cell.
-    Verdict(Verdict),
+    Verdict(Option<Verdict>),
     None,
 }
 
@@ -98,7 +99,7 @@ impl Sign {
             }
             Self::Ring => area.draw(&mark((middle, y), Mark::Ring, INK, 7))?,
             Self::Verdict(verdict) => {
-                verdict.draw(area, Frame { left, top: y - 9, right, bottom: y + 9 }, (middle, y))?;
+                verdict::draw(verdict, area, Frame { left, top: y - 9, right, bottom: y + 9 }, (middle, y))?;
             }
             Self::None => {}
             Self::Stroke(line) => path(area, &ends, line)?,

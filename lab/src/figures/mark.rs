@@ -17,7 +17,7 @@ pub(super) enum Mark {
     Ground,
 }
 
-/// A shape at a place, in data coordinates or in pixels, with so many pixels from its middle to its edge.
+/// A shape at a place, in data coordinates or in pixels, with the number of pixels from its middle to its edge.
 pub(super) fn mark<C>(at: C, mark: Mark, colour: RGBColor, size: i32) -> Shape<C> {
     Shape { at, mark, colour, size }
 }

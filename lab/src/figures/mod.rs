@@ -5,12 +5,14 @@ mod axis;
 mod canvas;
 mod chart;
 mod curves;
+mod figure;
 mod font;
 mod influence;
 mod legend;
 mod legended;
 mod map;
 mod mark;
+mod picture;
 mod ratios;
 mod regrets;
 mod replay;
@@ -18,108 +20,16 @@ mod style;
 mod training;
 mod verdict;
 
-use canvas::Area;
-use plotters::element::Text;
-use plotters::style::RGBColor;
-use plotters_backend::text_anchor::{HPos, VPos};
-use std::path::{Path, PathBuf};
-use style::{GAP, INK, SECONDARY, SMALL, TITLE, line_height};
-
 pub(crate) use agreement::{Agreement, AgreementGroup, AgreementPoint, Values};
-pub(crate) use curves::{Band, BorderLine, Curve, CurvePanel, CurvePoint, Curves};
+pub(crate) use curves::{Band, CrossoverLine, Curve, CurvePanel, CurvePoint, Curves};
+pub use figure::Figure;
 pub(crate) use influence::{Influence, InfluenceCell};
 pub(crate) use map::{FieldMap, MapCell, MapPanel, MapPoint};
+pub use picture::{Picture, UnknownPicture};
 pub(crate) use ratios::{RatioGroup, RatioKind, RatioValue, Ratios};
 pub(crate) use regrets::{Regrets, StrategyRegrets};
 pub use replay::ReplayPicture;
 pub use training::TrainingPicture;
-pub(crate) use verdict::Verdict;
-
-/// Lines at most of a title, and of a paragraph of a caption: a name or command of a megabyte makes no picture of a mile.
-const TITLE_LINES: usize = 3;
-const CAPTION_LINES: usize = 12;
-
-/// How a picture is stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Picture {
-    /// Lines and text, which stay sharp at every size.
-    Svg,
-    /// Pixels, two for each unit of length.
-    Png,
-}
-
-impl Picture {
-    /// What the name of a file asks for.
-    ///
-    /// # Errors
-    /// When it ends in neither `.svg` nor `.png`.
-    pub fn of(path: &Path) -> Result<Self, UnknownPicture> {
-        match path.extension().and_then(|e| e.to_str()) {
-            Some("svg") => Ok(Self::Svg),
-            Some("png") => Ok(Self::Png),
-            _ => Err(UnknownPicture { path: path.to_owned() }),
-        }
-    }
-}
-
-/// The name of a file that does not say which kind of picture it is.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("name a file that ends in .svg or .png")]
-#[non_exhaustive]
-pub struct UnknownPicture {
-    /// The file.
-    pub path: PathBuf,
-}
-
-/// A picture of plain data.
-///
-/// Only the figures of this module can draw: the canvas is theirs.
-pub trait Figure {
-    /// What stands above it; nothing where this is empty.
-    fn title(&self) -> &str;
-
-    /// Width and height in units of what [`draw_on`](Self::draw_on) draws, without title and caption.
-    fn size(&self) -> (u32, u32);
-
-    /// Draws it from the upper left corner.
-    ///
-    /// # Errors
-    /// When the picture can't be drawn.
-    fn draw_on(&self, area: &Area<'_>) -> anyhow::Result<()>;
-
-    /// The whole picture, each paragraph of the caption on lines of its own below: sources and the command that makes it.
-    ///
-    /// # Errors
-    /// When the picture can't be drawn.
-    fn draw(&self, format: Picture, caption: &[String]) -> anyhow::Result<Vec<u8>> {
-        let (width, height) = self.size();
-        let room = width as i32 - 2 * GAP;
-        let title = if self.title().is_empty() { Vec::new() } else { font::wrapped(self.title(), TITLE, room, TITLE_LINES) };
-        let caption: Vec<String> = caption.iter().flat_map(|text| font::wrapped(text, SMALL, room, CAPTION_LINES)).collect();
-        let top = block(&title, TITLE);
-        let bottom = block(&caption, SMALL);
-        canvas::picture(format, (width, top + height + bottom), |root| {
-            let (above, rest) = root.split_vertically(top);
-            let (body, below) = rest.split_vertically(height);
-            lines(&above, &title, TITLE, INK)?;
-            self.draw_on(&body)?;
-            lines(&below, &caption, SMALL, SECONDARY)
-        })
-    }
-}
-
-/// Height of lines of text with room around them.
-fn block(text: &[String], size: u32) -> u32 {
-    if text.is_empty() { 0 } else { (text.len() as i32 * line_height(size) + 2 * GAP) as u32 }
-}
-
-fn lines(area: &Area<'_>, text: &[String], size: u32, colour: RGBColor) -> anyhow::Result<()> {
-    for (k, line) in text.iter().enumerate() {
-        let place = (GAP, GAP + k as i32 * line_height(size));
-        area.draw(&Text::new(line.as_str(), place, style::text(size, colour, HPos::Left, VPos::Top)))?;
-    }
-    Ok(())
-}
 
 #[cfg(test)]
 mod tests;

@@ -15,7 +15,7 @@ pub(crate) struct Ratios {
     pub(crate) title: String,
     /// Name of the machine that the ratios are to.
     pub(crate) reference: String,
-    /// The others: their positions give colours and marks.
+    /// The others: their positions decide colours and marks.
     pub(crate) machines: Vec<String>,
     pub(crate) groups: Vec<RatioGroup>,
 }

@@ -1,7 +1,11 @@
 //! Tests of all pictures, most of them with data that is not as it should be.
 
 use super::canvas::PNG_UNIT;
+use super::style::{INK, SECONDARY};
 use super::*;
+use crate::evaluate::Verdict;
+use plotters::style::RGBColor;
+use std::path::Path;
 
 /// Characters that mean something in SVG, that the font lacks, that XML forbids, and that turn text around.
 const ODD: &str = "<b>&\"it's\" é日\u{1}\u{202e}]]>";
@@ -118,7 +122,7 @@ fn a_caption_of_any_length_has_room() {
 }
 
 #[test]
-fn curves_show_fields_and_borders() {
+fn curves_show_fields_and_crossovers() {
     let panel = CurvePanel {
         title: format!("panel {ODD}"),
         series: vec![curve(1, &[(10.0, 1e3), (1e4, 1e7)]), curve(4, &[(10.0, 1e5), (1e4, 1e6)])],
@@ -126,13 +130,13 @@ fn curves_show_fields_and_borders() {
             Band { from: 0.0, to: 800.0, style: 1, name: "sap@cpu1".to_owned() },
             Band { from: 800.0, to: f64::INFINITY, style: 4, name: "sap@cpu4".to_owned() },
         ],
-        borders: vec![BorderLine { objects: 800.0, low: 700.0, high: 950.0 }],
+        crossovers: vec![CrossoverLine { objects: 800.0, low: 700.0, high: 950.0 }],
     };
     let one = Curves { title: format!("title {ODD}"), panels: vec![panel.clone()] };
     let (svg, _) = drawn(&one);
     let titles = [format!("title {ESCAPED}"), format!("panel {ESCAPED}")];
     assert!(titles.iter().all(|t| svg.contains(t)), "{svg}");
-    assert!(svg.contains("objects\n") && svg.contains("time of a frame (us)") && svg.contains("border, with"));
+    assert!(svg.contains("objects\n") && svg.contains("time of a frame (us)") && svg.contains("crossover, with"));
     // In the legend and in the row of fields.
     assert_eq!((svg.matches("sap@cpu1\n").count(), svg.matches("sap@cpu4\n").count()), (2, 2), "{svg}");
     for RGBColor(r, g, b) in [1, 4].map(style::colour) {
@@ -148,8 +152,8 @@ fn any_curves_are_drawn() {
     let with = |series: Vec<Curve>| {
         let ends = every_pair();
         let fields = ends.iter().map(|&(from, to)| Band { from, to, style: 3, name: ODD.to_owned() }).collect();
-        let borders = ends.iter().map(|&(low, high)| BorderLine { objects: low, low, high }).collect();
-        Curves { title: String::new(), panels: vec![CurvePanel { title: String::new(), series, fields, borders }] }
+        let crossovers = ends.iter().map(|&(low, high)| CrossoverLine { objects: low, low, high }).collect();
+        Curves { title: String::new(), panels: vec![CurvePanel { title: String::new(), series, fields, crossovers }] }
     };
     for (figure, sentence) in [
         (Curves::default(), true),
@@ -264,11 +268,9 @@ fn any_map_is_drawn() {
 
 #[test]
 fn a_matrix_tells_verdicts_by_sign_and_text() {
-    let cell = |verdict, value, text: &str| InfluenceCell { verdict, value, text: text.to_owned() };
-    let cells = vec![
-        vec![cell(Verdict::Linked, Some(-0.8), ""), cell(Verdict::NotLinked, Some(0.05), "weak")],
-        vec![cell(Verdict::CannotBeTold, Some(f64::NAN), "")],
-    ];
+    let cell = |verdict, text: &str| InfluenceCell { verdict: Some(verdict), text: text.to_owned() };
+    let cells =
+        vec![vec![cell(Verdict::Linked, "-0.80"), cell(Verdict::NotLinked, "weak")], vec![cell(Verdict::CannotBeTold, "")]];
     let names = |names: [&str; 2]| names.map(str::to_owned).to_vec();
     let columns = names(["sap@cpu1", ODD]);
     let figure = Influence { title: "Influence".to_owned(), columns, rows: names(["clock (MHz)", ODD]), cells };
@@ -283,27 +285,27 @@ fn a_matrix_tells_verdicts_by_sign_and_text() {
     }
 }
 
-fn borders(points: Vec<AgreementPoint>) -> Agreement {
-    let groups = vec![AgreementGroup { name: format!("border {ODD}"), style: 2, points }];
-    Agreement { title: "Borders".to_owned(), values: Values::BordersObjects, groups }
+fn crossovers(points: Vec<AgreementPoint>) -> Agreement {
+    let groups = vec![AgreementGroup { name: format!("crossover {ODD}"), style: 2, points }];
+    Agreement { title: "Crossovers".to_owned(), values: Values::CrossoversObjects, groups }
 }
 
 #[test]
 fn predictions_are_drawn_where_both_values_are_known() {
     let point =
         |measured: f64, predicted| AgreementPoint { measured, predicted, interval: Some((0.8 * measured, 1.3 * measured)) };
-    let (svg, _) = drawn(&borders(vec![point(100.0, 150.0), point(1e5, 3e4), point(f64::INFINITY, 10.0)]));
-    let needed = ["measured border (objects)", "predicted border (objects)", "factor of two", "1 without a position"];
+    let (svg, _) = drawn(&crossovers(vec![point(100.0, 150.0), point(1e5, 3e4), point(f64::INFINITY, 10.0)]));
+    let needed = ["measured crossover (objects)", "predicted crossover (objects)", "factor of two", "1 without a position"];
     assert!(needed.iter().all(|text| svg.contains(text)), "{svg}");
-    assert_eq!(svg.matches(&format!("border {ESCAPED}")).count(), 1);
+    assert_eq!(svg.matches(&format!("crossover {ESCAPED}")).count(), 1);
     let awkward: Vec<AgreementPoint> = every_pair().into_iter().map(|(a, b)| point(a, b)).collect();
     for points in [awkward.clone(), vec![point(7.0, 7.0)]] {
-        assert!(!drawn(&borders(points)).0.contains("No border was both"));
+        assert!(!drawn(&crossovers(points)).0.contains("No crossover was both"));
     }
     for points in [Vec::new(), vec![point(f64::NAN, 1.0), point(1.0, 0.0)]] {
-        assert!(drawn(&borders(points)).0.contains("No border was both"));
+        assert!(drawn(&crossovers(points)).0.contains("No crossover was both"));
     }
-    let many = (0..200).map(|style| AgreementGroup { style, ..borders(vec![point(7.0, 8.0)]).groups.remove(0) });
+    let many = (0..200).map(|style| AgreementGroup { style, ..crossovers(vec![point(7.0, 8.0)]).groups.remove(0) });
     drawn(&Agreement { groups: many.collect(), ..Agreement::default() });
 }
 

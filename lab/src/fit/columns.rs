@@ -49,7 +49,7 @@ impl Columns {
                 continue;
             }
             let unit = column.mapv(|v| (v - centre) / scale);
-            // The leverages that the column would give beside the mean alone.
+            // The leverages of the column beside the mean alone.
             if unit.iter().zip(&shares).any(|(v, share)| share * (1.0 + v * v) > ALONE) {
                 continue;
             }

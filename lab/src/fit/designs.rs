@@ -19,7 +19,8 @@ use std::collections::BTreeMap;
 const FEWEST_POINTS: usize = 8;
 /// Cold forks and joins of a frame on several threads where none was timed: it forks and joins at least once.
 const UNSEEN_FORK_JOINS: f64 = 1.0;
-/// Rows of a method, about. Its dozen coefficients need no more, and a fit takes time in proportion to them: of many reports each/// gives a few rows, other ones than the next.
+/// Rows of a method, about. Its dozen coefficients need no more, and a fit takes time in proportion to them: of many reports each
+/// adds a few rows, other ones than the next.
 const MOST_ROWS: usize = 6000;
 /// Rows of a method for each profile at least.
 const FEWEST_OF_PROFILE: usize = 2;

@@ -35,7 +35,7 @@ pub fn measured_tuning(report: &Report, scenario: &str) -> Result<Tuning> {
     if !report.provenance.optimised {
         tuning.warnings.push("the report was timed by an unoptimised build".to_owned());
     }
-    measure_borders(&mut tuning, report);
+    measure_crossovers(&mut tuning, report);
     Ok(tuning)
 }
 
@@ -186,11 +186,11 @@ fn correction(measured: &[(f64, f64)], floors: &[(f64, f64)]) -> Vec<Knot> {
 }
 
 /// Replaces the interval of each crossover by the one from paired samples, where there is one.
-fn measure_borders(tuning: &mut Tuning, report: &Report) {
+fn measure_crossovers(tuning: &mut Tuning, report: &Report) {
     let mut measured = 0;
-    for border in &mut tuning.crossovers {
-        let Some((low, high)) = measured_interval(border, report, &tuning.scenario) else { continue };
-        (border.low, border.high) = (Some(low), Some(high));
+    for crossover in &mut tuning.crossovers {
+        let Some((low, high)) = measured_interval(crossover, report, &tuning.scenario) else { continue };
+        (crossover.low, crossover.high) = (Some(low), Some(high));
         measured += 1;
     }
     if measured > 0 {
@@ -203,23 +203,23 @@ fn measure_borders(tuning: &mut Tuning, report: &Report) {
     }
 }
 
-/// The interval of a border of the cost curves, from the points of its scenario at which both neighbours were timed.
+/// The interval of a crossover of the cost curves, from the points of its scenario at which both neighbours were timed.
 ///
-/// The border itself stays: the curves know all scenarios, and a choice by them changes there. Where the samples cross
-/// elsewhere the interval reaches from the border over their crossing, and where they don't cross to the last size. `None` where
-/// fewer than three sizes have both, or the border lies beyond them.
-fn measured_interval(border: &Crossover, report: &Report, scenario: &str) -> Option<(f64, f64)> {
+/// The crossover itself stays: the curves know all scenarios, and a choice by them changes there. Where the samples cross
+/// elsewhere the interval reaches from the crossover over their crossing, and where they don't cross to the last size. `None` where
+/// fewer than three sizes have both, or the crossover lies beyond them.
+fn measured_interval(crossover: &Crossover, report: &Report, scenario: &str) -> Option<(f64, f64)> {
     let samples = |point: &'_ Point, id: &AlgorithmId| point.timings.iter().position(|t| t.algorithm == *id);
     let mut points = Vec::new();
     for point in report.points.iter().filter(|p| p.scenario == scenario) {
-        let (Some(a), Some(b)) = (samples(point, &border.below), samples(point, &border.above)) else { continue };
+        let (Some(a), Some(b)) = (samples(point, &crossover.below), samples(point, &crossover.above)) else { continue };
         points.push(PairedSamples {
             objects: point.load.objects,
             first_ns: &point.timings[a].samples_ns,
             second_ns: &point.timings[b].samples_ns,
         });
     }
-    PairedComparison::new(&points)?.interval(border.objects, true)
+    PairedComparison::new(&points)?.interval(crossover.objects, true)
 }
 
 #[cfg(test)]
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn borders_get_intervals_from_paired_frames() {
+    fn crossovers_get_intervals_from_paired_frames() {
         let report = Machine::family()[2].report();
         let tuning = measured_tuning(&report, "uniform").unwrap();
         assert!(
@@ -321,7 +321,7 @@ mod tests {
         }
     }
 
-    /// A report of `brute@cpu1` and `grid-sap@cpu1` whose ratio is `(n / crossing) ^ 0.5` in `uniform`, and a border at 1000.
+    /// A report of `brute@cpu1` and `grid-sap@cpu1` whose ratio is `(n / crossing) ^ 0.5` in `uniform`, and a crossover at 1000.
     fn crossed_at(crossing: f64) -> (Report, Crossover) {
         let mut report = Machine::family()[0].clone().exact().report();
         let [below, above] = ["brute@cpu1", "grid-sap@cpu1"].map(|id| id.parse::<AlgorithmId>().unwrap());
@@ -344,10 +344,10 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_holds_the_border_and_the_crossing_of_the_samples() {
+    fn the_interval_holds_the_crossover_and_the_crossing_of_the_samples() {
         for crossing in [300.0, 1000.0, 4000.0] {
-            let (report, border) = crossed_at(crossing);
-            let (low, high) = measured_interval(&border, &report, "uniform").unwrap();
+            let (report, crossover) = crossed_at(crossing);
+            let (low, high) = measured_interval(&crossover, &report, "uniform").unwrap();
             let (least, most) = (f64::min(crossing, 1000.0), f64::max(crossing, 1000.0));
             assert!(low <= least * 1.001 && most <= high * 1.001, "{crossing}: {low} to {high}");
             assert!(low > 0.8 * least && high < 1.25 * most, "{crossing}: {low} to {high}");
@@ -356,19 +356,19 @@ mod tests {
 
     #[test]
     fn where_the_samples_do_not_cross_the_interval_goes_on_to_the_last_size_of_both() {
-        let (mut report, mut border) = crossed_at(1e9);
-        assert_eq!(measured_interval(&border, &report, "uniform").unwrap().0, 1000.0);
+        let (mut report, mut crossover) = crossed_at(1e9);
+        assert_eq!(measured_interval(&crossover, &report, "uniform").unwrap().0, 1000.0);
         // Whoever left the race has no samples there.
         report.points.iter_mut().filter(|p| p.load.objects > 20_000).for_each(|p| p.timings.truncate(1));
         let last = report.points.iter().filter(|p| p.timings.len() == 2).map(|p| p.load.objects).max().unwrap();
-        let (low, high) = measured_interval(&border, &report, "uniform").unwrap();
+        let (low, high) = measured_interval(&crossover, &report, "uniform").unwrap();
         assert!(low == 1000.0 && (high / f64::from(last) - 1.0).abs() < 1e-9, "{low} to {high}");
-        // And a border beyond keeps the interval of the curves.
-        border.objects = 50_000.0;
-        assert_eq!(measured_interval(&border, &report, "uniform"), None);
+        // And a crossover beyond keeps the interval of the curves.
+        crossover.objects = 50_000.0;
+        assert_eq!(measured_interval(&crossover, &report, "uniform"), None);
         report.points.iter_mut().for_each(|p| p.timings.truncate(1));
-        border.objects = 1000.0;
-        assert_eq!(measured_interval(&border, &report, "uniform"), None);
+        crossover.objects = 1000.0;
+        assert_eq!(measured_interval(&crossover, &report, "uniform"), None);
     }
 
     #[test]

@@ -173,7 +173,7 @@ pub(crate) fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
     before.map(|b| b.0)
 }
 
-/// The least of values, given ascending with their weights, up to which at least this much weight is reached; `None` where all have less.
+/// The least of values, which ascend and have weights, up to which at least this much weight is reached; `None` where all have less.
 pub(crate) fn value_at_weight(values: &[(f64, f64)], weight: f64) -> Option<f64> {
     let mut passed = 0.0;
     let reached = values.iter().find(|v| {

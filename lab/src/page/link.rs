@@ -1,6 +1,6 @@
 //! Links, to files beside the page and to rows of its list of reports.
 
-use super::Source;
+use super::content::Source;
 use maud::{Markup, html};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 

@@ -17,7 +17,7 @@ const WIDE: usize = 12;
 /// Longer texts are words, which go over several lines; shorter ones stay on one.
 const WORDS: usize = 32;
 
-/// The table below the caption `{id}-caption`. `row_id` gives the name of a row's place, by its position.
+/// The table below the caption `{id}-caption`. `row_id` returns the name of a row's place, by its position.
 pub(super) fn table(id: &str, data: &DataTable, reports: &Reports<'_>, row_id: &dyn Fn(usize) -> Option<String>) -> Markup {
     let traced = data.rows.iter().any(|r| !r.reports.is_empty());
     let numeric: Vec<bool> = (0..data.columns.len()).map(|k| is_numeric(&data.rows, k)).collect();

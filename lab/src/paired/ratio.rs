@@ -3,7 +3,6 @@
 //! Drawing frames again would show the error of a median within its point only. Between points the host changes, and with it
 //! both costs by some percent; that error shows in how far medians lie from the lines, and between rounds.
 
-use super::PairedSamples;
 use sapwise::stats::{median, robust_deviation};
 
 /// A line takes part of this much to either side of its place, in natural logarithms of the size: 0.6 of a decade, over which
@@ -18,6 +17,17 @@ const SHORTER: f64 = 0.5;
 const ALIKE: f64 = 2.0;
 /// Distance of the places at which the ratio is evaluated: 1/32 octave.
 const GRID_STEP: f64 = std::f64::consts::LN_2 / 32.0;
+
+/// Frames of two algorithms at one point. The k-th sample of both is the same frame; what has no partner is not used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PairedSamples<'a> {
+    /// Objects in each frame.
+    pub objects: u32,
+    /// Nanoseconds of the first algorithm.
+    pub first_ns: &'a [u64],
+    /// Nanoseconds of the second algorithm.
+    pub second_ns: &'a [u64],
+}
 
 /// `ln(first / second)` over the logarithm of the size.
 #[derive(Debug, Clone)]

@@ -1,17 +1,11 @@
 //! Reports as JSON text.
 
-use super::Report;
-use sapwise::json::{Error, Format, Read, Schema};
+use super::record::Report;
+use sapwise::json::{Error, Format, Read};
 use serde::de::Error as _;
 
 /// Files of reports.
 pub const FORMAT: Format = Format::new("report", 2, 0);
-
-/// Whether a text says that it is a report, of whatever version.
-#[must_use]
-pub fn is_report(text: &str) -> bool {
-    Schema::of(text).is_ok_and(|schema| schema.name() == FORMAT.schema().name())
-}
 
 /// Reads a report and checks its figures. Keys that this version does not know, in a file of a newer one, are in the answer.
 ///

@@ -122,7 +122,7 @@ impl<'a> Costs<'a> {
         }
     }
 
-    /// So many bytes of each box whose working set the last-level cache does not hold.
+    /// `bytes` of each box whose working set the last-level cache does not hold.
     fn moving(&self, n: f64, bytes: f64, threads: f64) -> f64 {
         let cpu = &self.machine.cpu;
         let held = cpu.cache_bytes[2] * self.cpu.cache_share / (WORKING_SET_BYTES * n).max(1.0);

@@ -13,7 +13,7 @@ const SCENARIOS: [Scenario; 3] = [Scenario::Uniform, Scenario::Fast, Scenario::C
 pub struct Loads(pub(super) Vec<(Scenario, Vec<Load>)>);
 
 impl Loads {
-    /// The loads at the sizes of a quick sweep, up to `max_objects` where that is given. The scenes are made and their pairs counted; nothing
+    /// The loads at the sizes of a quick sweep, up to `max_objects` where there is one. The scenes are made and their pairs counted; nothing
     /// is timed.
     ///
     /// # Errors

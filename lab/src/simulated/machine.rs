@@ -105,7 +105,7 @@ impl TrueCpu {
         let to_memory = (65.0 + 6.0 * cores.log2()) * factor(seed, name, "latency of the memory", 0.12);
         let latency_ns = [4.0 / ghz, 13.0 / ghz, 36.0 / ghz + 0.2 * cores, to_memory];
         let all_threads_gb_per_s = cpu.memory_gb_per_s * between("share of the memory's bandwidth", 0.7, 0.9);
-        // One core has so many lines of 64 bytes on their way at a time; prefetchers have got better over the years.
+        // Lines of 64 bytes that one core has on their way at a time; prefetchers have got better over the years.
         let lines = 10.0 + 1.0 * (year - 2008.0).clamp(0.0, 20.0);
         let joining = |ns: f64, what| ns * (1.0 + 0.2 * threads.log2()) * factor(seed, name, what, 0.35);
         Self {

@@ -21,7 +21,7 @@ use sapwise::{AlgorithmId, Registry};
 pub use loads::Loads;
 pub use specification::{Specifications, built_in, read};
 
-/// So many machines made from specifications, each with the name of its file less the ending. The same arguments make the same
+/// `machines` machines made from specifications, each with the name of its file less the ending. The same arguments make the same
 /// reports.
 ///
 /// # Errors

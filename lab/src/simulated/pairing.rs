@@ -17,10 +17,10 @@ const MOST_YEARS: u32 = 3;
 /// Draws of GPUs for a CPU whose machine stands there already, before it is passed over.
 const DRAWS: u64 = 20;
 
-/// So many different machines. No CPU stands in two of them before each stands in one.
+/// `count` different machines. No CPU stands in two of them before each stands in one.
 ///
 /// # Errors
-/// When there are not so many different ones.
+/// When the specifications make fewer.
 pub(super) fn builds(specifications: &Specifications, count: usize, seed: u64) -> Result<Vec<Build<'_>>> {
     let mut builds: Vec<Build<'_>> = Vec::new();
     let mut names: Vec<String> = Vec::new();

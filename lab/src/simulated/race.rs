@@ -12,7 +12,7 @@ use sapwise_scenes::{Random, Scenario};
 const SAMPLES: usize = 160;
 /// Bounds of the frames of a point: the fewest that a real point of a quick sweep has, and half of the most.
 const FRAMES: std::ops::RangeInclusive<usize> = 5..=20;
-/// A clock ticks in so many nanoseconds.
+/// Nanoseconds of a tick of the clock.
 const TICK_NS: f64 = 10.0;
 
 /// Times the algorithms over all loads, scenario by scenario. `name` parts the noise of this machine from that of others.

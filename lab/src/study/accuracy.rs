@@ -1,4 +1,4 @@
-//! How well times, borders and choices are predicted from hardware parameters alone: the validation of a training as tables.
+//! How well times, crossovers and choices are predicted from hardware parameters alone: the validation of a training as tables.
 
 use super::entry::Entry;
 use crate::Validation;
@@ -8,7 +8,7 @@ use crate::figures::{Agreement, AgreementGroup, AgreementPoint, Values};
 use sapwise::{AlgorithmId, BackendClass, Crossover};
 use std::collections::BTreeMap;
 
-/// Kinds of borders, each drawn with a mark of its own; the last is of those whose predicted curves do not cross.
+/// Kinds of crossovers, each drawn with a mark of its own; the last is of those whose predicted curves do not cross.
 const KINDS: [&str; 4] = [
     "between methods",
     "between numbers of threads or GPUs",
@@ -16,7 +16,7 @@ const KINDS: [&str; 4] = [
     "predicted not to cross: an end of the sizes",
 ];
 
-/// Two fits mean the same border where they are within 5 % of each other, as a natural logarithm.
+/// Two fits mean the same crossover where they are within 5 % of each other, as a natural logarithm.
 const SAME_LN: f64 = 0.05;
 
 /// The score of every strategy.
@@ -24,20 +24,28 @@ pub(super) fn scores(validation: &Validation, studied: &[usize]) -> DataTable {
     let mut table = DataTable::new([
         ("strategy", "strategy"),
         ("mean regret", "mean_regret_share"),
+        ("least", "least_regret_share"),
+        ("largest", "largest_regret_share"),
         ("mean regret in games", "mean_regret_in_games_share"),
+        ("least in games", "least_regret_in_games_share"),
+        ("largest in games", "largest_regret_in_games_share"),
         ("95th percentile", "p95_regret_share"),
-        ("borders off by (octaves)", "borders_off_by_octaves"),
-        ("borders within half an octave", "borders_within_half_octave_share"),
+        ("crossovers off by (octaves)", "crossovers_off_by_octaves"),
+        ("crossovers within half an octave", "crossovers_within_half_octave_share"),
         ("points over 10 %", "points_over_10_percent_share"),
         ("gap to the oracle closed", "gap_closed_share"),
     ]);
     for m in &validation.methods {
         let share = |value: Option<f64>, why: &str| value.map_or_else(|| Cell::Missing(why.to_owned()), Cell::percent);
-        let none = "it predicts no costs";
+        let (none, unknown) = ("it predicts no costs", "not known");
         let cells = vec![
             Cell::text(&m.name),
             Cell::percent(m.mean_regret),
-            share(m.mean_regret_in_games, "not known"),
+            share(m.least_regret, unknown),
+            share(m.largest_regret, unknown),
+            share(m.mean_regret_in_games, unknown),
+            share(m.least_regret_in_games, unknown),
+            share(m.largest_regret_in_games, unknown),
             Cell::percent(m.p95_regret),
             Cell::optional(m.crossing_error_octaves, 2, none),
             share(m.crossings_within_half_octave, none),
@@ -114,11 +122,11 @@ pub(super) fn times(held_out: &HeldOut, entries: &[Entry]) -> DataTable {
     table
 }
 
-/// Measured borders with their intervals, by the file of their report.
+/// Measured crossovers with their intervals, by the file of their report.
 pub(super) type Measured = BTreeMap<String, Vec<Crossover>>;
 
-/// The measured borders beside the predicted ones, as a table and as a picture.
-pub(super) fn borders(held_out: &HeldOut, measured: &Measured, entries: &[Entry]) -> (DataTable, Agreement) {
+/// The measured crossovers beside the predicted ones, as a table and as a picture.
+pub(super) fn crossovers(held_out: &HeldOut, measured: &Measured, entries: &[Entry]) -> (DataTable, Agreement) {
     let mut table = DataTable::new([
         ("report", "report"),
         ("below", "below"),
@@ -154,15 +162,15 @@ pub(super) fn borders(held_out: &HeldOut, measured: &Measured, entries: &[Entry]
         groups[kind].points.push(point);
     }
     let groups = groups.into_iter().filter(|g| !g.points.is_empty()).collect();
-    let title = format!("Predicted and measured borders, {OURS}");
-    (table, Agreement { title, values: Values::BordersObjects, groups })
+    let title = format!("Predicted and measured crossovers, {OURS}");
+    (table, Agreement { title, values: Values::CrossoversObjects, groups })
 }
 
-/// The interval of the measured border between two algorithms near a number of objects. Both fits, that of the validation and that with
-/// intervals, see the same timings; where they do not agree on a border its interval is not known.
-fn interval(borders: &[Crossover], below: &AlgorithmId, above: &AlgorithmId, objects: f64) -> Option<(f64, f64)> {
+/// The interval of the measured crossover between two algorithms near a number of objects. Both fits, that of the validation and that with
+/// intervals, see the same timings; where they do not agree on a crossover its interval is not known.
+fn interval(crossovers: &[Crossover], below: &AlgorithmId, above: &AlgorithmId, objects: f64) -> Option<(f64, f64)> {
     let is_own = |b: &&Crossover| b.below == *below && b.above == *above && (b.objects / objects).ln().abs() < SAME_LN;
-    borders.iter().find(is_own)?.interval().filter(|(low, high)| (*low..=*high).contains(&objects))
+    crossovers.iter().find(is_own)?.interval().filter(|(low, high)| (*low..=*high).contains(&objects))
 }
 
 fn kind(below: &AlgorithmId, above: &AlgorithmId) -> usize {

@@ -152,7 +152,7 @@ fn by_reports(said: Said, parameter: GpuParameterId, influence: &Influence) -> (
     let of_gpus = |on: &On| match on {
         On::Method(method) => method.ends_with("GPU"),
         On::Algorithm(name) => name.contains("gpu0"),
-        On::Border(_) | On::Choice => false,
+        On::Crossover(_) | On::Choice => false,
     };
     let links = || influence.links.iter().filter(|l| of_gpus(&l.on));
     let ranks: Vec<String> = links()

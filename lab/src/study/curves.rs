@@ -4,7 +4,7 @@ use super::entry::{Entry, SOFTWARE, best_of_machines};
 use crate::Report;
 use crate::data::usual_scenario;
 use crate::data_table::{Cell, DataTable};
-use crate::figures::{Band, BorderLine, Curve, CurvePanel, CurvePoint, Curves};
+use crate::figures::{Band, CrossoverLine, Curve, CurvePanel, CurvePoint, Curves};
 use crate::fit::measured_tuning;
 use crate::sweep::median;
 use sapwise::stats::quantile;
@@ -103,12 +103,12 @@ impl Compared {
                 series.push(Curve { name: name(of), style: k, points });
             }
         }
-        let (fields, borders) = match measured_tuning(&own, &scenario) {
-            Ok(tuning) => (bands(&tuning, style, |k| name(&sides[k])), border_lines(&tuning)),
+        let (fields, crossovers) = match measured_tuning(&own, &scenario) {
+            Ok(tuning) => (bands(&tuning, style, |k| name(&sides[k])), crossover_lines(&tuning)),
             // Too few sizes for curves; the points are drawn all the same.
             Err(_) => (Vec::new(), Vec::new()),
         };
-        CurvePanel { title: format!("{} ({scenario})", entry.name), series, fields, borders }
+        CurvePanel { title: format!("{} ({scenario})", entry.name), series, fields, crossovers }
     }
 }
 
@@ -181,17 +181,17 @@ fn bands(tuning: &Tuning, style: impl Fn(&AlgorithmId) -> usize, name: impl Fn(u
     bands
 }
 
-/// The borders between sides.
-fn border_lines(tuning: &Tuning) -> Vec<BorderLine> {
+/// The crossovers between sides.
+fn crossover_lines(tuning: &Tuning) -> Vec<CrossoverLine> {
     let apart = tuning.crossovers.iter().filter(|b| side(b.below.backend()) != side(b.above.backend()));
     let line = |b: &Crossover| {
         let (low, high) = b.interval().unwrap_or((b.objects, b.objects));
-        BorderLine { objects: b.objects, low, high }
+        CrossoverLine { objects: b.objects, low, high }
     };
     apart.map(line).collect()
 }
 
-/// What the panels show as tables: the times, the fields and the borders. `drawn` are the reports of the panels, by position.
+/// What the panels show as tables: the times, the fields and the crossovers. `drawn` are the reports of the panels, by position.
 pub(super) fn tables(figure: &Curves, drawn: &[(usize, &Entry, &Report)]) -> [DataTable; 3] {
     let heads = [("machine", "machine"), ("scenario", "scenario")];
     let mut times = DataTable::new([
@@ -210,10 +210,10 @@ pub(super) fn tables(figure: &Curves, drawn: &[(usize, &Entry, &Report)]) -> [Da
         ("from (objects)", "from_objects"),
         ("to (objects)", "to_objects"),
     ]);
-    let mut borders = DataTable::new([
+    let mut crossovers = DataTable::new([
         heads[0],
         heads[1],
-        ("border (objects)", "objects"),
+        ("crossover (objects)", "objects"),
         ("interval from (objects)", "low_objects"),
         ("interval to (objects)", "high_objects"),
     ]);
@@ -229,12 +229,12 @@ pub(super) fn tables(figure: &Curves, drawn: &[(usize, &Entry, &Report)]) -> [Da
             let figures = [field.from, field.to].map(Cell::exact);
             fields.push([heads(), vec![Cell::text(&field.name)], figures.to_vec()].concat(), &[*k]);
         }
-        for border in &panel.borders {
-            let figures = [border.objects, border.low, border.high].map(Cell::exact);
-            borders.push([heads(), figures.to_vec()].concat(), &[*k]);
+        for crossover in &panel.crossovers {
+            let figures = [crossover.objects, crossover.low, crossover.high].map(Cell::exact);
+            crossovers.push([heads(), figures.to_vec()].concat(), &[*k]);
         }
     }
-    [times, fields, borders]
+    [times, fields, crossovers]
 }
 
 #[cfg(test)]
@@ -263,9 +263,9 @@ mod tests {
             let least = single.filter_map(|t| median(&t.samples_ns)).min_by(f64::total_cmp).unwrap();
             assert!(point.ns <= least * 1.001 && point.low_ns <= point.ns && point.ns <= point.high_ns, "{point:?} {least}");
         }
-        // Bands follow each other, and between two of them is a border.
+        // Bands follow each other, and between two of them is a crossover.
         assert!(panel.fields.len() > 1 && panel.fields.windows(2).all(|w| w[0].to == w[1].from && w[0].style != w[1].style));
-        assert!(panel.borders.len() >= panel.fields.len() - 1);
+        assert!(panel.crossovers.len() >= panel.fields.len() - 1);
         assert!(!Compared::Gpus.is_in(&entry) && !Compared::CpuAndGpu.is_in(&entry) && Compared::Threads.is_in(&entry));
     }
 

@@ -227,8 +227,6 @@ mod tests {
             assert!(path(name).exists(), "{name}");
         }
         assert_eq!(earlier(&path("")).unwrap().unwrap(), [PAGE, "tables/machines.csv"]);
-        // The form of earlier versions is replaced too.
-        assert_eq!(listed_files(r#"{"schema":"study/1","files":["index.html"]}"#).unwrap(), [PAGE]);
         assert_eq!(fs::read_to_string(path("tables/machines.csv")).unwrap(), "a\n");
     }
 }

@@ -1,4 +1,4 @@
-//! Which hardware parameters go with which algorithm and which border, by two methods.
+//! Which hardware parameters go with which algorithm and which crossover, by two methods.
 
 use super::entry::{Entry, representatives};
 use super::rank::{self, Rank};
@@ -21,8 +21,8 @@ pub(super) enum On {
     Algorithm(String),
     /// The times of a method on a class of processor, on any number of threads or GPUs, over what is predicted for it.
     Method(String),
-    /// The place of a border between two sides.
-    Border(String),
+    /// The place of a crossover between two sides.
+    Crossover(String),
     /// The regret of what is chosen.
     Choice,
 }
@@ -70,10 +70,10 @@ impl Influence {
         let chosen: Vec<&Entry> = reports.iter().map(|&k| &entries[k]).collect();
         let mut outcomes: BTreeMap<On, Vec<Option<f64>>> =
             slownesses(&chosen).into_iter().map(|(name, values)| (On::Algorithm(name), values)).collect();
-        let borders: Vec<BTreeMap<String, f64>> = chosen.par_iter().map(|e| borders_of(e)).collect();
-        let names: BTreeSet<&String> = borders.iter().flat_map(BTreeMap::keys).collect();
+        let crossovers: Vec<BTreeMap<String, f64>> = chosen.par_iter().map(|e| crossovers_of(e)).collect();
+        let names: BTreeSet<&String> = crossovers.iter().flat_map(BTreeMap::keys).collect();
         for name in names {
-            outcomes.insert(On::Border(name.clone()), borders.iter().map(|b| b.get(name).copied()).collect());
+            outcomes.insert(On::Crossover(name.clone()), crossovers.iter().map(|b| b.get(name).copied()).collect());
         }
         let parameters = parameters();
         let values: Vec<Vec<Option<f64>>> =
@@ -90,7 +90,7 @@ impl Influence {
         let mut links: Vec<Link> =
             cells.into_iter().zip(ranks).map(|((k, on), rank)| link(&parameters[k], on.clone(), rank, importance)).collect();
         let methods: BTreeSet<&String> =
-            importance.iter().flat_map(|i| &i.parameters).flat_map(|p| &p.methods).map(|m| &m.method).collect();
+            importance.iter().flat_map(|i| &i.parameters).flat_map(|p| p.distance_rise_ln.keys()).collect();
         for method in methods {
             links.extend(parameters.iter().map(|parameter| link(parameter, On::Method(method.clone()), None, importance)));
         }
@@ -101,7 +101,7 @@ impl Influence {
         }
         links.retain(|link| link.rank.is_some() || link.effect.is_some());
         for of in importance.iter().flat_map(|i| &i.parameters).filter(|p| p.regret_rise.is_told()) {
-            let effect = of.regret_rise.clone();
+            let effect = of.regret_rise;
             let verdict = effect.verdict;
             let parameter = of.parameter.clone();
             links.push(Link { parameter, on: On::Choice, rank: None, effect: Some(effect), verdict });
@@ -115,8 +115,8 @@ impl Influence {
     }
 }
 
-/// Where sides give way to each other on a machine. A software adapter is no side against the CPU.
-fn borders_of(entry: &Entry) -> BTreeMap<String, f64> {
+/// Where one side overtakes another on a machine. A software adapter is no side against the CPU.
+fn crossovers_of(entry: &Entry) -> BTreeMap<String, f64> {
     let mut profile = entry.profile.clone();
     let software_gpus = entry.software_gpus();
     profile.retain(|t| !matches!(t.id.backend(), Backend::Gpu(gpus) if gpus.iter().any(|g| software_gpus.contains(g))));
@@ -126,8 +126,8 @@ fn borders_of(entry: &Entry) -> BTreeMap<String, f64> {
 fn link(parameter: &str, on: On, rank: Option<Rank>, importance: Option<&Importance>) -> Link {
     let of = importance.and_then(|i| i.parameters.iter().find(|p| p.parameter == parameter));
     let effect = of.and_then(|of| match &on {
-        On::Method(name) => of.methods.iter().find(|m| m.method == *name).map(|m| m.distance_rise_ln.clone()),
-        On::Algorithm(_) | On::Border(_) | On::Choice => None,
+        On::Method(name) => of.distance_rise_ln.get(name).copied(),
+        On::Algorithm(_) | On::Crossover(_) | On::Choice => None,
     });
     let effect = effect.filter(Effect::is_told);
     Link { parameter: parameter.to_owned(), on, rank, effect, verdict: Verdict::CannotBeTold }

@@ -5,6 +5,7 @@ use crate::data::Profile;
 use crate::data_table::{Cell, DataTable};
 use crate::figures::{FieldMap, MapCell, MapPanel, MapPoint};
 use crate::fit::measured_costs;
+use crate::spread::range;
 use crate::train::without;
 use anyhow::Result;
 use rayon::prelude::*;
@@ -27,6 +28,8 @@ pub(super) struct Map {
     pub(super) held_out: String,
     /// Mean regret of the predicted choices at the points where the choice was timed, how many these are, and of how many; none of none.
     pub(super) regret: Option<f64>,
+    /// The least and the largest regret of such a point.
+    pub(super) range: Option<[f64; 2]>,
     pub(super) known: usize,
     pub(super) points: usize,
     /// Share of the cells in which both choose the same.
@@ -98,7 +101,8 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
     let figure = FieldMap { title, names, x, y, y_name: "overlapping pairs of an object".to_owned(), panels };
     let (known, points) = (regrets.len(), count);
     let regret = (known > 0).then(|| regrets.iter().sum::<f64>() / known as f64);
-    Ok(Map { figure, held_out, regret, known, points, agreeing })
+    let range = range(&regrets);
+    Ok(Map { figure, held_out, regret, range, known, points, agreeing })
 }
 
 impl Map {
@@ -136,7 +140,7 @@ impl Map {
     }
 }
 
-/// The load of so many unit cubes spread evenly, with so many pairs an object.
+/// The load of `objects` unit cubes spread evenly, each in `pairs_of_object` pairs.
 fn spread_evenly(objects: f64, pairs_of_object: f64, moved: f64) -> Load {
     let objects = objects.round().max(2.0) as u32;
     let few = objects.min(MOST_BOXES);

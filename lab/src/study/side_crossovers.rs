@@ -1,10 +1,10 @@
-//! Where one side of a pair of algorithms gives way to the other on a machine, by cost curves.
+//! Where one side of a pair of algorithms overtakes the other on a machine, by cost curves.
 
 use crate::data::Profile;
 use crate::fit::measured_costs;
 use sapwise::{AlgorithmCost, AlgorithmId, Backend, BackendClass, Load};
 
-/// One side of a border: the cheapest of its algorithms counts.
+/// One side of a crossover: the cheapest of its algorithms counts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Side(Vec<AlgorithmId>);
 
@@ -45,7 +45,7 @@ fn pairs(available: &[AlgorithmId]) -> Vec<Pair> {
     pairs
 }
 
-/// Every pair whose border was measured, by name, with the place of the border in octaves of the slice.
+/// Every pair whose crossover was measured, by name, with the place of the crossover in octaves of the slice.
 pub(super) fn measured_crossovers(profile: &Profile) -> Vec<(String, f64)> {
     let (slice, measured) = (profile.slice(profile.usual_scenario()), measured_costs(profile).0);
     let at = |pair: Pair| Some((pair.octaves(&measured, &slice)?, pair.name));
@@ -53,8 +53,8 @@ pub(super) fn measured_crossovers(profile: &Profile) -> Vec<(String, f64)> {
 }
 
 impl Pair {
-    /// Octaves of the slice in which the first side is the cheaper one: the distance of the border from the smallest size. Where one
-    /// side is always cheaper the border counts as lying at an end of the slice, and of several borders all count. `None` where
+    /// Octaves of the slice in which the first side is the cheaper one: the distance of the crossover from the smallest size. Where one
+    /// side is always cheaper the crossover counts as lying at an end of the slice, and of several crossovers all count. `None` where
     /// no cost of a side is known.
     fn octaves(&self, costs: &[AlgorithmCost], slice: &[Load]) -> Option<f64> {
         let of = |side: &Side| costs.iter().filter(|c| side.0.contains(&c.algorithm)).collect::<Vec<_>>();
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn borders_are_found_and_those_that_are_not_there_lie_at_the_ends() {
+    fn crossovers_are_found_and_those_that_are_not_there_lie_at_the_ends() {
         let ids: Vec<AlgorithmId> = ["brute@cpu1", "brute@cpu4", "grid-sap@cpu1", "grid-sap@cpu4", "grid-sap@gpu0"]
             .map(|id| id.parse().unwrap())
             .into();

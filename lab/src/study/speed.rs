@@ -24,7 +24,7 @@ pub(super) struct SpeedUp {
     pub(super) points: usize,
 }
 
-/// The speed-up from `reference` to `other` of each algorithm that both were timed with at five points or more with so many objects.
+/// The speed-up from `reference` to `other` of each algorithm that both were timed with at five points or more whose objects are in `sizes`.
 pub(super) fn speed_ups(reference: &Entry, other: &Entry, sizes: Range<u32>) -> BTreeMap<String, SpeedUp> {
     let (before, mut after) = (reference.times(), other.times());
     let of = |(name, before): (String, BTreeMap<PointKey<'_>, f64>)| {

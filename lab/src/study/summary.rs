@@ -128,22 +128,13 @@ impl StudyClaim {
     }
 }
 
-/// The files that the study of this folder lists, by a `study.json` of this or the earlier form; `None` of any other text.
+/// The files that the study of this folder lists; `None` of a text that is no `study.json`.
 pub(super) fn listed_files(text: &str) -> Option<Vec<String>> {
     #[derive(Deserialize)]
-    #[serde(untagged)]
-    enum Listed {
-        Path(String),
-        File(StudyFile),
-    }
-    #[derive(Deserialize)]
-    struct Earlier {
+    struct Listed {
         schema: String,
-        files: Vec<Listed>,
+        files: Vec<StudyFile>,
     }
-    let earlier: Earlier = serde_json::from_str(text).ok()?;
-    let path = |listed| match listed {
-        Listed::Path(path) | Listed::File(StudyFile { path, .. }) => path,
-    };
-    earlier.schema.starts_with("study/").then(|| earlier.files.into_iter().map(path).collect())
+    let Listed { schema, files } = serde_json::from_str(text).ok()?;
+    schema.starts_with("study/").then(|| files.into_iter().map(|file| file.path).collect())
 }

@@ -3,14 +3,14 @@
 /// An algorithm leaves when it takes more than this many times as long as the best.
 const HOPELESS: f64 = 8.0;
 
-/// An algorithm leaves at this ratio where the next size would not fit into the time with it: the border between the fast ones
+/// An algorithm leaves at this ratio where the next size would not fit into the time with it: the crossover between the fast ones
 /// is worth more than one more point of a slow one.
 const SLOW: f64 = 3.0;
 
 /// Nobody leaves below this size: a frame costs microseconds there, and a ratio of two such times jumps from size to size.
 const JUDGED_FROM: u32 = 1000;
 
-/// The paper's method stays up to this size even when it is hopeless: its curve is what the paper's borders are made of.
+/// The paper's method stays up to this size even when it is hopeless: its curve is what the paper's crossovers are made of.
 const BRUTE_STAYS_BELOW: u32 = 3000;
 
 /// The race of one algorithm through the sizes of a scenario.

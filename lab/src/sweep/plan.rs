@@ -22,7 +22,7 @@ pub struct Plan {
     pub total: Duration,
 }
 
-/// Spread over the densities that shift the borders most: even, in blobs, and with sizes over two decades.
+/// Spread over the densities that shift the crossovers most: even, in blobs, and with sizes over two decades.
 const QUICK: [Scenario; 3] = [Scenario::Uniform, Scenario::Clustered, Scenario::Mixed];
 const QUICK_OBJECTS: u32 = 300_000;
 const QUICK_PER_DECADE: u32 = 3;
@@ -49,7 +49,7 @@ const FULL_TOTAL: Duration = Duration::from_secs(160);
 const ASCENT_SHARE: f64 = 0.6;
 
 impl Plan {
-    /// The usual plan, with the user's scenarios and largest size where they are given.
+    /// The usual plan, with the user's scenarios and largest size where there are any.
     pub fn new(quick: bool, scenarios: &[Scenario], max_objects: Option<u32>) -> Self {
         let (usual, objects, per_decade, rounds, total) = if quick {
             (QUICK.to_vec(), QUICK_OBJECTS, QUICK_PER_DECADE, QUICK_ROUNDS, QUICK_TOTAL)
@@ -64,7 +64,7 @@ impl Plan {
     }
 }
 
-/// So many sizes a decade from 10 up, and `max` as the last.
+/// Sizes from 10 up, `per_decade` of them to a decade, and `max` as the last.
 fn sizes(max: u32, per_decade: u32) -> Vec<u32> {
     let each = f64::from(per_decade);
     let grid = (per_decade..).map(|k| 10.0_f64.powf(f64::from(k) / each).round() as u32);

@@ -6,6 +6,7 @@ use crate::progress::Progress;
 use crate::terminal::Terminal;
 use crate::{interrupt, output, shell};
 use sapwise_lab::data::Evidence;
+use sapwise_lab::spread;
 use sapwise_lab::study::{NotAmongReports, PAGE, Sources, Study, Summary, prepare};
 use sapwise_lab::text::count;
 use std::path::Path;
@@ -82,9 +83,9 @@ fn text(summary: &Summary, out: &Path, simulated: bool) -> String {
     text.push_str(&format!("\n{}", Terminal::of_standard_output().table(&rows)));
     if let Some(ours) = summary.strategies.first() {
         text.push_str(&format!(
-            "\nPredicted from hardware parameters, with each {} held out in turn: mean regret {:.1} %\n",
+            "\nPredicted from hardware parameters, with each {} held out in turn: mean regret (least to largest) {}\n",
             summary.held_out,
-            ours.mean_regret * 100.0
+            spread::percent(ours.mean_regret, ours.regret_range(), 1)
         ));
     }
     for missing in &summary.missing {

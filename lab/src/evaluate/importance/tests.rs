@@ -17,14 +17,13 @@ fn what_the_timings_were_made_of_is_linked_and_what_they_were_not_is_not() {
     let of = |name: &str| found.parameters.iter().find(|p| p.parameter == name).unwrap();
     let of_gpus = of("gpu/upload_rate_gb_per_s");
     // What GPUs do is nothing to the CPU.
-    for method in of_gpus.methods.iter().filter(|m| m.method.ends_with("CPU")) {
-        assert_eq!(method.distance_rise_ln.rise.map_or(0.0, |i| i.high), 0.0, "{method:#?}");
+    for (method, effect) in of_gpus.distance_rise_ln.iter().filter(|(method, _)| method.ends_with("CPU")) {
+        assert_eq!(effect.rise.map_or(0.0, |i| i.high), 0.0, "{method} {effect:?}");
     }
-    let linked = |p: &OfParameter| p.methods.iter().filter(|m| m.distance_rise_ln.verdict == Verdict::Linked).count();
+    let linked = |p: &OfParameter| p.distance_rise_ln.values().filter(|e| e.verdict == Verdict::Linked).count();
     assert!(linked(of(ParameterId::ClockMeasuredGhz.as_str())) > 0, "{:#?}", of(ParameterId::ClockMeasuredGhz.as_str()));
     let memory = of(ParameterId::MemoryBytes.as_str());
-    assert!(memory.deviation_octaves > 0.3, "{memory:?}");
-    let effects = memory.methods.iter().map(|m| &m.distance_rise_ln).chain([&memory.regret_rise]);
+    let effects = memory.distance_rise_ln.values().chain([&memory.regret_rise]);
     effects.for_each(|e| assert_eq!(e.verdict, Verdict::NotLinked, "{e:?}"));
     assert!(found.page(crate::text::columns).contains("memory_bytes"));
 }
@@ -34,11 +33,7 @@ fn of_four_machines_nothing_is_told() {
     let four: Vec<Profile> = Machine::family()[..4].iter().map(|m| Profile::of(m.name, &m.report())).collect();
     let found = importance(&four, &Silent).unwrap();
     assert!(found.mean_regret.is_none() && found.notes[0].contains("4 physical machines"), "{:?}", found.notes);
-    assert_eq!(found.parameters.len(), Figure::ALL.len());
-    for p in &found.parameters {
-        assert_eq!((p.regret_rise.verdict, p.regret_rise.rise), (Verdict::CannotBeTold, None));
-    }
-    assert!(found.page(crate::text::columns).contains("cannot be told from these machines"));
+    assert!(found.parameters.is_empty() && found.page(crate::text::columns).contains("nothing is told"));
 }
 
 /// A parameter that a scale reads and that stands in no list would go unexamined.

@@ -1,6 +1,7 @@
-//! What the intervals of a parameter say.
+//! A mean rise over machines, how far it would differ with other machines, and what follows.
 
-use super::interval::Interval;
+use sapwise::stats::{mean, quantile};
+use sapwise_scenes::Random;
 use serde::Serialize;
 use std::fmt;
 
@@ -8,6 +9,34 @@ use std::fmt;
 pub(super) const FEWEST_MACHINES: usize = 5;
 /// Standard deviation of a parameter over the machines, in octaves, below which they are alike in it: 7 %.
 const LEAST_DEVIATION: f64 = 0.1;
+/// Draws of as many machines as there are, with replacement, and their seed.
+const DRAWS: usize = 2000;
+const SEED: u64 = 1;
+
+/// A mean over physical machines with its 90 % interval by a bootstrap over them, in the unit of what holds it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Interval {
+    /// The mean over the machines.
+    pub mean: f64,
+    /// Lower end, the 5 % quantile of the means of the draws.
+    pub low: f64,
+    /// Upper end, the 95 % quantile.
+    pub high: f64,
+}
+
+impl Interval {
+    /// Of one value for each machine; `None` of no machine.
+    ///
+    /// Machines are drawn and not rows: more rows of one machine are no more evidence about others. The models are not fitted again to
+    /// each draw, so that the interval says how far machines differ under these models.
+    pub(super) fn of(values: &[f64]) -> Option<Self> {
+        let mut random = Random::new(SEED);
+        let mut draw = || values[(random.bits() % values.len() as u64) as usize];
+        let count = if values.is_empty() { 0 } else { DRAWS };
+        let means: Vec<f64> = (0..count).map(|_| values.iter().map(|_| draw()).sum::<f64>() / values.len() as f64).collect();
+        Some(Self { low: quantile(&means, 0.05)?, high: quantile(&means, 0.95)?, mean: mean(values) })
+    }
+}
 
 /// Whether a parameter and an outcome belong together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -32,15 +61,13 @@ impl fmt::Display for Verdict {
 }
 
 /// How much worse an outcome is on machines held out, and what follows.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Effect {
-    /// The rise with one value of the parameter for all machines, in the training too: what no other parameter stands in for. None of too
-    /// few machines.
+    /// The rise with one value of the parameter for all machines, in the training too: what no other parameter stands in for. `None` of
+    /// fewer than five machines.
     pub rise: Option<Interval>,
-    /// What follows.
+    /// What follows. Neither where the parameter hardly varies over the machines.
     pub verdict: Verdict,
-    /// Why it can't be told; empty where it can.
-    pub because: String,
 }
 
 impl Effect {
@@ -51,23 +78,20 @@ impl Effect {
         self.rise.is_some_and(|i| i.low != 0.0 || i.high != 0.0)
     }
 
-    /// `deviation` is the standard deviation of the parameter over so many machines, in octaves; `least` what matters of the outcome.
-    pub(super) fn new(rise: Option<Interval>, machines: usize, deviation: f64, least: f64) -> Self {
-        let Some(rise) = rise.filter(|_| machines >= FEWEST_MACHINES) else {
-            let because = format!("{machines} physical machines have both; it takes {FEWEST_MACHINES}");
-            return Self { rise: None, verdict: Verdict::CannotBeTold, because };
-        };
-        let (mut verdict, mut because) = (Verdict::CannotBeTold, String::new());
-        if deviation < LEAST_DEVIATION {
-            because = format!("the parameter hardly varies: its standard deviation is {deviation:.3} octaves");
-        } else if rise.high <= least {
-            verdict = Verdict::NotLinked;
-        } else if rise.low > 0.0 {
-            verdict = Verdict::Linked;
-        } else {
-            because = "the interval holds zero, and more than what matters".to_owned();
-        }
-        Self { rise: Some(rise), verdict, because }
+    /// `rises` has one value for each machine, `deviation` is the standard deviation of the parameter over them, in octaves, and `least` is
+    /// what matters of the outcome.
+    pub(super) fn new(rises: &[f64], deviation: f64, least: f64) -> Self {
+        let rise = Interval::of(rises).filter(|_| rises.len() >= FEWEST_MACHINES);
+        Self { rise, verdict: rise.map_or(Verdict::CannotBeTold, |rise| verdict(rise, deviation, least)) }
+    }
+}
+
+fn verdict(rise: Interval, deviation: f64, least: f64) -> Verdict {
+    match rise {
+        _ if deviation < LEAST_DEVIATION => Verdict::CannotBeTold,
+        _ if rise.high <= least => Verdict::NotLinked,
+        _ if rise.low > 0.0 => Verdict::Linked,
+        _ => Verdict::CannotBeTold,
     }
 }
 
@@ -76,18 +100,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn an_interval_of_a_mean_is_as_wide_as_that_of_a_normal_distribution() {
+        let mut random = Random::named(3, &[]);
+        let values: Vec<f64> = (0..100).map(|_| 2.0 + random.normal()).collect();
+        let found = Interval::of(&values).unwrap();
+        // 1.645 standard deviations of the mean of a hundred to either side.
+        assert!(((found.high - found.low) / 0.329 - 1.0).abs() < 0.25, "{found:?}");
+        assert!(found.low < 2.0 && 2.0 < found.high && found.low < found.mean && found.mean < found.high, "{found:?}");
+        assert_eq!(Interval::of(&[]), None);
+        assert_eq!(Interval::of(&[0.5; 7]), Some(Interval { mean: 0.5, low: 0.5, high: 0.5 }));
+    }
+
+    #[test]
     fn verdicts_follow_from_the_interval() {
-        let interval = |low: f64, high: f64| Some(Interval { mean: (low + high) / 2.0, low, high });
-        let of = |rise, machines, deviation| Effect::new(rise, machines, deviation, 0.1);
-        let (none, wide, above) = (interval(-0.01, 0.01), interval(-0.2, 0.5), interval(0.05, 0.5));
-        assert_eq!(of(none, 9, 1.0).verdict, Verdict::NotLinked);
-        assert_eq!(of(above, 9, 1.0).verdict, Verdict::Linked);
+        let of = |low: f64, high: f64, deviation| verdict(Interval { mean: (low + high) / 2.0, low, high }, deviation, 0.1);
+        assert_eq!(of(-0.01, 0.01, 1.0), Verdict::NotLinked);
+        assert_eq!(of(0.05, 0.5, 1.0), Verdict::Linked);
         // What is surely there and too small to matter.
-        assert_eq!(of(interval(0.01, 0.02), 9, 1.0).verdict, Verdict::NotLinked);
-        for (effect, word) in
-            [(of(wide, 9, 1.0), "holds zero"), (of(above, 9, 0.01), "hardly varies"), (of(above, 4, 1.0), "it takes 5")]
-        {
-            assert!(effect.verdict == Verdict::CannotBeTold && effect.because.contains(word), "{effect:?}");
-        }
+        assert_eq!(of(0.01, 0.02, 1.0), Verdict::NotLinked);
+        // The interval holds zero and what matters; the parameter hardly varies; there are four machines.
+        assert_eq!([of(-0.2, 0.5, 1.0), of(0.05, 0.5, 0.01)], [Verdict::CannotBeTold; 2]);
+        assert_eq!(Effect::new(&[0.3; 4], 1.0, 0.1), Effect { rise: None, verdict: Verdict::CannotBeTold });
+        assert_eq!(Effect::new(&[0.3; 5], 1.0, 0.1).verdict, Verdict::Linked);
     }
 }

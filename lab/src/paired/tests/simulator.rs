@@ -25,7 +25,7 @@ pub(super) const USUAL: Host = Host { noise: 0.05, points: 0.025, rounds: 0.0 };
 pub(super) enum Second {
     Nothing,
     /// The sizes on both sides of each change of the winner, and their geometric mean.
-    Borders,
+    Crossovers,
     Everything,
 }
 
@@ -48,14 +48,14 @@ pub(super) fn sweep(ratio: &dyn Fn(f64) -> f64, host: Host, second: Second, seed
     let mut points = round(&sizes, &|n| ratio(n) + shift, host, &mut random);
     let again = match second {
         Second::Nothing => Vec::new(),
-        Second::Borders => around_borders(&points),
+        Second::Crossovers => around_crossovers(&points),
         Second::Everything => sizes,
     };
     points.extend(round(&again, &|n| ratio(n) - shift, host, &mut random));
     points
 }
 
-fn around_borders(points: &[Timed]) -> Vec<u32> {
+fn around_crossovers(points: &[Timed]) -> Vec<u32> {
     let median = |samples: &[u64]| {
         let mut samples = samples.to_vec();
         samples.sort_unstable();

@@ -1,13 +1,14 @@
 //! What goes with what: parameters and outcomes between machines, and what it does to take one thing from a machine.
 
-use super::SectionBuilder;
+use super::builder::SectionBuilder;
 use crate::data_table::{Cell, DataTable};
 use crate::evaluate::{Interval, Verdict};
 use crate::figures::{self, InfluenceCell};
 use crate::page::{Block, Section};
 use crate::study::folder::Folder;
 use crate::study::influence::{Influence, Link, On};
-use crate::study::{Study, rank, restrictions};
+use crate::study::material::Study;
+use crate::study::{rank, restrictions};
 use crate::text::count;
 use anyhow::Result;
 use std::collections::BTreeSet;
@@ -21,7 +22,7 @@ pub(super) fn influences(
     folder: &mut Folder,
     missing: &mut Vec<String>,
 ) -> Result<Section> {
-    let mut section = SectionBuilder::new("influence", "Which parameters matter for which algorithm and border", missing);
+    let mut section = SectionBuilder::new("influence", "Which parameters matter for which algorithm and crossover", missing);
     let links: Vec<&Link> = influence.links.iter().collect();
     if links.is_empty() {
         let few = influence.machines < rank::FEWEST_MACHINES;
@@ -33,7 +34,7 @@ pub(super) fn influences(
                 rank::FEWEST_MACHINES
             )
         } else {
-            format!("no parameter and no time or border are known of {} machines, and vary", rank::FEWEST_MACHINES)
+            format!("no parameter and no time or crossover are known of {} machines, and vary", rank::FEWEST_MACHINES)
         });
         return Ok(section.section);
     }
@@ -50,7 +51,7 @@ pub(super) fn influences(
     let matrix = matrix(influence, &links);
     let all = links.iter().map(|l| l.parameter.as_str()).collect::<BTreeSet<_>>().len();
     let told = format!(
-        "{} of {all} parameters, those first that say most, against algorithms, predictions of methods, borders and the choice: the verdict, \
+        "{} of {all} parameters, those first that say most, against algorithms, predictions of methods, crossovers and the choice: the verdict, \
          and the rank correlation where there is one.",
         matrix.rows.len()
     );
@@ -66,7 +67,7 @@ fn outcome(on: &On) -> String {
     match on {
         On::Algorithm(name) => format!("time of {name}"),
         On::Method(name) => format!("prediction of {name}"),
-        On::Border(name) => format!("border {name}"),
+        On::Crossover(name) => format!("crossover {name}"),
         On::Choice => "the choice".to_owned(),
     }
 }
@@ -84,14 +85,9 @@ fn matrix(influence: &Influence, links: &[&Link]) -> figures::Influence {
     rows.sort_by_key(|p| std::cmp::Reverse(weight(p)));
     rows.truncate(MOST_ROWS);
     let cell = |parameter: &str, on: &On| match influence.link(parameter, on) {
-        None => InfluenceCell { verdict: figures::Verdict::Absent, value: None, text: String::new() },
+        None => InfluenceCell::default(),
         Some(link) => InfluenceCell {
-            verdict: match link.verdict {
-                Verdict::Linked => figures::Verdict::Linked,
-                Verdict::NotLinked => figures::Verdict::NotLinked,
-                Verdict::CannotBeTold => figures::Verdict::CannotBeTold,
-            },
-            value: link.rank.map(|r| r.correlation),
+            verdict: Some(link.verdict),
             text: link.rank.map_or(String::new(), |r| format!("{:+.2}", r.correlation)),
         },
     };

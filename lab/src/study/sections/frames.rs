@@ -1,12 +1,14 @@
 //! Frames: time over objects, and the fastest algorithm over objects and density.
 
-use super::SectionBuilder;
+use super::builder::SectionBuilder;
 use crate::Report;
 use crate::page::Section;
+use crate::spread;
 use crate::study::curves::{self, Compared};
 use crate::study::entry::Entry;
 use crate::study::folder::Folder;
-use crate::study::{Study, map};
+use crate::study::map;
+use crate::study::material::Study;
 use anyhow::Result;
 
 pub(super) fn curves(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Result<Section> {
@@ -14,7 +16,7 @@ pub(super) fn curves(study: &Study, folder: &mut Folder, missing: &mut Vec<Strin
     section.text(
         "Figures 4, 6 and 7 of the paper, all of it measured. The curve of each side is its fastest algorithm at each size: medians with \
          quartiles as bars. The shades are the fields of optimal performance, by curves fitted to the same timings; the vertical lines are \
-         the borders between them, hatched over their 90 % intervals.",
+         the crossovers between them, hatched over their 90 % intervals.",
     );
     for (compared, drawn) in &study.drawn {
         if drawn.is_empty() {
@@ -27,9 +29,9 @@ pub(super) fn curves(study: &Study, folder: &mut Folder, missing: &mut Vec<Strin
             format!("{}: measured time of a frame over the number of objects, of up to four machines.", compared.title());
         let figure = compared.figure(&reports);
         let id = compared.id();
-        let [times, fields, borders] = curves::tables(&figure, &reports);
-        let [of_fields, of_borders] = ["fields", "borders"].map(|what| format!("{id}-{what}"));
-        let tables = [(id, &times), (of_fields.as_str(), &fields), (of_borders.as_str(), &borders)];
+        let [times, fields, crossovers] = curves::tables(&figure, &reports);
+        let [of_fields, of_crossovers] = ["fields", "crossovers"].map(|what| format!("{id}-{what}"));
+        let tables = [(id, &times), (of_fields.as_str(), &fields), (of_crossovers.as_str(), &crossovers)];
         section.push(folder.figure(id, &figure, &told, &of, &tables))?;
     }
     Ok(section.section)
@@ -52,9 +54,10 @@ pub(super) fn fields(study: &Study, folder: &mut Folder, missing: &mut Vec<Strin
     match map::map(&study.entries[k], &study.profiles) {
         Err(why) => section.lacks(format!("{why:#}")),
         Ok(map) => {
-            let regret = map.regret.map_or("is not known".to_owned(), |regret| format!("is {:.1} %", 100.0 * regret));
+            let known = |regret| format!("is {}", spread::percent(regret, map.range, 1));
+            let regret = map.regret.map_or("is not known".to_owned(), known);
             let told = format!(
-                "Held out of the training: the {} of this report. The mean regret of the predicted choices {regret}, at {} of {} points: \
+                "Held out of the training: the {} of this report. The mean regret (least to largest) of the predicted choices {regret}, at {} of {} points: \
                  at the others what was chosen was no longer timed. In {:.0} % of the cells both choose the same.",
                 map.held_out,
                 map.known,

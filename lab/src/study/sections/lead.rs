@@ -1,8 +1,10 @@
 //! The first words of the page: what was read, and what these machines can and can't say.
 
+use crate::MethodScore;
 use crate::label_text::is_evidence;
-use crate::study::Study;
+use crate::spread;
 use crate::study::influence::Influence;
+use crate::study::material::Study;
 use crate::study::rank::FEWEST_MACHINES;
 use crate::text::{count, grouped};
 
@@ -57,33 +59,31 @@ pub(in crate::study) fn can_say(study: &Study, influence: &Influence) -> Vec<Str
     said
 }
 
-/// How well choices and borders are predicted, beside the best fixed algorithm.
+/// How well choices and crossovers are predicted, beside the best fixed algorithm.
 fn prediction(study: &Study) -> Option<String> {
     let validation = &study.trained.as_ref().ok()?.training.validation;
     let ours = validation.methods.first()?;
     let single = validation.methods.iter().find(|m| m.name == crate::evaluate::SINGLE_BEST);
-    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let beside = |of: fn(&crate::MethodScore) -> Option<f64>| {
-        single.and_then(of).map_or(String::new(), |s| format!(" (the best single algorithm: {})", percent(s)))
+    let percent = |share: f64| spread::percent(share, None, 1);
+    let all = |m: &MethodScore| Some(spread::percent(m.mean_regret, m.regret_range(), 1));
+    let in_games = |m: &MethodScore| Some(spread::percent(m.mean_regret_in_games?, m.regret_range_in_games(), 1));
+    let beside = |of: &dyn Fn(&MethodScore) -> Option<String>| {
+        single.and_then(of).map_or(String::new(), |s| format!(", with the best single algorithm {s}"))
     };
     let mut text = format!(
-        "Chosen by predictions from hardware parameters alone, with each {} held out in turn, a frame takes {} more than with the best choice{}, \
-         averaged over scenarios and sizes",
+        "Chosen by predictions from hardware parameters alone, with each {} held out in turn, a frame takes more time than with the best choice \
+         by {}{}, averaged over scenarios and sizes",
         validation.held_out,
-        percent(ours.mean_regret),
-        beside(|m| Some(m.mean_regret)),
+        all(ours)?,
+        beside(&all),
     );
-    if let Some(games) = ours.mean_regret_in_games {
-        text += &format!(
-            "; at the sizes that games are assumed to have, {}{}",
-            percent(games),
-            beside(|m| m.mean_regret_in_games)
-        );
+    if let Some(games) = in_games(ours) {
+        text += &format!("; at the sizes that games are assumed to have, by {games}{}", beside(&in_games));
     }
-    text.push('.');
+    text += ". The least and the largest mean of what was held out stand in brackets.";
     if let (Some(octaves), Some(near)) = (ours.crossing_error_octaves, ours.crossings_within_half_octave) {
         text += &format!(
-            " Predicted borders are off by {octaves:.2} octaves (a factor of {:.1}) at the median; {} of them lie within half an octave.",
+            " Predicted crossovers are off by {octaves:.2} octaves (a factor of {:.1}) at the median; {} of them lie within half an octave.",
             octaves.exp2(),
             percent(near)
         );

@@ -1,5 +1,6 @@
 //! The sections of the page, in the order in which they are read: pictures first, the claims of the paper and the tables of parameters last.
 
+mod builder;
 mod causes;
 mod frames;
 mod lead;
@@ -8,42 +9,17 @@ mod prediction;
 use super::claims::{self, Claim, Outcome, PRINTED_SPEED_UP};
 use super::entry::Entry;
 use super::folder::Folder;
+use super::hardware;
 use super::influence::Influence;
+use super::material::Study;
 use super::ratios::Comparison;
-use super::{Study, hardware};
 use crate::data_table::{Cell, DataTable};
 use crate::label_text::kind;
 use crate::page::{Block, Section};
 use anyhow::Result;
+use builder::SectionBuilder;
 
 pub(super) use lead::{can_say, lead};
-
-/// A section that is being made. What it lacks is told on the page and at its end.
-struct SectionBuilder<'a> {
-    section: Section,
-    missing: &'a mut Vec<String>,
-}
-
-impl<'a> SectionBuilder<'a> {
-    fn new(id: &str, title: &str, missing: &'a mut Vec<String>) -> Self {
-        Self { section: Section { id: id.to_owned(), title: title.to_owned(), blocks: Vec::new() }, missing }
-    }
-
-    fn text(&mut self, text: impl Into<String>) {
-        self.section.blocks.push(Block::Text(text.into()));
-    }
-
-    fn lacks(&mut self, what: impl Into<String>) {
-        let what = what.into();
-        self.missing.push(format!("{}: {what}", self.section.title));
-        self.section.blocks.push(Block::Missing(what));
-    }
-
-    fn push(&mut self, block: Result<Block>) -> Result<()> {
-        self.section.blocks.push(block?);
-        Ok(())
-    }
-}
 
 /// Everything on the page.
 ///

@@ -1,15 +1,16 @@
-//! How well times, borders and choices are predicted.
+//! How well times, crossovers and choices are predicted.
 
-use super::SectionBuilder;
+use super::builder::SectionBuilder;
 use crate::figures::TrainingPicture;
 use crate::page::Section;
+use crate::study::accuracy;
 use crate::study::folder::Folder;
-use crate::study::{Study, accuracy};
+use crate::study::material::Study;
 use anyhow::Result;
 
 /// What the columns and rows of the scores mean.
 const SCORES: &str = "Strategies that choose an algorithm for what was held out. Regret is the time of what is chosen over that of the best, less \
-one; in games, sizes count as often as games are assumed to have them (log-normal around 800 objects); borders are off by the median of octaves \
+one; least and largest are the means of the machine, or of the report where all are of one machine, that was served best and worst; in games, sizes count as often as games are assumed to have them (log-normal around 800 objects); crossovers are off by the median of octaves \
 (factors of two) between measured and predicted ones; the gap is 0 % closed by the one algorithm that is best on average and 100 % by the oracle, which \
 is best at each point: a strategy that costs more than that one algorithm closes none of it. Physics + ridge is what predict does without samples; ours + 8 \
 samples corrects it by as many timings of the machine itself; frozen constants switch at a number of objects that an engine has written down (64 or 1000); default and nearest machine take \
@@ -43,20 +44,20 @@ pub(super) fn prediction(study: &Study, folder: &mut Folder, missing: &mut Vec<S
     section.push(folder.table("scores", SCORES, accuracy::scores(validation, &studied)))?;
     let told = "Times of what was held out, predicted from hardware parameters alone.";
     section.push(folder.figure("times", &times, told, &studied, &[("times", &of_times)]))?;
-    let (borders, figure) = accuracy::borders(held_out, &study.borders, &study.entries);
-    if borders.rows.is_empty() {
-        section.lacks("no border was measured on what was held out");
+    let (crossovers, figure) = accuracy::crossovers(held_out, &study.crossovers, &study.entries);
+    if crossovers.rows.is_empty() {
+        section.lacks("no crossover was measured on what was held out");
     } else {
         let ends = held_out.crossovers.iter().filter(|b| !b.compared.crosses).count();
         let twice =
             if held_out.by_machine { "" } else { " A report is held out twice: with its vectors and with its threads." };
         let told = format!(
-            "Borders between fields, measured with 90 % intervals where these are known. Of {} predicted ones {ends} do not cross within the \
+            "Crossovers between fields, measured with 90 % intervals where these are known. Of {} predicted ones {ends} do not cross within the \
              sizes that were measured; the end beyond which they would stands for them, drawn apart.{twice}",
             held_out.crossovers.len(),
         );
-        section.push(folder.figure("borders", &figure, &told, &studied, &[("borders", &borders)]))?;
-        section.push(folder.table("borders", "Each of these borders.", borders))?;
+        section.push(folder.figure("crossovers", &figure, &told, &studied, &[("crossovers", &crossovers)]))?;
+        section.push(folder.table("crossovers", "Each of these crossovers.", crossovers))?;
     }
     section.push(folder.table("regrets", "Mean regret of each strategy on each of what was held out.", of_regrets))?;
     let caption = "Predicted and measured times, thinned evenly where there are many.";

@@ -1,8 +1,4 @@
-//! One machine, one day: what was measured, and nothing that was concluded.
-
-mod text;
-
-pub use text::{FORMAT, is_report, read, write};
+//! What a report holds.
 
 use sapwise::model::Scale;
 use sapwise::{AlgorithmId, Hardware, Load, Term};

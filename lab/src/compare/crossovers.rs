@@ -1,4 +1,4 @@
-//! How far the borders between fields move from report to report.
+//! How far the crossovers between fields move from report to report.
 
 use crate::fit::measured_tuning;
 use crate::report::{Point, Report};
@@ -8,10 +8,10 @@ use sapwise::{AlgorithmId, Crossover, Tuning};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A border over several reports.
+/// A crossover over several reports.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct BorderSpread {
+pub struct CrossoverSpread {
     /// Name of the scenario.
     pub scenario: String,
     /// The faster algorithm with fewer objects.
@@ -26,35 +26,35 @@ pub struct BorderSpread {
     pub largest_deviation: f64,
     /// Interquartile range over median; `None` below four reports.
     pub dispersion: Option<f64>,
-    /// Share of the reports whose own 90 % interval of the border holds the median.
+    /// Share of the reports whose own 90 % interval of the crossover holds the median.
     pub own_interval_holds_median: f64,
-    /// What the wrong side costs at half or at twice the objects of the border, as a share: 0.1 is 10 %. From how the ratio of the two
-    /// times grows with the number of objects around the border; `None` where fewer than three points tell it.
+    /// What the wrong side costs at half or at twice the objects of the crossover, as a share: 0.1 is 10 %. From how the ratio of the two
+    /// times grows with the number of objects around the crossover; `None` where fewer than three points tell it.
     pub cost_of_factor_two: Option<f64>,
 }
 
-/// Points within this factor of a border tell how steep it is.
+/// Points within this factor of a crossover tell how steep it is.
 const AROUND: f64 = 4.0;
 
-/// The borders of every scenario that all reports have, where at least half of the reports have them.
-pub(super) fn borders(reports: &[&Report]) -> Vec<BorderSpread> {
-    let mut found: Vec<BorderSpread> = Vec::new();
+/// The crossovers of every scenario that all reports have, where at least half of the reports have them.
+pub(super) fn crossovers(reports: &[&Report]) -> Vec<CrossoverSpread> {
+    let mut found: Vec<CrossoverSpread> = Vec::new();
     for scenario in scenarios(reports) {
         let all: Vec<Tuning> = reports.iter().filter_map(|r| measured_tuning(r, scenario).ok()).collect();
         // A pair can cross more than once; the k-th crossing of one report is compared with the k-th of the others.
         let mut groups: BTreeMap<(AlgorithmId, AlgorithmId, usize), Vec<&Crossover>> = BTreeMap::new();
         for tuning in &all {
             let mut counts: BTreeMap<(&AlgorithmId, &AlgorithmId), usize> = BTreeMap::new();
-            for border in &tuning.crossovers {
-                let count = counts.entry((&border.below, &border.above)).or_default();
-                groups.entry((border.below.clone(), border.above.clone(), *count)).or_default().push(border);
+            for crossover in &tuning.crossovers {
+                let count = counts.entry((&crossover.below, &crossover.above)).or_default();
+                groups.entry((crossover.below.clone(), crossover.above.clone(), *count)).or_default().push(crossover);
                 *count += 1;
             }
         }
-        let mut of_scenario: Vec<BorderSpread> = groups
+        let mut of_scenario: Vec<CrossoverSpread> = groups
             .into_iter()
             .filter(|(_, group)| 2 * group.len() >= reports.len())
-            .filter_map(|((below, above, _), group)| border(reports, scenario, below, above, &group))
+            .filter_map(|((below, above, _), group)| crossover(reports, scenario, below, above, &group))
             .collect();
         of_scenario.sort_by(|a, b| a.objects.total_cmp(&b.objects));
         found.append(&mut of_scenario);
@@ -73,18 +73,18 @@ fn scenarios<'a>(reports: &[&'a Report]) -> Vec<&'a str> {
     names
 }
 
-fn border(
+fn crossover(
     reports: &[&Report],
     scenario: &str,
     below: AlgorithmId,
     above: AlgorithmId,
     group: &[&Crossover],
-) -> Option<BorderSpread> {
+) -> Option<CrossoverSpread> {
     let positions: Vec<f64> = group.iter().map(|b| b.objects).collect();
     let objects = median(&positions)?;
     let holding = group.iter().filter(|b| b.interval().is_some_and(|(low, high)| (low..=high).contains(&objects))).count();
     let points = reports.iter().flat_map(|r| &r.points).filter(|p| p.scenario == scenario);
-    Some(BorderSpread {
+    Some(CrossoverSpread {
         scenario: scenario.to_owned(),
         reports: group.len(),
         objects,
@@ -97,7 +97,7 @@ fn border(
     })
 }
 
-/// The exponent of the ratio of two costs, by least squares over the medians of the points around a border.
+/// The exponent of the ratio of two costs, by least squares over the medians of the points around a crossover.
 fn slope<'a>(
     points: impl Iterator<Item = &'a Point>,
     objects: f64,
