@@ -4,7 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 
 /// Writes what `write` produces to `path`, so that a reader never sees half of it.
 ///
@@ -15,7 +15,7 @@ use anyhow::{Context, Result, bail};
 /// Names `path`. The file that stood there, or its absence, is unchanged, and no temporary file is left.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
     let result = match fs::metadata(path) {
-        Ok(found) if found.is_dir() => Err(anyhow::anyhow!("it is a folder")),
+        Ok(found) if found.is_dir() => Err(anyhow!("it is a folder")),
         Ok(found) if !found.is_file() => write_through(path, write),
         // Through a link to the file it names; where that can't be told, as for a file not yet there, the path itself.
         _ => replace(&fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()), write),
@@ -37,13 +37,18 @@ fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Res
         Some(folder) => folder.to_owned(),
         None => bail!("it names no file"),
     };
+    if !folder.is_dir() {
+        bail!("there is no folder {}; make it or name another", folder.display());
+    }
     let mut builder = tempfile::Builder::new();
     builder.prefix(".sapwise-").suffix(".tmp");
     // Private otherwise, where every other program's files follow the umask.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut temporary =
-        builder.tempfile_in(&folder).with_context(|| format!("no file can be made in {}", folder.display()))?;
+    // Of the error its kind alone: its text names the temporary file, of which the user knows nothing.
+    let mut temporary = builder
+        .tempfile_in(&folder)
+        .map_err(|e| anyhow!("no file can be made in {}: {}", folder.display(), std::io::Error::from(e.kind())))?;
     buffered(temporary.as_file_mut(), write)?;
     // Without this a crash of the machine may leave the name with an empty file.
     temporary.as_file().sync_all()?;

@@ -42,7 +42,7 @@ pub enum Scenario {
     /// for 30 frames those whose index is 1, and so on. 0.4 to 0.55 pairs per object.
     Resting,
     /// After Broadmark's scene of that name: unit cubes in the world of [`Scenario::Uniform`] that fly straight on at up to 0.1
-    /// edges per axis and frame; one in 64 sets off anew in each frame. 0.38 to 0.55 pairs per object.
+    /// edges per axis and frame; one in 64 takes a new direction in each frame. 0.38 to 0.55 pairs per object.
     Brownian,
     /// After Broadmark's scene of that name: unit cubes fall at 9.81 m/s^2 (edge 1 m, 60 frames a second) onto a pile of columns up
     /// to 16 high, come to rest by frame 140, and are dropped again in frame 240. 0.05 to 0.15 pairs per object in the

@@ -43,10 +43,12 @@ pub fn read_document(path: &Path, warn: &dyn Fn(&str)) -> anyhow::Result<Documen
             let (model, skipped) = read_model_and_skipped(&text).with_context(unsound)?;
             (Document::Model(Box::new(model)), skipped)
         }
-        _ => {
+        // Under the older name the error tells how to convert it.
+        "tuning" | "fields" => {
             let read = Format::TUNING.read(&text).with_context(unsound)?;
             (Document::Tuning(Box::new(read.value)), read.skipped)
         }
+        _ => bail!("{} has the schema {schema}, which is none of report/2, model/2 and tuning/1", path.display()),
     };
     if !skipped.is_empty() {
         warn(&ignored(path, &schema, &skipped));

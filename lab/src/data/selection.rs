@@ -113,8 +113,7 @@ fn refusal(report: &Report, evidence: Evidence) -> Option<String> {
     match (report.label, evidence) {
         (Label::Published, _) => return Some("holds published parameters, without timings".to_owned()),
         (Label::Simulated, Evidence::Real) => {
-            let why =
-                "is simulated, which is no evidence of how fast a machine is; `train --simulated` takes such reports alone";
+            let why = "is simulated, which is no evidence of how fast a machine is; with `--simulated` such reports are taken alone";
             return Some(why.to_owned());
         }
         (Label::Simulated, Evidence::Simulated) => {}

@@ -298,7 +298,7 @@ impl<'a> Data<'a> {
             let told = |regrets: &[f64]| percent(mean(regrets), range(regrets), 1);
             format!(
                 "{} samples replayed from the timings that judge them, on {} held-out reports: under the loads of the scenario that is \
-                 sampled the mean regret falls from {} to {}, 95th percentile {:.1} %",
+                 sampled the mean regret goes from {} to {}, 95th percentile {:.1} %",
                 sampled::SAMPLES,
                 found.len(),
                 told(&without),

@@ -43,6 +43,9 @@ fn next_step(files: &[Finding]) -> String {
     let bad = files.iter().find(|f| !f.problems.is_empty());
     let Some(file) = bad.or(files.first()) else { return "sapwise predict".to_owned() };
     let (name, schema) = (shell::quoted(&file.file), file.schema.unwrap_or(""));
+    if file.problems.iter().any(|p| p.contains("`sapwise convert")) {
+        return format!("sapwise convert {name} --out converted");
+    }
     match (bad.is_some(), schema.split('/').next()) {
         (true, Some("model")) => "sapwise predict".to_owned(),
         (true, Some("tuning")) => "sapwise predict --out tuning.json".to_owned(),

@@ -3,6 +3,7 @@
 use crate::algorithms::Algorithms;
 use crate::args::Pairs as Arguments;
 use crate::exit::{Outcome, WrongUsage};
+use crate::outputs::refuse_overwriting;
 use crate::progress::Progress;
 use crate::{gpus, interrupt, output, shell};
 use anyhow::Context;
@@ -36,6 +37,7 @@ struct Answer {
 }
 
 pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
+    refuse_overwriting(std::slice::from_ref(&arguments.boxes), &arguments.out.iter().collect::<Vec<_>>())?;
     let mut registry = algorithms.registry(usable_cores());
     registry.pin_threads();
     let id = algorithm(arguments, &registry)?;

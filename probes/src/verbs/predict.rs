@@ -8,21 +8,22 @@ use crate::hardware::{self, measure_hardware};
 use crate::outputs::refuse_overwriting;
 use crate::prediction::{self, Slice};
 use crate::terminal::Terminal;
-use crate::{interrupt, output, shell, summary};
+use crate::{interrupt, output, revisions, shell, summary};
 use anyhow::{Context, bail};
-use sapwise::json;
+use sapwise::{json, usable_cores};
 use sapwise_lab::data::{Document, read_document};
 use sapwise_lab::data::{as_at_the_points, usual_scenario};
 use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::report::Report;
 use sapwise_lab::write::write_text;
 use sapwise_scenes::Scenario;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     hardware::check_threads(arguments.threads)?;
     let report = arguments.report.as_deref().map(read_report).transpose()?;
-    refuse_overwriting(arguments.report.as_slice(), &arguments.out.iter().collect::<Vec<_>>())?;
+    let inputs: Vec<PathBuf> = arguments.report.iter().chain(&arguments.model).cloned().collect();
+    refuse_overwriting(&inputs, &arguments.out.iter().collect::<Vec<_>>())?;
     let model = if arguments.measured { None } else { Some(prediction::model(arguments.model.as_deref())?) };
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
@@ -83,6 +84,11 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     };
     tuning.warnings.append(&mut remarks);
     if let Some(report) = &report {
+        // What a model predicts does not rest on the timings of the report.
+        if model.is_none() {
+            let stale = revisions::stale_in_report(report, &algorithms.registry(usable_cores()));
+            tuning.warnings.extend(stale.into_iter().map(|why| format!("the report is stale: {why}; probe again")));
+        }
         tuning.warnings.extend(doubts(report).into_iter().map(|doubt| format!("the report is doubtful: {doubt}")));
     }
     if let Some(path) = &arguments.out {

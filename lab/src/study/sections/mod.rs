@@ -60,12 +60,9 @@ fn paper(claims: &[Claim], folder: &mut Folder, missing: &mut Vec<String>) -> Re
     let undecided: Vec<&Claim> = claims.iter().filter(|c| c.by_reports.0 == Outcome::Undecidable).collect();
     if let Some(first) = undecided.first() {
         section.lacks(if undecided.iter().all(|c| c.by_reports.1 == first.by_reports.1) {
-            format!(
-                "these reports decide {} of {} claims: {}",
-                claims.len() - undecided.len(),
-                claims.len(),
-                first.by_reports.1
-            )
+            let decided = |c: &&Claim| !matches!(c.by_reports.0, Outcome::Undecidable | Outcome::NotAsked);
+            let decided = claims.iter().filter(decided).count();
+            format!("these reports decide {decided} of {} claims: {}", claims.len(), first.by_reports.1)
         } else {
             format!("these reports leave {} of {} claims open; the table says why for each", undecided.len(), claims.len())
         });
