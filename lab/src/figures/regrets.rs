@@ -54,7 +54,7 @@ impl Legended for Regrets {
             return missing(area, frame, NOTHING);
         }
         let chart = Chart::new(area, frame, Axis::linear(0.0, 100.0), percent_axis(all()));
-        let x_name = format!("share of the held-out {}s with no more regret (%)", self.unit);
+        let x_name = format!("quantile over the held-out {}s (%)", self.unit);
         chart.grid(title, &x_name, &format!("mean regret (%, {LEAST_PERCENT} or less at the bottom)"))?;
         for strategy in &self.strategies {
             let mut regrets = strategy.regrets.clone();
