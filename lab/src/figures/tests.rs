@@ -317,7 +317,7 @@ fn the_figures_of_a_training_stand_alone() {
     let times = Agreement { title: "Times".to_owned(), values: Values::TimesNs, groups: vec![group] };
     let strategy = StrategyRegrets { name: format!("strategy {ODD}"), style: 1, regrets: AWKWARD.to_vec() };
     let regrets = Regrets { title: "Regrets".to_owned(), unit: "physical machine".to_owned(), strategies: vec![strategy] };
-    let units = ["measured time of a frame (", "share of the held-out physical machines"];
+    let units = ["measured time of a frame (", "quantile over the held-out physical machines"];
     let figures: [&dyn Figure; 2] = [&times, &regrets];
     for (figure, unit) in figures.into_iter().zip(units) {
         let svg = drawn(figure).0;
