@@ -36,6 +36,13 @@ impl Aabb {
         (0..3).all(|a| self.min[a] <= other.max[a] && other.min[a] <= self.max[a])
     }
 
+    /// The smallest box that contains both.
+    #[inline]
+    pub(crate) fn union(&self, other: &Self) -> Self {
+        let of = |a: [f32; 3], b: [f32; 3], pick: fn(f32, f32) -> f32| [0, 1, 2].map(|k| pick(a[k], b[k]));
+        Self { min: of(self.min, other.min, f32::min), max: of(self.max, other.max, f32::max) }
+    }
+
     /// What is wrong with this box, if anything.
     #[inline]
     #[must_use]

@@ -58,6 +58,12 @@ impl Filter {
         of(a).wants(of(b))
     }
 
+    /// Whether the box at this position never moves.
+    #[inline]
+    pub(crate) fn is_fixed(&self, id: usize) -> bool {
+        self.memberships.get(id).is_some_and(|m| m.fixed)
+    }
+
     /// Brings the wanted ones of `pairs` to its head, in their order, and returns their number.
     pub(crate) fn keep_wanted(&self, pairs: &mut [Pair]) -> usize {
         let mut kept = 0;

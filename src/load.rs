@@ -20,7 +20,7 @@ pub(crate) use strip_grid::{Cover, StripGrid, StripSpan};
 pub struct Load {
     /// Boxes in the frame.
     pub objects: u32,
-    /// Pairs that overlap on the axis of greatest variance: what a sweep along that axis has to test.
+    /// Pairs that overlap on the axis on which the fewest do: what a sweep along that axis has to test.
     pub axis_candidates: f64,
     /// Pairs that overlap on that axis and share a strip of the grid over the other two.
     pub strip_candidates: f64,
@@ -71,9 +71,7 @@ impl Load {
         let (plan, sample, grid) = FramePlan::seen(&chosen, boxes.len());
         let n = boxes.len() as f64;
         let all = n * (n - 1.0).max(0.0) / 2.0;
-        let axis = sample.widest_axis();
-        let share_on = |a: usize| chosen.share_of_pairs(|b| [(b.min[a], b.max[a])]);
-        let shares = [share_on(0), share_on(1), share_on(2)];
+        let (axis, shares) = (sample.sweep_axis(), sample.shares);
         let axis_candidates = shares[axis] * all;
         // Independence of the axes is wrong for clusters, but the frame before corrects it from the second frame on.
         let independent = shares.iter().product::<f64>() * all;

@@ -1,6 +1,7 @@
 //! Algorithms on the CPU, one file per method.
 
 mod brute;
+mod bvh;
 mod columns;
 mod grid_sap;
 #[cfg(feature = "parallel")]
@@ -11,6 +12,7 @@ mod pair_cache;
 mod sap;
 mod sort;
 mod threads;
+mod tree;
 mod workers;
 
 #[cfg(feature = "measure")]
@@ -52,5 +54,6 @@ pub(crate) const METHODS: &[Method] = &[
     Method { name: "brute", revision: 2, create: Create::OneWidth(brute::create) },
     Method { name: "sap", revision: 2, create: Create::OneWidth(sap::create) },
     Method { name: "grid-sap", revision: 2, create: Create::OneWidth(grid_sap::create) },
+    Method { name: "bvh", revision: 1, create: Create::OneWidth(bvh::create) },
     Method { name: "pair-cache", revision: 1, create: Create::AnyWidth(pair_cache::create) },
 ];

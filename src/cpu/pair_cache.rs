@@ -19,13 +19,14 @@ use crate::cpu::columns::part;
 use crate::cpu::grid_sap::Finder;
 use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::level::Simd;
+use crate::cpu::tree::FAR;
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
 use crate::load::{FramePlan, Sample, StripGrid};
 use crate::pairs::Pairs;
 use grown::{Grown, Margin, Share};
 use motion::{Advice, MOST_KEPT, Motion};
-use tree::{FAR, Tree};
+use tree::GrownTree;
 
 /// The method; see the module.
 #[derive(Debug)]
@@ -37,7 +38,7 @@ struct PairCache {
     outputs: Outputs,
     motion: Motion,
     grown: Grown,
-    tree: Tree,
+    tree: GrownTree,
     /// One for each task: its share of the boxes.
     shares: Vec<Share>,
     /// One for each task: its share of the kept pairs. Tasks beyond those of the present width have none.
@@ -67,7 +68,7 @@ pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box
         outputs: Outputs::default(),
         motion: Motion::default(),
         grown: Grown::new(simd),
-        tree: Tree::new(simd),
+        tree: GrownTree::new(simd),
         shares: (0..tasks).map(|_| Share::default()).collect(),
         kept: (0..tasks).map(|_| Pairs::new()).collect(),
         dealt: Pairs::new(),
@@ -170,7 +171,7 @@ impl PairCache {
         if rebuilt {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes), shares);
             let sample = Sample::of(grown.as_slice());
-            tree.build(workers, grown.as_slice(), &sample)?;
+            tree.build(workers, grown.as_slice(), &sample, None)?;
             let most = most_kept(boxes.len(), kept.len());
             for list in kept.iter_mut() {
                 list.clear();

@@ -1,4 +1,5 @@
-//! Sort on the axis of greatest variance, then sweep along it. From scratch every frame, as in the paper.
+//! Sort on the axis on which the fewest pairs overlap, then sweep along it. From scratch every frame, as in the paper, which takes the axis of
+//! greatest variance: a few boxes far away decide that one.
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
@@ -52,11 +53,11 @@ impl BroadPhase for Sap {
         pairs.clear();
         check_count(boxes.len())?;
         self.resize(boxes.len())?;
-        let axis = plan.sample(boxes).widest_axis();
+        let axis = plan.sample(boxes).sweep_axis();
         let Self { workers, keys, scratch, columns, outputs, simd } = self;
         workers.check(boxes)?;
         workers.map(boxes, &mut keys[..boxes.len()], |id, b| u64::from(order_key(b.min[axis])) << 32 | id as u64);
-        sort(workers, keys, scratch, boxes.len())?;
+        sort(workers, &mut keys[..boxes.len()], scratch)?;
         workers.fill(columns.as_mut(), |first, mut part| {
             for at in 0..part.len() {
                 let id = keys[first + at] as u32;

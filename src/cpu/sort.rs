@@ -1,4 +1,4 @@
-//! Sorts keys on all threads: each part on its own, then parts merged two by two.
+//! Sorts keys on all threads: each part on its own by its digits, then parts merged two by two.
 
 use crate::cpu::columns::ensure;
 use crate::cpu::workers::Workers;
@@ -7,26 +7,75 @@ use crate::error::Error;
 /// Keys that one task merges at the least; below, a task costs more than it saves.
 const SMALLEST_MERGE: usize = 4096;
 
-/// Sorts the first `len` keys. `scratch` may be of any length and hold anything, and is left so.
-pub(crate) fn sort(workers: &Workers, keys: &mut Vec<u64>, scratch: &mut Vec<u64>, len: usize) -> Result<(), Error> {
-    let mut run = len.div_ceil(workers.threads().next_power_of_two()).max(SMALLEST_MERGE);
-    workers.each_of(keys[..len].chunks_mut(run), <[u64]>::sort_unstable);
-    if run >= len {
+/// Keys from which on counting digits costs less than comparing.
+const SMALLEST_RADIX: usize = 512;
+
+/// Bits of a digit: 2048 counts fit into the first-level cache, and three digits hold what is sorted by.
+const DIGIT: u32 = 11;
+const DIGITS: usize = 3;
+
+/// Sorts keys by their upper halves, and those with the same upper half by their lower ones.
+///
+/// The lower halves of keys with the same upper half must ascend, as positions in the order of the input do. `scratch` may be of any
+/// length and hold anything, and is left so.
+pub(crate) fn sort(workers: &Workers, keys: &mut [u64], scratch: &mut Vec<u64>) -> Result<(), Error> {
+    let len = keys.len();
+    if len < SMALLEST_RADIX {
+        keys.sort_unstable();
         return Ok(());
     }
     ensure(scratch, len, "sort keys")?;
+    let scratch = &mut scratch[..len];
+    let mut run = len.div_ceil(workers.threads().next_power_of_two()).max(SMALLEST_MERGE);
+    workers.each_of(keys.chunks_mut(run).zip(scratch.chunks_mut(run)), |(keys, scratch)| radix(keys, scratch));
+    let part = (len / workers.tasks()).max(SMALLEST_MERGE);
+    let (mut from, mut to, mut swapped) = (&mut *keys, &mut *scratch, false);
     while run < len {
-        let part = (len / workers.tasks()).max(SMALLEST_MERGE);
-        let pairs_of_runs = keys[..len].chunks(2 * run).zip(scratch[..len].chunks_mut(2 * run));
+        let pairs_of_runs = from.chunks(2 * run).zip(to.chunks_mut(2 * run));
         let parts = pairs_of_runs.flat_map(|(from, to)| {
             let (a, b) = from.split_at(run.min(from.len()));
             to.chunks_mut(part).zip((0..).step_by(part)).map(move |(to, first)| (a, b, first, to))
         });
         workers.each_of(parts, |(a, b, first, to)| merge_part(a, b, first, to));
-        std::mem::swap(keys, scratch);
+        (from, to, swapped) = (to, from, !swapped);
         run *= 2;
     }
+    if swapped {
+        workers.each_of(keys.chunks_mut(part).zip(scratch.chunks(part)), |(to, from)| to.copy_from_slice(from));
+    }
     Ok(())
+}
+
+/// Sorts keys by their upper halves and leaves those with the same upper half in their order. `scratch` is as long.
+fn radix(keys: &mut [u64], scratch: &mut [u64]) {
+    if keys.len() < SMALLEST_RADIX {
+        return keys.sort_unstable();
+    }
+    let digit = |key: u64, k: usize| (key >> (u64::BITS / 2 + DIGIT * k as u32)) as usize & ((1 << DIGIT) - 1);
+    let mut starts = [[0_u32; 1 << DIGIT]; DIGITS];
+    for &key in &*keys {
+        (0..DIGITS).for_each(|k| starts[k][digit(key, k)] += 1);
+    }
+    let (mut from, mut to) = (&mut *keys, &mut *scratch);
+    let mut swapped = false;
+    for (k, starts) in starts.iter_mut().enumerate() {
+        // A digit that all keys share leaves their order as it is.
+        if starts[digit(from[0], k)] as usize == from.len() {
+            continue;
+        }
+        let mut total = 0;
+        starts.iter_mut().for_each(|start| total += std::mem::replace(start, total));
+        for &key in &*from {
+            let at = &mut starts[digit(key, k)];
+            to[*at as usize] = key;
+            *at += 1;
+        }
+        std::mem::swap(&mut from, &mut to);
+        swapped = !swapped;
+    }
+    if swapped {
+        keys.copy_from_slice(scratch);
+    }
 }
 
 /// Writes to `to` what stands from position `first` on when `a` and `b`, both ascending, are merged.
@@ -62,10 +111,10 @@ mod tests {
             let workers = Workers::new("sort", threads, &Threads::default()).unwrap();
             let mut scratch = Vec::new();
             for (len, distinct) in [(0, 1), (1, 1), (4096, 9), (4097, u64::MAX), (50_000, 3), (100_003, u64::MAX)] {
-                let mut keys: Vec<u64> = (0..len as u64 + 7).map(|k| mix(k) % distinct).collect();
+                let mut keys: Vec<u64> = (0..len as u64 + 7).map(|k| (mix(k) >> 32) % distinct << 32 | k).collect();
                 let mut expected = keys[..len].to_vec();
                 expected.sort_unstable();
-                sort(&workers, &mut keys, &mut scratch, len).unwrap();
+                sort(&workers, &mut keys[..len], &mut scratch).unwrap();
                 assert!(keys[..len] == expected, "{len} keys, {threads} threads");
             }
         }

@@ -52,9 +52,9 @@ const MOST_SLOTS: f64 = 16_777_216.0;
 const LARGE_LENGTHS: f64 = 16.0;
 
 impl Params {
-    /// Sweeping along the axis on which the boxes of a sample spread most.
+    /// Sweeping along the axis on which the fewest pairs of a sample overlap.
     pub(super) fn sap(sample: &Sample, objects: u32) -> Self {
-        Self { objects, axis: sample.widest_axis() as u32, ..Self::default() }
+        Self { objects, axis: sample.sweep_axis() as u32, ..Self::default() }
     }
 
     /// Strips for boxes that look like the sample, with about as many slots as there are boxes. All choices cost speed at

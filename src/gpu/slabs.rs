@@ -30,11 +30,11 @@ pub(super) struct Members {
 const BEGINS: u32 = 1 << 31;
 
 impl Slabs {
-    /// Cuts the boxes into slabs that hold these shares of all boxes, ascending along the axis of greatest spread.
+    /// Cuts the boxes into slabs that hold these shares of all boxes, ascending along the axis on which the fewest pairs overlap.
     ///
     /// The cuts follow the density of the boxes and not the space: half of the space may hold a hundredth of them.
     pub(super) fn plan(&mut self, sample: &Sample, boxes: &[Aabb], shares: impl ExactSizeIterator<Item = f64>) {
-        self.axis = sample.widest_axis();
+        self.axis = sample.sweep_axis();
         let count = boxes.len().min(MOST_SAMPLED);
         self.sampled.clear();
         let at = |k: usize| ((2 * k as u64 + 1) * boxes.len() as u64 / (2 * count.max(1) as u64)) as usize;

@@ -1,6 +1,8 @@
 //! A glance at a frame: what a few hundred of its boxes tell about all of them.
 
 use crate::aabb::Aabb;
+use crate::splitmix::mix;
+use std::cmp::Ordering;
 
 /// Boxes looked at, at most. 256 boxes give 32 640 pairs: an axis on which 1 % of the pairs overlap is then known to
 /// about 10 %.
@@ -9,22 +11,21 @@ const SAMPLE: usize = 256;
 /// Boxes looked at, at least: the quantile of the extents needs a few.
 const SMALLEST_SAMPLE: usize = 32;
 
-/// Statistics of an evenly spaced sample of boxes. Infinite bounds are clamped before they enter any sum.
+/// Share of the sample on either side that says nothing about where the boxes lie: what is pooled far away or asleep below the floor.
+const TAIL: usize = 16;
+
+/// Statistics of a sample of boxes: ranks and counts, which a few boxes anywhere in space don't move.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sample {
-    /// Mean of the centres on each axis.
-    pub(crate) mean: [f64; 3],
-    /// Standard deviation of the centres on each axis.
-    pub(crate) deviation: [f64; 3],
-    /// Lowest minimum in the sample on each axis.
-    pub(crate) low: [f64; 3],
-    /// Highest minimum in the sample on each axis.
-    pub(crate) high: [f64; 3],
+    /// Where the middles of most boxes begin on each axis, and the length over which they lie.
+    ranges: [(f64, f64); 3],
     /// The extent that nine boxes in ten do not exceed, on each axis.
     pub(crate) extent: [f64; 3],
+    /// The share of all pairs that overlap on each axis.
+    pub(crate) shares: [f64; 3],
 }
 
-/// Beyond this a bound counts as this: squares and sums of clamped values stay finite in `f64`.
+/// Beyond this a bound counts as this: differences of clamped values stay finite in `f64`.
 const CLAMP: f64 = 1.0e30;
 
 impl Sample {
@@ -44,55 +45,59 @@ impl Sample {
         Self::statistics(&chosen)
     }
 
-    /// Where cells of a grid on this axis begin, and how much length they share.
+    /// Where cells of a grid on this axis begin, and how much length they share: that of most of the boxes. The cells at its ends take
+    /// those that lie beyond.
     pub(crate) fn range(&self, axis: usize) -> (f64, f64) {
-        // Three deviations hold all of a uniform scene and leave out far outliers, which the border cells take.
-        let low = self.low[axis].max(self.mean[axis] - 3.0 * self.deviation[axis]);
-        let high = self.high[axis].min(self.mean[axis] + 3.0 * self.deviation[axis]);
-        (low, (high - low).max(0.0))
+        self.ranges[axis]
     }
 
-    /// The axis on which the centres spread most.
-    pub(crate) fn widest_axis(&self) -> usize {
-        (0..3).max_by(|&a, &b| self.deviation[a].total_cmp(&self.deviation[b])).unwrap_or(0)
+    /// The axis along which a sweep has the fewest candidates: on which the fewest pairs overlap.
+    pub(crate) fn sweep_axis(&self) -> usize {
+        // In a large world a sample may hold no pair that overlaps; then the axis on which the boxes are the shortest part of the world.
+        let order = |a: usize| (self.shares[a], self.extent[a] / self.ranges[a].1);
+        (0..3).min_by(|&a, &b| order(a).partial_cmp(&order(b)).unwrap_or(Ordering::Equal)).unwrap_or(0)
     }
 
     /// The statistics of boxes that were chosen already.
     pub(crate) fn statistics(chosen: &Chosen) -> Self {
         let boxes = chosen.as_slice();
         let mut sample = Self::default();
-        if boxes.is_empty() {
+        let (count, tail) = (boxes.len(), boxes.len() / TAIL);
+        if count == 0 {
             return sample;
         }
-        let count = boxes.len() as f64;
         for axis in 0..3 {
             let bound = |v: f32| f64::from(v).clamp(-CLAMP, CLAMP);
-            let mut extents = [0.0_f64; SAMPLE];
-            let (mut sum, mut square, mut low, mut high) = (0.0, 0.0, f64::INFINITY, f64::NEG_INFINITY);
-            // Sums are taken from the first centre: far from the origin they would cancel otherwise.
-            let origin = (bound(boxes[0].min[axis]) + bound(boxes[0].max[axis])) / 2.0;
-            for (b, extent) in boxes.iter().zip(&mut extents) {
+            let (mut middles, mut extents) = ([0.0_f64; SAMPLE], [0.0_f64; SAMPLE]);
+            for ((b, middle), extent) in boxes.iter().zip(&mut middles).zip(&mut extents) {
                 let (min, max) = (bound(b.min[axis]), bound(b.max[axis]));
-                let centre = (min + max) / 2.0 - origin;
-                sum += centre;
-                square += centre * centre;
-                low = f64::min(low, min);
-                high = f64::max(high, min);
+                *middle = (min + max) / 2.0;
                 *extent = max - min;
             }
-            let mean = sum / count;
-            sample.mean[axis] = mean + origin;
-            sample.deviation[axis] = (square / count - mean * mean).max(0.0).sqrt();
-            sample.low[axis] = low;
-            sample.high[axis] = high;
-            let rank = boxes.len() * 9 / 10;
-            sample.extent[axis] = *extents[..boxes.len()].select_nth_unstable_by(rank, f64::total_cmp).1;
+            let middles = &mut middles[..count];
+            let (below, &mut low, above) = middles.select_nth_unstable_by(tail, f64::total_cmp);
+            let lowest = below.iter().copied().fold(low, f64::min);
+            let last = count - 1 - 2 * tail;
+            // `above` begins behind position `tail`.
+            let (high, highest) = match last {
+                0 => (low, above.iter().copied().fold(low, f64::max)),
+                _ => {
+                    let (_, &mut high, beyond) = above.select_nth_unstable_by(last - 1, f64::total_cmp);
+                    (high, beyond.iter().copied().fold(high, f64::max))
+                }
+            };
+            // An even spread goes on for as long as its share of the sample says.
+            let more = if last == 0 { 0.0 } else { (high - low) * tail as f64 / last as f64 };
+            let (low, high) = (lowest.max(low - more), highest.min(high + more));
+            sample.ranges[axis] = (low, high - low);
+            sample.extent[axis] = *extents[..count].select_nth_unstable_by(count * 9 / 10, f64::total_cmp).1;
+            sample.shares[axis] = chosen.share_of_pairs(|b| [(b.min[axis], b.max[axis])]);
         }
         sample
     }
 }
 
-/// Evenly spaced boxes of a frame, without the invalid ones: a glance is taken before the input is checked.
+/// Boxes of a frame, without the invalid ones: a glance is taken before the input is checked.
 pub(crate) struct Chosen {
     boxes: [Aabb; SAMPLE],
     count: usize,
@@ -104,9 +109,15 @@ impl Chosen {
         // Twice the root of the count: the cost of the glance stays a small share of the frame's at every size, while the
         // share of overlapping pairs, which falls with the count, stays countable.
         let wanted = boxes.len().min((2 * boxes.len().isqrt()).clamp(SMALLEST_SAMPLE, SAMPLE));
+        // Others in each frame of a scene in which anything moves, and the same for the same boxes.
+        let probe = boxes.len() / 2;
+        let seed = boxes.get(probe).map_or(0, |b| mix(u64::from(b.min[0].to_bits()) << 32 | u64::from(b.min[1].to_bits())));
+        let start = |k: usize| (k as u64 * boxes.len() as u64 / wanted as u64) as usize;
         for k in 0..wanted {
-            // One box from the middle of each of `wanted` equal parts; u64 because the product passes 32 bits.
-            let at = ((2 * k as u64 + 1) * boxes.len() as u64 / (2 * wanted as u64)) as usize;
+            // One box out of each of `wanted` equal parts, at a place that differs from part to part: boxes of a kind may follow each other
+            // at regular distances, and an even spacing could meet all of them or none.
+            let (first, end) = (start(k), start(k + 1));
+            let at = first + (mix(seed ^ k as u64) % (end - first) as u64) as usize;
             if boxes[at].defect().is_none() {
                 chosen.boxes[chosen.count] = boxes[at];
                 chosen.count += 1;
@@ -160,17 +171,46 @@ mod tests {
     }
 
     #[test]
-    fn a_row_of_boxes_spreads_on_its_axis() {
+    fn a_row_of_boxes_is_swept_along_itself() {
         let boxes: Vec<Aabb> = (0..1000).map(|k| Aabb::cube([0.0, 10.0 * k as f32, 5.0], 0.5)).collect();
         let sample = Sample::of(&boxes);
-        assert_eq!(sample.widest_axis(), 1);
-        assert_eq!(sample.extent, [1.0; 3]);
+        assert_eq!((sample.sweep_axis(), sample.extent, sample.shares), (1, [1.0; 3], [1.0, 0.0, 1.0]));
         let chosen = Chosen::from(&boxes);
-        let share = |axis: usize| chosen.share_of_pairs(|b| [(b.min[axis], b.max[axis])]);
-        assert_eq!([share(0), share(1), share(2)], [1.0, 0.0, 1.0]);
         assert_eq!(chosen.share_of_pairs(|b| [(b.min[0], b.max[0]), (b.min[2], b.max[2])]), 1.0);
-        // Evenly spaced over 10 000: deviation = length / sqrt(12).
-        assert!((sample.deviation[1] - 2886.75).abs() < 30.0, "{}", sample.deviation[1]);
+        let (low, length) = sample.range(1);
+        assert!(low.abs() < 600.0 && (length - 10_000.0).abs() < 900.0, "{low} {length}");
+        assert_eq!(sample.range(0), (0.0, 0.0));
+    }
+
+    #[test]
+    fn boxes_far_away_move_neither_the_axis_nor_the_ranges() {
+        let at = |k: u64, a: u64| (mix(3 * k + a) % 10_000) as f32;
+        let near = |k: u64| Aabb::cube([at(k, 0) / 10.0, at(k, 1) / 100.0, at(k, 2) / 100.0], 0.5);
+        let scene = |far: f32| -> Vec<Aabb> {
+            let pooled = |k: u64| Aabb::cube([500.0, -far, 50.0], 0.5 + k as f32 * 1e-6);
+            (0..20_000).map(|k| if k % 50 == 7 { pooled(k) } else { near(k) }).collect()
+        };
+        for far in [0.0, 4.0e6, 1.0e38] {
+            let sample = Sample::of(&scene(far));
+            assert_eq!(sample.sweep_axis(), 0, "{far}");
+            for (axis, length) in [1000.0, 100.0, 100.0].into_iter().enumerate() {
+                let (low, range) = sample.range(axis);
+                assert!(low > -0.2 * length && range > 0.8 * length && range < 1.2 * length, "{far}: {low} {range}");
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_of_a_kind_at_regular_distances_are_met_by_their_share() {
+        for every in [16, 64, 256, 512] {
+            for first in [0, every / 2] {
+                let kind = |k: usize| if k % every == first { 100.0 } else { k as f32 * 1e-6 };
+                let boxes: Vec<Aabb> = (0..131_072).map(|k| Aabb::cube([kind(k); 3], 0.5)).collect();
+                let chosen = Chosen::from(&boxes);
+                let met = chosen.as_slice().iter().filter(|b| b.min[0] > 50.0).count();
+                assert!(met <= 256 / every + 20, "{every} from {first}: {met}");
+            }
+        }
     }
 
     #[test]
@@ -178,7 +218,7 @@ mod tests {
         let inf = f32::INFINITY;
         let boxes = [Aabb::new([-inf; 3], [inf; 3]), Aabb::new([inf; 3], [inf; 3]), Aabb::cube([0.0; 3], 1.0)];
         let sample = Sample::of(&boxes);
-        let all = [sample.mean, sample.deviation, sample.low, sample.high, sample.extent];
-        assert!(all.iter().flatten().all(|v| v.is_finite()), "{sample:?}");
+        let all = sample.ranges.iter().flat_map(|&(low, length)| [low, length]).chain(sample.extent).chain(sample.shares);
+        assert!(all.into_iter().all(f64::is_finite), "{sample:?}");
     }
 }

@@ -56,19 +56,22 @@ pub(crate) struct Cover {
 impl StripGrid {
     /// A grid for `objects` boxes that look like the sample.
     pub(crate) fn plan(sample: &Sample, objects: usize) -> Self {
-        let axis = sample.widest_axis();
+        let axis = sample.sweep_axis();
         let across = [(axis + 1) % 3, (axis + 2) % 3];
         let range = across.map(|a| sample.range(a));
-        let wanted = objects as f64 / BOXES_PER_STRIP;
-        // Square cells, unless the world is flatter than a cell: then all of them go to the other axis.
-        let square = (range[0].1 * range[1].1 / wanted.max(1.0)).sqrt();
+        let wanted = (objects as f64 / BOXES_PER_STRIP).max(1.0);
+        // Cells so narrow that most boxes stand in several save nothing.
+        // 1 for NaN too, of a world without length.
+        let held = |cells: f64, most: f64| cells.max(1.0).min(most);
+        let most = [0, 1].map(|d| held(range[d].1 / (2.0 * sample.extent[across[d]]), MOST_CELLS));
+        // Square cells. What one axis can't use goes to the other, as in a world that is flatter than a cell.
+        let square = (range[0].1 * range[1].1 / wanted).sqrt();
+        let second = held(wanted / held(range[0].1 / square, most[0]), most[1]);
+        let counts = [held(wanted / second, most[0]), second];
         let mut grid = Self { axis, across, ..Self::default() };
         for d in 0..2 {
             let (low, length) = range[d];
-            let other = range[1 - d].1;
-            let width = if other <= square { length / wanted.max(1.0) } else { square };
-            let width = width.max(2.0 * sample.extent[across[d]]);
-            let cells = (length / width).floor().clamp(1.0, MOST_CELLS);
+            let cells = counts[d].floor();
             // A world so small that the inverse of a cell overflows would put every box into every cell.
             let cells = if ((cells / length) as f32).is_finite() { cells } else { 1.0 };
             // One cell needs no width, and a flat axis has none.

@@ -1,6 +1,6 @@
 //! The grown boxes: which boxes have left theirs, and new ones for these.
 
-use super::tree::{NOTHING, Tree};
+use super::tree::GrownTree;
 use crate::aabb::Aabb;
 use crate::cpu::columns::ensure;
 use crate::cpu::kernel::contain::{each_doubtful_block, within};
@@ -8,6 +8,9 @@ use crate::cpu::level::Simd;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 use std::ops::Range;
+
+/// Contains no box, not even an infinite one: whatever has no grown box yet is seen to have left it.
+const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
 
 /// Every box grown by a margin, in the order of the input.
 #[derive(Debug)]
@@ -130,7 +133,7 @@ impl Grown {
     /// Calls `found` for every box whose grown box overlaps the new one of box `i`. Of two boxes with new ones, the lower is
     /// told of the higher.
     #[inline]
-    pub(super) fn meet(&self, tree: &Tree, i: u32, mut found: impl FnMut(u32)) {
+    pub(super) fn meet(&self, tree: &GrownTree, i: u32, mut found: impl FnMut(u32)) {
         let bounds = &self.boxes[i as usize];
         tree.overlapping(bounds, |j| {
             if j > i || !self.is_new(j) {

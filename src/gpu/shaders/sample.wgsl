@@ -1,12 +1,26 @@
-// A glance at boxes that the CPU does not see: up to 256 of them, evenly spaced.
+// A glance at boxes that the CPU does not see: one out of each of up to 256 equal parts, at a place that differs from part to part and from
+// frame to frame. An even spacing could meet all boxes of a kind, or none, where these follow each other at regular distances.
 
 @group(0) @binding(4) var<storage, read_write> sampled: array<u32>;
 
+// The permutation of PCG (O'Neill, 2014) on one word.
+fn mixed(word: u32) -> u32 {
+    let state = word * 747796405u + 2891336453u;
+    let turned = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return (turned >> 22u) ^ turned;
+}
+
+fn start(part: u32) -> u32 {
+    // part * objects / 256 in two parts, because the product passes 32 bits.
+    return part * (params.objects / 256u) + part * (params.objects % 256u) / 256u;
+}
+
 @compute @workgroup_size(256)
 fn sample(@builtin(local_invocation_index) t: u32) {
-    // t * objects / 256 in two parts, because the product passes 32 bits.
-    let step = params.objects / 256u;
-    let at = min(t * step + t * (params.objects % 256u) / 256u + step / 2u, params.objects - 1u);
+    let probe = params.objects / 2u * 6u;
+    let seed = mixed(boxes[probe] ^ mixed(boxes[probe + 1u]));
+    let first = start(t);
+    let at = min(first + mixed(seed ^ t) % max(start(t + 1u) - first, 1u), params.objects - 1u);
     for (var k = 0u; k < 6u; k++) {
         sampled[t * 6u + k] = boxes[at * 6u + k];
     }

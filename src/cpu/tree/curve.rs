@@ -1,0 +1,268 @@
+//! The order of boxes along a curve through space.
+
+use super::Members;
+use crate::aabb::Aabb;
+use crate::cpu::columns::ensure;
+use crate::cpu::kernel::node::LANES;
+use crate::cpu::sort::sort;
+use crate::cpu::workers::Workers;
+use crate::error::Error;
+use crate::filter::Filter;
+use crate::load::Sample;
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+/// Boxes that share a cell of the curve and are left in any order: two leaves of them.
+const CROWD: usize = 2 * LANES;
+
+/// Boxes of a crowd from which on all threads put it in order; smaller crowds are dealt out to them.
+const LARGE_CROWD: usize = 16_384;
+
+/// Cells of the curve on each axis: nine bits of the code for each.
+const CELLS: f32 = 512.0;
+
+/// Cells of the curve of a crowd on each axis.
+const CROWD_CELLS: f32 = 1024.0;
+
+/// The code's bit of a fixed box, and where the class of a box begins in it.
+const FIXED: u32 = 1 << 31;
+const CLASS: u32 = 27;
+
+/// A box this many times as long on one axis as on each of the others stands with those that are long on the same axis.
+const LONG: f32 = 4.0;
+
+/// Coordinates count as no larger than this: the length between two of them is a number.
+const MOST: f32 = 1.0e38;
+
+/// A curve through the cells of a cube, Morton's order.
+pub(super) struct Curve {
+    origin: [f32; 3],
+    inverse_width: f32,
+    cells: f32,
+    /// Longest edge up to which a box is of the usual size.
+    usual: f32,
+}
+
+impl Curve {
+    /// Through where most of the boxes of a sample lie. Cells have the same width on each axis.
+    pub(super) fn over(sample: &Sample) -> Self {
+        let range = [0, 1, 2].map(|a| sample.range(a));
+        let longest = range.iter().map(|r| r.1).fold(0.0, f64::max);
+        let edge = sample.extent.iter().copied().fold(0.0, f64::max);
+        Self::through(range.map(|r| r.0 as f32), longest as f32, CELLS, 2.0 * edge as f32)
+    }
+
+    /// Through the middles of a crowd, which have these bounds. `None` where there is nothing to tell them apart by.
+    fn within(bounds: &Aabb) -> Option<Self> {
+        let length = (0..3).map(|a| bounds.max[a] - bounds.min[a]).fold(0.0, f32::max);
+        let curve = Self::through(bounds.min, length, CROWD_CELLS, f32::INFINITY);
+        (curve.inverse_width > 0.0).then_some(curve)
+    }
+
+    fn through(origin: [f32; 3], length: f32, cells: f32, usual: f32) -> Self {
+        let inverse = cells / length;
+        Self { origin, inverse_width: if inverse.is_finite() { inverse } else { 0.0 }, cells, usual }
+    }
+
+    /// Gives the boxes of a crowd codes along this curve.
+    fn recode(&self, keys: &mut [u64], boxes: &[Aabb]) {
+        for key in keys {
+            let id = *key as u32;
+            *key = u64::from(self.cell(&boxes[id as usize])) << 32 | u64::from(id);
+        }
+    }
+
+    /// Where the middle of a box lies on the curve. Outside the cube that is the nearest cell on its surface.
+    #[inline]
+    fn cell(&self, b: &Aabb) -> u32 {
+        let middle = middle(b);
+        let cell = |a: usize| ((middle[a] - self.origin[a]) * self.inverse_width).clamp(0.0, self.cells - 1.0) as u32;
+        interleave(cell(0)) | interleave(cell(1)) << 1 | interleave(cell(2)) << 2
+    }
+
+    /// What boxes are sorted by: first their class, then their place on the curve. Boxes that are much larger than the others, or long on
+    /// another axis, would widen the leaves that they share with them.
+    #[inline]
+    fn code(&self, b: &Aabb) -> u32 {
+        let edges = [0, 1, 2].map(|a| b.max[a] - b.min[a]);
+        let longest = edges[0].max(edges[1]).max(edges[2]);
+        self.cell(b) | if longest > self.usual { class(edges, longest / self.usual) << CLASS } else { 0 }
+    }
+}
+
+/// The class, 1 to 15, of a box that is larger than the usual ones: by size in steps of four, and in the lower three of them by the axis on
+/// which it is long.
+#[cold]
+fn class(edges: [f32; 3], ratio: f32) -> u32 {
+    // False for NaN, of infinity over infinity: the largest class.
+    let step = [4.0, 16.0, 64.0, 256.0, 1024.0].iter().take_while(|&&limit| !(ratio <= limit)).count() as u32;
+    if step > 2 {
+        return 10 + step;
+    }
+    let long = |a: usize| (0..3).all(|other| other == a || edges[a] > LONG * edges[other]);
+    1 + 4 * step + (0..3).find(|&a| long(a)).map_or(0, |a| 1 + a as u32)
+}
+
+/// Ten bits with two zeros between any two of them.
+#[inline]
+fn interleave(v: u32) -> u32 {
+    let v = (v | v << 16) & 0x0300_00ff;
+    let v = (v | v << 8) & 0x0300_f00f;
+    let v = (v | v << 4) & 0x030c_30c3;
+    (v | v << 2) & 0x0924_9249
+}
+
+/// Puts boxes in order.
+#[derive(Debug, Default)]
+pub(super) struct Order {
+    /// Code in the upper half, position of the box in the lower.
+    keys: Vec<u64>,
+    len: usize,
+    scratch: Vec<u64>,
+    /// Crowds that wait to be put in order, the large ones and the others.
+    large: Vec<Range<usize>>,
+    small: Vec<Range<usize>>,
+    /// The bounds that each task found of its part of a large crowd.
+    bounds: Vec<Aabb>,
+}
+
+impl Order {
+    pub(super) fn reserve(&mut self, objects: usize) -> Result<(), Error> {
+        ensure(&mut self.keys, objects, "sort keys")?;
+        ensure(&mut self.scratch, objects, "sort keys")
+    }
+
+    /// The boxes in order: their positions in the lower halves.
+    pub(super) fn ids(&self) -> &[u64] {
+        &self.keys[..self.len]
+    }
+
+    /// Sorts the members. Returns how many of them may move: those come first.
+    pub(super) fn sort(
+        &mut self,
+        workers: &Workers,
+        boxes: &[Aabb],
+        members: Members<'_>,
+        curve: &Curve,
+        filter: Option<&Filter>,
+    ) -> Result<usize, Error> {
+        self.len = match members {
+            Members::All => boxes.len(),
+            Members::Of(ids) => ids.len(),
+        };
+        ensure(&mut self.keys, self.len, "sort keys")?;
+        let keys = &mut self.keys[..self.len];
+        let invalid = AtomicUsize::new(usize::MAX);
+        let key = |id: usize, b: &Aabb| {
+            if b.defect().is_some() {
+                invalid.fetch_min(id, Relaxed);
+            }
+            let fixed = if filter.is_some_and(|f| f.is_fixed(id)) { FIXED } else { 0 };
+            u64::from(curve.code(b) | fixed) << 32 | id as u64
+        };
+        match members {
+            Members::All => workers.map(boxes, keys, key),
+            Members::Of(ids) => workers.map(ids, keys, |_, &id| key(id as usize, &boxes[id as usize])),
+        }
+        let invalid = invalid.into_inner();
+        boxes.get(invalid).map_or(Ok(()), |b| Aabb::check(std::slice::from_ref(b), invalid))?;
+        sort(workers, keys, &mut self.scratch)?;
+        let moving = keys.partition_point(|&key| code(key) < FIXED);
+        self.spread_crowds(workers, boxes)?;
+        Ok(moving)
+    }
+
+    /// Puts those in order that share a cell, by a curve through their own bounds, and so on with those that share a cell of that one.
+    fn spread_crowds(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<(), Error> {
+        let Self { keys, len, scratch, large, small, bounds } = self;
+        let keys = &mut keys[..*len];
+        let mut note = |keys: &[u64], first: usize, large: &mut Vec<_>| {
+            each_crowd(keys, |crowd| {
+                let crowd = first + crowd.start..first + crowd.end;
+                if crowd.len() < LARGE_CROWD { small.push(crowd) } else { large.push(crowd) }
+            });
+        };
+        note(keys, 0, large);
+        while let Some(crowd) = large.pop() {
+            let (first, keys) = (crowd.start, &mut keys[crowd]);
+            let size = keys.len().div_ceil(workers.tasks());
+            bounds.clear();
+            bounds.resize(workers.tasks(), Aabb::default());
+            workers.each_of(bounds.iter_mut().zip(keys.chunks(size)), |(bounds, keys)| *bounds = bounds_of(keys, boxes));
+            let all = bounds[..keys.len().div_ceil(size)].iter().fold(bounds[0], |all, b| all.union(b));
+            if let Some(curve) = Curve::within(&all) {
+                workers.each_of(keys.chunks_mut(size), |keys| curve.recode(keys, boxes));
+                sort(workers, keys, scratch)?;
+                note(keys, first, large);
+            }
+        }
+        let mut rest = &mut *keys;
+        let mut behind = 0;
+        // In the order in which they stand, so that the keys can be cut up for them.
+        small.sort_unstable_by_key(|crowd| crowd.start);
+        let crowds = small.drain(..).map(|crowd| {
+            let (_, from) = std::mem::take(&mut rest).split_at_mut(crowd.start - behind);
+            let (crowd_keys, after) = from.split_at_mut(crowd.len());
+            behind = crowd.end;
+            rest = after;
+            crowd_keys
+        });
+        workers.each_of(crowds, |keys| spread(keys, boxes));
+        Ok(())
+    }
+}
+
+fn code(key: u64) -> u32 {
+    (key >> 32) as u32
+}
+
+/// Puts a crowd in order, and so on.
+fn spread(keys: &mut [u64], boxes: &[Aabb]) {
+    // Each curve is a thousand times as fine as the one before: the range of floats is used up after 28 of them.
+    let Some(curve) = Curve::within(&bounds_of(keys, boxes)) else { return };
+    curve.recode(keys, boxes);
+    keys.sort_unstable();
+    let mut first = 0;
+    for run in keys.chunk_by_mut(|&a, &b| code(a) == code(b)) {
+        first += run.len();
+        if run.len() > CROWD {
+            spread(run, boxes);
+        }
+    }
+    debug_assert_eq!(first, keys.len());
+}
+
+/// Calls `found` for every run of more than [`CROWD`] keys with one code.
+fn each_crowd(keys: &[u64], mut found: impl FnMut(Range<usize>)) {
+    let mut at = 0;
+    while at + CROWD < keys.len() {
+        // Most runs are short: the key that ends a crowd tells whether there is one.
+        let same = code(keys[at]);
+        if code(keys[at + CROWD]) == same {
+            let end = at + keys[at..].partition_point(|&key| code(key) == same);
+            found(at..end);
+            at = end;
+        } else {
+            at += 1;
+        }
+    }
+}
+
+/// The bounds of the middles of boxes.
+fn bounds_of(keys: &[u64], boxes: &[Aabb]) -> Aabb {
+    let nothing = Aabb::new([MOST; 3], [-MOST; 3]);
+    keys.iter().fold(nothing, |all, &key| {
+        let middle = middle(&boxes[key as u32 as usize]);
+        Aabb { min: [0, 1, 2].map(|a| all.min[a].min(middle[a])), max: [0, 1, 2].map(|a| all.max[a].max(middle[a])) }
+    })
+}
+
+/// Where a box lies, at infinity on the way there.
+#[inline]
+fn middle(b: &Aabb) -> [f32; 3] {
+    [0, 1, 2].map(|a| {
+        let middle = b.min[a] * 0.5 + b.max[a] * 0.5;
+        // NaN, of infinity less infinity, becomes 0.
+        if middle.is_nan() { 0.0 } else { middle.clamp(-MOST, MOST) }
+    })
+}
