@@ -49,6 +49,25 @@ fn every_algorithm_gives_the_wanted_pairs_of_every_scenario() {
     }
 }
 
+#[test]
+fn the_ground_of_a_static_world_is_in_no_pair_with_itself() {
+    let mut scene = Scenario::StaticWorld.start(3000, 42);
+    let fixed = |k| Membership { fixed: scene.is_fixed(k), ..Membership::ALL };
+    let memberships: Vec<Membership> = (0..3000).map(fixed).collect();
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    pairs.set_filter(Some(Filter::new(memberships.clone())));
+    let mut algorithms = every_algorithm();
+    for frame in 0..40 {
+        let expected = naive_filtered(scene.boxes(), &memberships);
+        assert!((30..400).contains(&expected.len()), "{}", expected.len());
+        for (id, algorithm) in &mut algorithms {
+            algorithm.find_pairs(scene.boxes(), &mut pairs).unwrap();
+            assert!(pairs.as_slice() == expected, "{id}, frame {frame}");
+        }
+        scene.advance();
+    }
+}
+
 /// Long enough for pairs to be kept from frame to frame: those that are kept must not have passed a filter that has changed.
 #[test]
 fn memberships_change_while_pairs_are_kept() {

@@ -93,7 +93,7 @@ fn ctrl_c_keeps_what_was_measured() {
         probe.args(["--scenario", scenario.name()]);
     }
     let mut probe = probe.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
-    // Written first when the first of ten scenarios is done.
+    // Written first when the first of all scenarios is done.
     while !out.exists() {
         assert_eq!(probe.try_wait().unwrap(), None, "the probe ended before its first scenario did");
         std::thread::sleep(std::time::Duration::from_millis(5));

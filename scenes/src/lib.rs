@@ -22,6 +22,16 @@
 //! | `free-fall` | cubes that fall onto a pile, rest, and are dropped again | 0.05 to 1.3 |
 //! | `gravity` | a dense swarm about a point that moves | 5 to 7 |
 //! | `fragmentation` | cubes that shatter and are cleared away, ten to the peak and back | 0.15 to 2.6 |
+//! | `parked` | one object in fifty pooled ten thousand worlds away | 0.06 to 0.13 |
+//! | `stations` | two worlds far apart | 0.07 to 0.12 |
+//! | `layers` | thin floors that do not touch | none |
+//! | `plates` | packs of plates as wide as the world, between storeys of cubes | 0.07 to 0.13 |
+//! | `rods` | long thin boxes among cubes | 0.06 to 0.12 |
+//! | `static-world` | a ground of overlapping boxes that never move, and a few objects that do | 10 to 11, 0.01 to 0.12 of them with one that moves |
+//! | `asleep` | one object in fifty far below the floor | 0.06 to 0.13 |
+//! | `tower` | everything on one line | 1 |
+//! | `aliased` | far objects wherever an evenly spaced sample looks | 0.06 to 0.13 |
+//! | `teleport` | every 30th frame everything jumps | 0.06 to 0.13 |
 //!
 //! `fragmentation` follows Figure 1 of Avril, Gouranton and Arnaldi (ISVRI 2011); `brownian`, `free-fall` and `gravity` follow the scenes of
 //! those names of the benchmark Broadmark. The variants of [`Scenario`] describe each in full.

@@ -4,22 +4,21 @@ mod drift;
 mod fall;
 mod fragmentation;
 mod rng;
+mod roam;
+mod scene;
 mod walk;
 
 use std::fmt;
 use std::str::FromStr;
 
-use drift::{Brownian, Clusters, Gravity};
-use fall::Fall;
-use fragmentation::Fragmentation;
-use rng::Rng;
-use sapwise::Aabb;
-use walk::{Walk, reflect};
+pub use scene::Scene;
 
 /// A kind of scene.
 ///
 /// Lengths are in edges of the usual object, a unit cube. A *pair per object* is the number of overlapping pairs over the
 /// number of objects. The bands given hold every frame seen with 1000, 2000 and 60 000 objects over several seeds.
+///
+/// From [`Scenario::Parked`] on the scenes have few pairs and are hard all the same: each has something that makes a usual shortcut quadratic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Scenario {
@@ -56,11 +55,45 @@ pub enum Scenario {
     /// of its range several times both ways; then all begins again. 0.15 to 2.6 pairs per object while there are
     /// 100 or more, 0.6 to 1.1 on average. The cubes' volumes always add up to about the same.
     Fragmentation,
+    /// As [`Scenario::Teleport`] without its jumps, but one object in fifty, anywhere in the list, is pooled ten thousand world edges
+    /// away on each axis, as games do with what is not in play: spread there on a lattice, and still. 0.06 to 0.13 pairs per object.
+    Parked,
+    /// Two worlds of equal halves of the objects, a thousand of their edges apart along a diagonal, each as dense as the one of
+    /// [`Scenario::Teleport`] and moving as it. Which object is where has no order. 0.07 to 0.12 pairs per object.
+    Stations,
+    /// About n^(1/2) floors of about n^(1/4) by n^(1/4) flat boxes of 1 by 1 by 0.1, a quarter of an edge apart, each walking in a field of its
+    /// own by up to 0.005 edges per axis and frame. No pair; on x and y together each box overlaps about half as many as there are floors.
+    Layers,
+    /// Unit cubes as sparse as those of [`Scenario::Teleport`] and moving as they do in up to eight storeys, and between storeys packs of plates
+    /// as wide as the world, one object in 33, which all packs together are as high as all storeys; no two plates overlap. 0.07 to
+    /// 0.13 pairs per object, 0.01 to 0.02 of them with more than 60 000 objects between a plate and a cube that reaches a tenth
+    /// of an edge into a pack, else pairs of cubes.
+    Plates,
+    /// Unit cubes and, one object in ten, rods of 1 by 1 by 30 along random axes, moving as those of [`Scenario::Uniform`]. 0.06 to 0.12 pairs
+    /// per object.
+    Rods,
+    /// Nineteen objects in twenty are the ground and never move, which [`Scene::is_fixed`] tells: boxes of 2.2 by 2.2 by 2 on a hilly lattice
+    /// of pitch 1, each overlapping 24 others, 10 to 11 pairs per object. The twentieth is a unit cube that moves as those of
+    /// [`Scenario::Uniform`] above and in the ground: 0.01 to 0.12 pairs per object have a member that moves.
+    StaticWorld,
+    /// As [`Scenario::Teleport`] without its jumps, but one object in fifty, anywhere in the list, lies 4 000 000 edges below on y and stays there.
+    /// 0.06 to 0.13 pairs per object.
+    Asleep,
+    /// Unit cubes on one line along z, 0.75 edges apart, in no order in the list, each walking about its place by up to a tenth of an edge:
+    /// each overlaps the next one above and below, and all overlap on x and y. One pair per object.
+    Tower,
+    /// As [`Scenario::Teleport`] without its jumps, but up to 256 objects are far apart, within five hundred world edges on each axis: the middle
+    /// ones of as many equal parts of the list, a power of two, which is where an evenly spaced sample of as many looks. With 2^17 objects they
+    /// have the indices 256 modulo 512. 0.06 to 0.13 pairs per object.
+    Aliased,
+    /// Unit cubes in a cube-shaped world of edge 2 (5 n)^(1/3), moving as those of [`Scenario::Uniform`], and in every 30th frame all at once to new
+    /// random places. 0.06 to 0.13 pairs per object.
+    Teleport,
 }
 
 impl Scenario {
     /// Every scenario.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 20] = [
         Self::Uniform,
         Self::Fast,
         Self::Clustered,
@@ -71,6 +104,16 @@ impl Scenario {
         Self::FreeFall,
         Self::Gravity,
         Self::Fragmentation,
+        Self::Parked,
+        Self::Stations,
+        Self::Layers,
+        Self::Plates,
+        Self::Rods,
+        Self::StaticWorld,
+        Self::Asleep,
+        Self::Tower,
+        Self::Aliased,
+        Self::Teleport,
     ];
 
     /// Frames in one cycle of [`Scenario::Fragmentation`], after which the numbers of objects repeat.
@@ -90,6 +133,16 @@ impl Scenario {
             Self::FreeFall => "free-fall",
             Self::Gravity => "gravity",
             Self::Fragmentation => "fragmentation",
+            Self::Parked => "parked",
+            Self::Stations => "stations",
+            Self::Layers => "layers",
+            Self::Plates => "plates",
+            Self::Rods => "rods",
+            Self::StaticWorld => "static-world",
+            Self::Asleep => "asleep",
+            Self::Tower => "tower",
+            Self::Aliased => "aliased",
+            Self::Teleport => "teleport",
         }
     }
 
@@ -107,6 +160,16 @@ impl Scenario {
             Self::FreeFall => "unit cubes falling onto a pile, coming to rest and dropped again",
             Self::Gravity => "a dense swarm of unit cubes swirling about a point that moves",
             Self::Fragmentation => "cubes shattering and cleared away: from ten to the peak and back in 600 frames",
+            Self::Parked => "unit cubes, one in fifty of them pooled ten thousand worlds away",
+            Self::Stations => "two worlds of unit cubes, a thousand of their edges apart",
+            Self::Layers => "thin floors of flat boxes, none of which touches another",
+            Self::Plates => "unit cubes between packs of plates as wide as the world",
+            Self::Rods => "unit cubes and rods of length 30 along random axes",
+            Self::StaticWorld => "a hilly ground of overlapping boxes that never move, and one object in twenty that does",
+            Self::Asleep => "unit cubes, one in fifty of them four million edges below",
+            Self::Tower => "unit cubes stacked on one line",
+            Self::Aliased => "unit cubes, and far ones wherever an evenly spaced sample looks",
+            Self::Teleport => "unit cubes that all jump to new places in every 30th frame",
         }
     }
 
@@ -116,29 +179,7 @@ impl Scenario {
     /// that the scene will ever need is allocated here: up to 52 bytes per object.
     #[must_use]
     pub fn start(self, objects: usize, seed: u64) -> Scene {
-        let mut rng = Rng::new(seed);
-        let mut boxes = Vec::with_capacity(objects);
-        let mut motion = match self {
-            Self::Uniform => Motion::Walk(Walk::uniform(objects, STEP, 1, &mut rng)),
-            Self::Fast => Motion::Walk(Walk::uniform(objects, 2.0, 1, &mut rng)),
-            Self::Clustered => Motion::Clusters(Clusters::new(objects, STEP, &mut rng)),
-            Self::Slab => Motion::Walk(Walk::slab(objects, STEP, &mut rng)),
-            Self::Mixed => Motion::Walk(Walk::mixed(objects, STEP, &mut rng)),
-            Self::Resting => Motion::Walk(Walk::uniform(objects, STEP, 20, &mut rng)),
-            Self::Brownian => Motion::Brownian(Brownian::new(objects, &mut rng)),
-            Self::FreeFall => Motion::Fall(Fall::new(objects)),
-            Self::Gravity => Motion::Gravity(Gravity::new(objects, &mut rng)),
-            Self::Fragmentation => Motion::Fragmentation(Box::new(Fragmentation::new(objects))),
-        };
-        match &mut motion {
-            Motion::Walk(m) => m.place(&mut boxes),
-            Motion::Clusters(m) => m.place(&mut boxes),
-            Motion::Brownian(m) => m.place(&mut boxes),
-            Motion::Gravity(m) => m.place(&mut boxes),
-            Motion::Fall(m) => m.drop(&mut rng, &mut boxes),
-            Motion::Fragmentation(m) => m.advance(0, &mut rng, &mut boxes),
-        }
-        Scene { scenario: self, objects, frame: 0, boxes, rng, motion }
+        Scene::start(self, objects, seed)
     }
 }
 
@@ -161,72 +202,4 @@ impl FromStr for Scenario {
 #[error("{text:?} is no scenario; use one of {}", Scenario::ALL.map(Scenario::name).join(", "))]
 pub struct UnknownScenario {
     text: String,
-}
-
-/// Greatest step on each axis in a frame, in edges, where objects move slowly.
-const STEP: f32 = 0.05;
-
-/// A scene in one of its frames.
-#[derive(Debug, Clone)]
-pub struct Scene {
-    scenario: Scenario,
-    objects: usize,
-    frame: u64,
-    boxes: Vec<Aabb>,
-    rng: Rng,
-    motion: Motion,
-}
-
-/// What moves the objects, by the state that it needs.
-#[derive(Debug, Clone)]
-enum Motion {
-    Walk(Walk),
-    Clusters(Clusters),
-    Brownian(Brownian),
-    Gravity(Gravity),
-    Fall(Fall),
-    Fragmentation(Box<Fragmentation>),
-}
-
-impl Scene {
-    /// The boxes of this frame, in the order of the objects. All are valid and finite.
-    #[must_use]
-    pub fn boxes(&self) -> &[Aabb] {
-        &self.boxes
-    }
-
-    /// Goes on to the next frame. Allocates nothing.
-    ///
-    /// An object keeps its index from frame to frame, except in [`Scenario::Fragmentation`], where objects come and go at
-    /// the end of the list.
-    pub fn advance(&mut self) {
-        self.frame += 1;
-        let (rng, boxes) = (&mut self.rng, &mut self.boxes);
-        match &mut self.motion {
-            Motion::Walk(m) => m.advance(self.frame, rng, boxes),
-            Motion::Clusters(m) => m.advance(rng, boxes),
-            Motion::Brownian(m) => m.advance(rng, boxes),
-            Motion::Gravity(m) => m.advance(self.frame, rng, boxes),
-            Motion::Fall(m) => m.advance(self.frame, rng, boxes),
-            Motion::Fragmentation(m) => m.advance(self.frame, rng, boxes),
-        }
-    }
-
-    /// How often the scene was advanced.
-    #[must_use]
-    pub fn frame(&self) -> u64 {
-        self.frame
-    }
-
-    /// The kind of scene.
-    #[must_use]
-    pub fn scenario(&self) -> Scenario {
-        self.scenario
-    }
-
-    /// The largest number of boxes that any frame has.
-    #[must_use]
-    pub fn peak_objects(&self) -> usize {
-        self.objects
-    }
 }

@@ -1,6 +1,6 @@
 //! The frames that simulated machines are timed on: those of real scenes.
 
-use crate::sweep::{self, Plan};
+use crate::sweep::{self, Ascent, Plan};
 use anyhow::Result;
 use sapwise::Load;
 use sapwise_scenes::Scenario;
@@ -20,7 +20,7 @@ impl Loads {
     /// When the pairs of a scene can't be found.
     pub fn of_a_sweep(seed: u64, max_objects: Option<u32>) -> Result<Self> {
         let plan = Plan::new(true, &SCENARIOS, max_objects);
-        let of = |&scenario: &Scenario| Ok((scenario, sweep::loads(scenario, &plan.sizes, seed, |_| Ok(()))?));
-        Ok(Self(plan.scenarios.iter().map(of).collect::<Result<_>>()?))
+        let of = |a: &Ascent| Ok((a.scenario, sweep::loads(a.scenario, &a.sizes, seed, |_| Ok(()))?));
+        Ok(Self(plan.ascents.iter().map(of).collect::<Result<_>>()?))
     }
 }

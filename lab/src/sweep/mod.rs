@@ -8,7 +8,7 @@ mod plan;
 
 pub use dropout::Standing;
 pub use loads::{loads, next_frame};
-pub use plan::{Plan, share};
+pub use plan::{Ascent, Plan, share};
 
 /// Frames before the samples of an incremental algorithm: how far boxes move is known in the second, and the shares of them that leave their
 /// grown boxes follow over some tens. Fewer would time the cheap frames after a rebuild: at 3162 objects 11 us where the others take 34.

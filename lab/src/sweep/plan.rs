@@ -5,21 +5,28 @@ use std::time::Duration;
 
 /// Scenarios, sizes and time of a sweep.
 ///
-/// It begins with an ascent: every algorithm through all sizes, for the shape of the cost curves. Rounds of visits follow, to where
-/// the choice is in doubt after what was measured before.
+/// It begins with the ascents, one for each scenario: every algorithm through all sizes, for the shape of the cost curves. Rounds of
+/// visits follow, to where the choice is in doubt after what was measured before.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// In the order of measurement.
-    pub scenarios: Vec<Scenario>,
-    /// Numbers of objects in the ascent, ascending.
-    pub sizes: Vec<u32>,
-    /// Time for the ascent of each scenario. A slower machine gets fewer sizes in that time, not more time.
-    pub ascent: Duration,
+    pub ascents: Vec<Ascent>,
     /// Rounds of visits. Several, minutes apart: what the host does in the meantime differs, and medians over all of them are
     /// worth more than as many samples at once.
     pub rounds: u32,
     /// Time for everything. What the ascents leave is for the visits.
     pub total: Duration,
+}
+
+/// One scenario through its sizes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ascent {
+    /// The kind of scene.
+    pub scenario: Scenario,
+    /// Numbers of objects, ascending.
+    pub sizes: Vec<u32>,
+    /// Time for all of them. A slower machine gets fewer sizes in that time, not more time.
+    pub time: Duration,
 }
 
 /// Spread over the densities that shift the crossovers most: even, in blobs, and with sizes over two decades.
@@ -39,6 +46,24 @@ const FULL: [Scenario; 7] = [
     Scenario::Gravity,
     Scenario::Fragmentation,
 ];
+/// Few pairs, and each with something that makes a usual shortcut quadratic: what counts here is how bad a method gets, not where exactly one
+/// overtakes another. So a full sweep takes them at one size a decade, in a quarter of the time each.
+const HARD: [Scenario; 10] = [
+    Scenario::Parked,
+    Scenario::Stations,
+    Scenario::Layers,
+    Scenario::Plates,
+    Scenario::Rods,
+    Scenario::StaticWorld,
+    Scenario::Asleep,
+    Scenario::Tower,
+    Scenario::Aliased,
+    Scenario::Teleport,
+];
+const HARD_PER_DECADE: u32 = 1;
+const HARD_SHARE: f64 = 0.25;
+/// Below this size no scene is hard.
+const HARD_FROM: u32 = 1000;
 const FULL_OBJECTS: u32 = 1_000_000;
 const FULL_PER_DECADE: u32 = 4;
 const FULL_ROUNDS: u32 = 3;
@@ -50,17 +75,27 @@ const ASCENT_SHARE: f64 = 0.6;
 
 impl Plan {
     /// The usual plan, with the user's scenarios and largest size where there are any.
+    ///
+    /// A quick plan has none of the hard scenarios, and a full one has them at fewer sizes. A scenario that the user names is measured as
+    /// thoroughly as any.
     pub fn new(quick: bool, scenarios: &[Scenario], max_objects: Option<u32>) -> Self {
-        let (usual, objects, per_decade, rounds, total) = if quick {
-            (QUICK.to_vec(), QUICK_OBJECTS, QUICK_PER_DECADE, QUICK_ROUNDS, QUICK_TOTAL)
+        let (usual, usual_hard, objects, per_decade, rounds, total) = if quick {
+            (&QUICK[..], &[][..], QUICK_OBJECTS, QUICK_PER_DECADE, QUICK_ROUNDS, QUICK_TOTAL)
         } else {
-            (FULL.to_vec(), FULL_OBJECTS, FULL_PER_DECADE, FULL_ROUNDS, FULL_TOTAL)
+            (&FULL[..], &HARD[..], FULL_OBJECTS, FULL_PER_DECADE, FULL_ROUNDS, FULL_TOTAL)
         };
-        let scenarios = if scenarios.is_empty() { usual.clone() } else { scenarios.to_vec() };
+        let (even, hard) = if scenarios.is_empty() { (usual, usual_hard) } else { (scenarios, &[][..]) };
+        let max = max_objects.unwrap_or(objects);
+        let shares = |even: &[Scenario], hard: &[Scenario]| even.len() as f64 + hard.len() as f64 * HARD_SHARE;
         // More scenarios than usual share the time; fewer don't get more than usual each.
-        let total = total.min(total / usual.len() as u32 * scenarios.len() as u32);
-        let ascent = total.mul_f64(ASCENT_SHARE) / scenarios.len() as u32;
-        Self { scenarios, sizes: sizes(max_objects.unwrap_or(objects), per_decade), ascent, rounds, total }
+        let total = total.min(total.mul_f64(shares(even, hard) / shares(usual, usual_hard)));
+        let time = total.mul_f64(ASCENT_SHARE / shares(even, hard));
+        let ascent = |&scenario: &Scenario| Ascent { scenario, sizes: sizes(max, per_decade), time };
+        let mut hard_sizes = sizes(max, HARD_PER_DECADE);
+        hard_sizes.retain(|&objects| objects >= HARD_FROM.min(max));
+        let hard_ascent =
+            |&scenario: &Scenario| Ascent { scenario, sizes: hard_sizes.clone(), time: time.mul_f64(HARD_SHARE) };
+        Self { ascents: even.iter().map(ascent).chain(hard.iter().map(hard_ascent)).collect(), rounds, total }
     }
 }
 
@@ -102,11 +137,25 @@ mod tests {
             let limit = if quick { 30 } else { 180 };
             // Eight seconds for the hardware, starting and writing.
             assert!(plan.total + Duration::from_secs(8) < Duration::from_secs(limit));
-            assert!(plan.ascent * (plan.scenarios.len() as u32) < plan.total);
+            assert!(plan.ascents.iter().map(|a| a.time).sum::<Duration>() < plan.total);
         }
         let all = Plan::new(true, &Scenario::ALL, Some(100));
-        assert_eq!((all.total, all.scenarios.len()), (QUICK_TOTAL, 10));
+        assert_eq!((all.total, all.ascents.len()), (QUICK_TOTAL, Scenario::ALL.len()));
         assert_eq!(Plan::new(true, &[Scenario::Slab], None).total, QUICK_TOTAL / 3);
+    }
+
+    #[test]
+    fn hard_scenarios_take_a_quarter_of_the_time_unless_they_are_named() {
+        let plan = Plan::new(false, &[], None);
+        let of = |plan: &Plan, scenario| plan.ascents.iter().find(|a| a.scenario == scenario).unwrap().clone();
+        let (uniform, parked) = (of(&plan, Scenario::Uniform), of(&plan, Scenario::Parked));
+        assert_eq!((uniform.sizes.len(), &parked.sizes[..]), (21, &[1000, 10_000, 100_000, 1_000_000][..]));
+        assert!((parked.time.as_secs_f64() / uniform.time.as_secs_f64() - HARD_SHARE).abs() < 1e-6);
+        assert_eq!(plan.ascents.len(), FULL.len() + HARD.len());
+        assert!(HARD.iter().all(|s| !FULL.contains(s)));
+        let named = Plan::new(false, &[Scenario::Parked], None);
+        assert_eq!(of(&named, Scenario::Parked), Ascent { scenario: Scenario::Parked, ..uniform });
+        assert_eq!(of(&Plan::new(false, &[], Some(300)), Scenario::Parked).sizes, [300]);
     }
 
     #[test]

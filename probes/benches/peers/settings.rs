@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
-const SCENARIOS: [Scenario; 8] = [
+const SCENARIOS: [Scenario; 18] = [
     Scenario::Uniform,
     Scenario::Fast,
     Scenario::Clustered,
@@ -15,6 +15,16 @@ const SCENARIOS: [Scenario; 8] = [
     Scenario::Resting,
     Scenario::Gravity,
     Scenario::Fragmentation,
+    Scenario::Parked,
+    Scenario::Stations,
+    Scenario::Layers,
+    Scenario::Plates,
+    Scenario::Rods,
+    Scenario::StaticWorld,
+    Scenario::Asleep,
+    Scenario::Tower,
+    Scenario::Aliased,
+    Scenario::Teleport,
 ];
 
 const SIZES: [usize; 9] = [100, 300, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000];

@@ -47,8 +47,8 @@ pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnM
     let progress = Progress::new(plan.total.as_secs());
     let gpus = conditions.gpus.clone();
     let mut sweep = Sweep { plan, conditions, gpus, began, progress, found: Found::default() };
-    for scenario in &plan.scenarios {
-        if !sweep.go(&scenario.to_string(), Schedule::Ascent(plan.sizes.clone()), plan.ascent, 0)? {
+    for ascent in &plan.ascents {
+        if !sweep.go(&ascent.scenario.to_string(), Schedule::Ascent(ascent.sizes.clone()), ascent.time, 0)? {
             return Ok(sweep.found);
         }
         keep(&sweep.found);
@@ -56,7 +56,7 @@ pub(crate) fn sweep_all(plan: &Plan, conditions: &Conditions, keep: &mut dyn FnM
     let mut shuffle = Random::new(conditions.seed);
     for round in 1..=plan.rounds {
         let left = plan.total.saturating_sub(began.elapsed()) / (plan.rounds + 1 - round);
-        let starts = START * plan.scenarios.len() as u32;
+        let starts = START * plan.ascents.len() as u32;
         for (scenario, mut visits) in adaptive_sampling::visits(&sweep.found.points, left.saturating_sub(starts)) {
             let time = START + Duration::from_secs_f64(visits.iter().map(|v| v.seconds).sum());
             // In random order, so that a machine that slows down does not pass for a longer time at large sizes.

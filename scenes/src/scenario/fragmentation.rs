@@ -4,8 +4,8 @@
 //! ISVRI 2011: few cubes, which a user splits or deletes at will, so that the number of objects runs from few to thousands.
 
 use super::Scenario;
-use super::reflect;
 use super::rng::{Powers, Rng, cube_root};
+use super::walk::reflect;
 use sapwise::Aabb;
 
 /// Cubes at the beginning of a cycle, or the peak where that is lower.

@@ -46,6 +46,12 @@ impl Rng {
         (self.bits() >> 40) as f32 * (1.0 / 16_777_216.0)
     }
 
+    /// A whole number from 0 up to, not including, `end`, which is far below 2^64: then every number is as likely to parts in a billion.
+    #[inline]
+    pub(super) fn below(&mut self, end: usize) -> usize {
+        (self.bits() % end as u64) as usize
+    }
+
     /// Three numbers of mean 0 and variance 1, each the sum of twelve uniform ones less six (Irwin and Hall).
     ///
     /// Within 6 of the mean; close to a Gaussian everywhere but in the tails beyond 3.

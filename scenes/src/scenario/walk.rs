@@ -77,6 +77,11 @@ impl Walk {
         boxes.extend(self.centres.iter().zip(&self.halves).map(|(&centre, &half)| Aabb::cube(centre, half)));
     }
 
+    /// Whether the object at this place in the list never moves.
+    pub(super) fn is_fixed(&self, index: usize) -> bool {
+        index < self.fixed
+    }
+
     /// Steps into `frame` and rewrites the boxes of the objects that moved.
     pub(super) fn advance(&mut self, frame: u64, rng: &mut Rng, boxes: &mut [Aabb]) {
         let phase = (frame / AWAKE_FRAMES % self.sparsity as u64) as usize;

@@ -1,0 +1,320 @@
+//! Objects that walk about homes: the scenes that are few pairs and hard all the same.
+//!
+//! `parked`, `stations`, `layers`, `plates`, `rods`, `static-world`, `asleep`, `tower`, `aliased`, `teleport`.
+
+use super::rng::{Rng, cube_root};
+use super::walk::reflect;
+use sapwise::Aabb;
+
+/// Greatest step on each axis in a frame, in edges.
+const STEP: f32 = 0.05;
+/// Frames from one jump of `teleport` to the next.
+const JUMP_FRAMES: u64 = 30;
+/// Half the edge of a cube.
+const HALF: f32 = 0.5;
+
+/// Objects of a few kinds, each of which walks about a home of its own between walls that reflect its centre.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Roam {
+    kinds: Vec<Kind>,
+    /// The kind of each object, by its place in `kinds`.
+    kind_of: Vec<u8>,
+    /// The place about which each object walks.
+    homes: Vec<[f32; 3]>,
+    /// Where each object is, seen from its home.
+    offsets: Vec<[f32; 3]>,
+    /// Whether all objects jump now and then.
+    jumps: bool,
+}
+
+/// What objects of one shape and freedom have in common.
+#[derive(Debug, Clone, Copy)]
+struct Kind {
+    /// Half the extent on each axis.
+    half: [f32; 3],
+    /// Greatest distance of a centre from its home on each axis.
+    walls: [f32; 3],
+    /// Greatest step on each axis.
+    step: f32,
+}
+
+impl Kind {
+    /// Unit cubes that walk as those of `uniform` do, up to `walls` from their home.
+    fn cubes(walls: [f32; 3]) -> Self {
+        Self { half: [HALF; 3], walls, step: STEP }
+    }
+
+    /// Boxes that stay in their home.
+    fn fixed(half: [f32; 3]) -> Self {
+        Self { half, walls: [0.0; 3], step: 0.0 }
+    }
+}
+
+/// Half the edge of the world in which `objects` unit cubes have 0.1 pairs each: a fifth of the density of `uniform`.
+fn wall(objects: usize) -> f32 {
+    cube_root(5.0 * objects as f64) as f32
+}
+
+/// One object of every run of some, at a random place in its run.
+struct Scattered {
+    run: usize,
+    chosen: usize,
+}
+
+impl Scattered {
+    fn one_in(run: usize) -> Self {
+        Self { run, chosen: 0 }
+    }
+
+    /// Whether it is the object `k`. Asked of every object in turn.
+    fn is(&mut self, k: usize, rng: &mut Rng) -> bool {
+        if k.is_multiple_of(self.run) {
+            self.chosen = rng.below(self.run);
+        }
+        k % self.run == self.chosen
+    }
+}
+
+/// The point `k` of a cubic lattice about the origin with `side` points along each edge, `pitch` apart.
+fn lattice(k: usize, side: usize, pitch: f32) -> [f32; 3] {
+    let middle = side as f32 * 0.5;
+    [k % side, k / side % side, k / side / side].map(|at| (at as f32 - middle) * pitch)
+}
+
+impl Roam {
+    fn new(objects: usize, kinds: Vec<Kind>) -> Self {
+        Self {
+            kinds,
+            kind_of: Vec::with_capacity(objects),
+            homes: Vec::with_capacity(objects),
+            offsets: Vec::with_capacity(objects),
+            jumps: false,
+        }
+    }
+
+    /// Adds an object somewhere between the walls about its home.
+    fn add(&mut self, kind: usize, home: [f32; 3], rng: &mut Rng) {
+        self.kind_of.push(kind as u8);
+        self.homes.push(home);
+        self.offsets.push(self.kinds[kind].anywhere(rng));
+    }
+
+    /// Puts the objects into a random order, so that neighbours in the list are none in space.
+    fn shuffled(mut self, rng: &mut Rng) -> Self {
+        for last in (1..self.homes.len()).rev() {
+            let other = rng.below(last + 1);
+            self.kind_of.swap(last, other);
+            self.homes.swap(last, other);
+            self.offsets.swap(last, other);
+        }
+        self
+    }
+
+    /// One object in fifty stands ten thousand worlds away on each axis, on a lattice.
+    pub(super) fn parked(objects: usize, rng: &mut Rng) -> Self {
+        let wall = wall(objects);
+        let mut roam = Self::new(objects, vec![Kind::cubes([wall; 3]), Kind::fixed([HALF; 3])]);
+        let side = cube_root((objects / 50 + 1) as f64).ceil() as usize;
+        let far = 10_000.0 * 2.0 * wall;
+        let (mut scattered, mut parked) = (Scattered::one_in(50), 0);
+        for k in 0..objects {
+            if scattered.is(k, rng) {
+                roam.add(1, lattice(parked, side, 4.0).map(|at| far + at), rng);
+                parked += 1;
+            } else {
+                roam.add(0, [0.0; 3], rng);
+            }
+        }
+        roam
+    }
+
+    /// Half of the objects in each of two worlds, a thousand of their edges apart.
+    pub(super) fn stations(objects: usize, rng: &mut Rng) -> Self {
+        let wall = wall(objects.div_ceil(2));
+        let mut roam = Self::new(objects, vec![Kind::cubes([wall; 3])]);
+        // Half of 1000 edges of 2 walls, along the diagonal of a cube.
+        let away = 1000.0 * wall / 3.0_f32.sqrt();
+        let mut scattered = Scattered::one_in(2);
+        for k in 0..objects {
+            let home = if scattered.is(k, rng) { away } else { -away };
+            roam.add(0, [home; 3], rng);
+        }
+        roam
+    }
+
+    /// Floors of n^(1/4) by n^(1/4) flat objects, each in a field of its own.
+    pub(super) fn layers(objects: usize, rng: &mut Rng) -> Self {
+        let side = (objects as f64).sqrt().sqrt().ceil().max(1.0) as usize;
+        let thickness = 0.1;
+        let half = [HALF, HALF, 0.5 * thickness];
+        // Fields are 1.25 wide and floors 0.25 apart: a twentieth stays free at least on x and y, a fiftieth on z.
+        let flat = Kind { half, walls: [0.1, 0.1, 0.065], step: STEP * thickness };
+        let mut roam = Self::new(objects, vec![flat]);
+        let floors = objects.div_ceil(side * side);
+        for k in 0..objects {
+            let [x, y, floor] = [k % side, k / side % side, k / side / side];
+            let home = [(x as f32) * 1.25, (y as f32) * 1.25, (floor as f32 - floors as f32 * 0.5) * 0.25];
+            roam.add(0, home, rng);
+        }
+        roam.shuffled(rng)
+    }
+
+    /// Up to eight packs of plates as wide as the world, one object in 33, and cubes in the storeys between the packs.
+    pub(super) fn plates(objects: usize, rng: &mut Rng) -> Self {
+        let wall = wall(objects);
+        let plates = objects / 33 + 1;
+        let packs = plates.min(8);
+        // Storeys add up to the world's edge, and so do the packs, whatever the number of plates.
+        let storey = 2.0 * wall / packs as f32;
+        let in_pack = plates.div_ceil(packs);
+        let pitch = storey / in_pack as f32;
+        // Cubes reach a tenth of an edge into the packs, and plates leave a quarter of the pitch free.
+        let cubes = Kind::cubes([wall, wall, (0.5 * storey - HALF + 0.1).max(0.0)]);
+        let plate =
+            Kind { half: [wall + 1.0, wall + 1.0, 0.25 * pitch], walls: [0.125 * pitch; 3], step: STEP * 0.5 * pitch };
+        let mut roam = Self::new(objects, vec![cubes, plate]);
+        let bottom = |level: usize| (2.0 * level as f32 - packs as f32) * storey;
+        let (mut scattered, mut placed) = (Scattered::one_in(33), 0);
+        for k in 0..objects {
+            if scattered.is(k, rng) {
+                let at = (placed % in_pack) as f32 + 0.5;
+                roam.add(1, [0.0, 0.0, bottom(placed / in_pack) + storey + at * pitch], rng);
+                placed += 1;
+            } else {
+                let level = rng.below(packs);
+                roam.add(0, [0.0, 0.0, bottom(level) + 0.5 * storey], rng);
+            }
+        }
+        roam
+    }
+
+    /// One object in ten is a rod along a random axis.
+    pub(super) fn rods(objects: usize, rng: &mut Rng) -> Self {
+        // The mean volume in which two of these objects overlap is 42, not 8: 0.1 pairs need a world of 212 per object.
+        let wall = (cube_root(212.0 * objects as f64) * 0.5) as f32;
+        let mut kinds = vec![Kind::cubes([wall; 3]); 4];
+        (0..3).for_each(|axis| kinds[axis].half[axis] = 15.0);
+        let mut roam = Self::new(objects, kinds);
+        let mut scattered = Scattered::one_in(10);
+        for k in 0..objects {
+            let kind = if scattered.is(k, rng) { rng.below(3) } else { 3 };
+            roam.add(kind, [0.0; 3], rng);
+        }
+        roam
+    }
+
+    /// A hilly ground of fixed boxes that overlap their 24 neighbours, and one object in twenty that moves above and in it.
+    pub(super) fn static_world(objects: usize, rng: &mut Rng) -> Self {
+        let side = (objects as f64).sqrt().ceil() as usize;
+        let wall = side as f32 * 0.5;
+        let mut roam = Self::new(objects, vec![Kind::fixed([1.1, 1.1, 1.0]), Kind::cubes([wall, wall, 5.0])]);
+        // Up and down by 2 within 20 edges: neighbours differ by at most 0.4, less than a box is high.
+        let hill = |at: usize| (at % 20).abs_diff(10) as f32 * 0.2 - 1.0;
+        let mut scattered = Scattered::one_in(20);
+        for k in 0..objects {
+            if scattered.is(k, rng) {
+                roam.add(1, [0.0, 0.0, 5.0], rng);
+            } else {
+                let (x, y) = (k % side, k / side);
+                roam.add(0, [x as f32 - wall, y as f32 - wall, hill(x) + hill(y)], rng);
+            }
+        }
+        roam.shuffled(rng)
+    }
+
+    /// One object in fifty lies four million edges below the others and stays there.
+    pub(super) fn asleep(objects: usize, rng: &mut Rng) -> Self {
+        let wall = wall(objects);
+        let mut roam = Self::new(objects, vec![Kind::cubes([wall; 3]), Kind::fixed([HALF; 3])]);
+        let mut scattered = Scattered::one_in(50);
+        for k in 0..objects {
+            if scattered.is(k, rng) {
+                let [x, y, z] = Kind::cubes([wall; 3]).anywhere(rng);
+                roam.add(1, [x, y - 4.0e6, z], rng);
+            } else {
+                roam.add(0, [0.0; 3], rng);
+            }
+        }
+        roam
+    }
+
+    /// Unit cubes on one line, each of which overlaps the next ones above and below it.
+    pub(super) fn tower(objects: usize, rng: &mut Rng) -> Self {
+        let mut roam = Self::new(objects, vec![Kind::cubes([0.1; 3])]);
+        for k in 0..objects {
+            roam.add(0, [0.0, 0.0, (k as f32 - objects as f32 * 0.5) * 0.75], rng);
+        }
+        roam.shuffled(rng)
+    }
+
+    /// Boxes far apart where an evenly spaced sample looks, in the middle of each of 256 equal parts of the list.
+    pub(super) fn aliased(objects: usize, rng: &mut Rng) -> Self {
+        let wall = wall(objects);
+        let mut roam = Self::new(objects, vec![Kind::cubes([wall; 3])]);
+        // A power of two: for 2^17 objects the special ones have the indices 256 modulo 512.
+        let parts = 1 << (objects as u64 / 32).max(1).ilog2().min(8);
+        let mut part = 0;
+        for k in 0..objects as u64 {
+            let special = (2 * part + 1) * objects as u64 / (2 * parts) == k;
+            part += u64::from(special);
+            let home = if special { rng.signed3().map(|u| u * 1000.0 * wall) } else { [0.0; 3] };
+            roam.add(0, home, rng);
+        }
+        roam
+    }
+
+    /// Unit cubes that walk for some frames and all jump to new places then.
+    pub(super) fn teleport(objects: usize, rng: &mut Rng) -> Self {
+        let mut roam = Self::new(objects, vec![Kind::cubes([wall(objects); 3])]);
+        (0..objects).for_each(|_| roam.add(0, [0.0; 3], rng));
+        roam.jumps = true;
+        roam
+    }
+
+    /// Writes the boxes of all objects.
+    pub(super) fn place(&self, boxes: &mut Vec<Aabb>) {
+        boxes.clear();
+        let objects = self.kind_of.iter().zip(&self.homes).zip(&self.offsets);
+        boxes.extend(objects.map(|((&kind, home), offset)| self.kinds[usize::from(kind)].aabb(home, offset)));
+    }
+
+    /// Steps into `frame` and rewrites the boxes of the objects that moved.
+    pub(super) fn advance(&mut self, frame: u64, rng: &mut Rng, boxes: &mut [Aabb]) {
+        let jump = self.jumps && frame.is_multiple_of(JUMP_FRAMES);
+        let objects = self.kind_of.iter().zip(&self.homes).zip(&mut self.offsets).zip(boxes);
+        for (((&kind, home), offset), aabb) in objects {
+            let kind = &self.kinds[usize::from(kind)];
+            if kind.step == 0.0 {
+                continue;
+            }
+            if jump {
+                *offset = kind.anywhere(rng);
+            } else {
+                let step = rng.signed3();
+                for a in 0..3 {
+                    offset[a] = reflect(offset[a] + step[a] * kind.step, kind.walls[a]);
+                }
+            }
+            *aabb = kind.aabb(home, offset);
+        }
+    }
+
+    /// Whether the object at this place in the list never moves.
+    pub(super) fn is_fixed(&self, index: usize) -> bool {
+        self.kind_of.get(index).is_some_and(|&kind| self.kinds[usize::from(kind)].step == 0.0)
+    }
+}
+
+impl Kind {
+    /// A random place between the walls, seen from the home.
+    fn anywhere(&self, rng: &mut Rng) -> [f32; 3] {
+        let u = rng.signed3();
+        [0, 1, 2].map(|a| u[a] * self.walls[a])
+    }
+
+    #[inline]
+    fn aabb(&self, home: &[f32; 3], offset: &[f32; 3]) -> Aabb {
+        let centre = [0, 1, 2].map(|a| home[a] + offset[a]);
+        Aabb::new([0, 1, 2].map(|a| centre[a] - self.half[a]), [0, 1, 2].map(|a| centre[a] + self.half[a]))
+    }
+}
