@@ -10,7 +10,7 @@ use crate::aabb::Aabb;
 pub use displacement::Displacement;
 pub use plan::FramePlan;
 pub(crate) use sample::{Chosen, Sample};
-pub(crate) use strip_grid::{Cover, StripGrid, StripSpan};
+pub(crate) use strip_grid::{StripGrid, StripSpan};
 
 /// The figures of a frame that decide what each algorithm costs, all known from a sample and the frame before.
 ///
@@ -102,11 +102,7 @@ impl Load {
 /// The two are joined like a Poisson count with a gamma prior of shape 4.
 fn strip_share(chosen: &Chosen, grid: &StripGrid, axis_share: f64, clumping: f64) -> f64 {
     const SHAPE: f64 = 4.0;
-    let cells = |b: &Aabb| {
-        let cover = grid.cover(b);
-        // Cell numbers stay below 2^16, which f32 holds, so that all three comparisons are of one type.
-        [0, 1].map(|d| (cover.first[d] as f32, cover.last[d] as f32))
-    };
+    let cells = |b: &Aabb| grid.cells_of(b);
     let across = [0, 1].map(|d| chosen.share_of_pairs(|b| [cells(b)[d]]));
     let expected = axis_share * across[0] * across[1] * clumping.max(1.0).sqrt();
     let counted = chosen.share_of_pairs(|b| {

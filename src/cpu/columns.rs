@@ -8,7 +8,7 @@ use std::ops::Range;
 const PADDING: usize = 16;
 
 /// Boxes as eight columns: three lower bounds, three upper bounds, positions in the input, and for a strip
-/// [`Cover::begins`](crate::load::Cover::begins).
+/// the mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip).
 ///
 /// Axis 0 is the sweep axis, whichever axis of the input that is.
 #[derive(Debug, Default)]

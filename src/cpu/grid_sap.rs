@@ -1,34 +1,48 @@
 //! A grid of strips over two axes, a sweep along the third inside each strip. From scratch every frame.
 //!
-//! Phase one, one task a thread: each thread sorts its share of the boxes into bins of its own, one for each strip that
-//! a box touches. Phase two, several tasks a thread: each strip gathers its bins from all threads, sorts them along the
-//! sweep axis and sweeps. Boxes much larger than a cell stand in no bin; each strip tests those that cross it.
+//! Phase one, one task a thread: each thread sorts its share of the boxes into bins of its own, one for each strip that a box touches. Phase
+//! two, several tasks a thread: each strip gathers its bins from all threads, sorts them along the sweep axis and sweeps.
+//!
+//! What a strip is no good for stands apart, in a [tree](super::tree) of the frame: boxes much larger than a cell, the boxes of strips that hold
+//! far more than others, and fixed boxes, of which no two are a pair. The tree is compared with itself, and with the boxes of each strip.
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::Threads;
 use crate::cpu::columns::{Columns, ensure, order_key, part};
-use crate::cpu::kernel::{All, InStrip, Query, query_rows, sweep_rows};
+use crate::cpu::kernel::node::{Group, LANES};
+use crate::cpu::kernel::{InStrip, sweep_rows};
 use crate::cpu::level::Simd;
+use crate::cpu::tree::{Members, Tree};
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
-use crate::load::{Cover, FramePlan, StripGrid, StripSpan};
+use crate::filter::Filter;
+use crate::load::{FramePlan, Sample, StripGrid, StripSpan};
 use crate::pairs::Pairs;
+use std::ops::Range;
+
+/// Boxes that a strip holds at most; those of a fuller one stand apart. Four times as many as one holds of boxes that are spread evenly.
+const MOST_BOXES: usize = 1024;
+
+/// the mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip) of a box in the first of its strips.
+const BOTH: u32 = 3;
+
+/// Marks the count of a strip whose boxes stand apart.
+const OVERFULL: u32 = 1 << 31;
+
+/// The same of the boxes of one thread's share, which need not be an equal part of every strip.
+const MOST_OF_SHARE: usize = 512;
 
 /// The method; see the module.
 #[derive(Debug)]
 struct GridSap {
     workers: Workers,
-    finder: Finder,
-    outputs: Outputs,
-}
-
-/// The work without its output: pairs go into as many lists as the workers have tasks.
-#[derive(Debug)]
-pub(super) struct Finder {
     bins: Vec<Bins>,
-    large: Large,
+    /// Positions in the input of the boxes that stand apart, ascending, and the tree of them.
+    apart: Vec<u32>,
+    tree: Tree,
     tasks: Vec<Task>,
+    outputs: Outputs,
     simd: Simd,
 }
 
@@ -40,9 +54,9 @@ struct Bins {
     /// The strips in which each box of the share stands.
     spans: Vec<StripSpan>,
     entries: Vec<Entry>,
-    /// Positions in the input of the boxes kept apart; only the first `large_count` are of this frame.
-    large: Vec<u32>,
-    large_count: usize,
+    /// Positions in the input of the boxes that stand apart; only the first `apart_count` are of this frame.
+    apart: Vec<u32>,
+    apart_count: usize,
     /// What went wrong, to be reported after the phase.
     error: Option<Error>,
 }
@@ -52,16 +66,8 @@ struct Bins {
 struct Entry {
     bounds: Aabb,
     id: u32,
-    /// [`Cover::begins`] in this strip.
+    /// the mask of [`StripGrid::each_strip`] in this strip.
     begins: u32,
-}
-
-/// The boxes kept apart, ascending on the sweep axis.
-#[derive(Debug, Default)]
-struct Large {
-    keys: Vec<u64>,
-    columns: Columns,
-    covers: Vec<Cover>,
 }
 
 /// Memory of one task of phase two.
@@ -70,15 +76,20 @@ struct Task {
     entries: Vec<Entry>,
     keys: Vec<u64>,
     columns: Columns,
-    /// The furthest end on the sweep axis among all rows so far.
-    ends: Vec<f32>,
     error: Option<Error>,
 }
 
 pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
     let workers = Workers::new("grid-sap", threads, pools)?;
-    let finder = Finder::new(&workers, simd);
-    Ok(Box::new(GridSap { workers, finder, outputs: Outputs::default() }))
+    Ok(Box::new(GridSap {
+        bins: (0..workers.threads()).map(|_| Bins::default()).collect(),
+        apart: Vec::new(),
+        tree: Tree::new(simd),
+        tasks: (0..workers.tasks()).map(|_| Task::default()).collect(),
+        outputs: Outputs::default(),
+        workers,
+        simd,
+    }))
 }
 
 impl BroadPhase for GridSap {
@@ -89,52 +100,38 @@ impl BroadPhase for GridSap {
     fn find_pairs_with(&mut self, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;
-        let Self { workers, finder, outputs } = self;
-        let grid = plan.grid(boxes);
-        outputs.collect(workers, pairs, |lists| finder.find(workers, &grid, boxes, lists))?;
+        let Self { workers, bins, apart, tree, tasks, outputs, simd } = self;
+        let (grid, filter) = (plan.grid(boxes), pairs.filter());
+        let threads = workers.threads();
+        workers.each(bins, |k, bin| {
+            bin.error = bin.fill(&grid, boxes, part(boxes.len(), k, threads), threads, filter).err();
+        });
+        bins.iter_mut().find_map(|b| b.error.take()).map_or(Ok(()), Err)?;
+        apart.clear();
+        let count = bins.iter().map(|b| b.apart_count).sum();
+        apart.try_reserve(count).map_err(|_| Error::OutOfMemory { what: "boxes that stand apart", elements: count })?;
+        bins.iter().for_each(|b| apart.extend_from_slice(&b.apart[..b.apart_count]));
+        let tree = if apart.is_empty() {
+            None
+        } else {
+            tree.build(workers, boxes, Members::Of(apart), &Sample::of_members(boxes, apart), filter)?;
+            Some(&*tree)
+        };
+        let (bins, strips, count) = (&*bins, grid.strips(), tasks.len());
+        outputs.collect(workers, pairs, |lists| {
+            workers.each_with(tasks, lists, |k, task, list| {
+                let strips = balanced(bins, strips, k, count)..balanced(bins, strips, k + 1, count);
+                task.error = task.find(bins, tree, grid.axis, strips, *simd, list).err();
+                if let Some(tree) = tree {
+                    tree.self_pairs(tree.part(k, count), list);
+                }
+            });
+            tasks.iter_mut().find_map(|t| t.error.take()).map_or(Ok(()), Err)
+        })?;
         pairs.finish()
     }
 
     fn prepare(&mut self, objects: usize) {
-        self.finder.prepare(objects);
-    }
-}
-
-impl Finder {
-    /// Memory for any workers that have no more threads than these.
-    pub(super) fn new(workers: &Workers, simd: Simd) -> Self {
-        let bins = (0..workers.threads()).map(|_| Bins::default()).collect();
-        let tasks = (0..workers.tasks()).map(|_| Task::default()).collect();
-        Self { bins, large: Large::default(), tasks, simd }
-    }
-
-    /// Adds the pairs to `lists`, one for each task of `workers`; in each of them those that are near in space are near.
-    pub(super) fn find(
-        &mut self,
-        workers: &Workers,
-        grid: &StripGrid,
-        boxes: &[Aabb],
-        lists: &mut [Pairs],
-    ) -> Result<(), Error> {
-        let Self { bins, large, tasks, simd } = self;
-        let threads = workers.threads();
-        let (bins, tasks) = (&mut bins[..threads], &mut tasks[..workers.tasks()]);
-        workers.each(bins, |k, bin| {
-            let share = part(boxes.len(), k, threads);
-            bin.error = bin.fill(grid, boxes, share).err();
-        });
-        bins.iter_mut().find_map(|b| b.error.take()).map_or(Ok(()), Err)?;
-        large.gather(grid, boxes, bins)?;
-        let (bins, large, strips, count) = (&*bins, &*large, grid.strips(), tasks.len());
-        workers.each_with(tasks, lists, |k, task, list| {
-            let strips = balanced(bins, strips, k, count)..balanced(bins, strips, k + 1, count);
-            let rows = part(large.covers.len(), k, count);
-            task.error = task.find(bins, large, grid, strips, rows, *simd, list).err();
-        });
-        tasks.iter_mut().find_map(|t| t.error.take()).map_or(Ok(()), Err)
-    }
-
-    pub(super) fn prepare(&mut self, objects: usize) {
         // A refused allocation is reported by the frame that needs it. Boxes stand in 1.6 strips on average.
         let share = objects / self.bins.len();
         for bin in &mut self.bins {
@@ -160,7 +157,14 @@ fn balanced(bins: &[Bins], strips: usize, k: usize, parts: usize) -> usize {
 
 impl Bins {
     /// Sorts a share of the boxes into bins. Where each goes is worked out once, in the pass that counts.
-    fn fill(&mut self, grid: &StripGrid, boxes: &[Aabb], share: std::ops::Range<usize>) -> Result<(), Error> {
+    fn fill(
+        &mut self,
+        grid: &StripGrid,
+        boxes: &[Aabb],
+        share: Range<usize>,
+        threads: usize,
+        filter: Option<&Filter>,
+    ) -> Result<(), Error> {
         let first = share.start;
         let share = &boxes[share];
         let strips = grid.strips();
@@ -168,9 +172,13 @@ impl Bins {
         ensure(&mut self.spans, share.len(), "boxes in strips")?;
         // The axes are constants in each of the three, so that no index is computed.
         match grid.axis {
-            0 => self.count::<0>(grid, share, first)?,
-            1 => self.count::<1>(grid, share, first)?,
-            _ => self.count::<2>(grid, share, first)?,
+            0 => self.count::<0>(grid, share, first, filter)?,
+            1 => self.count::<1>(grid, share, first, filter)?,
+            _ => self.count::<2>(grid, share, first, filter)?,
+        }
+        let most = (MOST_BOXES / threads).max(MOST_OF_SHARE) as u32;
+        if self.apart_count > 0 || self.starts[..strips].iter().any(|&count| count > most) {
+            self.set_apart(grid, most, first, share.len())?;
         }
         let starts = &mut self.starts[..=strips];
         let entries: u64 = starts.iter().map(|&s| u64::from(s)).sum();
@@ -200,22 +208,48 @@ impl Bins {
     }
 
     /// Finds the strips of each box and counts how many go into each bin.
-    fn count<const AXIS: usize>(&mut self, grid: &StripGrid, share: &[Aabb], first: usize) -> Result<(), Error> {
+    fn count<const AXIS: usize>(
+        &mut self,
+        grid: &StripGrid,
+        share: &[Aabb],
+        first: usize,
+        filter: Option<&Filter>,
+    ) -> Result<(), Error> {
         let starts = &mut self.starts[..=grid.strips()];
         starts.fill(0);
-        self.large_count = 0;
+        self.apart_count = 0;
         for ((b, span), k) in share.iter().zip(&mut self.spans).zip(first..) {
             if let Some(defect) = b.defect() {
                 return Err(Error::InvalidBox { index: k, defect });
             }
-            *span = grid.span::<AXIS>(b);
-            if *span == StripSpan::APART {
-                ensure(&mut self.large, self.large_count + 1, "large boxes")?;
-                self.large[self.large_count] = k as u32;
-                self.large_count += 1;
-            }
+            let fixed = filter.is_some_and(|f| f.is_fixed(k));
+            *span = if fixed { StripSpan::APART } else { grid.span::<AXIS>(b) };
+            self.apart_count += usize::from(*span == StripSpan::APART);
             grid.each_strip(*span, |strip, _| starts[strip] += 1);
         }
+        Ok(())
+    }
+
+    /// Takes the boxes of strips with more than `most` of them out of all their strips, and lists the boxes that stand apart.
+    fn set_apart(&mut self, grid: &StripGrid, most: u32, first: usize, len: usize) -> Result<(), Error> {
+        let Self { starts, spans, apart, apart_count, .. } = self;
+        let starts = &mut starts[..grid.strips()];
+        *apart_count = 0;
+        starts.iter_mut().filter(|count| **count > most).for_each(|count| *count |= OVERFULL);
+        for (span, id) in spans[..len].iter_mut().zip(first..) {
+            let mut leaves = false;
+            grid.each_strip(*span, |strip, _| leaves |= starts[strip] & OVERFULL != 0);
+            if leaves {
+                grid.each_strip(*span, |strip, _| starts[strip] -= 1);
+                *span = StripSpan::APART;
+            }
+            if *span == StripSpan::APART {
+                ensure(apart, *apart_count + 1, "boxes that stand apart")?;
+                apart[*apart_count] = id as u32;
+                *apart_count += 1;
+            }
+        }
+        starts.iter_mut().for_each(|count| *count &= !OVERFULL);
         Ok(())
     }
 
@@ -225,50 +259,25 @@ impl Bins {
     }
 }
 
-impl Large {
-    fn gather(&mut self, grid: &StripGrid, boxes: &[Aabb], bins: &[Bins]) -> Result<(), Error> {
-        let ids = || bins.iter().flat_map(|b| &b.large[..b.large_count]);
-        let count = ids().count();
-        ensure(&mut self.keys, count, "large boxes")?;
-        let keys = &mut self.keys[..count];
-        for (key, &id) in keys.iter_mut().zip(ids()) {
-            *key = u64::from(order_key(boxes[id as usize].min[grid.axis])) << 32 | u64::from(id);
-        }
-        keys.sort_unstable();
-        self.columns.resize(count)?;
-        self.covers.clear();
-        self.covers.try_reserve(count).map_err(|_| Error::OutOfMemory { what: "large boxes", elements: count })?;
-        let mut columns = self.columns.as_mut();
-        for (at, &key) in keys.iter().enumerate() {
-            let id = key as u32;
-            columns.set(at, &boxes[id as usize], grid.axis, id);
-            self.covers.push(grid.cover(&boxes[id as usize]));
-        }
-        Ok(())
-    }
-}
-
 impl Task {
-    #[expect(clippy::too_many_arguments, reason = "the frame's shared state, each part borrowed on its own")]
+    /// Adds the pairs of the boxes in these strips with one another and with those in the tree.
     fn find(
         &mut self,
         bins: &[Bins],
-        large: &Large,
-        grid: &StripGrid,
-        strips: std::ops::Range<usize>,
-        large_rows: std::ops::Range<usize>,
+        tree: Option<&Tree>,
+        axis: usize,
+        strips: Range<usize>,
         simd: Simd,
         pairs: &mut Pairs,
     ) -> Result<(), Error> {
         for strip in strips {
-            self.sort(bins, strip, grid.axis)?;
+            self.sort(bins, strip, axis)?;
             let boxes = self.columns.len();
             sweep_rows::<InStrip>(simd, &self.columns, 0..boxes, pairs);
-            if !large.covers.is_empty() && boxes > 0 {
-                self.query_large(large, grid.cell(strip), simd, pairs)?;
+            if let Some(tree) = tree {
+                (0..boxes).step_by(LANES).filter_map(|at| self.group(at, axis)).for_each(|group| tree.pairs_with(&group, pairs));
             }
         }
-        sweep_rows::<All>(simd, &large.columns, large_rows, pairs);
         Ok(())
     }
 
@@ -300,28 +309,20 @@ impl Task {
         Ok(())
     }
 
-    /// Tests the large boxes that cross a strip against the boxes in it.
-    fn query_large(&mut self, large: &Large, cell: [u32; 2], simd: Simd, pairs: &mut Pairs) -> Result<(), Error> {
-        let Self { columns, ends, .. } = self;
-        ensure(ends, columns.len(), "ends of boxes")?;
-        let ends = &mut ends[..columns.len()];
-        let mut furthest = f32::NEG_INFINITY;
-        for (end, &high) in ends.iter_mut().zip(columns.high(0)) {
-            furthest = furthest.max(high);
-            *end = furthest;
+    /// Up to 16 boxes that follow one another along the sweep, those of them that begin in this strip: each box is in one group of one strip.
+    fn group(&self, at: usize, axis: usize) -> Option<Group> {
+        let of = &self.columns;
+        let rows = at..(at + LANES).min(of.len());
+        let begins = &of.padded().begins[rows.clone()];
+        let mut group: Option<Group> = None;
+        for (lane, row) in rows.enumerate().filter(|&(lane, _)| begins[lane] == BOTH) {
+            let mut b = Aabb::default();
+            for k in 0..3 {
+                (b.min[(axis + k) % 3], b.max[(axis + k) % 3]) = (of.low(k)[row], of.high(k)[row]);
+            }
+            let group = group.get_or_insert_with(|| Group::of(&b));
+            group.set(lane, &b, of.ids()[row]);
         }
-        let of = &large.columns;
-        for (k, cover) in large.covers.iter().enumerate().filter(|(_, c)| c.contains(cell)) {
-            let query = Query {
-                low: [0, 1, 2].map(|a| of.low(a)[k]),
-                high: [0, 1, 2].map(|a| of.high(a)[k]),
-                id: of.ids()[k],
-                begins: cover.begins(cell),
-            };
-            // No row before this one ends late enough to be hit.
-            let start = ends.partition_point(|&end| end < query.low[0]);
-            query_rows(simd, columns, start, &query, pairs);
-        }
-        Ok(())
+        group
     }
 }

@@ -53,24 +53,9 @@ pub(crate) fn brute_rows(simd: Simd, columns: &Columns, rows: Range<usize>, pair
     }
 }
 
-/// Tests one box against the rows of a strip from `start` on until one begins beyond its end on the sweep axis, and adds
-/// the pairs that this strip reports.
-pub(crate) fn query_rows(simd: Simd, columns: &Columns, start: usize, query: &Query, pairs: &mut Pairs) {
-    let view = View::new(columns);
-    match simd {
-        // SAFETY: the proof says that this CPU has the instructions.
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx512(proof) => unsafe { x86::query_avx512(proof, &view, start, query, pairs) },
-        // SAFETY: as above.
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(proof) => unsafe { x86::query_avx2(proof, &view, start, query, pairs) },
-        Simd::Portable => query_from(Baseline, &view, start, query, pairs),
-    }
-}
-
 /// What the rows of a sweep are.
 pub(crate) trait Rows {
-    /// Whether a pair counts only where both bits of [`Cover::begins`](crate::load::Cover::begins) are set in either box.
+    /// Whether a pair counts only where both bits of the mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip) are set in either box.
     const IN_STRIP: bool;
 }
 
@@ -90,13 +75,13 @@ impl Rows for InStrip {
 
 /// The one box.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Query {
+struct Query {
     /// Bounds, sweep axis first.
-    pub(crate) low: [f32; 3],
-    pub(crate) high: [f32; 3],
-    pub(crate) id: u32,
+    low: [f32; 3],
+    high: [f32; 3],
+    id: u32,
     /// As in [`Columns::begins`].
-    pub(crate) begins: u32,
+    begins: u32,
 }
 
 /// The columns as pointers of one common length.
@@ -143,7 +128,7 @@ trait Lanes: Copy {
     /// As above.
     unsafe fn ends_after(self, view: &View<'_>, at: usize, low: f32) -> u32;
     /// Those of `hits` whose pair with the box that this strip has to report; see
-    /// [`Cover::begins`](crate::load::Cover::begins).
+    /// the mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip).
     ///
     /// # Safety
     /// As above.
@@ -221,24 +206,6 @@ fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs: &mut Pa
             }
             at += L::COUNT;
         }
-    }
-}
-
-#[inline(always)]
-fn query_from<L: Lanes>(lanes: L, view: &View<'_>, start: usize, query: &Query, pairs: &mut Pairs) {
-    let mut at = start;
-    while at < view.len {
-        // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
-        let (reach, hits) = unsafe { lanes.reach_and_hits(view, at, query) };
-        if hits != 0 {
-            // SAFETY: as above.
-            let hits = hits & unsafe { lanes.ends_after(view, at, query.low[0]) };
-            add::<L, InStrip>(lanes, view, at, query, hits, pairs);
-        }
-        if reach != L::ALL {
-            break;
-        }
-        at += L::COUNT;
     }
 }
 

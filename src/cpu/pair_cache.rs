@@ -2,8 +2,8 @@
 //!
 //! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes, so a frame costs
 //! one look at each box and one test of each kept pair. A box that leaves its grown box gets a new one, and a tree of the
-//! grown boxes finds its new neighbours. After many of those the list is made again by the grid. Where the boxes move too
-//! far for that to pay, the grid finds the pairs directly and a few boxes are watched for it to end.
+//! grown boxes finds its new neighbours. After many of those tree and list are made again. Where the boxes move too far for
+//! that to pay, a tree of the boxes themselves finds their pairs, as in [`bvh`](super::bvh), and a few boxes are watched for it to end.
 //!
 //! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules; physics engines know the grown boxes as fat
 //! boxes.
@@ -16,16 +16,16 @@ use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, Incremental, check_count};
 use crate::cpu::Threads;
 use crate::cpu::columns::part;
-use crate::cpu::grid_sap::Finder;
 use crate::cpu::kernel::{overlap, prefetch};
 use crate::cpu::level::Simd;
 use crate::cpu::tree::FAR;
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
-use crate::load::{FramePlan, Sample, StripGrid};
+use crate::load::{FramePlan, Sample};
 use crate::pairs::Pairs;
 use grown::{Grown, Margin, Share};
-use motion::{Advice, MOST_KEPT, Motion};
+use motion::{Advice, MOST_KEPT, Motion, Work};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use tree::GrownTree;
 
 /// The method; see the module.
@@ -34,7 +34,6 @@ struct PairCache {
     /// One for each number of threads that it may run on, ascending, and which of them runs it now.
     widths: Vec<Workers>,
     width: usize,
-    finder: Finder,
     outputs: Outputs,
     motion: Motion,
     grown: Grown,
@@ -64,7 +63,6 @@ pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box
     let widest = &widths[widths.len() - 1];
     let tasks = widest.tasks();
     Ok(Box::new(PairCache {
-        finder: Finder::new(widest, simd),
         outputs: Outputs::default(),
         motion: Motion::default(),
         grown: Grown::new(simd),
@@ -99,10 +97,10 @@ impl BroadPhase for PairCache {
         };
         if kept == Kept::Not {
             pairs.clear();
-            let Self { widths, width, finder, outputs, .. } = self;
+            let Self { widths, width, tree, outputs, .. } = self;
             let workers = &widths[*width];
-            let grid = plan.grid(boxes);
-            outputs.collect(workers, pairs, |lists| finder.find(workers, &grid, boxes, lists))?;
+            tree.build(workers, boxes, &plan.sample(boxes), pairs.filter())?;
+            outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
         }
         self.motion.found(boxes.len(), pairs.overlapping());
         pairs.finish()
@@ -110,8 +108,7 @@ impl BroadPhase for PairCache {
 
     fn prepare(&mut self, objects: usize) {
         // A refused allocation is reported by the frame that needs it.
-        self.finder.prepare(objects);
-        let _ = self.grown.reserve(objects);
+        let _ = self.tree.reserve(objects).and_then(|()| self.grown.reserve(objects));
     }
 
     fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
@@ -163,22 +160,22 @@ impl PairCache {
 
     /// Finds the pairs among the kept ones, as far as those can be kept.
     fn keep(&mut self, plan: &FramePlan, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
-        let Self { widths, width, finder, outputs, motion, grown, tree, shares, kept, .. } = self;
+        let Self { widths, width, outputs, motion, grown, tree, shares, kept, .. } = self;
         let workers = &widths[*width];
         let (shares, kept) = (&mut shares[..workers.tasks()], &mut kept[..workers.tasks()]);
-        let changes = grown.check(workers, boxes, margin, shares)?;
+        let changes = grown.check(workers, boxes, margin, pairs.filter(), shares)?;
         let rebuilt = motion.wants_rebuild(boxes.len(), &changes);
         if rebuilt {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes), shares);
             let sample = Sample::of(grown.as_slice());
-            tree.build(workers, grown.as_slice(), &sample, None)?;
+            tree.build(workers, grown.as_slice(), &sample, pairs.filter())?;
             let most = most_kept(boxes.len(), kept.len());
             for list in kept.iter_mut() {
                 list.clear();
                 list.set_limit(Some(most));
             }
-            let grid = StripGrid::plan(&sample, boxes.len());
-            finder.find(workers, &grid, grown.as_slice(), kept)?;
+            let parts = kept.len();
+            workers.each(kept, |k, list| tree.self_pairs(k, parts, list));
             if !kept.iter_mut().all(|list| list.is_complete() && list.reserve_some_more().is_ok()) {
                 return Ok(Kept::Not);
             }
@@ -189,6 +186,7 @@ impl PairCache {
         }
         let (grown, tree, tasks) = (&*grown, &*tree, kept.len());
         let far = boxes.len() > FAR;
+        let looked = AtomicU64::new(0);
         outputs.collect(workers, pairs, |lists| {
             workers.each_with(kept, lists, |k, kept, list| {
                 let overlap = |(i, j): (u32, u32)| overlap(&boxes[i as usize], &boxes[j as usize]);
@@ -203,19 +201,21 @@ impl PairCache {
                     return;
                 }
                 kept.sift(list, |pair| grown.is_dirty(pair), fetch, overlap);
+                let mut nodes = 0;
                 for i in tree.moved(k, tasks) {
-                    grown.meet(tree, i, |j| {
+                    nodes += u64::from(grown.meet(tree, i, |j| {
                         kept.push(i, j);
                         if overlap((i, j)) {
                             list.push(i, j);
                         }
-                    });
+                    }));
                 }
+                looked.fetch_add(nodes, Relaxed);
             });
             Ok(())
         })?;
-        let total = kept.iter().map(Pairs::len).sum();
-        let pays = motion.learn(boxes.len(), &changes, total, rebuilt);
+        let kept_pairs = kept.iter().map(Pairs::len).sum();
+        let pays = motion.learn(boxes.len(), &changes, &Work { kept_pairs, nodes: looked.into_inner(), rebuilt });
         Ok(match (kept.iter().all(Pairs::is_complete), pays) {
             (false, _) => Kept::Not,
             (true, false) => Kept::Dearly,

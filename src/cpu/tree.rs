@@ -132,12 +132,7 @@ impl Tree {
         Ok(())
     }
 
-    /// How many leaves hold boxes that may move. The pairs of all leaves are those that begin in one of these.
-    pub(crate) fn moving_leaves(&self) -> usize {
-        self.moving
-    }
-
-    /// Part `k` of `parts` of these leaves.
+    /// Part `k` of `parts` of the leaves that hold boxes that may move: all pairs are found from those.
     pub(crate) fn part(&self, k: usize, parts: usize) -> Range<usize> {
         part(self.moving, k, parts)
     }

@@ -34,6 +34,11 @@ impl Sample {
         Self::statistics(&Chosen::from(boxes))
     }
 
+    /// Looks at up to 256 of the boxes at these positions.
+    pub(crate) fn of_members(boxes: &[Aabb], members: &[u32]) -> Self {
+        Self::statistics(&Chosen::among(members.len(), |k| &boxes[members[k] as usize]))
+    }
+
     /// The statistics of boxes that were chosen elsewhere, of up to 256 of them.
     #[cfg(feature = "gpu")]
     pub(crate) fn of_all(boxes: &[Aabb]) -> Self {
@@ -105,21 +110,28 @@ pub(crate) struct Chosen {
 
 impl Chosen {
     pub(crate) fn from(boxes: &[Aabb]) -> Self {
+        Self::among(boxes.len(), |k| &boxes[k])
+    }
+
+    fn among<'a>(count: usize, of: impl Fn(usize) -> &'a Aabb) -> Self {
         let mut chosen = Self { boxes: [Aabb::default(); SAMPLE], count: 0 };
         // Twice the root of the count: the cost of the glance stays a small share of the frame's at every size, while the
         // share of overlapping pairs, which falls with the count, stays countable.
-        let wanted = boxes.len().min((2 * boxes.len().isqrt()).clamp(SMALLEST_SAMPLE, SAMPLE));
+        let wanted = count.min((2 * count.isqrt()).clamp(SMALLEST_SAMPLE, SAMPLE));
+        if wanted == 0 {
+            return chosen;
+        }
         // Others in each frame of a scene in which anything moves, and the same for the same boxes.
-        let probe = boxes.len() / 2;
-        let seed = boxes.get(probe).map_or(0, |b| mix(u64::from(b.min[0].to_bits()) << 32 | u64::from(b.min[1].to_bits())));
-        let start = |k: usize| (k as u64 * boxes.len() as u64 / wanted as u64) as usize;
+        let [x, y, _] = of(count / 2).min.map(f32::to_bits);
+        let seed = mix(u64::from(x) << 32 | u64::from(y));
+        let start = |k: usize| (k as u64 * count as u64 / wanted as u64) as usize;
         for k in 0..wanted {
             // One box out of each of `wanted` equal parts, at a place that differs from part to part: boxes of a kind may follow each other
             // at regular distances, and an even spacing could meet all of them or none.
             let (first, end) = (start(k), start(k + 1));
-            let at = first + (mix(seed ^ k as u64) % (end - first) as u64) as usize;
-            if boxes[at].defect().is_none() {
-                chosen.boxes[chosen.count] = boxes[at];
+            let b = of(first + (mix(seed ^ k as u64) % (end - first) as u64) as usize);
+            if b.defect().is_none() {
+                chosen.boxes[chosen.count] = *b;
                 chosen.count += 1;
             }
         }

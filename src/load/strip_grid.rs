@@ -2,7 +2,6 @@
 
 use super::sample::Sample;
 use crate::aabb::Aabb;
-use std::ops::RangeInclusive;
 
 /// Boxes that a strip holds on average. Their columns take 28 bytes each, so that a strip fits the first-level cache
 /// while there are enough strips to cut down the candidates.
@@ -45,13 +44,6 @@ impl StripSpan {
 
 /// More cells than this beyond the first, on either axis, don't fit into a span.
 const MOST_MORE: u32 = 0x7f;
-
-/// The cells that a box covers, ends included.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Cover {
-    pub(crate) first: [u32; 2],
-    pub(crate) last: [u32; 2],
-}
 
 impl StripGrid {
     /// A grid for `objects` boxes that look like the sample.
@@ -96,18 +88,10 @@ impl StripGrid {
         (self.cells[0] * self.cells[1]) as usize
     }
 
-    /// The cell of a strip.
-    pub(crate) fn cell(&self, strip: usize) -> [u32; 2] {
-        [strip as u32 % self.cells[0], strip as u32 / self.cells[0]]
-    }
-
-    /// The cells that a box covers.
-    #[inline]
-    pub(crate) fn cover(&self, b: &Aabb) -> Cover {
-        Cover {
-            first: [self.cell_of(0, b.min[self.across[0]]), self.cell_of(1, b.min[self.across[1]])],
-            last: [self.cell_of(0, b.max[self.across[0]]), self.cell_of(1, b.max[self.across[1]])],
-        }
+    /// The first and the last cell that a box covers on each grid axis. Cell numbers stay below 2^16, which f32 holds.
+    pub(super) fn cells_of(&self, b: &Aabb) -> [(f32, f32); 2] {
+        let bound = |d: usize, v: f32| ((v - self.origin[d]) * self.inverse_width[d]).max(0.0).min(self.last[d]).floor();
+        [0, 1].map(|d| (bound(d, b.min[self.across[d]]), bound(d, b.max[self.across[d]])))
     }
 
     /// The strips in which a box stands, on the sweep axis `AXIS`, which is the grid's.
@@ -128,7 +112,10 @@ impl StripGrid {
         StripSpan((y * self.cells[0] + x) | more_x << 16 | more_y << 24)
     }
 
-    /// Calls `f` for each strip of a span, with [`Cover::begins`] there.
+    /// Calls `f` for each strip of a span, with a mask: bit d is set when the strip is the first of this box on grid axis d.
+    ///
+    /// Two boxes that share several strips overlap first, on each axis, in the cell where the later of them begins. So the one strip in which
+    /// both bits are set in either box is the one that reports the pair.
     #[inline(always)]
     pub(crate) fn each_strip(&self, span: StripSpan, mut f: impl FnMut(usize, u32)) {
         let StripSpan(packed) = span;
@@ -147,16 +134,11 @@ impl StripGrid {
             }
         }
     }
-
-    /// The cell of a bound, which never descends as the bound ascends: that alone makes the strips correct. Bounds outside
-    /// the grid go to the border cells. The cast saturates and sends NaN to 0.
-    #[inline]
-    fn cell_of(&self, d: usize, bound: f32) -> u32 {
-        (((bound - self.origin[d]) * self.inverse_width[d]) as u32).min(self.cells[d] - 1)
-    }
 }
 
 /// Four cell numbers along two axes, which take turns: `cells` held between 0 and `last`, NaN at 0, without their fractions.
+///
+/// None descends as its bound ascends: that alone makes the strips correct. Bounds outside the grid go to the cells at its border.
 #[inline(always)]
 fn cell_numbers(cells: [f32; 4], last: [f32; 2]) -> [u32; 4] {
     let mut at = [0.0_f32; 4];
@@ -170,38 +152,26 @@ fn cell_numbers(cells: [f32; 4], last: [f32; 2]) -> [u32; 4] {
     at.map(|cell| unsafe { cell.max(0.0).to_int_unchecked::<i32>() } as u32)
 }
 
-impl Cover {
-    /// All cells of one row of the grid.
-    pub(crate) fn columns(&self) -> RangeInclusive<u32> {
-        self.first[0]..=self.last[0]
-    }
-
-    /// The rows of the grid.
-    pub(crate) fn rows(&self) -> RangeInclusive<u32> {
-        self.first[1]..=self.last[1]
-    }
-
-    /// Whether a cell is covered.
-    pub(crate) fn contains(&self, cell: [u32; 2]) -> bool {
-        self.columns().contains(&cell[0]) && self.rows().contains(&cell[1])
-    }
-
-    /// Bit d is set when the cell is the first of this box on grid axis d.
-    ///
-    /// Two boxes that share several strips overlap first, on each axis, in the cell where the later of them begins. So
-    /// the one strip in which both bits are set in either box is the one that reports the pair.
-    #[inline]
-    pub(crate) fn begins(&self, cell: [u32; 2]) -> u32 {
-        u32::from(self.first[0] == cell[0]) | u32::from(self.first[1] == cell[1]) << 1
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn grid(boxes: &[Aabb]) -> StripGrid {
         StripGrid::plan(&Sample::of(boxes), boxes.len())
+    }
+
+    /// The cell of a bound on a grid axis, as the definition has it.
+    fn cell(grid: &StripGrid, d: usize, bound: f32) -> u32 {
+        // The cast saturates and sends NaN to 0.
+        (((bound - grid.origin[d]) * grid.inverse_width[d]) as u32).min(grid.cells[d] - 1)
+    }
+
+    /// The cells of a span and the mask in each.
+    fn strips(grid: &StripGrid, span: StripSpan) -> Vec<([u32; 2], u32)> {
+        let mut strips = Vec::new();
+        let row = grid.cells[0];
+        grid.each_strip(span, |strip, begins| strips.push(([strip as u32 % row, strip as u32 / row], begins)));
+        strips
     }
 
     #[test]
@@ -212,21 +182,22 @@ mod tests {
         assert_eq!(grid.axis, 0);
         assert!(grid.strips() > 20, "{grid:?}");
         let bounds = [f32::NEG_INFINITY, -1.0e30, -5.0, 0.0, 13.0, 50.0, 99.0, 1.0e30, f32::INFINITY];
-        let cells = bounds.map(|b| grid.cell_of(0, b));
+        let cells = bounds.map(|b| cell(&grid, 0, b));
         assert!(cells.is_sorted(), "{cells:?}");
-        // Boxes in strips and large ones, which are asked strip by strip, must agree on the cells.
+        assert_eq!((cells[0], cells[8]), (0, grid.cells[0] - 1));
         for low in bounds {
             for high in bounds.into_iter().filter(|&h| h >= low) {
                 let b = Aabb::new([1.0, low, low * 0.5], [2.0, high, high * 0.5]);
-                let (span, cover) = (grid.span::<0>(&b), grid.cover(&b));
-                let mut strips = Vec::new();
-                grid.each_strip(span, |strip, begins| strips.push((grid.cell(strip), begins)));
-                let expected = cover.rows().flat_map(|y| cover.columns().map(move |x| [x, y]));
-                let expected: Vec<_> = expected.map(|cell| (cell, cover.begins(cell))).collect();
+                let span = grid.span::<0>(&b);
+                let strips = strips(&grid, span);
+                let cells = [0, 1].map(|d| cell(&grid, d, b.min[1 + d])..=cell(&grid, d, b.max[1 + d]));
+                let [columns, rows] = &cells;
+                let expected = rows.clone().flat_map(|y| columns.clone().map(move |x| [x, y]));
+                let first = |d: usize, at: u32| u32::from(at == *cells[d].start()) << d;
+                let expected: Vec<_> = expected.map(|at| (at, first(0, at[0]) | first(1, at[1]))).collect();
                 assert!(span == StripSpan::APART || strips == expected, "{b:?}: {strips:?}");
             }
         }
-        assert_eq!((cells[0], cells[8]), (0, grid.cells[0] - 1));
     }
 
     #[test]
@@ -247,12 +218,11 @@ mod tests {
 
     #[test]
     fn a_pair_is_reported_by_the_strip_where_the_later_box_begins() {
-        let a = Cover { first: [1, 2], last: [3, 3] };
-        let b = Cover { first: [2, 1], last: [2, 3] };
-        let owners: Vec<[u32; 2]> = (0..5)
-            .flat_map(|x| (0..5).map(move |y| [x, y]))
-            .filter(|&c| a.contains(c) && b.contains(c) && a.begins(c) | b.begins(c) == 3)
-            .collect();
+        let grid = StripGrid { cells: [5, 5], ..StripGrid::default() };
+        let span = |x: u32, y: u32, more_x: u32, more_y: u32| strips(&grid, StripSpan(y * 5 + x | more_x << 16 | more_y << 24));
+        let (a, b) = (span(1, 2, 2, 1), span(2, 1, 0, 2));
+        let shared = a.iter().flat_map(|&(at, begins)| b.iter().filter(move |(other, _)| *other == at).map(move |o| (at, begins | o.1)));
+        let owners: Vec<[u32; 2]> = shared.filter(|&(_, begins)| begins == 3).map(|(at, _)| at).collect();
         assert_eq!(owners, [[2, 2]]);
     }
 }

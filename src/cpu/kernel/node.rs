@@ -20,11 +20,11 @@ pub(crate) struct Node {
 /// Boxes that are together compared with those of a tree.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Group {
-    pub(crate) node: Node,
+    node: Node,
     /// What contains all of them.
-    pub(crate) bounds: Aabb,
+    bounds: Aabb,
     /// Their positions in the input.
-    pub(crate) ids: [u32; LANES],
+    ids: [u32; LANES],
 }
 
 /// The nodes of a tree and the box in each lane of its leaves, to be walked through.
@@ -99,6 +99,21 @@ impl Node {
             }
         }
         meet.iter().enumerate().fold(0, |mask, (lane, &meet)| mask | u32::from(meet) << lane)
+    }
+}
+
+impl Group {
+    /// No box yet, and one to come within these bounds.
+    pub(crate) fn of(bounds: &Aabb) -> Self {
+        Self { node: Node::EMPTY, bounds: *bounds, ids: [0; LANES] }
+    }
+
+    /// Puts a box into a lane that is still empty.
+    #[inline]
+    pub(crate) fn set(&mut self, lane: usize, b: &Aabb, id: u32) {
+        self.node.set(lane, b);
+        self.bounds = self.bounds.union(b);
+        self.ids[lane] = id;
     }
 }
 
@@ -389,13 +404,9 @@ mod tests {
             (0..j).filter(|&i| boxes[i as usize].overlaps(&boxes[j as usize])).for_each(|i| expected.push(i, j));
         });
         let outside: Vec<Aabb> = (0..LANES).map(|k| Aabb::cube([2.0 * k as f32, 8.0, 8.0], 3.0)).collect();
-        let mut group = Group { node: Node::EMPTY, bounds: outside[0], ids: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15] };
+        let mut group = Group::of(&outside[0]);
         // Lane 15 holds nothing.
-        for (lane, b) in outside[..15].iter().enumerate() {
-            group.node.set(lane, b);
-            group.ids[lane] = 1000 + lane as u32;
-            group.bounds = group.bounds.union(b);
-        }
+        outside[..15].iter().enumerate().for_each(|(lane, b)| group.set(lane, b, 1000 + lane as u32));
         let across = outside[..15].iter().flat_map(|a| boxes.iter().filter(|b| a.overlaps(b))).count();
         for simd in Simd::every() {
             let mut found = Pairs::new();

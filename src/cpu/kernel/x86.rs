@@ -1,6 +1,6 @@
 //! SSE2, which every x86-64 CPU has, AVX2 and AVX-512.
 
-use super::{Lanes, Query, Rows, View, brute, query_from, sweep};
+use super::{Lanes, Query, Rows, View, brute, sweep};
 use crate::cpu::level::{Avx2, Avx512};
 use crate::pair::Pair;
 use crate::pairs::Pairs;
@@ -141,11 +141,6 @@ pub(super) fn brute_avx2(proof: Avx2, view: &View<'_>, rows: Range<usize>, pairs
     brute(proof, view, rows, pairs);
 }
 
-#[target_feature(enable = "avx2")]
-pub(super) fn query_avx2(proof: Avx2, view: &View<'_>, start: usize, query: &Query, pairs: &mut Pairs) {
-    query_from(proof, view, start, query, pairs);
-}
-
 #[target_feature(enable = "avx512f")]
 pub(super) fn sweep_avx512<R: Rows>(proof: Avx512, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
     sweep::<_, R>(proof, view, rows, pairs);
@@ -154,9 +149,4 @@ pub(super) fn sweep_avx512<R: Rows>(proof: Avx512, view: &View<'_>, rows: Range<
 #[target_feature(enable = "avx512f")]
 pub(super) fn brute_avx512(proof: Avx512, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
     brute(proof, view, rows, pairs);
-}
-
-#[target_feature(enable = "avx512f")]
-pub(super) fn query_avx512(proof: Avx512, view: &View<'_>, start: usize, query: &Query, pairs: &mut Pairs) {
-    query_from(proof, view, start, query, pairs);
 }

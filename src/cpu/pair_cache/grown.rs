@@ -7,6 +7,7 @@ use crate::cpu::kernel::contain::{each_doubtful_block, within};
 use crate::cpu::level::Simd;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
+use crate::filter::Filter;
 use std::ops::Range;
 
 /// Contains no box, not even an infinite one: whatever has no grown box yet is seen to have left it.
@@ -17,9 +18,18 @@ const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
 pub(super) struct Grown {
     boxes: Vec<Aabb>,
     len: usize,
-    /// Bit k of word w is set when box 64 w + k got a new grown box in this frame, or is gone.
-    dirty: Vec<u64>,
+    /// Of 64 boxes each.
+    flags: Vec<Flags>,
     simd: Simd,
+}
+
+/// One bit for each of 64 boxes.
+#[derive(Debug, Clone, Copy, Default)]
+struct Flags {
+    /// The box got a new grown box in this frame, or is gone.
+    dirty: u64,
+    /// The box is fixed: its pairs with other fixed boxes are not kept.
+    fixed: u64,
 }
 
 /// How much a box is grown on each side: a share of its mean edge.
@@ -55,7 +65,7 @@ pub(super) struct Changes {
 
 impl Grown {
     pub(super) fn new(simd: Simd) -> Self {
-        Self { boxes: Vec::new(), len: 0, dirty: Vec::new(), simd }
+        Self { boxes: Vec::new(), len: 0, flags: Vec::new(), simd }
     }
 
     pub(super) fn as_slice(&self) -> &[Aabb] {
@@ -70,15 +80,15 @@ impl Grown {
     /// Makes room for `objects` boxes.
     pub(super) fn reserve(&mut self, objects: usize) -> Result<(), Error> {
         ensure(&mut self.boxes, objects, "grown boxes")?;
-        ensure(&mut self.dirty, objects.div_ceil(64) + 1, "grown boxes")
+        ensure(&mut self.flags, objects.div_ceil(64) + 1, "grown boxes")
     }
 
-    /// Boxes in the share of one task; a multiple of 64, so that no two tasks write to one word of `dirty`.
+    /// Boxes in the share of one task; a multiple of 64, so that no two tasks write to the flags of one box.
     fn share_len(&self, tasks: usize) -> usize {
         self.len.div_ceil(tasks).next_multiple_of(64).max(64)
     }
 
-    /// One phase: makes a new grown box for every box that is not within its own.
+    /// One phase: makes a new grown box for every box that is not within its own, and for those that are no longer fixed.
     ///
     /// # Errors
     /// [`Error::InvalidBox`]; what is known of the grown boxes is then of no use.
@@ -87,6 +97,7 @@ impl Grown {
         workers: &Workers,
         boxes: &[Aabb],
         margin: Margin,
+        filter: Option<&Filter>,
         shares: &mut [Share],
     ) -> Result<Changes, Error> {
         self.reserve(boxes.len().max(self.len))?;
@@ -103,15 +114,16 @@ impl Grown {
         }
         let simd = self.simd;
         let grown = (&mut self.boxes[..self.len], size);
-        let dirty = (&mut self.dirty[..self.len.div_ceil(64)], size / 64);
-        workers.each_share(shares, grown, dirty, |k, share, grown, dirty| {
+        let flags = (&mut self.flags[..self.len.div_ceil(64)], size / 64);
+        workers.each_share(shares, grown, flags, |k, share, grown, flags| {
             let first = k * size;
-            share.error = share.check(&boxes[first..first + grown.len()], grown, dirty, first, margin, simd).err();
+            free(flags, grown, first, filter);
+            share.error = share.check(&boxes[first..first + grown.len()], grown, flags, first, margin, simd).err();
         });
         shares.iter_mut().find_map(|s| s.error.take()).map_or(Ok(()), Err)?;
         // Kept pairs of boxes that are gone go with the pairs of those that left.
         for id in gone.clone() {
-            self.dirty[id / 64] |= 1 << (id % 64);
+            self.flags[id / 64].dirty |= 1 << (id % 64);
         }
         let left = shares.iter().map(|s| s.left.len()).sum::<usize>() + gone.len();
         Ok(Changes { left, far_away: shares.iter().map(|s| s.far_away).sum(), new, gone })
@@ -121,25 +133,29 @@ impl Grown {
     pub(super) fn grow_all(&mut self, workers: &Workers, boxes: &[Aabb], margin: Margin, shares: &mut [Share]) {
         let size = self.share_len(shares.len());
         shares.iter_mut().for_each(|share| share.left.clear());
-        let (grown, dirty) = ((&mut self.boxes[..self.len], size), (&mut self.dirty[..self.len.div_ceil(64)], size / 64));
-        workers.each_share(shares, grown, dirty, |k, _, grown, dirty| {
-            dirty.fill(0);
+        let (grown, flags) = ((&mut self.boxes[..self.len], size), (&mut self.flags[..self.len.div_ceil(64)], size / 64));
+        workers.each_share(shares, grown, flags, |k, _, grown, flags| {
+            flags.iter_mut().for_each(|flags| flags.dirty = 0);
             for (grown, b) in grown.iter_mut().zip(&boxes[k * size..]) {
                 *grown = margin.grow(b);
             }
         });
     }
 
-    /// Calls `found` for every box whose grown box overlaps the new one of box `i`. Of two boxes with new ones, the lower is
-    /// told of the higher.
+    /// Calls `found` for every box whose grown box overlaps the new one of box `i`, but for two fixed ones. Of two boxes with new ones, the
+    /// lower is told of the higher. Returns how many nodes of the tree were looked at.
     #[inline]
-    pub(super) fn meet(&self, tree: &GrownTree, i: u32, mut found: impl FnMut(u32)) {
-        let bounds = &self.boxes[i as usize];
+    pub(super) fn meet(&self, tree: &GrownTree, i: u32, mut found: impl FnMut(u32)) -> u32 {
+        let (bounds, fixed) = (&self.boxes[i as usize], self.is_fixed(i));
         tree.overlapping(bounds, |j| {
-            if j > i || !self.is_new(j) {
+            if (j > i || !self.is_new(j)) && !(fixed && self.is_fixed(j)) {
                 found(j);
             }
-        });
+        })
+    }
+
+    fn is_fixed(&self, id: u32) -> bool {
+        self.flags[id as usize / 64].fixed >> (id % 64) & 1 == 1
     }
 
     /// Whether a kept pair has a box that got a new grown box, or is gone.
@@ -152,7 +168,19 @@ impl Grown {
     /// Whether a box got a new grown box, or is gone.
     #[inline(always)]
     pub(super) fn is_new(&self, id: u32) -> bool {
-        self.dirty[id as usize / 64] >> (id % 64) & 1 == 1
+        self.flags[id as usize / 64].dirty >> (id % 64) & 1 == 1
+    }
+}
+
+/// Takes in which boxes are fixed now. One that is no longer has pairs that are not kept: it is given a grown box that it has left.
+fn free(flags: &mut [Flags], grown: &mut [Aabb], first: usize, filter: Option<&Filter>) {
+    for ((flags, grown), first) in flags.iter_mut().zip(grown.chunks_mut(64)).zip((first..).step_by(64)) {
+        let fixed = filter.map_or(0, |f| (0..grown.len()).fold(0, |bits, k| bits | u64::from(f.is_fixed(first + k)) << k));
+        let freed = flags.fixed & !fixed;
+        flags.fixed = fixed;
+        if freed != 0 {
+            grown.iter_mut().enumerate().filter(|(k, _)| freed >> k & 1 == 1).for_each(|(_, grown)| *grown = NOTHING);
+        }
     }
 }
 
@@ -161,12 +189,12 @@ impl Share {
         &mut self,
         boxes: &[Aabb],
         grown: &mut [Aabb],
-        dirty: &mut [u64],
+        flags: &mut [Flags],
         first: usize,
         margin: Margin,
         simd: Simd,
     ) -> Result<(), Error> {
-        dirty.fill(0);
+        flags.iter_mut().for_each(|flags| flags.dirty = 0);
         let mut invalid = None;
         each_doubtful_block(simd, boxes, grown, |at, block| {
             for (k, grown) in block.iter_mut().enumerate() {
@@ -180,7 +208,7 @@ impl Share {
                 }
                 let before = std::mem::replace(grown, margin.grow(b));
                 self.far_away += usize::from(!before.overlaps(grown));
-                dirty[(at + k) / 64] |= 1 << ((at + k) % 64);
+                flags[(at + k) / 64].dirty |= 1 << ((at + k) % 64);
                 self.left.push((first + at + k) as u32);
             }
         });

@@ -13,10 +13,10 @@ mod cost {
     pub(super) const KEPT: f32 = 2.5;
     /// A box looked at again in a frame in which some box left.
     pub(super) const AGAIN: f32 = 1.0;
-    /// A box that left, and each of its kept pairs, while the tree is in the cache.
-    pub(super) const LEFT: [f32; 2] = [120.0, 20.0];
-    /// A box and a pair in the strips.
-    pub(super) const SCRATCH: [f32; 2] = [30.0, 7.0];
+    /// A box that left, and each node of the tree that is looked at for it, while the tree is in the cache.
+    pub(super) const LEFT: [f32; 2] = [60.0, 10.0];
+    /// A box and a pair found by a tree from scratch.
+    pub(super) const SCRATCH: [f32; 2] = [40.0, 7.0];
 }
 
 /// Margins that are compared, as shares of a mean edge.
@@ -35,6 +35,20 @@ const MARGIN_STEP: f32 = 1.005;
 
 /// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
 const PROVEN: u32 = 256;
+
+/// Nodes of a tree that are looked at for a box, before any was counted.
+const NODES: f32 = 12.0;
+
+/// What a frame in which pairs were kept has done.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Work {
+    /// Kept pairs that were tested.
+    pub(super) kept_pairs: usize,
+    /// Nodes of the tree that were looked at for boxes that left.
+    pub(super) nodes: u64,
+    /// Whether tree and pairs were made again.
+    pub(super) rebuilt: bool,
+}
 
 /// What the next frame should do.
 #[derive(Debug, Clone, Copy)]
@@ -67,6 +81,8 @@ struct Keeping {
     /// Share of the boxes that leave in a frame and kept pairs for each box, averaged over the last [`LEARNING`] frames.
     leaving: f32,
     kept: f32,
+    /// Nodes looked at for each box that left, averaged in the same way.
+    nodes: f32,
     /// Boxes that left since all were made again, over all boxes.
     left: f32,
     /// Frames since keeping began.
@@ -123,15 +139,15 @@ impl Motion {
         })
     }
 
-    /// Learns from a frame in which boxes left as `changes` says and `kept` pairs were tested. `false` when keeping does not pay
-    /// any more.
-    pub(super) fn learn(&mut self, objects: usize, changes: &Changes, kept: usize, rebuilt: bool) -> bool {
+    /// Learns from a frame in which boxes left as `changes` says. `false` when keeping does not pay any more.
+    pub(super) fn learn(&mut self, objects: usize, changes: &Changes, did: &Work) -> bool {
         let far = far(objects);
         let scratch = scratch(far, self.density);
         let Some(k) = &mut self.keeping else { return false };
         let share = |count: usize| count as f32 / objects.max(1) as f32;
-        let (left, kept) = (share(changes.left), share(kept));
-        let leaving = if left > 0.0 { cost::AGAIN + self::left(far, kept) * left } else { 0.0 };
+        let (left, kept, rebuilt) = (share(changes.left), share(did.kept_pairs), did.rebuilt);
+        let nodes = did.nodes as f32 / changes.left.max(1) as f32;
+        let leaving = if left > 0.0 { cost::AGAIN + self::left(far, nodes) * left } else { 0.0 };
         let work = if rebuilt { 1.5 * self::scratch(far, kept) } else { leaving };
         let now = tests(far, kept) + work;
         k.cost += (now - k.cost) / 16.0;
@@ -141,12 +157,13 @@ impl Motion {
         } else {
             k.left += worn(objects, changes);
             k.leaving += (left - k.leaving) / LEARNING;
+            k.nodes += if changes.left > 0 { (nodes - k.nodes) / LEARNING } else { 0.0 };
         }
         // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p with p
         // between 1, for those that fly straight on, and 2, for those that wander.
         let m = k.margin.share;
         let (keep, leave) =
-            ((tests(far, k.kept) - cost::BOX) * 6.0 * m / (1.0 + 2.0 * m), 1.5 * self::left(far, k.kept) * k.leaving);
+            ((tests(far, k.kept) - cost::BOX) * 6.0 * m / (1.0 + 2.0 * m), 1.5 * self::left(far, k.nodes) * k.leaving);
         if leave > 1.2 * keep {
             k.margin.share = (m * MARGIN_STEP).min(MARGINS[MARGINS.len() - 1]);
         } else if keep > 1.2 * leave {
@@ -176,7 +193,7 @@ impl Motion {
         let scratch = scratch(far, self.density);
         let cost = |m: f32| {
             let kept = self.density * (1.0 + 2.0 * m).powi(3);
-            tests(far, kept) + cost::AGAIN + left(far, kept) * leaving(motion, m)
+            tests(far, kept) + cost::AGAIN + left(far, NODES) * leaving(motion, m)
         };
         let best = MARGINS.into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
         let kept = self.density * (1.0 + 2.0 * best).powi(3);
@@ -185,6 +202,7 @@ impl Motion {
             cost: cost(best),
             leaving: leaving(motion, best),
             kept,
+            nodes: NODES,
             left: 0.0,
             frames: 0,
         })
@@ -203,7 +221,7 @@ fn worn(objects: usize, changes: &Changes) -> f32 {
     (changes.left as f32 + FAR_AWAY * changes.far_away as f32) / objects.max(1) as f32
 }
 
-/// The cost of a box in the strips.
+/// The cost of a box from scratch.
 fn scratch(far: f32, density: f32) -> f32 {
     far.sqrt() * (cost::SCRATCH[0] + cost::SCRATCH[1] * density)
 }
@@ -213,9 +231,9 @@ fn tests(far: f32, kept: f32) -> f32 {
     cost::BOX + far.sqrt() * cost::KEPT * kept
 }
 
-/// The cost of a box that left when each box has this many kept pairs.
-fn left(far: f32, kept: f32) -> f32 {
-    far * (cost::LEFT[0] + cost::LEFT[1] * kept)
+/// The cost of a box that left when this many nodes are looked at for each.
+fn left(far: f32, nodes: f32) -> f32 {
+    far * (cost::LEFT[0] + cost::LEFT[1] * nodes)
 }
 
 /// How many times as much a look at a node of the tree costs than in a small scene: with the number of objects the tree
@@ -271,10 +289,11 @@ mod tests {
         (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
         let frames = |far_away: usize, motion: &mut Motion| {
             let changes = Changes { left: 10, far_away, new: 0..0, gone: 0..0 };
-            motion.learn(1000, &changes, 1000, true);
+            let did = |rebuilt| Work { kept_pairs: 1000, nodes: 120, rebuilt };
+            motion.learn(1000, &changes, &did(true));
             (0..1000)
                 .take_while(|_| {
-                    motion.learn(1000, &changes, 1000, false);
+                    motion.learn(1000, &changes, &did(false));
                     !motion.wants_rebuild(1000, &changes)
                 })
                 .count()
