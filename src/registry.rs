@@ -148,9 +148,9 @@ impl Registry {
     ///
     /// An algorithm on K threads has the calling thread and K - 1 of the pool, so the most is one more than the pool has; beyond that
     /// it is [unavailable](Entry::unavailable). Called from within the pool (`install`, `scope`, a job), a frame takes no more
-    /// threads than the pool has. Each phase of a frame is a scope of rayon, with rayon's rules: it ends when the pool has come
-    /// to its jobs, so a thread of the pool must not wait for the one that calls, and a caller that is one of them may run
-    /// other jobs of the pool meanwhile. [Pinning](Self::pin_threads) does not apply: where the pool's threads run is the
+    /// threads than the pool has. The pool's threads are invited and not waited for: those that are free help, the caller does what is left,
+    /// and a frame beside a pool that is busy with other jobs takes as long as on one thread. A caller that is a thread of a pool runs none of
+    /// its other jobs meanwhile, so it may hold a lock that they want. [Pinning](Self::pin_threads) does not apply: where the pool's threads run is the
     /// program's business. The pool is of [the version of rayon](crate::rayon1) that this library exports.
     ///
     /// ```

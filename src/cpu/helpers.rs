@@ -1,5 +1,6 @@
 //! The threads that help the calling one, and where they run.
 
+use crate::cpu::phases::Phases;
 use crate::error::Unavailable;
 use core_affinity::CoreId;
 use std::cell::Cell;
@@ -10,9 +11,16 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 #[derive(Debug)]
 pub(crate) struct Helpers {
     pool: Arc<rayon::ThreadPool>,
-    seats: Option<Seats>,
+    shared: Arc<Shared>,
     /// Whether the caller may be a thread of the pool itself, as it may be of a pool that the program gave.
     may_call: bool,
+}
+
+/// What a helper that was invited finds when it comes, which may be after all else of this is gone.
+#[derive(Debug)]
+struct Shared {
+    phases: Phases,
+    seats: Option<Seats>,
 }
 
 /// Cores for the helpers and one more. A scheduler that wakes a bound helper on the core of the caller would have them take turns
@@ -44,37 +52,44 @@ impl Helpers {
             free: AtomicUsize::new(0),
             caller: AtomicUsize::new(usize::MAX),
         });
-        Ok(Self { pool: Arc::new(build_pool(count, 1, pinned)?), seats, may_call: false })
+        Ok(Self::over(Arc::new(build_pool(count, 1, pinned)?), seats, false))
     }
 
     /// The threads of a program's pool, which may run on any core.
     pub(crate) fn of(pool: Arc<rayon::ThreadPool>) -> Self {
-        Self { pool, seats: None, may_call: true }
+        Self::over(pool, None, true)
     }
 
-    /// Runs `helper` on `count` helpers and `caller` here, which is told how many those are. Returns when all are done.
+    fn over(pool: Arc<rayon::ThreadPool>, seats: Option<Seats>, may_call: bool) -> Self {
+        Self { pool, shared: Arc::new(Shared { phases: Phases::default(), seats }), may_call }
+    }
+
+    /// Runs `work` here and on up to `count` helpers, those that come while it lasts. Returns when no one works on it any more.
     ///
-    /// A caller that is one of them can't help itself: then there is one less to help.
-    pub(crate) fn run(&self, count: usize, helper: impl Fn() + Sync, caller: impl FnOnce(usize) + Send) {
-        if let Some(seats) = &self.seats {
+    /// A caller that is one of them can't help itself: then there is one less to help. It runs no other job of its pool meanwhile.
+    pub(crate) fn run(&self, count: usize, work: &(dyn Fn() + Sync)) {
+        if let Some(seats) = &self.shared.seats {
             seats.caller.store(current_core(), Relaxed);
         }
-        let count = if self.may_call && self.pool.current_thread_index().is_some() {
-            count.min(self.pool.current_num_threads() - 1)
-        } else {
-            count
-        };
-        self.pool.in_place_scope(|scope| {
-            for _ in 0..count {
-                scope.spawn(|_| {
-                    self.make_way();
-                    helper();
-                });
-            }
-            caller(count);
+        let most = self.pool.current_num_threads();
+        let most = if self.may_call && self.pool.current_thread_index().is_some() { most - 1 } else { most };
+        self.shared.phases.run(count.min(most), most, work, || {
+            let shared = Arc::clone(&self.shared);
+            self.pool.spawn(move || {
+                shared.make_way();
+                shared.phases.join();
+            });
         });
     }
 
+    /// Invitations that no helper has come upon yet.
+    #[cfg(test)]
+    pub(crate) fn invited(&self) -> usize {
+        self.shared.phases.invited()
+    }
+}
+
+impl Shared {
     /// Moves this helper to the free core if it is bound to that of the caller.
     fn make_way(&self) {
         let (Some(seats), Some(index)) = (&self.seats, rayon::current_thread_index()) else { return };
@@ -117,15 +132,19 @@ fn current_core() -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::{Barrier, Mutex};
+    use std::sync::atomic::AtomicBool;
+    use std::sync::{Barrier, Mutex, mpsc};
     use std::thread::{ThreadId, current};
 
-    /// The threads that help when `threads` are asked for, and how many the caller was told.
-    fn helping(helpers: &Helpers, threads: usize) -> (Vec<ThreadId>, usize) {
-        let (seen, told) = (Mutex::new(Vec::new()), AtomicUsize::new(usize::MAX));
-        let note = || seen.lock().unwrap().push(current().id());
-        helpers.run(threads, note, |count| told.store(count, Relaxed));
-        (seen.into_inner().unwrap(), told.into_inner())
+    /// The threads that work where `threads` helpers are wanted and `all` are there at once, the caller among them.
+    fn working(helpers: &Helpers, threads: usize, all: usize) -> Vec<ThreadId> {
+        let (seen, all) = (Mutex::new(Vec::new()), Barrier::new(all));
+        helpers.run(threads, &|| {
+            seen.lock().unwrap().push(current().id());
+            // Were it one less, no one would get past this; were it one more, that one would be left behind.
+            all.wait();
+        });
+        seen.into_inner().unwrap()
     }
 
     #[test]
@@ -135,21 +154,56 @@ mod tests {
             let size = size as usize;
             let own = pool.broadcast(|_| current().id());
             let helpers = Helpers::of(Arc::clone(&pool));
-            let (seen, told) = helping(&helpers, size);
-            assert!(seen.len() == size && told == size && seen.iter().all(|id| own.contains(id)));
-            let (seen, told) = pool.install(|| helping(&helpers, size));
-            assert!(seen.len() == size - 1 && told == size - 1 && seen.iter().all(|id| own.contains(id)));
+            let seen = working(&helpers, size, size + 1);
+            assert!(seen.len() == size + 1 && seen.iter().filter(|id| own.contains(id)).count() == size);
+            let seen = pool.install(|| working(&helpers, size, size));
+            assert!(seen.len() == size && seen.iter().all(|id| own.contains(id)));
         }
     }
 
-    /// Were one helper less started, none of them would get past the barrier.
+    /// As many invitations as the pool has threads wait in its queue, however many frames call meanwhile.
     #[test]
-    fn all_helpers_work_at_the_same_time() {
-        let pool = Arc::new(build_pool(3, 0, false).unwrap());
+    fn a_busy_pool_is_neither_waited_for_nor_flooded() {
+        let pool = Arc::new(build_pool(2, 0, false).unwrap());
         let helpers = Helpers::of(Arc::clone(&pool));
-        let all = Barrier::new(4);
-        helpers.run(3, || _ = all.wait(), |_| _ = all.wait());
-        let others = Barrier::new(3);
-        pool.install(|| helpers.run(3, || _ = others.wait(), |_| _ = others.wait()));
+        let (came, here) = mpsc::channel();
+        let gates: Vec<_> = (0..2)
+            .map(|_| {
+                let (came, (open, gate)) = (came.clone(), mpsc::channel::<()>());
+                pool.spawn(move || {
+                    came.send(()).unwrap();
+                    let _ = gate.recv();
+                });
+                open
+            })
+            .collect();
+        (0..2).for_each(|_| here.recv().unwrap());
+        let worked = AtomicUsize::new(0);
+        for _ in 0..1000 {
+            helpers.run(2, &|| _ = worked.fetch_add(1, Relaxed));
+        }
+        assert_eq!((worked.load(Relaxed), helpers.invited()), (1000, 2));
+        drop(gates);
+        // The old invitations serve a phase that comes later.
+        assert_eq!(working(&helpers, 2, 3).len(), 3);
+    }
+
+    #[test]
+    fn a_panic_in_the_programs_pool_reaches_the_caller() {
+        let pool = Arc::new(build_pool(1, 0, false).unwrap());
+        let helpers = Helpers::of(Arc::clone(&pool));
+        let (both, done) = (Barrier::new(2), AtomicBool::new(false));
+        let caller = current().id();
+        let run = || {
+            helpers.run(1, &|| {
+                both.wait();
+                assert!(current().id() == caller, "a helper panics");
+                done.store(true, Relaxed);
+            });
+        };
+        let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_err();
+        assert_eq!((caught.downcast_ref(), done.into_inner()), (Some(&"a helper panics"), true));
+        // The pool's thread is none the worse.
+        assert_eq!(working(&helpers, 1, 2).len(), 2);
     }
 }

@@ -8,6 +8,8 @@ mod helpers;
 mod kernel;
 mod level;
 mod pair_cache;
+#[cfg(feature = "parallel")]
+mod phases;
 mod sap;
 mod sort;
 mod threads;

@@ -10,10 +10,7 @@ use crate::cpu::helpers::Helpers;
 use crate::error::Error;
 use crate::pairs::Pairs;
 #[cfg(feature = "parallel")]
-use std::sync::{
-    Arc, Mutex, PoisonError,
-    atomic::{AtomicUsize, Ordering},
-};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The threads of one algorithm: the caller's own, and those of a pool that help it.
 #[derive(Debug)]
@@ -31,11 +28,6 @@ const SMALLEST_FILL: usize = 1024;
 
 /// Pairs that are joined on all threads; fewer are copied in less time than a phase takes.
 const SMALLEST_JOIN: usize = 16_384;
-
-/// Rounds for which the caller looks whether its helpers are done before it goes to sleep: some 20 us on the machine of the
-/// first reports. To be woken takes longer than most of what is left of a task by then.
-#[cfg(feature = "parallel")]
-const SPINS: u32 = 1000;
 
 impl Workers {
     /// `threads` threads for the algorithm `method`.
@@ -73,20 +65,7 @@ impl Workers {
         if let Some(helpers) = self.helpers.as_ref().filter(|_| tasks.size_hint().1.is_none_or(|most| most > 1)) {
             let queue = Mutex::new(tasks);
             let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
-            let drain = || std::iter::from_fn(next).for_each(&work);
-            let done = AtomicUsize::new(0);
-            let helper = || {
-                drain();
-                done.fetch_add(1, Ordering::Release);
-            };
-            return helpers.run(self.threads - 1, helper, |helping| {
-                drain();
-                let mut spins = 0;
-                while done.load(Ordering::Acquire) < helping && spins < SPINS {
-                    std::hint::spin_loop();
-                    spins += 1;
-                }
-            });
+            return helpers.run(self.threads - 1, &|| std::iter::from_fn(next).for_each(&work));
         }
         tasks.for_each(work);
     }
