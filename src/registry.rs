@@ -131,14 +131,18 @@ impl Registry {
         self.simd = self.simd.min(level);
     }
 
-    /// Binds each thread that helps the calling one, in the pools that are made from now on, to a core of its own. The
-    /// calling thread is not bound, because what it starts would be bound with it; on Linux a helper moves to a free core when it
-    /// finds the caller on its own.
+    /// Binds each thread that helps the calling one, in the pools that are made from now on, to a CPU of its own: one for each physical
+    /// core before any has two, on Linux, beginning at another core in each process and with other CPUs for each pool of a process where
+    /// there are enough. The calling thread is not bound, because what it starts would be bound with it; on Linux a helper moves to a free CPU
+    /// when it finds the caller on its own core. Where a cgroup limits the time on the CPUs no thread is bound: the quota is for any of
+    /// them, and a bound thread could not move away from those that other containers use.
     ///
-    /// Some schedulers, those of virtual machines above all, wake two threads of a pool on one core and leave the other
-    /// idle for milliseconds: on the machine of the first reports nothing under 3 ms gained from a second thread. The
-    /// command measures and runs with pinned threads. It is off unless asked for, because a pinned thread can't move away
-    /// from a core that another thread of the program keeps busy.
+    /// For a program that has the machine to itself. Some schedulers, those of virtual machines above all, wake two threads of a pool on one
+    /// core and leave the other idle for milliseconds: on the machine of the first reports nothing under 3 ms gained from a second thread. The
+    /// command measures and runs with pinned threads. It is off unless asked for, [`Adaptive::for_this_machine`] included, because a pinned
+    /// thread can't move away from a core that another thread of the program keeps busy.
+    ///
+    /// [`Adaptive::for_this_machine`]: crate::StartOptions
     pub fn pin_threads(&mut self) {
         self.threads.pinned = true;
     }

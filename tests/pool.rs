@@ -173,9 +173,9 @@ fn many_callers_share_a_pool() {
             for _ in 0..20 {
                 let mut frame = || algorithm.find_pairs(&boxes, &mut pairs).unwrap();
                 if inside {
-                    pool.install(frame)
+                    pool.install(frame);
                 } else {
-                    frame()
+                    frame();
                 }
                 assert!(pairs.as_slice() == expected);
             }
