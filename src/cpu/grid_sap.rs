@@ -90,6 +90,7 @@ impl BroadPhase for GridSap {
         pairs.clear();
         check_count(boxes.len())?;
         let Self { workers, finder, outputs } = self;
+        let workers = &workers.fit(boxes.len());
         let grid = plan.grid(boxes);
         outputs.collect(workers, pairs, |lists| finder.find(workers, &grid, boxes, lists))?;
         pairs.finish()
