@@ -57,11 +57,11 @@ fn every_algorithm(registry: &Registry, most: u32) -> Vec<(AlgorithmId, Box<dyn 
 
 /// Scenes with enough in them for every phase to have tasks for all threads.
 fn scenes() -> Vec<(&'static str, Vec<Aabb>)> {
-    let clustered = Scenario::Clustered.start(3000, 1).boxes().to_vec();
+    let clustered = Scenario::Clustered.start(6000, 1).boxes().to_vec();
     vec![
         ("nothing", Vec::new()),
         ("one box", vec![Aabb::cube([0.0; 3], 1.0)]),
-        ("cubes", Random(3).cubes(5000, [30.0; 3], 0.5)),
+        ("cubes", Random(3).cubes(6000, [32.0; 3], 0.5)),
         ("clusters", clustered),
     ]
 }
@@ -217,7 +217,7 @@ fn the_choice_keeps_to_the_pool() {
     let pool = pool(2);
     let registry = registry(8, &pool);
     let mut adaptive = Adaptive::new(Tuning::usual(&registry), &registry).unwrap();
-    let boxes = Random(11).cubes(6000, [40.0; 3], 0.5);
+    let boxes = Random(11).cubes(23_000, [62.0; 3], 0.5);
     let mut pairs = Pairs::with_order(PairOrder::Canonical);
     pool.install(|| adaptive.find_pairs(&boxes, &mut pairs)).unwrap();
     assert!(pairs.as_slice() == naive(&boxes));
