@@ -20,6 +20,8 @@ pub struct Registry {
     entries: Vec<Entry>,
     makers: Vec<Maker>,
     threads: Threads,
+    /// The most threads that an algorithm of ours may have.
+    cores: u32,
     simd: SimdLevel,
     #[cfg(feature = "gpu")]
     gpus: crate::gpu::Gpus,
@@ -39,20 +41,22 @@ impl Registry {
         Self::with_cores(usable_cores())
     }
 
-    /// Our algorithms on 1, 2, 4, ... and `cores` threads.
+    /// Our algorithms on 1, 2, 4, ... and `cores` threads. They can be had on any number up to `cores`, which may be more than the machine
+    /// has: that is for tests.
     #[must_use]
     pub fn with_cores(cores: u32) -> Self {
         let mut registry = Self {
             entries: Vec::new(),
             makers: Vec::new(),
             threads: Threads::default(),
+            cores: cores.clamp(1, MOST_THREADS),
             simd: SimdLevel::in_use(),
             #[cfg(feature = "gpu")]
             gpus: crate::gpu::Gpus::none(),
         };
         for method in cpu::METHODS {
             for threads in thread_counts(cores) {
-                let unavailable = registry.threads.unavailable(threads);
+                let unavailable = registry.unavailable(threads);
                 let entry = Entry::new(AlgorithmId::cpu(method.name, threads), method.revision);
                 registry.set(Entry { unavailable, ..entry }, Maker::Ours);
             }
@@ -182,9 +186,14 @@ impl Registry {
         }
         for (entry, maker) in self.entries.iter_mut().zip(&self.makers) {
             if let (&Backend::Cpu(threads), Maker::Ours) = (entry.id.backend(), maker) {
-                entry.unavailable = self.threads.unavailable(threads);
+                entry.unavailable = unavailable(&self.threads, self.cores, threads);
             }
         }
+    }
+
+    /// Why an algorithm of ours can't have `threads` threads, if it can't.
+    fn unavailable(&self, threads: u32) -> Option<Unavailable> {
+        unavailable(&self.threads, self.cores, threads)
     }
 
     /// Every algorithm, ours first.
@@ -237,17 +246,17 @@ impl Registry {
                 unavailable(Unavailable::OtherRevision { cost: revision, build: known.revision })
             }
             Some(_) if most.is_some_and(|most| id.threads() > most) => {
-                unavailable(Unavailable::TooFewCores { threads: id.threads() })
+                unavailable(Unavailable::TooFewCores { threads: id.threads(), most: most.unwrap_or(1) })
             }
             _ => None,
         }
     }
 
-    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads and on any of the GPUs
-    /// that were added.
+    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads up to the most that is listed, and on any
+    /// of the GPUs that were added.
     ///
     /// # Errors
-    /// [`Error::UnknownAlgorithm`] and [`Error::Unavailable`].
+    /// [`Error::UnknownAlgorithm`] and [`Error::Unavailable`]: a file from a larger machine names threads that this one has no cores for.
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
         match self.position(id).map(|at| &self.makers[at]) {
             Some(Maker::One(factory)) => return factory(),
@@ -255,7 +264,7 @@ impl Registry {
             Some(Maker::Ours) | None => {}
         }
         match (ours(id), id.backend()) {
-            (Some(method), &Backend::Cpu(threads)) => match self.threads.unavailable(threads) {
+            (Some(method), &Backend::Cpu(threads)) => match self.unavailable(threads) {
                 None => match method.create {
                     Create::OneWidth(create) => create(threads, &self.threads, Simd::at_most(self.simd)),
                     Create::AnyWidth(create) => create(&[threads], &self.threads, Simd::at_most(self.simd)),
@@ -300,7 +309,7 @@ impl Registry {
             Some(Maker::One(_)) => None,
             Some(Maker::Family(factory)) => Some(Family::Users(factory)),
             Some(Maker::Ours) | None => match ours(id)?.create {
-                Create::AnyWidth(create) if self.threads.unavailable(threads).is_none() => Some(Family::Ours(create)),
+                Create::AnyWidth(create) if self.unavailable(threads).is_none() => Some(Family::Ours(create)),
                 _ => None,
             },
         }
@@ -322,6 +331,11 @@ impl Family<'_> {
             _ => false,
         }
     }
+}
+
+/// Why an algorithm of ours can't have that many of `pool` in a registry of `cores` cores, if it can't.
+fn unavailable(pool: &Threads, cores: u32, threads: u32) -> Option<Unavailable> {
+    pool.unavailable(threads).or_else(|| (threads > cores).then_some(Unavailable::TooFewCores { threads, most: cores }))
 }
 
 /// The method of ours of this name on the CPU.
@@ -425,6 +439,32 @@ mod tests {
         // One that was replaced is no longer of the family.
         registry.add(ids[3].clone(), 1, || Ok(Box::new(Nothing)));
         assert!(registry.create_family(&[&ids[0], &ids[3]]).unwrap().is_none());
+    }
+
+    #[test]
+    fn no_file_starts_more_threads_than_there_are_cores() {
+        let registry = Registry::with_cores(3);
+        for text in ["grid-sap@cpu4096", "brute@cpu4", "pair-cache@cpu4"] {
+            let id: AlgorithmId = text.parse().unwrap();
+            let Err(error) = registry.create(&id) else { panic!("made {text}") };
+            if cfg!(feature = "parallel") {
+                assert!(error.to_string().contains("3 threads are the most here"), "{error}");
+            }
+            // Nor where all widths share one instance.
+            assert!(registry.create_family(&[&"pair-cache@cpu1".parse().unwrap(), &id]).unwrap().is_none());
+            // Tuning that has steps only.
+            let step = |from_objects, id: &str| crate::Step { from_objects, algorithm: id.parse().unwrap() };
+            let tuning = crate::Tuning::from_steps(vec![step(0, text), step(20, "brute@cpu1")]).unwrap();
+            let mut adaptive = crate::Adaptive::new(tuning, &registry).unwrap();
+            adaptive.find_pairs(&[Aabb::cube([0.0; 3], 1.0)], &mut Pairs::new()).unwrap();
+            assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "brute@cpu1");
+            assert!(crate::Adaptive::only(id, &registry).is_err());
+        }
+        if cfg!(feature = "parallel") {
+            for text in ["grid-sap@cpu2", "brute@cpu3", "pair-cache@cpu3"] {
+                assert!(registry.create(&text.parse().unwrap()).is_ok(), "{text}");
+            }
+        }
     }
 
     #[test]
