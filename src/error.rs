@@ -85,10 +85,12 @@ pub enum Unavailable {
         /// Threads of the pool.
         pool: u32,
     },
-    /// It needs more threads than this machine has cores.
+    /// It needs more threads than this machine has cores, or than [`Registry::with_cores`](crate::Registry::with_cores) says.
     TooFewCores {
         /// Threads that it needs.
         threads: u32,
+        /// The most that an algorithm may have.
+        most: u32,
     },
     /// The system refuses the threads.
     ThreadsRefused {
@@ -143,7 +145,13 @@ impl fmt::Display for Unavailable {
                     pool.saturating_add(1)
                 )
             }
-            Self::TooFewCores { threads } => write!(f, "it has {threads} threads, more than this machine has cores"),
+            Self::TooFewCores { threads, most } => {
+                write!(
+                    f,
+                    "it has {threads} threads, and {most} threads are the most here; predict again on this machine, \
+                     or ask for more with `Registry::with_cores`"
+                )
+            }
             Self::ThreadsRefused { threads, message } => write!(f, "{threads} threads can't be started: {message}"),
             Self::FixedThreads { wanted } => write!(f, "it can't run on {wanted} threads"),
             Self::OtherRevision { cost, build } => {

@@ -39,6 +39,8 @@ mod algorithm;
 mod broad_phase;
 #[cfg(feature = "this-machine")]
 mod calibrate;
+#[cfg(feature = "parallel")]
+mod cgroup;
 mod changes;
 mod cost;
 mod cpu;

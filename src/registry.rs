@@ -20,6 +20,8 @@ pub struct Registry {
     entries: Vec<Entry>,
     makers: Vec<Maker>,
     threads: Threads,
+    /// The most threads that an algorithm of ours may have.
+    cores: u32,
     simd: SimdLevel,
     #[cfg(feature = "gpu")]
     gpus: crate::gpu::Gpus,
@@ -39,20 +41,22 @@ impl Registry {
         Self::with_cores(usable_cores())
     }
 
-    /// Our algorithms on 1, 2, 4, ... and `cores` threads.
+    /// Our algorithms on 1, 2, 4, ... and `cores` threads. They can be had on any number up to `cores`, which may be more than the machine
+    /// has: that is for tests.
     #[must_use]
     pub fn with_cores(cores: u32) -> Self {
         let mut registry = Self {
             entries: Vec::new(),
             makers: Vec::new(),
             threads: Threads::default(),
+            cores: cores.clamp(1, MOST_THREADS),
             simd: SimdLevel::in_use(),
             #[cfg(feature = "gpu")]
             gpus: crate::gpu::Gpus::none(),
         };
         for method in cpu::METHODS {
             for threads in thread_counts(cores) {
-                let unavailable = registry.threads.unavailable(threads);
+                let unavailable = registry.unavailable(threads);
                 let entry = Entry::new(AlgorithmId::cpu(method.name, threads), method.revision);
                 registry.set(Entry { unavailable, ..entry }, Maker::Ours);
             }
@@ -131,14 +135,18 @@ impl Registry {
         self.simd = self.simd.min(level);
     }
 
-    /// Binds each thread that helps the calling one, in the pools that are made from now on, to a core of its own. The
-    /// calling thread is not bound, because what it starts would be bound with it; on Linux a helper moves to a free core when it
-    /// finds the caller on its own.
+    /// Binds each thread that helps the calling one, in the pools that are made from now on, to a CPU of its own: one for each physical
+    /// core before any has two, on Linux, beginning at another core in each process and with other CPUs for each pool of a process where
+    /// there are enough. The calling thread is not bound, because what it starts would be bound with it; on Linux a helper moves to a free CPU
+    /// when it finds the caller on its own core. Where a cgroup limits the time on the CPUs no thread is bound: the quota is for any of
+    /// them, and a bound thread could not move away from those that other containers use.
     ///
-    /// Some schedulers, those of virtual machines above all, wake two threads of a pool on one core and leave the other
-    /// idle for milliseconds: on the machine of the first reports nothing under 3 ms gained from a second thread. The
-    /// command measures and runs with pinned threads. It is off unless asked for, because a pinned thread can't move away
-    /// from a core that another thread of the program keeps busy.
+    /// For a program that has the machine to itself. Some schedulers, those of virtual machines above all, wake two threads of a pool on one
+    /// core and leave the other idle for milliseconds: on the machine of the first reports nothing under 3 ms gained from a second thread. The
+    /// command measures and runs with pinned threads. It is off unless asked for, [`Adaptive::for_this_machine`] included, because a pinned
+    /// thread can't move away from a core that another thread of the program keeps busy.
+    ///
+    /// [`Adaptive::for_this_machine`]: crate::StartOptions
     pub fn pin_threads(&mut self) {
         self.threads.pinned = true;
     }
@@ -148,9 +156,9 @@ impl Registry {
     ///
     /// An algorithm on K threads has the calling thread and K - 1 of the pool, so the most is one more than the pool has; beyond that
     /// it is [unavailable](Entry::unavailable). Called from within the pool (`install`, `scope`, a job), a frame takes no more
-    /// threads than the pool has. Each phase of a frame is a scope of rayon, with rayon's rules: it ends when the pool has come
-    /// to its jobs, so a thread of the pool must not wait for the one that calls, and a caller that is one of them may run
-    /// other jobs of the pool meanwhile. [Pinning](Self::pin_threads) does not apply: where the pool's threads run is the
+    /// threads than the pool has. The pool's threads are invited and not waited for: those that are free help, the caller does what is left,
+    /// and a frame beside a pool that is busy with other jobs takes as long as on one thread. A caller that is a thread of a pool runs none of
+    /// its other jobs meanwhile, so it may hold a lock that they want. [Pinning](Self::pin_threads) does not apply: where the pool's threads run is the
     /// program's business. The pool is of [the version of rayon](crate::rayon1) that this library exports.
     ///
     /// ```
@@ -178,9 +186,14 @@ impl Registry {
         }
         for (entry, maker) in self.entries.iter_mut().zip(&self.makers) {
             if let (&Backend::Cpu(threads), Maker::Ours) = (entry.id.backend(), maker) {
-                entry.unavailable = self.threads.unavailable(threads);
+                entry.unavailable = unavailable(&self.threads, self.cores, threads);
             }
         }
+    }
+
+    /// Why an algorithm of ours can't have `threads` threads, if it can't.
+    fn unavailable(&self, threads: u32) -> Option<Unavailable> {
+        unavailable(&self.threads, self.cores, threads)
     }
 
     /// Every algorithm, ours first.
@@ -233,17 +246,17 @@ impl Registry {
                 unavailable(Unavailable::OtherRevision { cost: revision, build: known.revision })
             }
             Some(_) if most.is_some_and(|most| id.threads() > most) => {
-                unavailable(Unavailable::TooFewCores { threads: id.threads() })
+                unavailable(Unavailable::TooFewCores { threads: id.threads(), most: most.unwrap_or(1) })
             }
             _ => None,
         }
     }
 
-    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads and on any of the GPUs
-    /// that were added.
+    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads up to the most that is listed, and on any
+    /// of the GPUs that were added.
     ///
     /// # Errors
-    /// [`Error::UnknownAlgorithm`] and [`Error::Unavailable`].
+    /// [`Error::UnknownAlgorithm`] and [`Error::Unavailable`]: a file from a larger machine names threads that this one has no cores for.
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
         match self.position(id).map(|at| &self.makers[at]) {
             Some(Maker::One(factory)) => return factory(),
@@ -251,7 +264,7 @@ impl Registry {
             Some(Maker::Ours) | None => {}
         }
         match (ours(id), id.backend()) {
-            (Some(method), &Backend::Cpu(threads)) => match self.threads.unavailable(threads) {
+            (Some(method), &Backend::Cpu(threads)) => match self.unavailable(threads) {
                 None => match method.create {
                     Create::OneWidth(create) => create(threads, &self.threads, Simd::at_most(self.simd)),
                     Create::AnyWidth(create) => create(&[threads], &self.threads, Simd::at_most(self.simd)),
@@ -296,7 +309,7 @@ impl Registry {
             Some(Maker::One(_)) => None,
             Some(Maker::Family(factory)) => Some(Family::Users(factory)),
             Some(Maker::Ours) | None => match ours(id)?.create {
-                Create::AnyWidth(create) if self.threads.unavailable(threads).is_none() => Some(Family::Ours(create)),
+                Create::AnyWidth(create) if self.unavailable(threads).is_none() => Some(Family::Ours(create)),
                 _ => None,
             },
         }
@@ -318,6 +331,11 @@ impl Family<'_> {
             _ => false,
         }
     }
+}
+
+/// Why an algorithm of ours can't have that many of `pool` in a registry of `cores` cores, if it can't.
+fn unavailable(pool: &Threads, cores: u32, threads: u32) -> Option<Unavailable> {
+    pool.unavailable(threads).or_else(|| (threads > cores).then_some(Unavailable::TooFewCores { threads, most: cores }))
 }
 
 /// The method of ours of this name on the CPU.
@@ -421,6 +439,32 @@ mod tests {
         // One that was replaced is no longer of the family.
         registry.add(ids[3].clone(), 1, || Ok(Box::new(Nothing)));
         assert!(registry.create_family(&[&ids[0], &ids[3]]).unwrap().is_none());
+    }
+
+    #[test]
+    fn no_file_starts_more_threads_than_there_are_cores() {
+        let registry = Registry::with_cores(3);
+        for text in ["grid-sap@cpu4096", "brute@cpu4", "pair-cache@cpu4"] {
+            let id: AlgorithmId = text.parse().unwrap();
+            let Err(error) = registry.create(&id) else { panic!("made {text}") };
+            if cfg!(feature = "parallel") {
+                assert!(error.to_string().contains("3 threads are the most here"), "{error}");
+            }
+            // Nor where all widths share one instance.
+            assert!(registry.create_family(&[&"pair-cache@cpu1".parse().unwrap(), &id]).unwrap().is_none());
+            // Tuning that has steps only.
+            let step = |from_objects, id: &str| crate::Step { from_objects, algorithm: id.parse().unwrap() };
+            let tuning = crate::Tuning::from_steps(vec![step(0, text), step(20, "brute@cpu1")]).unwrap();
+            let mut adaptive = crate::Adaptive::new(tuning, &registry).unwrap();
+            adaptive.find_pairs(&[Aabb::cube([0.0; 3], 1.0)], &mut Pairs::new()).unwrap();
+            assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "brute@cpu1");
+            assert!(crate::Adaptive::only(id, &registry).is_err());
+        }
+        if cfg!(feature = "parallel") {
+            for text in ["grid-sap@cpu2", "brute@cpu3", "pair-cache@cpu3"] {
+                assert!(registry.create(&text.parse().unwrap()).is_ok(), "{text}");
+            }
+        }
     }
 
     #[test]

@@ -96,6 +96,20 @@ fn clusters_and_outliers() {
     assert_all_agree("clusters", &boxes, &mut algorithms);
 }
 
+/// Below these numbers of boxes not all of seven threads have work.
+#[test]
+fn scenes_for_seven_threads() {
+    let mut algorithms = every_algorithm();
+    for scenario in [Scenario::Uniform, Scenario::Clustered, Scenario::Mixed] {
+        assert_all_agree(&format!("a large {scenario}"), scenario.start(7500, 3).boxes(), &mut algorithms);
+    }
+    let mut random = Random(17);
+    assert_all_agree("a flat world", &random.cubes(7500, [400.0, 1.0, 1.0], 0.2), &mut algorithms);
+    let mut boxes = large_boxes();
+    boxes.extend(random.cubes(4000, [60.0, 50.0, 40.0], 0.3));
+    assert_all_agree("many large boxes", &boxes, &mut algorithms);
+}
+
 #[test]
 fn infinite_and_empty_boxes_are_legal() {
     let mut algorithms = every_algorithm();

@@ -6,7 +6,36 @@ use common::{Random, naive};
 use sapwise::rayon1::{self as rayon, ThreadPool, ThreadPoolBuilder};
 use sapwise::{Aabb, Adaptive, AlgorithmId, Backend, BroadPhase, Error, PairOrder, Pairs, Registry, Tuning};
 use sapwise_scenes::Scenario;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, mpsc};
+use std::time::Duration;
+
+/// Fails instead of hanging. The time is no measure of anything: it is a thousand times what this takes.
+fn ends(test: impl FnOnce() + Send + 'static) {
+    let (done, end) = mpsc::channel();
+    let thread = std::thread::spawn(move || {
+        // Dropped by a panic too.
+        let _done: mpsc::Sender<()> = done;
+        test();
+    });
+    assert_ne!(end.recv_timeout(Duration::from_secs(120)), Err(mpsc::RecvTimeoutError::Timeout), "it hangs");
+    thread.join().unwrap();
+}
+
+/// Occupies every thread of the pool until what it returns is dropped.
+fn occupied(pool: &ThreadPool) -> Vec<mpsc::Sender<()>> {
+    let (came, here) = mpsc::channel();
+    let occupy = |_| {
+        let (came, (open, gate)) = (came.clone(), mpsc::channel());
+        pool.spawn(move || {
+            came.send(()).unwrap();
+            let _ = gate.recv();
+        });
+        open
+    };
+    let gates: Vec<_> = (0..pool.current_num_threads()).map(occupy).collect();
+    gates.iter().for_each(|_| here.recv().unwrap());
+    gates
+}
 
 fn pool(threads: usize) -> Arc<ThreadPool> {
     Arc::new(ThreadPoolBuilder::new().num_threads(threads).build().unwrap())
@@ -28,11 +57,11 @@ fn every_algorithm(registry: &Registry, most: u32) -> Vec<(AlgorithmId, Box<dyn 
 
 /// Scenes with enough in them for every phase to have tasks for all threads.
 fn scenes() -> Vec<(&'static str, Vec<Aabb>)> {
-    let clustered = Scenario::Clustered.start(3000, 1).boxes().to_vec();
+    let clustered = Scenario::Clustered.start(6000, 1).boxes().to_vec();
     vec![
         ("nothing", Vec::new()),
         ("one box", vec![Aabb::cube([0.0; 3], 1.0)]),
-        ("cubes", Random(3).cubes(5000, [30.0; 3], 0.5)),
+        ("cubes", Random(3).cubes(6000, [32.0; 3], 0.5)),
         ("clusters", clustered),
     ]
 }
@@ -83,6 +112,83 @@ fn frames_in_every_thread_of_the_pool_end() {
     }
 }
 
+/// A worker of rayon's that holds a lock calls, while a job that wants the lock stands first in its queue: to wait by running other jobs would
+/// be to wait for oneself.
+#[test]
+fn a_worker_that_holds_a_lock_runs_no_other_job() {
+    ends(|| {
+        let pool = pool(2);
+        // With helpers of ours and with those of the pool.
+        for registry in [Registry::with_cores(7), registry(3, &pool)] {
+            let boxes = Random(7).cubes(12_000, [50.0; 3], 0.5);
+            let most = registry.available().iter().map(|e| e.id.threads()).max().unwrap();
+            for (_, mut algorithm) in every_algorithm(&registry, most) {
+                let lock = Arc::new(Mutex::new(0));
+                let mut pairs = Pairs::new();
+                pool.install(|| {
+                    for frame in 0..8 {
+                        let mut held = lock.lock().unwrap();
+                        let wants = Arc::clone(&lock);
+                        rayon::spawn(move || *wants.lock().unwrap() += 1);
+                        algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+                        *held += 1;
+                        assert!(*held > frame);
+                    }
+                });
+            }
+        }
+    });
+}
+
+#[test]
+fn frames_end_without_a_pool_whose_threads_are_all_busy() {
+    ends(|| {
+        let pool = pool(2);
+        let registry = registry(8, &pool);
+        let boxes = Random(9).cubes(12_000, [50.0; 3], 0.5);
+        let expected = naive(&boxes);
+        let gates = occupied(&pool);
+        for (id, mut algorithm) in every_algorithm(&registry, 3) {
+            let mut pairs = Pairs::with_order(PairOrder::Canonical);
+            for _ in 0..3 {
+                algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+                assert!(pairs.as_slice() == expected, "{id}");
+            }
+        }
+        drop(gates);
+    });
+}
+
+/// More callers than threads, on threads of their own and in the pool.
+#[test]
+fn many_callers_share_a_pool() {
+    ends(|| {
+        let pool = pool(3);
+        let registry = registry(4, &pool);
+        let boxes = Random(13).cubes(8000, [45.0; 3], 0.5);
+        let expected = naive(&boxes);
+        let run = |inside: bool| {
+            let mut algorithm = registry.create(&"grid-sap@cpu4".parse().unwrap()).unwrap();
+            let mut pairs = Pairs::with_order(PairOrder::Canonical);
+            for _ in 0..20 {
+                let mut frame = || algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+                if inside {
+                    pool.install(frame);
+                } else {
+                    frame();
+                }
+                assert!(pairs.as_slice() == expected);
+            }
+        };
+        std::thread::scope(|scope| {
+            for caller in 0..12 {
+                let run = &run;
+                scope.spawn(move || run(caller % 2 == 0));
+            }
+        });
+    });
+}
+
 #[test]
 fn more_threads_than_the_pool_has_are_unavailable_with_a_reason() {
     let pool = pool(4);
@@ -111,7 +217,7 @@ fn the_choice_keeps_to_the_pool() {
     let pool = pool(2);
     let registry = registry(8, &pool);
     let mut adaptive = Adaptive::new(Tuning::usual(&registry), &registry).unwrap();
-    let boxes = Random(11).cubes(6000, [40.0; 3], 0.5);
+    let boxes = Random(11).cubes(23_000, [62.0; 3], 0.5);
     let mut pairs = Pairs::with_order(PairOrder::Canonical);
     pool.install(|| adaptive.find_pairs(&boxes, &mut pairs)).unwrap();
     assert!(pairs.as_slice() == naive(&boxes));

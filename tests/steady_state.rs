@@ -103,7 +103,9 @@ fn a_steady_state_allocates_nothing() {
         for scenario in [Scenario::Uniform, Scenario::Mixed, Scenario::Gravity, Scenario::Fragmentation] {
             // Half of them with all extras, and each algorithm with and without.
             let extras = matches!(scenario, Scenario::Mixed | Scenario::Gravity);
-            let (counted, large) = allocations(scenario, 3000, FRAMES, algorithm.as_mut(), extras);
+            // Fewer would not keep four threads busy.
+            let objects = if id.threads() > 2 { 4096 } else { 3000 };
+            let (counted, large) = allocations(scenario, objects, FRAMES, algorithm.as_mut(), extras);
             // rayon allocates a job of some 100 bytes for each helper in each phase, and now and then a block of its queue.
             let phases = match id.method() {
                 "brute" => 4,

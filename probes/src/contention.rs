@@ -101,10 +101,11 @@ impl fmt::Display for Contended {
     }
 }
 
-/// The cores that a measurement on fewer than all leaves, from the last one on: a thread that shares its one core would lose
-/// half of its time, which says nothing about memory or cache. None where all are measured: there the scheduler decides.
+/// The cores for what runs beside a measurement on one thread, from the last one on: were that thread to share its core, it would lose
+/// half of its time, which says nothing about memory or cache. None beside more threads, which are bound to any cores, and none where all
+/// cores are measured: there the scheduler decides.
 fn spare_cores(all: Vec<CoreId>, threads: Option<u32>) -> Vec<CoreId> {
-    threads.map_or(Vec::new(), |used| all.into_iter().skip(used as usize).rev().collect())
+    if threads == Some(1) { all.into_iter().skip(1).rev().collect() } else { Vec::new() }
 }
 
 /// The buffer of all threads that take the cache. One for all of them: however many last-level caches the machine has and
@@ -149,11 +150,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whoever_is_beside_fewer_threads_keeps_off_their_cores() {
+    fn whoever_is_beside_one_thread_leaves_it_a_core() {
         let all = || (0..4).map(|id| CoreId { id }).collect::<Vec<_>>();
         let ids = |threads| spare_cores(all(), threads).iter().map(|c| c.id).collect::<Vec<_>>();
-        assert_eq!((ids(None), ids(Some(4))), (vec![], vec![]));
-        assert_eq!((ids(Some(1)), ids(Some(3))), (vec![3, 2, 1], vec![3]));
+        assert_eq!((ids(None), ids(Some(2)), ids(Some(4))), (vec![], vec![], vec![]));
+        assert_eq!(ids(Some(1)), [3, 2, 1]);
     }
 
     #[test]

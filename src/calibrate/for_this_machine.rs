@@ -89,8 +89,8 @@ fn in_background(options: &StartOptions, began: Instant) -> Result<Adaptive, Err
 
 /// The algorithms of a program that names none.
 fn usual_registry(with_gpus: bool) -> Registry {
+    #[cfg_attr(not(feature = "measure-gpu"), expect(unused_mut, reason = "there is nothing to add"))]
     let mut registry = Registry::new();
-    registry.pin_threads();
     #[cfg(feature = "measure-gpu")]
     if with_gpus {
         registry.add_gpus(&crate::gpu::Gpus::find().choose(|gpu| gpu.kind != crate::GpuKind::Software));

@@ -10,6 +10,9 @@ use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
 use crate::pairs::Pairs;
 
+/// Pairs that are tested in the time that a box takes in a grid, in round numbers.
+const PAIRS_PER_BOX: usize = 512;
+
 /// The method; see the module.
 #[derive(Debug)]
 struct Brute {
@@ -30,6 +33,7 @@ impl BroadPhase for Brute {
         check_count(boxes.len())?;
         self.columns.resize(boxes.len())?;
         let Self { workers, columns, outputs, simd } = self;
+        let workers = &workers.fit(boxes.len().saturating_mul(boxes.len()) / (2 * PAIRS_PER_BOX));
         workers.check(boxes)?;
         workers.fill(columns.as_mut(), |first, mut part| {
             for at in 0..part.len() {

@@ -34,6 +34,7 @@ impl BroadPhase for Bvh {
         pairs.clear();
         check_count(boxes.len())?;
         let Self { workers, tree, outputs } = self;
+        let workers = &workers.fit(boxes.len());
         tree.build(workers, boxes, Members::All, &plan.sample(boxes), pairs.filter())?;
         outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(tree.part(k, parts), list));
         pairs.finish()

@@ -102,7 +102,9 @@ impl BroadPhase for GridSap {
         check_count(boxes.len())?;
         let Self { workers, bins, apart, tree, tasks, outputs, simd } = self;
         let (grid, filter) = (plan.grid(boxes), pairs.filter());
+        let workers = &workers.fit(boxes.len());
         let threads = workers.threads();
+        let (bins, tasks) = (&mut bins[..threads], &mut tasks[..workers.tasks()]);
         workers.each(bins, |k, bin| {
             bin.error = bin.fill(&grid, boxes, part(boxes.len(), k, threads), threads, filter).err();
         });

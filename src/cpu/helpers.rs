@@ -1,104 +1,87 @@
 //! The threads that help the calling one, and where they run.
 
+use crate::cpu::phases::Phases;
+use crate::cpu::seats::Seats;
 use crate::error::Unavailable;
-use core_affinity::CoreId;
-use std::cell::Cell;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// A pool whose threads leave the calling thread's core to it, or one that a program gave.
+/// A pool of ours, or one that a program gave.
 #[derive(Debug)]
 pub(crate) struct Helpers {
     pool: Arc<rayon::ThreadPool>,
-    seats: Option<Seats>,
+    shared: Arc<Shared>,
     /// Whether the caller may be a thread of the pool itself, as it may be of a pool that the program gave.
     may_call: bool,
 }
 
-/// Cores for the helpers and one more. A scheduler that wakes a bound helper on the core of the caller would have them take turns
-/// there while another core idles.
+/// What a helper that was invited finds when it comes, which may be after all else of this is gone.
 #[derive(Debug)]
-struct Seats {
-    cores: Vec<CoreId>,
-    /// The core to which no helper is bound, as a position in `cores`.
-    free: AtomicUsize,
-    /// The core on which the caller last ran, as the system counts them.
-    caller: AtomicUsize,
-}
-
-thread_local! {
-    /// The core to which this helper is bound, as a position in [`Seats::cores`].
-    static SEAT: Cell<Option<usize>> = const { Cell::new(None) };
+struct Shared {
+    phases: Phases,
+    /// Where the helpers are bound, and one seat more for the caller.
+    seats: Option<Arc<Seats>>,
 }
 
 impl Helpers {
-    /// `count` helpers, each bound to a core of its own where that is wanted and there is one more core than that.
+    /// `count` helpers, each bound to a CPU of its own where that is wanted, allowed, and there is one more CPU than that.
     ///
     /// # Errors
     /// [`Unavailable::ThreadsRefused`].
     pub(crate) fn new(count: u32, pinned: bool) -> Result<Self, Unavailable> {
-        let mut cores = if pinned { core_affinity::get_core_ids().unwrap_or_default() } else { Vec::new() };
-        cores.truncate(count as usize + 1);
-        let seats = (cores.len() > count as usize).then(|| Seats {
-            cores,
-            free: AtomicUsize::new(0),
-            caller: AtomicUsize::new(usize::MAX),
-        });
-        Ok(Self { pool: Arc::new(build_pool(count, 1, pinned)?), seats, may_call: false })
+        let seats = if pinned { Seats::take(count as usize + 1).map(Arc::new) } else { None };
+        Ok(Self::over(Arc::new(build_pool(count, seats.clone(), 1)?), seats, false))
     }
 
     /// The threads of a program's pool, which may run on any core.
     pub(crate) fn of(pool: Arc<rayon::ThreadPool>) -> Self {
-        Self { pool, seats: None, may_call: true }
+        Self::over(pool, None, true)
     }
 
-    /// Runs `helper` on `count` helpers and `caller` here, which is told how many those are. Returns when all are done.
+    fn over(pool: Arc<rayon::ThreadPool>, seats: Option<Arc<Seats>>, may_call: bool) -> Self {
+        Self { pool, shared: Arc::new(Shared { phases: Phases::default(), seats }), may_call }
+    }
+
+    /// Runs `work` here and on up to `count` helpers, those that come while it lasts. Returns when no one works on it any more.
     ///
-    /// A caller that is one of them can't help itself: then there is one less to help.
-    pub(crate) fn run(&self, count: usize, helper: impl Fn() + Sync, caller: impl FnOnce(usize) + Send) {
-        if let Some(seats) = &self.seats {
-            seats.caller.store(current_core(), Relaxed);
+    /// A caller that is one of them can't help itself: then there is one less to help. It runs no other job of its pool meanwhile.
+    pub(crate) fn run(&self, count: usize, work: &(dyn Fn() + Sync)) {
+        if let Some(seats) = &self.shared.seats {
+            seats.follow_caller();
         }
-        let count = if self.may_call && self.pool.current_thread_index().is_some() {
-            count.min(self.pool.current_num_threads() - 1)
-        } else {
-            count
-        };
-        self.pool.in_place_scope(|scope| {
-            for _ in 0..count {
-                scope.spawn(|_| {
-                    self.make_way();
-                    helper();
-                });
-            }
-            caller(count);
+        let most = self.pool.current_num_threads();
+        let most = if self.may_call && self.pool.current_thread_index().is_some() { most - 1 } else { most };
+        self.shared.phases.run(count.min(most), most, work, || {
+            let shared = Arc::clone(&self.shared);
+            self.pool.spawn(move || {
+                if let Some(seats) = &shared.seats {
+                    seats.make_way();
+                }
+                shared.phases.join();
+            });
         });
     }
 
-    /// Moves this helper to the free core if it is bound to that of the caller.
-    fn make_way(&self) {
-        let (Some(seats), Some(index)) = (&self.seats, rayon::current_thread_index()) else { return };
-        // The pool bound helper k to core k + 1.
-        let seat = SEAT.get().unwrap_or(index + 1);
-        if seats.cores[seat].id == seats.caller.load(Relaxed) {
-            let free = seats.free.swap(seat, Relaxed);
-            core_affinity::set_for_current(seats.cores[free]);
-            SEAT.set(Some(free));
-        }
+    /// Invitations that no helper has come upon yet.
+    #[cfg(test)]
+    pub(crate) fn invited(&self) -> usize {
+        self.shared.phases.invited()
     }
 }
 
-/// A pool of `threads` threads, each bound to a core of its own, from core number `first` on, where that is wanted and there
-/// are enough.
+/// A pool of `threads` threads, each bound to a CPU of its own where there are enough and [that is allowed](crate::cpu::seats::may_bind).
 ///
 /// # Errors
 /// [`Unavailable::ThreadsRefused`].
-pub(crate) fn build_pool(threads: u32, first: usize, pinned: bool) -> Result<rayon::ThreadPool, Unavailable> {
-    let cores = if pinned { core_affinity::get_core_ids().unwrap_or_default() } else { Vec::new() };
+#[cfg(feature = "measure")]
+pub(crate) fn seated_pool(threads: u32) -> Result<rayon::ThreadPool, Unavailable> {
+    build_pool(threads, Seats::take(threads as usize).map(Arc::new), 0)
+}
+
+/// A pool of `threads` threads, of which number k has seat `first` + k.
+fn build_pool(threads: u32, seats: Option<Arc<Seats>>, first: usize) -> Result<rayon::ThreadPool, Unavailable> {
     let bind = move |k: usize| {
-        if let Some(&core) = cores.get(first + k).filter(|_| cores.len() >= first + threads as usize) {
-            // A refusal leaves the thread to the scheduler, as without pinning.
-            core_affinity::set_for_current(core);
+        if let Some(seats) = &seats {
+            seats.bind(first + k);
         }
     };
     let named = move |k| format!("sapwise-{threads}-{k}");
@@ -106,50 +89,81 @@ pub(crate) fn build_pool(threads: u32, first: usize, pinned: bool) -> Result<ray
     builder.build().map_err(|e| Unavailable::ThreadsRefused { threads, message: e.to_string() })
 }
 
-/// The core on which this thread runs now; a number that no core has where the system does not tell.
-fn current_core() -> usize {
-    #[cfg(target_os = "linux")]
-    return rustix::thread::sched_getcpu();
-    #[cfg(not(target_os = "linux"))]
-    usize::MAX
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::{Barrier, Mutex};
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+    use std::sync::{Barrier, Mutex, mpsc};
     use std::thread::{ThreadId, current};
 
-    /// The threads that help when `threads` are asked for, and how many the caller was told.
-    fn helping(helpers: &Helpers, threads: usize) -> (Vec<ThreadId>, usize) {
-        let (seen, told) = (Mutex::new(Vec::new()), AtomicUsize::new(usize::MAX));
-        let note = || seen.lock().unwrap().push(current().id());
-        helpers.run(threads, note, |count| told.store(count, Relaxed));
-        (seen.into_inner().unwrap(), told.into_inner())
+    /// The threads that work where `threads` helpers are wanted and `all` are there at once, the caller among them.
+    fn working(helpers: &Helpers, threads: usize, all: usize) -> Vec<ThreadId> {
+        let (seen, all) = (Mutex::new(Vec::new()), Barrier::new(all));
+        helpers.run(threads, &|| {
+            seen.lock().unwrap().push(current().id());
+            // Were it one less, no one would get past this; were it one more, that one would be left behind.
+            all.wait();
+        });
+        seen.into_inner().unwrap()
     }
 
     #[test]
     fn a_programs_threads_help_and_a_caller_among_them_does_not_help_itself() {
         for size in [1, 2, 4] {
-            let pool = Arc::new(build_pool(size, 0, false).unwrap());
+            let pool = Arc::new(build_pool(size, None, 0).unwrap());
             let size = size as usize;
             let own = pool.broadcast(|_| current().id());
             let helpers = Helpers::of(Arc::clone(&pool));
-            let (seen, told) = helping(&helpers, size);
-            assert!(seen.len() == size && told == size && seen.iter().all(|id| own.contains(id)));
-            let (seen, told) = pool.install(|| helping(&helpers, size));
-            assert!(seen.len() == size - 1 && told == size - 1 && seen.iter().all(|id| own.contains(id)));
+            let seen = working(&helpers, size, size + 1);
+            assert!(seen.len() == size + 1 && seen.iter().filter(|id| own.contains(id)).count() == size);
+            let seen = pool.install(|| working(&helpers, size, size));
+            assert!(seen.len() == size && seen.iter().all(|id| own.contains(id)));
         }
     }
 
-    /// Were one helper less started, none of them would get past the barrier.
+    /// As many invitations as the pool has threads wait in its queue, however many frames call meanwhile.
     #[test]
-    fn all_helpers_work_at_the_same_time() {
-        let pool = Arc::new(build_pool(3, 0, false).unwrap());
+    fn a_busy_pool_is_neither_waited_for_nor_flooded() {
+        let pool = Arc::new(build_pool(2, None, 0).unwrap());
         let helpers = Helpers::of(Arc::clone(&pool));
-        let all = Barrier::new(4);
-        helpers.run(3, || _ = all.wait(), |_| _ = all.wait());
-        let others = Barrier::new(3);
-        pool.install(|| helpers.run(3, || _ = others.wait(), |_| _ = others.wait()));
+        let (came, here) = mpsc::channel();
+        let gates: Vec<_> = (0..2)
+            .map(|_| {
+                let (came, (open, gate)) = (came.clone(), mpsc::channel::<()>());
+                pool.spawn(move || {
+                    came.send(()).unwrap();
+                    let _ = gate.recv();
+                });
+                open
+            })
+            .collect();
+        (0..2).for_each(|_| here.recv().unwrap());
+        let worked = AtomicUsize::new(0);
+        for _ in 0..1000 {
+            helpers.run(2, &|| _ = worked.fetch_add(1, Relaxed));
+        }
+        assert_eq!((worked.load(Relaxed), helpers.invited()), (1000, 2));
+        drop(gates);
+        // The old invitations serve a phase that comes later.
+        assert_eq!(working(&helpers, 2, 3).len(), 3);
+    }
+
+    #[test]
+    fn a_panic_in_the_programs_pool_reaches_the_caller() {
+        let pool = Arc::new(build_pool(1, None, 0).unwrap());
+        let helpers = Helpers::of(Arc::clone(&pool));
+        let (both, done) = (Barrier::new(2), AtomicBool::new(false));
+        let caller = current().id();
+        let run = || {
+            helpers.run(1, &|| {
+                both.wait();
+                assert!(current().id() == caller, "a helper panics");
+                done.store(true, Relaxed);
+            });
+        };
+        let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_err();
+        assert_eq!((caught.downcast_ref(), done.into_inner()), (Some(&"a helper panics"), true));
+        // The pool's thread is none the worse.
+        assert_eq!(working(&helpers, 1, 2).len(), 2);
     }
 }

@@ -9,14 +9,18 @@ mod helpers;
 mod kernel;
 mod level;
 mod pair_cache;
+#[cfg(feature = "parallel")]
+mod phases;
 mod sap;
+#[cfg(feature = "parallel")]
+mod seats;
 mod sort;
 mod threads;
 mod tree;
 mod workers;
 
 #[cfg(feature = "measure")]
-pub(crate) use helpers::build_pool;
+pub(crate) use helpers::seated_pool;
 pub(crate) use level::Simd;
 pub use level::{SimdLevel, SimdLevelError};
 pub(crate) use threads::Threads;

@@ -55,6 +55,7 @@ impl BroadPhase for Sap {
         self.resize(boxes.len())?;
         let axis = plan.sample(boxes).sweep_axis();
         let Self { workers, keys, scratch, columns, outputs, simd } = self;
+        let workers = &workers.fit(boxes.len());
         workers.check(boxes)?;
         workers.map(boxes, &mut keys[..boxes.len()], |id, b| u64::from(order_key(b.min[axis])) << 32 | id as u64);
         sort(workers, &mut keys[..boxes.len()], scratch)?;

@@ -31,12 +31,14 @@ pub(crate) fn sort(workers: &Workers, keys: &mut [u64], scratch: &mut Vec<u64>) 
     let part = (len / workers.tasks()).max(SMALLEST_MERGE);
     let (mut from, mut to, mut swapped) = (&mut *keys, &mut *scratch, false);
     while run < len {
+        // Each run of two ends in a part that may be short.
+        let most = len.div_ceil(part) + len.div_ceil(2 * run);
         let pairs_of_runs = from.chunks(2 * run).zip(to.chunks_mut(2 * run));
         let parts = pairs_of_runs.flat_map(|(from, to)| {
             let (a, b) = from.split_at(run.min(from.len()));
             to.chunks_mut(part).zip((0..).step_by(part)).map(move |(to, first)| (a, b, first, to))
         });
-        workers.each_of(parts, |(a, b, first, to)| merge_part(a, b, first, to));
+        workers.each_of(parts.take(most), |(a, b, first, to)| merge_part(a, b, first, to));
         (from, to, swapped) = (to, from, !swapped);
         run *= 2;
     }

@@ -38,7 +38,7 @@ impl Threads {
     /// Which threads these are: `pinned`, `free`, or `given` by the program.
     #[cfg(feature = "this-machine")]
     pub(crate) fn kind(&self) -> &'static str {
-        match (&self.given, self.pinned) {
+        match (&self.given, self.pinned && crate::cpu::seats::may_bind()) {
             (Some(_), _) => "given",
             (None, true) => "pinned",
             (None, false) => "free",

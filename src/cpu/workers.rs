@@ -10,15 +10,13 @@ use crate::cpu::helpers::Helpers;
 use crate::error::Error;
 use crate::pairs::Pairs;
 #[cfg(feature = "parallel")]
-use std::sync::{
-    Arc, Mutex, PoisonError,
-    atomic::{AtomicUsize, Ordering},
-};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The threads of one algorithm: the caller's own, and those of a pool that help it.
 #[derive(Debug)]
 pub(crate) struct Workers {
     threads: usize,
+    tasks: usize,
     #[cfg(feature = "parallel")]
     helpers: Option<Arc<Helpers>>,
 }
@@ -26,16 +24,18 @@ pub(crate) struct Workers {
 /// Tasks for each thread: enough to even out tasks of unequal length, few enough to cost nothing.
 const TASKS_PER_THREAD: usize = 8;
 
+/// Boxes for which one more thread is worth its waking. Of the machines of the first reports one gained half from a second thread at 1800 boxes
+/// of `grid-sap`, the other nothing.
+const BOXES_PER_THREAD: usize = 1024;
+
+/// Boxes in a task at the least. With half of what a thread is worth, two tasks of unequal length even out.
+const SMALLEST_TASK: usize = BOXES_PER_THREAD / 2;
+
 /// Boxes that one task of a filling phase writes at the least; below, a task costs more than it saves.
 const SMALLEST_FILL: usize = 1024;
 
 /// Pairs that are joined on all threads; fewer are copied in less time than a phase takes.
 const SMALLEST_JOIN: usize = 16_384;
-
-/// Rounds for which the caller looks whether its helpers are done before it goes to sleep: some 20 us on the machine of the
-/// first reports. To be woken takes longer than most of what is left of a task by then.
-#[cfg(feature = "parallel")]
-const SPINS: u32 = 1000;
 
 impl Workers {
     /// `threads` threads for the algorithm `method`.
@@ -44,6 +44,7 @@ impl Workers {
         let _ = (method, pools);
         Ok(Self {
             threads: threads as usize,
+            tasks: if threads == 1 { 1 } else { threads as usize * TASKS_PER_THREAD },
             #[cfg(feature = "parallel")]
             helpers: if threads == 1 {
                 None
@@ -60,7 +61,19 @@ impl Workers {
 
     /// Tasks into which a phase is best divided: one when there is one thread.
     pub(crate) fn tasks(&self) -> usize {
-        if self.threads == 1 { 1 } else { self.threads * TASKS_PER_THREAD }
+        self.tasks
+    }
+
+    /// As many of these threads as a frame of `boxes` boxes keeps busy, and as many tasks. A frame that costs more or less for each box than that of
+    /// a grid says by how many boxes it is outweighed.
+    pub(crate) fn fit(&self, boxes: usize) -> Self {
+        let threads = self.threads.min(boxes / BOXES_PER_THREAD).max(1);
+        Self {
+            threads,
+            tasks: if threads == 1 { 1 } else { (threads * TASKS_PER_THREAD).min(boxes / SMALLEST_TASK) },
+            #[cfg(feature = "parallel")]
+            helpers: self.helpers.as_ref().filter(|_| threads > 1).map(Arc::clone),
+        }
     }
 
     /// One phase: hands out the tasks one by one to the caller and to its helpers. Returns when all are done.
@@ -69,24 +82,11 @@ impl Workers {
     #[cfg_attr(not(feature = "parallel"), expect(clippy::unused_self, reason = "without threads nobody helps"))]
     pub(crate) fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
         #[cfg(feature = "parallel")]
-        // A single task needs no help.
-        if let Some(helpers) = self.helpers.as_ref().filter(|_| tasks.size_hint().1.is_none_or(|most| most > 1)) {
+        // A single task needs no help, and no task more than one thread.
+        if let (Some(helpers), most @ 2..) = (&self.helpers, tasks.size_hint().1.unwrap_or(usize::MAX)) {
             let queue = Mutex::new(tasks);
             let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
-            let drain = || std::iter::from_fn(next).for_each(&work);
-            let done = AtomicUsize::new(0);
-            let helper = || {
-                drain();
-                done.fetch_add(1, Ordering::Release);
-            };
-            return helpers.run(self.threads - 1, helper, |helping| {
-                drain();
-                let mut spins = 0;
-                while done.load(Ordering::Acquire) < helping && spins < SPINS {
-                    std::hint::spin_loop();
-                    spins += 1;
-                }
-            });
+            return helpers.run((self.threads - 1).min(most - 1), &|| std::iter::from_fn(next).for_each(&work));
         }
         tasks.for_each(work);
     }
@@ -123,6 +123,7 @@ impl Workers {
         #[cfg(feature = "parallel")]
         if self.helpers.is_some() {
             let size = self.part_of(columns.len());
+            let count = columns.len().div_ceil(size);
             let (mut rest, mut first) = (Some(columns), 0);
             let parts = std::iter::from_fn(|| {
                 let columns = rest.take().filter(|c| c.len() > 0)?;
@@ -133,7 +134,7 @@ impl Workers {
                 rest = Some(behind);
                 Some((at, part))
             });
-            return self.each_of(parts, |(first, part)| fill(first, part));
+            return self.each_of(parts.take(count), |(first, part)| fill(first, part));
         }
         fill(0, columns);
     }
@@ -249,5 +250,83 @@ impl Outputs {
             Ok(())
         });
         debug_assert!(found.is_ok(), "nothing above fails");
+    }
+}
+
+#[cfg(all(test, feature = "parallel"))]
+mod tests {
+    use super::*;
+    use crate::cpu::level::{Simd, SimdLevel};
+    use crate::cpu::{Create, METHODS};
+    use crate::splitmix::mix;
+    use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+    use std::sync::mpsc;
+
+    /// The helpers of 128 threads, none of which comes before what is returned with them is dropped: whoever is invited is counted.
+    fn busy_helpers() -> (Threads, Arc<Helpers>, Vec<mpsc::Sender<()>>) {
+        let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(127).build().unwrap());
+        let gates = (0..127).map(|_| {
+            let (open, gate) = mpsc::channel::<()>();
+            pool.spawn(move || _ = gate.recv());
+            open
+        });
+        let gates = gates.collect();
+        let threads = Threads::of(pool);
+        let helpers = threads.helpers(127).unwrap();
+        (threads, helpers, gates)
+    }
+
+    #[test]
+    fn threads_and_tasks_follow_the_work() {
+        let wide = Workers::new("test", 128, &Threads::default()).unwrap();
+        for (boxes, threads, tasks) in [
+            (0, 1, 1),
+            (2047, 1, 1),
+            (2048, 2, 4),
+            (3000, 2, 5),
+            (10_000, 9, 19),
+            (131_072, 128, 256),
+            (600_000, 128, 1024),
+            (usize::MAX, 128, 1024),
+        ] {
+            let fit = wide.fit(boxes);
+            assert_eq!((fit.threads(), fit.tasks(), fit.helpers.is_some()), (threads, tasks, threads > 1), "{boxes} boxes");
+            let narrow = Workers::new("test", 2, &Threads::default()).unwrap().fit(boxes);
+            assert_eq!((narrow.threads(), narrow.tasks()), (threads.min(2), tasks.min(16)), "{boxes} boxes");
+        }
+        assert_eq!((wide.threads(), wide.tasks()), (128, 1024));
+    }
+
+    #[test]
+    fn no_more_helpers_are_invited_than_there_are_tasks_for() {
+        let (threads, helpers, _gates) = busy_helpers();
+        let wide = Workers::new("test", 128, &threads).unwrap();
+        let done = AtomicUsize::new(0);
+        let run = |tasks: usize| {
+            wide.each_of(0..tasks, |_| _ = done.fetch_add(1, Relaxed));
+            (done.swap(0, Relaxed), helpers.invited())
+        };
+        assert_eq!([run(1), run(2), run(5), run(1000)], [(1, 0), (2, 1), (5, 4), (1000, 127)]);
+    }
+
+    /// From the sources of a frame of 3000 boxes to its pairs, one of 127 helpers is asked.
+    #[test]
+    fn a_small_frame_of_many_threads_is_left_to_a_few() {
+        let scene = |count: u64| -> Vec<Aabb> {
+            let at = |k: u64| (mix(k) >> 40) as f32 / 1_048_576.0;
+            (0..count).map(|k| Aabb::cube([at(3 * k), at(3 * k + 1), at(3 * k + 2)], 0.1)).collect()
+        };
+        for name in ["brute", "sap", "grid-sap"] {
+            let (threads, helpers, _gates) = busy_helpers();
+            let method = METHODS.iter().find(|method| method.name == name).unwrap();
+            let Create::OneWidth(create) = method.create else { panic!("{name} has several widths") };
+            let mut algorithm = create(128, &threads, Simd::at_most(SimdLevel::in_use())).unwrap();
+            let mut pairs = Pairs::new();
+            algorithm.find_pairs(&scene(1000), &mut pairs).unwrap();
+            assert_eq!(helpers.invited(), 0, "{name}: 1000 boxes");
+            algorithm.find_pairs(&scene(3000), &mut pairs).unwrap();
+            // For brute force they are as much as 9000.
+            assert_eq!(helpers.invited(), if name == "brute" { 7 } else { 1 }, "{name}: 3000 boxes");
+        }
     }
 }

@@ -6,8 +6,9 @@ use std::time::Instant;
 
 use rayon::ThreadPool;
 
-use super::{Options, cache_sizes, cgroup, foreign_load, pool};
+use super::{Options, cache_sizes, foreign_load, pool};
 use crate::SimdLevel;
+use crate::cgroup;
 use crate::hardware::{Parameter, ParameterId};
 
 /// Bytes that STREAM counts for one element of triad: two read, one written, the line fetched before the write not counted.

@@ -7,7 +7,6 @@
 mod arithmetic;
 mod cache_sizes;
 mod caches;
-mod cgroup;
 mod clock;
 mod core_to_core;
 mod foreign_load;
@@ -200,7 +199,7 @@ pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
 ///
 /// The error is a sentence for [`Parameter::missing`]: a limit on processes can refuse the threads.
 fn pool(threads: usize) -> Result<ThreadPool, String> {
-    crate::cpu::build_pool(u32::try_from(threads).unwrap_or(u32::MAX), 0, true).map_err(|e| e.to_string())
+    crate::cpu::seated_pool(u32::try_from(threads).unwrap_or(u32::MAX)).map_err(|e| e.to_string())
 }
 
 /// What `threads` threads of the pool do together: the sum of their rates.

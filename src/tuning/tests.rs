@@ -74,16 +74,21 @@ fn rank_respects_what_is_usable() {
 }
 
 #[test]
-fn the_usual_tuning_are_sound_with_any_number_of_cores() {
-    for cores in [1, 2, 6] {
+fn the_usual_tuning_has_more_threads_where_there_is_more_work_and_never_many() {
+    let steps = |cores| -> Vec<(u32, String)> {
         let tuning = Tuning::usual(&Registry::with_cores(cores));
         assert_eq!(tuning.defect(), None);
-        let steps: Vec<_> = tuning.steps.iter().map(|s| (s.from_objects, s.algorithm.to_string())).collect();
-        let (most, parallel) = (format!("pair-cache@cpu{cores}"), cores > 1 && cfg!(feature = "parallel"));
-        let mut expected = vec![(0, "brute@cpu1".to_owned()), (80, "pair-cache@cpu1".to_owned())];
-        expected.extend(parallel.then_some((3000, most)));
-        assert_eq!(steps, expected);
-    }
+        tuning.steps.iter().map(|s| (s.from_objects, s.algorithm.to_string())).collect()
+    };
+    let expected = |parallel: &[(u32, u32)]| -> Vec<(u32, String)> {
+        let one = [(0, "brute@cpu1".to_owned()), (80, "pair-cache@cpu1".to_owned())];
+        let several = parallel.iter().map(|&(from, threads)| (from, format!("pair-cache@cpu{threads}")));
+        one.into_iter().chain(several.filter(|_| cfg!(feature = "parallel"))).collect()
+    };
+    assert_eq!(steps(1), expected(&[]));
+    assert_eq!(steps(2), expected(&[(10_000, 2)]));
+    assert_eq!(steps(6), expected(&[(10_000, 2), (40_000, 4), (90_000, 6)]));
+    assert_eq!(steps(128), expected(&[(10_000, 2), (40_000, 4), (160_000, 8), (640_000, 16)]));
 }
 
 #[test]

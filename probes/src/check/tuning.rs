@@ -3,7 +3,7 @@
 use super::{Finding, Here};
 use crate::gpus::uses;
 use crate::revisions;
-use sapwise::{AlgorithmId, Backend, GpuKind, Tuning, usable_cores};
+use sapwise::{AlgorithmId, Backend, GpuKind, Tuning};
 
 impl Here {
     pub(super) fn tuning(&self, tuning: &Tuning, finding: &mut Finding) {
@@ -34,8 +34,7 @@ impl Here {
             // The revision check reports an unknown method already, but tuning without costs has no revisions.
             _ if !revisions::is_known(revisions::of(id), &self.registry) => Some(format!("{id} is not in this build")),
             // Ours can be made on any number of threads, a user's only on those that are listed.
-            Backend::Cpu(threads) if *threads <= usable_cores() => self.registry.create(id).err().map(|e| e.to_string()),
-            Backend::Cpu(_) => Some(format!("{id} needs more than the {} cores of this machine", usable_cores())),
+            Backend::Cpu(_) => self.registry.create(id).err().map(|e| e.to_string()),
             Backend::Gpu(indices) => self.gpus().lacks(indices).map(|why| format!("{id} can't run here: {why}")),
             _ => Some(format!("{id} can't run here: this version does not know this kind of processor")),
         }

@@ -62,13 +62,16 @@ fn every_part_of_the_key_has_a_file_of_its_own() {
         with_gpu,
         new_driver,
         revised,
-        of(&pinned),
         of(&Registry::with_cores(1)),
         Key::new(&Registry::with_cores(2), &model).unwrap(),
         Key { version: "0.0.0".to_owned(), ..key() },
         Key { usable_cores: key().usable_cores + 1, ..key() },
         Key { machine: Machine { physical_id: "0".to_owned(), ..key().machine }, ..key() },
     ];
+    // Under a quota no thread is bound.
+    if pinned.helpers() == "pinned" {
+        keys.push(of(&pinned));
+    }
     if crate::cpu::SimdLevel::in_use() > crate::cpu::SimdLevel::Portable {
         keys.push(of(&slow));
     }

@@ -1,0 +1,306 @@
+//! Work that a caller shares with helpers who may come late, or never.
+//!
+//! A phase borrows from the caller's stack, and a job of a pool must own what it holds. The scopes of rayon bridge that by waiting for
+//! every job, and while they wait they run other jobs of the caller's pool, any of which may want a lock that the caller holds. Here a job
+//! is an invitation and owns no part of a phase: whoever comes gets the closure from the list of open phases, under its lock, and is counted
+//! from then on. The caller takes its phase off the list once nothing is left to do, and waits for those who are counted and for no one else.
+//!
+//! That takes the one `unsafe` of the library that is neither a kernel nor a query of a driver: a closure that borrows stands in a list
+//! which is shared. Safe code has nothing for that but scopes, which wait for jobs that never ran.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+/// What caller and helpers do, each until nothing is left to do.
+type Work<'a> = &'a (dyn Fn() + Sync);
+
+/// Rounds for which the caller looks whether its helpers are done before it goes to sleep: some 20 us on the machine of the
+/// first reports. To be woken takes longer than most of what is left of a task by then.
+const SPINS: u32 = 1000;
+
+/// In [`Latch::state`]: the caller sleeps.
+const ASLEEP: usize = 1;
+/// In [`Latch::state`]: one helper.
+const HELPER: usize = 2;
+
+/// The phases that can be joined, and how many helpers are on their way.
+#[derive(Default)]
+pub(crate) struct Phases {
+    list: Mutex<List>,
+}
+
+#[derive(Default)]
+struct List {
+    open: Vec<Open>,
+    /// Latches of phases that are over: a frame allocates none.
+    spare: Vec<Arc<Latch>>,
+    /// Invitations that nobody has come upon yet. They name no phase, so an old one serves a new phase.
+    invited: usize,
+}
+
+/// A phase that can be joined.
+struct Open {
+    /// Lives for as long as this stands in the list, and as long as `latch` counts a helper.
+    work: Work<'static>,
+    /// Helpers that may still join.
+    seats: usize,
+    latch: Arc<Latch>,
+}
+
+/// What the caller waits on.
+#[derive(Default)]
+struct Latch {
+    /// [`ASLEEP`], and [`HELPER`] times the helpers that have joined and not left.
+    state: AtomicUsize,
+    /// What the first helper panicked with.
+    panic: Mutex<Option<Box<dyn Any + Send>>>,
+    left: Condvar,
+}
+
+impl Phases {
+    /// Runs `work` here and on as many as `helpers` that come while it lasts. `invite` makes one [come](Self::join) some time, or never; no
+    /// more than `most` are on their way at once. Returns when no one works on it any more.
+    ///
+    /// # Panics
+    /// With what `work` panics here, else with what it panics on a helper.
+    pub(crate) fn run(&self, helpers: usize, most: usize, work: Work<'_>, invite: impl Fn()) {
+        let latch = self.list().spare.pop().unwrap_or_default();
+        // Made first: from here on nothing leaves this function, not even a panic, before the phase is closed.
+        let phase = Joinable { phases: self, latch: &latch };
+        // SAFETY: only the lifetime changes. The reference stands in the list until `phase` is dropped, which is within this function,
+        // where `work` lives. A helper copies it from the list under the lock, and is counted in the latch under that same lock;
+        // it counts itself off after its last use. Dropping `phase` takes the reference off the list and returns when none is counted.
+        let work_for_helpers = unsafe { std::mem::transmute::<Work<'_>, Work<'static>>(work) };
+        let missing = {
+            let mut list = self.list();
+            list.open.push(Open { work: work_for_helpers, seats: helpers, latch: Arc::clone(&latch) });
+            let wanted = list.open.iter().map(|open| open.seats).sum::<usize>().min(most);
+            let missing = wanted.saturating_sub(list.invited);
+            list.invited += missing;
+            missing
+        };
+        (0..missing).for_each(|_| invite());
+        work();
+        drop(phase);
+        let panic = lock(&latch.panic).take();
+        self.list().spare.push(latch);
+        if let Some(panic) = panic {
+            resume_unwind(panic);
+        }
+    }
+
+    /// Works on the phase that has been open the longest, if there is one with a seat. To be called once for each invitation.
+    pub(crate) fn join(&self) {
+        let joined = {
+            let mut list = self.list();
+            list.invited -= 1;
+            list.open.iter_mut().find(|open| open.seats > 0).map(|open| {
+                open.seats -= 1;
+                open.latch.state.fetch_add(HELPER, Ordering::Relaxed);
+                (open.work, Arc::clone(&open.latch))
+            })
+        };
+        let Some((work, latch)) = joined else { return };
+        // The caller works on after a panic here, and tells of it when all is done.
+        let mut end = catch_unwind(AssertUnwindSafe(work));
+        if end.is_err() {
+            let mut first = lock(&latch.panic);
+            if first.is_none() {
+                *first = std::mem::replace(&mut end, Ok(())).err();
+            }
+        }
+        latch.leave();
+    }
+
+    fn list(&self) -> MutexGuard<'_, List> {
+        lock(&self.list)
+    }
+
+    /// Invitations that nobody has come upon yet.
+    #[cfg(test)]
+    pub(crate) fn invited(&self) -> usize {
+        self.list().invited
+    }
+}
+
+/// A phase for as long as helpers may join it or work on it.
+struct Joinable<'a> {
+    phases: &'a Phases,
+    latch: &'a Arc<Latch>,
+}
+
+impl Drop for Joinable<'_> {
+    fn drop(&mut self) {
+        self.phases.list().open.retain(|open| !Arc::ptr_eq(&open.latch, self.latch));
+        self.latch.wait();
+    }
+}
+
+impl Latch {
+    /// Counts a helper off. The last one wakes the caller if that sleeps.
+    fn leave(&self) {
+        if self.state.fetch_sub(HELPER, Ordering::AcqRel) == HELPER | ASLEEP {
+            // Taken and released, so that the caller is either not yet asleep, and will look again, or can be woken.
+            drop(lock(&self.panic));
+            self.left.notify_one();
+        }
+    }
+
+    /// Returns when no helper is counted.
+    fn wait(&self) {
+        for _ in 0..SPINS {
+            if self.state.load(Ordering::Acquire) == 0 {
+                return;
+            }
+            std::hint::spin_loop();
+        }
+        self.state.fetch_or(ASLEEP, Ordering::AcqRel);
+        let mut held = lock(&self.panic);
+        while self.state.load(Ordering::Acquire) != ASLEEP {
+            held = self.left.wait(held).unwrap_or_else(PoisonError::into_inner);
+        }
+        self.state.store(0, Ordering::Relaxed);
+    }
+}
+
+/// A panic never happens while one of these is held, and would leave nothing half-done.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl std::fmt::Debug for Phases {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Phases").finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicBool;
+    use std::sync::mpsc;
+    use std::thread;
+
+    /// Numbers that are handed out one by one, and what was handed out.
+    struct Numbers {
+        next: AtomicUsize,
+        taken: Vec<AtomicBool>,
+    }
+
+    impl Numbers {
+        fn new(count: usize) -> Self {
+            Self { next: AtomicUsize::new(0), taken: (0..count).map(|_| AtomicBool::new(false)).collect() }
+        }
+
+        fn drain(&self) {
+            while let Some(taken) = self.taken.get(self.next.fetch_add(1, Ordering::Relaxed)) {
+                assert!(!taken.swap(true, Ordering::Relaxed), "handed out twice");
+            }
+        }
+    }
+
+    /// Every phase borrows from a frame of the stack that is gone soon after, and helpers come at any time, most of them too late.
+    #[test]
+    fn helpers_that_come_at_any_time_touch_no_phase_that_is_over() {
+        let phases = Phases::default();
+        let (invite, invitations) = mpsc::channel();
+        let invitations = Mutex::new(invitations);
+        thread::scope(|scope| {
+            for _ in 0..3 {
+                scope.spawn(|| {
+                    loop {
+                        let came = lock(&invitations).recv();
+                        if came.is_err() {
+                            return;
+                        }
+                        phases.join();
+                    }
+                });
+            }
+            thread::scope(|scope| {
+                for caller in 0..4_usize {
+                    let (phases, invite) = (&phases, invite.clone());
+                    scope.spawn(move || {
+                        for k in 0..if cfg!(miri) { 20 } else { 5000 } {
+                            let numbers = Numbers::new((k + caller) % 7);
+                            phases.run(2, 3, &|| numbers.drain(), || invite.send(()).unwrap());
+                            assert!(numbers.taken.iter().all(|t| t.load(Ordering::Relaxed)));
+                        }
+                    });
+                }
+            });
+            drop(invite);
+        });
+        assert_eq!((phases.invited(), phases.list().open.len()), (0, 0));
+    }
+
+    #[test]
+    fn nobody_is_waited_for_who_did_not_come_and_no_one_is_asked_twice() {
+        let (phases, asked, worked) = (Phases::default(), AtomicUsize::new(0), AtomicUsize::new(0));
+        let work = || _ = worked.fetch_add(1, Ordering::Relaxed);
+        for _ in 0..100 {
+            phases.run(3, 2, &work, || _ = asked.fetch_add(1, Ordering::Relaxed));
+        }
+        assert_eq!((asked.load(Ordering::Relaxed), phases.invited(), worked.load(Ordering::Relaxed)), (2, 2, 100));
+        // They come now, and find nothing.
+        phases.join();
+        phases.join();
+        assert_eq!((phases.invited(), worked.load(Ordering::Relaxed)), (0, 100));
+    }
+
+    /// The helper is let go only when the caller is about to sleep or asleep: it has nothing else to do any more.
+    #[test]
+    fn a_caller_sleeps_until_the_last_helper_is_done() {
+        let phases = Phases::default();
+        for _ in 0..if cfg!(miri) { 5 } else { 200 } {
+            let (came, left) = (AtomicBool::new(false), AtomicBool::new(false));
+            let caller = thread::current().id();
+            thread::scope(|scope| {
+                let (phases, came, left) = (&phases, &came, &left);
+                let work = move || {
+                    if thread::current().id() == caller {
+                        while !came.load(Ordering::Acquire) {
+                            thread::yield_now();
+                        }
+                        return;
+                    }
+                    came.store(true, Ordering::Release);
+                    // Long after the caller has stopped looking, were it not for a latch that sleeps.
+                    while !phases.list().open.is_empty() {
+                        thread::yield_now();
+                    }
+                    (0..2000).for_each(|_| thread::yield_now());
+                    left.store(true, Ordering::Release);
+                };
+                phases.run(1, 1, &work, || _ = scope.spawn(move || phases.join()));
+                assert!(left.load(Ordering::Acquire));
+            });
+        }
+    }
+
+    #[test]
+    fn a_panic_of_a_helper_or_of_the_caller_ends_the_phase_for_both() {
+        let phases = Phases::default();
+        let caller = thread::current().id();
+        for on_caller in [false, true] {
+            let both = std::sync::Barrier::new(2);
+            let here = AtomicBool::new(false);
+            let caught = thread::scope(|scope| {
+                let phases = &phases;
+                let work = || {
+                    both.wait();
+                    assert!((thread::current().id() == caller) != on_caller, "a task panics");
+                    here.store(true, Ordering::Relaxed);
+                };
+                catch_unwind(AssertUnwindSafe(|| phases.run(1, 1, &work, || _ = scope.spawn(move || phases.join()))))
+            });
+            assert_eq!(caught.unwrap_err().downcast_ref(), Some(&"a task panics"));
+            assert!(here.into_inner(), "the other went on");
+            assert_eq!((phases.invited(), phases.list().open.len()), (0, 0));
+        }
+        // What panicked before is forgotten.
+        phases.run(1, 1, &|| (), || phases.join());
+    }
+}
