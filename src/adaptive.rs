@@ -9,6 +9,7 @@ mod load_tracker;
 mod policy;
 #[cfg(feature = "this-machine")]
 mod setup;
+mod shelter;
 mod switching;
 mod throttle;
 
@@ -291,10 +292,10 @@ impl BroadPhase for Adaptive {
                     let ns = (running.elapsed().as_nanos() as f64).max(1.0);
                     self.measured_ns = Some(ns);
                     self.tracker.ran(boxes, pairs.overlapping(), Some(ns));
-                    self.policy.ran(choice.chosen, ns);
+                    let dear = self.policy.ran(choice.chosen, ns);
                     let decision_ns = (!decided).then(|| started.elapsed().as_nanos() as f64 - ns);
                     self.tracker.took(decision_ns, ns);
-                    if !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis) {
+                    if dear || !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis) {
                         // What began in this frame is looked at once more before it may rest.
                         self.tracker.wake();
                     }

@@ -64,16 +64,25 @@ impl Filter {
         self.memberships.get(id).is_some_and(|m| m.fixed)
     }
 
-    /// Brings the wanted ones of `pairs` to its head, in their order, and returns their number.
-    pub(crate) fn keep_wanted(&self, pairs: &mut [Pair]) -> usize {
-        let mut kept = 0;
+    /// Brings the wanted ones of `pairs` to its head, in their order. Returns their number, and how many of the others have a member that
+    /// may move.
+    pub(crate) fn keep_wanted(&self, pairs: &mut [Pair]) -> (usize, usize) {
+        let (mut kept, mut unwanted) = (0, 0);
         for at in 0..pairs.len() {
             // Moved in any case and kept if wanted, as where pairs are tested.
             let pair = pairs[at];
             pairs[kept] = pair;
-            kept += usize::from(self.wants(pair));
+            let wanted = self.wants(pair);
+            kept += usize::from(wanted);
+            unwanted += usize::from(!wanted & !self.both_fixed(pair));
         }
-        kept
+        (kept, unwanted)
+    }
+
+    /// Whether neither of two boxes ever moves.
+    #[inline]
+    pub(crate) fn both_fixed(&self, (a, b): Pair) -> bool {
+        self.is_fixed(a as usize) & self.is_fixed(b as usize)
     }
 }
 

@@ -32,7 +32,7 @@ pub struct Pairs {
     len: usize,
     /// Wanted pairs that were found and could not be stored.
     beyond: u64,
-    /// Pairs that the filter kept out.
+    /// Pairs that the filter kept out, without those of two fixed boxes, which most algorithms never look for.
     unwanted: u64,
     /// Shared with the lists of tasks while they work.
     filter: Option<Arc<Filter>>,
@@ -115,7 +115,8 @@ impl Pairs {
         self.as_slice().iter()
     }
 
-    /// How many pairs of boxes overlap in the last frame, those included that the filter kept out.
+    /// How many pairs of boxes overlap in the last frame, those included that the filter kept out, but for pairs of two fixed boxes: those are
+    /// not looked for.
     #[must_use]
     pub fn overlapping(&self) -> u64 {
         self.found() + self.unwanted
@@ -138,8 +139,8 @@ impl Pairs {
     /// Adds one pair, in either order of its members, if the filter wants it. Beyond the limit it is counted and not stored.
     #[inline]
     pub fn push(&mut self, a: u32, b: u32) {
-        if self.filter.as_ref().is_some_and(|filter| !filter.wants((a, b))) {
-            self.unwanted += 1;
+        if let Some(filter) = self.filter.as_ref().filter(|filter| !filter.wants((a, b))) {
+            self.unwanted += u64::from(!filter.both_fixed((a, b)));
             return;
         }
         if self.is_full() || self.len == self.buffer.len() && !self.grow(1) {

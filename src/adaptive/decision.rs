@@ -20,6 +20,9 @@ pub enum Reason {
     Explored,
     /// The one that was chosen failed in this frame.
     FellBack,
+    /// A frame of the one before cost far more than was expected of it: this one is the cheapest of the others, most often a tree, whose cost
+    /// does not depend on where the boxes lie.
+    Sheltered,
 }
 
 /// The last decision and what it rested on.

@@ -4,6 +4,7 @@ use super::decision::{Choice, Reason};
 use super::frame_batch::{FrameBatch, Predicted};
 use super::knots::{KnotPosition, View};
 use super::learner::Learner;
+use super::shelter::Shelter;
 use super::switching::{Expected, Kind, SwitchingCosts};
 use crate::cost::Counts;
 use crate::load::Load;
@@ -17,6 +18,9 @@ const STEP_SLACK: f64 = 0.05;
 const MOST_DEARER: f64 = 1.3;
 /// Frames between two that explore, at least.
 const EXPLORE_EVERY: u64 = 60;
+/// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a breakpoint or a page
+/// from disk tells nothing of the frames that follow.
+const MOST_WAIT: f64 = 64.0;
 /// What is found out is taken to be of use for this many frames: five seconds of a game.
 const HORIZON: f64 = 300.0;
 
@@ -33,6 +37,7 @@ pub(super) struct Policy {
     learns: bool,
     explores: bool,
     switching: SwitchingCosts,
+    shelter: Shelter,
     /// The candidate that runs unless one explores, and what ran last.
     settled: Option<usize>,
     ran: Option<usize>,
@@ -63,6 +68,7 @@ impl Policy {
             learns: true,
             explores: true,
             switching: SwitchingCosts::new(kept),
+            shelter: Shelter::new(ids.iter().copied()),
             settled: None,
             ran: None,
             mean_ns: vec![f64::INFINITY; count],
@@ -137,10 +143,12 @@ impl Policy {
             return self.choose_by_count(load.objects);
         }
         self.expect(load);
-        let best = self.cheapest(|_| true)?;
+        // Where all are avoided, all are as good as before.
+        let best = self.cheapest(|k| !self.is_avoided(k)).or_else(|| self.cheapest(|_| true))?;
         let (settled, reason) = match self.settled {
             None if self.ran.is_none() => (best, Reason::First),
             None => (best, Reason::FellBack),
+            Some(settled) if self.is_avoided(settled) => (best, Reason::Sheltered),
             Some(settled) => self.settle(settled, best, frames),
         };
         if self.settled != Some(settled) {
@@ -174,6 +182,19 @@ impl Policy {
         }
     }
 
+    /// Whether a candidate is not to run in this frame, since a frame of its method was far dearer than expected.
+    fn is_avoided(&self, candidate: usize) -> bool {
+        self.shelter.avoids(candidate, self.frame)
+    }
+
+    /// What a candidate took in the frame that ran, by all that is expected at most.
+    fn is_dear(&mut self, candidate: usize, ns: f64) -> bool {
+        let shelters = (0..self.usable.len()).filter(|&k| self.usable[k] && self.shelter.is_shelter(k));
+        let Some(shelter_ns) = shelters.map(|k| self.mean_ns[k]).min_by(f64::total_cmp) else { return false };
+        let most_ns = self.mean_ns[candidate].max(self.switching.rebuild_ns(candidate, self.expected[candidate]));
+        self.shelter.ran(candidate, self.frame, ns, most_ns, shelter_ns)
+    }
+
     /// What the first frame of a candidate costs beside the mean of its frames.
     fn switch_ns(&self, candidate: usize) -> f64 {
         let expected = self.expected[candidate];
@@ -199,7 +220,7 @@ impl Policy {
         if best == settled {
             return (settled, Reason::Stayed);
         }
-        let paid = |k: usize| self.mean_ns[k] < now && self.saved_ns[k] >= self.switch_ns(k);
+        let paid = |k: usize| self.mean_ns[k] < now && self.saved_ns[k] >= self.switch_ns(k) && !self.is_avoided(k);
         self.cheapest(paid).map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
     }
 
@@ -214,7 +235,7 @@ impl Policy {
         let now = self.mean_ns[settled];
         let worth = |k: usize| {
             let first = self.mean_ns[k] + self.switch_ns(k);
-            if k == settled || !self.usable[k] || first > MOST_DEARER * now {
+            if k == settled || !self.usable[k] || first > MOST_DEARER * now || self.is_avoided(k) {
                 return None;
             }
             let deviation = learner.variance_of_ratio(view(settled), view(k)).sqrt();
@@ -230,10 +251,20 @@ impl Policy {
         Choice { chosen, predicted_ns: Some(self.mean_ns[chosen]), runner_up, reason }
     }
 
-    /// Takes in that a candidate ran the frame that was decided, and what that took.
-    pub(super) fn ran(&mut self, candidate: usize, ns: f64) {
+    /// Takes in that a candidate ran the frame that was decided, and what that took. Whether that was so much that the next frame is to be
+    /// decided on, whatever it was before.
+    pub(super) fn ran(&mut self, candidate: usize, ns: f64) -> bool {
         let entered = self.ran != Some(candidate);
         self.ran = Some(candidate);
+        if self.is_by_count() {
+            return false;
+        }
+        let dear = self.is_dear(candidate, ns);
+        self.learn(candidate, entered, ns);
+        dear
+    }
+
+    fn learn(&mut self, candidate: usize, entered: bool, ns: f64) {
         let expected = self.expected[candidate];
         let kind = self.switching.ran(candidate, entered, self.frame, ns, expected, self.learns);
         let Some(learner) = self.learner.as_mut().filter(|_| self.learns) else { return };
@@ -249,7 +280,8 @@ impl Policy {
             let known = learner.knows(candidate);
             let dearest_ns = if known { self.switching.rebuild_ns(candidate, expected) } else { f64::INFINITY };
             self.batch.cold = entered;
-            let waited_ns = self.batch.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns);
+            let waited_ns =
+                self.batch.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns).min(MOST_WAIT * dearest_ns);
             learner.waited(candidate, waited_ns, self.frame);
         }
         if self.batch.is_full() {

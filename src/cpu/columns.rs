@@ -5,7 +5,7 @@ use crate::error::Error;
 use std::ops::Range;
 
 /// Readable boxes behind the last one: the widest vector may start at any box and run past the end.
-const PADDING: usize = 16;
+pub(super) const PADDING: usize = 16;
 
 /// Boxes as eight columns: three lower bounds, three upper bounds, positions in the input, and for a strip
 /// the mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip).

@@ -277,7 +277,10 @@ impl Task {
             let boxes = self.columns.len();
             sweep_rows::<InStrip>(simd, &self.columns, 0..boxes, pairs);
             if let Some(tree) = tree {
-                (0..boxes).step_by(LANES).filter_map(|at| self.group(at, axis)).for_each(|group| tree.pairs_with(&group, pairs));
+                (0..boxes)
+                    .step_by(LANES)
+                    .filter_map(|at| self.group(at, axis))
+                    .for_each(|group| tree.pairs_with(&group, pairs));
             }
         }
         Ok(())

@@ -27,16 +27,60 @@ use portable::Portable as Baseline;
 ///
 /// The columns must ascend by lower bound on the sweep axis.
 pub(crate) fn sweep_rows<R: Rows>(simd: Simd, columns: &Columns, rows: Range<usize>, pairs: &mut Pairs) {
-    let view = View::new(columns);
+    sweep_at::<R>(simd, &View::new(columns), rows, |row, _| row + 1, pairs);
+}
+
+/// A sweep that begins for each row where `start` says.
+fn sweep_at<R: Rows>(
+    simd: Simd,
+    view: &View<'_>,
+    rows: Range<usize>,
+    start: impl FnMut(usize, &Query) -> usize,
+    pairs: &mut Pairs,
+) {
     match simd {
         // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx512(proof) => unsafe { x86::sweep_avx512::<R>(proof, &view, rows, pairs) },
+        Simd::Avx512(proof) => unsafe { x86::sweep_avx512::<R>(proof, view, rows, start, pairs) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(proof) => unsafe { x86::sweep_avx2::<R>(proof, &view, rows, pairs) },
-        Simd::Portable => sweep::<_, R>(Baseline, &view, rows, pairs),
+        Simd::Avx2(proof) => unsafe { x86::sweep_avx2::<R>(proof, view, rows, start, pairs) },
+        Simd::Portable => sweep::<_, R>(Baseline, view, rows, start, pairs),
     }
+}
+
+/// Whether a row counts that begins where the one before which it would stand begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ties {
+    Count,
+    Skip,
+}
+
+/// Tests every row of `rows` against those of `others` that begin no earlier than it, until one begins beyond its end on the sweep axis,
+/// and adds the pairs. With both directions, one of which skips ties, these are all pairs of the two.
+///
+/// Rows of both ranges must ascend by lower bound on the sweep axis, and a gap or the end must follow `others`.
+pub(crate) fn sweep_across(
+    simd: Simd,
+    columns: &Columns,
+    rows: Range<usize>,
+    others: Range<usize>,
+    ties: Ties,
+    pairs: &mut Pairs,
+) {
+    let view = View::new(columns);
+    let low = &columns.low(0)[..others.end];
+    let Some(&first) = columns.low(0).get(rows.start).filter(|_| !rows.is_empty()) else { return };
+    let before = |other: f32, row: f32| if ties == Ties::Count { other < row } else { other <= row };
+    let mut at = others.start + low[others.start..].partition_point(|&other| before(other, first));
+    // Both ascend: where one row begins, those before it have passed.
+    let start = |_: usize, query: &Query| {
+        while at < others.end && before(low[at], query.low[0]) {
+            at += 1;
+        }
+        at
+    };
+    sweep_at::<All>(simd, &view, rows, start, pairs);
 }
 
 /// Tests every row of `rows` against all rows behind it, on all three axes, and adds the pairs.
@@ -173,11 +217,17 @@ fn add<L: Lanes, R: Rows>(lanes: L, view: &View<'_>, at: usize, query: &Query, h
 }
 
 #[inline(always)]
-fn sweep<L: Lanes, R: Rows>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+fn sweep<L: Lanes, R: Rows>(
+    lanes: L,
+    view: &View<'_>,
+    rows: Range<usize>,
+    mut start: impl FnMut(usize, &Query) -> usize,
+    pairs: &mut Pairs,
+) {
     debug_assert!(rows.end <= view.len);
     for i in rows {
         let query = view.query(i);
-        let mut at = i + 1;
+        let mut at = start(i, &query);
         while at < view.len {
             // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
             let (reach, hits) = unsafe { lanes.reach_and_hits(view, at, &query) };
@@ -274,7 +324,7 @@ mod tests {
             .for_each(|j| (0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).for_each(|i| expected.push(i as u32, j as u32)));
         let view = View::new(&columns);
         let (mut swept, mut tested) = (Pairs::new(), Pairs::new());
-        sweep::<_, All>(portable::Portable, &view, 0..boxes.len(), &mut swept);
+        sweep::<_, All>(portable::Portable, &view, 0..boxes.len(), |row, _| row + 1, &mut swept);
         brute(portable::Portable, &view, 0..boxes.len(), &mut tested);
         assert_eq!(swept.fingerprint(), expected.fingerprint());
         assert_eq!(tested.fingerprint(), expected.fingerprint());

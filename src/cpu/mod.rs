@@ -8,6 +8,7 @@ mod grid_sap;
 mod helpers;
 mod kernel;
 mod level;
+mod moving_first;
 mod pair_cache;
 #[cfg(feature = "parallel")]
 mod phases;

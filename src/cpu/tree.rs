@@ -89,7 +89,8 @@ impl Tree {
         let (leaves, above) = levels.split_at_mut(1);
         let parents = &mut above[0];
         let size = parents.len().div_ceil(workers.tasks()).max(SMALLEST_FILL);
-        let parts = parents.chunks_mut(size).zip(leaves[0].chunks_mut(size * LANES)).zip(ids.chunks_mut(size * LANES * LANES));
+        let parts =
+            parents.chunks_mut(size).zip(leaves[0].chunks_mut(size * LANES)).zip(ids.chunks_mut(size * LANES * LANES));
         workers.each_of(parts.zip((0..).step_by(size * LANES * LANES)), |(((parents, leaves), ids), first)| {
             for (at, leaf) in leaves.iter_mut().enumerate() {
                 *leaf = Node::EMPTY;
@@ -216,7 +217,8 @@ fn lay_out(levels: &mut Vec<Vec<Node>>, ids: &mut Vec<u32>, places: usize) -> Re
 }
 
 fn grow_list(ids: &mut Vec<u32>, places: usize) -> Result<(), Error> {
-    ids.try_reserve(places.saturating_sub(ids.len())).map_err(|_| Error::OutOfMemory { what: "boxes in a tree", elements: places })?;
+    ids.try_reserve(places.saturating_sub(ids.len()))
+        .map_err(|_| Error::OutOfMemory { what: "boxes in a tree", elements: places })?;
     ids.resize(places, NOBODY);
     Ok(())
 }

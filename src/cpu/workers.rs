@@ -4,7 +4,7 @@ use crate::aabb::Aabb;
 #[cfg(feature = "parallel")]
 use crate::algorithm::AlgorithmId;
 use crate::cpu::Threads;
-use crate::cpu::columns::{ColumnsMut, part};
+use crate::cpu::columns::ColumnsMut;
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
 use crate::error::Error;
@@ -226,18 +226,8 @@ impl Outputs {
         }
     }
 
-    /// One phase: `find` on equal parts of `0..rows`, each into a list of its own, then all lists joined in order.
-    pub(crate) fn find_rows(
-        &mut self,
-        workers: &Workers,
-        rows: usize,
-        pairs: &mut Pairs,
-        find: impl Fn(std::ops::Range<usize>, &mut Pairs) + Sync + Send,
-    ) {
-        self.find(workers, pairs, |k, parts, list| find(part(rows, k, parts), list));
-    }
-
-    /// As [`Outputs::find_rows`] over parts that `find` works out itself: it gets the number of the part and of all parts.
+    /// One phase: `find` on every part, each into a list of its own, then all lists joined in order. It gets the number of the part and of all
+    /// parts.
     pub(crate) fn find(
         &mut self,
         workers: &Workers,

@@ -219,9 +219,12 @@ mod tests {
     #[test]
     fn a_pair_is_reported_by_the_strip_where_the_later_box_begins() {
         let grid = StripGrid { cells: [5, 5], ..StripGrid::default() };
-        let span = |x: u32, y: u32, more_x: u32, more_y: u32| strips(&grid, StripSpan(y * 5 + x | more_x << 16 | more_y << 24));
+        let span =
+            |x: u32, y: u32, more_x: u32, more_y: u32| strips(&grid, StripSpan(y * 5 + x | more_x << 16 | more_y << 24));
         let (a, b) = (span(1, 2, 2, 1), span(2, 1, 0, 2));
-        let shared = a.iter().flat_map(|&(at, begins)| b.iter().filter(move |(other, _)| *other == at).map(move |o| (at, begins | o.1)));
+        let shared = a
+            .iter()
+            .flat_map(|&(at, begins)| b.iter().filter(move |(other, _)| *other == at).map(move |o| (at, begins | o.1)));
         let owners: Vec<[u32; 2]> = shared.filter(|&(_, begins)| begins == 3).map(|(at, _)| at).collect();
         assert_eq!(owners, [[2, 2]]);
     }

@@ -105,8 +105,8 @@ impl Pairs {
     fn extend_by_wanted(&mut self, added: usize) {
         let Self { buffer, len, filter, unwanted, .. } = self;
         let written = &mut buffer[*len..*len + added];
-        let wanted = filter.as_ref().map_or(added, |filter| filter.keep_wanted(written));
-        *unwanted += (added - wanted) as u64;
+        let (wanted, others) = filter.as_ref().map_or((added, 0), |filter| filter.keep_wanted(written));
+        *unwanted += others as u64;
         *len += wanted;
     }
 

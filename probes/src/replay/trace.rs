@@ -60,6 +60,7 @@ fn name(reason: Reason) -> &'static str {
         Reason::Switched => "switched",
         Reason::Explored => "explored",
         Reason::FellBack => "fell_back",
+        Reason::Sheltered => "sheltered",
         _ => "other",
     }
 }

@@ -212,3 +212,33 @@ fn what_rebuilds_too_often_is_left_and_taken_up_again() {
     assert!(kept(0..100) > 0 && kept(200..600) < 260, "{} of 400", kept(200..600));
     assert!(kept(1000..1200) == 200, "{} of 200", kept(1000..1200));
 }
+
+/// A second at a breakpoint, in a frame on two threads, says nothing of the frames that follow.
+#[test]
+fn one_long_frame_bans_no_number_of_threads() {
+    let truth = |k: usize, n: f64, at: usize| n * [100.0, 60.0][k] + if at == 500 { 1.0e9 } else { 0.0 };
+    let mut policy = policy(tuning_of_threads());
+    let frames = run(&mut policy, 0..2000, 1000, &truth);
+    assert!(frames[400..500].iter().filter(|f| f.chosen == 1).count() > 90);
+    let away = frames[501..].iter().filter(|f| f.chosen == 0).count();
+    assert!(away < 250, "on one thread for {away} of the 1500 frames after the long one");
+}
+
+#[test]
+fn a_scene_that_makes_a_method_quadratic_is_left_to_the_tree_at_once() {
+    let costs = [("grid-sap@cpu1", 0.0, 50.0), ("bvh@cpu1", 0.0, 100.0)];
+    // From frame 200 on the first costs a hundred times as much.
+    let truth = |k: usize, n: f64, at: usize| n * [if at < 200 { 50.0 } else { 5000.0 }, 100.0][k];
+    let mut policy = policy(tuning(&costs));
+    let frames = run(&mut policy, 0..1200, 1000, &truth);
+    assert!(frames[..200].iter().filter(|f| f.chosen == 0).count() > 190);
+    assert_eq!((frames[200].chosen, frames[201].chosen, frames[201].reason), (0, 1, Reason::Sheltered));
+    let dear = frames[200..].iter().filter(|f| f.chosen == 0).count();
+    assert!(dear <= 6, "{dear} frames spent on it");
+    // Without learning, too.
+    let mut policy = Policy::new(tuning(&costs), &[None; 2], vec![true; 2]);
+    policy.set_learning(false);
+    let frames = run(&mut policy, 0..1200, 1000, &truth);
+    let dear = frames[200..].iter().filter(|f| f.chosen == 0).count();
+    assert!(dear <= 6, "{dear} frames spent on it without learning");
+}

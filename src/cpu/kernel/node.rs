@@ -182,7 +182,9 @@ impl Walk<'_> {
 
     #[inline(always)]
     fn group_with_all(&self, group: &Group, overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy, pairs: &mut Pairs) {
-        self.each(&group.bounds, 0, 1, overlapping, |other| self.meet(&group.node, &group.bounds, &group.ids, other, overlapping, pairs));
+        self.each(&group.bounds, 0, 1, overlapping, |other| {
+            self.meet(&group.node, &group.bounds, &group.ids, other, overlapping, pairs)
+        });
     }
 
     /// Adds the pairs of some boxes, which these bounds contain, with those of a leaf.
@@ -322,8 +324,9 @@ mod x86 {
             let (from, to) = (_mm256_set1_ps(b.max[a]), _mm256_set1_ps(b.min[a]));
             for (k, all) in halves.iter_mut().enumerate() {
                 // SAFETY: each column has 16 floats.
-                let (low, high) =
-                    unsafe { (_mm256_loadu_ps(node.low[a].as_ptr().add(8 * k)), _mm256_loadu_ps(node.high[a].as_ptr().add(8 * k))) };
+                let (low, high) = unsafe {
+                    (_mm256_loadu_ps(node.low[a].as_ptr().add(8 * k)), _mm256_loadu_ps(node.high[a].as_ptr().add(8 * k)))
+                };
                 let below = _mm256_cmp_ps::<_CMP_LE_OQ>(low, from);
                 *all = _mm256_and_ps(*all, _mm256_and_ps(below, _mm256_cmp_ps::<_CMP_GE_OQ>(high, to)));
             }

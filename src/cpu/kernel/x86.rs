@@ -132,8 +132,14 @@ impl Lanes for Avx512 {
 }
 
 #[target_feature(enable = "avx2")]
-pub(super) fn sweep_avx2<R: Rows>(proof: Avx2, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
-    sweep::<_, R>(proof, view, rows, pairs);
+pub(super) fn sweep_avx2<R: Rows>(
+    proof: Avx2,
+    view: &View<'_>,
+    rows: Range<usize>,
+    start: impl FnMut(usize, &Query) -> usize,
+    pairs: &mut Pairs,
+) {
+    sweep::<_, R>(proof, view, rows, start, pairs);
 }
 
 #[target_feature(enable = "avx2")]
@@ -142,8 +148,14 @@ pub(super) fn brute_avx2(proof: Avx2, view: &View<'_>, rows: Range<usize>, pairs
 }
 
 #[target_feature(enable = "avx512f")]
-pub(super) fn sweep_avx512<R: Rows>(proof: Avx512, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
-    sweep::<_, R>(proof, view, rows, pairs);
+pub(super) fn sweep_avx512<R: Rows>(
+    proof: Avx512,
+    view: &View<'_>,
+    rows: Range<usize>,
+    start: impl FnMut(usize, &Query) -> usize,
+    pairs: &mut Pairs,
+) {
+    sweep::<_, R>(proof, view, rows, start, pairs);
 }
 
 #[target_feature(enable = "avx512f")]
