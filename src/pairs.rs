@@ -188,7 +188,7 @@ impl Pairs {
         let wanted = self.limit.map_or(pairs, |l| pairs.min(l));
         if wanted > self.buffer.len() {
             let more = wanted - self.buffer.len();
-            if self.buffer.try_reserve(more).is_err() {
+            if self.buffer.try_reserve_exact(more).is_err() {
                 return Err(Error::OutOfMemory { what: "pairs", elements: wanted });
             }
             self.buffer.resize(wanted, (0, 0));

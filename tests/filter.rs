@@ -108,6 +108,37 @@ fn memberships_change_while_pairs_are_kept() {
     }
 }
 
+/// Nothing moves, so that pairs are kept as they are: those of two boxes that were fixed must be found once one of them may move.
+#[test]
+fn boxes_are_set_free_while_pairs_are_kept() {
+    let boxes = Random(5).cubes(1000, [10.0; 3], 0.6);
+    let mut pairs = Pairs::with_order(PairOrder::Canonical);
+    let all = |fixed: &dyn Fn(usize) -> bool| -> Vec<Membership> {
+        (0..1000).map(|k| Membership { fixed: fixed(k), ..Membership::ALL }).collect()
+    };
+    let mut algorithms = every_algorithm();
+    // Each for some frames: a ground, one of its boxes free, all free, and fixed again.
+    for (stage, memberships) in [
+        all(&|k| k % 10 != 0),
+        all(&|k| k % 10 != 0 && k != 77),
+        Vec::new(),
+        all(&|_| true),
+        all(&|k| k != 500),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        pairs.set_filter((!memberships.is_empty()).then(|| Filter::new(memberships.clone())));
+        let expected = naive_filtered(&boxes, &memberships);
+        for frame in 0..6 {
+            for (id, algorithm) in &mut algorithms {
+                algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+                assert!(pairs.as_slice() == expected, "{id}, stage {stage}, frame {frame}: {} pairs", pairs.len());
+            }
+        }
+    }
+}
+
 #[test]
 fn a_scene_of_fixed_boxes_has_no_pair_however_small_the_limit() {
     let boxes = [Aabb::cube([3.0; 3], 1.0); 2000];

@@ -122,12 +122,14 @@ impl<'a> ColumnsMut<'a> {
     }
 }
 
-/// Grows `list` to at least `len` elements, and reports a refused allocation.
+/// Grows `list` to at least `len` elements, a sixteenth more, and reports a refused allocation.
 ///
-/// It never shrinks, and elements once there stay initialised, so that a steady state writes each element just once.
+/// It never shrinks, and elements once there stay initialised, so that a steady state writes each element just once. Twice the length, as
+/// lists grow by themselves, would hold memory that no frame of that size needs.
 pub(crate) fn ensure<T: Clone + Default>(list: &mut Vec<T>, len: usize, what: &'static str) -> Result<(), Error> {
     if list.len() < len {
-        list.try_reserve(len - list.len()).map_err(|_| Error::OutOfMemory { what, elements: len })?;
+        let len = len + len / 16;
+        list.try_reserve_exact(len - list.len()).map_err(|_| Error::OutOfMemory { what, elements: len })?;
         list.resize(len, T::default());
     }
     Ok(())

@@ -141,7 +141,8 @@ impl OnGpus {
 impl Share {
     fn start(&mut self, slabs: &Slabs, slab: usize, boxes: &[Aabb], exponent: f64) {
         self.began.get_or_insert_with(Instant::now);
-        self.failure = None;
+        // What a slab before this one left says nothing of it, even where its gathering fails.
+        (self.failure, self.full) = (None, false);
         match slabs.gather(slab, boxes, self.engine.most_objects(), &mut self.members) {
             Ok(fits) => self.full = !fits,
             Err(error) => self.failure = Some(Failure::Frame(error)),

@@ -16,25 +16,28 @@ const MOST_EDGE: f32 = 1.0e30;
 pub struct Displacement {
     watched: [(u32, Aabb); WATCHED],
     watching: usize,
+    /// How often boxes were watched.
+    rounds: u64,
 }
 
 impl Default for Displacement {
     /// Of a frame that has no frame before.
     fn default() -> Self {
-        Self { watched: [(0, Aabb::default()); WATCHED], watching: 0 }
+        Self { watched: [(0, Aabb::default()); WATCHED], watching: 0, rounds: 0 }
     }
 }
 
 impl Displacement {
-    /// Remembers where up to 64 boxes are, for the next frame to compare with. Allocates nothing.
+    /// Remembers where up to 64 boxes are, other ones each time, for the next frame to compare with. Allocates nothing.
     pub fn watch(&mut self, boxes: &[Aabb]) {
+        self.rounds = self.rounds.wrapping_add(1);
         self.watching = boxes.len().min(WATCHED);
         let start = |part: usize| (part as u64 * boxes.len() as u64 / self.watching as u64) as usize;
         for (k, watched) in self.watched[..self.watching].iter_mut().enumerate() {
-            // One box out of each of 64 equal parts, at a place that differs from part to part: boxes that move may follow each
-            // other at regular distances, and an even spacing could meet all of them or none.
+            // One box out of each of 64 equal parts, at a place that differs from part to part and from time to time: boxes that move may
+            // follow each other at regular distances, and an even spacing could meet all of them or none.
             let (first, end) = (start(k), start(k + 1));
-            let id = first + (mix(k as u64) % (end - first) as u64) as usize;
+            let id = first + (mix(self.rounds << 8 | k as u64) % (end - first) as u64) as usize;
             *watched = (id as u32, boxes[id]);
         }
     }
@@ -134,6 +137,19 @@ mod tests {
         let shares: Vec<f64> = (0..20).map(met).collect();
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-6);
         assert!(shares.iter().all(|&s| s < 0.2), "{shares:?}");
+    }
+
+    #[test]
+    fn in_time_every_box_is_watched() {
+        let before = row(640, 0.0);
+        let mut now = before.clone();
+        now[333] = Aabb::cube([-9.0; 3], 0.5);
+        let mut displacement = Displacement::default();
+        let mut met = || {
+            displacement.watch(&before);
+            displacement.moved(&now) > Some(0.0)
+        };
+        assert!((5..20).contains(&(0..100).filter(|_| met()).count()));
     }
 
     #[test]

@@ -81,13 +81,13 @@ impl Pairs {
         }
     }
 
-    /// Makes room for half as many pairs again where there is room for less than an eighth more: a list that grows and
-    /// shrinks around a size then allocates once.
+    /// Makes room for an eighth of the pairs more where there is room for less than a sixteenth: a list that grows and shrinks around a size
+    /// then allocates once.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
     pub(crate) fn reserve_some_more(&mut self) -> Result<(), Error> {
-        if self.buffer.len() < self.len + self.len / 8 { self.reserve(self.len + self.len / 2) } else { Ok(()) }
+        if self.buffer.len() < self.len + self.len / 16 { self.reserve(self.len + self.len / 8) } else { Ok(()) }
     }
 
     /// Takes in those that the filter wants of the pairs that were written at the head of [`Pairs::room`], lower member first.
@@ -197,7 +197,8 @@ impl Pairs {
         if self.refused.is_some() || self.len + more > limit {
             return false;
         }
-        let wanted = (self.buffer.len() * 2).max(self.len + more).max(64).min(limit);
+        // By a quarter, as memory counts for more than the copies of the first frames.
+        let wanted = (self.buffer.len() + self.buffer.len() / 4).max(self.len + more).max(64).min(limit);
         if self.buffer.try_reserve_exact(wanted - self.buffer.len()).is_err() {
             self.refused = Some(wanted);
             return false;

@@ -266,3 +266,107 @@ fn middle(b: &Aabb) -> [f32; 3] {
         if middle.is_nan() { 0.0 } else { middle.clamp(-MOST, MOST) }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cpu::Threads;
+    use crate::splitmix::mix;
+
+    /// A box of the unit cube, moved and scaled.
+    fn at(k: u64, scale: f32, by: [f32; 3]) -> Aabb {
+        let unit = |a: u64| (mix(3 * k + a) >> 40) as f32 / (1 << 24) as f32;
+        Aabb::cube([0, 1, 2].map(|a| unit(a) * scale + by[a as usize]), scale / 200.0)
+    }
+
+    fn ordered(boxes: &[Aabb], threads: u32, filter: Option<&Filter>) -> (Vec<u32>, usize) {
+        let workers = Workers::new("bvh", threads, &Threads::default()).unwrap();
+        let mut order = Order::default();
+        let curve = Curve::over(&Sample::of(boxes));
+        let moving = order.sort(&workers, boxes, Members::All, &curve, filter).unwrap();
+        (order.ids().iter().map(|&key| key as u32).collect(), moving)
+    }
+
+    /// The mean over leaves of the longest edge of what contains one.
+    fn longest_edge(boxes: &[Aabb], ids: &[u32]) -> f64 {
+        let edge = |leaf: &[u32]| {
+            let all = leaf.iter().map(|&id| boxes[id as usize]).reduce(|a, b| a.union(&b)).unwrap();
+            (0..3).map(|a| f64::from(all.max[a]) - f64::from(all.min[a])).fold(0.0, f64::max)
+        };
+        ids.chunks(LANES).map(edge).sum::<f64>() / ids.len().div_ceil(LANES) as f64
+    }
+
+    #[test]
+    fn boxes_near_in_space_are_near_in_the_order_on_every_scale() {
+        let most = if cfg!(feature = "parallel") { 3 } else { 1 };
+        let one = |k: u64| at(k, 100.0, [0.0; 3]);
+        // Worlds of one size: many on a line a million edges apart, so that each of them is a crowd; a thousand times as small from one to the
+        // next, in one corner; and one with a crowd for all threads far away.
+        let row = |k: u64| at(k, 100.0, [1.0e8 * (k % 40) as f32, 0.0, 0.0]);
+        let nested = |k: u64| at(k, 100.0 * 1.0e-3_f32.powi((k % 5) as i32), [0.0; 3]);
+        let pooled = |k: u64| if k % 2 == 0 { one(k) } else { at(k, 100.0, [3.0e9, -8.0e9, 5.0e9]) };
+        let count = 40_000;
+        let even = longest_edge(&(0..count).map(one).collect::<Vec<_>>(), &ordered(&(0..count).map(one).collect::<Vec<_>>(), 1, None).0);
+        for (name, of) in [("row", &row as &dyn Fn(u64) -> Aabb), ("nested", &nested), ("pooled", &pooled)] {
+            let boxes: Vec<Aabb> = (0..count).map(of).collect();
+            let (ids, moving) = ordered(&boxes, 1, None);
+            let mut all = ids.clone();
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..count as u32) && moving == count as usize, "{name}");
+            assert_eq!(ordered(&boxes, most, None).0, ids, "{name} on {most} threads");
+            // As many boxes in fewer worlds lie closer; what spans two worlds is a handful of leaves.
+            let mut edges: Vec<f64> = ids.chunks(LANES).map(|leaf| longest_edge(&boxes, leaf)).collect();
+            edges.sort_unstable_by(f64::total_cmp);
+            let middle = edges[edges.len() / 2];
+            assert!(middle < 4.0 * even, "{name}: {middle}, evenly spread {even}");
+            let astray = edges.iter().filter(|&&edge| edge > 400.0).count();
+            assert!(astray <= 80, "{name}: {astray} leaves of {}", edges.len());
+        }
+    }
+
+    #[test]
+    fn boxes_in_one_point_at_infinity_or_without_size_are_ordered_once() {
+        let inf = f32::INFINITY;
+        let odd = [
+            Aabb::cube([1.0; 3], 0.0),
+            Aabb::new([-inf; 3], [inf; 3]),
+            Aabb::new([inf; 3], [inf; 3]),
+            Aabb::new([-inf, 0.0, 0.0], [3.0, 1.0, 1.0]),
+            Aabb::new([f32::MIN; 3], [f32::MAX; 3]),
+            Aabb::cube([1.0e-40; 3], 1.0e-44),
+        ];
+        for pad in [0, 60, 20_000] {
+            for of in &odd {
+                let mut boxes = vec![*of; 20_000];
+                boxes.extend((0..pad).map(|k| odd[k % odd.len()]));
+                let (mut ids, _) = ordered(&boxes, 1, None);
+                ids.sort_unstable();
+                assert!(ids.into_iter().eq(0..boxes.len() as u32), "{of:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn large_and_long_boxes_share_no_leaf_with_others_and_fixed_ones_come_last() {
+        let boxes: Vec<Aabb> = (0..4096)
+            .map(|k| {
+                let mut b = at(k, 100.0, [0.0; 3]);
+                match k % 64 {
+                    0 => b.max[0] += 40.0,
+                    1 => b.max[2] += 40.0,
+                    2 => b = Aabb { min: b.min, max: b.max.map(|v| v + 300.0) },
+                    _ => {}
+                }
+                b
+            })
+            .collect();
+        let mut filter = Filter::default();
+        filter.memberships = (0..4096).map(|k| crate::Membership { fixed: k % 3 == 0, ..crate::Membership::ALL }).collect();
+        let (ids, moving) = ordered(&boxes, 1, Some(&filter));
+        assert!(moving == 2730 && (0..4096).all(|k| (ids[k] % 3 == 0) == (k >= moving)));
+        let (ids, _) = ordered(&boxes, 1, None);
+        let kind = |id: u32| (id % 64).min(3);
+        let mixed = ids.chunks(LANES).filter(|leaf| leaf.iter().any(|&id| kind(id) != kind(leaf[0]))).count();
+        assert!(mixed <= 4, "{mixed} leaves with boxes of several kinds");
+    }
+}
