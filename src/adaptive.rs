@@ -16,6 +16,7 @@ mod throttle;
 use crate::aabb::Aabb;
 use crate::algorithm::AlgorithmId;
 use crate::broad_phase::{BroadPhase, Incremental};
+use crate::clock::{self, Instant};
 use crate::error::{Error, Unavailable};
 use crate::load::Load;
 use crate::pairs::Pairs;
@@ -26,7 +27,6 @@ use instances::{Candidate, Instance};
 use load_tracker::LoadTracker;
 use policy::Policy;
 use std::fmt;
-use std::time::Instant;
 
 pub use decision::{Decision, Reason};
 pub(crate) use instances::Instances;
@@ -104,9 +104,10 @@ impl Adaptive {
 
     /// Whether the times of frames correct the expected costs. On unless it is turned off; what was learned until then stays in use.
     ///
-    /// Tuning without cost curves have nothing to correct, and decide by the number of objects always.
+    /// Tuning without cost curves have nothing to correct, and decide by the number of objects always. On `wasm32-unknown-unknown`, which has
+    /// no clock, no frame is timed and nothing is learned.
     pub fn set_learning(&mut self, learns: bool) {
-        self.policy.set_learning(learns);
+        self.policy.set_learning(learns && clock::TICKS);
     }
 
     /// Whether now and then a frame is run by another algorithm than the cheapest, to learn what that one costs: at most one frame in
@@ -290,7 +291,7 @@ impl BroadPhase for Adaptive {
                         return Ok(());
                     };
                     let ns = (running.elapsed().as_nanos() as f64).max(1.0);
-                    self.measured_ns = Some(ns);
+                    self.measured_ns = clock::TICKS.then_some(ns);
                     self.tracker.ran(boxes, pairs.overlapping(), Some(ns));
                     let dear = self.policy.ran(choice.chosen, ns);
                     let decision_ns = (!decided).then(|| started.elapsed().as_nanos() as f64 - ns);
@@ -343,7 +344,9 @@ impl fmt::Debug for Adaptive {
 }
 
 fn policy(tuning: Tuning, made: &Instances) -> Policy {
-    Policy::new(tuning, &made.kept(), made.usable())
+    let mut policy = Policy::new(tuning, &made.kept(), made.usable());
+    policy.set_learning(clock::TICKS);
+    policy
 }
 
 #[cfg(test)]

@@ -42,6 +42,7 @@ mod calibrate;
 #[cfg(feature = "parallel")]
 mod cgroup;
 mod changes;
+mod clock;
 mod cost;
 mod cpu;
 mod entry;

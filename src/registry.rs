@@ -143,10 +143,8 @@ impl Registry {
     ///
     /// For a program that has the machine to itself. Some schedulers, those of virtual machines above all, wake two threads of a pool on one
     /// core and leave the other idle for milliseconds: on the machine of the first reports nothing under 3 ms gained from a second thread. The
-    /// command measures and runs with pinned threads. It is off unless asked for, [`Adaptive::for_this_machine`] included, because a pinned
+    /// command measures and runs with pinned threads. It is off unless asked for, `Adaptive::for_this_machine` included, because a pinned
     /// thread can't move away from a core that another thread of the program keeps busy.
-    ///
-    /// [`Adaptive::for_this_machine`]: crate::StartOptions
     pub fn pin_threads(&mut self) {
         self.threads.pinned = true;
     }
@@ -368,111 +366,4 @@ fn thread_counts(cores: u32) -> impl Iterator<Item = u32> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::aabb::Aabb;
-    use crate::broad_phase::Incremental;
-    use crate::pairs::Pairs;
-
-    #[test]
-    fn thread_counts_double_up_to_all() {
-        assert_eq!(thread_counts(1).collect::<Vec<_>>(), [1]);
-        assert_eq!(thread_counts(2).collect::<Vec<_>>(), [1, 2]);
-        assert_eq!(thread_counts(6).collect::<Vec<_>>(), [1, 2, 4, 6]);
-        assert_eq!(thread_counts(0).collect::<Vec<_>>(), [1]);
-    }
-
-    struct Nothing;
-
-    impl BroadPhase for Nothing {
-        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-            pairs.clear();
-            pairs.finish()
-        }
-    }
-
-    #[test]
-    fn a_user_adds_and_replaces_algorithms() {
-        let mut registry = Registry::with_cores(1);
-        let ours = registry.entries().len();
-        let id: AlgorithmId = "my-tree@cpu1".parse().unwrap();
-        registry.add(id.clone(), 7, || Ok(Box::new(Nothing)));
-        registry.add(id.clone(), 8, || Ok(Box::new(Nothing)));
-        assert_eq!(registry.entries().len(), ours + 1);
-        assert_eq!(registry.entries()[ours].revision, 8);
-        assert!(registry.create(&id).is_ok());
-    }
-
-    /// Runs on as many threads as it was told last.
-    struct Wide(Vec<u32>, u32);
-
-    impl BroadPhase for Wide {
-        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-            pairs.clear();
-            pairs.finish()
-        }
-
-        fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-            Some(self)
-        }
-    }
-
-    impl Incremental for Wide {
-        fn set_threads(&mut self, threads: u32) -> bool {
-            self.1 = threads;
-            self.0.contains(&threads)
-        }
-    }
-
-    #[test]
-    fn a_family_is_one_instance_on_any_of_its_numbers_of_threads() {
-        let mut registry = Registry::with_cores(1);
-        registry.add_family("mine", &[1, 2, 4], 3, |threads| Ok(Box::new(Wide(threads.to_vec(), 1)))).unwrap();
-        assert!(registry.add_family("Mine", &[1], 3, |_| unreachable!()).is_err());
-        let ids: Vec<AlgorithmId> = ["mine@cpu4", "mine@cpu1", "brute@cpu1", "mine@cpu2"].map(|t| t.parse().unwrap()).into();
-        let mut family = registry.create_family(&[&ids[0], &ids[1]]).unwrap().unwrap();
-        let incremental = family.as_incremental().unwrap();
-        assert_eq!([1, 2, 4].map(|k| incremental.set_threads(k)), [true, false, true]);
-        assert!(registry.create_family(&[&ids[1], &ids[2]]).unwrap().is_none());
-        assert!(registry.create_family(&[]).unwrap().is_none());
-        assert!(registry.create(&ids[3]).unwrap().is_incremental());
-        // One that was replaced is no longer of the family.
-        registry.add(ids[3].clone(), 1, || Ok(Box::new(Nothing)));
-        assert!(registry.create_family(&[&ids[0], &ids[3]]).unwrap().is_none());
-    }
-
-    #[test]
-    fn no_file_starts_more_threads_than_there_are_cores() {
-        let registry = Registry::with_cores(3);
-        for text in ["grid-sap@cpu4096", "brute@cpu4", "pair-cache@cpu4"] {
-            let id: AlgorithmId = text.parse().unwrap();
-            let Err(error) = registry.create(&id) else { panic!("made {text}") };
-            if cfg!(feature = "parallel") {
-                assert!(error.to_string().contains("3 threads are the most here"), "{error}");
-            }
-            // Nor where all widths share one instance.
-            assert!(registry.create_family(&[&"pair-cache@cpu1".parse().unwrap(), &id]).unwrap().is_none());
-            // Tuning that has steps only.
-            let step = |from_objects, id: &str| crate::Step { from_objects, algorithm: id.parse().unwrap() };
-            let tuning = crate::Tuning::from_steps(vec![step(0, text), step(20, "brute@cpu1")]).unwrap();
-            let mut adaptive = crate::Adaptive::new(tuning, &registry).unwrap();
-            adaptive.find_pairs(&[Aabb::cube([0.0; 3], 1.0)], &mut Pairs::new()).unwrap();
-            assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "brute@cpu1");
-            assert!(crate::Adaptive::only(id, &registry).is_err());
-        }
-        if cfg!(feature = "parallel") {
-            for text in ["grid-sap@cpu2", "brute@cpu3", "pair-cache@cpu3"] {
-                assert!(registry.create(&text.parse().unwrap()).is_ok(), "{text}");
-            }
-        }
-    }
-
-    #[test]
-    fn unknown_algorithms_are_refused_with_the_known_ones() {
-        let registry = Registry::with_cores(1);
-        let Err(error) = registry.create(&"octree@cpu1".parse().unwrap()) else { panic!("made an unknown algorithm") };
-        assert!(error.to_string().contains("brute@cpu1"), "{error}");
-        assert!(registry.create(&"brute@gpu0".parse().unwrap()).is_err());
-        assert!(registry.create(&"octree@gpu0".parse().unwrap()).is_err());
-    }
-}
+mod tests;

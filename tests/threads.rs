@@ -1,4 +1,4 @@
-//! What an engine may share between its threads.
+//! What an engine may share between its threads, and where ours run.
 
 use sapwise::{Adaptive, BroadPhase, Changes, Error, Load, Model, Pairs, Registry, Tuning};
 
@@ -15,4 +15,42 @@ fn what_an_engine_holds_is_send_and_sync() {
     both::<Model>();
     both::<Load>();
     both::<Error>();
+}
+
+/// How many threads of our pools there are, and how many of them may run on one CPU only.
+#[cfg(all(feature = "parallel", target_os = "linux"))]
+fn pool_threads() -> (usize, usize) {
+    let status = |task: std::io::Result<std::fs::DirEntry>| std::fs::read_to_string(task.ok()?.path().join("status")).ok();
+    let ours =
+        std::fs::read_dir("/proc/self/task").unwrap().filter_map(status).filter(|text| text.starts_with("Name:\tsapwise-"));
+    let allowed = |text: &String| {
+        let list = text.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:")).unwrap().trim();
+        list.bytes().all(|b| b.is_ascii_digit())
+    };
+    let bound: Vec<bool> = ours.map(|text| allowed(&text)).collect();
+    (bound.len(), bound.iter().filter(|&&bound| bound).count())
+}
+
+#[cfg(all(feature = "parallel", target_os = "linux"))]
+#[test]
+fn no_thread_is_pinned_unless_asked() {
+    use sapwise::{Aabb, usable_cores};
+    if usable_cores() < 2 {
+        // One CPU is all that any thread may run on.
+        return;
+    }
+    let boxes: Vec<Aabb> = (0..20_000).map(|k| Aabb::cube([(k % 100) as f32, (k / 100) as f32, 0.0], 0.4)).collect();
+    let run = |registry: &Registry, text: &str| {
+        let mut algorithm = registry.create(&text.parse().unwrap()).unwrap();
+        (0..20).for_each(|_| algorithm.find_pairs(&boxes, &mut Pairs::new()).unwrap());
+        algorithm
+    };
+    let mut registry = Registry::with_cores(3);
+    let free = run(&registry, "grid-sap@cpu3");
+    assert_eq!(pool_threads(), (2, 0));
+    registry.pin_threads();
+    let pinned = run(&registry, "grid-sap@cpu2");
+    // That of two threads, which the registry makes now. Under a quota it is not bound either; where that is so, tests in the library tell.
+    assert!(matches!(pool_threads(), (3, 0 | 1)), "{:?}", pool_threads());
+    drop((free, pinned));
 }

@@ -2,8 +2,8 @@
 
 use super::throttle::DecisionThrottle;
 use crate::aabb::Aabb;
+use crate::clock::Instant;
 use crate::load::{Displacement, FramePlan, Load};
-use std::time::Instant;
 
 /// Share of the frames' time that samples may take where the number of objects holds still ...
 const SHARE: f64 = 0.005;

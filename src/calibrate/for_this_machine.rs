@@ -205,6 +205,11 @@ mod tests {
     use crate::hardware::Machine;
 
     #[test]
+    fn no_thread_is_pinned_unless_asked() {
+        assert_eq!(usual_registry(false).helpers(), "free");
+    }
+
+    #[test]
     fn a_figure_that_can_not_be_costs_what_needs_it_and_no_more() {
         let model = Model::built_in().unwrap();
         let figure = |&name: &ParameterId| match name {

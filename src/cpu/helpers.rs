@@ -166,4 +166,24 @@ mod tests {
         // The pool's thread is none the worse.
         assert_eq!(working(&helpers, 1, 2).len(), 2);
     }
+
+    /// Each is bound before it works, and says where it works.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn helpers_are_bound_where_that_is_wanted_allowed_and_possible() {
+        for pinned in [false, true] {
+            let helpers = Helpers::new(1, pinned).unwrap();
+            let usable = core_affinity::get_core_ids().unwrap().len();
+            let bound = Mutex::new(Vec::new());
+            let (all, caller) = (Barrier::new(2), current().id());
+            helpers.run(1, &|| {
+                all.wait();
+                if current().id() != caller {
+                    bound.lock().unwrap().push(core_affinity::get_core_ids().unwrap().len());
+                }
+            });
+            let one = pinned && crate::cpu::seats::may_bind() && usable > 1;
+            assert_eq!(bound.into_inner().unwrap(), [if one { 1 } else { usable }]);
+        }
+    }
 }
