@@ -25,7 +25,7 @@
 //! let status = sapwise_cli::Command::new().with(double_loop).run();
 //! ```
 //!
-//! `examples/bvh.rs` is such a program with the tree of parry3d.
+//! `examples/parry.rs` is such a program with the tree of parry3d.
 
 mod algorithms;
 mod args;

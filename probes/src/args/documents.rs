@@ -14,13 +14,13 @@ const DOCUMENTS: [(&str, &str); 8] = [
     ("BENCHMARKS.md", include_str!("../../../BENCHMARKS.md")),
 ];
 
-/// How a line of a shell calls this program. `bvh` is the example of a program with an algorithm of its own.
+/// How a line of a shell calls this program. `parry` is the example of a program with an algorithm of its own.
 const CALLS: [&str; 5] = [
     "cargo run --release -p sapwise-cli -- ",
-    "cargo run --release -p sapwise-cli --example bvh -- ",
+    "cargo run --release -p sapwise-cli --example parry -- ",
     "cargo run --release -- ",
     "sapwise ",
-    "bvh ",
+    "parry ",
 ];
 
 /// The arguments of a line of a shell that calls this program.

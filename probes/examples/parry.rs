@@ -1,11 +1,11 @@
 //! A command of your own: all of `sapwise`, with parry3d's bounding volume hierarchy as one more algorithm.
 //!
 //! ```sh
-//! bvh() { cargo run --release -p sapwise-cli --example bvh -- "$@"; }
-//! bvh probe --no-gpus --out bvh.json                      # times it beside ours, and verifies every answer
-//! bvh train bvh.json --out with-bvh.json                  # fits its cost, with terms of its own, beside those of ours
-//! bvh predict --model with-bvh.json --out tuning.json     # where it is the fastest on this machine
-//! bvh run fragmentation --tuning tuning.json              # what choosing it saves
+//! parry() { cargo run --release -p sapwise-cli --example parry -- "$@"; }
+//! parry probe --no-gpus --out parry.json                      # times it beside ours, and verifies every answer
+//! parry train parry.json --out with-parry.json                  # fits its cost, with terms of its own, beside those of ours
+//! parry predict --model with-parry.json --out tuning.json     # where it is the fastest on this machine
+//! parry run fragmentation --tuning tuning.json              # what choosing it saves
 //! ```
 //!
 //! The manifest of a program outside of this repository needs `sapwise` and `sapwise-cli`.
@@ -21,7 +21,7 @@ use std::process::ExitCode;
 pub(crate) fn main() -> ExitCode {
     // The name stands in reports, models and tuning. The 1 is the revision: count it up whenever `find_pairs` gets faster or slower, so
     // that what was measured before is known to be stale. An algorithm on several threads is made by `UserAlgorithm::on_threads`.
-    let tree = UserAlgorithm::on_one_thread("bvh", 1, || Ok(Box::new(Tree::default())));
+    let tree = UserAlgorithm::on_one_thread("parry", 1, || Ok(Box::new(Tree::default())));
     Command::new().with(tree.terms(&terms())).run()
 }
 
