@@ -39,7 +39,7 @@ impl BroadPhase for Brute {
         outputs.find(workers, pairs, |k, parts, list| {
             brute_rows(*simd, columns, row(columns.len(), k, parts)..row(columns.len(), k + 1, parts), list);
         });
-        pairs.finish()
+        pairs.finish_on(workers)
     }
 
     fn prepare(&mut self, objects: usize) {

@@ -92,7 +92,7 @@ impl BroadPhase for GridSap {
         let Self { workers, finder, outputs } = self;
         let grid = plan.grid(boxes);
         outputs.collect(workers, pairs, |lists| finder.find(workers, &grid, boxes, lists))?;
-        pairs.finish()
+        pairs.finish_on(workers)
     }
 
     fn prepare(&mut self, objects: usize) {

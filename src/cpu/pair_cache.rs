@@ -104,7 +104,7 @@ impl BroadPhase for PairCache {
             outputs.collect(workers, pairs, |lists| finder.find(workers, &grid, boxes, lists))?;
         }
         self.motion.found(boxes.len(), pairs.overlapping());
-        pairs.finish()
+        pairs.finish_on(&self.widths[self.width])
     }
 
     fn prepare(&mut self, objects: usize) {

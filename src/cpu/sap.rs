@@ -64,7 +64,7 @@ impl BroadPhase for Sap {
             }
         });
         outputs.find_rows(workers, columns.len(), pairs, |rows, list| sweep_rows::<All>(*simd, columns, rows, list));
-        pairs.finish()
+        pairs.finish_on(workers)
     }
 
     fn prepare(&mut self, objects: usize) {
