@@ -31,7 +31,7 @@ use std::fmt;
 pub use decision::{Decision, Reason};
 pub(crate) use instances::Instances;
 #[cfg(feature = "this-machine")]
-pub(crate) use setup::{Arrival, Handover, Keeper, Start};
+pub(crate) use setup::{Arrival, Awaited, Handover, Keeper, Start};
 #[cfg(feature = "this-machine")]
 pub use setup::{Origin, SaveError, Setup};
 
@@ -170,7 +170,7 @@ impl Adaptive {
 
     /// Takes what was made in the background, once it is there. The estimate of the load stays.
     #[cfg(feature = "this-machine")]
-    fn take_over(&mut self) {
+    pub(crate) fn take_over(&mut self) {
         let Some((tuning, made)) = self.start.arrived() else { return };
         let before = std::mem::replace(&mut self.policy, policy(tuning, &made));
         self.policy.set_as(&before);
@@ -192,12 +192,13 @@ impl Adaptive {
         &self.start.setup
     }
 
-    /// Keeps what was learned in the cache, for the next start of a program on this machine: call it at the end of a session.
+    /// Keeps what was learned in the cache, for the next start of a program on this machine: call it at the end of a session. `false`, and
+    /// nothing is kept, after a session so short that the tuning of this machine did not arrive, and where nothing could be predicted.
     ///
     /// # Errors
     /// When there is no cache to keep it in, or it can't be written.
     #[cfg(feature = "this-machine")]
-    pub fn save(&self) -> Result<(), SaveError> {
+    pub fn save(&self) -> Result<bool, SaveError> {
         self.start.save(|| self.learned())
     }
 

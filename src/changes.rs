@@ -1,7 +1,7 @@
 //! What began and what ended between two frames.
 
 use crate::error::Error;
-use crate::pairs::Pairs;
+use crate::pairs::{Alone, Pairs, Sorter};
 
 /// Follows pairs from frame to frame by ids of the caller's: which began, which ended, and all there are.
 ///
@@ -14,7 +14,7 @@ use crate::pairs::Pairs;
 /// An update sorts the pairs as numbers of 64 bits and runs along those of the update before. On one core of an AMD EPYC that
 /// takes 10 to 20 ns a pair with 1000 to 100 000 pairs: about as long as `grid-sap@cpu1` takes to find the pairs of a crowded scene,
 /// and a third of it where they come in canonical order and ids ascend with the positions. When ids have changed it sorts them
-/// too. Memory for each pair: 8 bytes and two pairs of ids, and another for each that began or ended; for each box 8 bytes and
+/// too. Memory for each pair: 12 bytes and two pairs of ids, and another for each that began or ended; for each box 8 bytes and
 /// two ids.
 // A hash table of the pairs took two thirds of that time with 1000 pairs, at least as long with 100 000, more than twice as long with 3
 // million, and leaves them in no order.
@@ -28,6 +28,7 @@ pub struct Changes<Id = u32> {
     ranks: Vec<u32>,
     /// The new pairs: the rank of the lower id, and below it that of the other. Numbers sort faster than pairs of ids.
     keys: Vec<u64>,
+    sorter: Sorter,
     pairs: Vec<(Id, Id)>,
     /// Memory for the pairs of the next update.
     next: Vec<(Id, Id)>,
@@ -44,6 +45,7 @@ impl<Id: Copy + Ord> Changes<Id> {
             sorted: Vec::new(),
             ranks: Vec::new(),
             keys: Vec::new(),
+            sorter: Sorter::default(),
             pairs: Vec::new(),
             next: Vec::new(),
             begun: Vec::new(),
@@ -66,7 +68,7 @@ impl<Id: Copy + Ord> Changes<Id> {
         }
         let missing = |position: u32| Error::MissingId { position, ids: ids.len() };
         let ranks = &self.ranks;
-        fill_keys(&mut self.keys, pairs, |at| ranks.get(at as usize).copied().ok_or_else(|| missing(at)))?;
+        fill_keys(&mut self.keys, &mut self.sorter, pairs, |at| ranks.get(at as usize).copied().ok_or_else(|| missing(at)))?;
         let sorted = &self.sorted;
         fill(&mut self.next, &self.keys, |rank| sorted[rank as usize].0)?;
         self.compare()
@@ -141,7 +143,7 @@ impl Changes<u32> {
     pub fn update_positions(&mut self, pairs: &Pairs) -> Result<(), Error> {
         self.begun.clear();
         self.ended.clear();
-        fill_keys(&mut self.keys, pairs, Ok)?;
+        fill_keys(&mut self.keys, &mut self.sorter, pairs, Ok)?;
         fill(&mut self.next, &self.keys, |position| position)?;
         self.compare()
     }
@@ -154,7 +156,12 @@ impl<Id: Copy + Ord> Default for Changes<Id> {
 }
 
 /// Fills `keys` with the pairs in terms of ranks, ascending, each once, those of a rank with itself left out.
-fn fill_keys(keys: &mut Vec<u64>, pairs: &Pairs, rank: impl Fn(u32) -> Result<u32, Error>) -> Result<(), Error> {
+fn fill_keys(
+    keys: &mut Vec<u64>,
+    sorter: &mut Sorter,
+    pairs: &Pairs,
+    rank: impl Fn(u32) -> Result<u32, Error>,
+) -> Result<(), Error> {
     keys.clear();
     reserve(keys, pairs.len())?;
     for &(i, j) in pairs {
@@ -163,7 +170,7 @@ fn fill_keys(keys: &mut Vec<u64>, pairs: &Pairs, rank: impl Fn(u32) -> Result<u3
             keys.push(u64::from(a.min(b)) << 32 | u64::from(a.max(b)));
         }
     }
-    keys.sort_unstable();
+    sorter.sort(&Alone, keys);
     keys.dedup();
     Ok(())
 }

@@ -25,12 +25,11 @@ pub enum Error {
         /// Boxes in the input.
         objects: usize,
     },
-    /// More pairs than [`Pairs::set_limit`](crate::Pairs::set_limit) allows.
+    /// More wanted pairs than [`Pairs::set_limit`](crate::Pairs::set_limit) allows. The search ended there, so how many there are is not
+    /// known.
     TooManyPairs {
         /// The limit that was set.
         limit: usize,
-        /// Overlapping pairs in the input that the [`Filter`](crate::Filter) wants, all counted.
-        pairs: u64,
     },
     /// A pair has a member that has no id in [`Changes::update`](crate::Changes::update).
     MissingId {
@@ -183,8 +182,8 @@ impl fmt::Display for Error {
                     u32::MAX
                 )
             }
-            Error::TooManyPairs { limit, pairs } => {
-                write!(f, "{pairs} pairs overlap, more than the limit of {limit}; raise the limit or thin out the scene")
+            Error::TooManyPairs { limit } => {
+                write!(f, "more than {limit} pairs overlap, which is the limit; raise it or thin out the scene")
             }
             Error::MissingId { position, ids } => {
                 write!(f, "box {position} is in a pair and has no id: {ids} were given; give one for each box")

@@ -1,14 +1,17 @@
 //! The one output of every algorithm.
 
 mod fill;
+mod order;
 
 use crate::error::Error;
 use crate::filter::Filter;
 use crate::pair::Pair;
 use crate::splitmix::mix;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 pub(crate) use fill::each_bit;
+pub(crate) use order::{Alone, Parallel, Sorter};
 
 /// The order in which a caller wants the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -30,8 +33,10 @@ pub struct Pairs {
     /// Initialised up to the largest frame seen, so that growth within it writes each pair just once.
     buffer: Vec<Pair>,
     len: usize,
-    /// Wanted pairs that were found and could not be stored.
-    beyond: u64,
+    /// Whether there are more wanted pairs than could be stored.
+    over: bool,
+    /// Where this list takes a part of the pairs: whether any of the parts is over.
+    any_over: Option<Arc<AtomicBool>>,
     /// Pairs that the filter kept out, without those of two fixed boxes, which most algorithms never look for.
     unwanted: u64,
     /// Shared with the lists of tasks while they work.
@@ -40,6 +45,7 @@ pub struct Pairs {
     limit: Option<usize>,
     /// Elements of the allocation that was refused, if one was.
     refused: Option<usize>,
+    sorter: Sorter,
 }
 
 impl Pairs {
@@ -57,7 +63,8 @@ impl Pairs {
 
     /// Sets the most pairs that may be stored, 8 bytes each, or lifts that limit.
     ///
-    /// A frame with more wanted pairs is [`Error::TooManyPairs`], which tells how many there are. An algorithm on `k` threads, `k` above 1,
+    /// A frame with more wanted pairs is [`Error::TooManyPairs`]. Our algorithms end soon after the limit was exceeded, so how many there are
+    /// is not known. An algorithm on `k` threads, `k` above 1,
     /// may hold up to `8 k + 1` times the limit while it works: each of its tasks has a list of its own. `pair-cache` keeps up to 32 pairs
     /// for each box beside that, whatever the limit.
     pub fn set_limit(&mut self, limit: Option<usize>) {
@@ -119,7 +126,7 @@ impl Pairs {
     /// not looked for.
     #[must_use]
     pub fn overlapping(&self) -> u64 {
-        self.found() + self.unwanted
+        self.len as u64 + self.unwanted
     }
 
     /// A 64-bit hash of the set of pairs that does not depend on their order.
@@ -131,12 +138,12 @@ impl Pairs {
     /// Empties the list and keeps its memory. Every [`BroadPhase`](crate::BroadPhase) begins with this.
     pub fn clear(&mut self) {
         self.len = 0;
-        self.beyond = 0;
+        self.over = false;
         self.unwanted = 0;
         self.refused = None;
     }
 
-    /// Adds one pair, in either order of its members, if the filter wants it. Beyond the limit it is counted and not stored.
+    /// Adds one pair, in either order of its members, if the filter wants it. Beyond the limit it is not stored.
     #[inline]
     pub fn push(&mut self, a: u32, b: u32) {
         if let Some(filter) = self.filter.as_ref().filter(|filter| !filter.wants((a, b))) {
@@ -144,38 +151,38 @@ impl Pairs {
             return;
         }
         if self.is_full() || self.len == self.buffer.len() && !self.grow(1) {
-            self.beyond += 1;
+            self.exceed();
             return;
         }
         self.buffer[self.len] = (a.min(b), a.max(b));
         self.len += 1;
     }
 
-    /// Wanted pairs found, those that could not be stored included.
-    fn found(&self) -> u64 {
-        self.len as u64 + self.beyond
-    }
-
     /// Whether every wanted pair is stored.
     pub(crate) fn is_complete(&self) -> bool {
-        self.beyond == 0 && self.refused.is_none()
+        !self.over && self.refused.is_none()
     }
 
     /// Sorts if the caller wants it, and reports what did not fit. Every [`BroadPhase`](crate::BroadPhase) ends with this.
     ///
+    /// To sort takes 4 bytes for each pair, and 8 where pairs are few or objects many millions. Where they are refused it takes longer.
+    ///
     /// # Errors
     /// [`Error::TooManyPairs`] and [`Error::OutOfMemory`].
     pub fn finish(&mut self) -> Result<(), Error> {
+        self.finish_on(&Alone)
+    }
+
+    /// As [`finish`](Self::finish), on several threads where it pays.
+    pub(crate) fn finish_on(&mut self, threads: &impl Parallel) -> Result<(), Error> {
         if let Some(elements) = self.refused {
             return Err(Error::OutOfMemory { what: "pairs", elements });
         }
-        if let Some(limit) = self.limit
-            && self.found() > limit as u64
-        {
-            return Err(Error::TooManyPairs { limit, pairs: self.found() });
+        if let Some(limit) = self.limit.filter(|_| self.over) {
+            return Err(Error::TooManyPairs { limit });
         }
         if self.order == PairOrder::Canonical {
-            self.buffer[..self.len].sort_unstable();
+            self.sorter.sort(threads, &mut self.buffer[..self.len]);
         }
         Ok(())
     }
@@ -227,11 +234,11 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_bounds_memory_and_the_error_counts_every_pair() {
+    fn a_limit_bounds_memory_and_more_pairs_are_an_error() {
         let mut list = Pairs::new();
         list.set_limit(Some(10));
         (0..1000).for_each(|j| list.push(0, j + 1));
-        assert_eq!(list.finish(), Err(Error::TooManyPairs { limit: 10, pairs: 1000 }));
+        assert_eq!(list.finish(), Err(Error::TooManyPairs { limit: 10 }));
         assert!(list.buffer.capacity() <= 16);
         list.clear();
         (0..10).for_each(|j| list.push(0, j + 1));

@@ -153,7 +153,7 @@ fn a_scene_of_fixed_boxes_has_no_pair_however_small_the_limit() {
 }
 
 #[test]
-fn the_limit_and_its_error_count_the_wanted_pairs_only() {
+fn the_limit_counts_the_wanted_pairs_only() {
     // All overlap; of 1200 boxes the 100 of the second group collide with the 1100 of the first, and with nothing else.
     let boxes = [Aabb::cube([3.0; 3], 1.0); 1200];
     let of = |k: usize| if k % 12 == 5 { (2, 1) } else { (1, 2) };
@@ -163,8 +163,7 @@ fn the_limit_and_its_error_count_the_wanted_pairs_only() {
     for (id, mut algorithm) in every_algorithm() {
         for limit in [0, 1, 1000, 109_999] {
             pairs.set_limit(Some(limit));
-            let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
-            assert_eq!(error, Error::TooManyPairs { limit, pairs: 110_000 }, "{id}");
+            assert_eq!(algorithm.find_pairs(&boxes, &mut pairs), Err(Error::TooManyPairs { limit }), "{id}");
         }
         pairs.set_limit(Some(110_000));
         algorithm.find_pairs(&boxes, &mut pairs).unwrap();

@@ -52,7 +52,9 @@ fn every_scenario_at_the_edges_of_blocks() {
         for objects in [0, 1, 2, 31, 32, 33, 1000] {
             assert_all_agree(&format!("{scenario} of {objects}"), &frame(scenario, objects), &mut algorithms);
         }
-        let large = [65_535, 65_536, 65_537, 40_961 + 1009 * k][k % 4];
+        // The hard ones, which come last, are quadratic on a GPU: at the sizes of the others a software adapter takes minutes.
+        let hard = scenario > Scenario::Fragmentation;
+        let large = if hard { 4097 + k } else { [65_535, 65_536, 65_537, 40_961 + 1009 * k][k % 4] };
         let fast = |id: &str| !id.contains("brute");
         let (mut fast, rest): (Vec<_>, Vec<_>) = algorithms.into_iter().partition(|(id, _)| fast(id));
         assert_all_agree(&format!("{scenario} of {large}"), &frame(scenario, large), &mut fast);
@@ -143,10 +145,10 @@ fn a_filter_keeps_pairs_out_and_the_limit_counts_the_others() {
             algorithm.find_pairs(boxes, &mut pairs).unwrap_or_else(|e| panic!("{id} on scene {scene}: {e}"));
             assert!(pairs.as_slice() == expected, "{id} on scene {scene}: {} pairs, not {}", pairs.len(), expected.len());
             assert_eq!(pairs.overlapping(), all as u64, "{id} on scene {scene}");
-            pairs.set_limit(Some(expected.len() - 1));
-            let error = algorithm.find_pairs(boxes, &mut pairs).unwrap_err();
-            let counted = Error::TooManyPairs { limit: expected.len() - 1, pairs: expected.len() as u64 };
-            assert_eq!(error, counted, "{id} on scene {scene}");
+            let limit = expected.len() - 1;
+            pairs.set_limit(Some(limit));
+            let refused = Err(Error::TooManyPairs { limit });
+            assert_eq!(algorithm.find_pairs(boxes, &mut pairs), refused, "{id} on scene {scene}");
         }
     }
 }
@@ -178,15 +180,14 @@ fn the_first_invalid_box_is_named() {
 }
 
 #[test]
-fn ten_million_pairs_come_whole_and_a_limit_counts_them() {
+fn ten_million_pairs_come_whole_and_a_limit_refuses_them() {
     let Some(gpus) = gpus() else { return };
     let boxes: Vec<Aabb> = (0..5000).map(|k| Aabb::cube([k as f32 * 1e-4, 0.0, 0.0], 1.0)).collect();
     let all = 5000 * 4999 / 2;
     for (id, mut algorithm) in every_algorithm(&gpus) {
         let mut pairs = Pairs::new();
         pairs.set_limit(Some(1000));
-        let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
-        assert_eq!(error, Error::TooManyPairs { limit: 1000, pairs: all }, "{id}");
+        assert_eq!(algorithm.find_pairs(&boxes, &mut pairs), Err(Error::TooManyPairs { limit: 1000 }), "{id}");
         pairs.set_limit(None);
         for frame in 0..2 {
             algorithm.find_pairs(&boxes, &mut pairs).unwrap();
@@ -206,7 +207,6 @@ fn rows_of_very_many_candidates_lose_no_pair() {
     let hits = (0..70_000_u32).filter(|k| k % 7 == 0).count();
     // No more than that: a software adapter on two slow cores takes a second for ten million tests, and after a minute it counts as lost.
     let point = [Aabb::cube([1.0; 3], 0.5); 12_000];
-    let pairs_of_point = 12_000 * 11_999 / 2;
     for (id, mut algorithm) in every_algorithm(&gpus).into_iter().filter(|(id, _)| !id.contains("brute")) {
         let mut pairs = Pairs::with_order(PairOrder::Canonical);
         algorithm.find_pairs(&row, &mut pairs).unwrap();
@@ -214,8 +214,7 @@ fn rows_of_very_many_candidates_lose_no_pair() {
         // Quadratic, so once for each method and GPU.
         if !id.contains('+') && !id.contains("twice") {
             pairs.set_limit(Some(1000));
-            let error = algorithm.find_pairs(&point, &mut pairs).unwrap_err();
-            assert_eq!(error, Error::TooManyPairs { limit: 1000, pairs: pairs_of_point }, "{id}");
+            assert_eq!(algorithm.find_pairs(&point, &mut pairs), Err(Error::TooManyPairs { limit: 1000 }), "{id}");
         }
     }
 }

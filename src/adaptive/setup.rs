@@ -1,11 +1,14 @@
 //! How an [`Adaptive`](super::Adaptive) came to its tuning, and where what it learns is kept.
 
 use super::instances::Instances;
+use crate::measure::Pace;
 use crate::tuning::Tuning;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
 
 /// How an [`Adaptive`](crate::Adaptive) came to its tuning.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -45,10 +48,6 @@ pub enum Origin {
 pub enum SaveError {
     /// The program gave the tuning, and keeps it itself.
     Given,
-    /// The tuning of this machine is not there yet.
-    Awaited,
-    /// Nothing was predicted that could have been corrected.
-    NothingPredicted,
     /// There is no cache to keep it in.
     NoCache,
     /// The tuning can't be written as JSON.
@@ -68,10 +67,6 @@ impl fmt::Display for SaveError {
             Self::Given => f.write_str(
                 "the tuning was given by the program; write `Adaptive::learned` to a file with `json::write_tuning`",
             ),
-            Self::Awaited => f.write_str("the tuning of this machine is not there yet; save at the end of the session"),
-            Self::NothingPredicted => {
-                f.write_str("nothing was predicted that could have been corrected; `Adaptive::setup` says why")
-            }
             Self::NoCache => f.write_str("there is no cache to keep it in; `Adaptive::setup` and the options say why"),
             Self::Encode(_) => f.write_str("the tuning can't be written as JSON"),
             Self::Write { file, .. } => write!(f, "{} can't be written", file.display()),
@@ -101,26 +96,24 @@ pub(crate) struct Start {
     pub(crate) setup: Setup,
     /// Keeps tuning that holds for this machine.
     pub(crate) keeper: Option<Box<dyn Keeper>>,
-    pub(crate) awaited: Option<Arc<Handover>>,
+    pub(crate) awaited: Option<Awaited>,
 }
 
 impl Start {
-    /// Keeps what was learned.
-    pub(super) fn save(&self, learned: impl FnOnce() -> Tuning) -> Result<(), SaveError> {
+    /// Keeps what was learned. `false` where there is nothing that could have been corrected.
+    pub(super) fn save(&self, learned: impl FnOnce() -> Tuning) -> Result<bool, SaveError> {
         match (&self.keeper, self.setup.origin) {
-            (Some(keeper), _) => keeper.keep(learned()),
+            (Some(keeper), _) => keeper.keep(learned()).map(|()| true),
             (None, Origin::Given) => Err(SaveError::Given),
-            (None, Origin::Awaited) => Err(SaveError::Awaited),
-            (None, Origin::Usual) => Err(SaveError::NothingPredicted),
+            (None, Origin::Awaited | Origin::Usual) => Ok(false),
             (None, Origin::Cached | Origin::Probed) => Err(SaveError::NoCache),
         }
     }
 
     /// What the thread in the background has made, once it is there. One look at a flag until then, and nothing after.
     pub(super) fn arrived(&mut self) -> Option<(Tuning, Instances)> {
-        let handover = self.awaited.take_if(|h| h.ready.load(Ordering::Acquire))?;
-        // That thread let go of the lock before it set the flag.
-        let arrival = handover.slot.lock().unwrap_or_else(PoisonError::into_inner).take()?;
+        let awaited = self.awaited.take_if(|a| a.handover.ready.load(Ordering::Acquire))?;
+        let arrival = awaited.handover.slot().take()?;
         (self.setup, self.keeper) = (arrival.setup, arrival.keeper);
         arrival.tuning
     }
@@ -132,13 +125,59 @@ pub(crate) struct Handover {
     /// The slot is filled and will not be touched by that thread again.
     ready: AtomicBool,
     slot: Mutex<Option<Arrival>>,
+    filled: Condvar,
 }
 
 impl Handover {
-    /// Leaves what was made; once.
+    fn slot(&self) -> MutexGuard<'_, Option<Arrival>> {
+        self.slot.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Leaves what was made; once, and last of all.
     pub(crate) fn leave(&self, arrival: Arrival) {
-        *self.slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(arrival);
+        let mut slot = self.slot();
+        *slot = Some(arrival);
+        // Under the lock, so that nobody looks before it and goes to sleep after it.
         self.ready.store(true, Ordering::Release);
+        drop(slot);
+        self.filled.notify_all();
+    }
+
+    /// Waits until something was left, but no longer than that. Whether there was.
+    fn wait(&self, at_most: Duration) -> bool {
+        let waits = |_: &mut Option<Arrival>| !self.ready.load(Ordering::Acquire);
+        drop(self.filled.wait_timeout_while(self.slot(), at_most, waits));
+        self.ready.load(Ordering::Acquire)
+    }
+}
+
+/// How long who ends waits for the thread in the background. It looks whether it is to stop after each sample, of which the longest take
+/// tenths of a second; the driver of a GPU may hold it longer.
+const LAST_WAIT: Duration = Duration::from_secs(2);
+
+/// The thread in the background. It ends with who waits for it.
+#[derive(Debug)]
+pub(crate) struct Awaited {
+    pub(crate) handover: Arc<Handover>,
+    pub(crate) pace: Arc<Pace>,
+    pub(crate) thread: Option<JoinHandle<()>>,
+}
+
+impl Awaited {
+    /// Waits for it while it does nothing else, but no longer than that; from then on it leaves most of the time to the program.
+    pub(crate) fn wait(&self, at_most: Duration) {
+        self.handover.wait(at_most);
+        self.pace.go_gently();
+    }
+}
+
+impl Drop for Awaited {
+    fn drop(&mut self) {
+        self.pace.stop();
+        if self.handover.wait(LAST_WAIT) {
+            // It has nothing left to do. Its panics were caught.
+            let _ = self.thread.take().map(JoinHandle::join);
+        }
     }
 }
 

@@ -1,25 +1,44 @@
 //! Tuning kept from one start of a program to the next.
 //!
-//! A file for each [`Key`]. It is written beside its place and renamed, so that two processes at once leave one whole file; what
+//! A file for each [`Key`], and beside it what a measurement that was stopped has found so far. It is written beside its place and renamed, so that two processes at once leave one whole file; what
 //! was cut off by a crash of the machine can't be read and is replaced.
 
 use super::options::Cache;
 use crate::adaptive::{Keeper, SaveError};
 use crate::algorithm::AlgorithmId;
 use crate::entry::Entry;
-use crate::hardware::{GpuIdentity, Machine};
+use crate::hardware::{GpuIdentity, Hardware, Machine, Parameter};
 use crate::json::{self, Format};
 use crate::measure::{fnv1a, machine};
 use crate::model::Model;
 use crate::registry::{Registry, usable_cores};
 use crate::tuning::Tuning;
 use etcetera::BaseStrategy;
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
 
 /// How the files are read and written.
 const FORMAT: Format = Format::new("cache", 2, 0);
+
+/// How what a stopped measurement has found is read and written.
+const UNFINISHED: Format = Format::new("unfinished", 1, 0);
+
+/// The file that a process locks while it measures.
+const LOCK: &str = ".sapwise.lock";
+
+/// How often to look whether another process is done.
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
+
+/// How the names of files begin and end while they are written.
+const TEMPORARY: (&str, &str) = (".sapwise-", ".tmp");
+
+/// To write a file takes milliseconds: what is as old was left by a crash.
+const CRASHED: Duration = Duration::from_secs(60 * 60);
+
+/// What was neither read nor written for as long is of a machine, a driver or a build that is gone.
+const UNUSED: Duration = Duration::from_secs(90 * 24 * 60 * 60);
 
 /// A file that is longer was written by something else.
 const LONGEST_BYTES: u64 = 16 << 20;
@@ -32,6 +51,15 @@ struct Cached {
     key: Key,
     /// The tuning, predicted or learned.
     tuning: Tuning,
+}
+
+/// What a measurement that was stopped has found.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+struct Unfinished {
+    /// What the figures hold for.
+    key: Key,
+    /// Those that were measured.
+    hardware: Hardware,
 }
 
 /// All that tuning depends on, in plain words. Names no host, no user and no single piece of hardware.
@@ -112,6 +140,75 @@ impl CacheFile {
         &self.path
     }
 
+    fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new("."))
+    }
+
+    /// Where the figures of an unfinished measurement are.
+    fn unfinished(&self) -> PathBuf {
+        self.path.with_extension("unfinished.json")
+    }
+
+    /// Waits until no other process measures, but no longer than `patience` and not when it is to stop. What comes back is to be kept while
+    /// this one measures; the system gives it back when a process dies. `None` after the time, and where there is no folder or no lock.
+    pub(super) fn wait_for_turn(&self, patience: Duration, stop: impl Fn() -> bool) -> Option<File> {
+        fs::create_dir_all(self.folder()).ok()?;
+        let lock = File::create(self.folder().join(LOCK)).ok()?;
+        let began = Instant::now();
+        loop {
+            match lock.try_lock() {
+                Ok(()) => return Some(lock),
+                Err(TryLockError::WouldBlock) if began.elapsed() < patience && !stop() => std::thread::sleep(LOOK_AGAIN),
+                Err(_) => return None,
+            }
+        }
+    }
+
+    /// What a measurement has found that was stopped; nothing where there is none that can be used.
+    pub(super) fn read_unfinished(&self) -> Vec<Parameter> {
+        let text =
+            Some(self.unfinished()).filter(|p| fs::metadata(p).is_ok_and(|m| m.is_file() && m.len() <= LONGEST_BYTES));
+        let text = text.and_then(|path| fs::read_to_string(path).ok());
+        let found = text.and_then(|text| UNFINISHED.read::<Unfinished>(&text).ok()).map(|read| read.value);
+        found.filter(|of| of.key == self.key).map(|of| of.hardware.parameters).unwrap_or_default()
+    }
+
+    /// Keeps what was measured so far, until a tuning is kept.
+    pub(super) fn keep_unfinished(&self, measured: &[Parameter]) -> Result<(), SaveError> {
+        let hardware = Hardware::new(self.key.machine.clone(), measured.to_vec());
+        self.write(&self.unfinished(), UNFINISHED.write(&Unfinished { key: self.key.clone(), hardware }))
+    }
+
+    /// Drops them: the measurement is finished, well or not.
+    pub(super) fn forget_unfinished(&self) {
+        // Where it stays because it can't be removed it could not be written either.
+        let _ = fs::remove_file(self.unfinished());
+    }
+
+    fn write(&self, path: &Path, text: Result<String, json::Error>) -> Result<(), SaveError> {
+        let text = text.map_err(|e| SaveError::Encode(e.into()))?;
+        self.replace(path, &text).map_err(|source| SaveError::Write { file: path.to_owned(), source })
+    }
+
+    /// Removes what no process will use again: temporary files of those that crashed, and files that none has read or written for long.
+    fn clean(&self) {
+        let Ok(entries) = fs::read_dir(self.folder()) else { return };
+        for entry in entries.flatten() {
+            let name = entry.file_name();
+            let Some(name) = name.to_str() else { continue };
+            let most = match name {
+                _ if name.starts_with(TEMPORARY.0) && name.ends_with(TEMPORARY.1) => CRASHED,
+                _ if name.starts_with("tuning-") && name.ends_with(".json") => UNUSED,
+                _ => continue,
+            };
+            let age = entry.metadata().ok().filter(fs::Metadata::is_file).and_then(|m| m.modified().ok()?.elapsed().ok());
+            if age.is_some_and(|age| age > most) {
+                // Another process may have been quicker.
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+    }
+
     /// The tuning that is kept; `None` where there is none.
     ///
     /// # Errors
@@ -131,21 +228,23 @@ impl CacheFile {
         if cached.key != self.key {
             return Err(ignored("it is of another machine, another build or another model"));
         }
+        // It is in use, which keeps it from being cleaned; where it can't be written nobody else cleans it either.
+        let _ = File::options().append(true).open(&self.path).and_then(|f| f.set_modified(SystemTime::now()));
         Ok(Some(cached.tuning))
     }
 
-    fn replace(&self, text: &str) -> std::io::Result<()> {
-        let folder = self.path.parent().unwrap_or(Path::new("."));
+    fn replace(&self, path: &Path, text: &str) -> std::io::Result<()> {
+        let folder = self.folder();
         fs::create_dir_all(folder)?;
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".sapwise-").suffix(".tmp");
+        builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1);
         // Private otherwise, where every other program's files follow the umask.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let mut temporary = builder.tempfile_in(folder)?;
         // Not forced to the disk, which may take longer than measuring again what a crash of the machine cuts off.
         temporary.write_all(text.as_bytes())?;
-        temporary.persist(&self.path).map_err(|failed| failed.error)?;
+        temporary.persist(path).map_err(|failed| failed.error)?;
         Ok(())
     }
 }
@@ -153,8 +252,9 @@ impl CacheFile {
 impl Keeper for CacheFile {
     fn keep(&self, tuning: Tuning) -> Result<(), SaveError> {
         let cached = Cached { key: self.key.clone(), tuning };
-        let text = FORMAT.write(&cached).map_err(|e| SaveError::Encode(e.into()))?;
-        self.replace(&text).map_err(|source| SaveError::Write { file: self.path.clone(), source })
+        self.write(&self.path, FORMAT.write(&cached))?;
+        self.clean();
+        Ok(())
     }
 }
 

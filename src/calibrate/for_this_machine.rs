@@ -3,25 +3,33 @@
 use super::cache::{CacheFile, Key};
 use super::options::StartOptions;
 use super::slice;
-use crate::adaptive::{Adaptive, Arrival, Handover, Instances, Keeper, Origin, Setup, Start};
+use crate::adaptive::{Adaptive, Arrival, Awaited, Handover, Instances, Keeper, Origin, Setup, Start};
 use crate::entry::Entry;
 use crate::error::Error;
 use crate::hardware::{GpuHardware, Hardware, Parameter, ParameterId};
-use crate::measure;
+use crate::measure::{self, Pace};
 use crate::model::Model;
 use crate::registry::Registry;
 use crate::tuning::Tuning;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// How long to wait for another process that measures, beside the time that this one would measure for.
+const MOST_WAIT: Duration = Duration::from_secs(10);
+
+/// The same in the background, where the usual tuning decides meanwhile: longer than a measurement that leaves most of the time to its
+/// program.
+const MOST_WAIT_IN_BACKGROUND: Duration = Duration::from_secs(120);
 
 impl Adaptive {
     /// An adaptive broad phase with the tuning of this machine: the one that an earlier start has kept, else predicted from
     /// its hardware parameters, which are measured in at most two seconds, and kept for the next start.
     ///
     /// In the background, which is the default, it returns at once, with [`Tuning::usual`] for the first frames; see
-    /// [`StartOptions::background`]. The thread that measures ends by itself, whether this is dropped before or not. What is kept
-    /// holds for this machine, its drivers, this version of the library, its algorithms and the model; after a change of any of
+    /// [`StartOptions::background`]. The thread that measures takes a tenth of the time, and ends when this is dropped, which waits for it
+    /// for two seconds at most; what it has measured by then the next start goes on from. Of processes that start together one
+    /// measures, and the others take what it keeps. What is kept holds for this machine, its drivers, this version of the library, its algorithms and the model; after a change of any of
     /// them the next start measures again. A cache that can't be read or written keeps nothing from working: [`setup`](Self::setup) tells.
     ///
     /// Uses no network and no global state.
@@ -34,7 +42,7 @@ impl Adaptive {
             in_background(options, began)?
         } else {
             let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry(true)));
-            let arrival = arrive(options, &registry, began, || true);
+            let arrival = arrive(options, &registry, began, &Arc::default(), MOST_WAIT + options.probe_limit);
             // Only where there is no prediction: to make algorithms takes memory, and on GPUs time.
             let Arrival { setup, keeper, tuning } = arrival;
             let mut adaptive = match tuning {
@@ -60,14 +68,16 @@ fn in_background(options: &StartOptions, began: Instant) -> Result<Adaptive, Err
             Adaptive::new(Tuning::usual(&registry), &registry)?
         }
     };
-    let handover = Arc::new(Handover::default());
-    let (options, filled) = (options.clone(), Arc::clone(&handover));
+    let (handover, pace) = (Arc::new(Handover::default()), Arc::new(Pace::default()));
+    let wait_at_most = options.wait_at_most;
+    let (options, filled, own_pace) = (options.clone(), Arc::clone(&handover), Arc::clone(&pace));
     let run = move || {
         let made = catch_unwind(AssertUnwindSafe(|| {
             let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry(true)));
-            // The other owner is the broad phase that waits.
-            arrive(&options, &registry, began, || Arc::strong_count(&filled) > 1)
+            arrive(&options, &registry, began, &own_pace, MOST_WAIT_IN_BACKGROUND)
         }));
+        // Before it is told that nothing is left to do.
+        drop(options);
         let arrival = made.unwrap_or_else(|_| {
             let remarks = vec!["the thread in the background panicked: the usual tuning stays".to_owned()];
             Arrival { setup: Setup { remarks, ..usual(began) }, keeper: None, tuning: None }
@@ -75,15 +85,20 @@ fn in_background(options: &StartOptions, began: Instant) -> Result<Adaptive, Err
         filled.leave(arrival);
     };
     adaptive.set_start(match std::thread::Builder::new().name("sapwise-setup".to_owned()).spawn(run) {
-        Ok(_) => {
+        Ok(thread) => {
             let setup = Setup { origin: Origin::Awaited, ..Setup::default() };
-            Start { setup, keeper: None, awaited: Some(handover) }
+            let awaited = Awaited { handover, pace, thread: Some(thread) };
+            awaited.wait(wait_at_most);
+            Start { setup, keeper: None, awaited: Some(awaited) }
         }
         Err(e) => {
             let remarks = vec![format!("no thread can be started in the background ({e}): the usual tuning stays")];
             Start { setup: Setup { remarks, ..usual(began) }, ..Start::default() }
         }
     });
+    if wait_at_most > Duration::ZERO {
+        adaptive.take_over();
+    }
     Ok(adaptive)
 }
 
@@ -104,11 +119,12 @@ fn usual(began: Instant) -> Setup {
     Setup { origin: Origin::Usual, seconds: began.elapsed().as_secs_f64(), ..Setup::default() }
 }
 
-/// Tuning of this machine with their algorithms, which are made only where they are still wanted.
-fn arrive(options: &StartOptions, registry: &Registry, began: Instant, wanted: impl Fn() -> bool) -> Arrival {
+/// Tuning of this machine with their algorithms, which are made only where they are still wanted. `patience` is for another process that
+/// measures already.
+fn arrive(options: &StartOptions, registry: &Registry, began: Instant, pace: &Arc<Pace>, patience: Duration) -> Arrival {
     let mut remarks = Vec::new();
-    let found = find(options, registry, &mut remarks);
-    let made = found.filter(|_| wanted()).and_then(|(tuning, origin, file)| {
+    let found = find(options, registry, pace, patience, &mut remarks);
+    let made = found.filter(|_| !pace.is_stopped()).and_then(|(tuning, origin, file)| {
         let mut made = Instances::of(&tuning, registry);
         match made.failure() {
             None => Some((tuning, made, origin, file)),
@@ -126,10 +142,13 @@ fn arrive(options: &StartOptions, registry: &Registry, began: Instant, wanted: i
     Arrival { setup, keeper: file.map(|f| Box::new(f) as Box<dyn Keeper>), tuning: Some((tuning, made)) }
 }
 
-/// Tuning from the cache, else from a prediction, and its file in the cache. `None` where nothing can be predicted.
+/// Tuning from the cache, else from a prediction, and its file in the cache. `None` where nothing can be predicted, or what measured was
+/// stopped.
 fn find(
     options: &StartOptions,
     registry: &Registry,
+    pace: &Arc<Pace>,
+    patience: Duration,
     remarks: &mut Vec<String>,
 ) -> Option<(Tuning, Origin, Option<CacheFile>)> {
     let built_in = if options.model.is_none() { Model::built_in().map(Some) } else { Ok(None) };
@@ -145,12 +164,22 @@ fn find(
         Some(Err(why)) => remarks.push(why),
         Some(Ok(None)) | None => {}
     }
-    let hardware = hardware(options, registry, model, remarks);
+    // Processes that start together measure once, and don't disturb each other.
+    let turn = file.as_ref().and_then(|f| f.wait_for_turn(patience, || pace.is_stopped()));
+    if let Some(Ok(Some(tuning))) = file.as_ref().map(CacheFile::read) {
+        return Some((tuning, Origin::Cached, file));
+    }
+    let hardware = hardware(options, registry, model, pace, file.as_ref(), remarks);
+    if pace.is_stopped() {
+        return None;
+    }
+    file.iter().for_each(CacheFile::forget_unfinished);
     let (tuning, sound) = predict(model, hardware, &registry.available(), remarks)?;
     // Another process may have been quicker, and may even have learned: what it has kept stays.
     if let Some(file) = file.as_ref().filter(|f| sound && !matches!(f.read(), Ok(Some(_)))) {
         remarks.extend(file.keep(tuning.clone()).err().map(with_cause));
     }
+    drop(turn);
     // Nor may what is learned upon them take the place of a sound measurement.
     Some((tuning, Origin::Probed, file.filter(|_| sound)))
 }
@@ -173,10 +202,24 @@ fn predict(
 }
 
 /// Measures what the model reads, of the machine as the registry uses it.
-fn hardware(options: &StartOptions, registry: &Registry, model: &Model, remarks: &mut Vec<String>) -> Hardware {
+///
+/// What a start measured that was stopped is taken from the cache, and what this one measures is kept there until it has a tuning.
+fn hardware(
+    options: &StartOptions,
+    registry: &Registry,
+    model: &Model,
+    pace: &Arc<Pace>,
+    file: Option<&CacheFile>,
+    remarks: &mut Vec<String>,
+) -> Hardware {
     let threads = registry.available().iter().map(|e| e.id.threads()).max();
-    let plan = measure::Options { threads, limit: Some(options.probe_limit), ..measure::Options::default() };
-    let mut hardware = measure::hardware_for(&model.parameters(), &plan);
+    let (limit, pace) = (Some(options.probe_limit), Some(Arc::clone(pace)));
+    let plan = measure::Options { threads, limit, pace, ..measure::Options::default() };
+    let measured = file.map(CacheFile::read_unfinished).unwrap_or_default();
+    let mut hardware = measure::go_on(&model.parameters(), &plan, measured, |so_far| {
+        // Where nothing can be kept the tuning tells so.
+        let _ = file.map(|f| f.keep_unfinished(so_far));
+    });
     let simd = registry.simd();
     if let Some(lanes) = hardware.parameters.iter_mut().find(|p| p.name == ParameterId::SimdLanes) {
         *lanes = Parameter::reported(ParameterId::SimdLanes, f64::from(simd.lanes()), "the SIMD level of the registry");
@@ -184,6 +227,9 @@ fn hardware(options: &StartOptions, registry: &Registry, model: &Model, remarks:
     hardware.machine.simd = simd.to_string();
     #[cfg(feature = "measure-gpu")]
     for index in registry.gpus().identities().map(|g| g.index) {
+        if plan.pace.as_ref().is_some_and(|pace| pace.is_stopped()) {
+            break;
+        }
         match measure::gpu(registry.gpus(), index, &plan) {
             Ok(gpu) => hardware.gpus.push(gpu),
             Err(why) => remarks.push(format!("gpu{index} can't be measured: {why}")),

@@ -27,6 +27,10 @@ pub struct StartOptions {
     /// On by default. A program that shows a loading screen turns it off: what is measured while its other threads work is off by
     /// what they take, which can't be told from a slower machine, and is kept until [`save`](crate::Adaptive::save) has better.
     pub background: bool,
+    /// How long the constructor waits for what happens in the background, which until then takes the machine for itself: for a program that
+    /// has some time at its start, but not as much as a first measurement may take. Afterwards the background works a tenth of the time,
+    /// some milliseconds at once where a sample is no longer, and takes ten times as long. Nothing by default.
+    pub wait_at_most: Duration,
     /// Where tuning is kept from one start to the next. The user's cache folder by default.
     pub cache: Cache,
     /// The algorithms to choose from: the program's own, its thread pool ([`Registry::use_pool`]), its GPUs
@@ -37,7 +41,8 @@ pub struct StartOptions {
     /// default: [`Model::built_in`].
     pub model: Option<Model>,
     /// The longest that the hardware may be measured, a sample more or less, and each GPU once more. Two seconds by default; where
-    /// other programs work meanwhile less than one returns figures that are far off. What is had in the time is used.
+    /// other programs work meanwhile less than one returns figures that are far off. What is had in the time is used. Pauses in the
+    /// [background](Self::background) don't count.
     pub probe_limit: Duration,
 }
 
@@ -62,6 +67,7 @@ impl StartOptions {
             learning: true,
             exploring: true,
             background: true,
+            wait_at_most: Duration::ZERO,
             cache: Cache::User,
             registry: None,
             model: None,
@@ -85,6 +91,12 @@ impl StartOptions {
     #[must_use]
     pub fn background(self, background: bool) -> Self {
         Self { background, ..self }
+    }
+
+    /// The same with another [`wait_at_most`](Self::wait_at_most).
+    #[must_use]
+    pub fn wait_at_most(self, wait_at_most: Duration) -> Self {
+        Self { wait_at_most, ..self }
     }
 
     /// The same with its tuning [kept](Self::cache) there.

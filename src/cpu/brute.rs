@@ -56,7 +56,7 @@ impl BroadPhase for Brute {
             let row = |k: usize| row(moving, boxes.len(), k, parts);
             brute_rows(*simd, columns, row(k)..row(k + 1), list);
         });
-        pairs.finish()
+        pairs.finish_on(workers)
     }
 
     fn prepare(&mut self, objects: usize) {

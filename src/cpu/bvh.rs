@@ -37,7 +37,7 @@ impl BroadPhase for Bvh {
         let workers = &workers.fit(boxes.len());
         tree.build(workers, boxes, Members::All, &plan.sample(boxes), pairs.filter())?;
         outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(tree.part(k, parts), list));
-        pairs.finish()
+        pairs.finish_on(workers)
     }
 
     fn prepare(&mut self, objects: usize) {

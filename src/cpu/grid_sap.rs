@@ -130,7 +130,7 @@ impl BroadPhase for GridSap {
             });
             tasks.iter_mut().find_map(|t| t.error.take()).map_or(Ok(()), Err)
         })?;
-        pairs.finish()
+        pairs.finish_on(workers)
     }
 
     fn prepare(&mut self, objects: usize) {

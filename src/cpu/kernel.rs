@@ -38,6 +38,9 @@ fn sweep_at<R: Rows>(
     start: impl FnMut(usize, &Query) -> usize,
     pairs: &mut Pairs,
 ) {
+    if pairs.is_any_over() {
+        return;
+    }
     match simd {
         // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
@@ -85,6 +88,9 @@ pub(crate) fn sweep_across(
 
 /// Tests every row of `rows` against all rows behind it, on all three axes, and adds the pairs.
 pub(crate) fn brute_rows(simd: Simd, columns: &Columns, rows: Range<usize>, pairs: &mut Pairs) {
+    if pairs.is_any_over() {
+        return;
+    }
     let view = View::new(columns);
     match simd {
         // SAFETY: the proof says that this CPU has the instructions.
@@ -239,6 +245,10 @@ fn sweep<L: Lanes, R: Rows>(
             }
             at += L::COUNT;
         }
+        // 2^20 boxes in one point have 5 * 10^11 pairs: a caller who wants a thousand does not wait for all.
+        if pairs.is_over() {
+            return;
+        }
     }
 }
 
@@ -255,6 +265,10 @@ fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs: &mut Pa
                 add::<L, All>(lanes, view, at, &query, hits, pairs);
             }
             at += L::COUNT;
+        }
+        // As above.
+        if pairs.is_over() {
+            return;
         }
     }
 }
@@ -304,9 +318,39 @@ pub(crate) fn prefetch<T>(value: &T) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Aabb;
+    use crate::{Aabb, Filter, Membership};
+    use std::sync::Arc;
 
     /// On targets without kernels of their own; here it only has to be right.
+    /// Pairs that the filter keeps out are counted, and tell how many were found at all.
+    #[test]
+    fn a_search_ends_with_the_row_that_exceeds_the_limit() {
+        let boxes = vec![Aabb::cube([1.0; 3], 0.5); 1000];
+        let mut columns = Columns::default();
+        columns.resize(boxes.len()).unwrap();
+        boxes.iter().enumerate().for_each(|(row, b)| columns.as_mut().set(row, b, 0, row as u32));
+        let ground = |k: usize| Membership { fixed: k >= 500, ..Membership::ALL };
+        let whole = {
+            let mut pairs = Pairs::new();
+            pairs.set_limit(Some(10));
+            pairs.set_filter(Some(Filter::new((0..1000).map(ground).collect())));
+            pairs
+        };
+        for search in [sweep_rows::<All>, brute_rows] {
+            let mut pairs = whole.clone();
+            search(Simd::Portable, &columns, 0..1000, &mut pairs);
+            assert!(pairs.is_over() && pairs.overlapping() == 10, "{}", pairs.overlapping());
+            search(Simd::Portable, &columns, 600..1000, &mut pairs);
+            assert_eq!(pairs.overlapping(), 10, "what is over is not gone on with");
+            // Nor is it with another part of the same frame.
+            let any_over = Arc::default();
+            let mut parts = [Pairs::new(), Pairs::new()];
+            parts.iter_mut().for_each(|part| part.begin_part(&whole, &any_over));
+            parts.iter_mut().for_each(|part| search(Simd::Portable, &columns, 0..1000, part));
+            assert_eq!(parts.map(|part| part.len()), [10, 0]);
+        }
+    }
+
     #[test]
     fn plain_rust_gives_the_pairs_of_the_double_loop() {
         let boxes: Vec<Aabb> = (0..203)

@@ -103,7 +103,7 @@ impl BroadPhase for PairCache {
             outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
         }
         self.motion.found(boxes.len(), pairs.overlapping());
-        pairs.finish()
+        pairs.finish_on(&self.widths[self.width])
     }
 
     fn prepare(&mut self, objects: usize) {

@@ -97,7 +97,7 @@ impl BroadPhase for Sap {
             let rows = part(fixed.len(), k, parts);
             sweep_across(*simd, columns, fixed.start + rows.start..fixed.start + rows.end, 0..moving, Ties::Skip, list);
         });
-        pairs.finish()
+        pairs.finish_on(workers)
     }
 
     fn prepare(&mut self, objects: usize) {

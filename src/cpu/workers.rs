@@ -8,9 +8,13 @@ use crate::cpu::columns::ColumnsMut;
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
 use crate::error::Error;
-use crate::pairs::Pairs;
+use crate::pairs::{Pairs, Parallel};
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
 #[cfg(feature = "parallel")]
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 /// The threads of one algorithm: the caller's own, and those of a pool that help it.
 #[derive(Debug)]
@@ -172,19 +176,35 @@ impl Workers {
     }
 }
 
-/// The pairs that one task finds.
+impl Parallel for Workers {
+    fn threads(&self) -> usize {
+        self.threads
+    }
+
+    fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
+        Self::each_of(self, tasks, work);
+    }
+}
+
+/// The pairs that the tasks find.
 #[derive(Debug, Default)]
-pub(crate) struct Outputs(Vec<Pairs>);
+pub(crate) struct Outputs {
+    /// One for each task.
+    lists: Vec<Pairs>,
+    /// Whether one of them has exceeded the limit in this frame.
+    any_over: Arc<AtomicBool>,
+}
 
 impl Outputs {
     /// As many lists as `workers` has tasks, each empty and under the caller's limit and filter. Those of more tasks stay for when there
     /// are as many again.
     fn ready(&mut self, workers: &Workers, pairs: &Pairs) -> &mut [Pairs] {
-        if self.0.len() < workers.tasks() {
-            self.0.resize_with(workers.tasks(), Pairs::new);
+        if self.lists.len() < workers.tasks() {
+            self.lists.resize_with(workers.tasks(), Pairs::new);
         }
-        let lists = &mut self.0[..workers.tasks()];
-        lists.iter_mut().for_each(|list| list.begin_part(pairs));
+        let lists = &mut self.lists[..workers.tasks()];
+        self.any_over.store(false, Ordering::Relaxed);
+        lists.iter_mut().for_each(|list| list.begin_part(pairs, &self.any_over));
         lists
     }
 

@@ -11,6 +11,8 @@ use crate::cpu::{Threads, Workers};
 use crate::error::{Error, GpuError};
 use crate::load::{FramePlan, Sample};
 use crate::pairs::Pairs;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Most boxes in a frame: the numbers of boxes have 31 bits on a GPU, and one more says who owns a pair.
@@ -36,6 +38,8 @@ pub(crate) struct OnGpus {
     parts: Vec<Share>,
     slabs: Slabs,
     workers: Workers,
+    /// Whether one of the parts has exceeded the limit in this frame.
+    any_over: Arc<AtomicBool>,
     /// By how much the work of a GPU grows with the logarithm of its boxes.
     exponent: f64,
     /// Whether its kernels have run: some drivers finish compiling when they first do.
@@ -99,7 +103,15 @@ impl OnGpus {
             "sap" => 5.0 / 3.0,
             _ => 1.0,
         };
-        Ok(Box::new(Self { id: id.clone(), parts, slabs: Slabs::default(), workers, exponent, warm: false }))
+        Ok(Box::new(Self {
+            id: id.clone(),
+            parts,
+            slabs: Slabs::default(),
+            workers,
+            any_over: Arc::default(),
+            exponent,
+            warm: false,
+        }))
     }
 
     /// All boxes at once on the one GPU that there is.
@@ -111,7 +123,8 @@ impl OnGpus {
 
     /// In slabs: as many as there are GPUs, or that many times `rounds`. `false` when a slab is too large for its GPU.
     fn slabs(&mut self, rounds: usize, sample: &Sample, boxes: &[Aabb], pairs: &mut Pairs) -> Result<bool, Failure> {
-        let Self { parts, slabs, workers, exponent, .. } = self;
+        let Self { parts, slabs, workers, any_over, exponent, .. } = self;
+        any_over.store(false, Ordering::Relaxed);
         let exponent = *exponent;
         let shares: Vec<f64> = shares(parts.iter().map(|p| p.speed), exponent);
         let each = shares.iter().flat_map(|s| std::iter::repeat_n(s / rounds as f64, rounds)).collect::<Vec<_>>();
@@ -119,7 +132,7 @@ impl OnGpus {
         debug_assert_eq!(slabs.count(), parts.len() * rounds);
         let slabs = &*slabs;
         for part in parts.iter_mut() {
-            part.pairs.begin_part(pairs);
+            part.pairs.begin_part(pairs, any_over);
             part.work = 0.0;
             part.began = None;
         }
@@ -131,6 +144,9 @@ impl OnGpus {
             }
             if let Some(failure) = worst(parts) {
                 return Err(failure);
+            }
+            if any_over.load(Ordering::Relaxed) {
+                break;
             }
         }
         parts.iter().for_each(|p| pairs.append(&p.pairs));
@@ -229,7 +245,7 @@ impl BroadPhase for OnGpus {
             }
         };
         match found {
-            Ok(()) => pairs.finish(),
+            Ok(()) => pairs.finish_on(&self.workers),
             Err(failure) => Err(failure.of(&self.id)),
         }
     }

@@ -128,8 +128,8 @@ mod tests {
     #[test]
     fn one_core_has_no_pair() {
         assert!(pairs(1).is_empty() && pairs(0).is_empty());
-        assert_eq!(core_to_core_ns(&Options { threads: Some(1), brief: true, limit: None }), None);
-        let parameters = measure(&Options { threads: Some(1), brief: true, limit: None });
+        assert_eq!(core_to_core_ns(&Options::default().with_threads(Some(1)).brief(true)), None);
+        let parameters = measure(&Options::default().with_threads(Some(1)).brief(true));
         assert_eq!((parameters.len(), parameters[0].value), (1, None));
     }
 

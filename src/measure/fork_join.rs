@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn missing_on_one_core() {
-        let parameters = measure(&Options { threads: Some(1), brief: true, limit: None });
+        let parameters = measure(&Options::default().with_threads(Some(1)).brief(true));
         assert_eq!(parameters.len(), 2);
         assert!(parameters.iter().all(|p| p.value.is_none() && p.source == "one usable core"));
     }

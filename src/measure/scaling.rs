@@ -66,7 +66,7 @@ mod tests {
 
     #[test]
     fn one_core() {
-        let parameters = measure(&Options { threads: Some(1), brief: true, limit: None });
+        let parameters = measure(&Options::default().with_threads(Some(1)).brief(true));
         assert_eq!((parameters[0].value, parameters[1].value), (None, Some(1.0)));
     }
 

@@ -3,6 +3,8 @@
 use super::Pairs;
 use crate::error::Error;
 use crate::pair::Pair;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Pairs that are fetched together, then tested together: few enough for the first-level cache, enough for memory to answer.
 const SIFTED_TOGETHER: usize = 64;
@@ -20,11 +22,7 @@ impl Pairs {
     /// Adds `id` paired with each of `others` whose bit is set in `mask`.
     #[inline]
     pub(crate) fn push_mask(&mut self, id: u32, others: &[u32], mask: u32) {
-        if self.is_full() && self.filter.is_none() {
-            self.beyond += u64::from(mask.count_ones());
-        } else {
-            each_bit(mask, |bit| self.push(id, others[bit]));
-        }
+        each_bit(mask, |bit| self.push(id, others[bit]));
     }
 
     /// Adds those of `pairs` for which `wanted` holds. They stand lower member first. `fetch` is told of each some time before
@@ -119,10 +117,9 @@ impl Pairs {
         Some(&mut self.buffer[self.len..self.len + more])
     }
 
-    /// Whether nothing more can be stored. From there on pairs are only counted, without a filter sixteen at a time: 2^20 boxes in one
-    /// point have 5 * 10^11.
+    /// Whether nothing more can be stored.
     #[inline]
-    pub(crate) fn is_full(&self) -> bool {
+    pub(super) fn is_full(&self) -> bool {
         self.refused.is_some() || self.limit.is_some_and(|limit| self.len >= limit)
     }
 
@@ -143,21 +140,38 @@ impl Pairs {
         Ok(())
     }
 
-    /// Whether `more` pairs, none of which was looked at, are too many: then [`skip`](Self::skip) is all there is to do with them.
+    /// Whether a wanted pair could not be stored in this list: then the frame has no answer, and the search may end. Asked for every row.
+    #[inline]
+    pub(crate) fn is_over(&self) -> bool {
+        self.over
+    }
+
+    /// The same of any part of the frame's pairs; asked where work begins.
+    #[inline]
+    pub(crate) fn is_any_over(&self) -> bool {
+        self.over || self.any_over.as_ref().is_some_and(|over| over.load(Relaxed))
+    }
+
+    /// Notes that there are more wanted pairs than can be stored.
+    #[cold]
+    pub(crate) fn exceed(&mut self) {
+        self.over = true;
+        if let Some(over) = &self.any_over {
+            over.store(true, Relaxed);
+        }
+    }
+
+    /// Whether `more` wanted pairs are too many, as far as can be known before the filter looked at them.
     #[cfg(feature = "gpu")]
     pub(crate) fn is_too_small_for(&self, more: u64) -> bool {
         self.filter.is_none() && self.limit.is_some_and(|limit| self.len as u64 + more > limit as u64)
     }
 
-    /// Counts pairs that are not stored.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn skip(&mut self, pairs: u64) {
-        self.beyond += pairs;
-    }
-
-    /// Empties a list that takes a part of the pairs of `whole`, under the same limit and filter.
-    pub(crate) fn begin_part(&mut self, whole: &Pairs) {
+    /// Empties a list that takes a part of the pairs of `whole`, under the same limit and filter. All parts that work side by side share
+    /// `any_over`, which is `false`.
+    pub(crate) fn begin_part(&mut self, whole: &Pairs, any_over: &Arc<AtomicBool>) {
         self.clear();
+        self.any_over = Some(Arc::clone(any_over));
         self.limit = whole.limit;
         self.filter.clone_from(&whole.filter);
     }
@@ -175,18 +189,17 @@ impl Pairs {
         }
     }
 
-    /// Appends a part: its pairs, its counts and its refused allocation.
+    /// Appends a part: its pairs, its counts and what it could not store.
     pub(crate) fn append(&mut self, part: &Pairs) {
         self.refused = self.refused.or(part.refused);
         let fits = self.limit.map_or(part.len, |l| part.len.min(l.saturating_sub(self.len)));
         self.unwanted += part.unwanted;
         if self.len + fits > self.buffer.len() && self.reserve(self.len + fits).is_err() {
             self.refused = Some(self.len + fits);
-            self.beyond += part.found();
         } else {
             self.buffer[self.len..self.len + fits].copy_from_slice(&part.buffer[..fits]);
             self.len += fits;
-            self.beyond += part.found() - fits as u64;
+            self.over |= part.over || fits < part.len;
         }
     }
 

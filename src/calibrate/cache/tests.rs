@@ -20,6 +20,83 @@ fn names(folder: &Path) -> Vec<String> {
     fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
 }
 
+fn age(path: &Path, days: u32) {
+    let modified = SystemTime::now() - Duration::from_secs(24 * 60 * 60) * days;
+    File::options().append(true).open(path).unwrap().set_modified(modified).unwrap();
+}
+
+#[test]
+fn what_nobody_uses_is_removed_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, days: u32| {
+        let path = folder.path().join(name);
+        fs::write(&path, "").unwrap();
+        age(&path, days);
+    };
+    file("tuning-0123456789abcdef.json", 100);
+    file("tuning-0123456789abcdef.unfinished.json", 100);
+    file(".sapwise-crashed.tmp", 1);
+    let stay = ["tuning-fedcba9876543210.json", ".sapwise-in-work.tmp", "notes.json", "tuning-of-mine.txt"];
+    for (name, days) in stay.into_iter().zip([80, 0, 1000, 1000]) {
+        file(name, days);
+    }
+    fs::create_dir(folder.path().join("tuning-folder.json")).unwrap();
+    let entry = entry(folder.path(), key());
+    entry.keep(tuning(1)).unwrap();
+    let mut left = names(folder.path());
+    left.retain(|name| !entry.path().ends_with(name) && name != "tuning-folder.json");
+    left.sort();
+    assert_eq!(left, [".sapwise-in-work.tmp", "notes.json", "tuning-fedcba9876543210.json", "tuning-of-mine.txt"]);
+    // What is read is in use.
+    age(entry.path(), 100);
+    entry.read().unwrap().unwrap();
+    entry.keep_unfinished(&[]).unwrap();
+    CacheFile::new(&Cache::Folder(folder.path().to_owned()), Key { version: "0.0.0".to_owned(), ..key() })
+        .unwrap()
+        .unwrap()
+        .keep(tuning(2))
+        .unwrap();
+    assert_eq!(entry.read(), Ok(Some(tuning(1))));
+}
+
+#[test]
+fn an_unfinished_measurement_is_kept_until_it_is_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = entry(folder.path(), key());
+    assert!(file.read_unfinished().is_empty());
+    let measured = vec![Parameter::measured("photons_per_s", 1e9, "test")];
+    file.keep_unfinished(&measured).unwrap();
+    assert_eq!(file.read_unfinished(), measured);
+    // Of another machine, damaged, and gone.
+    let other = entry(folder.path(), Key { usable_cores: key().usable_cores + 1, ..key() });
+    fs::copy(file.unfinished(), other.unfinished()).unwrap();
+    assert!(other.read_unfinished().is_empty());
+    let text = fs::read_to_string(file.unfinished()).unwrap();
+    fs::write(other.unfinished(), &text[..text.len() / 2]).unwrap();
+    assert!(other.read_unfinished().is_empty());
+    file.forget_unfinished();
+    assert!(file.read_unfinished().is_empty());
+}
+
+#[test]
+fn one_measures_at_a_time_and_who_stops_does_not_wait() {
+    let folder = tempfile::tempdir().unwrap();
+    let [one, other] = [1, 2].map(|cores| entry(folder.path(), Key { usable_cores: cores, ..key() }));
+    let turn = one.wait_for_turn(Duration::ZERO, || false).unwrap();
+    assert!(other.wait_for_turn(Duration::ZERO, || false).is_none());
+    let looks = std::cell::Cell::new(0);
+    let stop = || looks.replace(looks.get() + 1) == 3;
+    assert!(other.wait_for_turn(Duration::MAX, stop).is_none());
+    std::thread::scope(|scope| {
+        let waits = scope.spawn(|| other.wait_for_turn(Duration::MAX, || false).is_some());
+        drop(turn);
+        assert!(waits.join().unwrap());
+    });
+    fs::write(folder.path().join("occupied"), "").unwrap();
+    let nowhere = entry(&folder.path().join("occupied"), key());
+    assert!(nowhere.wait_for_turn(Duration::MAX, || false).is_none());
+}
+
 #[test]
 fn what_is_kept_comes_back_and_nothing_else_is_left() {
     let folder = tempfile::tempdir().unwrap();

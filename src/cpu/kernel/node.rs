@@ -134,6 +134,9 @@ impl Walk<'_> {
 
     /// Adds the pairs of the boxes in these leaves with one another and with those in all leaves behind.
     pub(crate) fn self_pairs(&self, simd: Simd, leaves: Range<usize>, pairs: &mut Pairs) {
+        if pairs.is_any_over() {
+            return;
+        }
         match simd {
             // SAFETY: the proof says that this CPU has the instructions.
             #[cfg(target_arch = "x86_64")]
@@ -147,6 +150,9 @@ impl Walk<'_> {
 
     /// Adds the pairs of the boxes of a group with those in the leaves.
     pub(crate) fn pairs_with(&self, simd: Simd, group: &Group, pairs: &mut Pairs) {
+        if pairs.is_any_over() {
+            return;
+        }
         match simd {
             // SAFETY: the proof says that this CPU has the instructions.
             #[cfg(target_arch = "x86_64")]
@@ -177,6 +183,10 @@ impl Walk<'_> {
             }
             let bounds = self.bounds_of(leaf);
             self.each(&bounds, leaf + 1, 1, overlapping, |other| self.meet(node, &bounds, ids, other, overlapping, pairs));
+            // As a sweep ends: a caller who wants a thousand pairs does not wait for all.
+            if pairs.is_over() {
+                return;
+            }
         }
     }
 

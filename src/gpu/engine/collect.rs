@@ -20,10 +20,13 @@ impl Engine {
             let total = header.total();
             all += total;
             if pairs.is_too_small_for(total) {
-                // More than the caller wants: they are counted and stay where they are.
-                pairs.skip(total);
+                // More than the caller wants: they stay where they are.
+                pairs.exceed();
             } else {
                 self.fetch(&mut frame, total, pairs)?;
+            }
+            if pairs.is_over() {
+                break;
             }
             if frame.tile_pairs_left > 0 || header.more != 0 {
                 next = Some(self.go_on(frame)?);

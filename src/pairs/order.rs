@@ -1,0 +1,361 @@
+//! Sorts pairs by radix: into buckets by the highest bits, then each bucket, which fits into a cache, from the lowest bits on.
+//!
+//! In a bucket only the rest of a key counts, which mostly has 32 bits: half as many bytes are moved. On several threads each
+//! first sorts a share of its own into buckets, which are then brought together.
+
+use crate::pair::Pair;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// What has a place in an order, and is nothing but that place.
+pub(crate) trait Keyed: Copy + Default + Send + Sync {
+    /// Two numbers that decide, the first in the upper half.
+    fn key(self) -> u64;
+    /// What has this key.
+    fn of(key: u64) -> Self;
+}
+
+impl Keyed for Pair {
+    #[inline(always)]
+    fn key(self) -> u64 {
+        u64::from(self.0) << 32 | u64::from(self.1)
+    }
+
+    #[inline(always)]
+    fn of(key: u64) -> Self {
+        ((key >> 32) as u32, key as u32)
+    }
+}
+
+impl Keyed for u64 {
+    #[inline(always)]
+    fn key(self) -> u64 {
+        self
+    }
+
+    #[inline(always)]
+    fn of(key: u64) -> Self {
+        key
+    }
+}
+
+impl Keyed for u32 {
+    #[inline(always)]
+    fn key(self) -> u64 {
+        u64::from(self)
+    }
+
+    #[inline(always)]
+    fn of(key: u64) -> Self {
+        key as u32
+    }
+}
+
+/// The threads that sort.
+pub(crate) trait Parallel {
+    /// How many they are.
+    fn threads(&self) -> usize;
+    /// `work` on every task, side by side; returns when all are done.
+    fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync);
+}
+
+/// The calling thread.
+pub(crate) struct Alone;
+
+impl Parallel for Alone {
+    fn threads(&self) -> usize {
+        1
+    }
+
+    fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
+        tasks.for_each(work);
+    }
+}
+
+/// Fewer than these are compared: the counters of a radix cost more.
+const FEW: usize = 256;
+
+/// Fewer than these are sorted by one thread: to wake another takes as long.
+const SMALLEST_SHARED: usize = 16_384;
+
+/// What a bucket should hold: 32 KB of pairs and half of that to sort them into stay in the caches of a core.
+const BUCKET: usize = 4096;
+
+/// Bits that are told apart at once, at most: more counters than these, or more places to write to, leave the first-level cache.
+const MOST_BITS: u32 = 11;
+
+/// The same in a bucket that has few: clearing the counters would take as long as counting.
+const BITS_OF_FEW: u32 = 8;
+
+/// Shares for each thread: those that take longer are evened out.
+const SHARES_PER_THREAD: usize = 4;
+
+/// Memory to sort with, kept from list to list: mostly half as much as the list.
+#[derive(Debug, Default)]
+pub(crate) struct Sorter {
+    narrow: Vec<u32>,
+    /// Used instead where the rest of a key has more than 32 bits.
+    wide: Vec<u64>,
+    /// For each share where each of its buckets begins; one more than there are buckets.
+    starts: Vec<u32>,
+}
+
+/// What one list has grown is of no use to its copy.
+impl Clone for Sorter {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl Sorter {
+    /// Sorts a list.
+    pub(crate) fn sort<T: Keyed>(&mut self, on: &impl Parallel, list: &mut [T]) {
+        // Brute force and GPUs often return them so, and so does who looks up canonical pairs in ascending ids.
+        if list.is_sorted_by_key(|t| t.key()) {
+            return;
+        }
+        let sorted = if list.len() < FEW || u32::try_from(list.len()).is_err() {
+            None
+        } else if list.len() < SMALLEST_SHARED || on.threads() == 1 {
+            self.sort_on(&Alone, list)
+        } else {
+            self.sort_on(on, list)
+        };
+        // Without memory to sort with they are compared in place, which takes longer.
+        if sorted.is_none() {
+            list.sort_unstable_by_key(|t| t.key());
+        }
+    }
+
+    /// `None`, and nothing is done, if memory is refused.
+    fn sort_on<T: Keyed>(&mut self, on: &impl Parallel, list: &mut [T]) -> Option<()> {
+        let Self { narrow, wide, starts } = self;
+        let layout = Layout::of(on, list);
+        let len = list.len();
+        // Sixteen of each bucket in each share at least, so that bringing them together copies whole cache lines.
+        let shares =
+            if on.threads() == 1 { 1 } else { (on.threads() * SHARES_PER_THREAD).min(len / layout.buckets / 16).max(1) };
+        let starts = ensure(starts, shares * (layout.buckets + 1))?;
+        if layout.rest <= u32::BITS {
+            by_buckets(on, list, ensure(narrow, len)?, starts, layout);
+        } else {
+            by_buckets(on, list, ensure(wide, len)?, starts, layout);
+        }
+        Some(())
+    }
+}
+
+/// Where the two numbers of a key stand once the bits that none of them has are left out, and where the bucket ends.
+#[derive(Debug, Clone, Copy)]
+struct Layout {
+    /// Bits of the second number.
+    low: u32,
+    buckets: usize,
+    /// Bits below those of the bucket.
+    rest: u32,
+    rest_mask: u64,
+}
+
+impl Layout {
+    fn of<T: Keyed>(on: &impl Parallel, list: &[T]) -> Self {
+        let (high, low) = (AtomicU32::new(0), AtomicU32::new(0));
+        on.each_of(list.chunks(list.len().div_ceil(on.threads())), |list| {
+            let halves = |t: &T| ((t.key() >> 32) as u32, t.key() as u32);
+            let most = list.iter().map(halves).fold((0, 0), |most, of| (most.0.max(of.0), most.1.max(of.1)));
+            high.fetch_max(most.0, Relaxed);
+            low.fetch_max(most.1, Relaxed);
+        });
+        let bits = |most: AtomicU32| u32::BITS - most.into_inner().leading_zeros();
+        let low = bits(low);
+        let all = bits(high) + low;
+        let bits = (list.len() / BUCKET).checked_ilog2().map_or(0, |bits| bits + 1).min(MOST_BITS).min(all);
+        let rest = all - bits;
+        Self { low, buckets: 1 << bits, rest, rest_mask: 1_u64.checked_shl(rest).unwrap_or(0).wrapping_sub(1) }
+    }
+
+    /// A key without the gap between its numbers.
+    #[inline(always)]
+    fn packed(self, key: u64) -> u64 {
+        key >> 32 << self.low | key & 0xffff_ffff
+    }
+
+    #[inline(always)]
+    fn bucket<T: Keyed>(self, t: T) -> usize {
+        (self.packed(t.key()) >> self.rest) as usize
+    }
+
+    #[inline(always)]
+    fn rest<T: Keyed, K: Keyed>(self, t: T) -> K {
+        K::of(self.packed(t.key()) & self.rest_mask)
+    }
+
+    /// What all packed keys of a bucket have in common.
+    fn base(self, bucket: usize) -> u64 {
+        // All 64 bits are the rest where there is but one bucket.
+        (bucket as u64).checked_shl(self.rest).unwrap_or(0)
+    }
+
+    /// What has this rest of a key in a bucket.
+    #[inline(always)]
+    fn whole<T: Keyed, K: Keyed>(self, base: u64, rest: K) -> T {
+        let packed = base | rest.key();
+        T::of(packed >> self.low << 32 | packed & ((1 << self.low) - 1))
+    }
+}
+
+/// Sorts `list` by way of `rests`, which is as long. `starts` says into how many shares it is divided first.
+fn by_buckets<T: Keyed, K: Keyed>(on: &impl Parallel, list: &mut [T], rests: &mut [K], starts: &mut [u32], layout: Layout) {
+    if layout.buckets == 1 {
+        return sort_bucket(list, rests, true, 0, layout);
+    }
+    let each = layout.buckets + 1;
+    let share = list.len().div_ceil(starts.len() / each);
+    let parts = list.chunks(share).zip(rests.chunks_mut(share)).zip(starts.chunks_mut(each));
+    let shares = parts.len();
+    on.each_of(parts, |((from, to), starts)| {
+        starts.fill(0);
+        scatter(from, to, starts, |t| layout.bucket(t), |t| layout.rest(t));
+        // Every start has moved to its bucket's end, which is the start of the next.
+        starts.copy_within(..each - 1, 1);
+        starts[0] = 0;
+    });
+    let starts = &starts[..shares * each];
+    let sizes = || (0..each - 1).map(|k| starts.chunks(each).map(|s| (s[k + 1] - s[k]) as usize).sum());
+    if shares > 1 {
+        on.each_of(split(list, sizes()).enumerate(), |(bucket, to)| {
+            let parts = starts.chunks(each).zip(rests.chunks(share));
+            let rests = parts.flat_map(|(s, rests)| &rests[s[bucket] as usize..s[bucket + 1] as usize]);
+            let base = layout.base(bucket);
+            to.iter_mut().zip(rests).for_each(|(t, &rest)| *t = layout.whole(base, rest));
+        });
+    }
+    on.each_of(split(list, sizes()).zip(split(rests, sizes())).enumerate(), |(bucket, (list, rests))| {
+        sort_bucket(list, rests, shares > 1, layout.base(bucket), layout);
+    });
+}
+
+/// That much of a list, which is made longer where need be. `None` if memory is refused.
+fn ensure<T: Copy + Default>(list: &mut Vec<T>, len: usize) -> Option<&mut [T]> {
+    if list.len() < len {
+        list.try_reserve(len - list.len()).ok()?;
+        list.resize(len, T::default());
+    }
+    Some(&mut list[..len])
+}
+
+/// Parts of these sizes, one after another.
+fn split<T>(list: &mut [T], sizes: impl Iterator<Item = usize>) -> impl Iterator<Item = &mut [T]> {
+    let mut rest = list;
+    sizes.map(move |size| {
+        let (part, behind) = std::mem::take(&mut rest).split_at_mut(size);
+        rest = behind;
+        part
+    })
+}
+
+/// Counts how many of `from` belong to each digit into `starts`, which is all zero, and writes what `make` makes of them to `to`, digit by
+/// digit and otherwise in their order. Each start ends as the end of its digit.
+#[inline(always)]
+fn scatter<F: Copy, T>(from: &[F], to: &mut [T], starts: &mut [u32], digit: impl Fn(F) -> usize, make: impl Fn(F) -> T) {
+    from.iter().for_each(|&f| starts[digit(f)] += 1);
+    let mut total = 0;
+    starts.iter_mut().for_each(|start| total += std::mem::replace(start, total));
+    for &f in from {
+        let at = &mut starts[digit(f)];
+        to[*at as usize] = make(f);
+        *at += 1;
+    }
+}
+
+/// Sorts a bucket, which stands in `list` if `whole` and else as rests of keys in `rests`, into `list`: from one to the other and back,
+/// some bits each time.
+fn sort_bucket<T: Keyed, K: Keyed>(list: &mut [T], rests: &mut [K], mut whole: bool, base: u64, layout: Layout) {
+    let most = if list.len() < BUCKET / 2 { BITS_OF_FEW } else { MOST_BITS };
+    let passes = if list.len() < FEW { 0 } else { layout.rest.div_ceil(most) };
+    // From the one where the last pass ends in `list`.
+    if whole != (passes % 2 == 0) {
+        if whole {
+            rests.iter_mut().zip(&*list).for_each(|(rest, &t)| *rest = layout.rest(t));
+        } else {
+            list.iter_mut().zip(&*rests).for_each(|(t, &rest)| *t = layout.whole(base, rest));
+        }
+        whole = !whole;
+    }
+    if passes == 0 {
+        return list.sort_unstable_by_key(|t| t.key());
+    }
+    let width = layout.rest.div_ceil(passes);
+    let mut starts = [0_u32; 1 << MOST_BITS];
+    let starts = &mut starts[..1 << width];
+    for pass in 0..passes {
+        let digit = |rest: K| (rest.key() >> (pass * width)) as usize & ((1 << width) - 1);
+        starts.fill(0);
+        if whole {
+            scatter(list, rests, starts, |t| digit(layout.rest(t)), |t| layout.rest(t));
+        } else {
+            scatter(rests, list, starts, digit, |rest| layout.whole(base, rest));
+        }
+        whole = !whole;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::splitmix::mix;
+
+    /// Sorts as threads would, one task after another.
+    struct Several(usize);
+
+    impl Parallel for Several {
+        fn threads(&self) -> usize {
+            self.0
+        }
+
+        fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
+            tasks.for_each(work);
+        }
+    }
+
+    fn assert_sorts<T: Keyed + PartialEq>(list: &[T], what: &str) {
+        for threads in [1, 2, 3, 7] {
+            // With memory that is used, and is longer.
+            let mut sorter = Sorter::default();
+            for len in [list.len(), list.len() / 2, list.len()] {
+                let mut sorted = list[..len].to_vec();
+                sorter.sort(&Several(threads), &mut sorted);
+                let mut expected = list[..len].to_vec();
+                expected.sort_by_key(|t| t.key());
+                assert!(sorted == expected, "{what}, {len} on {threads} threads");
+            }
+        }
+    }
+
+    #[test]
+    fn any_list_is_sorted_as_by_comparison() {
+        for len in [0, 1, 2, 255, 256, 257, 1000, 4095, 4096, 8192, 16_383, 16_384, 50_001, 300_000] {
+            for (what, firsts, seconds) in [
+                ("a usual frame", len as u64 / 5 + 1, len as u64 / 5 + 1),
+                ("few boxes", 3, 5),
+                ("one box in every pair", 1, 1 << 20),
+                ("one box is always second", 1 << 20, 1),
+                ("ids of all bits", 1 << 32, 1 << 32),
+            ] {
+                let of = |k: usize| ((mix(k as u64) % firsts) as u32, (mix(!(k as u64)) % seconds) as u32);
+                let list: Vec<Pair> = (0..len).map(of).collect();
+                assert_sorts(&list, what);
+                let keys: Vec<u64> = list.iter().map(|p| p.key()).collect();
+                assert_sorts(&keys, what);
+            }
+            let near_the_end =
+                |k: usize| (u32::MAX - (mix(k as u64) % 1000) as u32, u32::MAX - (mix(7 + k as u64) % 1000) as u32);
+            assert_sorts(&(0..len).map(near_the_end).collect::<Vec<Pair>>(), "ids near the end");
+            let ascending: Vec<Pair> = (0..len as u32).map(|k| (k / 7, k % 7 + k)).collect();
+            assert_sorts(&ascending, "a sorted list");
+            assert_sorts(&ascending.iter().rev().copied().collect::<Vec<Pair>>(), "a reversed list");
+            // One box meets half of all others, and all the rest is even.
+            let skewed =
+                |k: usize| if k.is_multiple_of(2) { (5, k as u32) } else { ((mix(k as u64) % 100_000) as u32, k as u32) };
+            assert_sorts(&(0..len).map(|k| skewed(k * 7919 % len.max(1))).collect::<Vec<Pair>>(), "a skewed list");
+        }
+    }
+}
