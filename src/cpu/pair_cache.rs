@@ -34,13 +34,16 @@ struct PairCache {
     /// One for each number of threads that it may run on, ascending, and which of them runs it now.
     widths: Vec<Workers>,
     width: usize,
+    /// As many of those threads as the frames keep busy, and for how many boxes that was found out; `None`: not for this width yet.
+    workers: Workers,
+    fitted_for: Option<usize>,
     outputs: Outputs,
     motion: Motion,
     grown: Grown,
     tree: GrownTree,
     /// One for each task: its share of the boxes.
     shares: Vec<Share>,
-    /// One for each task: its share of the kept pairs. Tasks beyond those of the present width have none.
+    /// One for each task: its share of the kept pairs. Tasks beyond those of the present frame have none.
     kept: Vec<Pairs>,
     /// The kept pairs of all tasks, while they are dealt out to another number of them.
     dealt: Pairs,
@@ -70,6 +73,8 @@ pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box
         shares: (0..tasks).map(|_| Share::default()).collect(),
         kept: (0..tasks).map(|_| Pairs::new()).collect(),
         dealt: Pairs::new(),
+        workers: widths[0].fit(0),
+        fitted_for: None,
         width: 0,
         widths,
     }))
@@ -83,6 +88,7 @@ impl BroadPhase for PairCache {
     fn find_pairs_with(&mut self, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
         check_count(boxes.len())?;
+        self.fit(boxes.len());
         let kept = match self.motion.advise(plan, boxes) {
             Advice::Scratch => Kept::Not,
             Advice::Keep(margin) => {
@@ -90,20 +96,19 @@ impl BroadPhase for PairCache {
                 if kept != Ok(Kept::Well) {
                     // What is known of the grown boxes may be half of this frame and half of the one before.
                     self.grown.forget();
-                    if kept.is_ok() { self.motion.stop() } else { self.motion.interrupt() }
+                    if let Ok(kept) = kept { self.motion.stop(kept == Kept::Not) } else { self.motion.interrupt() }
                 }
                 kept?
             }
         };
         if kept == Kept::Not {
             pairs.clear();
-            let Self { widths, width, tree, outputs, .. } = self;
-            let workers = &widths[*width];
+            let Self { workers, tree, outputs, .. } = self;
             tree.build(workers, boxes, &plan.sample(boxes), pairs.filter())?;
             outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
         }
         self.motion.found(boxes.len(), pairs.overlapping());
-        pairs.finish_on(&self.widths[self.width])
+        pairs.finish_on(&self.workers)
     }
 
     fn prepare(&mut self, objects: usize) {
@@ -120,9 +125,8 @@ impl Incremental for PairCache {
     fn set_threads(&mut self, threads: u32) -> bool {
         let Some(width) = self.widths.iter().position(|w| w.threads() == threads as usize) else { return false };
         if width != self.width {
-            let before = self.widths[self.width].tasks();
             self.width = width;
-            self.deal(before);
+            self.fitted_for = None;
         }
         true
     }
@@ -134,10 +138,24 @@ fn most_kept(boxes: usize, tasks: usize) -> usize {
 }
 
 impl PairCache {
-    /// Deals the kept pairs of this many tasks out to those of the present width.
+    /// Takes as many threads of the present width as a frame of this many boxes keeps busy. They stay while that number is about the same:
+    /// to deal the kept pairs out to another number of tasks takes time.
+    fn fit(&mut self, boxes: usize) {
+        if self.fitted_for.is_some_and(|before| boxes <= 2 * before.max(1) && before <= 2 * boxes.max(1)) {
+            return;
+        }
+        let before = self.workers.tasks();
+        self.workers = self.widths[self.width].fit(boxes);
+        self.fitted_for = Some(boxes);
+        if self.workers.tasks() != before {
+            self.deal(before);
+        }
+    }
+
+    /// Deals the kept pairs of this many tasks out to those of the present frame.
     fn deal(&mut self, before: usize) {
-        let Self { widths, width, kept, dealt, grown, motion, .. } = self;
-        let tasks = widths[*width].tasks();
+        let Self { workers, kept, dealt, grown, motion, .. } = self;
+        let tasks = workers.tasks();
         dealt.clear();
         // After a frame that forgot all the lists hold nothing of use.
         if !grown.as_slice().is_empty() {
@@ -160,8 +178,8 @@ impl PairCache {
 
     /// Finds the pairs among the kept ones, as far as those can be kept.
     fn keep(&mut self, plan: &FramePlan, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
-        let Self { widths, width, outputs, motion, grown, tree, shares, kept, .. } = self;
-        let workers = &widths[*width];
+        let Self { workers, outputs, motion, grown, tree, shares, kept, .. } = self;
+        let workers = &*workers;
         let (shares, kept) = (&mut shares[..workers.tasks()], &mut kept[..workers.tasks()]);
         let changes = grown.check(workers, boxes, margin, pairs.filter(), shares)?;
         let rebuilt = motion.wants_rebuild(boxes.len(), &changes);

@@ -326,11 +326,13 @@ mod tests {
             let at = |k: u64| (mix(k) >> 40) as f32 / 1_048_576.0;
             (0..count).map(|k| Aabb::cube([at(3 * k), at(3 * k + 1), at(3 * k + 2)], 0.1)).collect()
         };
-        for name in ["brute", "sap", "grid-sap"] {
+        for method in METHODS {
+            let (name, simd) = (method.name, Simd::at_most(SimdLevel::in_use()));
             let (threads, helpers, _gates) = busy_helpers();
-            let method = METHODS.iter().find(|method| method.name == name).unwrap();
-            let Create::OneWidth(create) = method.create else { panic!("{name} has several widths") };
-            let mut algorithm = create(128, &threads, Simd::at_most(SimdLevel::in_use())).unwrap();
+            let mut algorithm = match method.create {
+                Create::OneWidth(create) => create(128, &threads, simd).unwrap(),
+                Create::AnyWidth(create) => create(&[128], &threads, simd).unwrap(),
+            };
             let mut pairs = Pairs::new();
             algorithm.find_pairs(&scene(1000), &mut pairs).unwrap();
             assert_eq!(helpers.invited(), 0, "{name}: 1000 boxes");

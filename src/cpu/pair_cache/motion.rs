@@ -70,6 +70,8 @@ pub(super) struct Motion {
     /// Frames for which nothing is kept, and how many that will be the next time.
     pause: u32,
     next_pause: u32,
+    /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap yet.
+    most_margin: f32,
 }
 
 /// What is known while pairs are kept.
@@ -78,6 +80,8 @@ struct Keeping {
     margin: Margin,
     /// Cost for each box, averaged over the last frames.
     cost: f32,
+    /// What of that the kept pairs took in the last frame.
+    tests: f32,
     /// Share of the boxes that leave in a frame and kept pairs for each box, averaged over the last [`LEARNING`] frames.
     leaving: f32,
     kept: f32,
@@ -91,7 +95,7 @@ struct Keeping {
 
 impl Default for Motion {
     fn default() -> Self {
-        Self { displacement: Displacement::default(), density: 0.0, keeping: None, pause: 0, next_pause: PAUSE[0] }
+        Self { displacement: Displacement::default(), density: 0.0, keeping: None, pause: 0, next_pause: PAUSE[0], most_margin: MARGINS[MARGINS.len() - 1] }
     }
 }
 
@@ -110,9 +114,11 @@ impl Motion {
         self.density = pairs as f32 / objects.max(1) as f32;
     }
 
-    /// Keeping failed; it will not be tried for some frames.
-    pub(super) fn stop(&mut self) {
-        self.keeping = None;
+    /// Keeping failed, because there were too many pairs to keep or because it did not pay; it will not be tried for some frames.
+    pub(super) fn stop(&mut self, too_many: bool) {
+        if let Some(failed) = self.keeping.take().filter(|failed| too_many || failed.tests > 0.5 * failed.cost) {
+            self.most_margin = (0.5 * failed.margin.share).max(MARGINS[0]);
+        }
         self.pause = self.next_pause;
         self.next_pause = (self.next_pause * 2).min(PAUSE[1]);
     }
@@ -149,7 +155,8 @@ impl Motion {
         let nodes = did.nodes as f32 / changes.left.max(1) as f32;
         let leaving = if left > 0.0 { cost::AGAIN + self::left(far, nodes) * left } else { 0.0 };
         let work = if rebuilt { 1.5 * self::scratch(far, kept) } else { leaving };
-        let now = tests(far, kept) + work;
+        k.tests = tests(far, kept);
+        let now = k.tests + work;
         k.cost += (now - k.cost) / 16.0;
         k.kept += (kept - k.kept) / LEARNING;
         if rebuilt {
@@ -171,7 +178,7 @@ impl Motion {
         }
         k.frames = k.frames.saturating_add(1);
         if k.frames == PROVEN {
-            self.next_pause = PAUSE[0];
+            (self.next_pause, self.most_margin) = (PAUSE[0], MARGINS[MARGINS.len() - 1]);
         }
         k.cost < scratch
     }
@@ -195,11 +202,13 @@ impl Motion {
             let kept = self.density * (1.0 + 2.0 * m).powi(3);
             tests(far, kept) + cost::AGAIN + left(far, NODES) * leaving(motion, m)
         };
-        let best = MARGINS.into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
+        let margins = MARGINS.into_iter().filter(|&m| m <= self.most_margin);
+        let best = margins.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
         let kept = self.density * (1.0 + 2.0 * best).powi(3);
         (cost(best) < scratch && kept < MOST_KEPT).then(|| Keeping {
             margin: Margin { share: best, longest_edge: longest_edge(plan, boxes) },
             cost: cost(best),
+            tests: 0.0,
             leaving: leaving(motion, best),
             kept,
             nodes: NODES,
@@ -277,7 +286,7 @@ mod tests {
             motion.advise(&FramePlan::default(), &boxes);
             assert_eq!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)), pairs == 1000);
         }
-        motion.stop();
+        motion.stop(false);
         assert!((0..PAUSE[0]).all(|_| matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Scratch)));
         assert!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)));
     }
@@ -300,5 +309,29 @@ mod tests {
         };
         let (wandering, jumping) = (frames(0, &mut motion), frames(10, &mut motion));
         assert!(wandering > 100 && jumping < 12, "{wandering} and {jumping} frames");
+    }
+
+    #[test]
+    fn a_margin_that_keeps_too_many_pairs_is_halved_and_one_that_too_many_leave_is_not() {
+        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
+        let margin_after = |kept_pairs: usize, left: usize| {
+            let mut motion = Motion::default();
+            motion.found(1000, 0);
+            let plan = FramePlan::default().with_moved(Some(0.05));
+            let keep = |motion: &mut Motion| loop {
+                if let Advice::Keep(margin) = motion.advise(&plan, &boxes) {
+                    return margin.share;
+                }
+            };
+            let first = keep(&mut motion);
+            let changes = Changes { left, far_away: 0, new: 0..0, gone: 0..0 };
+            let did = Work { kept_pairs, nodes: 12 * left as u64, rebuilt: false };
+            assert!((0..100).any(|_| !motion.learn(1000, &changes, &did)), "it never ceases to pay");
+            motion.stop(false);
+            keep(&mut motion) / first
+        };
+        let (crowded, restless) = (margin_after(40_000, 0), margin_after(0, 1000));
+        assert!(crowded <= 0.5, "{crowded}");
+        assert!(restless > 0.9, "{restless}");
     }
 }
