@@ -183,7 +183,7 @@ impl fmt::Display for Error {
                 )
             }
             Error::TooManyPairs { limit } => {
-                write!(f, "more than {limit} pairs overlap, which is the limit; raise it or thin out the scene")
+                write!(f, "more pairs overlap than the limit of {limit}; raise the limit or thin out the scene")
             }
             Error::MissingId { position, ids } => {
                 write!(f, "box {position} is in a pair and has no id: {ids} were given; give one for each box")
