@@ -118,15 +118,10 @@ fn boxes_are_set_free_while_pairs_are_kept() {
     };
     let mut algorithms = every_algorithm();
     // Each for some frames: a ground, one of its boxes free, all free, and fixed again.
-    for (stage, memberships) in [
-        all(&|k| k % 10 != 0),
-        all(&|k| k % 10 != 0 && k != 77),
-        Vec::new(),
-        all(&|_| true),
-        all(&|k| k != 500),
-    ]
-    .into_iter()
-    .enumerate()
+    for (stage, memberships) in
+        [all(&|k| k % 10 != 0), all(&|k| k % 10 != 0 && k != 77), Vec::new(), all(&|_| true), all(&|k| k != 500)]
+            .into_iter()
+            .enumerate()
     {
         pairs.set_filter((!memberships.is_empty()).then(|| Filter::new(memberships.clone())));
         let expected = naive_filtered(&boxes, &memberships);

@@ -3,9 +3,9 @@
 //! This program has a `main` of its own (`harness = false`): verbs start parts of a measurement as processes of the program that
 //! they are in, and one made by the usual harness would run tests there. Started with [`AS_COMMAND`] it is the example.
 
+mod common;
 #[path = "../examples/parry.rs"]
 mod parry;
-mod common;
 
 use assert_cmd::Command;
 use common::{failure, npy, sapwise, success};

@@ -21,17 +21,18 @@ use crate::load::{FramePlan, Sample, StripGrid, StripSpan};
 use crate::pairs::Pairs;
 use std::ops::Range;
 
-/// Boxes that a strip holds at most; those of a fuller one stand apart. Four times as many as one holds of boxes that are spread evenly.
-const MOST_BOXES: usize = 1024;
+/// Boxes that a strip holds at most; those of a fuller one stand apart. Sixteen times as many as one holds of boxes that are spread evenly: up to
+/// there a sweep of one dense strip among others costs less than the tree and what the other strips have to do with it.
+const MOST_BOXES: usize = 4096;
 
-/// the mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip) of a box in the first of its strips.
+/// The same of the boxes of one thread's share, which need not be an equal part of every strip.
+const MOST_OF_SHARE: usize = 1024;
+
+/// The mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip) in the first of a box's strips.
 const BOTH: u32 = 3;
 
 /// Marks the count of a strip whose boxes stand apart.
 const OVERFULL: u32 = 1 << 31;
-
-/// The same of the boxes of one thread's share, which need not be an equal part of every strip.
-const MOST_OF_SHARE: usize = 512;
 
 /// The method; see the module.
 #[derive(Debug)]

@@ -95,7 +95,14 @@ struct Keeping {
 
 impl Default for Motion {
     fn default() -> Self {
-        Self { displacement: Displacement::default(), density: 0.0, keeping: None, pause: 0, next_pause: PAUSE[0], most_margin: MARGINS[MARGINS.len() - 1] }
+        Self {
+            displacement: Displacement::default(),
+            density: 0.0,
+            keeping: None,
+            pause: 0,
+            next_pause: PAUSE[0],
+            most_margin: MARGINS[MARGINS.len() - 1],
+        }
     }
 }
 
