@@ -2,7 +2,7 @@
 
 use crate::algorithm::AlgorithmId;
 
-/// The method that is cheap enough wherever the boxes lie.
+/// The name of a method that is cheap enough wherever the boxes lie. Where a tuning has no cost of one, there is no shelter.
 const METHOD: &str = "bvh";
 
 /// A frame is dear that costs this many times what was expected of it, and as many times what the shelter is expected to cost.

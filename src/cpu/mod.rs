@@ -1,7 +1,6 @@
 //! Algorithms on the CPU, one file per method.
 
 mod brute;
-mod bvh;
 mod columns;
 mod grid_sap;
 #[cfg(feature = "parallel")]
@@ -59,6 +58,5 @@ pub(crate) const METHODS: &[Method] = &[
     Method { name: "brute", revision: 2, create: Create::OneWidth(brute::create) },
     Method { name: "sap", revision: 2, create: Create::OneWidth(sap::create) },
     Method { name: "grid-sap", revision: 2, create: Create::OneWidth(grid_sap::create) },
-    Method { name: "bvh", revision: 1, create: Create::OneWidth(bvh::create) },
     Method { name: "pair-cache", revision: 1, create: Create::AnyWidth(pair_cache::create) },
 ];

@@ -3,7 +3,7 @@
 //! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes, so a frame costs
 //! one look at each box and one test of each kept pair. A box that leaves its grown box gets a new one, and a tree of the
 //! grown boxes finds its new neighbours. After many of those tree and list are made again. Where the boxes move too far for
-//! that to pay, a tree of the boxes themselves finds their pairs, as in [`bvh`](super::bvh), and a few boxes are watched for it to end.
+//! that to pay, a tree of the boxes themselves finds their pairs, and a few boxes are watched for it to end.
 //!
 //! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules; physics engines know the grown boxes as fat
 //! boxes.

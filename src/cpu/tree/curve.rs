@@ -280,7 +280,7 @@ mod tests {
     }
 
     fn ordered(boxes: &[Aabb], threads: u32, filter: Option<&Filter>) -> (Vec<u32>, usize) {
-        let workers = Workers::new("bvh", threads, &Threads::default()).unwrap();
+        let workers = Workers::new("tree", threads, &Threads::default()).unwrap();
         let mut order = Order::default();
         let curve = Curve::over(&Sample::of(boxes));
         let moving = order.sort(&workers, boxes, Members::All, &curve, filter).unwrap();
