@@ -6,6 +6,7 @@ pub(crate) mod contain;
 pub(crate) mod node;
 #[cfg(any(test, not(target_arch = "x86_64")))]
 mod portable;
+pub(crate) mod walk;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 

@@ -7,8 +7,9 @@ mod curve;
 
 use crate::aabb::Aabb;
 use crate::cpu::columns::part;
-use crate::cpu::kernel::node::{Group, LANES, Node, Walk};
+use crate::cpu::kernel::node::{Group, LANES, Node};
 use crate::cpu::kernel::prefetch;
+use crate::cpu::kernel::walk::Walk;
 use crate::cpu::level::Simd;
 use crate::cpu::workers::Workers;
 use crate::error::Error;

@@ -1,0 +1,342 @@
+//! A walk through a tree of nodes: which boxes overlap a box, and which pairs of boxes overlap each other.
+
+use super::node::{Group, LANES, Node};
+use super::prefetch;
+use crate::aabb::Aabb;
+use crate::cpu::level::Simd;
+use crate::pairs::{Pairs, each_bit};
+use std::ops::Range;
+
+/// The nodes of a tree and the box in each lane of its leaves, to be walked through.
+///
+/// Lane k of node n in a level above the leaves contains node 16 n + k of the level below. The last level that has nodes is the top; there
+/// is one level above the leaves at least.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Walk<'a> {
+    pub(crate) levels: &'a [Vec<Node>],
+    /// 16 for each leaf.
+    pub(crate) ids: &'a [u32],
+    /// The nodes are likely not in the cache, and are asked for ahead.
+    pub(crate) far: bool,
+}
+
+/// Levels of a tree of 2^32 boxes.
+const MOST_LEVELS: usize = 9;
+
+impl Walk<'_> {
+    /// Calls `found` for every place in the leaves whose box overlaps `b`. Returns how many nodes were compared with it.
+    #[inline]
+    pub(crate) fn each_overlapping(&self, simd: Simd, b: &Aabb, found: impl FnMut(usize)) -> u32 {
+        match simd {
+            // SAFETY: the proof says that this CPU has the instructions.
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx512(_) => unsafe { x86::each_avx512(self, b, found) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx2(_) => unsafe { x86::each_avx2(self, b, found) },
+            Simd::Portable => self.each(b, 0, 0, Node::overlapping, found),
+        }
+    }
+
+    /// Adds the pairs of the boxes in these leaves with one another and with those in all leaves behind.
+    pub(crate) fn self_pairs(&self, simd: Simd, leaves: Range<usize>, pairs: &mut Pairs) {
+        if pairs.is_any_over() {
+            return;
+        }
+        match simd {
+            // SAFETY: the proof says that this CPU has the instructions.
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx512(_) => unsafe { x86::self_avx512(self, leaves, pairs) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx2(_) => unsafe { x86::self_avx2(self, leaves, pairs) },
+            Simd::Portable => self.leaves_with_all_behind(leaves, Node::overlapping, pairs),
+        }
+    }
+
+    /// Adds the pairs of the boxes of a group with those in the leaves.
+    pub(crate) fn pairs_with(&self, simd: Simd, group: &Group, pairs: &mut Pairs) {
+        if pairs.is_any_over() {
+            return;
+        }
+        match simd {
+            // SAFETY: the proof says that this CPU has the instructions.
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx512(_) => unsafe { x86::group_avx512(self, group, pairs) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx2(_) => unsafe { x86::group_avx2(self, group, pairs) },
+            Simd::Portable => self.group_with_all(group, Node::overlapping, pairs),
+        }
+    }
+
+    #[inline(always)]
+    fn leaves_with_all_behind(
+        &self,
+        leaves: Range<usize>,
+        overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy,
+        pairs: &mut Pairs,
+    ) {
+        for leaf in leaves {
+            let node = &self.levels[0][leaf];
+            let ids = self.ids_of(leaf);
+            for (lane, &id) in ids.iter().enumerate() {
+                // Those behind it in the leaf: each pair is found from its first lane.
+                let hits = overlapping(node, &node.lane(lane)) & (u32::MAX - 1) << lane;
+                if hits != 0 {
+                    add(id, ids, hits, pairs);
+                }
+            }
+            let bounds = self.bounds_of(leaf);
+            self.each(&bounds, leaf + 1, 1, overlapping, |other| self.meet(node, &bounds, ids, other, overlapping, pairs));
+            // As a sweep ends: a caller who wants a thousand pairs does not wait for all.
+            if pairs.is_over() {
+                return;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn group_with_all(&self, group: &Group, overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy, pairs: &mut Pairs) {
+        self.each(&group.bounds, 0, 1, overlapping, |other| {
+            self.meet(&group.node, &group.bounds, &group.ids, other, overlapping, pairs)
+        });
+    }
+
+    /// Adds the pairs of some boxes, which these bounds contain, with those of a leaf.
+    #[inline(always)]
+    fn meet(
+        &self,
+        boxes: &Node,
+        bounds: &Aabb,
+        ids: &[u32; LANES],
+        leaf: usize,
+        overlapping: impl Fn(&Node, &Aabb) -> u32,
+        pairs: &mut Pairs,
+    ) {
+        let (node, others) = (&self.levels[0][leaf], self.ids_of(leaf));
+        let mine = overlapping(boxes, &self.bounds_of(leaf));
+        if mine == 0 {
+            return;
+        }
+        let theirs = overlapping(node, bounds);
+        // Most often few of the boxes reach into the other leaf: those of the side that has fewer of them are compared with the other.
+        let (few, few_ids, many, many_ids, all) = if mine.count_ones() <= theirs.count_ones() {
+            (boxes, ids, node, others, mine)
+        } else {
+            (node, others, boxes, ids, theirs)
+        };
+        each_bit(all, |lane| {
+            let hits = overlapping(many, &few.lane(lane));
+            if hits != 0 {
+                add(few_ids[lane], many_ids, hits, pairs);
+            }
+        });
+    }
+
+    fn bounds_of(&self, leaf: usize) -> Aabb {
+        self.levels[1][leaf / LANES].lane(leaf % LANES)
+    }
+
+    fn ids_of(&self, leaf: usize) -> &[u32; LANES] {
+        &self.ids.as_chunks().0[leaf]
+    }
+
+    /// Calls `found` for every lane of level `bottom`, from number `first` on, that overlaps a box: lane k of node n has the number
+    /// 16 n + k. Returns how many nodes were compared with it.
+    #[inline(always)]
+    fn each(
+        &self,
+        b: &Aabb,
+        first: usize,
+        bottom: usize,
+        overlapping: impl Fn(&Node, &Aabb) -> u32,
+        mut found: impl FnMut(usize),
+    ) -> u32 {
+        let Some(top) = self.levels.iter().rposition(|level| !level.is_empty()) else { return 0 };
+        // The lanes of a node in a level that contain nothing before `first` alone.
+        let lanes = |level: usize, node: usize| {
+            let first = first >> (4 * (level - bottom));
+            let before = first.saturating_sub(node * LANES);
+            if before < LANES { u32::MAX << before } else { 0 }
+        };
+        let mut looked = 0;
+        for root in (first >> (4 * (top - bottom) + 4))..self.levels[top].len() {
+            // For each level, the node whose children are being visited and which of them are left.
+            let mut open = [(0, 0); MOST_LEVELS];
+            let mut at = top;
+            open[at] = (root, overlapping(&self.levels[at][root], b) & lanes(at, root));
+            looked += 1;
+            loop {
+                let (node, left) = &mut open[at];
+                if *left == 0 || at == bottom {
+                    let first = *node * LANES;
+                    each_bit(*left, |lane| found(first + lane));
+                    at += 1;
+                    if at > top {
+                        break;
+                    }
+                    continue;
+                }
+                let child = *node * LANES + left.trailing_zeros() as usize;
+                *left &= *left - 1;
+                let below = &self.levels[at - 1];
+                if self.far && *left != 0 {
+                    let next = *node * LANES + left.trailing_zeros() as usize;
+                    below.get(next).into_iter().for_each(prefetch);
+                }
+                at -= 1;
+                open[at] = (child, overlapping(&below[child], b) & lanes(at, child));
+                looked += 1;
+            }
+        }
+        looked
+    }
+}
+
+/// Adds a box paired with each of `others` whose bit is set.
+#[inline(always)]
+fn add(id: u32, others: &[u32; LANES], hits: u32, pairs: &mut Pairs) {
+    if let Some(room) = pairs.room(LANES) {
+        let mut room = room.iter_mut();
+        each_bit(hits, |bit| {
+            let other = others[bit];
+            if let Some(pair) = room.next() {
+                *pair = (id.min(other), id.max(other));
+            }
+        });
+        pairs.extend_by(hits.count_ones() as usize);
+    } else {
+        pairs.push_mask(id, others, hits);
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::Walk;
+    use crate::aabb::Aabb;
+    use crate::cpu::kernel::node::{Group, Node};
+    use crate::pairs::Pairs;
+    use std::arch::x86_64::*;
+    use std::ops::Range;
+
+    #[target_feature(enable = "avx512f")]
+    #[inline]
+    fn overlapping_avx512(node: &Node, b: &Aabb) -> u32 {
+        let mut mask = u16::MAX;
+        for a in 0..3 {
+            // SAFETY: each column has 16 floats.
+            let (low, high) = unsafe { (_mm512_loadu_ps(node.low[a].as_ptr()), _mm512_loadu_ps(node.high[a].as_ptr())) };
+            mask &= _mm512_cmp_ps_mask::<_CMP_LE_OQ>(low, _mm512_set1_ps(b.max[a]));
+            mask &= _mm512_cmp_ps_mask::<_CMP_GE_OQ>(high, _mm512_set1_ps(b.min[a]));
+        }
+        u32::from(mask)
+    }
+
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn overlapping_avx2(node: &Node, b: &Aabb) -> u32 {
+        let mut halves = [_mm256_castsi256_ps(_mm256_set1_epi32(-1)); 2];
+        for a in 0..3 {
+            let (from, to) = (_mm256_set1_ps(b.max[a]), _mm256_set1_ps(b.min[a]));
+            for (k, all) in halves.iter_mut().enumerate() {
+                // SAFETY: each column has 16 floats.
+                let (low, high) = unsafe {
+                    (_mm256_loadu_ps(node.low[a].as_ptr().add(8 * k)), _mm256_loadu_ps(node.high[a].as_ptr().add(8 * k)))
+                };
+                let below = _mm256_cmp_ps::<_CMP_LE_OQ>(low, from);
+                *all = _mm256_and_ps(*all, _mm256_and_ps(below, _mm256_cmp_ps::<_CMP_GE_OQ>(high, to)));
+            }
+        }
+        _mm256_movemask_ps(halves[0]) as u32 | (_mm256_movemask_ps(halves[1]) as u32) << 8
+    }
+
+    #[target_feature(enable = "avx512f")]
+    pub(super) fn each_avx512(walk: &Walk<'_>, b: &Aabb, found: impl FnMut(usize)) -> u32 {
+        walk.each(b, 0, 0, |node, b| overlapping_avx512(node, b), found)
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn each_avx2(walk: &Walk<'_>, b: &Aabb, found: impl FnMut(usize)) -> u32 {
+        walk.each(b, 0, 0, |node, b| overlapping_avx2(node, b), found)
+    }
+
+    #[target_feature(enable = "avx512f")]
+    pub(super) fn self_avx512(walk: &Walk<'_>, leaves: Range<usize>, pairs: &mut Pairs) {
+        walk.leaves_with_all_behind(leaves, |node, b| overlapping_avx512(node, b), pairs);
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn self_avx2(walk: &Walk<'_>, leaves: Range<usize>, pairs: &mut Pairs) {
+        walk.leaves_with_all_behind(leaves, |node, b| overlapping_avx2(node, b), pairs);
+    }
+
+    #[target_feature(enable = "avx512f")]
+    pub(super) fn group_avx512(walk: &Walk<'_>, group: &Group, pairs: &mut Pairs) {
+        walk.group_with_all(group, |node, b| overlapping_avx512(node, b), pairs);
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn group_avx2(walk: &Walk<'_>, group: &Group, pairs: &mut Pairs) {
+        walk.group_with_all(group, |node, b| overlapping_avx2(node, b), pairs);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 300 boxes in 19 leaves, the last of them with lanes that hold nothing.
+    fn scene() -> (Vec<Aabb>, Vec<Vec<Node>>, Vec<u32>) {
+        let boxes: Vec<Aabb> =
+            (0..300).map(|k| Aabb::cube([k as f32 / 9.0, (k * 7 % 16) as f32, (k * 3 % 16) as f32], 2.5)).collect();
+        let mut levels = vec![vec![Node::EMPTY; 19], vec![Node::EMPTY; 2], vec![]];
+        for (k, b) in boxes.iter().enumerate() {
+            levels[0][k / LANES].set(k % LANES, b);
+            assert!(levels[1][k / LANES / LANES].widen(k / LANES % LANES, b) || k % LANES > 0);
+        }
+        (boxes, levels, (0..19 * LANES as u32).collect())
+    }
+
+    #[test]
+    fn every_level_finds_the_lanes_that_overlap() {
+        let (boxes, levels, ids) = scene();
+        let walk = Walk { levels: &levels, ids: &ids, far: true };
+        let infinite = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
+        let queries = (0..60).map(|k| Aabb::cube([(k % 34) as f32, (k % 13) as f32, (k % 11) as f32], 0.1 * k as f32));
+        for query in queries.chain([infinite]) {
+            let expected: Vec<usize> = (0..boxes.len()).filter(|&k| boxes[k].overlaps(&query)).collect();
+            for simd in Simd::every() {
+                let mut found = Vec::new();
+                let looked = walk.each_overlapping(simd, &query, |k| found.push(k));
+                assert_eq!(found, expected, "{simd:?}");
+                assert!(looked >= 2 && looked as usize <= 2 + 19);
+            }
+        }
+    }
+
+    #[test]
+    fn every_level_finds_each_pair_once() {
+        let (boxes, levels, ids) = scene();
+        let walk = Walk { levels: &levels, ids: &ids, far: false };
+        let mut expected = Pairs::new();
+        (0..300_u32).for_each(|j| {
+            (0..j).filter(|&i| boxes[i as usize].overlaps(&boxes[j as usize])).for_each(|i| expected.push(i, j));
+        });
+        let outside: Vec<Aabb> = (0..LANES).map(|k| Aabb::cube([2.0 * k as f32, 8.0, 8.0], 3.0)).collect();
+        let mut group = Group::of(&outside[0]);
+        // Lane 15 holds nothing.
+        outside[..15].iter().enumerate().for_each(|(lane, b)| group.set(lane, b, 1000 + lane as u32));
+        let across = outside[..15].iter().flat_map(|a| boxes.iter().filter(|b| a.overlaps(b))).count();
+        for simd in Simd::every() {
+            let mut found = Pairs::new();
+            for leaves in [0..3, 3..4, 4..19] {
+                walk.self_pairs(simd, leaves, &mut found);
+            }
+            assert_eq!(found.fingerprint(), expected.fingerprint(), "{simd:?}");
+            found.clear();
+            walk.pairs_with(simd, &group, &mut found);
+            assert!(found.len() == across && found.iter().all(|&(a, b)| a < 300 && (1000..1015).contains(&b)), "{simd:?}");
+        }
+    }
+}
