@@ -113,7 +113,7 @@ mod tests {
             let workers = Workers::new("sort", threads, &Threads::default()).unwrap();
             let mut scratch = Vec::new();
             for (len, distinct) in [(0, 1), (1, 1), (4096, 9), (4097, u64::MAX), (50_000, 3), (100_003, u64::MAX)] {
-                let mut keys: Vec<u64> = (0..len as u64 + 7).map(|k| (mix(k) >> 32) % distinct << 32 | k).collect();
+                let mut keys: Vec<u64> = (0..len as u64 + 7).map(|k| ((mix(k) >> 32) % distinct) << 32 | k).collect();
                 let mut expected = keys[..len].to_vec();
                 expected.sort_unstable();
                 sort(&workers, &mut keys[..len], &mut scratch).unwrap();

@@ -220,7 +220,7 @@ mod tests {
     fn a_pair_is_reported_by_the_strip_where_the_later_box_begins() {
         let grid = StripGrid { cells: [5, 5], ..StripGrid::default() };
         let span =
-            |x: u32, y: u32, more_x: u32, more_y: u32| strips(&grid, StripSpan(y * 5 + x | more_x << 16 | more_y << 24));
+            |x: u32, y: u32, more_x: u32, more_y: u32| strips(&grid, StripSpan((y * 5 + x) | more_x << 16 | more_y << 24));
         let (a, b) = (span(1, 2, 2, 1), span(2, 1, 0, 2));
         let shared = a
             .iter()

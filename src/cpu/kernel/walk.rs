@@ -99,7 +99,7 @@ impl Walk<'_> {
     #[inline(always)]
     fn group_with_all(&self, group: &Group, overlapping: impl Fn(&Node, &Aabb) -> u32 + Copy, pairs: &mut Pairs) {
         self.each(&group.bounds, 0, 1, overlapping, |other| {
-            self.meet(&group.node, &group.bounds, &group.ids, other, overlapping, pairs)
+            self.meet(&group.node, &group.bounds, &group.ids, other, overlapping, pairs);
         });
     }
 

@@ -94,8 +94,8 @@ impl Curve {
 /// which it is long.
 #[cold]
 fn class(edges: [f32; 3], ratio: f32) -> u32 {
-    // False for NaN, of infinity over infinity: the largest class.
-    let step = [4.0, 16.0, 64.0, 256.0, 1024.0].iter().take_while(|&&limit| !(ratio <= limit)).count() as u32;
+    // Not a number, of infinity over infinity, is in the largest class.
+    let step = [4.0, 16.0, 64.0, 256.0, 1024.0].iter().take_while(|&&limit| ratio > limit || ratio.is_nan()).count() as u32;
     if step > 2 {
         return 10 + step;
     }
@@ -304,7 +304,7 @@ mod tests {
         // next, in one corner; and one with a crowd for all threads far away.
         let row = |k: u64| at(k, 100.0, [1.0e8 * (k % 40) as f32, 0.0, 0.0]);
         let nested = |k: u64| at(k, 100.0 * 1.0e-3_f32.powi((k % 5) as i32), [0.0; 3]);
-        let pooled = |k: u64| if k % 2 == 0 { one(k) } else { at(k, 100.0, [3.0e9, -8.0e9, 5.0e9]) };
+        let pooled = |k: u64| if k.is_multiple_of(2) { one(k) } else { at(k, 100.0, [3.0e9, -8.0e9, 5.0e9]) };
         let count = 40_000;
         let even = longest_edge(
             &(0..count).map(one).collect::<Vec<_>>(),
@@ -363,10 +363,10 @@ mod tests {
                 b
             })
             .collect();
-        let mut filter = Filter::default();
-        filter.memberships = (0..4096).map(|k| crate::Membership { fixed: k % 3 == 0, ..crate::Membership::ALL }).collect();
+        let membership = |k: u32| crate::Membership { fixed: k.is_multiple_of(3), ..crate::Membership::ALL };
+        let filter = Filter::new((0..4096).map(membership).collect());
         let (ids, moving) = ordered(&boxes, 1, Some(&filter));
-        assert!(moving == 2730 && (0..4096).all(|k| (ids[k] % 3 == 0) == (k >= moving)));
+        assert!(moving == 2730 && (0..4096).all(|k| ids[k].is_multiple_of(3) == (k >= moving)));
         let (ids, _) = ordered(&boxes, 1, None);
         let kind = |id: u32| (id % 64).min(3);
         let mixed = ids.chunks(LANES).filter(|leaf| leaf.iter().any(|&id| kind(id) != kind(leaf[0]))).count();
