@@ -33,9 +33,9 @@ fn both_have_the_same_pairs_in_every_frame_while_bodies_break_and_are_cleared() 
         // A comparison of few pairs would prove little, and so would one in which margins or rules play no part.
         let fullest = counts.iter().max_by_key(|c| c.own).unwrap();
         assert!(fullest.own > 500 && fullest.rapier > fullest.own, "seed {seed}: {fullest:?}");
-        // Eight pairs of the floor and the walls are left out as well; the rest is debris.
-        assert!(fullest.overlapping > fullest.wanted as u64 + 8 + 50, "seed {seed}: {fullest:?}");
-        assert!(counts[0].overlapping >= 280 && counts[0].own == 0, "seed {seed}: {:?}", counts[0]);
+        // The pairs of the floor and the walls are not looked for: what is left out is debris.
+        assert!(fullest.overlapping > fullest.wanted as u64 + 50, "seed {seed}: {fullest:?}");
+        assert!(counts[0].overlapping >= 272 && counts[0].own == 0, "seed {seed}: {:?}", counts[0]);
     }
 }
 
