@@ -116,6 +116,20 @@ impl Scenario {
         Self::Teleport,
     ];
 
+    /// Those with few pairs, each with something that makes a usual shortcut quadratic.
+    pub const HARD: [Self; 10] = [
+        Self::Parked,
+        Self::Stations,
+        Self::Layers,
+        Self::Plates,
+        Self::Rods,
+        Self::StaticWorld,
+        Self::Asleep,
+        Self::Tower,
+        Self::Aliased,
+        Self::Teleport,
+    ];
+
     /// Frames in one cycle of [`Scenario::Fragmentation`], after which the numbers of objects repeat.
     pub const FRAGMENTATION_FRAMES: u64 = 600;
 

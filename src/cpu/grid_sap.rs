@@ -67,7 +67,7 @@ struct Bins {
 struct Entry {
     bounds: Aabb,
     id: u32,
-    /// the mask of [`StripGrid::each_strip`] in this strip.
+    /// The mask of [`StripGrid::each_strip`] in this strip.
     begins: u32,
 }
 

@@ -46,20 +46,8 @@ const FULL: [Scenario; 7] = [
     Scenario::Gravity,
     Scenario::Fragmentation,
 ];
-/// Few pairs, and each with something that makes a usual shortcut quadratic: what counts here is how bad a method gets, not where exactly one
-/// overtakes another. So a full sweep takes them at one size a decade, in a quarter of the time each.
-const HARD: [Scenario; 10] = [
-    Scenario::Parked,
-    Scenario::Stations,
-    Scenario::Layers,
-    Scenario::Plates,
-    Scenario::Rods,
-    Scenario::StaticWorld,
-    Scenario::Asleep,
-    Scenario::Tower,
-    Scenario::Aliased,
-    Scenario::Teleport,
-];
+/// In the hard scenarios it counts how bad a method gets, not where exactly one overtakes another. So a full sweep takes them at one size a
+/// decade, in a quarter of the time each.
 const HARD_PER_DECADE: u32 = 1;
 const HARD_SHARE: f64 = 0.25;
 /// Below this size no scene is hard.
@@ -82,7 +70,7 @@ impl Plan {
         let (usual, usual_hard, objects, per_decade, rounds, total) = if quick {
             (&QUICK[..], &[][..], QUICK_OBJECTS, QUICK_PER_DECADE, QUICK_ROUNDS, QUICK_TOTAL)
         } else {
-            (&FULL[..], &HARD[..], FULL_OBJECTS, FULL_PER_DECADE, FULL_ROUNDS, FULL_TOTAL)
+            (&FULL[..], &Scenario::HARD[..], FULL_OBJECTS, FULL_PER_DECADE, FULL_ROUNDS, FULL_TOTAL)
         };
         let (even, hard) = if scenarios.is_empty() { (usual, usual_hard) } else { (scenarios, &[][..]) };
         let max = max_objects.unwrap_or(objects);
@@ -151,8 +139,8 @@ mod tests {
         let (uniform, parked) = (of(&plan, Scenario::Uniform), of(&plan, Scenario::Parked));
         assert_eq!((uniform.sizes.len(), &parked.sizes[..]), (21, &[1000, 10_000, 100_000, 1_000_000][..]));
         assert!((parked.time.as_secs_f64() / uniform.time.as_secs_f64() - HARD_SHARE).abs() < 1e-6);
-        assert_eq!(plan.ascents.len(), FULL.len() + HARD.len());
-        assert!(HARD.iter().all(|s| !FULL.contains(s)));
+        assert_eq!(plan.ascents.len(), FULL.len() + Scenario::HARD.len());
+        assert!(Scenario::HARD.iter().all(|s| !FULL.contains(s)));
         let named = Plan::new(false, &[Scenario::Parked], None);
         assert_eq!(of(&named, Scenario::Parked), Ascent { scenario: Scenario::Parked, ..uniform });
         assert_eq!(of(&Plan::new(false, &[], Some(300)), Scenario::Parked).sizes, [300]);

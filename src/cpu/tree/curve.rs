@@ -165,7 +165,7 @@ impl Order {
             Members::Of(ids) => workers.map(ids, keys, |_, &id| key(id as usize, &boxes[id as usize])),
         }
         let invalid = invalid.into_inner();
-        boxes.get(invalid).map_or(Ok(()), |b| Aabb::check(std::slice::from_ref(b), invalid))?;
+        boxes.get(invalid..).map_or(Ok(()), |rest| Aabb::check(rest, invalid))?;
         sort(workers, keys, &mut self.scratch)?;
         let moving = keys.partition_point(|&key| code(key) < FIXED);
         self.spread_crowds(workers, boxes)?;
@@ -222,14 +222,8 @@ fn spread(keys: &mut [u64], boxes: &[Aabb]) {
     let Some(curve) = Curve::within(&bounds_of(keys, boxes)) else { return };
     curve.recode(keys, boxes);
     keys.sort_unstable();
-    let mut first = 0;
-    for run in keys.chunk_by_mut(|&a, &b| code(a) == code(b)) {
-        first += run.len();
-        if run.len() > CROWD {
-            spread(run, boxes);
-        }
-    }
-    debug_assert_eq!(first, keys.len());
+    let runs = keys.chunk_by_mut(|&a, &b| code(a) == code(b));
+    runs.filter(|run| run.len() > CROWD).for_each(|run| spread(run, boxes));
 }
 
 /// Calls `found` for every run of more than [`CROWD`] keys with one code.
@@ -253,7 +247,7 @@ fn bounds_of(keys: &[u64], boxes: &[Aabb]) -> Aabb {
     let nothing = Aabb::new([MOST; 3], [-MOST; 3]);
     keys.iter().fold(nothing, |all, &key| {
         let middle = middle(&boxes[key as u32 as usize]);
-        Aabb { min: [0, 1, 2].map(|a| all.min[a].min(middle[a])), max: [0, 1, 2].map(|a| all.max[a].max(middle[a])) }
+        all.union(&Aabb::new(middle, middle))
     })
 }
 
