@@ -158,10 +158,13 @@ impl Browser {
         found.iter().map(|e| e.as_str().unwrap().to_owned()).collect()
     }
 
-    /// Keeps a picture of the whole page for eyes.
+    /// Keeps a picture of the whole page for eyes, where somebody wants one. Nobody else waits for it: a Chromium that has just opened a
+    /// page on a busy machine may say that there is nothing to take a picture of ("0 width").
     pub(crate) fn screenshot(&self, name: &str) {
-        let picture = self.devtools("Page.captureScreenshot", &json!({ "captureBeyondViewport": true }));
-        keep(&format!("{name}.png"), &picture["data"]);
+        if pictures().is_some() {
+            let picture = self.devtools("Page.captureScreenshot", &json!({ "captureBeyondViewport": true }));
+            keep(&format!("{name}.png"), &picture["data"]);
+        }
     }
 
     /// Prints the page to PDF and keeps that for eyes.
@@ -227,10 +230,15 @@ fn installed() -> Option<PathBuf> {
     names.iter().flat_map(|name| folders.iter().map(move |f| f.join(name))).find(|p| p.is_file())
 }
 
-/// Writes a file into the folder that `SAPWISE_SCREENSHOTS` names, and nothing without it.
+/// The folder that `SAPWISE_SCREENSHOTS` names, for pictures.
+fn pictures() -> Option<PathBuf> {
+    std::env::var_os("SAPWISE_SCREENSHOTS").map(PathBuf::from)
+}
+
+/// Writes a file into the folder for pictures, and nothing without one.
 fn keep(name: &str, base64: &Value) {
     let bytes = BASE64_STANDARD.decode(base64.as_str().unwrap()).unwrap();
-    if let Some(folder) = std::env::var_os("SAPWISE_SCREENSHOTS").map(PathBuf::from) {
+    if let Some(folder) = pictures() {
         std::fs::create_dir_all(&folder).unwrap();
         std::fs::write(folder.join(name), bytes).unwrap();
     }
