@@ -24,7 +24,7 @@ use crate::error::Error;
 use crate::load::{FramePlan, Sample};
 use crate::pairs::Pairs;
 use grown::{Grown, Margin, Share};
-use motion::{Advice, MOST_KEPT, Motion, Work};
+use motion::{Advice, Motion, Work};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use tree::GrownTree;
 
@@ -132,9 +132,9 @@ impl Incremental for PairCache {
     }
 }
 
-/// Kept pairs of a task, at most, when there are this many boxes and tasks.
-fn most_kept(boxes: usize, tasks: usize) -> usize {
-    MOST_KEPT as usize * boxes / tasks + 1024
+/// How many of the pairs that may be kept one of these tasks may keep: a crowd may lie in the part of one.
+fn most_of_task(most_kept: usize, tasks: usize) -> usize {
+    (4 * most_kept / tasks).min(most_kept)
 }
 
 impl PairCache {
@@ -162,7 +162,7 @@ impl PairCache {
             kept[..before].iter().for_each(|list| dealt.append(list));
         }
         kept.iter_mut().for_each(Pairs::clear);
-        let most = most_kept(grown.as_slice().len(), tasks);
+        let most = most_of_task(motion.most_kept(grown.as_slice().len()), tasks);
         for (k, list) in kept[..tasks].iter_mut().enumerate() {
             let share = part(dealt.len(), k, tasks);
             // Many narrow tasks may keep more than a wide one: none of that is to be lost.
@@ -187,7 +187,7 @@ impl PairCache {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes), shares);
             let sample = Sample::of(grown.as_slice());
             tree.build(workers, grown.as_slice(), &sample, pairs.filter())?;
-            let most = most_kept(boxes.len(), kept.len());
+            let most = most_of_task(motion.most_kept(boxes.len()), kept.len());
             for list in kept.iter_mut() {
                 list.clear();
                 list.set_limit(Some(most));

@@ -22,8 +22,13 @@ mod cost {
 /// Margins that are compared, as shares of a mean edge.
 const MARGINS: [f32; 8] = [0.04, 0.07, 0.1, 0.15, 0.22, 0.33, 0.5, 0.75];
 
-/// Kept pairs for each box, at most: keeping more would not pay, and takes memory.
-pub(super) const MOST_KEPT: f32 = 32.0;
+/// Kept pairs for each box, at most: keeping more would not pay, and takes memory. Of those that a margin promises, as many times as this may
+/// be kept and as many more: what a margin too large costs, once, stays within some frames from scratch.
+const MOST_KEPT: f32 = 32.0;
+const KEPT_OVER_PROMISED: f32 = 4.0;
+
+/// Boxes near a box, at the least, of those that a margin makes its neighbours: where none overlap yet, boxes may be stacked a hair apart.
+const FEWEST_NEAR: f32 = 0.5;
 
 /// Frames from scratch after keeping did not pay, at first and at most.
 const PAUSE: [u32; 2] = [16, 512];
@@ -135,6 +140,13 @@ impl Motion {
         self.keeping = None;
     }
 
+    /// How many pairs this many boxes may keep. More are not what the margin promised.
+    pub(super) fn most_kept(&self, objects: usize) -> usize {
+        let promised = self.keeping.map_or(MOST_KEPT, |k| k.kept);
+        let each = (KEPT_OVER_PROMISED * (promised + 1.0)).min(MOST_KEPT);
+        (each * objects as f32) as usize + 1024
+    }
+
     /// Whether the kept pairs are to be found again in this frame, in which boxes left as `changes` says.
     pub(super) fn wants_rebuild(&self, objects: usize, changes: &Changes) -> bool {
         let Some(keeping) = self.keeping else { return false };
@@ -205,13 +217,14 @@ impl Motion {
         let motion = self.moved(plan, boxes)? as f32;
         let far = far(boxes.len());
         let scratch = scratch(far, self.density);
+        let density = self.density.max(FEWEST_NEAR);
         let cost = |m: f32| {
-            let kept = self.density * (1.0 + 2.0 * m).powi(3);
+            let kept = density * (1.0 + 2.0 * m).powi(3);
             tests(far, kept) + cost::AGAIN + left(far, NODES) * leaving(motion, m)
         };
         let margins = MARGINS.into_iter().filter(|&m| m <= self.most_margin);
         let best = margins.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
-        let kept = self.density * (1.0 + 2.0 * best).powi(3);
+        let kept = density * (1.0 + 2.0 * best).powi(3);
         (cost(best) < scratch && kept < MOST_KEPT).then(|| Keeping {
             margin: Margin { share: best, longest_edge: longest_edge(plan, boxes) },
             cost: cost(best),
@@ -316,6 +329,18 @@ mod tests {
         };
         let (wandering, jumping) = (frames(0, &mut motion), frames(10, &mut motion));
         assert!(wandering > 100 && jumping < 12, "{wandering} and {jumping} frames");
+    }
+
+    #[test]
+    fn where_no_boxes_overlap_the_margin_is_no_larger_than_slow_boxes_need_and_few_pairs_may_be_kept() {
+        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
+        let mut motion = Motion::default();
+        motion.found(1000, 0);
+        let plan = FramePlan::default().with_moved(Some(0.005));
+        motion.advise(&plan, &boxes);
+        let Advice::Keep(margin) = motion.advise(&plan, &boxes) else { panic!("slow boxes are worth keeping") };
+        assert!((MARGINS[0]..=0.15).contains(&margin.share), "{}", margin.share);
+        assert!(motion.most_kept(1000) < 10_000, "{}", motion.most_kept(1000));
     }
 
     #[test]
