@@ -21,7 +21,7 @@ const MOST_LN_FACTOR: f64 = 50.0;
 pub struct CostCurve {
     /// Terms of the sum; none is negative.
     pub terms: Vec<CostTerm>,
-    /// Terms of the fallback of the algorithm, which it takes where this sum is the smaller one: `pair-cache` leaves a frame to `grid-sap` where
+    /// Terms of the fallback of the algorithm, which it takes where this sum is the smaller one: `pair-cache` does what `bvh` does where
     /// boxes move too far. Empty where it has none.
     pub fallback_terms: Vec<CostTerm>,
     /// Last-level cache of the machine, for [`Term::ColdObjects`].

@@ -16,5 +16,5 @@ trap 'rm -rf "$work"' EXIT
 for figure in figure-7-threads field-map; do
   cp "$work/study/figures/$figure.svg" "$out/$figure.svg"
 done
-"$sapwise" run fragmentation --objects 20000 --tuning datasets/amd-epyc-2c-full--2026-11-21.json --no-gpus --plot "$out/fragmentation.svg"
+"$sapwise" run fragmentation --objects 20000 --tuning datasets/amd-epyc-zen3-2c-full--2026-11-22.json --no-gpus --plot "$out/fragmentation.svg"
 echo "The pictures are in $out."

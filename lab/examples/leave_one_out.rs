@@ -1,7 +1,7 @@
 //! Trains on all reports of a folder but those of one machine, and prints what choices cost on one of its reports.
 //!
 //! ```text
-//! cargo run --release -p sapwise-lab --example leave_one_out -- datasets amd-epyc-2c-full--2026-11-21.json
+//! cargo run --release -p sapwise-lab --example leave_one_out -- datasets/earlier amd-epyc-2c-full--2026-11-21.json
 //! ```
 
 use anyhow::{Context, Result};

@@ -291,7 +291,19 @@ pub(crate) fn truth() -> Vec<MethodModel> {
             (Moved, SharedCycle, 150.0),
         ],
     );
-    pair_cache.fallback_terms = of(&sorted(7000.0, 4.4, (StripCandidates, SharedLane, 66.0)));
+    let tree = |factor: f64| {
+        let terms = [
+            (Call, Cycle, 2000.0),
+            (Call, ForkJoin, 3.0),
+            (Objects, SharedCycle, 170.0),
+            (Objects, Cycle, 5.0),
+            (Sort, SharedCycle, 5.0),
+            (ColdObjects, Byte, 100.0),
+            (Pairs, SharedCycle, 25.0),
+        ];
+        terms.map(|(term, scale, unit)| (term, scale, factor * unit))
+    };
+    pair_cache.fallback_terms = of(&tree(1.1));
     vec![
         method(
             "brute",
@@ -305,6 +317,7 @@ pub(crate) fn truth() -> Vec<MethodModel> {
         ),
         method("sap", &sorted(1500.0, 3.0, (AxisCandidates, SharedLane, 7.0))),
         method("grid-sap", &sorted(6000.0, 4.0, (StripCandidates, SharedLane, 60.0))),
+        method("bvh", &tree(1.0)),
         pair_cache,
     ]
 }

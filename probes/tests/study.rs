@@ -13,7 +13,7 @@ fn dataset(name: &str) -> PathBuf {
 }
 
 fn stored(profile: &str) -> PathBuf {
-    dataset(&format!("amd-epyc-2c-{profile}--2026-11-21.json"))
+    dataset(&format!("earlier/amd-epyc-2c-{profile}--2026-11-21.json"))
 }
 
 fn read(path: &Path) -> Value {

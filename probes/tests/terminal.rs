@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 fn report() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/amd-epyc-2c-full--2026-11-21.json"))
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/earlier/amd-epyc-2c-full--2026-11-21.json"))
 }
 
 /// What the prediction for a report shows on a terminal of that many columns. `None`, with a line that says so, where the program is missing

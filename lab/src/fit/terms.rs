@@ -10,25 +10,25 @@ fn tests(method: &str) -> &'static [Term] {
         "brute" => &[Term::AllPairs],
         "sap" => &[Term::AxisCandidates],
         "grid-sap" => &[Term::StripCandidates],
-        // Kept pairs are tested one by one, and found again in few frames.
-        "pair-cache" => &[],
+        // A tree tests what is near, which objects and pairs tell. Kept pairs are tested one by one, and found again in few frames.
+        "bvh" | "pair-cache" => &[],
         _ => &[Term::AllPairs, Term::AxisCandidates, Term::StripCandidates],
     }
 }
 
-/// The method that another one falls back to where that is cheaper: the grid takes over where boxes move too far for kept pairs.
+/// The method that another one falls back to where that is cheaper: a tree takes over where boxes move too far for kept pairs.
 pub fn fallback_method(method: &str) -> Option<&'static str> {
-    (method == "pair-cache").then_some("grid-sap")
+    (method == "pair-cache").then_some("bvh")
 }
 
-/// Whether the boxes are sorted in every frame. `pair-cache` sorts them in few, or, where the grid takes over, by their cells only.
+/// Whether the boxes are sorted in every frame. `pair-cache` sorts them in few, or where the tree takes over.
 fn sorts(method: &str) -> bool {
     !matches!(method, "brute" | "pair-cache")
 }
 
 /// Whether a frame may be cheaper where boxes move little.
 fn is_incremental(method: &str) -> bool {
-    !matches!(method, "brute" | "sap" | "grid-sap")
+    !matches!(method, "brute" | "sap" | "grid-sap" | "bvh")
 }
 
 /// The physical terms of a method over machines, for any number of threads or GPUs.

@@ -87,7 +87,7 @@ mod tests {
     use std::path::Path;
 
     fn stored_report() -> Report {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/amd-epyc-2c-full--2026-11-21.json");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/earlier/amd-epyc-2c-full--2026-11-21.json");
         read_report(Path::new(path), &|_| ()).unwrap().1
     }
 

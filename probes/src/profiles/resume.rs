@@ -151,7 +151,7 @@ mod tests {
     use sapwise_lab::data::read_report;
 
     fn stored_report() -> Report {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/amd-epyc-2c-full--2026-11-21.json");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/earlier/amd-epyc-2c-full--2026-11-21.json");
         read_report(Path::new(path), &|_| ()).unwrap().1
     }
     use crate::profiles::family::{Whole, family};
