@@ -323,7 +323,7 @@ fn a_program_that_names_no_algorithms_gets_all_of_ours() {
         frames_until_it_came(&mut adaptive);
         assert!([Origin::Probed, Origin::Cached].contains(&origin(&adaptive)), "{:?}", adaptive.setup());
         let known: Vec<String> = adaptive.tuning().algorithms().iter().map(ToString::to_string).collect();
-        for id in ["brute@cpu1", "sap@cpu1", "grid-sap@cpu1", "pair-cache@cpu1"] {
+        for id in ["brute@cpu1", "sap@cpu1", "grid-sap@cpu1", "bvh@cpu1", "pair-cache@cpu1"] {
             assert!(known.iter().any(|k| k == id), "{known:?}");
         }
         frame(&mut adaptive, &boxes(1000));

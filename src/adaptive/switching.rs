@@ -3,7 +3,8 @@
 /// Share of a frame that the first one costs beside: memory that is no longer in a cache, threads that sleep. Learned from then on.
 const COLD: f64 = 0.15;
 /// A frame made again by an incremental algorithm, over a frame of the other way that its cost curve knows, or over a frame of its own
-/// where there is no other way. `pair-cache` over `grid-sap` on one thread: 1.0 to 2.7 at 100 to 30 000 objects of four scenarios.
+/// where there is no other way. `pair-cache` over `grid-sap`, then its other way, on one thread: 1.0 to 2.7 at 100 to 30 000
+/// objects of four scenarios.
 const FROM_NOTHING: f64 = 2.0;
 
 /// Frames of absence after which what an algorithm kept is worth nothing any more.

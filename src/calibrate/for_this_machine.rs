@@ -273,8 +273,9 @@ mod tests {
         let mut broken = hardware;
         broken.parameters.iter_mut().filter(|p| p.name == ParameterId::ForkJoinColdNs).for_each(|p| p.value = Some(0.0));
         let (tuning, sound) = predict(&model, broken, &algorithms, &mut remarks).unwrap();
-        assert!(tuning.costs.iter().all(|c| c.algorithm.threads() == 1) && !sound);
-        assert_eq!(tuning.costs.len(), algorithms.len() / 2);
+        assert!(!sound && tuning.costs.len() < algorithms.len());
+        let costs_nothing_to_wake = |e: &&Entry| e.id.threads() == 1;
+        assert!(algorithms.iter().filter(costs_nothing_to_wake).all(|e| tuning.costs.iter().any(|c| c.algorithm == e.id)));
         assert!(remarks.len() == 1 && remarks[0].contains("fork_join_cold_ns is 0"), "{remarks:?}");
     }
 }
