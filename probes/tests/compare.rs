@@ -34,11 +34,11 @@ fn compare_tells_how_well_reports_agree_and_refuses_what_can_not_be_compared() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let [machine, other] = machines(folder);
-    // As if `grid-sap` had run elsewhere, three times as slow.
+    // As if `pair-cache` had run elsewhere, three times as slow.
     let mut slower = machine.clone();
     for point in slower["points"].as_array_mut().unwrap() {
         for timing in point["timings"].as_array_mut().unwrap() {
-            if timing["algorithm"].as_str().unwrap().starts_with("grid-sap@cpu") {
+            if timing["algorithm"].as_str().unwrap().starts_with("pair-cache@cpu") {
                 let samples = timing["samples_ns"].as_array_mut().unwrap();
                 samples.iter_mut().for_each(|ns| *ns = (ns.as_u64().unwrap() * 3).into());
             }

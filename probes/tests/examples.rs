@@ -18,7 +18,7 @@ fn stored(name: &str) -> PathBuf {
 /// A folder with the files that examples name.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let report = |profile: &str| stored(&format!("datasets/earlier/amd-epyc-2c-{profile}--2026-11-21.json"));
+    let report = |profile: &str| stored(&format!("datasets/amd-epyc-zen3-2c-{profile}--2026-11-22.json"));
     let put = |from: &Path, to: &str| {
         let to = folder.path().join(to);
         fs::create_dir_all(to.parent().unwrap()).unwrap();
