@@ -273,7 +273,7 @@ mod tests {
         let broken = |name: &ParameterId| {
             let (mut broken, mut remarks) = (hardware.clone(), Vec::new());
             broken.parameters.iter_mut().filter(|p| p.name == *name).for_each(|p| p.value = Some(0.0));
-            let (tuning, sound) = predict(&model, broken, &algorithms, &mut remarks).ok()?;
+            let (tuning, sound) = predict(&model, broken, &algorithms, &mut remarks)?;
             (tuning.costs.len() < algorithms.len()).then_some((*name, tuning, sound, remarks))
         };
         let (name, tuning, sound, remarks) =

@@ -22,13 +22,16 @@ mod cost {
 /// Margins that are compared, as shares of a mean edge.
 const MARGINS: [f32; 8] = [0.04, 0.07, 0.1, 0.15, 0.22, 0.33, 0.5, 0.75];
 
-/// Kept pairs for each box, at most: keeping more would not pay, and takes memory. Of those that a margin promises, as many times as this may
-/// be kept and as many more: what a margin too large costs, once, stays within some frames from scratch.
+/// Kept pairs for each box, at most: keeping more would not pay, and takes memory.
 const MOST_KEPT: f32 = 32.0;
+
+/// No more pairs are kept than this many times what the margin promised and one for each box. A margin that was too large then costs as much as a
+/// few frames from scratch, where it would cost as much as twenty.
 const KEPT_OVER_PROMISED: f32 = 4.0;
 
-/// Boxes near a box, at the least, of those that a margin makes its neighbours: where none overlap yet, boxes may be stacked a hair apart.
-const FEWEST_NEAR: f32 = 0.5;
+/// Pairs that a box is taken to have at the least when a margin is chosen. Where none overlap yet, boxes may be stacked a hair apart, and any
+/// margin would seem free.
+const FEWEST_PAIRS: f32 = 0.5;
 
 /// Frames from scratch after keeping did not pay, at first and at most.
 const PAUSE: [u32; 2] = [16, 512];
@@ -217,7 +220,7 @@ impl Motion {
         let motion = self.moved(plan, boxes)? as f32;
         let far = far(boxes.len());
         let scratch = scratch(far, self.density);
-        let density = self.density.max(FEWEST_NEAR);
+        let density = self.density.max(FEWEST_PAIRS);
         let cost = |m: f32| {
             let kept = density * (1.0 + 2.0 * m).powi(3);
             tests(far, kept) + cost::AGAIN + left(far, NODES) * leaving(motion, m)
