@@ -134,7 +134,7 @@ impl Incremental for PairCache {
 
 /// How many of the pairs that may be kept one of these tasks may keep: a crowd may lie in the part of one.
 fn most_of_task(most_kept: usize, tasks: usize) -> usize {
-    (4 * most_kept / tasks).min(most_kept)
+    (most_kept / tasks).saturating_mul(4).min(most_kept)
 }
 
 impl PairCache {

@@ -221,13 +221,11 @@ impl Motion {
         let far = far(boxes.len());
         let scratch = scratch(far, self.density);
         let density = self.density.max(FEWEST_PAIRS);
-        let cost = |m: f32| {
-            let kept = density * (1.0 + 2.0 * m).powi(3);
-            tests(far, kept) + cost::AGAIN + left(far, NODES) * leaving(motion, m)
-        };
+        let kept = |m: f32| density * (1.0 + 2.0 * m).powi(3);
+        let cost = |m: f32| tests(far, kept(m)) + cost::AGAIN + left(far, NODES) * leaving(motion, m);
         let margins = MARGINS.into_iter().filter(|&m| m <= self.most_margin);
         let best = margins.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
-        let kept = density * (1.0 + 2.0 * best).powi(3);
+        let kept = kept(best);
         (cost(best) < scratch && kept < MOST_KEPT).then(|| Keeping {
             margin: Margin { share: best, longest_edge: longest_edge(plan, boxes) },
             cost: cost(best),
