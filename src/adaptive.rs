@@ -12,6 +12,7 @@ mod setup;
 mod shelter;
 mod switching;
 mod throttle;
+mod warming;
 
 use crate::aabb::Aabb;
 use crate::algorithm::AlgorithmId;
@@ -165,6 +166,7 @@ impl Adaptive {
         }
         self.policy.remade(&made.kept(), &made.usable());
         self.exchange(made);
+        self.prepare(self.prepared);
         Ok(())
     }
 
@@ -175,14 +177,15 @@ impl Adaptive {
         let before = std::mem::replace(&mut self.policy, policy(tuning, &made));
         self.policy.set_as(&before);
         self.exchange(made);
+        // As those of before were, but within a frame.
+        (0..self.instances.len()).for_each(|k| self.warm(k, self.prepared));
     }
 
-    /// Other candidates take the place of those of before, prepared as those were. What was decided goes with them.
+    /// Other candidates take the place of those of before. What was decided goes with them.
     fn exchange(&mut self, made: Instances) {
         (self.candidates, self.instances) = (made.candidates, made.instances);
         self.decided = None;
         self.choice = None;
-        self.prepare(self.prepared);
     }
 
     /// Where its tuning came from, what went wrong on the way and how long it took.
@@ -226,6 +229,7 @@ impl Adaptive {
     pub fn decide(&mut self, boxes: &[Aabb]) -> Option<Decision<'_>> {
         #[cfg(feature = "this-machine")]
         self.take_over();
+        self.take_back(false);
         self.choose(boxes);
         self.decided = Some(boxes.len());
         self.last_decision()
@@ -233,7 +237,7 @@ impl Adaptive {
 
     fn choose(&mut self, boxes: &[Aabb]) {
         let frames = self.tracker.decide(boxes);
-        self.choice = self.policy.choose(&self.tracker.load(), frames);
+        self.choice = self.choose_among(frames);
         self.measured_ns = None;
     }
 
@@ -244,14 +248,52 @@ impl Adaptive {
         always || self.tracker.is_due(boxes) || self.policy.is_exploring()
     }
 
+    /// The choice among those that are here; where none is, among those that are awaited.
+    fn choose_among(&mut self, frames: u32) -> Option<Choice> {
+        let load = self.tracker.load();
+        let choice = self.policy.choose(&load, frames);
+        if choice.is_some() || !self.take_back(true) {
+            return choice;
+        }
+        self.policy.choose(&load, 0)
+    }
+
+    /// Gets an instance ready. Meanwhile none of its candidates is chosen where that takes a thread of its own.
+    fn warm(&mut self, instance: usize, objects: usize) {
+        self.instances[instance].warm(objects);
+        self.update(instance);
+    }
+
+    /// Takes back what has got ready, or with `patience` all that is getting ready. Whether anything has come back.
+    fn take_back(&mut self, patience: bool) -> bool {
+        let mut any = false;
+        for k in 0..self.instances.len() {
+            if self.instances[k].take_back(patience) {
+                self.update(k);
+                any = true;
+            }
+        }
+        any
+    }
+
+    /// Its candidates can be chosen while it is here, and never again where it is gone.
+    fn update(&mut self, instance: usize) {
+        let (here, away) = (self.instances[instance].is_here(), self.instances[instance].is_away());
+        for (k, candidate) in self.candidates.iter_mut().enumerate().filter(|(_, c)| c.instance == Some(instance)) {
+            self.policy.set_usable(k, here);
+            if !here && !away {
+                candidate.instance = None;
+            }
+        }
+    }
+
     /// Gets the runner-up ready when its turn may come soon.
     fn warm_runner_up(&mut self, boxes: usize) {
         let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), .. }) = self.choice else { return };
-        let Some(instance) = self.candidates[next].instance.map(|k| &mut self.instances[k]) else { return };
-        if ns <= best * WARM_WITHIN && instance.ready < boxes {
+        let Some(instance) = self.candidates[next].instance else { return };
+        if ns <= best * WARM_WITHIN && self.instances[instance].is_cold(boxes) {
             // By powers of two, so that a growing scene pays for this a few times in all.
-            instance.ready = boxes.checked_next_power_of_two().unwrap_or(boxes);
-            instance.algorithm.prepare(instance.ready);
+            self.warm(instance, boxes.checked_next_power_of_two().unwrap_or(boxes));
         }
     }
 }
@@ -259,9 +301,10 @@ impl Adaptive {
 impl BroadPhase for Adaptive {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         let decided = self.decided.take() == Some(boxes.len());
-        #[cfg(feature = "this-machine")]
         if !decided {
+            #[cfg(feature = "this-machine")]
             self.take_over();
+            self.take_back(false);
         }
         let mut started = (decided || self.is_due(boxes)).then(Instant::now);
         self.measured_ns = None;
@@ -310,7 +353,7 @@ impl BroadPhase for Adaptive {
                     self.policy.set_usable(choice.chosen, false);
                     // The one that runs instead is told apart from what ran before.
                     started.get_or_insert_with(Instant::now);
-                    let next = self.policy.choose(&self.tracker.load(), 0);
+                    let next = self.choose_among(0);
                     self.choice = next.map(|c| Choice { reason: Reason::FellBack, ..c });
                 }
                 Err(error) => {
@@ -324,9 +367,9 @@ impl BroadPhase for Adaptive {
 
     fn prepare(&mut self, objects: usize) {
         self.prepared = self.prepared.max(objects);
-        for instance in &mut self.instances {
-            instance.algorithm.prepare(objects);
-            instance.ready = instance.ready.max(objects);
+        self.take_back(true);
+        for k in 0..self.instances.len() {
+            self.instances[k].prepare(objects);
         }
     }
 

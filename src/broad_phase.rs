@@ -35,7 +35,9 @@ pub trait BroadPhase: Send + Sync {
 
     /// Gets ready for frames of up to `objects` boxes, so that the first of them costs no more than the next.
     ///
-    /// Called ahead of a switch to this algorithm. Cheap when there is nothing to do; doing nothing is allowed.
+    /// Called ahead of a switch to this algorithm. Cheap when there is nothing to do; doing nothing is allowed. [`Adaptive`](crate::Adaptive)
+    /// calls it between frames: of an algorithm on a GPU, whose driver may keep it waiting, on a thread of its own, and chooses others until it
+    /// returns; of any other on the thread of the frames, where it is to reserve memory at most.
     fn prepare(&mut self, objects: usize) {
         let _ = objects;
     }

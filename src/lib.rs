@@ -50,9 +50,9 @@ mod error;
 mod filter;
 #[cfg(feature = "gpu")]
 pub mod gpu;
-// Without the feature only which algorithms there are: reports name them, and nothing of them can run.
+// Without the feature only which algorithms there are and what they ask of a GPU: reports name them, and nothing of them can run.
 #[cfg(not(feature = "gpu"))]
-#[path = "gpu/methods.rs"]
+#[path = "gpu/without_gpus.rs"]
 pub mod gpu;
 pub mod hardware;
 #[cfg(feature = "model")]

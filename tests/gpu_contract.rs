@@ -16,7 +16,7 @@ fn every_algorithm(gpus: &Gpus) -> Vec<(String, Box<dyn BroadPhase>)> {
     let ids = registry.available().into_iter().map(|e| e.id).filter(|id| id.to_string().contains("@gpu"));
     let mut all: Vec<(String, Box<dyn BroadPhase>)> =
         ids.map(|id| (id.to_string(), registry.create(&id).unwrap())).collect();
-    for method in ["brute", "sap", "grid-sap"] {
+    for method in ["brute", "sap", "grid-sap", "bvh"] {
         let devices = vec![gpus.open(0).unwrap(), gpus.open_another(0).unwrap()];
         all.push((format!("{method} on gpu0 twice"), broad_phase(method, devices).unwrap()));
     }
@@ -199,7 +199,8 @@ fn ten_million_pairs_come_whole_and_a_limit_refuses_them() {
     }
 }
 
-/// More candidates than one submission tests, and than the 65 535 turns after which one driver ends a loop silently.
+/// More candidates than one submission tests, and than the 65 535 turns after which one driver ends a loop silently. A unit test of the engine
+/// has rows that go on in every method.
 #[test]
 fn rows_of_very_many_candidates_lose_no_pair() {
     let Some(gpus) = gpus() else { return };

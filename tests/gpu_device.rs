@@ -5,9 +5,10 @@
 mod common;
 
 use common::{Random, gpus, naive};
-use sapwise::gpu::{Gpu, Gpus, wgpu30 as wgpu};
-use sapwise::{Aabb, BroadPhase, GpuIdentity, PairOrder, Pairs, Registry};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use sapwise::gpu::{Gpu, GpuErrorKind, Gpus, Resident, broad_phase, wgpu30 as wgpu};
+use sapwise::{Aabb, BroadPhase, Error, GpuIdentity, PairOrder, Pairs, Registry, Unavailable};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
 
 /// A device as a program opens it: no more than the limits that wgpu promises everywhere, no feature.
 fn device(gpus: &Gpus, index: u32) -> (wgpu::Device, wgpu::Queue) {
@@ -78,7 +79,7 @@ fn ours_and_the_programs_own_work_share_a_queue() {
         registry.add_gpus(&Gpus::of([shared(index, &device, &queue)]));
         let ids = registry.available().into_iter().map(|e| e.id).filter(|id| id.to_string().contains("@gpu"));
         let mut algorithms: Vec<_> = ids.map(|id| (id.to_string(), registry.create(&id).unwrap())).collect();
-        assert_eq!(algorithms.len(), 3);
+        assert_eq!(algorithms.len(), 4);
         let mut own = Own::new(&device, &queue);
         // In turn, as within a frame.
         for (id, algorithm) in &mut algorithms {
@@ -103,6 +104,109 @@ fn ours_and_the_programs_own_work_share_a_queue() {
             println!("gpu{index}: {turns} rounds of the program's own work");
         });
     }
+}
+
+/// Handlers as a program sets them, and what they have heard.
+#[derive(Clone, Default)]
+struct Handlers {
+    errors: Arc<Mutex<Vec<String>>>,
+    losses: Arc<AtomicU32>,
+}
+
+impl Handlers {
+    fn of(device: &wgpu::Device) -> Self {
+        let handlers = Self::default();
+        let (errors, losses) = (Arc::clone(&handlers.errors), Arc::clone(&handlers.losses));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| errors.lock().unwrap().push(error.to_string())));
+        device.set_device_lost_callback(move |_, _| {
+            losses.fetch_add(1, Relaxed);
+        });
+        handlers
+    }
+
+    fn errors(&self) -> Vec<String> {
+        self.errors.lock().unwrap().clone()
+    }
+}
+
+/// Boxes of the program on its own device.
+fn boxes_of(device: &wgpu::Device, queue: &wgpu::Queue, boxes: &[Aabb]) -> wgpu::Buffer {
+    let floats = boxes.iter().flat_map(|b| b.min.into_iter().chain(b.max));
+    let bytes: Vec<u8> = floats.flat_map(f32::to_le_bytes).collect();
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+    let descriptor = wgpu::BufferDescriptor { label: None, size: bytes.len() as u64, usage, mapped_at_creation: false };
+    let buffer = device.create_buffer(&descriptor);
+    queue.write_buffer(&buffer, 0, &bytes);
+    buffer
+}
+
+fn kind(error: &Error) -> Option<GpuErrorKind> {
+    match error {
+        Error::Unavailable { reason: Unavailable::Gpu(error), .. } => Some(error.kind()),
+        _ => None,
+    }
+}
+
+#[test]
+fn the_handlers_of_the_program_stay_and_hear_of_its_own_errors_only() {
+    let Some(gpus) = gpus() else { return };
+    let boxes = Random(22).cubes(800, [9.0; 3], 0.5);
+    let expected = naive(&boxes);
+    for index in gpus.identities().map(|g| g.index) {
+        let (device, queue) = device(&gpus, index);
+        let handlers = Handlers::of(&device);
+        let gpu = shared(index, &device, &queue);
+        let mut algorithm = broad_phase("grid-sap", vec![gpu.clone()]).unwrap();
+        let mut resident = Resident::new(&gpu, "sap").unwrap();
+        agree("grid-sap", algorithm.as_mut(), &boxes, &expected);
+        // Ours: a submission with a buffer that is gone, and a kernel that is bound to one.
+        let there = boxes_of(&device, &queue, &boxes);
+        assert_eq!(resident.find_pairs(&there, 800).unwrap().count as usize, expected.len());
+        there.destroy();
+        for _ in 0..2 {
+            let error = resident.find_pairs(&there, 800).unwrap_err();
+            assert_eq!(kind(&error), Some(GpuErrorKind::Refused), "gpu{index}: {error:#}");
+        }
+        let other = boxes_of(&device, &queue, &boxes);
+        other.destroy();
+        assert_eq!(kind(&resident.find_pairs(&other, 800).unwrap_err()), Some(GpuErrorKind::Refused));
+        assert!(handlers.errors().is_empty(), "gpu{index}: {:?}", handlers.errors());
+        // The program's own.
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::MAP_WRITE;
+        let own = wgpu::BufferDescriptor { label: Some("its own"), size: 4, usage, mapped_at_creation: false };
+        drop(device.create_buffer(&own));
+        let told = handlers.errors();
+        assert!(told.len() == 1 && told[0].contains("its own"), "gpu{index}: {told:?}");
+        // And neither keeps the other from going on.
+        agree("grid-sap", algorithm.as_mut(), &boxes, &expected);
+        assert_eq!(gpu.fault(), None);
+        device.destroy();
+        for _ in 0..2 {
+            let mut pairs = Pairs::new();
+            let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err();
+            assert_eq!(kind(&error), Some(GpuErrorKind::Lost), "gpu{index}: {error:#}");
+        }
+        device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        assert_eq!((handlers.errors().len(), handlers.losses.load(Relaxed)), (1, 1), "gpu{index}");
+    }
+}
+
+#[test]
+fn nothing_can_be_made_on_a_device_of_the_program_that_is_gone() {
+    let Some(gpus) = gpus() else { return };
+    let (device, queue) = device(&gpus, 0);
+    let handlers = Handlers::of(&device);
+    device.destroy();
+    let gpu = shared(0, &device, &queue);
+    for method in ["brute", "sap", "grid-sap", "bvh"] {
+        let made = broad_phase(method, vec![gpu.clone()]);
+        let found = made.and_then(|mut algorithm| {
+            algorithm.prepare(1000);
+            algorithm.find_pairs(&Random(1).cubes(100, [9.0; 3], 0.5), &mut Pairs::new())
+        });
+        assert_eq!(found.as_ref().err().and_then(kind), Some(GpuErrorKind::Lost), "{method}: {found:?}");
+    }
+    assert!(handlers.errors().is_empty(), "{:?}", handlers.errors());
 }
 
 #[test]

@@ -5,12 +5,12 @@ mod common;
 use common::{Random, gpus, naive};
 use sapwise::gpu::{Gpu, Gpus, broad_phase, wgpu30 as wgpu};
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Load, PairOrder, Pairs, Reason, Registry, Source,
-    Term, Tuning,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Entry, Error, GpuIdentity, GpuKind, Load,
+    PairOrder, Pairs, Reason, Registry, Source, Term, Tuning,
 };
 use sapwise_scenes::Scenario;
 
-const METHODS: [&str; 3] = ["brute", "sap", "grid-sap"];
+const METHODS: [&str; 4] = ["brute", "sap", "grid-sap", "bvh"];
 
 /// The first GPU as a device whose buffers are that small.
 fn small(gpus: &Gpus, bytes: u64) -> Gpu {
@@ -27,17 +27,22 @@ fn pairs_of(algorithm: &mut dyn BroadPhase, boxes: &[Aabb]) -> Result<Vec<(u32, 
     Ok(pairs.as_slice().to_vec())
 }
 
-/// The revision that this build has of a method of the CPU; 1 of any other.
-fn revision(id: &str) -> u32 {
+/// The revision that this build has of an algorithm's method.
+fn revision(id: &AlgorithmId) -> u32 {
     let registry = Registry::with_cores(1);
-    registry.entries().iter().find(|e| id.starts_with(&format!("{}@cpu", e.id.method()))).map_or(1, |e| e.revision)
+    let any = GpuIdentity::new(0, "any", GpuKind::Software);
+    let mut all = registry.entries().iter().cloned().chain(sapwise::gpu::algorithms([&any]));
+    let same = |e: &Entry| e.id.method() == id.method() && e.id.backend().class() == id.backend().class();
+    all.find(same).unwrap().revision
 }
 
 /// Tuning in which each algorithm costs that much a frame.
 fn tuning(costs: &[(&str, f64)]) -> Tuning {
     let cost = |&(id, unit_ns): &(&str, f64)| {
         let curve = CostCurve::new(vec![CostTerm { term: Term::Call, unit_ns }]);
-        AlgorithmCost::new(id.parse().unwrap(), revision(id), curve, 0.0)
+        let id = id.parse().unwrap();
+        let revision = revision(&id);
+        AlgorithmCost::new(id, revision, curve, 0.0)
     };
     let loads: Vec<Load> = (0..16).map(|k| Load::of_objects(1 << k)).collect();
     Tuning::from_costs(Source::Measured, "uniform", costs.iter().map(cost).collect(), &loads)
@@ -64,11 +69,19 @@ fn a_lost_device_is_an_error_from_then_on() {
 
 #[test]
 fn the_adaptive_module_goes_on_without_a_lost_device_in_the_same_frame() {
-    let Some(gpus) = gpus() else { return };
+    let Some(found) = gpus() else { return };
+    // One that we opened, then one of the program's, whose handlers tell us nothing.
+    goes_on_without(&found);
+    goes_on_without(&Gpus::of([small(&found, 128 << 20)]));
+}
+
+fn goes_on_without(gpus: &Gpus) {
     let mut registry = Registry::with_cores(1);
-    registry.add_gpus(&gpus);
+    registry.add_gpus(gpus);
     let tuning = tuning(&[("grid-sap@gpu0", 1.0), ("sap@gpu0", 2.0), ("grid-sap@cpu1", 3.0), ("brute@cpu1", 9.0)]);
     let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
+    // Else the first frames run on the CPU, until the GPU is ready.
+    adaptive.prepare(4096);
     // Where a GPU is an act, the CPU is soon known to be faster.
     adaptive.set_learning(false);
     let mut scene = Scenario::Uniform.start(2000, 3);
@@ -99,6 +112,7 @@ fn a_device_that_is_lost_and_back_is_taken_up_again() {
     };
     let tuning = tuning(&[("grid-sap@gpu0", 1.0), ("sap@gpu0", 2.0), ("grid-sap@cpu1", 3.0), ("brute@cpu1", 9.0)]);
     let mut adaptive = Adaptive::new(tuning, &registry(&gpus)).unwrap();
+    adaptive.prepare(4096);
     // Where a GPU is an act, the CPU is soon known to be faster.
     adaptive.set_learning(false);
     let mut scene = Scenario::Fragmentation.start(400, 5);
@@ -134,11 +148,39 @@ fn a_gpu_that_does_not_answer_is_lost_and_nobody_waits_for_it() {
     assert!(error.contains("did not answer within 1 ms"), "{error}");
     assert!(algorithm.find_pairs(&boxes[..100], &mut pairs).unwrap_err().to_string().contains("did not answer"));
     drop(algorithm);
-    drop(gpu);
+    finish(&gpu);
+}
+
+#[test]
+fn the_wait_limit_is_the_programs_before_and_after_a_gpu_is_opened() {
+    let Some(gpus) = gpus() else { return };
+    let software = is_software(&gpus.open(0).unwrap());
+    let boxes = vec![Aabb::cube([0.0; 3], 1.0); if software { 20_000 } else { 130_000 }];
+    for opened_before in [false, true] {
+        // Found anew: one that did not answer stays lost.
+        let gpus = Gpus::find();
+        let open = opened_before.then(|| gpus.open(0).unwrap());
+        // A clone, which has the same GPUs.
+        gpus.clone().set_wait_limit(std::time::Duration::from_millis(1));
+        let mut registry = Registry::with_cores(1);
+        registry.add_gpus(&gpus);
+        let mut algorithm = registry.create(&"brute@gpu0".parse().unwrap()).unwrap();
+        let mut pairs = Pairs::new();
+        pairs.set_limit(Some(1));
+        let error = algorithm.find_pairs(&boxes, &mut pairs).unwrap_err().to_string();
+        assert!(error.contains("did not answer within 1 ms"), "opened before: {opened_before}: {error}");
+        drop((algorithm, open));
+        finish(&gpus.open(0).unwrap());
+    }
+}
+
+/// Waits for what a GPU was too slow for: a software adapter whose process ends while it works on crashes.
+fn finish(gpu: &Gpu) {
+    gpu.device().poll(wgpu::PollType::wait_indefinitely()).unwrap();
 }
 
 fn is_software(gpu: &Gpu) -> bool {
-    gpu.identity().kind == sapwise::GpuKind::Software
+    gpu.identity().kind == GpuKind::Software
 }
 
 #[test]
@@ -156,14 +198,14 @@ fn a_gpu_that_is_gone_leaves_the_cpu() {
 #[test]
 fn frames_beyond_the_limits_of_a_device_come_in_pieces() {
     let Some(gpus) = gpus() else { return };
-    // 1 MiB holds 32 768 sorted boxes and 131 072 pairs.
+    // 1 MiB holds 26 214 sorted boxes with their share of a tree and 131 072 pairs.
     let gpu = small(&gpus, 1 << 20);
     let mut scene = Scenario::Uniform.start(100_000, 4);
     scene.advance();
     let oracle =
         pairs_of(Registry::with_cores(1).create(&"grid-sap@cpu1".parse().unwrap()).unwrap().as_mut(), scene.boxes());
     let oracle = oracle.unwrap();
-    for method in ["sap", "grid-sap"] {
+    for method in ["sap", "grid-sap", "bvh"] {
         let mut algorithm = broad_phase(method, vec![gpu.clone()]).unwrap();
         assert!(pairs_of(algorithm.as_mut(), scene.boxes()).unwrap() == oracle, "{method}");
     }

@@ -4,14 +4,11 @@
 #     tools/public-api.sh            writes docs/public-api.txt
 #     tools/public-api.sh --check    says what differs from it, and fails if anything does
 #
-# Needs cargo-public-api, in the version that reads what the rustdoc of this toolchain writes:
-#
-#     cargo install cargo-public-api --version 0.52.0 --locked --debug
+# It reads what rustdoc writes with tools/public-api, which cargo builds here.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 list=docs/public-api.txt
-command -v cargo-public-api >/dev/null || { echo "public-api: cargo-public-api is missing; see the head of $0" >&2; exit 1; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
@@ -20,7 +17,9 @@ trap 'rm -rf "$work"' EXIT
 printf '#!/bin/sh\nRUSTC_BOOTSTRAP=1 exec rustdoc "$@"\n' > "$work/rustdoc"
 chmod +x "$work/rustdoc"
 RUSTDOC="$work/rustdoc" cargo rustdoc --quiet -p sapwise --lib --all-features --locked -- -Z unstable-options --output-format json
-cargo-public-api public-api -sss --rustdoc-json "${CARGO_TARGET_DIR:-target}/doc/sapwise.json" > "$work/list"
+built=${CARGO_TARGET_DIR:-target}
+CARGO_TARGET_DIR=$built/tools cargo build --quiet --locked --manifest-path tools/public-api/Cargo.toml
+"$built/tools/debug/sapwise-public-api" "$built/doc/sapwise.json" > "$work/list"
 if [ "${1:-}" = --check ]; then
     diff -u "$list" "$work/list" || { echo "public-api: the API has changed; run tools/public-api.sh and commit $list" >&2; exit 1; }
 else

@@ -19,7 +19,7 @@
 #
 # BIN_DIR       folder of prebuilt sapwise, gpu_bench, gpu_contract and the other tests of GPUs; beside this script if they are there
 # LOADER_DEBS   folder of the .deb files of the Vulkan loader, unpacked where the system has none; BIN_DIR if not given
-# LIMIT_FACTOR  multiplies every time limit, for software GPUs and slow machines
+# LIMIT_FACTOR  multiplies every time limit, for slow machines and software GPUs, which take 10 on two cores
 # SKIP          names of steps to leave out, as they are printed; every_size takes an hour on a software GPU
 # SAPWISE_GPUS  the GPUs of the benchmark, as in gpu0,gpu0+1; all if not given
 set -euo pipefail
@@ -125,7 +125,7 @@ step() {
     esac
     [ "$limit" -le "$left" ] || limit=$((left > 0 ? left : 1))
     # An interrupt lets a probe keep what it measured.
-    timeout --signal=INT --kill-after=5 "$limit" "$@" >"$out/$name.log" 2>&1 || status=$?
+    timeout --signal=INT --kill-after=$((5 * factor)) "$limit" "$@" >"$out/$name.log" 2>&1 || status=$?
     case $status in
         0) echo "done, $((SECONDS - began)) s" ;;
         124 | 137) echo "NOT DONE within $limit s; see $name.log" ;;

@@ -5,7 +5,8 @@
 #
 # Prints the two variables for it and nothing else; whatever it does is told on standard error. What is missing comes from
 # Debian's packages: lavapipe and the Vulkan loader are installed; SwiftShader is one file of the package chromium-common,
-# which is downloaded and unpacked into a cache folder, not installed. Where all is there, nothing is asked of the network.
+# which, where it is not installed, is downloaded and unpacked into a cache folder. Where all is there, nothing is asked of
+# the network.
 #
 # SWIFTSHADER=/path/to/libvk_swiftshader.so takes that file instead. Every Chromium and Chrome brings one along.
 set -euo pipefail
@@ -58,6 +59,8 @@ if ! has_loader || [ -z "$(lavapipe)" ]; then
 fi
 
 mkdir -p "$cache"
+installed=/usr/lib/chromium/libvk_swiftshader.so
+if [ -z "${SWIFTSHADER:-}" ] && [ -e "$installed" ]; then SWIFTSHADER=$installed; fi
 swiftshader=${SWIFTSHADER:-$cache/libvk_swiftshader.so}
 if [ ! -e "$swiftshader" ]; then
     [ -z "${SWIFTSHADER:-}" ] || fail "there is no $swiftshader; SWIFTSHADER names it"

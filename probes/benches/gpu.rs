@@ -43,8 +43,8 @@ const LONGEST_FRAME: Duration = Duration::from_secs(3);
 
 /// A method, the largest size at which it is asked for, and the power of the number of objects with which its time grows in
 /// `uniform`.
-const METHODS: [(&str, usize, f64); 3] =
-    [("brute", 100_000, 2.0), ("sap", 1_000_000, 5.0 / 3.0), ("grid-sap", 10_000_000, 1.1)];
+const METHODS: [(&str, usize, f64); 4] =
+    [("brute", 100_000, 2.0), ("sap", 1_000_000, 5.0 / 3.0), ("grid-sap", 10_000_000, 1.1), ("bvh", 10_000_000, 1.1)];
 
 /// Goes through one frame; the time it took and the fingerprint of the pairs.
 type Turn = Box<dyn FnMut(&[Aabb]) -> Result<(Duration, u64), String>>;

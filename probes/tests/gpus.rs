@@ -26,9 +26,12 @@ fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
     report["label"] = "real_full".into();
     // The fixture is old; this is a report of this build.
     let registry = sapwise::Registry::with_cores(1);
+    let any = sapwise::GpuIdentity::new(0, "any", sapwise::GpuKind::Discrete);
+    let of_this_build = [registry.entries(), &sapwise::gpu::algorithms([&any])].concat();
     for algorithm in report["algorithms"].as_array_mut().unwrap() {
-        let of = |e: &&sapwise::Entry| algorithm["id"].as_str().unwrap().starts_with(&format!("{}@cpu", e.id.method()));
-        if let Some(revision) = registry.entries().iter().find(of).map(|e| e.revision) {
+        let id: sapwise::AlgorithmId = algorithm["id"].as_str().unwrap().parse().unwrap();
+        let same = |e: &&sapwise::Entry| e.id.method() == id.method() && e.id.backend().class() == id.backend().class();
+        if let Some(revision) = of_this_build.iter().find(same).map(|e| e.revision) {
             algorithm["revision"] = revision.into();
         }
     }

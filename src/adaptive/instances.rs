@@ -1,7 +1,8 @@
 //! The algorithms to choose from, and what runs them.
 
+use super::warming::Place;
 use crate::aabb::Aabb;
-use crate::algorithm::AlgorithmId;
+use crate::algorithm::{AlgorithmId, Backend};
 use crate::broad_phase::BroadPhase;
 use crate::error::{Error, Unavailable};
 use crate::load::FramePlan;
@@ -18,19 +19,70 @@ pub(crate) struct Candidate {
 
 /// Runs one candidate, or several that differ in their number of threads only and share what they keep from frame to frame.
 pub(crate) struct Instance {
-    pub(super) algorithm: Box<dyn BroadPhase>,
+    place: Place,
+    /// Whether it may wait for a driver while it gets ready.
+    waits: bool,
     /// Whether it builds on the frame before.
     pub(super) is_incremental: bool,
     /// Where several share it, on how many threads it runs.
     threads: Option<u32>,
     /// Objects that its buffers are ready for.
-    pub(super) ready: usize,
+    ready: usize,
 }
 
 impl Instance {
-    fn new(mut algorithm: Box<dyn BroadPhase>, threads: Option<u32>) -> Self {
+    fn new(id: &AlgorithmId, mut algorithm: Box<dyn BroadPhase>, threads: Option<u32>) -> Self {
         let is_incremental = algorithm.is_incremental();
-        Self { algorithm, is_incremental, threads, ready: 0 }
+        let waits = matches!(id.backend(), Backend::Gpu(_));
+        Self { place: Place::Here(algorithm), waits, is_incremental, threads, ready: 0 }
+    }
+
+    /// Gets it ready for frames of that many objects, now.
+    pub(super) fn prepare(&mut self, objects: usize) {
+        self.place.wait();
+        if let Some(algorithm) = self.place.here() {
+            algorithm.prepare(objects);
+            self.ready = self.ready.max(objects);
+        }
+    }
+
+    /// The same within a frame: what may wait for a driver does so on a thread of its own.
+    pub(super) fn warm(&mut self, objects: usize) {
+        // What is away for fewer is cold once more when it comes back.
+        if self.is_away() {
+            return;
+        }
+        if self.waits {
+            self.ready = self.ready.max(objects);
+            self.place.send(objects);
+        } else {
+            self.prepare(objects);
+        }
+    }
+
+    /// Whether that is still to be done for so many objects.
+    pub(super) fn is_cold(&self, objects: usize) -> bool {
+        self.ready < objects
+    }
+
+    /// Takes it back from that thread if it is ready, or else with `patience` when it is. Whether it has come back.
+    pub(super) fn take_back(&mut self, patience: bool) -> bool {
+        let away = self.is_away();
+        if patience {
+            self.place.wait();
+        } else {
+            self.place.take_back();
+        }
+        away && !self.is_away()
+    }
+
+    pub(super) fn is_away(&self) -> bool {
+        self.place.is_away()
+    }
+
+    /// Whether it can run: it is neither away nor did it panic there.
+    pub(super) fn is_here(&mut self) -> bool {
+        self.place.here().is_some()
     }
 
     pub(super) fn run(
@@ -40,15 +92,18 @@ impl Instance {
         boxes: &[Aabb],
         pairs: &mut Pairs,
     ) -> Result<(), Error> {
+        let Some(algorithm) = self.place.here() else {
+            return Err(Error::Unavailable { algorithm: id.clone(), reason: Unavailable::FailedBefore });
+        };
         let wanted = id.threads();
         if self.threads.is_some_and(|threads| threads != wanted) {
-            if !self.algorithm.as_incremental().is_some_and(|algorithm| algorithm.set_threads(wanted)) {
+            if !algorithm.as_incremental().is_some_and(|algorithm| algorithm.set_threads(wanted)) {
                 let reason = Unavailable::FixedThreads { wanted };
                 return Err(Error::Unavailable { algorithm: id.clone(), reason });
             }
             self.threads = Some(wanted);
         }
-        self.algorithm.find_pairs_with(plan, boxes, pairs)?;
+        algorithm.find_pairs_with(plan, boxes, pairs)?;
         self.ready = self.ready.max(boxes.len());
         Ok(())
     }
@@ -112,13 +167,13 @@ impl Instances {
                     candidate.instance = Some(made.instances.len());
                 }
                 // On none of them yet, so that the first frame sets it.
-                made.instances.push(Instance::new(algorithm, Some(0)));
+                made.instances.push(Instance::new(id, algorithm, Some(0)));
                 continue;
             }
             match registry.create(id) {
                 Ok(algorithm) => {
                     made.candidates[k].instance = Some(made.instances.len());
-                    made.instances.push(Instance::new(algorithm, None));
+                    made.instances.push(Instance::new(id, algorithm, None));
                 }
                 Err(why) => made.failure = Some(why),
             }

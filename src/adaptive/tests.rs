@@ -1,4 +1,5 @@
 mod learning;
+mod warming;
 
 use super::*;
 use crate::scene::{Scenario, Scene};

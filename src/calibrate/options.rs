@@ -34,7 +34,7 @@ pub struct StartOptions {
     /// Where tuning is kept from one start to the next. The user's cache folder by default.
     pub cache: Cache,
     /// The algorithms to choose from: the program's own, its thread pool ([`Registry::use_pool`]), its GPUs
-    /// (`Registry::add_gpus`). `None`, the default: ours on all usable cores, with
+    /// (`Registry::add_gpus`, with a `Gpus::set_wait_limit` of the program's). `None`, the default: ours on all usable cores, with
     /// threads that the system puts where it likes ([`Registry::pin_threads`] is for programs that have the machine to themselves), and with the feature `measure-gpu` on every GPU that is no software adapter.
     pub registry: Option<Arc<Registry>>,
     /// The model that predicts, for a program with algorithms of its own, which the built-in one does not know. `None`, the

@@ -21,6 +21,9 @@ pub enum GpuErrorKind {
     NotFound,
     /// It was lost, did not answer in time, or an error came that nobody expected. It can't be used any more.
     Lost,
+    /// It takes work and says that it is done, and executes nothing: a driver without hardware behind it, or hardware that hangs. It
+    /// can't be used any more.
+    Inert,
     /// Its device or driver refuses: memory, a kernel, a binding.
     Refused,
     /// It is more than this GPU, or a single submission to it, can take.
@@ -42,9 +45,12 @@ impl GpuError {
         Self { kind, text: text.into(), source: Some(Arc::new(source)) }
     }
 
-    /// The same, said of something greater.
+    /// The same, said of something greater. That a GPU is gone is no matter of what it was to do.
     pub(crate) fn of(self, text: impl Into<String>) -> Self {
-        Self { text: text.into(), ..self }
+        match self.kind {
+            GpuErrorKind::Lost | GpuErrorKind::Inert => self,
+            _ => Self { text: text.into(), ..self },
+        }
     }
 
     /// What kind of error it is.

@@ -4,6 +4,7 @@ use super::device::Gpu;
 use crate::error::{GpuError, GpuErrorKind};
 use crate::hardware::{GpuIdentity, GpuKind};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 /// The GPUs that were found or given, in the order of their numbers. A GPU is opened once for all clones.
 #[derive(Debug, Clone, Default)]
@@ -17,6 +18,8 @@ struct Found {
     /// `None` of a GPU that the program opened itself.
     adapter: Option<wgpu::Adapter>,
     opened: Mutex<Option<Result<Gpu, GpuError>>>,
+    /// Where it is to be another than the usual one.
+    wait_limit: Mutex<Option<Duration>>,
 }
 
 impl Gpus {
@@ -40,7 +43,12 @@ impl Gpus {
             infos.iter().cloned().zip(adapters).enumerate().filter(|(k, _)| keep(*k)).map(|(_, found)| found).collect();
         adapters.sort_by_key(|(info, _)| kind(info.device_type));
         let found = adapters.into_iter().enumerate().map(|(k, (info, adapter))| {
-            Arc::new(Found { identity: GpuIdentity::of(k as u32, &info), adapter: Some(adapter), opened: Mutex::new(None) })
+            Arc::new(Found {
+                identity: GpuIdentity::of(k as u32, &info),
+                adapter: Some(adapter),
+                opened: Mutex::default(),
+                wait_limit: Mutex::default(),
+            })
         });
         Self { found: found.collect() }
     }
@@ -65,7 +73,12 @@ impl Gpus {
         for gpu in gpus {
             let identity = gpu.identity().clone();
             if !found.iter().any(|f| f.identity.index == identity.index) {
-                found.push(Arc::new(Found { identity, adapter: None, opened: Mutex::new(Some(Ok(gpu))) }));
+                found.push(Arc::new(Found {
+                    identity,
+                    adapter: None,
+                    opened: Mutex::new(Some(Ok(gpu))),
+                    wait_limit: Mutex::default(),
+                }));
             }
         }
         found.sort_by_key(|f| f.identity.index);
@@ -87,6 +100,25 @@ impl Gpus {
     #[must_use]
     pub fn choose(&self, wanted: impl Fn(&GpuIdentity) -> bool) -> Self {
         Self { found: self.found.iter().filter(|f| wanted(&f.identity)).cloned().collect() }
+    }
+
+    /// Sets the [wait limit](Gpu::set_wait_limit) of each of them, open or not: a program that begins with [`find`](Self::find) has it before
+    /// the first frame, whatever opens the GPUs.
+    ///
+    /// ```
+    /// # use sapwise::gpu::Gpus;
+    /// let gpus = Gpus::find();
+    /// // A game goes on with the CPU where a driver does not answer.
+    /// gpus.set_wait_limit(std::time::Duration::from_millis(500));
+    /// ```
+    pub fn set_wait_limit(&self, limit: Duration) {
+        for found in &self.found {
+            found.wait_limit.lock().unwrap_or_else(PoisonError::into_inner).replace(limit);
+            // One that is being opened takes it when it is open.
+            if let Some(Ok(gpu)) = &*found.opened.lock().unwrap_or_else(PoisonError::into_inner) {
+                gpu.set_wait_limit(limit);
+            }
+        }
     }
 
     fn found(&self, index: u32) -> Option<&Found> {
@@ -154,7 +186,11 @@ impl Found {
             let text = format!("gpu{} is the program's own device, which can't be opened again", self.identity.index);
             return Err(GpuError::new(GpuErrorKind::NotFound, text));
         };
-        Gpu::open(adapter, self.identity.clone())
+        let gpu = Gpu::open(adapter, self.identity.clone())?;
+        if let Some(limit) = *self.wait_limit.lock().unwrap_or_else(PoisonError::into_inner) {
+            gpu.set_wait_limit(limit);
+        }
+        Ok(gpu)
     }
 }
 

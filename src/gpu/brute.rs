@@ -5,15 +5,9 @@ use super::inputs::Inputs;
 use super::kernel::{Bound, Kernel, source};
 use super::output::Output;
 use crate::error::GpuError;
-use crate::hardware::GpuKind;
 
 /// Boxes of a tile.
 const TILE: u32 = 128;
-
-/// Tile pairs of one submission. A driver of a desktop gives up on one that takes seconds; these take tens of milliseconds
-/// on a GPU of two hundred thousand million tests a second, and seconds on a software adapter.
-const MOST_TILE_PAIRS: u32 = 1 << 19;
-const MOST_TILE_PAIRS_SOFTWARE: u32 = 1 << 17;
 
 /// The method on one GPU.
 #[derive(Debug)]
@@ -21,7 +15,6 @@ pub(super) struct Brute {
     count: Kernel,
     write: Kernel,
     bound: Option<[Bound; 2]>,
-    most: u32,
 }
 
 impl Brute {
@@ -29,12 +22,10 @@ impl Brute {
     pub(super) const MOST_OBJECTS: usize = 1 << 22;
 
     pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let software = gpu.identity().kind == GpuKind::Software;
         Ok(Self {
             count: Kernel::new(gpu, source::BRUTE, "count")?,
             write: Kernel::new(gpu, source::BRUTE, "write")?,
             bound: None,
-            most: if software { MOST_TILE_PAIRS_SOFTWARE } else { MOST_TILE_PAIRS },
         })
     }
 
@@ -44,10 +35,8 @@ impl Brute {
         tiles * (tiles + 1) / 2
     }
 
-    /// Tile pairs of one submission, at most.
-    pub(super) fn band(&self) -> u32 {
-        self.most
-    }
+    /// Tile pairs of one submission, at most: with as many tests as the other methods have in one, see [`params`](super::params).
+    pub(super) const BAND: u32 = 1 << 16;
 
     pub(super) fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
         let common = [(0, inputs.params), (1, inputs.boxes), (2, inputs.ids)];

@@ -1,11 +1,13 @@
 //! An open GPU: device, queue, limits, and what went wrong with it.
 
+use super::scope::{Recording, Scope};
 use crate::error::{GpuError, GpuErrorKind};
 use crate::hardware::GpuIdentity;
 use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// The longest that a submission may take before its GPU counts as lost, unless it is set otherwise. Drivers of desktops give up after 2 to 10 s; a
 /// software adapter may be a thousand times slower than a real one.
@@ -22,9 +24,16 @@ struct Shared {
     device: wgpu::Device,
     queue: wgpu::Queue,
     limits: wgpu::Limits,
-    /// Errors that no scope caught, and the loss of the device.
-    fault: Arc<Mutex<Option<String>>>,
+    /// Why it can't be used any more.
+    fault: Fault,
     wait_limit_ms: AtomicU64,
+}
+
+/// Set once: what came first stays.
+type Fault = Arc<Mutex<Option<GpuError>>>;
+
+fn note(fault: &Fault, error: GpuError) {
+    fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
 }
 
 impl Gpu {
@@ -41,42 +50,92 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| GpuError::caused(GpuErrorKind::NotFound, format!("gpu{} can't be opened", identity.index), e))?;
-        Ok(Self::from_parts(device, queue, identity))
+        let gpu = Self::from_parts(device, queue, identity);
+        gpu.listen();
+        Ok(gpu)
     }
 
     /// A device and queue that the caller has opened, so that a program that draws with wgpu shares them.
     ///
-    /// Takes over the device's handlers of lost devices and uncaught errors.
+    /// The device stays the program's: its handlers of lost devices and of uncaught errors are not touched, and no error of ours reaches
+    /// them. That it was lost we notice by ourselves, when it takes no more work.
     #[must_use]
     pub fn from_parts(device: wgpu::Device, queue: wgpu::Queue, identity: GpuIdentity) -> Self {
-        let fault: Arc<Mutex<Option<String>>> = Arc::default();
-        let note = |fault: &Arc<Mutex<Option<String>>>| {
-            let fault = Arc::clone(fault);
-            move |text: String| {
-                fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
-            }
-        };
-        let (lost, uncaught) = (note(&fault), note(&fault));
-        device.set_device_lost_callback(move |reason, message| lost(format!("the device was lost ({reason:?}): {message}")));
-        // The default handler panics.
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| uncaught(error.to_string())));
         let limits = device.limits();
         let wait_limit_ms = AtomicU64::new(WAIT_LIMIT.as_millis() as u64);
-        Self { shared: Arc::new(Shared { identity, device, queue, limits, fault, wait_limit_ms }) }
+        Self { shared: Arc::new(Shared { identity, device, queue, limits, fault: Fault::default(), wait_limit_ms }) }
+    }
+
+    /// Takes over the handlers of a device that we opened ourselves: its loss is then known before the next frame.
+    fn listen(&self) {
+        let (lost, uncaught) = (Arc::clone(&self.shared.fault), Arc::clone(&self.shared.fault));
+        self.shared.device.set_device_lost_callback(move |reason, message| {
+            let text = format!("the device was lost ({reason:?}): {message}");
+            note(&lost, GpuError::new(GpuErrorKind::Lost, text));
+        });
+        // The default handler panics.
+        self.shared.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            note(&uncaught, GpuError::new(GpuErrorKind::Lost, error.to_string()));
+        }));
     }
 
     pub(super) fn wait_limit(&self) -> Duration {
         Duration::from_millis(self.shared.wait_limit_ms.load(Ordering::Relaxed))
     }
 
-    /// Submits, and returns what the device has against it. Without the scope it would count as a fault of the GPU.
-    pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> Result<wgpu::SubmissionIndex, GpuError> {
+    /// Begins to record commands. Whatever else is done to buffers until they are submitted belongs to them, should it fail.
+    pub(crate) fn record(&self) -> Recording {
+        Recording::new(&self.shared.device)
+    }
+
+    /// Submits what was recorded, and returns what the device has against it.
+    pub(crate) fn submit(&self, recording: Recording) -> Result<wgpu::SubmissionIndex, GpuError> {
         self.check()?;
-        self.try_make(|_| self.shared.queue.submit([encoder.finish()]))
+        recording.submit(&self.shared.queue).map_err(|e| self.refusal("the device refuses", e))
+    }
+
+    /// Asks for a part of a buffer to be mapped. Whether that went well `done` is told, and nobody else.
+    pub(crate) fn map(
+        &self,
+        slice: wgpu::BufferSlice<'_>,
+        mode: wgpu::MapMode,
+        done: impl FnOnce(Result<(), wgpu::BufferAsyncError>) + Send + 'static,
+    ) {
+        let scope = Scope::of_one(&self.shared.device, wgpu::ErrorFilter::Validation);
+        slice.map_async(mode, done);
+        let _ = scope.end();
+    }
+
+    /// Unmaps a buffer. One of a lost device can't be, which the next submission tells.
+    #[cfg(feature = "measure-gpu")]
+    pub(crate) fn unmap(&self, buffer: &wgpu::Buffer) {
+        let scope = Scope::of_one(&self.shared.device, wgpu::ErrorFilter::Validation);
+        buffer.unmap();
+        let _ = scope.end();
+    }
+
+    /// That the device refuses, unless it was lost: then nothing that it says of its buffers is the reason.
+    pub(super) fn refusal(&self, text: &str, source: impl std::error::Error + Send + Sync + 'static) -> GpuError {
+        let refused = GpuError::caused(GpuErrorKind::Refused, text, source);
+        self.check().err().or_else(|| self.probe().err()).unwrap_or(refused)
+    }
+
+    /// Whether the device still takes work: one that was lost does not say so, it returns things that don't exist.
+    pub(super) fn probe(&self) -> Result<(), GpuError> {
+        let scope = Scope::new(&self.shared.device);
+        let submission = self.shared.queue.submit([]);
+        let _ = scope.end();
+        let polled = self.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(Duration::ZERO) });
+        match polled {
+            Err(wgpu::PollError::WrongSubmissionIndex(..)) => note(&self.shared.fault, lost()),
+            // It is at work.
+            Ok(_) | Err(wgpu::PollError::Timeout) => {}
+        }
+        self.check()
     }
 
     /// Sets the longest that a submission may take before this GPU counts as lost: a minute unless it is set, which is long for a
-    /// game. Below a millisecond it is one.
+    /// game. Below a millisecond it is one. For GPUs that others open there is [`Gpus::set_wait_limit`](super::Gpus::set_wait_limit).
     pub fn set_wait_limit(&self, limit: Duration) {
         let ms = u64::try_from(limit.as_millis()).unwrap_or(u64::MAX);
         self.shared.wait_limit_ms.store(ms.max(1), Ordering::Relaxed);
@@ -109,7 +168,25 @@ impl Gpu {
     /// Why the GPU can't be used any more, if it can't: it was lost, or an error came that nobody expected.
     #[must_use]
     pub fn fault(&self) -> Option<String> {
+        self.error().map(|error| error.to_string())
+    }
+
+    fn error(&self) -> Option<GpuError> {
         self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// It was seen to execute nothing, and can't be used any more: for that reason, or one that came before.
+    pub(crate) fn inert(&self) -> GpuError {
+        let GpuIdentity { index, name, .. } = self.identity();
+        let text = format!(
+            "gpu{index} ({name}) executes nothing: its driver takes work and says that it is done, and no kernel has run; update the \
+             driver, restart the machine or leave this GPU out"
+        );
+        // Dropping the queue asserts that all of its work is done.
+        std::mem::forget(self.clone());
+        let error = GpuError::new(GpuErrorKind::Inert, text);
+        note(&self.shared.fault, error.clone());
+        self.error().unwrap_or(error)
     }
 
     /// Waits for a submission, at most as long as the [limit](Self::set_wait_limit), and calls back what was mapped before it.
@@ -130,27 +207,43 @@ impl Gpu {
 
     fn wait_for(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), GpuError> {
         let limit = self.wait_limit();
-        let poll = wgpu::PollType::Wait { submission_index, timeout: Some(limit) };
-        if let Err(error) = self.shared.device.poll(poll) {
-            let text = match error {
-                wgpu::PollError::Timeout => {
-                    // Dropping the queue waits for it without a limit. A GPU that hangs is therefore never dropped.
-                    std::mem::forget(self.clone());
-                    format!("it did not answer within {} ms", limit.as_millis())
-                }
-                other => other.to_string(),
-            };
-            self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
+        let began = Instant::now();
+        match self.poll(wgpu::PollType::Wait { submission_index, timeout: Some(limit) }) {
+            Ok(_) => {}
+            // The driver has not waited at all, and says that it has.
+            Err(wgpu::PollError::Timeout) if began.elapsed() < limit / 2 => drop(self.inert()),
+            Err(wgpu::PollError::Timeout) => {
+                // Dropping the queue waits for it without a limit. A GPU that hangs is therefore never dropped.
+                std::mem::forget(self.clone());
+                let text = format!("it did not answer within {} ms", limit.as_millis());
+                note(&self.shared.fault, GpuError::new(GpuErrorKind::Lost, text));
+            }
+            // Of a submission that was made and is not known.
+            Err(wgpu::PollError::WrongSubmissionIndex(..)) => note(&self.shared.fault, lost()),
         }
         self.check()
+    }
+
+    /// Polls the device. One that is lost while it is waited for is a fault from then on, and done with.
+    pub(super) fn poll(&self, poll: wgpu::PollType) -> Result<wgpu::PollStatus, wgpu::PollError> {
+        // wgpu 30 panics where the driver says that the device is lost, and where a wait is over and what was waited for is not done.
+        catch_unwind(AssertUnwindSafe(|| self.shared.device.poll(poll))).unwrap_or_else(|panic| {
+            match fault_by_panic(&*panic) {
+                Some(GpuErrorKind::Lost) => note(&self.shared.fault, lost()),
+                Some(_) => drop(self.inert()),
+                // Of the program, in a callback of its own that came with our wait.
+                None => resume_unwind(panic),
+            }
+            Ok(wgpu::PollStatus::Poll)
+        })
     }
 
     /// `Err` once the GPU can't be used any more.
     ///
     /// # Errors
-    /// [`GpuErrorKind::Lost`] says what happened.
+    /// [`GpuErrorKind::Lost`] or [`GpuErrorKind::Inert`] says what happened.
     pub fn check(&self) -> Result<(), GpuError> {
-        self.fault().map_or(Ok(()), |text| Err(GpuError::new(GpuErrorKind::Lost, text)))
+        self.error().map_or(Ok(()), Err)
     }
 
     /// Runs `make` and returns what it made, or the error of the device: out of memory, invalid, internal.
@@ -158,21 +251,48 @@ impl Gpu {
     /// # Errors
     /// [`GpuErrorKind::Refused`], with the error of the device as its source.
     pub fn try_make<T>(&self, make: impl FnOnce(&wgpu::Device) -> T) -> Result<T, GpuError> {
-        let device = &self.shared.device;
-        let filters = [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Validation];
-        let scopes = filters.map(|filter| device.push_error_scope(filter));
-        let made = make(device);
-        let mut error = None;
-        // Scopes end in the reverse of the order in which they began.
-        for scope in scopes.into_iter().rev() {
-            error = pollster::block_on(scope.pop()).or(error);
-        }
-        error.map_or(Ok(made), |e| Err(GpuError::caused(GpuErrorKind::Refused, "the device refuses", e)))
+        let scope = Scope::new(&self.shared.device);
+        let made = make(&self.shared.device);
+        scope.end().map_err(|e| self.refusal("the device refuses", e)).map(|()| made)
+    }
+}
+
+fn lost() -> GpuError {
+    GpuError::new(GpuErrorKind::Lost, "the device was lost: it takes no more work")
+}
+
+/// What has become of the device, where that made wgpu panic.
+fn fault_by_panic(panic: &(dyn std::any::Any + Send)) -> Option<GpuErrorKind> {
+    let text = panic.downcast_ref::<String>()?;
+    if text.starts_with("Error in Device::poll: ") {
+        Some(GpuErrorKind::Lost)
+    } else if text.starts_with("If the queue is empty, the current submission index") {
+        Some(GpuErrorKind::Inert)
+    } else {
+        None
     }
 }
 
 impl fmt::Debug for Gpu {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Gpu").field("identity", &self.shared.identity).field("fault", &self.fault()).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{GpuErrorKind, fault_by_panic};
+    use std::any::Any;
+
+    #[test]
+    fn faults_are_told_from_panics_of_the_program() {
+        let text = |text: &str| fault_by_panic(&*(Box::new(text.to_owned()) as Box<dyn Any + Send>));
+        // As `CoreDevice::poll` and `Device::maintain` of wgpu 30 word them.
+        assert_eq!(text("Error in Device::poll:   Parent device is lost\n"), Some(GpuErrorKind::Lost));
+        let done =
+            "If the queue is empty, the current submission index (0) should be at least the wait submission index (1)";
+        assert_eq!(text(done), Some(GpuErrorKind::Inert));
+        assert_eq!(text("the program's own"), None);
+        assert_eq!(fault_by_panic(&*(Box::new("of a literal") as Box<dyn Any + Send>)), None);
     }
 }

@@ -1,27 +1,33 @@
 //! One method on one GPU, frame by frame: boxes up, kernels, pairs down.
 
+mod ahead;
+mod canary;
 mod collect;
+#[cfg(test)]
+mod tests;
 
 use super::brute::Brute;
 use super::device::Gpu;
 use super::inputs::Inputs;
+use super::look::Look;
 use super::output::{Output, PAIR};
 use super::params::{Header, Params};
 use super::sampler::{self, Sampler};
-use super::sorted::Sorted;
+use super::scope::Recording;
+use super::sorted::{Kind, MOST_OF_BOX, Sorted};
 use super::storage::{Storage, largest};
 use super::transfer::Transfer;
 use crate::aabb::Aabb;
 use crate::error::{GpuError, GpuErrorKind};
-use crate::load::Sample;
+use crate::load::Chosen;
 
 /// Bytes of a box.
 const BOX: u64 = size_of::<Aabb>() as u64;
 /// Where things stand in the upload: parameters, header, boxes and behind them their numbers. Copies begin at multiples of 8.
-const HEADER_AT: u64 = 256;
-const BOXES_AT: u64 = 512;
+const HEADER_AT: u64 = 1792;
+const BOXES_AT: u64 = 2048;
 /// Where pairs begin in the download, behind the header.
-const PAIRS_AT: u64 = 16;
+const PAIRS_AT: u64 = 48;
 /// Bytes of pairs that one download takes. More pairs come in several.
 const MOST_DOWNLOAD: u64 = 64 << 20;
 /// Pairs beyond those of the frame before that come back with the header. If there are more, a second submission gets them.
@@ -45,7 +51,11 @@ pub(super) struct Engine {
     bound_to: Option<wgpu::Buffer>,
     /// Pairs of the frame before.
     expected: u64,
+    /// The number of the last submission that counted.
+    submissions: u32,
     frame: Option<Frame>,
+    /// The number of a submission that nobody waits for and whose header is on its way.
+    unread: Option<u32>,
 }
 
 #[derive(Debug)]
@@ -58,9 +68,9 @@ impl Search {
     /// Blocks of the first submission of a frame, and the tile pairs of brute force that are left to further ones.
     fn blocks(&self, objects: u32) -> (u32, u64) {
         match self {
-            Self::Brute(brute) => {
+            Self::Brute(_) => {
                 let all = Brute::blocks(objects);
-                let first = all.min(u64::from(brute.band()));
+                let first = all.min(u64::from(Brute::BAND));
                 (first as u32, all - first)
             }
             Self::Sorted(_) => (Sorted::blocks(objects), 0),
@@ -96,19 +106,26 @@ pub(super) struct Piece<'a> {
 }
 
 impl Engine {
-    /// `method` is `brute`, `sap` or `grid-sap`.
+    /// A method by its name.
     pub(super) fn new(gpu: Gpu, method: &str) -> Result<Self, GpuError> {
-        let search = match method {
-            "brute" => Search::Brute(Brute::new(&gpu)?),
-            "sap" => Search::Sorted(Box::new(Sorted::new(&gpu, false)?)),
-            "grid-sap" => Search::Sorted(Box::new(Sorted::new(&gpu, true)?)),
-            other => return Err(GpuError::new(GpuErrorKind::NotFound, format!("no method {other} runs on GPUs"))),
+        let search = match (method, Kind::named(method)) {
+            ("brute", _) => Search::Brute(Brute::new(&gpu)?),
+            (_, Some(kind)) => Search::Sorted(Box::new(Sorted::new(&gpu, kind)?)),
+            (other, None) => {
+                return Err(GpuError::new(GpuErrorKind::NotFound, format!("no method {other} runs on GPUs")));
+            }
         };
         let uniform = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let header = wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_SRC
+            | wgpu::BufferUsages::COPY_DST
+            | wgpu::BufferUsages::INDIRECT;
+        let mut params = Storage::with_usage(&gpu, "parameters", uniform)?;
+        params.ensure(&gpu, size_of::<Params>() as u64)?;
         Ok(Self {
             output: Output::new(&gpu)?,
-            params: Storage::with_usage(&gpu, "parameters", uniform)?,
-            header: Storage::new(&gpu, "header")?,
+            params,
+            header: Storage::with_usage(&gpu, "header", header)?,
             boxes: Storage::new(&gpu, "boxes")?,
             ids: Storage::new(&gpu, "numbers of boxes")?,
             upload: Transfer::upload(&gpu)?,
@@ -118,7 +135,9 @@ impl Engine {
             sampler: None,
             bound_to: None,
             expected: 0,
+            submissions: 0,
             frame: None,
+            unread: None,
         })
     }
 
@@ -133,7 +152,7 @@ impl Engine {
     /// Boxes that fit into the largest buffers of the GPU. More have to come in pieces.
     pub(super) fn most_objects(&self) -> usize {
         // A sorted box is the largest thing that there is one of for each box.
-        let most = largest(&self.gpu, wgpu::BufferUsages::STORAGE) / super::sorted::SORTED_BOX;
+        let most = largest(&self.gpu, wgpu::BufferUsages::STORAGE) / MOST_OF_BOX;
         let numbered = match &self.search {
             Search::Brute(_) => Brute::MOST_OBJECTS,
             Search::Sorted(_) => Sorted::MOST_OBJECTS,
@@ -141,12 +160,11 @@ impl Engine {
         usize::try_from(most).unwrap_or(usize::MAX).min(numbered)
     }
 
-    /// The parameters of a frame of boxes that look like the sample, which is taken only where the method needs one.
-    pub(super) fn plan(&self, objects: u32, sample: impl FnOnce() -> Sample) -> Params {
+    /// The parameters of a frame of boxes that look like this, at which the method looks only where it needs to.
+    pub(super) fn plan(&self, objects: u32, look: impl FnOnce() -> Look) -> Params {
         match &self.search {
             Search::Brute(_) => Params { objects, ..Params::default() },
-            Search::Sorted(sorted) if sorted.is_grid_sap() => Params::grid_sap(&sample(), objects),
-            Search::Sorted(_) => Params::sap(&sample(), objects),
+            Search::Sorted(sorted) => sorted.plan(&look(), objects),
         }
     }
 
@@ -181,8 +199,17 @@ impl Engine {
         let (blocks, _) = self.search.blocks(params.objects);
         grown |= self.output.ensure_blocks(gpu, blocks)?;
         // Most scenes have fewer pairs than objects.
-        grown |= self.output.ensure_pairs(gpu, n.max(self.expected + self.expected / 4))?;
-        self.download.ensure(gpu, PAIRS_AT + self.sendable() * PAIR)?;
+        let wanted = n.max(self.expected + self.expected / 4);
+        grown |= if self.sampler.is_none() {
+            self.output.ensure_pairs(gpu, wanted)?
+        } else {
+            // Commands of the program may still read the list of before. Where there is no room for as many as in the frame before, there may be
+            // for those of this one.
+            self.output.enlarge_pairs(gpu, wanted).or_else(|_| self.output.enlarge_pairs(gpu, n))?
+        };
+        if self.sampler.is_none() {
+            self.download.ensure(gpu, PAIRS_AT + self.sendable() * PAIR)?;
+        }
         let boxes = external.unwrap_or_else(|| self.boxes.buffer());
         if grown || self.bound_to.as_ref() != Some(boxes) {
             let boxes = boxes.clone();
@@ -225,11 +252,6 @@ impl Engine {
 
     /// As [`start`](Self::start), with boxes that are on the GPU already, and pairs that stay there.
     pub(super) fn start_resident(&mut self, boxes: &wgpu::Buffer, params: Params) -> Result<(), GpuError> {
-        if self.search.blocks(params.objects).1 > 0 {
-            let reason = "pairs that stay on a GPU come from one submission, and brute force on so many boxes takes several";
-            let text = format!("{} boxes are too many: {reason}; use grid-sap", params.objects);
-            return Err(GpuError::new(GpuErrorKind::Limit, text));
-        }
         self.prepare(&params, false, Some(boxes))?;
         self.submit(params, None)
     }
@@ -238,6 +260,7 @@ impl Engine {
     fn submit(&mut self, mut params: Params, piece: Option<Piece<'_>>) -> Result<(), GpuError> {
         let (blocks, tile_pairs_left) = self.search.blocks(params.objects);
         params.blocks = blocks;
+        params.submission = self.next_submission();
         params.capacity = self.output.capacity();
         params.piece = u32::from(piece.is_some_and(|p| p.ids.is_some()));
         let boxes: &[u8] = piece.map_or(&[], |p| bytemuck::cast_slice(p.boxes));
@@ -250,9 +273,9 @@ impl Engine {
         view.slice(BOXES_AT as usize..ids_at).copy_from_slice(boxes);
         view.slice(ids_at..).copy_from_slice(ids);
         drop(view);
-        self.upload.unmap();
 
-        let mut encoder = self.encoder();
+        let mut encoder = self.gpu.record();
+        self.upload.unmap();
         let upload = self.upload.buffer();
         encoder.copy_buffer_to_buffer(upload, 0, self.params.buffer(), 0, size_of::<Params>() as u64);
         encoder.copy_buffer_to_buffer(upload, HEADER_AT, self.header.buffer(), 0, size_of::<Header>() as u64);
@@ -262,17 +285,16 @@ impl Engine {
         if !ids.is_empty() {
             encoder.copy_buffer_to_buffer(upload, ids_at as u64, self.ids.buffer(), 0, ids.len() as u64);
         }
+        if let Search::Sorted(sorted) = &self.search {
+            sorted.clear(&mut encoder, &params);
+        }
         self.record(&mut encoder, &params, Step::Sort);
         let sent = if self.sampler.is_none() { self.sendable() } else { 0 };
         self.copy_back(&mut encoder, sent);
         let submission = self.submit_mapped(encoder, PAIRS_AT + (sent * PAIR).max(self.sample_bytes()))?;
-        self.upload.ask(self.upload.bytes());
+        self.upload.ask(&self.gpu, self.upload.bytes());
         self.frame = Some(Frame { submission, params, sent, tile_pairs_left });
         Ok(())
-    }
-
-    fn encoder(&self) -> wgpu::CommandEncoder {
-        self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sapwise") })
     }
 
     /// The steps of a frame from `first` on.
@@ -311,11 +333,11 @@ impl Engine {
     }
 
     /// Looks at boxes that are on the GPU, without a frame.
-    pub(super) fn look(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Sample, GpuError> {
+    pub(super) fn look(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Look, GpuError> {
         let params = Params { objects, ..Params::default() };
         self.prepare(&params, false, Some(boxes))?;
+        let mut encoder = self.gpu.record();
         self.set(&params);
-        let mut encoder = self.encoder();
         self.copy_back(&mut encoder, 0);
         let submission = self.submit_mapped(encoder, PAIRS_AT + sampler::BYTES)?;
         self.gpu.wait(submission)?;
@@ -323,16 +345,17 @@ impl Engine {
     }
 
     /// What the sampler of the last submission saw.
-    fn seen(&self) -> Result<Sample, GpuError> {
+    fn seen(&self) -> Result<Look, GpuError> {
         let view = self.download.readable(&self.gpu, PAIRS_AT..PAIRS_AT + sampler::BYTES)?;
-        Ok(Sample::of_all(bytemuck::cast_slice(&view)))
+        Ok(Look::at(&Chosen::given(bytemuck::cast_slice(&view))))
     }
 
     /// Submits, and asks for the first `bytes` of the download.
-    fn submit_mapped(&self, encoder: wgpu::CommandEncoder, bytes: u64) -> Result<wgpu::SubmissionIndex, GpuError> {
+    fn submit_mapped(&mut self, commands: Recording, bytes: u64) -> Result<wgpu::SubmissionIndex, GpuError> {
+        self.unread = None;
         self.download.unmap();
-        let submission = self.gpu.submit(encoder)?;
-        self.download.ask(bytes);
+        let submission = self.gpu.submit(commands)?;
+        self.download.ask(&self.gpu, bytes);
         Ok(submission)
     }
 }

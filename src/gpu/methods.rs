@@ -13,8 +13,12 @@ struct Method {
 }
 
 /// Every method, the simplest first.
-const METHODS: &[Method] =
-    &[Method { name: "brute", revision: 1 }, Method { name: "sap", revision: 1 }, Method { name: "grid-sap", revision: 1 }];
+const METHODS: &[Method] = &[
+    Method { name: "brute", revision: 2 },
+    Method { name: "sap", revision: 2 },
+    Method { name: "grid-sap", revision: 3 },
+    Method { name: "bvh", revision: 2 },
+];
 
 /// Whether a method runs on GPUs.
 #[cfg(feature = "gpu")]

@@ -24,30 +24,41 @@
 //!   [`BroadPhase`](crate::BroadPhase), `grid-sap@gpu0` as well as `grid-sap@cpu1`, and every figure that is not labelled.
 //! - *device-resident*: boxes in a [`wgpu30::Buffer`], pairs in another: [`Resident`].
 //!
-//! Pairs come out in an order that does not depend on timing, by counting, adding up and writing; where several GPUs share a frame
-//! it follows their shares, which follow their measured speeds. [`PairOrder::Canonical`](crate::PairOrder) is the same everywhere.
-//! What does not fit a buffer comes in several steps, and what does not fit a GPU in slabs.
+//! The order of the pairs does not depend on timing, but in two cases: several GPUs share a frame, in shares that follow their measured speeds; or more than 32 768
+//! boxes begin in one cell of `grid-sap`, in a frame of a million more than 1024. [`PairOrder::Canonical`](crate::PairOrder) is the same everywhere. Pairs that do not fit a
+//! buffer come in several steps, and boxes that do not fit a GPU are searched in slabs of space, one after the other.
 //!
-//! A GPU that is lost, refuses memory or does not answer within a minute is [`Error::Unavailable`](crate::Error);
+//! Methods: `brute`; `sap`, a radix sort along one axis; `grid-sap`, a counting sort into the slots of a grid of strips, with the boxes that are too large
+//! for it in a tree; `bvh`, that tree over all boxes. Each eight boxes that follow each other along Hilbert's curve are a node, so that no node
+//! holds a pointer and no invocation a stack.
+//!
+//! A GPU that is lost, refuses memory, executes nothing of what it is given or does not answer within a minute is [`Error::Unavailable`](crate::Error);
 //! [`Adaptive`](crate::Adaptive) then runs the same frame on what is left.
 
 mod adapters;
 mod brute;
+mod cells;
 mod device;
+mod division;
 mod engine;
 mod inputs;
 pub(crate) mod kernel;
+mod look;
 mod methods;
 mod on_gpus;
 mod output;
 mod params;
 mod resident;
 mod sampler;
+mod scope;
+mod sizes;
 mod slabs;
 mod sort;
 mod sorted;
 mod storage;
+mod traffic;
 mod transfer;
+mod tree;
 
 pub use crate::error::{GpuError, GpuErrorKind};
 pub use adapters::Gpus;
@@ -58,7 +69,8 @@ pub use methods::algorithms;
 pub(crate) use methods::has_method;
 pub(crate) use on_gpus::OnGpus;
 pub use on_gpus::broad_phase;
-pub use resident::{Resident, ResidentPairs};
+pub use resident::{Resident, ResidentPairs, SubmittedCounts, SubmittedPairs};
+pub use traffic::{Card, Traffic};
 /// The version of wgpu whose buffers and devices this library takes. Its number is part of the name, because another one would be
 /// other types: a release of this library that takes a newer wgpu exports it under a new name, and is a breaking one.
 pub use wgpu as wgpu30;

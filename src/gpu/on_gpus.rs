@@ -2,6 +2,7 @@
 
 use super::adapters::Gpus;
 use super::engine::{Engine, Piece};
+use super::look::Look;
 use super::slabs::{Members, Slabs};
 use super::storage::{Failure, unavailable};
 use crate::aabb::Aabb;
@@ -9,7 +10,7 @@ use crate::algorithm::{AlgorithmId, Backend, ParseIdError};
 use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::{Threads, Workers};
 use crate::error::{Error, GpuError};
-use crate::load::{FramePlan, Sample};
+use crate::load::{Chosen, FramePlan, Sample};
 use crate::pairs::Pairs;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -46,7 +47,7 @@ pub(crate) struct OnGpus {
     warm: bool,
 }
 
-/// The method `brute`, `sap` or `grid-sap` on GPUs that are open already: from boxes in host memory to pairs in host memory.
+/// The method `brute`, `sap`, `grid-sap` or `bvh` on GPUs that are open already: from boxes in host memory to pairs in host memory.
 ///
 /// For programs that have opened a device of their own ([`Gpu::from_parts`](super::Gpu::from_parts)). Several GPUs share each
 /// frame; they may be several devices of one adapter.
@@ -116,7 +117,7 @@ impl OnGpus {
 
     /// All boxes at once on the one GPU that there is.
     fn whole(part: &mut Share, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Failure> {
-        let params = part.engine.plan(boxes.len() as u32, || plan.sample(boxes));
+        let params = part.engine.plan(boxes.len() as u32, || Look::of(&Chosen::from(boxes), plan.sample(boxes)));
         part.engine.start(Piece { boxes, ids: None }, params)?;
         part.engine.finish(pairs)
     }
@@ -168,7 +169,7 @@ impl Share {
         }
         let Members { boxes, ids } = &self.members;
         self.work += (boxes.len() as f64).powf(exponent);
-        let params = self.engine.plan(boxes.len() as u32, || Sample::of(boxes));
+        let params = self.engine.plan(boxes.len() as u32, || Look::at(&Chosen::from(boxes)));
         self.failure = self.engine.start(Piece { boxes, ids: Some(ids) }, params).err().map(Failure::Gpu);
     }
 
@@ -254,7 +255,7 @@ impl BroadPhase for OnGpus {
         let parts = self.parts.len();
         for part in &mut self.parts {
             let share = (objects / parts).min(part.engine.most_objects()) as u32;
-            let params = part.engine.plan(share, Sample::default);
+            let params = part.engine.plan(share, Look::default);
             // A refused allocation is reported by the frame that needs it.
             let _ = part.engine.prepare(&params, parts > 1, None);
         }

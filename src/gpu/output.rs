@@ -38,6 +38,24 @@ impl Output {
         self.pairs.ensure(gpu, (pairs * PAIR).min(most))
     }
 
+    /// As [`ensure_pairs`](Self::ensure_pairs), but the list of before stays with whoever holds it.
+    pub(super) fn enlarge_pairs(&mut self, gpu: &Gpu, pairs: u64) -> Result<bool, GpuError> {
+        let pairs = pairs.min(largest(gpu, wgpu::BufferUsages::STORAGE) / PAIR);
+        let grows = pairs > u64::from(self.capacity());
+        if grows {
+            self.replace_pairs(gpu, pairs)?;
+        }
+        Ok(grows)
+    }
+
+    /// A larger list of pairs; the one before stays with whoever holds it.
+    ///
+    /// # Errors
+    /// When no buffer may be as large, or there is no memory.
+    pub(super) fn replace_pairs(&mut self, gpu: &Gpu, pairs: u64) -> Result<(), GpuError> {
+        self.pairs.replace(gpu, pairs * PAIR)
+    }
+
     /// Pairs that there is room for.
     pub(super) fn capacity(&self) -> u32 {
         u32::try_from(self.pairs.bytes() / PAIR).unwrap_or(u32::MAX)

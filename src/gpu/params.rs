@@ -1,6 +1,10 @@
 //! The parameters of a frame, as the kernels see them.
 
-use crate::load::{Sample, StripGrid};
+use super::division::{PARTS, Segment};
+use super::look::Look;
+use super::sizes::{CELLS_OF_BLOCK, raises};
+use crate::error::BoxDefect;
+use crate::load::StripGrid;
 
 /// `Params` of `shaders/common.wgsl`, field by field.
 #[derive(Debug, Clone, Copy, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -16,9 +20,17 @@ pub(super) struct Params {
     pub(super) slots: u32,
     pub(super) cells: [u32; 2],
     pub(super) large_key: u32,
-    pub(super) longest: u32,
-    pub(super) origin: [f32; 4],
-    pub(super) inverse: [f32; 4],
+    pub(super) longest: f32,
+    pub(super) submission: u32,
+    pub(super) round: u32,
+    pub(super) budget: u32,
+    pub(super) top: u32,
+    pub(super) curve_shift: u32,
+    pub(super) cell_blocks: u32,
+    pub(super) usual: f32,
+    pub(super) unused: u32,
+    pub(super) curve: [[Segment; PARTS]; 3],
+    pub(super) grid: [[Segment; PARTS]; 3],
 }
 
 /// `Header` of `shaders/common.wgsl`.
@@ -29,19 +41,24 @@ pub(super) struct Header {
     pub(super) total_high: u32,
     pub(super) invalid: u32,
     pub(super) more: u32,
+    pub(super) ran: u32,
+    pub(super) groups: [u32; 3],
+    pub(super) held: u32,
 }
 
 impl Header {
     /// Before any kernel has run.
-    pub(super) const START: Self = Self { total_low: 0, total_high: 0, invalid: u32::MAX, more: 0 };
+    pub(super) const START: Self =
+        Self { total_low: 0, total_high: 0, invalid: u32::MAX, more: 0, ran: 0, groups: [0, 1, 1], held: 0 };
 
     pub(super) fn total(&self) -> u64 {
         u64::from(self.total_high) << 32 | u64::from(self.total_low)
     }
 
-    /// Position of the first invalid box, and whether it is inverted rather than not a number.
-    pub(super) fn invalid(&self) -> Option<(usize, bool)> {
-        (self.invalid != u32::MAX).then_some(((self.invalid >> 1) as usize, self.invalid & 1 == 1))
+    /// Position of the first invalid box, and what is wrong with it.
+    pub(super) fn invalid(&self) -> Option<(usize, BoxDefect)> {
+        let defect = if self.invalid & 1 == 1 { BoxDefect::Inverted } else { BoxDefect::NotANumber };
+        (self.invalid != u32::MAX).then_some(((self.invalid >> 1) as usize, defect))
     }
 }
 
@@ -51,39 +68,89 @@ const MOST_SLOTS: f64 = 16_777_216.0;
 /// A box longer on the sweep axis than this many times the usual length is kept apart: it would search all the strip.
 const LARGE_LENGTHS: f64 = 16.0;
 
-impl Params {
-    /// Sweeping along the axis on which the fewest pairs of a sample overlap.
-    pub(super) fn sap(sample: &Sample, objects: u32) -> Self {
-        Self { objects, axis: sample.sweep_axis() as u32, ..Self::default() }
-    }
+/// Candidates and nodes that all rows together are counted with in one submission, of up to a million rows: a tenth of a second at ten thousand
+/// million tests a second, which is assumed of the GPU of a processor. Drivers of desktops give up after 2 to 10 s. Writing may test as many again.
+const MOST_TESTS: u32 = 1 << 30;
 
-    /// Strips for boxes that look like the sample, with about as many slots as there are boxes. All choices cost speed at
-    /// worst, never a pair.
-    pub(super) fn grid_sap(sample: &Sample, objects: u32) -> Self {
-        let grid = StripGrid::plan(sample, objects as usize);
-        let a = grid.axis;
-        let strips = grid.strips() as f64;
-        let (low, length) = sample.range(a);
-        let slots = (f64::from(objects) / strips).ceil().clamp(1.0, (MOST_SLOTS / strips).floor());
-        // A world so small that the inverse of a slot overflows would put every box into every slot.
-        let slots = if ((slots / length) as f32).is_finite() { slots } else { 1.0 };
-        let per_length = if slots > 1.0 { slots / length } else { 0.0 };
-        let (cells, origin, inverse) = grid.across_sweep();
+/// The same of one row: lavapipe ends a loop after 65 535 turns. And at least, so that a frame ends: of more than a million rows a submission may
+/// have as many times more tests.
+const MOST_OF_ROW: u32 = 1 << 15;
+const FEWEST_OF_ROW: u32 = 1 << 10;
+
+/// Cells of the curve's grid on one axis, and in the extent of a usual box.
+const CURVE_CELLS: f64 = 1024.0;
+const CELLS_OF_BOX: f64 = 2.0;
+
+/// Bits of a place on the curve, with those of the size.
+const CURVE_BITS: u32 = 32;
+
+impl Params {
+    /// For rows of boxes that look like this, swept along an axis.
+    fn rows(look: &Look, objects: u32, axis: usize) -> Self {
+        let turned = [axis, (axis + 1) % 3, (axis + 2) % 3];
+        let longest = look.sample.extent.iter().copied().fold(0.0, f64::max);
+        // Where most boxes are points, a box is large that is longer than a small part of the world.
+        let world = (0..3).map(|a| look.sample.range(a).1).fold(0.0, f64::max) / f64::from(objects.max(1)).cbrt();
+        let usual = (1.0 / longest.max(world / 8.0)) as f32;
         Self {
             objects,
-            axis: a as u32,
-            slots: slots as u32,
-            cells,
-            large_key: (strips * slots) as u32,
-            longest: (LARGE_LENGTHS * sample.extent[a] * per_length).clamp(16.0, MOST_SLOTS) as u32,
-            origin: [low as f32, origin[0], origin[1], 0.0],
-            inverse: [per_length as f32, inverse[0], inverse[1], 0.0],
+            axis: axis as u32,
+            budget: (MOST_TESTS / objects.max(1)).clamp(FEWEST_OF_ROW, MOST_OF_ROW),
+            top: 3 * raises(objects),
+            usual: if usual.is_finite() { usual } else { 1.0 },
+            curve: turned
+                .map(|a| look.parts[a].divide(|width, share| curve_cells(width, share, look.sample.extent[a])).segments),
             ..Self::default()
         }
     }
 
-    /// Bits of the largest sort key.
-    pub(super) fn key_bits(&self) -> u32 {
-        u32::BITS - self.large_key.leading_zeros()
+    /// Sweeping along the axis on which the fewest pairs of a sample overlap.
+    pub(super) fn sap(look: &Look, objects: u32) -> Self {
+        Self::rows(look, objects, look.sample.sweep_axis())
     }
+
+    /// A tree over the order in which a curve passes the boxes.
+    pub(super) fn bvh(look: &Look, objects: u32) -> Self {
+        Self::rows(look, objects, 0)
+    }
+
+    /// Strips for boxes that look like the sample, with about as many slots as there are boxes. All choices cost speed at
+    /// worst, never a pair.
+    pub(super) fn grid_sap(look: &Look, objects: u32) -> Self {
+        let sample = &look.sample;
+        let plan = StripGrid::plan(sample, objects as usize);
+        let [a, u, v] = [0, 1, 2].map(|k| (plan.axis + k) % 3);
+        let across = |axis: usize, cells: u32| {
+            // As in the plan, cells so narrow that most boxes stand in several save nothing.
+            look.parts[axis]
+                .divide(|width, share| (share * f64::from(cells)).round().min(width / (2.0 * sample.extent[axis])))
+        };
+        let [cells_u, cells_v] = plan.cells();
+        let (across_u, across_v) = (across(u, cells_u), across(v, cells_v));
+        let strips = f64::from(across_u.cells) * f64::from(across_v.cells);
+        let wanted = (f64::from(objects) / strips).ceil().min((MOST_SLOTS / strips).floor());
+        let along = look.parts[a].divide(|_, share| share * wanted);
+        let (slots, strips) = (along.cells, across_u.cells * across_v.cells);
+        let large_key = strips * slots;
+        // Boxes kept apart are few: an eighth of the boxes has a cell of its own.
+        let curve_bits = (objects.max(2).ilog2() - 1).saturating_sub(2).clamp(5, 16);
+        let table = large_key + (1 << curve_bits) + 1;
+        Self {
+            slots,
+            cells: [across_u.cells, across_v.cells],
+            large_key,
+            longest: (LARGE_LENGTHS * sample.extent[a]) as f32,
+            grid: [along.segments, across_u.segments, across_v.segments],
+            curve_shift: CURVE_BITS - curve_bits,
+            cell_blocks: table.div_ceil(CELLS_OF_BLOCK),
+            ..Self::rows(look, objects, a)
+        }
+    }
+}
+
+/// Cells of the curve's grid on one axis, less one for each part. In each part as many as its share of the boxes says, so that a cluster in a world
+/// a million times its size is told apart, and none much shorter than a usual box: else what tells the boxes of a tower apart across it would
+/// weigh as much as where they stand in it.
+fn curve_cells(width: f64, share: f64, extent: f64) -> f64 {
+    (width * CELLS_OF_BOX / extent).min(share * (CURVE_CELLS - PARTS as f64))
 }

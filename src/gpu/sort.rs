@@ -6,51 +6,41 @@ use super::storage::Storage;
 use crate::error::GpuError;
 use wgpu::util::DeviceExt;
 
-/// Bits of a digit, and values that it has.
-const DIGIT_BITS: u32 = 4;
-const DIGITS: u32 = 1 << DIGIT_BITS;
-/// Keys of one workgroup.
-const BLOCK: u32 = 1024;
+/// Passes, of eight bits each, and values of a digit.
+const PASSES: u32 = 4;
+const DIGITS: u32 = 256;
+/// Keys of one workgroup, and counts of one that adds them up.
+const BLOCK: u32 = 2048;
+const COUNTS: u32 = 4096;
 
 /// The kernels and buffers of the sort.
 #[derive(Debug)]
 pub(super) struct Sort {
-    histogram: Kernel,
-    scan_digits: Kernel,
+    add_counts: Kernel,
     scatter: Kernel,
     /// Passes read from one and write to the other, in turn.
     keys: [Storage; 2],
     values: [Storage; 2],
+    /// For each pass the counts of each digit and block.
     counts: Storage,
-    totals: Storage,
-    /// For each pass its digit.
-    digits: Vec<wgpu::Buffer>,
-    passes: Vec<[Bound; 3]>,
+    starts: Storage,
+    /// What each pass is told.
+    tasks: Vec<wgpu::Buffer>,
+    passes: Vec<[Bound; 2]>,
 }
 
 impl Sort {
     pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let digit = |pass: u32| {
-            let contents = [pass * DIGIT_BITS, u32::from(pass == 0), 0, 0];
-            gpu.try_make(|device| {
-                device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label: Some("digit of a sort pass"),
-                    contents: bytemuck::cast_slice(&contents),
-                    usage: wgpu::BufferUsages::UNIFORM,
-                })
-            })
-        };
-        let mut totals = Storage::new(gpu, "digits")?;
-        totals.ensure(gpu, u64::from(DIGITS) * 4)?;
         Ok(Self {
-            histogram: Kernel::new(gpu, source::SORT, "histogram")?,
-            scan_digits: Kernel::new(gpu, source::SORT, "scan_digits")?,
+            add_counts: Kernel::new(gpu, source::SORT, "add_counts")?,
             scatter: Kernel::new(gpu, source::SORT, "scatter")?,
             keys: [Storage::new(gpu, "sort keys")?, Storage::new(gpu, "sort keys")?],
             values: [Storage::new(gpu, "sorted positions")?, Storage::new(gpu, "sorted positions")?],
             counts: Storage::new(gpu, "digits of blocks")?,
-            totals,
-            digits: (0..u32::BITS / DIGIT_BITS).map(digit).collect::<Result<_, _>>()?,
+            starts: Storage::new(gpu, "where digits begin")?,
+            tasks: (0..PASSES)
+                .map(|pass| constant(gpu, "a sort pass", [pass, u32::from(pass + 1 == PASSES), 0, 0]))
+                .collect::<Result<_, _>>()?,
             passes: Vec::new(),
         })
     }
@@ -61,29 +51,28 @@ impl Sort {
         for list in self.keys.iter_mut().chain(&mut self.values) {
             grown |= list.ensure(gpu, u64::from(objects) * 4)?;
         }
-        let counts = u64::from(objects.div_ceil(BLOCK) * DIGITS) * 4;
-        Ok(self.counts.ensure(gpu, counts)? | grown)
+        grown |= self.starts.ensure(gpu, u64::from(counts(objects)) * 4)?;
+        Ok(self.counts.ensure(gpu, bytes_of_counts(objects))? | grown)
     }
 
     pub(super) fn bind(&mut self, gpu: &Gpu, params: &wgpu::Buffer) -> Result<(), GpuError> {
         self.passes.clear();
-        for (pass, digit) in self.digits.iter().enumerate() {
+        for (pass, task) in self.tasks.iter().enumerate() {
             let (from, to) = (pass % 2, (pass + 1) % 2);
-            let (keys, counts, totals) = (self.keys[from].buffer(), self.counts.buffer(), self.totals.buffer());
+            let (keys, counts, starts) = (self.keys[from].buffer(), self.counts.buffer(), self.starts.buffer());
             self.passes.push([
-                self.histogram.bind(gpu, &[(0, params), (1, digit), (2, keys), (6, counts)])?,
-                self.scan_digits.bind(gpu, &[(0, params), (6, counts), (7, totals)])?,
+                self.add_counts.bind(gpu, &[(0, params), (1, task), (6, counts), (7, starts)])?,
                 self.scatter.bind(
                     gpu,
                     &[
                         (0, params),
-                        (1, digit),
+                        (1, task),
                         (2, keys),
                         (3, self.values[from].buffer()),
                         (4, self.keys[to].buffer()),
                         (5, self.values[to].buffer()),
                         (6, counts),
-                        (7, totals),
+                        (7, starts),
                     ],
                 )?,
             ]);
@@ -91,32 +80,46 @@ impl Sort {
         Ok(())
     }
 
-    /// Where the keys go before the sort.
-    pub(super) fn unsorted(&self) -> &wgpu::Buffer {
-        self.keys[0].buffer()
+    /// Where the keys go before the sort, and the counts of their first digits, which are added to what is there.
+    pub(super) fn unsorted(&self) -> [&wgpu::Buffer; 2] {
+        [self.keys[0].buffer(), self.counts.buffer()]
     }
 
-    /// The keys in order and their positions before the sort, by the side on which the last pass ended.
-    pub(super) fn sorted(&self, side: usize) -> (&wgpu::Buffer, &wgpu::Buffer) {
-        (self.keys[side].buffer(), self.values[side].buffer())
+    /// After the sort: which key stood where. There is an even number of passes.
+    pub(super) fn order(&self) -> &wgpu::Buffer {
+        self.values[0].buffer()
     }
 
-    /// On which side a sort of keys of that many bits ends.
-    pub(super) fn side(bits: u32) -> usize {
-        passes(bits) % 2
+    /// Clears the counts, before the keys are written.
+    pub(super) fn clear(&self, encoder: &mut wgpu::CommandEncoder, objects: u32) {
+        encoder.clear_buffer(self.counts.buffer(), 0, Some(bytes_of_counts(objects)));
     }
 
-    /// Adds the sort of `objects` keys of which the lower `bits` differ.
-    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, objects: u32, bits: u32) {
-        for [histogram, scan_digits, scatter] in &self.passes[..passes(bits)] {
-            histogram.dispatch(pass, objects.div_ceil(BLOCK));
-            scan_digits.dispatch(pass, DIGITS);
+    /// Adds the sort of `objects` keys.
+    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, objects: u32) {
+        for [add_counts, scatter] in &self.passes {
+            add_counts.dispatch(pass, counts(objects).div_ceil(COUNTS));
             scatter.dispatch(pass, objects.div_ceil(BLOCK));
         }
     }
 }
 
-/// Passes over keys of that many bits: one at least, because the first makes the positions.
-fn passes(bits: u32) -> usize {
-    bits.div_ceil(DIGIT_BITS).clamp(1, u32::BITS / DIGIT_BITS) as usize
+/// Counts of one pass.
+fn counts(objects: u32) -> u32 {
+    objects.div_ceil(BLOCK) * DIGITS
+}
+
+fn bytes_of_counts(objects: u32) -> u64 {
+    u64::from(counts(objects) * PASSES) * 4
+}
+
+/// Four words that a kernel reads and that never change.
+pub(super) fn constant(gpu: &Gpu, label: &str, words: [u32; 4]) -> Result<wgpu::Buffer, GpuError> {
+    gpu.try_make(|device| {
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some(label),
+            contents: bytemuck::cast_slice(&words),
+            usage: wgpu::BufferUsages::UNIFORM,
+        })
+    })
 }

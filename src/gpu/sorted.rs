@@ -1,88 +1,110 @@
-//! The methods that sort first: sap and grid-sap; see `shaders/rows.wgsl`, `sap.wgsl` and `grid_sap.wgsl`.
+//! The methods that sort first: sap, grid-sap and bvh; see `shaders/rows.wgsl` and the file there of each.
 
+use super::cells::Cells;
 use super::device::Gpu;
 use super::inputs::Inputs;
 use super::kernel::{Bound, Kernel, source};
+use super::look::Look;
 use super::output::Output;
 use super::params::Params;
+use super::sizes::KEPT;
 use super::sort::Sort;
 use super::storage::Storage;
+use super::tree::Tree;
 use crate::error::GpuError;
 
 /// Rows of one block, and boxes of one workgroup of the other kernels.
 const ROWS: u32 = 64;
 const BOXES: u32 = 256;
-/// Candidates that a row is tested with in one submission; see `shaders/rows.wgsl`.
-pub(super) const CANDIDATES: u32 = 32_768;
 /// Bytes of a sorted box.
-pub(super) const SORTED_BOX: u64 = 32;
-/// Pairs of a row that are kept from the counting to the writing.
-const KEPT: u64 = 4;
+const SORTED_BOX: u64 = 32;
+/// The same with its share of the nodes of a tree, of which each has eight below it, and of the few nodes at the top.
+pub(super) const MOST_OF_BOX: u64 = 40;
+/// Words of a row: its pairs, and its state before a submission and after it.
+const ROW_WORDS: u64 = 3;
+
+/// What is sorted, and what the rows are searched in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Sap,
+    GridSap,
+    Bvh,
+}
+
+impl Kind {
+    /// The kind of a method's name.
+    pub(super) fn named(method: &str) -> Option<Self> {
+        match method {
+            "sap" => Some(Self::Sap),
+            "grid-sap" => Some(Self::GridSap),
+            "bvh" => Some(Self::Bvh),
+            _ => None,
+        }
+    }
+}
 
 /// A method that sorts, on one GPU.
 #[derive(Debug)]
 pub(super) struct Sorted {
-    strips: bool,
-    sort: Sort,
+    kind: Kind,
+    order: Order,
     make_keys: Kernel,
     gather: Kernel,
-    /// grid-sap only.
-    build_table: Option<Kernel>,
+    tree: Option<Tree>,
     count: Kernel,
     write: Kernel,
+    /// The sorted boxes, then the levels of the tree.
     boxes: Storage,
-    counts: Storage,
+    rows: Storage,
     kept: Storage,
-    /// grid-sap only: how far each box reaches, and where slots begin.
-    reach: Storage,
-    table: Storage,
-    bound: Option<Bindings>,
+    bound: Option<[Bound; 4]>,
 }
 
+/// What brings the boxes into their order.
 #[derive(Debug)]
-struct Bindings {
-    make_keys: Bound,
-    /// By the side on which the sort ends.
-    sides: [Side; 2],
-}
-
-#[derive(Debug)]
-struct Side {
-    gather: Bound,
-    build_table: Option<Bound>,
-    count: Bound,
-    write: Bound,
+enum Order {
+    Radix(Sort),
+    Cells(Cells),
 }
 
 impl Sorted {
     /// The pairs of a block of rows are counted in 32 bits.
     pub(super) const MOST_OBJECTS: usize = 1 << 26;
 
-    pub(super) fn new(gpu: &Gpu, strips: bool) -> Result<Self, GpuError> {
-        let (rows, keys, gather) = if strips {
-            (source::GRID_SAP, "strip_keys", "strip_gather")
-        } else {
-            (source::SAP, "sweep_keys", "sweep_gather")
+    pub(super) fn new(gpu: &Gpu, kind: Kind) -> Result<Self, GpuError> {
+        let (rows, keys, gather) = match kind {
+            Kind::Sap => (source::SAP, "sweep_keys", "gather"),
+            Kind::GridSap => (source::GRID_SAP, "cell_keys", "gather_cells"),
+            Kind::Bvh => (source::BVH, "curve_keys", "gather"),
         };
         Ok(Self {
-            strips,
-            sort: Sort::new(gpu)?,
+            kind,
+            order: match kind {
+                Kind::GridSap => Order::Cells(Cells::new(gpu)?),
+                Kind::Sap | Kind::Bvh => Order::Radix(Sort::new(gpu)?),
+            },
             make_keys: Kernel::new(gpu, source::KEYS, keys)?,
-            gather: Kernel::new(gpu, source::KEYS, gather)?,
-            build_table: strips.then(|| Kernel::new(gpu, source::TABLE, "build")).transpose()?,
+            gather: Kernel::new(gpu, source::GATHER, gather)?,
+            tree: match kind {
+                Kind::Sap => None,
+                Kind::GridSap | Kind::Bvh => Some(Tree::new(gpu, kind == Kind::GridSap)?),
+            },
             count: Kernel::new(gpu, rows, "count")?,
             write: Kernel::new(gpu, rows, "write")?,
             boxes: Storage::new(gpu, "sorted boxes")?,
-            counts: Storage::new(gpu, "counts of rows")?,
+            rows: Storage::new(gpu, "rows")?,
             kept: Storage::new(gpu, "kept pairs")?,
-            reach: Storage::new(gpu, "reaches of boxes")?,
-            table: Storage::new(gpu, "slots")?,
             bound: None,
         })
     }
 
-    pub(super) fn is_grid_sap(&self) -> bool {
-        self.strips
+    /// The parameters of a frame of boxes that look like this.
+    pub(super) fn plan(&self, look: &Look, objects: u32) -> Params {
+        match self.kind {
+            Kind::Sap => Params::sap(look, objects),
+            Kind::GridSap => Params::grid_sap(look, objects),
+            Kind::Bvh => Params::bvh(look, objects),
+        }
     }
 
     pub(super) fn blocks(objects: u32) -> u32 {
@@ -92,77 +114,92 @@ impl Sorted {
     /// Makes room for that many boxes. Whether a buffer is another one now.
     pub(super) fn ensure(&mut self, gpu: &Gpu, params: &Params) -> Result<bool, GpuError> {
         let n = u64::from(params.objects);
-        let mut grown = self.sort.ensure(gpu, params.objects)?;
-        grown |= self.boxes.ensure(gpu, n * SORTED_BOX)?;
-        grown |= self.counts.ensure(gpu, n * 4)?;
-        grown |= self.kept.ensure(gpu, n * KEPT * 4)?;
-        if self.strips {
-            grown |= self.reach.ensure(gpu, n * 4)?;
-            // There are about as many slots as boxes. How many exactly changes with the scene, and must not cost a buffer each time.
-            grown |= self.table.ensure(gpu, (u64::from(params.large_key).max(n + n / 8) + 1) * 4)?;
-        }
-        Ok(grown)
+        let mut grown = match &mut self.order {
+            Order::Radix(sort) => sort.ensure(gpu, params.objects)?,
+            Order::Cells(cells) => cells.ensure(gpu, params)?,
+        };
+        let elements = if self.tree.is_some() { Tree::elements(params.objects) } else { n };
+        grown |= self.boxes.ensure(gpu, elements * SORTED_BOX)?;
+        grown |= self.rows.ensure(gpu, n * ROW_WORDS * 4)?;
+        Ok(self.kept.ensure(gpu, n * u64::from(KEPT) * 4)? | grown)
     }
 
     pub(super) fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
         let Inputs { params, boxes, ids, header } = *inputs;
-        self.sort.bind(gpu, params)?;
-        let mut make_keys = vec![(0, params), (1, boxes), (3, header), (4, self.sort.unsorted()), (2, ids)];
-        if self.strips {
-            make_keys.push((7, self.reach.buffer()));
-        }
-        let side = |side: usize| -> Result<Side, GpuError> {
-            let (keys, order) = self.sort.sorted(side);
-            let mut gather = vec![(0, params), (1, boxes), (2, ids), (5, order), (6, self.boxes.buffer())];
-            let mut rows = vec![
-                (0, params),
-                (2, self.boxes.buffer()),
-                (4, output.sums()),
-                (5, output.pairs()),
-                (6, self.counts.buffer()),
-                (7, self.kept.buffer()),
-            ];
-            if self.strips {
-                gather.push((7, self.reach.buffer()));
-                rows.extend([(1, keys), (8, self.table.buffer())]);
+        let sorted = self.boxes.buffer();
+        let mut make_keys = vec![(0, params), (1, boxes), (2, ids), (3, header)];
+        let mut gather = vec![(0, params), (1, boxes), (2, ids), (5, sorted)];
+        let mut rows = vec![
+            (0, params),
+            (2, sorted),
+            (4, output.sums()),
+            (5, output.pairs()),
+            (6, self.rows.buffer()),
+            (7, self.kept.buffer()),
+        ];
+        let mut table = None;
+        match &mut self.order {
+            Order::Radix(sort) => {
+                sort.bind(gpu, params)?;
+                let [keys, counts] = sort.unsorted();
+                make_keys.extend([(4, keys), (5, counts)]);
+                gather.push((4, sort.order()));
             }
-            let table = |kernel: &Kernel| kernel.bind(gpu, &[(0, params), (1, keys), (2, self.table.buffer())]);
-            Ok(Side {
-                gather: self.gather.bind(gpu, &gather)?,
-                build_table: self.build_table.as_ref().map(table).transpose()?,
-                write: self.write.bind(gpu, &rows)?,
-                count: self.count.bind(gpu, &[rows.as_slice(), &[(3, header)]].concat())?,
-            })
-        };
-        let sides = [side(0)?, side(1)?];
-        self.bound = Some(Bindings { make_keys: self.make_keys.bind(gpu, &make_keys)?, sides });
+            Order::Cells(cells) => {
+                cells.bind(gpu, params)?;
+                let [keys, counts, ranks] = cells.unsorted();
+                make_keys.extend([(4, keys), (5, counts), (6, ranks)]);
+                gather.extend([(4, cells.order()), (6, keys), (7, cells.table()), (8, cells.sorted_keys())]);
+                rows.extend([(1, cells.sorted_keys()), (8, cells.table())]);
+                table = Some(cells.table());
+            }
+        }
+        if let Some(tree) = &mut self.tree {
+            tree.bind(gpu, params, sorted, table)?;
+        }
+        let write = self.write.bind(gpu, &rows)?;
+        rows.push((3, header));
+        self.bound = Some([
+            self.make_keys.bind(gpu, &make_keys)?,
+            self.gather.bind(gpu, &gather)?,
+            self.count.bind(gpu, &rows)?,
+            write,
+        ]);
         Ok(())
     }
 
-    fn key_bits(&self, params: &Params) -> u32 {
-        if self.strips { params.key_bits() } else { u32::BITS }
+    /// Clears what the keys are counted in, before anything else of a frame.
+    pub(super) fn clear(&self, encoder: &mut wgpu::CommandEncoder, params: &Params) {
+        match &self.order {
+            Order::Radix(sort) => sort.clear(encoder, params.objects),
+            Order::Cells(cells) => cells.clear(encoder, params),
+        }
     }
 
     /// Sorts and gathers.
     pub(super) fn record_sort(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
-        let Some(bound) = &self.bound else { return };
-        let (objects, bits) = (params.objects, self.key_bits(params));
-        let side = &bound.sides[Sort::side(bits)];
-        bound.make_keys.dispatch(pass, objects.div_ceil(BOXES));
-        self.sort.record(pass, objects, bits);
-        side.gather.dispatch(pass, objects.div_ceil(BOXES));
-        if let Some(build) = &side.build_table {
-            build.dispatch(pass, (params.large_key + 1).div_ceil(BOXES));
+        let Some([make_keys, gather, ..]) = &self.bound else { return };
+        let groups = params.objects.div_ceil(BOXES);
+        make_keys.dispatch(pass, groups);
+        match &self.order {
+            Order::Radix(sort) => sort.record(pass, params.objects),
+            Order::Cells(cells) => cells.record(pass, params),
+        }
+        gather.dispatch(pass, groups);
+        if let Some(tree) = &self.tree {
+            tree.record(pass, params.objects);
         }
     }
 
     pub(super) fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
-        let Some(bound) = &self.bound else { return };
-        bound.sides[Sort::side(self.key_bits(params))].count.dispatch(pass, Self::blocks(params.objects));
+        if let Some([.., count, _]) = &self.bound {
+            count.dispatch(pass, Self::blocks(params.objects));
+        }
     }
 
     pub(super) fn record_write(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
-        let Some(bound) = &self.bound else { return };
-        bound.sides[Sort::side(self.key_bits(params))].write.dispatch(pass, Self::blocks(params.objects));
+        if let Some([.., write]) = &self.bound {
+            write.dispatch(pass, Self::blocks(params.objects));
+        }
     }
 }

@@ -85,6 +85,18 @@ impl Storage {
         if bytes <= self.bytes {
             return Ok(false);
         }
+        // The old one is given back first: there may be no room for both.
+        self.buffer.destroy();
+        self.bytes = 0;
+        self.replace(gpu, bytes)?;
+        Ok(true)
+    }
+
+    /// A buffer of `bytes` and a quarter more in place of this one, which stays with whoever holds it.
+    ///
+    /// # Errors
+    /// As [`ensure`](Self::ensure).
+    pub(super) fn replace(&mut self, gpu: &Gpu, bytes: u64) -> Result<(), GpuError> {
         let most = largest(gpu, self.usage);
         if bytes > most {
             let index = gpu.identity().index;
@@ -93,12 +105,9 @@ impl Storage {
         }
         // A quarter more than asked for, so that a growing scene grows the buffer a few times in all.
         let wanted = (bytes + bytes / 4).next_multiple_of(256).min(most);
-        // The old one is given back first: there may be no room for both.
-        self.buffer.destroy();
-        self.bytes = 0;
         self.buffer = create(gpu, self.label, self.usage, wanted).or_else(|_| create(gpu, self.label, self.usage, bytes))?;
         self.bytes = self.buffer.size();
-        Ok(true)
+        Ok(())
     }
 }
 

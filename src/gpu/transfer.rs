@@ -2,7 +2,7 @@
 
 use super::device::Gpu;
 use super::storage::Storage;
-use crate::error::{GpuError, GpuErrorKind};
+use crate::error::GpuError;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Instant;
@@ -21,10 +21,6 @@ const ASKED: u8 = 1;
 const MAPPED: u8 = 2;
 
 const NOT_MAPPED: &str = "the driver refuses to map memory";
-
-fn unmapped(source: impl std::error::Error + Send + Sync + 'static) -> GpuError {
-    GpuError::caused(GpuErrorKind::Refused, NOT_MAPPED, source)
-}
 
 impl Transfer {
     /// Memory that the CPU writes.
@@ -51,38 +47,38 @@ impl Transfer {
 
     pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<(), GpuError> {
         if bytes > self.storage.bytes() {
-            self.unmap();
-            self.storage.ensure(gpu, bytes)?;
+            // Of the buffer of before, which goes whether it is mapped or not.
             self.state = Arc::default();
+            self.storage.ensure(gpu, bytes)?;
         }
         Ok(())
     }
 
     /// Asks for the first `bytes` to be mapped as soon as the GPU is done with them.
-    pub(super) fn ask(&self, bytes: u64) {
+    pub(super) fn ask(&self, gpu: &Gpu, bytes: u64) {
         if self.state.compare_exchange(UNMAPPED, ASKED, Ordering::AcqRel, Ordering::Acquire).is_ok() {
             let state = Arc::clone(&self.state);
             let done = move |result: Result<(), wgpu::BufferAsyncError>| {
                 state.store(if result.is_ok() { MAPPED } else { UNMAPPED }, Ordering::Release);
             };
-            self.storage.buffer().map_async(self.mode, 0..bytes.next_multiple_of(8).min(self.bytes()), done);
+            gpu.map(self.storage.buffer().slice(0..bytes.next_multiple_of(8).min(self.bytes())), self.mode, done);
         }
     }
 
     /// The mapped memory, for the CPU to write. Waits for the mapping where it was not asked for ahead.
     pub(super) fn writable(&self, gpu: &Gpu, bytes: u64) -> Result<wgpu::BufferViewMut, GpuError> {
         if self.state.load(Ordering::Acquire) != MAPPED {
-            self.ask(self.bytes());
+            self.ask(gpu, self.bytes());
             gpu.wait_all()?;
         }
         self.mapped(gpu)?;
-        self.storage.buffer().get_mapped_range_mut(0..bytes).map_err(unmapped)
+        self.storage.buffer().get_mapped_range_mut(0..bytes).map_err(|e| gpu.refusal(NOT_MAPPED, e))
     }
 
     /// The mapped memory, for the CPU to read.
     pub(super) fn readable(&self, gpu: &Gpu, bytes: std::ops::Range<u64>) -> Result<wgpu::BufferView, GpuError> {
         self.mapped(gpu)?;
-        self.storage.buffer().get_mapped_range(bytes).map_err(unmapped)
+        self.storage.buffer().get_mapped_range(bytes).map_err(|e| gpu.refusal(NOT_MAPPED, e))
     }
 
     /// After a wait for the GPU. Where several threads wait for one GPU, another one may have taken the news of this mapping and
@@ -90,16 +86,31 @@ impl Transfer {
     fn mapped(&self, gpu: &Gpu) -> Result<(), GpuError> {
         let start = Instant::now();
         while self.state.load(Ordering::Acquire) == ASKED && start.elapsed() < gpu.wait_limit() {
-            gpu.device().poll(wgpu::PollType::Poll).map_err(unmapped)?;
+            gpu.poll(wgpu::PollType::Poll).map_err(|e| gpu.refusal(NOT_MAPPED, e))?;
+            gpu.check()?;
             std::thread::yield_now();
         }
         let mapped = self.state.load(Ordering::Acquire) == MAPPED;
-        mapped.then_some(()).ok_or_else(|| GpuError::new(GpuErrorKind::Refused, NOT_MAPPED))
+        if mapped { Ok(()) } else { Err(gpu.refusal(NOT_MAPPED, wgpu::BufferAsyncError)) }
     }
 
-    /// Hands the memory back to the GPU.
-    pub(super) fn unmap(&self) {
-        if self.state.swap(UNMAPPED, Ordering::AcqRel) != UNMAPPED {
+    /// Whether the memory is mapped by now. Lets the device say so, and does not wait.
+    pub(super) fn arrived(&self, gpu: &Gpu) -> Result<bool, GpuError> {
+        gpu.poll(wgpu::PollType::Poll).map_err(|e| gpu.refusal(NOT_MAPPED, e))?;
+        gpu.check()?;
+        Ok(self.state.load(Ordering::Acquire) == MAPPED)
+    }
+
+    /// Whether a mapping was asked for and has neither come nor failed.
+    pub(super) fn is_on_its_way(&self) -> bool {
+        self.state.load(Ordering::Acquire) == ASKED
+    }
+
+    /// Hands the memory back to the GPU, for the commands that are being recorded.
+    pub(super) fn unmap(&mut self) {
+        if self.state.load(Ordering::Acquire) != UNMAPPED {
+            // What another thread is about to tell of this mapping is not taken for news of the next.
+            self.state = Arc::default();
             self.storage.buffer().unmap();
         }
     }

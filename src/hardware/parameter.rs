@@ -287,6 +287,14 @@ parameters! {
         BufferBytes = "buffer_bytes" => told("bytes", "the driver");
         /// 1 where CPU and GPU share one memory, else 0.
         UnifiedMemory = "unified_memory" => told("0 or 1", "the driver");
+        /// Largest heap of memory of its own.
+        DeviceLocalBytes = "device_local_bytes" => told("bytes", "the driver");
+        /// Largest heap of memory of its own that the CPU reaches too; 0 where there is none.
+        HostVisibleLocalBytes = "host_visible_local_bytes" => told("bytes", "the driver");
+        /// 1 where the CPU reaches all memory of a card (resizable BAR), 0 where it reaches a window of it or nothing.
+        ResizableBar = "resizable_bar" => told("0 or 1", "the driver");
+        /// 1 where it executes what it is given, 0 where it only says so: then nothing of it is timed.
+        Executes = "executes" => told("0 or 1", "a kernel whose result is read back");
         /// Of a group: uploads of all GPUs at once over the fastest one alone, in bytes per second.
         GroupUploadRatio = "group_upload_ratio" =>
             Quantity { read_by_model: true, ..told("ratio", "uploads, a thread for each GPU") };

@@ -39,17 +39,6 @@ impl Sample {
         Self::statistics(&Chosen::among(members.len(), |k| &boxes[members[k] as usize]))
     }
 
-    /// The statistics of boxes that were chosen elsewhere, of up to 256 of them.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn of_all(boxes: &[Aabb]) -> Self {
-        let mut chosen = Chosen { boxes: [Aabb::default(); SAMPLE], count: 0 };
-        for b in boxes.iter().filter(|b| b.defect().is_none()).take(SAMPLE) {
-            chosen.boxes[chosen.count] = *b;
-            chosen.count += 1;
-        }
-        Self::statistics(&chosen)
-    }
-
     /// Where cells of a grid on this axis begin, and how much length they share: that of most of the boxes. The cells at its ends take
     /// those that lie beyond.
     pub(crate) fn range(&self, axis: usize) -> (f64, f64) {
@@ -134,6 +123,17 @@ impl Chosen {
                 chosen.boxes[chosen.count] = *b;
                 chosen.count += 1;
             }
+        }
+        chosen
+    }
+
+    /// Boxes that were chosen elsewhere, up to 256 of them.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn given(boxes: &[Aabb]) -> Self {
+        let mut chosen = Self { boxes: [Aabb::default(); SAMPLE], count: 0 };
+        for b in boxes.iter().filter(|b| b.defect().is_none()).take(SAMPLE) {
+            chosen.boxes[chosen.count] = *b;
+            chosen.count += 1;
         }
         chosen
     }

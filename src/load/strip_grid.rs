@@ -77,10 +77,10 @@ impl StripGrid {
         grid
     }
 
-    /// Cells, origins and inverse widths on the two grid axes, for those who work out cells elsewhere.
+    /// Cells on the two grid axes, for those who divide them in another way.
     #[cfg(feature = "gpu")]
-    pub(crate) fn across_sweep(&self) -> ([u32; 2], [f32; 2], [f32; 2]) {
-        (self.cells, self.origin, self.inverse_width)
+    pub(crate) fn cells(&self) -> [u32; 2] {
+        self.cells
     }
 
     /// How many strips there are.

@@ -2,7 +2,7 @@
 
 use super::{NOT_TIMED, Partition, RegretTable, by_costs};
 use crate::data::Profile;
-use crate::fit::{Designs, TermsOf, model, terms};
+use crate::fit::{ComponentsOf, Designs, components, model};
 use crate::progress::Silent;
 use crate::simulated;
 use crate::text::columns;
@@ -27,7 +27,7 @@ const fn tests(term: Term) -> bool {
     matches!(term, Term::AllPairs | Term::AxisCandidates | Term::StripCandidates)
 }
 
-/// Every term of the list in `terms`.
+/// Every term of the list in `components`.
 const WITHHELD: [Withheld; 19] = [
     ("call, cycles", |t, s| t == Term::Call && s == Scale::Cycle),
     ("fork and join", |_, s| s == Scale::ForkJoin),
@@ -51,8 +51,8 @@ const WITHHELD: [Withheld; 19] = [
 ];
 
 /// Mean regrets on machines held out, with the residual and without.
-fn mean_regrets(profiles: &[Profile], partition: &Partition, terms: &TermsOf) -> (f64, f64) {
-    let designs = Designs::with(profiles, terms);
+fn mean_regrets(profiles: &[Profile], partition: &Partition, components: &ComponentsOf) -> (f64, f64) {
+    let designs = Designs::with(profiles, components);
     let of_fold = |fold: &Vec<usize>| -> Vec<(f64, f64)> {
         let chosen: Vec<bool> = (0..profiles.len()).map(|k| !fold.contains(&k)).collect();
         let (whole, _) = model(profiles, &designs, &chosen, "withheld").unwrap();
@@ -90,9 +90,11 @@ struct Loss {
 /// Withholds one term after the other, in the order of [`WITHHELD`], and prints a table.
 fn losses(profiles: &[Profile], folds: usize) -> Vec<Loss> {
     let partition = Partition::of_machines(profiles, folds).unwrap();
-    let whole = mean_regrets(profiles, &partition, &terms);
+    let whole = mean_regrets(profiles, &partition, &components);
     let without = |&(withheld, is): &Withheld| {
-        let left = move |method: &str, class| terms(method, class).into_iter().filter(|&(t, s)| !is(t, s)).collect();
+        let left = move |method: &str, class| {
+            components(method, class).into_iter().filter(|c| !c.0.iter().any(|&(_, t, s)| is(t, s))).collect()
+        };
         let (ridge, physics) = mean_regrets(profiles, &partition, &left);
         Loss { withheld, ratio: ridge / whole.0, ratio_of_terms: physics / whole.0 }
     };

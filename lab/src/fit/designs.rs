@@ -5,7 +5,7 @@ use crate::fit::min_of_two::MinOfTwo;
 use crate::fit::residual::{Residuals, Ridge};
 use crate::fit::robust::Problem;
 use crate::fit::rows::{Row, rows};
-use crate::fit::terms::{fallback_method, terms};
+use crate::fit::terms::{Component, components, fallback_method};
 use crate::report::Label;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
@@ -26,7 +26,7 @@ const MOST_ROWS: usize = 6000;
 const FEWEST_OF_PROFILE: usize = 2;
 
 /// What the time of a method on a class of processor may consist of.
-pub type TermsOf = dyn Fn(&str, BackendClass) -> Vec<(Term, Scale)>;
+pub type ComponentsOf = dyn Fn(&str, BackendClass) -> Vec<Component>;
 
 /// The rows of every method with all that a fit needs of them, worked out once for all fits to parts of the profiles.
 #[derive(Debug)]
@@ -44,25 +44,25 @@ pub struct Designs<'a> {
 struct Design {
     method: String,
     class: BackendClass,
-    terms: Vec<(Term, Scale)>,
+    components: Vec<Component>,
     rows: Vec<Row>,
-    /// Nanoseconds for one unit of each term, shape (rows, terms).
+    /// Nanoseconds for one unit of each component, shape (rows, components).
     values: Array2<f64>,
     /// Shape (rows, features of the class).
     features: Array2<f64>,
-    /// Terms of the method that this one falls back to, and their values; none where there is no such method.
-    other_terms: Vec<(Term, Scale)>,
+    /// Components of the method that this one falls back to, and their values; none where there is no such method.
+    other_components: Vec<Component>,
     other_values: Array2<f64>,
 }
 
 impl<'a> Designs<'a> {
     /// The rows of all methods, with the terms that reports name for one, else with the usual ones.
     pub fn new(profiles: &'a [Profile]) -> Self {
-        Self::with(profiles, &terms)
+        Self::with(profiles, &components)
     }
 
     /// The same with other terms in place of the usual ones, which tells what a term is worth.
-    pub fn with(profiles: &'a [Profile], terms: &TermsOf) -> Self {
+    pub fn with(profiles: &'a [Profile], components: &ComponentsOf) -> Self {
         let most = (MOST_ROWS / profiles.len().max(1)).max(FEWEST_OF_PROFILE);
         let mut by_method: BTreeMap<(BackendClass, String), Vec<Row>> = BTreeMap::new();
         for (k, profile) in profiles.iter().enumerate() {
@@ -82,8 +82,8 @@ impl<'a> Designs<'a> {
         let methods = by_method
             .into_iter()
             .map(|((class, method), rows)| {
-                let own = reported_terms(profiles, &method, class).unwrap_or_else(|| terms(&method, class));
-                let other = fallback_method(&method).map_or_else(Vec::new, |other| terms(other, class));
+                let own = reported_terms(profiles, &method, class).unwrap_or_else(|| components(&method, class));
+                let other = fallback_method(&method).map_or_else(Vec::new, |other| components(other, class));
                 Design::new(method, class, [own, other], rows, profiles, &mut notes)
             })
             .collect();
@@ -122,16 +122,16 @@ impl<'a> Designs<'a> {
 }
 
 /// The terms that the reports name for a method, each once in the order of the first that has it; `None` where no report names any.
-fn reported_terms(profiles: &[Profile], method: &str, class: BackendClass) -> Option<Vec<(Term, Scale)>> {
+fn reported_terms(profiles: &[Profile], method: &str, class: BackendClass) -> Option<Vec<Component>> {
     let timed = profiles.iter().flat_map(|p| &p.algorithms);
     let own = timed.filter(|t| t.id.method() == method && t.id.backend().class() == class).flat_map(|t| &t.terms);
-    let mut terms: Vec<(Term, Scale)> = Vec::new();
-    for term in own.map(|t| (t.term, t.scale)) {
-        if !terms.contains(&term) {
-            terms.push(term);
+    let mut components: Vec<Component> = Vec::new();
+    for component in own.map(|t| Component::of(t.term, t.scale)) {
+        if !components.contains(&component) {
+            components.push(component);
         }
     }
-    Some(terms).filter(|t| !t.is_empty())
+    Some(components).filter(|c| !c.is_empty())
 }
 
 /// Position of the physical machine of each profile.
@@ -162,12 +162,12 @@ impl Design {
     fn new(
         method: String,
         class: BackendClass,
-        [terms, other_terms]: [Vec<(Term, Scale)>; 2],
+        [components, other_components]: [Vec<Component>; 2],
         rows: Vec<Row>,
         profiles: &[Profile],
         notes: &mut Vec<String>,
     ) -> Self {
-        let all = [&terms[..], &other_terms].concat();
+        let all = [&components[..], &other_components].concat();
         let (mut kept, mut values, mut features) = (Vec::new(), Vec::new(), Vec::new());
         let mut told: Vec<(usize, String)> = Vec::new();
         for row in rows {
@@ -189,10 +189,10 @@ impl Design {
             }
         }
         let values = Array2::from_shape_vec((kept.len(), all.len()), values).unwrap_or_default();
-        let (values, other_values) = values.view().split_at(Axis(1), terms.len());
+        let (values, other_values) = values.view().split_at(Axis(1), components.len());
         let (values, other_values) = (values.to_owned(), other_values.to_owned());
         let features = Array2::from_shape_vec((kept.len(), Feature::of(class).len()), features).unwrap_or_default();
-        Self { method, class, terms, rows: kept, values, features, other_terms, other_values }
+        Self { method, class, components, rows: kept, values, features, other_components, other_values }
     }
 
     fn name(&self) -> String {
@@ -250,8 +250,8 @@ impl Design {
         let min_of_two = other_ns.as_ref().map(|other_ns| MinOfTwo::fit(&problem, other_ns));
         let mut units = Array1::from(min_of_two.as_ref().map_or_else(|| problem.units(), |found| found.units.clone()));
         // Timings of one thread tell nothing of a fork and join, and without it several threads would be the best choice everywhere.
-        for (unit, (column, (_, scale))) in units.iter_mut().zip(problem.terms.columns().into_iter().zip(&self.terms)) {
-            if *scale == Scale::ForkJoin && column.iter().all(|v| *v == 0.0) {
+        for (unit, (values, component)) in units.iter_mut().zip(problem.terms.columns().into_iter().zip(&self.components)) {
+            if component.has(Scale::ForkJoin) && values.iter().all(|v| *v == 0.0) {
                 *unit = UNSEEN_FORK_JOINS;
             }
         }
@@ -275,7 +275,7 @@ impl Design {
         let ridge = residuals.ridge()?;
         let left: Vec<f64> = (0..measured.len()).map(|k| residuals.ln_ratios[k] - residuals.at(&ridge, k)).collect();
         let spread_ln = robust_deviation(&left).unwrap_or(0.0);
-        let used = self.terms.iter().zip(&units).filter(|(_, u)| **u > 0.0);
+        let used = self.components.iter().zip(&units).filter(|(_, u)| **u > 0.0);
         let objects = || measured.iter().map(|&k| row(k).load.objects);
         let mut gpu_kinds: Vec<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();
         gpu_kinds.sort_unstable();
@@ -288,7 +288,11 @@ impl Design {
         model.gpu_kinds = gpu_kinds;
         model.min_objects = objects().min().unwrap_or(1);
         model.max_objects = objects().max().unwrap_or(1);
-        model.terms = used.map(|(&(term, scale), &unit)| ModelTerm { term, scale, unit }).collect();
+        model.terms = used
+            .flat_map(|(component, &unit)| {
+                component.0.iter().map(move |&(times, term, scale)| ModelTerm { term, scale, unit: unit * times })
+            })
+            .collect();
         if let Some((found, other)) = min_of_two.zip(other) {
             model.fallback_terms = other.iter().map(|t| ModelTerm { unit: t.unit * found.factor, ..*t }).collect();
         }
@@ -298,10 +302,13 @@ impl Design {
 
     /// What the method that this one falls back to costs in some of the rows, without its residual.
     fn other_ns(&self, rows: &[usize], other: &[ModelTerm]) -> Vec<f64> {
-        let unit = |(term, scale): &(Term, Scale)| {
-            other.iter().find(|t| (t.term, t.scale) == (*term, *scale)).map_or(0.0, |t| t.unit)
+        let unit = |component: &Component| {
+            let found = component.0.first().and_then(|&(times, term, scale)| {
+                other.iter().find(|t| (t.term, t.scale) == (term, scale)).map(|t| t.unit / times)
+            });
+            found.unwrap_or(0.0)
         };
-        let units: Vec<f64> = self.other_terms.iter().map(unit).collect();
+        let units: Vec<f64> = self.other_components.iter().map(unit).collect();
         self.other_values.select(Axis(0), rows).dot(&Array1::from(units)).to_vec()
     }
 
@@ -335,9 +342,9 @@ impl Design {
     }
 }
 
-/// Nanoseconds for one unit of each term in a row, and the features of its residual.
+/// Nanoseconds for one unit of each component in a row, and the features of its residual.
 fn nanoseconds(
-    terms: &[(Term, Scale)],
+    components: &[Component],
     hardware: &Hardware,
     id: &AlgorithmId,
     row: &Row,
@@ -353,8 +360,11 @@ fn nanoseconds(
     let features = Feature::of(backend.class()).iter().map(|f| f.value(hardware, backend, &row.load));
     // The residual needs its parameters even where no term does.
     let features = features.collect::<Result<Vec<f64>, PredictError>>()?;
-    let one = |&(term, scale): &(Term, Scale)| Ok(term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?);
-    Ok((terms.iter().map(one).collect::<Result<_, PredictError>>()?, features))
+    let one = |&(times, term, scale): &(f64, Term, Scale)| {
+        Ok(times * term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?)
+    };
+    let sum = |component: &Component| component.0.iter().map(one).sum::<Result<f64, PredictError>>();
+    Ok((components.iter().map(sum).collect::<Result<_, PredictError>>()?, features))
 }
 
 #[cfg(test)]

@@ -13,9 +13,9 @@ mod rows;
 mod terms;
 
 pub(crate) use designs::thinned;
-pub use designs::{Designs, TermsOf};
+pub use designs::{ComponentsOf, Designs};
 pub use measured_costs::{measured_costs, measured_slice, measured_tuning, slice_tuning};
 pub use model::model;
 pub use prior::{TimingError, prior};
 pub use rows::{Row, rows};
-pub use terms::{fallback_method, terms, terms_of_one_machine};
+pub use terms::{Component, components, fallback_method, terms_of_one_machine};

@@ -1,7 +1,24 @@
 //! What the time of a method may consist of.
 
+use sapwise::gpu::Traffic;
 use sapwise::model::Scale;
 use sapwise::{BackendClass, Term};
+
+/// Counts of a frame that have one unit together: how often each, of which term and scale.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Component(pub Vec<(f64, Term, Scale)>);
+
+impl Component {
+    /// One term with a unit of its own.
+    pub fn of(term: Term, scale: Scale) -> Self {
+        Self(vec![(1.0, term, scale)])
+    }
+
+    /// Whether one of the counts is of this scale.
+    pub fn has(&self, scale: Scale) -> bool {
+        self.0.iter().any(|&(_, _, s)| s == scale)
+    }
+}
 
 /// What a method tests. The tests of the other methods are left out: within one machine they correlate with its own, and would
 /// grow differently beyond the sizes that were measured.
@@ -31,46 +48,78 @@ fn is_incremental(method: &str) -> bool {
     !matches!(method, "brute" | "sap" | "grid-sap" | "bvh")
 }
 
-/// The physical terms of a method over machines, for any number of threads or GPUs.
+/// What the time of a method may consist of over machines, for any number of threads or GPUs.
 ///
-/// Of columns that can't be told apart the first one is used, so that the order matters where all machines are alike: work of
+/// Of components that can't be told apart the first one is used, so that the order matters where all machines are alike: work of
 /// the lanes before work of the cycles, divided work before serial work, the GPU's work before that of the CPU for it.
-pub fn terms(method: &str, class: BackendClass) -> Vec<(Term, Scale)> {
+pub fn components(method: &str, class: BackendClass) -> Vec<Component> {
+    match class {
+        BackendClass::Cpu => on_cpu(method).into_iter().map(|(term, scale)| Component::of(term, scale)).collect(),
+        BackendClass::Gpu => on_gpus(method),
+    }
+}
+
+fn on_cpu(method: &str) -> Vec<(Term, Scale)> {
     use {Scale::*, Term::*};
     let sorts = sorts(method);
-    let tests = tests(method).iter();
-    let mut list;
-    match class {
-        BackendClass::Cpu => {
-            list = vec![(Call, Cycle), (Call, ForkJoin), (Objects, SharedCycle)];
-            if sorts {
-                list.push((Sort, SharedCycle));
-            }
-            if method != "brute" {
-                list.push((ColdObjects, Byte));
-            }
-            list.extend(tests.flat_map(|&t| [(t, SharedLane), (t, SharedCycle)]));
-            list.push((Pairs, SharedCycle));
-            if is_incremental(method) {
-                list.push((Moved, SharedCycle));
-            }
-            list.extend([(Objects, SharedLine), (Objects, Cycle)]);
-            if sorts {
-                list.push((Sort, Cycle));
-            }
-        }
-        BackendClass::Gpu => {
-            list = vec![(Call, GpuRoundTrip), (Call, GpuDispatch), (Objects, GpuUploadByte), (Objects, GpuMemoryByte)];
-            if sorts {
-                list.push((Sort, GpuMemoryByte));
-            }
-            list.extend(tests.map(|&t| (t, GpuOperation)));
-            // The CPU takes boxes into mapped memory and pairs out of it, which the transfers hold only in part.
-            list.extend([(Pairs, GpuDownloadByte), (Objects, Cycle), (Pairs, Cycle)]);
-        }
+    let mut list = vec![(Call, Cycle), (Call, ForkJoin), (Objects, SharedCycle)];
+    if sorts {
+        list.push((Sort, SharedCycle));
+    }
+    if method != "brute" {
+        list.push((ColdObjects, Byte));
+    }
+    list.extend(tests(method).iter().flat_map(|&t| [(t, SharedLane), (t, SharedCycle)]));
+    list.push((Pairs, SharedCycle));
+    if is_incremental(method) {
+        list.push((Moved, SharedCycle));
+    }
+    list.extend([(Objects, SharedLine), (Objects, Cycle)]);
+    if sorts {
+        list.push((Sort, Cycle));
     }
     list
 }
+
+/// Bytes of a box and of a pair.
+const BOX: f64 = 24.0;
+const PAIR: f64 = 8.0;
+
+/// Dispatches and bytes are those that [`Traffic`] counts. A fit tells only how many times as dear a dispatch or a byte of the method is as one that a
+/// hardware parameter was measured with. A card that was not measured is taken to have the same ratios.
+fn on_gpus(method: &str) -> Vec<Component> {
+    use {Scale::*, Term::*};
+    let counted = |objects, pairs| Traffic::of(method, objects, pairs);
+    // Where nothing is counted, as of brute force, each box is read once.
+    let (dispatches, of_box, of_pair) =
+        match (counted(TYPICAL, 0), counted(2 * TYPICAL, 0), counted(TYPICAL, u64::from(TYPICAL))) {
+            (Some(one), Some(two), Some(paired)) => {
+                let n = f64::from(TYPICAL);
+                (f64::from(one.dispatches), (two.bytes - one.bytes) / n, (paired.bytes - one.bytes) / n)
+            }
+            _ => (1.0, BOX, PAIR),
+        };
+    let mut list = vec![
+        Component::of(Call, GpuRoundTrip),
+        Component(vec![(dispatches, Call, GpuDispatch)]),
+        Component(vec![(BOX, Objects, GpuUploadByte)]),
+        // What came up or goes down is copied once more.
+        Component(vec![(of_box + 2.0 * BOX, Objects, GpuMemoryByte), (of_pair + 2.0 * PAIR, Pairs, GpuMemoryByte)]),
+    ];
+    // The nodes that a box is tested with.
+    let tests = if method == "bvh" { &[Objects] } else { tests(method) };
+    list.extend(tests.iter().map(|&t| Component::of(t, GpuOperation)));
+    // The CPU takes boxes into mapped memory and pairs out of it, which the transfers hold only in part.
+    list.extend([
+        Component(vec![(PAIR, Pairs, GpuDownloadByte)]),
+        Component::of(Objects, Cycle),
+        Component::of(Pairs, Cycle),
+    ]);
+    list
+}
+
+/// Boxes of a frame that is worth a GPU. How often levels are put on a tree depends on them, and little else that is counted does but in proportion.
+const TYPICAL: u32 = 100_000;
 
 /// The terms of a method within one machine, where everything but the load is constant.
 pub fn terms_of_one_machine(method: &str, class: BackendClass) -> Vec<Term> {

@@ -25,14 +25,16 @@
 //! | method on GPUs | dependent dispatches | operations | bytes in the GPU's memory |
 //! |---|---|---|---|
 //! | `brute` | 5 | 20 all pairs | 60 n |
-//! | `sap` | 40 | 25 axis candidates | 60 n + 25 n log2 n |
-//! | `grid-sap` | 50 | 300 strip candidates | 60 n + 25 n log2 n |
+//! | `sap` | as counted | 25 axis candidates | 48 n, and as counted |
+//! | `grid-sap` | as counted | 300 strip candidates | 48 n, and as counted |
+//! | `bvh` | as counted | 1500 n | 48 n, and as counted |
 //!
-//! Every method on GPUs pays a round trip and a read-back, 24 bytes up a box, 8 bytes down a pair, and 6 cycles a box and 4 a pair of
+//! What is counted is [`sapwise::gpu::Traffic`], and two dispatches more. Every method on GPUs pays a round trip and a read-back, 24 bytes up a box, 8 bytes down a pair, and 6 cycles a box and 4 a pair of
 //! the CPU. With several GPUs each takes an equal share of the boxes and a tenth more that lie on a border.
 
 use super::factors::{CpuFactors, GpuFactors, of_method};
 use super::machine::{TrueGpu, TrueMachine};
+use sapwise::gpu::Traffic;
 use sapwise::{AlgorithmId, Backend, Load};
 
 /// Bytes that a frame keeps in flight for each box.
@@ -149,11 +151,15 @@ impl<'a> Costs<'a> {
         let more = if indices.len() > 1 { 1.0 + ON_A_BORDER } else { 1.0 };
         let n = f64::from(load.objects);
         let all = n * (n - 1.0).max(0.0) / 2.0;
-        let sort = n * n.max(1.0).log2();
-        let (dispatches, operations, bytes) = match method {
-            "brute" => (5.0, 20.0 * all, 60.0 * n),
-            "sap" => (40.0, 25.0 * load.axis_candidates, 60.0 * n + 25.0 * sort),
-            "grid-sap" => (50.0, 300.0 * load.strip_candidates, 60.0 * n + 25.0 * sort),
+        // The methods that sort are counted; boxes come up and are copied once more.
+        let counted = Traffic::of(method, load.objects, load.pairs as u64);
+        let (dispatches, bytes) = counted.map_or((3.0, 12.0 * n), |t| (f64::from(t.dispatches), t.bytes));
+        let (dispatches, bytes) = (dispatches + 2.0, bytes + 48.0 * n);
+        let operations = match method {
+            "brute" => 20.0 * all,
+            "sap" => 25.0 * load.axis_candidates,
+            "grid-sap" => 300.0 * load.strip_candidates,
+            "bvh" => 1500.0 * n,
             _ => return None,
         };
         let group = self.machine.group.filter(|_| indices.len() > 1);
@@ -226,7 +232,7 @@ mod tests {
         let (mut pairs_of_gpus, mut paid) = (0, 0);
         for machine in machines().iter().filter(|m| m.gpus.len() >= 2 && m.gpus[0].name == m.gpus[1].name) {
             pairs_of_gpus += 1;
-            for method in ["brute", "sap", "grid-sap"] {
+            for method in ["brute", "sap", "grid-sap", "bvh"] {
                 let cost = |gpus: &str| ns(machine, &format!("{method}@{gpus}"), &load(10_000_000, 1.0));
                 let (one, two) = (cost("gpu0"), cost("gpu0+1"));
                 assert!(two >= 0.5 * one, "{method}: {two} with two GPUs and {one} with one of {machine:?}");

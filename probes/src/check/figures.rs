@@ -7,8 +7,12 @@ use sapwise::{GpuHardware, Hardware, How, Parameter, SimdLevel};
 use sapwise_lab::report::{Label, Point, Report, Restricted};
 use std::collections::BTreeMap;
 
-/// How far several threads may exceed their number, by a clock that rises between two measurements.
+/// How far several threads may exceed their number, by a clock that rises between two measurements. Beyond that the one thread was disturbed, which a
+/// guest does not always see.
 const SCALING_TOLERANCE: f64 = 1.1;
+
+/// How far no disturbance takes them.
+const IMPOSSIBLE_SCALING: f64 = 2.0;
 
 /// Share of the points with foreign load that is worth a word.
 const DISTURBED_SHARE: f64 = 0.25;
@@ -58,25 +62,17 @@ fn impossible_parameter(report: &Report, of: &str, p: &Parameter) -> Option<Stri
     if p.name == ParameterId::UsableCores && value.fract() != 0.0 {
         return Some(format!("{name} is {value}"));
     }
-    // A disturbed measurement of one thread alone makes several look better than they are: that is a doubt.
-    if report.label == Label::RealContended || is_disturbed(p) {
-        return None;
-    }
-    scaling_beyond_threads(&report.hardware, p).map(|what| format!("{what}{of}"))
+    scaling_beyond_threads(&report.hardware, p, IMPOSSIBLE_SCALING).map(|what| format!("{what}{of}"))
 }
 
-fn is_disturbed(p: &Parameter) -> bool {
-    p.foreign_load.is_some_and(|load| load > Watch::SPOILING)
-}
-
-/// What several threads gain over one, where that is more than their number.
-fn scaling_beyond_threads(hardware: &Hardware, p: &Parameter) -> Option<String> {
+/// What several threads gain over one, where that is more than `tolerance` times their number.
+fn scaling_beyond_threads(hardware: &Hardware, p: &Parameter, tolerance: f64) -> Option<String> {
     let threads = match p.name.parse().ok()? {
         ParameterId::ScalingTwoThreadsRatio => 2.0,
         ParameterId::ScalingAllThreadsRatio => hardware.value(ParameterId::UsableCores)?,
         _ => return None,
     };
-    let value = p.value.filter(|value| *value > threads * SCALING_TOLERANCE)?;
+    let value = p.value.filter(|value| *value > threads * tolerance)?;
     Some(format!("{} is {value:.2}, and {threads} threads can't be more than {threads} times as fast as one", p.name))
 }
 
@@ -196,11 +192,11 @@ pub(crate) fn doubts(report: &Report) -> Vec<String> {
 /// The same of hardware parameters alone.
 pub(crate) fn hardware_doubts(hardware: &Hardware) -> Vec<String> {
     let own = hardware.parameters.iter();
-    let beyond = own.filter_map(|p| scaling_beyond_threads(hardware, p));
+    let beyond = own.filter_map(|p| scaling_beyond_threads(hardware, p, SCALING_TOLERANCE));
     beyond
         .map(|what| {
             format!(
-                "{what}; other programs disturbed the measurement of one thread: measure again with nothing else running"
+                "{what}; other programs or the host disturbed the measurement of one thread: measure again with nothing else running"
             )
         })
         .collect()

@@ -54,9 +54,10 @@ impl GpuChoice {
             return None;
         }
         let names: Vec<String> = left_out.iter().map(|g| format!("gpu{} ({})", g.index, g.name)).collect();
-        let (verb, what) = if names.len() == 1 { ("is", "a software adapter") } else { ("are", "software adapters") };
+        let (verb, what, them) =
+            if names.len() == 1 { ("is", "a software adapter", "it") } else { ("are", "software adapters", "them") };
         let names = names.join(", ");
-        Some(format!("Not used: {names} {verb} {what}, slower than the CPU. Use --software-gpus to measure it anyway."))
+        Some(format!("Not used: {names} {verb} {what}, slower than the CPU. Use --software-gpus to measure {them} anyway."))
     }
 }
 

@@ -1,8 +1,10 @@
 //! Which algorithms can be made on the GPUs of this machine, tried without loading a driver into the process that asks.
 
+use super::choice::uses;
+use super::parameters::inert;
 use crate::child::{Ended, run_part};
-use sapwise::gpu::Gpus;
-use sapwise::{AlgorithmId, Registry};
+use sapwise::gpu::{GpuErrorKind, Gpus};
+use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Pairs, Registry, Unavailable};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -16,6 +18,8 @@ pub(crate) struct OnGpus {
     pub(crate) id: AlgorithmId,
     /// Why it can't run here, if it can't.
     pub(crate) unavailable: Option<String>,
+    /// The GPU of it that executes nothing, in a sentence, if one does not.
+    pub(crate) inert: Option<String>,
 }
 
 /// What the process prints: each algorithm in a line.
@@ -27,10 +31,22 @@ pub(crate) fn print_entries() -> anyhow::Result<()> {
     let mut registry = Registry::with_cores(1);
     registry.add_gpus(&gpus);
     for id in sapwise::gpu::algorithms(gpus.identities()).into_iter().map(|e| e.id) {
-        let unavailable = registry.create(&id).err().map(|e| e.to_string());
-        crate::output::print_json(&OnGpus { id, unavailable })?;
+        let error = registry.create(&id).and_then(|mut algorithm| try_out(algorithm.as_mut())).err();
+        let gpu = match &error {
+            Some(Error::Unavailable { reason: Unavailable::Gpu(why), .. }) if why.kind() == GpuErrorKind::Inert => gpus
+                .identities()
+                .find(|gpu| uses(&id).contains(&gpu.index) && gpus.open(gpu.index).is_ok_and(|g| g.fault().is_some())),
+            _ => None,
+        };
+        let (unavailable, inert) = (error.map(|e| e.to_string()), gpu.map(inert));
+        crate::output::print_json(&OnGpus { id, unavailable, inert })?;
     }
     Ok(())
+}
+
+/// A frame of two boxes: a device that executes nothing compiles whatever it is given.
+fn try_out(algorithm: &mut dyn BroadPhase) -> Result<(), Error> {
+    algorithm.find_pairs(&[Aabb::default(); 2], &mut Pairs::new())
 }
 
 /// The algorithms that could be tried, and what kept the process from trying the others.

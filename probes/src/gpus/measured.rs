@@ -2,10 +2,10 @@
 
 use super::choice::{GpuChoice, uses};
 use super::look::look;
-use super::parameters::{group_without_parameters, without_parameters};
+use super::parameters::{group_without_parameters, inert, without_parameters};
 use crate::child::{Ended, run_part};
 use crate::progress::Progress;
-use sapwise::{GpuGroup, GpuHardware, GpuIdentity};
+use sapwise::{GpuGroup, GpuHardware, GpuIdentity, GpuParameterId};
 use serde::de::DeserializeOwned;
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ pub(crate) struct Measured {
     pub(crate) gpus: Vec<GpuHardware>,
     /// Those that work together.
     pub(crate) groups: Vec<GpuGroup>,
-    /// The taken GPUs that may be used from here on: all but those that ended their process.
+    /// The taken GPUs that may be used from here on: all but those that ended their process and those that execute nothing.
     pub(crate) usable: Vec<GpuIdentity>,
     /// The GPUs that were not taken.
     pub(crate) left_out: Vec<GpuIdentity>,
@@ -63,6 +63,10 @@ impl Measured {
     fn gpu(&mut self, identity: GpuIdentity, threads: Option<u32>) -> anyhow::Result<()> {
         let index = identity.index;
         let hardware = match part::<GpuHardware>("gpu", &index.to_string(), threads)? {
+            Ok(hardware) if hardware.gpu == identity && hardware.value(GpuParameterId::Executes) == Some(0.0) => {
+                self.remarks.push(format!("{}; nothing of it is timed", inert(&identity)));
+                hardware
+            }
             Ok(hardware) if hardware.gpu == identity => {
                 self.usable.push(identity);
                 hardware

@@ -42,6 +42,14 @@ pub(super) fn without_parameters(gpu: GpuIdentity, why: &str) -> GpuHardware {
     GpuHardware::new(gpu, names.iter().map(|name| Parameter::missing(name, why)).collect())
 }
 
+/// That a GPU executes nothing, in words for whoever may have never heard of that.
+pub(super) fn inert(gpu: &GpuIdentity) -> String {
+    format!(
+        "gpu{} ({}) executes nothing: its driver takes work and says that it is done, and no kernel has run",
+        gpu.index, gpu.name
+    )
+}
+
 /// Several GPUs that could not be measured together.
 pub(super) fn group_without_parameters(indices: &[u32], why: &str) -> GpuGroup {
     let names = GpuParameterId::GROUP;

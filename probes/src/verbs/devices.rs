@@ -18,6 +18,8 @@ struct Answer {
     adapters: Vec<GpuIdentity>,
     /// What went wrong while looking for GPUs.
     remark: Option<String>,
+    /// The adapters that execute nothing, each in a sentence.
+    inert: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -34,7 +36,8 @@ pub(crate) fn run(arguments: &Devices, known: &Algorithms) -> anyhow::Result<Out
     progress.message("looking for GPUs");
     let seen = if arguments.no_gpus { Seen::default() } else { look()? };
     progress.message("algorithms on the GPUs");
-    let answer = Answer { algorithms: algorithms(&seen, known)?, adapters: seen.identities, remark: seen.remark };
+    let (algorithms, inert) = algorithms(&seen, known)?;
+    let answer = Answer { algorithms, adapters: seen.identities, remark: seen.remark, inert };
     drop(progress);
     if arguments.json {
         output::print_json(&answer)?;
@@ -44,11 +47,12 @@ pub(crate) fn run(arguments: &Devices, known: &Algorithms) -> anyhow::Result<Out
     Ok(Outcome::Done)
 }
 
-/// Those of the CPU, then those of the GPUs that were seen. Drivers are loaded into processes of their own only.
+/// Those of the CPU, then those of the GPUs that were seen; and of which GPUs it was seen that they execute nothing. Drivers are loaded into
+/// processes of their own only.
 ///
 /// # Errors
 /// When no process can be started.
-fn algorithms(seen: &Seen, known: &Algorithms) -> anyhow::Result<Vec<Algorithm>> {
+fn algorithms(seen: &Seen, known: &Algorithms) -> anyhow::Result<(Vec<Algorithm>, Vec<String>)> {
     let (on_gpus, failure) = if seen.identities.is_empty() { (Vec::new(), None) } else { gpus::entries()? };
     let reason = |id: &AlgorithmId| match on_gpus.iter().find(|e| e.id == *id) {
         Some(entry) => entry.unavailable.clone(),
@@ -69,7 +73,13 @@ fn algorithms(seen: &Seen, known: &Algorithms) -> anyhow::Result<Vec<Algorithm>>
     for sapwise::Entry { id, revision, .. } in sapwise::gpu::algorithms(&seen.identities) {
         list.push(algorithm(&id, revision, reason(&id)));
     }
-    Ok(list)
+    let mut inert: Vec<String> = Vec::new();
+    for sentence in on_gpus.iter().filter_map(|e| e.inert.as_ref()) {
+        if !inert.contains(sentence) {
+            inert.push(sentence.clone());
+        }
+    }
+    Ok((list, inert))
 }
 
 fn text(answer: &Answer, no_gpus: bool, terminal: Terminal) -> String {
@@ -85,6 +95,9 @@ fn text(answer: &Answer, no_gpus: bool, terminal: Terminal) -> String {
         text += &format!("\n{}", terminal.warning(&format!("{remark}.")));
     } else if answer.adapters.is_empty() && !no_gpus {
         text += "\nNo GPU was found; the algorithms on the CPU are not affected.";
+    }
+    for sentence in &answer.inert {
+        text += &format!("\n{}", terminal.warning(&format!("{sentence}.")));
     }
     text + "\nNext: sapwise predict"
 }

@@ -39,8 +39,9 @@ pub(crate) fn remarks_but_of_moves(report: &sapwise_lab::report::Report) -> Vec<
 pub(crate) fn success(command: &mut Command) -> String {
     let ended = command.output().unwrap();
     let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(0), "{command:?}: {complaint}");
-    String::from_utf8(ended.stdout).unwrap()
+    let told = String::from_utf8(ended.stdout).unwrap();
+    assert_eq!(ended.status.code(), Some(0), "{command:?}: {complaint}{told}");
+    told
 }
 
 /// Runs to this exit status and returns standard error, which must not be a panic.

@@ -1,12 +1,11 @@
 //! What an engine does once a frame was submitted: waiting, bringing pairs home, going on where one submission was too few.
 
 use super::{Engine, Frame, PAIRS_AT, Search, Step};
-use crate::error::{BoxDefect, Error, GpuError};
+use crate::error::{Error, GpuError};
+use crate::gpu::look::Look;
 use crate::gpu::output::PAIR;
 use crate::gpu::params::{Header, Params};
-use crate::gpu::sorted::CANDIDATES;
 use crate::gpu::storage::Failure;
-use crate::load::Sample;
 use crate::pairs::Pairs;
 use std::mem::offset_of;
 
@@ -29,7 +28,7 @@ impl Engine {
                 break;
             }
             if frame.tile_pairs_left > 0 || header.more != 0 {
-                next = Some(self.go_on(frame)?);
+                next = Some(self.go_on(frame, 0)?);
             }
         }
         self.expected = all;
@@ -38,24 +37,50 @@ impl Engine {
 
     /// Waits for what was started and returns the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer), and
     /// what the boxes look like.
-    pub(in crate::gpu) fn finish_resident(&mut self) -> Result<(u32, Sample), Failure> {
-        let Some(mut frame) = self.frame.take() else { return Ok((0, Sample::default())) };
-        let header = self.header_of(&frame)?;
-        if header.more != 0 {
-            let reason = format!("a box has more than {CANDIDATES} candidates, which takes several submissions");
-            return Err(Failure::limit(format!("{reason}, and pairs that stay on gpu{} come from one", self.index())));
-        }
-        let total = header.total();
-        let sample = self.seen()?;
-        self.expected = total;
-        if total > u64::from(self.output.capacity()) {
-            self.grow(&mut frame, total)?;
-            if total > u64::from(self.output.capacity()) {
-                return Err(Failure::limit(format!("{total} pairs don't fit into one buffer of gpu{}", self.index())));
+    pub(in crate::gpu) fn finish_resident(&mut self) -> Result<(u32, Look), Failure> {
+        let mut all = 0_u64;
+        let mut look = None;
+        let mut next = self.frame.take();
+        while let Some(mut frame) = next.take() {
+            let header = self.header_of(&frame)?;
+            // A sample is taken with the first submission of a frame; every one brings the same back.
+            look = Some(look.map_or_else(|| self.seen(), Ok)?);
+            let before = all;
+            all += header.total();
+            if all > u64::from(u32::MAX) {
+                let reason = format!("{all} pairs are more than the 2^32 that gpu{} can number", self.index());
+                return Err(Failure::limit(reason));
             }
-            self.rewrite(&frame.params)?;
+            if all > u64::from(self.output.capacity()) {
+                self.make_room_for_pairs(&mut frame, all, before)?;
+                self.rewrite(&frame.params)?;
+            }
+            if frame.tile_pairs_left > 0 || header.more != 0 {
+                // The pairs of the next submission stand behind those of this one: a window that begins below zero, modulo 2^32.
+                next = Some(self.go_on(frame, (all as u32).wrapping_neg())?);
+            }
         }
-        Ok((total as u32, sample))
+        self.expected = all;
+        Ok((all as u32, look.unwrap_or_default()))
+    }
+
+    /// A larger list of pairs that begins with the first `kept` of this one.
+    fn make_room_for_pairs(&mut self, frame: &mut Frame, total: u64, kept: u64) -> Result<(), Failure> {
+        let before = self.output.pairs().clone();
+        // Whatever fails from here on, nothing goes on with the list of before.
+        let boxes = self.bound_to.take();
+        self.output.replace_pairs(&self.gpu, total)?;
+        if kept > 0 {
+            let mut encoder = self.gpu.record();
+            encoder.copy_buffer_to_buffer(&before, 0, self.output.pairs(), 0, kept * PAIR);
+            let submission = self.gpu.submit(encoder)?;
+            self.gpu.wait(submission)?;
+        }
+        if let Some(boxes) = boxes {
+            self.bind(&boxes)?;
+        }
+        frame.params.capacity = self.output.capacity();
+        Ok(())
     }
 
     /// The list of pairs of the frame before.
@@ -70,12 +95,19 @@ impl Engine {
     /// Waits for a frame and reads its header.
     fn header_of(&self, frame: &Frame) -> Result<Header, Failure> {
         self.gpu.wait(frame.submission.clone())?;
-        let view = self.download.readable(&self.gpu, 0..PAIRS_AT)?;
-        let header: Header = bytemuck::pod_read_unaligned(&view);
-        if let Some((index, inverted)) = header.invalid() {
-            let defect = if inverted { BoxDefect::Inverted } else { BoxDefect::NotANumber };
-            return Err(Error::InvalidBox { index, defect }.into());
+        let header = self.downloaded(frame.params.submission)?;
+        match header.invalid() {
+            Some((index, defect)) => Err(Error::InvalidBox { index, defect }.into()),
+            None => Ok(header),
         }
+    }
+
+    /// The header of the submission of this number, which has come back.
+    pub(super) fn downloaded(&self, submission: u32) -> Result<Header, GpuError> {
+        let view = self.download.readable(&self.gpu, 0..PAIRS_AT)?;
+        let header: Header = bytemuck::pod_read_unaligned(&view[..size_of::<Header>()]);
+        drop(view);
+        self.check_ran(&header, submission)?;
         Ok(header)
     }
 
@@ -105,7 +137,7 @@ impl Engine {
                 continue;
             }
             let count = (total.min(end) - have).min((self.download.bytes() - PAIRS_AT) / PAIR);
-            let mut encoder = self.encoder();
+            let mut encoder = self.gpu.record();
             let from = (have - u64::from(window)) * PAIR;
             encoder.copy_buffer_to_buffer(self.output.pairs(), from, self.download.buffer(), PAIRS_AT, count * PAIR);
             let submission = self.submit_mapped(encoder, PAIRS_AT + count * PAIR)?;
@@ -128,8 +160,8 @@ impl Engine {
 
     /// Writes the window of `params` into the list of pairs. Nothing is counted again.
     fn rewrite(&self, params: &Params) -> Result<(), GpuError> {
+        let mut encoder = self.gpu.record();
         self.set(params);
-        let mut encoder = self.encoder();
         self.record(&mut encoder, params, Step::Write);
         let submission = self.gpu.submit(encoder)?;
         self.gpu.wait(submission)
@@ -140,27 +172,28 @@ impl Engine {
         self.gpu.queue().write_buffer(self.params.buffer(), 0, bytemuck::bytes_of(params));
     }
 
-    /// Goes on with the tile pairs, or the candidates of rows, that are left.
-    fn go_on(&mut self, frame: Frame) -> Result<Frame, GpuError> {
+    /// Goes on with the tile pairs, or the candidates of rows, that are left. `window`: where the pairs that are wanted begin.
+    fn go_on(&mut self, frame: Frame, window: u32) -> Result<Frame, GpuError> {
         let mut params = frame.params;
         match &self.search {
             Search::Brute(_) => {
                 params.first += params.blocks;
                 params.blocks = frame.tile_pairs_left.min(u64::from(params.blocks)) as u32;
             }
-            Search::Sorted(_) => params.first += CANDIDATES,
+            Search::Sorted(_) => params.round += 1,
         }
-        params.window = 0;
+        params.submission = self.next_submission();
+        params.window = window;
         params.capacity = self.output.capacity();
+        let mut encoder = self.gpu.record();
         self.set(&params);
-        let mut encoder = self.encoder();
         for field in [offset_of!(Header, total_low), offset_of!(Header, total_high), offset_of!(Header, more)] {
             encoder.clear_buffer(self.header.buffer(), field as u64, Some(4));
         }
         self.record(&mut encoder, &params, Step::Count);
-        let sent = self.sendable();
+        let sent = if self.sampler.is_none() { self.sendable() } else { 0 };
         self.copy_back(&mut encoder, sent);
-        let submission = self.submit_mapped(encoder, PAIRS_AT + sent * PAIR)?;
+        let submission = self.submit_mapped(encoder, PAIRS_AT + (sent * PAIR).max(self.sample_bytes()))?;
         let tile_pairs_left = frame.tile_pairs_left.saturating_sub(u64::from(params.blocks));
         Ok(Frame { submission, params, sent, tile_pairs_left })
     }

@@ -9,7 +9,9 @@ const WORDS: u32 = 4u;
 @group(0) @binding(5) var<storage, read_write> pairs: array<vec2<u32>>;
 
 var<workgroup> columns_lo: array<vec4<u32>, TILE>;
-var<workgroup> columns_hi: array<vec4<u32>, TILE>;
+// In two, because a word less a column lets more workgroups run at once.
+var<workgroup> columns_hi: array<vec2<u32>, TILE>;
+var<workgroup> columns_hi_z: array<u32, TILE>;
 
 // The tiles of a pair, the lower one first.
 fn tiles(k: u32) -> vec2<u32> {
@@ -30,7 +32,8 @@ fn hits(tile: vec2<u32>, t: u32, wanted: bool) -> vec4<u32> {
     if (wanted && first + t < params.objects) {
         let b = load_box(first + t);
         columns_lo[t] = b.lo;
-        columns_hi[t] = b.hi;
+        columns_hi[t] = b.hi.xy;
+        columns_hi_z[t] = b.hi.z;
     }
     workgroupBarrier();
     let row = tile.x * TILE + t;
@@ -47,11 +50,12 @@ fn hits(tile: vec2<u32>, t: u32, wanted: bool) -> vec4<u32> {
         let end = min(count, (w + 1u) * 32u);
         for (var c = max(begin, w * 32u); c < end; c++) {
             let lo = columns_lo[c];
-            let hi = columns_hi[c];
+            let hi = vec3<u32>(columns_hi[c], columns_hi_z[c]);
             let apart = a.lo.x > hi.x || lo.x > a.hi.x || a.lo.y > hi.y || lo.y > a.hi.y || a.lo.z > hi.z || lo.z > a.hi.z;
             word |= select(1u << (c & 31u), 0u, apart || !owned(a.lo.w, lo.w));
         }
-        found[w] = word;
+        // All words pass through: compilers may put a vector that is indexed by a variable into memory.
+        found = vec4<u32>(found.yzw, word);
     }
     return found;
 }
@@ -86,17 +90,18 @@ fn write(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     let tile = tiles(params.first + block);
     // Most tile pairs of a large sparse scene hold nothing. They must not return here: some compilers take no barrier behind a
     // branch on what a buffer holds.
-    let found = hits(tile, t, sums[block] != sums[block + 1u]);
+    var found = hits(tile, t, sums[block] != sums[block + 1u]);
     // Unsigned wrap-around puts what lies before the window beyond every capacity.
     var at = sums[block] + exclusive(t, ones(found)) - params.window;
-    let row = number(tile.x * TILE + t);
     for (var k = 0u; k < WORDS; k++) {
-        var word = found[k];
+        var word = found.x;
+        found = found.yzww;
         while (word != 0u) {
             let c = k * 32u + firstTrailingBit(word);
             word &= word - 1u;
+            // A row behind the last box has no bit, and no number.
             if (at < params.capacity) {
-                pairs[at] = pair_of(row, columns_lo[c].w);
+                pairs[at] = pair_of(number(tile.x * TILE + t), columns_lo[c].w);
             }
             at++;
         }

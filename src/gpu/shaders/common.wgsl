@@ -3,6 +3,17 @@
 // Bounds are compared as integers in the order of the floats. Float comparisons would be shorter, but drivers may flush
 // denormals to zero and may take NaN and infinities to be absent, and each of the two loses pairs.
 
+// A part of an axis with cells of one width.
+struct Segment {
+    begin: f32,
+    // Cells in a unit of length; 0 where there is one.
+    per_length: f32,
+    // The number of its first cell.
+    first: u32,
+    // Its last cell, counted from its first.
+    last: u32,
+}
+
 struct Params {
     // Boxes in this frame or piece.
     objects: u32,
@@ -12,7 +23,7 @@ struct Params {
     axis: u32,
     // Pairs that `pairs` has room for.
     capacity: u32,
-    // Where this submission goes on: in brute force the first tile pair, else the first candidate of every row.
+    // Brute force: the first tile pair of this submission.
     first: u32,
     // Blocks of rows, or tile pairs, in this submission.
     blocks: u32,
@@ -22,14 +33,27 @@ struct Params {
     slots: u32,
     // Cells of the grid across the sweep axis.
     cells: vec2<u32>,
-    // Sort key of the boxes that are kept apart, behind all others.
+    // Sort key of the first of the boxes that are kept apart, behind all others.
     large_key: u32,
-    // Slots that a box may cover beyond its first without being kept apart.
-    longest: u32,
-    // Where slots and cells begin, on the sweep axis and the two across.
-    origin: vec4<f32>,
-    // Slots or cells in a unit of length.
-    inverse: vec4<f32>,
+    // A box longer than this on the sweep axis that covers many slots is kept apart.
+    longest: f32,
+    // Which submission this is: another number than the one before, and never 0.
+    submission: u32,
+    // How many submissions of this frame came before.
+    round: u32,
+    // Candidates and nodes that a row is tested with in one submission.
+    budget: u32,
+    // The highest level of the tree; see `tree.wgsl`.
+    top: u32,
+    // Bits of a place on the curve that the cell of a box kept apart leaves out.
+    curve_shift: u32,
+    // Blocks of cells.
+    cell_blocks: u32,
+    // One over the longest extent of a usual box.
+    usual: f32,
+    unused: u32,
+    // For each axis, x the sweep axis, how it is divided into the cells of the curve, then into slots and the cells of the grid; see `division.wgsl`.
+    segments: array<Segment, 96>,
 }
 
 // What a submission found, for the CPU to read.
@@ -39,8 +63,16 @@ struct Header {
     total_high: u32,
     // Twice the position of the first invalid box, plus 1 if it is inverted; all ones when every box is valid.
     invalid: atomic<u32>,
-    // 1 where a row has candidates beyond those of this submission.
+    // 1 where a row has candidates beyond its budget.
     more: atomic<u32>,
+    // The number of the submission. Without it nothing was executed, and whatever else stands here says nothing.
+    ran: u32,
+    // For the indirect dispatch of a kernel over the pairs, workgroups of 64 of them.
+    groups_x: u32,
+    groups_y: u32,
+    groups_z: u32,
+    // How many of the pairs stand in `pairs`.
+    held: u32,
 }
 
 // A box with its axes turned so that x is the sweep axis. lo.w is its number, the owner bit on top.

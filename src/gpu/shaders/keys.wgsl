@@ -1,75 +1,64 @@
-// Before the sort a key for each box, after it the boxes in the order of their keys.
+// Before the sort: for each box its key, and how often each first digit or each cell occurs.
 
+// Sorted by digits: a key. Sorted by cells: the cell, then what `Box.hi.w` holds.
 @group(0) @binding(4) var<storage, read_write> keys: array<u32>;
-@group(0) @binding(5) var<storage, read> order: array<u32>;
-@group(0) @binding(6) var<storage, read_write> sorted: array<Box>;
-// For each box, by position in the input, what `Box.hi.w` holds in strips.
-@group(0) @binding(7) var<storage, read_write> reach: array<u32>;
+// For each digit and block of the first pass, or for each cell, how many boxes there are. Cleared before.
+@group(0) @binding(5) var<storage, read_write> counts: array<atomic<u32>>;
+// Which box of its cell a box is, by chance: `gather` sets their order right.
+@group(0) @binding(6) var<storage, read_write> ranks: array<u32>;
 
 fn invocation(w: vec3<u32>, n: vec3<u32>, t: u32) -> u32 {
     return (w.y * n.x + w.x) * 256u + t;
+}
+
+fn put_key(at: u32, key: u32) {
+    check_box(at);
+    keys[at] = key;
+    note_digit(0u, key, at);
 }
 
 @compute @workgroup_size(256)
 fn sweep_keys(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
     let at = invocation(w, n, t);
     if (at < params.objects) {
-        check_box(at);
-        keys[at] = order_key(bound(at, 0u, 0u));
+        put_key(at, order_key(bound(at, 0u, 0u)));
     }
 }
 
 @compute @workgroup_size(256)
-fn sweep_gather(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn curve_keys(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
     let at = invocation(w, n, t);
     if (at < params.objects) {
-        sorted[at] = load_box(order[at]);
+        put_key(at, curve(at));
     }
 }
 
-// The slot or cell of a bound, which never descends as the bound ascends: that alone makes the strips correct. It is worked
-// out in this one kernel only, because another might round in another way. Bounds outside go to the border cells.
-fn cell(bits: u32, axis: u32, cells: u32) -> u32 {
-    // Infinities are clamped first: infinity times an inverse of zero is not a number.
-    let v = clamp(bitcast<f32>(bits), -3.0e38, 3.0e38);
-    let c = (v - params.origin[axis]) * params.inverse[axis];
-    return min(u32(clamp(c, 0.0, f32(cells - 1u))), cells - 1u);
+// The first and the last cell of a box on an axis of the grid.
+fn cells_of(at: u32, axis: u32) -> vec2<u32> {
+    let base = GRID + axis * PARTS;
+    return vec2<u32>(cell(tame(bound(at, 0u, axis)), base), cell(tame(bound(at, 1u, axis)), base));
 }
 
 @compute @workgroup_size(256)
-fn strip_keys(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn cell_keys(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
     let at = invocation(w, n, t);
     if (at >= params.objects) {
         return;
     }
     check_box(at);
-    let first = vec3<u32>(
-        cell(bound(at, 0u, 0u), 0u, params.slots),
-        cell(bound(at, 0u, 1u), 1u, params.cells.x),
-        cell(bound(at, 0u, 2u), 2u, params.cells.y),
-    );
-    let last = vec3<u32>(
-        cell(bound(at, 1u, 0u), 0u, params.slots),
-        cell(bound(at, 1u, 1u), 1u, params.cells.x),
-        cell(bound(at, 1u, 2u), 2u, params.cells.y),
-    );
-    let span = last - first;
-    if (span.x > params.longest || span.y > 1u || span.z > 1u) {
-        keys[at] = params.large_key;
-        reach[at] = 0u;
-    } else {
-        keys[at] = (first.z * params.cells.x + first.y) * params.slots + first.x;
-        reach[at] = span.x | (span.y << 30u) | (span.z << 31u);
+    let x = cells_of(at, 0u);
+    let y = cells_of(at, 1u);
+    let z = cells_of(at, 2u);
+    // Of an inverted box, which is reported, some differences are huge.
+    let more = vec3<u32>(x.y - x.x, y.y - y.x, z.y - z.x);
+    var key = (z.x * params.cells.x + y.x) * params.slots + x.x;
+    var reach = more.x | (more.y << 30u) | (more.z << 31u);
+    let is_long = more.x > 16u && tame(bound(at, 1u, 0u)) - tame(bound(at, 0u, 0u)) > params.longest;
+    if (is_long || more.y > 1u || more.z > 1u) {
+        key = params.large_key + (curve(at) >> params.curve_shift);
+        reach = 0u;
     }
-}
-
-@compute @workgroup_size(256)
-fn strip_gather(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
-    let at = invocation(w, n, t);
-    if (at < params.objects) {
-        let source = order[at];
-        var b = load_box(source);
-        b.hi.w = reach[source];
-        sorted[at] = b;
-    }
+    keys[at * 2u] = key;
+    keys[at * 2u + 1u] = reach;
+    ranks[at] = atomicAdd(&counts[key], 1u);
 }

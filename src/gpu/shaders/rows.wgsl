@@ -1,12 +1,14 @@
 // Counting and writing the pairs of sorted boxes, one row an invocation. The file that follows says which boxes a row is
-// tested with: `search(row)` calls `hit` for each pair.
+// tested with: `search` calls `hit` for each pair.
+//
+// A row is tested with `params.budget` candidates in one submission and goes on in the next: drivers give up on a dispatch that takes
+// seconds, and some end a loop silently, lavapipe after 65 535 turns of all loops of an invocation together.
 
 const THREADS: u32 = 64u;
 // Pairs of a row that are kept while they are counted, so that most rows are searched once.
 const KEPT: u32 = 4u;
-// Candidates that a row is tested with in one submission; more come in further ones. Some drivers end a loop silently: lavapipe
-// after 65 535 turns of all loops of an invocation together. Others give up on a dispatch that takes seconds.
-const CANDIDATES: u32 = 32768u;
+// The state of a row that has been tested with all its candidates.
+const DONE: u32 = 0xffffffffu;
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> keys: array<u32>;
@@ -14,7 +16,8 @@ const CANDIDATES: u32 = 32768u;
 @group(0) @binding(3) var<storage, read_write> header: Header;
 @group(0) @binding(4) var<storage, read_write> sums: array<u32>;
 @group(0) @binding(5) var<storage, read_write> pairs: array<vec2<u32>>;
-@group(0) @binding(6) var<storage, read_write> counts: array<u32>;
+// The pairs of each row in this submission; then the states of all rows before a submission, of even ones and of odd ones.
+@group(0) @binding(6) var<storage, read_write> rows: array<u32>;
 @group(0) @binding(7) var<storage, read_write> kept: array<u32>;
 
 var<private> writing: bool;
@@ -22,26 +25,24 @@ var<private> writing: bool;
 var<private> found: u32;
 // Position of the row's first pair in `pairs`.
 var<private> start: u32;
-// Candidates of this row that earlier submissions tested and that are yet to be passed over, and those that are left to this one.
-var<private> passed: u32;
+// Candidates and nodes that this row may still be tested with.
 var<private> left: u32;
-// Whether there are candidates beyond those.
-var<private> more: bool;
 
-// The part of the candidates from `begin` to `end` that this submission tests.
-fn part(begin: u32, end: u32) -> vec2<u32> {
-    let over = min(passed, end - begin);
-    passed -= over;
-    let taken = min(left, end - begin - over);
-    left -= taken;
-    more = more || taken < end - begin - over;
-    return vec2<u32>(begin + over, begin + over + taken);
+fn state_at(row: u32, round: u32) -> u32 {
+    return (1u + (round & 1u)) * params.objects + row;
 }
 
-fn test_row(row: u32) {
-    passed = params.first;
-    left = CANDIDATES;
-    search(row);
+// Tests a row with its next candidates. Returns its state after it.
+fn test_row(row: u32) -> u32 {
+    var state = first_state(row);
+    if (params.round > 0u) {
+        state = rows[state_at(row, params.round)];
+        if (state == DONE) {
+            return DONE;
+        }
+    }
+    left = params.budget;
+    return search(row, state);
 }
 
 fn store(at: u32, pair: vec2<u32>) {
@@ -71,9 +72,10 @@ fn count(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     }
     let row = block * THREADS + t;
     if (row < params.objects) {
-        test_row(row);
-        counts[row] = found;
-        if (more) {
+        let state = test_row(row);
+        rows[row] = found;
+        rows[state_at(row, params.round + 1u)] = state;
+        if (state != DONE) {
             atomicStore(&header.more, 1u);
         }
     }
@@ -92,12 +94,12 @@ fn write(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u
     let row = block * THREADS + t;
     var count = 0u;
     if (row < params.objects) {
-        count = counts[row];
+        count = rows[row];
     }
     start = sums[block] + exclusive(t, count) - params.window;
     if (count > KEPT) {
         writing = true;
-        test_row(row);
+        _ = test_row(row);
         return;
     }
     if (count == 0u) {

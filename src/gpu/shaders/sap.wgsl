@@ -1,17 +1,24 @@
 // A row is tested with the boxes behind it until one begins after its end.
 
-fn search(row: u32) {
+// The state is the position of the next candidate.
+fn first_state(row: u32) -> u32 {
+    return row + 1u;
+}
+
+fn search(row: u32, state: u32) -> u32 {
     let a = boxes[row];
-    let begin = min(row + 1u + passed, params.objects);
-    let end = min(begin + left, params.objects);
-    for (var j = begin; j < end; j++) {
+    let end = min(state + left, params.objects);
+    for (var j = state; j < end; j++) {
         let b = boxes[j];
         if (b.lo.x > a.hi.x) {
-            return;
+            return DONE;
         }
         if (overlap_across(a, b)) {
             hit(row, a.lo.w, b.lo.w);
         }
     }
-    more = end < params.objects && boxes[end].lo.x <= a.hi.x;
+    if (end < params.objects && boxes[end].lo.x <= a.hi.x) {
+        return end;
+    }
+    return DONE;
 }

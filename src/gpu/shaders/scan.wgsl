@@ -3,6 +3,8 @@
 
 const THREADS: u32 = 256u;
 const EACH: u32 = 16u;
+// Workgroups on one axis of a dispatch that every GPU takes.
+const MOST_GROUPS: u32 = 65535u;
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(3) var<storage, read_write> header: Header;
@@ -53,5 +55,12 @@ fn positions(@builtin(local_invocation_index) t: u32) {
         sums[params.blocks] = before.x + (before.y << 16u);
         header.total_low = before.x | (before.y << 16u);
         header.total_high = before.y >> 16u;
+        let held = select(min(header.total_low, params.capacity), params.capacity, header.total_high > 0u);
+        let groups = held / 64u + min(held % 64u, 1u);
+        header.groups_x = min(groups, MOST_GROUPS);
+        header.groups_y = (groups + MOST_GROUPS - 1u) / MOST_GROUPS;
+        header.groups_z = 1u;
+        header.held = held;
+        header.ran = params.submission;
     }
 }

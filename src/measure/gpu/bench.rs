@@ -80,16 +80,16 @@ impl<'a> Bench<'a> {
     }
 
     /// Records commands and submits them.
-    pub(super) fn submit(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> wgpu::SubmissionIndex {
-        let mut encoder = self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        record(&mut encoder);
-        self.gpu.queue().submit([encoder.finish()])
+    pub(super) fn submit(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<wgpu::SubmissionIndex, String> {
+        let mut commands = self.gpu.record();
+        record(&mut commands);
+        self.gpu.submit(commands).map_err(words)
     }
 
     /// Records commands, submits them and waits for them; the time of all three.
     pub(super) fn time(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<Duration, String> {
         let start = Instant::now();
-        let submission = self.submit(record);
+        let submission = self.submit(record)?;
         self.gpu.wait(submission).map_err(words)?;
         Ok(start.elapsed())
     }
@@ -107,13 +107,13 @@ impl<'a> Bench<'a> {
 
     /// The first word of a buffer, by way of 4 bytes of memory that the CPU reads.
     pub(super) fn read_word(&self, buffer: &wgpu::Buffer, staging: &wgpu::Buffer) -> Result<u32, String> {
-        let submission = self.submit(|encoder| encoder.copy_buffer_to_buffer(buffer, 0, staging, 0, 4));
-        staging.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+        let submission = self.submit(|encoder| encoder.copy_buffer_to_buffer(buffer, 0, staging, 0, 4))?;
+        self.gpu.map(staging.slice(..), wgpu::MapMode::Read, |_| {});
         self.gpu.wait(submission).map_err(words)?;
         let view = staging.slice(..).get_mapped_range().map_err(|e| e.to_string())?;
         let word = view.first_chunk().map(|bytes| u32::from_le_bytes(*bytes));
         drop(view);
-        staging.unmap();
+        self.gpu.unmap(staging);
         word.ok_or_else(|| "a mapping came without its bytes".to_owned())
     }
 }

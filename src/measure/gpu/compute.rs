@@ -59,7 +59,7 @@ impl Arithmetic {
     }
 
     /// Submits `count` dispatches and does not wait.
-    pub(super) fn submit(&self, bench: &Bench<'_>, bound: &Bound, count: u32) -> wgpu::SubmissionIndex {
+    pub(super) fn submit(&self, bench: &Bench<'_>, bound: &Bound, count: u32) -> Result<wgpu::SubmissionIndex, String> {
         bench.submit(|encoder| record(bound, encoder, self.groups, count))
     }
 }

@@ -135,7 +135,7 @@ fn round_trips(benches: &[Bench<'_>]) -> Result<Vec<Parameter>, String> {
                 .iter()
                 .zip(&bound)
                 .map(|(bench, bound)| bench.submit(|encoder| record(bound, encoder, 1, 1)))
-                .collect();
+                .collect::<Result<_, _>>()?;
             for (bench, submission) in benches.iter().zip(submissions) {
                 bench.gpu.wait(submission).map_err(words)?;
             }

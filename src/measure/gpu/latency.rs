@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use super::bench::{Bench, or_missing, record, words};
+use crate::gpu::GpuErrorKind;
 use crate::hardware::{GpuParameterId, Parameter};
 
 const SOURCE: &str = include_str!("shaders/latency.wgsl");
@@ -22,6 +23,22 @@ pub(super) fn measure(bench: &Bench<'_>) -> Vec<Parameter> {
     or_missing(&NAMES, latencies(bench))
 }
 
+/// That the GPU executes what it is given. `Err` says that it does not; whatever else goes wrong shows in what is measured next.
+pub(super) fn proof(bench: &Bench<'_>) -> Result<(), String> {
+    const STEPS: u32 = 3;
+    let counted = || -> Result<u32, String> {
+        let count = bench.storage(16)?;
+        let step = bench.bind(&bench.kernel(SOURCE, "step", &[])?, &[(0, &count)])?;
+        bench.time_dispatches(&step, 1, STEPS)?;
+        bench.first_word(&count)
+    };
+    let told = match counted() {
+        Ok(steps) if steps != STEPS => Err(bench.gpu.inert()),
+        _ => bench.gpu.check(),
+    };
+    told.or_else(|e| if e.kind() == GpuErrorKind::Inert { Err(e.to_string()) } else { Ok(()) })
+}
+
 fn latencies(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     let count = bench.storage(16)?;
     let (empty, step) = (bench.kernel(SOURCE, "empty", &[])?, bench.kernel(SOURCE, "step", &[])?);
@@ -32,7 +49,7 @@ fn latencies(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     let mut figures = bench
         .collect(bench.plan(40, bench.pick(250, 400)), || {
             let start = Instant::now();
-            let submission = bench.submit(|encoder| record(&empty, encoder, 1, 1));
+            let submission = bench.submit(|encoder| record(&empty, encoder, 1, 1))?;
             let submit = start.elapsed();
             bench.gpu.wait(submission).map_err(words)?;
             let round_trip = start.elapsed();

@@ -15,15 +15,16 @@ const NVIDIA: u32 = 0x10de;
 const INTEL: u32 = 0x8086;
 const APPLE: u32 = 0x106b;
 
-pub(super) fn measure(bench: &Bench<'_>, raw: &Raw) -> Vec<Parameter> {
+pub(super) fn measure(bench: &Bench<'_>, raw: &Raw, executes: bool) -> Vec<Parameter> {
     let info = bench.gpu.device().adapter_info();
-    let (nvml, sysfs, clock) = if bench.is_software() { (None, None, None) } else { ask(bench, &info) };
+    let (nvml, sysfs, clock) = if bench.is_software() || !executes { (None, None, None) } else { ask(bench, &info) };
     let mut parameters = limits(bench);
     parameters.push(memory(bench, raw, nvml.as_ref(), sysfs.as_ref()));
     parameters.push(clock_parameter(bench, &info, nvml.as_ref(), clock));
     parameters.extend(processors(bench, &info, raw, nvml.as_ref(), sysfs.as_ref()));
-    parameters.push(subgroup(bench, &info));
+    parameters.push(subgroup(bench, &info, raw, executes));
     parameters.push(unified(bench, raw));
+    parameters.extend(heaps(bench, raw));
     parameters
 }
 
@@ -74,7 +75,7 @@ impl Load {
 
     fn start(&self, bench: &Bench<'_>) -> Option<wgpu::SubmissionIndex> {
         let bound = self.work.bind(bench, self.rounds).ok()?;
-        Some(self.work.submit(bench, &bound, 8))
+        self.work.submit(bench, &bound, 8).ok()
     }
 }
 
@@ -188,10 +189,15 @@ fn unknown(info: &wgpu::AdapterInfo) -> &'static str {
     }
 }
 
-fn subgroup(bench: &Bench<'_>, info: &wgpu::AdapterInfo) -> Parameter {
+fn subgroup(bench: &Bench<'_>, info: &wgpu::AdapterInfo, raw: &Raw, executes: bool) -> Parameter {
     let name = GpuParameterId::SubgroupLanes;
     let (low, high) = (info.subgroup_min_size, info.subgroup_max_size);
-    let seen = if bench.gpu.device().features().contains(wgpu::Features::SUBGROUP) {
+    if let (false, Some((lanes, source))) = (executes, raw.subgroup) {
+        return Parameter::reported(name, f64::from(lanes), source);
+    }
+    let seen = if !executes {
+        Err("the GPU executes nothing".to_owned())
+    } else if bench.gpu.device().features().contains(wgpu::Features::SUBGROUP) {
         observe(bench)
     } else {
         Err("the device has no subgroups".to_owned())
@@ -212,6 +218,32 @@ fn observe(bench: &Bench<'_>) -> Result<u32, String> {
     let kernel = bench.kernel(SUBGROUP_SOURCE, "observe", &[])?;
     bench.time_dispatches(&bench.bind(&kernel, &[(0, &lanes)])?, 1, 1)?;
     bench.first_word(&lanes)
+}
+
+/// What the CPU reaches of the memory of a card.
+fn heaps(bench: &Bench<'_>, raw: &Raw) -> [Parameter; 3] {
+    use GpuParameterId::{DeviceLocalBytes, HostVisibleLocalBytes, ResizableBar};
+    let bytes = |id: GpuParameterId, bytes: Option<u64>, source: &str| match bytes {
+        Some(bytes) => Parameter::reported(id, bytes as f64, source),
+        None => Parameter::missing(id, "no driver has told of its heaps of memory"),
+    };
+    let bar = match (bench.gpu.identity().kind, raw.has_resizable_bar()) {
+        (GpuKind::Discrete, Some(yes)) => {
+            let source = "Vulkan, whether the host-visible device-local heap is as large as the device-local one";
+            Parameter::reported(ResizableBar, f64::from(u8::from(yes)), source)
+        }
+        (GpuKind::Discrete, None) => Parameter::missing(ResizableBar, "no driver has told of its heaps of memory"),
+        _ => Parameter::missing(ResizableBar, "a matter of cards with memory of their own"),
+    };
+    [
+        bytes(DeviceLocalBytes, raw.largest_local_bytes(), "Vulkan, the largest device-local heap"),
+        bytes(
+            HostVisibleLocalBytes,
+            raw.visible_local_bytes(),
+            "Vulkan, the largest device-local heap with a host-visible type",
+        ),
+        bar,
+    ]
 }
 
 fn unified(bench: &Bench<'_>, raw: &Raw) -> Parameter {

@@ -9,6 +9,6 @@ const SOURCES: [(&str, &str); 5] = [
 ];
 
 #[test]
-fn kernels_are_valid() {
+fn every_shader_is_valid() {
     SOURCES.iter().for_each(|(name, source)| crate::gpu::kernel::assert_valid(name, source));
 }

@@ -177,10 +177,12 @@ impl<'a> Transfer<'a> {
         view.copy_from_slice(source);
         drop(view);
         let host = start.elapsed();
-        self.up.unmap();
-        let submission = self.bench.submit(|encoder| encoder.copy_buffer_to_buffer(&self.up, 0, &self.device, 0, bytes));
+        let submission = self.bench.submit(|encoder| {
+            self.up.unmap();
+            encoder.copy_buffer_to_buffer(&self.up, 0, &self.device, 0, bytes);
+        })?;
         // Mapped as a whole: the next transfer may be larger.
-        self.up.slice(..).map_async(wgpu::MapMode::Write, |_| {});
+        self.bench.gpu.map(self.up.slice(..), wgpu::MapMode::Write, |_| {});
         self.bench.gpu.wait(submission).map_err(words)?;
         Ok(Times { host, device: start.elapsed().saturating_sub(host) })
     }
@@ -188,15 +190,16 @@ impl<'a> Transfer<'a> {
     /// Fetches the first bytes.
     fn download(&mut self, bytes: u64) -> Result<Times, String> {
         let start = Instant::now();
-        let submission = self.bench.submit(|encoder| encoder.copy_buffer_to_buffer(&self.device, 0, &self.down, 0, bytes));
-        self.down.slice(..bytes).map_async(wgpu::MapMode::Read, |_| {});
+        let submission =
+            self.bench.submit(|encoder| encoder.copy_buffer_to_buffer(&self.device, 0, &self.down, 0, bytes))?;
+        self.bench.gpu.map(self.down.slice(..bytes), wgpu::MapMode::Read, |_| {});
         self.bench.gpu.wait(submission).map_err(words)?;
         let view = self.down.slice(..bytes).get_mapped_range().map_err(|e| e.to_string())?;
         let device = start.elapsed();
         self.received.get_mut(..bytes as usize).ok_or("more bytes than there are")?.copy_from_slice(&view);
         let host = start.elapsed().saturating_sub(device);
         drop(view);
-        self.down.unmap();
+        self.bench.gpu.unmap(&self.down);
         Ok(Times { host, device })
     }
 

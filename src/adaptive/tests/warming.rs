@@ -1,0 +1,137 @@
+//! No frame waits for an algorithm that gets ready.
+
+use super::*;
+use std::sync::{Arc, Condvar, Mutex};
+use std::time::Duration;
+
+/// For what would hang for ever.
+const LONG: Duration = Duration::from_secs(60);
+
+/// What an algorithm does that never gets ready until it is let go.
+#[derive(Default)]
+struct Gate {
+    /// How often it was to get ready, and whether it may.
+    state: Mutex<(u32, bool)>,
+    changed: Condvar,
+}
+
+impl Gate {
+    fn pass(&self) {
+        let mut state = self.state.lock().unwrap();
+        state.0 += 1;
+        self.changed.notify_all();
+        let (state, _) = self.changed.wait_timeout_while(state, LONG, |s| !s.1).unwrap();
+        assert!(state.1, "nobody has let it go");
+    }
+
+    fn wait_until_asked(&self) {
+        let (state, _) = self.changed.wait_timeout_while(self.state.lock().unwrap(), LONG, |s| s.0 == 0).unwrap();
+        assert!(state.0 > 0, "it was never to get ready");
+    }
+
+    fn open(&self) {
+        self.state.lock().unwrap().1 = true;
+        self.changed.notify_all();
+    }
+}
+
+/// Brute force behind a driver that keeps it waiting.
+struct Slow(Box<dyn BroadPhase>, Arc<Gate>);
+
+impl BroadPhase for Slow {
+    fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        self.0.find_pairs(boxes, pairs)
+    }
+
+    fn prepare(&mut self, _: usize) {
+        self.1.pass();
+    }
+}
+
+/// The module over `slow@gpu0` and one other.
+fn beside(other: &str, costs: [(f64, f64); 2]) -> (Adaptive, Arc<Gate>) {
+    let gate = Arc::<Gate>::default();
+    let mut registry = Registry::with_cores(1);
+    let made = Arc::clone(&gate);
+    registry.add("slow@gpu0".parse().unwrap(), 1, move || {
+        let brute = Registry::with_cores(1).create(&"brute@cpu1".parse().unwrap())?;
+        Ok(Box::new(Slow(brute, Arc::clone(&made))))
+    });
+    registry.add("fragile@gpu1".parse().unwrap(), 1, || Ok(Box::new(Fragile(3))));
+    let [(call, object), (slow_call, slow_object)] = costs;
+    let tuning = tuning(&[(other, call, object), ("slow@gpu0", slow_call, slow_object)]);
+    let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
+    adaptive.set_learning(false);
+    (adaptive, gate)
+}
+
+#[test]
+fn frames_go_on_while_the_runner_up_waits_for_its_driver_and_it_is_chosen_once_it_is_ready() {
+    // 10 n = 500 + 5 n at n = 100.
+    let (mut adaptive, gate) = beside("brute@cpu1", [(0.0, 10.0), (500.0, 5.0)]);
+    for _ in 0..3 {
+        assert_eq!(chosen(&mut adaptive, 90).0, "brute@cpu1");
+    }
+    gate.wait_until_asked();
+    // Now it would be the cheaper one, and is not there.
+    for _ in 0..200 {
+        assert_eq!(chosen(&mut adaptive, 128).0, "brute@cpu1");
+    }
+    gate.open();
+    let began = Instant::now();
+    while chosen(&mut adaptive, 128).0 != "slow@gpu0" {
+        assert!(began.elapsed() < LONG, "it was not chosen when it was ready");
+    }
+    assert_eq!(gate.state.lock().unwrap().0, 1, "it was to get ready once");
+}
+
+#[test]
+fn where_nothing_else_can_run_the_frame_waits_for_it() {
+    let (mut adaptive, gate) = beside("fragile@gpu1", [(1.0, 0.0), (1.2, 0.0)]);
+    assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu1");
+    gate.wait_until_asked();
+    assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu1");
+    assert_eq!(chosen(&mut adaptive, 30).0, "fragile@gpu1");
+    std::thread::scope(|scope| {
+        scope.spawn(|| gate.open());
+        assert_eq!(chosen(&mut adaptive, 30), ("slow@gpu0".to_owned(), Reason::FellBack));
+    });
+}
+
+#[test]
+fn what_gets_ready_ends_with_the_module() {
+    let (mut adaptive, gate) = beside("brute@cpu1", [(0.0, 10.0), (0.0, 11.0)]);
+    chosen(&mut adaptive, 90);
+    gate.wait_until_asked();
+    let held = Arc::strong_count(&gate);
+    std::thread::scope(|scope| {
+        scope.spawn(|| gate.open());
+        drop(adaptive);
+    });
+    assert!(Arc::strong_count(&gate) < held, "the thread holds its algorithm still");
+}
+
+#[test]
+fn one_that_panics_while_it_gets_ready_is_never_chosen() {
+    struct Panics;
+    impl BroadPhase for Panics {
+        fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+            pairs.clear();
+            pairs.finish()
+        }
+        fn prepare(&mut self, _: usize) {
+            panic!("of the test");
+        }
+    }
+    let mut registry = Registry::with_cores(1);
+    registry.add("panics@gpu0".parse().unwrap(), 1, || Ok(Box::new(Panics)));
+    let tuning = tuning(&[("brute@cpu1", 0.0, 10.0), ("panics@gpu0", 500.0, 5.0)]);
+    let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
+    adaptive.set_learning(false);
+    chosen(&mut adaptive, 90);
+    // Waits for it, and goes on without it.
+    adaptive.prepare(90);
+    for _ in 0..100 {
+        assert_eq!(chosen(&mut adaptive, 128).0, "brute@cpu1");
+    }
+}

@@ -1,0 +1,180 @@
+//! How an axis is divided into cells; see `shaders/division.wgsl`.
+//!
+//! Cells of one width are few where the boxes are, once some of them are far away. So an axis is divided along a line with corners through the
+//! distribution of the boxes, by the method of Ramer (1972) and of Douglas and Peucker (1973): one straight part where they lie evenly, a part for each
+//! cluster and each gap where they do not. Within a part all cells have one width.
+
+/// Most parts of an axis: eight clusters with gaps between them.
+pub(super) const PARTS: usize = 16;
+
+/// A part is straight while no box of it is further from its line, in ranks, than this times the root of their number. Of a thousand looks at boxes that
+/// are spread evenly one finds such a box (Kolmogorov's distribution).
+const NOISE: f64 = 1.95;
+
+/// A frame is looked at by a sample of its boxes. A cluster ends not where the outermost of these lies, but this many times their mean distance beyond it.
+const BEYOND: f64 = 2.0;
+
+/// The parts of an axis, ascending.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Parts {
+    /// Where each begins, with the rank of the sampled box there; behind the last part where it ends.
+    corners: [(f64, f64); PARTS + 1],
+    count: usize,
+}
+
+/// A part with its cells: `Segment` of `shaders/common.wgsl`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(super) struct Segment {
+    begin: f32,
+    /// Cells in a unit of length; 0 where there is one.
+    per_length: f32,
+    /// The number of its first cell.
+    first: u32,
+    /// Its last cell, counted from its first.
+    last: u32,
+}
+
+/// The cells of an axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Division {
+    pub(super) segments: [Segment; PARTS],
+    pub(super) cells: u32,
+}
+
+impl Parts {
+    /// Of boxes whose centres, in ascending order and finite, are these.
+    pub(super) fn of(centres: &[f32]) -> Self {
+        let Some(end) = centres.len().checked_sub(1) else { return Self { count: 1, ..Self::default() } };
+        let mut ends = vec![0, end];
+        while ends.len() <= PARTS
+            && let Some(corner) =
+                ends.windows(2).filter_map(|w| sharpest(centres, w[0], w[1])).max_by(|a, b| a.1.total_cmp(&b.1))
+        {
+            ends.insert(ends.partition_point(|&at| at < corner.0), corner.0);
+        }
+        let mut parts = Self { count: ends.len() - 1, ..Self::default() };
+        for (corner, &at) in parts.corners.iter_mut().zip(&ends) {
+            *corner = (f64::from(centres[at]), at as f64);
+        }
+        parts.widen_clusters();
+        parts
+    }
+
+    /// Moves each corner into the emptier of its two parts.
+    fn widen_clusters(&mut self) {
+        let corners = self.corners;
+        let width = |k: usize| corners[k + 1].0 - corners[k].0;
+        let distance = |k: usize| width(k) / (corners[k + 1].1 - corners[k].1);
+        for k in 1..self.count {
+            // Both ends of a part may move, so neither as far as its middle.
+            let (before, after) = (distance(k - 1), distance(k));
+            self.corners[k].0 += if before < after {
+                (BEYOND * before).min(0.4 * width(k))
+            } else {
+                -(BEYOND * after).min(0.4 * width(k - 1))
+            };
+        }
+    }
+
+    /// Divides each part into as many cells as `cells` says of its width and its share of the boxes, and at least one.
+    pub(super) fn divide(&self, cells: impl Fn(f64, f64) -> f64) -> Division {
+        let all = self.corners[self.count].1.max(1.0);
+        // No bound is beyond the largest float, so that no box is found in a part that is not used.
+        let mut division = Division { segments: [Segment { begin: f32::MAX, ..Segment::default() }; PARTS], cells: 0 };
+        for (segment, ends) in division.segments.iter_mut().zip(self.corners[..=self.count].windows(2)) {
+            let width = ends[1].0 - ends[0].0;
+            let wanted = cells(width, (ends[1].1 - ends[0].1) / all).floor().max(1.0);
+            // A world so small that the inverse of a cell overflows has one, and so has one without a width.
+            let per_length = if wanted > 1.0 { (wanted / width) as f32 } else { 0.0 };
+            let count = if per_length.is_finite() { wanted as u32 } else { 1 };
+            *segment = Segment {
+                begin: ends[0].0 as f32,
+                per_length: if count > 1 { per_length } else { 0.0 },
+                first: division.cells,
+                last: count - 1,
+            };
+            division.cells += count;
+        }
+        division
+    }
+}
+
+/// The box between two that is furthest from the line between them, and by how many times what is taken for noise; `None` where all are near it.
+fn sharpest(centres: &[f32], first: usize, last: usize) -> Option<(usize, f64)> {
+    let at = |k: usize| f64::from(centres[k]);
+    let boxes = (last - first) as f64;
+    let per_length = boxes / (at(last) - at(first));
+    let off = |k: usize| ((k - first) as f64 - (at(k) - at(first)) * per_length).abs() / (NOISE * boxes.sqrt());
+    let all = (first + 1..last).map(|k| (k, off(k)));
+    all.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|&(_, off)| off.is_finite() && off > 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The cell of a value, as the kernel finds it.
+    fn cell(division: &Division, value: f32) -> u32 {
+        let segment = division.segments.iter().rev().find(|s| s.begin <= value).unwrap_or(&division.segments[0]);
+        segment.first + (((value - segment.begin) * segment.per_length).max(0.0) as u32).min(segment.last)
+    }
+
+    /// 256 places that lie as evenly as chance lets them.
+    fn evenly(seed: u64, length: f64) -> Vec<f32> {
+        let mut list: Vec<f32> =
+            (0..256).map(|k| (crate::splitmix::mix(seed << 32 | k) as f64 / u64::MAX as f64 * length) as f32).collect();
+        list.sort_unstable_by(f32::total_cmp);
+        list
+    }
+
+    #[test]
+    fn evenly_spread_boxes_have_one_part() {
+        let bent = (0..1000).filter(|&seed| Parts::of(&evenly(seed, 100.0)).count > 1).count();
+        assert!(bent <= 5, "{bent} of 1000");
+        let division = Parts::of(&evenly(1, 100.0)).divide(|width, share| (width * share / 9.0).round());
+        assert_eq!((division.cells, division.segments[1].begin), (11, f32::MAX));
+    }
+
+    #[test]
+    fn clusters_and_the_gaps_between_them_have_parts_of_their_own() {
+        // Two of a length of 100, a million apart, and a few boxes far below both.
+        let mut centres: Vec<f32> = evenly(1, 100.0)
+            .into_iter()
+            .step_by(2)
+            .chain(evenly(2, 100.0).into_iter().step_by(2).map(|v| v + 1.0e6))
+            .collect();
+        centres.splice(0..0, [-1.0e30; 12]);
+        let parts = Parts::of(&centres);
+        let division = parts.divide(|_, share| 1000.0 * share);
+        let in_cluster =
+            |low: f32| (0..100).map(|k| cell(&division, low + k as f32)).collect::<std::collections::BTreeSet<_>>().len();
+        assert!(in_cluster(0.0) > 90 && in_cluster(1.0e6) > 90, "{division:?}");
+        assert!((4..=7).contains(&parts.count), "{parts:?}");
+    }
+
+    #[test]
+    fn no_cell_descends_as_the_bound_ascends() {
+        for seed in 0..50 {
+            // Each place many times as far out as the one before, so that there are as many corners as there may be.
+            let centres: Vec<f32> =
+                evenly(seed, 1.0).iter().map(|v| (v * 40.0 * ((seed % 7) as f32 + 0.1)).exp() - 5.0).collect();
+            let division = Parts::of(&centres).divide(|width, share| (width * 3.0).min(share * 5000.0));
+            let mut bounds: Vec<f32> = centres.iter().flat_map(|&v| [v.next_down(), v, v.next_up(), v * 1.5, -v]).collect();
+            bounds.extend(division.segments.iter().flat_map(|s| [s.begin.next_down(), s.begin, s.begin.next_up()]));
+            bounds.extend([-1.0e38, 1.0e38, 0.0]);
+            bounds.retain(|v| v.abs() <= 1.0e38);
+            bounds.sort_unstable_by(f32::total_cmp);
+            assert!(bounds.is_sorted_by_key(|&v| cell(&division, v)), "{division:?}");
+            assert!(bounds.iter().all(|&v| cell(&division, v) < division.cells));
+        }
+    }
+
+    #[test]
+    fn worlds_without_a_width_have_one_cell() {
+        for centres in [&[][..], &[1.0], &[1.0, 1.0, 1.0], &[0.0, f32::MIN_POSITIVE / 1.0e6]] {
+            let division = Parts::of(centres).divide(|_, _| 1.0e6);
+            assert_eq!((division.cells, division.segments[0].per_length), (1, 0.0), "{centres:?}");
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! What a plan for a GPU is made of: a glance at a frame.
+
+use super::division::Parts;
+use crate::load::{Chosen, Sample};
+
+/// Statistics of a sample of boxes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Look {
+    pub(super) sample: Sample,
+    /// For each axis the parts in which the boxes lie evenly.
+    pub(super) parts: [Parts; 3],
+}
+
+impl Look {
+    /// At boxes that were chosen from a frame, whose statistics are known.
+    pub(super) fn of(chosen: &Chosen, sample: Sample) -> Self {
+        let boxes = chosen.as_slice();
+        let parts = |axis: usize| {
+            let centre = |low: f32, high: f32| low + (high - low) * 0.5;
+            let mut centres: Vec<f32> = boxes.iter().map(|b| centre(tame(b.min[axis]), tame(b.max[axis]))).collect();
+            centres.sort_unstable_by(f32::total_cmp);
+            Parts::of(&centres)
+        };
+        Self { sample, parts: [parts(0), parts(1), parts(2)] }
+    }
+
+    /// At these boxes themselves.
+    pub(super) fn at(chosen: &Chosen) -> Self {
+        Self::of(chosen, Sample::statistics(chosen))
+    }
+}
+
+/// As `tame` of `shaders/curve.wgsl`.
+fn tame(bound: f32) -> f32 {
+    bound.clamp(-1.0e38, 1.0e38)
+}

@@ -1,0 +1,70 @@
+//! Scopes that catch what a device has against our calls, so that its handlers, which may be the program's, hear nothing of it.
+
+use std::ops::{Deref, DerefMut};
+
+/// Errors of one or of every kind, in the calls of this thread until it ends.
+pub(super) struct Scope {
+    guards: [Option<wgpu::ErrorScopeGuard>; 3],
+}
+
+impl Scope {
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        let filters = [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Validation];
+        Self { guards: filters.map(|filter| Some(device.push_error_scope(filter))) }
+    }
+
+    /// For calls that fail in one way only.
+    pub(super) fn of_one(device: &wgpu::Device, filter: wgpu::ErrorFilter) -> Self {
+        Self { guards: [Some(device.push_error_scope(filter)), None, None] }
+    }
+
+    /// Ends it, and returns the error if there was one.
+    pub(super) fn end(mut self) -> Result<(), wgpu::Error> {
+        self.pop().map_or(Ok(()), Err)
+    }
+
+    fn pop(&mut self) -> Option<wgpu::Error> {
+        // In the reverse of the order in which they began, which wgpu insists on.
+        let guards = self.guards.iter_mut().rev().filter_map(Option::take);
+        guards.fold(None, |error, guard| pollster::block_on(guard.pop()).or(error))
+    }
+}
+
+impl Drop for Scope {
+    fn drop(&mut self) {
+        let _ = self.pop();
+    }
+}
+
+/// Commands on their way to a device: one scope from the first of them until they are submitted.
+pub(crate) struct Recording {
+    encoder: wgpu::CommandEncoder,
+    scope: Scope,
+}
+
+impl Recording {
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        let scope = Scope::new(device);
+        let encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sapwise") });
+        Self { encoder, scope }
+    }
+
+    pub(super) fn submit(self, queue: &wgpu::Queue) -> Result<wgpu::SubmissionIndex, wgpu::Error> {
+        let submission = queue.submit([self.encoder.finish()]);
+        self.scope.end().map(|()| submission)
+    }
+}
+
+impl Deref for Recording {
+    type Target = wgpu::CommandEncoder;
+
+    fn deref(&self) -> &Self::Target {
+        &self.encoder
+    }
+}
+
+impl DerefMut for Recording {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.encoder
+    }
+}

@@ -1,0 +1,73 @@
+// A counting sort by cell: from how many boxes each cell holds to where each cell begins, which is the table that the search reads too,
+// then each box to its place. `keys.wgsl` has counted.
+
+const THREADS: u32 = 256u;
+// Cells of one workgroup.
+const EACH: u32 = 4096u;
+
+@group(0) @binding(0) var<uniform> params: Params;
+// The counts of all cells, four in each; then where each cell begins. Whole blocks of `EACH`, zero behind the last cell.
+@group(0) @binding(1) var<storage, read_write> cells: array<vec4<u32>>;
+// The sums of blocks.
+@group(0) @binding(2) var<storage, read_write> sums: array<u32>;
+// Where each cell begins.
+@group(0) @binding(3) var<storage, read> table: array<u32>;
+@group(0) @binding(4) var<storage, read> keys: array<vec2<u32>>;
+@group(0) @binding(5) var<storage, read> ranks: array<u32>;
+@group(0) @binding(6) var<storage, read_write> order: array<u32>;
+
+fn total(v: vec4<u32>) -> u32 {
+    return v.x + v.y + v.z + v.w;
+}
+
+// What stands before each of four, of which the first has `first` before it.
+fn starts(first: u32, v: vec4<u32>) -> vec4<u32> {
+    return vec4<u32>(first, first + v.x, first + v.x + v.y, first + v.x + v.y + v.z);
+}
+
+@compute @workgroup_size(256)
+fn add_up(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+    let block = w.y * n.x + w.x;
+    if (block >= params.cell_blocks) {
+        return;
+    }
+    let at = block * (EACH / 4u) + t;
+    let own = cells[at] + cells[at + THREADS] + cells[at + 2u * THREADS] + cells[at + 3u * THREADS];
+    _ = exclusive(t, total(own));
+    if (t == THREADS - 1u) {
+        sums[block] = scan[t];
+    }
+}
+
+@compute @workgroup_size(256)
+fn begin(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+    let block = w.y * n.x + w.x;
+    if (block >= params.cell_blocks) {
+        return;
+    }
+    var before = 0u;
+    for (var k = t; k < block; k += THREADS) {
+        before += sums[k];
+    }
+    let at = block * (EACH / 4u) + t * 4u;
+    let a = cells[at];
+    let b = cells[at + 1u];
+    let c = cells[at + 2u];
+    let d = cells[at + 3u];
+    _ = exclusive(t, before);
+    let blocks_before = scan[THREADS - 1u];
+    workgroupBarrier();
+    let first = blocks_before + exclusive(t, total(a + b + c + d));
+    cells[at] = starts(first, a);
+    cells[at + 1u] = starts(first + total(a), b);
+    cells[at + 2u] = starts(first + total(a + b), c);
+    cells[at + 3u] = starts(first + total(a + b + c), d);
+}
+
+@compute @workgroup_size(256)
+fn put(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+    let at = (w.y * n.x + w.x) * THREADS + t;
+    if (at < params.objects) {
+        order[table[keys[at].x] + ranks[at]] = at;
+    }
+}

@@ -1,0 +1,41 @@
+// Walks over the tree, from one position in the order to the end. There is no stack: where the walk goes on follows from where it is.
+
+// Tests a row with all boxes that stand at `begin` or behind it. Returns `DONE`, or the position at which to go on.
+fn walk(row: u32, a: Box, begin: u32) -> u32 {
+    var at = begin - 1u;
+    var level = 0u;
+    var first = 0u;
+    var down = false;
+    loop {
+        if (down) {
+            down = false;
+        } else {
+            at++;
+            // What begins a group is tested as a group.
+            while (level < params.top && (at & 7u) == 0u) {
+                first += span(level);
+                level++;
+                at >>= 3u;
+            }
+        }
+        if (at >= span(level)) {
+            break;
+        }
+        if (left == 0u) {
+            return at << (3u * level);
+        }
+        left--;
+        let b = boxes[first + at];
+        if (a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && overlap_across(a, b)) {
+            if (level == 0u) {
+                hit(row, a.lo.w, b.lo.w);
+            } else {
+                level--;
+                first -= span(level);
+                at <<= 3u;
+                down = true;
+            }
+        }
+    }
+    return DONE;
+}
