@@ -64,9 +64,10 @@ impl Kept {
             fs::remove_dir(&file).unwrap();
             self.damaged.retain(|d| *d != file);
         }
-        // One for each number of cores: what could not be put in its place has left nothing behind.
-        let files = fs::read_dir(self.folder.path().join("cache")).map_or(0, Iterator::count);
-        assert!(files <= 4, "{files} files in the cache");
+        // One for each number of cores, and the lock: what could not be put in its place has left nothing behind.
+        let entries = fs::read_dir(self.folder.path().join("cache")).into_iter().flatten().flatten();
+        let names: Vec<_> = entries.map(|e| e.file_name().into_string().unwrap()).filter(|n| n != ".sapwise.lock").collect();
+        assert!(names.len() <= 4 && names.iter().all(|n| n.starts_with("tuning-")), "{names:?} in the cache");
     }
 
     /// Something happens to a file, or nothing does.
