@@ -146,7 +146,7 @@ pub struct TimedTerm {
 pub struct Point {
     /// Name of the scenario.
     pub scenario: String,
-    /// Load of the last frame, as an in-line choice would have estimated it, with the pairs of the frame before.
+    /// Mean load of the timed frames, each as an in-line choice would have estimated it, with the pairs of the frame before.
     pub load: Load,
     /// Pairs in the last frame.
     pub pairs: u64,

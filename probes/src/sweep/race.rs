@@ -106,18 +106,20 @@ impl Race {
         let mut frames = 0;
         let (mut spoiled, mut highest) = (0, None);
         let (mut windows, mut thrown) = (0, 0);
-        let mut pairs_before = None;
         let mut shortest = Duration::MAX;
+        let mut mean_load = MeanLoad::default();
         loop {
             // Samples are kept or thrown away by windows that are long enough to tell foreign load.
             let watch = Watch::begin();
             let mut fresh = 0;
+            let load_before = mean_load;
             while fresh == 0 || !watch.is_long_enough() {
                 let started = Instant::now();
-                pairs_before = self.frame(racers, scene, |r| !r.rests, &mut mismatches);
+                let pairs_before = self.frame(racers, scene, |r| !r.rests, &mut mismatches);
                 if racers.iter().all(|r| !r.rests) {
                     shortest = shortest.min(started.elapsed());
                 }
+                mean_load.add(&self.load(scene, pairs_before));
                 fresh += 1;
             }
             let foreign = watch.foreign_load();
@@ -133,6 +135,7 @@ impl Race {
                 racer.keep(frames, if redo { 0 } else { kept });
             }
             if redo {
+                mean_load = load_before;
                 spoiled += kept as u32;
                 thrown += 1;
                 continue;
@@ -153,7 +156,7 @@ impl Race {
                 break;
             }
         }
-        let mut point = self.point(racers, scene, pairs_before);
+        let mut point = self.point(racers, scene, mean_load.mean());
         point.foreign_load = highest;
         point.spoiled = spoiled;
         point.core_to_core_ns = core_to_core.and_then(|before| Some([before, core_to_core_ns(&self.cores)?]));
@@ -207,15 +210,20 @@ impl Race {
         }
     }
 
+    /// The load of the frame that ran, with the pairs of the one before.
+    fn load(&self, scene: &Scene, before: Option<u64>) -> Load {
+        Load::estimate(scene.boxes(), before.map(|pairs| pairs as f64), self.displacement.moved(scene.boxes()))
+    }
+
     /// What was found, without what the machine did meanwhile.
-    fn point(&self, racers: &[Racer], scene: &Scene, before: Option<u64>) -> Point {
+    fn point(&self, racers: &[Racer], scene: &Scene, load: Load) -> Point {
         let answer = racers.iter().filter(|r| r.error.is_none()).find_map(|r| r.answer);
         let answer = answer.unwrap_or(Answer { pairs: 0, fingerprint: 0 });
         let timings =
             racers.iter().map(|r| Timing { algorithm: r.id.clone(), samples_ns: r.samples.clone(), error: r.error.clone() });
         Point {
             scenario: scene.scenario().to_string(),
-            load: Load::estimate(scene.boxes(), before.map(|pairs| pairs as f64), self.displacement.moved(scene.boxes())),
+            load,
             pairs: answer.pairs,
             fingerprint: format!("{:016x}", answer.fingerprint),
             foreign_load: None,
@@ -223,6 +231,33 @@ impl Race {
             core_to_core_ns: None,
             timings: timings.collect(),
         }
+    }
+}
+
+/// The mean load of frames with the same number of objects. That of any one of them may be unlike most: where all objects jump in every
+/// 30th frame, a race of few frames may end with that one.
+#[derive(Debug, Clone, Copy, Default)]
+struct MeanLoad {
+    frames: f64,
+    sum: Load,
+}
+
+impl MeanLoad {
+    fn add(&mut self, load: &Load) {
+        let sum = &self.sum;
+        self.sum = Load::of_objects(load.objects)
+            .with_pairs(sum.pairs + load.pairs)
+            .with_candidates(sum.axis_candidates + load.axis_candidates, sum.strip_candidates + load.strip_candidates)
+            .with_moved(sum.moved + load.moved);
+        self.frames += 1.0;
+    }
+
+    fn mean(&self) -> Load {
+        let Self { frames, sum } = *self;
+        Load::of_objects(sum.objects)
+            .with_pairs(sum.pairs / frames)
+            .with_candidates(sum.axis_candidates / frames, sum.strip_candidates / frames)
+            .with_moved(sum.moved / frames)
     }
 }
 
@@ -334,6 +369,17 @@ mod tests {
             frames.map(|f| f.load(Relaxed))
         };
         assert_eq!(with - without, WARM_UP);
+    }
+
+    #[test]
+    fn a_frame_in_which_all_jumps_is_one_of_many() {
+        let mut load = MeanLoad::default();
+        for moved in [0.04, 0.04, 1.0, 0.04] {
+            load.add(&Load::of_objects(10).with_pairs(moved * 100.0).with_candidates(8.0, 6.0).with_moved(moved));
+        }
+        let mean = load.mean();
+        assert!((mean.moved - 0.28).abs() < 1e-12 && (mean.pairs - 28.0).abs() < 1e-12, "{mean:?}");
+        assert_eq!((mean.objects, mean.axis_candidates, mean.strip_candidates), (10, 8.0, 6.0));
     }
 
     #[test]
