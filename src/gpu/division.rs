@@ -46,15 +46,19 @@ impl Parts {
     /// Of boxes whose centres, in ascending order and finite, are these.
     pub(super) fn of(centres: &[f32]) -> Self {
         let Some(end) = centres.len().checked_sub(1) else { return Self { count: 1, ..Self::default() } };
-        let mut ends = vec![0, end];
-        while ends.len() <= PARTS
-            && let Some(corner) =
-                ends.windows(2).filter_map(|w| sharpest(centres, w[0], w[1])).max_by(|a, b| a.1.total_cmp(&b.1))
+        // Where each begins and ends, and its sharpest corner, which is looked for once.
+        let part = |first: usize, last: usize| (first, last, sharpest(centres, first, last));
+        let mut straight = vec![part(0, end)];
+        while straight.len() < PARTS
+            && let Some((k, corner)) =
+                straight.iter().enumerate().filter_map(|(k, part)| Some((k, part.2?))).max_by(|a, b| a.1.1.total_cmp(&b.1.1))
         {
-            ends.insert(ends.partition_point(|&at| at < corner.0), corner.0);
+            let (first, last, _) = straight[k];
+            straight.splice(k..=k, [part(first, corner.0), part(corner.0, last)]);
         }
-        let mut parts = Self { count: ends.len() - 1, ..Self::default() };
-        for (corner, &at) in parts.corners.iter_mut().zip(&ends) {
+        let mut parts = Self { count: straight.len(), ..Self::default() };
+        let ends = straight.iter().map(|part| part.0).chain([end]);
+        for (corner, at) in parts.corners.iter_mut().zip(ends) {
             *corner = (f64::from(centres[at]), at as f64);
         }
         parts.widen_clusters();
