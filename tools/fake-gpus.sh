@@ -12,6 +12,7 @@
 # Debian's backports, of Mesa 25.0, downloaded and unpacked into a cache folder: nothing is installed, and root is not needed. Where they are there
 # already, nothing is asked of the network.
 set -euo pipefail
+. "$(dirname "$0")/vulkan-driver.sh"
 
 say() { echo "fake-gpus: $*" >&2; }
 fail() { say "$*"; exit 1; }
@@ -56,11 +57,6 @@ missing=$(ldd "$driver" | sed -n 's/^\s*\(\S*\) => not found$/\1/p' | paste -sd 
 [ -z "$missing" ] || fail "the driver needs libraries that are not here: $missing (Debian's mesa-vulkan-drivers and libvulkan1 bring them)"
 
 icd=$cache/radeon_icd.json
-text='{"file_format_version": "1.0.0", "ICD": {"library_path": "'$driver'", "api_version": "1.4.305"}}'
-if [ "$text" != "$(cat "$icd" 2>/dev/null)" ]; then
-    new=$(mktemp "$icd.XXXXXX")
-    echo "$text" >"$new"
-    mv -f "$new" "$icd"
-fi
+write_driver "$icd" "$driver" 1.4.305
 
 printf 'export SAPWISE_FAKE_GPU_SHIM=%q\nexport SAPWISE_FAKE_GPU_ICD=%q\n' "$shim" "$icd"

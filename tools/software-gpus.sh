@@ -10,6 +10,7 @@
 #
 # SWIFTSHADER=/path/to/libvk_swiftshader.so takes that file instead. Every Chromium and Chrome brings one along.
 set -euo pipefail
+. "$(dirname "$0")/vulkan-driver.sh"
 
 say() { echo "software-gpus: $*" >&2; }
 fail() { say "$*"; exit 1; }
@@ -80,12 +81,7 @@ fi
 swiftshader=$(realpath "$swiftshader")
 
 icd=$cache/swiftshader_icd.json
-text='{"file_format_version": "1.0.0", "ICD": {"library_path": "'$swiftshader'", "api_version": "1.1.0"}}'
-if [ "$text" != "$(cat "$icd" 2>/dev/null)" ]; then
-    new=$(mktemp "$icd.XXXXXX")
-    echo "$text" >"$new"
-    mv -f "$new" "$icd"
-fi
+write_driver "$icd" "$swiftshader" 1.1.0
 
 # The loaders before 1.3.207 know the first name only, later ones prefer the second.
 for name in VK_ICD_FILENAMES VK_DRIVER_FILES; do
