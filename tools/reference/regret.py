@@ -106,23 +106,26 @@ def main():
         points = read(path)
         if points is None:
             continue
-        cells, columns = table(points), []
+        cells, columns = table(points), ["-"] * 3
         tuning = tunings / path.name
-        for corrected in (True, False):
-            if not tuning.is_file():
-                columns.append("-")
-                continue
+        if tuning.is_file():
             costs = json.loads(tuning.read_text())["costs"]
-            best = lambda _s, _q, load: min(costs, key=lambda c: cost(c["curve"], load, corrected))["algorithm"]
-            columns.append("%.1f (%.1f)" % regret(cells, best))
+            for column, corrected in enumerate((True, False)):
+
+                def cheapest(_scenario, _quarter, load):
+                    return min(costs, key=lambda c: cost(c["curve"], load, corrected))["algorithm"]
+
+                columns[column] = "%.1f (%.1f)" % regret(cells, cheapest)
         first = path.with_name(path.name.replace("-again", ""))
         if first != path and first.is_file():
             known = table(read(first))
-            best = lambda s, q, _l: min(known[s, q][1], key=known[s, q][1].get) if (s, q) in known else None
+
+            def known_best(scenario, quarter, _load):
+                over_best = known[scenario, quarter][1]
+                return min(over_best, key=over_best.get)
+
             shared = {at: cell for at, cell in cells.items() if at in known}
-            columns.append("%.2f (%.2f)" % regret(shared, best))
-        else:
-            columns.append("-")
+            columns[2] = "%.2f (%.2f)" % regret(shared, known_best)
         print(f"{path.name:<48} {columns[0]:>15} {columns[1]:>15} {columns[2]:>15}")
 
 
