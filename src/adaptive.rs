@@ -3,7 +3,6 @@
 mod decision;
 mod frame_batch;
 mod instances;
-mod knots;
 mod learner;
 mod load_tracker;
 mod policy;
@@ -131,15 +130,10 @@ impl Adaptive {
     pub fn learned(&self) -> Tuning {
         let tuning = self.policy.tuning();
         let Some(learner) = self.policy.learned() else { return tuning.clone() };
-        let mut costs = tuning.costs.clone();
-        for (k, cost) in costs.iter_mut().enumerate() {
-            let lasting = |log2_objects| learner.lasting_ln(k, log2_objects);
-            cost.curve.correction = cost.curve.corrected_by(knots::octaves(), lasting);
-            cost.spread_ln = learner.spread_ln(k);
-        }
+        let costs = learner.lasting(&tuning.costs);
         let load = self.tracker.load();
         let like = |quarter: u32| {
-            let objects = knots::objects_of(quarter);
+            let objects = 10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32;
             load.rescaled(objects, load.pairs * f64::from(objects) / f64::from(load.objects.max(1)))
         };
         let loads: Vec<Load> = SLICE.map(like).collect();

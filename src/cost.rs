@@ -1,37 +1,62 @@
-//! What a frame costs: a sum of terms, each a count of operations times nanoseconds per operation.
+//! What a frame costs: a sum of terms, each a count of operations times nanoseconds per operation, times what the load tells beside them; and
+//! what several threads make of that.
 
+mod error;
+mod helpers;
+mod residual;
 mod term;
 
 use crate::Load;
-use std::fmt;
+use std::cell::{Cell, OnceCell};
+use std::ptr;
+use std::sync::Arc;
 
+pub use error::CurveError;
+pub use helpers::Helpers;
+pub(crate) use residual::Likeness;
+pub use residual::{Places, Residual};
 pub use term::{Counts, Product, Term};
 
 /// The most nanoseconds that one count may take: an hour for one object. Beyond these bounds the arithmetic of a cost would end in infinities,
 /// and an infinity less an infinity is no cost.
 pub const MOST_UNIT_NS: f64 = 3.6e12;
-/// 2^64 objects.
-const MOST_LOG2_OBJECTS: f64 = 64.0;
-/// A correction by e^50.
-const MOST_LN_FACTOR: f64 = 50.0;
 
 /// The cost of one algorithm on one machine as a function of the load.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct CostCurve {
-    /// Terms of the sum; none is negative.
-    pub terms: Vec<CostTerm>,
-    /// Terms of the fallback of the algorithm, which it takes where this sum is the smaller one: `pair-cache` does what `bvh` does where
-    /// boxes move too far. Empty where it has none.
-    pub fallback_terms: Vec<CostTerm>,
-    /// Last-level cache of the machine, for [`Term::ColdObjects`].
-    pub cache_bytes: f64,
-    /// What the terms leave unexplained, ascending by `log2_objects`: the sum is multiplied by `exp(ln_factor)`,
-    /// linear between knots and constant beyond the outer ones. Empty: nothing is corrected.
-    pub correction: Vec<Knot>,
+    /// What it takes on one thread, or on its GPUs. Shared by the algorithms of a method, for which it is worked out once.
+    pub work: Arc<Work>,
+    /// What several threads make of it; `None` of one thread and of GPUs.
+    pub helpers: Option<Helpers>,
+    /// What frames that ran told of this algorithm; `None` where none told anything.
+    pub observed: Option<Residual>,
 }
 
-/// One term of a cost curve.
+/// The cost of a method on one thread of a machine, or on some of its GPUs: a sum of terms times the exponential of a residual.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
+pub struct Work {
+    /// Terms of the sum; none is negative.
+    pub terms: Vec<CostTerm>,
+    /// What it does instead where that is cheaper: `pair-cache` does what `bvh` does where boxes move too far.
+    pub fallback: Option<Fallback>,
+    /// Last-level cache of the machine, for [`Term::ColdObjects`].
+    pub cache_bytes: f64,
+    /// What the terms leave unexplained.
+    pub residual: Option<Residual>,
+}
+
+/// The work of another method, done instead.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fallback {
+    /// That work, which has no fallback of its own.
+    pub work: Arc<Work>,
+    /// How many times as much it costs here.
+    pub factor: f64,
+}
+
+/// One term of a cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CostTerm {
     /// What is counted.
@@ -40,13 +65,50 @@ pub struct CostTerm {
     pub unit_ns: f64,
 }
 
-/// One point of a correction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Knot {
-    /// Base-2 logarithm of the number of objects.
-    pub log2_objects: f64,
-    /// Natural logarithm of measured over modelled time there.
-    pub ln_factor: f64,
+/// One load, looked at by many costs: what these have in common is worked out once.
+pub(crate) struct Frame<'a> {
+    counts: Counts<'a>,
+    load: &'a Load,
+    /// Of the places that were asked for first; the methods of a tuning share theirs.
+    likeness: OnceCell<(*const Places, Likeness)>,
+    /// What some works take, which the algorithms of a method share.
+    known: [Cell<(*const Work, f64)>; 8],
+}
+
+impl<'a> Frame<'a> {
+    pub(crate) fn new(load: &'a Load) -> Self {
+        Self {
+            counts: Counts::new(load),
+            load,
+            likeness: OnceCell::new(),
+            known: [const { Cell::new((ptr::null(), 0.0)) }; 8],
+        }
+    }
+
+    /// How like its load is to each of these places.
+    pub(crate) fn likeness<R>(&self, places: &Arc<Places>, look: impl FnOnce(&Likeness) -> R) -> R {
+        let wanted = Arc::as_ptr(places);
+        let (of, likeness) = self.likeness.get_or_init(|| (wanted, places.likeness_of(self.load)));
+        if *of == wanted { look(likeness) } else { look(&places.likeness_of(self.load)) }
+    }
+
+    fn residual_ln(&self, residual: &Residual) -> f64 {
+        self.likeness(&residual.places, |likeness| residual.ln_of(likeness))
+    }
+
+    fn work_ns(&self, work: &Arc<Work>) -> f64 {
+        let of = Arc::as_ptr(work);
+        let free = |known: &&Cell<(*const Work, f64)>| known.get().0 == of || known.get().0.is_null();
+        match self.known.iter().find(free).map(|known| (known, known.get())) {
+            Some((_, (known, ns))) if known == of => ns,
+            Some((known, _)) => {
+                let ns = work.ns_of(self);
+                known.set((of, ns));
+                ns
+            }
+            None => work.ns_of(self),
+        }
+    }
 }
 
 impl CostTerm {
@@ -57,211 +119,229 @@ impl CostTerm {
     }
 }
 
-impl CostCurve {
-    /// The sum of these terms, without a fallback or a correction, on a machine of which no cache is known.
+impl Work {
+    /// The sum of these terms, on a machine of which no cache is known.
     #[must_use]
     pub fn new(terms: Vec<CostTerm>) -> Self {
         Self { terms, ..Self::default() }
     }
 
-    /// The same with the terms of a fallback.
+    /// Nanoseconds of a frame under `load`.
     #[must_use]
-    pub fn with_fallback(self, fallback_terms: Vec<CostTerm>) -> Self {
-        Self { fallback_terms, ..self }
+    pub fn ns(&self, load: &Load) -> f64 {
+        self.ns_of(&Frame::new(load))
+    }
+
+    pub(crate) fn ns_of(&self, frame: &Frame<'_>) -> f64 {
+        let sum: f64 = self.terms.iter().map(|t| t.unit_ns * frame.counts.of(t.term, self.cache_bytes)).sum();
+        let least = self.fallback.as_ref().map_or(sum, |f| sum.min(f.factor * frame.work_ns(&f.work)));
+        least * self.factor(frame)
+    }
+
+    fn factor(&self, frame: &Frame<'_>) -> f64 {
+        self.residual.as_ref().map_or(1.0, |residual| frame.residual_ln(residual).exp())
+    }
+
+    /// What makes it unusable, if anything.
+    pub(crate) fn defect(&self) -> Option<CurveError> {
+        if let Some(t) = self.terms.iter().find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
+            return Some(CurveError::Unit { term: t.term, unit_ns: t.unit_ns });
+        }
+        if let Some(t) = self.terms.iter().find(|t| matches!(t.term, Term::Product(p) if !p.is_sound())) {
+            return Some(CurveError::Powers { term: t.term });
+        }
+        if !(self.cache_bytes.is_finite() && self.cache_bytes >= 0.0) {
+            return Some(CurveError::Cache { bytes: self.cache_bytes });
+        }
+        if self.residual.as_ref().is_some_and(|r| !r.is_sound()) {
+            return Some(CurveError::Residual);
+        }
+        if self.terms.iter().all(|t| t.unit_ns == 0.0) {
+            return Some(CurveError::Nothing);
+        }
+        let fallback = self.fallback.as_ref()?;
+        if fallback.work.fallback.is_some() || !(0.01..=100.0).contains(&fallback.factor) {
+            return Some(CurveError::Fallback);
+        }
+        fallback.work.defect()
+    }
+}
+
+impl CostCurve {
+    /// The sum of these terms on one thread, without a fallback or a residual, on a machine of which no cache is known.
+    #[must_use]
+    pub fn new(terms: Vec<CostTerm>) -> Self {
+        Self::of(Arc::new(Work::new(terms)))
+    }
+
+    /// What this work takes, on one thread or on GPUs.
+    #[must_use]
+    pub fn of(work: Arc<Work>) -> Self {
+        Self { work, ..Self::default() }
+    }
+
+    /// The same with other work that is done instead where that is cheaper, though it costs this many times as much here.
+    #[must_use]
+    pub fn with_fallback(mut self, work: Arc<Work>, factor: f64) -> Self {
+        self.work_mut().fallback = Some(Fallback { work, factor });
+        self
     }
 
     /// The same on a machine with a last-level cache of this many bytes.
     #[must_use]
-    pub fn with_cache(self, cache_bytes: f64) -> Self {
-        Self { cache_bytes, ..self }
+    pub fn with_cache(mut self, cache_bytes: f64) -> Self {
+        self.work_mut().cache_bytes = cache_bytes;
+        self
     }
 
-    /// The same with a correction, whose knots ascend.
+    /// The same on several threads.
     #[must_use]
-    pub fn with_correction(self, correction: Vec<Knot>) -> Self {
-        Self { correction, ..self }
+    pub fn with_helpers(self, helpers: Helpers) -> Self {
+        Self { helpers: Some(helpers), ..self }
+    }
+
+    /// The same with what frames told of it.
+    #[must_use]
+    pub fn with_observed(self, observed: Residual) -> Self {
+        Self { observed: Some(observed), ..self }
+    }
+
+    /// What it takes on one thread or on its GPUs, to be changed for this algorithm alone.
+    pub fn work_mut(&mut self) -> &mut Work {
+        Arc::make_mut(&mut self.work)
     }
 
     /// Predicted nanoseconds for a frame under `load`.
     #[must_use]
     pub fn cost_ns(&self, load: &Load) -> f64 {
-        self.cost_of(&Counts::new(load))
+        self.cost_of(&Frame::new(load))
     }
 
-    pub(crate) fn cost_of(&self, counts: &Counts<'_>) -> f64 {
-        let sum = self.uncorrected(counts);
-        if self.correction.is_empty() { sum } else { sum * self.ln_correction(counts.log2_objects()).exp() }
+    pub(crate) fn cost_of(&self, frame: &Frame<'_>) -> f64 {
+        self.after(frame.work_ns(&self.work), frame)
+    }
+
+    /// Its cost where the work takes so long.
+    fn after(&self, work_ns: f64, frame: &Frame<'_>) -> f64 {
+        let ns = self.helpers.map_or(work_ns, |h| h.cost_ns(frame.load.objects, work_ns));
+        self.observed.as_ref().map_or(ns, |observed| ns * frame.residual_ln(observed).exp())
     }
 
     /// Predicted nanoseconds of the fallback, where there is one.
-    pub(crate) fn fallback_of(&self, counts: &Counts<'_>) -> Option<f64> {
-        let ns: f64 = self.fallback_terms.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum();
-        (!self.fallback_terms.is_empty()).then(|| ns * self.ln_correction(counts.log2_objects()).exp())
+    pub(crate) fn fallback_of(&self, frame: &Frame<'_>) -> Option<f64> {
+        let fallback = self.work.fallback.as_ref()?;
+        let ns = fallback.factor * frame.work_ns(&fallback.work) * self.work.factor(frame);
+        Some(self.after(ns, frame))
     }
 
-    /// What of the predicted nanoseconds is due to [`Term::Call`].
-    pub(crate) fn calls_of(&self, counts: &Counts<'_>) -> f64 {
-        let ns: f64 = self.terms.iter().filter(|t| t.term == Term::Call).map(|t| t.unit_ns).sum();
-        ns * self.ln_correction(counts.log2_objects()).exp()
-    }
-
-    /// The sum of the terms, of the fallback where that is cheaper.
-    fn uncorrected(&self, counts: &Counts<'_>) -> f64 {
-        let sum =
-            |terms: &[CostTerm]| -> f64 { terms.iter().map(|t| t.unit_ns * counts.of(t.term, self.cache_bytes)).sum() };
-        let first = sum(&self.terms);
-        if self.fallback_terms.is_empty() { first } else { first.min(sum(&self.fallback_terms)) }
-    }
-
-    /// What the cost is at least and at most under the loads of which no count is below `least` nor above `most`.
-    pub(crate) fn bounds(&self, least: &Counts<'_>, most: &Counts<'_>) -> (f64, f64) {
-        let (low, high) = (self.uncorrected(least), self.uncorrected(most));
-        if self.correction.is_empty() {
-            return (low, high);
-        }
-        // It is linear between knots, so that its extremes lie at the ends or at the knots between them.
-        let (from, to) = (least.log2_objects(), most.log2_objects());
-        let (a, b) = (self.ln_correction(from), self.ln_correction(to));
-        let first = self.correction.partition_point(|k| k.log2_objects <= from);
-        let inner = self.correction[first..].iter().take_while(|k| k.log2_objects < to).map(|k| k.ln_factor);
-        let (lowest, highest) = inner.fold((a.min(b), a.max(b)), |(l, h), k| (l.min(k), h.max(k)));
-        (low * lowest.exp(), high * highest.exp())
-    }
-
-    /// The correction with `ln` added to it, as knots at its own places and at `octaves`, within what a file may hold.
-    #[must_use]
-    pub fn corrected_by(&self, octaves: impl Iterator<Item = f64>, ln: impl Fn(f64) -> f64) -> Vec<Knot> {
-        let mut octaves: Vec<f64> = self.correction.iter().map(|k| k.log2_objects).chain(octaves).collect();
-        octaves.sort_by(f64::total_cmp);
-        octaves.dedup();
-        let knot = |log2_objects: f64| {
-            let ln_factor = self.ln_correction(log2_objects) + ln(log2_objects);
-            Knot { log2_objects, ln_factor: ln_factor.clamp(-MOST_LN_FACTOR, MOST_LN_FACTOR) }
-        };
-        octaves.into_iter().map(knot).collect()
-    }
-
-    /// The correction at a base-2 logarithm of the number of objects, as a natural logarithm.
-    #[must_use]
-    pub fn ln_correction(&self, x: f64) -> f64 {
-        let after = self.correction.partition_point(|k| k.log2_objects <= x);
-        match (after.checked_sub(1).map(|k| self.correction[k]), self.correction.get(after)) {
-            (Some(a), Some(b)) => {
-                let share = (x - a.log2_objects) / (b.log2_objects - a.log2_objects);
-                a.ln_factor + share * (b.ln_factor - a.ln_factor)
+    /// What of the predicted nanoseconds is due to calls: of several threads what it takes to call helpers and to wait for them, else
+    /// [`Term::Call`].
+    pub(crate) fn calls_of(&self, frame: &Frame<'_>) -> f64 {
+        let ns = match self.helpers {
+            Some(helpers) => helpers.calls_ns(frame.load.objects, frame.work_ns(&self.work)),
+            None => {
+                let calls = self.work.terms.iter().filter(|t| t.term == Term::Call);
+                calls.map(|t| t.unit_ns).sum::<f64>() * self.work.factor(frame)
             }
-            (Some(outer), None) => outer.ln_factor,
-            (None, Some(outer)) => outer.ln_factor,
-            (None, None) => 0.0,
+        };
+        self.observed.as_ref().map_or(ns, |observed| ns * frame.residual_ln(observed).exp())
+    }
+
+    /// Multiplies that by a factor.
+    pub(crate) fn scale_calls(&mut self, factor: f64) {
+        match &mut self.helpers {
+            Some(helpers) => {
+                helpers.call_ns *= factor;
+                helpers.late_ns *= factor;
+            }
+            None => {
+                let terms = &mut self.work_mut().terms;
+                terms.iter_mut().filter(|t| t.term == Term::Call).for_each(|t| t.unit_ns *= factor);
+            }
         }
     }
 
     /// What makes this curve unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<CurveError> {
-        let terms = || self.terms.iter().chain(&self.fallback_terms);
-        if let Some(t) = terms().find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
-            return Some(CurveError::Unit { term: t.term, unit_ns: t.unit_ns });
+        if let Some(defect) = self.work.defect() {
+            return Some(defect);
         }
-        if let Some(t) = terms().find(|t| matches!(t.term, Term::Product(p) if !p.is_sound())) {
-            return Some(CurveError::Powers { term: t.term });
+        if self.helpers.is_some_and(|h| !h.is_sound()) {
+            return Some(CurveError::Helpers);
         }
-        if !(self.cache_bytes.is_finite() && self.cache_bytes >= 0.0) {
-            return Some(CurveError::Cache { bytes: self.cache_bytes });
-        }
-        let bounded = |k: &Knot| k.log2_objects.abs() <= MOST_LOG2_OBJECTS && k.ln_factor.abs() <= MOST_LN_FACTOR;
-        if !self.correction.iter().all(bounded) || !self.correction.is_sorted_by(|a, b| a.log2_objects < b.log2_objects) {
-            return Some(CurveError::Correction);
-        }
-        let nothing = |terms: &[CostTerm]| terms.iter().all(|t| t.unit_ns == 0.0);
-        if nothing(&self.terms) || !self.fallback_terms.is_empty() && nothing(&self.fallback_terms) {
-            return Some(CurveError::Nothing);
-        }
-        None
+        self.observed.as_ref().is_some_and(|r| !r.is_sound()).then_some(CurveError::Residual)
     }
 }
-
-/// What makes a cost curve unusable.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum CurveError {
-    /// A negative unit, or one beyond [`MOST_UNIT_NS`].
-    Unit {
-        /// The term.
-        term: Term,
-        /// Its unit.
-        unit_ns: f64,
-    },
-    /// A product of more powers than [`Product::MOST_POWERS`].
-    Powers {
-        /// The term.
-        term: Term,
-    },
-    /// A cache of a size that none has.
-    Cache {
-        /// Its size.
-        bytes: f64,
-    },
-    /// Knots of the correction that are not ascending, or beyond every measurement.
-    Correction,
-    /// No term above zero.
-    Nothing,
-}
-
-impl fmt::Display for CurveError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unit { term, unit_ns } => write!(f, "the term {term:?} has {unit_ns} ns a unit"),
-            Self::Powers { term } => write!(f, "{term:?} has more than {} powers", Product::MOST_POWERS),
-            Self::Cache { bytes } => write!(f, "a cache of {bytes} bytes"),
-            Self::Correction => f.write_str("knots of the correction that are not ascending, or beyond every measurement"),
-            Self::Nothing => f.write_str("no term above zero, so the cost is always nothing"),
-        }
-    }
-}
-
-impl std::error::Error for CurveError {}
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn load(objects: u32) -> Load {
+        Load::of_objects(objects)
+    }
+
     #[test]
-    fn a_curve_adds_its_terms_and_applies_its_correction_between_knots() {
-        let mut curve = CostCurve {
-            terms: vec![CostTerm { term: Term::Call, unit_ns: 100.0 }, CostTerm { term: Term::AllPairs, unit_ns: 2.0 }],
-            ..CostCurve::default()
-        };
-        let load = |objects| Load { objects, ..Load::default() };
+    fn a_curve_adds_its_terms_and_multiplies_by_what_the_load_and_frames_tell() {
+        let curve = CostCurve::new(vec![CostTerm::new(Term::Call, 100.0), CostTerm::new(Term::AllPairs, 2.0)]);
         assert_eq!(curve.cost_ns(&load(5)), 100.0 + 2.0 * 10.0);
-        curve.correction =
-            vec![Knot { log2_objects: 2.0, ln_factor: 0.0 }, Knot { log2_objects: 4.0, ln_factor: 2.0_f64.ln() }];
-        assert_eq!(curve.cost_ns(&load(4)), 112.0);
-        assert!((curve.cost_ns(&load(8)) - 156.0 * 2.0_f64.sqrt()).abs() < 1e-9);
-        assert!((curve.cost_ns(&load(1024)) / (100.0 + 1024.0 * 1023.0) - 2.0).abs() < 1e-9);
-        assert_eq!(curve.defect(), None);
+        let places = Arc::new(Places::new(vec![load(16)]));
+        let residual = Residual::new(Arc::clone(&places), vec![2.0_f64.ln()], false);
+        let mut with = curve.clone();
+        with.work_mut().residual = Some(residual.clone());
+        assert!((with.cost_ns(&load(16)) / curve.cost_ns(&load(16)) - 2.0).abs() < 1e-9);
+        let with = with.with_observed(residual.with_constant(3.0_f64.ln()));
+        assert!((with.cost_ns(&load(16)) / curve.cost_ns(&load(16)) - 12.0).abs() < 1e-9);
+        assert_eq!(with.defect(), None);
     }
 
     #[test]
     fn an_algorithm_with_a_fallback_takes_the_cheaper_one() {
-        let term = |term, unit_ns| CostTerm { term, unit_ns };
-        let mut curve = CostCurve {
-            terms: vec![term(Term::Objects, 2.0), term(Term::Moved, 100.0)],
-            fallback_terms: vec![term(Term::Objects, 30.0)],
-            ..CostCurve::default()
-        };
-        let load = |moved| Load { objects: 10, moved, ..Load::default() };
-        assert_eq!([0.0, 0.25, 1.0].map(|moved| curve.cost_ns(&load(moved))), [20.0, 270.0, 300.0]);
-        curve.fallback_terms = vec![term(Term::Objects, 0.0)];
-        assert!(curve.defect().is_some());
+        let mut curve = CostCurve::new(vec![CostTerm::new(Term::Objects, 2.0), CostTerm::new(Term::Moved, 100.0)])
+            .with_fallback(Arc::new(Work::new(vec![CostTerm::new(Term::Objects, 20.0)])), 1.5);
+        assert_eq!([0.0, 0.25, 1.0].map(|moved| curve.cost_ns(&load(10).with_moved(moved))), [20.0, 270.0, 300.0]);
+        let of_itself = Arc::clone(&curve.work);
+        assert_eq!(curve.clone().with_fallback(of_itself, 1.0).defect(), Some(CurveError::Fallback));
+        curve.work_mut().fallback = Some(Fallback { work: Arc::new(Work::default()), factor: 1.0 });
+        assert_eq!(curve.defect(), Some(CurveError::Nothing));
+    }
+
+    #[test]
+    fn helpers_divide_the_work_of_one_thread_and_calls_are_what_does_not_grow() {
+        let one = CostCurve::new(vec![CostTerm::new(Term::Call, 50.0), CostTerm::new(Term::Objects, 10.0)]);
+        let two = one.clone().with_helpers(Helpers::new(2).with_call(1000.0, 0.0));
+        assert_eq!((one.cost_ns(&load(1000)), two.cost_ns(&load(1000))), (10_050.0, 6025.0));
+        let large = load(1000);
+        let frame = Frame::new(&large);
+        assert_eq!((one.calls_of(&frame), two.calls_of(&frame)), (50.0, 1000.0));
+        // Both look at the same work, which is worked out once.
+        assert!(Arc::ptr_eq(&one.work, &two.work));
+    }
+
+    #[test]
+    fn many_works_are_looked_at_under_one_load() {
+        let curves: Vec<CostCurve> =
+            (1..=20).map(|k| CostCurve::new(vec![CostTerm::new(Term::Objects, f64::from(k))])).collect();
+        let load = load(10);
+        let frame = Frame::new(&load);
+        for _ in 0..2 {
+            for (k, curve) in curves.iter().enumerate() {
+                assert_eq!(curve.cost_of(&frame), 10.0 * (k + 1) as f64);
+            }
+        }
     }
 
     #[test]
     fn impossible_curves_are_told() {
-        let curve = |unit_ns| CostCurve { terms: vec![CostTerm { term: Term::Call, unit_ns }], ..CostCurve::default() };
-        let knot = |log2_objects| Knot { log2_objects, ln_factor: 0.0 };
-        let far = CostCurve { correction: vec![knot(-1e308), knot(1e308)], ..curve(1.0) };
-        assert!(far.defect().is_some() && curve(1.0).defect().is_none());
+        let curve = |unit_ns| CostCurve::new(vec![CostTerm::new(Term::Call, unit_ns)]);
+        let places = Arc::new(Places::new(vec![load(16)]));
+        let residual = |weights: &[f64]| Residual::new(Arc::clone(&places), weights.to_vec(), false);
+        assert_eq!(curve(1.0).with_observed(residual(&[0.1])).defect(), None);
+        for wrong in [&[f64::NAN][..], &[1e9], &[0.1, 0.1]] {
+            assert_eq!(curve(1.0).with_observed(residual(wrong)).defect(), Some(CurveError::Residual), "{wrong:?}");
+        }
+        assert_eq!(curve(1.0).with_helpers(Helpers::new(1)).defect(), Some(CurveError::Helpers));
         let powers = CostCurve::new(vec![CostTerm::new(Term::Product(Product::ONE.pairs(9)), 1.0)]);
         assert!(matches!(powers.defect(), Some(CurveError::Powers { .. })));
         assert!(curve(-1.0).defect().is_some() && curve(f64::NAN).defect().is_some() && curve(0.0).defect().is_some());

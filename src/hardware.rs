@@ -4,7 +4,6 @@ mod error;
 mod figure;
 pub mod gpu;
 mod parameter;
-mod placement;
 mod plausible;
 mod statistic;
 

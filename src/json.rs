@@ -1,6 +1,6 @@
 //! Tuning and models as JSON text, and what reads and writes every file of Sapwise.
 //!
-//! The first key of each file names its schema: `tuning/1`, or `tuning/1.3` where only keys were added since. A file of a newer minor version
+//! The first key of each file names its schema: `tuning/2`, or `tuning/2.3` where only keys were added since. A file of a newer minor version
 //! is read, and what this version does not know in it is skipped and told; in any other file an unknown key is an error. An older
 //! schema is refused with the command that converts its files.
 

@@ -84,7 +84,9 @@ pub use calibrate::cache_schema;
 #[cfg(feature = "this-machine")]
 pub use calibrate::{Cache, StartOptions};
 pub use changes::Changes;
-pub use cost::{CostCurve, CostTerm, Counts, CurveError, Knot, MOST_UNIT_NS, Product, Term};
+pub use cost::{
+    CostCurve, CostTerm, Counts, CurveError, Fallback, Helpers, MOST_UNIT_NS, Places, Product, Residual, Term, Work,
+};
 pub use cpu::{SimdLevel, SimdLevelError};
 pub use entry::Entry;
 pub use error::{BoxDefect, Error, Unavailable};
@@ -103,7 +105,7 @@ pub use pairs::{PairOrder, Pairs};
 #[cfg(feature = "parallel")]
 pub use rayon as rayon1;
 pub use registry::{Registry, usable_cores};
-pub use tuning::{AlgorithmCost, Crossover, Observation, Ranking, Source, Step, Tuning, TuningError};
+pub use tuning::{AlgorithmCost, Crossover, Observation, Observed, Ranking, Source, Step, Tuning, TuningError};
 
 /// The example of the README as a test, with the feature that it needs.
 #[cfg(all(doctest, feature = "this-machine"))]

@@ -2,17 +2,19 @@
 
 mod curve;
 mod error;
-mod feature;
 mod gpu_set;
+mod helpers;
 mod needed;
 mod predict;
 mod scale;
 
+use crate::cost::Places;
 use crate::hardware::{GpuKind, ParameterId};
 use crate::{BackendClass, Term};
+use std::sync::Arc;
 
 pub use error::{ModelError, PredictError};
-pub use feature::Feature;
+pub use helpers::{HelpersModel, ThreadFigures};
 pub use predict::{ASK, Prediction};
 pub use scale::Scale;
 
@@ -22,7 +24,8 @@ pub const GPU_PREFIX: &str = "gpu/";
 /// A cost model for every method and class of processor, shared over machines, thread counts and GPUs, evaluated by plain
 /// arithmetic.
 ///
-/// The time of a frame is `sum of unit * scale(hardware, backend) * term(load)`, times `exp` of a ridge residual.
+/// The time of a frame on one thread, or on GPUs, is `sum of unit * scale(hardware, backend) * term(load)`, times `exp` of a
+/// [residual](crate::Residual) over the load; [helpers](HelpersModel) make of it what several threads take.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Model {
@@ -32,6 +35,11 @@ pub struct Model {
     pub simulated: bool,
     /// Lowest and highest value of each hardware parameter in training; a machine outside is extrapolated.
     pub ranges: Vec<Range>,
+    /// On machines held out of the training nine of ten ratios of the times of two algorithms lay within a factor of e to this of their prediction;
+    /// `None` where fewer than two machines were held out.
+    pub ratios_90_ln: Option<f64>,
+    /// Loads at which the residuals of all methods are known.
+    pub places: Arc<Places>,
     /// One cost model for each method on each class of processor.
     pub methods: Vec<MethodModel>,
 }
@@ -61,20 +69,27 @@ pub struct MethodModel {
     pub max_threads: u32,
     /// Kinds of the GPUs that were timed, without repetition; others are extrapolated. Empty for the CPU.
     pub gpu_kinds: Vec<GpuKind>,
-    /// Fewest objects that were timed; the residual is held constant below.
-    pub min_objects: u32,
-    /// Most objects that were timed; the residual is held constant above, where its slopes would carry it anywhere.
-    pub max_objects: u32,
-    /// The physical terms; no unit is negative.
+    /// The physical terms, on one thread or on GPUs; no unit is negative.
     pub terms: Vec<ModelTerm>,
-    /// Terms of the fallback, where the algorithm has one: [`CostCurve::fallback_terms`](crate::CostCurve::fallback_terms).
-    pub fallback_terms: Vec<ModelTerm>,
-    /// Constant of the residual.
-    pub residual_intercept: f64,
-    /// Slopes of the residual on the natural logarithm of measured over modelled time.
-    pub residual: Vec<ResidualTerm>,
+    /// The method that it falls back to where that is cheaper, if it does.
+    pub fallback: Option<FallbackModel>,
+    /// What the terms leave unexplained: a weight for each of [`Model::places`]. Empty: nothing.
+    pub residual: Vec<f64>,
+    /// Whether the residual tells loads apart by how far boxes move, as of incremental methods.
+    pub residual_by_motion: bool,
+    /// What several threads make of it; `None` of a method that runs on one thread only, or on GPUs.
+    pub helpers: Option<HelpersModel>,
     /// Standard deviation of what remains, in natural logarithms.
     pub spread_ln: f64,
+}
+
+/// A method that another one falls back to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FallbackModel {
+    /// Its name. It falls back to none itself.
+    pub method: String,
+    /// How many times as much it costs there.
+    pub factor: f64,
 }
 
 /// One physical term.
@@ -88,19 +103,8 @@ pub struct ModelTerm {
     pub unit: f64,
 }
 
-/// One slope of the residual.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ResidualTerm {
-    /// What it is a slope on.
-    pub feature: Feature,
-    /// Mean of the feature in training, taken off before the slope is applied.
-    pub centre: f64,
-    /// The slope.
-    pub slope: f64,
-}
-
 impl MethodModel {
-    /// A method on a class of processor, of which nothing was timed: no terms, one thread, no objects.
+    /// A method on a class of processor, of which nothing was timed: no terms, one thread.
     #[must_use]
     pub fn new(method: impl Into<String>, backend: BackendClass, revision: u32) -> Self {
         Self {
@@ -109,12 +113,11 @@ impl MethodModel {
             revision,
             max_threads: 1,
             gpu_kinds: Vec::new(),
-            min_objects: 0,
-            max_objects: 0,
             terms: Vec::new(),
-            fallback_terms: Vec::new(),
-            residual_intercept: 0.0,
+            fallback: None,
             residual: Vec::new(),
+            residual_by_motion: false,
+            helpers: None,
             spread_ln: 0.0,
         }
     }
@@ -122,27 +125,31 @@ impl MethodModel {
     /// The same by its physical terms alone.
     #[must_use]
     pub fn without_residual(&self) -> Self {
-        Self { residual: Vec::new(), residual_intercept: 0.0, ..self.clone() }
+        Self { residual: Vec::new(), ..self.clone() }
     }
 
     /// What can not be of it, if anything.
-    fn defect(&self) -> Option<String> {
-        let terms = || self.terms.iter().chain(&self.fallback_terms);
-        if let Some(t) = terms().find(|t| !t.scale.is_of(self.backend)) {
+    fn defect(&self, places: usize) -> Option<String> {
+        if let Some(t) = self.terms.iter().find(|t| !t.scale.is_of(self.backend)) {
             return Some(format!("the scale {} is of another processor", t.scale));
         }
-        if let Some(r) = self.residual.iter().find(|r| !r.feature.is_of(self.backend)) {
-            return Some(format!("the feature {} is of another processor", r.feature));
+        if self.helpers.is_some() && self.backend != BackendClass::Cpu {
+            return Some("helpers are of the CPU".to_owned());
         }
-        if let Some(t) = terms().find(|t| !(t.unit.is_finite() && t.unit >= 0.0)) {
+        if self.helpers.is_some_and(|h| !h.is_sound()) {
+            return Some("helpers with a figure that is negative or no number".to_owned());
+        }
+        if let Some(t) = self.terms.iter().find(|t| !(t.unit.is_finite() && t.unit >= 0.0)) {
             return Some(format!("the term {:?} has the unit {}", t.term, t.unit));
         }
         if self.terms.iter().all(|t| t.unit == 0.0) {
             return Some("no term above zero".to_owned());
         }
-        let finite = self.residual.iter().all(|r| r.centre.is_finite() && r.slope.is_finite());
-        (!finite || !self.residual_intercept.is_finite() || !self.spread_ln.is_finite() || self.spread_ln < 0.0)
-            .then(|| "a residual or spread that is not finite".to_owned())
+        if !self.residual.is_empty() && self.residual.len() != places {
+            return Some(format!("a residual of {} weights for {places} places", self.residual.len()));
+        }
+        let finite = self.residual.iter().all(|w| w.is_finite()) && self.spread_ln.is_finite();
+        (!finite || self.spread_ln < 0.0).then(|| "a residual or spread that is not finite".to_owned())
     }
 }
 
@@ -150,7 +157,26 @@ impl Model {
     /// A model of these methods, from the ranges of its training.
     #[must_use]
     pub fn new(name: impl Into<String>, methods: Vec<MethodModel>, ranges: Vec<Range>) -> Self {
-        Self { name: name.into(), simulated: false, ranges, methods }
+        Self {
+            name: name.into(),
+            simulated: false,
+            ranges,
+            ratios_90_ln: None,
+            places: Arc::new(Places::new(Vec::new())),
+            methods,
+        }
+    }
+
+    /// The same with intervals, which hold nine of ten ratios of two times within a factor of e to this.
+    #[must_use]
+    pub fn with_intervals(self, ratios_90_ln: Option<f64>) -> Self {
+        Self { ratios_90_ln, ..self }
+    }
+
+    /// The same with the places that the residuals of its methods have weights for.
+    #[must_use]
+    pub fn with_places(self, places: Arc<Places>) -> Self {
+        Self { places, ..self }
     }
 
     /// The hardware parameters that a prediction looks at, those of GPUs aside, each once: for its costs, and to tell whether the machine
@@ -158,10 +184,10 @@ impl Model {
     #[must_use]
     pub fn parameters(&self) -> Vec<ParameterId> {
         let of_method = |m: &MethodModel| {
-            let scales = m.terms.iter().chain(&m.fallback_terms).flat_map(|t| t.scale.parameters());
-            let features = m.residual.iter().flat_map(|r| r.feature.parameters());
+            let scales = m.terms.iter().flat_map(|t| t.scale.parameters());
+            let helpers = m.helpers.iter().flat_map(|_| HelpersModel::PARAMETERS);
             let cache = (m.backend == BackendClass::Cpu).then_some(&ParameterId::CacheLlcBytes);
-            scales.chain(features).chain(cache).copied().collect::<Vec<_>>()
+            scales.chain(helpers).chain(cache).copied().collect::<Vec<_>>()
         };
         // A range of a parameter that this version does not know is none that it can measure.
         let ranges = self.ranges.iter().filter_map(|r| r.parameter.parse().ok());
@@ -180,9 +206,18 @@ impl Model {
         if let Some(r) = self.ranges.iter().find(|r| !(r.min.is_finite() && r.max.is_finite() && r.min <= r.max)) {
             return Some(ModelError::Range { parameter: r.parameter.clone() });
         }
+        if self.ratios_90_ln.is_some_and(|ln| !(0.0..=50.0).contains(&ln)) {
+            return Some(ModelError::Intervals);
+        }
         self.methods.iter().find_map(|m| {
             let method = format!("{} on the {}", m.method, m.backend);
-            m.defect().map(|why| ModelError::Method { method, why })
+            let found =
+                |f: &FallbackModel| self.of_method(&f.method, m.backend).is_some_and(|other| other.fallback.is_none());
+            if let Some(f) = m.fallback.as_ref().filter(|f| !found(f) || !(0.01..=100.0).contains(&f.factor)) {
+                let why = format!("it falls back to {} at {} times its cost, which is no such method", f.method, f.factor);
+                return Some(ModelError::Method { method, why });
+            }
+            m.defect(self.places.loads().len()).map(|why| ModelError::Method { method, why })
         })
     }
 }

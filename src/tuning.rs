@@ -1,14 +1,17 @@
 //! The fields of optimal performance: for each load the cheapest algorithm.
 
+pub(crate) mod belief;
 mod crossover;
 mod error;
 mod slice;
 
-use crate::cost::Counts;
+use crate::cost::Frame;
 use crate::named::named;
-use crate::{AlgorithmId, CostCurve, Load, Registry};
+use crate::{AlgorithmId, CostCurve, Load, Registry, Residual};
 use slice::Slice;
+use std::sync::Arc;
 
+pub use belief::{Observed, Slope};
 pub use crossover::Crossover;
 pub use error::TuningError;
 
@@ -127,6 +130,12 @@ impl AlgorithmCost {
     pub fn new(algorithm: AlgorithmId, revision: u32, curve: CostCurve, spread_ln: f64) -> Self {
         Self { algorithm, revision, curve, spread_ln }
     }
+
+    /// Those of its residuals that there are.
+    pub(crate) fn residuals(&self) -> impl Iterator<Item = &Residual> {
+        let fallback = self.curve.work.fallback.iter().filter_map(|f| f.work.residual.as_ref());
+        self.curve.work.residual.iter().chain(&self.curve.observed).chain(fallback)
+    }
 }
 
 impl Observation {
@@ -168,7 +177,7 @@ impl Tuning {
     /// Tuning from cost curves, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
     ///
     /// The loads are interpolated between each other, so a handful per decade is enough. A field narrower than 3 % in objects may
-    /// be missed. Intervals follow from the curves'
+    /// be missed, and an algorithm that is cheaper by less than 2 % has none. Intervals follow from the curves'
     /// `spread_ln`: where the logarithms of two costs differ by less than [`NORMAL_90`](crate::stats::NORMAL_90) standard deviations of that difference.
     #[must_use]
     pub fn from_costs(source: Source, scenario: &str, costs: Vec<AlgorithmCost>, loads: &[Load]) -> Self {
@@ -230,10 +239,10 @@ impl Tuning {
     /// `None` when there are no cost curves or none is usable.
     #[must_use]
     pub fn rank(&self, load: &Load, usable: impl Fn(usize) -> bool) -> Option<Ranking> {
-        let counts = Counts::new(load);
+        let frame = Frame::new(load);
         let mut ranking: Option<Ranking> = None;
         for (k, cost) in self.costs.iter().enumerate().filter(|&(k, _)| usable(k)) {
-            let ns = cost.curve.cost_of(&counts);
+            let ns = cost.curve.cost_of(&frame);
             ranking = Some(match ranking {
                 None => Ranking { best: k, best_ns: ns, runner_up: None },
                 Some(r) if ns < r.best_ns => Ranking { best: k, best_ns: ns, runner_up: Some((r.best, r.best_ns)) },
@@ -266,8 +275,13 @@ impl Tuning {
         if let Some(s) = self.samples.iter().find(|s| !is_time(s.predicted_ns) || !is_time(s.measured_ns)) {
             return Some(TuningError::Sample { algorithm: s.algorithm.clone(), objects: s.objects });
         }
+        let places = || self.costs.iter().flat_map(AlgorithmCost::residuals).map(|r| &r.places);
         for (k, cost) in self.costs.iter().enumerate() {
             let algorithm = || cost.algorithm.clone();
+            let other = |own: &Residual| places().next().is_some_and(|p| !Arc::ptr_eq(p, &own.places) && **p != *own.places);
+            if cost.residuals().any(other) {
+                return Some(TuningError::Places { algorithm: algorithm() });
+            }
             if let Some(source) = cost.curve.defect() {
                 return Some(TuningError::Curve { algorithm: algorithm(), source });
             }

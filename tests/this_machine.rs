@@ -113,7 +113,7 @@ fn a_damaged_file_is_told_replaced_and_harmless() {
     let folder = tempfile::tempdir().unwrap();
     let file = start(&options(folder.path())).setup().file.clone().unwrap();
     let whole = fs::read_to_string(&file).unwrap();
-    for text in ["", "{}", &whole[..whole.len() / 2], &whole.replace("cache/2", "cache/1")] {
+    for text in ["", "{}", &whole[..whole.len() / 2], &whole.replace("cache/3", "cache/1")] {
         fs::write(&file, text).unwrap();
         let mut again = start(&options(folder.path()));
         assert_eq!(origin(&again), Origin::Probed);

@@ -3,9 +3,8 @@
 //! Works on the text of a file, so that it needs no types of old versions. What is current already is refused: nothing is converted twice.
 
 use crate::report;
-use crate::training::{read_model, write_model};
 use sapwise::json;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 /// The old names of the methods, and what each is called now.
 const METHODS: [(&str, &str); 3] = [("strips", "grid-sap"), ("sweep", "sap"), ("verlet", "pair-cache")];
@@ -13,21 +12,6 @@ const METHODS: [(&str, &str); 3] = [("strips", "grid-sap"), ("sweep", "sap"), ("
 const NAMES: [&str; 5] = ["algorithm", "id", "method", "below", "above"];
 /// Keys of the text, or the list of texts, that people read.
 const TEXTS: [&str; 4] = ["remarks", "warnings", "error", "interval_basis"];
-/// Keys of `model/1` that tell of its training.
-const TRAINING: [&str; 4] = ["trained_on", "trained_on_counts", "prior", "validation"];
-/// Keys of `model/1`, and of its validation, that have no successor, and what they held.
-const DROPPED: [(&str, &str); 2] = [
-    ("clouds", "the joint distribution of the parameters in training"),
-    ("folds", "the fits without some machines, which intervals were made of"),
-];
-const DROPPED_OF_VALIDATION: [(&str, &str); 2] = [
-    ("learning", "the scores of trainings on fewer machines"),
-    ("coverage", "how often intervals over machines held the measured time"),
-];
-
-/// The strategy of `model/1` that is none any more.
-const GONE: &str = "direct elastic net";
-
 /// A file in its current form.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -53,8 +37,11 @@ pub enum ConvertError {
     /// A cache holds what is measured again in seconds.
     #[error("it is a cache, which is not converted; delete it, and the next start measures again")]
     Cache,
+    /// A model of before has another form, which its reports fill and no figure of it does.
+    #[error("models of before are not converted: train again with `sapwise train REPORTS... --out MODEL.json`")]
+    Model,
     /// Another file.
-    #[error("{0}; report/1, model/1 and fields/1 are converted")]
+    #[error("{0}; report/1, tuning/1 and fields/1 are converted")]
     Unknown(String),
     /// Its form is that of an old file, and what it holds is not sound.
     #[error("it is no sound {0}")]
@@ -64,7 +51,7 @@ pub enum ConvertError {
 /// Reads a converted text as what it is now and writes it in its own layout.
 type Rewrite = fn(&str) -> Result<String, Unsound>;
 
-/// Converts `report/1` into `report/2`, `model/1` into `model/2` and `fields/1` into `tuning/1`. No figure that is kept changes.
+/// Converts `report/1` into `report/2`, and `fields/1` and `tuning/1` into `tuning/2`. No figure that is kept changes.
 ///
 /// # Errors
 /// Where the text is of none of these schemas, is damaged, or is current already.
@@ -75,15 +62,12 @@ pub fn convert(text: &str) -> Result<Converted, ConvertError> {
     let mut dropped = Vec::new();
     let (schema, current): (_, Rewrite) = match schema.as_str() {
         "report/1" => ("report/2", |text| Ok(report::write(&report::read(text)?.value)?)),
-        "model/1" => {
-            dropped = move_training(&mut file);
-            ("model/2", |text| {
-                let stored = read_model(text)?;
-                Ok(write_model(&stored.model, &stored.training)?)
-            })
+        "model/1" | "model/2" => return Err(ConvertError::Model),
+        "fields/1" | "tuning/1" => {
+            dropped = share_works(&mut file);
+            ("tuning/2", |text| Ok(json::write_tuning(&json::tuning(text)?)?))
         }
-        "fields/1" => ("tuning/1", |text| Ok(json::write_tuning(&json::tuning(text)?)?)),
-        "cache/1" => return Err(ConvertError::Cache),
+        "cache/1" | "cache/2" => return Err(ConvertError::Cache),
         "" => return Err(ConvertError::Unknown("it names no schema".to_owned())),
         current if ["report/", "model/", "tuning/", "cache/"].iter().any(|s| current.starts_with(s)) => {
             return Err(ConvertError::Current(schema));
@@ -100,37 +84,28 @@ pub fn convert(text: &str) -> Result<Converted, ConvertError> {
 
 type Unsound = Box<dyn std::error::Error + Send + Sync>;
 
-/// Puts what a model says of its training under a key of its own, and tells what is left out.
-fn move_training(model: &mut Map<String, Value>) -> Vec<String> {
-    let mut dropped = drop_keys(model, &DROPPED);
-    let simulated = |report: &Value| report.get("label").is_some_and(|label| label == "simulated");
-    let simulated = ["trained_on", "trained_on_counts"]
-        .iter()
-        .filter_map(|key| model.get(*key)?.as_array())
-        .any(|reports| reports.iter().any(simulated));
-    let mut training: Map<String, Value> =
-        TRAINING.iter().filter_map(|&key| Some((key.to_owned(), model.remove(key)?))).collect();
-    if let Some(validation) = training.get_mut("validation").and_then(Value::as_object_mut) {
-        dropped.extend(drop_keys(validation, &DROPPED_OF_VALIDATION));
-        if let Some(scores) = validation.get_mut("methods").and_then(Value::as_array_mut) {
-            let before = scores.len();
-            scores.retain(|score| score["name"] != GONE);
-            dropped.extend(
-                (scores.len() < before).then(|| format!("methods: the score of {GONE}, which is no strategy any more")),
-            );
-        }
+/// Puts what each algorithm costs into a list of works, and tells what is left out.
+fn share_works(tuning: &mut Map<String, Value>) -> Vec<String> {
+    let (mut works, mut corrected) = (Vec::new(), 0);
+    let costs = tuning.get_mut("costs").and_then(Value::as_array_mut).into_iter().flatten().filter_map(Value::as_object_mut);
+    for cost in costs {
+        let Some(Value::Object(mut curve)) = cost.remove("curve") else { continue };
+        let cache = curve.get("cache_bytes").cloned().unwrap_or(Value::Null);
+        let fallback = ["fallback_terms", "otherwise"].iter().find_map(|key| curve.remove(*key));
+        let fallback = fallback.filter(|terms| terms.as_array().is_some_and(|list| !list.is_empty())).map(|terms| {
+            works.push(json!({ "terms": terms, "fallback": null, "cache_bytes": cache }));
+            json!({ "work": works.len() - 1, "factor": 1.0 })
+        });
+        corrected += usize::from(curve.get("correction").and_then(Value::as_array).is_some_and(|knots| !knots.is_empty()));
+        works.push(json!({ "terms": curve.remove("terms"), "fallback": fallback, "cache_bytes": cache }));
+        let more = [("work", json!(works.len() - 1)), ("helpers", Value::Null), ("observed", Value::Null)];
+        cost.extend(more.map(|(key, value)| (key.to_owned(), value)));
     }
-    if simulated {
-        model.insert("simulated".to_owned(), true.into());
-    }
-    model.insert("training".to_owned(), Value::Object(training));
-    dropped
-}
-
-/// Removes keys, and tells those that were there.
-fn drop_keys(from: &mut Map<String, Value>, keys: &[(&str, &str)]) -> Vec<String> {
-    let there = keys.iter().filter(|(key, _)| from.remove(*key).is_some());
-    there.map(|(key, what)| format!("{key}: {what}")).collect()
+    tuning.insert("works".to_owned(), Value::Array(works));
+    let told = format!(
+        "correction: of {corrected} algorithms, by the number of objects alone; predict or measure again to have one by the load"
+    );
+    if corrected > 0 { vec![told] } else { Vec::new() }
 }
 
 /// Calls methods and keys by their current names, wherever in the file they stand.
@@ -138,9 +113,6 @@ fn rename(value: &mut Value) {
     match value {
         Value::Array(items) => items.iter_mut().for_each(rename),
         Value::Object(entries) => {
-            if let Some(terms) = entries.remove("otherwise") {
-                entries.insert("fallback_terms".to_owned(), terms);
-            }
             for (key, value) in entries {
                 match value {
                     Value::String(name) if NAMES.contains(&key.as_str()) => *name = renamed(name),

@@ -54,7 +54,10 @@ pub mod write;
 pub use report::Report;
 pub use schemas::schemas;
 pub use train::{Trained, train, without};
-pub use training::{MethodScore, StoredModel, Training, TrainingCount, TrainingReport, Validation, read_model, write_model};
+pub use training::{
+    Coverage, Floor, MethodScore, Regrets, Split, StoredModel, Training, TrainingCount, TrainingReport, Validation,
+    read_model, write_model,
+};
 
 /// The example of the guide for researchers as a test.
 #[cfg(doctest)]

@@ -5,8 +5,8 @@ use crate::fit::components;
 use crate::report::{Label, Point, Provenance, Report, Timed, Timing};
 use sapwise::hardware::GpuParameterId;
 use sapwise::hardware::{GpuGroup, GpuHardware, GpuIdentity, GpuKind, ParameterId};
-use sapwise::model::{MethodModel, ModelTerm, Scale};
-use sapwise::{AlgorithmId, BackendClass, Hardware, Load, Parameter, Term};
+use sapwise::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, Scale};
+use sapwise::{AlgorithmCost, AlgorithmId, BackendClass, Entry, Hardware, Load, Model, Parameter, Term};
 use sapwise_scenes::Random;
 
 /// A machine of the made-up family.
@@ -132,27 +132,25 @@ impl Machine {
         let hardware = self.hardware();
         let mut random = Random::named(u64::from(self.cores) * 1000 + self.ghz.to_bits() % 997, &[]);
         let threads = (0..).map(|k| 1 << k).take_while(|&k| k < self.cores).chain([self.cores]);
-        let methods = truth();
-        let on_gpus = gpu_truth();
-        let of = |methods: &'_ [MethodModel], backend: String| -> Vec<(AlgorithmId, MethodModel)> {
-            methods.iter().map(|m| (format!("{}@{backend}", m.method).parse().unwrap(), m.clone())).collect()
+        let of = |methods: &'_ [MethodModel], backend: String| -> Vec<AlgorithmId> {
+            methods.iter().map(|m| format!("{}@{backend}", m.method).parse().unwrap()).collect()
         };
-        let mut ids: Vec<_> = threads.flat_map(|k| of(&methods, format!("cpu{k}"))).collect();
-        ids.extend((0..self.gpus.len()).flat_map(|k| of(&on_gpus, format!("gpu{k}"))));
+        let mut ids: Vec<AlgorithmId> = threads.flat_map(|k| of(&truth(), format!("cpu{k}"))).collect();
+        ids.extend((0..self.gpus.len()).flat_map(|k| of(&gpu_truth(), format!("gpu{k}"))));
         if self.gpus.len() == 2 {
-            ids.extend(of(&on_gpus, "gpu0+1".to_owned()));
+            ids.extend(of(&gpu_truth(), "gpu0+1".to_owned()));
         }
-        let curves: Vec<_> = ids.iter().map(|(id, m)| m.curve(&hardware, id.backend()).unwrap()).collect();
+        let costs = true_costs(&hardware, &ids);
         let mut points = Vec::new();
         for scenario in ["uniform", "clustered"] {
             let mut racing = vec![true; ids.len()];
             let mut before = vec![0.0; ids.len()];
             for k in 0..23 {
                 let load = load(scenario, 2.0_f64.powf(4.0 + 0.7 * f64::from(k)).round());
-                let ns: Vec<f64> = curves.iter().map(|c| c.cost_ns(&load)).collect();
+                let ns: Vec<f64> = costs.iter().map(|c| c.curve.cost_ns(&load)).collect();
                 let best = ns.iter().copied().fold(f64::INFINITY, f64::min);
                 let timings = (0..ids.len()).filter(|&a| racing[a]).map(|a| Timing {
-                    algorithm: ids[a].0.clone(),
+                    algorithm: ids[a].clone(),
                     samples_ns: (0..self.frames)
                         .map(|_| (ns[a] * (self.noise * random.normal()).exp()).round() as u64)
                         .collect(),
@@ -162,13 +160,13 @@ impl Machine {
                 for (a, ns) in ns.iter().enumerate() {
                     let ratio = ns / best;
                     // A GPU starts far behind and gains.
-                    let gains = ratio < before[a] && ids[a].0.backend().class() == BackendClass::Gpu;
+                    let gains = ratio < before[a] && ids[a].backend().class() == BackendClass::Gpu;
                     racing[a] &= load.objects < 500 || ratio < 8.0 || gains;
                     before[a] = ratio;
                 }
             }
         }
-        let algorithms = ids.into_iter().map(|(id, m)| Timed::new(id, m.revision)).collect();
+        let algorithms = ids.into_iter().map(|id| Timed::new(id, 1)).collect();
         Report { label: Label::RealFull, provenance: provenance(), hardware, algorithms, points, remarks: Vec::new() }
     }
 }
@@ -233,7 +231,7 @@ pub(crate) fn load(scenario: &str, n: f64) -> Load {
 
 fn method(name: &str, backend: BackendClass, terms: &[(Term, Scale, f64)]) -> MethodModel {
     let mut method = MethodModel::new(name, backend, 1);
-    (method.max_threads, method.min_objects, method.max_objects) = (16, 1, u32::MAX);
+    method.max_threads = 16;
     method.terms = of(terms);
     method
 }
@@ -262,60 +260,61 @@ pub(crate) fn gpu_truth() -> Vec<MethodModel> {
     vec![truth("brute", 12.0), truth("sap", 15.0), truth("grid-sap", 300.0)]
 }
 
+/// How the helpers of every method are called.
+pub(crate) const HELPERS: HelpersModel = HelpersModel::new(400.0, 0.35, 0.1, 0);
+
 /// The costs on the CPU that the reports are made from.
 pub(crate) fn truth() -> Vec<MethodModel> {
     use {Scale::*, Term::*};
-    let method = |name: &str, terms: &[(Term, Scale, f64)]| method(name, BackendClass::Cpu, terms);
-    let sorted = |call, join, tests| {
+    let method = |name: &str, terms: &[(Term, Scale, f64)]| {
+        let mut method = method(name, BackendClass::Cpu, terms);
+        method.helpers = Some(HELPERS);
+        method
+    };
+    let sorted = |call, tests| {
         [
             (Call, Cycle, call),
-            (Call, ForkJoin, join),
-            (Objects, SharedCycle, 20.0),
-            (Objects, Cycle, 5.0),
-            (Sort, SharedCycle, 2.5),
+            (Objects, Cycle, 25.0),
+            (Sort, Cycle, 2.5),
             (ColdObjects, Byte, 100.0),
             tests,
-            (Pairs, SharedCycle, 12.0),
+            (Pairs, Cycle, 12.0),
         ]
     };
     let mut pair_cache = method(
         "pair-cache",
         &[
             (Call, Cycle, 800.0),
-            (Call, ForkJoin, 2.0),
-            (Objects, SharedCycle, 15.0),
+            (Objects, Cycle, 15.0),
             (ColdObjects, Byte, 60.0),
-            (Pairs, SharedCycle, 20.0),
-            (Moved, SharedCycle, 150.0),
+            (Pairs, Cycle, 20.0),
+            (Moved, Cycle, 150.0),
         ],
     );
-    let tree = |factor: f64| {
-        let terms = [
-            (Call, Cycle, 2000.0),
-            (Call, ForkJoin, 3.0),
-            (Objects, SharedCycle, 170.0),
-            (Objects, Cycle, 5.0),
-            (Sort, SharedCycle, 5.0),
-            (ColdObjects, Byte, 100.0),
-            (Pairs, SharedCycle, 25.0),
-        ];
-        terms.map(|(term, scale, unit)| (term, scale, factor * unit))
-    };
-    pair_cache.fallback_terms = of(&tree(1.1));
+    pair_cache.fallback = Some(FallbackModel { method: "bvh".to_owned(), factor: 1.1 });
     vec![
+        method("brute", &[(Call, Cycle, 600.0), (Objects, Cycle, 4.0), (AllPairs, Lane, 6.0), (Pairs, Cycle, 12.0)]),
+        method("sap", &sorted(1500.0, (AxisCandidates, Lane, 7.0))),
+        method("grid-sap", &sorted(6000.0, (StripCandidates, Lane, 60.0))),
         method(
-            "brute",
+            "bvh",
             &[
-                (Call, Cycle, 600.0),
-                (Call, ForkJoin, 1.0),
-                (Objects, SharedCycle, 4.0),
-                (AllPairs, SharedLane, 6.0),
-                (Pairs, SharedCycle, 12.0),
+                (Call, Cycle, 2000.0),
+                (Objects, Cycle, 175.0),
+                (Sort, Cycle, 5.0),
+                (ColdObjects, Byte, 100.0),
+                (Pairs, Cycle, 25.0),
             ],
         ),
-        method("sap", &sorted(1500.0, 3.0, (AxisCandidates, SharedLane, 7.0))),
-        method("grid-sap", &sorted(6000.0, 4.0, (StripCandidates, SharedLane, 60.0))),
-        method("bvh", &tree(1.0)),
         pair_cache,
     ]
+}
+
+/// What the algorithms of a machine cost in truth, in the order of their ids.
+pub(crate) fn true_costs(machine: &Hardware, ids: &[AlgorithmId]) -> Vec<AlgorithmCost> {
+    let entries: Vec<Entry> = ids.iter().map(|id| Entry::new(id.clone(), 1)).collect();
+    let model = Model::new("truth", [truth(), gpu_truth()].concat(), Vec::new());
+    let costs = model.predict(machine, &entries).unwrap().costs;
+    assert_eq!(costs.len(), ids.len());
+    costs
 }

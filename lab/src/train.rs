@@ -2,7 +2,7 @@
 
 use crate::data::{Evidence, Profile, Selection};
 use crate::evaluate::{HeldOut, Partition, folded, validate};
-use crate::fit::{Designs, model};
+use crate::fit::{Designs, TrainingSet, model};
 use crate::progress::Progress;
 use crate::report::Label;
 use crate::training::{Training, TrainingCount, TrainingReport};
@@ -39,7 +39,7 @@ pub fn without(profiles: &[Profile], file: &str) -> Result<(Model, String)> {
     if !chosen.contains(&true) {
         bail!("there is no other report to predict {file} from");
     }
-    let model = model(profiles, &Designs::new(profiles), &chosen, "without")?.0;
+    let model = model(profiles, &Designs::new(profiles), TrainingSet::of(&chosen), "without")?.0;
     Ok((model, partition.held_out))
 }
 
@@ -63,20 +63,20 @@ pub fn train(selection: Selection, name: &str, progress: &dyn Progress) -> Resul
         bail!("no report can be trained on: {why}; {next}");
     }
     let designs = Designs::new(&profiles);
-    let (model, left_out) = model(&profiles, &designs, &vec![true; profiles.len()], name)?;
+    let (model, left_out) = model(&profiles, &designs, TrainingSet::of(&vec![true; profiles.len()]), name)?;
     notes.extend(designs.notes.iter().cloned());
     notes.extend(left_out);
     let validated = validate(&profiles, &designs, &Partition::new(&profiles), progress)?;
     notes.extend(validated.notes);
-    let training = Training { prior: validated.prior, validation: validated.validation, ..behind(&profiles) };
+    let model = model.with_intervals(validated.validation.coverage.map(|c| c.ratios_90_ln));
+    let training = Training { validation: validated.validation, ..behind(&profiles) };
     Ok(Trained { model, training, notes: folded(notes), held_out: validated.held_out })
 }
 
 /// What a training says of the reports behind it, before any validation.
 fn behind(profiles: &[Profile]) -> Training {
     if profiles.len() <= MOST_LISTED {
-        let report =
-            |p: &Profile| TrainingReport { file: p.file.clone(), physical_id: p.machine().to_owned(), label: p.label };
+        let report = |p: &Profile| TrainingReport { file: p.file.clone(), host: p.machine().to_owned(), label: p.label };
         return Training { trained_on: profiles.iter().map(report).collect(), ..Training::default() };
     }
     // By the name of the label, since labels have no order.
@@ -154,7 +154,7 @@ mod tests {
         let mut profiles = vec![Profile::of("a.json", &one.1); 401];
         profiles.iter_mut().enumerate().for_each(|(k, p)| {
             p.file = format!("{k}.json");
-            p.hardware.machine.physical_id = format!("{:016x}", k / 2);
+            p.host = format!("{:016x}", k / 2);
         });
         profiles[1].label = Label::RealRestricted;
         let many = behind(&profiles);
@@ -192,7 +192,7 @@ mod tests {
         assert!((tree.terms[0].unit / 9.0 - 1.0).abs() < 0.01, "{tree:?}");
         let costs = crate::fit::measured_costs(&Profile::of("", &reports[0].1)).0;
         let own = costs.iter().find(|c| c.algorithm == id).unwrap();
-        assert_eq!(own.curve.terms.iter().map(|t| t.term).collect::<Vec<_>>(), [named.term]);
+        assert_eq!(own.curve.work.terms.iter().map(|t| t.term).collect::<Vec<_>>(), [named.term]);
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! What a training says of itself: what it was trained on, and how well it did on what it had not seen.
 
-use crate::belief::Prior;
 use crate::report::Label;
 use sapwise::Model;
 use sapwise::json::{self, Format};
@@ -18,9 +17,6 @@ pub struct Training {
     /// Their numbers by label, where they are too many to be listed; else empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub trained_on_counts: Vec<TrainingCount>,
-    /// How far costs lie from their prediction on machines that were held out; `None` where none was.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub prior: Option<Prior>,
     /// How each strategy did on what was held out.
     pub validation: Validation,
 }
@@ -31,8 +27,8 @@ pub struct Training {
 pub struct TrainingReport {
     /// File name without folders.
     pub file: String,
-    /// The physical machine.
-    pub physical_id: String,
+    /// The host.
+    pub host: String,
     /// What kind of evidence it is.
     pub label: Label,
 }
@@ -58,10 +54,68 @@ pub struct Validation {
     pub held_out: String,
     /// Physical machines in the data.
     pub physical_machines: usize,
+    /// CPU models of these.
+    pub cpu_models: usize,
     /// Profiles, that is reports, in the data.
     pub profiles: usize,
     /// The strategies that were compared.
     pub methods: Vec<MethodScore>,
+    /// What is lost by chance: by choosing from the timings of another run on the same machine. `None` without two runs of one machine.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor: Option<Floor>,
+    /// How far times lie from their prediction; `None` where fewer than two physical machines were held out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<Coverage>,
+}
+
+/// Mean regrets: over all sizes, and with each number of objects as often as games are assumed to have it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct Regrets {
+    /// Over all cells.
+    pub all: f64,
+    /// As games have them.
+    pub in_games: f64,
+}
+
+/// Mean regrets of all reports, of those of one thread and of those of several.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct Split {
+    /// Of all reports.
+    pub all: Regrets,
+    /// Of those in which no algorithm ran on several threads; `None` of none.
+    pub one_thread: Option<Regrets>,
+    /// Of the others.
+    pub several_threads: Option<Regrets>,
+}
+
+/// What is lost by chance.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct Floor {
+    /// Pairs of runs on one machine under the same restriction, each judged on the other.
+    pub pairs: usize,
+    /// Whoever was best in the same cell of the other run.
+    pub cells: Split,
+    /// Whoever is cheapest by the costs measured in the other run.
+    pub full_sweep: Split,
+}
+
+/// How far times lie from their prediction on machines held out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct Coverage {
+    /// Physical machines.
+    pub physical_machines: usize,
+    /// Nine of ten times lie within a factor of e to this of their prediction.
+    pub times_90_ln: f64,
+    /// The share of a machine's times that lie within the factor that the others tell, the mean over machines.
+    pub times: f64,
+    /// Nine of ten ratios of the times of the two fastest algorithms under a load lie within a factor of e to this of their prediction.
+    pub ratios_90_ln: f64,
+    /// The share of such ratios of a machine within the factor that the others tell.
+    pub ratios: f64,
 }
 
 /// The score of one strategy. Regret is the time of its choice over the time of the best, less one.
@@ -81,6 +135,19 @@ pub struct MethodScore {
     /// Largest mean regret of the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_regret: Option<f64>,
+    /// Mean regrets where the scenario was held out as well as the machine, as a user's scene is none of ours; `None` of a strategy that this
+    /// is not asked of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unseen_scenario: Option<Split>,
+    /// Mean regret judged by the means over frames in place of their medians.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by_means: Option<Regrets>,
+    /// Mean regret on the reports in which no algorithm ran on several threads.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub one_thread: Option<Regrets>,
+    /// The same of the others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub several_threads: Option<Regrets>,
     /// 95th percentile over held-out reports of their mean regret.
     pub p95_regret: f64,
     /// Share of all cells with a regret over 10 %.
@@ -144,7 +211,7 @@ impl Training {
     /// counts are kept.
     #[must_use]
     pub fn physical_machines(&self) -> usize {
-        let listed: BTreeSet<&str> = self.trained_on.iter().map(|r| r.physical_id.as_str()).collect();
+        let listed: BTreeSet<&str> = self.trained_on.iter().map(|r| r.host.as_str()).collect();
         listed.len() + self.trained_on_counts.iter().map(|c| c.physical_machines).sum::<usize>()
     }
 
@@ -164,7 +231,8 @@ impl Training {
 }
 
 /// What training says of itself, read from the file of a model, whose other keys are the engine's.
-const TRAINING: Format = Format::new("model", 2, 0).skipping(&["name", "simulated", "ranges", "methods"]);
+const TRAINING: Format =
+    Format::new("model", 3, 0).skipping(&["name", "simulated", "ranges", "ratios_90_ln", "places", "methods"]);
 
 /// Reads a model with what training says of itself.
 ///
@@ -181,9 +249,6 @@ pub(crate) fn read_model_and_skipped(text: &str) -> Result<(StoredModel, Vec<Str
         training: Training,
     }
     let json::Read { value: Keys { training }, mut skipped, .. } = TRAINING.read(text)?;
-    if let Some(defect) = training.prior.and_then(|p| p.defect()) {
-        return Err(json::Error::Data { path: "training.prior".to_owned(), source: serde::de::Error::custom(defect) });
-    }
     let json::Read { value: model, skipped: in_model, .. } = Format::MODEL.read(text)?;
     // A new key of the outermost level is unknown to both readers.
     skipped.extend(in_model.into_iter().filter(|key| !skipped.contains(key)).collect::<Vec<_>>());

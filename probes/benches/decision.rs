@@ -1,29 +1,44 @@
-//! What one decision costs: the ranking alone, and the whole of `Adaptive::decide` with its sampled estimate.
+//! What one decision costs: the ranking alone, an observation, and the whole of `Adaptive::decide` with its sampled estimate.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use sapwise::{Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Knot, Load, Pairs, Registry, Source, Term, Tuning};
+use sapwise::{
+    Adaptive, BroadPhase, Hardware, Load, Machine, Model, Observed, Pairs, Parameter, ParameterId, Registry, Tuning,
+};
 use sapwise_scenes::Scenario;
 use std::hint::black_box;
 
-/// As many algorithms, terms and knots as a predicted field of a 16-core machine has.
+/// What the built-in model predicts for a machine of 16 cores.
 fn tuning(registry: &Registry) -> Tuning {
-    let curve = |k: u32| {
-        let terms = Term::ALL.map(|term| CostTerm::new(term, 1.0 + f64::from(k) / 100.0)).to_vec();
-        let knot = |o: u32| Knot { log2_objects: f64::from(o), ln_factor: 0.01 * f64::from(o % 5) };
-        CostCurve::new(terms).with_cache(3.2e7).with_correction((3..=24).map(knot).collect())
-    };
-    let ids = registry.entries().iter().map(|e| (e.id.clone(), e.revision));
-    let costs = ids.zip(0..).map(|((algorithm, revision), k)| AlgorithmCost::new(algorithm, revision, curve(k), 0.05));
+    let figures = [
+        (ParameterId::UsableCores, 16.0),
+        (ParameterId::ClockMeasuredGhz, 3.0),
+        (ParameterId::SimdLanes, 8.0),
+        (ParameterId::CacheLlcBytes, 3.2e7),
+        (ParameterId::BandwidthOneThreadGbPerS, 20.0),
+        (ParameterId::ForkJoinColdNs, 8000.0),
+        (ParameterId::ScalingTwoThreadsRatio, 1.9),
+        (ParameterId::ScalingAllThreadsRatio, 12.0),
+    ];
+    let parameters = figures.map(|(id, value)| Parameter::reported(id, value, "made up")).to_vec();
+    let hardware = Hardware::new(Machine::default(), parameters);
     let loads: Vec<Load> = (3..20).map(|k| Load::of_objects(1 << k)).collect();
-    Tuning::from_costs(Source::Measured, "uniform", costs.collect(), &loads)
+    let model = Model::built_in().expect("the built-in model is sound");
+    model.predict(&hardware, registry.entries()).expect("a machine like others").tuning("uniform", &loads)
 }
 
 fn decision(c: &mut Criterion) {
     let registry = Registry::with_cores(16);
     let tuning = tuning(&registry);
-    let load = Load::of_objects(12_345).with_candidates(1e6, 1e5).with_pairs(6e3).with_moved(1.0);
-    c.bench_function(&format!("rank {} algorithms", tuning.costs.len()), |b| {
-        b.iter(|| tuning.rank(black_box(&load), |_| true));
+    let load = Load::of_objects(12_345).with_candidates(1e6, 1e5).with_pairs(6e3).with_moved(0.04);
+    for count in [16, tuning.costs.len()] {
+        c.bench_function(&format!("rank {count} algorithms"), |b| {
+            b.iter(|| tuning.rank(black_box(&load), |k| k < count));
+        });
+    }
+    let mut observed = Observed::new(tuning.costs.clone());
+    let ns = tuning.costs[0].curve.cost_ns(&load);
+    c.bench_function("observe one time", |b| {
+        b.iter(|| observed.observe(black_box(0), black_box(&load), black_box(1.1 * ns), 0.1));
     });
     for objects in [100, 10_000, 1_000_000] {
         let scene = Scenario::Uniform.start(objects, 1);

@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn terms_are_those_of_the_method_on_any_number_of_threads() {
         let mut algorithms = Algorithms::default();
-        let terms = [(Term::Call, Scale::Cycle), (Term::Pairs, Scale::SharedCycle)];
+        let terms = [(Term::Call, Scale::Cycle), (Term::Pairs, Scale::Lane)];
         algorithms.add(UserAlgorithm::on_threads("grid", 1, nothing).terms(&terms)).unwrap();
         algorithms.add(serial("tree", 1)).unwrap();
         let of = |id: &str| algorithms.terms(&id.parse().unwrap());

@@ -8,9 +8,9 @@ use anyhow::bail;
 use sapwise::hardware::ParameterId;
 use sapwise::model::{ASK, Prediction};
 use sapwise::stats::median;
-use sapwise::{GpuIdentity, Hardware, Load, Model, Registry, Source, Tuning};
+use sapwise::{GpuIdentity, Hardware, Load, Model, Observed, Registry, Source, Tuning};
 use sapwise_lab::StoredModel;
-use sapwise_lab::belief::{Prior, Taken, learn};
+use sapwise_lab::belief::{Taken, learn};
 use sapwise_lab::data::{Document, read_document};
 use sapwise_lab::sweep::loads;
 use sapwise_lab::text::count;
@@ -83,7 +83,7 @@ pub(crate) fn predict(
 /// # Errors
 /// As [`predict`], and when no process can be started.
 pub(crate) fn predict_and_sample(
-    StoredModel { model, training }: &StoredModel,
+    model: &Model,
     hardware: &Hardware,
     gpus: &[GpuIdentity],
     slice: &Slice,
@@ -102,29 +102,21 @@ pub(crate) fn predict_and_sample(
     };
     let disturbed: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
     let mut live = Live::new(session, median(&disturbed));
-    let prior = training.prior.unwrap_or(Prior::ASSUMED);
-    let learned = learn(prediction.costs.clone(), &prior, loads, &mut live, most as usize)?;
+    let costs = prediction.costs.clone();
+    let predicted = if prediction.extrapolated { Observed::of_unlike_machine(costs) } else { Observed::new(costs) };
+    let learned = learn(predicted, loads, &mut live, most as usize)?;
     let (remarks, wrong) = live.remarks();
     if !learned.usable.contains(&true) {
         bail!("every algorithm failed: {}; --samples 0 predicts without samples", learned.remarks.join("; "));
     }
-    let mut usable = learned.usable.iter();
-    prediction.costs.retain(|_| usable.next() == Some(&true));
+    prediction.costs = learned.costs();
     let mut tuning = prediction.tuning(&scenario.to_string(), loads);
     tuning.warnings.extend(unknown(algorithms, &registry, model));
-    // Without any sample the posterior is the prior, whose spread is that of machines left out and not of the model.
     if !learned.taken.is_empty() {
-        let mut corrected = Tuning::from_costs(Source::Learned, &scenario.to_string(), learned.costs(), loads);
-        corrected.model = tuning.model.take();
-        corrected.extrapolated = tuning.extrapolated;
-        corrected.samples = learned.taken.iter().map(Taken::observation).collect();
+        tuning.source = Source::Learned;
+        tuning.samples = learned.taken.iter().map(Taken::observation).collect();
         // What asked for samples has got them.
-        corrected.warnings = std::mem::take(&mut tuning.warnings);
-        corrected.warnings.retain(|w| w != ASK);
-        // The prior rests on too few machines for an interval on one that was never measured, sampled or not.
-        corrected.crossovers.iter_mut().for_each(|c| (c.low, c.high) = (None, None));
-        corrected.interval_basis = std::mem::take(&mut tuning.interval_basis);
-        tuning = corrected;
+        tuning.warnings.retain(|w| w != ASK);
     }
     tuning.warnings.extend(remarks);
     tuning.warnings.extend(learned.remarks);

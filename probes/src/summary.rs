@@ -3,7 +3,7 @@
 use crate::gpus::GpuChoice;
 use crate::shell;
 use crate::terminal::Terminal;
-use sapwise::{Backend, Crossover, GpuHardware, GpuIdentity, Hardware, How, Parameter, Tuning};
+use sapwise::{Backend, Crossover, GpuHardware, GpuIdentity, Hardware, How, Model, Parameter, Tuning};
 use sapwise_lab::data::usual_scenario;
 use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::label_text;
@@ -15,8 +15,9 @@ use std::path::Path;
 /// The hardware, then the tuning of every scenario that was swept.
 pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
     let mut text = hardware(&report.hardware, terminal);
+    let base = Model::built_in().ok();
     for scenario in scenarios(report) {
-        match measured_tuning(report, scenario) {
+        match measured_tuning(report, scenario, base.as_ref()) {
             Ok(measured) => text.push_str(&format!("\n{}", tuning(&measured, terminal))),
             Err(why) => text.push_str(&format!("\n{scenario}: no tuning: {why:#}\n")),
         }
@@ -38,7 +39,7 @@ pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
 pub(crate) fn next_step(report: &Report, path: &Path) -> String {
     let path = shell::path(path);
     // A report without a sweep, or one that was interrupted early, serves for its hardware only.
-    let next = if measured_tuning(report, usual_scenario(report)).is_ok() {
+    let next = if measured_tuning(report, usual_scenario(report), None).is_ok() {
         format!("sapwise run fragmentation --tuning {path}")
     } else {
         format!("sapwise predict --report {path}")

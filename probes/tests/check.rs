@@ -49,7 +49,7 @@ fn revision() -> u32 {
 
 fn tuning(steps: &Value) -> Value {
     json!({
-        "schema": "tuning/1", "source": "default", "model": null, "extrapolated": false, "warnings": [],
+        "schema": "tuning/2", "source": "default", "model": null, "extrapolated": false, "warnings": [],
         "scenario": "uniform", "steps": steps, "crossovers": [], "interval_basis": "", "costs": []
     })
 }
@@ -79,7 +79,7 @@ fn sound_files_pass() {
     assert_eq!(status, 0, "{findings:?}");
     assert!(findings.iter().all(|f| f["sound"] == true && f["current"] == true), "{findings:?}");
     assert_eq!((&findings[0]["schema"], &findings[0]["applicable"]), (&"report/2".into(), &false.into()));
-    assert_eq!((&findings[1]["schema"], &findings[1]["applicable"]), (&"tuning/1".into(), &true.into()));
+    assert_eq!((&findings[1]["schema"], &findings[1]["applicable"]), (&"tuning/2".into(), &true.into()));
     assert!(findings[0]["notes"].to_string().contains("no evidence of accuracy"), "{findings:?}");
 }
 
@@ -394,7 +394,7 @@ fn keys_of_a_newer_version_are_ignored_and_told_once_a_file() {
     assert!(status == 0 && findings[0]["notes"].to_string().contains(sentence), "{findings:?}");
     let out = folder.path().join("tuning.json");
     let mut steps = tuning(&json!([{"from_objects": 0, "algorithm": "brute@cpu1"}]));
-    steps["schema"] = "tuning/1.1".into();
+    steps["schema"] = "tuning/2.1".into();
     steps["mood"] = "good".into();
     let steps = write(folder.path(), "newer-tuning.json", steps.to_string());
     let complaints = |words: &[&str], file: &Path| {
@@ -408,5 +408,5 @@ fn keys_of_a_newer_version_are_ignored_and_told_once_a_file() {
         assert!(matches!(&told[..], [one] if one.ends_with(sentence)), "{told:?}");
     }
     let told = complaints(&replayed, &steps);
-    assert!(matches!(&told[..], [one] if one.contains("is of tuning/1.1") && one.ends_with(": mood")), "{told:?}");
+    assert!(matches!(&told[..], [one] if one.contains("is of tuning/2.1") && one.ends_with(": mood")), "{told:?}");
 }

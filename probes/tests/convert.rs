@@ -15,15 +15,15 @@ fn old(name: &str) -> PathBuf {
 fn old_files_are_refused_by_the_name_of_the_verb_and_sound_once_converted() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("new");
-    for name in ["report-1.json", "model-1-folds.json", "fields-1.json"] {
+    for name in ["report-1.json", "tuning-1.json", "fields-1.json"] {
         let refused = sapwise().arg("check").arg(old(name)).output().unwrap();
         let told = String::from_utf8(refused.stdout).unwrap();
         assert!(refused.status.code() == Some(1) && told.contains("sapwise convert FILE... --out DIR"), "{name}: {told}");
     }
-    let files = ["report-1.json", "model-1-folds.json", "fields-1.json"].map(old);
+    let files = ["report-1.json", "tuning-1.json", "fields-1.json"].map(old);
     let told = success(sapwise().arg("convert").args(files).arg("--out").arg(&out));
-    assert!(told.contains("report/2 in ") && told.contains("left out: folds: "), "{told}");
-    for (name, schema) in [("report-1.json", "report/2"), ("model-1-folds.json", "model/2"), ("fields-1.json", "tuning/1")] {
+    assert!(told.contains("report/2 in ") && told.contains("left out: correction: "), "{told}");
+    for (name, schema) in [("report-1.json", "report/2"), ("tuning-1.json", "tuning/2"), ("fields-1.json", "tuning/2")] {
         let answer = sapwise().args(["check", "--json"]).arg(out.join(name)).output().unwrap().stdout;
         let answer: Value = serde_json::from_slice(&answer).unwrap();
         assert_eq!(answer["files"][0]["schema"], schema, "{answer}");
@@ -48,6 +48,6 @@ fn what_is_not_converted_is_told_and_nothing_is_written_over() {
     assert_eq!(again.status.code(), Some(1));
     let answer: Value = serde_json::from_slice(&again.stdout).unwrap();
     let problem = |k: usize| answer["files"][k]["problem"].as_str().unwrap_or_default().to_owned();
-    assert!(problem(0).contains("tuning/1 already") && problem(1).contains("no JSON"), "{answer}");
+    assert!(problem(0).contains("tuning/2 already") && problem(1).contains("no JSON"), "{answer}");
     assert_eq!(fs::read_dir(&second).unwrap().count(), 0);
 }

@@ -176,7 +176,7 @@ fn tuning_for_a_gpu_that_is_not_here_are_told_and_run_on_the_rest() {
     let folder = tempfile::tempdir().unwrap();
     let step = |from: u32, id: &str| json!({"from_objects": from, "algorithm": id});
     let tuning = json!({
-        "schema": "tuning/1", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
+        "schema": "tuning/2", "source": "default", "model": null, "extrapolated": false, "warnings": [], "scenario": "uniform",
         "steps": [step(0, "brute@cpu1"), step(100, "grid-sap@gpu99")], "crossovers": [], "interval_basis": "", "costs": []
     });
     let path = folder.path().join("tuning.json");

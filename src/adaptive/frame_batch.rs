@@ -3,6 +3,8 @@
 //! An incremental algorithm runs cheap frames for a while and then an expensive one, in which it rebuilds. What counts is their mean, so that
 //! frames are added up before they are compared with what was expected.
 
+use crate::tuning::belief::View;
+
 /// Frames that are added up where an algorithm runs on, and right after it began.
 const MOST: u32 = 16;
 const FEWEST: u32 = 2;
@@ -40,6 +42,7 @@ pub(super) struct FrameBatch {
     pub(super) predicted_ns: f64,
     calls_ns: f64,
     log2_objects: f64,
+    view: View,
     /// It is the one frame with which the candidate began.
     pub(super) cold: bool,
     /// Frames until it is full.
@@ -50,6 +53,13 @@ impl FrameBatch {
     /// Mean logarithm of the number of objects.
     pub(super) fn log2_objects(&self) -> f64 {
         self.log2_objects / f64::from(self.frames.max(1))
+    }
+
+    /// The mean load, as what is learned sees it.
+    pub(super) fn view(&self) -> View {
+        let mut mean = View::default();
+        mean.add(&self.view, 1.0 / f64::from(self.frames.max(1)));
+        mean
     }
 
     /// Share of calls in the predicted time.
@@ -68,13 +78,14 @@ impl FrameBatch {
     }
 
     /// Adds a frame, of which no more counts than `dearest_ns` allows. Returns the rest.
-    pub(super) fn add(&mut self, ns: f64, predicted: Predicted, log2_objects: f64, dearest_ns: f64) -> f64 {
+    pub(super) fn add(&mut self, ns: f64, predicted: Predicted, (log2_objects, view): (f64, &View), dearest_ns: f64) -> f64 {
         let counted = ns.min(MOST_OVER * dearest_ns);
         self.frames += 1;
         self.calls_ns += predicted.calls_ns;
         self.real_ns += counted;
         self.predicted_ns += predicted.ns;
         self.log2_objects += log2_objects;
+        self.view.add(view, 1.0);
         ns - counted
     }
 
@@ -101,7 +112,7 @@ mod tests {
             if !batch.takes(candidate, log2_objects) {
                 batch = batch.next(candidate);
             }
-            batch.add(150.0, predicted, log2_objects, 200.0);
+            batch.add(150.0, predicted, (log2_objects, &View::default()), 200.0);
             if batch.is_full() {
                 assert_eq!((batch.real_ns, batch.calls()), (150.0 * f64::from(batch.frames), 0.5));
                 full.push((frame, batch.frames));
@@ -114,7 +125,7 @@ mod tests {
     #[test]
     fn what_other_programs_took_is_given_back() {
         let mut batch = FrameBatch::default().next(0);
-        assert_eq!(batch.add(1000.0, Predicted { ns: 0.0, calls_ns: 0.0 }, 3.0, 100.0), 800.0);
+        assert_eq!(batch.add(1000.0, Predicted { ns: 0.0, calls_ns: 0.0 }, (3.0, &View::default()), 100.0), 800.0);
         assert_eq!((batch.real_ns, batch.calls()), (200.0, 0.0));
     }
 }

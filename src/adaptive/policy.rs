@@ -2,14 +2,14 @@
 
 use super::decision::{Choice, Reason};
 use super::frame_batch::{FrameBatch, Predicted};
-use super::knots::{KnotPosition, View};
 use super::learner::Learner;
 use super::shelter::Shelter;
 use super::switching::{Expected, Kind, SwitchingCosts};
-use crate::cost::Counts;
+use crate::cost::Frame;
 use crate::load::Load;
 use crate::stats::normal_density;
 use crate::tuning::Tuning;
+use crate::tuning::belief::View;
 
 /// By number of objects alone, the algorithm of before stays while its own step is within this share.
 const STEP_SLACK: f64 = 0.05;
@@ -47,6 +47,7 @@ pub(super) struct Policy {
     expected: Vec<Expected>,
     predicted: Vec<Predicted>,
     log2_objects: f64,
+    view: View,
     batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
@@ -75,6 +76,7 @@ impl Policy {
             expected: vec![Expected { built_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
             predicted: vec![Predicted::default(); count],
             log2_objects: 0.0,
+            view: View::default(),
             batch: FrameBatch::default(),
             saved_ns: vec![0.0; count],
             frame: 0,
@@ -166,15 +168,15 @@ impl Policy {
 
     /// Fills in what every candidate is expected to cost.
     fn expect(&mut self, load: &Load) {
-        let counts = Counts::new(load);
-        self.log2_objects = counts.log2_objects();
-        let position = KnotPosition::of(self.log2_objects);
+        let frame = Frame::new(load);
+        self.log2_objects = f64::from(load.objects.max(1)).log2();
+        self.view = self.learner.as_ref().map_or_else(View::default, |l| l.view(&frame));
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
         for (k, cost) in self.tuning.costs.iter().enumerate() {
-            let ns = cost.curve.cost_of(&counts);
-            let alone_ns = cost.curve.fallback_of(&counts).unwrap_or(ns).max(ns);
-            let predicted = Predicted { ns, calls_ns: cost.curve.calls_of(&counts).min(ns) };
-            let factor = learner.map_or(1.0, |l| l.correction_ln(k, View { position, calls: predicted.calls() }).exp());
+            let ns = cost.curve.cost_of(&frame);
+            let alone_ns = cost.curve.fallback_of(&frame).unwrap_or(ns).max(ns);
+            let predicted = Predicted { ns, calls_ns: cost.curve.calls_of(&frame).min(ns) };
+            let factor = learner.map_or(1.0, |l| l.correction_ln(k, &self.view, predicted.calls()).exp());
             let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));
             self.predicted[k] = predicted;
             self.expected[k] = Expected { built_ns: ns * factor, alone_ns: alone_ns * factor };
@@ -230,15 +232,14 @@ impl Policy {
         if self.frame < self.explored_at + EXPLORE_EVERY {
             return None;
         }
-        let position = KnotPosition::of(self.log2_objects);
-        let view = |k: usize| (k, View { position, calls: self.predicted[k].calls() });
+        let called = |k: usize| (k, self.predicted[k].calls());
         let now = self.mean_ns[settled];
         let worth = |k: usize| {
             let first = self.mean_ns[k] + self.switch_ns(k);
             if k == settled || !self.usable[k] || first > MOST_DEARER * now || self.is_avoided(k) {
                 return None;
             }
-            let deviation = learner.variance_of_ratio(view(settled), view(k)).sqrt();
+            let deviation = learner.variance_of_ratio(&self.view, called(settled), called(k)).sqrt();
             let gain = now * expected_gain((self.mean_ns[k] / now).ln(), deviation) * HORIZON - (first - now).max(0.0);
             (gain > 0.0).then_some((k, gain))
         };
@@ -280,8 +281,10 @@ impl Policy {
             let known = learner.knows(candidate);
             let dearest_ns = if known { self.switching.rebuild_ns(candidate, expected) } else { f64::INFINITY };
             self.batch.cold = entered;
-            let waited_ns =
-                self.batch.add(ns, self.predicted[candidate], self.log2_objects, dearest_ns).min(MOST_WAIT * dearest_ns);
+            let waited_ns = self
+                .batch
+                .add(ns, self.predicted[candidate], (self.log2_objects, &self.view), dearest_ns)
+                .min(MOST_WAIT * dearest_ns);
             learner.waited(candidate, waited_ns, self.frame);
         }
         if self.batch.is_full() {

@@ -13,10 +13,9 @@ fn tuning_of(terms: [Term; 2], costs: &[(&str, f64, f64)]) -> Tuning {
     let costs = costs.iter().map(|&(id, first, second)| AlgorithmCost {
         algorithm: id.parse().unwrap(),
         revision: revision(id),
-        curve: CostCurve {
-            terms: terms.into_iter().zip([first, second]).map(|(term, unit_ns)| CostTerm { term, unit_ns }).collect(),
-            ..CostCurve::default()
-        },
+        curve: CostCurve::new(
+            terms.into_iter().zip([first, second]).map(|(term, unit_ns)| CostTerm { term, unit_ns }).collect(),
+        ),
         spread_ln: 0.0,
     });
     let loads: Vec<Load> = (0..16).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 /// How the files are read and written.
-const FORMAT: Format = Format::new("cache", 2, 0);
+const FORMAT: Format = Format::new("cache", 3, 0);
 
 /// How what a stopped measurement has found is read and written.
 const UNFINISHED: Format = Format::new("unfinished", 1, 0);

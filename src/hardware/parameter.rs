@@ -151,19 +151,23 @@ parameters! {
         BandwidthOneThreadGbPerS = "bandwidth_one_thread_gb_per_s" =>
             read("GB/s", 0.2, 1000.0, "one channel of memory of 1998, and more than any one core takes", TRIAD);
         /// Memory bandwidth of all usable cores.
-        BandwidthAllThreadsGbPerS = "bandwidth_all_threads_gb_per_s" =>
-            read("GB/s", 0.2, 5000.0, "one channel of memory of 1998, and two sockets of stacked memory", TRIAD);
+        BandwidthAllThreadsGbPerS = "bandwidth_all_threads_gb_per_s" => Quantity {
+            read_by_model: false,
+            ..read("GB/s", 0.2, 5000.0, "one channel of memory of 1998, and two sockets of stacked memory", TRIAD)
+        };
         /// Time until one core sees what another one wrote.
-        CoreToCoreNs = "core_to_core_ns" => read(
-            "ns",
-            1.0,
-            1e5,
-            "light goes a foot in a nanosecond; between sockets it is under a microsecond",
-            "a cache line that two cores write in turn",
-        );
+        CoreToCoreNs = "core_to_core_ns" => Quantity {
+            read_by_model: false,
+            ..read(
+                "ns",
+                1.0,
+                1e5,
+                "light goes a foot in a nanosecond; between sockets it is under a microsecond",
+                "a cache line that two cores write in turn",
+            )
+        };
         /// Cost of spreading work over all usable cores and waiting for it, while the helpers are awake.
-        ForkJoinWarmNs = "fork_join_warm_ns" =>
-            Quantity { read_by_model: true, ..told("ns", "an empty parallel call, one after the other") };
+        ForkJoinWarmNs = "fork_join_warm_ns" => told("ns", "an empty parallel call, one after the other");
         /// The same after the helpers have been idle for 2 ms.
         ForkJoinColdNs = "fork_join_cold_ns" => read(
             "ns",

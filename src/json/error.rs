@@ -59,6 +59,12 @@ impl fmt::Display for Error {
             Self::OtherSchema { found, expected } => {
                 write!(f, "the schema is {found:?}; this version reads {:?}", expected.to_string())
             }
+            Self::OldSchema { found, expected } if expected.name() == "model" => write!(
+                f,
+                "the schema is {found:?}, of an older version; this one reads {:?}: train again with `sapwise train REPORTS... --out \
+                 MODEL.json`",
+                expected.to_string()
+            ),
             Self::OldSchema { found, expected } => write!(
                 f,
                 "the schema is {found:?}, of an older version; this one reads {:?}: convert the file with \

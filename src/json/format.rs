@@ -7,7 +7,7 @@ use serde_ignored::Path;
 use std::borrow::Cow;
 use std::fmt;
 
-/// The schema of a file: `tuning/1`, or `tuning/1.3`.
+/// The schema of a file: `tuning/2`, or `tuning/2.3`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Schema {
     name: Cow<'static, str>,
@@ -85,10 +85,10 @@ pub struct Format {
 
 impl Format {
     /// Files of tuning.
-    pub const TUNING: Self = Self { old_name: Some("fields"), ..Self::new("tuning", 1, 0) };
+    pub const TUNING: Self = Self { old_name: Some("fields"), ..Self::new("tuning", 2, 0) };
 
     /// Files of models, without what training says of itself.
-    pub const MODEL: Self = Self::new("model", 2, 0).skipping(&["training"]);
+    pub const MODEL: Self = Self::new("model", 3, 0).skipping(&["training"]);
 
     /// The format of a schema in the newest version that the caller knows.
     #[must_use]

@@ -10,7 +10,7 @@ fn sample() -> Value {
 #[test]
 fn tuning_reads_back_and_its_first_key_is_the_schema() {
     let text = write_tuning(&tuning(&sample().to_string()).unwrap()).unwrap();
-    assert!(text.starts_with("{\n  \"schema\": \"tuning/1\",\n  \"source\": \"default\",\n"), "{text}");
+    assert!(text.starts_with("{\n  \"schema\": \"tuning/2\",\n  \"source\": \"default\",\n"), "{text}");
     assert_eq!(tuning(&text).unwrap().source, Source::Default);
 }
 
@@ -20,8 +20,8 @@ fn an_unknown_key_is_an_error_that_names_it_but_in_a_newer_minor_version_it_is_t
     file["colour"] = json!("green");
     file["steps"][0]["why"] = json!({ "deep": [1, 2] });
     let error = tuning(&file.to_string()).unwrap_err();
-    assert!(matches!(&error, Error::UnknownKey { .. }) && error.to_string().contains("is no key of tuning/1"), "{error}");
-    file["schema"] = json!("tuning/1.3");
+    assert!(matches!(&error, Error::UnknownKey { .. }) && error.to_string().contains("is no key of tuning/2"), "{error}");
+    file["schema"] = json!("tuning/2.3");
     let read = Format::TUNING.read::<Tuning>(&file.to_string()).unwrap();
     assert_eq!((read.schema.minor(), read.value), (3, tuning(&sample().to_string()).unwrap()));
     let mut skipped = read.skipped;
@@ -41,10 +41,10 @@ fn an_old_schema_is_refused_with_the_command_that_converts_it() {
         matches!(old, Error::OldSchema { .. }) && old.to_string().contains("`sapwise convert FILE... --out DIR`"),
         "{old}"
     );
-    for other in ["model/2", "tuning/2", "tuning", "tuning/+1", "tuning/1.x", ""] {
+    for other in ["model/3", "tuning/3", "tuning", "tuning/+2", "tuning/2.x", ""] {
         let error = schema(other);
         assert!(
-            matches!(error, Error::OtherSchema { .. }) && error.to_string().contains("\"tuning/1\""),
+            matches!(error, Error::OtherSchema { .. }) && error.to_string().contains("\"tuning/2\""),
             "{other}: {error}"
         );
     }

@@ -1,128 +1,61 @@
-//! The cost curve of a method on a backend of a machine.
+//! The cost of a method on a machine.
 
 use super::needed::needed;
-use super::{Feature, MethodModel, ModelTerm, PredictError, ResidualTerm, Scale};
+use super::{MethodModel, PredictError};
+use crate::cost::{Places, Residual};
 use crate::hardware::{Hardware, ParameterId};
-use crate::{Backend, BackendClass, CostCurve, CostTerm, Knot};
+use crate::{Backend, BackendClass, CostCurve, CostTerm, Fallback, Work};
+use std::sync::Arc;
 
-/// Objects at which the correction of a predicted curve is tabulated: 2^3 to 2^24, every octave.
-const CORRECTION_OCTAVES: std::ops::RangeInclusive<u32> = 3..=24;
-
-/// The figures of one backend of a machine, each looked up once: a method and its folds share them.
-pub(super) struct Figures<'a> {
-    hardware: &'a Hardware,
-    backend: &'a Backend,
-    scales: Vec<(Scale, Result<f64, PredictError>)>,
-    features: Vec<(Feature, Result<f64, PredictError>)>,
-    cache: Option<Result<f64, PredictError>>,
-}
-
-/// What a curve is made of, of a model or of one of its folds.
-pub(super) struct Formula<T, R> {
-    pub(super) class: BackendClass,
-    pub(super) terms: T,
-    /// Terms of the other way, where there is one.
-    pub(super) fallback_terms: T,
-    pub(super) intercept: f64,
-    pub(super) residual: R,
-    /// Fewest and most objects that were timed; the residual is held constant beyond.
-    pub(super) objects: (u32, u32),
-}
-
-impl<'a> Figures<'a> {
-    pub(super) fn new(hardware: &'a Hardware, backend: &'a Backend) -> Self {
-        Self { hardware, backend, scales: Vec::new(), features: Vec::new(), cache: None }
-    }
-
-    fn nanoseconds(&mut self, scale: Scale) -> Result<f64, PredictError> {
-        if let Some((_, known)) = self.scales.iter().find(|s| s.0 == scale) {
-            return known.clone();
-        }
-        let looked_up = scale.nanoseconds(self.hardware, self.backend);
-        self.scales.push((scale, looked_up.clone()));
-        looked_up
-    }
-
-    /// The terms with what a unit of each takes, those of the same count together.
-    fn costs(&mut self, terms: impl Iterator<Item = ModelTerm>) -> Result<Vec<CostTerm>, PredictError> {
-        let mut costs: Vec<CostTerm> = Vec::new();
-        for t in terms.filter(|t| t.unit > 0.0) {
-            let unit_ns = t.unit * self.nanoseconds(t.scale)?;
-            match costs.iter_mut().find(|c| c.term == t.term) {
-                Some(same) => same.unit_ns += unit_ns,
-                None => costs.push(CostTerm { term: t.term, unit_ns }),
-            }
-        }
-        Ok(costs)
-    }
-
-    fn feature(&mut self, feature: Feature) -> Result<f64, PredictError> {
-        if let Some((_, known)) = self.features.iter().find(|f| f.0 == feature) {
-            return known.clone();
-        }
-        let looked_up = feature.of_machine(self.hardware, self.backend);
-        self.features.push((feature, looked_up.clone()));
-        looked_up
-    }
-
-    fn cache_bytes(&mut self) -> Result<f64, PredictError> {
-        let hardware = self.hardware;
-        self.cache.get_or_insert_with(|| needed(hardware, ParameterId::CacheLlcBytes)).clone()
-    }
-}
-
-impl<T: Iterator<Item = ModelTerm>, R: Iterator<Item = ResidualTerm>> Formula<T, R> {
+impl MethodModel {
+    /// What this method takes on one thread of a machine, or on the GPUs of `backend`. `places` are those of its model, `fallback` what it
+    /// falls back to there.
+    ///
     /// # Errors
-    /// Names the hardware parameter or the GPU that is missing.
-    pub(super) fn curve(self, figures: &mut Figures<'_>) -> Result<CostCurve, PredictError> {
-        let (terms, fallback_terms) = (figures.costs(self.terms)?, figures.costs(self.fallback_terms)?);
-        // What depends on the machine alone is added up once for all octaves.
-        let (mut fixed, mut with_load, mut corrected) = (self.intercept, Vec::with_capacity(2), self.intercept != 0.0);
-        for r in self.residual {
-            corrected = true;
-            if r.feature.of_octaves(0.0, figures.backend).is_some() {
-                with_load.push(r);
-            } else {
-                fixed += r.slope * (figures.feature(r.feature)? - r.centre);
+    /// Names the hardware parameter or the GPU that is missing, or what is wrong with the cost.
+    pub fn work(
+        &self,
+        hardware: &Hardware,
+        backend: &Backend,
+        places: &Arc<Places>,
+        fallback: Option<Fallback>,
+    ) -> Result<Work, PredictError> {
+        // Those of the same count together.
+        let mut terms: Vec<CostTerm> = Vec::new();
+        for t in self.terms.iter().filter(|t| t.unit > 0.0) {
+            let unit_ns = t.unit * t.scale.nanoseconds(hardware, backend)?;
+            match terms.iter_mut().find(|c| c.term == t.term) {
+                Some(same) => same.unit_ns += unit_ns,
+                None => terms.push(CostTerm { term: t.term, unit_ns }),
             }
         }
-        let mut correction = Vec::new();
-        let backend = figures.backend;
-        if corrected {
-            let (fewest, most) = self.objects;
-            correction.extend(CORRECTION_OCTAVES.map(|octave| {
-                let octaves = f64::from((1 << octave).min(most).max(fewest).max(1)).log2();
-                let slope = |r: &ResidualTerm| r.slope * (r.feature.of_octaves(octaves, backend).unwrap_or(0.0) - r.centre);
-                Knot { log2_objects: f64::from(octave), ln_factor: fixed + with_load.iter().map(slope).sum::<f64>() }
-            }));
-        }
-        let cache_bytes = match self.class {
-            BackendClass::Cpu => figures.cache_bytes()?,
-            // No term of a GPU depends on the caches of the CPU.
-            BackendClass::Gpu => 0.0,
+        let residual = (!self.residual.is_empty())
+            .then(|| Residual::new(Arc::clone(places), self.residual.clone(), self.residual_by_motion));
+        let work = Work {
+            terms,
+            fallback,
+            cache_bytes: match self.backend {
+                BackendClass::Cpu => needed(hardware, ParameterId::CacheLlcBytes)?,
+                // No term of a GPU depends on the caches of the CPU.
+                BackendClass::Gpu => 0.0,
+            },
+            residual,
         };
-        let curve = CostCurve { terms, fallback_terms, cache_bytes, correction };
+        work.defect().map_or(Ok(work), |e| Err(PredictError::Curve(e)))
+    }
+
+    /// The cost curve of this method on a backend of a machine where its work takes so long.
+    ///
+    /// # Errors
+    /// Names the hardware parameter that is missing, or what is wrong with the curve.
+    pub fn curve(&self, work: Arc<Work>, hardware: &Hardware, backend: &Backend) -> Result<CostCurve, PredictError> {
+        let mut curve = CostCurve::of(work);
+        if let Backend::Cpu(threads) = backend {
+            curve.helpers = self.helpers.unwrap_or(UNSEEN).on(hardware, *threads)?;
+        }
         curve.defect().map_or(Ok(curve), |e| Err(PredictError::Curve(e)))
     }
 }
 
-impl MethodModel {
-    pub(super) fn formula(&self) -> Formula<impl Iterator<Item = ModelTerm>, impl Iterator<Item = ResidualTerm>> {
-        Formula {
-            class: self.backend,
-            terms: self.terms.iter().copied(),
-            fallback_terms: self.fallback_terms.iter().copied(),
-            intercept: self.residual_intercept,
-            residual: self.residual.iter().copied(),
-            objects: (self.min_objects, self.max_objects),
-        }
-    }
-
-    /// The cost curve of this method on a backend of a machine.
-    ///
-    /// # Errors
-    /// Names the hardware parameter or the GPU that is missing, or what is wrong with the curve.
-    pub fn curve(&self, hardware: &Hardware, backend: &Backend) -> Result<CostCurve, PredictError> {
-        self.formula().curve(&mut Figures::new(hardware, backend))
-    }
-}
+/// Helpers of a method that was never timed on several threads: one cold fork and join, and all that threads add.
+const UNSEEN: super::HelpersModel = super::HelpersModel::new(0.0, 1.0, 0.0, 0);

@@ -15,6 +15,8 @@ pub enum ModelError {
         /// The parameter.
         parameter: String,
     },
+    /// Intervals of a width that can't be.
+    Intervals,
     /// A method with something that can't be.
     Method {
         /// The method, with its processor.
@@ -29,6 +31,7 @@ impl fmt::Display for ModelError {
         match self {
             Self::NoMethod => f.write_str("it holds no method"),
             Self::Range { parameter } => write!(f, "the range of {parameter} has ends that are no numbers or not ascending"),
+            Self::Intervals => f.write_str("its intervals have a width that is negative or no number"),
             Self::Method { method, why } => write!(f, "{method}: {why}"),
         }
     }
@@ -59,12 +62,17 @@ pub enum PredictError {
         /// Its number.
         index: u32,
     },
-    /// A scale or a feature of the model that this processor does not have.
+    /// A scale of the model that this processor does not have.
     NotOfProcessor {
         /// The processor.
         backend: String,
-        /// The scale or the feature.
+        /// The scale.
         what: String,
+    },
+    /// A method that another one falls back to, and that the model does not hold.
+    NoMethod {
+        /// Its name.
+        method: String,
     },
     /// A figure that no machine has.
     Hardware(HardwareError),
@@ -91,6 +99,7 @@ impl fmt::Display for PredictError {
                 write!(f, "the hardware holds no gpu{index}; see `sapwise devices`, then measure again")
             }
             Self::NotOfProcessor { backend, what } => write!(f, "{backend} has no {what}"),
+            Self::NoMethod { method } => write!(f, "the model holds no {method}, to which it falls back"),
             Self::Hardware(error) => error.fmt(f),
             Self::Curve(error) => error.fmt(f),
             Self::Nothing { model, warnings } => {

@@ -1,10 +1,11 @@
 //! Cost curves of a machine from its hardware parameters.
 
-use super::curve::Figures;
 use super::gpu_set::GpuSet;
 use super::{GPU_PREFIX, MethodModel, Model, PredictError, Range};
 use crate::hardware::{GpuKind, Hardware};
-use crate::{AlgorithmCost, AlgorithmId, Backend, BackendClass, Entry, GpuHardware, Load, Source, Tuning};
+use crate::stats::NORMAL_90;
+use crate::{AlgorithmCost, AlgorithmId, Backend, BackendClass, Entry, Fallback, GpuHardware, Load, Source, Tuning, Work};
+use std::sync::Arc;
 
 /// Cost curves for one machine.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,11 +19,12 @@ pub struct Prediction {
     pub warnings: Vec<String>,
     /// Name of the model.
     pub model: String,
+    /// [`Model::ratios_90_ln`].
+    pub ratios_90_ln: Option<f64>,
 }
 
 /// Why a predicted crossover has no interval.
-const NO_INTERVALS: &str =
-    "no interval is claimed: too few machines were measured to say how far a prediction lies from the truth on a new one";
+const NO_INTERVALS: &str = "no interval is claimed: too few machines like this one were measured to say how far a prediction lies from the truth on it";
 
 /// What to do where a machine is unlike those of training.
 pub const ASK: &str = "this machine is unlike those of training: measure a few timings with `sapwise predict --samples 8`, or all with \
@@ -42,7 +44,13 @@ impl Model {
         if let Some(why) = hardware.implausible() {
             return Err(PredictError::Hardware(why));
         }
-        let mut p = Prediction { costs: Vec::new(), extrapolated: false, warnings: Vec::new(), model: self.name.clone() };
+        let mut p = Prediction {
+            costs: Vec::new(),
+            extrapolated: false,
+            warnings: Vec::new(),
+            model: self.name.clone(),
+            ratios_90_ln: self.ratios_90_ln,
+        };
         if self.simulated {
             p.warnings.push(format!(
                 "the model {} was trained on simulated machines: what it predicts is no evidence; train on real reports",
@@ -56,6 +64,7 @@ impl Model {
         }
         let mut unknown: Vec<String> = Vec::new();
         let mut gpus: Vec<u32> = Vec::new();
+        let mut works: Works<'_> = Vec::new();
         for Entry { id, revision, .. } in algorithms {
             let backend = id.backend();
             let Some(method) = self.method(id) else {
@@ -69,8 +78,8 @@ impl Model {
                 ));
                 continue;
             }
-            let mut figures = Figures::new(hardware, backend);
-            let curve = match gpus_that_are(hardware, backend).and_then(|()| method.formula().curve(&mut figures)) {
+            let work = gpus_that_are(hardware, backend).and_then(|()| self.work(method, hardware, backend, &mut works));
+            let curve = match work.and_then(|work| method.curve(work, hardware, backend)) {
                 Ok(curve) => curve,
                 Err(missing) => {
                     p.warnings.push(format!("{id} is left out: {missing}"));
@@ -117,9 +126,43 @@ impl Model {
     /// The cost model of an algorithm's method on its class of processor.
     #[must_use]
     pub fn method(&self, id: &AlgorithmId) -> Option<&MethodModel> {
-        self.methods.iter().find(|m| m.method == id.method() && m.backend == id.backend().class())
+        self.of_method(id.method(), id.backend().class())
+    }
+
+    pub(super) fn of_method(&self, method: &str, class: BackendClass) -> Option<&MethodModel> {
+        self.methods.iter().find(|m| m.method == method && m.backend == class)
+    }
+
+    /// What a method takes on one thread of a machine, or on GPUs: worked out once for all numbers of threads.
+    fn work<'a>(
+        &'a self,
+        method: &'a MethodModel,
+        hardware: &Hardware,
+        backend: &Backend,
+        known: &mut Works<'a>,
+    ) -> Result<Arc<Work>, PredictError> {
+        // On whatever number of threads.
+        let on = if let Backend::Gpu(_) = backend { backend.clone() } else { Backend::Cpu(1) };
+        if let Some((.., work)) = known.iter().find(|w| w.0 == method.method && w.1 == on) {
+            return Ok(Arc::clone(work));
+        }
+        let fallback = match &method.fallback {
+            None => None,
+            Some(f) => {
+                let missing = || PredictError::NoMethod { method: f.method.clone() };
+                let other =
+                    self.of_method(&f.method, method.backend).filter(|o| o.fallback.is_none()).ok_or_else(missing)?;
+                Some(Fallback { work: self.work(other, hardware, backend, known)?, factor: f.factor })
+            }
+        };
+        let work = Arc::new(method.work(hardware, backend, &self.places, fallback)?);
+        known.push((&method.method, on, Arc::clone(&work)));
+        Ok(work)
     }
 }
+
+/// What is known already of methods on backends.
+type Works<'a> = Vec<(&'a str, Backend, Arc<Work>)>;
 
 /// # Errors
 /// The parameter of one of the GPUs that no GPU has.
@@ -135,15 +178,26 @@ fn gpus_that_are(hardware: &Hardware, backend: &Backend) -> Result<(), PredictEr
 impl Prediction {
     /// The tuning, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
     ///
-    /// Its crossovers have no intervals: how far a prediction lies from the truth on machines never seen was not measured on enough of
-    /// them.
+    /// The interval of a crossover is where the ratio of the two costs is nearer to one than nine of ten such ratios were to their prediction on machines
+    /// held out of the training; none is claimed where fewer than two were, or where the machine is extrapolated.
     #[must_use]
     pub fn tuning(self, scenario: &str, loads: &[Load]) -> Tuning {
-        let mut tuning = Tuning::from_costs(Source::Predicted, scenario, self.costs, loads);
-        for crossover in &mut tuning.crossovers {
-            (crossover.low, crossover.high) = (None, None);
+        let within = self.ratios_90_ln.filter(|_| !self.extrapolated);
+        let spread = |_: usize, _: usize, _: &Load| within.unwrap_or(0.0) / NORMAL_90;
+        let mut tuning = Tuning::from_costs_with(Source::Predicted, scenario, self.costs, loads, spread);
+        match within {
+            Some(ln) => {
+                tuning.interval_basis = format!(
+                    "within a factor of {:.2} of equal cost: on machines held out of the training nine of ten ratios of two times lay that near their \
+                     prediction",
+                    ln.exp()
+                );
+            }
+            None => {
+                tuning.crossovers.iter_mut().for_each(|c| (c.low, c.high) = (None, None));
+                tuning.interval_basis = NO_INTERVALS.to_owned();
+            }
         }
-        tuning.interval_basis = NO_INTERVALS.to_owned();
         tuning.model = Some(self.model);
         (tuning.extrapolated, tuning.warnings) = (self.extrapolated, self.warnings);
         tuning

@@ -8,7 +8,7 @@ use crate::named::named;
 use crate::{Backend, BackendClass};
 
 named! {
-    /// Nanoseconds that one unit of work takes on a machine, with `k` threads or on some of its GPUs.
+    /// Nanoseconds that one unit of work takes on one thread of a machine, or on some of its GPUs.
     ///
     /// Of several GPUs latencies are those of the slowest, because a frame is done when the last of them is. Rates are the sum of
     /// all, but no more than the rate of the fastest times the ratio that the group was measured to have; where it was not
@@ -16,19 +16,12 @@ named! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
     #[non_exhaustive]
     pub enum Scale("scale") {
-        /// One cycle of one core: 1 / clock. Work that is not divided among threads, and what the CPU does for a GPU.
+        /// One cycle of one core: 1 / clock. Of a GPU what the CPU does for it.
         Cycle = "cycle",
-        /// One cycle of `k` cores: 1 / (clock * measured scaling of `k` threads).
-        SharedCycle = "shared_cycle",
-        /// One lane of one cycle of `k` cores: 1 / (clock * lanes * measured scaling of `k` threads).
-        SharedLane = "shared_lane",
-        /// One byte at the memory bandwidth of `k` threads.
+        /// One lane of one cycle of one core: 1 / (clock * lanes).
+        Lane = "lane",
+        /// One byte at the memory bandwidth of one thread.
         Byte = "byte",
-        /// One fork and join of a pool that sleeps, as it does between frames; nothing with one thread.
-        ForkJoin = "fork_join",
-        /// One cache line of a frame, read by one of `k` cores that read at the same time: of `k` lines `k - 1` come from another core,
-        /// `core_to_core_ns` * (k - 1) / k^2. Nothing with one thread.
-        SharedLine = "shared_line",
         /// One submission that is waited for, and reading back a few bytes of its result: `round_trip_ns` + `read_back_ns`, times
         /// `group_round_trip_ratio` of several GPUs.
         GpuRoundTrip = "gpu_round_trip",
@@ -57,9 +50,7 @@ impl Scale {
         match self {
             // The CPU works for a GPU too: it copies boxes and pairs.
             Self::Cycle => true,
-            Self::SharedCycle | Self::SharedLane | Self::Byte | Self::ForkJoin | Self::SharedLine => {
-                class == BackendClass::Cpu
-            }
+            Self::Lane | Self::Byte => class == BackendClass::Cpu,
             _ => class == BackendClass::Gpu,
         }
     }
@@ -70,24 +61,8 @@ impl Scale {
     pub fn parameters(self) -> &'static [ParameterId] {
         match self {
             Self::Cycle => &[ParameterId::ClockMeasuredGhz, ParameterId::ClockReportedGhz],
-            Self::SharedCycle => &[
-                ParameterId::ClockMeasuredGhz,
-                ParameterId::ClockReportedGhz,
-                ParameterId::UsableCores,
-                ParameterId::ScalingTwoThreadsRatio,
-                ParameterId::ScalingAllThreadsRatio,
-            ],
-            Self::SharedLane => &[
-                ParameterId::ClockMeasuredGhz,
-                ParameterId::ClockReportedGhz,
-                ParameterId::UsableCores,
-                ParameterId::ScalingTwoThreadsRatio,
-                ParameterId::ScalingAllThreadsRatio,
-                ParameterId::SimdLanes,
-            ],
-            Self::Byte => &[ParameterId::BandwidthOneThreadGbPerS, ParameterId::BandwidthAllThreadsGbPerS],
-            Self::ForkJoin => &[ParameterId::ForkJoinColdNs],
-            Self::SharedLine => &[ParameterId::CoreToCoreNs, ParameterId::ForkJoinWarmNs],
+            Self::Lane => &[ParameterId::ClockMeasuredGhz, ParameterId::ClockReportedGhz, ParameterId::SimdLanes],
+            Self::Byte => &[ParameterId::BandwidthOneThreadGbPerS],
             Self::GpuRoundTrip
             | Self::GpuDispatch
             | Self::GpuUploadByte
@@ -106,22 +81,15 @@ impl Scale {
             _ if !self.is_of(backend.class()) => {
                 Err(PredictError::NotOfProcessor { backend: backend.to_string(), what: format!("scale {self}") })
             }
-            Backend::Cpu(threads) => self.on_cpu(hardware, *threads),
+            Backend::Cpu(_) => self.on_cpu(hardware),
             Backend::Gpu(gpus) => self.on_gpus(hardware, gpus),
         }
     }
 
-    fn on_cpu(self, hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
+    fn on_cpu(self, hardware: &Hardware) -> Result<f64, PredictError> {
         Ok(match self {
-            Self::SharedCycle => cycle(hardware)? / speed_up(hardware, threads)?,
-            Self::SharedLane => cycle(hardware)? / speed_up(hardware, threads)? / needed(hardware, ParameterId::SimdLanes)?,
-            Self::Byte => 1.0 / bandwidth(hardware, threads)?,
-            Self::ForkJoin | Self::SharedLine if threads == 1 => 0.0,
-            Self::SharedLine => {
-                let k = f64::from(threads);
-                core_to_core(hardware)? * (k - 1.0) / (k * k)
-            }
-            Self::ForkJoin => needed(hardware, ParameterId::ForkJoinColdNs)?,
+            Self::Lane => cycle(hardware)? / needed(hardware, ParameterId::SimdLanes)?,
+            Self::Byte => 1.0 / needed(hardware, ParameterId::BandwidthOneThreadGbPerS)?,
             _ => cycle(hardware)?,
         })
     }
@@ -159,43 +127,7 @@ impl Scale {
 }
 
 /// One cycle in ns, of the measured clock where there is one.
-fn cycle(hardware: &Hardware) -> Result<f64, PredictError> {
+pub(super) fn cycle(hardware: &Hardware) -> Result<f64, PredictError> {
     let measured = needed(hardware, ParameterId::ClockMeasuredGhz);
     measured.or_else(|e| needed(hardware, ParameterId::ClockReportedGhz).map_err(|_| e)).map(|ghz| 1.0 / ghz)
-}
-
-/// Cache lines that go from core to core in a warm fork and join: of twelve reports of one machine it took 15 times the latency where
-/// its two cores lay near each other, and 9.6 times where they lay apart.
-const LINES_OF_A_FORK_JOIN: f64 = 12.0;
-
-/// Latency between cores in ns; what the warm fork and join implies where it was not measured, as in reports of old versions.
-fn core_to_core(hardware: &Hardware) -> Result<f64, PredictError> {
-    needed(hardware, ParameterId::CoreToCoreNs)
-        .or_else(|e| needed(hardware, ParameterId::ForkJoinWarmNs).map(|ns| ns / LINES_OF_A_FORK_JOIN).map_err(|_| e))
-}
-
-/// Work of `threads` threads over work of one, interpolated on logarithmic axes between one, two and all.
-fn speed_up(hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
-    if threads <= 1 {
-        return Ok(1.0);
-    }
-    let cores = needed(hardware, ParameterId::UsableCores)?;
-    let all = needed(hardware, ParameterId::ScalingAllThreadsRatio)?;
-    let k = f64::from(threads);
-    if k >= cores {
-        return Ok(all);
-    }
-    let two = needed(hardware, ParameterId::ScalingTwoThreadsRatio)?;
-    let share = if cores > 2.0 { (k / 2.0).ln() / (cores / 2.0).ln() } else { 1.0 };
-    Ok((two.ln() * (1.0 - share) + all.ln() * share).exp())
-}
-
-/// Memory bandwidth of `threads` threads in GB/s, which is bytes per nanosecond.
-fn bandwidth(hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
-    let one = needed(hardware, ParameterId::BandwidthOneThreadGbPerS)?;
-    if threads <= 1 {
-        return Ok(one);
-    }
-    let all = needed(hardware, ParameterId::BandwidthAllThreadsGbPerS)?;
-    Ok((one * f64::from(threads)).min(all))
 }

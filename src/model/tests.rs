@@ -50,12 +50,11 @@ fn method(backend: BackendClass, scale: Scale) -> MethodModel {
         revision: 1,
         max_threads: 1,
         gpu_kinds: if backend == BackendClass::Gpu { vec![GpuKind::Software] } else { Vec::new() },
-        min_objects: 1,
-        max_objects: 1000,
         terms: vec![ModelTerm { term: Term::Call, scale, unit: 2.0 }],
-        fallback_terms: Vec::new(),
-        residual_intercept: 0.0,
+        fallback: None,
         residual: Vec::new(),
+        residual_by_motion: false,
+        helpers: None,
         spread_ln: 0.1,
     }
 }
@@ -70,6 +69,8 @@ fn model(methods: Vec<MethodModel>) -> Model {
             range("gpu/upload_gb_per_s"),
             range("gpu/copy_gb_per_s"),
         ],
+        ratios_90_ln: None,
+        places: Arc::new(Places::new(Vec::new())),
         methods,
     }
 }
@@ -111,22 +112,15 @@ fn several_gpus_have_the_slowest_latency_and_added_rates_within_what_was_measure
 }
 
 #[test]
-fn scales_and_features_of_the_other_processor_are_refused() {
+fn scales_and_helpers_of_the_other_processor_are_refused() {
     let h = hardware();
-    assert!(
-        Scale::SharedLane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().to_string().contains("gpu0 has no scale")
-    );
+    assert!(Scale::Lane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().to_string().contains("gpu0 has no scale"));
     assert!(Scale::GpuDispatch.nanoseconds(&h, &Backend::Cpu(2)).unwrap_err().to_string().contains("cpu2 has no scale"));
-    let load = Load { objects: 8, ..Load::default() };
-    let feature = |f: Feature, backend: Backend| f.value(&h, &backend, &load);
-    assert_eq!(feature(Feature::Log2Threads, Backend::Gpu(vec![0, 1])), Ok(1.0));
-    assert_eq!(feature(Feature::Log2Objects, Backend::Gpu(vec![0])), Ok(3.0));
-    assert!(feature(Feature::Log2Lanes, Backend::Gpu(vec![0])).is_err());
     let wrong = model(vec![method(BackendClass::Cpu, Scale::GpuDispatch)]);
     assert!(wrong.defect().unwrap().to_string().contains("gpu_dispatch"));
-    let term = ResidualTerm { feature: Feature::Log2Lanes, centre: 0.0, slope: 1.0 };
-    let wrong = MethodModel { residual: vec![term], ..method(BackendClass::Gpu, Scale::GpuDispatch) };
-    assert!(model(vec![wrong]).defect().unwrap().to_string().contains("log2_lanes"));
+    let helped =
+        MethodModel { helpers: Some(HelpersModel::new(0.0, 0.0, 0.0, 0)), ..method(BackendClass::Gpu, Scale::GpuDispatch) };
+    assert!(model(vec![helped]).defect().unwrap().to_string().contains("helpers are of the CPU"));
 }
 
 #[test]
@@ -184,45 +178,64 @@ fn hardware_with_impossible_gpus_is_told() {
     assert!(defect(&|h| h.gpu_groups = vec![group(&[0, 1]), group(&[0, 1])]).contains("twice"));
 }
 
-/// What a scale reads: with those parameters alone it has a value for any number of threads, and without any it has none for several.
+fn of_parameters(ids: &[ParameterId], figure: impl Fn(ParameterId) -> f64) -> Hardware {
+    let parameters = ids.iter().map(|&id| Parameter::reported(id, figure(id), "test")).collect();
+    Hardware { parameters, gpus: Vec::new(), ..hardware() }
+}
+
+/// With those parameters alone it has a value, and each of them shows in some value.
 #[test]
-fn the_parameters_of_a_scale_are_those_that_it_reads() {
-    // Four cores of which two threads use one and a half, so that every figure shows in some number of threads.
-    let figure = |id: ParameterId| match id {
-        ParameterId::UsableCores => 4.0,
-        ParameterId::ScalingTwoThreadsRatio => 1.5,
-        ParameterId::BandwidthAllThreadsGbPerS => 5.0,
-        _ => 2.0,
+fn the_parameters_of_a_scale_and_of_helpers_are_those_that_they_read() {
+    let shows = |ids: &[ParameterId], name: ParameterId, value: &dyn Fn(&Hardware) -> Vec<f64>| {
+        // Four cores of which two threads use one and a half, so that every figure shows in some number of threads.
+        let figure = |id: ParameterId| match id {
+            ParameterId::UsableCores => 4.0,
+            ParameterId::ScalingTwoThreadsRatio => 1.5,
+            _ => 2.0,
+        };
+        let other = |id: ParameterId| if id == name { 1.5 * figure(id) } else { figure(id) };
+        value(&of_parameters(ids, figure)) != value(&of_parameters(ids, other))
     };
-    let with = |ids: &[ParameterId]| {
-        let parameters = ids.iter().map(|&id| Parameter::reported(id, figure(id), "test")).collect();
-        Hardware { parameters, gpus: Vec::new(), ..hardware() }
+    // What stands in for the first shows where that one is absent.
+    let read = |ids: &[ParameterId], value: &dyn Fn(&Hardware) -> Vec<f64>| {
+        ids.iter().all(|&id| shows(ids, id, value) || shows(&ids[1..], id, value))
     };
-    let of_cpu = [Scale::Cycle, Scale::SharedCycle, Scale::SharedLane, Scale::Byte, Scale::ForkJoin, Scale::SharedLine];
-    for scale in of_cpu {
-        for threads in [1, 2, 3, 8] {
-            let ns = scale.nanoseconds(&with(scale.parameters()), &Backend::Cpu(threads));
-            assert!(ns.is_ok(), "{scale:?} on {threads}: {ns:?}");
-        }
-        assert!(scale.nanoseconds(&with(&[]), &Backend::Cpu(2)).is_err());
-        for name in scale.parameters() {
-            // What stands in for the first shows where that one is absent.
-            let shows = |ids: &[ParameterId]| {
-                let mut other = with(ids);
-                other.parameters.iter_mut().filter(|p| p.name == *name).for_each(|p| p.value = p.value.map(|v| 1.5 * v));
-                let on = |hardware: &Hardware, threads| scale.nanoseconds(hardware, &Backend::Cpu(threads));
-                [1, 2, 3, 8].into_iter().any(|k| on(&other, k) != on(&with(ids), k))
-            };
-            assert!(shows(scale.parameters()) || shows(&scale.parameters()[1..]), "{scale:?} does not read {name}");
-        }
+    for scale in [Scale::Cycle, Scale::Lane, Scale::Byte] {
+        let ns = |h: &Hardware| vec![scale.nanoseconds(h, &Backend::Cpu(1)).unwrap()];
+        assert!(read(scale.parameters(), &ns), "{scale:?}");
+        assert!(scale.nanoseconds(&of_parameters(&[], |_| 1.0), &Backend::Cpu(2)).is_err());
     }
+    let helpers = HelpersModel::new(100.0, 0.5, 0.5, 0);
+    let figures = |h: &Hardware| {
+        let of = |threads| helpers.on(h, threads).unwrap().unwrap();
+        [2, 3, 8].into_iter().flat_map(|k| [of(k).call_ns, of(k).late_ns, of(k).speed_up]).collect()
+    };
+    assert!(read(HelpersModel::PARAMETERS, &figures));
+    assert!(helpers.on(&of_parameters(&[], |_| 1.0), 2).is_err() && helpers.on(&hardware(), 1) == Ok(None));
+}
+
+#[test]
+fn a_method_falls_back_to_one_that_the_model_holds() {
+    let mut both = vec![method(BackendClass::Cpu, Scale::Cycle), method(BackendClass::Cpu, Scale::Cycle)];
+    both[1].method = "other".to_owned();
+    both[0].fallback = Some(FallbackModel { method: "other".to_owned(), factor: 0.5 });
+    let whole = model(both.clone());
+    assert_eq!(whole.defect(), None);
+    let mut machine = hardware();
+    machine.parameters.extend(parameters(&[(ParameterId::CacheLlcBytes, 3e7)]));
+    let p = whole.predict(&machine, &ids(&["brute@cpu1", "other@cpu1"])).unwrap();
+    // Two cycles of a quarter of a nanosecond, and half of that.
+    assert_eq!((p.costs[0].curve.cost_ns(&Load::default()), p.costs[1].curve.cost_ns(&Load::default())), (0.25, 0.5));
+    both[1].fallback = Some(FallbackModel { method: "brute".to_owned(), factor: 1.0 });
+    assert!(model(both.clone()).defect().unwrap().to_string().contains("falls back"));
+    assert!(model(both[..1].to_vec()).defect().unwrap().to_string().contains("no such method"));
 }
 
 #[test]
 fn what_a_model_reads_of_the_machine_is_marked_in_the_table_and_nothing_else() {
     let scales = Scale::ALL.iter().flat_map(|s| s.parameters());
-    let features = Feature::ALL.iter().flat_map(|f| f.parameters());
-    let mut read: Vec<ParameterId> = scales.chain(features).copied().chain([ParameterId::CacheLlcBytes]).collect();
+    let mut read: Vec<ParameterId> =
+        scales.chain(HelpersModel::PARAMETERS).copied().chain([ParameterId::CacheLlcBytes]).collect();
     read.sort_unstable();
     read.dedup();
     assert_eq!(read, ParameterId::ALL.into_iter().filter(|id| id.quantity().read_by_model).collect::<Vec<_>>());

@@ -26,6 +26,23 @@ pub enum TuningError {
         /// The number of objects.
         objects: u32,
     },
+    /// A cost without the work that it is made of.
+    NoWork {
+        /// The algorithm.
+        algorithm: AlgorithmId,
+        /// The position at which its work is said to be.
+        work: usize,
+    },
+    /// A work that falls back to none that stands before it.
+    NoFallback {
+        /// The position at which that is said to be.
+        work: usize,
+    },
+    /// Residuals that are known at different places.
+    Places {
+        /// An algorithm whose places are not those of the first.
+        algorithm: AlgorithmId,
+    },
     /// A cost curve that can't be.
     Curve {
         /// The algorithm.
@@ -57,6 +74,11 @@ impl fmt::Display for TuningError {
             }
             Self::Sample { algorithm, objects } => {
                 write!(f, "the sample of {algorithm} at {objects} objects has no time above zero")
+            }
+            Self::NoWork { algorithm, work } => write!(f, "the cost of {algorithm}: there is no work {work}"),
+            Self::NoFallback { work } => write!(f, "a work falls back to the work {work}, which does not stand before it"),
+            Self::Places { algorithm } => {
+                write!(f, "the cost of {algorithm}: its residual is known at other places than that of the first algorithm")
             }
             Self::Curve { algorithm, source } => write!(f, "the cost of {algorithm}: {source}"),
             Self::Spread { algorithm, spread_ln } => write!(f, "the cost of {algorithm}: a spread of {spread_ln}"),

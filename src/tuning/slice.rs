@@ -2,11 +2,15 @@
 
 use super::AlgorithmCost;
 use crate::Load;
-use crate::cost::Counts;
+use crate::cost::Frame;
 
 /// Loads this far apart in objects, as a logarithm, have nothing looked up between them: a field narrower than that may be
 /// missed.
 const FINEST_LN: f64 = 0.03;
+
+/// An algorithm whose cost is within this factor of the least is as good as the cheapest: on one thread and on two that have nothing to divide the same code runs,
+/// and who is cheaper there is chance.
+const SAME: f64 = 1.02;
 
 /// Halvings of a stretch that is [`FINEST_LN`] wide: a border in it is then known to a ten-thousandth.
 const HALVINGS: u32 = 8;
@@ -15,13 +19,6 @@ const HALVINGS: u32 = 8;
 /// of the way to the next.
 pub(super) struct Slice<'a> {
     loads: &'a [Load],
-}
-
-/// A stretch of a slice: the places, loads and cheapest algorithms at its two ends.
-#[derive(Clone, Copy)]
-struct Stretch {
-    from: (f64, Load, usize),
-    to: (f64, Load, usize),
 }
 
 impl<'a> Slice<'a> {
@@ -75,49 +72,39 @@ impl<'a> Slice<'a> {
     }
 
     /// The loads from which on another algorithm is the cheapest, and which, by its position in `costs`. The first is where the
-    /// slice begins.
-    ///
-    /// Halves the slice, and in each stretch keeps only the algorithms that may be the cheapest somewhere within: those whose cost
-    /// can fall below what the others can't exceed. Where one is left there is nothing to look for.
+    /// slice begins. Algorithms that cost the same but for [`SAME`] are one field: that of the one before.
     pub(super) fn steps(&self, costs: &[AlgorithmCost]) -> Vec<(Load, usize)> {
-        let all: Vec<usize> = (0..costs.len()).collect();
         let mut steps = Vec::new();
         let Some(first) = self.loads.first() else { return steps };
-        let Some(best) = cheapest(costs, &all, first) else { return steps };
+        let Some((mut best, _)) = cheapest(costs, first) else { return steps };
         steps.push((*first, best));
-        let mut from = (0.0, *first, best);
-        for (k, load) in self.loads.iter().enumerate().skip(1) {
-            let to = (k as f64, *load, cheapest(costs, &all, load).unwrap_or(best));
-            self.search(costs, &all, Stretch { from, to }, &mut steps);
-            from = to;
+        // Places since the last step, at each of which the algorithm of that step is held.
+        let mut held = vec![(0.0, *first)];
+        for k in 1..self.loads.len() {
+            let ln = (f64::from(self.loads[k].objects) / f64::from(self.loads[k - 1].objects.max(1))).ln();
+            let parts = (ln / FINEST_LN).ceil().max(1.0) as u32;
+            for part in 1..=parts {
+                let place = (k - 1) as f64 + f64::from(part) / f64::from(parts);
+                let load = self.load(place);
+                let Some((other, least)) = cheapest(costs, &load) else { return steps };
+                if costs[best].curve.cost_ns(&load) > SAME * least {
+                    // Back to where it was not cheaper yet.
+                    let dearer = |load: &Load| costs[other].curve.cost_ns(load) >= costs[best].curve.cost_ns(load);
+                    let from = held.iter().rposition(|(_, load)| dearer(load)).unwrap_or(0);
+                    let to = held.get(from + 1).copied().unwrap_or((place, load));
+                    note(&mut steps, self.crossing(&costs[best], &costs[other], held[from].0, to), other);
+                    best = other;
+                    held.clear();
+                }
+                held.push((place, load));
+            }
         }
         steps
     }
 
-    fn search(&self, costs: &[AlgorithmCost], among: &[usize], stretch: Stretch, steps: &mut Vec<(Load, usize)>) {
-        let Stretch { from, to } = stretch;
-        if to.1.objects <= from.1.objects.saturating_add(1)
-            || (f64::from(to.1.objects) / f64::from(from.1.objects.max(1))).ln() <= FINEST_LN
-        {
-            if from.2 != to.2 {
-                note(steps, self.crossing(&costs[from.2], &costs[to.2], stretch), to.2);
-            }
-            return;
-        }
-        let candidates = candidates(costs, among, &from.1, &to.1);
-        if candidates.len() < 2 {
-            return;
-        }
-        let place = f64::midpoint(from.0, to.0);
-        let load = self.load(place);
-        let middle = (place, load, cheapest(costs, &candidates, &load).unwrap_or(from.2));
-        self.search(costs, &candidates, Stretch { from, to: middle }, steps);
-        self.search(costs, &candidates, Stretch { from: middle, to }, steps);
-    }
-
-    /// The first load of a stretch at which the second of two algorithms is cheaper.
-    fn crossing(&self, below: &AlgorithmCost, above: &AlgorithmCost, stretch: Stretch) -> Load {
-        let (mut low, mut high, mut load) = (stretch.from.0, stretch.to.0, stretch.to.1);
+    /// The first load between a place and another with its load at which the second of two algorithms is cheaper.
+    fn crossing(&self, below: &AlgorithmCost, above: &AlgorithmCost, from: f64, to: (f64, Load)) -> Load {
+        let (mut low, (mut high, mut load)) = (from, to);
         for _ in 0..HALVINGS {
             let place = f64::midpoint(low, high);
             let middle = self.load(place);
@@ -143,34 +130,11 @@ fn note(steps: &mut Vec<(Load, usize)>, load: Load, best: usize) {
     }
 }
 
-fn cheapest(costs: &[AlgorithmCost], among: &[usize], load: &Load) -> Option<usize> {
-    let counts = Counts::new(load);
-    let mut best: Option<(usize, f64)> = None;
-    for &k in among {
-        let ns = costs[k].curve.cost_of(&counts);
-        if best.is_none_or(|b| ns < b.1) {
-            best = Some((k, ns));
-        }
-    }
-    best.map(|b| b.0)
-}
-
-/// Which algorithms may be the cheapest at some load between two.
-fn candidates(costs: &[AlgorithmCost], among: &[usize], a: &Load, b: &Load) -> Vec<usize> {
-    // No figure of a load in between lies outside those of the two, and no count of operations falls when a figure rises.
-    let corner = |of: fn(f64, f64) -> f64| Load {
-        objects: of(f64::from(a.objects), f64::from(b.objects)) as u32,
-        axis_candidates: of(a.axis_candidates, b.axis_candidates),
-        strip_candidates: of(a.strip_candidates, b.strip_candidates),
-        pairs: of(a.pairs, b.pairs),
-        moved: of(a.moved, b.moved),
-    };
-    let (least, most) = (corner(f64::min), corner(f64::max));
-    let (least, most) = (Counts::new(&least), Counts::new(&most));
-    let bounds: Vec<(f64, f64)> = among.iter().map(|&k| costs[k].curve.bounds(&least, &most)).collect();
-    let reached = bounds.iter().map(|b| b.1).fold(f64::INFINITY, f64::min);
-    // Rounding must not shut out the cheapest itself.
-    among.iter().zip(&bounds).filter(|(_, b)| b.0 <= reached * (1.0 + 1e-9)).map(|(&k, _)| k).collect()
+/// The cheapest by its position, and its cost.
+fn cheapest(costs: &[AlgorithmCost], load: &Load) -> Option<(usize, f64)> {
+    let frame = Frame::new(load);
+    let all = costs.iter().enumerate().map(|(k, cost)| (k, cost.curve.cost_of(&frame)));
+    all.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// The load a share of the way from one to another.
@@ -190,14 +154,22 @@ fn between(a: &Load, b: &Load, share: f64) -> Load {
 mod tests {
     use super::*;
     use crate::splitmix;
-    use crate::{CostCurve, CostTerm, Knot, Term};
+    use crate::{CostCurve, CostTerm, Places, Residual, Term};
+    use std::sync::Arc;
 
     fn draw(state: &mut u64) -> f64 {
         (splitmix::next(state) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Curves of many terms with corrections that bend, over loads of which some figures fall while the objects rise.
+    /// Curves of many terms with residuals that bend, over loads of which some figures fall while the objects rise.
     fn drawn(seed: u64) -> (Vec<AlgorithmCost>, Vec<Load>) {
+        let load = |k: i32| {
+            let n = 10.0_f64.powf(f64::from(k) / 4.0).round();
+            let strip_candidates = 3.0 * n.powf(1.2);
+            Load { objects: n as u32, strip_candidates, moved: n.powf(-0.2), pairs: n, axis_candidates: n.powf(1.6) }
+        };
+        let loads: Vec<Load> = (4..=24).map(load).collect();
+        let places = Arc::new(Places::new(loads.clone()));
         let mut state = seed;
         let costs = (0..16).map(|k| {
             let mut unit = |scale: f64| scale * (6.0 * draw(&mut state) - 3.0).exp();
@@ -210,50 +182,43 @@ mod tests {
                 CostTerm { term: Term::StripCandidates, unit_ns: unit(1.0) },
                 CostTerm { term: Term::Moved, unit_ns: unit(20.0) },
             ];
-            let knot = |k| Knot { log2_objects: f64::from(k), ln_factor: 0.4 * draw(&mut state) };
-            let curve =
-                CostCurve { terms, fallback_terms: Vec::new(), cache_bytes: 1e6, correction: (3..=24).map(knot).collect() };
+            let weights = (0..places.loads().len()).map(|_| 0.4 * draw(&mut state)).collect();
+            let observed = Residual::new(Arc::clone(&places), weights, false);
+            let curve = CostCurve::new(terms).with_cache(1e6).with_observed(observed);
             AlgorithmCost { algorithm: format!("m{k}@cpu1").parse().unwrap(), revision: 1, curve, spread_ln: 0.1 }
         });
         let costs = costs.collect();
-        let load = |k: i32| {
-            let n = 10.0_f64.powf(f64::from(k) / 4.0).round();
-            let strip_candidates = 3.0 * n.powf(1.2);
-            Load { objects: n as u32, strip_candidates, moved: n.powf(-0.2), pairs: n, axis_candidates: n.powf(1.6) }
-        };
-        (costs, (4..=24).map(load).collect())
+        (costs, loads)
     }
 
     #[test]
-    fn no_field_of_three_percent_is_lost_against_a_walk_in_steps_of_a_thousandth() {
+    fn a_walk_in_steps_of_a_thousandth_finds_no_field_of_three_percent_that_is_lost() {
         let mut borders = 0;
         for seed in 0..40 {
             let (costs, loads) = drawn(seed);
             let slice = Slice::new(&loads);
-            let all: Vec<usize> = (0..costs.len()).collect();
-            let mut walked: Vec<(u32, usize)> = Vec::new();
-            let mut place = 0.0;
-            while place <= slice.last() {
-                let load = slice.load(place);
-                let best = cheapest(&costs, &all, &load).unwrap();
-                if walked.last().is_none_or(|w| w.1 != best) {
-                    walked.push((load.objects, best));
-                }
-                place += 0.001 / (10.0_f64.ln() / 4.0);
-            }
             let steps = slice.steps(&costs);
             let at = |n: u32| steps[..steps.partition_point(|s| s.0.objects <= n)].last().unwrap().1;
-            for (k, &(objects, best)) in walked.iter().enumerate() {
-                let next = walked.get(k + 1).map_or(1_000_000, |w| w.0);
-                if f64::from(next) > 1.031 * f64::from(objects) && next > objects + 1 {
-                    let middle = (f64::from(objects) * f64::from(next)).sqrt() as u32;
-                    assert_eq!(at(middle), best, "seed {seed}: {objects} to {next} of {walked:?}");
-                }
+            let mut place = 0.0;
+            let mut worse_since = None;
+            while place <= slice.last() {
+                let load = slice.load(place);
+                let (_, least) = cheapest(&costs, &load).unwrap();
+                // What is chosen may be a little dearer, and for 3 % of the objects by more.
+                worse_since = (costs[at(load.objects)].curve.cost_ns(&load) > 1.021 * least)
+                    .then(|| worse_since.unwrap_or(load.objects));
+                let since = worse_since.unwrap_or(load.objects);
+                assert!(
+                    f64::from(load.objects) <= 1.035 * f64::from(since) || load.objects <= since + 1,
+                    "seed {seed}: from {since} to {} of {steps:?}",
+                    load.objects
+                );
+                place += 0.001 / (10.0_f64.ln() / 4.0);
             }
             assert!(steps.is_sorted_by(|a, b| a.0.objects < b.0.objects && a.1 != b.1), "seed {seed}");
             borders += steps.len() - 1;
         }
-        assert!(borders > 80, "{borders} borders");
+        assert!(borders > 60, "{borders} borders");
     }
 
     #[test]

@@ -3,12 +3,7 @@ use crate::{CostTerm, Term};
 
 fn cost(id: &str, terms: &[(Term, f64)], spread_ln: f64) -> AlgorithmCost {
     let terms = terms.iter().map(|&(term, unit_ns)| CostTerm { term, unit_ns }).collect();
-    AlgorithmCost {
-        algorithm: id.parse().unwrap(),
-        revision: 1,
-        curve: CostCurve { terms, ..CostCurve::default() },
-        spread_ln,
-    }
+    AlgorithmCost { algorithm: id.parse().unwrap(), revision: 1, curve: CostCurve::new(terms), spread_ln }
 }
 
 fn loads() -> Vec<Load> {

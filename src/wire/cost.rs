@@ -2,7 +2,7 @@
 
 use super::wire;
 use crate::Term;
-use crate::cost::{CostTerm, Knot, Product};
+use crate::cost::{CostTerm, Product};
 
 wire! {
     /// The figures of a frame that decide what each algorithm costs.
@@ -21,37 +21,28 @@ wire! {
 }
 
 wire! {
-    /// The cost of one algorithm on one machine as a function of the load.
-    CostCurve = crate::CostCurve {
-        /// Terms of the sum; none is negative.
-        terms: Vec<CostTerm>,
-        /// Terms of the fallback of the algorithm, which it takes where their sum is the smaller one.
-        #[serde(default, skip_serializing_if = "Vec::is_empty")]
-        fallback_terms: Vec<CostTerm>,
-        /// Last-level cache of the machine.
-        cache_bytes: f64,
-        /// Logarithms of factors on the sum, ascending by `log2_objects`.
-        correction: Vec<Knot>,
+    /// What several threads make of the work of one.
+    HelpersKeys = crate::Helpers {
+        /// Threads, the caller's included.
+        threads: u32,
+        /// Nanoseconds to call all of them.
+        call_ns: f64,
+        /// Nanoseconds of one thread's work that are lost while they wake.
+        late_ns: f64,
+        /// How many times as fast all of them work as one.
+        speed_up: f64,
+        /// Boxes that keep one thread busy; 0: all threads work in every frame.
+        boxes_per_thread: u32,
     }
 }
 
 wire! {
-    /// One term of a cost curve.
+    /// One term of a cost.
     CostTermKeys = CostTerm {
         /// What is counted.
         term: Term,
         /// Nanoseconds for each.
         unit_ns: f64,
-    }
-}
-
-wire! {
-    /// One point of a correction.
-    KnotKeys = Knot {
-        /// Base-2 logarithm of the number of objects.
-        log2_objects: f64,
-        /// Natural logarithm of measured over modelled time there.
-        ln_factor: f64,
     }
 }
 

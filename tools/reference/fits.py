@@ -17,7 +17,9 @@ import numpy
 import scipy
 import sklearn
 from scipy.optimize import least_squares, nnls
-from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import ConstantKernel, RationalQuadratic
+from sklearn.linear_model import LinearRegression
 
 SEED = 2011
 # The constants of lab/src/fit/robust.rs.
@@ -56,22 +58,28 @@ def non_negative_problems(random):
     yield non_negative("nothing to explain", numpy.abs(a[:, :2]) + 0.1, -numpy.ones(12))
 
 
-def standardised(x, weights):
-    centres = numpy.average(x, axis=0, weights=weights)
-    scales = numpy.sqrt(numpy.average((x - centres) ** 2, axis=0, weights=weights))
-    return (x - centres) / scales
+def residual(random, by_motion):
+    """A Gaussian process over the load. Ours has inducing points; where these are all of the loads, it is the same."""
+    def loads(count):
+        objects = numpy.round(10 ** random.uniform(1, 6, size=count))
+        ratios = few_digits(random.uniform([0, 0.5, 1], [3, 10, 100], size=(count, 3)))
+        return numpy.column_stack([objects, objects[:, None] * ratios, few_digits(random.uniform(0, 1, size=count))])
 
+    def coordinates(loads):
+        n = loads[:, 0]
+        figures = [numpy.log2(n), numpy.log2(loads[:, 1] / n + 0.05), numpy.log2(loads[:, 2] / n + 1), numpy.log2(loads[:, 3] / n + 1)]
+        figures = [f / length for f, length in zip(figures, (3, 3, 4, 6))]
+        return numpy.stack(figures + ([loads[:, 4] / 0.375] if by_motion else []), axis=1)
 
-def weighted_ridge(random, penalty):
-    """Ours is the mean of squares under the weights plus the penalty times the squares of the slopes; scikit-learn takes sums."""
-    octaves = few_digits(4 + 13 * random.uniform(size=40))
-    x = numpy.stack([octaves, octaves**2, random.integers(2, 5, 40), random.integers(0, 4, 40)], axis=1)
-    x = few_digits(x)
-    weights = few_digits(random.uniform(0.2, 3.0, size=40))
-    y = few_digits(0.2 + 0.03 * x[:, 0] - 0.1 * x[:, 2] + 0.1 * random.normal(size=40))
-    ridge = Ridge(alpha=penalty * weights.sum(), solver="cholesky")
-    fitted = ridge.fit(standardised(x, weights), y, sample_weight=weights).predict(standardised(x, weights))
-    return dict(penalty=penalty, x=x.tolist(), weights=weights.tolist(), y=y.tolist(), fitted=fitted.tolist())
+    known, at = loads(30), loads(60)
+    at = at[(at[:, 0] >= known[:, 0].min()) & (at[:, 0] <= known[:, 0].max())][:8]
+    ln = few_digits(0.2 * numpy.sin(known[:, 1] / known[:, 0]) + 0.05 * random.normal(size=len(known)))
+    behind = few_digits(random.uniform(1, 6, size=len(known)))
+    kernel = ConstantKernel(0.2**2, "fixed") * RationalQuadratic(1.0, 16.0, "fixed", "fixed")
+    noise = (0.08 * numpy.minimum(behind, 4)) ** 2
+    process = GaussianProcessRegressor(kernel, alpha=noise, optimizer=None).fit(coordinates(known), ln)
+    answers = dict(loads=known.tolist(), ln=ln.tolist(), behind=behind.tolist(), at=at.tolist())
+    return dict(by_motion=by_motion, **answers, predictions=process.predict(coordinates(at)).tolist())
 
 
 def ordinary(random, rows):
@@ -156,7 +164,7 @@ def main():
         made_by="tools/reference/fits.py",
         versions=versions,
         nnls=list(non_negative_problems(random[0])),
-        ridge=[weighted_ridge(random[1], penalty) for penalty in (0.03, 0.3)],
+        residual=[residual(random[1], by_motion) for by_motion in (False, True)],
         least_squares=[ordinary(random[3], rows) for rows in (7, 20)],
         robust=list(robust_problems(random[4])),
         quantiles=[quantiles(numpy.exp(random[5].normal(size=count)) * 1e4) for count in (4, 5, 12, 31)],

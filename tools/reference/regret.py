@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Regret of tunings on reports, by a program of its own: a check of `lab/src/evaluate/regret_table.rs`, and of a model on reports that came after it.
 
-    sapwise predict --report R.json --samples 0 --json > tunings/R.json     # for each report
+    sapwise predict --report R.json --json > tunings/R.json     # for each report
     tools/reference/regret.py tunings R.json ...
 
 Prints for each report the mean regret over all cells and as in games, in percent, of the tuning of the same name, of its physical terms alone
-(without the correction), and of the best of each cell itself where the name of the report ends in `-again`: the noise floor. Reports that hold
+(without the residual), and of the best of each cell itself where the name of the report ends in `-again`: the noise floor. Reports that hold
 algorithms on GPUs are left out. Needs Python 3.8 and nothing else.
 """
 
@@ -75,26 +75,57 @@ def regret(cells, choose):
     return 100 * statistics.fmean(r for r, _ in pairs), 100 * weighted
 
 
-def cost(curve, load, corrected):
-    """Nanoseconds by a curve of a tuning, as `src/cost.rs` has it."""
+def coordinates(load, octaves):
+    n = max(load["objects"], 1)
+    return (
+        min(max(math.log2(n), octaves[0]), octaves[1]) / 3,
+        math.log2(load["pairs"] / n + 0.05) / 3,
+        math.log2(load["strip_candidates"] / n + 1) / 4,
+        math.log2(load["axis_candidates"] / n + 1) / 6,
+        load["moved"] / 0.375,
+    )
+
+
+def residual(weights, by_motion, places, load):
+    """The logarithm of a factor, as `src/cost/residual.rs` has it."""
+    if not weights:
+        return 0.0
+    sizes = [math.log2(max(p["objects"], 1)) for p in places]
+    octaves = (min(sizes), max(sizes))
+    count = 5 if by_motion else 4
+    at = coordinates(load, octaves)[:count]
+    distances = (sum((a - b) ** 2 for a, b in zip(at, coordinates(p, octaves))) for p in places)
+    return sum(w * (1 + d / 32) ** -16 for w, d in zip(weights, distances))
+
+
+def work_ns(tuning, k, load, corrected):
+    """Nanoseconds on one thread, or on GPUs."""
+    work = tuning["works"][k]
     n = load["objects"]
-    octaves = math.log2(max(n, 1))
-    counts = dict(load, call=1, all_pairs=n * (n - 1) / 2, sort=n * octaves, moved=n * load["moved"])
-    counts["cold_objects"] = n * max(0.0, 1 - curve["cache_bytes"] / max(64 * n, 1))
+    counts = dict(load, call=1, all_pairs=n * (n - 1) / 2, sort=n * math.log2(max(n, 1)), moved=n * load["moved"])
+    counts["cold_objects"] = n * max(0.0, 1 - work["cache_bytes"] / max(64 * n, 1))
+    ns = sum(t["unit_ns"] * counts[t["term"]] for t in work["terms"])
+    if work["fallback"]:
+        ns = min(ns, work["fallback"]["factor"] * work_ns(tuning, work["fallback"]["work"], load, corrected))
+    weights = work.get("residual", []) if corrected else []
+    return ns * math.exp(residual(weights, work["residual_by_motion"], tuning.get("places", []), load))
 
-    def total(terms):
-        return sum(t["unit_ns"] * counts[t["term"]] for t in terms)
 
-    ns = total(curve["terms"])
-    if curve.get("fallback_terms"):
-        ns = min(ns, total(curve["fallback_terms"]))
-    knots = [(k["log2_objects"], k["ln_factor"]) for k in curve.get("correction", [])] if corrected else []
-    if not knots:
-        return ns
-    if octaves <= knots[0][0] or octaves >= knots[-1][0]:
-        return ns * math.exp(knots[0 if octaves <= knots[0][0] else -1][1])
-    (x0, y0), (x1, y1) = next(pair for pair in zip(knots, knots[1:]) if octaves < pair[1][0])
-    return ns * math.exp(y0 + (octaves - x0) / (x1 - x0) * (y1 - y0))
+def cost(tuning, algorithm, load, corrected):
+    """Nanoseconds of an algorithm, as `src/cost.rs` has it."""
+    ns = work_ns(tuning, algorithm["work"], load, corrected)
+    helpers = algorithm["helpers"]
+    if helpers:
+        called, most = helpers["threads"] - 1, helpers["threads"] - 1
+        if helpers["boxes_per_thread"]:
+            called = min(max(load["objects"] // helpers["boxes_per_thread"], 1), helpers["threads"]) - 1
+        if called > 0:
+            speed_up = 1 + called / most * (helpers["speed_up"] - 1)
+            ns = called / most * helpers["call_ns"] + min(ns, (ns + helpers["late_ns"]) / speed_up)
+    observed = algorithm["observed"] if corrected else None
+    if observed:
+        ns *= math.exp(observed["constant"] + residual(observed["weights"], observed["by_motion"], tuning.get("places", []), load))
+    return ns
 
 
 def main():
@@ -109,11 +140,11 @@ def main():
         cells, columns = table(points), ["-"] * 3
         tuning = tunings / path.name
         if tuning.is_file():
-            costs = json.loads(tuning.read_text())["costs"]
+            held = json.loads(tuning.read_text())
             for column, corrected in enumerate((True, False)):
 
                 def cheapest(_scenario, _quarter, load):
-                    return min(costs, key=lambda c: cost(c["curve"], load, corrected))["algorithm"]
+                    return min(held["costs"], key=lambda a: cost(held, a, load, corrected))["algorithm"]
 
                 columns[column] = "%.1f (%.1f)" % regret(cells, cheapest)
         first = path.with_name(path.name.replace("-again", ""))

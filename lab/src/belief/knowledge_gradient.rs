@@ -1,8 +1,8 @@
 //! What an observation is worth before it is made.
 
-use super::posterior::{Posterior, Slope};
 use sapwise::stats::{normal_density, normal_tail};
-use sapwise::{Counts, Load};
+use sapwise::tuning::Slope;
+use sapwise::{Load, Observed};
 
 /// A line further above the best than this many times its slope crosses it so rarely that it changes no gain by a millionth.
 const REACH: f64 = 5.0;
@@ -15,8 +15,6 @@ const REACH: f64 = 5.0;
 pub struct KnowledgeGradient {
     /// One for each load.
     scenes: Vec<Scene>,
-    /// Covariance of each curve with the observation in question.
-    with: Vec<f64>,
     /// Algorithms that may become the best of a scene: how far they are behind, and how that changes with one standard deviation of
     /// surprise.
     lines: Vec<Line>,
@@ -44,8 +42,8 @@ struct Line {
 impl KnowledgeGradient {
     /// The choices between the algorithms that `usable` admits, under each of `loads`.
     #[must_use]
-    pub fn new(posterior: &Posterior, loads: &[Load], usable: &[bool]) -> Self {
-        let count = posterior.costs.len();
+    pub fn new(observed: &Observed, loads: &[Load], usable: &[bool]) -> Self {
+        let count = observed.predicted().len();
         let scene = |load: &Load| Scene {
             load: *load,
             slopes: Vec::with_capacity(count),
@@ -54,22 +52,20 @@ impl KnowledgeGradient {
         };
         let mut gradient = Self {
             scenes: loads.iter().map(scene).collect(),
-            with: vec![0.0; posterior.mean.len()],
             lines: Vec::with_capacity(count),
             envelope: Vec::with_capacity(count),
         };
-        gradient.refresh(posterior, usable);
+        gradient.refresh(observed, usable);
         gradient
     }
 
-    /// Takes over what `posterior` expects by now.
-    pub fn refresh(&mut self, posterior: &Posterior, usable: &[bool]) {
+    /// Takes over what is expected by now.
+    pub fn refresh(&mut self, observed: &Observed, usable: &[bool]) {
         for Scene { load, slopes, mean_ln, best } in &mut self.scenes {
-            let counts = Counts::new(load);
             slopes.clear();
             mean_ln.clear();
             for (a, &usable) in usable.iter().enumerate() {
-                let (ln, slope) = posterior.look(a, &counts);
+                let (ln, slope) = observed.expected_ln(a, load);
                 slopes.push(slope);
                 mean_ln.push(if usable { ln } else { f64::INFINITY });
             }
@@ -78,26 +74,26 @@ impl KnowledgeGradient {
     }
 
     /// By how much the expected regret falls, in natural logarithms and on average over the loads, when the algorithm is observed
-    /// under `load` with that much noise beside the prior's.
+    /// under `load` with that much noise.
     ///
     /// In closed form: an observation moves every expectation along a line, by the surprise that it brings, and the expected
     /// minimum of lines follows from their lower envelope (Frazier, Powell and Dayanik, The knowledge-gradient policy for correlated
     /// normal beliefs, 2009).
-    pub fn gain(&mut self, posterior: &Posterior, algorithm: usize, load: &Load, noise_ln: f64) -> f64 {
-        let Self { scenes, with, lines, envelope } = self;
-        let (_, slope) = posterior.look(algorithm, &Counts::new(load));
-        let variance = posterior.covariances(&slope, noise_ln, with);
-        let deviation = variance.sqrt();
+    pub fn gain(&mut self, observed: &mut Observed, algorithm: usize, load: &Load, noise_ln: f64) -> f64 {
+        let Self { scenes, lines, envelope } = self;
+        let (_, with) = observed.expected_ln(algorithm, load);
+        let deviation = (observed.prepare(&with) + noise_ln * noise_ln).sqrt();
         let mut sum = 0.0;
         for Scene { slopes, mean_ln, best, .. } in &*scenes {
             if !mean_ln.get(*best).is_some_and(|m| m.is_finite()) {
                 continue;
             }
-            let of_best = slopes[*best].along(with);
+            let of_best = observed.covariance(&with, &slopes[*best]);
             lines.clear();
             lines.push(Line { behind: 0.0, slope: 0.0 });
             for (slope, mean) in slopes.iter().zip(mean_ln) {
-                let line = Line { behind: mean - mean_ln[*best], slope: (slope.along(with) - of_best) / deviation };
+                let line =
+                    Line { behind: mean - mean_ln[*best], slope: (observed.covariance(&with, slope) - of_best) / deviation };
                 if line.behind < REACH * line.slope.abs() {
                     lines.push(line);
                 }

@@ -32,9 +32,12 @@ impl<'a> Replay<'a> {
         Self { points, given: Vec::new(), incremental: IncrementalMethods::find() }
     }
 
-    /// Position of the point nearest to a load at which the algorithm was timed.
+    /// Position of the point nearest to a load at which the algorithm was timed: with that load itself where there is one, else by objects.
     fn nearest(&self, algorithm: &AlgorithmId, load: &Load) -> Option<usize> {
-        let distance = |p: &ReplayPoint| (f64::from(p.load.objects.max(1)) / f64::from(load.objects.max(1))).ln().abs();
+        let distance = |p: &ReplayPoint| {
+            let objects = (f64::from(p.load.objects.max(1)) / f64::from(load.objects.max(1))).ln().abs();
+            if p.load == *load { -1.0 } else { objects }
+        };
         let timed = |p: &ReplayPoint| p.timings.iter().any(|t| t.0 == *algorithm);
         let near = (0..self.points.len()).filter(|&k| distance(&self.points[k]) <= NEAR_LN && timed(&self.points[k]));
         near.min_by(|&a, &b| distance(&self.points[a]).total_cmp(&distance(&self.points[b])))

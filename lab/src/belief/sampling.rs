@@ -2,15 +2,17 @@
 
 use super::effort::Effort;
 use super::knowledge_gradient::KnowledgeGradient;
-use super::posterior::{Joint, Posterior};
-use super::prior::Prior;
-use sapwise::{AlgorithmCost, AlgorithmId, Backend, Load, Observation};
+use sapwise::{AlgorithmCost, AlgorithmId, Backend, Load, Observation, Observed};
 
 /// Time for all samples together.
 pub const SECONDS: f64 = 2.0;
 
 /// No sample is taken that promises less than this, as a share of a frame's time.
 const LEAST_GAIN: f64 = 1e-5;
+
+/// Standard deviation of the logarithm of a sample around what the same load takes in another run and in other scenes, beside its own noise. Judged on another
+/// run than they came from, eight samples that were believed to a third of that did harm.
+const NOISE_LN: f64 = 0.2;
 
 /// How long a sample will take is forecast with a cost this many standard deviations above the expected one.
 const CAUTION: f64 = 1.0;
@@ -80,7 +82,7 @@ impl Taken {
 #[derive(Debug, Clone)]
 pub struct Learned {
     /// What is known of all algorithms.
-    pub posterior: Posterior,
+    pub observed: Observed,
     /// Which of them did not fail.
     pub usable: Vec<bool>,
     /// What was sampled, in that order.
@@ -94,43 +96,37 @@ pub struct Learned {
 ///
 /// # Errors
 /// As [`Source::sample`].
-pub fn learn(
-    predicted: Vec<AlgorithmCost>,
-    prior: &Prior,
-    slice: &[Load],
-    source: &mut dyn Source,
-    most: usize,
-) -> anyhow::Result<Learned> {
-    let mut usable = vec![true; predicted.len()];
-    let mut open: Vec<(usize, usize)> = (0..predicted.len()).flat_map(|a| (0..slice.len()).map(move |at| (a, at))).collect();
-    let mut posterior = Posterior::new(predicted, prior);
-    let mut gradient = KnowledgeGradient::new(&posterior, slice, &usable);
+pub fn learn(mut observed: Observed, slice: &[Load], source: &mut dyn Source, most: usize) -> anyhow::Result<Learned> {
+    let count = observed.predicted().len();
+    let mut usable = vec![true; count];
+    let mut open: Vec<(usize, usize)> = (0..count).flat_map(|a| (0..slice.len()).map(move |at| (a, at))).collect();
+    let mut gradient = KnowledgeGradient::new(&observed, slice, &usable);
     let mut expected = Vec::new();
     let (mut taken, mut remarks, mut left) = (Vec::new(), Vec::new(), SECONDS);
     while taken.len() < most {
-        gradient.refresh(&posterior, &usable);
-        cautious_ns(&posterior, slice, &mut expected);
+        gradient.refresh(&observed, &usable);
+        cautious_ns(&mut observed, slice, &mut expected);
         // One sample may take two shares of what is left, so that the dear ones don't use up the time of the others.
         let longest = left * 2.0 / (most - taken.len() + 1) as f64;
         let mut next: Option<(f64, usize)> = None;
         for (k, &(a, at)) in open.iter().enumerate() {
-            let effort = source.effort(&posterior.predicted()[a].algorithm, &slice[at]);
+            let effort = source.effort(&observed.predicted()[a].algorithm, &slice[at]);
             if effort.is_none_or(|e| e.seconds(expected[at][a]) > longest) {
                 continue;
             }
-            let gain = gradient.gain(&posterior, a, &slice[at], 0.0);
+            let gain = gradient.gain(&mut observed, a, &slice[at], NOISE_LN);
             if gain > next.map_or(LEAST_GAIN, |n| n.0) {
                 next = Some((gain, k));
             }
         }
         let Some((_, k)) = next else { break };
         let (a, at) = open.swap_remove(k);
-        let algorithm = posterior.predicted()[a].algorithm.clone();
+        let algorithm = observed.predicted()[a].algorithm.clone();
         match source.sample(&algorithm, &slice[at])? {
             Answer::Over => break,
             Answer::Skipped => {}
             Answer::Failed { why, gpus } => {
-                for (other, usable) in posterior.predicted().iter().zip(&mut usable) {
+                for (other, usable) in observed.predicted().iter().zip(&mut usable) {
                     let lost =
                         matches!(other.algorithm.backend(), Backend::Gpu(used) if used.iter().any(|k| gpus.contains(k)));
                     *usable &= !lost && other.algorithm != algorithm;
@@ -141,35 +137,36 @@ pub fn learn(
             }
             Answer::Taken(sample) => {
                 left -= sample.seconds;
-                let predicted_ns = posterior.predicted()[a].curve.cost_ns(&sample.load);
-                if posterior.observe(a, &sample.load, sample.ns, sample.noise_ln) {
+                let predicted_ns = observed.predicted()[a].curve.cost_ns(&sample.load);
+                if observed.observe(a, &sample.load, sample.ns, NOISE_LN.hypot(sample.noise_ln)) {
                     taken.push(Taken { algorithm, sample, predicted_ns });
                 }
             }
         }
     }
-    Ok(Learned { posterior, usable, taken, remarks })
+    Ok(Learned { observed, usable, taken, remarks })
 }
 
 impl Learned {
     /// The corrected costs of the algorithms that did not fail.
     pub fn costs(&self) -> Vec<AlgorithmCost> {
         let mut usable = self.usable.iter();
-        let mut costs = self.posterior.costs();
+        let mut costs = self.observed.costs();
         costs.retain(|_| usable.next() == Some(&true));
         costs
     }
 }
 
 /// What algorithms may cost under each load, so that a sample that turns out dear seldom exceeds its time.
-fn cautious_ns(posterior: &Posterior, slice: &[Load], expected: &mut Vec<Vec<f64>>) {
-    let mut joint = Joint::default();
+fn cautious_ns(observed: &mut Observed, slice: &[Load], expected: &mut Vec<Vec<f64>>) {
+    let count = observed.predicted().len();
     expected.clear();
     expected.extend(slice.iter().map(|load| {
-        posterior.joint(load, &mut joint);
-        let count = joint.mean_ln.len();
-        let of = |a: usize| (joint.mean_ln[a] + CAUTION * joint.covariance[a * count + a].max(0.0).sqrt()).exp();
-        (0..count).map(of).collect::<Vec<f64>>()
+        let mut of = |a: usize| {
+            let (ln, slope) = observed.expected_ln(a, load);
+            (ln + CAUTION * observed.prepare(&slope).sqrt()).exp()
+        };
+        (0..count).map(&mut of).collect::<Vec<f64>>()
     }));
 }
 

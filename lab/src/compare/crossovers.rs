@@ -40,7 +40,7 @@ const AROUND: f64 = 4.0;
 pub(super) fn crossovers(reports: &[&Report]) -> Vec<CrossoverSpread> {
     let mut found: Vec<CrossoverSpread> = Vec::new();
     for scenario in scenarios(reports) {
-        let all: Vec<Tuning> = reports.iter().filter_map(|r| measured_tuning(r, scenario).ok()).collect();
+        let all: Vec<Tuning> = reports.iter().filter_map(|r| measured_tuning(r, scenario, None).ok()).collect();
         // A pair can cross more than once; the k-th crossing of one report is compared with the k-th of the others.
         let mut groups: BTreeMap<(AlgorithmId, AlgorithmId, usize), Vec<&Crossover>> = BTreeMap::new();
         for tuning in &all {

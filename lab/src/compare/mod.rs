@@ -6,6 +6,7 @@ mod losses;
 mod parameters;
 mod text;
 
+use crate::data::host;
 use crate::report::{Label, Report};
 use crate::steadiness::Steadiness;
 use anyhow::{Result, bail};
@@ -93,7 +94,7 @@ fn difference(a: &Report, b: &Report) -> Option<&'static str> {
     let gpu = |r: &Report, index: u32| r.hardware.gpus.iter().find(|g| g.gpu.index == index).map(|g| g.gpu.clone());
     let other_gpu = |index: u32| gpu(a, index).zip(gpu(b, index)).is_some_and(|(a, b)| a != b);
     let same = [
-        (x.physical_id == y.physical_id, "the physical machine"),
+        (host(&a.hardware) == host(&b.hardware), "the physical machine"),
         (x.simd == y.simd, "the SIMD level"),
         (a.provenance.threads == b.provenance.threads, "the number of threads"),
         (a.provenance.gpu_threads == b.provenance.gpu_threads, "the threads of a software adapter"),

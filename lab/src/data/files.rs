@@ -20,9 +20,9 @@ const LARGEST_BYTES: u64 = 64 << 20;
 pub enum Document {
     /// `report/2`.
     Report(Box<Report>),
-    /// `model/2`.
+    /// `model/3`.
     Model(Box<StoredModel>),
-    /// `tuning/1`.
+    /// `tuning/2`.
     Tuning(Box<Tuning>),
 }
 
@@ -48,7 +48,7 @@ pub fn read_document(path: &Path, warn: &dyn Fn(&str)) -> anyhow::Result<Documen
             let read = Format::TUNING.read(&text).with_context(unsound)?;
             (Document::Tuning(Box::new(read.value)), read.skipped)
         }
-        _ => bail!("{} has the schema {schema}, which is none of report/2, model/2 and tuning/1", path.display()),
+        _ => bail!("{} has the schema {schema}, which is none of report/2, model/3 and tuning/2", path.display()),
     };
     if !skipped.is_empty() {
         warn(&ignored(path, &schema, &skipped));

@@ -2,8 +2,8 @@
 
 use crate::report::{Label, Point, Report, Timed, Timing};
 use crate::sweep::median;
-use sapwise::{AlgorithmId, Entry, Hardware, Load};
-use std::borrow::Cow;
+use sapwise::hardware::ParameterId;
+use sapwise::{AlgorithmId, BackendClass, Entry, Hardware, Load};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A report without its samples, of which thousands fit into memory.
@@ -13,10 +13,12 @@ pub struct Profile {
     pub file: String,
     /// What kind of evidence it is.
     pub label: Label,
-    /// Without the raw samples of its parameters, its cores as far apart as at half of the points.
+    /// The host that it was measured on.
+    pub host: String,
+    /// How the machine was restricted, in words: the same for two runs that repeat each other.
+    pub setup: String,
+    /// Without the raw samples of its parameters.
     pub hardware: Hardware,
-    /// The same as it was measured, where that differs.
-    pub measured: Option<Hardware>,
     /// The algorithms that were timed.
     pub algorithms: Vec<Timed>,
     /// Where they were timed, in the order of the report.
@@ -30,10 +32,10 @@ pub struct Spot {
     pub scenario: String,
     /// The load that an in-line choice would have estimated.
     pub load: Load,
-    /// Latency between cores before and after the samples, their geometric mean; `None` where it is not known.
-    pub core_to_core_ns: Option<f64>,
     /// Position in [`Profile::algorithms`], and the median over the frames in ns.
     pub medians: Vec<(u16, f64)>,
+    /// The mean over the frames of each of these, in the same order: frames in which an incremental algorithm makes again what it keeps count.
+    pub means: Vec<f64>,
 }
 
 /// A median of fewer samples says nothing about disturbed frames.
@@ -45,30 +47,32 @@ impl Profile {
         let mut hardware = report.hardware.clone();
         let of_gpus = hardware.gpus.iter_mut().flat_map(|g| &mut g.parameters);
         hardware.parameters.iter_mut().chain(of_gpus).for_each(|p| p.raw = Vec::new());
+        let p = &report.provenance;
         let points = report.points.iter().map(|p| Spot::of(p, &report.algorithms));
-        let moved = as_at_the_points(&hardware, report);
-        let measured = (moved != hardware).then_some(hardware);
         Self {
             file: file.to_owned(),
             label: report.label,
-            hardware: moved,
-            measured,
+            host: host(&hardware),
+            setup: format!(
+                "{:?} {:?} {:?} {:?}",
+                p.threads,
+                p.simd,
+                p.gpu_threads,
+                p.restriction.as_ref().map(|r| &r.kinds)
+            ),
+            hardware,
             algorithms: report.algorithms.clone(),
             points: points.filter(|s| !s.medians.is_empty() && s.load.objects > 0).collect(),
         }
     }
 
-    /// The hardware with its cores as far apart as they were at a point, where that is known. Always from what was measured: a fork and
-    /// join that was bounded on the way to another place does not find back.
-    pub fn hardware_at(&self, core_to_core_ns: Option<f64>) -> Cow<'_, Hardware> {
-        match core_to_core_ns {
-            Some(ns) => Cow::Owned(self.measured.as_ref().unwrap_or(&self.hardware).with_cores_apart(ns)),
-            None => Cow::Borrowed(&self.hardware),
-        }
+    /// The host: all that its reports share is no evidence about another one.
+    pub fn machine(&self) -> &str {
+        &self.host
     }
 
-    /// The physical machine.
-    pub fn machine(&self) -> &str {
+    /// The CPU model with its caches, which several hosts may share.
+    pub fn cpu_model(&self) -> &str {
         &self.hardware.machine.physical_id
     }
 
@@ -109,6 +113,16 @@ impl Profile {
         loads
     }
 
+    /// Whether an algorithm ran on several threads.
+    pub fn has_threads(&self) -> bool {
+        self.algorithms.iter().any(|t| t.id.threads() > 1)
+    }
+
+    /// Whether an algorithm ran on the CPU.
+    pub fn has_cpu(&self) -> bool {
+        self.algorithms.iter().any(|t| t.id.backend().class() == BackendClass::Cpu)
+    }
+
     /// Position of an algorithm among those of the report.
     pub fn position(&self, id: &AlgorithmId) -> Option<u16> {
         self.algorithms.iter().position(|t| t.id == *id).map(|k| k as u16)
@@ -122,7 +136,10 @@ impl Profile {
         }
         let place = |k: u16| kept[..usize::from(k)].iter().filter(|k| **k).count() as u16;
         for spot in &mut self.points {
-            spot.medians.retain(|m| kept[usize::from(m.0)]);
+            let stays: Vec<bool> = spot.medians.iter().map(|m| kept[usize::from(m.0)]).collect();
+            let mut stays_too = stays.iter().chain(&stays);
+            spot.medians.retain(|_| stays_too.next() == Some(&true));
+            spot.means.retain(|_| stays_too.next() == Some(&true));
             spot.medians.iter_mut().for_each(|m| m.0 = place(m.0));
         }
         self.points.retain(|s| !s.medians.is_empty());
@@ -146,16 +163,13 @@ impl Profile {
     }
 }
 
-/// The hardware with its cores as far apart as they were at half of the points. Where a host moves them, the seconds in which the
-/// parameters were measured may have been unlike the minutes after.
-pub fn as_at_the_points(hardware: &Hardware, report: &Report) -> Hardware {
-    let apart: Vec<f64> = report.points.iter().filter_map(between_cores).collect();
-    sapwise::stats::median(&apart).map_or_else(|| hardware.clone(), |ns| hardware.with_cores_apart(ns))
-}
-
-/// The latency between cores at a point: the geometric mean of before and after.
-fn between_cores(point: &Point) -> Option<f64> {
-    point.core_to_core_ns.map(|[before, after]| (before * after).sqrt())
+/// What tells hosts apart, as far as hardware parameters do without a serial number: the CPU model with its caches and, of a guest, the clock that the
+/// hypervisor reports in MHz, which is the host's own. Without a hypervisor the system reports whatever the clock is at the moment, so that two
+/// machines of one model count as one.
+pub fn host(hardware: &Hardware) -> String {
+    let machine = &hardware.machine;
+    let clock = hardware.value(ParameterId::ClockReportedGhz).filter(|_| !matches!(&machine.hypervisor[..], "" | "none"));
+    clock.map_or_else(|| machine.physical_id.clone(), |ghz| format!("{}-{:.0}", machine.physical_id, 1000.0 * ghz))
 }
 
 /// `uniform` where a report has it, else its first scenario.
@@ -184,16 +198,13 @@ pub fn is_sound(timing: &Timing) -> bool {
 
 impl Spot {
     fn of(point: &Point, algorithms: &[Timed]) -> Self {
-        let median = |t: &Timing| {
+        let timing = |t: &Timing| {
             let k = algorithms.iter().position(|a| a.id == t.algorithm)?;
-            Some((k as u16, median(&t.samples_ns)?))
+            let mean = t.samples_ns.iter().sum::<u64>() as f64 / t.samples_ns.len() as f64;
+            Some(((k as u16, median(&t.samples_ns)?), mean))
         };
-        Self {
-            scenario: point.scenario.clone(),
-            load: point.load,
-            core_to_core_ns: between_cores(point),
-            medians: point.timings.iter().filter(|t| is_sound(t)).filter_map(median).collect(),
-        }
+        let (medians, means) = point.timings.iter().filter(|t| is_sound(t)).filter_map(timing).unzip();
+        Self { scenario: point.scenario.clone(), load: point.load, medians, means }
     }
 
     /// The least median in ns; `None` of none.

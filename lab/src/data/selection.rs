@@ -62,7 +62,14 @@ impl Selection {
     pub fn reduce(&self, file: &str, report: &Report) -> Result<Profile, LeftOut> {
         match refusal(report, self.evidence) {
             Some(why) => Err(LeftOut { file: file.to_owned(), why }),
-            None => Ok(Profile::of(file, report)),
+            None => {
+                let mut profile = Profile::of(file, report);
+                // Between two frames on the CPU a software adapter takes its caches, and its threads the cores: no other frame of a program has it so.
+                if report.label == Label::RealSoftwareGpu {
+                    profile.retain(|t| t.id.backend().class() == BackendClass::Gpu);
+                }
+                Ok(profile)
+            }
         }
     }
 

@@ -91,8 +91,10 @@ mod tests {
 
     fn slower(costs: &[AlgorithmCost], id: &AlgorithmId, factor: f64) -> Vec<AlgorithmCost> {
         let mut costs = costs.to_vec();
-        let own = costs.iter_mut().filter(|c| c.algorithm == *id);
-        own.flat_map(|c| c.curve.terms.iter_mut().chain(&mut c.curve.fallback_terms)).for_each(|t| t.unit_ns *= factor);
+        for cost in costs.iter_mut().filter(|c| c.algorithm == *id) {
+            let observed = cost.curve.observed.as_mut().expect("measured costs were observed");
+            observed.constant += factor.ln();
+        }
         costs
     }
 

@@ -27,7 +27,7 @@ fn best(point: &Point) -> (&AlgorithmId, f64) {
 #[test]
 fn where_the_number_of_objects_alone_is_wrong_by_a_factor_of_two_the_load_is_not() {
     let report = full_report();
-    let tuning = measured_tuning(&report, "uniform").unwrap();
+    let tuning = measured_tuning(&report, "uniform", None).unwrap();
     let (mut scenes, mut by_count, mut by_load) = (0, 0.0, 0.0);
     for point in &report.points {
         // The best for as many objects in the scenario of the thresholds, which are what the number alone has to go by.
@@ -57,7 +57,7 @@ fn two_scenes_of_as_many_boxes_get_the_algorithms_that_suit_them() {
     let of = |scenario: Scenario| {
         let point = report.points.iter().find(|p| p.scenario == scenario.name() && p.load.objects == 1778);
         let point = point.expect("the report has that point");
-        let mut adaptive = Adaptive::new(measured_tuning(&report, "uniform").unwrap(), &registry).unwrap();
+        let mut adaptive = Adaptive::new(measured_tuning(&report, "uniform", None).unwrap(), &registry).unwrap();
         // What frames take here is another matter.
         adaptive.set_learning(false);
         let (mut scene, mut pairs) = (scenario.start(1778, 1), Pairs::new());

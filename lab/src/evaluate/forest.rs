@@ -14,9 +14,9 @@ use std::collections::BTreeMap;
 type Key = (BackendClass, String);
 
 /// Trees of a forest.
-const TREES: usize = 25;
+const TREES: usize = 50;
 /// Rows that a forest is grown from, at most.
-const MOST_ROWS: usize = 1500;
+const MOST_ROWS: usize = 3000;
 /// Profiles that forests are grown from, about, spread over all, and rows of each at least for a method: of a profile with a
 /// handful of rows no tree learns how time grows with the load.
 const MOST_PROFILES: usize = 400;
@@ -31,6 +31,8 @@ pub(super) struct Table(BTreeMap<Key, Vec<Example>>);
 
 struct Example {
     profile: usize,
+    /// Position of its point in the profile.
+    spot: u32,
     features: Vec<f64>,
     ln_ns: f64,
 }
@@ -50,6 +52,7 @@ impl Table {
             for (key, rows) in own {
                 let example = |r: Row| Example {
                     profile: k,
+                    spot: r.spot,
                     features: features(&profile.hardware, profile.id(r.algorithm).backend(), &r.load),
                     ln_ns: r.ns.ln(),
                 };
@@ -59,14 +62,15 @@ impl Table {
         Self(table)
     }
 
-    /// The forests of the chosen profiles.
+    /// The forests of the chosen profiles, without the points that `left_out` names by profile and position.
     ///
     /// # Errors
     /// When smartcore refuses a fit.
-    pub(super) fn grow(&self, chosen: &[bool]) -> Result<Forests> {
+    pub(super) fn grow(&self, chosen: &[bool], left_out: impl Fn(usize, u32) -> bool) -> Result<Forests> {
         let mut forests = BTreeMap::new();
         for (key, examples) in &self.0 {
-            let known: Vec<&Example> = examples.iter().filter(|e| chosen[e.profile]).collect();
+            let known: Vec<&Example> =
+                examples.iter().filter(|e| chosen[e.profile] && !left_out(e.profile, e.spot)).collect();
             // At random: with even steps every profile would have rows of the same few sizes.
             let order = Random::new(SEED).shuffled(known.len());
             let known: Vec<&Example> = order.into_iter().take(MOST_ROWS).map(|k| known[k]).collect();
@@ -153,7 +157,7 @@ mod tests {
 
     /// Mean regret on the last machine of forests that were grown from `chosen`.
     fn regret(profiles: &[Profile], chosen: &[bool]) -> f64 {
-        let forests = Table::new(profiles).grow(chosen).unwrap();
+        let forests = Table::new(profiles).grow(chosen, |_, _| false).unwrap();
         let held = profiles.last().unwrap();
         let available = held.available();
         RegretTable::new(held).regret(held, &forests.chooser(&held.hardware, &available)).mean
@@ -172,7 +176,7 @@ mod tests {
     #[test]
     fn what_left_the_race_is_not_chosen_beyond() {
         let all = profiles();
-        let forests = Table::new(&all).grow(&vec![true; all.len()]).unwrap();
+        let forests = Table::new(&all).grow(&vec![true; all.len()], |_, _| false).unwrap();
         let available = all[2].available();
         let choose = forests.chooser(&all[2].hardware, &available);
         for spot in all[2].points.iter().filter(|s| s.load.objects > 100_000) {

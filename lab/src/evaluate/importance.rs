@@ -10,7 +10,7 @@ use super::baselines::by_costs;
 use super::partition::Partition;
 use super::regret_table::{NOT_TIMED, RegretTable};
 use crate::data::{Profile, machines};
-use crate::fit::{Designs, model};
+use crate::fit::{Designs, TrainingSet, model};
 use crate::progress::Progress;
 use crate::spread;
 use anyhow::{Context, Result};
@@ -157,7 +157,7 @@ fn outcomes(
     let fold = |fold: &Vec<usize>| -> Result<Vec<(usize, Outcome)>> {
         progress.check()?;
         let chosen: Vec<bool> = (0..profiles.len()).map(|k| !fold.contains(&k)).collect();
-        let model = model(profiles, &designs, &chosen, "importance")
+        let model = model(profiles, &designs, TrainingSet::of(&chosen), "importance")
             .with_context(|| format!("no importance is told when {} is held out", profiles[fold[0]].file))?
             .0;
         progress.advance(1);

@@ -2,7 +2,7 @@
 
 use super::{NOT_TIMED, Partition, RegretTable, by_costs};
 use crate::data::Profile;
-use crate::fit::{ComponentsOf, Designs, components, model};
+use crate::fit::{ComponentsOf, Designs, TrainingSet, components, model};
 use crate::progress::Silent;
 use crate::simulated;
 use crate::text::columns;
@@ -15,10 +15,8 @@ use sapwise::{Model, Term};
 /// are made good, of which the pairs lie highest, at 1.7, and the others, from 2.7 on.
 const MOST_LOST: f64 = 2.0;
 
-/// The terms whose loss the residual does not make good. It corrects a curve over the number of objects, at a slope that all machines
-/// share: moved boxes differ between scenarios of equal size, and what a fork and join costs a frame falls faster with the
-/// size than a parabola of its logarithm does.
-const NOT_MADE_GOOD: [&str; 2] = ["fork and join", "moved, divided cycles"];
+/// The terms whose loss the residual does not make good.
+const NOT_MADE_GOOD: [&str; 0] = [];
 
 /// A physical term over all methods: the tests of each method are one.
 type Withheld = (&'static str, fn(Term, Scale) -> bool);
@@ -28,26 +26,21 @@ const fn tests(term: Term) -> bool {
 }
 
 /// Every term of the list in `components`.
-const WITHHELD: [Withheld; 19] = [
+const WITHHELD: [Withheld; 14] = [
     ("call, cycles", |t, s| t == Term::Call && s == Scale::Cycle),
-    ("fork and join", |_, s| s == Scale::ForkJoin),
-    ("objects, divided cycles", |t, s| t == Term::Objects && s == Scale::SharedCycle),
-    ("sort, divided cycles", |t, s| t == Term::Sort && s == Scale::SharedCycle),
-    ("bytes outside the cache", |_, s| s == Scale::Byte),
-    ("tests, lanes", |t, s| tests(t) && s == Scale::SharedLane),
-    ("tests, divided cycles", |t, s| tests(t) && s == Scale::SharedCycle),
-    ("pairs, divided cycles", |t, s| t == Term::Pairs && s == Scale::SharedCycle),
-    ("moved, divided cycles", |t, _| t == Term::Moved),
-    ("lines between cores", |_, s| s == Scale::SharedLine),
     ("objects, cycles", |t, s| t == Term::Objects && s == Scale::Cycle),
     ("sort, cycles", |t, s| t == Term::Sort && s == Scale::Cycle),
+    ("bytes outside the cache", |_, s| s == Scale::Byte),
+    ("tests, lanes", |t, s| tests(t) && s == Scale::Lane),
+    ("tests, cycles", |t, s| tests(t) && s == Scale::Cycle),
+    ("pairs, cycles", |t, s| t == Term::Pairs && s == Scale::Cycle),
+    ("moved, cycles", |t, _| t == Term::Moved),
     ("GPU: round trip", |_, s| s == Scale::GpuRoundTrip),
     ("GPU: dispatches", |_, s| s == Scale::GpuDispatch),
     ("GPU: bytes up", |_, s| s == Scale::GpuUploadByte),
     ("GPU: bytes moved", |_, s| s == Scale::GpuMemoryByte),
     ("GPU: tests", |_, s| s == Scale::GpuOperation),
     ("GPU: bytes down", |_, s| s == Scale::GpuDownloadByte),
-    ("pairs, cycles", |t, s| t == Term::Pairs && s == Scale::Cycle),
 ];
 
 /// Mean regrets on machines held out, with the residual and without.
@@ -55,7 +48,7 @@ fn mean_regrets(profiles: &[Profile], partition: &Partition, components: &Compon
     let designs = Designs::with(profiles, components);
     let of_fold = |fold: &Vec<usize>| -> Vec<(f64, f64)> {
         let chosen: Vec<bool> = (0..profiles.len()).map(|k| !fold.contains(&k)).collect();
-        let (whole, _) = model(profiles, &designs, &chosen, "withheld").unwrap();
+        let (whole, _) = model(profiles, &designs, TrainingSet::of(&chosen), "withheld").unwrap();
         let mut physics = whole.clone();
         physics.methods = whole.methods.iter().map(MethodModel::without_residual).collect();
         fold.iter().map(|&k| (regret(&profiles[k], &whole), regret(&profiles[k], &physics))).collect()
@@ -95,8 +88,8 @@ fn losses(profiles: &[Profile], folds: usize) -> Vec<Loss> {
         let left = move |method: &str, class| {
             components(method, class).into_iter().filter(|c| !c.0.iter().any(|&(_, t, s)| is(t, s))).collect()
         };
-        let (ridge, physics) = mean_regrets(profiles, &partition, &left);
-        Loss { withheld, ratio: ridge / whole.0, ratio_of_terms: physics / whole.0 }
+        let (with_residual, physics) = mean_regrets(profiles, &partition, &left);
+        Loss { withheld, ratio: with_residual / whole.0, ratio_of_terms: physics / whole.0 }
     };
     let losses: Vec<Loss> = WITHHELD.par_iter().map(without).collect();
     let mut rows = vec![["withheld", "with the residual", "terms alone"].map(str::to_owned).to_vec()];

@@ -1,10 +1,13 @@
 //! How well strategies choose on machines that were held out, and what hardware parameters are worth to them.
 
 mod baselines;
+mod contestants;
+mod coverage;
 mod crossovers;
 #[cfg(test)]
 mod density;
 mod direct;
+mod floor;
 mod forest;
 mod held_out;
 mod importance;

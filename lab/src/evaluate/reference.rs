@@ -3,15 +3,15 @@
 
 use super::direct::Line;
 use crate::fit::columns::Columns;
+use crate::fit::load_residual::{self, Remainder};
 use crate::fit::nnls::nnls;
-use crate::fit::residual::Residuals;
 use crate::fit::robust::{HUBER, Problem};
 use ndarray::{Array1, Array2};
-use sapwise::BackendClass;
-use sapwise::model::Feature;
 use sapwise::stats::{quantile, relative_iqr, robust_deviation};
+use sapwise::{Load, Places, Residual};
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Of numbers that both sides compute in double precision by a direct method on columns of length one, with a condition
 /// below 1e4.
@@ -28,7 +28,7 @@ struct Answers {
     made_by: String,
     versions: BTreeMap<String, String>,
     nnls: Vec<NonNegative>,
-    ridge: Vec<WeightedRidge>,
+    residual: Vec<OverLoads>,
     least_squares: Vec<Ordinary>,
     robust: Vec<Robust>,
     quantiles: Vec<Quantiles>,
@@ -47,12 +47,14 @@ struct NonNegative {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct WeightedRidge {
-    penalty: f64,
-    x: Vec<Vec<f64>>,
-    weights: Vec<f64>,
-    y: Vec<f64>,
-    fitted: Vec<f64>,
+struct OverLoads {
+    by_motion: bool,
+    /// Objects, pairs, strip candidates, axis candidates, moved.
+    loads: Vec<[f64; 5]>,
+    ln: Vec<f64>,
+    behind: Vec<f64>,
+    at: Vec<[f64; 5]>,
+    predictions: Vec<f64>,
 }
 
 #[derive(Deserialize)]
@@ -107,7 +109,7 @@ fn the_numbers_say_where_they_come_from() {
     for package in ["python", "numpy", "scipy", "sklearn"] {
         assert!(answers.versions.contains_key(package), "{package}");
     }
-    let counts = [answers.nnls.len(), answers.ridge.len(), answers.least_squares.len()];
+    let counts = [answers.nnls.len(), answers.residual.len(), answers.least_squares.len()];
     assert!(counts.iter().all(|&c| c >= 2) && answers.robust.len() >= 4 && answers.quantiles.len() >= 4);
 }
 
@@ -130,22 +132,26 @@ fn non_negative_least_squares_agree_with_scipy() {
     }
 }
 
+/// Each place has a variance of its own with us, of a ten-thousandth.
 #[test]
-fn the_weighted_ridge_agrees_with_scikit_learn() {
-    for problem in answers().ridge {
-        let rows = problem.y.len();
-        let residuals = Residuals {
-            names: Feature::of(BackendClass::Cpu),
-            features: matrix(&problem.x),
-            ln_ratios: problem.y,
-            weights: problem.weights,
-            groups: vec![0; rows],
+fn the_residual_over_the_load_agrees_with_scikit_learns_gaussian_process() {
+    for problem in answers().residual {
+        let load =
+            |l: &[f64; 5]| Load::of_objects(l[0] as u32).with_pairs(l[1]).with_candidates(l[3], l[2]).with_moved(l[4]);
+        let places = Arc::new(Places::new(problem.loads.iter().map(load).collect()));
+        let remainder = |k: usize| Remainder {
+            load: load(&problem.loads[k]),
+            ln: problem.ln[k],
+            behind: problem.behind[k],
+            contended: false,
         };
-        let ridge = residuals.fit(&(0..rows).collect::<Vec<usize>>(), problem.penalty).unwrap();
-        assert_eq!(ridge.terms.len(), 4);
-        for (row, theirs) in problem.fitted.iter().enumerate() {
-            let ours = residuals.at(&ridge, row);
-            assert!(near(ours, *theirs, DIRECT), "penalty {}, row {row}: {ours} {theirs}", problem.penalty);
+        let remainders: Vec<Remainder> = (0..problem.loads.len()).map(remainder).collect();
+        let weights = load_residual::weights(&places, &remainders, problem.by_motion).unwrap();
+        let residual = Residual::new(places, weights, problem.by_motion);
+        assert!(problem.at.len() >= 5);
+        for (at, theirs) in problem.at.iter().zip(&problem.predictions) {
+            let ours = residual.ln(&load(at));
+            assert!((ours - theirs).abs() < 1e-3, "{at:?}: {ours} {theirs}");
         }
     }
 }

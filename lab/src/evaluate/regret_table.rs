@@ -48,6 +48,8 @@ struct Cell {
 pub struct Regret {
     /// For each cell, the mean over its points.
     pub cells: Vec<f64>,
+    /// How often a game has the number of objects of each, in proportion.
+    pub weights: Vec<f64>,
     /// Mean over the cells.
     pub mean: f64,
     /// Mean over the cells, weighted by how often a game has that number of objects.
@@ -55,6 +57,21 @@ pub struct Regret {
 }
 
 impl Regret {
+    /// Of these cells with their weights.
+    fn of(cells: Vec<f64>, weights: Vec<f64>) -> Self {
+        let total: f64 = weights.iter().sum();
+        let weighted: f64 = cells.iter().zip(&weights).map(|(r, w)| r * w).sum();
+        Self { mean: mean(&cells), as_in_games: if total > 0.0 { weighted / total } else { 0.0 }, cells, weights }
+    }
+
+    /// Of the cells of both.
+    #[must_use]
+    pub fn and(mut self, other: Self) -> Self {
+        self.cells.extend(other.cells);
+        self.weights.extend(other.weights);
+        Self::of(self.cells, self.weights)
+    }
+
     /// The least and the largest of a cell; `None` where there is no cell.
     #[must_use]
     pub fn range(&self) -> Option<[f64; 2]> {
@@ -63,16 +80,28 @@ impl Regret {
 }
 
 impl RegretTable {
-    /// Of one report.
+    /// Of one report, by the medians over frames.
     #[must_use]
     pub fn new(profile: &Profile) -> Self {
+        Self::by(profile, |spot| spot.medians.clone())
+    }
+
+    /// Of one report, by the means over frames, which is what a user waits for. One frame that another program interrupted moves them.
+    #[must_use]
+    pub fn by_means(profile: &Profile) -> Self {
+        Self::by(profile, |spot| spot.medians.iter().zip(&spot.means).map(|(m, mean)| (m.0, *mean)).collect())
+    }
+
+    fn by(profile: &Profile, times: impl Fn(&Spot) -> Vec<(u16, f64)>) -> Self {
         let mut groups: BTreeMap<(&str, i64), Vec<&Spot>> = BTreeMap::new();
         for spot in &profile.points {
             groups.entry((&spot.scenario, quarter(spot))).or_default().push(spot);
         }
         let algorithms = profile.algorithms.len();
-        let costs: BTreeMap<(&str, i64), Vec<Option<f64>>> =
-            groups.iter().map(|(&at, spots)| (at, ln_costs(spots, algorithms))).collect();
+        let costs: BTreeMap<(&str, i64), Vec<Option<f64>>> = groups
+            .iter()
+            .map(|(&at, spots)| (at, ln_costs(&spots.iter().map(|s| times(s)).collect::<Vec<_>>(), algorithms)))
+            .collect();
         let over_best = |at: (&str, i64), k: usize| {
             let cell = costs.get(&at)?;
             let least = cell.iter().flatten().copied().min_by(f64::total_cmp)?;
@@ -105,17 +134,38 @@ impl RegretTable {
         summed(cells, |cell| mean(&cell.loads.iter().map(|load| of(cell, load)).collect::<Vec<f64>>()))
     }
 
-    /// The regret of choosing each algorithm always.
-    pub fn always(&self) -> Vec<Regret> {
-        (0..self.algorithms).map(|k| summed(self.cells.iter(), |cell| cell.over_best[k] - 1.0)).collect()
+    /// The regret of choosing each algorithm always, under the loads of all scenarios but one, or of all.
+    pub fn always(&self, without: Option<&str>) -> Vec<Regret> {
+        let cells = || self.cells.iter().filter(|c| without.is_none_or(|w| c.scenario != w));
+        (0..self.algorithms).map(|k| summed(cells(), |cell| cell.over_best[k] - 1.0)).collect()
+    }
+
+    /// The regret of choosing in each cell what is best in the same cell of another table of the same algorithms, each given by its id; nothing of
+    /// cells that the other one lacks.
+    pub fn by_cells_of(&self, profile: &Profile, other: &Self, of_other: &Profile) -> Regret {
+        let alike = |cell: &Cell| other.cells.iter().find(|c| c.scenario == cell.scenario && c.decade == cell.decade);
+        let chosen = |cell: &Cell| -> Option<f64> {
+            let theirs = alike(cell)?;
+            let best = (0..theirs.over_best.len()).min_by(|&a, &b| theirs.over_best[a].total_cmp(&theirs.over_best[b]))?;
+            let own = profile.position(&of_other.algorithms[best].id)?;
+            Some(cell.over_best[usize::from(own)] - 1.0)
+        };
+        let cells = self.cells.iter().filter_map(|c| Some((chosen(c)?, in_games(c.decade))));
+        let (regrets, weights) = cells.unzip();
+        Regret::of(regrets, weights)
+    }
+
+    /// The scenarios of its cells, each once.
+    pub fn scenarios(&self) -> Vec<&str> {
+        let mut all: Vec<&str> = self.cells.iter().map(|c| c.scenario.as_str()).collect();
+        all.dedup();
+        all
     }
 }
 
 fn summed<'a>(cells: impl Iterator<Item = &'a Cell>, of: impl Fn(&Cell) -> f64) -> Regret {
     let (regrets, weights): (Vec<f64>, Vec<f64>) = cells.map(|c| (of(c), in_games(c.decade))).unzip();
-    let total: f64 = weights.iter().sum();
-    let weighted: f64 = regrets.iter().zip(&weights).map(|(r, w)| r * w).sum();
-    Regret { mean: mean(&regrets), as_in_games: if total > 0.0 { weighted / total } else { 0.0 }, cells: regrets }
+    Regret::of(regrets, weights)
 }
 
 fn quarter(spot: &Spot) -> i64 {
@@ -130,21 +180,20 @@ fn in_games(decade: f64) -> f64 {
 /// Natural logarithm of the cost of each algorithm over the points of a cell, up to what they share: the algorithms' part of a sum of
 /// what belongs to the algorithm and what belongs to the point. Not every algorithm was timed at every point, and a point with more
 /// objects costs all of them more.
-fn ln_costs(spots: &[&Spot], algorithms: usize) -> Vec<Option<f64>> {
+fn ln_costs(spots: &[Vec<(u16, f64)>], algorithms: usize) -> Vec<Option<f64>> {
     let mut costs: Vec<Option<f64>> = vec![None; algorithms];
     let mut shared = vec![0.0; spots.len()];
     for _ in 0..ROUNDS {
         let mut sums = vec![(0.0, 0.0); algorithms];
         for (spot, shared) in spots.iter().zip(&shared) {
-            for &(k, ns) in &spot.medians {
+            for &(k, ns) in spot {
                 let sum = &mut sums[usize::from(k)];
                 *sum = (sum.0 + ns.ln() - shared, sum.1 + 1.0);
             }
         }
         costs = sums.into_iter().map(|(sum, count)| (count > 0.0).then(|| sum / count)).collect();
         for (spot, shared) in spots.iter().zip(&mut shared) {
-            let left: Vec<f64> =
-                spot.medians.iter().map(|&(k, ns)| ns.ln() - costs[usize::from(k)].unwrap_or_default()).collect();
+            let left: Vec<f64> = spot.iter().map(|&(k, ns)| ns.ln() - costs[usize::from(k)].unwrap_or_default()).collect();
             *shared = mean(&left);
         }
     }
@@ -178,7 +227,7 @@ mod tests {
         let (once, twice) = (regret(&profile, &always), regret(&Profile::of("", &twice), &always));
         assert!(once.cells.iter().zip(&twice.cells).all(|(a, b)| (a - b).abs() < 1e-9));
         let place = usize::from(profile.position(&id).unwrap());
-        assert!((RegretTable::new(&profile).always()[place].mean - once.mean).abs() < 1e-12);
+        assert!((RegretTable::new(&profile).always(None)[place].mean - once.mean).abs() < 1e-12);
         let available = profile.available();
         let sweep = regret(&profile, &by_costs(measured_costs(&profile).0, &available));
         assert!(sweep.mean < 0.02 && sweep.as_in_games < 0.02, "{sweep:?}");
@@ -186,16 +235,9 @@ mod tests {
 
     #[test]
     fn points_with_other_algorithms_and_sizes_are_put_on_one_scale() {
-        let spot = |medians: &[(u16, f64)]| Spot {
-            scenario: String::new(),
-            load: Load::of_objects(100),
-            core_to_core_ns: None,
-            medians: medians.to_vec(),
-        };
         // The second point is three times as large and lacks the first algorithm, the third lacks the second.
-        let spots =
-            [spot(&[(0, 10.0), (1, 20.0), (2, 40.0)]), spot(&[(1, 60.0), (2, 120.0)]), spot(&[(0, 10.0), (2, 40.0)])];
-        let costs: Vec<f64> = ln_costs(&spots.iter().collect::<Vec<_>>(), 3).into_iter().flatten().collect();
+        let spots = [vec![(0, 10.0), (1, 20.0), (2, 40.0)], vec![(1, 60.0), (2, 120.0)], vec![(0, 10.0), (2, 40.0)]];
+        let costs: Vec<f64> = ln_costs(&spots, 3).into_iter().flatten().collect();
         assert!(((costs[1] - costs[0]).exp() - 2.0).abs() < 1e-3 && ((costs[2] - costs[0]).exp() - 4.0).abs() < 1e-3);
     }
 

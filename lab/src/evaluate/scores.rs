@@ -1,16 +1,17 @@
 //! From regrets on held-out profiles to the scores of strategies.
 
 use super::regret_table::Regret;
+use crate::data::Profile;
 use crate::fit::robust::value_at_weight;
 use crate::spread::range;
-use crate::training::MethodScore;
+use crate::training::{MethodScore, Regrets, Split};
 use sapwise::stats::{self, median};
 use std::collections::BTreeMap;
 
 /// The strategy that scores are relative to.
 pub const SINGLE_BEST: &str = "single best";
 /// The strategy of `predict`.
-pub const OURS: &str = "physics + ridge";
+pub const OURS: &str = "physics + load";
 
 /// A crossover that is predicted within this many octaves is near: a factor of 1.4.
 const NEAR_OCTAVES: f64 = 0.5;
@@ -22,12 +23,31 @@ pub(super) struct Judged {
     pub(super) file: String,
     /// The physical machine.
     pub(super) machine: String,
+    /// Whether an algorithm ran on several threads.
+    pub(super) several_threads: bool,
     pub(super) regret: Regret,
+    /// The same where the scenario was held out too; `None` where that was not asked.
+    pub(super) unseen: Option<Regret>,
+    /// The same judged by the means over frames.
+    pub(super) by_means: Option<Regret>,
     /// Octaves between measured and predicted crossovers; `None` of a strategy that predicts no costs.
     pub(super) crossings: Option<Vec<f64>>,
 }
 
 impl Judged {
+    pub(super) fn new(name: &'static str, profile: &Profile, regret: Regret, crossings: Option<Vec<f64>>) -> Self {
+        Self {
+            name,
+            file: profile.file.clone(),
+            machine: profile.machine().to_owned(),
+            several_threads: profile.has_threads(),
+            regret,
+            unseen: None,
+            by_means: None,
+            crossings,
+        }
+    }
+
     /// What one regret is told of: the machine, or the profile of the only one, which is held out more than once, with its vectors and
     /// with its threads.
     pub(super) fn unit(&self, by_machine: bool) -> &str {
@@ -83,11 +103,16 @@ fn score(all: &[Judged], name: &str, by_machine: bool) -> MethodScore {
     let near = |c: &Vec<f64>| c.iter().filter(|e| **e <= NEAR_OCTAVES).count() as f64 / c.len() as f64;
     let ends = range(&of_units(all, name, by_machine, |r| r.mean));
     let ends_in_games = range(&of_units(all, name, by_machine, |r| r.as_in_games));
+    let seen = split(&of(&own, |j| Some(&j.regret)));
     MethodScore {
         name: name.to_owned(),
         mean_regret: mean(&means),
         least_regret: ends.map(|e| e[0]),
         largest_regret: ends.map(|e| e[1]),
+        unseen_scenario: split(&of(&own, |j| j.unseen.as_ref())),
+        by_means: split(&of(&own, |j| j.by_means.as_ref())).map(|s| s.all),
+        one_thread: seen.and_then(|s| s.one_thread),
+        several_threads: seen.and_then(|s| s.several_threads),
         p95_regret: percentile_95(means),
         share_over_10_percent: mean(&weighted(&over)),
         closed_gap: 0.0,
@@ -98,6 +123,34 @@ fn score(all: &[Judged], name: &str, by_machine: bool) -> MethodScore {
         crossing_error_octaves: crossings.as_deref().and_then(median),
         crossings_within_half_octave: crossings.as_ref().filter(|c| !c.is_empty()).map(near),
     }
+}
+
+/// A regret on one report.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Part<'a> {
+    pub(super) machine: &'a str,
+    pub(super) several_threads: bool,
+    pub(super) regret: &'a Regret,
+}
+
+fn of<'a>(own: &[&'a Judged], which: impl Fn(&'a Judged) -> Option<&'a Regret>) -> Vec<Part<'a>> {
+    let part = |j: &&'a Judged| Some(Part { machine: &j.machine, several_threads: j.several_threads, regret: which(j)? });
+    own.iter().filter_map(part).collect()
+}
+
+/// Mean regrets, each physical machine counting the same; `None` of none.
+pub(super) fn split(parts: &[Part<'_>]) -> Option<Split> {
+    let of = |admitted: &dyn Fn(&Part<'_>) -> bool| -> Option<Regrets> {
+        let mut machines: BTreeMap<&str, Vec<&Regret>> = BTreeMap::new();
+        parts.iter().filter(|p| admitted(p)).for_each(|p| machines.entry(p.machine).or_default().push(p.regret));
+        let over = |of: fn(&Regret) -> f64| {
+            let means: Vec<f64> =
+                machines.values().map(|all| stats::mean(&all.iter().map(|r| of(r)).collect::<Vec<_>>())).collect();
+            stats::mean(&means)
+        };
+        (!machines.is_empty()).then(|| Regrets { all: over(|r| r.mean), in_games: over(|r| r.as_in_games) })
+    };
+    Some(Split { all: of(&|_| true)?, one_thread: of(&|p| !p.several_threads), several_threads: of(&|p| p.several_threads) })
 }
 
 /// Mean of values with their weights.
@@ -118,11 +171,14 @@ mod tests {
     use super::*;
 
     fn judged(name: &'static str, machine: &str, mean: f64) -> Judged {
-        let regret = Regret { cells: vec![0.0, 2.0 * mean], mean, as_in_games: mean / 2.0 };
+        let regret = Regret { cells: vec![0.0, 2.0 * mean], weights: vec![1.0; 2], mean, as_in_games: mean / 2.0 };
         Judged {
             name,
             file: String::new(),
             machine: machine.to_owned(),
+            several_threads: machine == "b",
+            unseen: None,
+            by_means: None,
             regret,
             crossings: (name == "ours").then(|| vec![mean, 1.0]),
         }
@@ -139,6 +195,9 @@ mod tests {
         assert!((ours.mean_regret - 0.155).abs() < 1e-12 && ours.p95_regret == 0.3, "{ours:?}");
         assert!((ours.closed_gap - 0.845).abs() < 1e-12 && (ours.share_over_10_percent - 0.275).abs() < 1e-12, "{ours:?}");
         assert!((ours.mean_regret_in_games.unwrap() - 0.0775).abs() < 1e-12 && ours.p95_regret_in_games == Some(0.15));
+        // Only "b" has several threads.
+        assert_eq!((ours.one_thread.map(|r| r.all), ours.several_threads.map(|r| r.all)), (Some(0.01), Some(0.3)));
+        assert_eq!(ours.unseen_scenario, None);
         // The range over machines holds the mean.
         assert_eq!((ours.least_regret.map(|r| (100.0 * r).round()), ours.largest_regret), (Some(1.0), Some(0.3)));
         assert_eq!(ours.regret_range_in_games().map(|r| r[1]), Some(0.15));

@@ -1,29 +1,32 @@
 //! The cost model of a method on one class of processor, shared by all machines, thread counts and GPUs.
 
 use crate::data::Profile;
+use crate::fit::late_helpers::{self, Called};
+use crate::fit::load_residual::{self, Remainder};
 use crate::fit::min_of_two::MinOfTwo;
-use crate::fit::residual::{Residuals, Ridge};
 use crate::fit::robust::Problem;
 use crate::fit::rows::{Row, rows};
-use crate::fit::terms::{Component, components, fallback_method};
+use crate::fit::terms::{Component, components, fallback_method, is_incremental};
+use crate::fit::weights::weights;
 use crate::report::Label;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
 use sapwise::hardware::ParameterId;
-use sapwise::model::{Feature, MethodModel, ModelTerm, PredictError, Scale};
+use sapwise::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures};
 use sapwise::stats::robust_deviation;
-use sapwise::{AlgorithmId, Backend, BackendClass, GpuKind, Hardware, Term};
+use sapwise::{AlgorithmId, Backend, BackendClass, Fallback, GpuKind, Hardware, Places, Work};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-/// Points that a method needs on all machines together.
-const FEWEST_POINTS: usize = 8;
-/// Cold forks and joins of a frame on several threads where none was timed: it forks and joins at least once.
-const UNSEEN_FORK_JOINS: f64 = 1.0;
+/// Points on one thread, or on GPUs, that a method needs on all machines together.
+const FEWEST_POINTS: usize = 3;
 /// Rows of a method, about. Its dozen coefficients need no more, and a fit takes time in proportion to them: of many reports each
 /// adds a few rows, other ones than the next.
 const MOST_ROWS: usize = 6000;
 /// Rows of a method for each profile at least.
 const FEWEST_OF_PROFILE: usize = 2;
+/// Timings on several threads that the figures of helpers are fitted to, at most.
+const MOST_CALLED: usize = 1000;
 
 /// What the time of a method on a class of processor may consist of.
 pub type ComponentsOf = dyn Fn(&str, BackendClass) -> Vec<Component>;
@@ -39,20 +42,54 @@ pub struct Designs<'a> {
     pub notes: Vec<String>,
 }
 
+/// What a model is fitted to: profiles, and scenarios of them.
+#[derive(Debug, Clone, Copy)]
+pub struct TrainingSet<'a> {
+    /// For each profile whether it is one.
+    pub profiles: &'a [bool],
+    /// The scenario that is left out, if one is.
+    pub without: Option<&'a str>,
+    /// Where residuals are to be known; `None`: at the places that tell most about the loads of the profiles.
+    pub places: Option<&'a Arc<Places>>,
+}
+
+/// The models of the methods.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// One for each method on each class of processor.
+    pub methods: Vec<MethodModel>,
+    /// Where their residuals are known.
+    pub places: Arc<Places>,
+    /// What was left out and why.
+    pub notes: Vec<String>,
+}
+
 /// The rows of one method.
 #[derive(Debug)]
 struct Design {
     method: String,
     class: BackendClass,
     components: Vec<Component>,
+    /// Those on one thread, or on GPUs.
     rows: Vec<Row>,
     /// Nanoseconds for one unit of each component, shape (rows, components).
     values: Array2<f64>,
-    /// Shape (rows, features of the class).
-    features: Array2<f64>,
-    /// Components of the method that this one falls back to, and their values; none where there is no such method.
-    other_components: Vec<Component>,
-    other_values: Array2<f64>,
+    /// Those that were measured on several threads, with what their machines have of these.
+    called: Vec<(Row, ThreadFigures)>,
+    /// It was never timed on one thread, so that what it takes on several counts as its work.
+    never_alone: bool,
+}
+
+impl<'a> TrainingSet<'a> {
+    /// These profiles with all of their scenarios.
+    pub fn of(profiles: &'a [bool]) -> Self {
+        Self { profiles, without: None, places: None }
+    }
+
+    fn holds(&self, row: &Row, all: &[Profile]) -> bool {
+        let scenario = || &all[row.profile].points[row.spot as usize].scenario;
+        self.profiles[row.profile] && self.without.is_none_or(|without| scenario() != without)
+    }
 }
 
 impl<'a> Designs<'a> {
@@ -64,15 +101,19 @@ impl<'a> Designs<'a> {
     /// The same with other terms in place of the usual ones, which tells what a term is worth.
     pub fn with(profiles: &'a [Profile], components: &ComponentsOf) -> Self {
         let most = (MOST_ROWS / profiles.len().max(1)).max(FEWEST_OF_PROFILE);
-        let mut by_method: BTreeMap<(BackendClass, String), Vec<Row>> = BTreeMap::new();
+        let mut by_method: BTreeMap<(BackendClass, String), [Vec<Row>; 2]> = BTreeMap::new();
         for (k, profile) in profiles.iter().enumerate() {
-            let mut own: BTreeMap<(BackendClass, &str), Vec<Row>> = BTreeMap::new();
+            let mut own: BTreeMap<(BackendClass, &str), [Vec<Row>; 2]> = BTreeMap::new();
             for row in rows(profile, k) {
                 let id = profile.id(row.algorithm);
-                own.entry((id.backend().class(), id.method())).or_default().push(row);
+                let (class, several) = (id.backend().class(), id.backend().width() > 1);
+                let place = usize::from(several && class == BackendClass::Cpu);
+                own.entry((class, id.method())).or_default()[place].push(row);
             }
-            for ((class, method), rows) in own {
-                by_method.entry((class, method.to_owned())).or_default().extend(thinned(rows, most, k));
+            for ((class, method), [alone, called]) in own {
+                let all = by_method.entry((class, method.to_owned())).or_default();
+                all[0].extend(thinned(alone, most, k));
+                all[1].extend(thinned(called, most, k));
             }
         }
         let mut notes = Vec::new();
@@ -83,31 +124,36 @@ impl<'a> Designs<'a> {
             .into_iter()
             .map(|((class, method), rows)| {
                 let own = reported_terms(profiles, &method, class).unwrap_or_else(|| components(&method, class));
-                let other = fallback_method(&method).map_or_else(Vec::new, |other| components(other, class));
-                Design::new(method, class, [own, other], rows, profiles, &mut notes)
+                Design::new(method, class, own, rows, profiles, &mut notes)
             })
             .collect();
         Self { profiles, machines: machines(profiles), methods, notes }
     }
 
-    /// A cost model for each method and class of processor that the chosen profiles hold enough timings of, and what was left
-    /// out and why.
+    /// A cost model for each method and class of processor that the training holds enough timings of.
     ///
     /// # Errors
-    /// When the regression of a residual fails.
-    pub fn fit(&self, chosen: &[bool]) -> Result<(Vec<MethodModel>, Vec<String>)> {
+    /// When a residual can't be solved for.
+    pub fn fit(&self, training: TrainingSet<'_>) -> Result<Fitted> {
         let (mut models, mut notes): (Vec<MethodModel>, _) = (Vec::new(), Vec::new());
+        let chosen = self.profiles.iter().zip(training.profiles).filter(|(_, chosen)| **chosen).map(|(p, _)| p);
+        let places = training.places.map_or_else(|| load_residual::places(chosen, training.without), Arc::clone);
         for design in &self.methods {
             let other = fallback_method(&design.method)
                 .and_then(|other| models.iter().find(|m| m.method == other && m.backend == design.class))
-                .map(|m| m.terms.clone());
-            let mut rows: Vec<usize> = (0..design.rows.len()).filter(|&k| chosen[design.rows[k].profile]).collect();
+                .cloned();
+            let mut rows: Vec<usize> =
+                (0..design.rows.len()).filter(|&k| training.holds(&design.rows[k], self.profiles)).collect();
             let name = design.name();
             if design.leave_out_software(&mut rows, self.profiles) {
                 notes.push(format!("{name}: timings on software adapters are left out, there being timings on real GPUs"));
             }
-            match design.fit(&rows, self.profiles, &self.machines, other.as_deref())? {
-                Some(model) => models.push(model),
+            let fitted = design.fit(&rows, self.profiles, &self.machines, other.as_ref(), &places)?;
+            match fitted {
+                Some(mut model) => {
+                    design.call_helpers(&mut model, other.as_ref(), training, self.profiles, &self.machines, &places)?;
+                    models.push(model);
+                }
                 // None of the chosen profiles knows it.
                 None if rows.is_empty() => {}
                 None => {
@@ -117,7 +163,7 @@ impl<'a> Designs<'a> {
                 }
             }
         }
-        Ok((models, notes))
+        Ok(Fitted { methods: models, places, notes })
     }
 }
 
@@ -162,37 +208,45 @@ impl Design {
     fn new(
         method: String,
         class: BackendClass,
-        [components, other_components]: [Vec<Component>; 2],
-        rows: Vec<Row>,
+        components: Vec<Component>,
+        [alone, called]: [Vec<Row>; 2],
         profiles: &[Profile],
         notes: &mut Vec<String>,
     ) -> Self {
-        let all = [&components[..], &other_components].concat();
-        let (mut kept, mut values, mut features) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut kept, mut values) = (Vec::new(), Vec::new());
         let mut told: Vec<(usize, String)> = Vec::new();
-        for row in rows {
+        let mut tell = |row: &Row, why: String| {
+            // A profile may hold several GPUs, of which one lacks a parameter.
+            if told.contains(&(row.profile, why.clone())) {
+                return;
+            }
+            let (profile, id) = (&profiles[row.profile], profiles[row.profile].id(row.algorithm).to_string());
+            let what = if class == BackendClass::Cpu { &method } else { &id };
+            notes.push(format!("{} is left out for {what}: {why}", profile.file));
+            told.push((row.profile, why));
+        };
+        let never_alone = alone.is_empty();
+        let (alone, called) = if never_alone { (called, Vec::new()) } else { (alone, called) };
+        for row in alone {
             let profile = &profiles[row.profile];
-            let id = profile.id(row.algorithm);
-            match nanoseconds(&all, &profile.hardware_at(row.core_to_core_ns), id, &row) {
-                Ok((ns, of_residual)) => {
+            match nanoseconds(&components, &profile.hardware, profile.id(row.algorithm), &row) {
+                Ok(ns) => {
                     values.extend(ns);
-                    features.extend(of_residual);
                     kept.push(row);
                 }
-                // A profile may hold several GPUs, of which one lacks a parameter.
-                Err(why) if told.contains(&(row.profile, why.to_string())) => {}
-                Err(why) => {
-                    let what = if class == BackendClass::Cpu { &method } else { &id.to_string() };
-                    notes.push(format!("{} is left out for {what}: {why}", profile.file));
-                    told.push((row.profile, why.to_string()));
-                }
+                Err(why) => tell(&row, why.to_string()),
             }
         }
-        let values = Array2::from_shape_vec((kept.len(), all.len()), values).unwrap_or_default();
-        let (values, other_values) = values.view().split_at(Axis(1), components.len());
-        let (values, other_values) = (values.to_owned(), other_values.to_owned());
-        let features = Array2::from_shape_vec((kept.len(), Feature::of(class).len()), features).unwrap_or_default();
-        Self { method, class, components, rows: kept, values, features, other_components, other_values }
+        let mut with_figures = Vec::new();
+        for row in called.into_iter().filter(|r| !r.floor) {
+            let profile = &profiles[row.profile];
+            match ThreadFigures::of(&profile.hardware, profile.id(row.algorithm).threads()) {
+                Ok(figures) => with_figures.push((row, figures)),
+                Err(why) => tell(&row, why.to_string()),
+            }
+        }
+        let values = Array2::from_shape_vec((kept.len(), components.len()), values).unwrap_or_default();
+        Self { method, class, components, rows: kept, values, called: with_figures, never_alone }
     }
 
     fn name(&self) -> String {
@@ -227,34 +281,29 @@ impl Design {
         }
     }
 
-    /// The model of some of the rows; `other` are the terms with units of the method that this one falls back to.
+    /// The model of some of the rows, without its helpers; `other` is that of the method that this one falls back to.
     fn fit(
         &self,
         rows: &[usize],
         profiles: &[Profile],
         machines: &[usize],
-        other: Option<&[ModelTerm]>,
+        other: Option<&MethodModel>,
+        places: &Arc<Places>,
     ) -> Result<Option<MethodModel>> {
         let measured: Vec<usize> = (0..rows.len()).filter(|&k| !self.rows[rows[k]].floor).collect();
         let Some(first) = measured.first().filter(|_| measured.len() >= FEWEST_POINTS) else { return Ok(None) };
         let row = |k: usize| &self.rows[rows[k]];
-        let weights = self.weights(rows, profiles, machines);
+        let all: Vec<&Row> = rows.iter().map(|&k| &self.rows[k]).collect();
         let problem = Problem {
             terms: self.values.select(Axis(0), rows),
-            ns: (0..rows.len()).map(|k| row(k).ns).collect(),
-            weights: weights.clone(),
-            floors: (0..rows.len()).map(|k| row(k).floor).collect(),
-            groups: (0..rows.len()).map(|k| row(k).profile).collect(),
+            ns: all.iter().map(|r| r.ns).collect(),
+            weights: weights(&all, profiles, machines),
+            floors: all.iter().map(|r| r.floor).collect(),
+            groups: all.iter().map(|r| r.profile).collect(),
         };
-        let other_ns = other.map(|other| self.other_ns(rows, other)).filter(|ns| ns.iter().all(|ns| *ns > 0.0));
+        let other_ns = other.map(|other| self.other_ns(&all, other, profiles, places)).transpose()?;
         let min_of_two = other_ns.as_ref().map(|other_ns| MinOfTwo::fit(&problem, other_ns));
-        let mut units = Array1::from(min_of_two.as_ref().map_or_else(|| problem.units(), |found| found.units.clone()));
-        // Timings of one thread tell nothing of a fork and join, and without it several threads would be the best choice everywhere.
-        for (unit, (values, component)) in units.iter_mut().zip(problem.terms.columns().into_iter().zip(&self.components)) {
-            if component.has(Scale::ForkJoin) && values.iter().all(|v| *v == 0.0) {
-                *unit = UNSEEN_FORK_JOINS;
-            }
-        }
+        let units = Array1::from(min_of_two.as_ref().map_or_else(|| problem.units(), |found| found.units.clone()));
         let modelled = match min_of_two.as_ref().zip(other_ns.as_ref()) {
             Some((min_of_two, other_ns)) => min_of_two.modelled(&problem, other_ns),
             None => problem.terms.dot(&units),
@@ -262,93 +311,132 @@ impl Design {
         if measured.iter().any(|&k| modelled[k] <= 0.0) {
             return Ok(None);
         }
-        let ln_ratios: Vec<f64> = measured.iter().map(|&k| (row(k).ns / modelled[k]).ln()).collect();
-        // A point that the terms miss by far is a term that is missing, or a disturbed measurement: either way no slope.
-        let reach = 3.0 * robust_deviation(&ln_ratios).unwrap_or(0.0).max(0.01);
-        let residuals = Residuals {
-            names: Feature::of(self.class),
-            features: self.features.select(Axis(0), &measured.iter().map(|&k| rows[k]).collect::<Vec<_>>()),
-            ln_ratios: ln_ratios.into_iter().map(|r| r.clamp(-reach, reach)).collect(),
-            weights: measured.iter().map(|&k| weights[k]).collect(),
-            groups: measured.iter().map(|&k| machines[row(k).profile]).collect(),
+        let remainder = |&k: &usize| Remainder {
+            load: row(k).load,
+            ln: (row(k).ns / modelled[k]).ln(),
+            behind: row(k).behind,
+            contended: profiles[row(k).profile].label == Label::RealContended,
         };
-        let ridge = residuals.ridge()?;
-        let left: Vec<f64> = (0..measured.len()).map(|k| residuals.ln_ratios[k] - residuals.at(&ridge, k)).collect();
-        let spread_ln = robust_deviation(&left).unwrap_or(0.0);
-        let used = self.components.iter().zip(&units).filter(|(_, u)| **u > 0.0);
-        let objects = || measured.iter().map(|&k| row(k).load.objects);
+        let remainders: Vec<Remainder> = measured.iter().map(remainder).collect();
+        let by_motion = is_incremental(&self.method);
         let mut gpu_kinds: Vec<GpuKind> = rows.iter().flat_map(|&k| self.gpu_kinds(k, profiles)).collect();
         gpu_kinds.sort_unstable();
         gpu_kinds.dedup();
-        let Ridge { intercept, terms } = ridge;
+        // What software adapters are off by is their CPU's, and twice as much on one machine as on another: no function of the load.
+        let residual = match gpu_kinds[..] {
+            [GpuKind::Software] => Vec::new(),
+            _ => load_residual::weights(places, &remainders, by_motion)?,
+        };
+        let likeness = |r: &Remainder| places.likeness(&r.load, by_motion);
+        let left = |r: &Remainder| r.ln - likeness(r).iter().zip(&residual).map(|(k, w)| k * w).sum::<f64>();
+        let spread_ln = robust_deviation(&remainders.iter().map(left).collect::<Vec<f64>>()).unwrap_or(0.0);
+        let used = self.components.iter().zip(&units).filter(|(_, u)| **u > 0.0);
         let width = |&k: &usize| self.id(rows[k], profiles).backend().width();
         let revision = profiles[row(*first).profile].algorithms[usize::from(row(*first).algorithm)].revision;
         let mut model = MethodModel::new(&self.method, self.class, revision);
         model.max_threads = measured.iter().map(width).max().unwrap_or(1);
         model.gpu_kinds = gpu_kinds;
-        model.min_objects = objects().min().unwrap_or(1);
-        model.max_objects = objects().max().unwrap_or(1);
         model.terms = used
             .flat_map(|(component, &unit)| {
                 component.0.iter().map(move |&(times, term, scale)| ModelTerm { term, scale, unit: unit * times })
             })
             .collect();
-        if let Some((found, other)) = min_of_two.zip(other) {
-            model.fallback_terms = other.iter().map(|t| ModelTerm { unit: t.unit * found.factor, ..*t }).collect();
-        }
-        (model.residual_intercept, model.residual, model.spread_ln) = (intercept, terms, spread_ln);
+        model.fallback =
+            min_of_two.zip(other).map(|(found, o)| FallbackModel { method: o.method.clone(), factor: found.factor });
+        (model.residual, model.residual_by_motion, model.spread_ln) = (residual, by_motion, spread_ln);
         Ok(Some(model))
     }
 
-    /// What the method that this one falls back to costs in some of the rows, without its residual.
-    fn other_ns(&self, rows: &[usize], other: &[ModelTerm]) -> Vec<f64> {
-        let unit = |component: &Component| {
-            let found = component.0.first().and_then(|&(times, term, scale)| {
-                other.iter().find(|t| (t.term, t.scale) == (term, scale)).map(|t| t.unit / times)
+    /// Fits to the timings on several threads what helpers make of the work of one.
+    ///
+    /// # Errors
+    /// When the model can't predict a profile that it was fitted to.
+    fn call_helpers(
+        &self,
+        model: &mut MethodModel,
+        other: Option<&MethodModel>,
+        training: TrainingSet<'_>,
+        profiles: &[Profile],
+        machines: &[usize],
+        places: &Arc<Places>,
+    ) -> Result<()> {
+        if self.never_alone {
+            model.helpers = (self.class == BackendClass::Cpu).then_some(HelpersModel::new(0.0, 0.0, 1.0, 0));
+            return Ok(());
+        }
+        let held = self.called.iter().filter(|(row, _)| training.holds(row, profiles));
+        let (all, figures): (Vec<&Row>, Vec<ThreadFigures>) = held.map(|(row, figures)| (row, *figures)).unzip();
+        let weights = weights(&all, profiles, machines);
+        let mut works: BTreeMap<usize, Work> = BTreeMap::new();
+        let step = all.len().div_ceil(MOST_CALLED).max(1);
+        let mut called = Vec::new();
+        for k in (0..all.len()).step_by(step) {
+            let (row, profile) = (all[k], &profiles[all[k].profile]);
+            let work = match works.entry(row.profile) {
+                std::collections::btree_map::Entry::Occupied(known) => known.into_mut(),
+                std::collections::btree_map::Entry::Vacant(new) => {
+                    let on = (&profile.hardware, &Backend::Cpu(1));
+                    let fallback = match (&model.fallback, other) {
+                        (Some(f), Some(other)) => {
+                            Some(Fallback { work: Arc::new(other.work(on.0, on.1, places, None)?), factor: f.factor })
+                        }
+                        _ => None,
+                    };
+                    new.insert(model.work(on.0, on.1, places, fallback)?)
+                }
+            };
+            let threads = profile.id(row.algorithm).threads();
+            model.max_threads = model.max_threads.max(threads);
+            called.push(Called {
+                objects: row.load.objects,
+                threads,
+                work_ns: work.ns(&row.load),
+                ns: row.ns,
+                weight: weights[k],
+                figures: figures[k],
             });
-            found.unwrap_or(0.0)
-        };
-        let units: Vec<f64> = self.other_components.iter().map(unit).collect();
-        self.other_values.select(Axis(0), rows).dot(&Array1::from(units)).to_vec()
+        }
+        model.helpers = late_helpers::fit(&called);
+        Ok(())
     }
 
-    /// Every physical machine counts the same, however many profiles it has: what a machine has of its own, which no parameter
-    /// tells, stands in all of its profiles, so that twenty of one machine would pass off its own for what machines share. Within a
-    /// machine every profile counts the same, and within that every octave of the number of objects. A contended profile counts a
-    /// quarter of the others of its machine: what other programs take changes from one second to the next, so that its parameters
-    /// say little about its timings. On the first one a cold fork and join was measured 800 times as long as a parallel frame took.
-    /// And a row counts the less the further it lies behind the best of its point: nobody chooses the algorithm there.
-    fn weights(&self, rows: &[usize], profiles: &[Profile], machines: &[usize]) -> Vec<f64> {
-        let octave = |k: &usize| (self.rows[*k].profile, self.rows[*k].load.objects.ilog2());
-        let mut counts: BTreeMap<(usize, u32), f64> = BTreeMap::new();
-        for k in rows {
-            *counts.entry(octave(k)).or_default() += 1.0;
+    /// What the method that this one falls back to costs in some rows.
+    ///
+    /// # Errors
+    /// When a machine lacks a parameter for it.
+    fn other_ns(
+        &self,
+        rows: &[&Row],
+        other: &MethodModel,
+        profiles: &[Profile],
+        places: &Arc<Places>,
+    ) -> Result<Vec<f64>, PredictError> {
+        // Several GPUs of a profile have each their own.
+        let mut works: Vec<(usize, &Backend, Work)> = Vec::new();
+        let mut all = Vec::with_capacity(rows.len());
+        for row in rows {
+            let (profile, backend) = (&profiles[row.profile], profiles[row.profile].id(row.algorithm).backend());
+            let known = works.iter().position(|w| w.0 == row.profile && w.1 == backend);
+            let at = match known {
+                Some(at) => at,
+                None => {
+                    works.push((row.profile, backend, other.work(&profile.hardware, backend, places, None)?));
+                    works.len() - 1
+                }
+            };
+            all.push(works[at].2.ns(&row.load));
         }
-        let own = |k: &usize| 1.0 / (counts[&octave(k)] * self.rows[*k].behind);
-        let mut sums: BTreeMap<usize, f64> = BTreeMap::new();
-        for k in rows {
-            *sums.entry(self.rows[*k].profile).or_default() += own(k);
-        }
-        let trust = |profile: usize| if profiles[profile].label == Label::RealContended { 0.25 } else { 1.0 };
-        let mut trusts: BTreeMap<usize, f64> = BTreeMap::new();
-        for &profile in sums.keys() {
-            *trusts.entry(machines[profile]).or_default() += trust(profile);
-        }
-        let weight = |k: &usize| {
-            let profile = self.rows[*k].profile;
-            trust(profile) / trusts[&machines[profile]] * own(k) / sums[&profile]
-        };
-        rows.iter().map(weight).collect()
+        Ok(all)
     }
 }
 
-/// Nanoseconds for one unit of each component in a row, and the features of its residual.
+/// Nanoseconds for one unit of each component in a row.
 fn nanoseconds(
     components: &[Component],
     hardware: &Hardware,
     id: &AlgorithmId,
     row: &Row,
-) -> Result<(Vec<f64>, Vec<f64>), PredictError> {
+) -> Result<Vec<f64>, PredictError> {
     let backend = id.backend();
     let cache = hardware.value(ParameterId::CacheLlcBytes).filter(|c| *c > 0.0);
     let cache = match backend.class() {
@@ -357,14 +445,14 @@ fn nanoseconds(
         }
         BackendClass::Gpu => 0.0,
     };
-    let features = Feature::of(backend.class()).iter().map(|f| f.value(hardware, backend, &row.load));
-    // The residual needs its parameters even where no term does.
-    let features = features.collect::<Result<Vec<f64>, PredictError>>()?;
-    let one = |&(times, term, scale): &(f64, Term, Scale)| {
-        Ok(times * term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?)
+    let sum = |component: &Component| -> Result<f64, PredictError> {
+        component
+            .0
+            .iter()
+            .map(|&(times, term, scale)| Ok(times * term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?))
+            .sum()
     };
-    let sum = |component: &Component| component.0.iter().map(one).sum::<Result<f64, PredictError>>();
-    Ok((components.iter().map(sum).collect::<Result<_, PredictError>>()?, features))
+    components.iter().map(sum).collect()
 }
 
 #[cfg(test)]

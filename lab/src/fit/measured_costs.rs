@@ -1,34 +1,36 @@
-//! The measured cost curves of one machine, from its own report.
+//! The costs on one machine, from its own report.
 
 use crate::data::Profile;
-use crate::fit::min_of_two::MinOfTwo;
-use crate::fit::robust::{Problem, weighted_median};
+use crate::fit::designs::{Designs, TrainingSet};
+use crate::fit::load_residual::NOISE_LN;
+use crate::fit::model::model;
 use crate::fit::rows::{Row, rows};
-use crate::fit::terms::{fallback_method, terms_of_one_machine};
 use crate::paired::{PairedComparison, PairedSamples};
-use crate::report::{Label, Point, Report, Timed};
+use crate::report::{Label, Point, Report};
 use anyhow::{Result, bail};
-use ndarray::Array2;
-use sapwise::hardware::ParameterId;
-use sapwise::stats::robust_deviation;
-use sapwise::{AlgorithmCost, AlgorithmId, CostCurve, CostTerm, Crossover, Knot, Load, Source, Term, Tuning};
+use sapwise::hardware::{GpuParameterId, ParameterId, Quantity};
+use sapwise::{AlgorithmCost, AlgorithmId, Crossover, Entry, Hardware, Load, Model, Observed, Parameter, Source, Tuning};
+use sapwise_scenes::Random;
 
-/// Distance of the knots of a correction, in octaves of the number of objects.
-const KNOT_STEP: f64 = 0.5;
-/// Residuals within this many octaves of a knot enter it, with a weight that falls linearly to zero.
-const KNOT_REACH: f64 = 0.75;
-/// Points that a curve needs: below that its terms and its correction can't be told apart.
+/// Points that a cost needs.
 const FEWEST_POINTS: usize = 3;
+/// A timing that lies this many times behind the best counts no less than one that lies further behind: nobody chooses the algorithm there.
+const MOST_BEHIND: f64 = 4.0;
 
 /// The tuning of the machine that `report` was measured on, with `steps` and `crossovers` for `scenario`.
 ///
-/// The cost curves are fitted to the points of all scenarios of the report. Intervals of crossovers come from the paired
-/// samples of `scenario` where both neighbours were timed there.
+/// The costs are those that `base` predicts for the machine, else, as for algorithms that it does not know, those of a model that is fitted to the
+/// report alone; all points of all scenarios correct them. Intervals of crossovers come from the paired samples of `scenario` where both neighbours were
+/// timed there.
 ///
 /// # Errors
 /// When no point of `scenario`, or no algorithm, has enough timings; names the scenarios there are.
-pub fn measured_tuning(report: &Report, scenario: &str) -> Result<Tuning> {
-    let mut tuning = profile_tuning(&Profile::of("", report), scenario)?;
+pub fn measured_tuning(report: &Report, scenario: &str, base: Option<&Model>) -> Result<Tuning> {
+    let profile = Profile::of("", report);
+    let loads = measured_slice(&profile, scenario)?;
+    let (costs, warnings) = measured_costs_over(&profile, base);
+    let mut tuning = slice_tuning(costs, scenario, &loads)?;
+    tuning.warnings = warnings;
     if report.label == Label::Simulated {
         tuning.warnings.push("the report is simulated".to_owned());
     }
@@ -36,15 +38,6 @@ pub fn measured_tuning(report: &Report, scenario: &str) -> Result<Tuning> {
         tuning.warnings.push("the report was timed by an unoptimised build".to_owned());
     }
     measure_crossovers(&mut tuning, report);
-    Ok(tuning)
-}
-
-/// The same without intervals from paired samples, which a profile does not hold.
-fn profile_tuning(profile: &Profile, scenario: &str) -> Result<Tuning> {
-    let loads = measured_slice(profile, scenario)?;
-    let (costs, warnings) = measured_costs(profile);
-    let mut tuning = slice_tuning(costs, scenario, &loads)?;
-    tuning.warnings = warnings;
     Ok(tuning)
 }
 
@@ -75,114 +68,83 @@ pub fn measured_slice(profile: &Profile, scenario: &str) -> Result<Vec<Load>> {
     Ok(loads)
 }
 
-/// The cost curve of each algorithm that was timed often enough, and a sentence for each other one.
+/// The cost of each algorithm that was timed often enough, by its own report alone, and a sentence for each other one.
 pub fn measured_costs(profile: &Profile) -> (Vec<AlgorithmCost>, Vec<String>) {
-    let rows = rows(profile, 0);
-    let cache_bytes = profile.hardware.value(ParameterId::CacheLlcBytes).unwrap_or(0.0);
-    let (mut costs, mut warnings) = (Vec::new(), Vec::new());
-    let mut order: Vec<(usize, &Timed)> = profile.algorithms.iter().enumerate().collect();
-    // What falls back to another method comes after that.
-    order.sort_by_key(|(_, timed)| fallback_method(timed.id.method()).is_some());
-    for (k, timed) in order {
-        let own: Vec<&Row> = rows.iter().filter(|r| usize::from(r.algorithm) == k).collect();
-        let points = own.iter().filter(|r| !r.floor).count();
-        let other = fallback_method(timed.id.method()).and_then(|other| {
-            let same = |c: &&AlgorithmCost| c.algorithm.method() == other && c.algorithm.backend() == timed.id.backend();
-            costs.iter().find(same).map(|c: &AlgorithmCost| c.curve.clone())
-        });
-        let fitted = (points >= FEWEST_POINTS).then(|| curve(&terms_of(timed), &own, cache_bytes, other.as_ref()));
-        match fitted.filter(|(curve, _)| curve.defect().is_none()) {
-            Some((curve, spread_ln)) => {
-                costs.push(AlgorithmCost::new(timed.id.clone(), timed.revision, curve, spread_ln));
-            }
-            None => warnings.push(format!("{} has no cost curve: it was timed at {points} points only", timed.id)),
-        }
-    }
-    costs.sort_by_key(|c: &AlgorithmCost| profile.position(&c.algorithm));
-    (costs, warnings)
+    measured_costs_over(profile, None)
 }
 
-/// What an algorithm's time consists of on one machine: the terms that its report names, else the usual ones.
-fn terms_of(timed: &Timed) -> Vec<Term> {
-    let mut terms: Vec<Term> = Vec::new();
-    for term in timed.terms.iter().map(|t| t.term) {
-        if !terms.contains(&term) {
-            terms.push(term);
-        }
+/// The same, corrections of what `base` predicts for the machine where it knows an algorithm.
+pub fn measured_costs_over(profile: &Profile, base: Option<&Model>) -> (Vec<AlgorithmCost>, Vec<String>) {
+    let all = rows(profile, 0);
+    let points = |k: usize| all.iter().filter(|r| usize::from(r.algorithm) == k && !r.floor).count();
+    let known: Vec<Entry> = (profile.algorithms.iter().enumerate().filter(|(k, _)| points(*k) >= FEWEST_POINTS))
+        .map(|(_, timed)| Entry::new(timed.id.clone(), timed.revision))
+        .collect();
+    let of_base = base.and_then(|model| model.predict(&profile.hardware, &known).ok());
+    let mut costs = of_base.map_or_else(Vec::new, |p| p.costs);
+    let unknown: Vec<Entry> = known.into_iter().filter(|e| costs.iter().all(|c| c.algorithm != e.id)).collect();
+    if !unknown.is_empty() {
+        costs.extend(own_costs(profile, &unknown, base.filter(|_| !costs.is_empty())));
     }
-    if terms.is_empty() { terms_of_one_machine(timed.id.method(), timed.id.backend().class()) } else { terms }
-}
-
-/// The curve of one algorithm on one machine, and its spread. `other` is that of the algorithm that it falls back to, if it does.
-fn curve(terms: &[Term], rows: &[&Row], cache_bytes: f64, other: Option<&CostCurve>) -> (CostCurve, f64) {
-    let problem = Problem {
-        terms: Array2::from_shape_fn((rows.len(), terms.len()), |(k, j)| terms[j].count(&rows[k].load, cache_bytes)),
-        ns: rows.iter().map(|r| r.ns).collect(),
-        weights: vec![1.0; rows.len()],
-        floors: rows.iter().map(|r| r.floor).collect(),
-        groups: vec![0; rows.len()],
+    costs.sort_by_key(|c| profile.position(&c.algorithm));
+    let lacking = profile.algorithms.iter().enumerate().filter(|(_, t)| costs.iter().all(|c| c.algorithm != t.id));
+    let warning = |(k, timed): (usize, &crate::report::Timed)| match points(k) {
+        few if few < FEWEST_POINTS => format!("{} has no cost: it was timed at {few} points only", timed.id),
+        _ => format!("{} has no cost: no term explains its time", timed.id),
     };
-    let (units, fallback_terms) = match other {
-        None => (problem.units(), Vec::new()),
-        Some(other) => {
-            let ns: Vec<f64> = rows.iter().map(|r| other.cost_ns(&r.load)).collect();
-            let found = MinOfTwo::fit(&problem, &ns);
-            let fallback_terms = other.terms.iter().map(|t| CostTerm { unit_ns: t.unit_ns * found.factor, ..*t }).collect();
-            (found.units, fallback_terms)
+    let warnings = lacking.map(warning).collect();
+    (observed(costs, profile, &all), warnings)
+}
+
+/// The costs of some algorithms by a model that is fitted to the report alone, known at the places of `base`.
+fn own_costs(profile: &Profile, some: &[Entry], base: Option<&Model>) -> Vec<AlgorithmCost> {
+    let mut own = profile.clone();
+    own.hardware = whole(&own.hardware);
+    let profiles = [own];
+    let designs = Designs::new(&profiles);
+    let training = TrainingSet { places: base.map(|b| &b.places), ..TrainingSet::of(&[true]) };
+    // What can't be fitted is told by what lacks a cost.
+    let Ok((model, _)) = model(&profiles, &designs, training, "own") else { return Vec::new() };
+    model.predict(&profiles[0].hardware, some).map_or_else(|_| Vec::new(), |p| p.costs)
+}
+
+/// The hardware with a figure for each parameter that a model reads. Which one does not matter where all timings are of that machine: a fit finds
+/// so many of its units.
+fn whole(hardware: &Hardware) -> Hardware {
+    let mut whole = hardware.clone();
+    let missing = |list: &[Parameter], name: &str| list.iter().all(|p| p.name != name || p.value.is_none());
+    let stand_in = |quantity: Quantity, name: &str| {
+        let bounds = quantity.bounds.filter(|_| quantity.read_by_model)?;
+        Some(Parameter::reported(name, (bounds.least * bounds.most).sqrt(), "stands in for what was not measured"))
+    };
+    let add = |list: &mut Vec<Parameter>, quantity: Quantity, name: &str| {
+        if missing(list, name)
+            && let Some(figure) = stand_in(quantity, name)
+        {
+            list.retain(|p| p.name != name);
+            list.push(figure);
         }
     };
-    let terms = terms.iter().zip(units).filter(|(_, u)| *u > 0.0).map(|(&term, unit_ns)| CostTerm { term, unit_ns });
-    let mut curve = CostCurve::new(terms.collect()).with_fallback(fallback_terms).with_cache(cache_bytes);
-    if curve.defect().is_some() {
-        return (curve, 0.0);
+    ParameterId::ALL.iter().for_each(|id| add(&mut whole.parameters, id.quantity(), id.as_str()));
+    for gpu in &mut whole.gpus {
+        // Those of groups stay as they are: without them rates are added up.
+        let own = GpuParameterId::ALL.iter().filter(|id| !id.as_str().starts_with("group_"));
+        own.for_each(|id| add(&mut gpu.parameters, id.quantity(), id.as_str()));
     }
-    // A bound that the terms break is evidence like a measurement: what is hopeless in one scenario and timed on in
-    // another would pass for cheap in both.
-    let floors = residuals(&curve, rows, true);
-    let mut evidence = residuals(&curve, rows, false);
-    let largest = evidence.iter().map(|r| r.0).fold(0.0, f64::max);
-    evidence.extend(floors.iter().filter(|f| f.0 <= largest && f.1 > 0.0));
-    curve.correction = correction(&evidence, &floors);
-    let spread_ln =
-        robust_deviation(&residuals(&curve, rows, false).into_iter().map(|r| r.1).collect::<Vec<f64>>()).unwrap_or(0.0);
-    (curve, spread_ln)
+    whole
 }
 
-/// Base-2 logarithm of the objects and natural logarithm of measured over modelled time, of the floors or of the others.
-fn residuals(curve: &CostCurve, rows: &[&Row], floors: bool) -> Vec<(f64, f64)> {
-    let of = |r: &&Row| (f64::from(r.load.objects).log2(), (r.ns / curve.cost_ns(&r.load)).ln());
-    rows.iter().filter(|r| r.floor == floors).map(of).collect()
-}
-
-/// Local medians of the residuals, and beyond the largest of them at least what keeps the cost above every floor.
-///
-/// Medians, because a host that slows down spoils all samples of a point at once, and one such point among those of several
-/// scenarios must not bend the curve.
-fn correction(measured: &[(f64, f64)], floors: &[(f64, f64)]) -> Vec<Knot> {
-    let low = measured.iter().map(|r| r.0).fold(f64::INFINITY, f64::min);
-    let high = measured.iter().map(|r| r.0).fold(0.0, f64::max);
-    let (first, last) = ((low / KNOT_STEP).floor() as u32, (high / KNOT_STEP).ceil() as u32);
-    let mut knots = Vec::new();
-    for k in first..=last {
-        let log2_objects = f64::from(k) * KNOT_STEP;
-        let weight = |x: f64| (1.0 - (x - log2_objects).abs() / KNOT_REACH).max(0.0);
-        let near = measured.iter().map(|r| (r.1, weight(r.0))).filter(|r| r.1 > 0.0).collect();
-        if let Some(ln_factor) = weighted_median(near) {
-            knots.push(Knot { log2_objects, ln_factor });
-        }
+/// The costs after all timings of the report.
+fn observed(costs: Vec<AlgorithmCost>, profile: &Profile, all: &[Row]) -> Vec<AlgorithmCost> {
+    let position = |row: &Row| costs.iter().position(|c| c.algorithm == *profile.id(row.algorithm));
+    let rows: Vec<(usize, &Row)> = all.iter().filter(|r| !r.floor).filter_map(|r| Some((position(r)?, r))).collect();
+    let mut observed = Observed::new(costs);
+    // At random: those of one scenario in a row would look like a machine that changes.
+    for k in Random::named(1, &["observations"]).shuffled(rows.len()) {
+        let (algorithm, row) = rows[k];
+        observed.observe(algorithm, &row.load, row.ns, NOISE_LN * row.behind.min(MOST_BEHIND));
     }
-    let mut beyond: Vec<(f64, f64)> = floors.iter().filter(|f| f.0 > f64::from(last) * KNOT_STEP).copied().collect();
-    beyond.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (log2_objects, needed) in beyond {
-        let Some(outer) = knots.last_mut() else { break };
-        if outer.log2_objects == log2_objects {
-            outer.ln_factor = outer.ln_factor.max(needed);
-        } else {
-            let ln_factor = outer.ln_factor.max(needed);
-            knots.push(Knot { log2_objects, ln_factor });
-        }
-    }
-    knots
+    observed.costs()
 }
 
 /// Replaces the interval of each crossover by the one from paired samples, where there is one.
@@ -227,13 +189,12 @@ mod tests {
     use super::*;
     use crate::report::Timing;
     use crate::synthetic::{Machine, load};
-    use sapwise::BackendClass;
 
     #[test]
     fn choosing_by_the_curves_loses_little_and_never_what_left_the_race() {
         for machine in Machine::family() {
             let report = machine.report();
-            let tuning = measured_tuning(&report, "uniform").unwrap();
+            let tuning = measured_tuning(&report, "uniform", None).unwrap();
             assert_eq!(tuning.defect(), None);
             let profile = Profile::of("", &report);
             let mut regret = 0.0;
@@ -251,7 +212,7 @@ mod tests {
     fn what_left_the_race_stays_behind_beyond_all_sizes() {
         for machine in Machine::family() {
             let report = machine.report();
-            let tuning = measured_tuning(&report, "uniform").unwrap();
+            let tuning = measured_tuning(&report, "uniform", None).unwrap();
             for objects in [200_000.0, 1e6, 8e6] {
                 for scenario in ["uniform", "clustered"] {
                     let best = tuning.rank(&load(scenario, objects), |_| true).unwrap().best;
@@ -262,27 +223,48 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_curve_that_left_the_race_is_lifted() {
-        // Only the call shows at small sizes: without floors this would be the cheapest of all large scenes.
-        let row = |objects: u32, ns: f64, floor: bool| Row {
-            profile: 0,
-            algorithm: 0,
-            load: load("uniform", f64::from(objects)),
-            core_to_core_ns: None,
-            ns,
-            behind: 1.0,
-            floor,
-        };
-        let mut rows: Vec<Row> = [16, 23, 32, 45].map(|n| row(n, 9000.0, false)).into();
-        rows.extend([64, 1024, 16_384, 262_144].map(|n| row(n, 100.0 * f64::from(n) * 2.0, true)));
-        let rows: Vec<&Row> = rows.iter().collect();
-        let (curve, _) = curve(&terms_of_one_machine("brute", BackendClass::Cpu), &rows, 1e6, None);
-        assert_eq!(curve.defect(), None);
-        for r in rows.iter().filter(|r| r.floor) {
-            assert!(curve.cost_ns(&r.load) > 0.99 * r.ns, "{curve:?}");
+    fn what_was_timed_in_small_scenes_only_is_not_cheap_in_large_ones() {
+        // Only the call shows at small sizes: without floors brute force would be the cheapest of all large scenes.
+        let mut report = Machine::family()[0].clone().exact().report();
+        let brute: AlgorithmId = "brute@cpu1".parse().unwrap();
+        for point in &mut report.points {
+            let objects = point.load.objects;
+            point.timings.retain(|t| t.algorithm != brute || objects <= 64);
+            point.timings.iter_mut().filter(|t| t.algorithm == brute).for_each(|t| t.samples_ns.fill(9000));
         }
-        assert!(curve.cost_ns(&load("uniform", 4e6)) > 100.0 * 4e6);
-        assert!((curve.cost_ns(&rows[0].load) / 9000.0 - 1.0).abs() < 0.05);
+        let costs = measured_costs(&Profile::of("", &report)).0;
+        let cost = costs.iter().find(|c| c.algorithm == brute).unwrap();
+        for objects in [4096.0, 262_144.0, 4e6] {
+            let load = load("uniform", objects);
+            let least = costs.iter().map(|c| c.curve.cost_ns(&load)).fold(f64::INFINITY, f64::min);
+            assert!(cost.curve.cost_ns(&load) > 1.5 * least, "{objects}");
+        }
+        let small = cost.curve.cost_ns(&load("uniform", 32.0));
+        assert!((small / 9000.0).ln().abs() < 0.5, "{small}");
+    }
+
+    #[test]
+    fn a_report_without_hardware_parameters_has_costs_all_the_same() {
+        let mut report = Machine::family_with_gpus()[1].clone().exact().report();
+        report.hardware.parameters.clear();
+        report.hardware.gpus.iter_mut().for_each(|g| g.parameters.clear());
+        let profile = Profile::of("", &report);
+        let (costs, warnings) = measured_costs(&profile);
+        assert!(warnings.is_empty() && costs.len() == profile.algorithms.len(), "{warnings:?}");
+    }
+
+    #[test]
+    fn a_model_is_the_base_for_what_it_knows() {
+        let [other, own] = [3, 0].map(|k| Profile::of("", &Machine::family()[k].report()));
+        let designs = Designs::new(std::slice::from_ref(&other));
+        let mut base = model(std::slice::from_ref(&other), &designs, TrainingSet::of(&[true]), "base").unwrap().0;
+        base.methods.retain(|m| m.method != "sap");
+        let (costs, warnings) = measured_costs_over(&own, Some(&base));
+        assert!(warnings.is_empty() && costs.len() == own.algorithms.len(), "{warnings:?}");
+        assert_eq!(
+            Tuning::from_costs(Source::Measured, "", costs, &[]).defect(),
+            None.or(Some(sapwise::TuningError::NoFirstStep))
+        );
     }
 
     #[test]
@@ -299,7 +281,7 @@ mod tests {
         for point in report.points.iter_mut().filter(|p| from(p)) {
             point.timings.retain(|t| t.algorithm.to_string() != "grid-sap@cpu2");
         }
-        let tuning = measured_tuning(&report, "uniform").unwrap();
+        let tuning = measured_tuning(&report, "uniform", None).unwrap();
         for point in report.points.iter().filter(|p| from(p)) {
             let chosen = &tuning.costs[tuning.rank(&point.load, |_| true).unwrap().best].algorithm;
             assert_ne!(chosen.to_string(), "grid-sap@cpu2", "{:?}", point.load);
@@ -309,7 +291,7 @@ mod tests {
     #[test]
     fn crossovers_get_intervals_from_paired_frames() {
         let report = Machine::family()[2].report();
-        let tuning = measured_tuning(&report, "uniform").unwrap();
+        let tuning = measured_tuning(&report, "uniform", None).unwrap();
         assert!(
             !tuning.crossovers.is_empty() && tuning.interval_basis.contains("paired samples"),
             "{}",
@@ -337,7 +319,7 @@ mod tests {
             };
             point.timings = vec![timing(&above, 0.0), timing(&below, 0.5)];
         }
-        let mut crossover = measured_tuning(&Machine::family()[0].report(), "uniform").unwrap().crossovers.remove(0);
+        let mut crossover = measured_tuning(&Machine::family()[0].report(), "uniform", None).unwrap().crossovers.remove(0);
         (crossover.below, crossover.above) = (below, above);
         (crossover.objects, crossover.low, crossover.high) = (1000.0, Some(900.0), Some(1100.0));
         (report, crossover)
@@ -373,7 +355,7 @@ mod tests {
 
     #[test]
     fn a_scenario_that_was_not_measured_is_told() {
-        let error = measured_tuning(&Machine::family()[0].report(), "dunes").unwrap_err().to_string();
+        let error = measured_tuning(&Machine::family()[0].report(), "dunes", None).unwrap_err().to_string();
         assert!(error.contains("clustered, uniform"), "{error}");
     }
 }

@@ -9,8 +9,8 @@ const ROUNDS: usize = 4;
 const LIKE: f64 = 0.2;
 /// What falling back costs over the algorithm itself, where no row did: what a look at the boxes costs.
 const USUAL_FACTOR: f64 = 1.05;
-/// Bounds of that factor. Beyond them it is not that algorithm.
-const FACTORS: (f64, f64) = (0.8, 1.5);
+/// Bounds of that factor. What falls back does at least what it falls back to, and beyond the other bound it is not that algorithm.
+const FACTORS: (f64, f64) = (1.0, 1.5);
 
 /// What was fitted.
 #[derive(Debug, Clone)]

@@ -2,20 +2,20 @@
 
 pub(crate) mod columns;
 mod designs;
+mod late_helpers;
+pub(crate) mod load_residual;
 mod measured_costs;
 mod min_of_two;
 mod model;
 pub(crate) mod nnls;
-mod prior;
-pub(crate) mod residual;
 pub(crate) mod robust;
 mod rows;
 mod terms;
+mod weights;
 
 pub(crate) use designs::thinned;
-pub use designs::{ComponentsOf, Designs};
-pub use measured_costs::{measured_costs, measured_slice, measured_tuning, slice_tuning};
+pub use designs::{ComponentsOf, Designs, Fitted, TrainingSet};
+pub use measured_costs::{measured_costs, measured_costs_over, measured_slice, measured_tuning, slice_tuning};
 pub use model::model;
-pub use prior::{TimingError, prior};
 pub use rows::{Row, rows};
-pub use terms::{Component, components, fallback_method, terms_of_one_machine};
+pub use terms::{Component, components, fallback_method};

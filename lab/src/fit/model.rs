@@ -1,20 +1,26 @@
 //! Puts a model together from the profiles that it is trained on.
 
-use super::designs::Designs;
+use super::designs::{Designs, Fitted, TrainingSet};
 use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile};
 use crate::report::Label;
 use anyhow::{Result, bail};
 use sapwise::model::{GPU_PREFIX, Range};
 use sapwise::{Backend, GpuHardware, Model};
 
-/// A model of the chosen profiles, and in sentences what was left out and why.
+/// A model of what is chosen of the profiles, and in sentences what was left out and why.
 ///
 /// # Errors
 /// When no method could be fitted, or a regression fails.
-pub fn model(profiles: &[Profile], designs: &Designs<'_>, chosen: &[bool], name: &str) -> Result<(Model, Vec<String>)> {
-    let (methods, notes) = designs.fit(chosen)?;
-    let profiles: Vec<&Profile> = profiles.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
-    let mut model = Model::new(name, methods, ranges(&profiles));
+pub fn model(
+    profiles: &[Profile],
+    designs: &Designs<'_>,
+    training: TrainingSet<'_>,
+    name: &str,
+) -> Result<(Model, Vec<String>)> {
+    let Fitted { methods, places, notes } = designs.fit(training)?;
+    let profiles: Vec<&Profile> =
+        profiles.iter().zip(training.profiles).filter(|(_, chosen)| **chosen).map(|(p, _)| p).collect();
+    let mut model = Model::new(name, methods, ranges(&profiles)).with_places(places);
     model.simulated = profiles.iter().any(|p| p.label == Label::Simulated);
     if let Some(defect) = model.defect() {
         bail!("no model could be fitted: {}", [vec![defect.to_string()], notes].concat().join("; "));

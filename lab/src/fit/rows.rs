@@ -11,10 +11,10 @@ pub struct Row {
     pub profile: usize,
     /// Position of the algorithm in [`Profile::algorithms`].
     pub algorithm: u16,
+    /// Position of the point in [`Profile::points`].
+    pub spot: u32,
     /// The load of the point.
     pub load: Load,
-    /// Latency between cores at the point, where it is known.
-    pub core_to_core_ns: Option<f64>,
     /// Median over the frames.
     pub ns: f64,
     /// Time over the best of the point, of a lower bound that bound over it.
@@ -35,18 +35,18 @@ pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
         let algorithm = algorithm as u16;
         // For each scenario the sizes at which it was timed, and how many times slower than the best it was there.
         let mut ratios: BTreeMap<&str, BTreeMap<u32, f64>> = BTreeMap::new();
-        let row = |spot: &Spot, best: f64, behind: f64, floor: bool| Row {
+        let row = |(k, spot): (usize, &Spot), best: f64, behind: f64, floor: bool| Row {
             profile: position,
             algorithm,
+            spot: k as u32,
             load: spot.load,
-            core_to_core_ns: spot.core_to_core_ns,
             ns: best * behind,
             behind,
             floor,
         };
-        for spot in &profile.points {
+        for (k, spot) in profile.points.iter().enumerate() {
             let (Some(ns), Some(best)) = (spot.of_position(algorithm), spot.best()) else { continue };
-            rows.push(row(spot, best, ns / best, false));
+            rows.push(row((k, spot), best, ns / best, false));
             ratios.entry(&spot.scenario).or_default().insert(spot.load.objects, ns / best);
         }
         let on_gpu = timed.id.backend().class() == BackendClass::Gpu;
@@ -55,10 +55,10 @@ pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
         ratios.retain(|_, course| !(on_gpu && gains(course)));
         let last: BTreeMap<&str, (u32, f64)> =
             ratios.iter().filter_map(|(s, course)| course.last_key_value().map(|(&n, &ratio)| (*s, (n, ratio)))).collect();
-        for spot in &profile.points {
+        for (k, spot) in profile.points.iter().enumerate() {
             let Some(&(objects, behind)) = last.get(spot.scenario.as_str()) else { continue };
             if let Some(best) = spot.best().filter(|_| spot.load.objects > objects) {
-                rows.push(row(spot, best, (behind / 2.0).max(LEFT_BEHIND), true));
+                rows.push(row((k, spot), best, (behind / 2.0).max(LEFT_BEHIND), true));
             }
         }
     }

@@ -13,11 +13,6 @@ impl Component {
     pub fn of(term: Term, scale: Scale) -> Self {
         Self(vec![(1.0, term, scale)])
     }
-
-    /// Whether one of the counts is of this scale.
-    pub fn has(&self, scale: Scale) -> bool {
-        self.0.iter().any(|&(_, _, s)| s == scale)
-    }
 }
 
 /// What a method tests. The tests of the other methods are left out: within one machine they correlate with its own, and would
@@ -44,14 +39,14 @@ fn sorts(method: &str) -> bool {
 }
 
 /// Whether a frame may be cheaper where boxes move little.
-fn is_incremental(method: &str) -> bool {
+pub(crate) fn is_incremental(method: &str) -> bool {
     !matches!(method, "brute" | "sap" | "grid-sap" | "bvh")
 }
 
-/// What the time of a method may consist of over machines, for any number of threads or GPUs.
+/// What the time of a method may consist of over machines, on one thread or on any number of GPUs.
 ///
 /// Of components that can't be told apart the first one is used, so that the order matters where all machines are alike: work of
-/// the lanes before work of the cycles, divided work before serial work, the GPU's work before that of the CPU for it.
+/// the lanes before work of the cycles, the GPU's work before that of the CPU for it.
 pub fn components(method: &str, class: BackendClass) -> Vec<Component> {
     match class {
         BackendClass::Cpu => on_cpu(method).into_iter().map(|(term, scale)| Component::of(term, scale)).collect(),
@@ -61,22 +56,17 @@ pub fn components(method: &str, class: BackendClass) -> Vec<Component> {
 
 fn on_cpu(method: &str) -> Vec<(Term, Scale)> {
     use {Scale::*, Term::*};
-    let sorts = sorts(method);
-    let mut list = vec![(Call, Cycle), (Call, ForkJoin), (Objects, SharedCycle)];
-    if sorts {
-        list.push((Sort, SharedCycle));
+    let mut list = vec![(Call, Cycle), (Objects, Cycle)];
+    if sorts(method) {
+        list.push((Sort, Cycle));
     }
     if method != "brute" {
         list.push((ColdObjects, Byte));
     }
-    list.extend(tests(method).iter().flat_map(|&t| [(t, SharedLane), (t, SharedCycle)]));
-    list.push((Pairs, SharedCycle));
+    list.extend(tests(method).iter().flat_map(|&t| [(t, Lane), (t, Cycle)]));
+    list.push((Pairs, Cycle));
     if is_incremental(method) {
-        list.push((Moved, SharedCycle));
-    }
-    list.extend([(Objects, SharedLine), (Objects, Cycle)]);
-    if sorts {
-        list.push((Sort, Cycle));
+        list.push((Moved, Cycle));
     }
     list
 }
@@ -120,21 +110,3 @@ fn on_gpus(method: &str) -> Vec<Component> {
 
 /// Boxes of a frame that is worth a GPU. How often levels are put on a tree depends on them, and little else that is counted does but in proportion.
 const TYPICAL: u32 = 100_000;
-
-/// The terms of a method within one machine, where everything but the load is constant.
-pub fn terms_of_one_machine(method: &str, class: BackendClass) -> Vec<Term> {
-    let mut list = vec![Term::Call, Term::Objects];
-    if sorts(method) {
-        list.push(Term::Sort);
-    }
-    // The caches of the CPU say nothing about a GPU.
-    if class == BackendClass::Cpu {
-        list.push(Term::ColdObjects);
-    }
-    list.extend(tests(method));
-    list.push(Term::Pairs);
-    if class == BackendClass::Cpu && is_incremental(method) {
-        list.push(Term::Moved);
-    }
-    list
-}

@@ -23,12 +23,17 @@ const SAME_LN: f64 = 0.05;
 pub(super) fn scores(validation: &Validation, studied: &[usize]) -> DataTable {
     let mut table = DataTable::new([
         ("strategy", "strategy"),
+        ("unseen scenario", "unseen_scenario_share"),
+        ("unseen scenario in games", "unseen_scenario_in_games_share"),
         ("mean regret", "mean_regret_share"),
         ("least", "least_regret_share"),
         ("largest", "largest_regret_share"),
         ("mean regret in games", "mean_regret_in_games_share"),
         ("least in games", "least_regret_in_games_share"),
         ("largest in games", "largest_regret_in_games_share"),
+        ("one thread", "one_thread_share"),
+        ("several threads", "several_threads_share"),
+        ("by means", "by_means_share"),
         ("95th percentile", "p95_regret_share"),
         ("crossovers off by (octaves)", "crossovers_off_by_octaves"),
         ("crossovers within half an octave", "crossovers_within_half_octave_share"),
@@ -37,15 +42,20 @@ pub(super) fn scores(validation: &Validation, studied: &[usize]) -> DataTable {
     ]);
     for m in &validation.methods {
         let share = |value: Option<f64>, why: &str| value.map_or_else(|| Cell::Missing(why.to_owned()), Cell::percent);
-        let (none, unknown) = ("it predicts no costs", "not known");
+        let (none, unknown, not_asked) = ("it predicts no costs", "not known", "not asked of this strategy");
         let cells = vec![
             Cell::text(&m.name),
+            share(m.unseen_scenario.map(|s| s.all.all), not_asked),
+            share(m.unseen_scenario.map(|s| s.all.in_games), not_asked),
             Cell::percent(m.mean_regret),
             share(m.least_regret, unknown),
             share(m.largest_regret, unknown),
             share(m.mean_regret_in_games, unknown),
             share(m.least_regret_in_games, unknown),
             share(m.largest_regret_in_games, unknown),
+            share(m.one_thread.map(|r| r.all), unknown),
+            share(m.several_threads.map(|r| r.all), unknown),
+            share(m.by_means.map(|r| r.all), unknown),
             Cell::percent(m.p95_regret),
             Cell::optional(m.crossing_error_octaves, 2, none),
             share(m.crossings_within_half_octave, none),

@@ -103,7 +103,7 @@ impl Compared {
                 series.push(Curve { name: name(of), style: k, points });
             }
         }
-        let (fields, crossovers) = match measured_tuning(&own, &scenario) {
+        let (fields, crossovers) = match measured_tuning(&own, &scenario, None) {
             Ok(tuning) => (bands(&tuning, style, |k| name(&sides[k])), crossover_lines(&tuning)),
             // Too few sizes for curves; the points are drawn all the same.
             Err(_) => (Vec::new(), Vec::new()),

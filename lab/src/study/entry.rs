@@ -41,15 +41,13 @@ impl Entry {
         let told = [&mut machine.cpu, &mut machine.simd, &mut report.provenance.command, &mut report.provenance.version];
         told.into_iter().chain(of_gpus).for_each(|text| *text = legible(text));
         let profile = Profile::of(file, &report);
-        let measured = profile.measured.clone();
         Self {
             path: path.to_owned(),
             file: file.to_owned(),
             name: file.strip_suffix(".json").unwrap_or(file).to_owned(),
             kind: report.label,
             provenance: report.provenance,
-            // As it was measured: the profile has moved the cores to where they were at the points.
-            hardware: measured.unwrap_or_else(|| profile.hardware.clone()),
+            hardware: profile.hardware.clone(),
             profile,
             studied,
         }
@@ -57,7 +55,7 @@ impl Entry {
 
     /// The physical machine.
     pub(super) fn machine(&self) -> &str {
-        &self.hardware.machine.physical_id
+        self.profile.machine()
     }
 
     /// Whether it has all of its machine.

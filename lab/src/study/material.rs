@@ -102,7 +102,7 @@ fn measured_crossovers(held_out: &HeldOut, entries: &[Entry]) -> Measured {
     let crossovers = |entry: &&Entry| {
         let mut report = read_report(&entry.path, &|_| ()).ok()?.1;
         curves::keep(&mut report, |id| entry.profile.position(id).is_some());
-        let tuning = measured_tuning(&report, usual_scenario(&report)).ok()?;
+        let tuning = measured_tuning(&report, usual_scenario(&report), None).ok()?;
         Some((entry.file.clone(), tuning.crossovers))
     };
     own.par_iter().filter_map(crossovers).collect()

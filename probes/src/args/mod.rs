@@ -60,8 +60,7 @@ pub(crate) struct Devices {
     pub(crate) json: bool,
 }
 
-/// Predicts which algorithm is fastest on this machine, for each number of objects, from its hardware parameters and a handful of
-/// samples.
+/// Predicts which algorithm is fastest on this machine, for each number of objects, from its hardware parameters.
 ///
 /// Measures the hardware in a few seconds, some more for each GPU, and runs no sweep. With --report it predicts for the machine
 /// of that report.
@@ -76,15 +75,16 @@ pub(crate) struct Predict {
     /// Predict for the machine of this report instead of measuring this one.
     #[arg(long, value_name = "R.json", conflicts_with = "threads")]
     pub(crate) report: Option<PathBuf>,
-    /// Compute the tuning from the report's own timings instead of a model.
-    #[arg(long, requires = "report", conflicts_with = "model")]
+    /// Correct the prediction by all timings of the report.
+    #[arg(long, requires = "report")]
     pub(crate) measured: bool,
     /// Use this model instead of the built-in one.
     #[arg(long, value_name = "M.json")]
     pub(crate) model: Option<PathBuf>,
     /// Correct the prediction by timing up to this many algorithms, each at the size where a sample reduces the expected regret most, in two
-    /// seconds at most. 0 takes no sample, and for the machine of a report none is taken.
-    #[arg(long, value_name = "K", default_value_t = 8, conflicts_with = "measured", value_parser = clap::value_parser!(u32).range(0..=100))]
+    /// seconds at most. That pays on a machine unlike those of training, which the prediction tells; on others it changes little. For the machine of a
+    /// report none is taken.
+    #[arg(long, value_name = "K", default_value_t = 0, conflicts_with = "measured", value_parser = clap::value_parser!(u32).range(0..=100))]
     pub(crate) samples: u32,
     /// Scenario of the slice that is shown; the choice itself depends on the load of each frame. Without this option uniform, with
     /// --measured the first of a report that lacks it.

@@ -22,7 +22,7 @@ Examples:
   sapwise run clustered --swing 50 --frames 600                    # the number of objects grows and shrinks
   sapwise run uniform --frames 900 --co-runner 450 --trace run.csv
   sapwise run clustered --objects 50000 --frames 100 --record clustered.npy --json
-  sapwise run clustered.npy --samples 0 --no-learning              # the pure prediction, on a recorded stream")]
+  sapwise run clustered.npy --no-learning              # the pure prediction, on a recorded stream")]
 pub(crate) struct Run {
     /// The scenario; or a stream of your own frames: an .npy file of 32-bit floats of shape frames x n x 6, each row a box: min x y z, max x
     /// y z. Rows of NaN at the end of a frame are absent boxes.
@@ -32,8 +32,8 @@ pub(crate) struct Run {
     /// the tuning is predicted from this machine's hardware.
     #[arg(long, value_name = "T.json")]
     pub(crate) tuning: Option<PathBuf>,
-    /// Correct the prediction by up to this many samples before the first frame, as `predict` does. 0 is the pure prediction.
-    #[arg(long, value_name = "K", default_value_t = 8, conflicts_with = "tuning", value_parser = clap::value_parser!(u32).range(0..=100))]
+    /// Correct the prediction by up to this many samples before the first frame, as `predict --samples` does.
+    #[arg(long, value_name = "K", default_value_t = 0, conflicts_with = "tuning", value_parser = clap::value_parser!(u32).range(0..=100))]
     pub(crate) samples: u32,
     /// Do not correct the expected costs by the times of the frames.
     #[arg(long)]

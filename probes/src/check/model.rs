@@ -9,11 +9,11 @@ use sapwise_lab::StoredModel;
 
 impl Here {
     pub(super) fn model(&self, StoredModel { model, training }: &StoredModel, finding: &mut Finding) {
-        finding.schema = Some("model/2");
+        finding.schema = Some("model/3");
         let used = model.methods.iter().map(|m| ((m.backend, m.method.as_str()), m.revision));
         finding.set_current(revisions::stale(used, &self.registry), "train it again on new reports");
         finding.applicable = Some(finding.current == Some(true));
-        let known = training.trained_on.iter().any(|t| t.physical_id == self.machine.physical_id);
+        let known = training.trained_on.iter().any(|t| t.host.starts_with(&self.machine.physical_id));
         finding.notes.push(if known {
             "trained on a machine like this one".to_owned()
         } else if training.trained_on.is_empty() && !training.trained_on_counts.is_empty() {

@@ -3,7 +3,7 @@
 use crate::algorithms::Algorithms;
 use crate::args::Predict;
 use crate::check::{doubts, hardware_doubts};
-use crate::exit::{Outcome, WrongUsage};
+use crate::exit::Outcome;
 use crate::hardware::{self, measure_hardware};
 use crate::outputs::refuse_overwriting;
 use crate::prediction::{self, Slice};
@@ -11,8 +11,8 @@ use crate::terminal::Terminal;
 use crate::{interrupt, output, revisions, shell, summary};
 use anyhow::{Context, bail};
 use sapwise::{json, usable_cores};
+use sapwise_lab::data::usual_scenario;
 use sapwise_lab::data::{Document, read_document};
-use sapwise_lab::data::{as_at_the_points, usual_scenario};
 use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::report::Report;
 use sapwise_lab::write::write_text;
@@ -24,7 +24,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     let report = arguments.report.as_deref().map(read_report).transpose()?;
     let inputs: Vec<PathBuf> = arguments.report.iter().chain(&arguments.model).cloned().collect();
     refuse_overwriting(&inputs, &arguments.out.iter().collect::<Vec<_>>())?;
-    let model = if arguments.measured { None } else { Some(prediction::model(arguments.model.as_deref())?) };
+    let model = prediction::model(arguments.model.as_deref())?.model;
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;
     let terminal = Terminal::of_standard_output();
@@ -33,19 +33,18 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     let (mut told, mut remarks) = (None, Vec::new());
     // Whether a sample returned wrong pairs.
     let mut wrong = false;
-    let mut tuning = match (&model, &report) {
-        (None, Some(report)) => {
+    let mut tuning = match &report {
+        Some(report) if arguments.measured => {
             let mut report = report.clone();
             arguments.gpus.restrict(&mut report);
             let report = &report;
             let scenario = arguments.scenario.map(|s| s.to_string());
-            measured_tuning(report, scenario.as_deref().unwrap_or_else(|| usual_scenario(report)))?
+            measured_tuning(report, scenario.as_deref().unwrap_or_else(|| usual_scenario(report)), Some(&model))?
         }
-        (None, None) => return Err(WrongUsage("--measured needs --report".to_owned()).into()),
-        (Some(model), report) => {
+        report => {
             let scenario = arguments.scenario.unwrap_or(Scenario::Uniform);
             let (hardware, measured) = match report {
-                Some(report) => (as_at_the_points(&report.hardware, report), None),
+                Some(report) => (report.hardware.clone(), None),
                 None => {
                     let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
                     (hardware, Some(measured))
@@ -74,18 +73,18 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
             let slice = Slice::of(scenario)?;
             if report.is_none() && arguments.samples > 0 {
                 let sampled =
-                    prediction::predict_and_sample(model, &hardware, &gpus, &slice, algorithms, arguments.samples)?;
+                    prediction::predict_and_sample(&model, &hardware, &gpus, &slice, algorithms, arguments.samples)?;
                 wrong = sampled.1;
                 sampled.0
             } else {
-                prediction::predict(&model.model, &hardware, &gpus, &slice, algorithms)?
+                prediction::predict(&model, &hardware, &gpus, &slice, algorithms)?
             }
         }
     };
     tuning.warnings.append(&mut remarks);
     if let Some(report) = &report {
         // What a model predicts does not rest on the timings of the report.
-        if model.is_none() {
+        if arguments.measured {
             let stale = revisions::stale_in_report(report, &algorithms.registry(usable_cores()));
             tuning.warnings.extend(stale.into_iter().map(|why| format!("the report is stale: {why}; probe again")));
         }
@@ -100,7 +99,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         return Ok(outcome);
     }
     text += &summary::tuning(&tuning, terminal);
-    if report.is_some() && model.is_some() && arguments.samples > 0 {
+    if report.is_some() && arguments.samples > 0 {
         text += "\nNo sample was taken: samples are timed on this machine, and the prediction is for the machine of the report.\n";
     }
     if let Some(told) = told {

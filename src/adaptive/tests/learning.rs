@@ -4,6 +4,7 @@ use super::super::decision::Reason;
 use super::super::policy::Policy;
 use super::tuning;
 use crate::{AlgorithmId, Load, Tuning};
+use std::sync::Arc;
 
 /// What a frame of an algorithm really takes: by its position, the number of objects and the frame.
 type Truth = dyn Fn(usize, f64, usize) -> f64;
@@ -193,7 +194,7 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
 fn what_rebuilds_too_often_is_left_and_taken_up_again() {
     // The first is incremental. Up to frame 600 it rebuilds in one frame of three, which the tuning knows nothing of.
     let mut costs = tuning(&[("sap@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 0.0, 20.0)]);
-    costs.costs[0].curve.fallback_terms = costs.costs[1].curve.terms.clone();
+    costs.costs[0].curve = costs.costs[0].curve.clone().with_fallback(Arc::clone(&costs.costs[1].curve.work), 1.0);
     let mut policy = Policy::new(costs, &[Some(0), None], vec![true; 2]);
     policy.set_exploring(false);
     let truth = |k: usize, n: f64, at: usize| {

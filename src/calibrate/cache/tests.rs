@@ -172,8 +172,8 @@ fn what_is_damaged_foreign_or_old_is_told_and_replaced() {
         ("", "EOF"),
         (&whole[..whole.len() / 2], "EOF"),
         (&whole[..whole.len() - 2], "EOF"),
-        (&whole.replacen("cache/2", "cache/1", 1), "the schema \"cache/1\" is of an older version"),
-        (&whole.replacen("\"key\"", "\"host\": \"x\",\n  \"key\"", 1), "host is no key of cache/2"),
+        (&whole.replacen("cache/3", "cache/1", 1), "the schema \"cache/1\" is of an older version"),
+        (&whole.replacen("\"key\"", "\"host\": \"x\",\n  \"key\"", 1), "host is no key of cache/3"),
         (&other_key, "another machine"),
         (&steps, "don't begin at 0"),
     ] {

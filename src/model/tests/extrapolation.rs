@@ -5,7 +5,7 @@ use super::*;
 /// A model of a method on both processors whose ranges hold the machine below.
 fn both() -> Model {
     let mut model = model(vec![
-        method(BackendClass::Cpu, Scale::SharedCycle),
+        method(BackendClass::Cpu, Scale::Cycle),
         MethodModel { gpu_kinds: vec![GpuKind::Discrete], ..method(BackendClass::Gpu, Scale::GpuDispatch) },
     ]);
     let ranges = [
@@ -23,6 +23,7 @@ fn machine(changes: &[(ParameterId, f64)]) -> Hardware {
         (ParameterId::UsableCores, 8.0),
         (ParameterId::ClockMeasuredGhz, 4.0),
         (ParameterId::CacheLlcBytes, 3e7),
+        (ParameterId::ForkJoinColdNs, 5000.0),
         (ParameterId::BandwidthOneThreadGbPerS, 20.0),
         (ParameterId::ScalingTwoThreadsRatio, 1.9),
         (ParameterId::ScalingAllThreadsRatio, 7.0),

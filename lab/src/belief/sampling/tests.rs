@@ -71,7 +71,7 @@ fn cheapest(costs: &[AlgorithmCost], objects: u32) -> String {
 #[test]
 fn samples_go_where_the_choice_is_in_doubt_and_turn_it() {
     let mut source = made_up(&[("grid-sap@cpu1", 1.3), ("my-tree@cpu1", 0.9)]);
-    let learned = learn(costs(), &Prior::ASSUMED, &slice(), &mut source, 6).unwrap();
+    let learned = learn(Observed::of_unlike_machine(costs()), &slice(), &mut source, 6).unwrap();
     assert_eq!(cheapest(&costs(), 1000), "grid-sap@cpu1");
     assert_eq!(cheapest(&learned.costs(), 1000), "my-tree@cpu1");
     assert!(source.asked.iter().all(|a| a.0 != id("brute@cpu1")), "{:?}", source.asked);
@@ -82,7 +82,7 @@ fn samples_go_where_the_choice_is_in_doubt_and_turn_it() {
     assert_eq!(places.len(), source.asked.len(), "a place was sampled twice");
     let first = &learned.taken[0];
     assert!((first.predicted_ns / first.observation().predicted_ns - 1.0).abs() < 1e-12);
-    assert!(learn(costs(), &Prior::ASSUMED, &slice(), &mut source, 0).unwrap().taken.is_empty());
+    assert!(learn(Observed::of_unlike_machine(costs()), &slice(), &mut source, 0).unwrap().taken.is_empty());
 }
 
 #[test]
@@ -90,14 +90,14 @@ fn samples_stay_within_their_time_on_a_slow_machine() {
     let slow: Vec<AlgorithmCost> = costs()
         .into_iter()
         .map(|mut cost| {
-            cost.curve.terms.iter_mut().for_each(|t| t.unit_ns *= 100.0);
+            cost.curve.work_mut().terms.iter_mut().for_each(|t| t.unit_ns *= 100.0);
             cost
         })
         .collect();
     let real: Vec<(String, f64)> = slow.iter().map(|c| (c.algorithm.to_string(), 100.0)).collect();
     let real: Vec<(&str, f64)> = real.iter().map(|(id, ratio)| (id.as_str(), *ratio)).collect();
     let mut source = made_up(&real);
-    let learned = learn(slow, &Prior::ASSUMED, &slice(), &mut source, 8).unwrap();
+    let learned = learn(Observed::of_unlike_machine(slow), &slice(), &mut source, 8).unwrap();
     let spent: f64 = learned.taken.iter().map(|t| t.sample.seconds).sum();
     assert!(!learned.taken.is_empty() && spent <= SECONDS, "{spent}");
     assert!(source.asked.iter().all(|a| a.1 < 1_000_000), "{:?}", source.asked);
@@ -107,12 +107,12 @@ fn samples_stay_within_their_time_on_a_slow_machine() {
 fn who_fails_is_left_out_with_all_on_its_gpus_and_the_rest_goes_on() {
     let mut source = made_up(&[]);
     source.failing = vec![(id("grid-sap@gpu0"), vec![0]), (id("my-tree@cpu1"), Vec::new())];
-    let learned = learn(costs(), &Prior::ASSUMED, &slice(), &mut source, 8).unwrap();
+    let learned = learn(Observed::of_unlike_machine(costs()), &slice(), &mut source, 8).unwrap();
     let left: Vec<String> = learned.costs().iter().map(|c| c.algorithm.to_string()).collect();
     assert_eq!(left, ["grid-sap@cpu1", "brute@cpu1"], "{:?}", learned.remarks);
     assert!(learned.remarks.len() == 2 && learned.remarks.iter().any(|r| r.contains("all on gpu0: it broke")));
     let mut source = made_up(&[]);
     source.answers = 1;
-    let learned = learn(costs(), &Prior::ASSUMED, &slice(), &mut source, 8).unwrap();
+    let learned = learn(Observed::of_unlike_machine(costs()), &slice(), &mut source, 8).unwrap();
     assert_eq!((learned.taken.len(), source.asked.len(), learned.costs().len()), (1, 2, 5));
 }

@@ -75,11 +75,6 @@ impl Figure {
             false => other.hardware.parameters.iter_mut().for_each(change),
             true => other.hardware.gpus.iter_mut().flat_map(|g| &mut g.parameters).for_each(change),
         }
-        // How far the cores lay apart at each point would tell the fork and join and the latency again.
-        if self.names.iter().any(|n| [ParameterId::ForkJoinColdNs.as_str(), ParameterId::CoreToCoreNs.as_str()].contains(n))
-        {
-            other.points.iter_mut().for_each(|p| p.core_to_core_ns = None);
-        }
         other
     }
 }

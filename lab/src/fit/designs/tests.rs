@@ -1,77 +1,87 @@
 use super::*;
 use crate::synthetic::{Machine, gpu_truth, truth};
 use sapwise::hardware::GpuParameterId;
+use sapwise::{Model, Term};
 
 fn profiles(machines: impl IntoIterator<Item = Machine>) -> Vec<Profile> {
     machines.into_iter().map(|m| Profile::of(&format!("{}.json", m.name), &m.report())).collect()
 }
 
 fn fitted(profiles: &[Profile]) -> (Vec<MethodModel>, Vec<String>) {
-    let designs = Designs::new(profiles);
-    let (models, notes) = designs.fit(&vec![true; profiles.len()]).unwrap();
-    (models, [designs.notes.clone(), notes].concat())
+    let (model, notes) = whole(profiles);
+    (model.methods, notes)
 }
 
-/// The measured rows of a profile that belong to a model.
-fn rows_of(profile: &Profile, method: &MethodModel) -> Vec<(AlgorithmId, Row)> {
-    let rows = rows(profile, 0).into_iter().map(|r| (profile.id(r.algorithm).clone(), r));
-    let own = |id: &AlgorithmId| id.method() == method.method && id.backend().class() == method.backend;
-    rows.filter(|(id, r)| own(id) && !r.floor).collect()
+fn whole(profiles: &[Profile]) -> (Model, Vec<String>) {
+    let designs = Designs::new(profiles);
+    let Fitted { methods, places, notes } = designs.fit(TrainingSet::of(&vec![true; profiles.len()])).unwrap();
+    (Model::new("test", methods, Vec::new()).with_places(places), [designs.notes.clone(), notes].concat())
+}
+
+/// What a model predicts for the measured rows of a profile over what was measured.
+fn ratios(model: &Model, profile: &Profile, of: impl Fn(&AlgorithmId) -> bool) -> Vec<f64> {
+    let costs = model.predict(&profile.hardware, &profile.with_revisions(&profile.available())).unwrap().costs;
+    let rows = rows(profile, 0).into_iter().filter(|r| !r.floor && of(profile.id(r.algorithm)));
+    let ratio = |r: Row| {
+        let cost = costs.iter().find(|c| c.algorithm == *profile.id(r.algorithm)).unwrap();
+        cost.curve.cost_ns(&r.load) / r.ns
+    };
+    rows.map(ratio).collect()
+}
+
+fn physics(model: &Model) -> Model {
+    let mut physics = model.clone();
+    physics.methods.iter_mut().for_each(|m| *m = m.without_residual());
+    physics
 }
 
 #[test]
 fn coefficients_are_recovered_from_six_machines_and_predict_the_seventh() {
     let all = profiles(Machine::family().into_iter().map(Machine::exact));
-    let (models, notes) = fitted(&all[..6]);
-    assert!(notes.is_empty() && models.len() == truth().len(), "{notes:?}");
+    let (model, notes) = whole(&all[..6]);
+    assert!(notes.is_empty() && model.methods.len() == truth().len(), "{notes:?}");
     for truth in truth() {
-        let found = models.iter().find(|m| m.method == truth.method).unwrap();
-        for t in &truth.terms {
+        let found = model.methods.iter().find(|m| m.method == truth.method).unwrap();
+        // `sap` left the race before its boxes left the cache.
+        for t in truth.terms.iter().filter(|t| truth.method != "sap" || t.term != Term::ColdObjects) {
             let unit = found.terms.iter().find(|f| (f.term, f.scale) == (t.term, t.scale)).map_or(0.0, |f| f.unit);
             assert!((unit / t.unit - 1.0).abs() < 0.05, "{}: {t:?} became {unit}; {:?}", truth.method, found.terms);
         }
         assert!(found.spread_ln < 0.005, "{found:?}");
-        for (id, row) in rows_of(&all[6], found) {
-            let curve = found.curve(&all[6].hardware, id.backend()).unwrap();
-            assert!((curve.cost_ns(&row.load) / row.ns - 1.0).abs() < 0.02, "{row:?}");
-        }
+        let (found, truth) = (found.helpers.unwrap(), truth.helpers.unwrap());
+        let off = [found.late_share - truth.late_share, found.serial_share - truth.serial_share];
+        assert!(off.iter().all(|o| o.abs() < 0.11), "{found:?}");
     }
+    let off = ratios(&model, &all[6], |_| true);
+    assert!(off.len() > 100 && off.iter().all(|r| r.ln().abs() < 0.1), "{off:?}");
 }
 
 #[test]
 fn coefficients_on_gpus_are_recovered_and_predict_the_machine_held_out() {
     let all = profiles(Machine::family_with_gpus().into_iter().map(Machine::exact));
-    let (models, notes) = fitted(&all[..7]);
-    assert!(notes.is_empty() && models.len() == truth().len() + gpu_truth().len(), "{notes:?}");
+    let (model, notes) = whole(&all[..7]);
+    assert!(notes.is_empty() && model.methods.len() == truth().len() + gpu_truth().len(), "{notes:?}");
     for truth in gpu_truth() {
         let alike = |m: &&MethodModel| m.method == truth.method && m.backend == BackendClass::Gpu;
-        let found = models.iter().find(alike).unwrap();
+        let found = model.methods.iter().find(alike).unwrap();
         assert_eq!((found.max_threads, &found.gpu_kinds[..]), (2, &[GpuKind::Discrete, GpuKind::Integrated][..]));
         for t in &truth.terms {
             let unit = found.terms.iter().find(|f| (f.term, f.scale) == (t.term, t.scale)).map_or(0.0, |f| f.unit);
             assert!((unit / t.unit - 1.0).abs() < 0.05, "{}: {t:?} became {unit}; {:?}", truth.method, found.terms);
         }
-        assert!(found.spread_ln < 0.005, "{found:?}");
-        let held = rows_of(&all[7], found);
-        assert!(held.len() > 10);
-        for (id, row) in held {
-            let curve = found.curve(&all[7].hardware, id.backend()).unwrap();
-            assert!((curve.cost_ns(&row.load) / row.ns - 1.0).abs() < 0.02, "{row:?}");
-        }
+        assert!(found.spread_ln < 0.005 && found.helpers.is_none(), "{found:?}");
     }
+    let off = ratios(&model, &all[7], |id| id.backend().class() == BackendClass::Gpu);
+    assert!(off.len() > 30 && off.iter().all(|r| r.ln().abs() < 0.05), "{off:?}");
 }
 
 #[test]
 fn one_machine_with_a_gpu_has_a_model_of_full_rank() {
     let all = profiles(Machine::family_with_gpus().into_iter().take(1));
-    let (models, notes) = fitted(&all);
-    assert!(notes.is_empty() && models.len() == truth().len() + gpu_truth().len(), "{notes:?}");
-    for method in models {
-        for (id, row) in rows_of(&all[0], &method) {
-            let curve = method.curve(&all[0].hardware, id.backend()).unwrap();
-            assert!((curve.cost_ns(&row.load) / row.ns).ln().abs() < 0.5, "{row:?}");
-        }
-    }
+    let (model, notes) = whole(&all);
+    assert!(notes.is_empty() && model.methods.len() == truth().len() + gpu_truth().len(), "{notes:?}");
+    let off = ratios(&model, &all[0], |_| true);
+    assert!(off.iter().all(|r| r.ln().abs() < 0.5), "{off:?}");
 }
 
 #[test]
@@ -107,17 +117,24 @@ fn the_residual_repairs_a_term_that_is_missing() {
         let factor = (-0.02 * (f64::from(spot.load.objects).log2() - 11.0).powi(2)).exp();
         spot.medians.iter_mut().for_each(|m| m.1 *= factor);
     }
-    let (models, _) = fitted(&all);
-    let mut errors = (0.0, 0.0);
-    for method in models {
-        let bare = method.without_residual();
-        let error = |m: &MethodModel| {
-            let curve = |id: &AlgorithmId| m.curve(&all[3].hardware, id.backend()).unwrap();
-            rows_of(&all[3], m).iter().map(|(id, r)| (curve(id).cost_ns(&r.load) / r.ns).ln().powi(2)).sum::<f64>()
-        };
-        errors = (errors.0 + error(&method), errors.1 + error(&bare));
+    let (model, _) = whole(&all);
+    let error = |m: &Model| ratios(m, &all[3], |_| true).iter().map(|r| r.ln().powi(2)).sum::<f64>();
+    let (with, without) = (error(&model), error(&physics(&model)));
+    assert!(with < 0.5 * without, "{with} {without}");
+}
+
+#[test]
+fn a_scenario_that_is_left_out_is_not_looked_at() {
+    let mut all = profiles(Machine::family().into_iter().take(3));
+    let chosen = vec![true; 3];
+    let without = TrainingSet { without: Some("clustered"), ..TrainingSet::of(&chosen) };
+    let fit = |all: &[Profile]| Designs::new(all).fit(without).unwrap().methods;
+    let before = fit(&all);
+    // A hundred times as slow there, but for who is best: what lies how far behind is a weight.
+    for spot in all.iter_mut().flat_map(|p| &mut p.points).filter(|s| s.scenario == "clustered") {
+        spot.medians.iter_mut().for_each(|m| m.1 *= 100.0);
     }
-    assert!(errors.0 < 0.8 * errors.1, "{errors:?}");
+    assert_eq!(before, fit(&all));
 }
 
 #[test]
@@ -131,10 +148,10 @@ fn machines_count_the_same_however_many_profiles_they_have() {
     }
     let designs = Designs::new(&all);
     for design in &designs.methods {
-        let rows: Vec<usize> = (0..design.rows.len()).collect();
-        let weights = design.weights(&rows, &all, &designs.machines);
+        let rows: Vec<&Row> = design.rows.iter().collect();
+        let weights = weights(&rows, &all, &designs.machines);
         let of = |chosen: &dyn Fn(usize) -> bool| -> f64 {
-            rows.iter().filter(|k| chosen(design.rows[**k].profile)).map(|k| weights[*k]).sum()
+            rows.iter().zip(&weights).filter(|(r, _)| chosen(r.profile)).map(|(_, w)| w).sum()
         };
         for machine in 0..3 {
             assert!((of(&|p| designs.machines[p] == machine) - 1.0).abs() < 1e-9, "{}", design.name());

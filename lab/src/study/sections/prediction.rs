@@ -10,9 +10,9 @@ use anyhow::Result;
 
 /// What the columns and rows of the scores mean.
 const SCORES: &str = "Strategies that choose an algorithm for what was held out. Regret is the time of what is chosen over that of the best, less \
-one; least and largest are the means of the machine, or of the report where all are of one machine, that was served best and worst; in games, sizes count as often as games are assumed to have them (log-normal around 800 objects); crossovers are off by the median of octaves \
+one; least and largest are the means of the machine, or of the report where all are of one machine, that was served best and worst; an unseen scenario was held out beside the machine, and is what to expect of your own scenes; by means, the means over frames judge in place of medians; in games, sizes count as often as games are assumed to have them (log-normal around 800 objects); crossovers are off by the median of octaves \
 (factors of two) between measured and predicted ones; the gap is 0 % closed by the one algorithm that is best on average and 100 % by the oracle, which \
-is best at each point: a strategy that costs more than that one algorithm closes none of it. Physics + ridge is what predict does without samples; ours + 8 \
+is best at each point: a strategy that costs more than that one algorithm closes none of it. Physics + load is what predict does; ours + 8 \
 samples corrects it by as many timings of the machine itself; frozen constants switch at a number of objects that an engine has written down (64 or 1000); default and nearest machine take \
 another machine's curves; full sweep has the machine's own timings, by which it is judged.";
 

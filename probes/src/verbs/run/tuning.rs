@@ -72,7 +72,7 @@ pub(super) fn predicted(arguments: &Run, algorithms: &Algorithms) -> anyhow::Res
     let (usable, slice) = (&measured.usable, Slice::of(Scenario::Uniform)?);
     let (mut tuning, wrong) = match arguments.samples {
         0 => (prediction::predict(&model.model, &hardware, usable, &slice, algorithms)?, false),
-        most => prediction::predict_and_sample(&model, &hardware, usable, &slice, algorithms, most)?,
+        most => prediction::predict_and_sample(&model.model, &hardware, usable, &slice, algorithms, most)?,
     };
     tuning.warnings.extend(measured.remarks);
     Ok(Origin { tuning, from: OriginKind::Prediction, other_machine: None, wrong })
@@ -95,7 +95,7 @@ pub(super) fn read(path: &Path, registry: &Registry, choice: &GpuChoice) -> anyh
         Document::Report(mut report) => {
             choice.restrict(&mut report);
             fresh(revisions::stale_in_report(&report, registry))?;
-            let tuning = measured_tuning(&report, usual_scenario(&report))
+            let tuning = measured_tuning(&report, usual_scenario(&report), sapwise::Model::built_in().ok().as_ref())
                 .with_context(|| format!("{} yields no tuning", path.display()))?;
             let machine = &report.hardware.machine;
             let here = machine.physical_id == measure::machine().physical_id;

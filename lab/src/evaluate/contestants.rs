@@ -1,0 +1,257 @@
+//! The strategies that a prediction competes with, and what each is fitted to.
+
+use super::baselines::{self, Likeness, by_costs};
+use super::direct::{RoleOutcome, direct, role_outcomes};
+use super::forest::{Forests, Table};
+use super::regret_table::{RegretTable, Strategy};
+use super::scores::{OURS, SINGLE_BEST};
+use crate::data::Profile;
+use crate::fit::{Designs, TrainingSet, measured_costs, model};
+use anyhow::Result;
+use rayon::prelude::*;
+use sapwise::model::MethodModel;
+use sapwise::{AlgorithmCost, AlgorithmId, Model};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Ours, corrected by [`SAMPLES`](super::sampled::SAMPLES) samples on the machine itself.
+pub(super) const SAMPLED: &str = "ours + 8 samples";
+const PHYSICS: &str = "physics";
+const FOREST: &str = "random forest";
+const NEAREST: &str = "nearest machine";
+
+/// Profiles of a training that the best single algorithm and the direct regression look at: a mean and a handful of slopes need no
+/// more, and both go through all of them for each held-out profile.
+const MOST_SEEN: usize = 100;
+/// Profiles that the direct regression looks for crossovers in, about.
+const MOST_CROSSED: usize = 600;
+
+/// The measured costs of profiles without a scenario of theirs.
+type Partial = BTreeMap<(usize, String), Arc<Vec<AlgorithmCost>>>;
+
+/// What all folds share.
+pub(super) struct Material<'a> {
+    pub(super) profiles: &'a [Profile],
+    designs: &'a Designs<'a>,
+    table: Table,
+    pub(super) regrets: Vec<RegretTable>,
+    /// The same by the means over frames.
+    pub(super) by_means: Vec<RegretTable>,
+    /// Which of two algorithms is cheaper where, of each profile; nothing of those that are not looked at.
+    outcomes: Vec<Vec<RoleOutcome>>,
+    /// What machines are compared by, of each profile.
+    likeness: Vec<Likeness>,
+    /// The measured costs of each profile, once they are asked for, and those without a scenario.
+    costs: Vec<OnceLock<Vec<AlgorithmCost>>>,
+    partial: Mutex<Partial>,
+}
+
+/// What was fitted to the training of a fold.
+pub(super) struct Fitted<'a> {
+    without: Option<&'a str>,
+    /// Positions of the profiles of the training, and what their machines are compared by.
+    known: Vec<usize>,
+    likeness: Vec<&'a Likeness>,
+    /// Some of them with the mean regret of each algorithm when it is chosen always, and some of those whose crossovers were looked for.
+    always: Vec<(&'a Profile, Vec<f64>)>,
+    crossed: Vec<(&'a Profile, &'a [RoleOutcome])>,
+    /// The model with its residual, and without; `None` where none could be fitted.
+    models: Option<(Model, Model)>,
+    forests: Forests,
+    pub(super) notes: Vec<String>,
+}
+
+/// What a model predicts for a profile, and its physical terms alone.
+pub(super) struct Ours {
+    pub(super) whole: Vec<AlgorithmCost>,
+    physics: Vec<AlgorithmCost>,
+}
+
+/// A strategy with its name.
+pub(super) struct Contestant<'a> {
+    pub(super) name: &'static str,
+    pub(super) choose: Strategy<'a>,
+    /// The costs that it chooses by, where it has any.
+    pub(super) costs: Option<&'a [AlgorithmCost]>,
+}
+
+impl<'a> Material<'a> {
+    pub(super) fn new(profiles: &'a [Profile], designs: &'a Designs<'a>) -> Self {
+        let step = profiles.len().div_ceil(MOST_CROSSED).max(1);
+        let outcomes = |(k, p): (usize, &Profile)| if k.is_multiple_of(step) { role_outcomes(p) } else { Vec::new() };
+        Self {
+            profiles,
+            designs,
+            table: Table::new(profiles),
+            regrets: profiles.par_iter().map(RegretTable::new).collect(),
+            by_means: profiles.par_iter().map(RegretTable::by_means).collect(),
+            outcomes: profiles.par_iter().enumerate().map(outcomes).collect(),
+            likeness: profiles.iter().map(|p| Likeness::new(&p.hardware)).collect(),
+            costs: profiles.iter().map(|_| OnceLock::new()).collect(),
+            partial: Mutex::default(),
+        }
+    }
+
+    /// Fits everything to the profiles that are not in a fold, to all of their scenarios but one.
+    ///
+    /// # Errors
+    /// When a regression fails.
+    pub(super) fn fit(&'a self, fold: &[usize], without: Option<&'a str>) -> Result<Fitted<'a>> {
+        let mut notes = Vec::new();
+        let mut chosen = vec![true; self.profiles.len()];
+        fold.iter().for_each(|&k| chosen[k] = false);
+        let training = TrainingSet { without, ..TrainingSet::of(&chosen) };
+        let models = match model(self.profiles, self.designs, training, "validation") {
+            Ok((model, _)) => {
+                let mut physics = model.clone();
+                physics.methods = model.methods.iter().map(MethodModel::without_residual).collect();
+                Some((model, physics))
+            }
+            Err(why) => {
+                let file = &self.profiles[fold[0]].file;
+                notes.push(format!("no model could be fitted when {file} was held out: {why:#}"));
+                None
+            }
+        };
+        let known: Vec<usize> = (0..self.profiles.len()).filter(|&k| chosen[k] && self.profiles[k].has_cpu()).collect();
+        let seen = known.iter().step_by(known.len().div_ceil(MOST_SEEN).max(1));
+        let mean = |k: usize| self.regrets[k].always(without).iter().map(|always| always.mean).collect();
+        let crossed = known.iter().map(|&k| (&self.profiles[k], &self.outcomes[k][..]));
+        let crossed: Vec<_> = crossed.filter(|(_, outcomes)| !outcomes.is_empty()).collect();
+        let step = crossed.len().div_ceil(MOST_SEEN).max(1);
+        let left_out = |k: usize, spot: u32| without.is_some_and(|w| self.profiles[k].points[spot as usize].scenario == w);
+        Ok(Fitted {
+            without,
+            likeness: known.iter().map(|&k| &self.likeness[k]).collect(),
+            always: seen.map(|&k| (&self.profiles[k], mean(k))).collect(),
+            crossed: crossed.into_iter().step_by(step).collect(),
+            models,
+            forests: self.table.grow(&chosen, left_out)?,
+            known,
+            notes,
+        })
+    }
+
+    /// The measured costs of a profile.
+    pub(super) fn costs(&self, k: usize) -> &[AlgorithmCost] {
+        self.costs[k].get_or_init(|| measured_costs(&self.profiles[k]).0)
+    }
+
+    /// The same without a scenario.
+    fn costs_without(&self, k: usize, scenario: &str) -> Arc<Vec<AlgorithmCost>> {
+        let key = (k, scenario.to_owned());
+        let known = self.partial.lock().unwrap_or_else(PoisonError::into_inner).get(&key).map(Arc::clone);
+        known.unwrap_or_else(|| {
+            let mut own = self.profiles[k].clone();
+            own.points.retain(|s| s.scenario != scenario);
+            let costs = Arc::new(measured_costs(&own).0);
+            self.partial.lock().unwrap_or_else(PoisonError::into_inner).insert(key, Arc::clone(&costs));
+            costs
+        })
+    }
+}
+
+impl Fitted<'_> {
+    /// What the model predicts for a profile, and a note where it predicts nothing.
+    pub(super) fn predict(&self, profile: &Profile, notes: &mut Vec<String>) -> Option<Ours> {
+        let (whole, physics) = self.models.as_ref()?;
+        let all = profile.with_revisions(&profile.available());
+        let predicted = |model: &Model| model.predict(&profile.hardware, &all).map(|p| p.costs);
+        match predicted(whole).and_then(|whole| Ok(Ours { whole, physics: predicted(physics)? })) {
+            Ok(ours) => Some(ours),
+            Err(why) => {
+                notes.push(format!("{} could not be predicted when it was held out: {why}", profile.file));
+                None
+            }
+        }
+    }
+
+    fn ours<'b>(
+        &'b self,
+        profile: &'b Profile,
+        ours: Option<&'b Ours>,
+        available: &'b [AlgorithmId],
+    ) -> [Contestant<'b>; 4] {
+        let always: Vec<(&Profile, &[f64])> = self.always.iter().map(|(p, means)| (*p, &means[..])).collect();
+        [
+            by(OURS, ours.map(|o| &o.whole[..]), available),
+            by(PHYSICS, ours.map(|o| &o.physics[..]), available),
+            alone(FOREST, self.forests.chooser(&profile.hardware, available)),
+            alone(SINGLE_BEST, baselines::single_best(&always, available)),
+        ]
+    }
+
+    /// All of them on one held-out profile.
+    ///
+    /// # Errors
+    /// When a regression fails.
+    pub(super) fn contestants<'b>(
+        &'b self,
+        data: &'b Material<'_>,
+        held: usize,
+        ours: Option<&'b Ours>,
+        available: &'b [AlgorithmId],
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Contestant<'b>>> {
+        let profile = &data.profiles[held];
+        let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).map(|k| data.costs(self.known[k]));
+        let default_machine = match self.known.first() {
+            None => nothing(),
+            Some(&first) => {
+                let own = baselines::default_machine(&data.profiles[first], data.costs(first), available);
+                own.unwrap_or_else(|why| {
+                    notes.push(format!("there is no default machine when {} is held out: {why:#}", profile.file));
+                    nothing()
+                })
+            }
+        };
+        let mut all = Vec::from(self.ours(profile, ours, available));
+        all.extend([
+            by(NEAREST, nearest, available),
+            alone("direct regression", direct(&self.crossed, &profile.hardware, available, notes)?),
+            alone("frozen constants (64)", baselines::frozen(64, "grid-sap", available)),
+            alone("frozen constants (1000)", baselines::frozen(999, "sap", available)),
+            alone("default machine", default_machine),
+            // Its costs are those that crossovers are measured by.
+            Contestant { costs: None, ..by("full sweep", Some(data.costs(held)), available) },
+        ]);
+        Ok(all)
+    }
+
+    /// Those that are asked of scenarios that nobody has seen.
+    pub(super) fn asked_of_unseen<'b>(
+        &'b self,
+        data: &'b Material<'_>,
+        held: usize,
+        ours: Option<&'b Ours>,
+        available: &'b [AlgorithmId],
+    ) -> Vec<Contestant<'b>> {
+        let mut all = Vec::from(self.ours(&data.profiles[held], ours, available));
+        let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).zip(self.without);
+        let costs = nearest.map(|(k, without)| data.costs_without(self.known[k], without));
+        let choose = costs.map_or_else(nothing, |costs| by_costs(costs.to_vec(), available));
+        all.push(alone(NEAREST, choose));
+        all
+    }
+}
+
+/// Chooses the cheapest by costs; nothing, which counts as the worst, where there are none.
+pub(super) fn by<'a>(
+    name: &'static str,
+    costs: Option<&'a [AlgorithmCost]>,
+    available: &'a [AlgorithmId],
+) -> Contestant<'a> {
+    let costs = costs.unwrap_or_default();
+    let choose = if costs.is_empty() { nothing() } else { by_costs(costs.to_vec(), available) };
+    Contestant { name, choose, costs: Some(costs) }
+}
+
+/// A strategy that predicts no costs.
+fn alone<'a>(name: &'static str, choose: Strategy<'a>) -> Contestant<'a> {
+    Contestant { name, choose, costs: None }
+}
+
+/// Chooses nothing, which counts as the worst.
+fn nothing<'a>() -> Strategy<'a> {
+    Box::new(|_| None)
+}

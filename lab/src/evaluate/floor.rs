@@ -1,0 +1,42 @@
+//! What is lost by chance: two runs of one machine, each judged on the other.
+
+use super::baselines::by_costs;
+use super::regret_table::{Regret, RegretTable};
+use super::scores::{Part, split};
+use crate::data::Profile;
+use crate::training::Floor;
+use rayon::prelude::*;
+use sapwise::AlgorithmCost;
+use std::collections::BTreeMap;
+
+/// Scenarios that both runs need to have: fewer are no repetition of a sweep.
+const FEWEST_POINTS: usize = 100;
+
+/// Of all profiles that repeat each other. `None` where none does.
+pub(super) fn floor<'a>(
+    profiles: &[Profile],
+    tables: &[RegretTable],
+    costs: impl Fn(usize) -> &'a [AlgorithmCost] + Sync,
+) -> Option<Floor> {
+    let mut alike: BTreeMap<(&str, &str, String), Vec<usize>> = BTreeMap::new();
+    for (k, p) in profiles.iter().enumerate().filter(|(_, p)| p.points.len() >= FEWEST_POINTS && p.has_cpu()) {
+        let algorithms: Vec<String> = p.algorithms.iter().map(|t| t.id.to_string()).collect();
+        alike.entry((p.machine(), &p.setup, algorithms.join(" "))).or_default().push(k);
+    }
+    // Each with the next one, both ways.
+    let pairs: Vec<(usize, usize)> =
+        alike.values().flat_map(|all| all.windows(2).flat_map(|w| [(w[0], w[1]), (w[1], w[0])])).collect();
+    let judged = |&(from, on): &(usize, usize)| -> (Regret, Regret) {
+        let available = profiles[on].available();
+        let cells = tables[on].by_cells_of(&profiles[on], &tables[from], &profiles[from]);
+        (cells, tables[on].regret(&profiles[on], &by_costs(costs(from).to_vec(), &available)))
+    };
+    let regrets: Vec<(Regret, Regret)> = pairs.par_iter().map(judged).collect();
+    let part = |k: usize, of: fn(&(Regret, Regret)) -> &Regret| {
+        let profile = &profiles[pairs[k].1];
+        Part { machine: profile.machine(), several_threads: profile.has_threads(), regret: of(&regrets[k]) }
+    };
+    let cells: Vec<Part<'_>> = (0..pairs.len()).map(|k| part(k, |r| &r.0)).collect();
+    let sweeps: Vec<Part<'_>> = (0..pairs.len()).map(|k| part(k, |r| &r.1)).collect();
+    Some(Floor { pairs: pairs.len() / 2, cells: split(&cells)?, full_sweep: split(&sweeps)? })
+}

@@ -1,0 +1,86 @@
+//! How a method calls its helpers: four figures that explain what several threads take by what one takes.
+
+use sapwise::model::{HelpersModel, ThreadFigures};
+
+/// One timing on several threads.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Called {
+    pub(crate) objects: u32,
+    pub(crate) threads: u32,
+    /// What one thread is modelled to take.
+    pub(crate) work_ns: f64,
+    pub(crate) ns: f64,
+    pub(crate) weight: f64,
+    pub(crate) figures: ThreadFigures,
+}
+
+/// Values that are tried, with the other figures as they are.
+const CALL_CYCLES: [f64; 11] = [0.0, 100.0, 200.0, 400.0, 700.0, 1000.0, 1500.0, 2000.0, 3000.0, 5000.0, 8000.0];
+const LATE_SHARES: [f64; 13] = [0.0, 0.03, 0.06, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0];
+const SERIAL_SHARES: [f64; 13] = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0];
+/// What the methods of this library need to call a thread, and whoever calls always.
+const BOXES_PER_THREAD: [u32; 2] = [0, 1024];
+/// Rounds over all figures, and starts: serial shares far apart.
+const ROUNDS: usize = 6;
+const STARTS: [f64; 2] = [0.1, 0.4];
+
+/// The figures with the least weighted mean of absolute logarithmic errors: robust, since the tasks of some frames wait for a core. `None` of no timing.
+pub(crate) fn fit(called: &[Called]) -> Option<HelpersModel> {
+    if called.is_empty() {
+        return None;
+    }
+    let error = |model: &HelpersModel| -> f64 {
+        let one = |c: &Called| {
+            let ns = model.with(c.figures, c.threads).cost_ns(c.objects, c.work_ns);
+            c.weight * (c.ns / ns).ln().abs()
+        };
+        called.iter().map(one).sum()
+    };
+    let polished = |serial_share: f64| {
+        let mut best = HelpersModel::new(500.0, 0.2, serial_share, 0);
+        let mut least = error(&best);
+        for _ in 0..ROUNDS {
+            let before = best;
+            let mut attempt = |model: HelpersModel| {
+                let error = error(&model);
+                if error < least {
+                    (best, least) = (model, error);
+                }
+            };
+            BOXES_PER_THREAD.iter().for_each(|&boxes_per_thread| attempt(HelpersModel { boxes_per_thread, ..before }));
+            // Together: a dearer call looks like a later helper.
+            for call_cycles in CALL_CYCLES {
+                LATE_SHARES.iter().for_each(|&late_share| attempt(HelpersModel { call_cycles, late_share, ..before }));
+            }
+            SERIAL_SHARES.iter().for_each(|&serial_share| attempt(HelpersModel { serial_share, ..before }));
+            if best == before {
+                break;
+            }
+        }
+        (best, least)
+    };
+    STARTS.map(polished).into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|found| found.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_of_made_up_helpers_are_found_though_some_frames_waited() {
+        for truth in [HelpersModel::new(400.0, 0.35, 0.1, 1024), HelpersModel::new(1500.0, 0.1, 0.3, 0)] {
+            let called: Vec<Called> = (0..120)
+                .map(|k| {
+                    let objects = 2_u32.pow(4 + k / 8);
+                    let threads = [2, 4][k as usize % 2];
+                    let work_ns = 300.0 + (30.0 + f64::from(k % 8)) * f64::from(objects);
+                    let figures = ThreadFigures::new(0.3, 8000.0 + 500.0 * f64::from(k % 5), 0.95 * f64::from(threads));
+                    let ns = truth.with(figures, threads).cost_ns(objects, work_ns) * if k % 17 == 0 { 5.0 } else { 1.0 };
+                    Called { objects, threads, work_ns, ns, weight: 1.0, figures }
+                })
+                .collect();
+            assert_eq!(fit(&called), Some(truth));
+        }
+        assert_eq!(fit(&[]), None);
+    }
+}

@@ -1,0 +1,252 @@
+//! What the terms of a cost leave unexplained, as a function of the load.
+//!
+//! A Gaussian process with inducing points (Quiñonero-Candela and Rasmussen, A unifying view of sparse approximate Gaussian process
+//! regression, 2005): a weighted sum of how like a load is to each of some places. It returns to nought, where the terms alone hold, away from
+//! all of them.
+
+use crate::Load;
+use std::sync::Arc;
+
+/// Coordinates of a load. The last one is looked at only for algorithms that are cheaper where boxes move little.
+const COORDINATES: usize = 5;
+/// What a coordinate's figure is divided by: the distance over which a residual keeps its height. The figures are base-2 logarithms of objects, of
+/// pairs, of strip candidates and of axis candidates an object, and [`Load::moved`]. Half or twice of each changes regrets by less than what two
+/// fits of the same reports differ by.
+const LENGTHS: [f64; COORDINATES] = [3.0, 3.0, 4.0, 6.0, 0.375];
+/// Pairs an object below which scenes are alike: a twentieth.
+const FEW_PAIRS: f64 = 0.05;
+/// A weight or a constant beyond is no measurement. Weights of places that are alike may be large against each other.
+const MOST_LN: f64 = 1000.0;
+/// The kernel is a rational quadratic with this exponent: between it and a squared exponential no regret tells a difference, and it takes a division
+/// and four products in place of an exponential.
+const EXPONENT_LOG2: u32 = 4;
+
+/// Loads at which residuals are known, for all methods of a machine or a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Places {
+    loads: Vec<Load>,
+    /// By coordinate, then by place.
+    coordinates: Vec<f64>,
+    /// Base-2 logarithms of the fewest and of the most objects; beyond, a load counts as one with as many.
+    octaves: [f64; 2],
+}
+
+/// The residual of one method over the load.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Residual {
+    /// Where it is known.
+    pub places: Arc<Places>,
+    /// For each of the first places what its likeness counts, as the natural logarithm of a factor on the cost.
+    pub weights: Vec<f64>,
+    /// The natural logarithm of a factor that holds away from all places too.
+    pub constant: f64,
+    /// Whether loads are told apart by how far boxes move.
+    pub by_motion: bool,
+}
+
+/// How like a load is to each place, 0 to 1.
+#[derive(Debug, Clone)]
+pub(crate) struct Likeness {
+    by_motion: [f64; Places::MOST],
+    whatever_moves: [f64; Places::MOST],
+}
+
+impl Places {
+    /// Places that a residual may have. More make no choice better, and each costs every decision two nanoseconds.
+    pub const MOST: usize = 64;
+
+    /// These loads, of which no more than [`Places::MOST`] are taken.
+    #[must_use]
+    pub fn new(mut loads: Vec<Load>) -> Self {
+        loads.truncate(Self::MOST);
+        let sizes = sizes(&loads);
+        Self::within(loads, sizes)
+    }
+
+    /// The same, of loads that are told apart by their sizes as far as `all` go.
+    #[must_use]
+    pub fn of_sizes(loads: Vec<Load>, all: &[Load]) -> Self {
+        Self::within(loads, sizes(all))
+    }
+
+    fn within(loads: Vec<Load>, octaves: [f64; 2]) -> Self {
+        let count = loads.len();
+        let mut coordinates = vec![0.0; COORDINATES * count];
+        for (k, load) in loads.iter().enumerate() {
+            for (c, x) in coordinates_of(load, octaves).into_iter().enumerate() {
+                coordinates[c * count + k] = x;
+            }
+        }
+        Self { loads, coordinates, octaves }
+    }
+
+    /// The loads, in the order of the weights of residuals.
+    #[must_use]
+    pub fn loads(&self) -> &[Load] {
+        &self.loads
+    }
+
+    /// How like `load` is to each place, 0 to 1; with `by_motion` loads are told apart by how far boxes move too. This is the correlation of two
+    /// values of a residual.
+    #[must_use]
+    pub fn likeness(&self, load: &Load, by_motion: bool) -> Vec<f64> {
+        let likeness = self.likeness_of(load);
+        likeness.of(by_motion)[..self.loads.len()].to_vec()
+    }
+
+    /// Places like those of scenes of a constant density that move little: for costs that come without any.
+    pub(crate) fn usual() -> Arc<Self> {
+        let load = |k: u32| {
+            let n = 2.0_f64.powi(3 + 3 * k as i32);
+            Load::of_objects(n as u32).with_pairs(0.5 * n).with_candidates(n.powf(1.5), 4.0 * n)
+        };
+        Arc::new(Self::new((0..7).map(load).collect()))
+    }
+
+    pub(crate) fn likeness_of(&self, load: &Load) -> Likeness {
+        let at = coordinates_of(load, self.octaves);
+        let count = self.loads.len();
+        let mut likeness = Likeness { by_motion: [0.0; Self::MOST], whatever_moves: [0.0; Self::MOST] };
+        // Coordinate by coordinate over all places, so that the compiler takes several places at a time.
+        let (rest, motion) = self.coordinates.split_at((COORDINATES - 1) * count);
+        let distances = &mut likeness.whatever_moves[..count];
+        for (x, row) in at.iter().zip(rest.chunks_exact(count.max(1))) {
+            for (d, y) in distances.iter_mut().zip(row) {
+                *d += (x - y) * (x - y);
+            }
+        }
+        let moved = at[COORDINATES - 1];
+        for ((k, d), y) in likeness.by_motion[..count].iter_mut().zip(distances).zip(motion) {
+            *k = kernel(*d + (moved - y) * (moved - y));
+            *d = kernel(*d);
+        }
+        likeness
+    }
+}
+
+impl Likeness {
+    pub(crate) fn of(&self, by_motion: bool) -> &[f64; Places::MOST] {
+        if by_motion { &self.by_motion } else { &self.whatever_moves }
+    }
+}
+
+impl Residual {
+    /// A residual with weights for the first places, and no constant.
+    #[must_use]
+    pub fn new(places: Arc<Places>, weights: Vec<f64>, by_motion: bool) -> Self {
+        Self { places, weights, constant: 0.0, by_motion }
+    }
+
+    /// The same with a factor of this natural logarithm everywhere.
+    #[must_use]
+    pub fn with_constant(self, constant: f64) -> Self {
+        Self { constant, ..self }
+    }
+
+    /// The natural logarithm of the factor on the cost under a load.
+    #[must_use]
+    pub fn ln(&self, load: &Load) -> f64 {
+        self.ln_of(&self.places.likeness_of(load))
+    }
+
+    pub(crate) fn ln_of(&self, likeness: &Likeness) -> f64 {
+        // Four sums side by side: one would wait for each addition.
+        let mut sums = [0.0; 4];
+        let (weights, likeness) = (self.weights.chunks_exact(4), likeness.of(self.by_motion));
+        let rest: f64 = weights.remainder().iter().zip(&likeness[self.weights.len() & !3..]).map(|(w, k)| w * k).sum();
+        for (w, k) in weights.zip(likeness.chunks_exact(4)) {
+            sums.iter_mut().zip(w.iter().zip(k)).for_each(|(sum, (w, k))| *sum += w * k);
+        }
+        self.constant + sums.iter().sum::<f64>() + rest
+    }
+
+    /// The sum of both, which are known at the same places.
+    pub(crate) fn plus(mut self, other: &Self) -> Self {
+        self.constant += other.constant;
+        self.weights.resize(self.weights.len().max(other.weights.len()), 0.0);
+        self.weights.iter_mut().zip(&other.weights).for_each(|(w, o)| *w += o);
+        self
+    }
+
+    /// Whether its weights are finite and no more than there are places.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.weights.len() <= self.places.loads.len()
+            && self.weights.iter().chain([&self.constant]).all(|w| w.abs() <= MOST_LN)
+            && self.places.coordinates.iter().all(|c| c.is_finite())
+    }
+}
+
+/// Base-2 logarithms of the fewest and of the most objects of some loads.
+fn sizes(loads: &[Load]) -> [f64; 2] {
+    let all = loads.iter().map(octaves);
+    [all.clone().fold(64.0, f64::min), all.fold(0.0, f64::max)]
+}
+
+fn octaves(load: &Load) -> f64 {
+    f64::from(load.objects.max(1)).log2()
+}
+
+fn coordinates_of(load: &Load, [fewest, most]: [f64; 2]) -> [f64; COORDINATES] {
+    let n = f64::from(load.objects.max(1));
+    let figures = [
+        octaves(load).min(most).max(fewest),
+        (load.pairs / n + FEW_PAIRS).log2(),
+        (load.strip_candidates / n + 1.0).log2(),
+        (load.axis_candidates / n + 1.0).log2(),
+        load.moved,
+    ];
+    std::array::from_fn(|k| figures[k] / LENGTHS[k])
+}
+
+fn kernel(squared_distance: f64) -> f64 {
+    let exponent = f64::from(1_u32 << EXPONENT_LOG2);
+    let mut k = 1.0 / (1.0 + squared_distance / (2.0 * exponent));
+    for _ in 0..EXPONENT_LOG2 {
+        k *= k;
+    }
+    k
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn load(objects: u32, pairs: f64, moved: f64) -> Load {
+        Load::of_objects(objects).with_pairs(pairs).with_moved(moved)
+    }
+
+    #[test]
+    fn the_kernel_is_near_a_squared_exponential() {
+        for k in 0..60 {
+            let d = f64::from(k) * 0.1;
+            assert!((kernel(d) - (-0.5 * d).exp()).abs() < 0.02, "{d}");
+        }
+        assert_eq!(kernel(0.0), 1.0);
+    }
+
+    #[test]
+    fn a_residual_holds_at_its_places_and_goes_back_to_nought_away_from_them() {
+        let places = Arc::new(Places::new(vec![load(1000, 500.0, 0.0), load(1_000_000, 500_000.0, 0.0)]));
+        let residual = Residual::new(places, vec![0.3, -0.2], false);
+        assert!((residual.ln(&load(1000, 500.0, 0.9)) - 0.3).abs() < 0.01);
+        assert!((residual.ln(&load(1_000_000, 500_000.0, 0.0)) + 0.2).abs() < 0.01);
+        // Beyond its sizes it is held.
+        assert_eq!(residual.ln(&load(4_000_000, 2_000_000.0, 0.0)), residual.ln(&load(1_000_000, 500_000.0, 0.0)));
+        assert!(residual.ln(&load(1000, 400_000.0, 0.0)).abs() < 0.05);
+        assert!(residual.is_sound());
+    }
+
+    #[test]
+    fn motion_tells_loads_apart_only_where_it_is_asked_for() {
+        let places = Arc::new(Places::new((0..7).map(|k| load(1 << (3 + k), 4.0, 0.0)).collect()));
+        let weights: Vec<f64> = (1..=7).map(|k| 0.1 * f64::from(k)).collect();
+        let still = Residual::new(Arc::clone(&places), weights.clone(), false);
+        let moving = Residual::new(places, weights, true);
+        let far = load(64, 4.0, 1.0);
+        assert_eq!(still.ln(&far), still.ln(&far.with_moved(0.0)));
+        assert!(moving.ln(&far) < 0.2 * moving.ln(&far.with_moved(0.0)));
+        let by_hand: f64 = still.weights.iter().zip(still.places.likeness(&far, false)).map(|(w, k)| w * k).sum();
+        assert!((still.ln(&far) - by_hand).abs() < 1e-12);
+    }
+}

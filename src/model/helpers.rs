@@ -1,0 +1,105 @@
+//! What several threads of a machine make of the work of one.
+
+use super::PredictError;
+use super::needed::needed;
+use super::scale::cycle;
+use crate::cost::Helpers;
+use crate::hardware::{Hardware, ParameterId};
+
+/// How a method calls its helpers, shared over machines and numbers of threads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HelpersModel {
+    /// Cycles of the caller for each helper that it calls.
+    pub call_cycles: f64,
+    /// Share of a cold fork and join ([`ParameterId::ForkJoinColdNs`]) by which they come late: that much work of one thread is lost.
+    pub late_share: f64,
+    /// Share of the work of one thread that stays with it (Amdahl, Validity of the single processor approach, 1967); the rest is divided as several threads
+    /// were measured to scale ([`ParameterId::ScalingTwoThreadsRatio`] and [`ParameterId::ScalingAllThreadsRatio`]).
+    pub serial_share: f64,
+    /// Boxes that keep one thread busy: a frame has no more threads than it has so many boxes. 0: it has all of them always.
+    pub boxes_per_thread: u32,
+}
+
+/// What a machine has of several threads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ThreadFigures {
+    /// One cycle of one core.
+    pub cycle_ns: f64,
+    /// One fork and join of all usable cores where they have been idle.
+    pub fork_join_cold_ns: f64,
+    /// Work of that many threads over work of one.
+    pub scaling: f64,
+}
+
+impl ThreadFigures {
+    /// A cycle and a cold fork and join in nanoseconds, and work of several threads over work of one.
+    #[must_use]
+    pub const fn new(cycle_ns: f64, fork_join_cold_ns: f64, scaling: f64) -> Self {
+        Self { cycle_ns, fork_join_cold_ns, scaling }
+    }
+
+    /// Those of so many threads on a machine.
+    ///
+    /// # Errors
+    /// Names the hardware parameter that is missing.
+    pub fn of(hardware: &Hardware, threads: u32) -> Result<Self, PredictError> {
+        let fork_join_cold_ns = needed(hardware, ParameterId::ForkJoinColdNs)?;
+        Ok(Self { cycle_ns: cycle(hardware)?, fork_join_cold_ns, scaling: scaling(hardware, threads)? })
+    }
+}
+
+impl HelpersModel {
+    /// The hardware parameters of the machine that [`on`](Self::on) looks at.
+    pub const PARAMETERS: &[ParameterId] = &[
+        ParameterId::ClockMeasuredGhz,
+        ParameterId::ClockReportedGhz,
+        ParameterId::UsableCores,
+        ParameterId::ForkJoinColdNs,
+        ParameterId::ScalingTwoThreadsRatio,
+        ParameterId::ScalingAllThreadsRatio,
+    ];
+
+    /// Helpers that are called by these cycles each, come late by that share of a fork and join and leave that share of the work to one.
+    #[must_use]
+    pub const fn new(call_cycles: f64, late_share: f64, serial_share: f64, boxes_per_thread: u32) -> Self {
+        Self { call_cycles, late_share, serial_share, boxes_per_thread }
+    }
+
+    /// The helpers of so many threads on a machine; `None` of one.
+    ///
+    /// # Errors
+    /// Names the hardware parameter that is missing.
+    pub fn on(&self, hardware: &Hardware, threads: u32) -> Result<Option<Helpers>, PredictError> {
+        (threads > 1).then(|| Ok(self.with(ThreadFigures::of(hardware, threads)?, threads))).transpose()
+    }
+
+    /// The helpers of so many threads, of which a machine has these figures.
+    #[must_use]
+    pub fn with(&self, figures: ThreadFigures, threads: u32) -> Helpers {
+        let mut helpers = Helpers::new(threads);
+        helpers.call_ns = self.call_cycles * f64::from(threads.max(1) - 1) * figures.cycle_ns;
+        helpers.late_ns = self.late_share * figures.fork_join_cold_ns;
+        helpers.speed_up = 1.0 / (self.serial_share + (1.0 - self.serial_share) / figures.scaling);
+        helpers.boxes_per_thread = self.boxes_per_thread;
+        helpers
+    }
+
+    pub(super) fn is_sound(&self) -> bool {
+        [self.call_cycles, self.late_share].iter().all(|x| x.is_finite() && *x >= 0.0)
+            && (0.0..=1.0).contains(&self.serial_share)
+    }
+}
+
+/// Work of `threads` threads over work of one, interpolated on logarithmic axes between one, two and all.
+fn scaling(hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
+    let cores = needed(hardware, ParameterId::UsableCores)?;
+    let all = needed(hardware, ParameterId::ScalingAllThreadsRatio)?;
+    let k = f64::from(threads);
+    if k >= cores {
+        return Ok(all);
+    }
+    let two = needed(hardware, ParameterId::ScalingTwoThreadsRatio)?;
+    let share = if cores > 2.0 { (k / 2.0).ln() / (cores / 2.0).ln() } else { 1.0 };
+    Ok((two.ln() * (1.0 - share) + all.ln() * share).exp())
+}

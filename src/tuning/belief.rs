@@ -1,0 +1,436 @@
+//! What is believed of the costs on a machine: a prediction, and how far from it each algorithm lies as far as timings told.
+//!
+//! The natural logarithm of real over predicted time is taken to be a sum of parts. Some are shared: by a class of processor (a clock that
+//! throttles, tuning of another machine), by a number of threads or GPUs, on all of a frame and on what calling them takes (cores that moved apart, a core
+//! that is taken), by incremental algorithms that keep the same from frame to frame, and by the algorithms of a method. One is the
+//! algorithm's own. Those of methods and algorithms are a constant and a function of the load, a Gaussian process at the first of the places
+//! of the residuals. A Kalman filter follows all of them: the shared ones with all their covariances, those of an algorithm by themselves. That
+//! leaves out what observations tell of the difference between a shared part and an own one, so that a sum of both is believed to be less sure than it
+//! is.
+
+mod basis;
+mod observed;
+
+use super::AlgorithmCost;
+use crate::algorithm::BackendClass;
+use crate::cost::{Frame, Places, Residual};
+use basis::Basis;
+use std::sync::Arc;
+
+pub(crate) use basis::View;
+pub use observed::{Observed, Slope};
+
+/// Functions of the load that a part consists of beside its constant. More places tell a little more of scenes that were measured and a little less of
+/// others.
+pub(crate) const CURVE: usize = 8;
+/// A constant and these.
+const SIZE: usize = CURVE + 1;
+
+/// Standard deviations of shared parts before anything was observed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Deviations {
+    class_ln: f64,
+    kept_ln: f64,
+    width_ln: f64,
+    calls_ln: f64,
+}
+
+impl Deviations {
+    /// Of a prediction for this machine, about as on machines held out.
+    const PREDICTED: Self = Self { class_ln: 0.3, kept_ln: 0.1, width_ln: 0.1, calls_ln: 0.3 };
+    /// Of a machine unlike those of the training, and in line: tuning may be of another machine and off by a factor of several for all algorithms at once, a core that is taken doubles the time of
+    /// those that use it, and a scene spares incremental algorithms more or less of their work.
+    pub(crate) const UNLIKE: Self = Self { class_ln: 0.8, kept_ln: 0.3, width_ln: 0.2, calls_ln: 0.7 };
+}
+
+/// Of what a method has for all of its algorithms, its constant and its curve: about what was left of predictions on machines held out.
+const METHOD_LN: [f64; 2] = [0.1, 0.1];
+/// Of an own part, its constant and its curve: tuning that was measured a minute ago is off by this in the next scene.
+const OWN_LN: [f64; 2] = [0.05, 0.15];
+
+/// Frames after which what was observed counts for half. In a hundred frames a class may change by 15 %, what keeping saves by 15 %, a width
+/// by 7 % and an own part by 2 % (standard deviations); a faster change shows in surprises.
+const CLASS_FRAMES: f64 = 10_000.0;
+const KEPT_FRAMES: f64 = 400.0;
+const WIDTH_FRAMES: f64 = 800.0;
+const OWN_FRAMES: f64 = 6000.0;
+
+/// No more than this many standard deviations of a surprise are believed at once: frames whose threads waited for a core take fifty times as long.
+pub(crate) const MOST_SURPRISE: f64 = 3.0;
+
+/// What is believed of the algorithms of a tuning. Memory is allocated when it is made.
+#[derive(Debug, Clone)]
+pub(crate) struct Belief {
+    basis: Basis,
+    algorithms: Vec<Parts>,
+    own: Vec<Own>,
+    /// The shared parts: means, covariance row by row, the variances before anything was observed, and frames after which each counts for half.
+    mean: Vec<f64>,
+    covariance: Vec<f64>,
+    before: Vec<f64>,
+    lasts: Vec<f64>,
+    /// Of the observation at hand: covariance of each shared part with it, and of each entry of the own part. `fading` is room for a passage of time.
+    with: Vec<f64>,
+    own_with: [f64; SIZE],
+    fading: Vec<f64>,
+    frame: u64,
+}
+
+/// Where the shared parts of an algorithm stand.
+#[derive(Debug, Clone, Copy)]
+struct Parts {
+    class: usize,
+    /// Of what it keeps from frame to frame, if it does.
+    kept: Option<usize>,
+    /// Of its width, if that is more than one: on all of its cost, and behind it on its calls.
+    width: Option<usize>,
+    /// Of its method, as many entries as an own part has.
+    method: usize,
+    by_motion: bool,
+}
+
+/// What an algorithm has for itself.
+#[derive(Debug, Clone)]
+struct Own {
+    mean: [f64; SIZE],
+    covariance: [[f64; SIZE]; SIZE],
+    before: [f64; SIZE],
+    /// The frame at which that held.
+    at: u64,
+}
+
+/// Entries of the shared parts that count for one algorithm at most, and how the logarithm of its cost hangs on each.
+const SHARED: usize = 4 + SIZE;
+type Slopes = [(usize, f64); SHARED];
+
+/// What is expected of an observation, as natural logarithms: its deviation from the prediction, and the variances of that in the shared and in
+/// the own parts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Expected {
+    pub(crate) ln: f64,
+    pub(crate) shared: f64,
+    pub(crate) own: f64,
+}
+
+impl Own {
+    fn new() -> Self {
+        let mut before = [OWN_LN[1].powi(2); SIZE];
+        before[0] = OWN_LN[0].powi(2);
+        let mut own = Self { mean: [0.0; SIZE], covariance: [[0.0; SIZE]; SIZE], before, at: 0 };
+        own.age(1.0);
+        own
+    }
+
+    /// The covariance goes back by that share towards what it was before anything was observed.
+    fn age(&mut self, share: f64) {
+        for (i, row) in self.covariance.iter_mut().enumerate() {
+            row.iter_mut().for_each(|entry| *entry *= 1.0 - share);
+            row[i] += share * self.before[i];
+        }
+    }
+}
+
+/// The share of an own part that is forgotten after so many frames. Of the exponential only the beginning: none of this is known to the last digit.
+fn aged(frames: u64) -> f64 {
+    let aged = frames as f64 / OWN_FRAMES;
+    aged / (1.0 + aged)
+}
+
+/// A shared part.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Part<'a> {
+    Class(BackendClass),
+    Kept(usize),
+    Width(BackendClass, u32),
+    Calls(BackendClass, u32),
+    Method(BackendClass, &'a str, usize),
+}
+
+impl Part<'_> {
+    fn deviation_ln(&self, deviations: Deviations) -> f64 {
+        match self {
+            Self::Class(_) => deviations.class_ln,
+            Self::Kept(_) => deviations.kept_ln,
+            Self::Width(..) => deviations.width_ln,
+            Self::Calls(..) => deviations.calls_ln,
+            Self::Method(_, _, entry) => METHOD_LN[usize::from(*entry > 0)],
+        }
+    }
+
+    fn frames(&self) -> f64 {
+        match self {
+            Self::Class(_) => CLASS_FRAMES,
+            Self::Kept(_) => KEPT_FRAMES,
+            Self::Width(..) | Self::Calls(..) => WIDTH_FRAMES,
+            Self::Method(..) => OWN_FRAMES,
+        }
+    }
+}
+
+impl Belief {
+    /// The belief in predictions of which nothing was observed. `kept` says for each algorithm where it finds what the frame before left, if a frame
+    /// is cheaper for it after one that was alike: one number for all that share it.
+    pub(crate) fn new(costs: &[AlgorithmCost], kept: &[Option<usize>], deviations: Deviations) -> Self {
+        let places = costs.iter().flat_map(AlgorithmCost::residuals).map(|r| Arc::clone(&r.places)).next();
+        let mut parts: Vec<Part<'_>> = Vec::new();
+        let mut at = |part: Part<'static>| -> usize {
+            parts.iter().position(|p| *p == part).unwrap_or_else(|| {
+                parts.push(part);
+                parts.len() - 1
+            })
+        };
+        let mut methods: Vec<(BackendClass, &str)> = Vec::new();
+        let mut algorithms = Vec::new();
+        for (cost, kept) in costs.iter().zip(kept) {
+            let (backend, name) = (cost.algorithm.backend(), cost.algorithm.method());
+            let class = backend.class();
+            let method = methods.iter().position(|m| *m == (class, name)).unwrap_or_else(|| {
+                methods.push((class, name));
+                methods.len() - 1
+            });
+            let width = (backend.width() > 1).then(|| {
+                let all = at(Part::Width(class, backend.width()));
+                // Always next to each other: no other adds one in between.
+                at(Part::Calls(class, backend.width()));
+                all
+            });
+            let by_motion = cost.residuals().next().map_or(kept.is_some(), |r| r.by_motion);
+            // Until all are known, which of the methods.
+            algorithms.push(Parts {
+                class: at(Part::Class(class)),
+                kept: kept.map(|k| at(Part::Kept(k))),
+                width,
+                method,
+                by_motion,
+            });
+        }
+        let first = parts.len();
+        for (class, name) in methods {
+            parts.extend((0..SIZE).map(|entry| Part::Method(class, name, entry)));
+        }
+        algorithms.iter_mut().for_each(|a| a.method = first + SIZE * a.method);
+        let before: Vec<f64> = parts.iter().map(|p| p.deviation_ln(deviations).powi(2)).collect();
+        let mut belief = Self {
+            basis: Basis::new(places.unwrap_or_else(Places::usual)),
+            algorithms,
+            own: costs.iter().map(|_| Own::new()).collect(),
+            mean: vec![0.0; parts.len()],
+            covariance: vec![0.0; parts.len() * parts.len()],
+            lasts: parts.iter().map(Part::frames).collect(),
+            with: vec![0.0; parts.len()],
+            own_with: [0.0; SIZE],
+            fading: vec![0.0; parts.len()],
+            before,
+            frame: 0,
+        };
+        belief.doubt_shared();
+        belief
+    }
+
+    pub(crate) fn view(&self, frame: &Frame<'_>) -> View {
+        self.basis.view(frame)
+    }
+
+    /// What the shared parts add to the logarithm of an algorithm's cost of which calls are that share, and which parts do with their slopes.
+    fn shared(&self, algorithm: usize, view: &View, calls: f64) -> (f64, Slopes) {
+        let parts = &self.algorithms[algorithm];
+        let mut slopes = [(0, 0.0); SHARED];
+        slopes[0] = (parts.class, 1.0);
+        slopes[1] = parts.kept.map_or((0, 0.0), |k| (k, 1.0));
+        let mut ln = self.mean[parts.class] + slopes[1].1 * self.mean[slopes[1].0];
+        if let Some(width) = parts.width {
+            // A factor on the calls alone. What it adds to the whole is not linear in its logarithm; its slope is that of the present one.
+            let called = calls * self.mean[width + 1].exp();
+            let whole = 1.0 - calls + called;
+            slopes[2] = (width, 1.0);
+            slopes[3] = (width + 1, called / whole);
+            ln += self.mean[width] + whole.ln();
+        }
+        slopes[4] = (parts.method, 1.0);
+        ln += self.mean[parts.method];
+        for (k, value) in view.of(parts.by_motion).iter().enumerate() {
+            slopes[5 + k] = (parts.method + 1 + k, *value);
+            ln += value * self.mean[parts.method + 1 + k];
+        }
+        (ln, slopes)
+    }
+
+    /// Expected natural logarithm of real over predicted time of an algorithm of whose predicted time calls are that share.
+    pub(crate) fn deviation_ln(&self, algorithm: usize, view: &View, calls: f64) -> f64 {
+        let own = &self.own[algorithm].mean;
+        let curve = view.of(self.algorithms[algorithm].by_motion);
+        self.shared(algorithm, view, calls).0 + own[0] + curve.iter().zip(&own[1..]).map(|(a, b)| a * b).sum::<f64>()
+    }
+
+    /// Variance of the own part of an algorithm.
+    fn own_variance(&self, algorithm: usize, view: &View) -> f64 {
+        let own = &self.own[algorithm];
+        let (age, values) = (aged(self.frame - own.at), values(view.of(self.algorithms[algorithm].by_motion)));
+        let row = |i: usize| {
+            let sum: f64 = own.covariance[i].iter().zip(&values).map(|(c, v)| c * v).sum();
+            values[i] * ((1.0 - age) * sum + age * own.before[i] * values[i])
+        };
+        (0..SIZE).map(row).sum()
+    }
+
+    /// Variance of the logarithm of the ratio of the costs of two algorithms of whose times calls are these shares.
+    pub(crate) fn variance_of_ratio(&self, view: &View, (a, of_a): (usize, f64), (b, of_b): (usize, f64)) -> f64 {
+        let mut weights = [(0, 0.0); 2 * SHARED];
+        let (first, second) = weights.split_at_mut(SHARED);
+        first.copy_from_slice(&self.shared(a, view, of_a).1);
+        second.copy_from_slice(&self.shared(b, view, of_b).1);
+        second.iter_mut().for_each(|(_, weight)| *weight = -*weight);
+        let size = self.mean.len();
+        let row = |&(i, x): &(usize, f64)| {
+            let covariance = &self.covariance[i * size..][..size];
+            x * weights.iter().map(|&(j, y)| y * covariance[j]).sum::<f64>()
+        };
+        let shared: f64 = weights.iter().map(row).sum();
+        shared.max(0.0) + self.own_variance(a, view) + self.own_variance(b, view)
+    }
+
+    /// What is expected of an observation of an algorithm, which is then to be [taken in](Self::absorb).
+    pub(crate) fn expect(&mut self, algorithm: usize, view: &View, calls: f64) -> Expected {
+        let (ln, slopes) = self.shared(algorithm, view, calls);
+        let size = self.mean.len();
+        self.with.fill(0.0);
+        for (entry, weight) in slopes.into_iter().filter(|s| s.1 != 0.0) {
+            let row = &self.covariance[entry * size..][..size];
+            self.with.iter_mut().zip(row).for_each(|(w, c)| *w += weight * c);
+        }
+        let shared: f64 = slopes.iter().map(|&(k, weight)| weight * self.with[k]).sum();
+        let values = values(view.of(self.algorithms[algorithm].by_motion));
+        let own = &mut self.own[algorithm];
+        own.age(aged(self.frame - own.at));
+        own.at = self.frame;
+        for (w, row) in self.own_with.iter_mut().zip(&own.covariance) {
+            *w = row.iter().zip(&values).map(|(c, v)| c * v).sum();
+        }
+        Expected { ln: ln + dot(&own.mean, &values), shared: shared.max(0.0), own: dot(&self.own_with, &values).max(0.0) }
+    }
+
+    /// Covariance of an algorithm's cost with the observation that was [expected](Self::expect) last, of algorithm `observed`.
+    fn along(&self, observed: usize, slope: &Slope) -> f64 {
+        let shared: f64 = slope.shared.iter().map(|&(k, weight)| weight * self.with[k]).sum();
+        let own = if observed == slope.algorithm { dot(&self.own_with, &slope.own) } else { 0.0 };
+        shared + own
+    }
+
+    /// Takes in that the observation that was [expected](Self::expect) last was off by `error`, where errors have this variance.
+    pub(crate) fn absorb(&mut self, algorithm: usize, error: f64, variance: f64) {
+        let size = self.mean.len();
+        let gain = error / variance;
+        for (i, row) in self.covariance.chunks_exact_mut(size.max(1)).enumerate() {
+            let with = self.with[i];
+            if with != 0.0 {
+                self.mean[i] += with * gain;
+                let over = with / variance;
+                row.iter_mut().zip(&self.with).for_each(|(entry, other)| *entry -= over * other);
+            }
+        }
+        let own = &mut self.own[algorithm];
+        for (i, row) in own.covariance.iter_mut().enumerate() {
+            own.mean[i] += self.own_with[i] * gain;
+            let over = self.own_with[i] / variance;
+            row.iter_mut().zip(&self.own_with).for_each(|(entry, other)| *entry -= over * other);
+        }
+    }
+
+    /// Takes in that a frame took the algorithm `ratio` times what was predicted, of which calls are that share. `noise_ln` is the standard deviation of
+    /// its logarithm. Whether it could be taken in: a time that is no positive number tells nothing.
+    pub(crate) fn observe(&mut self, algorithm: usize, view: &View, ratio: f64, calls: f64, noise_ln: f64) -> bool {
+        let expected = self.expect(algorithm, view, calls);
+        let surprise = ratio.ln() - expected.ln;
+        let variance = expected.shared + expected.own + noise_ln * noise_ln;
+        if !(surprise.is_finite() && variance.is_finite() && variance > 0.0) {
+            return false;
+        }
+        let most = MOST_SURPRISE * variance.sqrt();
+        self.absorb(algorithm, surprise.clamp(-most, most), variance);
+        true
+    }
+
+    /// It is this frame now, and the machine may have changed since the one before.
+    pub(crate) fn pass(&mut self, frame: u64) {
+        let frames = frame.saturating_sub(self.frame) as f64;
+        self.frame = self.frame.max(frame);
+        if frames == 0.0 {
+            return;
+        }
+        let size = self.mean.len();
+        for (i, fading) in self.fading.iter_mut().enumerate() {
+            let stays = 1.0 / (1.0 + frames / self.lasts[i]);
+            self.mean[i] *= stays;
+            // The root, so that the matrix remains that of a real vector.
+            *fading = stays.sqrt();
+        }
+        for (i, row) in self.covariance.chunks_exact_mut(size.max(1)).enumerate() {
+            let own = self.fading[i];
+            row.iter_mut().zip(&self.fading).for_each(|(entry, other)| *entry *= own * other);
+            row[i] += (1.0 - own * own) * self.before[i];
+        }
+    }
+
+    /// What was observed of shared parts holds no longer.
+    pub(crate) fn doubt_shared(&mut self) {
+        self.covariance.fill(0.0);
+        for (k, &variance) in self.before.iter().enumerate() {
+            self.covariance[k * self.before.len() + k] = variance;
+        }
+    }
+
+    /// What was observed of an algorithm's own part holds no longer, and it may be off by this much.
+    pub(crate) fn doubt_own(&mut self, algorithm: usize, ln: f64) {
+        let own = &mut self.own[algorithm];
+        for (i, row) in own.covariance.iter_mut().enumerate() {
+            row.fill(0.0);
+            row[i] = own.before[i].max(ln * ln);
+        }
+    }
+
+    /// The costs as they are expected now, with the spread that is left in their own parts and the noise of an observation. What passes is left out where
+    /// only what lasts is asked for: the parts of widths and of what is kept.
+    pub(crate) fn costs(
+        &self,
+        costs: &[AlgorithmCost],
+        lasting: bool,
+        noise_ln: impl Fn(usize) -> f64,
+    ) -> Vec<AlgorithmCost> {
+        let corrected = |(k, cost): (usize, &AlgorithmCost)| {
+            let (parts, own) = (&self.algorithms[k], &self.own[k]);
+            let mut cost = cost.clone();
+            let mut constant = self.mean[parts.class] + self.mean[parts.method] + own.mean[0];
+            if !lasting {
+                constant += parts.kept.map_or(0.0, |k| self.mean[k]) + parts.width.map_or(0.0, |w| self.mean[w]);
+                if let Some(width) = parts.width {
+                    cost.curve.scale_calls(self.mean[width + 1].exp());
+                }
+            }
+            let of_basis = std::array::from_fn(|i| self.mean[parts.method + 1 + i] + own.mean[1 + i]);
+            let weights = self.basis.weights(&of_basis, parts.by_motion)[..self.basis.count].to_vec();
+            let now = Residual::new(Arc::clone(&self.basis.places), weights, parts.by_motion).with_constant(constant);
+            cost.curve.observed = Some(match cost.curve.observed.take() {
+                Some(before) => before.plus(&now),
+                None => now,
+            });
+            let variance = own.covariance.iter().enumerate().map(|(i, row)| row[i]).sum::<f64>() / SIZE as f64;
+            cost.spread_ln = (variance + noise_ln(k).powi(2)).sqrt();
+            cost
+        };
+        costs.iter().enumerate().map(corrected).collect()
+    }
+}
+
+/// The values of an own part's entries.
+fn values(curve: &[f64; CURVE]) -> [f64; SIZE] {
+    let mut values = [1.0; SIZE];
+    values[1..].copy_from_slice(curve);
+    values
+}
+
+fn dot(a: &[f64; SIZE], b: &[f64; SIZE]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests;

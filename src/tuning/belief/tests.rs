@@ -1,0 +1,120 @@
+use super::*;
+use crate::{AlgorithmId, CostCurve, CostTerm, Helpers, Load, Term};
+
+fn cost(id: &str, unit_ns: f64) -> AlgorithmCost {
+    let id: AlgorithmId = id.parse().unwrap();
+    let mut curve = CostCurve::new(vec![CostTerm::new(Term::Objects, unit_ns)]);
+    if id.threads() > 1 {
+        curve = curve.with_helpers(Helpers::new(id.threads()).with_call(2000.0, 1000.0));
+    }
+    AlgorithmCost::new(id, 1, curve, 0.1)
+}
+
+fn costs() -> Vec<AlgorithmCost> {
+    [("sap@cpu1", 10.0), ("sap@cpu2", 10.0), ("brute@cpu1", 20.0), ("brute@cpu2", 20.0), ("sap@gpu0", 5.0)]
+        .map(|(id, unit)| cost(id, unit))
+        .into()
+}
+
+fn load(objects: u32) -> Load {
+    let n = f64::from(objects);
+    Load::of_objects(objects).with_pairs(0.5 * n).with_candidates(n.powf(1.5), 4.0 * n)
+}
+
+/// By how much each cost is expected to differ from its prediction.
+fn deviations(observed: &Observed, load: &Load) -> Vec<f64> {
+    let of = |k: usize| observed.expected_ln(k, load).0 - observed.predicted()[k].curve.cost_ns(load).ln();
+    (0..observed.predicted().len()).map(of).collect()
+}
+
+#[test]
+fn an_observation_moves_relatives_the_more_the_nearer_they_are() {
+    let mut observed = Observed::new(costs());
+    let here = load(1000);
+    let ns = observed.predicted()[0].curve.cost_ns(&here);
+    assert!(observed.observe(0, &here, 1.5 * ns, 0.05));
+    let moved = deviations(&observed, &here);
+    // Itself, its method on two threads, another method, another processor.
+    assert!(moved[0] > moved[1] && moved[1] > moved[2] && moved[2] > 0.05 && moved[4] == 0.0, "{moved:?}");
+    assert!((0.3..0.42).contains(&moved[0]), "{moved:?}");
+    // Far away on its own part only the constants are left.
+    let far = deviations(&observed, &load(1_000_000));
+    assert!(far[0] < 0.9 * moved[0] && far[0] > 0.2, "{far:?} {moved:?}");
+}
+
+#[test]
+fn many_observations_are_believed_and_doubt_falls() {
+    let mut observed = Observed::new(costs());
+    let here = load(5000);
+    let ns = observed.predicted()[1].curve.cost_ns(&here);
+    let doubt = |observed: &mut Observed| {
+        let (_, slope) = observed.expected_ln(1, &here);
+        observed.prepare(&slope)
+    };
+    let before = doubt(&mut observed);
+    for _ in 0..40 {
+        assert!(observed.observe(1, &here, 0.7 * ns, 0.1));
+    }
+    assert!((deviations(&observed, &here)[1] - 0.7_f64.ln()).abs() < 0.03);
+    assert!(doubt(&mut observed) < 0.1 * before && doubt(&mut observed) >= 0.0);
+}
+
+#[test]
+fn the_costs_are_those_that_are_expected() {
+    let mut observed = Observed::of_unlike_machine(costs());
+    for (k, objects, factor) in [(0, 300, 1.2), (1, 40_000, 2.0), (3, 2000, 0.6), (4, 100_000, 3.0), (2, 50, 0.9)] {
+        let ns = observed.predicted()[k].curve.cost_ns(&load(objects));
+        assert!(observed.observe(k, &load(objects), factor * ns, 0.05));
+    }
+    let after = observed.costs();
+    for objects in [20, 900, 30_000, 700_000] {
+        for (k, cost) in after.iter().enumerate() {
+            let ratio = cost.curve.cost_ns(&load(objects)).ln() - observed.expected_ln(k, &load(objects)).0;
+            assert!(ratio.abs() < 1e-9, "{} at {objects}: {ratio}", cost.algorithm);
+            assert_eq!(cost.curve.defect(), None);
+        }
+    }
+}
+
+#[test]
+fn a_time_that_waited_for_a_core_is_not_believed_as_it_stands() {
+    let mut observed = Observed::new(costs());
+    let here = load(1000);
+    let ns = observed.predicted()[0].curve.cost_ns(&here);
+    assert!(observed.observe(0, &here, 1000.0 * ns, 0.1));
+    assert!(deviations(&observed, &here)[0] < 1.3);
+}
+
+#[test]
+fn what_is_no_time_tells_nothing() {
+    let mut observed = Observed::new(costs());
+    let before = deviations(&observed, &load(1000));
+    for (k, ns, noise) in
+        [(0, f64::NAN, 0.1), (0, 0.0, 0.1), (0, -1.0, 0.1), (0, f64::INFINITY, 0.1), (9, 1.0, 0.1), (0, 1.0, f64::NAN)]
+    {
+        assert!(!observed.observe(k, &load(1000), ns, noise), "{k} {ns} {noise}");
+    }
+    assert_eq!(deviations(&observed, &load(1000)), before);
+}
+
+#[test]
+fn what_was_observed_of_a_machine_that_may_have_changed_is_forgotten_in_time() {
+    let list = costs();
+    let mut belief = Belief::new(&list, &[None; 5], Deviations::UNLIKE);
+    let here = load(1000);
+    let view = belief.view(&Frame::new(&here));
+    let doubt = |belief: &mut Belief| {
+        let expected = belief.expect(1, &view, 0.2);
+        expected.shared + expected.own
+    };
+    let before = doubt(&mut belief);
+    for frame in 0..50 {
+        belief.pass(frame);
+        assert!(belief.observe(1, &view, 1.4, 0.2, 0.05));
+    }
+    let (known, ln) = (doubt(&mut belief), belief.deviation_ln(1, &view, 0.2));
+    belief.pass(1_000_000);
+    let (later, ln_later) = (doubt(&mut belief), belief.deviation_ln(1, &view, 0.2));
+    assert!(known < 0.2 * before && later > 0.9 * before && later <= before * 1.001, "{before} {known} {later}");
+    assert!((ln - 1.4_f64.ln()).abs() < 0.02 && ln_later.abs() < ln, "{ln} {ln_later}");
+}
