@@ -48,14 +48,13 @@ impl Helpers {
     #[must_use]
     pub fn cost_ns(&self, objects: u32, work_ns: f64) -> f64 {
         let Some(share) = self.share(objects) else { return work_ns };
-        let speed_up = 1.0 + share * (self.speed_up - 1.0);
-        share * self.call_ns + work_ns.min((work_ns + self.late_ns) / speed_up)
+        share * self.call_ns + work_ns.min((work_ns + self.late_ns) / self.speed_up_of(share))
     }
 
     /// What of that is spent on calling them and on waiting for them.
     pub(crate) fn calls_ns(&self, objects: u32, work_ns: f64) -> f64 {
         let Some(share) = self.share(objects) else { return 0.0 };
-        let speed_up = 1.0 + share * (self.speed_up - 1.0);
+        let speed_up = self.speed_up_of(share);
         let late = (work_ns + self.late_ns) / speed_up < work_ns;
         share * self.call_ns + if late { self.late_ns / speed_up } else { 0.0 }
     }
@@ -67,6 +66,11 @@ impl Helpers {
         }
         let called = (objects / self.boxes_per_thread).min(self.threads).max(1) - 1;
         (called > 0).then(|| f64::from(called) / f64::from(self.threads - 1))
+    }
+
+    /// How many times as fast as one they work where that share of them is called.
+    fn speed_up_of(&self, share: f64) -> f64 {
+        1.0 + share * (self.speed_up - 1.0)
     }
 
     /// Whether its figures can be.

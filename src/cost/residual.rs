@@ -53,7 +53,7 @@ pub(crate) struct Likeness {
 }
 
 impl Places {
-    /// Places that a residual may have. More make no choice better, and each costs every decision two nanoseconds.
+    /// Places that a residual may have. 96 made no choice better on machines held out, and each of them costs time in every decision.
     pub const MOST: usize = 64;
 
     /// These loads, of which no more than [`Places::MOST`] are taken.

@@ -35,8 +35,6 @@ pub(super) struct Material<'a> {
     designs: &'a Designs<'a>,
     table: Table,
     pub(super) regrets: Vec<RegretTable>,
-    /// The same by the means over frames.
-    pub(super) by_means: Vec<RegretTable>,
     /// Which of two algorithms is cheaper where, of each profile; nothing of those that are not looked at.
     outcomes: Vec<Vec<RoleOutcome>>,
     /// What machines are compared by, of each profile.
@@ -84,7 +82,6 @@ impl<'a> Material<'a> {
             designs,
             table: Table::new(profiles),
             regrets: profiles.par_iter().map(RegretTable::new).collect(),
-            by_means: profiles.par_iter().map(RegretTable::by_means).collect(),
             outcomes: profiles.par_iter().enumerate().map(outcomes).collect(),
             likeness: profiles.iter().map(|p| Likeness::new(&p.hardware)).collect(),
             costs: profiles.iter().map(|_| OnceLock::new()).collect(),

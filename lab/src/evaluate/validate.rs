@@ -6,7 +6,7 @@ use super::crossovers::MeasuredCrossovers;
 use super::floor::floor;
 use super::held_out::{HeldOut, HeldOutCrossover, Time};
 use super::partition::Partition;
-use super::regret_table::Regret;
+use super::regret_table::{Regret, RegretTable};
 use super::sampled::{self, Predicted};
 use super::scores::{self, Judged};
 use crate::data::{Profile, machines};
@@ -161,9 +161,10 @@ fn held_out(data: &Material<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Resul
             let crossover = |compared| HeldOutCrossover { file: profile.file.clone(), compared };
             found.crossovers.extend(measured.predicted(costs).into_iter().map(crossover));
         }
+        let means = RegretTable::by_means(profile);
         let regret = |contestant: Contestant<'_>| {
             let regret = data.regrets[held].regret(profile, &contestant.choose);
-            let by_means = Some(data.by_means[held].regret(profile, &contestant.choose));
+            let by_means = Some(means.regret(profile, &contestant.choose));
             let crossings = contestant.costs.map(|costs| measured.errors(costs));
             Judged { by_means, ..Judged::new(contestant.name, profile, regret, crossings) }
         };

@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// Standard deviation of a residual, and of a timing around it, as natural logarithms. Neither half nor twice of them changes a regret by more than two
 /// fits to the same reports differ.
 const DEVIATION_LN: f64 = 0.2;
-pub(crate) const NOISE_LN: f64 = 0.08;
+const NOISE_LN: f64 = 0.08;
 /// A timing that lies this many times behind the best counts no less than one that lies further behind: nobody chooses the algorithm there.
 const MOST_BEHIND: f64 = 4.0;
 /// A variance of its own that each place has, as a share: it keeps the weights of places that lie near each other from growing against each other.
@@ -36,6 +36,11 @@ pub(crate) struct Remainder {
     pub(crate) behind: f64,
     /// Whether other programs were at work.
     pub(crate) contended: bool,
+}
+
+/// Standard deviation of the logarithm of a timing that lies so many times behind the best of its point, around what its load tells.
+pub(crate) fn noise_ln(behind: f64) -> f64 {
+    NOISE_LN * behind.min(MOST_BEHIND)
 }
 
 /// The places that tell most about the loads of the profiles that are chosen, each next one where those before tell least: a pivoted Cholesky
@@ -89,7 +94,7 @@ pub(crate) fn weights(places: &Places, remainders: &[Remainder], by_motion: bool
         row.into_iter().zip(places.likeness(&r.load, by_motion)).for_each(|(to, k)| *to = k);
     }
     let precision = Array1::from_iter(rows.iter().map(|r| {
-        let noise = NOISE_LN * r.behind.min(MOST_BEHIND) * if r.contended { 2.0 } else { 1.0 };
+        let noise = noise_ln(r.behind) * if r.contended { 2.0 } else { 1.0 };
         noise.powi(-2)
     }));
     let targets = Array1::from_iter(rows.iter().map(|r| r.ln.clamp(-reach, reach)));

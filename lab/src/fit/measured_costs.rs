@@ -2,7 +2,7 @@
 
 use crate::data::Profile;
 use crate::fit::designs::{Designs, TrainingSet};
-use crate::fit::load_residual::NOISE_LN;
+use crate::fit::load_residual::noise_ln;
 use crate::fit::model::model;
 use crate::fit::rows::{Row, rows};
 use crate::paired::{PairedComparison, PairedSamples};
@@ -14,8 +14,6 @@ use sapwise_scenes::Random;
 
 /// Points that a cost needs.
 const FEWEST_POINTS: usize = 3;
-/// A timing that lies this many times behind the best counts no less than one that lies further behind: nobody chooses the algorithm there.
-const MOST_BEHIND: f64 = 4.0;
 
 /// The tuning of the machine that `report` was measured on, with `steps` and `crossovers` for `scenario`.
 ///
@@ -142,7 +140,7 @@ fn observed(costs: Vec<AlgorithmCost>, profile: &Profile, all: &[Row]) -> Vec<Al
     // At random: those of one scenario in a row would look like a machine that changes.
     for k in Random::named(1, &["observations"]).shuffled(rows.len()) {
         let (algorithm, row) = rows[k];
-        observed.observe(algorithm, &row.load, row.ns, NOISE_LN * row.behind.min(MOST_BEHIND));
+        observed.observe(algorithm, &row.load, row.ns, noise_ln(row.behind));
     }
     observed.costs()
 }
