@@ -71,7 +71,8 @@ hardware parameters, and a choice by the number of objects alone. Notes say how 
 machines with that crossing than parameters to regress it on. `frozen constants (64)` and `(1000)` switch from brute force at the number of
 objects that engines have written down (64 colliders in nexus, 1000 bodies in mujoco_warp), `default machine` at the measured thresholds of
 the first report in the training, whatever the machine; `nearest machine` takes the measured costs of the machine of the training with the most
-similar parameters. `full sweep` has measured the held-out machine itself, and is judged by those same timings.
+similar parameters. `full sweep` has measured the held-out machine itself, and is judged by those same timings; of an unseen scenario it has measured
+all the others on that machine, so that what it still loses there is what a load does not tell of a scene.
 ";
 
 /// The model card as a page of Markdown, with the notes of the training.

@@ -49,7 +49,7 @@ pub struct TrainingCount {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Validation {
-    /// What was held out in turn: `physical machine`, or `one of 24 groups of physical machines`; where there is one physical machine
+    /// What was held out in turn: `physical machine`, or `one of 10 groups of physical machines`; where there is one physical machine
     /// only `SIMD level and thread count`, or `profile`. The last two say little about machines never seen.
     pub held_out: String,
     /// Physical machines in the data.

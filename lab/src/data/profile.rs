@@ -100,9 +100,14 @@ impl Profile {
         self.algorithms.iter().zip(timed).filter(|(_, timed)| *timed).map(|(t, _)| t.id.clone()).collect()
     }
 
+    /// The scenario of each point.
+    pub fn scenarios(&self) -> impl Iterator<Item = &str> + Clone {
+        self.points.iter().map(|p| p.scenario.as_str())
+    }
+
     /// `uniform` where it has that scenario, else its first one.
     pub fn usual_scenario(&self) -> &str {
-        usual(self.points.iter().map(|p| p.scenario.as_str()))
+        usual(self.scenarios())
     }
 
     /// The loads of a scenario, ascending by objects, each size once.

@@ -19,12 +19,13 @@ pub(super) const SAMPLED: &str = "ours + 8 samples";
 const PHYSICS: &str = "physics";
 const FOREST: &str = "random forest";
 const NEAREST: &str = "nearest machine";
+const FULL_SWEEP: &str = "full sweep";
 
 /// Profiles of a training that the best single algorithm and the direct regression look at: a mean and a handful of slopes need no
 /// more, and both go through all of them for each held-out profile.
 const MOST_SEEN: usize = 100;
 /// Profiles that the direct regression looks for crossovers in, about.
-const MOST_CROSSED: usize = 600;
+const MOST_CROSSED: usize = 200;
 
 /// The measured costs of profiles without a scenario of theirs.
 type Partial = BTreeMap<(usize, String), Arc<Vec<AlgorithmCost>>>;
@@ -34,7 +35,8 @@ pub(super) struct Material<'a> {
     pub(super) profiles: &'a [Profile],
     designs: &'a Designs<'a>,
     table: Table,
-    pub(super) regrets: Vec<RegretTable>,
+    /// The regret table of each profile, once it is asked for.
+    regrets: Vec<OnceLock<RegretTable>>,
     /// Which of two algorithms is cheaper where, of each profile; nothing of those that are not looked at.
     outcomes: Vec<Vec<RoleOutcome>>,
     /// What machines are compared by, of each profile.
@@ -81,7 +83,7 @@ impl<'a> Material<'a> {
             profiles,
             designs,
             table: Table::new(profiles),
-            regrets: profiles.par_iter().map(RegretTable::new).collect(),
+            regrets: profiles.iter().map(|_| OnceLock::new()).collect(),
             outcomes: profiles.par_iter().enumerate().map(outcomes).collect(),
             likeness: profiles.iter().map(|p| Likeness::new(&p.hardware)).collect(),
             costs: profiles.iter().map(|_| OnceLock::new()).collect(),
@@ -112,7 +114,7 @@ impl<'a> Material<'a> {
         };
         let known: Vec<usize> = (0..self.profiles.len()).filter(|&k| chosen[k] && self.profiles[k].has_cpu()).collect();
         let seen = known.iter().step_by(known.len().div_ceil(MOST_SEEN).max(1));
-        let mean = |k: usize| self.regrets[k].always(without).iter().map(|always| always.mean).collect();
+        let mean = |k: usize| self.regret_table(k).always(without).iter().map(|always| always.mean).collect();
         let crossed = known.iter().map(|&k| (&self.profiles[k], &self.outcomes[k][..]));
         let crossed: Vec<_> = crossed.filter(|(_, outcomes)| !outcomes.is_empty()).collect();
         let step = crossed.len().div_ceil(MOST_SEEN).max(1);
@@ -127,6 +129,11 @@ impl<'a> Material<'a> {
             known,
             notes,
         })
+    }
+
+    /// What each choice costs on a profile.
+    pub(super) fn regret_table(&self, k: usize) -> &RegretTable {
+        self.regrets[k].get_or_init(|| RegretTable::new(&self.profiles[k]))
     }
 
     /// The measured costs of a profile.
@@ -210,7 +217,7 @@ impl Fitted<'_> {
             alone("frozen constants (1000)", baselines::frozen(999, "sap", available)),
             alone("default machine", default_machine),
             // Its costs are those that crossovers are measured by.
-            Contestant { costs: None, ..by("full sweep", Some(data.costs(held)), available) },
+            Contestant { costs: None, ..by(FULL_SWEEP, Some(data.costs(held)), available) },
         ]);
         Ok(all)
     }
@@ -224,10 +231,14 @@ impl Fitted<'_> {
         available: &'b [AlgorithmId],
     ) -> Vec<Contestant<'b>> {
         let mut all = Vec::from(self.ours(&data.profiles[held], ours, available));
-        let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).zip(self.without);
-        let costs = nearest.map(|(k, without)| data.costs_without(self.known[k], without));
-        let choose = costs.map_or_else(nothing, |costs| by_costs(costs.to_vec(), available));
-        all.push(alone(NEAREST, choose));
+        let measured = |k: Option<usize>| match k.zip(self.without) {
+            Some((k, without)) => by_costs(data.costs_without(k, without).to_vec(), available),
+            None => nothing(),
+        };
+        let nearest = baselines::nearest(&self.likeness, &data.likeness[held]).map(|k| self.known[k]);
+        all.push(alone(NEAREST, measured(nearest)));
+        // Its own machine is not held out from it, only the scenario.
+        all.push(alone(FULL_SWEEP, measured(Some(held))));
         all
     }
 }

@@ -15,7 +15,7 @@ const FEWEST_POINTS: usize = 100;
 /// Of all profiles that repeat each other. `None` where none does.
 pub(super) fn floor<'a>(
     profiles: &[Profile],
-    tables: &[RegretTable],
+    table: impl Fn(usize) -> &'a RegretTable + Sync,
     costs: impl Fn(usize) -> &'a [AlgorithmCost] + Sync,
 ) -> Option<Floor> {
     let mut alike: BTreeMap<(&str, &str, String), Vec<usize>> = BTreeMap::new();
@@ -28,8 +28,8 @@ pub(super) fn floor<'a>(
         alike.values().flat_map(|all| all.windows(2).flat_map(|w| [(w[0], w[1]), (w[1], w[0])])).collect();
     let judged = |&(from, on): &(usize, usize)| -> (Regret, Regret) {
         let available = profiles[on].available();
-        let cells = tables[on].by_cells_of(&profiles[on], &tables[from], &profiles[from]);
-        (cells, tables[on].regret(&profiles[on], &by_costs(costs(from).to_vec(), &available)))
+        let cells = table(on).by_cells_of(&profiles[on], table(from), &profiles[from]);
+        (cells, table(on).regret(&profiles[on], &by_costs(costs(from).to_vec(), &available)))
     };
     let regrets: Vec<(Regret, Regret)> = pairs.par_iter().map(judged).collect();
     let part = |k: usize, of: fn(&(Regret, Regret)) -> &Regret| {

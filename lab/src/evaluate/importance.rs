@@ -83,7 +83,7 @@ pub fn importance(profiles: &[Profile], progress: &dyn Progress) -> Result<Impor
     let all = machines(profiles);
     let kept: Vec<&str> = all.iter().step_by(all.len().div_ceil(MOST_MACHINES).max(1)).copied().collect();
     let some: Vec<Profile> = profiles.iter().filter(|p| kept.contains(&p.machine())).cloned().collect();
-    let partition = Partition::of_machines(&some, MOST_FOLDS).filter(|_| kept.len() >= FEWEST_MACHINES);
+    let partition = Partition::of_machines(&some, MOST_FOLDS, MOST_FOLDS).filter(|_| kept.len() >= FEWEST_MACHINES);
     let Some(Partition { folds, .. }) = partition else {
         let notes = vec![format!(
             "nothing is told: there are {} physical machines, and it takes {FEWEST_MACHINES}; add reports of other machines",

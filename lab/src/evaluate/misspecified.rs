@@ -82,7 +82,7 @@ struct Loss {
 
 /// Withholds one term after the other, in the order of [`WITHHELD`], and prints a table.
 fn losses(profiles: &[Profile], folds: usize) -> Vec<Loss> {
-    let partition = Partition::of_machines(profiles, folds).unwrap();
+    let partition = Partition::of_machines(profiles, folds, folds).unwrap();
     let whole = mean_regrets(profiles, &partition, &components);
     let without = |&(withheld, is): &Withheld| {
         let left = move |method: &str, class| {

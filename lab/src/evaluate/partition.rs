@@ -4,8 +4,10 @@ use crate::data::Profile;
 use sapwise::hardware::ParameterId;
 use std::collections::BTreeMap;
 
-/// Machines that are held out one by one; of more, as many groups are made of them. Each costs a fit of everything.
-const MOST_FOLDS: usize = 24;
+/// Machines that are held out one by one; of more, groups are made of them, as many as is usual in cross-validation. Each fold costs a fit of
+/// everything.
+const MOST_ALONE: usize = 24;
+const GROUPS: usize = 10;
 
 /// The profiles of each fold: they are judged by what was fitted to all others.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -22,22 +24,26 @@ impl Partition {
     /// Each physical machine with all its profiles; of one machine alone each of its SIMD levels and each of its thread counts; of one
     /// without such restrictions each profile.
     pub fn new(profiles: &[Profile]) -> Self {
-        Self::of_machines(profiles, MOST_FOLDS).unwrap_or_else(|| Self::of_restrictions(profiles))
+        Self::of_machines(profiles, MOST_ALONE, GROUPS).unwrap_or_else(|| Self::of_restrictions(profiles))
     }
 
-    /// At most `most` folds of whole machines; `None` with fewer than two machines.
-    pub fn of_machines(profiles: &[Profile], most: usize) -> Option<Self> {
+    /// Up to `most_alone` machines one by one, else `groups` of them; `None` with fewer than two machines.
+    pub fn of_machines(profiles: &[Profile], most_alone: usize, groups: usize) -> Option<Self> {
         let machines = grouped(profiles, |p| p.machine().to_owned());
         let count = machines.len();
         if count < 2 {
             return None;
         }
-        let mut folds = vec![Vec::new(); count.min(most)];
+        let (folds, held_out) = if count > most_alone {
+            (groups, format!("one of {groups} groups of physical machines"))
+        } else {
+            (count, "physical machine".to_owned())
+        };
+        let mut folds = vec![Vec::new(); folds];
+        let places = folds.len();
         for (k, machine) in machines.into_iter().enumerate() {
-            folds[k % most].extend(machine);
+            folds[k % places].extend(machine);
         }
-        let held_out =
-            if count > most { format!("one of {most} groups of physical machines") } else { "physical machine".to_owned() };
         Some(Self { held_out, by_machine: true, folds })
     }
 
@@ -81,7 +87,7 @@ mod tests {
         let partition = Partition::new(&profiles(&machines));
         assert_eq!(partition.folds, [vec![0, 1], vec![2], vec![3], vec![4], vec![5], vec![6]]);
         assert!(partition.by_machine && partition.held_out == "physical machine");
-        let dealt = Partition::of_machines(&profiles(&machines), 4).unwrap();
+        let dealt = Partition::of_machines(&profiles(&machines), 4, 4).unwrap();
         assert_eq!(dealt.folds, [vec![0, 1, 5], vec![2, 6], vec![3], vec![4]]);
         assert!(dealt.held_out.contains("4 groups"));
     }

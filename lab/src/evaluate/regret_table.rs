@@ -154,13 +154,6 @@ impl RegretTable {
         let (regrets, weights) = cells.unzip();
         Regret::of(regrets, weights)
     }
-
-    /// The scenarios of its cells, each once.
-    pub fn scenarios(&self) -> Vec<&str> {
-        let mut all: Vec<&str> = self.cells.iter().map(|c| c.scenario.as_str()).collect();
-        all.dedup();
-        all
-    }
 }
 
 fn summed<'a>(cells: impl Iterator<Item = &'a Cell>, of: impl Fn(&Cell) -> f64) -> Regret {

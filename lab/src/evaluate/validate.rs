@@ -18,13 +18,13 @@ use anyhow::Result;
 use rayon::prelude::*;
 use sapwise::Observed;
 use sapwise::stats::mean;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Profiles that are judged, of all folds together, about: scores of a hundred machines change little with thousands more.
 const MOST_JUDGED: usize = 120;
 /// Held-out profiles on which samples are taken, at most.
 const MOST_SAMPLED: usize = 64;
-/// Fits without a fold and without a scenario, at most: of many machines some are held out in all scenarios.
+/// Fits without a fold and without a scenario, at most: of many machines each is held out in some scenarios.
 const MOST_UNSEEN: usize = 80;
 /// And of so many profiles fewer, since each fit takes longer.
 const MANY_PROFILES: usize = 500;
@@ -103,7 +103,7 @@ pub fn validate(
         let sampled = sampled(&data, predicted)?;
         all.extend(sampled.judged);
         notes.extend(sampled.told);
-        chance = floor(profiles, &data.regrets, |k| data.costs(k));
+        chance = floor(profiles, |k| data.regret_table(k), |k| data.costs(k));
         covered = coverage(&errors).filter(|_| partition.by_machine);
     }
     let mut cpu_models: Vec<&str> = profiles.iter().map(Profile::cpu_model).collect();
@@ -163,7 +163,7 @@ fn held_out(data: &Material<'_>, fitted: &Fitted<'_>, judged: &[usize]) -> Resul
         }
         let means = RegretTable::by_means(profile);
         let regret = |contestant: Contestant<'_>| {
-            let regret = data.regrets[held].regret(profile, &contestant.choose);
+            let regret = data.regret_table(held).regret(profile, &contestant.choose);
             let by_means = Some(means.regret(profile, &contestant.choose));
             let crossings = contestant.costs.map(|costs| measured.errors(costs));
             Judged { by_means, ..Judged::new(contestant.name, profile, regret, crossings) }
@@ -184,20 +184,18 @@ fn unseen(
     judged: &(dyn Fn(&Vec<usize>) -> Vec<usize> + Sync),
     progress: &dyn Progress,
 ) -> Result<BTreeMap<(String, &'static str), Regret>> {
-    let mut scenarios: Vec<&str> = data.regrets.iter().flat_map(|r| r.scenarios()).collect();
-    scenarios.sort_unstable();
-    scenarios.dedup();
+    let scenarios: BTreeSet<&str> = data.profiles.iter().flat_map(Profile::scenarios).collect();
     if scenarios.len() < 2 {
         return Ok(BTreeMap::new());
     }
     let most = if data.profiles.len() > MANY_PROFILES { FEW_UNSEEN } else { MOST_UNSEEN };
-    let step = partition.folds.len().div_ceil((most / scenarios.len()).max(1));
-    let fits: Vec<(&Vec<usize>, &str)> =
-        partition.folds.iter().step_by(step).flat_map(|fold| scenarios.iter().map(move |s| (fold, *s))).collect();
+    let fits = partition.folds.iter().flat_map(|fold| scenarios.iter().map(move |s| (fold, *s)));
+    let step = (partition.folds.len() * scenarios.len()).div_ceil(most);
+    let fits: Vec<(&Vec<usize>, &str)> = fits.step_by(step).collect();
     let one = |&(fold, scenario): &(&Vec<usize>, &str)| -> Result<Vec<((String, &'static str), Regret)>> {
         progress.check()?;
         let held: Vec<usize> =
-            judged(fold).into_iter().filter(|&k| data.regrets[k].scenarios().contains(&scenario)).collect();
+            judged(fold).into_iter().filter(|&k| data.profiles[k].scenarios().any(|s| s == scenario)).collect();
         if held.is_empty() {
             return Ok(Vec::new());
         }
@@ -208,7 +206,7 @@ fn unseen(
             let ours = fitted.predict(profile, &mut Vec::new());
             let available = profile.available();
             for c in fitted.asked_of_unseen(data, k, ours.as_ref(), &available) {
-                let regret = data.regrets[k].regret_in(Some(scenario), profile, &c.choose);
+                let regret = data.regret_table(k).regret_in(Some(scenario), profile, &c.choose);
                 regrets.push(((profile.file.clone(), c.name), regret));
             }
         }
@@ -235,7 +233,7 @@ fn sampled(data: &Material<'_>, predicted: Vec<Predicted>) -> Result<OfSamples> 
         // Where no sample can be taken the prediction stays.
         let costs = corrected.as_deref().unwrap_or(&predicted[k].costs);
         let [with, without] = [costs, &predicted[k].costs].map(|costs| by(SAMPLED, Some(costs), &available));
-        let regret = |c: &Contestant<'_>| data.regrets[held].regret(profile, &c.choose);
+        let regret = |c: &Contestant<'_>| data.regret_table(held).regret(profile, &c.choose);
         let crossings = MeasuredCrossovers::new(profile, data.costs(held)).errors(costs);
         let (without, with) = (regret(&without).mean, regret(&with));
         Ok((without, with.mean, Judged::new(SAMPLED, profile, with, Some(crossings))))

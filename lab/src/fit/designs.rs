@@ -11,6 +11,7 @@ use crate::fit::weights::weights;
 use crate::report::Label;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
+use rayon::prelude::*;
 use sapwise::hardware::ParameterId;
 use sapwise::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures};
 use sapwise::stats::robust_deviation;
@@ -100,20 +101,28 @@ impl<'a> Designs<'a> {
 
     /// The same with other terms in place of the usual ones, which tells what a term is worth.
     pub fn with(profiles: &'a [Profile], components: &ComponentsOf) -> Self {
+        // Of so many that not each can add the fewest rows, some add them, spread over all.
+        let step = (profiles.len() * FEWEST_OF_PROFILE).div_ceil(MOST_ROWS).max(1);
         let most = (MOST_ROWS / profiles.len().max(1)).max(FEWEST_OF_PROFILE);
-        let mut by_method: BTreeMap<(BackendClass, String), [Vec<Row>; 2]> = BTreeMap::new();
-        for (k, profile) in profiles.iter().enumerate() {
-            let mut own: BTreeMap<(BackendClass, &str), [Vec<Row>; 2]> = BTreeMap::new();
+        let of_profile = |(k, profile): (usize, &Profile)| -> BTreeMap<(BackendClass, String), [Vec<Row>; 2]> {
+            let mut own: BTreeMap<(BackendClass, String), [Vec<Row>; 2]> = BTreeMap::new();
             for row in rows(profile, k) {
                 let id = profile.id(row.algorithm);
                 let (class, several) = (id.backend().class(), id.backend().width() > 1);
                 let place = usize::from(several && class == BackendClass::Cpu);
-                own.entry((class, id.method())).or_default()[place].push(row);
+                own.entry((class, id.method().to_owned())).or_default()[place].push(row);
             }
-            for ((class, method), [alone, called]) in own {
-                let all = by_method.entry((class, method.to_owned())).or_default();
-                all[0].extend(thinned(alone, most, k));
-                all[1].extend(thinned(called, most, k));
+            let thin = |(method, [alone, called]): ((BackendClass, String), [Vec<Row>; 2])| {
+                (method, [thinned(alone, most, k), thinned(called, most, k)])
+            };
+            own.into_iter().map(thin).collect()
+        };
+        let mut by_method: BTreeMap<(BackendClass, String), [Vec<Row>; 2]> = BTreeMap::new();
+        for own in profiles.par_iter().enumerate().step_by(step).map(of_profile).collect::<Vec<_>>() {
+            for (method, [alone, called]) in own {
+                let all = by_method.entry(method).or_default();
+                all[0].extend(alone);
+                all[1].extend(called);
             }
         }
         let mut notes = Vec::new();

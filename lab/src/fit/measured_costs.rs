@@ -57,7 +57,7 @@ pub fn slice_tuning(costs: Vec<AlgorithmCost>, scenario: &str, loads: &[Load]) -
 pub fn measured_slice(profile: &Profile, scenario: &str) -> Result<Vec<Load>> {
     let loads = profile.slice(scenario);
     if loads.len() < 2 {
-        let mut known: Vec<&str> = profile.points.iter().map(|p| p.scenario.as_str()).collect();
+        let mut known: Vec<&str> = profile.scenarios().collect();
         known.sort_unstable();
         known.dedup();
         let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
