@@ -49,7 +49,7 @@ assumption, not a count: log-normal around 800 objects, two thirds of the frames
 - **unseen scenario**: the machine was held out, and the scenario too. A user's scene is none of ours, so that this is the figure that counts.
 - **seen scenario**: the machine was held out alone. **least to largest**: of the machine that was served best and of the one that was served worst; of
   the held-out reports where all are of one machine.
-- **one thread**, **several**: the same on reports in which no algorithm ran on several threads, and on the others.
+- **one thread**, **several**: the same two figures on reports in which no algorithm ran on several threads, and on the others.
 - **by means**: all reports, judged by the mean over the frames of a timing in place of their median. It holds the frames in which an incremental algorithm makes
   again what it keeps, and those that another program interrupted.
 - **crossovers off by**: octaves between the measured crossover of two algorithms in the scenario `uniform` and where their predicted costs
@@ -184,12 +184,12 @@ pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) 
     let head = [
         "strategy",
         "unseen scenario",
-        "one thread",
-        "several",
+        "unseen, one thread",
+        "unseen, several",
         "seen scenario",
         "least to largest",
-        "one thread",
-        "several",
+        "seen, one thread",
+        "seen, several",
         "by means",
         "crossovers off by",
         "over 10 %",

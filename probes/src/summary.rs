@@ -12,6 +12,9 @@ use sapwise_lab::text::{columns, count, duration, grouped};
 use sapwise_lab::units::value;
 use std::path::Path;
 
+/// The least and the most objects of the slice of a prediction.
+const ENDS: [f64; 2] = [10.0, 1e6];
+
 /// The hardware, then the tuning of every scenario that was swept.
 pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
     let mut text = hardware(&report.hardware, terminal);
@@ -118,6 +121,9 @@ pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
         let crossover =
             tuning.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
         let interval = crossover.and_then(Crossover::interval).map_or(String::new(), |(low, high)| {
+            if low <= ENDS[0] && high >= ENDS[1] {
+                return "anywhere: both cost about the same".to_owned();
+            }
             format!("{} to {}", grouped(low.round() as u64), grouped(high.round() as u64))
         });
         let from = format!("  from {}", grouped(u64::from(step.from_objects)));

@@ -41,6 +41,7 @@ impl Schema {
     pub fn of(text: &str) -> Result<Self, Error> {
         /// Only this key; the rest is skipped without being built, so hostile nesting costs nothing.
         #[derive(serde::Deserialize)]
+        #[serde(expecting = "an object with the key `schema`")]
         struct Tag {
             schema: String,
         }

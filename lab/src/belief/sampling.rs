@@ -99,7 +99,16 @@ pub struct Learned {
 pub fn learn(mut observed: Observed, slice: &[Load], source: &mut dyn Source, most: usize) -> anyhow::Result<Learned> {
     let count = observed.predicted().len();
     let mut usable = vec![true; count];
+    // Several threads of which one does the work are the algorithm of one thread, which is sampled itself.
+    let runs_as_one = |a: usize, at: usize| {
+        let (curve, load) = (&observed.predicted()[a].curve, &slice[at]);
+        curve.helpers.is_some_and(|h| {
+            let work_ns = curve.work.ns(load);
+            h.cost_ns(load.objects, work_ns) == work_ns
+        })
+    };
     let mut open: Vec<(usize, usize)> = (0..count).flat_map(|a| (0..slice.len()).map(move |at| (a, at))).collect();
+    open.retain(|&(a, at)| !runs_as_one(a, at));
     let mut gradient = KnowledgeGradient::new(&observed, slice, &usable);
     let mut expected = Vec::new();
     let (mut taken, mut remarks, mut left) = (Vec::new(), Vec::new(), SECONDS);

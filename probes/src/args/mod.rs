@@ -159,7 +159,7 @@ pub(crate) struct Pairs {
     /// Where the pairs of the last frame go, 32-bit unsigned integers of shape m x 2, sorted.
     #[arg(long, value_name = "PAIRS.npy")]
     pub(crate) out: Option<PathBuf>,
-    /// Fail when a frame has more pairs than this, and say how many. Without this option the free memory sets the limit.
+    /// Fail when a frame has more pairs than this; the search ends there. Without this option the free memory sets the limit.
     #[arg(long, value_name = "N")]
     pub(crate) limit: Option<usize>,
     /// One JSON object on standard output instead of a summary.

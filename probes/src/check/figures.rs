@@ -3,6 +3,7 @@
 use crate::date;
 use sapwise::hardware::ParameterId;
 use sapwise::measure::Watch;
+use sapwise::stats::median;
 use sapwise::{GpuHardware, Hardware, How, Parameter, SimdLevel};
 use sapwise_lab::report::{Label, Point, Report, Restricted};
 use std::collections::BTreeMap;
@@ -200,6 +201,17 @@ pub(crate) fn hardware_doubts(hardware: &Hardware) -> Vec<String> {
             )
         })
         .collect()
+}
+
+/// In a sentence that other programs took a share of the CPU while the hardware was measured, if they did.
+pub(crate) fn hardware_disturbed(hardware: &Hardware) -> Option<String> {
+    let loads: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
+    let load = median(&loads).filter(|&load| load > Watch::SPOILING)?;
+    Some(format!(
+        "other programs took {:.0} % of the CPU while the hardware was measured (the median over its parameters); predict again when \
+         the machine is idle",
+        load * 100.0
+    ))
 }
 
 /// What a maintainer should ask about, one sentence each.

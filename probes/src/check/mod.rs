@@ -15,7 +15,7 @@ use serde::Serialize;
 use std::cell::{OnceCell, RefCell};
 use std::path::Path;
 
-pub(crate) use figures::{doubts, hardware_doubts};
+pub(crate) use figures::{doubts, hardware_disturbed, hardware_doubts};
 
 /// What is known about one file.
 #[derive(Debug, Serialize)]

@@ -2,7 +2,7 @@
 
 use crate::algorithms::Algorithms;
 use crate::args::Predict;
-use crate::check::{doubts, hardware_doubts};
+use crate::check::{doubts, hardware_disturbed, hardware_doubts};
 use crate::exit::Outcome;
 use crate::hardware::{self, measure_hardware};
 use crate::outputs::refuse_overwriting;
@@ -52,9 +52,8 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
             };
             if report.is_none() {
                 text = format!("{}\n", summary::hardware(&hardware, terminal));
-            }
-            if report.is_none() {
                 remarks = hardware_doubts(&hardware);
+                remarks.extend(hardware_disturbed(&hardware));
             }
             interrupt::check()?;
             let gpus = match measured {

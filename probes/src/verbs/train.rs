@@ -145,8 +145,8 @@ fn command(arguments: &Train, plot: &Path) -> String {
 }
 
 /// What the columns in the summary mean, in few words.
-const COLUMNS: &str = "Regret is time over the best time, less one. In games: the numbers of objects weighted as games are assumed to have \
-them (log-normal around\n800). Crossovers off by: the median distance in octaves between measured and predicted crossovers. --card explains \
+const COLUMNS: &str = "Regret is time over the best time, less one; in parentheses with the numbers of objects weighted as games are assumed to \
+have them (log-normal\naround 800). Crossovers off by: the median distance in octaves between measured and predicted crossovers. --card explains \
 every column.\n";
 
 fn summary(model: &Model, training: &Training, notes: &[String], path: &Path, drawn: &str, terminal: Terminal) -> String {
