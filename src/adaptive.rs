@@ -11,6 +11,7 @@ mod setup;
 mod shelter;
 mod switching;
 mod throttle;
+mod trials;
 mod warming;
 
 use crate::aabb::Aabb;
@@ -110,9 +111,9 @@ impl Adaptive {
         self.policy.set_learning(learns && clock::TICKS);
     }
 
-    /// Whether now and then a frame is run by another algorithm than the cheapest, to learn what that one costs: at most one frame in
-    /// 60, none that is expected to cost more than 30 % over the cheapest, and only where what it may save in the next 300
-    /// frames is more than what it costs. On unless it is turned off; without [learning](Self::set_learning) it does nothing.
+    /// Whether now and then another algorithm than the cheapest is tried, to learn what that one costs: in one frame, or in up to twelve where it
+    /// keeps work from frame to frame. Only where what it may save in the next 300 frames is more than the trial is expected to cost, and
+    /// all trials together are expected to cost no more than 0.5 % of the time of the frames and four frames. On unless it is turned off; without [learning](Self::set_learning) it does nothing.
     pub fn set_exploring(&mut self, explores: bool) {
         self.policy.set_exploring(explores);
     }

@@ -14,14 +14,20 @@ const WAIT_FRAMES: f64 = 800.0;
 const WAIT_SHARE: f64 = 1.0 / 128.0;
 const KNOWN: u32 = 4;
 
+/// A frame that takes so many times what the dearest kind of it is expected to, the latter before the algorithm is known, and of which there was
+/// no other for so many frames, is a stall: a page from disk, a breakpoint, another program. It tells nothing of any algorithm. Those that
+/// come again are waits of its width.
+const STALL: [f64; 2] = [2.0, 64.0];
+const STALLS_APART: u64 = 50;
+
 /// The noise of a frame is learned for each algorithm; it starts here, and is never believed to be less.
 const NOISE_LN: f64 = 0.1;
 const LEAST_NOISE_LN: f64 = 0.02;
 /// Of this many frames in a row the mean is as noisy as of this power of their number far apart.
 const ALIKE: f64 = 0.7;
-/// And the frame with which an algorithm begins as this part of one where it was slower than expected, for its threads may have slept or met
-/// another program; where it was faster, that was no accident.
-const COLD_WORTH: [f64; 2] = [0.02, 0.5];
+/// And the frame with which an algorithm begins as this part of one, whether it was slower than expected or faster: its threads may have slept
+/// or met another program, and to believe the lucky ones sooner would make whatever is tried look cheap.
+const COLD_WORTH: f64 = 0.2;
 /// Share of each new deviation in the noise.
 const NOISE_SHARE: f64 = 1.0 / 8.0;
 
@@ -46,6 +52,8 @@ pub(super) struct Learner {
     frames: Vec<Frames>,
     /// For each class and width the mean time that a frame waits for other programs, nanoseconds, and the frame at which that held.
     waits: Vec<(f64, u64)>,
+    /// For each of them the last frame that took far longer than expected.
+    stalled: Vec<Option<u64>>,
     observed: u64,
 }
 
@@ -67,6 +75,7 @@ impl Learner {
             belief: Belief::new(costs, kept, Deviations::UNLIKE),
             frames,
             waits: vec![(0.0, 0); widths.len()],
+            stalled: vec![None; widths.len()],
             observed: 0,
         }
     }
@@ -92,6 +101,15 @@ impl Learner {
     /// Whether an algorithm was observed often enough to tell a frame that waited from one that was expected wrongly.
     pub(super) fn knows(&self, algorithm: usize) -> bool {
         self.frames[algorithm].batches >= KNOWN
+    }
+
+    /// Whether a frame that took so many times what the dearest kind of it is expected to is to be charged to nobody.
+    pub(super) fn is_stall(&mut self, algorithm: usize, over: f64, frame: u64) -> bool {
+        if over <= STALL[usize::from(!self.knows(algorithm))] {
+            return false;
+        }
+        let last = self.stalled[self.frames[algorithm].wait].replace(frame);
+        last.is_none_or(|last| frame - last > STALLS_APART)
     }
 
     /// Takes in that a frame took this many nanoseconds more than any of its kind is expected to, or none.
@@ -125,7 +143,7 @@ impl Learner {
         let a = &mut self.frames[algorithm];
         a.batches = a.batches.saturating_add(1);
         // Frames in a row are alike, so that many of them tell less than as many that were far apart.
-        let worth = if batch.cold { COLD_WORTH[usize::from(surprise < 0.0)] } else { f64::from(batch.frames).powf(ALIKE) };
+        let worth = if batch.cold { COLD_WORTH } else { f64::from(batch.frames).powf(ALIKE) };
         let variance = expected.shared + expected.own + a.noise / worth;
         let most = MOST_SURPRISE * variance.sqrt();
         let error = surprise.clamp(-most, most);

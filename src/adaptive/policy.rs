@@ -5,25 +5,18 @@ use super::frame_batch::{FrameBatch, Predicted};
 use super::learner::Learner;
 use super::shelter::Shelter;
 use super::switching::{Expected, Kind, SwitchingCosts};
+use super::trials::{HORIZON, Offer, Trials, expected_gain};
 use crate::cost::Frame;
 use crate::load::Load;
-use crate::stats::normal_density;
 use crate::tuning::Tuning;
 use crate::tuning::belief::View;
 
 /// By number of objects alone, the algorithm of before stays while its own step is within this share.
 const STEP_SLACK: f64 = 0.05;
 
-/// A frame that explores is expected to cost at most this much more than the cheapest, its start included.
-const MOST_DEARER: f64 = 1.3;
-/// Frames between two that explore, at least.
-const EXPLORE_EVERY: u64 = 60;
 /// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a breakpoint or a page
 /// from disk tells nothing of the frames that follow.
 const MOST_WAIT: f64 = 64.0;
-/// What is found out is taken to be of use for this many frames: five seconds of a game.
-const HORIZON: f64 = 300.0;
-
 /// Chooses, and learns from what the choices cost.
 #[derive(Debug, Clone)]
 pub(super) struct Policy {
@@ -52,7 +45,7 @@ pub(super) struct Policy {
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
     frame: u64,
-    explored_at: u64,
+    trials: Trials,
 }
 
 impl Policy {
@@ -80,7 +73,7 @@ impl Policy {
             batch: FrameBatch::default(),
             saved_ns: vec![0.0; count],
             frame: 0,
-            explored_at: 0,
+            trials: Trials::default(),
             tuning,
             usable,
         }
@@ -115,6 +108,9 @@ impl Policy {
         if !usable && self.settled == Some(candidate) {
             self.settled = None;
         }
+        if !usable && self.trials.candidate() == Some(candidate) {
+            self.trials.stop(self.frame);
+        }
     }
 
     /// Whether the number of objects alone decides.
@@ -127,6 +123,7 @@ impl Policy {
         (0..usable.len()).for_each(|k| self.set_usable(k, usable[k]));
         // A frame with them is a first one, and begins a batch of its own.
         self.ran = None;
+        self.trials.stop(self.frame);
         self.batch = FrameBatch::default();
         if !self.switching.remade(kept) {
             self.switching = SwitchingCosts::new(kept);
@@ -153,17 +150,33 @@ impl Policy {
             Some(settled) if self.is_avoided(settled) => (best, Reason::Sheltered),
             Some(settled) => self.settle(settled, best, frames),
         };
+        let (settled, reason) = self.after_trial(settled).map_or((settled, reason), |other| (other, Reason::Switched));
         if self.settled != Some(settled) {
             self.saved_ns.fill(0.0);
             self.settled = Some(settled);
+            self.trials.stop(self.frame);
         }
-        if reason == Reason::Stayed
-            && let Some(other) = self.worth_exploring(settled)
-        {
-            self.explored_at = self.frame;
-            return Some(self.choice(other, Reason::Explored));
+        self.trials.allow(self.mean_ns[settled], frames);
+        if reason == Reason::Stayed {
+            self.offer_trial(settled);
         }
-        Some(self.choice(settled, reason))
+        Some(match self.trials.next() {
+            Some(other) => self.choice(other, Reason::Explored),
+            None => self.choice(settled, reason),
+        })
+    }
+
+    /// Ends a trial that has shown enough. The one that was tried, where it is expected to be cheaper by now and keeps work, which it has made
+    /// in the trial: nothing is left to be paid for a switch.
+    fn after_trial(&mut self, settled: usize) -> Option<usize> {
+        let other = self.trials.candidate()?;
+        let over = self.mean_ns[other] / self.mean_ns[settled];
+        let avoided = self.is_avoided(other);
+        if !avoided && !self.trials.has_shown_enough(over) {
+            return None;
+        }
+        self.trials.stop(self.frame);
+        (over < 1.0 && !avoided && self.switching.keeps(other)).then_some(other)
     }
 
     /// Fills in what every candidate is expected to cost.
@@ -226,25 +239,28 @@ impl Policy {
         self.cheapest(paid).map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
     }
 
-    /// The candidate of which one frame is expected to save the most over the next ones, if that is more than the frame costs.
-    fn worth_exploring(&self, settled: usize) -> Option<usize> {
-        let learner = self.learner.as_ref().filter(|_| self.learns && self.explores)?;
-        if self.frame < self.explored_at + EXPLORE_EVERY {
-            return None;
-        }
+    /// Begins a trial of the candidate that is expected to save the most by it, if there is one.
+    fn offer_trial(&mut self, settled: usize) {
+        let Some(learner) = self.learner.as_ref().filter(|_| self.learns && self.explores) else { return };
+        let Some(allowance_ns) = self.trials.allowance_ns(self.frame) else { return };
         let called = |k: usize| (k, self.predicted[k].calls());
-        let now = self.mean_ns[settled];
-        let worth = |k: usize| {
-            let first = self.mean_ns[k] + self.switch_ns(k);
-            if k == settled || !self.usable[k] || first > MOST_DEARER * now || self.is_avoided(k) {
+        let now_ns = self.mean_ns[settled];
+        let offer = |k: usize| {
+            if k == settled || !self.usable[k] || self.is_avoided(k) {
+                return None;
+            }
+            let offer = Offer::of(k, self.switching.keeps(k), self.switch_ns(k), self.mean_ns[k], now_ns);
+            if offer.price_ns > allowance_ns {
                 return None;
             }
             let deviation = learner.variance_of_ratio(&self.view, called(settled), called(k)).sqrt();
-            let gain = now * expected_gain((self.mean_ns[k] / now).ln(), deviation) * HORIZON - (first - now).max(0.0);
-            (gain > 0.0).then_some((k, gain))
+            let gain_ns = now_ns * expected_gain((self.mean_ns[k] / now_ns).ln(), deviation) * HORIZON - offer.price_ns;
+            (gain_ns > 0.0).then_some((offer, gain_ns))
         };
-        let best = (0..self.usable.len()).filter_map(worth).max_by(|a, b| a.1.total_cmp(&b.1));
-        best.map(|(k, _)| k)
+        let best = (0..self.usable.len()).filter_map(offer).max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((offer, _)) = best {
+            self.trials.begin(offer);
+        }
     }
 
     fn choice(&self, chosen: usize, reason: Reason) -> Choice {
@@ -267,6 +283,11 @@ impl Policy {
 
     fn learn(&mut self, candidate: usize, entered: bool, ns: f64) {
         let expected = self.expected[candidate];
+        let dearest_ns = self.switching.rebuild_ns(candidate, expected);
+        let learner = self.learner.as_mut().filter(|_| self.learns);
+        if learner.is_some_and(|l| l.is_stall(candidate, ns / dearest_ns, self.frame)) {
+            return self.switching.went_on(candidate, self.frame);
+        }
         let kind = self.switching.ran(candidate, entered, self.frame, ns, expected, self.learns);
         let Some(learner) = self.learner.as_mut().filter(|_| self.learns) else { return };
         if !self.batch.takes(candidate, self.log2_objects) {
@@ -275,7 +296,7 @@ impl Policy {
             }
             self.batch = self.batch.next(candidate);
         }
-        let first_of_many = kind == Kind::First && self.settled == Some(candidate);
+        let first_of_many = kind == Kind::First && (self.trials.has_more() || self.settled == Some(candidate));
         if kind != Kind::Rebuilt && !first_of_many {
             // Until it is known what is dear, all of a frame counts.
             let known = learner.knows(candidate);
@@ -322,20 +343,4 @@ impl Policy {
         self.settled = Some(chosen);
         Some(Choice { chosen, predicted_ns: None, runner_up: None, reason })
     }
-}
-
-/// Expected saving, as a share of the present cost, of knowing what another costs: the mean over a normal distribution of the logarithm
-/// `ln_ratio` of other over present cost, of what is below nought.
-fn expected_gain(ln_ratio: f64, deviation: f64) -> f64 {
-    if deviation <= 0.0 {
-        return 0.0;
-    }
-    let u = -ln_ratio / deviation;
-    // What is saved beside what a switch without looking would save already.
-    (deviation * (normal_density(u) + u * cumulative(u)) - (-ln_ratio).max(0.0)).max(0.0)
-}
-
-/// The cumulative distribution of the standard normal one, to 1e-3: the logistic curve that comes closest.
-fn cumulative(x: f64) -> f64 {
-    1.0 / (1.0 + (-1.702 * x).exp())
 }

@@ -3,9 +3,9 @@
 /// Share of a frame that the first one costs beside: memory that is no longer in a cache, threads that sleep. Learned from then on.
 const COLD: f64 = 0.15;
 /// A frame made again by an incremental algorithm, over a frame of the other way that its cost curve knows, or over a frame of its own
-/// where there is no other way. `pair-cache` over `grid-sap`, then its other way, on one thread: 1.0 to 2.7 at 100 to 30 000
-/// objects of four scenarios.
-const FROM_NOTHING: f64 = 2.0;
+/// where there is no other way. `pair-cache` over `bvh`, its other way: medians 1.6 to 1.9, quartiles 1.4 to 3.0, in four reports of the two
+/// hosts of `datasets/` (frames over 2.5 times the median of their timing, where these are less than a fifth of its frames).
+const FROM_NOTHING: f64 = 1.7;
 
 /// Frames of absence after which what an algorithm kept is worth nothing any more.
 const FORGOTTEN: u64 = 3;
@@ -90,6 +90,11 @@ impl SwitchingCosts {
     pub(super) fn remade(&mut self, kept: &[Option<usize>]) -> bool {
         self.kept.iter_mut().for_each(|work| work.last = None);
         self.costs.iter().map(|p| p.kept).eq(kept.iter().copied())
+    }
+
+    /// Whether a candidate keeps work from frame to frame.
+    pub(super) fn keeps(&self, candidate: usize) -> bool {
+        self.costs[candidate].kept.is_some()
     }
 
     /// A candidate ran all frames up to this one.

@@ -1,4 +1,8 @@
 mod learning;
+#[cfg(feature = "model")]
+mod recorded;
+#[cfg(feature = "model")]
+mod replay;
 mod warming;
 
 use super::*;

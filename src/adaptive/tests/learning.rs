@@ -22,10 +22,10 @@ struct Frame {
 }
 
 /// Numbers between nought and one, of which the next follows from the last.
-struct Chance(u64);
+pub(super) struct Chance(pub(super) u64);
 
 impl Chance {
-    fn next(&mut self) -> f64 {
+    pub(super) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -149,8 +149,10 @@ fn exploring_is_rare_bounded_and_can_be_turned_off() {
     let frames = run(&mut policy(near()), 0..4000, 1000, &truth);
     let explored: Vec<usize> = (0..frames.len()).filter(|&k| frames[k].reason == Reason::Explored).collect();
     assert!(explored.len() >= 5, "{explored:?}");
-    assert!(explored.windows(2).all(|w| w[1] - w[0] >= 60), "{explored:?}");
-    assert!(explored.iter().all(|&k| frames[k].predicted_ns <= 1.3 * frames[k].cheapest_ns));
+    assert!(explored.windows(2).all(|w| w[1] - w[0] >= 20), "{explored:?}");
+    let price: f64 = explored.iter().map(|&k| frames[k].predicted_ns - frames[k].cheapest_ns).sum();
+    let spent: f64 = frames.iter().map(|f| f.cheapest_ns).sum();
+    assert!(price <= 0.01 * spent, "{price} of {spent}");
     let mut quiet = policy(near());
     quiet.set_exploring(false);
     assert!(run(&mut quiet, 0..4000, 1000, &truth).iter().all(|f| f.reason != Reason::Explored));
@@ -162,7 +164,7 @@ fn exploring_is_rare_bounded_and_can_be_turned_off() {
 
 #[test]
 fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
-    // The second is incremental: its first frame costs two, and so does one in fifty of those behind it. 2 % are saved a frame.
+    // The second is incremental: its first frame costs 1.7, and so does one in fifty of those behind it. 3 % are saved a frame.
     let costs = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 0.0, 96.0)]);
     let start = |costs: Tuning| {
         let mut policy = Policy::new(costs, &[None, Some(0)], vec![true; 2]);
@@ -176,12 +178,12 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
     let mut steady = start(costs.clone());
     let load = |objects| Load { objects, ..Load::default() };
     let waited = (0..100).find(|_| steady.choose(&load(1000), 1).unwrap().reason == Reason::Switched);
-    // 192 us less 97.92 us saved at 2.08 us a frame.
-    assert_eq!(waited, Some(45));
+    // 163.2 us less 97.34 us saved at 2.66 us a frame.
+    assert_eq!(waited, Some(24));
     // Frames that were not decided count too.
     let mut seldom = start(costs);
     let waited = (0..100).find(|_| seldom.choose(&load(1000), 6).unwrap().reason == Reason::Switched);
-    assert_eq!(waited, Some(7));
+    assert_eq!(waited, Some(4));
     // 100 n and 50 n + 50 000 cross at 1000: about it the load flickers by one part in a hundred.
     let mut flicker = start(tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 50_000.0, 50.0)]));
     for k in 0..2000 {

@@ -1,0 +1,170 @@
+//! Trials: another algorithm than the one that is settled on runs for some frames, so that it is learned what it costs.
+
+use crate::stats::normal_density;
+
+/// What is found out is taken to be of use for this many frames: five seconds of a game.
+pub(super) const HORIZON: f64 = 300.0;
+
+/// Share of the time of all frames that trials may cost, and frames' worth of that which is there at the start: one frame in which an incremental
+/// algorithm begins costs two or three.
+const SHARE: f64 = 0.005;
+const AT_FIRST: f64 = 4.0;
+/// No more frames' worth than these are saved up: else a long rest would be followed by one trial after the other.
+const MOST: f64 = 12.0;
+/// Frames between the end of a trial and the beginning of the next, at least.
+const APART: u64 = 20;
+
+/// Frames of a trial of an algorithm that keeps work from frame to frame: its first one makes that, and the others show what it saves, one
+/// in several of them a part of it being made again. Any other shows what it costs in one frame.
+const OF_KEPT: u32 = 12;
+/// A trial ends after this many frames where it is expected by then to cost so many times what ran before.
+const ENOUGH: (u32, f64) = (4, 1.2);
+
+/// The trial that runs, and what trials may cost.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Trials {
+    running: Option<Trial>,
+    /// The frame before which the last one ended.
+    ended: u64,
+    /// What trials may cost now, in nanoseconds; `None` before the first frame.
+    allowance_ns: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Trial {
+    candidate: usize,
+    frames: u32,
+    left: u32,
+}
+
+/// A trial that may be made.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Offer {
+    candidate: usize,
+    frames: u32,
+    /// What it is expected to cost beside what frames cost now.
+    pub(super) price_ns: f64,
+}
+
+impl Offer {
+    /// Of a candidate of which a frame is expected to take `mean_ns` and its first one `switch_ns` more, where one takes `now_ns`.
+    pub(super) fn of(candidate: usize, keeps: bool, switch_ns: f64, mean_ns: f64, now_ns: f64) -> Self {
+        let frames = if keeps { OF_KEPT } else { 1 };
+        // One that turns out dear ends early.
+        let dear_ns = f64::from(frames.min(ENOUGH.0)) * (mean_ns - now_ns).max(0.0);
+        Self { candidate, frames, price_ns: switch_ns + dear_ns }
+    }
+}
+
+impl Trials {
+    /// The candidate that is tried now.
+    pub(super) fn candidate(&self) -> Option<usize> {
+        self.running.map(|t| t.candidate)
+    }
+
+    /// Whether frames of the trial follow the one that ran.
+    pub(super) fn has_more(&self) -> bool {
+        self.running.is_some_and(|t| t.left > 0)
+    }
+
+    /// Adds to what trials may cost that of some frames which took `now_ns` each.
+    pub(super) fn allow(&mut self, now_ns: f64, frames: u32) {
+        let before = self.allowance_ns.unwrap_or(AT_FIRST * now_ns);
+        self.allowance_ns = Some((before + SHARE * now_ns * f64::from(frames)).min(MOST * now_ns));
+    }
+
+    /// What a trial may cost that begins with this frame; `None` where none may begin.
+    pub(super) fn allowance_ns(&self, frame: u64) -> Option<f64> {
+        if self.running.is_none() && frame >= self.ended + APART { self.allowance_ns } else { None }
+    }
+
+    /// Begins a trial, which is paid for at once.
+    pub(super) fn begin(&mut self, offer: Offer) {
+        let Offer { candidate, frames, price_ns } = offer;
+        self.allowance_ns = self.allowance_ns.map(|ns| ns - price_ns);
+        self.running = Some(Trial { candidate, frames, left: frames });
+    }
+
+    /// The candidate of the next frame of the trial, if one runs.
+    pub(super) fn next(&mut self) -> Option<usize> {
+        let trial = self.running.as_mut()?;
+        trial.left = trial.left.saturating_sub(1);
+        Some(trial.candidate)
+    }
+
+    /// Whether the trial is over, where its candidate is expected to cost so many times what ran before.
+    pub(super) fn has_shown_enough(&self, over: f64) -> bool {
+        self.running.is_some_and(|t| t.left == 0 || t.frames - t.left >= ENOUGH.0 && over > ENOUGH.1)
+    }
+
+    /// Ends the trial that runs before this frame, if one does.
+    pub(super) fn stop(&mut self, frame: u64) {
+        if self.running.take().is_some() {
+            self.ended = frame;
+        }
+    }
+}
+
+/// Expected saving, as a share of the present cost, of knowing what another costs: the mean over a normal distribution of the logarithm
+/// `ln_ratio` of other over present cost, of what is below nought.
+pub(super) fn expected_gain(ln_ratio: f64, deviation: f64) -> f64 {
+    if deviation <= 0.0 {
+        return 0.0;
+    }
+    let u = -ln_ratio / deviation;
+    // What is saved beside what a switch without looking would save already.
+    (deviation * (normal_density(u) + u * cumulative(u)) - (-ln_ratio).max(0.0)).max(0.0)
+}
+
+/// The cumulative distribution of the standard normal one, to 1e-2: the logistic curve that comes closest.
+fn cumulative(x: f64) -> f64 {
+    1.0 / (1.0 + (-1.702 * x).exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trials_cost_no_more_than_their_share_however_dear_one_is() {
+        let mut trials = Trials::default();
+        let (mut paid, mut begun) = (0.0, 0);
+        for frame in 0..20_000 {
+            if trials.has_shown_enough(2.0) {
+                trials.stop(frame);
+            }
+            trials.allow(100.0, 1);
+            let offer = Offer::of(1, begun % 2 == 0, 150.0, 130.0, 100.0);
+            if trials.allowance_ns(frame).is_some_and(|ns| ns >= offer.price_ns) {
+                trials.begin(offer);
+                paid += offer.price_ns;
+                begun += 1;
+            }
+            trials.next();
+        }
+        assert!(paid <= (0.005 * 20_000.0 + 4.0) * 100.0 && paid > 9000.0, "{paid} for {begun}");
+    }
+
+    #[test]
+    fn a_trial_of_what_keeps_work_goes_on_while_it_is_not_dear() {
+        let frames = |over: f64| {
+            let mut trials = Trials::default();
+            trials.allow(100.0, 1);
+            trials.begin(Offer::of(3, true, 100.0, 100.0, 100.0));
+            (0..).take_while(|_| !trials.has_shown_enough(over) && trials.next() == Some(3)).count()
+        };
+        assert_eq!((frames(0.9), frames(1.3)), (12, 4));
+        let mut trials = Trials::default();
+        trials.begin(Offer::of(0, false, 100.0, 100.0, 100.0));
+        assert!(trials.next() == Some(0) && !trials.has_more() && trials.has_shown_enough(0.5));
+        trials.stop(7);
+        trials.allow(100.0, 1);
+        assert!(trials.allowance_ns(26).is_none() && trials.allowance_ns(27).is_some());
+    }
+
+    #[test]
+    fn what_is_known_saves_nothing_and_what_is_doubtful_the_more_the_nearer() {
+        assert_eq!(expected_gain(0.1, 0.0), 0.0);
+        assert!(expected_gain(0.05, 0.2) > expected_gain(0.3, 0.2) && expected_gain(0.3, 0.2) >= 0.0);
+    }
+}
