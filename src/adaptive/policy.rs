@@ -249,7 +249,8 @@ impl Policy {
             if k == settled || !self.usable[k] || self.is_avoided(k) {
                 return None;
             }
-            let offer = Offer::of(k, self.switching.keeps(k), self.switch_ns(k), self.mean_ns[k], now_ns);
+            let begins = self.switching.keeps(k) && !self.switching.share(k, settled);
+            let offer = Offer::of(k, begins, self.switch_ns(k), self.mean_ns[k], now_ns);
             if offer.price_ns > allowance_ns {
                 return None;
             }

@@ -97,6 +97,11 @@ impl SwitchingCosts {
         self.costs[candidate].kept.is_some()
     }
 
+    /// Whether a candidate finds what another one keeps.
+    pub(super) fn share(&self, candidate: usize, other: usize) -> bool {
+        self.keeps(candidate) && self.costs[candidate].kept == self.costs[other].kept
+    }
+
     /// A candidate ran all frames up to this one.
     pub(super) fn went_on(&mut self, candidate: usize, frame: u64) {
         if let Some(work) = self.costs[candidate].kept.map(|k| &mut self.kept[k]) {

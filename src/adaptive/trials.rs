@@ -48,8 +48,9 @@ pub(super) struct Offer {
 
 impl Offer {
     /// Of a candidate of which a frame is expected to take `mean_ns` and its first one `switch_ns` more, where one takes `now_ns`.
-    pub(super) fn of(candidate: usize, keeps: bool, switch_ns: f64, mean_ns: f64, now_ns: f64) -> Self {
-        let frames = if keeps { OF_KEPT } else { 1 };
+    /// `begins`: its first frame makes what it keeps.
+    pub(super) fn of(candidate: usize, begins: bool, switch_ns: f64, mean_ns: f64, now_ns: f64) -> Self {
+        let frames = if begins { OF_KEPT } else { 1 };
         // One that turns out dear ends early.
         let dear_ns = f64::from(frames.min(ENOUGH.0)) * (mean_ns - now_ns).max(0.0);
         Self { candidate, frames, price_ns: switch_ns + dear_ns }
