@@ -4,8 +4,9 @@
 const COLD: f64 = 0.15;
 /// A frame made again by an incremental algorithm, over a frame of the other way that its cost curve knows, or over a frame of its own
 /// where there is no other way. `pair-cache` over `bvh`, its other way: medians 1.6 to 1.9, quartiles 1.4 to 3.0, in four reports of the two
-/// hosts of `datasets/` (frames over 2.5 times the median of their timing, where these are less than a fifth of its frames).
-const FROM_NOTHING: f64 = 1.7;
+/// hosts of `datasets/` (frames over 2.5 times the median of their timing, where these are less than a fifth of its frames). Rather more: a
+/// first frame is colder than these.
+const FROM_NOTHING: f64 = 2.0;
 
 /// Frames of absence after which what an algorithm kept is worth nothing any more.
 const FORGOTTEN: u64 = 3;

@@ -164,7 +164,7 @@ fn exploring_is_rare_bounded_and_can_be_turned_off() {
 
 #[test]
 fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
-    // The second is incremental: its first frame costs 1.7, and so does one in fifty of those behind it. 3 % are saved a frame.
+    // The second is incremental: its first frame costs two, and so does one in fifty of those behind it. 2 % are saved a frame.
     let costs = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 0.0, 96.0)]);
     let start = |costs: Tuning| {
         let mut policy = Policy::new(costs, &[None, Some(0)], vec![true; 2]);
@@ -178,12 +178,12 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
     let mut steady = start(costs.clone());
     let load = |objects| Load { objects, ..Load::default() };
     let waited = (0..100).find(|_| steady.choose(&load(1000), 1).unwrap().reason == Reason::Switched);
-    // 163.2 us less 97.34 us saved at 2.66 us a frame.
-    assert_eq!(waited, Some(24));
+    // 192 us less 97.92 us saved at 2.08 us a frame.
+    assert_eq!(waited, Some(45));
     // Frames that were not decided count too.
     let mut seldom = start(costs);
     let waited = (0..100).find(|_| seldom.choose(&load(1000), 6).unwrap().reason == Reason::Switched);
-    assert_eq!(waited, Some(4));
+    assert_eq!(waited, Some(7));
     // 100 n and 50 n + 50 000 cross at 1000: about it the load flickers by one part in a hundred.
     let mut flicker = start(tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 50_000.0, 50.0)]));
     for k in 0..2000 {
