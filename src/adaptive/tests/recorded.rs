@@ -61,7 +61,7 @@ impl Recorded {
             }
             scenes.entry(point["scenario"].as_str().unwrap().to_owned()).or_default().push(Spot { load, ns });
         }
-        scenes.values_mut().for_each(|spots| fill(spots));
+        scenes.values_mut().for_each(fill);
         scenes.values_mut().flatten().filter(|s| s.load.objects < FEWEST_FOR_TWO).for_each(|s| join(&ids, s));
         let hardware = serde_json::from_value(report["hardware"].clone()).unwrap();
         Self { ids, entries, hardware, scenes }
