@@ -17,6 +17,7 @@ const STEP_SLACK: f64 = 0.05;
 /// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a breakpoint or a page
 /// from disk tells nothing of the frames that follow.
 const MOST_WAIT: f64 = 64.0;
+
 /// Chooses, and learns from what the choices cost.
 #[derive(Debug, Clone)]
 pub(super) struct Policy {

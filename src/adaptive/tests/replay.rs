@@ -120,6 +120,8 @@ fn courses(machine: &Recorded) -> Vec<Vec<Stretch<'_>>> {
 fn of_another(machine: &Recorded, other: &Recorded) -> Tuning {
     let mut tuning = other.predicted();
     tuning.costs.retain(|c| machine.ids.contains(&c.algorithm));
+    // By their positions algorithms are told apart below.
+    assert!(tuning.costs.iter().map(|c| &c.algorithm).eq(&machine.ids));
     tuning
 }
 
