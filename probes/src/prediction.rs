@@ -20,6 +20,16 @@ use std::path::Path;
 /// Objects of the slice that the tuning shows: four sizes a decade from ten to a million.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 
+/// The number of objects at so many quarters of a decade.
+fn size(quarter: u32) -> u32 {
+    10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32
+}
+
+/// Whether an interval goes from the least to the most objects of the slice.
+pub(crate) fn is_whole_slice((low, high): (f64, f64)) -> bool {
+    low <= f64::from(size(*SLICE.start())) && high >= f64::from(size(*SLICE.end()))
+}
+
 /// Seed of the scenes that the slice goes through.
 const SEED: u64 = 1;
 
@@ -36,7 +46,7 @@ impl Slice {
     /// # Errors
     /// When the pairs can't be found for want of memory, and on Ctrl-C.
     pub(crate) fn of(scenario: Scenario) -> anyhow::Result<Self> {
-        let sizes: Vec<u32> = SLICE.map(|quarter| 10.0_f64.powf(f64::from(quarter) / 4.0).round() as u32).collect();
+        let sizes: Vec<u32> = SLICE.map(size).collect();
         let progress = Progress::new(sizes.iter().map(|&n| u64::from(n)).sum());
         progress.message(format!("pairs of the scenario {scenario}"));
         let done = |objects: u32| {

@@ -1,6 +1,7 @@
 //! What a person reads at the end of a probe or a prediction.
 
 use crate::gpus::GpuChoice;
+use crate::prediction::is_whole_slice;
 use crate::shell;
 use crate::terminal::Terminal;
 use sapwise::{Backend, Crossover, GpuHardware, GpuIdentity, Hardware, How, Model, Parameter, Tuning};
@@ -11,9 +12,6 @@ use sapwise_lab::report::{Label, Report};
 use sapwise_lab::text::{columns, count, duration, grouped};
 use sapwise_lab::units::value;
 use std::path::Path;
-
-/// The least and the most objects of the slice of a prediction.
-const ENDS: [f64; 2] = [10.0, 1e6];
 
 /// The hardware, then the tuning of every scenario that was swept.
 pub(crate) fn report(report: &Report, terminal: Terminal) -> String {
@@ -121,7 +119,7 @@ pub(crate) fn tuning(tuning: &Tuning, terminal: Terminal) -> String {
         let crossover =
             tuning.crossovers.iter().find(|b| b.above == step.algorithm && b.objects as u32 == step.from_objects);
         let interval = crossover.and_then(Crossover::interval).map_or(String::new(), |(low, high)| {
-            if low <= ENDS[0] && high >= ENDS[1] {
+            if is_whole_slice((low, high)) {
                 return "anywhere: both cost about the same".to_owned();
             }
             format!("{} to {}", grouped(low.round() as u64), grouped(high.round() as u64))

@@ -11,7 +11,7 @@ const FEWEST: u32 = 2;
 /// Octaves of objects over which a batch goes at most.
 const OCTAVES: f64 = 0.5;
 /// What counts of a frame, at most: this many times what the dearest kind of frame is expected to cost. The rest is another program's.
-const MOST_OVER: f64 = 2.0;
+pub(super) const MOST_OVER: f64 = 2.0;
 
 /// What the tuning says of a frame, without any correction, in nanoseconds: all of it, and the calls in it.
 #[derive(Debug, Clone, Copy, Default)]

@@ -1,7 +1,7 @@
 //! What the frames that were run tell about the cost of every algorithm: the [`Belief`] observes them, in batches, each with a noise that is
 //! learned too.
 
-use super::frame_batch::FrameBatch;
+use super::frame_batch::{FrameBatch, MOST_OVER};
 use crate::algorithm::BackendClass;
 use crate::cost::Frame;
 use crate::tuning::AlgorithmCost;
@@ -17,7 +17,7 @@ const KNOWN: u32 = 4;
 /// A frame that takes so many times what the dearest kind of it is expected to, the latter before the algorithm is known, and of which there was
 /// no other for so many frames, is a stall: a page from disk, a breakpoint, another program. It tells nothing of any algorithm. Those that
 /// come again are waits of its width.
-const STALL: [f64; 2] = [2.0, 64.0];
+const STALL: [f64; 2] = [MOST_OVER, 64.0];
 const STALLS_APART: u64 = 50;
 
 /// The noise of a frame is learned for each algorithm; it starts here, and is never believed to be less.
@@ -50,11 +50,19 @@ struct Frames {
 pub(super) struct Learner {
     belief: Belief,
     frames: Vec<Frames>,
-    /// For each class and width the mean time that a frame waits for other programs, nanoseconds, and the frame at which that held.
-    waits: Vec<(f64, u64)>,
-    /// For each of them the last frame that took far longer than expected.
-    stalled: Vec<Option<u64>>,
+    /// One for each class and width.
+    waits: Vec<Wait>,
     observed: u64,
+}
+
+/// How long frames of a width wait for other programs.
+#[derive(Debug, Clone, Copy, Default)]
+struct Wait {
+    /// The mean, in nanoseconds, and the frame at which that held.
+    mean_ns: f64,
+    at: u64,
+    /// The last frame that took far longer than expected.
+    stalled: Option<u64>,
 }
 
 impl Learner {
@@ -74,8 +82,7 @@ impl Learner {
         Self {
             belief: Belief::new(costs, kept, Deviations::UNLIKE),
             frames,
-            waits: vec![(0.0, 0); widths.len()],
-            stalled: vec![None; widths.len()],
+            waits: vec![Wait::default(); widths.len()],
             observed: 0,
         }
     }
@@ -94,8 +101,8 @@ impl Learner {
     /// until the scheduler's next turn, however short the frame: a hundred times as long as some. The mean is what counts, so that this is not
     /// noise, and it is no factor either.
     pub(super) fn wait_ns(&self, algorithm: usize, frame: u64) -> f64 {
-        let (ns, at) = self.waits[self.frames[algorithm].wait];
-        ns / (1.0 + frame.saturating_sub(at) as f64 / WAIT_FRAMES)
+        let Wait { mean_ns, at, .. } = self.waits[self.frames[algorithm].wait];
+        mean_ns / (1.0 + frame.saturating_sub(at) as f64 / WAIT_FRAMES)
     }
 
     /// Whether an algorithm was observed often enough to tell a frame that waited from one that was expected wrongly.
@@ -108,7 +115,7 @@ impl Learner {
         if over <= STALL[usize::from(!self.knows(algorithm))] {
             return false;
         }
-        let last = self.stalled[self.frames[algorithm].wait].replace(frame);
+        let last = self.waits[self.frames[algorithm].wait].stalled.replace(frame);
         last.is_none_or(|last| frame - last > STALLS_APART)
     }
 
@@ -116,7 +123,8 @@ impl Learner {
     pub(super) fn waited(&mut self, algorithm: usize, ns: f64, frame: u64) {
         if self.knows(algorithm) {
             let before = self.wait_ns(algorithm, frame);
-            self.waits[self.frames[algorithm].wait] = (before + WAIT_SHARE * (ns - before), frame);
+            let wait = &mut self.waits[self.frames[algorithm].wait];
+            (wait.mean_ns, wait.at) = (before + WAIT_SHARE * (ns - before), frame);
         }
     }
 

@@ -3,15 +3,15 @@
 use crate::data::Profile;
 use crate::fit::late_helpers::{self, Called};
 use crate::fit::load_residual::{self, Remainder};
+use crate::fit::method_rows::rows_by_method;
 use crate::fit::min_of_two::MinOfTwo;
 use crate::fit::robust::Problem;
-use crate::fit::rows::{Row, rows};
+use crate::fit::rows::Row;
 use crate::fit::terms::{Component, components, fallback_method, is_incremental};
 use crate::fit::weights::weights;
 use crate::report::Label;
 use anyhow::Result;
 use ndarray::{Array1, Array2, Axis};
-use rayon::prelude::*;
 use sapwise::hardware::ParameterId;
 use sapwise::model::{FallbackModel, HelpersModel, MethodModel, ModelTerm, PredictError, ThreadFigures};
 use sapwise::stats::robust_deviation;
@@ -21,11 +21,6 @@ use std::sync::Arc;
 
 /// Points on one thread, or on GPUs, that a method needs on all machines together.
 const FEWEST_POINTS: usize = 3;
-/// Rows of a method, about. Its dozen coefficients need no more, and a fit takes time in proportion to them: of many reports each
-/// adds a few rows, other ones than the next.
-const MOST_ROWS: usize = 6000;
-/// Rows of a method for each profile at least.
-const FEWEST_OF_PROFILE: usize = 2;
 /// Timings on several threads that the figures of helpers are fitted to, at most.
 const MOST_CALLED: usize = 1000;
 
@@ -101,32 +96,8 @@ impl<'a> Designs<'a> {
 
     /// The same with other terms in place of the usual ones, which tells what a term is worth.
     pub fn with(profiles: &'a [Profile], components: &ComponentsOf) -> Self {
-        // Of so many that not each can add the fewest rows, some add them, spread over all.
-        let step = (profiles.len() * FEWEST_OF_PROFILE).div_ceil(MOST_ROWS).max(1);
-        let most = (MOST_ROWS / profiles.len().max(1)).max(FEWEST_OF_PROFILE);
-        let of_profile = |(k, profile): (usize, &Profile)| -> BTreeMap<(BackendClass, String), [Vec<Row>; 2]> {
-            let mut own: BTreeMap<(BackendClass, String), [Vec<Row>; 2]> = BTreeMap::new();
-            for row in rows(profile, k) {
-                let id = profile.id(row.algorithm);
-                let (class, several) = (id.backend().class(), id.backend().width() > 1);
-                let place = usize::from(several && class == BackendClass::Cpu);
-                own.entry((class, id.method().to_owned())).or_default()[place].push(row);
-            }
-            let thin = |(method, [alone, called]): ((BackendClass, String), [Vec<Row>; 2])| {
-                (method, [thinned(alone, most, k), thinned(called, most, k)])
-            };
-            own.into_iter().map(thin).collect()
-        };
-        let mut by_method: BTreeMap<(BackendClass, String), [Vec<Row>; 2]> = BTreeMap::new();
-        for own in profiles.par_iter().enumerate().step_by(step).map(of_profile).collect::<Vec<_>>() {
-            for (method, [alone, called]) in own {
-                let all = by_method.entry(method).or_default();
-                all[0].extend(alone);
-                all[1].extend(called);
-            }
-        }
         let mut notes = Vec::new();
-        let mut by_method: Vec<_> = by_method.into_iter().collect();
+        let mut by_method: Vec<_> = rows_by_method(profiles).into_iter().collect();
         // What falls back to another method is fitted after that.
         by_method.sort_by_key(|((_, method), _)| fallback_method(method).is_some());
         let methods = by_method
@@ -199,17 +170,6 @@ fn machines(profiles: &[Profile]) -> Vec<usize> {
             *known.entry(p.machine()).or_insert(next)
         })
         .collect()
-}
-
-/// At most so many of the rows, evenly spaced, from a place that differs with `turn`.
-pub(crate) fn thinned(rows: Vec<Row>, most: usize, turn: usize) -> Vec<Row> {
-    let all = rows.len();
-    if all <= most {
-        return rows;
-    }
-    let shift = turn % all;
-    let kept = |k: usize| (k * most) / all != ((k + 1) * most) / all;
-    rows.into_iter().enumerate().filter(|(k, _)| kept((k + shift) % all)).map(|(_, row)| row).collect()
 }
 
 impl Design {

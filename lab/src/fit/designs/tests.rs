@@ -1,4 +1,5 @@
 use super::*;
+use crate::fit::rows::rows;
 use crate::synthetic::{Machine, gpu_truth, truth};
 use sapwise::hardware::GpuParameterId;
 use sapwise::{Model, Term};
