@@ -16,7 +16,7 @@ mod warming;
 
 use crate::aabb::Aabb;
 use crate::algorithm::AlgorithmId;
-use crate::broad_phase::{BroadPhase, Incremental};
+use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, Incremental};
 use crate::clock::{self, Instant};
 use crate::error::{Error, Unavailable};
 use crate::load::Load;
@@ -53,8 +53,9 @@ pub struct Adaptive {
     policy: Policy,
     tracker: LoadTracker,
     choice: Option<Choice>,
-    /// What the frame of `choice` took, where it was timed.
+    /// What the frame of `choice` took, where it was timed, and how the last frame came about, where one may build on the one before.
     measured_ns: Option<f64>,
+    work: Option<FrameWork>,
     /// The most objects that were to be prepared for.
     prepared: usize,
     /// [`decide`](Self::decide) was called for a frame of this many boxes that has not run yet.
@@ -86,6 +87,7 @@ impl Adaptive {
             tracker: LoadTracker::default(),
             choice: None,
             measured_ns: None,
+            work: None,
             prepared: 0,
             decided: None,
             #[cfg(feature = "this-machine")]
@@ -111,9 +113,10 @@ impl Adaptive {
         self.policy.set_learning(learns && clock::TICKS);
     }
 
-    /// Whether now and then another algorithm than the cheapest is tried, to learn what that one costs: in one frame, or in up to twelve where it
-    /// keeps work from frame to frame. Only where what it may save in the next 300 frames is more than the trial is expected to cost, and
-    /// all trials together are expected to cost no more than 0.5 % of the time of the frames and four frames. On unless it is turned off; without [learning](Self::set_learning) it does nothing.
+    /// Whether now and then another algorithm than the cheapest is tried, to learn what that one costs: in two frames, or in twelve where it keeps
+    /// work from frame to frame. Only where what it may save in the next 300 frames is more than the trial is expected to cost. What trials
+    /// have cost is measured, and no other is made until that is no more than 0.5 % of the time of the frames and four frames. On unless it is
+    /// turned off; without [learning](Self::set_learning) it does nothing.
     pub fn set_exploring(&mut self, explores: bool) {
         self.policy.set_exploring(explores);
     }
@@ -231,8 +234,8 @@ impl Adaptive {
     }
 
     fn choose(&mut self, boxes: &[Aabb]) {
-        let frames = self.tracker.decide(boxes);
-        self.choice = self.choose_among(frames);
+        self.tracker.decide(boxes);
+        self.choice = self.choose_among();
         self.measured_ns = None;
     }
 
@@ -244,13 +247,13 @@ impl Adaptive {
     }
 
     /// The choice among those that are here; where none is, among those that are awaited.
-    fn choose_among(&mut self, frames: u32) -> Option<Choice> {
+    fn choose_among(&mut self) -> Option<Choice> {
         let load = self.tracker.load();
-        let choice = self.policy.choose(&load, frames);
+        let choice = self.policy.choose(&load);
         if choice.is_some() || !self.take_back(true) {
             return choice;
         }
-        self.policy.choose(&load, 0)
+        self.policy.choose(&load)
     }
 
     /// Gets an instance ready. Meanwhile none of its candidates is chosen where that takes a thread of its own.
@@ -324,15 +327,17 @@ impl BroadPhase for Adaptive {
             };
             let running = started.map(|_| Instant::now());
             match instance.run(&candidate.id, self.tracker.plan(), boxes, pairs) {
-                Ok(()) => {
+                Ok(work) => {
+                    self.work = work;
                     let Some((started, running)) = started.zip(running) else {
                         self.tracker.ran(boxes, pairs.overlapping(), None);
+                        self.policy.went_on(choice.chosen, work);
                         return Ok(());
                     };
                     let ns = (running.elapsed().as_nanos() as f64).max(1.0);
                     self.measured_ns = clock::TICKS.then_some(ns);
                     self.tracker.ran(boxes, pairs.overlapping(), Some(ns));
-                    let dear = self.policy.ran(choice.chosen, ns);
+                    let dear = self.policy.ran(choice.chosen, ns, work);
                     let decision_ns = (!decided).then(|| started.elapsed().as_nanos() as f64 - ns);
                     self.tracker.took(decision_ns, ns);
                     if dear || !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis) {
@@ -348,7 +353,7 @@ impl BroadPhase for Adaptive {
                     self.policy.set_usable(choice.chosen, false);
                     // The one that runs instead is told apart from what ran before.
                     started.get_or_insert_with(Instant::now);
-                    let next = self.choose_among(0);
+                    let next = self.choose_among();
                     self.choice = next.map(|c| Choice { reason: Reason::FellBack, ..c });
                 }
                 Err(error) => {
@@ -374,7 +379,12 @@ impl BroadPhase for Adaptive {
     }
 }
 
-impl Incremental for Adaptive {}
+impl Incremental for Adaptive {
+    /// Of an algorithm that keeps nothing every frame is from scratch.
+    fn last_frame(&self) -> FrameWork {
+        self.work.unwrap_or(FrameWork::new(FrameKind::FromScratch, 1.0))
+    }
+}
 
 impl fmt::Debug for Adaptive {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

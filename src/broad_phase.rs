@@ -48,8 +48,45 @@ pub trait BroadPhase: Send + Sync {
     }
 }
 
+/// How a frame of an incremental algorithm came about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FrameKind {
+    /// It built on what the frame before had left.
+    Updated,
+    /// It made again what it keeps, for the frames that follow.
+    Rebuilt,
+    /// It found the pairs from scratch, and keeps nothing.
+    FromScratch,
+}
+
+/// The work of a frame of an incremental algorithm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct FrameWork {
+    /// How the frame came about.
+    pub kind: FrameKind,
+    /// Its work over that of the mean frame of the present scene, those included in which all is made again; 1 where nobody knows. Frames right after
+    /// one of these are cheap, so that a few of them tell little of the mean.
+    pub over_mean: f64,
+}
+
+impl FrameWork {
+    /// Of a frame of this kind and so many times the work of the mean frame; what is no positive number counts as 1.
+    #[must_use]
+    pub fn new(kind: FrameKind, over_mean: f64) -> Self {
+        Self { kind, over_mean: if over_mean.is_finite() && over_mean > 0.0 { over_mean } else { 1.0 } }
+    }
+}
+
 /// An algorithm whose frame is cheaper after one that was alike. Time it after some frames, not on the first.
 pub trait Incremental: BroadPhase {
+    /// How the last frame came about. [`Adaptive`](crate::Adaptive) compares what a frame took with what its work lets expect; of an algorithm that
+    /// does not tell, every frame counts alike.
+    fn last_frame(&self) -> FrameWork {
+        FrameWork::new(FrameKind::Updated, 1.0)
+    }
+
     /// Runs on this many threads from the next frame on, with all that it keeps. `false` where it can't, and then nothing changes.
     ///
     /// One instance for several numbers of threads comes from [`Registry::create_family`](crate::Registry::create_family).

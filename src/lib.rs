@@ -78,7 +78,7 @@ pub use adaptive::{Adaptive, Decision, Reason};
 #[cfg(feature = "this-machine")]
 pub use adaptive::{Origin, SaveError, Setup};
 pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
-pub use broad_phase::{BroadPhase, Incremental};
+pub use broad_phase::{BroadPhase, FrameKind, FrameWork, Incremental};
 #[cfg(feature = "schema")]
 pub use calibrate::cache_schema;
 #[cfg(feature = "this-machine")]

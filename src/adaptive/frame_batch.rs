@@ -5,9 +5,8 @@
 
 use crate::tuning::belief::View;
 
-/// Frames that are added up where an algorithm runs on, and right after it began.
-const MOST: u32 = 16;
-const FEWEST: u32 = 2;
+/// Frames that are added up right after an algorithm began, and where it runs on.
+const ROOM: [u32; 2] = [2, 16];
 /// Octaves of objects over which a batch goes at most.
 const OCTAVES: f64 = 0.5;
 /// What counts of a frame, at most: this many times what the dearest kind of frame is expected to cost. The rest is another program's.
@@ -21,6 +20,11 @@ pub(super) struct Predicted {
 }
 
 impl Predicted {
+    /// Of a frame of so many times the usual work.
+    pub(super) fn times(self, work: f64) -> Self {
+        Self { ns: work * self.ns, calls_ns: work * self.calls_ns }
+    }
+
     /// Share of the calls.
     pub(super) fn calls(self) -> f64 {
         share(self.calls_ns, self.ns)
@@ -43,8 +47,6 @@ pub(super) struct FrameBatch {
     calls_ns: f64,
     log2_objects: f64,
     view: View,
-    /// It is the one frame with which the candidate began.
-    pub(super) cold: bool,
     /// Frames until it is full.
     room: u32,
 }
@@ -91,7 +93,8 @@ impl FrameBatch {
 
     /// An empty one. Where the candidate is the one of before, it has more room than that.
     pub(super) fn next(&self, candidate: usize) -> Self {
-        let room = if self.frames > 0 && candidate == self.candidate { (2 * self.room).min(MOST) } else { FEWEST };
+        let [first, most] = ROOM;
+        let room = if self.frames > 0 && candidate == self.candidate { (2 * self.room).min(most) } else { first };
         Self { candidate, room, ..Self::default() }
     }
 }

@@ -3,7 +3,7 @@
 use super::warming::Place;
 use crate::aabb::Aabb;
 use crate::algorithm::{AlgorithmId, Backend};
-use crate::broad_phase::BroadPhase;
+use crate::broad_phase::{BroadPhase, FrameWork};
 use crate::error::{Error, Unavailable};
 use crate::load::FramePlan;
 use crate::pairs::Pairs;
@@ -85,13 +85,14 @@ impl Instance {
         self.place.here().is_some()
     }
 
+    /// Finds the pairs. Returns how the frame came about where one may build on the one before.
     pub(super) fn run(
         &mut self,
         id: &AlgorithmId,
         plan: &FramePlan,
         boxes: &[Aabb],
         pairs: &mut Pairs,
-    ) -> Result<(), Error> {
+    ) -> Result<Option<FrameWork>, Error> {
         let Some(algorithm) = self.place.here() else {
             return Err(Error::Unavailable { algorithm: id.clone(), reason: Unavailable::FailedBefore });
         };
@@ -105,7 +106,9 @@ impl Instance {
         }
         algorithm.find_pairs_with(plan, boxes, pairs)?;
         self.ready = self.ready.max(boxes.len());
-        Ok(())
+        // Checked once more: the fields are anybody's to set.
+        let checked = |work: FrameWork| FrameWork::new(work.kind, work.over_mean);
+        Ok(algorithm.as_incremental().map(|algorithm| checked(algorithm.last_frame())))
     }
 }
 

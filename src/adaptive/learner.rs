@@ -25,9 +25,6 @@ const NOISE_LN: f64 = 0.1;
 const LEAST_NOISE_LN: f64 = 0.02;
 /// Of this many frames in a row the mean is as noisy as of this power of their number far apart.
 const ALIKE: f64 = 0.7;
-/// And the frame with which an algorithm begins as this part of one where it was slower than expected, for its threads may have slept or met
-/// another program; where it was faster, that was no accident. Not too much of that: whatever is tried would look cheap by its lucky frames.
-const COLD_WORTH: [f64; 2] = [0.02, 0.1];
 /// Share of each new deviation in the noise.
 const NOISE_SHARE: f64 = 1.0 / 8.0;
 
@@ -151,7 +148,7 @@ impl Learner {
         let a = &mut self.frames[algorithm];
         a.batches = a.batches.saturating_add(1);
         // Frames in a row are alike, so that many of them tell less than as many that were far apart.
-        let worth = if batch.cold { COLD_WORTH[usize::from(surprise < 0.0)] } else { f64::from(batch.frames).powf(ALIKE) };
+        let worth = f64::from(batch.frames).powf(ALIKE);
         let variance = expected.shared + expected.own + a.noise / worth;
         let most = MOST_SURPRISE * variance.sqrt();
         let error = surprise.clamp(-most, most);

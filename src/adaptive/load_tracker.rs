@@ -30,8 +30,12 @@ pub(super) struct LoadTracker {
     passed_ns: f64,
     /// What a sample takes: the last one, but at most `COST_RISES` times what the one before was taken to be.
     sample_ns: f64,
+    /// What the sample of the last decision took, where it had one.
+    sampled_ns: f64,
     displacement: Displacement,
     watching: Watching,
+    /// How far the boxes moved when that was last found out.
+    moved: Option<f64>,
     /// Objects and pairs of the frame before.
     before: Option<(u32, u64)>,
     throttle: DecisionThrottle,
@@ -70,24 +74,24 @@ impl LoadTracker {
         self.throttle.is_due(count(boxes)) || self.watching == Watching::Begun
     }
 
-    /// Brings the load up to date: sampled where that pays, else scaled from the last sample. Returns the number of frames that ran
-    /// since the last time.
-    pub(super) fn decide(&mut self, boxes: &[Aabb]) -> u32 {
+    /// Brings the load up to date: sampled where that pays, else scaled from the last sample.
+    pub(super) fn decide(&mut self, boxes: &[Aabb]) {
         let objects = count(boxes);
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
-        let mut moved = self.before.map(|_| self.load.moved);
-        self.plan.forget();
         if self.watching == Watching::Begun {
-            moved = Some(self.displacement.moved(boxes).unwrap_or(1.0));
-            self.plan = FramePlan::default().with_moved(moved);
+            self.moved = Some(self.displacement.moved(boxes).unwrap_or(1.0));
             self.watching = Watching::Done;
         }
+        let moved = self.moved;
+        self.sampled_ns = 0.0;
+        self.plan.forget();
         if self.is_sample_due(objects) {
             let started = Instant::now();
             let (load, plan) = Load::planned(boxes, pairs, moved);
             let took = started.elapsed().as_nanos() as f64;
             self.load = load;
-            self.plan = plan.with_moved(self.plan.moved());
+            self.plan = plan;
+            self.sampled_ns = took;
             self.sample_ns = if self.sample_ns > 0.0 { took.min(self.sample_ns * COST_RISES) } else { took };
             self.watching = Watching::Due;
             (self.sampled, self.age, self.passed_ns) = (objects, 0, 0.0);
@@ -95,7 +99,8 @@ impl LoadTracker {
             self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
             self.load.moved = moved.unwrap_or(self.load.moved);
         }
-        self.throttle.decide(objects)
+        self.plan = std::mem::take(&mut self.plan).with_moved(moved).with_pairs(pairs);
+        self.throttle.decide(objects);
     }
 
     /// Frames since the last sample.
@@ -126,9 +131,10 @@ impl LoadTracker {
         }
     }
 
-    /// What a decision took, where that is known, and its frame, in nanoseconds.
+    /// What a decision with its sample took, where that is known, and its frame, in nanoseconds.
     pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64) {
-        self.throttle.took(decision_ns, frame_ns);
+        // Samples have a share of the time of their own.
+        self.throttle.took(decision_ns.map(|ns| (ns - self.sampled_ns).max(0.0)), frame_ns);
     }
 
     /// The next frame is to be decided on again.
@@ -138,7 +144,7 @@ impl LoadTracker {
 
     /// After a frame that failed nothing is known of the one before, and the next one is decided on again.
     pub(super) fn failed(&mut self) {
-        self.before = None;
+        (self.before, self.moved) = (None, None);
         self.watching = Watching::Done;
         self.wake();
     }

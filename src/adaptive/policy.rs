@@ -4,8 +4,9 @@ use super::decision::{Choice, Reason};
 use super::frame_batch::{FrameBatch, Predicted};
 use super::learner::Learner;
 use super::shelter::Shelter;
-use super::switching::{Expected, Kind, SwitchingCosts};
+use super::switching::{Expected, SwitchingCosts};
 use super::trials::{HORIZON, Offer, Trials, expected_gain};
+use crate::broad_phase::{FrameKind, FrameWork};
 use crate::cost::Frame;
 use crate::load::Load;
 use crate::tuning::Tuning;
@@ -13,6 +14,9 @@ use crate::tuning::belief::View;
 
 /// By number of objects alone, the algorithm of before stays while its own step is within this share.
 const STEP_SLACK: f64 = 0.05;
+
+/// A switch that is expected to save its price within so many frames is made at once.
+const SOON: f64 = 4.0;
 
 /// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a breakpoint or a page
 /// from disk tells nothing of the frames that follow.
@@ -45,8 +49,12 @@ pub(super) struct Policy {
     batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
+    /// The number of the frame that is to run, and of the one that was decided last.
     frame: u64,
+    decided: u64,
     trials: Trials,
+    /// The last frame that was timed was one of a trial.
+    tried: bool,
 }
 
 impl Policy {
@@ -67,14 +75,16 @@ impl Policy {
             settled: None,
             ran: None,
             mean_ns: vec![f64::INFINITY; count],
-            expected: vec![Expected { built_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
+            expected: vec![Expected { mean_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
             predicted: vec![Predicted::default(); count],
             log2_objects: 0.0,
             view: View::default(),
             batch: FrameBatch::default(),
             saved_ns: vec![0.0; count],
             frame: 0,
+            decided: 0,
             trials: Trials::default(),
+            tried: false,
             tuning,
             usable,
         }
@@ -132,13 +142,9 @@ impl Policy {
         }
     }
 
-    /// The candidate that is to run the next frame, `frames` after the last one that was decided. `None` when none can run.
-    pub(super) fn choose(&mut self, load: &Load, frames: u32) -> Option<Choice> {
-        if let Some(ran) = self.ran.filter(|_| frames > 0) {
-            // All frames since it was decided on.
-            self.switching.went_on(ran, self.frame + u64::from(frames) - 1);
-        }
-        self.frame += u64::from(frames);
+    /// The candidate that is to run the next frame. `None` when none can run.
+    pub(super) fn choose(&mut self, load: &Load) -> Option<Choice> {
+        let frames = (self.frame - std::mem::replace(&mut self.decided, self.frame)) as f64;
         if self.is_by_count() {
             return self.choose_by_count(load.objects);
         }
@@ -167,17 +173,16 @@ impl Policy {
         })
     }
 
-    /// Ends a trial that has shown enough. The one that was tried, where it is expected to be cheaper by now and keeps work, which it has made
+    /// Ends a trial that is over. The one that was tried, where it is expected to be cheaper by now and keeps work, which it has made
     /// in the trial: nothing is left to be paid for a switch.
     fn after_trial(&mut self, settled: usize) -> Option<usize> {
         let other = self.trials.candidate()?;
-        let over = self.mean_ns[other] / self.mean_ns[settled];
         let avoided = self.is_avoided(other);
-        if !avoided && !self.trials.has_shown_enough(over) {
+        if !avoided && !self.trials.is_over() {
             return None;
         }
         self.trials.stop(self.frame);
-        (over < 1.0 && !avoided && self.switching.keeps(other)).then_some(other)
+        (self.mean_ns[other] < self.mean_ns[settled] && !avoided && self.switching.keeps(other)).then_some(other)
     }
 
     /// Fills in what every candidate is expected to cost.
@@ -189,12 +194,13 @@ impl Policy {
         for (k, cost) in self.tuning.costs.iter().enumerate() {
             let ns = cost.curve.cost_of(&frame);
             let alone_ns = cost.curve.fallback_of(&frame).unwrap_or(ns).max(ns);
-            let predicted = Predicted { ns, calls_ns: cost.curve.calls_of(&frame).min(ns) };
+            let mean_ns = self.switching.mean_ns(k, ns, alone_ns);
+            let predicted = Predicted { ns: mean_ns, calls_ns: cost.curve.calls_of(&frame).min(ns) };
             let factor = learner.map_or(1.0, |l| l.correction_ln(k, &self.view, predicted.calls()).exp());
             let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));
             self.predicted[k] = predicted;
-            self.expected[k] = Expected { built_ns: ns * factor, alone_ns: alone_ns * factor };
-            self.mean_ns[k] = self.switching.mean_ns(k, self.frame, self.expected[k]) + wait_ns;
+            self.expected[k] = Expected { mean_ns: mean_ns * factor, alone_ns: alone_ns * factor };
+            self.mean_ns[k] = mean_ns * factor + wait_ns;
         }
     }
 
@@ -215,7 +221,7 @@ impl Policy {
     fn switch_ns(&self, candidate: usize) -> f64 {
         let expected = self.expected[candidate];
         let first_ns = self.switching.first_ns(candidate, self.frame, expected);
-        (first_ns - self.switching.mean_ns(candidate, self.frame, expected)).max(0.0)
+        (first_ns - expected.mean_ns).max(0.0)
     }
 
     fn cheapest(&self, among: impl Fn(usize) -> bool) -> Option<usize> {
@@ -227,16 +233,21 @@ impl Policy {
     ///
     /// A switch is made once the frames since the other became cheaper would have saved what it costs. Where costs hold still that
     /// loses at most twice what knowing the future would, and where they flicker about a border nothing is ever saved for long.
-    fn settle(&mut self, settled: usize, best: usize, frames: u32) -> (usize, Reason) {
+    fn settle(&mut self, settled: usize, best: usize, frames: f64) -> (usize, Reason) {
         let now = self.mean_ns[settled];
         for (saved, mean_ns) in self.saved_ns.iter_mut().zip(&self.mean_ns) {
-            let gain = (now - mean_ns) * f64::from(frames);
+            let gain = (now - mean_ns) * frames;
             *saved = if gain.is_finite() { (*saved + gain).max(0.0) } else { 0.0 };
         }
         if best == settled {
             return (settled, Reason::Stayed);
         }
-        let paid = |k: usize| self.mean_ns[k] < now && self.saved_ns[k] >= self.switch_ns(k) && !self.is_avoided(k);
+        let paid = |k: usize| {
+            let saved_ns = self.saved_ns[k].max(SOON * (now - self.mean_ns[k]));
+            let leave_ns = self.switching.leave_ns(settled, k, self.frame, self.expected[settled]);
+            let price_ns = self.switch_ns(k) + leave_ns;
+            self.mean_ns[k] < now && saved_ns >= price_ns && !self.is_avoided(k)
+        };
         self.cheapest(paid).map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
     }
 
@@ -270,47 +281,61 @@ impl Policy {
         Choice { chosen, predicted_ns: Some(self.mean_ns[chosen]), runner_up, reason }
     }
 
-    /// Takes in that a candidate ran the frame that was decided, and what that took. Whether that was so much that the next frame is to be
-    /// decided on, whatever it was before.
-    pub(super) fn ran(&mut self, candidate: usize, ns: f64) -> bool {
+    /// Takes in that a candidate ran a frame that was neither decided on nor timed, and how it came about.
+    pub(super) fn went_on(&mut self, candidate: usize, work: Option<FrameWork>) {
+        self.switching.ran(candidate, self.frame, work);
+        self.frame += 1;
+    }
+
+    /// Takes in that a candidate ran the frame that was decided, what that took and how it came about; `None` where it builds on no frame
+    /// before. Whether that was so much that the next
+    /// frame is to be decided on, whatever it was before.
+    pub(super) fn ran(&mut self, candidate: usize, ns: f64, work: Option<FrameWork>) -> bool {
         let entered = self.ran != Some(candidate);
         self.ran = Some(candidate);
-        if self.is_by_count() {
-            return false;
+        self.switching.ran(candidate, self.frame, work);
+        let dear = !self.is_by_count() && self.is_dear(candidate, ns);
+        if self.learns {
+            self.learn(candidate, entered, ns, work);
         }
-        let dear = self.is_dear(candidate, ns);
-        self.learn(candidate, entered, ns);
+        self.frame += 1;
         dear
     }
 
-    fn learn(&mut self, candidate: usize, entered: bool, ns: f64) {
+    fn learn(&mut self, candidate: usize, entered: bool, ns: f64, work: Option<FrameWork>) {
         let expected = self.expected[candidate];
         let dearest_ns = self.switching.rebuild_ns(candidate, expected);
-        let learner = self.learner.as_mut().filter(|_| self.learns);
-        if learner.is_some_and(|l| l.is_stall(candidate, ns / dearest_ns, self.frame)) {
-            return self.switching.went_on(candidate, self.frame);
+        let Some(learner) = &mut self.learner else { return };
+        if learner.is_stall(candidate, ns / dearest_ns, self.frame) {
+            return;
         }
-        let kind = self.switching.ran(candidate, entered, self.frame, ns, expected, self.learns);
-        let Some(learner) = self.learner.as_mut().filter(|_| self.learns) else { return };
+        if let Some(settled) = self.settled.filter(|&k| k != candidate || entered && self.tried) {
+            // What is made again in this frame would have been made again in any other way.
+            let shares = candidate == settled || self.switching.share(candidate, settled);
+            let work = work.filter(|_| shares).map_or(1.0, |work| work.over_mean);
+            self.trials.pay(ns - work * self.mean_ns[settled], entered);
+        }
+        self.tried = self.settled != Some(candidate);
+        if work.map_or(entered, |work| work.kind == FrameKind::Rebuilt) {
+            self.switching.learn(candidate, ns, expected);
+        }
         if !self.batch.takes(candidate, self.log2_objects) {
             if self.batch.frames > 0 {
                 learner.observe(&self.batch, self.frame);
             }
             self.batch = self.batch.next(candidate);
         }
-        let first_of_many = kind == Kind::First && (self.trials.has_more() || self.settled == Some(candidate));
-        if kind != Kind::Rebuilt && !first_of_many {
+        // The first one is cold, and tells nothing of the rest.
+        if !entered {
             // Until it is known what is dear, all of a frame counts.
             let known = learner.knows(candidate);
             let dearest_ns = if known { self.switching.rebuild_ns(candidate, expected) } else { f64::INFINITY };
-            self.batch.cold = entered;
-            let waited_ns = self
-                .batch
-                .add(ns, self.predicted[candidate], (self.log2_objects, &self.view), dearest_ns)
-                .min(MOST_WAIT * dearest_ns);
+            let predicted = self.predicted[candidate].times(work.map_or(1.0, |work| work.over_mean));
+            let waited_ns =
+                self.batch.add(ns, predicted, (self.log2_objects, &self.view), dearest_ns).min(MOST_WAIT * dearest_ns);
             learner.waited(candidate, waited_ns, self.frame);
         }
-        if self.batch.is_full() {
+        if self.batch.is_full() || self.batch.frames > 0 && self.trials.is_over() {
             learner.observe(&self.batch, self.frame);
             self.batch = self.batch.next(candidate);
         }

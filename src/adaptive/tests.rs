@@ -57,9 +57,9 @@ fn it_switches_at_the_border_and_not_within_the_hysteresis() {
     let (brute, strips) = ("brute@cpu1".to_owned(), "grid-sap@cpu1".to_owned());
     assert_eq!(chosen(&mut adaptive, 100), (brute.clone(), Reason::First));
     assert_eq!(chosen(&mut adaptive, 150), (brute.clone(), Reason::Stayed));
-    assert_eq!(chosen(&mut adaptive, 205), (brute.clone(), Reason::Hysteresis));
+    assert_eq!(chosen(&mut adaptive, 202), (brute.clone(), Reason::Hysteresis));
     assert_eq!(chosen(&mut adaptive, 300), (strips.clone(), Reason::Switched));
-    assert_eq!(chosen(&mut adaptive, 195), (strips.clone(), Reason::Hysteresis));
+    assert_eq!(chosen(&mut adaptive, 198), (strips.clone(), Reason::Hysteresis));
     assert_eq!(chosen(&mut adaptive, 50), (brute, Reason::Switched));
     let decision = adaptive.last_decision().unwrap();
     assert_eq!(decision.predicted_ns, Some(500.0));

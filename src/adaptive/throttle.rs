@@ -2,6 +2,9 @@
 
 /// Share of the frames' time that decisions and their clock may take.
 const SHARE: f64 = 0.01;
+/// Share of a decision in the mean, and how many times the mean it counts at most.
+const MEAN: f64 = 1.0 / 8.0;
+const MOST_RISE: f64 = 4.0;
 /// Frames between two decisions, at most.
 const MOST_FRAMES: u32 = 128;
 
@@ -33,10 +36,9 @@ impl DecisionThrottle {
         self.frame_ns
     }
 
-    /// Begins a decision; returns the number of frames that ran since the last one.
-    pub(super) fn decide(&mut self, objects: u32) -> u32 {
-        self.objects = objects;
-        std::mem::take(&mut self.frames)
+    /// Begins a decision.
+    pub(super) fn decide(&mut self, objects: u32) {
+        (self.objects, self.frames) = (objects, 0);
     }
 
     /// The next frame is to be decided on again.
@@ -47,8 +49,10 @@ impl DecisionThrottle {
     /// What the decision took, where that is known, and its frame.
     pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64) {
         if let Some(ns) = decision_ns {
-            // The least of late: a decision that was interrupted says nothing, and neither does one that had to wait for memory.
-            self.decision_ns = if self.decision_ns > 0.0 { ns.min(1.05 * self.decision_ns) } else { ns };
+            // The mean of late, for that is what is paid: between two frames a program needs the caches for itself, and a decision waits for memory
+            // then. One that was interrupted counts for little.
+            let before = if self.decision_ns > 0.0 { self.decision_ns } else { ns };
+            self.decision_ns = before + MEAN * (ns.min(MOST_RISE * before) - before);
         }
         self.frame_ns = frame_ns;
         self.rest = (self.decision_ns / (SHARE * frame_ns.max(1.0))).min(f64::from(MOST_FRAMES)) as u32;

@@ -14,11 +14,12 @@ const MOST: f64 = 12.0;
 /// Frames between the end of a trial and the beginning of the next, at least.
 const APART: u64 = 20;
 
-/// Frames of a trial of an algorithm that keeps work from frame to frame: its first one makes that, and the others show what it saves, one
-/// in several of them a part of it being made again. Any other shows what it costs in one frame.
+/// Frames of a trial of an algorithm that keeps work from frame to frame: its first one makes that, and the others show what it saves. Any other
+/// shows what it costs in its second frame; the first one is cold.
 const OF_KEPT: u32 = 12;
-/// A trial ends after this many frames where it is expected by then to cost so many times what ran before.
-const ENOUGH: (u32, f64) = (4, 1.2);
+const OF_OTHERS: u32 = 2;
+/// A trial ends when the frames behind its first one have cost so many frames' worth: what that one has cost is spent.
+const ENOUGH: f64 = 2.0;
 
 /// The trial that runs, and what trials may cost.
 #[derive(Debug, Clone, Default)]
@@ -33,8 +34,9 @@ pub(super) struct Trials {
 #[derive(Debug, Clone, Copy)]
 struct Trial {
     candidate: usize,
-    frames: u32,
     left: u32,
+    /// What it may cost still, in nanoseconds.
+    left_ns: f64,
 }
 
 /// A trial that may be made.
@@ -44,16 +46,17 @@ pub(super) struct Offer {
     frames: u32,
     /// What it is expected to cost beside what frames cost now.
     pub(super) price_ns: f64,
+    now_ns: f64,
 }
 
 impl Offer {
     /// Of a candidate of which a frame is expected to take `mean_ns` and its first one `switch_ns` more, where one takes `now_ns`.
     /// `begins`: its first frame makes what it keeps.
     pub(super) fn of(candidate: usize, begins: bool, switch_ns: f64, mean_ns: f64, now_ns: f64) -> Self {
-        let frames = if begins { OF_KEPT } else { 1 };
+        let frames = if begins { OF_KEPT } else { OF_OTHERS };
         // One that turns out dear ends early.
-        let dear_ns = f64::from(frames.min(ENOUGH.0)) * (mean_ns - now_ns).max(0.0);
-        Self { candidate, frames, price_ns: switch_ns + dear_ns }
+        let dear_ns = (f64::from(frames) * (mean_ns - now_ns).max(0.0)).min(ENOUGH * now_ns);
+        Self { candidate, frames, price_ns: switch_ns + dear_ns, now_ns }
     }
 }
 
@@ -63,15 +66,10 @@ impl Trials {
         self.running.map(|t| t.candidate)
     }
 
-    /// Whether frames of the trial follow the one that ran.
-    pub(super) fn has_more(&self) -> bool {
-        self.running.is_some_and(|t| t.left > 0)
-    }
-
     /// Adds to what trials may cost that of some frames which took `now_ns` each.
-    pub(super) fn allow(&mut self, now_ns: f64, frames: u32) {
+    pub(super) fn allow(&mut self, now_ns: f64, frames: f64) {
         let before = self.allowance_ns.unwrap_or(AT_FIRST * now_ns);
-        self.allowance_ns = Some((before + SHARE * now_ns * f64::from(frames)).min(MOST * now_ns));
+        self.allowance_ns = Some((before + SHARE * now_ns * frames).min(MOST * now_ns));
     }
 
     /// What a trial may cost that begins with this frame; `None` where none may begin.
@@ -79,11 +77,18 @@ impl Trials {
         if self.running.is_none() && frame >= self.ended + APART { self.allowance_ns } else { None }
     }
 
-    /// Begins a trial, which is paid for at once.
+    /// Begins a trial.
     pub(super) fn begin(&mut self, offer: Offer) {
-        let Offer { candidate, frames, price_ns } = offer;
-        self.allowance_ns = self.allowance_ns.map(|ns| ns - price_ns);
-        self.running = Some(Trial { candidate, frames, left: frames });
+        let Offer { candidate, frames, now_ns, .. } = offer;
+        self.running = Some(Trial { candidate, left: frames, left_ns: ENOUGH * now_ns });
+    }
+
+    /// Takes in what a frame of a trial, its `first` or another, or the first one after it has cost beside what frames cost otherwise.
+    pub(super) fn pay(&mut self, ns: f64, first: bool) {
+        self.allowance_ns = self.allowance_ns.map(|allowed| allowed - ns);
+        if let Some(trial) = self.running.as_mut().filter(|_| !first) {
+            trial.left_ns -= ns;
+        }
     }
 
     /// The candidate of the next frame of the trial, if one runs.
@@ -93,9 +98,9 @@ impl Trials {
         Some(trial.candidate)
     }
 
-    /// Whether the trial is over, where its candidate is expected to cost so many times what ran before.
-    pub(super) fn has_shown_enough(&self, over: f64) -> bool {
-        self.running.is_some_and(|t| t.left == 0 || t.frames - t.left >= ENOUGH.0 && over > ENOUGH.1)
+    /// Whether a trial runs that is over.
+    pub(super) fn is_over(&self) -> bool {
+        self.running.is_some_and(|t| t.left == 0 || t.left_ns < 0.0)
     }
 
     /// Ends the trial that runs before this frame, if one does.
@@ -127,39 +132,49 @@ mod tests {
     use super::*;
 
     #[test]
-    fn trials_cost_no_more_than_their_share_however_dear_one_is() {
+    fn trials_cost_no_more_than_their_share_however_dear_they_turn_out() {
         let mut trials = Trials::default();
         let (mut paid, mut begun) = (0.0, 0);
         for frame in 0..20_000 {
-            if trials.has_shown_enough(2.0) {
+            if trials.is_over() {
                 trials.stop(frame);
             }
-            trials.allow(100.0, 1);
+            trials.allow(100.0, 1.0);
             let offer = Offer::of(1, begun % 2 == 0, 150.0, 130.0, 100.0);
             if trials.allowance_ns(frame).is_some_and(|ns| ns >= offer.price_ns) {
                 trials.begin(offer);
-                paid += offer.price_ns;
                 begun += 1;
             }
-            trials.next();
+            if trials.next().is_some() {
+                trials.pay(170.0, false);
+                paid += 170.0;
+            }
         }
-        assert!(paid <= (0.005 * 20_000.0 + 4.0) * 100.0 && paid > 9000.0, "{paid} for {begun}");
+        // Of the last one only the price that was expected was there.
+        assert!(paid <= (0.005 * 20_000.0 + 4.0 + 12.0) * 100.0 && paid > 9000.0, "{paid} for {begun}");
     }
 
     #[test]
-    fn a_trial_of_what_keeps_work_goes_on_while_it_is_not_dear() {
-        let frames = |over: f64| {
+    fn a_trial_of_what_keeps_work_goes_on_until_it_has_cost_two_frames_beside_its_first() {
+        let frames = |cost_ns: f64| {
             let mut trials = Trials::default();
-            trials.allow(100.0, 1);
+            trials.allow(100.0, 1.0);
             trials.begin(Offer::of(3, true, 100.0, 100.0, 100.0));
-            (0..).take_while(|_| !trials.has_shown_enough(over) && trials.next() == Some(3)).count()
+            (0..)
+                .take_while(|_| {
+                    !trials.is_over() && {
+                        trials.pay(cost_ns, false);
+                        trials.next() == Some(3)
+                    }
+                })
+                .count()
         };
-        assert_eq!((frames(0.9), frames(1.3)), (12, 4));
+        assert_eq!((frames(10.0), frames(60.0)), (12, 4));
         let mut trials = Trials::default();
         trials.begin(Offer::of(0, false, 100.0, 100.0, 100.0));
-        assert!(trials.next() == Some(0) && !trials.has_more() && trials.has_shown_enough(0.5));
+        assert!(trials.next() == Some(0) && !trials.is_over() && trials.next() == Some(0) && trials.is_over());
         trials.stop(7);
-        trials.allow(100.0, 1);
+        trials.allow(100.0, 1.0);
         assert!(trials.allowance_ns(26).is_none() && trials.allowance_ns(27).is_some());
     }
 

@@ -13,7 +13,7 @@ mod motion;
 mod tree;
 
 use crate::aabb::Aabb;
-use crate::broad_phase::{BroadPhase, Incremental, check_count};
+use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, Incremental, check_count};
 use crate::cpu::Threads;
 use crate::cpu::columns::part;
 use crate::cpu::kernel::{overlap, prefetch};
@@ -47,6 +47,7 @@ struct PairCache {
     kept: Vec<Pairs>,
     /// The kept pairs of all tasks, while they are dealt out to another number of them.
     dealt: Pairs,
+    last_frame: FrameKind,
 }
 
 /// What came of keeping pairs in a frame.
@@ -73,6 +74,7 @@ pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box
         shares: (0..tasks).map(|_| Share::default()).collect(),
         kept: (0..tasks).map(|_| Pairs::new()).collect(),
         dealt: Pairs::new(),
+        last_frame: FrameKind::FromScratch,
         workers: widths[0].fit(0),
         fitted_for: None,
         width: 0,
@@ -106,6 +108,7 @@ impl BroadPhase for PairCache {
             let Self { workers, tree, outputs, .. } = self;
             tree.build(workers, boxes, &plan.sample(boxes), pairs.filter())?;
             outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
+            self.last_frame = FrameKind::FromScratch;
         }
         self.motion.found(boxes.len(), pairs.overlapping());
         pairs.finish_on(&self.workers)
@@ -122,6 +125,11 @@ impl BroadPhase for PairCache {
 }
 
 impl Incremental for PairCache {
+    fn last_frame(&self) -> FrameWork {
+        let keeps = self.last_frame != FrameKind::FromScratch;
+        FrameWork::new(self.last_frame, if keeps { f64::from(self.motion.work_over_mean()) } else { 1.0 })
+    }
+
     fn set_threads(&mut self, threads: u32) -> bool {
         let Some(width) = self.widths.iter().position(|w| w.threads() == threads as usize) else { return false };
         if width != self.width {
@@ -178,11 +186,12 @@ impl PairCache {
 
     /// Finds the pairs among the kept ones, as far as those can be kept.
     fn keep(&mut self, plan: &FramePlan, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
-        let Self { workers, outputs, motion, grown, tree, shares, kept, .. } = self;
+        let Self { workers, outputs, motion, grown, tree, shares, kept, last_frame, .. } = self;
         let workers = &*workers;
         let (shares, kept) = (&mut shares[..workers.tasks()], &mut kept[..workers.tasks()]);
         let changes = grown.check(workers, boxes, margin, pairs.filter(), shares)?;
         let rebuilt = motion.wants_rebuild(boxes.len(), &changes);
+        *last_frame = if rebuilt { FrameKind::Rebuilt } else { FrameKind::Updated };
         if rebuilt {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes), shares);
             let sample = Sample::of(grown.as_slice());
@@ -239,5 +248,45 @@ impl PairCache {
             (true, false) => Kept::Dearly,
             (true, true) => Kept::Well,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Scenario, Scene};
+    use FrameKind::{FromScratch, Rebuilt, Updated};
+
+    fn frames(scenario: Scenario, count: usize, plan: &FramePlan) -> Vec<FrameWork> {
+        let mut method = create(&[1], &Threads::default(), Simd::Portable).unwrap();
+        let mut scene = Scene::start(scenario, 1000, 1);
+        let mut pairs = Pairs::new();
+        let frame = |_| {
+            method.find_pairs_with(plan, scene.boxes(), &mut pairs).unwrap();
+            scene.advance();
+            method.as_incremental().unwrap().last_frame()
+        };
+        (0..count).map(frame).collect()
+    }
+
+    #[test]
+    fn it_tells_how_each_frame_came_about() {
+        let kinds = |scenario, plan| frames(scenario, 4, plan).iter().map(|work| work.kind).collect::<Vec<_>>();
+        let known = FramePlan::default().with_moved(Some(0.03)).with_pairs(Some(500.0));
+        let unknown = FramePlan::default();
+        assert_eq!(kinds(Scenario::Uniform, &unknown), [FromScratch, Rebuilt, Updated, Updated]);
+        assert_eq!(kinds(Scenario::Uniform, &known), [Rebuilt, Updated, Updated, Updated]);
+        assert_eq!(kinds(Scenario::Fast, &unknown), [FromScratch; 4]);
+    }
+
+    #[test]
+    fn the_work_of_the_frames_is_that_of_the_mean_one_in_the_mean() {
+        for scenario in [Scenario::Uniform, Scenario::Clustered, Scenario::Slab] {
+            let works = frames(scenario, 400, &FramePlan::default());
+            let mean = works[100..].iter().map(|work| work.over_mean).sum::<f64>() / 300.0;
+            assert!((mean - 1.0).abs() < 0.1, "{scenario}: {mean}");
+            let dearer = works[1..].iter().filter(|work| work.kind == Rebuilt).all(|work| work.over_mean > 1.2);
+            assert!(dearer, "{scenario}");
+        }
     }
 }

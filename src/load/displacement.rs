@@ -42,11 +42,6 @@ impl Displacement {
         }
     }
 
-    /// Whether any box is remembered.
-    pub(crate) fn is_watching(&self) -> bool {
-        self.watching > 0
-    }
-
     /// How far the watched boxes have moved since, 0 to 1: the mean over them of the greatest displacement of a bound, in mean
     /// edges of the box and no more than 1. `None` when no valid box was watched that is still there.
     ///

@@ -12,6 +12,7 @@ use crate::aabb::Aabb;
 pub struct FramePlan {
     seen: Option<(Sample, StripGrid)>,
     moved: Option<f64>,
+    pairs: Option<f64>,
 }
 
 impl FramePlan {
@@ -19,7 +20,7 @@ impl FramePlan {
     pub(super) fn seen(chosen: &Chosen, objects: usize) -> (Self, Sample, StripGrid) {
         let sample = Sample::statistics(chosen);
         let grid = StripGrid::plan(&sample, objects);
-        (Self { seen: Some((sample, grid)), moved: None }, sample, grid)
+        (Self { seen: Some((sample, grid)), ..Self::default() }, sample, grid)
     }
 
     /// The same plan of a frame in which the boxes moved so far.
@@ -27,16 +28,27 @@ impl FramePlan {
         Self { moved, ..self }
     }
 
-    /// Knows nothing from now on.
-    pub(crate) fn forget(&mut self) {
-        self.seen = None;
-        self.moved = None;
+    /// The same plan of a frame in which about so many pairs overlap.
+    pub(crate) fn with_pairs(self, pairs: Option<f64>) -> Self {
+        Self { pairs, ..self }
     }
 
-    /// How far the boxes moved since the frame before, where that is known: [`Displacement::moved`](crate::Displacement::moved).
+    /// Knows nothing from now on.
+    pub(crate) fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// How far the boxes move from a frame to the next, where that is known: [`Displacement::moved`](crate::Displacement::moved) of this
+    /// frame, or of one not long before.
     #[must_use]
     pub fn moved(&self) -> Option<f64> {
         self.moved
+    }
+
+    /// How many pairs overlap in a frame, where that is known of one not long before.
+    #[must_use]
+    pub fn pairs(&self) -> Option<f64> {
+        self.pairs
     }
 
     /// The sample of this frame.

@@ -40,7 +40,7 @@ impl Deviations {
     const PREDICTED: Self = Self { class_ln: 0.3, kept_ln: 0.1, width_ln: 0.1, calls_ln: 0.3 };
     /// Of a machine unlike those of the training, and in line: tuning may be of another machine and off by a factor of several for all algorithms at once, a core that is taken doubles the time of
     /// those that use it, and a scene spares incremental algorithms more or less of their work.
-    pub(crate) const UNLIKE: Self = Self { class_ln: 0.8, kept_ln: 0.3, width_ln: 0.2, calls_ln: 0.7 };
+    pub(crate) const UNLIKE: Self = Self { class_ln: 0.8, kept_ln: 0.5, width_ln: 0.2, calls_ln: 0.7 };
 }
 
 /// Of what a method has for all of its algorithms, its constant and its curve: about what was left of predictions on machines held out.
@@ -379,8 +379,12 @@ impl Belief {
         }
     }
 
-    /// What was observed of an algorithm's own part holds no longer, and it may be off by this much.
+    /// What was observed of an algorithm's own part holds no longer, and it may be off by this much. Not of one that keeps work from frame to
+    /// frame: what changes it is the scene, whose part is forgotten sooner than an own one.
     pub(crate) fn doubt_own(&mut self, algorithm: usize, ln: f64) {
+        if self.algorithms[algorithm].kept.is_some() {
+            return;
+        }
         let own = &mut self.own[algorithm];
         for (i, row) in own.covariance.iter_mut().enumerate() {
             row.fill(0.0);

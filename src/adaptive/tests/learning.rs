@@ -3,7 +3,7 @@
 use super::super::decision::Reason;
 use super::super::policy::Policy;
 use super::tuning;
-use crate::{AlgorithmId, Load, Tuning};
+use crate::{AlgorithmId, FrameKind, FrameWork, Load, Tuning};
 use std::sync::Arc;
 
 /// What a frame of an algorithm really takes: by its position, the number of objects and the frame.
@@ -43,14 +43,25 @@ fn policy(tuning: Tuning) -> Policy {
 
 /// Runs this many frames of this many objects on a machine with that truth, each frame noisy by a tenth.
 fn run(policy: &mut Policy, frames: std::ops::Range<usize>, objects: u32, truth: &Truth) -> Vec<Frame> {
+    run_told(policy, frames, objects, truth, &|_, _| None)
+}
+
+/// The same where an algorithm tells how its frame came about, by its position and the frame.
+fn run_told(
+    policy: &mut Policy,
+    frames: std::ops::Range<usize>,
+    objects: u32,
+    truth: &Truth,
+    work: &dyn Fn(usize, usize) -> Option<FrameWork>,
+) -> Vec<Frame> {
     let count = policy.tuning().costs.len();
     let mut chance = Chance(17);
     let load = Load { objects, ..Load::default() };
     let frame = |at: usize| {
-        let choice = policy.choose(&load, 1).unwrap();
+        let choice = policy.choose(&load).unwrap();
         let of = |k: usize| truth(k, f64::from(objects), at);
         let real_ns = of(choice.chosen) * (0.1 * chance.normal()).exp();
-        policy.ran(choice.chosen, real_ns);
+        policy.ran(choice.chosen, real_ns, work(choice.chosen, at));
         let predicted_ns = choice.predicted_ns.unwrap();
         let cheapest_ns = choice.runner_up.map_or(predicted_ns, |(_, ns)| ns.min(predicted_ns));
         let best_ns = (0..count).map(of).fold(f64::INFINITY, f64::min);
@@ -135,7 +146,8 @@ fn one_disturbed_frame_changes_no_choice() {
     let truth = |k: usize, n: f64, at: usize| n * [100.0, 115.0][k] * if at % 150 == 149 { 50.0 } else { 1.0 };
     let frames = run(&mut policy(right), 0..900, 1000, &truth);
     let others = frames.iter().filter(|f| f.chosen != 0 && f.reason != Reason::Explored).count();
-    assert_eq!(others, 0);
+    // A trial that was lucky is followed by a few frames that set it right.
+    assert!(others < 9, "{others} of 900");
 }
 
 #[test]
@@ -149,7 +161,8 @@ fn exploring_is_rare_bounded_and_can_be_turned_off() {
     let frames = run(&mut policy(near()), 0..4000, 1000, &truth);
     let explored: Vec<usize> = (0..frames.len()).filter(|&k| frames[k].reason == Reason::Explored).collect();
     assert!(explored.len() >= 5, "{explored:?}");
-    assert!(explored.windows(2).all(|w| w[1] - w[0] >= 20), "{explored:?}");
+    // Two frames in a row are one trial.
+    assert!(explored.windows(2).all(|w| w[1] - w[0] == 1 || w[1] - w[0] >= 20), "{explored:?}");
     let price: f64 = explored.iter().map(|&k| frames[k].predicted_ns - frames[k].cheapest_ns).sum();
     let spent: f64 = frames.iter().map(|f| f.cheapest_ns).sum();
     assert!(price <= 0.01 * spent, "{price} of {spent}");
@@ -170,26 +183,56 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
         let mut policy = Policy::new(costs, &[None, Some(0)], vec![true; 2]);
         policy.set_learning(false);
         policy.set_usable(1, false);
-        assert_eq!(policy.choose(&Load { objects: 1000, ..Load::default() }, 1).unwrap().chosen, 0);
-        policy.ran(0, 1e5);
+        assert_eq!(policy.choose(&Load { objects: 1000, ..Load::default() }).unwrap().chosen, 0);
+        policy.ran(0, 1e5, None);
         policy.set_usable(1, true);
         policy
     };
     let mut steady = start(costs.clone());
     let load = |objects| Load { objects, ..Load::default() };
-    let waited = (0..100).find(|_| steady.choose(&load(1000), 1).unwrap().reason == Reason::Switched);
+    let waits = |policy: &mut Policy, frames: usize| {
+        (0..100).find(|_| {
+            let reason = policy.choose(&load(1000)).unwrap().reason;
+            (0..frames).for_each(|_| policy.went_on(0, None));
+            reason == Reason::Switched
+        })
+    };
+    let waited = waits(&mut steady, 1);
     // 192 us less 97.92 us saved at 2.08 us a frame.
     assert_eq!(waited, Some(45));
     // Frames that were not decided count too.
     let mut seldom = start(costs);
-    let waited = (0..100).find(|_| seldom.choose(&load(1000), 6).unwrap().reason == Reason::Switched);
-    assert_eq!(waited, Some(7));
+    let waited = waits(&mut seldom, 6);
+    assert_eq!(waited, Some(8));
     // 100 n and 50 n + 50 000 cross at 1000: about it the load flickers by one part in a hundred.
     let mut flicker = start(tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 50_000.0, 50.0)]));
     for k in 0..2000 {
-        let choice = flicker.choose(&load(1000 + [10, 0, 0][k % 3] - [0, 0, 12][k % 3]), 1).unwrap();
+        let choice = flicker.choose(&load(1000 + [10, 0, 0][k % 3] - [0, 0, 12][k % 3])).unwrap();
+        flicker.went_on(0, None);
         assert_eq!(choice.chosen, 0, "frame {k}");
     }
+}
+
+/// Kept pairs are worth what making them again would cost, and where none are kept there is nothing to lose.
+#[test]
+fn what_keeps_work_is_left_once_that_is_paid_for_and_at_once_where_it_keeps_none() {
+    let frames_until_left = |kind: FrameKind| {
+        let costs = tuning(&[("sap@cpu1", 0.0, 100.0), ("grid-sap@cpu1", 0.0, 90.0)]);
+        let mut policy = Policy::new(costs, &[Some(0), None], vec![true, false]);
+        policy.set_learning(false);
+        let work = Some(FrameWork::new(kind, 1.0));
+        let load = Load { objects: 1000, ..Load::default() };
+        assert_eq!(policy.choose(&load).unwrap().chosen, 0);
+        policy.ran(0, 1e5, work);
+        policy.set_usable(1, true);
+        (0..100).find(|_| {
+            let left = policy.choose(&load).unwrap().chosen == 1;
+            policy.went_on(0, work);
+            left
+        })
+    };
+    // 12 us are saved a frame. The switch costs 13.5 us, and the work that is left behind 98 us.
+    assert_eq!((frames_until_left(FrameKind::Updated), frames_until_left(FrameKind::FromScratch)), (Some(9), Some(0)));
 }
 
 #[test]
@@ -198,22 +241,25 @@ fn what_rebuilds_too_often_is_left_and_taken_up_again() {
     let mut costs = tuning(&[("sap@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 0.0, 20.0)]);
     costs.costs[0].curve = costs.costs[0].curve.clone().with_fallback(Arc::clone(&costs.costs[1].curve.work), 1.0);
     let mut policy = Policy::new(costs, &[Some(0), None], vec![true; 2]);
-    policy.set_exploring(false);
     let truth = |k: usize, n: f64, at: usize| {
         let rebuilds = at < 600 && at.is_multiple_of(3);
         n * if k == 1 {
             20.0
         } else if rebuilds {
-            45.0
+            90.0
         } else {
             10.0
         }
     };
-    let frames = run(&mut policy, 0..1200, 1000, &truth);
+    let work = |k: usize, at: usize| {
+        let rebuilt = at < 600 && at.is_multiple_of(3);
+        (k == 0).then(|| FrameWork::new(if rebuilt { FrameKind::Rebuilt } else { FrameKind::Updated }, 1.0))
+    };
+    let frames = run_told(&mut policy, 0..3000, 1000, &truth, &work);
     let kept = |range: std::ops::Range<usize>| frames[range].iter().filter(|f| f.chosen == 0).count();
-    // (10 + 10 + 70) / 3 is more than 20. Now and then it is tried whether that still holds.
+    // (10 + 10 + 90) / 3 is more than 20. Now and then it is tried whether that still holds.
     assert!(kept(0..100) > 0 && kept(200..600) < 260, "{} of 400", kept(200..600));
-    assert!(kept(1000..1200) == 200, "{} of 200", kept(1000..1200));
+    assert!(kept(2500..3000) > 450, "{} of 500", kept(2500..3000));
 }
 
 /// A second at a breakpoint, in a frame on two threads, says nothing of the frames that follow.

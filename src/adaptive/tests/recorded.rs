@@ -26,6 +26,10 @@ impl Spot {
     pub(super) fn mean_ns(&self, algorithm: usize) -> f64 {
         mean(&self.ns[algorithm])
     }
+
+    pub(super) fn median_ns(&self, algorithm: usize) -> f64 {
+        median(&self.ns[algorithm]).unwrap()
+    }
 }
 
 /// Standard deviation of the logarithm of a timing of a report around what a load tells.

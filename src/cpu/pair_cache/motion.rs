@@ -72,8 +72,8 @@ pub(super) enum Advice {
 pub(super) struct Motion {
     /// Of the frame before, while pairs are not kept.
     displacement: Displacement,
-    /// Pairs for each box in the frame before.
-    density: f32,
+    /// Pairs for each box in the last frame; `None` before the first.
+    density: Option<f32>,
     keeping: Option<Keeping>,
     /// Frames for which nothing is kept, and how many that will be the next time.
     pause: u32,
@@ -99,13 +99,53 @@ struct Keeping {
     left: f32,
     /// Frames since keeping began.
     frames: u32,
+    work: MeanWork,
+}
+
+/// The mean cost of a box over the frames from one in which all is made again to the next. A promise counts for as many frames as
+/// [`FEWEST`](Self::FEWEST).
+#[derive(Debug, Clone, Copy)]
+struct MeanWork {
+    /// Over the frames up to the last in which all was made again, and how many frames that counts for.
+    before: f32,
+    weight: f32,
+    /// Sum over the frames since, their number, and the last one.
+    sum: f32,
+    frames: f32,
+    last: f32,
+}
+
+impl MeanWork {
+    const FEWEST: f32 = 16.0;
+    const MOST: f32 = 64.0;
+    /// Where nothing moves nothing is ever made again: the sum is kept where `f32` adds up.
+    const LONGEST: f32 = 1024.0;
+
+    fn promised(cost: f32) -> Self {
+        Self { before: cost, weight: Self::FEWEST, sum: 0.0, frames: 0.0, last: cost }
+    }
+
+    fn mean(&self) -> f32 {
+        (self.before * self.weight + self.sum) / (self.weight + self.frames)
+    }
+
+    fn add(&mut self, cost: f32, rebuilt: bool) {
+        if rebuilt {
+            let weight = (self.weight + self.frames).min(Self::MOST);
+            *self = Self { before: self.mean(), weight, sum: 0.0, frames: 0.0, last: cost };
+        }
+        if self.frames >= Self::LONGEST {
+            (self.sum, self.frames) = (self.sum / 2.0, self.frames / 2.0);
+        }
+        (self.sum, self.frames, self.last) = (self.sum + cost, self.frames + 1.0, cost);
+    }
 }
 
 impl Default for Motion {
     fn default() -> Self {
         Self {
             displacement: Displacement::default(),
-            density: 0.0,
+            density: None,
             keeping: None,
             pause: 0,
             next_pause: PAUSE[0],
@@ -126,7 +166,7 @@ impl Motion {
 
     /// Takes note of the pairs of a frame.
     pub(super) fn found(&mut self, objects: usize, pairs: u64) {
-        self.density = pairs as f32 / objects.max(1) as f32;
+        self.density = Some(pairs as f32 / objects.max(1) as f32);
     }
 
     /// Keeping failed, because there were too many pairs to keep or because it did not pay; it will not be tried for some frames.
@@ -150,6 +190,11 @@ impl Motion {
         (each * objects as f32) as usize + 1024
     }
 
+    /// Work of the last frame in which pairs were kept, over that of the mean one.
+    pub(super) fn work_over_mean(&self) -> f32 {
+        self.keeping.map_or(1.0, |k| k.work.last / k.work.mean())
+    }
+
     /// Whether the kept pairs are to be found again in this frame, in which boxes left as `changes` says.
     pub(super) fn wants_rebuild(&self, objects: usize, changes: &Changes) -> bool {
         let Some(keeping) = self.keeping else { return false };
@@ -170,7 +215,7 @@ impl Motion {
     /// Learns from a frame in which boxes left as `changes` says. `false` when keeping does not pay any more.
     pub(super) fn learn(&mut self, objects: usize, changes: &Changes, did: &Work) -> bool {
         let far = far(objects);
-        let scratch = scratch(far, self.density);
+        let scratch = scratch(far, self.density.unwrap_or_default());
         let Some(k) = &mut self.keeping else { return false };
         let share = |count: usize| count as f32 / objects.max(1) as f32;
         let (left, kept, rebuilt) = (share(changes.left), share(did.kept_pairs), did.rebuilt);
@@ -180,6 +225,7 @@ impl Motion {
         k.tests = tests(far, kept);
         let now = k.tests + work;
         k.cost += (now - k.cost) / 16.0;
+        k.work.add(now, rebuilt);
         k.kept += (kept - k.kept) / LEARNING;
         if rebuilt {
             k.left = 0.0;
@@ -205,10 +251,12 @@ impl Motion {
         k.cost < scratch
     }
 
-    /// How far the boxes moved since the frame before; `None` in the first frame.
-    fn moved(&self, plan: &FramePlan, boxes: &[Aabb]) -> Option<f64> {
-        // Nothing is known of the pairs before the second frame either, even where it is known how far boxes moved.
-        if self.displacement.is_watching() { plan.moved().or_else(|| self.displacement.moved(boxes)) } else { None }
+    /// How far the boxes moved since the frame before, and how many pairs for each there are; `None` where nobody knows.
+    fn known(&self, plan: &FramePlan, boxes: &[Aabb]) -> Option<(f32, f32)> {
+        let moved = plan.moved().or_else(|| self.displacement.moved(boxes))?;
+        // What this method has found itself may be of long ago.
+        let density = plan.pairs().map(|pairs| pairs as f32 / boxes.len().max(1) as f32).or(self.density)?;
+        Some((moved as f32, density))
     }
 
     /// Begins to keep pairs if that promises to pay.
@@ -217,10 +265,11 @@ impl Motion {
             self.pause -= 1;
             return None;
         }
-        let motion = self.moved(plan, boxes)? as f32;
+        let (motion, density) = self.known(plan, boxes)?;
+        self.density = Some(density);
         let far = far(boxes.len());
-        let scratch = scratch(far, self.density);
-        let density = self.density.max(FEWEST_PAIRS);
+        let scratch = scratch(far, density);
+        let density = density.max(FEWEST_PAIRS);
         let kept = |m: f32| density * (1.0 + 2.0 * m).powi(3);
         let cost = |m: f32| tests(far, kept(m)) + cost::AGAIN + left(far, NODES) * leaving(motion, m);
         let margins = MARGINS.into_iter().filter(|&m| m <= self.most_margin);
@@ -235,6 +284,7 @@ impl Motion {
             nodes: NODES,
             left: 0.0,
             frames: 0,
+            work: MeanWork::promised(cost(best)),
         })
     }
 }
@@ -313,9 +363,19 @@ mod tests {
     }
 
     #[test]
+    fn the_mean_work_is_that_of_whole_rounds_and_does_not_drift_where_there_are_none() {
+        let mut work = MeanWork::promised(20.0);
+        (0..50).for_each(|k| work.add(if k % 10 == 0 { 100.0 } else { 10.0 }, k % 10 == 0));
+        assert!((work.mean() - 19.0).abs() < 2.0, "{}", work.mean());
+        (0..20_000_000).for_each(|_| work.add(10.0, false));
+        assert!((work.mean() - 10.0).abs() < 1.0, "{}", work.mean());
+    }
+
+    #[test]
     fn boxes_that_go_far_wear_the_order_sooner_than_those_that_wander() {
         let mut motion = Motion::default();
         let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
+        motion.found(1000, 0);
         (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
         let frames = |far_away: usize, motion: &mut Motion| {
             let changes = Changes { left: 10, far_away, new: 0..0, gone: 0..0 };
