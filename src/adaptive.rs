@@ -209,7 +209,9 @@ impl Adaptive {
         self.start = start;
     }
 
-    /// What was decided for the last frame; `None` before the first.
+    /// What was decided for the last frame; `None` before the first. As a text it is a sentence that tells why.
+    ///
+    /// With the feature `tracing` every switch is an event with that text: target `sapwise::adaptive`, level DEBUG; trials have level TRACE.
     #[must_use]
     pub fn last_decision(&self) -> Option<Decision<'_>> {
         self.choice.map(|c| Decision {
@@ -221,6 +223,18 @@ impl Adaptive {
             source: if self.policy.learned().is_some() { Source::Learned } else { self.policy.tuning().source },
             load: self.tracker.load(),
         })
+    }
+
+    /// Tells the program's subscriber what was decided and why.
+    fn tell(&self) {
+        #[cfg(feature = "tracing")]
+        if let Some(decision) = self.last_decision() {
+            if decision.reason == Reason::Explored {
+                tracing::trace!(target: "sapwise::adaptive", "{decision}");
+            } else {
+                tracing::debug!(target: "sapwise::adaptive", "{decision}");
+            }
+        }
     }
 
     /// Estimates the load of the next frame and decides, without running anything.
@@ -341,6 +355,7 @@ impl BroadPhase for Adaptive {
                     let decision_ns = (!decided).then(|| started.elapsed().as_nanos() as f64 - ns);
                     self.tracker.took(decision_ns, ns);
                     if dear || !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis) {
+                        self.tell();
                         // What began in this frame is looked at once more before it may rest.
                         self.tracker.wake();
                     }

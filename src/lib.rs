@@ -29,6 +29,7 @@
 //! - `measure`: measures the hardware parameters of this machine.
 //! - `measure-gpu`: those of its GPUs too.
 //! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and keeps the tuning for the next start.
+//! - `tracing`: events that tell each switch of `Adaptive` with its reason.
 //! - `schema`: the JSON Schemas of the files, for tools.
 
 #![cfg_attr(docsrs, feature(doc_cfg))]

@@ -3,6 +3,7 @@
 use crate::algorithm::AlgorithmId;
 use crate::load::Load;
 use crate::tuning::Source;
+use std::fmt;
 
 /// Why an algorithm was chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,7 +26,21 @@ pub enum Reason {
     Sheltered,
 }
 
-/// The last decision and what it rested on.
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::First => "the cheapest in the first frame",
+            Self::Stayed => "still the cheapest",
+            Self::Hysteresis => "no longer the cheapest, but a switch would not have paid yet",
+            Self::Switched => "cheaper than the one before by more than the switch costs",
+            Self::Explored => "not the cheapest, tried to learn what it costs",
+            Self::FellBack => "in place of one that failed",
+            Self::Sheltered => "in place of one that took far longer than expected",
+        })
+    }
+}
+
+/// The last decision and what it rested on. As a text it is one sentence for people, whose wording may change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Decision<'a> {
@@ -46,6 +61,36 @@ pub struct Decision<'a> {
     pub load: Load,
 }
 
+impl fmt::Display for Decision<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, {}", self.algorithm, self.reason)?;
+        match (self.predicted_ns, self.measured_ns) {
+            (Some(expected), Some(took)) => write!(f, ": {} expected, {} taken", Time(expected), Time(took))?,
+            (Some(expected), None) => write!(f, ": {} expected", Time(expected))?,
+            (None, Some(took)) => write!(f, ", decided by the number of boxes: {} taken", Time(took))?,
+            (None, None) => f.write_str(", decided by the number of boxes")?,
+        }
+        if let Some((next, ns)) = self.runner_up {
+            write!(f, ", the next is {next} with {}", Time(ns))?;
+        }
+        let Load { objects, pairs, moved, .. } = self.load;
+        write!(f, "; {objects} boxes, about {pairs:.0} pairs, boxes move by {moved:.2} of an edge")
+    }
+}
+
+/// Nanoseconds, as people read them.
+struct Time(f64);
+
+impl fmt::Display for Time {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            ns if ns < 1e3 => write!(f, "{ns:.0} ns"),
+            ns if ns < 1e6 => write!(f, "{:.1} us", ns / 1e3),
+            ns => write!(f, "{:.1} ms", ns / 1e6),
+        }
+    }
+}
+
 /// A decision by position among the candidates, without a copy of any name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Choice {
@@ -53,4 +98,29 @@ pub(super) struct Choice {
     pub(super) predicted_ns: Option<f64>,
     pub(super) runner_up: Option<(usize, f64)>,
     pub(super) reason: Reason,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_decision_is_one_sentence_with_what_is_known() {
+        let [algorithm, next]: [AlgorithmId; 2] = ["sap@cpu2", "bvh@cpu1"].map(|id| id.parse().unwrap());
+        let load = Load::of_objects(800).with_pairs(409.7).with_moved(0.031);
+        let decision = Decision {
+            algorithm: &algorithm,
+            predicted_ns: Some(41_049.0),
+            measured_ns: Some(1.52e6),
+            runner_up: Some((&next, 900.0)),
+            reason: Reason::Stayed,
+            source: Source::Measured,
+            load,
+        };
+        let told = "sap@cpu2, still the cheapest: 41.0 us expected, 1.5 ms taken, the next is bvh@cpu1 with 900 ns; \
+            800 boxes, about 410 pairs, boxes move by 0.03 of an edge";
+        assert_eq!(decision.to_string(), told);
+        let by_count = Decision { predicted_ns: None, measured_ns: None, runner_up: None, ..decision };
+        assert!(by_count.to_string().starts_with("sap@cpu2, still the cheapest, decided by the number of boxes; 800 boxes"));
+    }
 }
