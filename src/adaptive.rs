@@ -354,8 +354,11 @@ impl BroadPhase for Adaptive {
                     let dear = self.policy.ran(choice.chosen, ns, work);
                     let decision_ns = (!decided).then(|| started.elapsed().as_nanos() as f64 - ns);
                     self.tracker.took(decision_ns, ns);
-                    if dear || !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis) {
+                    let began = !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis);
+                    if began {
                         self.tell();
+                    }
+                    if dear || began {
                         // What began in this frame is looked at once more before it may rest.
                         self.tracker.wake();
                     }

@@ -5,8 +5,9 @@
 
 use crate::tuning::belief::View;
 
-/// Frames that are added up right after an algorithm began, and where it runs on.
-const ROOM: [u32; 2] = [2, 16];
+/// Frames that are added up where an algorithm runs on, and right after it began.
+const MOST: u32 = 16;
+const FEWEST: u32 = 2;
 /// Octaves of objects over which a batch goes at most.
 const OCTAVES: f64 = 0.5;
 /// What counts of a frame, at most: this many times what the dearest kind of frame is expected to cost. The rest is another program's.
@@ -93,8 +94,7 @@ impl FrameBatch {
 
     /// An empty one. Where the candidate is the one of before, it has more room than that.
     pub(super) fn next(&self, candidate: usize) -> Self {
-        let [first, most] = ROOM;
-        let room = if self.frames > 0 && candidate == self.candidate { (2 * self.room).min(most) } else { first };
+        let room = if self.frames > 0 && candidate == self.candidate { (2 * self.room).min(MOST) } else { FEWEST };
         Self { candidate, room, ..Self::default() }
     }
 }

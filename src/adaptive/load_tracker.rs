@@ -66,7 +66,7 @@ impl LoadTracker {
 
     /// The next frame is another one than the last that was decided on.
     pub(super) fn forget_plan(&mut self) {
-        self.plan.forget();
+        self.plan = FramePlan::default();
     }
 
     /// Whether the next frame is to be decided on again: how far boxes moved shows in no other than the one after a sample.
@@ -84,13 +84,11 @@ impl LoadTracker {
         }
         let moved = self.moved;
         self.sampled_ns = 0.0;
-        self.plan.forget();
+        let mut plan = FramePlan::default();
         if self.is_sample_due(objects) {
             let started = Instant::now();
-            let (load, plan) = Load::planned(boxes, pairs, moved);
+            (self.load, plan) = Load::planned(boxes, pairs, moved);
             let took = started.elapsed().as_nanos() as f64;
-            self.load = load;
-            self.plan = plan;
             self.sampled_ns = took;
             self.sample_ns = if self.sample_ns > 0.0 { took.min(self.sample_ns * COST_RISES) } else { took };
             self.watching = Watching::Due;
@@ -99,7 +97,7 @@ impl LoadTracker {
             self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
             self.load.moved = moved.unwrap_or(self.load.moved);
         }
-        self.plan = std::mem::take(&mut self.plan).with_moved(moved).with_pairs(pairs);
+        self.plan = plan.with_moved(moved).with_pairs(pairs);
         self.throttle.decide(objects);
     }
 

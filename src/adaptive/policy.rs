@@ -217,13 +217,6 @@ impl Policy {
         self.shelter.ran(candidate, self.frame, ns, most_ns, shelter_ns)
     }
 
-    /// What the first frame of a candidate costs beside the mean of its frames.
-    fn switch_ns(&self, candidate: usize) -> f64 {
-        let expected = self.expected[candidate];
-        let first_ns = self.switching.first_ns(candidate, self.frame, expected);
-        (first_ns - expected.mean_ns).max(0.0)
-    }
-
     fn cheapest(&self, among: impl Fn(usize) -> bool) -> Option<usize> {
         let usable = (0..self.usable.len()).filter(|&k| self.usable[k] && among(k));
         usable.min_by(|&a, &b| self.mean_ns[a].total_cmp(&self.mean_ns[b]))
@@ -244,8 +237,8 @@ impl Policy {
         }
         let paid = |k: usize| {
             let saved_ns = self.saved_ns[k].max(SOON * (now - self.mean_ns[k]));
-            let leave_ns = self.switching.leave_ns(settled, k, self.frame, self.expected[settled]);
-            let price_ns = self.switch_ns(k) + leave_ns;
+            let price_ns = self.switching.leave_ns(settled, k, self.frame, self.expected[settled])
+                + self.switching.enter_ns(k, self.frame, self.expected[k]);
             self.mean_ns[k] < now && saved_ns >= price_ns && !self.is_avoided(k)
         };
         self.cheapest(paid).map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
@@ -262,7 +255,8 @@ impl Policy {
                 return None;
             }
             let begins = self.switching.keeps(k) && !self.switching.share(k, settled);
-            let offer = Offer::of(k, begins, self.switch_ns(k), self.mean_ns[k], now_ns);
+            let enter_ns = self.switching.enter_ns(k, self.frame, self.expected[k]);
+            let offer = Offer::of(k, begins, enter_ns, self.mean_ns[k], now_ns);
             if offer.price_ns > allowance_ns {
                 return None;
             }

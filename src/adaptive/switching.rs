@@ -76,9 +76,13 @@ impl SwitchingCosts {
         built_ns + REBUILDS * rebuilds_ns
     }
 
-    /// What the first frame of a candidate is expected to take, were it to begin now.
-    pub(super) fn first_ns(&self, candidate: usize, frame: u64, expected: Expected) -> f64 {
-        if self.remembers(candidate, frame) { expected.mean_ns * (1.0 + COLD) } else { self.rebuild_ns(candidate, expected) }
+    /// What the first frame of a candidate costs beside the mean of its frames, were it to begin now.
+    pub(super) fn enter_ns(&self, candidate: usize, frame: u64, expected: Expected) -> f64 {
+        if self.remembers(candidate, frame) {
+            COLD * expected.mean_ns
+        } else {
+            self.rebuild_ns(candidate, expected) - expected.mean_ns
+        }
     }
 
     /// What is lost where a candidate is left for one that does not go on with what it keeps: to make that again later costs so much more.

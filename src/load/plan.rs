@@ -33,11 +33,6 @@ impl FramePlan {
         Self { pairs, ..self }
     }
 
-    /// Knows nothing from now on.
-    pub(crate) fn forget(&mut self) {
-        *self = Self::default();
-    }
-
     /// How far the boxes move from a frame to the next, where that is known: [`Displacement::moved`](crate::Displacement::moved) of this
     /// frame, or of one not long before.
     #[must_use]
