@@ -39,6 +39,13 @@ impl Load {
         Self { objects, ..Self::default() }
     }
 
+    /// Whether none of the figures differs from those of another load by more than that share of the greater.
+    pub(crate) fn is_within(&self, share: f64, other: &Self) -> bool {
+        let figures = |l: &Self| [f64::from(l.objects), l.axis_candidates, l.strip_candidates, l.pairs, l.moved];
+        // False for NaN.
+        figures(self).into_iter().zip(figures(other)).all(|(a, b)| (a - b).abs() <= share * a.abs().max(b.abs()))
+    }
+
     /// The same with this many overlapping pairs.
     #[must_use]
     pub fn with_pairs(self, pairs: f64) -> Self {

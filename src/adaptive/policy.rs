@@ -18,6 +18,10 @@ const STEP_SLACK: f64 = 0.05;
 /// A switch that is expected to save its price within so many frames is made at once.
 const SOON: f64 = 4.0;
 
+/// What was worked out for a load holds for another whose figures differ by no more than this share: costs follow them about in proportion, and
+/// are known less well than that.
+const ALIKE: f64 = 0.01;
+
 /// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a breakpoint or a page
 /// from disk tells nothing of the frames that follow.
 const MOST_WAIT: f64 = 64.0;
@@ -46,6 +50,8 @@ pub(super) struct Policy {
     predicted: Vec<Predicted>,
     log2_objects: f64,
     view: View,
+    /// The load for which that was worked out, and how much was observed by then.
+    worked_out: Option<(Load, u64)>,
     batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
@@ -79,6 +85,7 @@ impl Policy {
             predicted: vec![Predicted::default(); count],
             log2_objects: 0.0,
             view: View::default(),
+            worked_out: None,
             batch: FrameBatch::default(),
             saved_ns: vec![0.0; count],
             frame: 0,
@@ -163,7 +170,7 @@ impl Policy {
             self.settled = Some(settled);
             self.trials.stop(self.frame);
         }
-        self.trials.allow(self.mean_ns[settled], frames);
+        self.trials.allow(self.mean_ns[settled], frames, load.objects);
         if reason == Reason::Stayed {
             self.offer_trial(settled);
         }
@@ -185,8 +192,13 @@ impl Policy {
         (self.mean_ns[other] < self.mean_ns[settled] && !avoided && self.switching.keeps(other)).then_some(other)
     }
 
-    /// Fills in what every candidate is expected to cost.
+    /// Fills in what every candidate is expected to cost, where that is not known from a load that was alike.
     fn expect(&mut self, load: &Load) {
+        let observed = self.learner.as_ref().map_or(0, Learner::observed);
+        if self.worked_out.is_some_and(|(of, then)| then == observed && load.is_within(ALIKE, &of)) {
+            return;
+        }
+        self.worked_out = Some((*load, observed));
         let frame = Frame::new(load);
         self.log2_objects = f64::from(load.objects.max(1)).log2();
         self.view = self.learner.as_ref().map_or_else(View::default, |l| l.view(&frame));

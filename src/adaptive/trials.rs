@@ -6,13 +6,15 @@ use crate::stats::normal_density;
 pub(super) const HORIZON: f64 = 300.0;
 
 /// Share of the time of all frames that trials may cost, and frames' worth of that which is there at the start: one frame in which an incremental
-/// algorithm begins costs two or three.
+/// algorithm begins costs two or three. Where more objects than ever make frames dearer, as of a level that loads, the difference is a start of its own.
 const SHARE: f64 = 0.005;
 const AT_FIRST: f64 = 4.0;
 /// No more frames' worth than these are saved up: else a long rest would be followed by one trial after the other.
 const MOST: f64 = 12.0;
 /// Frames between the end of a trial and the beginning of the next, at least.
 const APART: u64 = 20;
+/// Frames after which it is looked again whether a trial pays, where none did: to look takes longer than the rest of a decision.
+const LOOK_AGAIN: u64 = 8;
 
 /// Frames of a trial of an algorithm that keeps work from frame to frame: its first one makes that, and the others show what it saves. Any other
 /// shows what it costs in its second frame; the first one is cold.
@@ -25,10 +27,12 @@ const ENOUGH: f64 = 2.0;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Trials {
     running: Option<Trial>,
-    /// The frame before which the last one ended.
-    ended: u64,
-    /// What trials may cost now, in nanoseconds; `None` before the first frame.
-    allowance_ns: Option<f64>,
+    /// The frame before which none may begin.
+    not_before: u64,
+    /// What trials may cost now, in nanoseconds.
+    allowance_ns: f64,
+    /// The most objects so far, and what their frame was expected to take, in nanoseconds.
+    most: (u32, f64),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -66,15 +70,23 @@ impl Trials {
         self.running.map(|t| t.candidate)
     }
 
-    /// Adds to what trials may cost that of some frames which took `now_ns` each.
-    pub(super) fn allow(&mut self, now_ns: f64, frames: f64) {
-        let before = self.allowance_ns.unwrap_or(AT_FIRST * now_ns);
-        self.allowance_ns = Some((before + SHARE * now_ns * frames).min(MOST * now_ns));
+    /// Adds to what trials may cost that of some frames with so many objects which took `now_ns` each.
+    pub(super) fn allow(&mut self, now_ns: f64, frames: f64, objects: u32) {
+        let mut dearer_ns = 0.0;
+        if objects > self.most.0 {
+            dearer_ns = (now_ns - self.most.1).max(0.0);
+            self.most = (objects, self.most.1 + dearer_ns);
+        }
+        self.allowance_ns = (self.allowance_ns + AT_FIRST * dearer_ns + SHARE * now_ns * frames).min(MOST * now_ns);
     }
 
-    /// What a trial may cost that begins with this frame; `None` where none may begin.
-    pub(super) fn allowance_ns(&self, frame: u64) -> Option<f64> {
-        if self.running.is_none() && frame >= self.ended + APART { self.allowance_ns } else { None }
+    /// What a trial may cost that begins with this frame; `None` where none may begin. The next look is some frames later.
+    pub(super) fn allowance_ns(&mut self, frame: u64) -> Option<f64> {
+        if self.running.is_some() || frame < self.not_before {
+            return None;
+        }
+        self.not_before = frame + LOOK_AGAIN;
+        Some(self.allowance_ns)
     }
 
     /// Begins a trial.
@@ -85,7 +97,7 @@ impl Trials {
 
     /// Takes in what a frame of a trial, its `first` or another, or the first one after it has cost beside what frames cost otherwise.
     pub(super) fn pay(&mut self, ns: f64, first: bool) {
-        self.allowance_ns = self.allowance_ns.map(|allowed| allowed - ns);
+        self.allowance_ns -= ns;
         if let Some(trial) = self.running.as_mut().filter(|_| !first) {
             trial.left_ns -= ns;
         }
@@ -106,7 +118,7 @@ impl Trials {
     /// Ends the trial that runs before this frame, if one does.
     pub(super) fn stop(&mut self, frame: u64) {
         if self.running.take().is_some() {
-            self.ended = frame;
+            self.not_before = frame + APART;
         }
     }
 }
@@ -139,7 +151,7 @@ mod tests {
             if trials.is_over() {
                 trials.stop(frame);
             }
-            trials.allow(100.0, 1.0);
+            trials.allow(100.0, 1.0, 9);
             let offer = Offer::of(1, begun % 2 == 0, 150.0, 130.0, 100.0);
             if trials.allowance_ns(frame).is_some_and(|ns| ns >= offer.price_ns) {
                 trials.begin(offer);
@@ -158,7 +170,7 @@ mod tests {
     fn a_trial_of_what_keeps_work_goes_on_until_it_has_cost_two_frames_beside_its_first() {
         let frames = |cost_ns: f64| {
             let mut trials = Trials::default();
-            trials.allow(100.0, 1.0);
+            trials.allow(100.0, 1.0, 9);
             trials.begin(Offer::of(3, true, 100.0, 100.0, 100.0));
             (0..)
                 .take_while(|_| {
@@ -174,8 +186,23 @@ mod tests {
         trials.begin(Offer::of(0, false, 100.0, 100.0, 100.0));
         assert!(trials.next() == Some(0) && !trials.is_over() && trials.next() == Some(0) && trials.is_over());
         trials.stop(7);
-        trials.allow(100.0, 1.0);
+        trials.allow(100.0, 1.0, 9);
         assert!(trials.allowance_ns(26).is_none() && trials.allowance_ns(27).is_some());
+    }
+
+    #[test]
+    fn a_level_that_loads_may_be_explored_as_a_scene_that_begins_with_it() {
+        let allowed = |objects: &[u32]| {
+            let mut trials = Trials::default();
+            objects.iter().for_each(|&n| trials.allow(f64::from(n), 1.0, n));
+            trials.allowance_ns(0).unwrap() / 1000.0
+        };
+        assert!(allowed(&[10, 1000]) > 4.0 && allowed(&[1000]) > 4.0);
+        // Only once: however often the scene comes and goes, and however the costs of one size waver.
+        assert!(allowed(&[10, 1000, 10, 1000, 10, 1000]) < 4.0);
+        let mut trials = Trials::default();
+        [100.0, 500.0, 900.0].iter().for_each(|&ns| trials.allow(ns, 1.0, 10));
+        assert!(trials.allowance_ns(0) < Some(500.0));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! A machine out of its report: which loads its scenes had, and what the frames of each algorithm took there.
 
+use crate::broad_phase::{FrameKind, FrameWork};
 use crate::model::Prediction;
 use crate::stats::{mean, median};
 use crate::{AlgorithmCost, AlgorithmId, Entry, Hardware, Load, Model, Observed, Source, Tuning};
@@ -26,9 +27,35 @@ impl Spot {
     pub(super) fn mean_ns(&self, algorithm: usize) -> f64 {
         mean(&self.ns[algorithm])
     }
+}
 
-    pub(super) fn median_ns(&self, algorithm: usize) -> f64 {
-        median(&self.ns[algorithm]).unwrap()
+/// Work of the frames of an incremental algorithm over that of the mean one, by kind: it does not stand in a report, and is taken to be in
+/// proportion to their times.
+#[derive(Clone, Copy)]
+pub(super) struct Kinds {
+    median_ns: f64,
+    updated: f64,
+    rebuilt: f64,
+}
+
+/// A recorded frame over so many medians of its timing is taken for one in which all was made again.
+const REBUILT: f64 = 2.5;
+
+impl Kinds {
+    pub(super) fn of(ns: &[f64]) -> Self {
+        let (median_ns, all) = (median(ns).unwrap(), mean(ns));
+        let (rebuilt, updated): (Vec<f64>, Vec<f64>) = ns.iter().partition(|&&ns| ns > REBUILT * median_ns);
+        let over = |of: &[f64]| if of.is_empty() { 1.0 } else { mean(of) / all };
+        Self { median_ns, updated: over(&updated), rebuilt: over(&rebuilt) }
+    }
+
+    /// How a frame that took so long came about.
+    pub(super) fn work(&self, ns: f64) -> FrameWork {
+        if ns > REBUILT * self.median_ns {
+            FrameWork::new(FrameKind::Rebuilt, self.rebuilt)
+        } else {
+            FrameWork::new(FrameKind::Updated, self.updated)
+        }
     }
 }
 
