@@ -25,6 +25,8 @@ use crate::registry::Registry;
 use crate::tuning::{Source, Step, Tuning};
 use decision::Choice;
 use instances::{Candidate, Instance};
+#[cfg(feature = "this-machine")]
+use learner::Learner;
 use load_tracker::LoadTracker;
 use policy::Policy;
 use std::fmt;
@@ -200,7 +202,7 @@ impl Adaptive {
     /// When there is no cache to keep it in, or it can't be written.
     #[cfg(feature = "this-machine")]
     pub fn save(&self) -> Result<bool, SaveError> {
-        self.start.save(|| self.learned())
+        self.start.save(|| (self.learned(), self.policy.learned().map_or(0.0, Learner::class_ln).exp()))
     }
 
     /// Begins with what a start on this machine found.

@@ -3,6 +3,8 @@
 mod error;
 mod figure;
 pub mod gpu;
+#[cfg(feature = "this-machine")]
+mod measurement;
 mod parameter;
 mod plausible;
 mod statistic;
@@ -10,6 +12,8 @@ mod statistic;
 pub use error::HardwareError;
 pub use figure::{How, Parameter};
 pub use gpu::{GpuGroup, GpuHardware, GpuIdentity, GpuKind};
+#[cfg(feature = "this-machine")]
+pub use measurement::Measurement;
 pub use parameter::{Bounds, GpuParameterId, ParameterId, Quantity};
 pub use statistic::Statistic;
 

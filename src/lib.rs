@@ -92,6 +92,8 @@ pub use cpu::{SimdLevel, SimdLevelError};
 pub use entry::Entry;
 pub use error::{BoxDefect, Error, Unavailable};
 pub use filter::{Filter, Membership};
+#[cfg(feature = "this-machine")]
+pub use hardware::Measurement;
 pub use hardware::{
     GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, Hardware, HardwareError, How, Machine, Parameter,
     ParameterId,

@@ -94,6 +94,12 @@ impl Learner {
         self.belief.view(frame)
     }
 
+    /// Natural logarithm of real over predicted time of the class of processor that is off the most, as far as all of its algorithms are.
+    #[cfg(feature = "this-machine")]
+    pub(super) fn class_ln(&self) -> f64 {
+        self.belief.class_ln()
+    }
+
     /// Mean time that a frame of an algorithm waits for other programs, in nanoseconds. A helper whose core another program has waits
     /// until the scheduler's next turn, however short the frame: a hundred times as long as some. The mean is what counts, so that this is not
     /// noise, and it is no factor either.

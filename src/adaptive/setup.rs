@@ -1,6 +1,7 @@
 //! How an [`Adaptive`](super::Adaptive) came to its tuning, and where what it learns is kept.
 
 use super::instances::Instances;
+use crate::hardware::Measurement;
 use crate::measure::Pace;
 use crate::tuning::Tuning;
 use std::fmt;
@@ -23,6 +24,8 @@ pub struct Setup {
     pub seconds: f64,
     /// The file of the cache, where there is one to be.
     pub file: Option<PathBuf>,
+    /// When and how the hardware was measured; `None` for tuning that was given, and for the usual one.
+    pub measured: Option<Measurement>,
 }
 
 /// Where the tuning of an [`Adaptive`](crate::Adaptive) came from.
@@ -86,8 +89,8 @@ impl std::error::Error for SaveError {
 
 /// Where tuning is kept for the next start.
 pub(crate) trait Keeper: fmt::Debug + Send + Sync {
-    /// Keeps it in place of what is there.
-    fn keep(&self, tuning: Tuning) -> Result<(), SaveError>;
+    /// Keeps it in place of what is there. Frames took so many times what was predicted since the start.
+    fn keep(&self, tuning: Tuning, over_predicted: f64) -> Result<(), SaveError>;
 }
 
 /// What an [`Adaptive`](super::Adaptive) keeps of its start.
@@ -100,10 +103,14 @@ pub(crate) struct Start {
 }
 
 impl Start {
-    /// Keeps what was learned. `false` where there is nothing that could have been corrected.
-    pub(super) fn save(&self, learned: impl FnOnce() -> Tuning) -> Result<bool, SaveError> {
+    /// Keeps what was learned: tuning, and how many times what was predicted frames took. `false` where there is nothing that could have been
+    /// corrected.
+    pub(super) fn save(&self, learned: impl FnOnce() -> (Tuning, f64)) -> Result<bool, SaveError> {
         match (&self.keeper, self.setup.origin) {
-            (Some(keeper), _) => keeper.keep(learned()).map(|()| true),
+            (Some(keeper), _) => {
+                let (tuning, over_predicted) = learned();
+                keeper.keep(tuning, over_predicted).map(|()| true)
+            }
             (None, Origin::Given) => Err(SaveError::Given),
             (None, Origin::Awaited | Origin::Usual) => Ok(false),
             (None, Origin::Cached | Origin::Probed) => Err(SaveError::NoCache),
@@ -112,8 +119,12 @@ impl Start {
 
     /// What the thread in the background has made, once it is there. One look at a flag until then, and nothing after.
     pub(super) fn arrived(&mut self) -> Option<(Tuning, Instances)> {
-        let awaited = self.awaited.take_if(|a| a.handover.ready.load(Ordering::Acquire))?;
-        let arrival = awaited.handover.slot().take()?;
+        let handover = &self.awaited.as_ref().filter(|a| a.handover.ready.load(Ordering::Acquire))?.handover;
+        let (arrival, is_last) = handover.take();
+        if is_last {
+            self.awaited = None;
+        }
+        let arrival = arrival?;
         (self.setup, self.keeper) = (arrival.setup, arrival.keeper);
         arrival.tuning
     }
@@ -122,32 +133,55 @@ impl Start {
 /// Where the thread in the background leaves what it has made.
 #[derive(Debug, Default)]
 pub(crate) struct Handover {
-    /// The slot is filled and will not be touched by that thread again.
+    /// Something was left that nobody has taken yet.
     ready: AtomicBool,
-    slot: Mutex<Option<Arrival>>,
+    left: Mutex<Left>,
     filled: Condvar,
 }
 
+/// What was left, and whether nothing comes after it.
+#[derive(Debug, Default)]
+struct Left {
+    arrival: Option<Arrival>,
+    is_last: bool,
+}
+
 impl Handover {
-    fn slot(&self) -> MutexGuard<'_, Option<Arrival>> {
-        self.slot.lock().unwrap_or_else(PoisonError::into_inner)
+    fn left(&self) -> MutexGuard<'_, Left> {
+        self.left.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Leaves what will do until more comes.
+    pub(crate) fn leave(&self, arrival: Arrival) {
+        self.fill(Left { arrival: Some(arrival), is_last: false });
     }
 
     /// Leaves what was made; once, and last of all.
-    pub(crate) fn leave(&self, arrival: Arrival) {
-        let mut slot = self.slot();
-        *slot = Some(arrival);
+    pub(crate) fn leave_last(&self, arrival: Arrival) {
+        self.fill(Left { arrival: Some(arrival), is_last: true });
+    }
+
+    fn fill(&self, new: Left) {
+        let mut left = self.left();
+        *left = new;
         // Under the lock, so that nobody looks before it and goes to sleep after it.
         self.ready.store(true, Ordering::Release);
-        drop(slot);
+        drop(left);
         self.filled.notify_all();
     }
 
-    /// Waits until something was left, but no longer than that. Whether there was.
-    fn wait(&self, at_most: Duration) -> bool {
-        let waits = |_: &mut Option<Arrival>| !self.ready.load(Ordering::Acquire);
-        drop(self.filled.wait_timeout_while(self.slot(), at_most, waits));
-        self.ready.load(Ordering::Acquire)
+    /// Takes what was left, and tells whether nothing comes after it.
+    fn take(&self) -> (Option<Arrival>, bool) {
+        let mut left = self.left();
+        self.ready.store(false, Ordering::Release);
+        (left.arrival.take(), left.is_last)
+    }
+
+    /// Waits until something was left, or with `to_the_end` the last of all, but no longer than that. Whether it was.
+    fn wait(&self, at_most: Duration, to_the_end: bool) -> bool {
+        let waits = |left: &mut Left| !(left.is_last || left.arrival.is_some() && !to_the_end);
+        let waited = self.filled.wait_timeout_while(self.left(), at_most, waits);
+        !waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()
     }
 }
 
@@ -166,7 +200,7 @@ pub(crate) struct Awaited {
 impl Awaited {
     /// Waits for it while it does nothing else, but no longer than that; from then on it leaves most of the time to the program.
     pub(crate) fn wait(&self, at_most: Duration) {
-        self.handover.wait(at_most);
+        self.handover.wait(at_most, false);
         self.pace.go_gently();
     }
 }
@@ -174,7 +208,7 @@ impl Awaited {
 impl Drop for Awaited {
     fn drop(&mut self) {
         self.pace.stop();
-        if self.handover.wait(LAST_WAIT) {
+        if self.handover.wait(LAST_WAIT, true) {
             // It has nothing left to do. Its panics were caught.
             let _ = self.thread.take().map(JoinHandle::join);
         }

@@ -7,7 +7,7 @@ use super::options::Cache;
 use crate::adaptive::{Keeper, SaveError};
 use crate::algorithm::AlgorithmId;
 use crate::entry::Entry;
-use crate::hardware::{GpuIdentity, Hardware, Machine, Parameter};
+use crate::hardware::{GpuIdentity, Hardware, Machine, Measurement, Parameter};
 use crate::json::{self, Format};
 use crate::measure::{fnv1a, machine};
 use crate::model::Model;
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 /// How the files are read and written.
-const FORMAT: Format = Format::new("cache", 3, 0);
+const FORMAT: Format = Format::new("cache", 4, 0);
 
 /// How what a stopped measurement has found is read and written.
 const UNFINISHED: Format = Format::new("unfinished", 1, 0);
@@ -49,6 +49,8 @@ const LONGEST_BYTES: u64 = 16 << 20;
 struct Cached {
     /// What the tuning holds for.
     key: Key,
+    /// When and how the hardware was measured from which it was predicted.
+    measured: Measurement,
     /// The tuning, predicted or learned.
     tuning: Tuning,
 }
@@ -111,10 +113,12 @@ impl Key {
 }
 
 /// The file of one key.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct CacheFile {
     key: Key,
     path: PathBuf,
+    /// What is kept was predicted from this, or was learned upon that.
+    measured: Measurement,
 }
 
 impl CacheFile {
@@ -133,7 +137,12 @@ impl CacheFile {
         };
         let text = serde_json::to_string(&key).map_err(|e| e.to_string())?;
         let path = folder.join(format!("tuning-{:016x}.json", fnv1a(&text)));
-        Ok(Some(Self { key, path }))
+        Ok(Some(Self { key, path, measured: Measurement::now(Vec::new(), None) }))
+    }
+
+    /// The same, for tuning of that measurement.
+    pub(super) fn of(self, measured: Measurement) -> Self {
+        Self { measured, ..self }
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -209,11 +218,11 @@ impl CacheFile {
         }
     }
 
-    /// The tuning that is kept; `None` where there is none.
+    /// The tuning that is kept, and what it is of; `None` where there is none.
     ///
     /// # Errors
     /// A sentence that says why what is there can't be used.
-    pub(super) fn read(&self) -> Result<Option<Tuning>, String> {
+    pub(super) fn read(&self) -> Result<Option<(Tuning, Measurement)>, String> {
         let ignored = |why: &str| format!("{} is ignored and replaced: {why}", self.path.display());
         match fs::metadata(&self.path) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
@@ -230,7 +239,7 @@ impl CacheFile {
         }
         // It is in use, which keeps it from being cleaned; where it can't be written nobody else cleans it either.
         let _ = File::options().append(true).open(&self.path).and_then(|f| f.set_modified(SystemTime::now()));
-        Ok(Some(cached.tuning))
+        Ok(Some((cached.tuning, cached.measured)))
     }
 
     fn replace(&self, path: &Path, text: &str) -> std::io::Result<()> {
@@ -250,8 +259,10 @@ impl CacheFile {
 }
 
 impl Keeper for CacheFile {
-    fn keep(&self, tuning: Tuning) -> Result<(), SaveError> {
-        let cached = Cached { key: self.key.clone(), tuning };
+    fn keep(&self, tuning: Tuning, over_predicted: f64) -> Result<(), SaveError> {
+        let mut measured = self.measured.clone();
+        measured.frames_over_predicted *= over_predicted;
+        let cached = Cached { key: self.key.clone(), measured, tuning };
         self.write(&self.path, FORMAT.write(&cached))?;
         self.clean();
         Ok(())

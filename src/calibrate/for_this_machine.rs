@@ -6,7 +6,7 @@ use super::slice;
 use crate::adaptive::{Adaptive, Arrival, Awaited, Handover, Instances, Keeper, Origin, Setup, Start};
 use crate::entry::Entry;
 use crate::error::Error;
-use crate::hardware::{GpuHardware, Hardware, Parameter, ParameterId};
+use crate::hardware::{GpuHardware, Hardware, Measurement, Parameter, ParameterId};
 use crate::measure::{self, Pace};
 use crate::model::Model;
 use crate::registry::Registry;
@@ -30,7 +30,8 @@ impl Adaptive {
     /// [`StartOptions::background`]. The thread that measures takes a tenth of the time, and ends when this is dropped, which waits for it
     /// for two seconds at most; what it has measured by then the next start goes on from. Of processes that start together one
     /// measures, and the others take what it keeps. What is kept holds for this machine, its drivers, this version of the library, its algorithms and the model; after a change of any of
-    /// them the next start measures again. A cache that can't be read or written keeps nothing from working: [`setup`](Self::setup) tells.
+    /// them the next start measures again. So it does after 30 days, and where other programs disturbed the measurement or frames took over twice
+    /// or less than half the time predicted, though no more than twice in a month; in the background what was kept decides meanwhile. A cache that can't be read or written keeps nothing from working: [`setup`](Self::setup) tells.
     ///
     /// Uses no network and no global state.
     ///
@@ -42,7 +43,7 @@ impl Adaptive {
             in_background(options, began)?
         } else {
             let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry(true)));
-            let arrival = arrive(options, &registry, began, &Arc::default(), MOST_WAIT + options.probe_limit);
+            let arrival = arrive(options, &registry, began, &Arc::default(), MOST_WAIT + options.probe_limit, None);
             // Only where there is no prediction: to make algorithms takes memory, and on GPUs time.
             let Arrival { setup, keeper, tuning } = arrival;
             let mut adaptive = match tuning {
@@ -74,7 +75,7 @@ fn in_background(options: &StartOptions, began: Instant) -> Result<Adaptive, Err
     let run = move || {
         let made = catch_unwind(AssertUnwindSafe(|| {
             let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry(true)));
-            arrive(&options, &registry, began, &own_pace, MOST_WAIT_IN_BACKGROUND)
+            arrive(&options, &registry, began, &own_pace, MOST_WAIT_IN_BACKGROUND, Some(&filled))
         }));
         // Before it is told that nothing is left to do.
         drop(options);
@@ -82,7 +83,7 @@ fn in_background(options: &StartOptions, began: Instant) -> Result<Adaptive, Err
             let remarks = vec!["the thread in the background panicked: the usual tuning stays".to_owned()];
             Arrival { setup: Setup { remarks, ..usual(began) }, keeper: None, tuning: None }
         });
-        filled.leave(arrival);
+        filled.leave_last(arrival);
     };
     adaptive.set_start(match std::thread::Builder::new().name("sapwise-setup".to_owned()).spawn(run) {
         Ok(thread) => {
@@ -119,38 +120,65 @@ fn usual(began: Instant) -> Setup {
     Setup { origin: Origin::Usual, seconds: began.elapsed().as_secs_f64(), ..Setup::default() }
 }
 
-/// Tuning of this machine with their algorithms, which are made only where they are still wanted. `patience` is for another process that
-/// measures already.
-fn arrive(options: &StartOptions, registry: &Registry, began: Instant, pace: &Arc<Pace>, patience: Duration) -> Arrival {
-    let mut remarks = Vec::new();
-    let found = find(options, registry, pace, patience, &mut remarks);
-    let made = found.filter(|_| !pace.is_stopped()).and_then(|(tuning, origin, file)| {
-        let mut made = Instances::of(&tuning, registry);
-        match made.failure() {
-            None => Some((tuning, made, origin, file)),
-            Some(e) => {
-                remarks.push(format!("none of the algorithms that were predicted can be made: {e:#}"));
-                None
-            }
+/// Tuning of this machine, and what there is to tell of it.
+struct Found {
+    tuning: Tuning,
+    origin: Origin,
+    measured: Measurement,
+    file: Option<CacheFile>,
+}
+
+impl Found {
+    /// With its algorithms.
+    fn arrive(self, registry: &Registry, began: Instant, remarks: &mut Vec<String>) -> Option<Arrival> {
+        let mut made = Instances::of(&self.tuning, registry);
+        if let Some(e) = made.failure() {
+            remarks.push(format!("none of the algorithms that were predicted can be made: {e:#}"));
+            return None;
         }
-    });
-    let Some((tuning, made, origin, file)) = made else {
-        return Arrival { setup: Setup { remarks, ..usual(began) }, keeper: None, tuning: None };
+        let setup = Setup {
+            origin: self.origin,
+            remarks: remarks.clone(),
+            seconds: began.elapsed().as_secs_f64(),
+            file: self.file.as_ref().map(|f| f.path().to_owned()),
+            measured: Some(self.measured),
+        };
+        let keeper = self.file.map(|f| Box::new(f) as Box<dyn Keeper>);
+        Some(Arrival { setup, keeper, tuning: Some((self.tuning, made)) })
+    }
+}
+
+/// Tuning of this machine with their algorithms, which are made only where they are still wanted. `patience` is for another process that
+/// measures already. What was kept and is measured again is left in the `handover` until then, where there is one.
+fn arrive(
+    options: &StartOptions,
+    registry: &Registry,
+    began: Instant,
+    pace: &Arc<Pace>,
+    patience: Duration,
+    handover: Option<&Handover>,
+) -> Arrival {
+    let mut remarks = Vec::new();
+    let meanwhile = |found: Found, remarks: &mut Vec<String>| {
+        if let Some((handover, arrival)) = handover.zip(found.arrive(registry, began, remarks)) {
+            handover.leave(arrival);
+        }
     };
-    let path = file.as_ref().map(|f| f.path().to_owned());
-    let setup = Setup { origin, remarks, seconds: began.elapsed().as_secs_f64(), file: path };
-    Arrival { setup, keeper: file.map(|f| Box::new(f) as Box<dyn Keeper>), tuning: Some((tuning, made)) }
+    let found = find(options, registry, pace, patience, &mut remarks, meanwhile).filter(|_| !pace.is_stopped());
+    let arrival = found.and_then(|found| found.arrive(registry, began, &mut remarks));
+    arrival.unwrap_or_else(|| Arrival { setup: Setup { remarks, ..usual(began) }, keeper: None, tuning: None })
 }
 
 /// Tuning from the cache, else from a prediction, and its file in the cache. `None` where nothing can be predicted, or what measured was
-/// stopped.
+/// stopped. What was kept and is measured again is given to `meanwhile`.
 fn find(
     options: &StartOptions,
     registry: &Registry,
     pace: &Arc<Pace>,
     patience: Duration,
     remarks: &mut Vec<String>,
-) -> Option<(Tuning, Origin, Option<CacheFile>)> {
+    meanwhile: impl Fn(Found, &mut Vec<String>),
+) -> Option<Found> {
     let built_in = if options.model.is_none() { Model::built_in().map(Some) } else { Ok(None) };
     let built_in = built_in.map_err(|e| remarks.push(format!("the built-in model can't be read: {e}"))).ok()?;
     let model = options.model.as_ref().or(built_in.as_ref())?;
@@ -159,29 +187,44 @@ fn find(
         remarks.push(why);
         None
     });
+    let cached = |(tuning, measured): (Tuning, Measurement)| {
+        let file = file.clone().map(|f| f.of(measured.clone()));
+        Found { tuning, origin: Origin::Cached, measured, file }
+    };
+    let mut before = None;
     match file.as_ref().map(CacheFile::read) {
-        Some(Ok(Some(tuning))) => return Some((tuning, Origin::Cached, file)),
+        Some(Ok(Some(kept))) => {
+            let Some(why) = kept.1.doubt() else { return Some(cached(kept)) };
+            remarks.push(format!("the hardware is measured again: {why}"));
+            meanwhile(cached(kept.clone()), remarks);
+            before = Some(kept);
+        }
         Some(Err(why)) => remarks.push(why),
         Some(Ok(None)) | None => {}
     }
     // Processes that start together measure once, and don't disturb each other.
     let turn = file.as_ref().and_then(|f| f.wait_for_turn(patience, || pace.is_stopped()));
-    if let Some(Ok(Some(tuning))) = file.as_ref().map(CacheFile::read) {
-        return Some((tuning, Origin::Cached, file));
+    let trusted = |file: &CacheFile| file.read().ok().flatten().filter(|kept| kept.1.doubt().is_none());
+    if let Some(kept) = file.as_ref().and_then(trusted) {
+        return Some(cached(kept));
     }
     let hardware = hardware(options, registry, model, pace, file.as_ref(), remarks);
     if pace.is_stopped() {
         return None;
     }
     file.iter().for_each(CacheFile::forget_unfinished);
-    let (tuning, sound) = predict(model, hardware, &registry.available(), remarks)?;
+    let measured = Measurement::now(hardware.disturbed(), before.as_ref().map(|kept| &kept.1));
+    let Some((tuning, sound)) = predict(model, hardware, &registry.available(), remarks) else {
+        return before.map(cached);
+    };
+    let file = file.map(|f| f.of(measured.clone()));
     // Another process may have been quicker, and may even have learned: what it has kept stays.
-    if let Some(file) = file.as_ref().filter(|f| sound && !matches!(f.read(), Ok(Some(_)))) {
-        remarks.extend(file.keep(tuning.clone()).err().map(with_cause));
+    if let Some(file) = file.as_ref().filter(|f| sound && trusted(f).is_none()) {
+        remarks.extend(file.keep(tuning.clone(), 1.0).err().map(with_cause));
     }
     drop(turn);
     // Nor may what is learned upon them take the place of a sound measurement.
-    Some((tuning, Origin::Probed, file.filter(|_| sound)))
+    Some(Found { tuning, origin: Origin::Probed, measured, file: file.filter(|_| sound) })
 }
 
 /// Tuning from hardware, without the figures and the GPUs that can't be: what needs one of them is left out. Also whether there was none.

@@ -262,6 +262,13 @@ impl Belief {
         self.shared(algorithm, view, calls).0 + own[0] + curve.iter().zip(&own[1..]).map(|(a, b)| a * b).sum::<f64>()
     }
 
+    /// What the part of the class of processor that is off the most adds to the logarithm of its costs.
+    #[cfg(feature = "this-machine")]
+    pub(crate) fn class_ln(&self) -> f64 {
+        let classes = self.algorithms.iter().map(|parts| self.mean[parts.class]);
+        classes.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+    }
+
     /// Variance of the own part of an algorithm.
     fn own_variance(&self, algorithm: usize, view: &View) -> f64 {
         let own = &self.own[algorithm];

@@ -16,6 +16,10 @@ fn entry(folder: &Path, key: Key) -> CacheFile {
     CacheFile::new(&Cache::Folder(folder.to_owned()), key).unwrap().unwrap()
 }
 
+fn read(file: &CacheFile) -> Tuning {
+    file.read().unwrap().unwrap().0
+}
+
 fn names(folder: &Path) -> Vec<String> {
     fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
 }
@@ -42,7 +46,7 @@ fn what_nobody_uses_is_removed_and_nothing_else() {
     }
     fs::create_dir(folder.path().join("tuning-folder.json")).unwrap();
     let entry = entry(folder.path(), key());
-    entry.keep(tuning(1)).unwrap();
+    entry.keep(tuning(1), 1.0).unwrap();
     let mut left = names(folder.path());
     left.retain(|name| !entry.path().ends_with(name) && name != "tuning-folder.json");
     left.sort();
@@ -54,9 +58,9 @@ fn what_nobody_uses_is_removed_and_nothing_else() {
     CacheFile::new(&Cache::Folder(folder.path().to_owned()), Key { version: "0.0.0".to_owned(), ..key() })
         .unwrap()
         .unwrap()
-        .keep(tuning(2))
+        .keep(tuning(2), 1.0)
         .unwrap();
-    assert_eq!(entry.read(), Ok(Some(tuning(1))));
+    assert_eq!(read(&entry), tuning(1));
 }
 
 #[test]
@@ -105,8 +109,8 @@ fn what_is_kept_comes_back_and_nothing_else_is_left() {
     let entry = entry(&inner, key());
     assert_eq!(entry.read(), Ok(None));
     for writer in [1, 2] {
-        entry.keep(tuning(writer)).unwrap();
-        assert_eq!(entry.read(), Ok(Some(tuning(writer))));
+        entry.keep(tuning(writer), 1.0).unwrap();
+        assert_eq!(read(&entry), tuning(writer));
     }
     assert_eq!(names(&inner), [entry.path().file_name().unwrap().to_str().unwrap()]);
     assert!(CacheFile::new(&Cache::None, key()).unwrap().is_none());
@@ -164,7 +168,7 @@ fn every_part_of_the_key_has_a_file_of_its_own() {
 fn what_is_damaged_foreign_or_old_is_told_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let entry = entry(folder.path(), key());
-    entry.keep(tuning(1)).unwrap();
+    entry.keep(tuning(1), 1.0).unwrap();
     let whole = fs::read_to_string(entry.path()).unwrap();
     let other_key = whole.replacen(&key().machine.physical_id, "0123456789abcdef", 1);
     let steps = whole.replacen("\"from_objects\": 0", "\"from_objects\": 7", 1);
@@ -172,8 +176,8 @@ fn what_is_damaged_foreign_or_old_is_told_and_replaced() {
         ("", "EOF"),
         (&whole[..whole.len() / 2], "EOF"),
         (&whole[..whole.len() - 2], "EOF"),
-        (&whole.replacen("cache/3", "cache/1", 1), "the schema \"cache/1\" is of an older version"),
-        (&whole.replacen("\"key\"", "\"host\": \"x\",\n  \"key\"", 1), "host is no key of cache/3"),
+        (&whole.replacen("cache/4", "cache/1", 1), "the schema \"cache/1\" is of an older version"),
+        (&whole.replacen("\"key\"", "\"host\": \"x\",\n  \"key\"", 1), "host is no key of cache/4"),
         (&other_key, "another machine"),
         (&steps, "don't begin at 0"),
     ] {
@@ -181,8 +185,8 @@ fn what_is_damaged_foreign_or_old_is_told_and_replaced() {
         fs::write(entry.path(), text).unwrap();
         let told = entry.read().unwrap_err();
         assert!(told.contains(why), "{why}: {told}");
-        entry.keep(tuning(2)).unwrap();
-        assert_eq!(entry.read(), Ok(Some(tuning(2))));
+        entry.keep(tuning(2), 1.0).unwrap();
+        assert_eq!(read(&entry), tuning(2));
     }
     fs::write(entry.path(), [0xff; 100]).unwrap();
     assert!(entry.read().is_err());
@@ -194,7 +198,7 @@ fn a_folder_in_its_place_is_an_error() {
     let entry = entry(folder.path(), key());
     fs::create_dir_all(entry.path().join("inside")).unwrap();
     assert!(entry.read().unwrap_err().contains("it is no file"));
-    let told = entry.keep(tuning(1)).unwrap_err().to_string();
+    let told = entry.keep(tuning(1), 1.0).unwrap_err().to_string();
     assert!(told.contains("can't be written"), "{told}");
     assert_eq!(names(folder.path()).len(), 1);
 }
@@ -203,18 +207,18 @@ fn a_folder_in_its_place_is_an_error() {
 #[test]
 fn writers_at_once_leave_a_whole_file() {
     let folder = tempfile::tempdir().unwrap();
-    entry(folder.path(), key()).keep(tuning(0)).unwrap();
+    entry(folder.path(), key()).keep(tuning(0), 1.0).unwrap();
     std::thread::scope(|scope| {
         let writers: Vec<_> = [1, 2]
             .map(|writer| {
                 let entry = entry(folder.path(), key());
-                scope.spawn(move || (0..200).for_each(|_| entry.keep(tuning(writer)).unwrap()))
+                scope.spawn(move || (0..200).for_each(|_| entry.keep(tuning(writer), 1.0).unwrap()))
             })
             .into();
         let entry = entry(folder.path(), key());
         let known = [tuning(0), tuning(1), tuning(2)];
         while writers.iter().any(|w| !w.is_finished()) {
-            let seen = entry.read().unwrap().unwrap();
+            let seen = read(&entry);
             assert!(known.contains(&seen));
         }
     });
