@@ -39,11 +39,14 @@ impl Load {
         Self { objects, ..Self::default() }
     }
 
-    /// Whether none of the figures differs from those of another load by more than that share of the greater.
+    /// Whether a frame of another load takes about as long, to that share: counts differ by no more than that share of themselves and of the
+    /// objects, each of which takes as long as some pairs.
     pub(crate) fn is_within(&self, share: f64, other: &Self) -> bool {
-        let figures = |l: &Self| [f64::from(l.objects), l.axis_candidates, l.strip_candidates, l.pairs, l.moved];
+        let objects = f64::from(self.objects);
+        let counts = |l: &Self| [f64::from(l.objects), l.axis_candidates, l.strip_candidates, l.pairs];
         // False for NaN.
-        figures(self).into_iter().zip(figures(other)).all(|(a, b)| (a - b).abs() <= share * a.abs().max(b.abs()))
+        let near = |(a, b): (f64, f64)| (a - b).abs() <= share * (a + objects);
+        counts(self).into_iter().zip(counts(other)).all(near) && (self.moved - other.moved).abs() <= share * self.moved
     }
 
     /// The same with this many overlapping pairs.

@@ -6,7 +6,7 @@
 use crate::tuning::belief::View;
 
 /// Frames that are added up where an algorithm runs on, and right after it began.
-const MOST: u32 = 16;
+const MOST: u32 = 32;
 const FEWEST: u32 = 2;
 /// Octaves of objects over which a batch goes at most.
 const OCTAVES: f64 = 0.5;
@@ -108,10 +108,10 @@ mod tests {
         let predicted = Predicted { ns: 100.0, calls_ns: 50.0 };
         let mut batch = FrameBatch::default();
         let mut full = Vec::new();
-        for frame in 0..60 {
-            let candidate = usize::from(frame >= 50);
-            // Twice the objects from frame 55 on: another batch, with more room than the one before.
-            let log2_objects = if frame < 55 { 10.0 } else { 11.0 };
+        for frame in 0..80 {
+            let candidate = usize::from(frame >= 70);
+            // Twice the objects from frame 75 on: another batch, with more room than the one before.
+            let log2_objects = if frame < 75 { 10.0 } else { 11.0 };
             if !batch.takes(candidate, log2_objects) {
                 batch = batch.next(candidate);
             }
@@ -122,7 +122,7 @@ mod tests {
                 batch = batch.next(candidate);
             }
         }
-        assert_eq!(full, [(1, 2), (5, 4), (13, 8), (29, 16), (45, 16), (51, 2)]);
+        assert_eq!(full, [(1, 2), (5, 4), (13, 8), (29, 16), (61, 32), (71, 2)]);
     }
 
     #[test]

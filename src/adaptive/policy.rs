@@ -18,8 +18,7 @@ const STEP_SLACK: f64 = 0.05;
 /// A switch that is expected to save its price within so many frames is made at once.
 const SOON: f64 = 4.0;
 
-/// What was worked out for a load holds for another whose figures differ by no more than this share: costs follow them about in proportion, and
-/// are known less well than that.
+/// What was worked out for a load holds for another that differs by no more than this share: costs are known less well than that.
 const ALIKE: f64 = 0.01;
 
 /// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a breakpoint or a page
