@@ -186,16 +186,19 @@ fn after_a_stall_the_choices_are_what_they_were() {
     }
 }
 
-/// Whatever runs on two threads takes 1.6 times as long for 600 frames, 300 frames after that began, and 300 after it ended.
-#[test]
-fn beside_another_program_the_number_of_threads_is_left_in_most_scenes() {
+/// Loss of the choices over the best for each frame while `disturbed` holds, from 300 frames after it began on, and from 300 frames after it
+/// ended on. It disturbs what runs on two threads, from frame 500 to 1100.
+fn lost_beside(disturbed: (f64, f64)) -> [f64; 2] {
     let mut lost = [Vec::new(), Vec::new()];
     for file in [XEON, ZEN3] {
         let machine = Recorded::of(file);
-        let shared = |threads: u32, at: usize| (if threads > 1 && (500..1100).contains(&at) { 1.6 } else { 1.0 }, 0.0);
+        let shared = |threads: u32, at: usize| if threads > 1 && (500..1100).contains(&at) { disturbed } else { (1.0, 0.0) };
         for course in courses(&machine).iter().filter(|c| c.len() == 1) {
             let means: Vec<f64> = (0..machine.ids.len()).map(|k| course[0].0.mean_ns(k)).collect();
-            let ns = |k: usize, at: usize| means[k] * shared(machine.ids[k].threads(), at).0;
+            let ns = |k: usize, at: usize| {
+                let (factor, more_ns) = shared(machine.ids[k].threads(), at);
+                means[k] * factor + more_ns
+            };
             for seed in 0..4 {
                 let spent = run(&machine, machine.measured(), &[(course[0].0, 2000)], seed, &shared);
                 for (lost, frames) in lost.iter_mut().zip([800..1100, 1400..2000]) {
@@ -206,7 +209,20 @@ fn beside_another_program_the_number_of_threads_is_left_in_most_scenes() {
             }
         }
     }
-    let told = format!("beside it {:.4}, after it {:.4}, of {}", mean(&lost[0]), mean(&lost[1]), lost[0].len());
-    println!("{told}");
-    assert!(mean(&lost[0]) < 0.05 && mean(&lost[1]) < 0.03, "{told}");
+    let lost = lost.map(|lost| mean(&lost));
+    println!("{disturbed:?} on two threads: beside it {:.4}, after it {:.4}", lost[0], lost[1]);
+    lost
+}
+
+#[test]
+fn beside_another_program_the_number_of_threads_is_left_in_most_scenes() {
+    let [beside, after] = lost_beside((1.6, 0.0));
+    assert!(beside < 0.05 && after < 0.03);
+}
+
+/// A line that went from core to core in 15 ns takes 220 after a move on the Zen 3 host, and a frame on two threads waits for some dozen of them.
+#[test]
+fn where_a_host_moves_cores_apart_and_back_the_choice_follows_without_being_told() {
+    let [apart, together] = lost_beside((1.0, 3000.0));
+    assert!(apart < 0.03 && together < 0.03);
 }
