@@ -117,8 +117,8 @@ impl Adaptive {
 
     /// Whether now and then another algorithm than the cheapest is tried, to learn what that one costs: in two frames, or in twelve where it keeps
     /// work from frame to frame. Only where what it may save in the next 300 frames is more than the trial is expected to cost. What trials
-    /// have cost is measured, and no other is made until that is no more than 0.5 % of the time of the frames and four frames of the largest
-    /// scene so far. On unless it is turned off; without [learning](Self::set_learning) it does nothing.
+    /// have cost is measured, and no other is made until that is no more than 0.5 % of the time of the frames and four frames, and four more for
+    /// a scene that suddenly is larger than all before. On unless it is turned off; without [learning](Self::set_learning) it does nothing.
     pub fn set_exploring(&mut self, explores: bool) {
         self.policy.set_exploring(explores);
     }

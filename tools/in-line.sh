@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Measures what the adaptive choice is worth on this machine: its regret against the best algorithm of every frame, with a tuning that was
-# measured, predicted, or measured on another machine, and beside another program.
+# Measures what the adaptive choice is worth on this machine: its time over that of the best single algorithm and over an oracle's, with tuning that
+# was predicted, measured, or of another machine, and beside another program.
 #
 #     tools/in-line.sh [DIR] [OTHER.json]
 #
-# Texts, traces and pictures go into DIR (`in-line` by default), where a report that is there already is used again. OTHER.json is the
-# report of another machine, whose tuning is to be corrected; without it one is simulated. Nothing else should run meanwhile;
-# takes about ten minutes beside the report's three.
+# Texts, traces and pictures go into DIR (`in-line` by default) with a table of all runs, `summary.txt`; a report that is there already is used again.
+# OTHER.json is the report of another machine, whose tuning is to be corrected; without it one is simulated. Nothing else should run
+# meanwhile; takes about half an hour beside the report's three minutes.
 set -euo pipefail
 
 folder=${1:-in-line}
@@ -27,27 +27,52 @@ fi
 
 stream=$folder/rapier3d.npy
 [ -s "$stream" ] || cargo run --quiet --release -p sapwise-example-rapier3d -- --frames 900 --bodies 2000 --quiet --record "$stream"
-# One name, then the scene and what differs.
+[ -s "$folder/pooled.npy" ] || cargo run --quiet --release -p sapwise-scenes --example streams -- "$folder" >/dev/null
+
+summary=$folder/summary.txt
+printf '%-28s %6s  %8s  %8s  %s\n' run single regret windows 'worst frame' >"$summary"
+# One name, then the scene and what differs. With `--after` the row has the regrets and the worst frame of the frames behind that.
 run() {
-    local name=$1
+    local name=$1 single regret windows worst
     shift
-    echo "== $name: run $*"
     "$sapwise" run "$@" --no-gpus --plot "$folder/$name.svg" --trace "$folder/$name.csv" >"$folder/$name.txt"
-    grep -A 6 '^frames' "$folder/$name.txt" | sed '/^$/,$d'
-    grep -E 'of the time of|ran beside it|Other programs' "$folder/$name.txt"
+    single=$(sed -n 's/^Adaptive takes \([0-9.]*\) .*/\1/p' "$folder/$name.txt")
+    # frames, regret, median of repeats, their quartiles, vs windows, switches, explored, worst frame
+    read -r regret windows worst < <(awk -v after=" $* " '
+        /^frames +regret/ { table = 1; next }
+        !NF { table = 0 }
+        table && (after ~ / --after / || $1 == "all") { row = $0 }
+        END {
+            split(row, cell, / %[ a-z]*/)
+            sub(/.* /, "", cell[1]); sub(/.* /, "", cell[5]); sub(/ times.*/, "", row); sub(/.* /, "", row)
+            print cell[1], cell[5], row
+        }' "$folder/$name.txt")
+    printf '%-28s %6s  %6s %%  %6s %%  %s\n' "$name" "$single" "$regret" "$windows" "$worst" | tee -a "$summary"
 }
 
-clustered=(clustered --swing 50 --frames 600)
+predicted=(--samples 8)
+measured=(--tuning "$report")
+for scenario in uniform fast clustered slab mixed resting brownian free-fall gravity; do
+    run "$scenario" $scenario --objects 3000 --frames 600 "${predicted[@]}"
+    run "$scenario-swing" $scenario --objects 3000 --swing 50 --frames 600 "${predicted[@]}"
+done
+run uniform-800 uniform --objects 800 --frames 600 "${predicted[@]}"
 for tuning in measured predicted; do
-    given=(--samples 8)
-    [ $tuning = measured ] && given=(--tuning "$report")
+    declare -n given=$tuning
     run "fragmentation-$tuning" fragmentation "${given[@]}"
     run "fragmentation-2000-$tuning" fragmentation --objects 2000 "${given[@]}"
-    run "clustered-$tuning" "${clustered[@]}" "${given[@]}"
-    run "stream-$tuning" "$stream" "${given[@]}"
+    run "clustered-20000-$tuning" clustered --swing 50 --frames 600 "${given[@]}"
+    run "rapier3d-$tuning" "$stream" "${given[@]}"
+    for own in level fight pooled; do
+        run "$own-$tuning" "$folder/$own.npy" "${given[@]}"
+    done
 done
 run fragmentation-wrong fragmentation --frames 1200 --tuning "$other" --after 300
 run clustered-wrong clustered --swing 50 --frames 1200 --tuning "$other" --after 300
-run stream-wrong "$stream" --tuning "$other" --after 300
-run fragmentation-shared fragmentation --frames 1500 --tuning "$report" --co-runner 600 --after 900
-run uniform-shared uniform --objects 5000 --frames 1200 --tuning "$report" --co-runner 600 --after 900
+run rapier3d-wrong "$stream" --tuning "$other" --after 300
+run fragmentation-shared fragmentation --frames 1500 "${measured[@]}" --co-runner 600 --after 900
+run uniform-shared uniform --objects 5000 --frames 1200 "${measured[@]}" --co-runner 600 --after 900
+
+awk 'NR > 1 && $1 !~ /-(wrong|shared)$/ { sum += log($2); n++; if ($2 > most) { most = $2; name = $1 } }
+    END { printf "\n%d undisturbed runs over the best single algorithm: geometric mean %.3f, most %.3f in %s\n", n, exp(sum / n), most, name }' \
+    "$summary" | tee -a "$summary"

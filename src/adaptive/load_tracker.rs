@@ -118,7 +118,7 @@ impl LoadTracker {
     /// Takes in a frame that was run: its overlapping pairs, those that a filter kept out included, and how long it took in nanoseconds,
     /// where it was timed.
     pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: Option<f64>) {
-        let usual_ns = self.throttle.ran();
+        let usual_ns = self.throttle.ran(count(boxes));
         self.before = Some((count(boxes), pairs));
         self.age = self.age.saturating_add(1);
         self.passed_ns += ns.unwrap_or(usual_ns);

@@ -1,4 +1,4 @@
-//! How often to decide: in short frames not in each of them.
+//! How often to decide: in short frames not in each of them, unless their number of objects changes.
 
 /// Share of the frames' time that decisions and their clock may take.
 const SHARE: f64 = 0.01;
@@ -6,19 +6,22 @@ const SHARE: f64 = 0.01;
 const MEAN: f64 = 1.0 / 8.0;
 const MOST_RISE: f64 = 4.0;
 /// Frames between two decisions, at most.
-const MOST_FRAMES: u32 = 128;
+const MOST_FRAMES: f64 = 128.0;
 
-/// A number of objects that has changed by this share, or by this many, is decided on at once.
-const CHANGE: u32 = 16;
+/// By how much the share rises with the change of the number of objects since the last decision, as a ratio less one.
+const SHARE_OF_DRIFT: f64 = 0.1;
+/// A number that differs from that of the frame before by a quarter, and by so many, is decided on at once.
+const JUMP: u32 = 4;
 const FEWEST: u32 = 16;
 
 /// Counts the frames until the next decision.
 #[derive(Debug, Clone, Default)]
 pub(super) struct DecisionThrottle {
-    /// Objects at the last decision, and frames since.
+    /// Objects at the last decision and in the last frame, and frames since that decision.
     objects: u32,
+    before: u32,
     frames: u32,
-    rest: u32,
+    rest: f64,
     /// What a decision takes, learning and the clock included.
     decision_ns: f64,
     frame_ns: f64,
@@ -27,11 +30,14 @@ pub(super) struct DecisionThrottle {
 impl DecisionThrottle {
     /// Whether a frame with this many objects is to be decided on again.
     pub(super) fn is_due(&self, objects: u32) -> bool {
-        self.frames >= self.rest || objects.abs_diff(self.objects) > (self.objects / CHANGE).max(FEWEST)
+        let drift = f64::from(objects.abs_diff(self.objects)) / f64::from(objects.min(self.objects).max(1));
+        let jumps = objects.abs_diff(self.before) > (self.before / JUMP).max(FEWEST);
+        jumps || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * drift) >= self.rest
     }
 
-    /// Counts a frame. Returns about how long frames take now, in nanoseconds.
-    pub(super) fn ran(&mut self) -> f64 {
+    /// Counts a frame of so many objects. Returns about how long frames take now, in nanoseconds.
+    pub(super) fn ran(&mut self, objects: u32) -> f64 {
+        self.before = objects;
         self.frames = self.frames.saturating_add(1);
         self.frame_ns
     }
@@ -43,7 +49,7 @@ impl DecisionThrottle {
 
     /// The next frame is to be decided on again.
     pub(super) fn wake(&mut self) {
-        self.rest = 0;
+        self.rest = 0.0;
     }
 
     /// What the decision took, where that is known, and its frame.
@@ -55,6 +61,6 @@ impl DecisionThrottle {
             self.decision_ns = before + MEAN * (ns.min(MOST_RISE * before) - before);
         }
         self.frame_ns = frame_ns;
-        self.rest = (self.decision_ns / (SHARE * frame_ns.max(1.0))).min(f64::from(MOST_FRAMES)) as u32;
+        self.rest = (self.decision_ns / (SHARE * frame_ns.max(1.0))).min(MOST_FRAMES).floor();
     }
 }

@@ -6,9 +6,11 @@ use crate::stats::normal_density;
 pub(super) const HORIZON: f64 = 300.0;
 
 /// Share of the time of all frames that trials may cost, and frames' worth of that which is there at the start: one frame in which an incremental
-/// algorithm begins costs two or three. Where more objects than ever make frames dearer, as of a level that loads, the difference is a start of its own.
+/// algorithm begins costs two or three. Where the objects are suddenly so many times the most so far, a level that loads, the difference is a start
+/// of its own; a scene that grows slowly brings along what it has learned.
 const SHARE: f64 = 0.005;
 const AT_FIRST: f64 = 4.0;
+const SUDDENLY: f64 = 1.25;
 /// No more frames' worth than these are saved up: else a long rest would be followed by one trial after the other.
 const MOST: f64 = 12.0;
 /// Frames between the end of a trial and the beginning of the next, at least.
@@ -72,10 +74,12 @@ impl Trials {
 
     /// Adds to what trials may cost that of some frames with so many objects which took `now_ns` each.
     pub(super) fn allow(&mut self, now_ns: f64, frames: f64, objects: u32) {
-        let mut dearer_ns = 0.0;
-        if objects > self.most.0 {
-            dearer_ns = (now_ns - self.most.1).max(0.0);
-            self.most = (objects, self.most.1 + dearer_ns);
+        let (most, dearest_ns) = self.most;
+        let dearest_now_ns = now_ns.max(dearest_ns);
+        let loads = f64::from(objects) >= SUDDENLY * f64::from(most);
+        let dearer_ns = if loads { dearest_now_ns - dearest_ns } else { 0.0 };
+        if objects > most {
+            self.most = (objects, dearest_now_ns);
         }
         self.allowance_ns = (self.allowance_ns + AT_FIRST * dearer_ns + SHARE * now_ns * frames).min(MOST * now_ns);
     }
@@ -203,6 +207,8 @@ mod tests {
         let mut trials = Trials::default();
         [100.0, 500.0, 900.0].iter().for_each(|&ns| trials.allow(ns, 1.0, 10));
         assert!(trials.allowance_ns(0) < Some(500.0));
+        let growing: Vec<u32> = (0..100).map(|k| 1000 + 20 * k).collect();
+        assert!(allowed(&growing) < 5.1);
     }
 
     #[test]
