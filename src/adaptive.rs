@@ -16,6 +16,8 @@ mod warming;
 
 use crate::aabb::Aabb;
 use crate::algorithm::AlgorithmId;
+#[cfg(feature = "this-machine")]
+use crate::algorithm::BackendClass;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, Incremental};
 use crate::clock::{self, Instant};
 use crate::error::{Error, Unavailable};
@@ -25,8 +27,6 @@ use crate::registry::Registry;
 use crate::tuning::{Source, Step, Tuning};
 use decision::Choice;
 use instances::{Candidate, Instance};
-#[cfg(feature = "this-machine")]
-use learner::Learner;
 use load_tracker::LoadTracker;
 use policy::Policy;
 use std::fmt;
@@ -117,8 +117,8 @@ impl Adaptive {
 
     /// Whether now and then another algorithm than the cheapest is tried, to learn what that one costs: in two frames, or in twelve where it keeps
     /// work from frame to frame. Only where what it may save in the next 300 frames is more than the trial is expected to cost. What trials
-    /// have cost is measured, and no other is made until that is no more than 0.5 % of the time of the frames and four frames, and four more for
-    /// a scene that suddenly is larger than all before. On unless it is turned off; without [learning](Self::set_learning) it does nothing.
+    /// have cost is measured, and no other is made until that is no more than 0.5 % of the time of the frames and four frames; a scene that
+    /// suddenly is larger than all before counts as one that begins. On unless it is turned off; without [learning](Self::set_learning) it does nothing.
     pub fn set_exploring(&mut self, explores: bool) {
         self.policy.set_exploring(explores);
     }
@@ -202,7 +202,14 @@ impl Adaptive {
     /// When there is no cache to keep it in, or it can't be written.
     #[cfg(feature = "this-machine")]
     pub fn save(&self) -> Result<bool, SaveError> {
-        self.start.save(|| (self.learned(), self.policy.learned().map_or(0.0, Learner::class_ln).exp()))
+        self.start.save(|| (self.learned(), self.over_predicted()))
+    }
+
+    /// How many times as long as predicted frames take on the CPU, as far as they told.
+    #[cfg(feature = "this-machine")]
+    fn over_predicted(&self) -> f64 {
+        let on_cpu = self.tuning().costs.iter().position(|c| c.algorithm.backend().class() == BackendClass::Cpu);
+        self.policy.learned().zip(on_cpu).map_or(1.0, |(learner, k)| learner.class_ln(k).exp())
     }
 
     /// Begins with what a start on this machine found.

@@ -94,10 +94,10 @@ impl Learner {
         self.belief.view(frame)
     }
 
-    /// Natural logarithm of real over predicted time of the class of processor that is off the most, as far as all of its algorithms are.
+    /// Natural logarithm of real over predicted time of an algorithm's class of processor, as far as all of its algorithms are off.
     #[cfg(feature = "this-machine")]
-    pub(super) fn class_ln(&self) -> f64 {
-        self.belief.class_ln()
+    pub(super) fn class_ln(&self, algorithm: usize) -> f64 {
+        self.belief.class_ln(algorithm)
     }
 
     /// Mean time that a frame of an algorithm waits for other programs, in nanoseconds. A helper whose core another program has waits

@@ -18,8 +18,10 @@ const STEP_SLACK: f64 = 0.05;
 /// A switch that is expected to save its price within so many frames is made at once.
 const SOON: f64 = 4.0;
 
-/// What was worked out for a load holds for another that differs by no more than this share: costs are known less well than that.
+/// What was worked out for a load holds for another that differs by no more than this share: costs are known less well than that. It holds for so
+/// many frames: waits pass, whether anything is observed or not.
 const ALIKE: f64 = 0.01;
+const HOLDS: u64 = 64;
 
 /// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a breakpoint or a page
 /// from disk tells nothing of the frames that follow.
@@ -49,8 +51,8 @@ pub(super) struct Policy {
     predicted: Vec<Predicted>,
     log2_objects: f64,
     view: View,
-    /// The load for which that was worked out, and how much was observed by then.
-    worked_out: Option<(Load, u64)>,
+    /// The load and the frame for which that was worked out, and how much was observed by then.
+    worked_out: Option<(Load, u64, u64)>,
     batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
@@ -139,7 +141,7 @@ impl Policy {
     pub(super) fn remade(&mut self, kept: &[Option<usize>], usable: &[bool]) {
         (0..usable.len()).for_each(|k| self.set_usable(k, usable[k]));
         // A frame with them is a first one, and begins a batch of its own.
-        self.ran = None;
+        (self.ran, self.worked_out) = (None, None);
         self.trials.stop(self.frame);
         self.batch = FrameBatch::default();
         if !self.switching.remade(kept) {
@@ -194,10 +196,11 @@ impl Policy {
     /// Fills in what every candidate is expected to cost, where that is not known from a load that was alike.
     fn expect(&mut self, load: &Load) {
         let observed = self.learner.as_ref().map_or(0, Learner::observed);
-        if self.worked_out.is_some_and(|(of, then)| then == observed && load.is_within(ALIKE, &of)) {
+        let holds = |(of, at, then)| then == observed && self.frame - at < HOLDS && load.is_within(ALIKE, &of);
+        if self.worked_out.is_some_and(holds) {
             return;
         }
-        self.worked_out = Some((*load, observed));
+        self.worked_out = Some((*load, self.frame, observed));
         let frame = Frame::new(load);
         self.log2_objects = f64::from(load.objects.max(1)).log2();
         self.view = self.learner.as_ref().map_or_else(View::default, |l| l.view(&frame));

@@ -125,6 +125,11 @@ impl Start {
             self.awaited = None;
         }
         let arrival = arrival?;
+        // What came before stays in use, with its keeper.
+        if arrival.tuning.is_none() && self.setup.origin == Origin::Cached {
+            self.setup.remarks = arrival.setup.remarks;
+            return None;
+        }
         (self.setup, self.keeper) = (arrival.setup, arrival.keeper);
         arrival.tuning
     }
@@ -177,10 +182,9 @@ impl Handover {
         (left.arrival.take(), left.is_last)
     }
 
-    /// Waits until something was left, or with `to_the_end` the last of all, but no longer than that. Whether it was.
-    fn wait(&self, at_most: Duration, to_the_end: bool) -> bool {
-        let waits = |left: &mut Left| !(left.is_last || left.arrival.is_some() && !to_the_end);
-        let waited = self.filled.wait_timeout_while(self.left(), at_most, waits);
+    /// Waits until the last was left, but no longer than that. Whether it was.
+    fn wait(&self, at_most: Duration) -> bool {
+        let waited = self.filled.wait_timeout_while(self.left(), at_most, |left| !left.is_last);
         !waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()
     }
 }
@@ -200,7 +204,7 @@ pub(crate) struct Awaited {
 impl Awaited {
     /// Waits for it while it does nothing else, but no longer than that; from then on it leaves most of the time to the program.
     pub(crate) fn wait(&self, at_most: Duration) {
-        self.handover.wait(at_most, false);
+        self.handover.wait(at_most);
         self.pace.go_gently();
     }
 }
@@ -208,7 +212,7 @@ impl Awaited {
 impl Drop for Awaited {
     fn drop(&mut self) {
         self.pace.stop();
-        if self.handover.wait(LAST_WAIT, true) {
+        if self.handover.wait(LAST_WAIT) {
             // It has nothing left to do. Its panics were caught.
             let _ = self.thread.take().map(JoinHandle::join);
         }
@@ -226,5 +230,29 @@ pub(crate) struct Arrival {
 impl fmt::Debug for Arrival {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Arrival").field("setup", &self.setup).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_measurement_that_brings_nothing_leaves_what_came_before_it() {
+        let arrival = |remark: &str| {
+            let setup = Setup { origin: Origin::Usual, remarks: vec![remark.to_owned()], ..Setup::default() };
+            Arrival { setup, keeper: None, tuning: None }
+        };
+        for (before, after) in [(Origin::Cached, Origin::Cached), (Origin::Awaited, Origin::Usual)] {
+            let handover = Arc::new(Handover::default());
+            handover.leave(arrival("first"));
+            handover.leave_last(arrival("last"));
+            let awaited = Awaited { handover, pace: Arc::default(), thread: None };
+            awaited.wait(Duration::MAX);
+            let setup = Setup { origin: before, ..Setup::default() };
+            let mut start = Start { setup, keeper: None, awaited: Some(awaited) };
+            assert!(start.arrived().is_none() && start.awaited.is_none() && start.arrived().is_none());
+            assert_eq!((start.setup.origin, &start.setup.remarks[..]), (after, &["last".to_owned()][..]));
+        }
     }
 }

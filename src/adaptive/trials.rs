@@ -76,9 +76,10 @@ impl Trials {
     pub(super) fn allow(&mut self, now_ns: f64, frames: f64, objects: u32) {
         let (most, dearest_ns) = self.most;
         let dearest_now_ns = now_ns.max(dearest_ns);
-        let loads = f64::from(objects) >= SUDDENLY * f64::from(most);
+        // An empty world is one that begins, too.
+        let loads = dearest_ns == 0.0 || objects > most && f64::from(objects) >= SUDDENLY * f64::from(most);
         let dearer_ns = if loads { dearest_now_ns - dearest_ns } else { 0.0 };
-        if objects > most {
+        if objects > most || loads {
             self.most = (objects, dearest_now_ns);
         }
         self.allowance_ns = (self.allowance_ns + AT_FIRST * dearer_ns + SHARE * now_ns * frames).min(MOST * now_ns);
@@ -207,6 +208,9 @@ mod tests {
         let mut trials = Trials::default();
         [100.0, 500.0, 900.0].iter().for_each(|&ns| trials.allow(ns, 1.0, 10));
         assert!(trials.allowance_ns(0) < Some(500.0));
+        let mut empty = Trials::default();
+        (0..100).for_each(|_| empty.allow(100.0, 1.0, 0));
+        assert!(empty.allowance_ns(0) < Some(460.0));
         let growing: Vec<u32> = (0..100).map(|k| 1000 + 20 * k).collect();
         assert!(allowed(&growing) < 5.1);
     }

@@ -40,6 +40,9 @@ const CRASHED: Duration = Duration::from_secs(60 * 60);
 /// What was neither read nor written for as long is of a machine, a driver or a build that is gone.
 const UNUSED: Duration = Duration::from_secs(90 * 24 * 60 * 60);
 
+/// A stopped measurement is gone on with for as long: its figures are to be of one time.
+const OUTDATED: Duration = Duration::from_secs(7 * 24 * 60 * 60);
+
 /// A file that is longer was written by something else.
 const LONGEST_BYTES: u64 = 16 << 20;
 
@@ -175,8 +178,9 @@ impl CacheFile {
 
     /// What a measurement has found that was stopped; nothing where there is none that can be used.
     pub(super) fn read_unfinished(&self) -> Vec<Parameter> {
-        let text =
-            Some(self.unfinished()).filter(|p| fs::metadata(p).is_ok_and(|m| m.is_file() && m.len() <= LONGEST_BYTES));
+        let fresh = |m: &fs::Metadata| m.modified().is_ok_and(|at| at.elapsed().is_ok_and(|age| age < OUTDATED));
+        let usable = |m: &fs::Metadata| m.is_file() && m.len() <= LONGEST_BYTES && fresh(m);
+        let text = Some(self.unfinished()).filter(|p| fs::metadata(p).is_ok_and(|m| usable(&m)));
         let text = text.and_then(|path| fs::read_to_string(path).ok());
         let found = text.and_then(|text| UNFINISHED.read::<Unfinished>(&text).ok()).map(|read| read.value);
         found.filter(|of| of.key == self.key).map(|of| of.hardware.parameters).unwrap_or_default()
@@ -260,6 +264,10 @@ impl CacheFile {
 
 impl Keeper for CacheFile {
     fn keep(&self, tuning: Tuning, over_predicted: f64) -> Result<(), SaveError> {
+        // Another process, or the background of this one, may have measured since: what is learned upon older figures does not take its place.
+        if self.read().is_ok_and(|kept| kept.is_some_and(|(_, since)| since.at_unix_s > self.measured.at_unix_s)) {
+            return Ok(());
+        }
         let mut measured = self.measured.clone();
         measured.frames_over_predicted *= over_predicted;
         let cached = Cached { key: self.key.clone(), measured, tuning };

@@ -160,9 +160,8 @@ fn arrive(
 ) -> Arrival {
     let mut remarks = Vec::new();
     let meanwhile = |found: Found, remarks: &mut Vec<String>| {
-        if let Some((handover, arrival)) = handover.zip(found.arrive(registry, began, remarks)) {
-            handover.leave(arrival);
-        }
+        let Some(handover) = handover.filter(|_| !pace.is_stopped()) else { return false };
+        found.arrive(registry, began, remarks).map(|arrival| handover.leave(arrival)).is_some()
     };
     let found = find(options, registry, pace, patience, &mut remarks, meanwhile).filter(|_| !pace.is_stopped());
     let arrival = found.and_then(|found| found.arrive(registry, began, &mut remarks));
@@ -170,14 +169,15 @@ fn arrive(
 }
 
 /// Tuning from the cache, else from a prediction, and its file in the cache. `None` where nothing can be predicted, or what measured was
-/// stopped. What was kept and is measured again is given to `meanwhile`.
+/// stopped. What was kept and is measured again is given to `meanwhile`, which tells whether it has any use for that, and is found where the
+/// measurement fails and nobody has it yet.
 fn find(
     options: &StartOptions,
     registry: &Registry,
     pace: &Arc<Pace>,
     patience: Duration,
     remarks: &mut Vec<String>,
-    meanwhile: impl Fn(Found, &mut Vec<String>),
+    meanwhile: impl Fn(Found, &mut Vec<String>) -> bool,
 ) -> Option<Found> {
     let built_in = if options.model.is_none() { Model::built_in().map(Some) } else { Ok(None) };
     let built_in = built_in.map_err(|e| remarks.push(format!("the built-in model can't be read: {e}"))).ok()?;
@@ -191,12 +191,12 @@ fn find(
         let file = file.clone().map(|f| f.of(measured.clone()));
         Found { tuning, origin: Origin::Cached, measured, file }
     };
-    let mut before = None;
+    let (mut before, mut in_use) = (None, false);
     match file.as_ref().map(CacheFile::read) {
         Some(Ok(Some(kept))) => {
             let Some(why) = kept.1.doubt() else { return Some(cached(kept)) };
             remarks.push(format!("the hardware is measured again: {why}"));
-            meanwhile(cached(kept.clone()), remarks);
+            in_use = meanwhile(cached(kept.clone()), remarks);
             before = Some(kept);
         }
         Some(Err(why)) => remarks.push(why),
@@ -214,8 +214,10 @@ fn find(
     }
     file.iter().for_each(CacheFile::forget_unfinished);
     let measured = Measurement::now(hardware.disturbed(), before.as_ref().map(|kept| &kept.1));
-    let Some((tuning, sound)) = predict(model, hardware, &registry.available(), remarks) else {
-        return before.map(cached);
+    let predicted = predict(model, hardware, &registry.available(), remarks);
+    // Figures that can't be cost algorithms: rather what was kept than that.
+    let Some((tuning, sound)) = predicted.filter(|(_, sound)| *sound || before.is_none()) else {
+        return before.filter(|_| !in_use).map(cached);
     };
     let file = file.map(|f| f.of(measured.clone()));
     // Another process may have been quicker, and may even have learned: what it has kept stays.

@@ -262,11 +262,10 @@ impl Belief {
         self.shared(algorithm, view, calls).0 + own[0] + curve.iter().zip(&own[1..]).map(|(a, b)| a * b).sum::<f64>()
     }
 
-    /// What the part of the class of processor that is off the most adds to the logarithm of its costs.
+    /// What the part of an algorithm's class of processor adds to the logarithm of its cost.
     #[cfg(feature = "this-machine")]
-    pub(crate) fn class_ln(&self) -> f64 {
-        let classes = self.algorithms.iter().map(|parts| self.mean[parts.class]);
-        classes.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+    pub(crate) fn class_ln(&self, algorithm: usize) -> f64 {
+        self.mean[self.algorithms[algorithm].class]
     }
 
     /// Variance of the own part of an algorithm.

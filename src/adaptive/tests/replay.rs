@@ -186,14 +186,15 @@ fn after_a_stall_the_choices_are_what_they_were() {
     }
 }
 
-/// Loss of the choices over the best for each frame while `disturbed` holds, from 300 frames after it began on, and from 300 frames after it
-/// ended on. It disturbs what runs on two threads, from frame 500 to 1100.
-fn lost_beside(disturbed: (f64, f64)) -> [f64; 2] {
-    let mut lost = [Vec::new(), Vec::new()];
+/// Of choices in scenes of at least so many objects: their loss over the best of each frame from 300 frames after a disturbance began on, and from 300
+/// frames after it ended on; and what it would be in the first of these if they were still those of before. It disturbs what runs on two threads, from
+/// frame 500 to 1100.
+fn lost_beside(disturbed: (f64, f64), least_objects: u32) -> [f64; 3] {
+    let mut lost = [Vec::new(), Vec::new(), Vec::new()];
     for file in [XEON, ZEN3] {
         let machine = Recorded::of(file);
         let shared = |threads: u32, at: usize| if threads > 1 && (500..1100).contains(&at) { disturbed } else { (1.0, 0.0) };
-        for course in courses(&machine).iter().filter(|c| c.len() == 1) {
+        for course in courses(&machine).iter().filter(|c| c.len() == 1 && c[0].0.load.objects >= least_objects) {
             let means: Vec<f64> = (0..machine.ids.len()).map(|k| course[0].0.mean_ns(k)).collect();
             let ns = |k: usize, at: usize| {
                 let (factor, more_ns) = shared(machine.ids[k].threads(), at);
@@ -201,28 +202,31 @@ fn lost_beside(disturbed: (f64, f64)) -> [f64; 2] {
             };
             for seed in 0..4 {
                 let spent = run(&machine, machine.measured(), &[(course[0].0, 2000)], seed, &shared);
-                for (lost, frames) in lost.iter_mut().zip([800..1100, 1400..2000]) {
+                let over = |frames: std::ops::Range<usize>, chosen: &dyn Fn(usize) -> usize| {
                     let least = |at: usize| (0..means.len()).map(|k| ns(k, at)).fold(f64::INFINITY, f64::min);
                     let best: f64 = frames.clone().map(least).sum();
-                    lost.push(frames.map(|at| ns(spent.chosen[at], at)).sum::<f64>() / best - 1.0);
-                }
+                    frames.map(|at| ns(chosen(at), at)).sum::<f64>() / best - 1.0
+                };
+                lost[0].push(over(800..1100, &|at| spent.chosen[at]));
+                lost[1].push(over(1400..2000, &|at| spent.chosen[at]));
+                lost[2].push(over(800..1100, &|at| spent.chosen[at - 600]));
             }
         }
     }
     let lost = lost.map(|lost| mean(&lost));
-    println!("{disturbed:?} on two threads: beside it {:.4}, after it {:.4}", lost[0], lost[1]);
+    println!("{disturbed:?} on two threads: beside it {:.4}, after it {:.4}, unmoved {:.4}", lost[0], lost[1], lost[2]);
     lost
 }
 
 #[test]
 fn beside_another_program_the_number_of_threads_is_left_in_most_scenes() {
-    let [beside, after] = lost_beside((1.6, 0.0));
-    assert!(beside < 0.05 && after < 0.03);
+    let [beside, after, unmoved] = lost_beside((1.6, 0.0), 0);
+    assert!(beside < 0.05 && after < 0.03 && unmoved > 0.06);
 }
 
-/// A line that went from core to core in 15 ns takes 220 after a move on the Zen 3 host, and a frame on two threads waits for some dozen of them.
+/// A line that went from core to core in 15 ns takes 220 after a move on the Zen 3 host. A frame that waits for a hundred and fifty of them takes 30 us more.
 #[test]
 fn where_a_host_moves_cores_apart_and_back_the_choice_follows_without_being_told() {
-    let [apart, together] = lost_beside((1.0, 3000.0));
-    assert!(apart < 0.03 && together < 0.03);
+    let [apart, together, unmoved] = lost_beside((1.0, 30_000.0), 2048);
+    assert!(apart < 0.5 * unmoved && together < 0.02);
 }

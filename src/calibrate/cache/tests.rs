@@ -78,6 +78,10 @@ fn an_unfinished_measurement_is_kept_until_it_is_finished() {
     let text = fs::read_to_string(file.unfinished()).unwrap();
     fs::write(other.unfinished(), &text[..text.len() / 2]).unwrap();
     assert!(other.read_unfinished().is_empty());
+    age(&file.unfinished(), 8);
+    assert!(file.read_unfinished().is_empty());
+    age(&file.unfinished(), 6);
+    assert_eq!(file.read_unfinished(), measured);
     file.forget_unfinished();
     assert!(file.read_unfinished().is_empty());
 }
@@ -114,6 +118,18 @@ fn what_is_kept_comes_back_and_nothing_else_is_left() {
     }
     assert_eq!(names(&inner), [entry.path().file_name().unwrap().to_str().unwrap()]);
     assert!(CacheFile::new(&Cache::None, key()).unwrap().is_none());
+}
+
+#[test]
+fn what_is_learned_upon_older_figures_does_not_take_the_place_of_newer_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let (newer, mut older) = (entry(folder.path(), key()), entry(folder.path(), key()));
+    older.measured.at_unix_s -= 1000;
+    older.keep(tuning(1), 3.0).unwrap();
+    assert_eq!(older.read().unwrap().unwrap().1.frames_over_predicted, 3.0);
+    newer.keep(tuning(2), 1.0).unwrap();
+    older.keep(tuning(3), 1.0).unwrap();
+    assert_eq!(read(&older), tuning(2));
 }
 
 #[test]
