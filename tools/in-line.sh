@@ -6,7 +6,7 @@
 #
 # Texts, traces and pictures go into DIR (`in-line` by default) with a table of all runs, `summary.txt`; a report that is there already is used again.
 # OTHER.json is the report of another machine, whose tuning is to be corrected; without it one is simulated. Nothing else should run
-# meanwhile; takes about half an hour beside the report's three minutes.
+# meanwhile; takes 10 to 16 minutes beside the report's three.
 set -euo pipefail
 
 folder=${1:-in-line}
