@@ -1,15 +1,13 @@
 //! The load of the next frame: from a sample now and then, from the frame before in between; and when to decide by it.
 
-use super::throttle::DecisionThrottle;
+use super::throttle::{DecisionThrottle, SHARE_OF_DRIFT, drift};
 use crate::aabb::Aabb;
 use crate::clock::Instant;
 use crate::load::{Displacement, FramePlan, Load};
 
-/// Share of the frames' time that samples may take where the number of objects holds still ...
-const SHARE: f64 = 0.005;
-/// ... and by how much that share rises with the change of that number since the last sample, as a ratio. A scene that doubles is
+/// Share of the frames' time that samples may take where the number of objects holds still. With [`SHARE_OF_DRIFT`] a scene that doubles is
 /// sampled when ten times the sample's cost has passed, one that grows by a sixteenth after ninety times.
-const SHARE_OF_DRIFT: f64 = 0.1;
+const SHARE: f64 = 0.005;
 
 /// A sample that the system interrupts looks dear. Taken at its word it would put off the next one for seconds of frames, over
 /// which a change of the scene goes unseen.
@@ -108,9 +106,7 @@ impl LoadTracker {
     }
 
     fn is_sample_due(&self, objects: u32) -> bool {
-        let (now, then) = (f64::from(objects.max(1)), f64::from(self.sampled.max(1)));
-        let ratio = (now / then).max(then / now);
-        let drift = ratio - 1.0;
+        let drift = drift(objects, self.sampled);
         let rested = self.age >= SAMPLE_EVERY || drift > 1.0 / 16.0;
         self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.sample_ns
     }

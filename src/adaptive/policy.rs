@@ -296,8 +296,7 @@ impl Policy {
     }
 
     /// Takes in that a candidate ran the frame that was decided, what that took and how it came about; `None` where it builds on no frame
-    /// before. Whether that was so much that the next
-    /// frame is to be decided on, whatever it was before.
+    /// before. Whether that was so much that the next frame is to be decided on, whatever it was before.
     pub(super) fn ran(&mut self, candidate: usize, ns: f64, work: Option<FrameWork>) -> bool {
         let entered = self.ran != Some(candidate);
         self.ran = Some(candidate);

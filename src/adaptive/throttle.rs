@@ -8,11 +8,17 @@ const MOST_RISE: f64 = 4.0;
 /// Frames between two decisions, at most.
 const MOST_FRAMES: f64 = 128.0;
 
-/// By how much the share rises with the change of the number of objects since the last decision, as a ratio less one.
-const SHARE_OF_DRIFT: f64 = 0.1;
+/// By how much such a share rises with the [`drift`] of the number of objects since the last decision.
+pub(super) const SHARE_OF_DRIFT: f64 = 0.1;
 /// A number that differs from that of the frame before by a quarter, and by so many, is decided on at once.
 const JUMP: u32 = 4;
 const FEWEST: u32 = 16;
+
+/// How far a number of objects is from another: the ratio of the greater to the less, less one.
+pub(super) fn drift(objects: u32, before: u32) -> f64 {
+    let (low, high) = (objects.min(before).max(1), objects.max(before).max(1));
+    f64::from(high) / f64::from(low) - 1.0
+}
 
 /// Counts the frames until the next decision.
 #[derive(Debug, Clone, Default)]
@@ -30,9 +36,8 @@ pub(super) struct DecisionThrottle {
 impl DecisionThrottle {
     /// Whether a frame with this many objects is to be decided on again.
     pub(super) fn is_due(&self, objects: u32) -> bool {
-        let drift = f64::from(objects.abs_diff(self.objects)) / f64::from(objects.min(self.objects).max(1));
         let jumps = objects.abs_diff(self.before) > (self.before / JUMP).max(FEWEST);
-        jumps || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * drift) >= self.rest
+        jumps || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * drift(objects, self.objects)) >= self.rest
     }
 
     /// Counts a frame of so many objects. Returns about how long frames take now, in nanoseconds.
