@@ -367,6 +367,9 @@ impl BroadPhase for Adaptive {
                     if began {
                         self.tell();
                     }
+                    if self.policy.doubts_load() {
+                        self.tracker.doubt(boxes);
+                    }
                     if dear || began {
                         // What began in this frame is looked at once more before it may rest.
                         self.tracker.wake();

@@ -31,6 +31,9 @@ const NOISE_SHARE: f64 = 1.0 / 8.0;
 /// This many surprises in a row that are too large to be believed, all to the same side, are no accident: the machine or the scene has changed.
 const NO_ACCIDENT: u32 = 3;
 
+/// After a look at the load surprises are believed for so many frames.
+const DOUBTS_APART: u64 = 64;
+
 /// What is known about one algorithm's frames beside their cost.
 #[derive(Debug, Clone)]
 struct Frames {
@@ -50,6 +53,10 @@ pub(super) struct Learner {
     /// One for each class and width.
     waits: Vec<Wait>,
     observed: u64,
+    /// How far boxes moved when what is known of keeping was observed.
+    moved: Option<f64>,
+    /// The frame at which the load was in doubt last.
+    doubted: Option<u64>,
 }
 
 /// How long frames of a width wait for other programs.
@@ -81,12 +88,22 @@ impl Learner {
             frames,
             waits: vec![Wait::default(); widths.len()],
             observed: 0,
+            moved: None,
+            doubted: None,
         }
     }
 
     /// Batches that were observed.
     pub(super) fn observed(&self) -> u64 {
         self.observed
+    }
+
+    /// Boxes move so far in a frame now, in edges.
+    pub(super) fn moves(&mut self, moved: f64) {
+        let before = *self.moved.get_or_insert(moved);
+        if self.belief.change_pace(before, moved) {
+            self.moved = Some(moved);
+        }
     }
 
     /// A load as what was learned sees it.
@@ -141,11 +158,12 @@ impl Learner {
         self.belief.variance_of_ratio(view, a, b)
     }
 
-    /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction.
-    pub(super) fn observe(&mut self, batch: &FrameBatch, frame: u64) {
+    /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction. False, and nothing is learned, where
+    /// that surprises so much that rather the load is another one than was estimated: for some frames after that surprises are believed.
+    pub(super) fn observe(&mut self, batch: &FrameBatch, frame: u64) -> bool {
         let (algorithm, ratio) = (batch.candidate, batch.real_ns / batch.predicted_ns);
         if !(ratio.is_finite() && ratio > 0.0) {
-            return;
+            return true;
         }
         self.belief.pass(frame);
         let expected = self.belief.expect(algorithm, &batch.view(), batch.calls());
@@ -158,6 +176,10 @@ impl Learner {
         let variance = expected.shared + expected.own + a.noise / worth;
         let most = MOST_SURPRISE * variance.sqrt();
         let error = surprise.clamp(-most, most);
+        if error != surprise && self.doubted.is_none_or(|last| frame - last > DOUBTS_APART) {
+            self.doubted = Some(frame);
+            return false;
+        }
         let side = if error == surprise { 0 } else { surprise.signum() as i32 };
         a.run = if side == 0 {
             0
@@ -170,13 +192,15 @@ impl Learner {
         a.noise += NOISE_SHARE * (deviation.max(0.0) - a.noise);
         a.noise = a.noise.max(LEAST_NOISE_LN.powi(2));
         if a.run.unsigned_abs() < NO_ACCIDENT {
-            return self.belief.absorb(algorithm, error, variance);
+            self.belief.absorb(algorithm, error, variance);
+            return true;
         }
         // What was observed holds no longer: the next frames count as if they were the first. And what shared parts have not explained until now
         // is more likely the algorithm's own.
         a.run = 0;
         self.belief.doubt_shared();
         self.belief.doubt_own(algorithm, surprise);
+        true
     }
 
     /// The costs as they are expected now, without what passes.

@@ -16,6 +16,12 @@ const COST_RISES: f64 = 2.0;
 /// Samples are at least this many frames apart where nothing drifts: what `moved` tells changes slowly.
 const SAMPLE_EVERY: u32 = 32;
 
+/// The same share for a sample of a load that frames contradict.
+const SHARE_IN_DOUBT: f64 = 0.02;
+
+/// The same for finding out between samples how far boxes move.
+const SHARE_OF_MOTION: f64 = 0.003;
+
 /// Keeps the estimate of the load up to date.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LoadTracker {
@@ -32,6 +38,11 @@ pub(super) struct LoadTracker {
     sampled_ns: f64,
     displacement: Displacement,
     watching: Watching,
+    /// What it takes to find out how far boxes move, and the time of the frames since that was known last.
+    watch_ns: f64,
+    unwatched_ns: f64,
+    /// Frames contradict the load since the last sample.
+    doubted: bool,
     /// How far the boxes moved when that was last found out.
     moved: Option<f64>,
     /// Objects and pairs of the frame before.
@@ -39,13 +50,13 @@ pub(super) struct LoadTracker {
     throttle: DecisionThrottle,
 }
 
-/// How far the boxes move is found out in the frame after each sample.
+/// How far the boxes move is found out in the frame after each sample, and in between as often as its share of the time allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Watching {
     /// It is known.
     #[default]
     Done,
-    /// It was sampled; this frame is to be watched when its pairs are found.
+    /// This frame is to be watched when its pairs are found.
     Due,
     /// The next frame is to be compared with what was watched.
     Begun,
@@ -77,7 +88,11 @@ impl LoadTracker {
         let objects = count(boxes);
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
         if self.watching == Watching::Begun {
+            let started = Instant::now();
             self.moved = Some(self.displacement.moved(boxes).unwrap_or(1.0));
+            // To watch the boxes takes about as long as to compare them.
+            self.watch_ns = 2.0 * started.elapsed().as_nanos() as f64;
+            self.unwatched_ns = 0.0;
             self.watching = Watching::Done;
         }
         let moved = self.moved;
@@ -91,6 +106,7 @@ impl LoadTracker {
             self.sample_ns = if self.sample_ns > 0.0 { took.min(self.sample_ns * COST_RISES) } else { took };
             self.watching = Watching::Due;
             (self.sampled, self.age, self.passed_ns) = (objects, 0, 0.0);
+            self.doubted = false;
         } else {
             self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
             self.load.moved = moved.unwrap_or(self.load.moved);
@@ -107,6 +123,9 @@ impl LoadTracker {
 
     fn is_sample_due(&self, objects: u32) -> bool {
         let drift = drift(objects, self.sampled);
+        if self.doubted && self.passed_ns * SHARE_IN_DOUBT >= self.sample_ns {
+            return true;
+        }
         let rested = self.age >= SAMPLE_EVERY || drift > 1.0 / 16.0;
         self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.sample_ns
     }
@@ -118,6 +137,10 @@ impl LoadTracker {
         self.before = Some((count(boxes), pairs));
         self.age = self.age.saturating_add(1);
         self.passed_ns += ns.unwrap_or(usual_ns);
+        self.unwatched_ns += ns.unwrap_or(usual_ns);
+        if self.watching == Watching::Done && self.watch_ns > 0.0 && self.unwatched_ns * SHARE_OF_MOTION >= self.watch_ns {
+            self.watching = Watching::Due;
+        }
         // Not while looking: a frame may be looked at twice before it runs, and it has not moved in between.
         if self.watching == Watching::Due {
             self.displacement.watch(boxes);
@@ -134,6 +157,16 @@ impl LoadTracker {
     /// The next frame is to be decided on again.
     pub(super) fn wake(&mut self) {
         self.throttle.wake();
+    }
+
+    /// The frame that ran contradicts the load: it is to be looked at again, as soon as that may be paid.
+    pub(super) fn doubt(&mut self, boxes: &[Aabb]) {
+        if self.watching != Watching::Begun {
+            self.displacement.watch(boxes);
+            self.watching = Watching::Begun;
+        }
+        self.doubted = true;
+        self.wake();
     }
 
     /// After a frame that failed nothing is known of the one before, and the next one is decided on again.

@@ -62,6 +62,8 @@ pub(super) struct Policy {
     trials: Trials,
     /// The last frame that was timed was one of a trial.
     tried: bool,
+    /// Frames took so much more or less than expected that their load is in doubt.
+    doubts_load: bool,
 }
 
 impl Policy {
@@ -93,6 +95,7 @@ impl Policy {
             decided: 0,
             trials: Trials::default(),
             tried: false,
+            doubts_load: false,
             tuning,
             usable,
         }
@@ -203,6 +206,9 @@ impl Policy {
         self.worked_out = Some((*load, self.frame, observed));
         let frame = Frame::new(load);
         self.log2_objects = f64::from(load.objects.max(1)).log2();
+        if let Some(learner) = &mut self.learner {
+            learner.moves(load.moved);
+        }
         self.view = self.learner.as_ref().map_or_else(View::default, |l| l.view(&frame));
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
         for (k, cost) in self.tuning.costs.iter().enumerate() {
@@ -328,7 +334,7 @@ impl Policy {
         }
         if !self.batch.takes(candidate, self.log2_objects) {
             if self.batch.frames > 0 {
-                learner.observe(&self.batch, self.frame);
+                self.doubts_load |= !learner.observe(&self.batch, self.frame);
             }
             self.batch = self.batch.next(candidate);
         }
@@ -343,9 +349,16 @@ impl Policy {
             learner.waited(candidate, waited_ns, self.frame);
         }
         if self.batch.is_full() || self.batch.frames > 0 && self.trials.is_over() {
-            learner.observe(&self.batch, self.frame);
-            self.batch = self.batch.next(candidate);
+            let believed = learner.observe(&self.batch, self.frame);
+            self.doubts_load |= !believed;
+            // What is in doubt is looked at again soon.
+            self.batch = if believed { self.batch } else { FrameBatch::default() }.next(candidate);
         }
+    }
+
+    /// Whether the load of the frames since this was asked last is in doubt.
+    pub(super) fn doubts_load(&mut self) -> bool {
+        std::mem::take(&mut self.doubts_load)
     }
 
     /// Whether the next frame has to be decided: this one explored.

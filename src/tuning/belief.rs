@@ -55,6 +55,12 @@ const KEPT_FRAMES: f64 = 400.0;
 const WIDTH_FRAMES: f64 = 800.0;
 const OWN_FRAMES: f64 = 6000.0;
 
+/// Where boxes move e times as far as before, or an e-th of that, an e-th stays of what was observed of keeping. This much of an edge is added to
+/// both: below it the boxes are as good as still. Less than the third is the noise of [`Displacement`](crate::Displacement), which watches few boxes.
+const PACE_LN: f64 = 1.0;
+const STILL: f64 = 0.01;
+const SAME_PACE_LN: f64 = 0.5;
+
 /// No more than this many standard deviations of a surprise are believed at once: frames whose threads waited for a core take fifty times as long.
 pub(crate) const MOST_SURPRISE: f64 = 3.0;
 
@@ -363,12 +369,34 @@ impl Belief {
         if frames == 0.0 {
             return;
         }
+        for (stays, lasts) in self.fading.iter_mut().zip(&self.lasts) {
+            *stays = 1.0 / (1.0 + frames / lasts);
+        }
+        self.fade();
+    }
+
+    /// Boxes moved so far in a frame, in edges, when it was observed how much keeping work spares, and move so far now. What a scene spares at one
+    /// pace tells the less of another the further that is. False where it is about the same pace, and nothing is forgotten.
+    pub(crate) fn change_pace(&mut self, before: f64, now: f64) -> bool {
+        let away = ((before + STILL) / (now + STILL)).ln().abs();
+        if away < SAME_PACE_LN {
+            return false;
+        }
+        self.fading.fill(1.0);
+        for kept in self.algorithms.iter().filter_map(|a| a.kept) {
+            self.fading[kept] = (-away / PACE_LN).exp();
+        }
+        self.fade();
+        true
+    }
+
+    /// Of each part that share in `fading` stays; the rest is as before anything was observed.
+    fn fade(&mut self) {
         let size = self.mean.len();
-        for (i, fading) in self.fading.iter_mut().enumerate() {
-            let stays = 1.0 / (1.0 + frames / self.lasts[i]);
-            self.mean[i] *= stays;
+        for (mean, fading) in self.mean.iter_mut().zip(&mut self.fading) {
+            *mean *= *fading;
             // The root, so that the matrix remains that of a real vector.
-            *fading = stays.sqrt();
+            *fading = fading.sqrt();
         }
         for (i, row) in self.covariance.chunks_exact_mut(size.max(1)).enumerate() {
             let own = self.fading[i];

@@ -1,6 +1,7 @@
 //! Courses on machines that are made up: what the policy learns, when it switches and when it explores. No clock is read.
 
 use super::super::decision::Reason;
+use super::super::learner::Learner;
 use super::super::policy::Policy;
 use super::tuning;
 use crate::{AlgorithmId, FrameKind, FrameWork, Load, Tuning};
@@ -290,4 +291,24 @@ fn a_scene_that_makes_a_method_quadratic_is_left_to_the_tree_at_once() {
     let frames = run(&mut policy, 0..1200, 1000, &truth);
     let dear = frames[200..].iter().filter(|f| f.chosen == 0).count();
     assert!(dear <= 6, "{dear} frames spent on it without learning");
+}
+
+#[test]
+fn a_surprise_puts_the_load_in_doubt_before_it_is_believed() {
+    let tuning = tuning(&[("sap@cpu1", 0.0, 20.0), ("grid-sap@cpu1", 0.0, 30.0)]);
+    let mut policy = policy(tuning);
+    let usual = |k: usize, n: f64, _: usize| n * [20.0, 30.0][k];
+    run(&mut policy, 0..200, 1000, &usual);
+    assert!(!policy.doubts_load());
+    let before = policy.learned().map(Learner::observed);
+    let dear = |k: usize, n: f64, _: usize| 4.0 * n * [20.0, 30.0][k];
+    let mut doubted = Vec::new();
+    for at in 200..300 {
+        run(&mut policy, at..at + 1, 1000, &dear);
+        doubted.extend(policy.doubts_load().then_some(at));
+    }
+    // Once, and then it is learned that everything takes four times as long.
+    assert!(doubted.len() == 1 && policy.learned().map(Learner::observed) > before, "{doubted:?}");
+    let expected_ns = run(&mut policy, 300..301, 1000, &dear)[0].predicted_ns;
+    assert!((0.8..1.2).contains(&(expected_ns / 80_000.0)), "{expected_ns}");
 }

@@ -36,6 +36,10 @@ const FEWEST_PAIRS: f32 = 0.5;
 /// Frames from scratch after keeping did not pay, at first and at most.
 const PAUSE: [u32; 2] = [16, 512];
 
+/// Where boxes moved too far for it, the pause is over as soon as they move by less than this share of that. Every so many frames it is looked.
+const CALMER: f32 = 0.5;
+const LOOK: u32 = 4;
+
 /// Frames over which the shares that decide the margin are averaged, and by how much it changes in a frame. After all boxes got new
 /// grown boxes none leaves for some frames: a margin that followed at once would swing.
 const LEARNING: f32 = 64.0;
@@ -78,6 +82,9 @@ pub(super) struct Motion {
     /// Frames for which nothing is kept, and how many that will be the next time.
     pause: u32,
     next_pause: u32,
+    /// The pause is over as soon as boxes move less, and how far they moved when it began.
+    ends_early: bool,
+    paused_at: Option<f32>,
     /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap yet.
     most_margin: f32,
 }
@@ -149,6 +156,8 @@ impl Default for Motion {
             keeping: None,
             pause: 0,
             next_pause: PAUSE[0],
+            ends_early: false,
+            paused_at: None,
             most_margin: MARGINS[MARGINS.len() - 1],
         }
     }
@@ -171,7 +180,9 @@ impl Motion {
 
     /// Keeping failed, because there were too many pairs to keep or because it did not pay; it will not be tried for some frames.
     pub(super) fn stop(&mut self, too_many: bool) {
-        if let Some(failed) = self.keeping.take().filter(|failed| too_many || failed.tests > 0.5 * failed.cost) {
+        let crowded = self.keeping.take().filter(|failed| too_many || failed.tests > 0.5 * failed.cost);
+        (self.ends_early, self.paused_at) = (crowded.is_none(), None);
+        if let Some(failed) = crowded {
             self.most_margin = (0.5 * failed.margin.share).max(MARGINS[0]);
         }
         self.pause = self.next_pause;
@@ -259,11 +270,24 @@ impl Motion {
         Some((moved as f32, density))
     }
 
+    /// Whether boxes move so much less than when keeping ceased to pay that it may pay again.
+    fn is_calmer(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> bool {
+        if !self.ends_early || !self.pause.is_multiple_of(LOOK) {
+            return false;
+        }
+        let Some(moved) = plan.moved().or_else(|| self.displacement.moved(boxes)) else { return false };
+        let before = *self.paused_at.get_or_insert(moved as f32);
+        (moved as f32) < CALMER * before
+    }
+
     /// Begins to keep pairs if that promises to pay.
     fn begin(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Option<Keeping> {
         if self.pause > 0 {
             self.pause -= 1;
-            return None;
+            if !self.is_calmer(plan, boxes) {
+                return None;
+            }
+            self.pause = 0;
         }
         let (motion, density) = self.known(plan, boxes)?;
         self.density = Some(density);
@@ -360,6 +384,25 @@ mod tests {
         motion.stop(false);
         assert!((0..PAUSE[0]).all(|_| matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Scratch)));
         assert!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)));
+    }
+
+    #[test]
+    fn a_pause_ends_when_boxes_that_moved_too_far_come_to_rest() {
+        let paused = |too_many: bool, moves: [f64; 2]| {
+            let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
+            let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
+            let mut motion = Motion::default();
+            motion.advise(&plan(0.001), &boxes);
+            motion.stop(too_many);
+            let paused = |at: &u32| {
+                let moved = if *at < 8 { moves[0] } else { moves[1] };
+                matches!(motion.advise(&plan(moved), &boxes), Advice::Scratch)
+            };
+            (0..PAUSE[0]).take_while(paused).count() as u32
+        };
+        assert!((8..8 + LOOK).contains(&paused(false, [0.2, 0.01])));
+        // Crowds stay crowds, and a little less is no rest.
+        assert_eq!([paused(true, [0.2, 0.01]), paused(false, [0.2, 0.15])], [PAUSE[0]; 2]);
     }
 
     #[test]

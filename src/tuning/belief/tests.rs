@@ -118,3 +118,24 @@ fn what_was_observed_of_a_machine_that_may_have_changed_is_forgotten_in_time() {
     assert!(known < 0.2 * before && later > 0.9 * before && later <= before * 1.001, "{before} {known} {later}");
     assert!((ln - 1.4_f64.ln()).abs() < 0.02 && ln_later.abs() < ln, "{ln} {ln_later}");
 }
+
+#[test]
+fn what_keeping_spares_at_one_pace_is_forgotten_at_another() {
+    let list = vec![cost("pair-cache@cpu1", 10.0), cost("sap@cpu1", 20.0)];
+    let mut belief = Belief::new(&list, &[Some(0), None], Deviations::UNLIKE);
+    let view = belief.view(&Frame::new(&load(1000)));
+    for frame in 0..50 {
+        belief.pass(frame);
+        assert!(belief.observe(0, &view, 3.0, 0.0, 0.05) && belief.observe(1, &view, 1.0, 0.0, 0.05));
+    }
+    let believed = |belief: &Belief| [0, 1].map(|k| belief.deviation_ln(k, &view, 0.0));
+    let before = believed(&belief);
+    assert!((before[0] - 3.0_f64.ln()).abs() < 0.05, "{before:?}");
+    // As little as the noise of what tells it, and as good as still either way.
+    assert!(!belief.change_pace(0.1, 0.13) && !belief.change_pace(0.0, 0.002) && believed(&belief) == before);
+    let doubt = belief.variance_of_ratio(&view, (0, 0.0), (1, 0.0));
+    assert!(belief.change_pace(0.2, 0.0));
+    let after = believed(&belief);
+    assert!(after[0] < 0.6 * before[0] && after[1] == before[1], "{before:?} {after:?}");
+    assert!(belief.variance_of_ratio(&view, (0, 0.0), (1, 0.0)) > 4.0 * doubt);
+}
