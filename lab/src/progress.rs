@@ -2,7 +2,7 @@
 
 /// The user asked to stop before the end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("interrupted before the end; nothing was written")]
+#[error("interrupted before the end; there is no result")]
 pub struct Interrupted;
 
 /// Where long work tells how far it has come. A program draws a bar of it; [`Silent`] draws nothing.

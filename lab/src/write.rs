@@ -1,10 +1,12 @@
 //! Output files that are whole or absent.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
-
 use anyhow::{Context, Result, anyhow, bail};
+use std::ffi::OsStr;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tempfile::TempDir;
 
 /// Writes what `write` produces to `path`, so that a reader never sees half of it.
 ///
@@ -31,6 +33,73 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
     write_atomically(path, |out| Ok(out.write_all(text.as_bytes())?))
 }
 
+/// What the names of files and folders begin and end with that are there until they are moved to their place.
+const TEMPORARY: [&str; 2] = [".sapwise-", ".tmp"];
+
+/// A younger one may belong to a program that has not locked it yet.
+const ABANDONED_AFTER: Duration = Duration::from_secs(60);
+
+/// Whether a file or folder is called as those are that [`write_atomically`] and [`TemporaryFolder`] make.
+#[must_use]
+pub fn is_temporary(name: &OsStr) -> bool {
+    name.to_str().is_some_and(|name| name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1]))
+}
+
+/// A folder within another, for files that are moved from there to their places. It is removed with the value.
+#[derive(Debug)]
+pub struct TemporaryFolder {
+    folder: TempDir,
+    _lock: Option<File>,
+}
+
+impl TemporaryFolder {
+    /// One within `folder`. What a program that was killed has left there is removed.
+    ///
+    /// # Errors
+    /// Names `folder`.
+    pub fn within(folder: &Path) -> Result<Self> {
+        remove_abandoned(folder);
+        let made = temporary().tempdir_in(folder).map_err(|e| refused(folder, &e))?;
+        let lock = locked(made.path());
+        Ok(Self { folder: made, _lock: lock })
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+}
+
+/// A lock that lasts until the file is closed, as the system does for a program that is killed. Where the system can't lock a folder, or
+/// another program has, there is none: it can't be told for abandoned either.
+fn locked(path: &Path) -> Option<File> {
+    File::open(path).ok().filter(|file| file.try_lock().is_ok())
+}
+
+/// Removes what programs that were killed have left in a folder. What can't be removed stays: it is in nobody's way.
+fn remove_abandoned(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten().filter(|entry| is_temporary(&entry.file_name())) {
+        let path = entry.path();
+        let old = entry.metadata().and_then(|found| found.modified());
+        let old = old.is_ok_and(|at| at.elapsed().is_ok_and(|age| age >= ABANDONED_AFTER));
+        if old && locked(&path).is_some() {
+            let _ = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+        }
+    }
+}
+
+fn temporary() -> tempfile::Builder<'static, 'static> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY[0]).suffix(TEMPORARY[1]);
+    builder
+}
+
+/// Of the error its kind alone: its text names the temporary file, of which the user knows nothing.
+fn refused(folder: &Path, error: &io::Error) -> anyhow::Error {
+    anyhow!("no file can be made in {}: {}", folder.display(), io::Error::from(error.kind()))
+}
+
 fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
     let folder = match path.parent() {
         Some(folder) if folder.as_os_str().is_empty() => PathBuf::from("."),
@@ -40,15 +109,14 @@ fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()>) -> Res
     if !folder.is_dir() {
         bail!("there is no folder {}; make it or name another", folder.display());
     }
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".sapwise-").suffix(".tmp");
+    remove_abandoned(&folder);
+    let mut builder = temporary();
     // Private otherwise, where every other program's files follow the umask.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    // Of the error its kind alone: its text names the temporary file, of which the user knows nothing.
-    let mut temporary = builder
-        .tempfile_in(&folder)
-        .map_err(|e| anyhow!("no file can be made in {}: {}", folder.display(), std::io::Error::from(e.kind())))?;
+    let mut temporary = builder.tempfile_in(&folder).map_err(|e| refused(&folder, &e))?;
+    // Where it can't be locked no other program can tell it for abandoned.
+    let _ = temporary.as_file().try_lock();
     buffered(temporary.as_file_mut(), write)?;
     // Without this a crash of the machine may leave the name with an empty file.
     temporary.as_file().sync_all()?;
@@ -92,6 +160,40 @@ mod tests {
         write_atomically(&path, hello).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"hello");
         assert_eq!(names(folder.path()), ["out"]);
+    }
+
+    #[test]
+    fn what_a_killed_program_has_left_is_removed_and_what_a_running_one_writes_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let aged = |name: &str| {
+            let file = File::create(path(name)).unwrap();
+            file.set_modified(std::time::SystemTime::now() - 2 * ABANDONED_AFTER).unwrap();
+            file
+        };
+        drop(aged(".sapwise-killed.tmp"));
+        drop(aged("mine.tmp"));
+        let written = aged(".sapwise-written.tmp");
+        written.lock().unwrap();
+        File::create(path(".sapwise-young.tmp")).unwrap();
+        let beside = TemporaryFolder::within(folder.path()).unwrap();
+        File::create(beside.path().join("half")).unwrap();
+        write_atomically(&path("out"), hello).unwrap();
+        let beside_name = beside.path().file_name().unwrap().to_str().unwrap().to_owned();
+        let mut left = vec![".sapwise-written.tmp", ".sapwise-young.tmp", &beside_name, "mine.tmp", "out"];
+        left.sort_unstable();
+        assert_eq!(names(folder.path()), left);
+        // A folder is no older than what was put into it last.
+        #[cfg(unix)]
+        {
+            let killed = path(".sapwise-folder.tmp");
+            fs::create_dir(&killed).unwrap();
+            File::create(killed.join("half")).unwrap();
+            File::open(&killed).unwrap().set_modified(std::time::SystemTime::now() - 2 * ABANDONED_AFTER).unwrap();
+            File::open(beside.path()).unwrap().set_modified(std::time::SystemTime::now() - 2 * ABANDONED_AFTER).unwrap();
+            write_atomically(&path("out"), hello).unwrap();
+            assert_eq!(names(folder.path()), left);
+        }
     }
 
     #[test]

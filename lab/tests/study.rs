@@ -17,7 +17,7 @@ fn the_stored_reports_make_a_study_whose_files_are_all_there() {
     prepare(&out).unwrap();
     let sources = Sources::new(&reports, None, &[]).unwrap();
     let study = Study::of(&sources, Evidence::Real, "sapwise study".to_owned(), &Silent).unwrap();
-    let summary = study.write(&out).unwrap();
+    let summary = study.write(&out, &Silent).unwrap();
     assert!(study.unreadable().is_empty() && summary.files.iter().any(|f| f.path == PAGE));
     assert!(summary.files.iter().all(|f| out.join(&f.path).is_file() && !f.holds.is_empty()), "{:?}", summary.files);
     // The cause of what can't be said comes before the claims.

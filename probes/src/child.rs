@@ -19,7 +19,7 @@ const SAVING: Duration = Duration::from_secs(20);
 pub(crate) enum Ended {
     /// With exit status 0.
     Well,
-    /// By Ctrl-C or SIGTERM.
+    /// By Ctrl-C, SIGTERM or SIGHUP.
     Interrupted,
     /// In any other way: "was ended by signal 11".
     Badly(String),
@@ -54,8 +54,10 @@ pub(crate) fn run_verb(
     run(&mut command, limit, SAVING, &mut |_| Ok(()), on_wait)
 }
 
+/// This program again. Where the system does not tell where it is, as Linux without `/proc`, it is called as it was called itself.
 fn own_program() -> anyhow::Result<Command> {
-    Ok(Command::new(std::env::current_exe().context("the program can't find itself")?))
+    let path = std::env::current_exe().or_else(|error| std::env::args_os().next().map(Into::into).ok_or(error));
+    Ok(Command::new(path.context("the program can't find itself")?))
 }
 
 fn run(
@@ -232,7 +234,7 @@ fn judge(status: ExitStatus, complaint: &str) -> Ended {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
         // The terminal sends these to the part as well, and it may be the first to go.
-        return if matches!(signal, 2 | 15) {
+        return if matches!(signal, 1 | 2 | 15) {
             Ended::Interrupted
         } else {
             Ended::Badly(format!("was ended by signal {signal}"))

@@ -2,7 +2,8 @@
 
 use crate::algorithms::Algorithms;
 use crate::args::Arguments;
-use crate::{exit, verbs};
+use crate::exit::{self, Outcome};
+use crate::{output, verbs};
 use clap::Parser;
 use std::process::ExitCode;
 
@@ -37,13 +38,18 @@ impl Command {
     }
 
     /// Reads the arguments of this process, does what they ask, and returns the exit status for `main` to return: 0 done, 1 failed,
-    /// 2 wrong usage. Ends the process itself where the arguments can't be read or ask for help.
+    /// 2 wrong usage, 128 and its number where a signal asked to stop. Ends the process itself where the arguments can't be read.
     #[must_use]
     pub fn run(self) -> ExitCode {
         // Before the arguments are looked at: whoever wrote the program should see it, whatever they ask for.
         if let Some(why) = self.refused {
             return exit::report(Err(anyhow::anyhow!("{why}")));
         }
-        exit::report(verbs::run(Arguments::parse().verb, &self.algorithms))
+        match Arguments::try_parse() {
+            Ok(arguments) => exit::report(verbs::run(arguments.verb, &self.algorithms)),
+            // Help and the version were asked for, and are lost where standard output takes nothing.
+            Err(help) if !help.use_stderr() => exit::report(help.print().map_err(output::refused).map(|()| Outcome::Done)),
+            Err(wrong_usage) => wrong_usage.exit(),
+        }
     }
 }

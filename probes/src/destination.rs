@@ -1,7 +1,8 @@
 //! Where a report goes, checked before the minutes of measuring, with a way out when it fails after them.
 
 use crate::output;
-use anyhow::{Context, bail};
+use crate::outputs::check_writable;
+use anyhow::Context;
 use sapwise_lab::report::Report;
 use std::path::{Path, PathBuf};
 
@@ -18,16 +19,7 @@ impl Destination {
     /// When the folder takes none, or the path is a folder itself.
     pub(crate) fn new(path: Option<&Path>) -> anyhow::Result<Self> {
         let path = path.unwrap_or(Path::new(DEFAULT)).to_path_buf();
-        if path.is_dir() {
-            bail!("{} is a folder; name a file with --out", path.display());
-        }
-        // A device or a pipe is written as it is, whatever its folder takes.
-        if path.exists() && !path.is_file() {
-            return Ok(Self(path));
-        }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        tempfile::tempfile_in(folder)
-            .with_context(|| format!("no file can be written in {}; name another with --out", folder.display()))?;
+        check_writable(&path).context("name another file with --out")?;
         Ok(Self(path))
     }
 

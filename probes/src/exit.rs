@@ -1,4 +1,4 @@
-//! Exit statuses: 0 done, 1 failed, 2 wrong usage.
+//! Exit statuses: 0 done, 1 failed, 2 wrong usage, 128 and the number of a signal where that asked the program to stop.
 
 use std::fmt;
 use std::process::ExitCode;
@@ -8,7 +8,7 @@ use std::process::ExitCode;
 pub(crate) enum Outcome {
     /// Exit status 0.
     Done,
-    /// Exit status 1. What failed stands in the output already.
+    /// Exit status 1, or that of a signal. What failed stands in the output already.
     Failed,
 }
 
@@ -28,12 +28,16 @@ impl std::error::Error for WrongUsage {}
 pub(crate) fn report(result: anyhow::Result<Outcome>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::Failed) => ExitCode::from(1),
+        Ok(Outcome::Failed) => failed(),
         Err(error) if crate::output::is_closed(&error) => ExitCode::SUCCESS,
         Err(error) => {
             let wrong_usage = error.downcast_ref::<WrongUsage>().is_some();
             crate::output::complain(&format!("error: {error:#}"));
-            ExitCode::from(if wrong_usage { 2 } else { 1 })
+            if wrong_usage { ExitCode::from(2) } else { failed() }
         }
     }
+}
+
+fn failed() -> ExitCode {
+    ExitCode::from(crate::interrupt::exit_status().unwrap_or(1))
 }

@@ -1,24 +1,29 @@
-//! Ctrl-C and SIGTERM: the first asks the verb to stop and keep what it has, the second ends the program at once.
+//! Ctrl-C, SIGTERM and SIGHUP: the first asks the verb to stop and keep what it has, the second ends the program at once.
 
 use anyhow::Context;
 use sapwise_lab::progress::Interrupted;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::io;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering::SeqCst};
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 
-/// Exit status after a second Ctrl-C, as shells report it: 128 + SIGINT.
-const ENDED_BY_SIGINT: i32 = 130;
+/// The number of the signal that asked; 0 where it was none.
+static SIGNAL: AtomicU8 = AtomicU8::new(0);
 
 /// From now on signals set a flag instead of ending the program. For verbs that poll [`requested`].
+///
+/// A signal that the program was started to ignore is ignored: `nohup` does so with SIGHUP, shells with the SIGINT of what runs in the
+/// background.
 ///
 /// # Errors
 /// When the system refuses the handler.
 pub(crate) fn listen() -> anyhow::Result<()> {
-    ctrlc::set_handler(|| {
-        if REQUESTED.swap(true, Ordering::SeqCst) {
+    on_signal(|signal| {
+        if REQUESTED.swap(true, SeqCst) {
             // Child processes notice the closed pipe and end too.
-            std::process::exit(ENDED_BY_SIGINT);
+            end_by(signal);
         }
+        SIGNAL.store(signal, SeqCst);
         crate::output::complain("interrupted: about to stop; press Ctrl-C again to end at once");
     })
     .context("Ctrl-C can't be caught")
@@ -26,12 +31,18 @@ pub(crate) fn listen() -> anyhow::Result<()> {
 
 /// Does what a first Ctrl-C does, however often.
 pub(crate) fn request() {
-    REQUESTED.store(true, Ordering::SeqCst);
+    REQUESTED.store(true, SeqCst);
 }
 
 /// Whether the user asked to stop.
 pub(crate) fn requested() -> bool {
-    REQUESTED.load(Ordering::SeqCst)
+    REQUESTED.load(SeqCst)
+}
+
+/// The exit status of a program that has stopped because a signal asked it to, as shells report one that was ended by it.
+pub(crate) fn exit_status() -> Option<u8> {
+    let signal = SIGNAL.load(SeqCst);
+    (signal > 0).then_some(128 + signal)
 }
 
 /// An error when the user asked to stop, for verbs that have nothing to keep.
@@ -40,4 +51,46 @@ pub(crate) fn requested() -> bool {
 /// When a signal has come since [`listen`].
 pub(crate) fn check() -> anyhow::Result<()> {
     if requested() { Err(Interrupted.into()) } else { Ok(()) }
+}
+
+/// Calls `caught` on a thread of its own with the number of each signal that comes.
+#[cfg(unix)]
+fn on_signal(mut caught: impl FnMut(u8) + Send + 'static) -> io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let heard = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|&signal| !is_ignored(signal));
+    let mut signals = signal_hook::iterator::Signals::new(heard)?;
+    let forward = move || signals.forever().for_each(|signal| caught(signal as u8));
+    std::thread::Builder::new().name("signals".to_owned()).spawn(forward)?;
+    Ok(())
+}
+
+/// Whether whoever started the program wanted a signal to be ignored.
+#[cfg(unix)]
+fn is_ignored(signal: libc::c_int) -> bool {
+    let mut found = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
+    // SAFETY: without a new action this only fills in the present one, for which there is room.
+    let asked = unsafe { libc::sigaction(signal, std::ptr::null(), found.as_mut_ptr()) };
+    // SAFETY: all zero bits are a valid value, whether it was filled in or not.
+    let action = unsafe { found.assume_init() };
+    asked == 0 && action.sa_sigaction == libc::SIG_IGN
+}
+
+/// Ends the program as if it had never caught the signal, so that whoever waits for it sees which one it was.
+#[cfg(unix)]
+fn end_by(signal: u8) {
+    let _ = signal_hook::low_level::emulate_default_handler(signal.into());
+}
+
+#[cfg(windows)]
+fn on_signal(mut caught: impl FnMut(u8) + Send + 'static) -> io::Result<()> {
+    ctrlc::set_handler(move || caught(SIGINT)).map_err(io::Error::other)
+}
+
+/// What shells call Ctrl-C, where the system has no number for it.
+#[cfg(windows)]
+const SIGINT: u8 = 2;
+
+#[cfg(windows)]
+fn end_by(signal: u8) {
+    std::process::exit(128 + i32::from(signal));
 }

@@ -1,6 +1,5 @@
 //! Standard output and standard error, without the panics of `println!`.
 
-use anyhow::Context;
 use std::fmt;
 use std::io::{ErrorKind, Write};
 
@@ -23,10 +22,15 @@ impl std::error::Error for Closed {}
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     let written = out.write_all(text.trim_end_matches('\n').as_bytes()).and_then(|()| out.write_all(b"\n"));
-    match written.and_then(|()| out.flush()) {
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Err(Closed.into()),
-        written => written.context("standard output can't be written"),
+    written.and_then(|()| out.flush()).map_err(refused)
+}
+
+/// Why standard output was not written, for [`is_closed`].
+pub(crate) fn refused(error: std::io::Error) -> anyhow::Error {
+    if error.kind() == ErrorKind::BrokenPipe {
+        return Closed.into();
     }
+    anyhow::Error::from(error).context("standard output can't be written")
 }
 
 /// Writes a value as one line of JSON to standard output.

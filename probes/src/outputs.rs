@@ -1,8 +1,18 @@
 //! Checks of output files before the work is done.
 
 use crate::exit::WrongUsage;
+use anyhow::{Context, bail};
 use sapwise_lab::figures::Picture;
 use std::path::{Path, PathBuf};
+
+/// What is to be known of the files that a verb writes before it works for minutes: none is read, none is named twice, and each can be written.
+///
+/// # Errors
+/// As [`refuse_overwriting`] and [`check_writable`].
+pub(crate) fn check(inputs: &[PathBuf], outputs: &[&PathBuf]) -> anyhow::Result<()> {
+    refuse_overwriting(inputs, outputs)?;
+    outputs.iter().try_for_each(|path| check_writable(path))
+}
 
 /// Refuses to write over a file that is read, or twice into one file.
 ///
@@ -20,6 +30,27 @@ pub(crate) fn refuse_overwriting(inputs: &[PathBuf], outputs: &[&PathBuf]) -> Re
             return Err(WrongUsage(format!("{} is named for two outputs", path.display())));
         }
     }
+    Ok(())
+}
+
+/// Tries whether a file can be written: whether its folder takes one. What isn't a regular file, such as a device or a pipe, is written as
+/// it is, whatever its folder takes.
+///
+/// # Errors
+/// Names the path and what to do.
+pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
+    if path.is_dir() {
+        bail!("{} is a folder; name a file", path.display());
+    }
+    if path.exists() && !path.is_file() {
+        return Ok(());
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        bail!("can't write {}: there is no such folder; make it or name another", path.display());
+    }
+    let tried = tempfile::tempfile_in(folder);
+    tried.with_context(|| format!("can't write {}: its folder takes no file; name another", path.display()))?;
     Ok(())
 }
 

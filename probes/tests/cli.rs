@@ -190,3 +190,33 @@ fn schema_writes_a_file_for_every_kind() {
         assert!(schema["properties"]["schema"].is_object() || schema["$defs"].is_object(), "{text}");
     }
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn help_that_nobody_gets_is_a_failure() {
+    for words in [&["--help"][..], &["probe", "--help"], &["--version"]] {
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+        let ended = command.args(words).stdout(full).output().unwrap();
+        let complaint = String::from_utf8(ended.stderr).unwrap();
+        assert_eq!(ended.status.code(), Some(1), "{words:?}: {complaint}");
+        assert!(complaint.contains("standard output can't be written"), "{complaint}");
+        assert!(success(sapwise().args(words)).contains("sapwise"));
+    }
+}
+
+/// Before minutes of work, not behind them.
+#[test]
+fn a_file_that_cannot_be_written_is_told_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("missing").join("out.json");
+    let report = concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/earlier/amd-epyc-2c-full--2026-11-21.json");
+    let commands: [&[&str]; 3] =
+        [&["train", report, "--out"], &["predict", "--report", report, "--out"], &["run", "uniform", "--record"]];
+    for words in commands {
+        let complaint = failure(sapwise().args(words).arg(&missing), 1);
+        assert!(complaint.contains("out.json") && complaint.contains("no such folder"), "{words:?}: {complaint}");
+        let complaint = failure(sapwise().args(words).arg(folder.path()), 1);
+        assert!(complaint.contains("is a folder"), "{words:?}: {complaint}");
+    }
+}

@@ -2,6 +2,8 @@
 
 mod common;
 
+#[cfg(unix)]
+use common::{TERMINATED, send};
 use common::{failure, remarks_but_of_moves, sapwise, success};
 use sapwise::ParameterId;
 use sapwise_lab::report::{Label, Report};
@@ -82,31 +84,69 @@ fn a_full_disk_keeps_the_report_in_the_folder_for_temporary_files() {
     assert!(read(&kept[0]).points.len() >= 2);
 }
 
+/// A probe of all scenarios that has written its report for the first time, and goes on.
 #[cfg(unix)]
-#[test]
-fn ctrl_c_keeps_what_was_measured() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("report.json");
+fn under_way(out: &Path) -> std::process::Child {
     let mut probe = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
-    probe.env_remove("SAPWISE_SIMD").args(["probe", "--max-objects", "30"]).arg("--out").arg(&out);
+    probe.env_remove("SAPWISE_SIMD").args(["probe", "--max-objects", "30"]).arg("--out").arg(out);
     for scenario in sapwise_scenes::Scenario::ALL {
         probe.args(["--scenario", scenario.name()]);
     }
     let mut probe = probe.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
-    // Written first when the first of all scenarios is done.
     while !out.exists() {
         assert_eq!(probe.try_wait().unwrap(), None, "the probe ended before its first scenario did");
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
-    let sent = std::process::Command::new("kill").args(["-INT", &probe.id().to_string()]).status().unwrap();
-    assert!(sent.success());
+    probe
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_what_was_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report.json");
+    let probe = under_way(&out);
+    send("-TERM", &probe);
     let ended = probe.wait_with_output().unwrap();
     let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(1), "{complaint}");
+    assert_eq!(ended.status.code(), Some(TERMINATED), "{complaint}");
     assert!(complaint.contains("error: interrupted"), "{complaint}");
     let report = read(&out);
     assert!(!report.points.is_empty());
     assert!(report.remarks.iter().any(|r| r.starts_with("interrupted after ")), "{:?}", report.remarks);
     assert!(!report.remarks.iter().any(|r| r.starts_with("unfinished")), "{:?}", report.remarks);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "a temporary file is left");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_second_signal_ends_it_as_if_it_were_not_caught() {
+    use std::os::unix::process::ExitStatusExt;
+    let folder = tempfile::tempdir().unwrap();
+    let probe = under_way(&folder.path().join("report.json"));
+    // Both come at once, before it can end of itself.
+    for signal in ["-STOP", "-TERM", "-HUP", "-CONT"] {
+        send(signal, &probe);
+    }
+    let ended = probe.wait_with_output().unwrap();
+    assert!(matches!(ended.status.signal(), Some(1 | 15)), "{ended:?}");
+}
+
+/// As `nohup` starts it.
+#[cfg(unix)]
+#[test]
+fn a_signal_that_it_was_started_to_ignore_is_ignored() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report.json");
+    let mut probe = std::process::Command::new("sh");
+    probe.args(["-c", "trap '' HUP; exec \"$@\"", "sh"]).arg(assert_cmd::cargo::cargo_bin!("sapwise"));
+    let mut probe = probe.args(TINY).arg("--out").arg(&out).stdout(std::process::Stdio::null()).spawn().unwrap();
+    // Until it has written its report it measures for seconds, and catches signals all the time.
+    while !out.exists() {
+        send("-HUP", &probe);
+        assert!(probe.try_wait().unwrap().is_none_or(|ended| ended.success()), "it was ended");
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    assert!(probe.wait().unwrap().success());
+    assert!(read(&out).points.len() >= 2);
 }

@@ -2,6 +2,8 @@
 
 mod common;
 
+#[cfg(unix)]
+use common::{TERMINATED, send};
 use common::{failure, sapwise, success};
 use sapwise_lab::Report;
 use sapwise_lab::report::Restricted;
@@ -111,7 +113,7 @@ fn a_restriction_is_proven_against_the_report_without_it_and_one_that_does_not_s
 
 #[cfg(unix)]
 #[test]
-fn after_ctrl_c_the_same_command_goes_on() {
+fn after_an_interrupt_the_same_command_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("reports");
     let until = |profile: &str| {
@@ -122,11 +124,10 @@ fn after_ctrl_c_the_same_command_goes_on() {
             assert_eq!(family.try_wait().unwrap(), None, "it ended before {profile} was there");
             std::thread::sleep(std::time::Duration::from_millis(20));
         }
-        let sent = std::process::Command::new("kill").args(["-INT", &family.id().to_string()]).status().unwrap();
-        assert!(sent.success());
+        send("-TERM", &family);
         let ended = family.wait_with_output().unwrap();
         let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
-        assert_eq!(ended.status.code(), Some(1), "{complaint}");
+        assert_eq!(ended.status.code(), Some(TERMINATED), "{complaint}");
         assert!(complaint.contains("the same command resumes there"), "{complaint}");
         String::from_utf8_lossy(&ended.stdout).into_owned()
     };

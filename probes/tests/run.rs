@@ -2,6 +2,8 @@
 
 mod common;
 
+#[cfg(unix)]
+use common::{TERMINATED, send};
 use common::{failure, npy, sapwise, success};
 use serde_json::{Value, json};
 use std::fs;
@@ -214,14 +216,13 @@ fn an_interrupt_ends_the_co_runner_and_keeps_the_repeats_that_are_complete() {
     loop {
         std::thread::sleep(wait);
         assert!(child.try_wait().unwrap().is_none(), "a thousand repeats were over before it could be interrupted");
-        let sent = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
+        send("-TERM", &child);
         let mut text = String::new();
         child.stdout.take().unwrap().read_to_string(&mut text).unwrap();
         let status = child.wait().unwrap();
         if !text.is_empty() {
             let told: Value = serde_json::from_str(&text).unwrap();
-            assert_eq!((status.code(), &told["interrupted"]), (Some(1), &true.into()));
+            assert_eq!((status.code(), &told["interrupted"]), (Some(TERMINATED), &true.into()));
             let repeats = told["repeats"].as_u64().unwrap();
             assert!((1..1000).contains(&repeats), "{told}");
             assert_eq!(told["regret_of_repeats"].as_array().unwrap().len() as u64, repeats);
@@ -232,4 +233,26 @@ fn an_interrupt_ends_the_co_runner_and_keeps_the_repeats_that_are_complete() {
         wait *= 2;
         child = command.spawn().unwrap();
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_recording_that_was_made_before_the_interrupt_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
+    let recording = folder.path().join("r.npy");
+    // The first repeat takes longer than it lives for.
+    let words = ["--objects", "3000", "--frames", "20000"];
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+    command.args(["run", "uniform", "--tuning"]).arg(&tuning).args(words).arg("--record").arg(&recording);
+    let mut child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
+    while !recording.exists() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it had recorded");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    send("-TERM", &child);
+    let ended = child.wait_with_output().unwrap();
+    let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(TERMINATED), "{complaint}");
+    assert!(complaint.contains("r.npy holds the whole recording: interrupted"), "{complaint}");
 }

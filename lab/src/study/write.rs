@@ -9,6 +9,7 @@ use super::sections;
 use super::summary::{StudiedReport, StudyClaim, Summary};
 use super::timings;
 use crate::page::{self, Page, Section, Source};
+use crate::progress::Progress;
 use anyhow::Result;
 use std::path::Path;
 
@@ -16,10 +17,10 @@ impl Study {
     /// Writes the page and everything beside it into a folder that [`prepare`](super::prepare) has seen, and returns what `study.json` says.
     ///
     /// # Errors
-    /// When a figure can't be drawn or a file not be written.
-    pub fn write(&self, to: &Path) -> Result<Summary> {
+    /// When a figure can't be drawn or a file not be written, and when the user asked to stop. An earlier study is as it was then.
+    pub fn write(&self, to: &Path, progress: &dyn Progress) -> Result<Summary> {
         let labels: Vec<String> = (1..=self.entries.len()).map(|k| format!("R{k}")).collect();
-        let mut folder = Folder::new(labels.clone(), self.command.clone());
+        let mut folder = Folder::new(labels.clone(), self.command.clone(), progress);
         let influence = Influence::new(&self.entries, self.importance.as_ref().ok());
         let claims = claims::claims(&self.entries, &influence);
         let mut missing = Vec::new();

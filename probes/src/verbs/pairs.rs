@@ -3,9 +3,8 @@
 use crate::algorithms::Algorithms;
 use crate::args::Pairs as Arguments;
 use crate::exit::{Outcome, WrongUsage};
-use crate::outputs::refuse_overwriting;
 use crate::progress::Progress;
-use crate::{gpus, interrupt, output, shell};
+use crate::{gpus, interrupt, output, outputs, shell};
 use anyhow::Context;
 use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry, usable_cores};
 use sapwise_lab::sweep::median;
@@ -37,7 +36,7 @@ struct Answer {
 }
 
 pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
-    refuse_overwriting(std::slice::from_ref(&arguments.boxes), &arguments.out.iter().collect::<Vec<_>>())?;
+    outputs::check(std::slice::from_ref(&arguments.boxes), &arguments.out.iter().collect::<Vec<_>>())?;
     let mut registry = algorithms.registry(usable_cores());
     registry.pin_threads();
     let id = algorithm(arguments, &registry)?;

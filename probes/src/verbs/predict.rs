@@ -5,10 +5,9 @@ use crate::args::Predict;
 use crate::check::{doubts, hardware_disturbed, hardware_doubts};
 use crate::exit::Outcome;
 use crate::hardware::{self, measure_hardware};
-use crate::outputs::refuse_overwriting;
 use crate::prediction::{self, Slice};
 use crate::terminal::Terminal;
-use crate::{interrupt, output, revisions, shell, summary};
+use crate::{interrupt, output, outputs, revisions, shell, summary};
 use anyhow::{Context, bail};
 use sapwise::{json, usable_cores};
 use sapwise_lab::data::usual_scenario;
@@ -23,7 +22,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     hardware::check_threads(arguments.threads)?;
     let report = arguments.report.as_deref().map(read_report).transpose()?;
     let inputs: Vec<PathBuf> = arguments.report.iter().chain(&arguments.model).cloned().collect();
-    refuse_overwriting(&inputs, &arguments.out.iter().collect::<Vec<_>>())?;
+    outputs::check(&inputs, &arguments.out.iter().collect::<Vec<_>>())?;
     let model = prediction::model(arguments.model.as_deref())?.model;
     // Until here Ctrl-C ends the program, even when it waits for a pipe.
     interrupt::listen()?;

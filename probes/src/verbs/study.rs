@@ -17,14 +17,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Ok(why) => WrongUsage(why.to_string()).into(),
         Err(why) => why,
     })?;
-    prepare(&arguments.out)?;
     interrupt::listen()?;
-    let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
-    let progress = Progress::new(0);
-    let study = Study::of(&sources, evidence, command(arguments), &progress)?;
-    progress.message("drawing");
-    let summary = study.write(&arguments.out)?;
-    drop(progress);
+    let made = prepare(&arguments.out)?;
+    let written = write(arguments, &sources);
+    if written.is_err() && made {
+        // Where something is in it by now it stays.
+        let _ = std::fs::remove_dir(&arguments.out);
+    }
+    let (study, summary) = written?;
     for (name, why) in study.unreadable() {
         output::warn(&format!("{name} is left out: {why}"));
     }
@@ -34,6 +34,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         output::print(&text(&summary, &arguments.out, arguments.simulated))?;
     }
     Ok(Outcome::Done)
+}
+
+fn write(arguments: &Arguments, sources: &Sources) -> anyhow::Result<(Study, Summary)> {
+    let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
+    let progress = Progress::new(0);
+    let study = Study::of(sources, evidence, command(arguments), &progress)?;
+    progress.message("drawing");
+    let summary = study.write(&arguments.out, &progress)?;
+    Ok((study, summary))
 }
 
 /// Paths in the command at most; more tell nobody anything.

@@ -3,10 +3,10 @@
 use crate::args::Train;
 use crate::check::doubts;
 use crate::exit::{Outcome, WrongUsage};
-use crate::outputs::{picture_format, refuse_overwriting};
+use crate::outputs::picture_format;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
-use crate::{interrupt, output, shell};
+use crate::{interrupt, output, outputs, shell};
 use rayon::prelude::*;
 use sapwise::Model;
 use sapwise_lab::data::{Evidence, Selection, read_report, report_files};
@@ -35,7 +35,8 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let reports = report_files(&arguments.reports)?;
     let outputs = [Some(&arguments.out), arguments.card.as_ref(), arguments.plot.as_ref(), arguments.importance.as_ref()];
-    refuse_overwriting(&reports, &outputs.into_iter().flatten().collect::<Vec<_>>())?;
+    let outputs: Vec<_> = outputs.into_iter().flatten().collect();
+    outputs::check(&reports, &outputs)?;
     interrupt::listen()?;
     let progress = Progress::new(reports.len() as u64);
     let (selection, doubtful) = select(&reports, evidence, &progress)?;

@@ -35,6 +35,16 @@ pub(crate) fn remarks_but_of_moves(report: &sapwise_lab::report::Report) -> Vec<
     report.remarks.iter().filter(|r| !r.starts_with("the machine changed:")).cloned().collect()
 }
 
+/// Sends a signal to a running command. Not SIGINT, which shells let what runs in the background ignore, these tests among it.
+#[cfg(unix)]
+pub(crate) fn send(signal: &str, to: &std::process::Child) {
+    let sent = std::process::Command::new("kill").args([signal, &to.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+}
+
+/// Exit status of a command that SIGTERM asked to stop.
+pub(crate) const TERMINATED: i32 = 128 + 15;
+
 /// Runs to exit status 0 and returns standard output.
 pub(crate) fn success(command: &mut Command) -> String {
     let ended = command.output().unwrap();

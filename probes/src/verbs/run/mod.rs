@@ -7,10 +7,10 @@ mod tuning;
 use crate::algorithms::Algorithms;
 use crate::args::{Run, Scene};
 use crate::exit::{Outcome, WrongUsage};
-use crate::outputs::{picture_format, refuse_overwriting};
+use crate::outputs::picture_format;
 use crate::replay::{FrameSource, ReplaySettings, Swing, check_trace, picture, replay, too_wide, write_trace};
 use crate::terminal::Terminal;
-use crate::{interrupt, output};
+use crate::{interrupt, output, outputs};
 use anyhow::{Context, bail};
 use sapwise::usable_cores;
 use sapwise_lab::figures::Figure;
@@ -40,9 +40,13 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     if let Some(path) = &arguments.record {
         settings.source.record(path, settings.frames)?;
     }
+    let recorded = |error: anyhow::Error| match &arguments.record {
+        Some(path) => error.context(format!("{} holds the whole recording", path.display())),
+        None => error,
+    };
     let origin = read.map_or_else(|| tuning::predicted(arguments, algorithms), Ok);
     // First: a prediction that was interrupted may complain of what was not measured.
-    interrupt::check()?;
+    interrupt::check().map_err(recorded)?;
     let mut origin = origin?;
     let gpu_warnings = tuning::add_gpus(&mut registry, &origin.tuning, &arguments.gpus)?;
     origin.tuning.warnings.extend(gpu_warnings);
@@ -52,7 +56,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     let hint = "none of the algorithms of the tuning runs here; leave out --tuning to predict for this machine";
     let mut outcome = replay(&settings, &origin.tuning, &registry).map_err(|error| match error.downcast_ref() {
         Some(sapwise::Error::Unavailable { .. } | sapwise::Error::UnknownAlgorithm { .. }) => error.context(hint),
-        _ => error,
+        _ => recorded(error),
     })?;
     origin.tuning.warnings.append(&mut outcome.notes);
     let segments: Vec<_> = segments(&cuts, settings.frames).into_iter().map(|range| outcome.part(range)).collect();
@@ -72,8 +76,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     Ok(if outcome.interrupted || origin.wrong { Outcome::Failed } else { Outcome::Done })
 }
 
-/// Refuses to write over what is read, to write two things to one file, and into a folder that isn't there: after the run its figures
-/// would be lost with the file.
+/// Refuses what can't be written: after the run its figures would be lost with the file.
 ///
 /// # Errors
 /// Names the file.
@@ -84,13 +87,7 @@ fn check_outputs(arguments: &Run) -> anyhow::Result<()> {
     }
     let outputs = [&arguments.record, &arguments.trace, &arguments.plot];
     let outputs: Vec<&PathBuf> = outputs.into_iter().flatten().collect();
-    for path in &outputs {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        if folder.is_some_and(|folder| !folder.is_dir()) {
-            bail!("can't write {}: there is no such folder; make it or name another", path.display());
-        }
-    }
-    Ok(refuse_overwriting(&read, &outputs)?)
+    outputs::check(&read, &outputs)
 }
 
 /// What to replay.
