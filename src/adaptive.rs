@@ -258,6 +258,9 @@ impl Adaptive {
 
     fn choose(&mut self, boxes: &[Aabb]) {
         self.tracker.decide(boxes);
+        if let Some(moved) = self.tracker.moved() {
+            self.policy.moves(moved);
+        }
         self.choice = self.choose_among();
         self.measured_ns = None;
     }

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Kills every verb that writes files, N times each at random moments (125 by default: 500 in all), and looks whether a file was lost or is
+# Kills `study`, `predict`, `run` and `train`, N times each at random moments (125 by default: 500 in all), and looks whether a file was lost or is
 # half-written: tests/kills.rs. Takes about three seconds a kill.
 #
 #   tools/kills.sh [N]

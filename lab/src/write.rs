@@ -81,8 +81,9 @@ fn locked(path: &Path) -> Option<File> {
 fn remove_abandoned(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten().filter(|entry| is_temporary(&entry.file_name())) {
         let path = entry.path();
-        let old = entry.metadata().and_then(|found| found.modified());
-        let old = old.is_ok_and(|at| at.elapsed().is_ok_and(|age| age >= ABANDONED_AFTER));
+        // Neither a link nor a pipe, which would be waited for, is one of ours.
+        let Some(found) = entry.metadata().ok().filter(|found| found.is_file() || found.is_dir()) else { continue };
+        let old = found.modified().is_ok_and(|at| at.elapsed().is_ok_and(|age| age >= ABANDONED_AFTER));
         if old && locked(&path).is_some() {
             let _ = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
         }

@@ -38,7 +38,7 @@ impl Command {
     }
 
     /// Reads the arguments of this process, does what they ask, and returns the exit status for `main` to return: 0 done, 1 failed,
-    /// 2 wrong usage, 128 and its number where a signal asked to stop. Ends the process itself where the arguments can't be read.
+    /// 2 wrong usage, 128 plus its number where a signal asked to stop. Ends the process itself where the arguments can't be read.
     #[must_use]
     pub fn run(self) -> ExitCode {
         // Before the arguments are looked at: whoever wrote the program should see it, whatever they ask for.

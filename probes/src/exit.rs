@@ -1,4 +1,4 @@
-//! Exit statuses: 0 done, 1 failed, 2 wrong usage, 128 and the number of a signal where that asked the program to stop.
+//! Exit statuses: 0 done, 1 failed, 2 wrong usage, 128 plus the number of a signal where that asked the program to stop.
 
 use std::fmt;
 use std::process::ExitCode;

@@ -19,11 +19,12 @@ static SIGNAL: AtomicU8 = AtomicU8::new(0);
 /// When the system refuses the handler.
 pub(crate) fn listen() -> anyhow::Result<()> {
     on_signal(|signal| {
-        if REQUESTED.swap(true, SeqCst) {
+        // The number first: whoever sees the request may end at once.
+        let first = SIGNAL.compare_exchange(0, signal, SeqCst, SeqCst).is_ok();
+        if REQUESTED.swap(true, SeqCst) && !first {
             // Child processes notice the closed pipe and end too.
             end_by(signal);
         }
-        SIGNAL.store(signal, SeqCst);
         crate::output::complain("interrupted: about to stop; press Ctrl-C again to end at once");
     })
     .context("Ctrl-C can't be caught")

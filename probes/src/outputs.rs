@@ -45,7 +45,9 @@ pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
     if path.exists() && !path.is_file() {
         return Ok(());
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // A link is followed, as it is when the file is written.
+    let place = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let folder = place.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         bail!("can't write {}: there is no such folder; make it or name another", path.display());
     }

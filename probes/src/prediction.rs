@@ -38,22 +38,39 @@ pub(crate) struct Slice {
     scenario: Scenario,
     /// Ascending.
     pub(crate) loads: Vec<Load>,
+    /// Why there are no more of them.
+    cut: Option<String>,
 }
 
 impl Slice {
-    /// The loads of a scenario, with the pairs that it really has.
+    /// The loads of a scenario, with the pairs that it really has, of as many objects as there is memory for.
     ///
     /// # Errors
-    /// When the pairs can't be found for want of memory, and on Ctrl-C.
+    /// On Ctrl-C, and where there is no memory for any.
     pub(crate) fn of(scenario: Scenario) -> anyhow::Result<Self> {
         let sizes: Vec<u32> = SLICE.map(size).collect();
         let progress = Progress::new(sizes.iter().map(|&n| u64::from(n)).sum());
         progress.message(format!("pairs of the scenario {scenario}"));
-        let done = |objects: u32| {
-            progress.advance(u64::from(objects));
+        let mut known = Vec::new();
+        let done = |load: &Load| {
+            known.push(*load);
+            progress.advance(u64::from(load.objects));
             interrupt::check()
         };
-        Ok(Self { scenario, loads: loads(scenario, &sizes, SEED, done)? })
+        let found = loads(scenario, &sizes, SEED, done).map(|_| ());
+        Self::as_far_as_known(scenario, known, found)
+    }
+
+    /// Those that are known, where only memory for more was wanting.
+    fn as_far_as_known(scenario: Scenario, loads: Vec<Load>, found: anyhow::Result<()>) -> anyhow::Result<Self> {
+        let cut = match (found, loads.last()) {
+            (Ok(()), _) => None,
+            (Err(error), Some(last)) if matches!(error.downcast_ref(), Some(sapwise::Error::OutOfMemory { .. })) => {
+                Some(format!("the tuning shows no more than {} objects, since memory was short: {error}", last.objects))
+            }
+            (Err(error), _) => return Err(error),
+        };
+        Ok(Self { scenario, loads, cut })
     }
 }
 
@@ -83,6 +100,7 @@ pub(crate) fn predict(
     let registry = algorithms.registry(cores(hardware));
     let mut tuning = prediction(model, hardware, gpus, &registry)?.tuning(&slice.scenario.to_string(), &slice.loads);
     tuning.warnings.extend(unknown(algorithms, &registry, model));
+    tuning.warnings.extend(slice.cut.clone());
     Ok(tuning)
 }
 
@@ -102,7 +120,7 @@ pub(crate) fn predict_and_sample(
 ) -> anyhow::Result<(Tuning, bool)> {
     let registry = algorithms.registry(cores(hardware));
     let mut prediction = prediction(model, hardware, gpus, &registry)?;
-    let Slice { scenario, loads } = slice;
+    let Slice { scenario, loads, cut } = slice;
     let session = Session {
         scenario: scenario.to_string(),
         seed: SEED,
@@ -122,6 +140,7 @@ pub(crate) fn predict_and_sample(
     prediction.costs = learned.costs();
     let mut tuning = prediction.tuning(&scenario.to_string(), loads);
     tuning.warnings.extend(unknown(algorithms, &registry, model));
+    tuning.warnings.extend(cut.clone());
     if !learned.taken.is_empty() {
         tuning.source = Source::Learned;
         tuning.samples = learned.taken.iter().map(Taken::observation).collect();
@@ -175,5 +194,17 @@ mod tests {
         assert!(uniform.is_sorted_by(|a, b| a.objects < b.objects && a.axis_candidates <= b.axis_candidates));
         assert!(clustered[20].pairs > 3.0 * uniform[20].pairs);
         assert!(uniform.iter().all(|l| (0.02..=0.05).contains(&l.moved)), "{uniform:?}");
+    }
+
+    #[test]
+    fn a_slice_ends_where_memory_does_and_no_other_error_is_passed_over() {
+        let short = || Err(anyhow::Error::from(sapwise::Error::OutOfMemory { what: "boxes", elements: 9 }).context("at 90"));
+        let known = vec![Load::of_objects(10), Load::of_objects(50)];
+        let slice = Slice::as_far_as_known(Scenario::Uniform, known.clone(), short()).unwrap();
+        let told = slice.cut.unwrap();
+        assert!(slice.loads.len() == 2 && told.contains("50 objects") && told.contains("at 90"), "{told}");
+        assert!(Slice::as_far_as_known(Scenario::Uniform, known.clone(), Ok(())).unwrap().cut.is_none());
+        assert!(Slice::as_far_as_known(Scenario::Uniform, Vec::new(), short()).is_err());
+        assert!(Slice::as_far_as_known(Scenario::Uniform, known, Err(anyhow::anyhow!("interrupted"))).is_err());
     }
 }

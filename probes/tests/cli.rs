@@ -2,6 +2,8 @@
 
 mod common;
 
+#[cfg(unix)]
+use common::send;
 use common::{failure, npy, sapwise, success, without_adapters};
 use std::fs;
 
@@ -218,5 +220,35 @@ fn a_file_that_cannot_be_written_is_told_first() {
         assert!(complaint.contains("out.json") && complaint.contains("no such folder"), "{words:?}: {complaint}");
         let complaint = failure(sapwise().args(words).arg(folder.path()), 1);
         assert!(complaint.contains("is a folder"), "{words:?}: {complaint}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_second_signal_ends_it_as_if_it_were_not_caught() {
+    use std::io::{BufRead, BufReader};
+    use std::os::unix::process::ExitStatusExt;
+    let folder = tempfile::tempdir().unwrap();
+    // A frame of them takes seconds, and within it no verb looks whether it is to stop.
+    let apart: Vec<f32> = (0..300_000).flat_map(|k| [k as f32 * 2.0, 0.0, 0.0, k as f32 * 2.0 + 1.0, 1.0, 1.0]).collect();
+    let boxes = npy(folder.path(), "apart.npy", "<f4", "300000, 6", &apart);
+    let mut wait = std::time::Duration::from_millis(300);
+    loop {
+        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
+        let command = command.arg("pairs").arg(&boxes).args(["--algorithm", "brute@cpu1"]);
+        let mut pairs = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(wait);
+        send("-TERM", &pairs);
+        let mut told = String::new();
+        BufReader::new(pairs.stderr.take().unwrap()).read_line(&mut told).unwrap();
+        if told.starts_with("interrupted: about to stop") {
+            send("-HUP", &pairs);
+            assert_eq!(pairs.wait().unwrap().signal(), Some(1));
+            return;
+        }
+        // It did not listen yet, and ended at once: it is tried again, later.
+        pairs.wait().unwrap();
+        assert!(wait.as_secs() < 60, "it never listens: {told}");
+        wait *= 2;
     }
 }

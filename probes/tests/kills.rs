@@ -68,7 +68,7 @@ fn kill_and_look(words: &[&str], out: &Path, seed: u64) {
     let whole = began.elapsed();
     let before = files(out);
     assert!(!before.is_empty());
-    let kills = std::env::var("SAPWISE_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(KILLS);
+    let kills = std::env::var("SAPWISE_KILLS").map_or(KILLS, |n| n.parse().expect("SAPWISE_KILLS is a number"));
     let mut random = Random(seed);
     random.next();
     for k in 0..kills {

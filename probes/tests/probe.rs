@@ -118,29 +118,20 @@ fn an_interrupt_keeps_what_was_measured() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "a temporary file is left");
 }
 
-#[cfg(unix)]
-#[test]
-fn a_second_signal_ends_it_as_if_it_were_not_caught() {
-    use std::os::unix::process::ExitStatusExt;
-    let folder = tempfile::tempdir().unwrap();
-    let probe = under_way(&folder.path().join("report.json"));
-    // Both come at once, before it can end of itself.
-    for signal in ["-STOP", "-TERM", "-HUP", "-CONT"] {
-        send(signal, &probe);
-    }
-    let ended = probe.wait_with_output().unwrap();
-    assert!(matches!(ended.status.signal(), Some(1 | 15)), "{ended:?}");
-}
-
 /// As `nohup` starts it.
 #[cfg(unix)]
 #[test]
 fn a_signal_that_it_was_started_to_ignore_is_ignored() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("report.json");
+    let ready = folder.path().join("ready");
     let mut probe = std::process::Command::new("sh");
-    probe.args(["-c", "trap '' HUP; exec \"$@\"", "sh"]).arg(assert_cmd::cargo::cargo_bin!("sapwise"));
+    probe.args(["-c", "trap '' HUP; : > \"$READY\"; exec \"$@\"", "sh"]).env("READY", &ready);
+    probe.arg(assert_cmd::cargo::cargo_bin!("sapwise"));
     let mut probe = probe.args(TINY).arg("--out").arg(&out).stdout(std::process::Stdio::null()).spawn().unwrap();
+    while !ready.exists() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
     // Until it has written its report it measures for seconds, and catches signals all the time.
     while !out.exists() {
         send("-HUP", &probe);

@@ -242,7 +242,7 @@ fn a_recording_that_was_made_before_the_interrupt_is_told() {
     let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
     let recording = folder.path().join("r.npy");
     // The first repeat takes longer than it lives for.
-    let words = ["--objects", "3000", "--frames", "20000"];
+    let words = ["--objects", "8000", "--frames", "300"];
     let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
     command.args(["run", "uniform", "--tuning"]).arg(&tuning).args(words).arg("--record").arg(&recording);
     let mut child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();

@@ -31,8 +31,8 @@ const NOISE_SHARE: f64 = 1.0 / 8.0;
 /// This many surprises in a row that are too large to be believed, all to the same side, are no accident: the machine or the scene has changed.
 const NO_ACCIDENT: u32 = 3;
 
-/// After a look at the load surprises are believed for so many frames.
-const DOUBTS_APART: u64 = 64;
+/// After the load was in doubt so many observations of the algorithm are believed, whatever they are.
+const BELIEVED: u32 = 16;
 
 /// What is known about one algorithm's frames beside their cost.
 #[derive(Debug, Clone)]
@@ -43,6 +43,8 @@ struct Frames {
     batches: u32,
     /// Surprises in a row, counted with their sign.
     run: i32,
+    /// Observations that are to be believed before the load can be in doubt again.
+    believed: u32,
 }
 
 /// Follows the costs of all algorithms. Allocates when it is made.
@@ -55,8 +57,6 @@ pub(super) struct Learner {
     observed: u64,
     /// How far boxes moved when what is known of keeping was observed.
     moved: Option<f64>,
-    /// The frame at which the load was in doubt last.
-    doubted: Option<u64>,
 }
 
 /// How long frames of a width wait for other programs.
@@ -80,7 +80,7 @@ impl Learner {
                 widths.push(width);
                 widths.len() - 1
             });
-            Frames { noise: NOISE_LN.powi(2), wait, batches: 0, run: 0 }
+            Frames { noise: NOISE_LN.powi(2), wait, batches: 0, run: 0, believed: 0 }
         });
         let frames = frames.collect();
         Self {
@@ -89,7 +89,6 @@ impl Learner {
             waits: vec![Wait::default(); widths.len()],
             observed: 0,
             moved: None,
-            doubted: None,
         }
     }
 
@@ -159,8 +158,8 @@ impl Learner {
     }
 
     /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction. False, and nothing is learned, where
-    /// that surprises so much that rather the load is another one than was estimated: for some frames after that surprises are believed.
-    pub(super) fn observe(&mut self, batch: &FrameBatch, frame: u64) -> bool {
+    /// that surprises so much of an algorithm that `runs_on` that rather the load is another one than was estimated: then it is believed for a while.
+    pub(super) fn observe(&mut self, batch: &FrameBatch, frame: u64, runs_on: bool) -> bool {
         let (algorithm, ratio) = (batch.candidate, batch.real_ns / batch.predicted_ns);
         if !(ratio.is_finite() && ratio > 0.0) {
             return true;
@@ -176,10 +175,11 @@ impl Learner {
         let variance = expected.shared + expected.own + a.noise / worth;
         let most = MOST_SURPRISE * variance.sqrt();
         let error = surprise.clamp(-most, most);
-        if error != surprise && self.doubted.is_none_or(|last| frame - last > DOUBTS_APART) {
-            self.doubted = Some(frame);
+        if error != surprise && runs_on && a.believed == 0 {
+            a.believed = BELIEVED;
             return false;
         }
+        a.believed = a.believed.saturating_sub(1);
         let side = if error == surprise { 0 } else { surprise.signum() as i32 };
         a.run = if side == 0 {
             0

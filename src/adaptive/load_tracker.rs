@@ -63,6 +63,16 @@ enum Watching {
 }
 
 impl LoadTracker {
+    /// How far the boxes move in a frame, in edges, where that was found out.
+    pub(super) fn moved(&self) -> Option<f64> {
+        self.moved
+    }
+
+    /// Whether a load that is in doubt may be paid a sample.
+    fn is_doubt_due(&self) -> bool {
+        self.doubted && self.passed_ns * SHARE_IN_DOUBT >= self.sample_ns
+    }
+
     /// The load that was estimated last.
     pub(super) fn load(&self) -> Load {
         self.load
@@ -80,7 +90,7 @@ impl LoadTracker {
 
     /// Whether the next frame is to be decided on again: how far boxes moved shows in no other than the one after a sample.
     pub(super) fn is_due(&self, boxes: &[Aabb]) -> bool {
-        self.throttle.is_due(count(boxes)) || self.watching == Watching::Begun
+        self.throttle.is_due(count(boxes)) || self.watching == Watching::Begun || self.is_doubt_due()
     }
 
     /// Brings the load up to date: sampled where that pays, else scaled from the last sample.
@@ -89,9 +99,10 @@ impl LoadTracker {
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
         if self.watching == Watching::Begun {
             let started = Instant::now();
-            self.moved = Some(self.displacement.moved(boxes).unwrap_or(1.0));
-            // To watch the boxes takes about as long as to compare them.
-            self.watch_ns = 2.0 * started.elapsed().as_nanos() as f64;
+            self.moved = self.displacement.moved(boxes);
+            // To watch the boxes takes about as long as to compare them, and this decision is made for it.
+            let took = 2.0 * started.elapsed().as_nanos() as f64 + self.throttle.decision_ns();
+            self.watch_ns = if self.watch_ns > 0.0 { took.min(self.watch_ns * COST_RISES) } else { took };
             self.unwatched_ns = 0.0;
             self.watching = Watching::Done;
         }
@@ -123,7 +134,7 @@ impl LoadTracker {
 
     fn is_sample_due(&self, objects: u32) -> bool {
         let drift = drift(objects, self.sampled);
-        if self.doubted && self.passed_ns * SHARE_IN_DOUBT >= self.sample_ns {
+        if self.is_doubt_due() {
             return true;
         }
         let rested = self.age >= SAMPLE_EVERY || drift > 1.0 / 16.0;

@@ -153,6 +153,13 @@ impl Policy {
         }
     }
 
+    /// Boxes were found to move so far in a frame, in edges.
+    pub(super) fn moves(&mut self, moved: f64) {
+        if let Some(learner) = self.learner.as_mut().filter(|_| self.learns) {
+            learner.moves(moved);
+        }
+    }
+
     /// The candidate that is to run the next frame. `None` when none can run.
     pub(super) fn choose(&mut self, load: &Load) -> Option<Choice> {
         let frames = (self.frame - std::mem::replace(&mut self.decided, self.frame)) as f64;
@@ -206,9 +213,6 @@ impl Policy {
         self.worked_out = Some((*load, self.frame, observed));
         let frame = Frame::new(load);
         self.log2_objects = f64::from(load.objects.max(1)).log2();
-        if let Some(learner) = &mut self.learner {
-            learner.moves(load.moved);
-        }
         self.view = self.learner.as_ref().map_or_else(View::default, |l| l.view(&frame));
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
         for (k, cost) in self.tuning.costs.iter().enumerate() {
@@ -334,7 +338,8 @@ impl Policy {
         }
         if !self.batch.takes(candidate, self.log2_objects) {
             if self.batch.frames > 0 {
-                self.doubts_load |= !learner.observe(&self.batch, self.frame);
+                let runs_on = self.settled == Some(self.batch.candidate);
+                self.doubts_load |= !learner.observe(&self.batch, self.frame, runs_on);
             }
             self.batch = self.batch.next(candidate);
         }
@@ -349,7 +354,7 @@ impl Policy {
             learner.waited(candidate, waited_ns, self.frame);
         }
         if self.batch.is_full() || self.batch.frames > 0 && self.trials.is_over() {
-            let believed = learner.observe(&self.batch, self.frame);
+            let believed = learner.observe(&self.batch, self.frame, self.settled == Some(candidate));
             self.doubts_load |= !believed;
             // What is in doubt is looked at again soon.
             self.batch = if believed { self.batch } else { FrameBatch::default() }.next(candidate);

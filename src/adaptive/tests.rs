@@ -181,6 +181,41 @@ fn a_change_of_how_far_boxes_move_is_seen_within_two_samples() {
     assert!(adaptive.last_decision().unwrap().load.moved <= 0.01);
 }
 
+/// Frames of a second each, which pay for any look at the load.
+fn looked(tracker: &mut LoadTracker, frames: usize, shift: f32) {
+    for _ in 0..frames {
+        let boxes: Vec<Aabb> =
+            row(500).iter().map(|b| Aabb::new(b.min.map(|x| x + shift), b.max.map(|x| x + shift))).collect();
+        tracker.decide(&boxes);
+        tracker.ran(&boxes, 100, Some(1e9));
+    }
+}
+
+#[test]
+fn a_load_in_doubt_is_sampled_before_its_time() {
+    let mut tracker = LoadTracker::default();
+    looked(&mut tracker, 5, 0.0);
+    assert_eq!(tracker.age(), 5);
+    tracker.doubt(&row(500));
+    assert!(tracker.is_due(&row(500)));
+    looked(&mut tracker, 1, 0.0);
+    assert_eq!(tracker.age(), 1);
+    looked(&mut tracker, 5, 0.0);
+    assert_eq!(tracker.age(), 6);
+}
+
+#[test]
+fn how_far_boxes_move_is_found_out_between_samples() {
+    let mut tracker = LoadTracker::default();
+    looked(&mut tracker, 5, 0.0);
+    assert_eq!(tracker.moved(), Some(0.0));
+    let seen = (1..=4).filter(|&k| {
+        looked(&mut tracker, 1, 0.25 * k as f32);
+        tracker.moved() > Some(0.1)
+    });
+    assert!(seen.count() > 0 && tracker.age() == 9, "{:?}", tracker.moved());
+}
+
 #[test]
 fn deciding_before_a_frame_does_not_make_it_look_at_rest() {
     let mut adaptive = grid_sap_or_pair_cache();

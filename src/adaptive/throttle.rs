@@ -40,6 +40,11 @@ impl DecisionThrottle {
         jumps || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * drift(objects, self.objects)) >= self.rest
     }
 
+    /// What a decision takes, without a sample, in nanoseconds.
+    pub(super) fn decision_ns(&self) -> f64 {
+        self.decision_ns
+    }
+
     /// Counts a frame of so many objects. Returns about how long frames take now, in nanoseconds.
     pub(super) fn ran(&mut self, objects: u32) -> f64 {
         self.before = objects;

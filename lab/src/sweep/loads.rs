@@ -16,8 +16,8 @@ pub fn next_frame(scene: &mut Scene) {
     }
 }
 
-/// The load of a scenario's second frame at each of `sizes`, in numbers of objects. `done` is called with each size after it, and ends the
-/// work by an error.
+/// The load of a scenario's second frame at each of `sizes`, in numbers of objects. `done` is called with each load as it is known, and ends
+/// the work by an error.
 ///
 /// # Errors
 /// When the pairs can't be found for want of memory, and those of `done`.
@@ -25,7 +25,7 @@ pub fn loads(
     scenario: Scenario,
     sizes: &[u32],
     seed: u64,
-    mut done: impl FnMut(u32) -> anyhow::Result<()>,
+    mut done: impl FnMut(&Load) -> anyhow::Result<()>,
 ) -> anyhow::Result<Vec<Load>> {
     let registry = Registry::with_cores(1);
     let mut counter = registry.create(&"grid-sap@cpu1".parse()?)?;
@@ -40,8 +40,9 @@ pub fn loads(
             .find_pairs(scene.boxes(), &mut pairs)
             .with_context(|| format!("the pairs of {scenario} at {objects} objects"))?;
         let moved = displacement.moved(scene.boxes());
-        loads.push(Load::estimate(scene.boxes(), Some(pairs.len() as f64), moved));
-        done(objects)?;
+        let load = Load::estimate(scene.boxes(), Some(pairs.len() as f64), moved);
+        done(&load)?;
+        loads.push(load);
     }
     Ok(loads)
 }

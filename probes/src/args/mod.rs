@@ -23,7 +23,7 @@ pub(crate) use study::Study;
 #[derive(Debug, Parser)]
 #[command(name = "sapwise", version, max_term_width = 100, propagate_version = true)]
 #[command(after_help = "\
-Exit status: 0 done, 1 failed, 2 wrong usage, 128 and its number after a signal.
+Exit status: 0 done, 1 failed, 2 wrong usage, 128 plus its number after a signal.
 SAPWISE_SIMD=portable|avx2|avx512 makes every algorithm use a lower level of vector instructions than the CPU has.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]

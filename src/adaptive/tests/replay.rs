@@ -58,6 +58,7 @@ fn run(machine: &Recorded, tuning: Tuning, course: &[Stretch<'_>], seed: u64, di
         let turn = (chance.next() * 1e6) as usize;
         let kinds: Vec<Kinds> = spot.ns.iter().map(|ns| Kinds::of(ns)).collect();
         for at in 0..*frames {
+            policy.moves(spot.load.moved);
             let chosen = policy.choose(&spot.load).unwrap().chosen;
             let samples = &spot.ns[chosen];
             let incremental = kept[chosen].is_some();

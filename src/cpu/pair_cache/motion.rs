@@ -37,8 +37,12 @@ const FEWEST_PAIRS: f32 = 0.5;
 const PAUSE: [u32; 2] = [16, 512];
 
 /// Where boxes moved too far for it, the pause is over as soon as they move by less than this share of that. Every so many frames it is looked.
+/// Boxes that move by less than the second are as good as still. Only where keeping went on for so many frames before: else what was looked
+/// at by chance would begin again and again what does not pay.
 const CALMER: f32 = 0.5;
+const STILL: f32 = 0.005;
 const LOOK: u32 = 4;
+const KEPT_WELL: u32 = 32;
 
 /// Frames over which the shares that decide the margin are averaged, and by how much it changes in a frame. After all boxes got new
 /// grown boxes none leaves for some frames: a margin that followed at once would swing.
@@ -82,7 +86,7 @@ pub(super) struct Motion {
     /// Frames for which nothing is kept, and how many that will be the next time.
     pause: u32,
     next_pause: u32,
-    /// The pause is over as soon as boxes move less, and how far they moved when it began.
+    /// The pause is over as soon as boxes move less, and how far they moved at its first look.
     ends_early: bool,
     paused_at: Option<f32>,
     /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap yet.
@@ -180,8 +184,10 @@ impl Motion {
 
     /// Keeping failed, because there were too many pairs to keep or because it did not pay; it will not be tried for some frames.
     pub(super) fn stop(&mut self, too_many: bool) {
-        let crowded = self.keeping.take().filter(|failed| too_many || failed.tests > 0.5 * failed.cost);
-        (self.ends_early, self.paused_at) = (crowded.is_none(), None);
+        let kept = self.keeping.take();
+        let crowded = kept.filter(|failed| too_many || failed.tests > 0.5 * failed.cost);
+        let well = kept.is_some_and(|kept| kept.frames >= KEPT_WELL);
+        (self.ends_early, self.paused_at) = (well && crowded.is_none(), None);
         if let Some(failed) = crowded {
             self.most_margin = (0.5 * failed.margin.share).max(MARGINS[0]);
         }
@@ -277,7 +283,7 @@ impl Motion {
         }
         let Some(moved) = plan.moved().or_else(|| self.displacement.moved(boxes)) else { return false };
         let before = *self.paused_at.get_or_insert(moved as f32);
-        (moved as f32) < CALMER * before
+        (moved as f32) < (CALMER * before).max(STILL)
     }
 
     /// Begins to keep pairs if that promises to pay.
@@ -388,11 +394,15 @@ mod tests {
 
     #[test]
     fn a_pause_ends_when_boxes_that_moved_too_far_come_to_rest() {
-        let paused = |too_many: bool, moves: [f64; 2]| {
+        let paused = |kept: u32, too_many: bool, moves: [f64; 2]| {
             let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
             let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
             let mut motion = Motion::default();
             motion.advise(&plan(0.001), &boxes);
+            let changes = Changes { left: 0, far_away: 0, new: 0..0, gone: 0..0 };
+            let did = Work { kept_pairs: 500, nodes: 0, rebuilt: false };
+            assert!((0..kept).all(|_| motion.learn(1000, &changes, &did)));
+            motion.keeping.as_mut().unwrap().tests = 0.0;
             motion.stop(too_many);
             let paused = |at: &u32| {
                 let moved = if *at < 8 { moves[0] } else { moves[1] };
@@ -400,9 +410,11 @@ mod tests {
             };
             (0..PAUSE[0]).take_while(paused).count() as u32
         };
-        assert!((8..8 + LOOK).contains(&paused(false, [0.2, 0.01])));
-        // Crowds stay crowds, and a little less is no rest.
-        assert_eq!([paused(true, [0.2, 0.01]), paused(false, [0.2, 0.15])], [PAUSE[0]; 2]);
+        assert!((8..8 + LOOK).contains(&paused(KEPT_WELL, false, [0.2, 0.01])));
+        assert!(paused(KEPT_WELL, false, [0.0, 0.0]) <= LOOK);
+        // Crowds stay crowds, a little less is no rest, and what never paid is left alone.
+        let waited = [(KEPT_WELL, true, 0.01), (KEPT_WELL, false, 0.15), (1, false, 0.01)];
+        assert_eq!(waited.map(|(kept, too_many, moved)| paused(kept, too_many, [0.2, moved])), [PAUSE[0]; 3]);
     }
 
     #[test]
