@@ -7,4 +7,6 @@ mod slice;
 
 #[cfg(feature = "schema")]
 pub use cache::cache_schema;
+#[cfg(fuzzing)]
+pub use cache::is_readable_cache;
 pub use options::{Cache, StartOptions};

@@ -103,6 +103,9 @@ pub use model::Model;
 pub use named::UnknownName;
 pub use pair::Pair;
 pub use pairs::{PairOrder, Pairs};
+#[cfg(all(fuzzing, feature = "this-machine"))]
+#[doc(hidden)]
+pub use calibrate::is_readable_cache;
 /// The version of rayon whose pools this library takes: [`Registry::use_pool`]. Its number is part of the name, because another one
 /// would be other types: a release of this library that takes a newer rayon exports it under a new name, and is a breaking one.
 #[cfg(feature = "parallel")]

@@ -67,6 +67,12 @@ impl Load {
         Self { moved, ..self }
     }
 
+    /// Whether every figure is finite and none negative.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        [self.axis_candidates, self.strip_candidates, self.pairs, self.moved].iter().all(|v| v.is_finite() && *v >= 0.0)
+    }
+
     /// Estimates the load of a frame from up to 256 of its boxes, in a time that does not grow beyond 16 000 objects.
     ///
     /// `pairs` is the number of pairs of the frame before and `moved` how far the boxes have moved since, if there was one.

@@ -209,6 +209,9 @@ impl Model {
         if self.ratios_90_ln.is_some_and(|ln| !(0.0..=50.0).contains(&ln)) {
             return Some(ModelError::Intervals);
         }
+        if let Some(position) = self.places.loads().iter().position(|load| !load.is_sound()) {
+            return Some(ModelError::Place { position });
+        }
         self.methods.iter().find_map(|m| {
             let method = format!("{} on the {}", m.method, m.backend);
             let found =

@@ -40,7 +40,8 @@ pub struct Tuning {
     pub warnings: Vec<String>,
     /// Scenario of the slice that `steps` and `crossovers` show.
     pub scenario: String,
-    /// The cheapest algorithm over the number of objects in that scenario, ascending: each holds until the next begins.
+    /// The cheapest algorithm over the number of objects in that scenario, ascending: each holds until the next begins. Empty only where there are
+    /// costs and no slice was asked for.
     pub steps: Vec<Step>,
     /// Where one step gives way to the next, in the order of `steps`.
     pub crossovers: Vec<Crossover>,
@@ -262,7 +263,9 @@ impl Tuning {
     /// What makes this tuning unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<TuningError> {
-        if self.steps.first().is_none_or(|s| s.from_objects != 0) {
+        // A slice through no load has no steps, and then the costs decide as ever.
+        let starts = self.steps.first().map_or(!self.costs.is_empty(), |s| s.from_objects == 0);
+        if !starts {
             return Some(TuningError::NoFirstStep);
         }
         if !self.steps.is_sorted_by(|a, b| a.from_objects < b.from_objects) {

@@ -41,6 +41,8 @@ fn damaged_files_are_refused_with_the_place() {
     assert!(refused(&whole.replace("model/3", "model/9")).contains("model/9"));
     assert!(refused(&whole.replacen("\"method\"", "\"methode\"", 1)).contains("methods[0]"));
     assert!(refused(&whole.replacen("\"unit\": ", "\"unit\": -", 1)).contains("unit"));
+    // Found by the fuzz target `files`: its costs were no numbers.
+    assert!(refused(&whole.replacen("\"axis_candidates\": ", "\"axis_candidates\": -", 1)).contains("places[0]"));
     let nested = format!("{{\"schema\": \"model/3\", \"name\": {}{}}}", "[".repeat(10_000), "]".repeat(10_000));
     assert!(!refused(&nested).is_empty());
 }

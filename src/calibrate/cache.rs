@@ -286,6 +286,16 @@ pub fn cache_schema() -> Result<(String, String), json::Error> {
     FORMAT.json_schema::<Cached>()
 }
 
+/// Whether a text could be a file of the cache or of an unfinished measurement. For fuzzing: files are read only where their key is this machine's.
+#[cfg(fuzzing)]
+pub fn is_readable_cache(text: &str) -> bool {
+    let reads_back = |cached: Cached| {
+        let again: Cached = FORMAT.read(&FORMAT.write(&cached).unwrap()).unwrap().value;
+        assert_eq!(again, cached);
+    };
+    FORMAT.read(text).map(|read| reads_back(read.value)).is_ok() || UNFINISHED.read::<Unfinished>(text).is_ok()
+}
+
 /// What is wrong with a file. An old one is not worth the command that converts files.
 fn told(error: &json::Error) -> String {
     match error {

@@ -173,7 +173,7 @@ impl Residual {
     pub(crate) fn is_sound(&self) -> bool {
         self.weights.len() <= self.places.loads.len()
             && self.weights.iter().chain([&self.constant]).all(|w| w.abs() <= MOST_LN)
-            && self.places.coordinates.iter().all(|c| c.is_finite())
+            && self.places.loads.iter().all(Load::is_sound)
     }
 }
 

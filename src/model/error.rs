@@ -17,6 +17,11 @@ pub enum ModelError {
     },
     /// Intervals of a width that can't be.
     Intervals,
+    /// A place at which residuals are known, whose load is negative or not finite.
+    Place {
+        /// Its position.
+        position: usize,
+    },
     /// A method with something that can't be.
     Method {
         /// The method, with its processor.
@@ -32,6 +37,7 @@ impl fmt::Display for ModelError {
             Self::NoMethod => f.write_str("it holds no method"),
             Self::Range { parameter } => write!(f, "the range of {parameter} has ends that are no numbers or not ascending"),
             Self::Intervals => f.write_str("its intervals have a width that is negative or no number"),
+            Self::Place { position } => write!(f, "places[{position}] is a load that is negative or not finite"),
             Self::Method { method, why } => write!(f, "{method}: {why}"),
         }
     }

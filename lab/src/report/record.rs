@@ -207,8 +207,7 @@ impl Report {
         }
         for (k, point) in self.points.iter().enumerate() {
             let at = format!("point {k} ({} at {} objects)", point.scenario, point.load.objects);
-            let Load { axis_candidates, strip_candidates, pairs, moved, .. } = point.load;
-            if ![axis_candidates, strip_candidates, pairs, moved].iter().all(|v| v.is_finite() && *v >= 0.0) {
+            if !point.load.is_sound() {
                 return Some(format!("{at}: a load that is negative or not finite"));
             }
             if !point.core_to_core_ns.iter().flatten().all(|ns| ns.is_finite() && *ns > 0.0) {

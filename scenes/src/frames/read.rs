@@ -28,14 +28,21 @@ impl Frames {
             if !found.is_file() {
                 return Err(NpyError::NotAFile);
             }
-            parse(BufReader::with_capacity(1 << 16, File::open(path)?), found.len())
+            Self::parse(BufReader::with_capacity(1 << 16, File::open(path)?), found.len())
         };
         frames().map_err(|source| FramesError { path: path.to_owned(), source })
     }
+
+    /// Reads the same from anything that holds `length` bytes.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn parse(file: impl Read, length: u64) -> Result<Self, NpyError> {
+        parse(file, length)
+    }
 }
 
-/// The frames in a file of `length` bytes.
-pub(super) fn parse(mut file: impl Read, length: u64) -> Result<Frames, NpyError> {
+fn parse(mut file: impl Read, length: u64) -> Result<Frames, NpyError> {
     if length == 0 {
         return Err(NpyError::Empty);
     }

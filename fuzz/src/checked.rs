@@ -1,0 +1,107 @@
+//! Algorithms whose every answer is held against the oracle.
+
+use crate::oracle::Answer;
+use crate::scene::Scene;
+use crate::source::Source;
+use sapwise::{Adaptive, AlgorithmId, BroadPhase, Hardware, Model, Pairs, Registry, SimdLevel, Tuning};
+use std::sync::LazyLock;
+
+/// Threads of the widest algorithm.
+const CORES: u32 = 3;
+
+/// A registry for each SIMD level of this machine, kept since its pools of threads are dear.
+static REGISTRIES: LazyLock<Vec<Registry>> = LazyLock::new(|| {
+    let at_most = |level| {
+        let mut registry = Registry::with_cores(CORES);
+        registry.limit_simd(level);
+        registry
+    };
+    SimdLevel::ALL.into_iter().filter(|&level| level <= SimdLevel::detected()).map(at_most).collect()
+});
+
+/// Tuning with a cost for each algorithm, so that the choice learns and explores.
+static PREDICTED: LazyLock<Tuning> = LazyLock::new(|| {
+    let entries = REGISTRIES[0].available();
+    let prediction = Model::built_in().unwrap().predict(&hardware(), &entries).unwrap();
+    prediction.tuning("uniform", &[])
+});
+
+/// Hardware parameters of some machine.
+///
+/// # Panics
+/// When the report that comes with the tests is damaged.
+#[must_use]
+pub fn hardware() -> Hardware {
+    sapwise_lab::report::read(include_str!("../../lab/tests/fixtures/report-2.json")).unwrap().value.hardware
+}
+
+/// Algorithms under their names.
+pub struct Checked(Vec<(String, Box<dyn BroadPhase>)>);
+
+impl Checked {
+    /// All methods at a SIMD level and on a number of threads that the input names, and now and then `Adaptive` over all of them.
+    ///
+    /// # Panics
+    /// When an algorithm that is said to be available is not.
+    #[must_use]
+    pub fn of(source: &mut Source<'_>) -> Self {
+        let registry = &REGISTRIES[usize::from(source.byte()) % REGISTRIES.len()];
+        let kind = source.byte();
+        let ids: Vec<AlgorithmId> = registry.available().into_iter().map(|e| e.id).collect();
+        let threads = [1, 1, 2, CORES][usize::from(kind % 4)];
+        let mut all: Vec<(String, Box<dyn BroadPhase>)> = Vec::new();
+        for id in ids.iter().filter(|id| id.threads() == threads) {
+            // One that can change its threads does so later.
+            let family: Vec<&AlgorithmId> = ids.iter().filter(|other| other.method() == id.method()).collect();
+            let made = registry.create_family(&family).unwrap().map_or_else(|| registry.create(id), Ok);
+            all.push((id.to_string(), made.unwrap()));
+        }
+        if kind & 4 != 0 {
+            let usual = kind & 8 != 0;
+            let tuning = if usual { Tuning::usual(registry) } else { PREDICTED.clone() };
+            all.push(("adaptive".to_owned(), Box::new(Adaptive::new(tuning, registry).unwrap())));
+        }
+        Self(all)
+    }
+
+    /// Moves those that can to another number of threads.
+    pub fn set_threads(&mut self, source: &mut Source<'_>) {
+        let threads = 1 + u32::from(source.byte()) % CORES;
+        for (_, algorithm) in &mut self.0 {
+            if let Some(incremental) = algorithm.as_incremental() {
+                incremental.set_threads(threads);
+            }
+        }
+    }
+
+    /// Runs a frame with each, and returns the pairs where there are any.
+    ///
+    /// # Panics
+    /// At a wrong answer.
+    pub fn frame(&mut self, scene: &mut Scene) -> Option<Pairs> {
+        let right = scene.answer();
+        let mut room = scene.room();
+        for (name, algorithm) in &mut self.0 {
+            let found = algorithm.find_pairs(scene.boxes(), &mut room);
+            check(name, &right, found, &room);
+        }
+        right.pairs.is_ok().then_some(room)
+    }
+}
+
+/// # Panics
+/// At a wrong answer.
+pub fn check(name: &str, right: &Answer, found: Result<(), sapwise::Error>, room: &Pairs) {
+    match (&right.pairs, found) {
+        (Ok(pairs), Ok(())) => {
+            let mut found = room.as_slice().to_vec();
+            if room.order() == sapwise::PairOrder::Any {
+                found.sort_unstable();
+            }
+            assert!(found == *pairs, "{name}: {} pairs, not {}", found.len(), pairs.len());
+            assert_eq!(room.overlapping(), right.overlapping, "{name}: overlapping");
+        }
+        (Err(expected), Err(error)) => assert_eq!(*expected, error, "{name}"),
+        (expected, found) => panic!("{name}: {found:?}, not {:?}", expected.as_ref().map(Vec::len)),
+    }
+}

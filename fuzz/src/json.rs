@@ -1,0 +1,68 @@
+//! Damages to JSON texts that keep them JSON, so that inputs come past the parser.
+
+use crate::source::Random;
+use serde_json::{Value, json};
+
+/// The text with one to four damages; `None` where it is no JSON.
+#[must_use]
+pub fn damaged(text: &[u8], seed: u32) -> Option<String> {
+    let mut whole: Value = serde_json::from_slice(text).ok()?;
+    let mut random = Random::new(seed);
+    for _ in 0..1 + random.below(4) {
+        // Something of another place of the same file may come to stand where it should not.
+        let other = pick(&mut whole, &mut random).clone();
+        damage(pick(&mut whole, &mut random), other, &mut random);
+    }
+    Some(whole.to_string())
+}
+
+/// A value anywhere in the file: at each level it goes on more likely than not.
+fn pick<'a>(value: &'a mut Value, random: &mut Random) -> &'a mut Value {
+    let children = match value {
+        Value::Array(items) => items.len(),
+        Value::Object(keys) => keys.len(),
+        _ => 0,
+    };
+    if children == 0 || random.below(6) == 0 {
+        return value;
+    }
+    let at = random.below(children);
+    let child = match value {
+        Value::Array(items) => items.get_mut(at),
+        Value::Object(keys) => keys.values_mut().nth(at),
+        _ => None,
+    };
+    pick(child.expect("it has as many children"), random)
+}
+
+fn damage(value: &mut Value, other: Value, random: &mut Random) {
+    match (value, random.below(6)) {
+        (value, 0) => *value = other,
+        (Value::Array(items), 1) if !items.is_empty() => drop(items.remove(random.below(items.len()))),
+        (Value::Array(items), 2) if !items.is_empty() => items.push(items[random.below(items.len())].clone()),
+        (Value::Array(items), 3) if !items.is_empty() => items.rotate_left(1),
+        (Value::Array(items), _) => items.push(other),
+        (Value::Object(keys), 1 | 2) if !keys.is_empty() => {
+            let key = keys.keys().nth(random.below(keys.len())).cloned();
+            key.map(|key| keys.remove(&key));
+        }
+        (Value::Object(keys), _) => drop(keys.insert(["schema", "made up", ""][random.below(3)].to_owned(), other)),
+        (Value::String(text), 1 | 2) => *text = text.chars().rev().collect(),
+        (Value::String(text), 3) => drop(text.pop()),
+        (Value::String(text), _) => *text = NAMES[random.below(NAMES.len())].to_owned(),
+        (Value::Bool(flag), _) => *flag = !*flag,
+        (value @ Value::Number(_), 1 | 2) => *value = json!(value.as_f64().unwrap_or(1.0) * FACTORS[random.below(FACTORS.len())]),
+        (value, _) => *value = serde_json::from_str(NUMBERS[random.below(NUMBERS.len())]).unwrap_or_default(),
+    }
+}
+
+const FACTORS: [f64; 8] = [-1.0, 0.5, 2.0, 1.0e3, 1.0e-3, 1.0e12, 1.0e-12, 1.0 + f64::EPSILON];
+
+const NUMBERS: [&str; 14] = [
+    "0", "1", "-1", "2", "0.0", "-0.0", "1e308", "-1e308", "5e-324", "4294967295", "4294967296", "18446744073709551615", "1e999", "null",
+];
+
+const NAMES: [&str; 14] = [
+    "", "brute@cpu1", "pair-cache@cpu2", "grid-sap@gpu0+1", "bvh@cpu4096", "sap", "call", "cpu", "gpu", "uniform", "tuning/2", "tuning/2.7",
+    "model/3", "report/2",
+];

@@ -1,0 +1,9 @@
+//! What the fuzz targets share.
+
+pub mod checked;
+pub mod json;
+pub mod oracle;
+pub mod scene;
+mod source;
+
+pub use source::{Random, Source};

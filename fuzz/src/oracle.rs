@@ -1,0 +1,58 @@
+//! Answers by the definitions alone.
+
+use sapwise::{Aabb, BoxDefect, Error, Membership, Pair};
+use std::collections::BTreeSet;
+
+/// What every algorithm must answer.
+#[derive(Debug)]
+pub struct Answer {
+    /// The wanted pairs in canonical order, or the error.
+    pub pairs: Result<Vec<Pair>, Error>,
+    /// How many pairs overlap that aren't of two fixed boxes.
+    pub overlapping: u64,
+}
+
+/// The answer to these boxes past a filter and within a limit.
+#[must_use]
+pub fn answer(boxes: &[Aabb], memberships: Option<&[Membership]>, limit: Option<usize>) -> Answer {
+    if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| Some((k, defect(b)?))) {
+        return Answer { pairs: Err(Error::InvalidBox { index, defect }), overlapping: 0 };
+    }
+    let of = |k: usize| memberships.and_then(|m| m.get(k)).copied().unwrap_or(Membership { groups: !0, mask: !0, fixed: false });
+    let mut pairs = Vec::new();
+    let mut overlapping = 0;
+    for i in 0..boxes.len() {
+        for j in i + 1..boxes.len() {
+            if !overlap(&boxes[i], &boxes[j]) {
+                continue;
+            }
+            let (a, b) = (of(i), of(j));
+            overlapping += u64::from(!(a.fixed && b.fixed));
+            if a.groups & b.mask != 0 && b.groups & a.mask != 0 && !(a.fixed && b.fixed) {
+                pairs.push((i as u32, j as u32));
+            }
+        }
+    }
+    match limit.filter(|&limit| pairs.len() > limit) {
+        Some(limit) => Answer { pairs: Err(Error::TooManyPairs { limit }), overlapping },
+        None => Answer { pairs: Ok(pairs), overlapping },
+    }
+}
+
+fn overlap(a: &Aabb, b: &Aabb) -> bool {
+    // Without branches, which would each be a place of their own for the fuzzer to cover.
+    (0..3).fold(true, |meet, k| meet & (a.min[k] <= b.max[k]) & (b.min[k] <= a.max[k]))
+}
+
+fn defect(b: &Aabb) -> Option<BoxDefect> {
+    let nan = b.min.iter().chain(&b.max).any(|x| x.is_nan());
+    let inverted = (0..3).any(|k| b.min[k] > b.max[k]);
+    if nan { Some(BoxDefect::NotANumber) } else { inverted.then_some(BoxDefect::Inverted) }
+}
+
+/// The pairs of ids that some pairs of positions stand for: those of two ids, each once.
+#[must_use]
+pub fn of_ids(pairs: &[Pair], ids: &[u8]) -> BTreeSet<(u8, u8)> {
+    let named = pairs.iter().map(|&(i, j)| (ids[i as usize], ids[j as usize]));
+    named.filter(|(a, b)| a != b).map(|(a, b)| (a.min(b), a.max(b))).collect()
+}

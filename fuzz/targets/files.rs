@@ -1,0 +1,98 @@
+//! Any text as a file of Sapwise, and what follows: tuning runs, models predict, reports are measured tuning, old files are converted, and
+//! what is read is read again as it was written.
+#![no_main]
+
+use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
+use sapwise::{Adaptive, BroadPhase, Error, Hardware, Model, Registry, Tuning, json};
+use sapwise_fuzz::checked::{check, hardware};
+use sapwise_fuzz::oracle::Answer;
+use sapwise_fuzz::scene::Scene;
+use sapwise_fuzz::{Source, json::damaged};
+use sapwise_lab::convert::convert;
+use sapwise_lab::fit::measured_tuning;
+use sapwise_lab::report;
+use std::sync::LazyLock;
+
+static REGISTRY: LazyLock<Registry> = LazyLock::new(|| Registry::with_cores(2));
+static HARDWARE: LazyLock<Hardware> = LazyLock::new(hardware);
+static BUILT_IN: LazyLock<Model> = LazyLock::new(|| Model::built_in().unwrap());
+
+/// Scenes of no, few and some boxes, with their answers.
+static SCENES: LazyLock<Vec<(Scene, Answer)>> = LazyLock::new(|| {
+    let boxes: [&[u8]; 3] = [&[], &[0, 9, 0, 0, 0, 8, 4, 0, 0, 8, 90, 0, 0, 1], &[1, 1, 1, 1, 0, 40, 40, 40]];
+    let scene = |bytes: &&[u8]| {
+        let mut scene = Scene::default();
+        scene.edit(&mut Source::new(bytes));
+        let answer = scene.answer();
+        (scene, answer)
+    };
+    boxes.iter().map(scene).collect()
+});
+
+fuzz_target!(|text: &str| {
+    if let Ok(tuning) = json::tuning(text) {
+        let written = json::write_tuning(&tuning).unwrap();
+        assert_eq!(json::tuning(&written).unwrap(), tuning);
+        run(tuning);
+    }
+    if let Ok(model) = json::model(text) {
+        let written = json::write_model(&model).unwrap();
+        assert_eq!(json::model(&written).unwrap(), model);
+        predict(&model, &HARDWARE);
+    }
+    if let Ok(read) = report::read(text) {
+        let report = read.value;
+        let written = report::write(&report).unwrap();
+        assert_eq!(report::read(&written).unwrap().value, report);
+        predict(&BUILT_IN, &report.hardware);
+        for base in [None, Some(&*BUILT_IN)] {
+            if let Ok(tuning) = measured_tuning(&report, "uniform", base) {
+                write_and_run(tuning);
+            }
+        }
+    }
+    if let Ok(converted) = convert(text) {
+        assert!(json::tuning(&converted.text).is_ok() || report::read(&converted.text).is_ok());
+    }
+    let _ = sapwise::is_readable_cache(text);
+});
+
+fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
+    match damaged(&data[..size], seed).filter(|text| text.len() <= max_size && seed % 4 != 0) {
+        Some(text) => {
+            data[..text.len()].copy_from_slice(text.as_bytes());
+            text.len()
+        }
+        None => fuzzer_mutate(data, size, max_size),
+    }
+});
+
+/// Whatever a model predicts of a machine that was measured is sound.
+fn predict(model: &Model, hardware: &Hardware) {
+    if let Ok(prediction) = model.predict(hardware, &REGISTRY.available()) {
+        write_and_run(prediction.tuning("uniform", &[]));
+    }
+}
+
+/// What this library makes it can read.
+fn write_and_run(tuning: Tuning) {
+    let written = json::write_tuning(&tuning).unwrap();
+    assert_eq!(json::tuning(&written).unwrap(), tuning);
+    run(tuning);
+}
+
+/// Frames by the tuning are right, and what is learned from them is sound.
+fn run(tuning: Tuning) {
+    let Ok(mut adaptive) = Adaptive::new(tuning, &REGISTRY) else { return };
+    for (scene, right) in SCENES.iter().chain(&*SCENES) {
+        let mut room = scene.room();
+        match adaptive.find_pairs(scene.boxes(), &mut room) {
+            Err(Error::Unavailable { .. }) => return,
+            found => check("adaptive", right, found, &room),
+        }
+        adaptive.last_decision().unwrap().to_string();
+    }
+    let learned = adaptive.learned();
+    let written = json::write_tuning(&learned).unwrap();
+    assert_eq!(json::tuning(&written).unwrap(), learned);
+}

@@ -1,0 +1,34 @@
+//! Any text as the name of an algorithm, a backend, a SIMD level, a schema: what is read is written as it stood, and is never run where it can't.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use sapwise::{AlgorithmId, Backend, ParameterId, Registry, SimdLevel, json};
+use sapwise_scenes::Scenario;
+use std::fmt::Display;
+use std::str::FromStr;
+use std::sync::LazyLock;
+
+static REGISTRY: LazyLock<Registry> = LazyLock::new(|| Registry::with_cores(2));
+
+fuzz_target!(|text: &str| {
+    same::<Backend>(text);
+    same::<SimdLevel>(text);
+    same::<Scenario>(text);
+    same::<ParameterId>(text);
+    if let Ok(schema) = json::Schema::of(text) {
+        let _ = schema.to_string();
+    }
+    if let Some(id) = same::<AlgorithmId>(text) {
+        let again = AlgorithmId::new(id.method(), id.backend().clone());
+        assert_eq!(again.as_ref(), Ok(&id));
+        let available = REGISTRY.available().iter().any(|e| e.id == id);
+        assert!(!available || REGISTRY.create(&id).is_ok(), "{id}");
+    }
+});
+
+/// What a text says, which is written as that text.
+fn same<T: FromStr + Display>(text: &str) -> Option<T> {
+    let value = T::from_str(text).ok()?;
+    assert_eq!(value.to_string(), text);
+    Some(value)
+}

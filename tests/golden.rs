@@ -1,0 +1,137 @@
+//! The pairs of every scenario over 500 frames, as hashes that are kept: the same whatever finds them, wherever, and in years to come.
+//!
+//! A line of tests/fixtures/golden.csv is a scenario and which of its frames are looked at, with a hash of the bits of their boxes and one of their
+//! pairs in canonical order, both by the oracle. Where scenes have changed on purpose, `SAPWISE_WRITE_GOLDEN=1 cargo test --test golden` writes them anew.
+
+mod common;
+
+use common::{every_algorithm, naive};
+use sapwise::{Aabb, BroadPhase, Pair, PairOrder, Pairs};
+use sapwise_scenes::Scenario;
+use std::fmt::Write;
+
+const GOLDEN: &str = include_str!("fixtures/golden.csv");
+const HEAD: &str = "scenario,objects,every,boxes_fnv1a,pairs_fnv1a";
+const FRAMES: usize = 500;
+
+/// Which frames of a scenario are looked at: of so many boxes, every so-manieth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Frames {
+    objects: usize,
+    every: usize,
+}
+
+/// On one thread and on several, none of which has enough to do.
+const SMALL: Frames = Frames { objects: 300, every: 1 };
+/// Where several threads share a frame.
+const LARGE: Frames = Frames { objects: 3000, every: 50 };
+/// For software adapters, which are slow.
+#[cfg(feature = "gpu")]
+const FEW: Frames = Frames { objects: 300, every: 50 };
+
+/// FNV-1a of 64 bits.
+struct Hash(u64);
+
+impl Hash {
+    fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+
+    fn add(&mut self, word: u32) {
+        for byte in word.to_le_bytes() {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+
+    fn pairs(&mut self, pairs: &[Pair]) {
+        self.add(pairs.len() as u32);
+        pairs.iter().for_each(|&(i, j)| [i, j].into_iter().for_each(|k| self.add(k)));
+    }
+
+    fn boxes(&mut self, boxes: &[Aabb]) {
+        self.add(boxes.len() as u32);
+        boxes.iter().flat_map(|b| b.min.into_iter().chain(b.max)).for_each(|x| self.add(x.to_bits()));
+    }
+}
+
+impl Frames {
+    fn of(self, scenario: Scenario) -> impl Iterator<Item = Vec<Aabb>> {
+        let mut scene = scenario.start(self.objects, 42);
+        (0..FRAMES).filter_map(move |frame| {
+            let boxes = (frame % self.every == 0).then(|| scene.boxes().to_vec());
+            scene.advance();
+            boxes
+        })
+    }
+
+    /// The hash of the pairs that is kept.
+    fn golden(self, scenario: Scenario) -> u64 {
+        let begin = format!("{scenario},{},{},", self.objects, self.every);
+        let line = GOLDEN.lines().find(|line| line.starts_with(&begin)).unwrap_or_else(|| panic!("there is no line {begin}..."));
+        u64::from_str_radix(line.rsplit(',').next().unwrap(), 16).unwrap()
+    }
+}
+
+/// The frames of every scenario with each algorithm, by turns in canonical order and in any.
+fn assert_golden(frames: Frames, mut algorithms: Vec<(String, Box<dyn BroadPhase>)>) {
+    let mut orders = [PairOrder::Canonical, PairOrder::Any].map(Pairs::with_order);
+    for scenario in Scenario::ALL {
+        let mut hashes: Vec<Hash> = algorithms.iter().map(|_| Hash::new()).collect();
+        for (frame, boxes) in frames.of(scenario).enumerate() {
+            let pairs = &mut orders[frame % 2];
+            for ((id, algorithm), hash) in algorithms.iter_mut().zip(&mut hashes) {
+                algorithm.find_pairs(&boxes, pairs).unwrap_or_else(|e| panic!("{id} on {scenario}: {e}"));
+                if pairs.order() == PairOrder::Canonical {
+                    hash.pairs(pairs.as_slice());
+                } else {
+                    let mut sorted = pairs.as_slice().to_vec();
+                    sorted.sort_unstable();
+                    hash.pairs(&sorted);
+                }
+            }
+        }
+        let golden = frames.golden(scenario);
+        for ((id, _), hash) in algorithms.iter().zip(hashes) {
+            assert_eq!(format!("{:016x}", hash.0), format!("{golden:016x}"), "{id} on {scenario}, {frames:?}");
+        }
+    }
+}
+
+#[test]
+fn the_oracle_finds_the_pairs_that_are_kept() {
+    let mut text = HEAD.to_owned() + "\n";
+    let all = [SMALL, Frames { objects: 300, every: 50 }, LARGE];
+    for (scenario, frames) in Scenario::ALL.into_iter().flat_map(|s| all.map(|f| (s, f))) {
+        let (mut boxes, mut pairs) = (Hash::new(), Hash::new());
+        for frame in frames.of(scenario) {
+            boxes.boxes(&frame);
+            pairs.pairs(&naive(&frame));
+        }
+        let Frames { objects, every } = frames;
+        writeln!(text, "{scenario},{objects},{every},{:016x},{:016x}", boxes.0, pairs.0).unwrap();
+    }
+    if std::env::var_os("SAPWISE_WRITE_GOLDEN").is_some() {
+        std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/golden.csv"), &text).unwrap();
+        return;
+    }
+    for (now, kept) in text.lines().zip(GOLDEN.lines()) {
+        assert_eq!(now, kept);
+    }
+    assert_eq!(text.lines().count(), GOLDEN.lines().count());
+}
+
+#[test]
+fn every_method_level_and_thread_count_finds_them() {
+    assert_golden(SMALL, every_algorithm());
+    assert_golden(LARGE, every_algorithm());
+}
+
+#[cfg(feature = "gpu")]
+#[test]
+fn every_gpu_finds_them() {
+    let Some(gpus) = common::gpus() else { return };
+    let mut registry = sapwise::Registry::with_cores(1);
+    registry.add_gpus(&gpus);
+    let ids = registry.available().into_iter().map(|e| e.id).filter(|id| id.to_string().contains("@gpu"));
+    assert_golden(FEW, ids.map(|id| (id.to_string(), registry.create(&id).unwrap())).collect());
+}
