@@ -82,6 +82,9 @@ pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
 pub use broad_phase::{BroadPhase, FrameKind, FrameWork, Incremental};
 #[cfg(feature = "schema")]
 pub use calibrate::cache_schema;
+#[cfg(all(fuzzing, feature = "this-machine"))]
+#[doc(hidden)]
+pub use calibrate::is_readable_cache;
 #[cfg(feature = "this-machine")]
 pub use calibrate::{Cache, StartOptions};
 pub use changes::Changes;
@@ -103,9 +106,6 @@ pub use model::Model;
 pub use named::UnknownName;
 pub use pair::Pair;
 pub use pairs::{PairOrder, Pairs};
-#[cfg(all(fuzzing, feature = "this-machine"))]
-#[doc(hidden)]
-pub use calibrate::is_readable_cache;
 /// The version of rayon whose pools this library takes: [`Registry::use_pool`]. Its number is part of the name, because another one
 /// would be other types: a release of this library that takes a newer rayon exports it under a new name, and is a breaking one.
 #[cfg(feature = "parallel")]

@@ -51,7 +51,9 @@ fn damage(value: &mut Value, other: Value, random: &mut Random) {
         (Value::String(text), 3) => drop(text.pop()),
         (Value::String(text), _) => *text = NAMES[random.below(NAMES.len())].to_owned(),
         (Value::Bool(flag), _) => *flag = !*flag,
-        (value @ Value::Number(_), 1 | 2) => *value = json!(value.as_f64().unwrap_or(1.0) * FACTORS[random.below(FACTORS.len())]),
+        (value @ Value::Number(_), 1 | 2) => {
+            *value = json!(value.as_f64().unwrap_or(1.0) * FACTORS[random.below(FACTORS.len())])
+        }
         (value, _) => *value = serde_json::from_str(NUMBERS[random.below(NUMBERS.len())]).unwrap_or_default(),
     }
 }
@@ -59,10 +61,35 @@ fn damage(value: &mut Value, other: Value, random: &mut Random) {
 const FACTORS: [f64; 8] = [-1.0, 0.5, 2.0, 1.0e3, 1.0e-3, 1.0e12, 1.0e-12, 1.0 + f64::EPSILON];
 
 const NUMBERS: [&str; 14] = [
-    "0", "1", "-1", "2", "0.0", "-0.0", "1e308", "-1e308", "5e-324", "4294967295", "4294967296", "18446744073709551615", "1e999", "null",
+    "0",
+    "1",
+    "-1",
+    "2",
+    "0.0",
+    "-0.0",
+    "1e308",
+    "-1e308",
+    "5e-324",
+    "4294967295",
+    "4294967296",
+    "18446744073709551615",
+    "1e999",
+    "null",
 ];
 
 const NAMES: [&str; 14] = [
-    "", "brute@cpu1", "pair-cache@cpu2", "grid-sap@gpu0+1", "bvh@cpu4096", "sap", "call", "cpu", "gpu", "uniform", "tuning/2", "tuning/2.7",
-    "model/3", "report/2",
+    "",
+    "brute@cpu1",
+    "pair-cache@cpu2",
+    "grid-sap@gpu0+1",
+    "bvh@cpu4096",
+    "sap",
+    "call",
+    "cpu",
+    "gpu",
+    "uniform",
+    "tuning/2",
+    "tuning/2.7",
+    "model/3",
+    "report/2",
 ];

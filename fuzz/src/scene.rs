@@ -11,8 +11,20 @@ const MOST_BOXES: usize = 4000;
 const MOST_PAIRS: u64 = 4000;
 
 /// Bounds that algorithms are likely to get wrong.
-const SPECIAL: [f32; 12] =
-    [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 0.0, -0.0, 1.0e-42, -1.0e-42, f32::MIN_POSITIVE, 1.0e30, 0.5];
+const SPECIAL: [f32; 12] = [
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::MAX,
+    f32::MIN,
+    0.0,
+    -0.0,
+    1.0e-42,
+    -1.0e-42,
+    f32::MIN_POSITIVE,
+    1.0e30,
+    0.5,
+];
 
 /// The boxes of a frame.
 #[derive(Debug, Default)]

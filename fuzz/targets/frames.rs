@@ -4,10 +4,10 @@
 
 use libfuzzer_sys::fuzz_target;
 use sapwise::Changes;
+use sapwise_fuzz::Source;
 use sapwise_fuzz::checked::Checked;
 use sapwise_fuzz::oracle::of_ids;
 use sapwise_fuzz::scene::Scene;
-use sapwise_fuzz::Source;
 use std::collections::BTreeSet;
 
 /// The most frames, and the most pairs of boxes that the oracle looks at in all of them.
