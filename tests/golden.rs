@@ -14,7 +14,7 @@ const GOLDEN: &str = include_str!("fixtures/golden.csv");
 const HEAD: &str = "scenario,objects,every,boxes_fnv1a,pairs_fnv1a";
 const FRAMES: usize = 500;
 
-/// Which frames of a scenario are looked at: of so many boxes, every so-manieth.
+/// Which frames of a scenario are looked at: of so many boxes, every nth one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Frames {
     objects: usize,

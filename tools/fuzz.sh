@@ -19,7 +19,7 @@ cargo fuzz --version >/dev/null 2>&1 \
 # Sanitizers are options of the nightly channel, and a part of every compiler.
 export RUSTC_BOOTSTRAP=1 CARGO_INCREMENTAL=0
 folder=${CARGO_TARGET_DIR:-$PWD/fuzz/target}/fuzz
-# Comparisons are not traced: the seeds hold every word, and frames would take ten times as long.
+# Comparisons are not traced: the seeds hold every word, and to trace those of boxes takes most of the time.
 cargo fuzz build --no-trace-compares --codegen-units 16 --target-dir "$folder"
 programs=$folder/$(rustc --version --verbose | sed -n 's/^host: //p')/release
 

@@ -19,7 +19,7 @@ static BUILT_IN: LazyLock<Model> = LazyLock::new(|| Model::built_in().unwrap());
 
 /// Scenes of no, few and some boxes, with their answers.
 static SCENES: LazyLock<Vec<(Scene, Answer)>> = LazyLock::new(|| {
-    let boxes: [&[u8]; 3] = [&[], &[0, 9, 0, 0, 0, 8, 4, 0, 0, 8, 90, 0, 0, 1], &[1, 1, 1, 1, 0, 40, 40, 40]];
+    let boxes: [&[u8]; 3] = [&[], &[0, 9, 0, 0, 0, 8, 4, 0, 0, 8, 90, 0, 0, 1], &[1, 1, 1, 200, 24, 24, 24]];
     let scene = |bytes: &&[u8]| {
         let mut scene = Scene::default();
         scene.edit(&mut Source::new(bytes));
