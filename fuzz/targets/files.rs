@@ -31,9 +31,7 @@ static SCENES: LazyLock<Vec<(Scene, Answer)>> = LazyLock::new(|| {
 
 fuzz_target!(|text: &str| {
     if let Ok(tuning) = json::tuning(text) {
-        let written = json::write_tuning(&tuning).unwrap();
-        assert_eq!(json::tuning(&written).unwrap(), tuning);
-        run(tuning);
+        write_and_run(tuning);
     }
     if let Ok(model) = json::model(text) {
         let written = json::write_model(&model).unwrap();
@@ -75,9 +73,13 @@ fn predict(model: &Model, hardware: &Hardware) {
 }
 
 /// What this library makes it can read.
+fn assert_reads_back(tuning: &Tuning) {
+    let written = json::write_tuning(tuning).unwrap();
+    assert_eq!(json::tuning(&written).unwrap(), *tuning);
+}
+
 fn write_and_run(tuning: Tuning) {
-    let written = json::write_tuning(&tuning).unwrap();
-    assert_eq!(json::tuning(&written).unwrap(), tuning);
+    assert_reads_back(&tuning);
     run(tuning);
 }
 
@@ -92,7 +94,5 @@ fn run(tuning: Tuning) {
         }
         adaptive.last_decision().unwrap().to_string();
     }
-    let learned = adaptive.learned();
-    let written = json::write_tuning(&learned).unwrap();
-    assert_eq!(json::tuning(&written).unwrap(), learned);
+    assert_reads_back(&adaptive.learned());
 }

@@ -37,51 +37,48 @@ impl Frames {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn parse(file: impl Read, length: u64) -> Result<Self, NpyError> {
-        parse(file, length)
+    pub fn parse(mut file: impl Read, length: u64) -> Result<Self, NpyError> {
+        if length == 0 {
+            return Err(NpyError::Empty);
+        }
+        let mut counted = Counted { file: &mut file, bytes: 0 };
+        let Header { descr, fortran_order, shape } = Header::read(&mut counted)?;
+        let held = length.saturating_sub(counted.bytes);
+        if descr != "<f4" {
+            return Err(NpyError::Elements(descr));
+        }
+        let (frames, objects) = match shape[..] {
+            [objects, BOUNDS] => (1, objects),
+            [frames, objects, BOUNDS] => (frames, objects),
+            _ => return Err(NpyError::Shape(shape)),
+        };
+        let single = shape.len() == 2;
+        // An axis beside one of length 0 takes no room in a file, so that only this bounds it.
+        let numbered = |count: u64| u32::try_from(count).ok().map(|count| count as usize);
+        let (Some(frames), Some(objects)) = (numbered(frames), numbered(objects)) else {
+            return Err(NpyError::TooLarge { shape, limit: "can be numbered" });
+        };
+        if objects == 0 && frames as u64 > MOST_EMPTY_FRAMES {
+            return Err(NpyError::EmptyFrames(frames as u64));
+        }
+        let count = frames.checked_mul(objects);
+        let Some((count, bytes)) = count.and_then(|boxes| Some((boxes, (boxes as u64).checked_mul(4 * BOUNDS)?))) else {
+            return Err(NpyError::TooLarge { shape, limit: "any file holds" });
+        };
+        if held < bytes {
+            return Err(NpyError::Truncated { missing: bytes - held, bytes });
+        }
+        if held > bytes {
+            return Err(NpyError::Trailing { extra: held - bytes, bytes });
+        }
+        let boxes =
+            if fortran_order { in_fortran_order(&mut file, frames, objects)? } else { in_c_order(&mut file, count)? };
+        // One frame has no other that could have more boxes, so that a row of NaN in it is a mistake.
+        if single {
+            return Ok(Frames { ends: vec![boxes.len()], boxes });
+        }
+        without_absent(boxes, frames, objects)
     }
-}
-
-fn parse(mut file: impl Read, length: u64) -> Result<Frames, NpyError> {
-    if length == 0 {
-        return Err(NpyError::Empty);
-    }
-    let mut counted = Counted { file: &mut file, bytes: 0 };
-    let Header { descr, fortran_order, shape } = Header::read(&mut counted)?;
-    let held = length.saturating_sub(counted.bytes);
-    if descr != "<f4" {
-        return Err(NpyError::Elements(descr));
-    }
-    let (frames, objects) = match shape[..] {
-        [objects, BOUNDS] => (1, objects),
-        [frames, objects, BOUNDS] => (frames, objects),
-        _ => return Err(NpyError::Shape(shape)),
-    };
-    let single = shape.len() == 2;
-    // An axis beside one of length 0 takes no room in a file, so that only this bounds it.
-    let numbered = |count: u64| u32::try_from(count).ok().map(|count| count as usize);
-    let (Some(frames), Some(objects)) = (numbered(frames), numbered(objects)) else {
-        return Err(NpyError::TooLarge { shape, limit: "can be numbered" });
-    };
-    if objects == 0 && frames as u64 > MOST_EMPTY_FRAMES {
-        return Err(NpyError::EmptyFrames(frames as u64));
-    }
-    let count = frames.checked_mul(objects);
-    let Some((count, bytes)) = count.and_then(|boxes| Some((boxes, (boxes as u64).checked_mul(4 * BOUNDS)?))) else {
-        return Err(NpyError::TooLarge { shape, limit: "any file holds" });
-    };
-    if held < bytes {
-        return Err(NpyError::Truncated { missing: bytes - held, bytes });
-    }
-    if held > bytes {
-        return Err(NpyError::Trailing { extra: held - bytes, bytes });
-    }
-    let boxes = if fortran_order { in_fortran_order(&mut file, frames, objects)? } else { in_c_order(&mut file, count)? };
-    // One frame has no other that could have more boxes, so that a row of NaN in it is a mistake.
-    if single {
-        return Ok(Frames { ends: vec![boxes.len()], boxes });
-    }
-    without_absent(boxes, frames, objects)
 }
 
 /// A reader that knows how far it has come.
