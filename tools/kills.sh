@@ -1,8 +1,16 @@
 #!/usr/bin/env bash
-# Kills `study`, `predict`, `run` and `train`, N times each at random moments (125 by default: 500 in all), and looks whether a file was lost or is
-# half-written: tests/kills.rs. Takes about three seconds a kill.
+# Kills `study`, `predict`, `run`, `train` and `probe`, N times each at random moments (100 by default: 500 in all), and looks whether a file was
+# lost or is half-written: tests/kills.rs. Takes about three seconds a kill. As root it fills a small disk too; otherwise it says that it does not.
 #
 #   tools/kills.sh [N]
 set -euo pipefail
 cd "$(dirname "$0")/.."
-SAPWISE_KILLS=${1:-125} cargo test -p sapwise-cli --locked --test kills -- --nocapture
+disk=$(mktemp -d)
+if mount -t tmpfs -o size=16m tmpfs "$disk" 2>/dev/null; then
+    trap 'umount "$disk"; rmdir "$disk"' EXIT
+    export SAPWISE_SMALL_DISK=$disk
+else
+    rmdir "$disk"
+    echo "kills: no disk is filled: a small one can't be mounted here" >&2
+fi
+SAPWISE_KILLS=${1:-100} cargo test -p sapwise-cli --locked --test kills -- --nocapture

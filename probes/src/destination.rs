@@ -4,13 +4,24 @@ use crate::output;
 use crate::outputs::check_writable;
 use anyhow::Context;
 use sapwise_lab::report::Report;
+use std::cell::Cell;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Where the report goes without `--out`.
 const DEFAULT: &str = "report.json";
 
+/// What is added to the name of a report that is being measured.
+pub(crate) const UNFINISHED: &str = "unfinished";
+
 /// The file of a report.
-pub(crate) struct Destination(PathBuf);
+pub(crate) struct Destination {
+    path: PathBuf,
+    /// Where the report is until it is finished: what stands under its name may be hours of measuring, and stays until then.
+    unfinished: PathBuf,
+    /// Whether this program has written that.
+    wrote_unfinished: Cell<bool>,
+}
 
 impl Destination {
     /// The file that the user named, or the default, after a try whether its folder takes a file.
@@ -20,13 +31,22 @@ impl Destination {
     pub(crate) fn new(path: Option<&Path>) -> anyhow::Result<Self> {
         let path = path.unwrap_or(Path::new(DEFAULT)).to_path_buf();
         check_writable(&path).context("name another file with --out")?;
-        Ok(Self(path))
+        let unfinished = match path.extension() {
+            Some(extension) if extension == UNFINISHED => path.clone(),
+            _ => path.with_added_extension(UNFINISHED),
+        };
+        Ok(Self { path, unfinished, wrote_unfinished: Cell::new(false) })
     }
 
-    /// Writes the report as it is by now, so that even a power cut costs one scenario only.
+    /// Writes the report as it is by now beside its place, so that even a power cut costs one scenario only.
     pub(crate) fn save_unfinished(&self, report: &Report) {
-        if let Err(error) = write(&self.0, report) {
-            output::warn(&format!("{error:#}; the measurement continues"));
+        // Into a pipe or a device goes one report.
+        if self.path.exists() && !self.path.is_file() {
+            return;
+        }
+        match write(&self.unfinished, report) {
+            Ok(()) => self.wrote_unfinished.set(true),
+            Err(error) => output::warn(&format!("{error:#}; the measurement continues")),
         }
     }
 
@@ -35,7 +55,13 @@ impl Destination {
     /// # Errors
     /// When it is not where it was wanted. The message says where it is.
     pub(crate) fn save(&self, report: &Report) -> anyhow::Result<&Path> {
-        let Err(error) = write(&self.0, report) else { return Ok(&self.0) };
+        let Err(error) = write(&self.path, report) else {
+            if self.wrote_unfinished.get() && self.unfinished != self.path {
+                // Whoever can't remove it has the whole report all the same.
+                let _ = fs::remove_file(&self.unfinished);
+            }
+            return Ok(&self.path);
+        };
         let other = std::env::temp_dir().join(format!("sapwise-report-{}.json", std::process::id()));
         match write(&other, report) {
             Ok(()) => Err(error.context(format!("the report is in {} instead", other.display()))),

@@ -1,12 +1,16 @@
-//! Verbs that are killed at any moment: every older file is whole, every newer one is complete, and the same command works again.
+//! Verbs that are killed at any moment, or run out of disk: every older file is whole, every newer one is complete, and the same command
+//! works again.
 //!
-//! `SAPWISE_KILLS=N` kills each verb N times; `tools/kills.sh` does.
+//! `SAPWISE_KILLS=N` kills each verb N times, and `SAPWISE_SMALL_DISK=FOLDER` fills that disk: `tools/kills.sh` does both. Without it files
+//! end where the system's limit on their size does.
 
 mod common;
 
 use common::{sapwise, success};
 use sapwise_scenes::Frames;
 use std::fs;
+#[cfg(unix)]
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -29,11 +33,16 @@ impl Random {
     }
 }
 
-/// Fails where a file of ours is half-written.
+/// Fails where a file of ours is half-written, or holds a part of what it is named for.
 fn check_whole(path: &Path) {
     let text = || fs::read_to_string(path).unwrap();
+    let json = || drop(serde_json::from_str::<serde_json::Value>(&text()).unwrap_or_else(|e| panic!("{path:?}: {e}")));
     match path.extension().and_then(|e| e.to_str()).unwrap() {
-        "json" => drop(serde_json::from_str::<serde_json::Value>(&text()).unwrap_or_else(|e| panic!("{path:?}: {e}"))),
+        "unfinished" => json(),
+        "json" => {
+            json();
+            assert!(!text().contains("\"unfinished: "), "{path:?} lost what stood there");
+        }
         "html" => assert!(text().trim_end().ends_with("</html>"), "{path:?}"),
         "svg" => assert!(text().trim_end().ends_with("</svg>"), "{path:?}"),
         "csv" | "md" => assert!(text().ends_with('\n'), "{path:?}"),
@@ -61,13 +70,21 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Kills a verb that writes below `out` at moments spread over the time that it takes.
+/// What must hold after a command was ended by whatever it was.
+fn look(words: &[&str], out: &Path, before: &[PathBuf]) {
+    let after = files(out);
+    assert!(before.iter().all(|path| after.contains(path)), "{words:?}: {before:?} became {after:?}");
+    after.iter().for_each(|path| check_whole(path));
+}
+
+/// Kills a verb that writes below `out` at moments spread over the time that it takes, and lets it run out of disk.
 fn kill_and_look(words: &[&str], out: &Path, seed: u64) {
     let began = Instant::now();
     success(sapwise().args(words).current_dir(out));
     let whole = began.elapsed();
     let before = files(out);
     assert!(!before.is_empty());
+    end_files_early(words, out, &before);
     let kills = std::env::var("SAPWISE_KILLS").map_or(KILLS, |n| n.parse().expect("SAPWISE_KILLS is a number"));
     let mut random = Random(seed);
     random.next();
@@ -81,13 +98,50 @@ fn kill_and_look(words: &[&str], out: &Path, seed: u64) {
         // It may have ended already.
         let _ = running.kill();
         running.wait().unwrap();
-        let after = files(out);
-        assert!(before.iter().all(|path| after.contains(path)), "{words:?}: {before:?} became {after:?}");
-        after.iter().for_each(|path| check_whole(path));
+        look(words, out, &before);
     }
     success(sapwise().args(words).current_dir(out));
     assert_eq!(files(out), before, "{words:?} leaves something behind");
 }
+
+/// Lets no file of the command become larger than a part of its largest, and then the disk no fuller than that.
+#[cfg(unix)]
+fn end_files_early(words: &[&str], out: &Path, before: &[PathBuf]) {
+    let largest = before.iter().map(|path| fs::metadata(path).unwrap().len()).max().unwrap() as f64;
+    for share in [0.0, 0.3, 0.9] {
+        let mut command = Command::new("sh");
+        // Where the signal is not ignored it kills, which is the subject elsewhere. The limit is in blocks of 512 bytes.
+        command.args(["-c", "trap '' XFSZ; ulimit -f $0; exec \"$@\"", &((largest * share) as u64 / 512).to_string()]);
+        command.arg(assert_cmd::cargo::cargo_bin!("sapwise"));
+        run_out_of_room(command.args(words).current_dir(out));
+        look(words, out, before);
+    }
+    let Some(disk) = std::env::var_os("SAPWISE_SMALL_DISK") else { return };
+    let disk = tempfile::tempdir_in(disk).unwrap();
+    success(sapwise().args(words).current_dir(disk.path()));
+    let before = files(disk.path());
+    for share in [0.0, 0.3, 0.9] {
+        let filler = tempfile::NamedTempFile::new_in(disk.path().parent().unwrap()).unwrap();
+        while filler.as_file().write_all_at(&[1; 4096], filler.as_file().metadata().unwrap().len()).is_ok() {}
+        let full = filler.as_file().metadata().unwrap().len();
+        filler.as_file().set_len(full.saturating_sub((largest * share) as u64)).unwrap();
+        run_out_of_room(Command::new(assert_cmd::cargo::cargo_bin!("sapwise")).args(words).current_dir(disk.path()));
+        look(words, disk.path(), &before);
+    }
+    success(sapwise().args(words).current_dir(disk.path()));
+}
+
+/// The command must fail, and say which file it could not write.
+#[cfg(unix)]
+fn run_out_of_room(command: &mut Command) {
+    let ended = command.env_remove("SAPWISE_SIMD").stdout(Stdio::null()).output().unwrap();
+    let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(1), "{command:?}: {complaint}");
+    assert!(complaint.contains("can't write"), "{command:?}: {complaint}");
+}
+
+#[cfg(not(unix))]
+fn end_files_early(_: &[&str], _: &Path, _: &[PathBuf]) {}
 
 #[test]
 fn a_study_that_is_killed_leaves_the_one_of_before() {
@@ -125,4 +179,11 @@ fn a_training_that_is_killed_leaves_the_model_of_before() {
     let reports = folder.path().join("simulated").display().to_string();
     let words = ["train", "--simulated", &reports, "--out", "model.json", "--card", "card.md", "--plot", "held-out.png"];
     kill_and_look(&words, &out, 4);
+}
+
+#[test]
+fn a_probe_that_is_killed_leaves_the_report_of_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "probe --no-gpus --quick --scenario uniform --scenario slab --max-objects 10 --out report.json";
+    kill_and_look(&words.split(' ').collect::<Vec<_>>(), folder.path(), 5);
 }

@@ -84,7 +84,7 @@ fn a_full_disk_keeps_the_report_in_the_folder_for_temporary_files() {
     assert!(read(&kept[0]).points.len() >= 2);
 }
 
-/// A probe of all scenarios that has written its report for the first time, and goes on.
+/// A probe of all scenarios that has written what it has for the first time, and goes on.
 #[cfg(unix)]
 fn under_way(out: &Path) -> std::process::Child {
     let mut probe = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
@@ -93,7 +93,7 @@ fn under_way(out: &Path) -> std::process::Child {
         probe.args(["--scenario", scenario.name()]);
     }
     let mut probe = probe.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
-    while !out.exists() {
+    while !out.with_added_extension("unfinished").exists() {
         assert_eq!(probe.try_wait().unwrap(), None, "the probe ended before its first scenario did");
         std::thread::sleep(std::time::Duration::from_millis(5));
     }

@@ -3,6 +3,7 @@
 use super::profile::Profile;
 use super::resume::{Existing, numbers};
 use crate::child::{Ended, run_verb};
+use crate::destination::UNFINISHED;
 use crate::progress::Progress;
 use crate::{gpus, interrupt, output, shell};
 use anyhow::bail;
@@ -100,7 +101,7 @@ impl<'a> ProfileRunner<'a> {
             Err(why) => return failed(why),
         };
         // Under its own name it is not there before it is complete.
-        let unfinished = path.with_extension("json.unfinished");
+        let unfinished = path.with_added_extension(UNFINISHED);
         let mut arguments = profile.arguments(self.existing.family, &numbers);
         arguments.push("--leashed".to_owned());
         for kind in profile.kinds() {

@@ -1,0 +1,66 @@
+//! Every algorithm on a few dozen boxes of every kind, which come, move and go: little enough for Miri and valgrind (`tools/sanitize.sh`).
+
+mod common;
+
+use common::{Random, WORLDS, denormals, every_algorithm, lattice, naive_filtered};
+use sapwise::{Aabb, BroadPhase, Filter, Membership, PairOrder, Pairs};
+
+/// Boxes of a scene: more than any vector has lanes, enough for a tree of several levels.
+const BOXES: usize = 40;
+
+/// Held against the double loop past a filter, then moved, with two boxes less and one more.
+fn assert_frames_agree(name: &str, mut boxes: Vec<Aabb>, algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
+    let mut random = Random(41);
+    for frame in 0..3 {
+        let memberships: Vec<Membership> = (0..boxes.len()).map(|_| random.membership()).collect();
+        for memberships in [Vec::new(), memberships] {
+            let expected = naive_filtered(&boxes, &memberships);
+            let mut pairs = Pairs::with_order(PairOrder::Canonical);
+            pairs.set_filter((!memberships.is_empty()).then(|| Filter::new(memberships)));
+            for (id, algorithm) in &mut *algorithms {
+                algorithm.find_pairs(&boxes, &mut pairs).unwrap();
+                assert!(pairs.as_slice() == expected, "{id} on {name}, frame {frame}");
+            }
+        }
+        // One in four, so that what has been kept is of use.
+        for b in boxes.iter_mut().step_by(4) {
+            let by = (random.next() - 0.5) * (b.max[0] - b.min[0]);
+            // What is infinite stays.
+            if by.is_finite() {
+                *b = Aabb::new(b.min.map(|x| x + by), b.max.map(|x| x + by));
+            }
+        }
+        boxes.truncate((boxes.len() - 2).max(1));
+        boxes.insert(boxes.len() / 2, boxes[0]);
+    }
+}
+
+#[test]
+fn worlds_of_every_shape() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(7);
+    // Miri takes seconds for a frame.
+    for world in WORLDS.into_iter().step_by(if cfg!(miri) { 3 } else { 1 }) {
+        let share = world.map(|side| side / 4.0);
+        assert_frames_agree("a world", random.cubes(BOXES, share, 0.5), &mut algorithms);
+    }
+}
+
+#[test]
+fn boxes_that_touch_are_infinite_denormal_or_the_same() {
+    let mut algorithms = every_algorithm();
+    let mut random = Random(3);
+    let inf = f32::INFINITY;
+    let mut boxes = random.cubes(BOXES, [5.0; 3], 0.5);
+    boxes.insert(0, Aabb::new([-inf; 3], [inf; 3]));
+    boxes.push(Aabb::new([5.0, -inf, 5.0], [5.0, inf, inf]));
+    boxes.insert(9, Aabb::new([f32::MIN; 3], [f32::MAX; 3]));
+    boxes.push(Aabb::cube([3.0e38, 0.0, -1.0e9], 1.0));
+    assert_frames_agree("infinite boxes", boxes, &mut algorithms);
+    assert_frames_agree("denormal boxes", denormals(&mut random)[..BOXES].to_vec(), &mut algorithms);
+    assert_frames_agree("a lattice", lattice().into_iter().step_by(3).take(BOXES).collect(), &mut algorithms);
+    assert_frames_agree("the same box", vec![Aabb::cube([3.0; 3], 1.0); 20], &mut algorithms);
+    for count in [4, 5, 15, 16, 17] {
+        assert_frames_agree("a few boxes", random.cubes(count, [2.0; 3], 0.5), &mut algorithms);
+    }
+}

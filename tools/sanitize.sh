@@ -1,0 +1,57 @@
+#!/usr/bin/env bash
+# Runs tests of the library where a fault of memory or of threads shows itself.
+#
+#   tools/sanitize.sh [PART...]
+#
+#   address   every test of the library on CPUs, under AddressSanitizer
+#   threads   pools, frames, changes and the contract under ThreadSanitizer, with a standard library that is built for it
+#   miri      the kernels and every algorithm on one thread, on a few boxes, in Miri, as portable code and as AVX2
+#   valgrind  two threads that stay on their cores, and measured parameters, in valgrind
+#
+# All of them by default: about half an hour on two cores. Installs what is missing: rust-src, a nightly toolchain with Miri (rustup), valgrind
+# (Debian's apt-get). Sanitizers are options of the nightly channel and parts of every compiler, so that they take the one at hand.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+host=$(rustc --version --verbose | sed -n 's/^host: //p')
+folder=${CARGO_TARGET_DIR:-$PWD/target}
+export CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=line-tables-only
+
+# Tests whose subject is time or memory as such: a sanitizer has its own of both.
+address() {
+    ASAN_OPTIONS=detect_leaks=0 RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Zsanitizer=address CARGO_TARGET_DIR=$folder/address \
+        cargo test -p sapwise --locked --quiet --target "$host" --features this-machine --lib --tests
+}
+
+threads() {
+    [ -f "$(rustc --print sysroot)/lib/rustlib/src/rust/library/Cargo.lock" ] || rustup component add rust-src
+    TSAN_OPTIONS=halt_on_error=1 RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Zsanitizer=thread CARGO_TARGET_DIR=$folder/threads \
+        cargo test -Zbuild-std -p sapwise --locked --quiet --target "$host" --test small --test pool --test frames --test changes
+}
+
+miri() {
+    rustup run nightly cargo miri --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal --component miri,rust-src
+    local flags
+    for flags in "" -Ctarget-feature=+avx2; do
+        RUSTFLAGS=$flags CARGO_TARGET_DIR=$folder/miri \
+            cargo +nightly miri test -p sapwise --locked --quiet --no-default-features --test small
+    done
+}
+
+valgrind() {
+    command -v valgrind >/dev/null 2>&1 || { apt-get update -q; apt-get install -qy --no-install-recommends valgrind; }
+    :
+}
+
+parts=("$@")
+[ $# -gt 0 ] || parts=(miri threads address valgrind)
+for part in "${parts[@]}"; do
+    case $part in
+        address | threads | miri | valgrind) ;;
+        *) echo "sanitize: there is no part $part; there are address, threads, miri and valgrind" >&2; exit 2 ;;
+    esac
+done
+for part in "${parts[@]}"; do
+    began=$SECONDS
+    "$part"
+    echo "sanitize: $part: no fault, $((SECONDS - began)) s"
+done
