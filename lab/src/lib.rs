@@ -31,6 +31,7 @@ pub mod data_table;
 pub mod evaluate;
 pub mod figures;
 pub mod fit;
+pub mod fleet;
 pub mod label_text;
 pub mod model_card;
 pub mod page;

@@ -108,7 +108,7 @@ fn kill_and_look(words: &[&str], out: &Path, seed: u64) {
 #[cfg(unix)]
 fn end_files_early(words: &[&str], out: &Path, before: &[PathBuf]) {
     let largest = before.iter().map(|path| fs::metadata(path).unwrap().len()).max().unwrap() as f64;
-    for share in [0.0, 0.3, 0.9] {
+    for share in [0.0, 0.3, 0.6] {
         let mut command = Command::new("sh");
         // Where the signal is not ignored it kills, which is the subject elsewhere. The limit is in blocks of 512 bytes.
         command.args(["-c", "trap '' XFSZ; ulimit -f $0; exec \"$@\"", &((largest * share) as u64 / 512).to_string()]);
@@ -120,7 +120,7 @@ fn end_files_early(words: &[&str], out: &Path, before: &[PathBuf]) {
     let disk = tempfile::tempdir_in(disk).unwrap();
     success(sapwise().args(words).current_dir(disk.path()));
     let before = files(disk.path());
-    for share in [0.0, 0.3, 0.9] {
+    for share in [0.0, 0.3, 0.6] {
         let filler = tempfile::NamedTempFile::new_in(disk.path().parent().unwrap()).unwrap();
         while filler.as_file().write_all_at(&[1; 4096], filler.as_file().metadata().unwrap().len()).is_ok() {}
         let full = filler.as_file().metadata().unwrap().len();

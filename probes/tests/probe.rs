@@ -66,10 +66,8 @@ fn a_folder_that_takes_no_file_is_told_before_measuring() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     fs::write(&file, "").unwrap();
-    for out in [file.join("report.json"), folder.path().to_path_buf()] {
-        let complaint = failure(sapwise().args(TINY).arg("--out").arg(&out), 1);
-        assert!(complaint.contains("--out"), "{complaint}");
-    }
+    let complaint = failure(sapwise().args(TINY).arg("--out").arg(file.join("report.json")), 1);
+    assert!(complaint.contains("--out"), "{complaint}");
 }
 
 #[cfg(target_os = "linux")]

@@ -10,7 +10,6 @@ use crate::data::host;
 use crate::report::{Label, Report};
 use crate::steadiness::Steadiness;
 use anyhow::{Result, bail};
-use sapwise::stats::median;
 use serde::Serialize;
 
 pub use crossovers::CrossoverSpread;
@@ -55,10 +54,10 @@ impl Comparison {
                 );
             }
         }
-        if let Some((name, _)) = reports.iter().find(|(_, r)| is_unfinished(r)) {
+        if let Some((name, _)) = reports.iter().find(|(_, r)| r.is_unfinished()) {
             bail!("{name} was not finished; remove it and measure it again");
         }
-        let foreign_load = reports.iter().filter_map(|(_, r)| load(r)).max_by(f64::total_cmp);
+        let foreign_load = reports.iter().filter_map(|(_, r)| r.foreign_load()).max_by(f64::total_cmp);
         let steadiness = reports.iter().map(|(_, r)| Steadiness::of(r)).collect();
         let (reports, not_compared) = common::common(reports);
         let all: Vec<&Report> = reports.iter().map(|(_, report)| report).collect();
@@ -102,20 +101,6 @@ fn difference(a: &Report, b: &Report) -> Option<&'static str> {
         (!a.hardware.gpus.iter().any(|g| other_gpu(g.gpu.index)), "the GPUs"),
     ];
     same.into_iter().find(|(same, _)| !same).map(|(_, what)| what)
-}
-
-/// Whether a report was cut short, as its remarks say.
-fn is_unfinished(report: &Report) -> bool {
-    report.remarks.iter().any(|r| r.starts_with("unfinished") || r.starts_with("interrupted"))
-}
-
-/// The foreign load at half of the points, or that of the parameters where there are none.
-fn load(report: &Report) -> Option<f64> {
-    let mut loads: Vec<f64> = report.points.iter().filter_map(|p| p.foreign_load).collect();
-    if loads.is_empty() {
-        loads = report.hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
-    }
-    median(&loads)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What a report holds.
 
 use sapwise::model::Scale;
+use sapwise::stats::median;
 use sapwise::{AlgorithmId, Hardware, Load, Term};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -199,6 +200,23 @@ impl std::fmt::Display for Restricted {
 }
 
 impl Report {
+    /// Whether it was cut short, as its remarks say.
+    #[must_use]
+    pub fn is_unfinished(&self) -> bool {
+        self.remarks.iter().any(|r| r.starts_with("unfinished") || r.starts_with("interrupted"))
+    }
+
+    /// The share of the CPU, 0 to 1, that other programs took at half of the points, or of the parameters where there are no points. `None` where it
+    /// can't be told.
+    #[must_use]
+    pub fn foreign_load(&self) -> Option<f64> {
+        let mut loads: Vec<f64> = self.points.iter().filter_map(|p| p.foreign_load).collect();
+        if loads.is_empty() {
+            loads = self.hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
+        }
+        median(&loads)
+    }
+
     /// What makes this report unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<String> {

@@ -2,6 +2,7 @@
 
 #[cfg(test)]
 mod documents;
+mod fleet;
 mod known;
 mod part;
 mod probe;
@@ -14,6 +15,7 @@ use sapwise::AlgorithmId;
 use sapwise_scenes::Scenario;
 use std::path::PathBuf;
 
+pub(crate) use fleet::Fleet;
 pub(crate) use part::{Part, PartKind};
 pub(crate) use probe::{Lifted, Probe};
 pub(crate) use run::{Run, Scene};
@@ -42,6 +44,7 @@ pub(crate) enum Verb {
     Check(Check),
     Convert(Convert),
     Compare(Compare),
+    Fleet(Fleet),
     Simulate(Simulate),
     Schema(Schema),
     #[command(hide = true)]

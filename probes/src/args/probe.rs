@@ -18,6 +18,7 @@ use std::str::FromStr;
 Examples:
   sapwise probe --quick
   sapwise probe --out this-machine.json
+  sapwise probe --out reports/                     # a folder that exists, also one that many nodes share
   sapwise probe --threads 1 --out one-core.json    # as if the machine had one core
   sapwise probe --profiles --out reports           # every profile of this machine, for train and for datasets/")]
 pub(crate) struct Probe {
@@ -58,7 +59,9 @@ pub(crate) struct Probe {
     /// Stop as at Ctrl-C when standard input ends. For a process that starts this one.
     #[arg(long, hide = true, conflicts_with = "profiles")]
     pub(crate) leashed: bool,
-    /// Where the report goes; with --profiles a folder. Without this option report.json, with --profiles reports/, with --json no file.
+    /// Where the report goes. In a folder that exists it is named after CPU, cores and node, and a good one of this node by the same command is kept:
+    /// `sapwise fleet` reads what many nodes have put there. SAPWISE_NODE tells nodes apart that have one host name. With --profiles a folder. Without
+    /// this option report.json, with --profiles reports/, with --json no file.
     #[arg(long, value_name = "R.json")]
     pub(crate) out: Option<PathBuf>,
     /// The report on standard output instead of a summary.

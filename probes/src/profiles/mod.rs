@@ -15,6 +15,7 @@ use anyhow::Context;
 use family::{Whole, family};
 use indicatif::HumanDuration;
 use profile::Profile;
+pub(crate) use profile::machine_stem;
 use resume::Existing;
 use runner::{End, ProfileRunner};
 use sapwise::{GpuIdentity, SimdLevel, measure, usable_cores};
@@ -42,7 +43,7 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     let machine = measure::machine();
     let (cores, level) = (usable_cores(), SimdLevel::detected());
     let family = family(&Whole { cores, level, gpus: taken(arguments)? }, arguments.quick);
-    let stem = profile::machine_stem(&machine.cpu, cores);
+    let stem = machine_stem(&machine.cpu, cores);
     let registry = algorithms.registry(cores);
     let (folder, stem, physical_id) = (folder.as_path(), stem.as_str(), machine.physical_id.as_str());
     let existing = Existing { folder, stem, physical_id, registry: &registry, family: arguments };

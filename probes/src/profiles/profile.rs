@@ -96,7 +96,7 @@ impl Profile {
 }
 
 /// The beginning of the file names of a machine's profiles.
-pub(super) fn machine_stem(cpu: &str, cores: u32) -> String {
+pub(crate) fn machine_stem(cpu: &str, cores: u32) -> String {
     format!("{}-{cores}c", super::slug::cpu(cpu))
 }
 

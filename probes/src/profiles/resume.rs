@@ -2,12 +2,13 @@
 
 use super::profile::{Profile, is_named};
 use crate::args::{Arguments, Probe, Verb};
-use crate::{output, provenance, restriction, revisions};
+use crate::flaw::flaw;
+use crate::{output, provenance};
 use clap::Parser;
 use sapwise::{GpuIdentity, Registry};
 use sapwise_lab::data::Document;
 use sapwise_lab::data::read_document;
-use sapwise_lab::report::{Label, Report};
+use sapwise_lab::report::Report;
 use std::path::{Path, PathBuf};
 
 /// A folder, and what its reports are compared with.
@@ -57,7 +58,7 @@ impl Existing<'_> {
     /// Why a report of this machine stays where this profile's would go, if so: what the same command would measure again is
     /// lost to nobody, a good report of another command is.
     fn keeps(&self, report: &Report, profile: &Profile) -> Option<String> {
-        if self.flaw(report).is_some() { None } else { self.foreign(report, profile) }
+        if flaw(report, self.registry).is_some() { None } else { self.foreign(report, profile) }
     }
 
     /// What a report lacks to be that of a profile, complete and current, if anything.
@@ -65,34 +66,13 @@ impl Existing<'_> {
         if report.hardware.machine.physical_id != self.physical_id {
             return Some("it is of another machine".to_owned());
         }
-        if let Some(why) = self.flaw(report).or_else(|| self.foreign(report, profile)) {
+        if let Some(why) = flaw(report, self.registry).or_else(|| self.foreign(report, profile)) {
             return Some(why);
         }
         let restriction = report.provenance.restriction.as_ref();
         let proven = |kind| restriction.is_some_and(|r| r.proof.iter().any(|p| p.kind == kind));
         let unproven = profile.kinds().into_iter().find(|&kind| !proven(kind));
         unproven.map(|kind| format!("nothing was there to prove the restriction {kind} by"))
-    }
-
-    /// Why a report is not worth keeping, whatever command it was measured by.
-    fn flaw(&self, report: &Report) -> Option<String> {
-        let provenance = &report.provenance;
-        if !provenance.optimised && !cfg!(debug_assertions) {
-            return Some("it was measured by a build without optimisation".to_owned());
-        }
-        if let Some(stale) = revisions::stale_in_report(report, self.registry).first() {
-            return Some(format!("it is stale: {stale}"));
-        }
-        if report.points.is_empty()
-            || report.remarks.iter().any(|r| r.starts_with("unfinished") || r.starts_with("interrupted"))
-        {
-            return Some("it is incomplete".to_owned());
-        }
-        let asked = provenance.command.split(' ').any(|word| word.starts_with("--contended"));
-        if report.label == Label::RealContended && !asked {
-            return Some("other programs disturbed it".to_owned());
-        }
-        restriction::not_shown(provenance.restriction.as_ref()?).into_iter().next()
     }
 
     /// Why a report is not one that this profile's command measures, if so.
@@ -156,7 +136,7 @@ mod tests {
     }
     use crate::profiles::family::{Whole, family};
     use sapwise::{GpuKind, SimdLevel};
-    use sapwise_lab::report::{Proof, Restricted, Restriction, Timed};
+    use sapwise_lab::report::{Label, Proof, Restricted, Restriction, Timed};
 
     fn gpu(index: u32, name: &str) -> GpuIdentity {
         GpuIdentity::new(index, name, GpuKind::Discrete)

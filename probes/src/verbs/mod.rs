@@ -4,6 +4,7 @@ mod check;
 mod compare;
 mod convert;
 mod devices;
+mod fleet;
 mod pairs;
 mod part;
 mod predict;
@@ -37,6 +38,7 @@ pub(crate) fn run(verb: Verb, algorithms: &Algorithms) -> anyhow::Result<Outcome
         Verb::Pairs(arguments) => pairs::run(&arguments, algorithms),
         Verb::Convert(arguments) => convert::run(&arguments),
         Verb::Compare(arguments) => compare::run(&arguments),
+        Verb::Fleet(arguments) => fleet::run(&arguments, algorithms),
         Verb::Check(arguments) => check::run(&arguments, algorithms),
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Schema(arguments) => schema::run(&arguments),

@@ -5,16 +5,19 @@ use crate::args::Probe;
 use crate::contention::contend;
 use crate::destination::Destination;
 use crate::exit::Outcome;
+use crate::flaw::flaw;
 use crate::hardware::{self, measure_hardware};
 use crate::sweep::{Conditions, Found, sweep_all};
 use crate::terminal::Terminal;
-use crate::{child, interrupt, output, profiles, provenance, restriction, summary};
+use crate::{child, interrupt, node, output, profiles, provenance, restriction, summary};
 use anyhow::Context;
 use sapwise::{Hardware, usable_cores};
+use sapwise_lab::data::read_report;
 use sapwise_lab::report;
 use sapwise_lab::report::{Report, Restriction};
 use sapwise_lab::steadiness::Steadiness;
 use sapwise_lab::sweep::Plan;
+use std::path::Path;
 use std::time::Instant;
 
 pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
@@ -24,8 +27,15 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     let began = Instant::now();
     let plan = plan(arguments)?;
     let references = restriction::references(&arguments.unrestricted)?;
-    let destination =
-        if arguments.json && arguments.out.is_none() { None } else { Some(Destination::new(arguments.out.as_deref())?) };
+    let in_folder = arguments.out.as_deref().filter(|out| out.is_dir()).map(node::report_in);
+    if let Some(path) = in_folder.as_deref().filter(|path| path.exists())
+        && is_good(path, arguments, algorithms)?
+    {
+        output::print(&format!("{} is complete: nothing is measured.\nNext: remove it to measure again", path.display()))?;
+        return Ok(Outcome::Done);
+    }
+    let out = in_folder.as_deref().or(arguments.out.as_deref());
+    let destination = if arguments.json && out.is_none() { None } else { Some(Destination::new(out)?) };
     interrupt::listen()?;
     if arguments.leashed {
         child::stop_with_parent();
@@ -82,6 +92,25 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     }
     printed?;
     Ok(Outcome::Done)
+}
+
+/// Whether the report of this node that is there already need not be measured again.
+///
+/// # Errors
+/// When it is a good one of another command, or no report: neither is replaced.
+fn is_good(path: &Path, arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<bool> {
+    let (_, there) = read_report(path, &output::warn).context("name a file, or another folder, with --out")?;
+    if flaw(&there, &algorithms.registry(usable_cores())).is_some() {
+        return Ok(false);
+    }
+    let command = provenance::command(arguments);
+    if there.provenance.command != command {
+        let (path, theirs) = (path.display(), &there.provenance.command);
+        anyhow::bail!(
+            "{path} was measured by `sapwise {theirs}`, not by `sapwise {command}`; name a file, or another folder, with --out"
+        );
+    }
+    Ok(true)
 }
 
 /// What to sweep; `None` with `--hardware-only`.

@@ -1,0 +1,25 @@
+//! What makes a report that is there already worth measuring again.
+
+use crate::{restriction, revisions};
+use sapwise::Registry;
+use sapwise_lab::report::{Label, Report};
+
+/// Why a report is not worth keeping, whatever command it was measured by.
+pub(crate) fn flaw(report: &Report, registry: &Registry) -> Option<String> {
+    let provenance = &report.provenance;
+    if !provenance.optimised && !cfg!(debug_assertions) {
+        return Some("it was measured by a build without optimisation".to_owned());
+    }
+    if let Some(stale) = revisions::stale_in_report(report, registry).first() {
+        return Some(format!("it is stale: {stale}"));
+    }
+    let hardware_only = provenance.command.split(' ').any(|word| word == "--hardware-only");
+    if report.points.is_empty() && !hardware_only || report.is_unfinished() {
+        return Some("it is incomplete".to_owned());
+    }
+    let asked = provenance.command.split(' ').any(|word| word.starts_with("--contended"));
+    if report.label == Label::RealContended && !asked {
+        return Some("other programs disturbed it".to_owned());
+    }
+    restriction::not_shown(provenance.restriction.as_ref()?).into_iter().next()
+}
