@@ -4,14 +4,14 @@
 //! up otherwise, and would make the model of all a little worse without a word.
 
 use crate::data::host;
-use crate::report::{Label, Report};
+use crate::report::{Label, Report, Restricted};
 use sapwise::ParameterId;
 use sapwise::stats::median;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A node whose algorithms take so many times what they take on the others of its kind is not like them. Reports of one machine that were measured
-/// twice in `datasets/` differ by 1.02 and 1.04.
+/// A node whose algorithms take so many times what they take on the others of its kind is not like them. The two machines of `datasets/` that were
+/// measured twice are 1.00 and 1.02 of themselves; a program beside them that takes memory or cache makes that 1.00 to 1.36.
 pub const SLOW: f64 = 1.15;
 
 /// Reports of nodes, sorted into kinds.
@@ -38,6 +38,8 @@ pub struct Kind {
     pub gpus: Vec<String>,
     /// CPU model, caches and host clock, as [`host`] tells them apart.
     pub host: String,
+    /// What was taken from it on purpose.
+    pub taken: Vec<Restricted>,
 }
 
 /// The report of one node.
@@ -95,6 +97,7 @@ impl Kind {
             simd: hardware.machine.simd.clone(),
             gpus: hardware.gpus.iter().map(|g| g.gpu.name.clone()).collect(),
             host: host(hardware),
+            taken: report.provenance.restriction.as_ref().map_or(Vec::new(), |r| r.kinds.clone()),
         }
     }
 }
@@ -105,7 +108,7 @@ impl Node {
         let foreign_load = report.foreign_load();
         let problem = if report.is_unfinished() {
             Some("unfinished: the node failed, or its job was ended; measure it again".to_owned())
-        } else if report.label == Label::RealContended {
+        } else if is_shared(report) {
             let share = foreign_load.map_or(String::new(), |share| format!(" took {:.0} % of its CPU", 100.0 * share));
             Some(format!("shared: other programs{share}; measure it alone"))
         } else {
@@ -122,7 +125,14 @@ impl Node {
 type Times<'a> = BTreeMap<(&'a str, u32, String), f64>;
 
 fn sound(report: &Report) -> bool {
-    !report.is_unfinished() && report.label != Label::RealContended
+    !report.is_unfinished() && !is_shared(report)
+}
+
+/// Whether other programs disturbed it than those that it was measured beside on purpose.
+fn is_shared(report: &Report) -> bool {
+    let kinds = report.provenance.restriction.iter().flat_map(|r| &r.kinds);
+    let mut contended = kinds.filter(|k| matches!(k, Restricted::ContendedMemory | Restricted::ContendedCache));
+    report.label == Label::RealContended && contended.next().is_none()
 }
 
 fn times(report: &Report) -> Times<'_> {

@@ -30,28 +30,28 @@ fn change(path: &Path, change: impl FnOnce(&mut sapwise_lab::Report)) {
 #[test]
 fn nodes_put_their_reports_into_one_folder_and_go_on_where_they_stopped() {
     let folder = tempfile::tempdir().unwrap();
-    success(&mut probe("first", folder.path()));
-    success(&mut probe("second", folder.path()));
+    success(&mut probe("qx-first", folder.path()));
+    success(&mut probe("qx-second", folder.path()));
     let files = reports(folder.path());
     assert_eq!(files.len(), 2);
     for file in &files {
         let (name, text) = (file.file_name().unwrap().to_str().unwrap(), fs::read_to_string(file).unwrap());
-        assert!(!name.contains("first") && !name.contains("second") && !text.contains("first"), "{name}");
+        assert!(!name.contains("qx-") && !text.contains("qx-"), "{name}");
         // What other programs took meanwhile is not the subject.
         change(file, |report| report.label = sapwise_lab::report::Label::RealFull);
     }
     let before = fs::read(&files[0]).unwrap();
-    for node in ["first", "second"] {
+    for node in ["qx-first", "qx-second"] {
         let told = success(&mut probe(node, folder.path()));
         assert!(told.contains("is complete: nothing is measured"), "{told}");
     }
     assert_eq!(fs::read(&files[0]).unwrap(), before);
-    let complaint = failure(probe("first", folder.path()).args(["--seed", "7"]), 1);
+    let complaint = failure(probe("qx-first", folder.path()).args(["--seed", "7"]), 1);
     assert!(complaint.contains("was measured by `sapwise probe") && complaint.contains("--out"), "{complaint}");
     // One that was cut short is measured again.
     change(&files[0], |report| report.remarks.push("interrupted after 1 of 2 scenarios".to_owned()));
-    success(probe("first", folder.path()).env("SAPWISE_NODE", "first"));
-    success(probe("second", folder.path()).env("SAPWISE_NODE", "second"));
+    success(probe("qx-first", folder.path()).env("SAPWISE_NODE", "qx-first"));
+    success(probe("qx-second", folder.path()).env("SAPWISE_NODE", "qx-second"));
     assert!(!fs::read_to_string(&files[0]).unwrap().contains("interrupted after"));
     assert_eq!(reports(folder.path()), files);
 }
@@ -85,7 +85,7 @@ fn a_fleet_is_told_in_a_table_with_whoever_failed_in_it() {
         |name: &str| told.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{name}: {told}")).to_owned();
     assert!(row("a.json").contains("slow: it takes 2.00"), "{told}");
     assert!(row("b.json").contains("good") && row("d.json.unfinished").contains("unfinished"), "{told}");
-    assert!(row("c.json").contains("JSON") || row("c.json").contains("can't"), "{told}");
+    assert!(row("c.json").contains("is no sound file"), "{told}");
     let json: serde_json::Value = serde_json::from_str(&failure_text(fleet().arg("--json"))).unwrap();
     assert_eq!(json["failed"].as_array().unwrap().len(), 2);
     assert_eq!(json["nodes"][0]["file"], "a.json");

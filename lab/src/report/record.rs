@@ -84,7 +84,7 @@ pub struct Restriction {
 }
 
 /// What can be taken from a machine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Restricted {
     /// Cores, by [`Provenance::threads`].

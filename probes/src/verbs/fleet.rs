@@ -116,5 +116,6 @@ fn table(answer: &Answer, terminal: Terminal) -> String {
 
 fn sentence(kind: &Kind) -> String {
     let gpus = if kind.gpus.is_empty() { "no GPU".to_owned() } else { kind.gpus.join(", ") };
-    format!("{}, {}, {}, {gpus}; host {}", kind.cpu, count(kind.cores as usize, "core"), kind.simd, kind.host)
+    let taken: String = kind.taken.iter().map(|what| format!(", {what}")).collect();
+    format!("{}, {}, {}, {gpus}{taken}; host {}", kind.cpu, count(kind.cores as usize, "core"), kind.simd, kind.host)
 }
