@@ -77,13 +77,13 @@ pub(crate) fn run(arguments: &args::Fleet, algorithms: &Algorithms) -> anyhow::R
     Ok(if bad + missing == 0 { Outcome::Done } else { Outcome::Failed })
 }
 
-/// What nodes have left in folders that did not finish.
+/// What nodes have left in folders that did not finish, but for those that have a report of before.
 fn unfinished(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for folder in paths.iter().filter(|path| path.is_dir()) {
         for entry in std::fs::read_dir(folder)? {
             let path = entry?.path();
-            if path.extension().is_some_and(|e| e == UNFINISHED) {
+            if path.extension().is_some_and(|e| e == UNFINISHED) && !path.with_extension("").exists() {
                 found.push(path);
             }
         }

@@ -11,7 +11,7 @@ use crate::sweep::{Conditions, Found, sweep_all};
 use crate::terminal::Terminal;
 use crate::{child, interrupt, node, output, profiles, provenance, restriction, summary};
 use anyhow::Context;
-use sapwise::{Hardware, usable_cores};
+use sapwise::{Hardware, measure, usable_cores};
 use sapwise_lab::data::read_report;
 use sapwise_lab::report;
 use sapwise_lab::report::{Report, Restriction};
@@ -29,9 +29,16 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     let references = restriction::references(&arguments.unrestricted)?;
     let in_folder = arguments.out.as_deref().filter(|out| out.is_dir()).map(node::report_in);
     if let Some(path) = in_folder.as_deref().filter(|path| path.exists())
-        && is_good(path, arguments, algorithms)?
+        && let Some(there) = good(path, arguments, algorithms)?
     {
-        output::print(&format!("{} is complete: nothing is measured.\nNext: remove it to measure again", path.display()))?;
+        if arguments.json {
+            output::print_file(&report::write(&there)?)?;
+        } else {
+            output::print(&format!(
+                "{} is complete: nothing is measured.\nNext: remove it to measure again",
+                path.display()
+            ))?;
+        }
         return Ok(Outcome::Done);
     }
     let out = in_folder.as_deref().or(arguments.out.as_deref());
@@ -94,23 +101,25 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     Ok(Outcome::Done)
 }
 
-/// Whether the report of this node that is there already need not be measured again.
+/// The report of this node that is there already, where it need not be measured again.
 ///
 /// # Errors
 /// When it is a good one of another command, or no report: neither is replaced.
-fn is_good(path: &Path, arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<bool> {
+fn good(path: &Path, arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<Option<Report>> {
     let (_, there) = read_report(path, &output::warn).context("name a file, or another folder, with --out")?;
-    if flaw(&there, &algorithms.registry(usable_cores())).is_some() {
-        return Ok(false);
+    let now = measure::machine();
+    if there.hardware.machine.physical_id != now.physical_id || flaw(&there, &algorithms.registry(usable_cores())).is_some()
+    {
+        return Ok(None);
     }
     let command = provenance::command(arguments);
-    if there.provenance.command != command {
-        let (path, theirs) = (path.display(), &there.provenance.command);
-        anyhow::bail!(
-            "{path} was measured by `sapwise {theirs}`, not by `sapwise {command}`; name a file, or another folder, with --out"
-        );
+    let (as_then, as_now) = ((&there.provenance.command, &there.hardware.machine.simd), (&command, &now.simd));
+    if as_then != as_now {
+        let told = |(command, simd): (&String, &String)| format!("`sapwise {command}` at {simd}");
+        let (then, now) = (told(as_then), told(as_now));
+        anyhow::bail!("{} was measured by {then}, not by {now}; name a file, or another folder, with --out", path.display());
     }
-    Ok(true)
+    Ok(Some(there))
 }
 
 /// What to sweep; `None` with `--hardware-only`.
