@@ -4,6 +4,7 @@ mod cache;
 mod for_this_machine;
 mod options;
 mod slice;
+mod tunings;
 
 #[cfg(feature = "schema")]
 pub use cache::cache_schema;

@@ -61,6 +61,20 @@ impl Machine {
     pub fn of(physical_id: impl Into<String>) -> Self {
         Self { physical_id: physical_id.into(), ..Self::default() }
     }
+
+    /// The name of the file with the tuning of machines of this kind, for [`StartOptions::tunings`](crate::StartOptions::tunings) and
+    /// `sapwise predict --report FOLDER`: physical id, SIMD level, cores that the program may use, and the device numbers of its GPUs, as in
+    /// `478e43ba2e7824ab-avx512-16-10de2335.json`. Software adapters don't count.
+    #[must_use]
+    pub fn tuning_file(&self, cores: u32, gpus: &[GpuIdentity]) -> String {
+        let mut name = format!("{}-{}-{cores}", self.physical_id, self.simd);
+        for gpu in gpus.iter().filter(|gpu| gpu.kind != GpuKind::Software) {
+            name.push('-');
+            // What a driver says may hold anything.
+            name.extend(gpu.device.chars().filter(char::is_ascii_alphanumeric));
+        }
+        name + ".json"
+    }
 }
 
 impl Hardware {

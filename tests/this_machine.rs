@@ -3,6 +3,8 @@
 #[path = "this_machine/age.rs"]
 mod age;
 mod common;
+#[path = "this_machine/shipped.rs"]
+mod shipped;
 
 use common::{Random, naive};
 use sapwise::{

@@ -99,3 +99,50 @@ fn failure_text(command: &mut assert_cmd::Command) -> String {
     let ended = command.assert().code(1);
     String::from_utf8(ended.get_output().stdout.clone()).unwrap()
 }
+
+#[test]
+fn each_kind_of_machine_gets_a_tuning_that_a_program_picks_by_its_identity() {
+    let [reports, tunings] = [(), ()].map(|()| tempfile::tempdir().unwrap());
+    for node in ["a", "b"] {
+        // Two sizes, as the curves of a measured tuning need.
+        let sizes = ["--max-objects", "20", "--out"];
+        success(sapwise().env("SAPWISE_NODE", node).args(&TINY[..5]).args(sizes).arg(reports.path()));
+    }
+    for file in self::reports(reports.path()) {
+        change(&file, |report| report.label = sapwise_lab::report::Label::RealFull);
+    }
+    // A larger machine of another make, and one that was not left alone.
+    let first = &self::reports(reports.path())[0];
+    for (name, id, label) in [
+        ("large.json", "1", sapwise_lab::report::Label::RealFull),
+        ("shared.json", "2", sapwise_lab::report::Label::RealContended),
+    ] {
+        let file = reports.path().join(name);
+        fs::copy(first, &file).unwrap();
+        change(&file, |report| {
+            report.hardware.machine.physical_id = id.repeat(16);
+            report.label = label;
+        });
+    }
+    let out = tunings.path().join("made");
+    let predict = |more: &[&str]| {
+        let mut command = sapwise();
+        command.args(["predict", "--no-gpus", "--report"]).arg(reports.path()).args(more);
+        command
+    };
+    let told = failure_text(predict(&["--out"]).arg(&out));
+    assert!(told.contains("2 tunings written") && told.contains("can be believed"), "{told}");
+    let machine = sapwise::measure::machine();
+    let own = out.join(machine.tuning_file(sapwise::usable_cores(), &[]));
+    let tuning = sapwise::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap();
+    assert_eq!(tuning.source, sapwise::Source::Predicted);
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 2);
+    fs::remove_file(reports.path().join("shared.json")).unwrap();
+    success(predict(&["--measured", "--out"]).arg(&out));
+    let tuning = sapwise::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap();
+    assert_eq!(tuning.source, sapwise::Source::Measured);
+    let complaint = failure(&mut predict(&[]), 2);
+    assert!(complaint.contains("--out"), "{complaint}");
+    let complaint = failure(predict(&["--out"]).arg(reports.path()), 2);
+    assert!(complaint.contains("holds the reports"), "{complaint}");
+}

@@ -24,7 +24,7 @@ pub struct Setup {
     pub seconds: f64,
     /// The file of the cache, where there is one to be.
     pub file: Option<PathBuf>,
-    /// When and how the hardware was measured; `None` for tuning that was given, and for the usual one.
+    /// When and how the hardware was measured, or when the tuning of its kind was first taken; `None` for tuning that was given, and for the usual one.
     pub measured: Option<Measurement>,
 }
 
@@ -37,6 +37,8 @@ pub enum Origin {
     Given,
     /// It is on its way; the usual tuning decides meanwhile. Looked for at every frame.
     Awaited,
+    /// From the folder with tunings of kinds of machines: [`StartOptions::tunings`](crate::StartOptions::tunings).
+    Shipped,
     /// From the cache.
     Cached,
     /// From a measurement of the hardware and a prediction.
@@ -113,7 +115,7 @@ impl Start {
             }
             (None, Origin::Given) => Err(SaveError::Given),
             (None, Origin::Awaited | Origin::Usual) => Ok(false),
-            (None, Origin::Cached | Origin::Probed) => Err(SaveError::NoCache),
+            (None, Origin::Shipped | Origin::Cached | Origin::Probed) => Err(SaveError::NoCache),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::cache::{CacheFile, Key};
 use super::options::StartOptions;
-use super::slice;
+use super::{slice, tunings};
 use crate::adaptive::{Adaptive, Arrival, Awaited, Handover, Instances, Keeper, Origin, Setup, Start};
 use crate::entry::Entry;
 use crate::error::Error;
@@ -191,16 +191,36 @@ fn find(
         let file = file.clone().map(|f| f.of(measured.clone()));
         Found { tuning, origin: Origin::Cached, measured, file }
     };
-    let (mut before, mut in_use) = (None, false);
-    match file.as_ref().map(CacheFile::read) {
-        Some(Ok(Some(kept))) => {
-            let Some(why) = kept.1.doubt() else { return Some(cached(kept)) };
-            remarks.push(format!("the hardware is measured again: {why}"));
-            in_use = meanwhile(cached(kept.clone()), remarks);
-            before = Some(kept);
+    let before = match file.as_ref().map(CacheFile::read) {
+        Some(Ok(kept)) => kept,
+        Some(Err(why)) => {
+            remarks.push(why);
+            None
         }
-        Some(Err(why)) => remarks.push(why),
-        Some(Ok(None)) | None => {}
+        None => None,
+    };
+    let doubt = before.as_ref().map(|kept| kept.1.doubt());
+    if let (Some(kept), Some(None)) = (&before, &doubt) {
+        return Some(cached(kept.clone()));
+    }
+    // What frames have contradicted is not taken a second time.
+    if let Some(folder) = &options.tunings
+        && !before.as_ref().is_some_and(|kept| kept.1.is_contradicted())
+    {
+        match tunings::of_this_machine(folder, registry) {
+            Ok(Some(tuning)) => {
+                let measured = Measurement::now(Vec::new(), None);
+                let file = file.map(|f| f.of(measured.clone()));
+                return Some(Found { tuning, origin: Origin::Shipped, measured, file });
+            }
+            Ok(None) => {}
+            Err(why) => remarks.push(why),
+        }
+    }
+    let mut in_use = false;
+    if let (Some(kept), Some(Some(why))) = (&before, doubt) {
+        remarks.push(format!("the hardware is measured again: {why}"));
+        in_use = meanwhile(cached(kept.clone()), remarks);
     }
     // Processes that start together measure once, and don't disturb each other.
     let turn = file.as_ref().and_then(|f| f.wait_for_turn(patience, || pace.is_stopped()));

@@ -33,6 +33,11 @@ pub struct StartOptions {
     pub wait_at_most: Duration,
     /// Where tuning is kept from one start to the next. The user's cache folder by default.
     pub cache: Cache,
+    /// A folder with a tuning for each kind of machine that is known beforehand: the nodes of a cluster, the consoles that a game runs on.
+    /// `sapwise predict --report REPORTS --out FOLDER` writes it, [`Machine::tuning_file`](crate::Machine::tuning_file) names its files. Where
+    /// the [`cache`](Self::cache) has nothing and the folder has a tuning of this kind of machine, that is taken and nothing is measured.
+    /// `None` by default.
+    pub tunings: Option<PathBuf>,
     /// The algorithms to choose from: the program's own, its thread pool ([`Registry::use_pool`]), its GPUs
     /// (`Registry::add_gpus`, with a `Gpus::set_wait_limit` of the program's). `None`, the default: ours on all usable cores, with
     /// threads that the system puts where it likes ([`Registry::pin_threads`] is for programs that have the machine to themselves), and with the feature `measure-gpu` on every GPU that is no software adapter.
@@ -69,6 +74,7 @@ impl StartOptions {
             background: true,
             wait_at_most: Duration::ZERO,
             cache: Cache::User,
+            tunings: None,
             registry: None,
             model: None,
             probe_limit: Duration::from_secs(2),
@@ -103,6 +109,12 @@ impl StartOptions {
     #[must_use]
     pub fn cache(self, cache: Cache) -> Self {
         Self { cache, ..self }
+    }
+
+    /// The same with the [`tunings`](Self::tunings) of this folder.
+    #[must_use]
+    pub fn tunings(self, folder: impl Into<PathBuf>) -> Self {
+        Self { tunings: Some(folder.into()), ..self }
     }
 
     /// The same over the algorithms of this [`registry`](Self::registry).

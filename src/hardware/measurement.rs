@@ -40,16 +40,20 @@ impl Measurement {
         self.doubt_at(now_unix_s())
     }
 
+    /// Whether frames took much longer or shorter than predicted from it.
+    pub(crate) fn is_contradicted(&self) -> bool {
+        !(1.0 / TOO_FAR..=TOO_FAR).contains(&self.frames_over_predicted)
+    }
+
     fn doubt_at(&self, now_unix_s: u64) -> Option<String> {
-        let over = self.frames_over_predicted;
         if self.is_old(now_unix_s) {
             Some(format!("it is over {} days old", LASTS.as_secs() / (24 * 60 * 60)))
         } else if self.attempt >= MOST_ATTEMPTS || now_unix_s.saturating_sub(self.at_unix_s) < RESTS.as_secs() {
             None
         } else if let Some(why) = self.disturbed.first() {
             Some(format!("it was disturbed: {why}"))
-        } else if !(1.0 / TOO_FAR..=TOO_FAR).contains(&over) {
-            Some(format!("frames take {over:.2} times as long as predicted from it"))
+        } else if self.is_contradicted() {
+            Some(format!("frames take {:.2} times as long as predicted from it", self.frames_over_predicted))
         } else {
             None
         }

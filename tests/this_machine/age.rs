@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// Makes another text of what a cache file says of its measurement.
-fn edit_measured(file: &Path, edit: impl Fn(&mut serde_json::Value)) {
+pub(crate) fn edit_measured(file: &Path, edit: impl Fn(&mut serde_json::Value)) {
     let mut cached: serde_json::Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
     edit(&mut cached["measured"]);
     fs::write(file, serde_json::to_string(&cached).unwrap()).unwrap();

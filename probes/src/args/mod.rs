@@ -73,9 +73,10 @@ Examples:
   sapwise predict
   sapwise predict --scenario clustered --out tuning.json
   sapwise predict --report other-machine.json --model mine.json
-  sapwise predict --report this-machine.json --measured --out tuning.json    # measured, for an engine to ship")]
+  sapwise predict --report this-machine.json --measured --out tuning.json    # measured, for an engine to ship
+  sapwise predict --report reports --measured --out tunings    # one for each kind of machine among the reports of a folder")]
 pub(crate) struct Predict {
-    /// Predict for the machine of this report instead of measuring this one.
+    /// Predict for the machine of this report instead of measuring this one; of a folder of reports, for each kind of machine.
     #[arg(long, value_name = "R.json", conflicts_with = "threads")]
     pub(crate) report: Option<PathBuf>,
     /// Correct the prediction by all timings of the report.
@@ -98,7 +99,7 @@ pub(crate) struct Predict {
     pub(crate) threads: Option<u32>,
     #[command(flatten)]
     pub(crate) gpus: GpuChoice,
-    /// Where the tuning goes.
+    /// Where the tuning goes; with a folder of reports the folder for the tunings, which is made where it is missing.
     #[arg(long, value_name = "T.json")]
     pub(crate) out: Option<PathBuf>,
     /// The tuning on standard output instead of a summary.

@@ -8,6 +8,7 @@ mod fleet;
 mod pairs;
 mod part;
 mod predict;
+mod predict_kinds;
 mod probe;
 mod run;
 mod schema;

@@ -1,5 +1,6 @@
 //! `sapwise predict`: the tuning of a machine without a sweep, or from the one that its report holds.
 
+use super::predict_kinds;
 use crate::algorithms::Algorithms;
 use crate::args::Predict;
 use crate::check::{doubts, hardware_disturbed, hardware_doubts};
@@ -9,7 +10,7 @@ use crate::prediction::{self, Slice};
 use crate::terminal::Terminal;
 use crate::{interrupt, output, outputs, revisions, shell, summary};
 use anyhow::{Context, bail};
-use sapwise::{json, usable_cores};
+use sapwise::{Model, Tuning, json, usable_cores};
 use sapwise_lab::data::usual_scenario;
 use sapwise_lab::data::{Document, read_document};
 use sapwise_lab::fit::measured_tuning;
@@ -20,6 +21,9 @@ use std::path::{Path, PathBuf};
 
 pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Result<Outcome> {
     hardware::check_threads(arguments.threads)?;
+    if let Some(folder) = arguments.report.as_deref().filter(|path| path.is_dir()) {
+        return predict_kinds::run(folder, arguments, algorithms);
+    }
     let report = arguments.report.as_deref().map(read_report).transpose()?;
     let inputs: Vec<PathBuf> = arguments.report.iter().chain(&arguments.model).cloned().collect();
     outputs::check(&inputs, &arguments.out.iter().collect::<Vec<_>>())?;
@@ -33,43 +37,23 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     // Whether a sample returned wrong pairs.
     let mut wrong = false;
     let mut tuning = match &report {
-        Some(report) if arguments.measured => {
-            let mut report = report.clone();
-            arguments.gpus.restrict(&mut report);
-            let report = &report;
-            let scenario = arguments.scenario.map(|s| s.to_string());
-            measured_tuning(report, scenario.as_deref().unwrap_or_else(|| usual_scenario(report)), Some(&model))?
-        }
-        report => {
-            let scenario = arguments.scenario.unwrap_or(Scenario::Uniform);
-            let (hardware, measured) = match report {
-                Some(report) => (report.hardware.clone(), None),
-                None => {
-                    let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
-                    (hardware, Some(measured))
-                }
-            };
-            if report.is_none() {
-                text = format!("{}\n", summary::hardware(&hardware, terminal));
-                remarks = hardware_doubts(&hardware);
-                remarks.extend(hardware_disturbed(&hardware));
+        Some(report) => {
+            if !arguments.measured {
+                let all = report.hardware.gpus.iter().map(|g| g.gpu.clone());
+                told = arguments.gpus.tell(&all.filter(|g| !arguments.gpus.takes(g)).collect::<Vec<_>>());
             }
+            of_report(report, arguments, &model, algorithms)?
+        }
+        None => {
+            let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
+            text = format!("{}\n", summary::hardware(&hardware, terminal));
+            remarks = hardware_doubts(&hardware);
+            remarks.extend(hardware_disturbed(&hardware));
             interrupt::check()?;
-            let gpus = match measured {
-                Some(measured) => {
-                    told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
-                    remarks.extend(measured.remarks);
-                    measured.usable
-                }
-                None => {
-                    let all = hardware.gpus.iter().map(|g| g.gpu.clone());
-                    let (taken, left_out): (Vec<_>, Vec<_>) = all.partition(|g| arguments.gpus.takes(g));
-                    told = arguments.gpus.tell(&left_out);
-                    taken
-                }
-            };
-            let slice = Slice::of(scenario)?;
-            if report.is_none() && arguments.samples > 0 {
+            told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
+            remarks.extend(measured.remarks);
+            let (gpus, slice) = (measured.usable, Slice::of(arguments.scenario.unwrap_or(Scenario::Uniform))?);
+            if arguments.samples > 0 {
                 let sampled =
                     prediction::predict_and_sample(&model, &hardware, &gpus, &slice, algorithms, arguments.samples)?;
                 wrong = sampled.1;
@@ -80,14 +64,6 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         }
     };
     tuning.warnings.append(&mut remarks);
-    if let Some(report) = &report {
-        // What a model predicts does not rest on the timings of the report.
-        if arguments.measured {
-            let stale = revisions::stale_in_report(report, &algorithms.registry(usable_cores()));
-            tuning.warnings.extend(stale.into_iter().map(|why| format!("the report is stale: {why}; probe again")));
-        }
-        tuning.warnings.extend(doubts(report).into_iter().map(|doubt| format!("the report is doubtful: {doubt}")));
-    }
     if let Some(path) = &arguments.out {
         write_text(path, &json::write_tuning(&tuning)?)?;
     }
@@ -111,6 +87,33 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
     };
     output::print(&text)?;
     Ok(outcome)
+}
+
+/// The tuning of the machine of a report, with what is doubtful about it.
+pub(super) fn of_report(
+    report: &Report,
+    arguments: &Predict,
+    model: &Model,
+    algorithms: &Algorithms,
+) -> anyhow::Result<Tuning> {
+    let mut tuning = if arguments.measured {
+        let mut report = report.clone();
+        arguments.gpus.restrict(&mut report);
+        let scenario = arguments.scenario.map(|s| s.to_string());
+        measured_tuning(&report, scenario.as_deref().unwrap_or_else(|| usual_scenario(&report)), Some(model))?
+    } else {
+        let gpus = report.hardware.gpus.iter().map(|g| g.gpu.clone());
+        let taken: Vec<_> = gpus.filter(|g| arguments.gpus.takes(g)).collect();
+        let slice = Slice::of(arguments.scenario.unwrap_or(Scenario::Uniform))?;
+        prediction::predict(model, &report.hardware, &taken, &slice, algorithms)?
+    };
+    // What a model predicts does not rest on the timings of the report.
+    if arguments.measured {
+        let stale = revisions::stale_in_report(report, &algorithms.registry(usable_cores()));
+        tuning.warnings.extend(stale.into_iter().map(|why| format!("the report is stale: {why}; probe again")));
+    }
+    tuning.warnings.extend(doubts(report).into_iter().map(|doubt| format!("the report is doubtful: {doubt}")));
+    Ok(tuning)
 }
 
 fn read_report(path: &Path) -> anyhow::Result<Report> {
