@@ -365,7 +365,8 @@ impl BroadPhase for Adaptive {
                     self.tracker.ran(boxes, pairs.overlapping(), Some(ns));
                     let dear = self.policy.ran(choice.chosen, ns, work);
                     let decision_ns = (!decided).then(|| started.elapsed().as_nanos() as f64 - ns);
-                    self.tracker.took(decision_ns, ns);
+                    self.tracker.took(decision_ns, ns, self.policy.lead_ln());
+                    self.policy.decision_took(decision_ns, self.tracker.decision_ns());
                     let began = !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis);
                     if began {
                         self.tell();

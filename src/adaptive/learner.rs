@@ -5,7 +5,7 @@ use super::frame_batch::{FrameBatch, MOST_OVER};
 use crate::algorithm::BackendClass;
 use crate::cost::Frame;
 use crate::tuning::AlgorithmCost;
-use crate::tuning::belief::{Belief, Deviations, MOST_SURPRISE, View};
+use crate::tuning::belief::{Belief, Deviations, MOST_SURPRISE, Running, View};
 
 /// Frames after which half of what was seen of waits is forgotten.
 const WAIT_FRAMES: f64 = 800.0;
@@ -45,6 +45,11 @@ struct Frames {
     run: i32,
     /// Observations that are to be believed before the load can be in doubt again.
     believed: u32,
+}
+
+/// Frames in a row are alike, so that many of them tell less than as many that were far apart.
+fn worth(frames: u32) -> f64 {
+    f64::from(frames).powf(ALIKE)
 }
 
 /// Follows the costs of all algorithms. Allocates when it is made.
@@ -152,9 +157,15 @@ impl Learner {
         self.belief.deviation_ln(algorithm, view, calls)
     }
 
-    /// Variance of the logarithm of the ratio of two costs.
-    pub(super) fn variance_of_ratio(&self, view: &View, a: (usize, f64), b: (usize, f64)) -> f64 {
-        self.belief.variance_of_ratio(view, a, b)
+    /// An algorithm that runs, of whose predicted time calls are that share, for [`told_of_ratio`](Self::told_of_ratio).
+    pub(super) fn running(&self, algorithm: usize, view: &View, calls: f64) -> Running {
+        self.belief.running(algorithm, view, calls)
+    }
+
+    /// What so many frames in a row of another algorithm would tell of the logarithm of its cost over that of the one that runs: the standard deviation of
+    /// by how much they correct it.
+    pub(super) fn told_of_ratio(&self, running: &Running, tried: usize, view: &View, calls: f64, frames: u32) -> f64 {
+        self.belief.told_of_ratio(running, tried, view, calls, self.frames[tried].noise / worth(frames))
     }
 
     /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction. False, and nothing is learned, where
@@ -170,8 +181,7 @@ impl Learner {
         self.observed += 1;
         let a = &mut self.frames[algorithm];
         a.batches = a.batches.saturating_add(1);
-        // Frames in a row are alike, so that many of them tell less than as many that were far apart.
-        let worth = f64::from(batch.frames).powf(ALIKE);
+        let worth = worth(batch.frames);
         let variance = expected.shared + expected.own + a.noise / worth;
         let most = MOST_SURPRISE * variance.sqrt();
         let error = surprise.clamp(-most, most);

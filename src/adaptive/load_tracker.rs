@@ -133,7 +133,7 @@ impl LoadTracker {
     }
 
     fn is_sample_due(&self, objects: u32) -> bool {
-        let drift = drift(objects, self.sampled);
+        let drift = self.throttle.telling(drift(objects, self.sampled));
         if self.is_doubt_due() {
             return true;
         }
@@ -159,10 +159,15 @@ impl LoadTracker {
         }
     }
 
-    /// What a decision with its sample took, where that is known, and its frame, in nanoseconds.
-    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64) {
+    /// What a decision with its sample took, where that is known, and its frame, in nanoseconds; and how far ahead the one that runs is, a logarithm.
+    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64, lead_ln: f64) {
         // Samples have a share of the time of their own.
-        self.throttle.took(decision_ns.map(|ns| (ns - self.sampled_ns).max(0.0)), frame_ns);
+        self.throttle.took(decision_ns.map(|ns| (ns - self.sampled_ns).max(0.0)), frame_ns, lead_ln);
+    }
+
+    /// What a decision takes in the mean, without a sample, in nanoseconds.
+    pub(super) fn decision_ns(&self) -> f64 {
+        self.throttle.decision_ns()
     }
 
     /// The next frame is to be decided on again.

@@ -18,6 +18,10 @@ const STEP_SLACK: f64 = 0.05;
 /// A switch that is expected to save its price within so many frames is made at once.
 const SOON: f64 = 4.0;
 
+/// An algorithm that is expected to cost so many times as much is not tried: beliefs are seldom off by that, and to ask how likely it is takes longer
+/// than the rest of a decision.
+const HOPELESS: f64 = 4.0;
+
 /// What was worked out for a load holds for another that differs by no more than this share: costs are known less well than that. It holds for so
 /// many frames: waits pass, whether anything is observed or not.
 const ALIKE: f64 = 0.01;
@@ -64,6 +68,8 @@ pub(super) struct Policy {
     tried: bool,
     /// Frames took so much more or less than expected that their load is in doubt.
     doubts_load: bool,
+    /// What a decision takes in the mean, in nanoseconds.
+    decision_ns: f64,
 }
 
 impl Policy {
@@ -96,6 +102,7 @@ impl Policy {
             trials: Trials::default(),
             tried: false,
             doubts_load: false,
+            decision_ns: 0.0,
             tuning,
             usable,
         }
@@ -272,19 +279,19 @@ impl Policy {
     fn offer_trial(&mut self, settled: usize) {
         let Some(learner) = self.learner.as_ref().filter(|_| self.learns && self.explores) else { return };
         let Some(allowance_ns) = self.trials.allowance_ns(self.frame) else { return };
-        let called = |k: usize| (k, self.predicted[k].calls());
         let now_ns = self.mean_ns[settled];
+        let running = learner.running(settled, &self.view, self.predicted[settled].calls());
         let offer = |k: usize| {
-            if k == settled || !self.usable[k] || self.is_avoided(k) {
+            if k == settled || !self.usable[k] || self.is_avoided(k) || self.mean_ns[k] > HOPELESS * now_ns {
                 return None;
             }
             let begins = self.switching.keeps(k) && !self.switching.share(k, settled);
             let enter_ns = self.switching.enter_ns(k, self.frame, self.expected[k]);
-            let offer = Offer::of(k, begins, enter_ns, self.mean_ns[k], now_ns);
+            let offer = Offer::of(k, begins, enter_ns, self.mean_ns[k], now_ns, self.decision_ns);
             if offer.price_ns > allowance_ns {
                 return None;
             }
-            let deviation = learner.variance_of_ratio(&self.view, called(settled), called(k)).sqrt();
+            let deviation = learner.told_of_ratio(&running, k, &self.view, self.predicted[k].calls(), offer.telling());
             let gain_ns = now_ns * expected_gain((self.mean_ns[k] / now_ns).ln(), deviation) * HORIZON - offer.price_ns;
             (gain_ns > 0.0).then_some((offer, gain_ns))
         };
@@ -359,6 +366,21 @@ impl Policy {
             // What is in doubt is looked at again soon.
             self.batch = if believed { self.batch } else { FrameBatch::default() }.next(candidate);
         }
+    }
+
+    /// Takes in what the decision for the frame that ran took, where that is known, and what decisions take in the mean.
+    pub(super) fn decision_took(&mut self, ns: Option<f64>, mean_ns: f64) {
+        self.decision_ns = mean_ns;
+        if self.tried {
+            self.trials.pay(ns.unwrap_or(mean_ns), true);
+        }
+    }
+
+    /// How far ahead of all that share nothing with it the one is that runs: the natural logarithm of the ratio of costs. Infinite where there is no other.
+    pub(super) fn lead_ln(&self) -> f64 {
+        let Some(settled) = self.settled.filter(|_| !self.is_by_count()) else { return 0.0 };
+        let next = self.cheapest(|k| k != settled && !self.switching.share(k, settled));
+        next.map_or(f64::INFINITY, |k| (self.mean_ns[k] / self.mean_ns[settled]).ln().max(0.0))
     }
 
     /// Whether the load of the frames since this was asked last is in doubt.

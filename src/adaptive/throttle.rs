@@ -10,6 +10,9 @@ const MOST_FRAMES: f64 = 128.0;
 
 /// By how much such a share rises with the [`drift`] of the number of objects since the last decision.
 pub(super) const SHARE_OF_DRIFT: f64 = 0.1;
+/// Costs of two methods grow with powers of the number of objects that differ by no more than this: a drift can't change which is cheaper before it has
+/// used up the lead.
+const POWERS_APART: f64 = 2.0;
 /// A number that differs from that of the frame before by a quarter, and by so many, is decided on at once.
 const JUMP: u32 = 4;
 const FEWEST: u32 = 16;
@@ -31,13 +34,20 @@ pub(super) struct DecisionThrottle {
     /// What a decision takes, learning and the clock included.
     decision_ns: f64,
     frame_ns: f64,
+    /// How far the number of objects may drift before it tells anything.
+    slack: f64,
 }
 
 impl DecisionThrottle {
     /// Whether a frame with this many objects is to be decided on again.
     pub(super) fn is_due(&self, objects: u32) -> bool {
         let jumps = objects.abs_diff(self.before) > (self.before / JUMP).max(FEWEST);
-        jumps || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * drift(objects, self.objects)) >= self.rest
+        jumps || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * self.telling(drift(objects, self.objects))) >= self.rest
+    }
+
+    /// What of a drift may change which algorithm is the cheapest.
+    pub(super) fn telling(&self, drift: f64) -> f64 {
+        (drift - self.slack).max(0.0)
     }
 
     /// What a decision takes, without a sample, in nanoseconds.
@@ -62,8 +72,9 @@ impl DecisionThrottle {
         self.rest = 0.0;
     }
 
-    /// What the decision took, where that is known, and its frame.
-    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64) {
+    /// What the decision took, where that is known, and its frame; and how far ahead the one that ran is, as the logarithm of a ratio of costs.
+    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64, lead_ln: f64) {
+        self.slack = (lead_ln / POWERS_APART).exp_m1();
         if let Some(ns) = decision_ns {
             // The mean of late, for that is what is paid: between two frames a program needs the caches for itself, and a decision waits for memory
             // then. One that was interrupted counts for little.

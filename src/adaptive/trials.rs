@@ -18,10 +18,13 @@ const APART: u64 = 20;
 /// Frames after which it is looked again whether a trial pays, where none did: to look takes longer than the rest of a decision.
 const LOOK_AGAIN: u64 = 8;
 
-/// Frames of a trial of an algorithm that keeps work from frame to frame: its first one makes that, and the others show what it saves. Any other
-/// shows what it costs in its second frame; the first one is cold.
-const OF_KEPT: u32 = 12;
+/// Frames of a trial of an algorithm that keeps work from frame to frame, at most: its first one makes that, the others show what it saves, and `pair-cache`
+/// finds the size of its margin in a hundred. Where it costs no more than the one that runs, they cost nothing. Any other algorithm shows what it costs in
+/// its second frame; the first one is cold.
+const OF_KEPT: u32 = 128;
 const OF_OTHERS: u32 = 2;
+/// Decisions of a trial: before, in and behind it. Each waits for memory, and takes as long as a short frame.
+const DECISIONS: f64 = 3.0;
 /// A trial ends when the frames behind its first one have cost so many frames' worth: what that one has cost is spent.
 const ENOUGH: f64 = 2.0;
 
@@ -50,7 +53,7 @@ struct Trial {
 pub(super) struct Offer {
     candidate: usize,
     frames: u32,
-    /// What it is expected to cost beside what frames cost now.
+    /// What it is expected to cost beside what frames cost now, its decisions included.
     pub(super) price_ns: f64,
     now_ns: f64,
 }
@@ -58,11 +61,17 @@ pub(super) struct Offer {
 impl Offer {
     /// Of a candidate of which a frame is expected to take `mean_ns` and its first one `switch_ns` more, where one takes `now_ns`.
     /// `begins`: its first frame makes what it keeps.
-    pub(super) fn of(candidate: usize, begins: bool, switch_ns: f64, mean_ns: f64, now_ns: f64) -> Self {
+    /// A decision takes `decision_ns`.
+    pub(super) fn of(candidate: usize, begins: bool, switch_ns: f64, mean_ns: f64, now_ns: f64, decision_ns: f64) -> Self {
         let frames = if begins { OF_KEPT } else { OF_OTHERS };
         // One that turns out dear ends early.
         let dear_ns = (f64::from(frames) * (mean_ns - now_ns).max(0.0)).min(ENOUGH * now_ns);
-        Self { candidate, frames, price_ns: switch_ns + dear_ns, now_ns }
+        Self { candidate, frames, price_ns: switch_ns + dear_ns + DECISIONS * decision_ns, now_ns }
+    }
+
+    /// Frames that tell what it costs: all but the first.
+    pub(super) fn telling(&self) -> u32 {
+        self.frames - 1
     }
 }
 
@@ -100,7 +109,8 @@ impl Trials {
         self.running = Some(Trial { candidate, left: frames, left_ns: ENOUGH * now_ns });
     }
 
-    /// Takes in what a frame of a trial, its `first` or another, or the first one after it has cost beside what frames cost otherwise.
+    /// Takes in what a decision, or a frame of a trial, its `first` or another, or the first one after it has cost beside what frames cost otherwise.
+    /// What decisions and first frames cost ends no trial: it is spent.
     pub(super) fn pay(&mut self, ns: f64, first: bool) {
         self.allowance_ns -= ns;
         if let Some(trial) = self.running.as_mut().filter(|_| !first) {
@@ -157,7 +167,7 @@ mod tests {
                 trials.stop(frame);
             }
             trials.allow(100.0, 1.0, 9);
-            let offer = Offer::of(1, begun % 2 == 0, 150.0, 130.0, 100.0);
+            let offer = Offer::of(1, begun % 2 == 0, 150.0, 130.0, 100.0, 1.0);
             if trials.allowance_ns(frame).is_some_and(|ns| ns >= offer.price_ns) {
                 trials.begin(offer);
                 begun += 1;
@@ -176,7 +186,7 @@ mod tests {
         let frames = |cost_ns: f64| {
             let mut trials = Trials::default();
             trials.allow(100.0, 1.0, 9);
-            trials.begin(Offer::of(3, true, 100.0, 100.0, 100.0));
+            trials.begin(Offer::of(3, true, 100.0, 100.0, 100.0, 1.0));
             (0..)
                 .take_while(|_| {
                     !trials.is_over() && {
@@ -186,9 +196,9 @@ mod tests {
                 })
                 .count()
         };
-        assert_eq!((frames(10.0), frames(60.0)), (12, 4));
+        assert_eq!((frames(0.0), frames(10.0), frames(60.0)), (128, 21, 4));
         let mut trials = Trials::default();
-        trials.begin(Offer::of(0, false, 100.0, 100.0, 100.0));
+        trials.begin(Offer::of(0, false, 100.0, 100.0, 100.0, 1.0));
         assert!(trials.next() == Some(0) && !trials.is_over() && trials.next() == Some(0) && trials.is_over());
         trials.stop(7);
         trials.allow(100.0, 1.0, 9);

@@ -55,6 +55,9 @@ const KEPT_FRAMES: f64 = 400.0;
 const WIDTH_FRAMES: f64 = 800.0;
 const OWN_FRAMES: f64 = 6000.0;
 
+/// So many frames are forgotten at once: that goes through all covariances, which between two frames of a program lie in no cache.
+const FEWEST_FRAMES: f64 = 16.0;
+
 /// Where boxes move e times as far as before, or an e-th of that, an e-th stays of what was observed of keeping. This much of an edge is added to
 /// both: below it the boxes are as good as still. Less than the third is the noise of [`Displacement`](crate::Displacement), which watches few boxes.
 const PACE_LN: f64 = 1.0;
@@ -108,6 +111,13 @@ struct Own {
 /// Entries of the shared parts that count for one algorithm at most, and how the logarithm of its cost hangs on each.
 const SHARED: usize = 4 + SIZE;
 type Slopes = [(usize, f64); SHARED];
+
+/// An algorithm that runs, as what is believed of others is held against it: how the logarithm of its cost hangs on shared parts, and its variance.
+#[derive(Debug, Clone)]
+pub(crate) struct Running {
+    slopes: Slopes,
+    variance: f64,
+}
 
 /// What is expected of an observation, as natural logarithms: its deviation from the prediction, and the variances of that in the shared and in
 /// the own parts.
@@ -274,33 +284,6 @@ impl Belief {
         self.mean[self.algorithms[algorithm].class]
     }
 
-    /// Variance of the own part of an algorithm.
-    fn own_variance(&self, algorithm: usize, view: &View) -> f64 {
-        let own = &self.own[algorithm];
-        let (age, values) = (aged(self.frame - own.at), values(view.of(self.algorithms[algorithm].by_motion)));
-        let row = |i: usize| {
-            let sum: f64 = own.covariance[i].iter().zip(&values).map(|(c, v)| c * v).sum();
-            values[i] * ((1.0 - age) * sum + age * own.before[i] * values[i])
-        };
-        (0..SIZE).map(row).sum()
-    }
-
-    /// Variance of the logarithm of the ratio of the costs of two algorithms of whose times calls are these shares.
-    pub(crate) fn variance_of_ratio(&self, view: &View, (a, of_a): (usize, f64), (b, of_b): (usize, f64)) -> f64 {
-        let mut weights = [(0, 0.0); 2 * SHARED];
-        let (first, second) = weights.split_at_mut(SHARED);
-        first.copy_from_slice(&self.shared(a, view, of_a).1);
-        second.copy_from_slice(&self.shared(b, view, of_b).1);
-        second.iter_mut().for_each(|(_, weight)| *weight = -*weight);
-        let size = self.mean.len();
-        let row = |&(i, x): &(usize, f64)| {
-            let covariance = &self.covariance[i * size..][..size];
-            x * weights.iter().map(|&(j, y)| y * covariance[j]).sum::<f64>()
-        };
-        let shared: f64 = weights.iter().map(row).sum();
-        shared.max(0.0) + self.own_variance(a, view) + self.own_variance(b, view)
-    }
-
     /// What is expected of an observation of an algorithm, which is then to be [taken in](Self::absorb).
     pub(crate) fn expect(&mut self, algorithm: usize, view: &View, calls: f64) -> Expected {
         let (ln, slopes) = self.shared(algorithm, view, calls);
@@ -326,6 +309,42 @@ impl Belief {
         let shared: f64 = slope.shared.iter().map(|&(k, weight)| weight * self.with[k]).sum();
         let own = if observed == slope.algorithm { dot(&self.own_with, &slope.own) } else { 0.0 };
         shared + own
+    }
+
+    /// Variance of the own part of an algorithm.
+    fn own_variance(&self, algorithm: usize, view: &View) -> f64 {
+        let own = &self.own[algorithm];
+        let (age, values) = (aged(self.frame - own.at), values(view.of(self.algorithms[algorithm].by_motion)));
+        let row = |i: usize| {
+            let sum: f64 = own.covariance[i].iter().zip(&values).map(|(c, v)| c * v).sum();
+            values[i] * ((1.0 - age) * sum + age * own.before[i] * values[i])
+        };
+        (0..SIZE).map(row).sum()
+    }
+
+    /// Covariance of what shared parts add to the logarithms of two costs.
+    fn between(&self, a: &Slopes, b: &Slopes) -> f64 {
+        let row = |&(i, x): &(usize, f64)| {
+            let covariance = &self.covariance[i * self.mean.len()..][..self.mean.len()];
+            x * b.iter().map(|&(j, y)| y * covariance[j]).sum::<f64>()
+        };
+        a.iter().filter(|(_, x)| *x != 0.0).map(row).sum()
+    }
+
+    /// An algorithm that runs, under a load at which calls are that share of its time, for others to be held against.
+    pub(crate) fn running(&self, algorithm: usize, view: &View, calls: f64) -> Running {
+        let slopes = self.shared(algorithm, view, calls).1;
+        Running { variance: self.between(&slopes, &slopes) + self.own_variance(algorithm, view), slopes }
+    }
+
+    /// What frames of another algorithm would tell of the logarithm of its cost over that of the one that runs, which is known by then: the standard
+    /// deviation of by how much they are expected to correct it. `noise` is the variance of the mean of their logarithms. What both have in common says
+    /// nothing of the ratio.
+    pub(crate) fn told_of_ratio(&self, running: &Running, tried: usize, view: &View, calls: f64, noise: f64) -> f64 {
+        let slopes = self.shared(tried, view, calls).1;
+        let in_common = self.between(&slopes, &running.slopes).powi(2) / running.variance.max(f64::MIN_POSITIVE);
+        let variance = (self.between(&slopes, &slopes) + self.own_variance(tried, view) - in_common).max(0.0);
+        if variance + noise > 0.0 { variance / (variance + noise).sqrt() } else { 0.0 }
     }
 
     /// Takes in that the observation that was [expected](Self::expect) last was off by `error`, where errors have this variance.
@@ -365,10 +384,10 @@ impl Belief {
     /// It is this frame now, and the machine may have changed since the one before.
     pub(crate) fn pass(&mut self, frame: u64) {
         let frames = frame.saturating_sub(self.frame) as f64;
-        self.frame = self.frame.max(frame);
-        if frames == 0.0 {
+        if frames < FEWEST_FRAMES {
             return;
         }
+        self.frame = frame;
         for (stays, lasts) in self.fading.iter_mut().zip(&self.lasts) {
             *stays = 1.0 / (1.0 + frames / lasts);
         }

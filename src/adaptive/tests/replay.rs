@@ -229,5 +229,5 @@ fn beside_another_program_the_number_of_threads_is_left_in_most_scenes() {
 #[test]
 fn where_a_host_moves_cores_apart_and_back_the_choice_follows_without_being_told() {
     let [apart, together, unmoved] = lost_beside((1.0, 30_000.0), 2048);
-    assert!(apart < 0.5 * unmoved && together < 0.02);
+    assert!(apart < 0.015 && unmoved > 0.015 && together < 0.02);
 }

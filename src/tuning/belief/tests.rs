@@ -133,9 +133,24 @@ fn what_keeping_spares_at_one_pace_is_forgotten_at_another() {
     assert!((before[0] - 3.0_f64.ln()).abs() < 0.05, "{before:?}");
     // As little as the noise of what tells it, and as good as still either way.
     assert!(!belief.change_pace(0.1, 0.13) && !belief.change_pace(0.0, 0.002) && believed(&belief) == before);
-    let doubt = belief.variance_of_ratio(&view, (0, 0.0), (1, 0.0));
+    let told = |belief: &Belief| belief.told_of_ratio(&belief.running(1, &view, 0.0), 0, &view, 0.0, 0.01);
+    let told_before = told(&belief);
     assert!(belief.change_pace(0.2, 0.0));
     let after = believed(&belief);
     assert!(after[0] < 0.6 * before[0] && after[1] == before[1], "{before:?} {after:?}");
-    assert!(belief.variance_of_ratio(&view, (0, 0.0), (1, 0.0)) > 4.0 * doubt);
+    assert!(told(&belief) > 2.0 * told_before);
+}
+
+#[test]
+fn frames_tell_less_of_a_ratio_the_noisier_they_are_and_nothing_of_what_both_have_in_common() {
+    let list = vec![cost("grid-sap@cpu1", 10.0), cost("sap@cpu1", 20.0)];
+    let mut belief = Belief::new(&list, &[None, None], Deviations::UNLIKE);
+    let view = belief.view(&Frame::new(&load(1000)));
+    let told = |belief: &Belief, noise: f64| belief.told_of_ratio(&belief.running(1, &view, 0.0), 0, &view, 0.0, noise);
+    let [exact, noisy, useless] = [0.0, 0.1, 100.0].map(|noise| told(&belief, noise));
+    assert!(exact > noisy && noisy > useless && useless < 0.01, "{exact} {noisy} {useless}");
+    // The class alone is off by 0.8.
+    assert!(exact < 0.3, "{exact}");
+    (0..20).for_each(|_| assert!(belief.observe(0, &view, 1.2, 0.0, 0.02)));
+    assert!(told(&belief, 0.01) < 0.3 * noisy);
 }
