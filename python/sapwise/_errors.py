@@ -1,0 +1,54 @@
+"""The exceptions and warnings of the package."""
+
+import warnings
+
+
+class SapwiseError(RuntimeError):
+    """Something failed that is no fault of the arguments; the base of all exceptions of the package."""
+
+
+class InputError(SapwiseError, ValueError):
+    """An argument can't be used; the text says what to give instead."""
+
+
+class InvalidBoxError(InputError):
+    """A box that can't be ordered: a bound is NaN, or a minimum lies above its maximum.
+
+    Attributes
+    ----------
+    index : int
+        Position of the first such box.
+    """
+
+    def __init__(self, text, index):
+        super().__init__(text)
+        self.index = index
+
+    def __reduce__(self):
+        return type(self), (self.args[0], self.index)
+
+
+class TooManyPairsError(SapwiseError, MemoryError):
+    """More pairs overlap than the limit allows.
+
+    Attributes
+    ----------
+    limit : int
+        The limit.
+    """
+
+    def __init__(self, text, limit):
+        super().__init__(text)
+        self.limit = limit
+
+    def __reduce__(self):
+        return type(self), (self.args[0], self.limit)
+
+
+class ConversionWarning(UserWarning):
+    """Many boxes were copied because they do not lie as the library reads them; told once in a process."""
+
+
+def warn_unsaved(why):
+    """Tell that what was learned is lost."""
+    warnings.warn(f"what was learned is not kept: {why}", RuntimeWarning, stacklevel=2)

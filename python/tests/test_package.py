@@ -1,0 +1,67 @@
+"""The package itself: examples in docstrings, stubs, the index in the documents."""
+
+import ast
+import doctest
+import inspect
+from importlib import resources
+
+import pytest
+from conftest import ROOT, run
+
+import sapwise
+
+PUBLIC = [name for name in sapwise.__all__ if name != "__version__"]
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_everything_is_documented_and_examples_hold(name):
+    of = getattr(sapwise, name)
+    assert inspect.getdoc(of)
+    finder, runner = doctest.DocTestFinder(recurse=False), doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    for example in finder.find(of, name, module=False, globs={"sapwise": sapwise}):
+        runner.run(example)
+    assert runner.failures == 0
+    if name in ("pairs", "pairs_between", "BroadPhase"):
+        assert runner.tries > 0
+
+
+def members(of):
+    return {name for name in vars(of) if not name.startswith("_")}
+
+
+def test_the_stubs_tell_what_there_is():
+    stub = ast.parse(resources.files("sapwise").joinpath("_sapwise.pyi").read_text())
+    classes = {node.name: node for node in stub.body if isinstance(node, ast.ClassDef)}
+    for name, node in classes.items():
+        functions = [n for n in node.body if isinstance(n, ast.FunctionDef)]
+        assert {f.name for f in functions if not f.name.startswith("_")} == members(getattr(sapwise, name))
+    functions = {node.name: node for node in stub.body if isinstance(node, ast.FunctionDef)}
+    functions |= {f"BroadPhase.{n.name}": n for n in classes["BroadPhase"].body if n.name in ("find", "set_filter")}
+    for name, node in functions.items():
+        of = sapwise._sapwise
+        for part in name.split("."):
+            of = getattr(of, part)
+        real = [p for p in inspect.signature(of).parameters if p != "self"]
+        args = node.args
+        assert real == [a.arg for a in args.posonlyargs + args.args + args.kwonlyargs if a.arg != "self"], name
+    assert resources.files("sapwise").joinpath("py.typed").is_file()
+
+
+def test_the_index_in_the_documents_is_complete():
+    document = (ROOT / "docs/python.md").read_text()
+    for name in PUBLIC:
+        if not issubclass(getattr(sapwise, name), BaseException) if inspect.isclass(getattr(sapwise, name)) else True:
+            first = inspect.getdoc(getattr(sapwise, name)).split("\n\n")[0].replace("\n", " ").replace("``", "`")
+            assert f"| `{name}` | {first} |" in document, f"| `{name}` | {first} |"
+        else:
+            assert f"`{name}`" in document
+
+
+def test_nothing_heavy_comes_with_the_import():
+    script = "import sys, numpy; before = set(sys.modules); import sapwise; print(sorted(m.split('.')[0] for m in set(sys.modules) - before))"
+    assert not {"pandas", "scipy", "matplotlib"} & set(eval(run(script)))
+
+
+def test_the_version_is_that_of_the_library():
+    manifest = (ROOT / "Cargo.toml").read_text()
+    assert f'version = "{sapwise.__version__}"' in manifest
