@@ -40,7 +40,7 @@ def cubes(count, seed=0, half=0.5, world=None):
 def mixed(count, seed=0):
     """Boxes of very different edges, some of them flat, some of them points."""
     rng = np.random.default_rng(seed)
-    low = rng.normal(0, count ** (1 / 3), (count, 3))
+    low = rng.normal(0, 0.5 * count ** (1 / 3), (count, 3))
     edges = 10 ** rng.uniform(-1.5, 0.7, (count, 3)) * (rng.random((count, 3)) > 0.1)
     low = low.astype(np.float32)
     return np.concatenate([low, low + edges.astype(np.float32)], axis=1)

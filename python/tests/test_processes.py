@@ -93,7 +93,7 @@ def test_a_fork_after_use_works_in_the_child_and_in_the_parent(busy):
     script = """
 import warnings; warnings.simplefilter('ignore')
 boxes = cubes(60_000, seed=2); known = sapwise.pairs(boxes)
-broad_phase = sapwise.BroadPhase(cache=False, measure=False, algorithm='grid-sap@cpu%d' % (2 if len(os.sched_getaffinity(0)) > 1 else 1))
+broad_phase = sapwise.BroadPhase(cache=False, measure=False, algorithm='grid-sap@cpu' + str(min(2, len(os.sched_getaffinity(0)))))
 broad_phase.set_filter(fixed=np.zeros(60_000, bool))
 other = sapwise.BroadPhase(cache=False, measure=False)
 other.find(boxes)
