@@ -5,6 +5,7 @@
 #   tools/python.sh wheel      # builds the wheel and tells where it is
 #   tools/python.sh bench      # the figures: overhead, other libraries, sizes, time of the import
 #   tools/python.sh examples   # runs python/examples/ and writes their pictures to target/python/examples/
+#   tools/python.sh index      # writes the index of docs/python.md from the docstrings
 #
 # Needs Python 3.10 or later with venv (Debian: python3-venv). Everything goes into target/python/. PYTHON names the interpreter.
 set -euo pipefail
@@ -62,24 +63,31 @@ test)
     tests=$root/python/tests
     run() { fresh/bin/python -m pytest -c "$root/python/pyproject.toml" --rootdir "$root/python" -p no:cacheprovider "$@"; }
     run "$tests/test_reports.py" "$tests/test_package.py" "$tests/test_machine.py"
-    pip fresh pandas
+    pip "$folder/fresh" pandas
     run "$tests"
     ;;
 bench)
     wheel
     fresh scipy rtree python-fcl trimesh
     sizes
-    cargo build --quiet --release --locked --manifest-path python/benches/Cargo.toml
+    cargo build --quiet --release --locked --manifest-path python/Cargo.toml --example figures
     cd "$folder"
-    fresh/bin/python "$root/python/benches/figures.py" "$CARGO_TARGET_DIR/release/sapwise-python-figures"
+    fresh/bin/python "$root/python/benches/figures.py" "$CARGO_TARGET_DIR/release/examples/figures"
     ;;
 examples)
     wheel
     fresh pandas matplotlib trimesh rtree scipy
+    # For a mesh that it ships: nothing of it is imported, nor what it depends on.
+    pip "$folder/fresh" --no-deps pyvista
     mkdir -p "$folder/examples"
     cd "$folder"
     fresh/bin/python "$root/python/examples/study.py" "$root/datasets" examples/study.png
     fresh/bin/python "$root/python/examples/trimesh_scene.py"
     ;;
-*) fail "usage: tools/python.sh [test|wheel|bench|examples]" ;;
+index)
+    wheel
+    fresh
+    "$folder/fresh/bin/python" tools/python_index.py docs/python.md
+    ;;
+*) fail "usage: tools/python.sh [test|wheel|bench|examples|index]" ;;
 esac
