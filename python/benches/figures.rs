@@ -1,6 +1,6 @@
 //! The Rust half of `figures.py`: scenes, and the time of the library's own call.
 //!
-//! `figures scene uniform OBJECTS SEED FILE` writes the second frame of a scenario as 32-bit floats. `figures serve FILE ALGORITHM` answers each number on a
+//! `figures scene uniform OBJECTS SEED FRAMES FILE` writes the frames of a scenario from the second on as 32-bit floats. `figures serve FILE ALGORITHM` answers each number on a
 //! line of the standard input with the times of as many frames, in nanoseconds, and the number of pairs.
 
 use sapwise::{Aabb, Adaptive, BroadPhase, PairOrder, Pairs, Registry};
@@ -12,16 +12,20 @@ use std::time::Instant;
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["scene", scenario, objects, seed, file] => {
+        ["scene", scenario, objects, seed, frames, file] => {
             let scenario: Scenario = scenario.parse()?;
             let mut scene = scenario.start(objects.parse()?, seed.parse()?);
-            scene.advance();
-            let floats = scene.boxes().iter().flat_map(|b| b.min.into_iter().chain(b.max));
-            std::fs::write(file, floats.flat_map(f32::to_le_bytes).collect::<Vec<u8>>())?;
+            let mut bytes = Vec::new();
+            for _ in 0..frames.parse::<usize>()? {
+                scene.advance();
+                let floats = scene.boxes().iter().flat_map(|b| b.min.into_iter().chain(b.max));
+                bytes.extend(floats.flat_map(f32::to_le_bytes));
+            }
+            std::fs::write(file, bytes)?;
             Ok(())
         }
         ["serve", file, algorithm] => serve(&std::fs::read(file)?, algorithm),
-        _ => Err("usage: figures scene SCENARIO OBJECTS SEED FILE | figures serve FILE ALGORITHM".into()),
+        _ => Err("usage: figures scene SCENARIO OBJECTS SEED FRAMES FILE | figures serve FILE ALGORITHM".into()),
     }
 }
 
