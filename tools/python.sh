@@ -63,7 +63,8 @@ test)
     tests=$root/python/tests
     run() { fresh/bin/python -m pytest -c "$root/python/pyproject.toml" --rootdir "$root/python" -p no:cacheprovider "$@"; }
     run "$tests/test_reports.py" "$tests/test_package.py" "$tests/test_machine.py"
-    pip "$folder/fresh" pandas
+    # mypy holds the stubs against the package.
+    pip "$folder/fresh" pandas pandas-stubs mypy
     run "$tests"
     ;;
 bench)

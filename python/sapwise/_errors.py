@@ -1,6 +1,7 @@
 """The exceptions and warnings of the package."""
 
 import warnings
+from typing import Any
 
 
 class SapwiseError(RuntimeError):
@@ -20,11 +21,11 @@ class InvalidBoxError(InputError):
         Position of the first such box.
     """
 
-    def __init__(self, text, index):
+    def __init__(self, text: str, index: int) -> None:
         super().__init__(text)
         self.index = index
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.args[0], self.index)
 
 
@@ -37,11 +38,11 @@ class TooManyPairsError(SapwiseError, MemoryError):
         The limit.
     """
 
-    def __init__(self, text, limit):
+    def __init__(self, text: str, limit: int) -> None:
         super().__init__(text)
         self.limit = limit
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.args[0], self.limit)
 
 
@@ -49,6 +50,6 @@ class ConversionWarning(UserWarning):
     """Many boxes were copied because they do not lie as the library reads them; told once in a process."""
 
 
-def warn_unsaved(why):
+def warn_unsaved(why: str) -> None:
     """Tell that what was learned is lost."""
     warnings.warn(f"what was learned is not kept: {why}", RuntimeWarning, stacklevel=2)

@@ -1,9 +1,21 @@
 from os import PathLike
 from types import TracebackType
-from typing import Any, Callable, Literal, Sequence
+from typing import Any, Callable, Literal, Sequence, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "BroadPhase",
+    "Decision",
+    "Tuning",
+    "__version__",
+    "last_decision",
+    "measure_hardware",
+    "pairs",
+    "pairs_between",
+    "predict",
+]
 
 __version__: str
 
@@ -17,6 +29,7 @@ def measure_hardware(
     quick: bool, progress: Callable[[int, int, str], object] | None
 ) -> tuple[dict[str, str], list[dict[str, Any]]]: ...
 
+@final
 class Decision:
     @property
     def algorithm(self) -> str: ...
@@ -33,6 +46,7 @@ class Decision:
     @property
     def load(self) -> dict[str, float]: ...
 
+@final
 class Tuning:
     @property
     def source(self) -> str: ...
@@ -66,9 +80,10 @@ class Tuning:
     @staticmethod
     def from_json(text: str) -> Tuning: ...
 
+@final
 class BroadPhase:
-    def __init__(
-        self,
+    def __new__(
+        cls,
         *,
         cache: str | PathLike[str] | Literal[False] | None = None,
         measure: bool = True,
@@ -82,7 +97,7 @@ class BroadPhase:
         exploring: bool = True,
         ordered: bool = True,
         limit: int | None = None,
-    ) -> None: ...
+    ) -> BroadPhase: ...
     def find(
         self, boxes: ArrayLike, upper: ArrayLike | None = None, *, ids: ArrayLike | Sequence[int] | None = None
     ) -> NDArray[np.uint32]: ...

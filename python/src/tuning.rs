@@ -170,7 +170,7 @@ impl PyTuning {
         json::write_tuning(&self.tuning).map_err(|why| failed(py, with_cause(&why)))
     }
 
-    /// Read what ``to_json`` or ``sapwise predict --out`` has written.
+    /// Read what ``to_json`` or ``sapwise predict --out tuning.json`` has written.
     #[staticmethod]
     fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
         json::tuning(text).map(Self::from).map_err(|why| unusable(py, with_cause(&why)))

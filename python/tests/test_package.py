@@ -1,9 +1,10 @@
 """The package itself: examples in docstrings, stubs, the index in the documents."""
 
-import ast
 import doctest
 import importlib.util
 import inspect
+import subprocess
+import sys
 from importlib import resources
 
 import pytest
@@ -26,25 +27,10 @@ def test_everything_is_documented_and_examples_hold(name):
         assert runner.tries > 0
 
 
-def members(of):
-    return {name for name in vars(of) if not name.startswith("_")}
-
-
 def test_the_stubs_tell_what_there_is():
-    stub = ast.parse(resources.files("sapwise").joinpath("_sapwise.pyi").read_text())
-    classes = {node.name: node for node in stub.body if isinstance(node, ast.ClassDef)}
-    for name, node in classes.items():
-        functions = [n for n in node.body if isinstance(n, ast.FunctionDef)]
-        assert {f.name for f in functions if not f.name.startswith("_")} == members(getattr(sapwise, name))
-    functions = {node.name: node for node in stub.body if isinstance(node, ast.FunctionDef)}
-    functions |= {f"BroadPhase.{n.name}": n for n in classes["BroadPhase"].body if n.name in ("find", "set_filter")}
-    for name, node in functions.items():
-        of = sapwise._sapwise
-        for part in name.split("."):
-            of = getattr(of, part)
-        real = [p for p in inspect.signature(of).parameters if p != "self"]
-        args = node.args
-        assert real == [a.arg for a in args.posonlyargs + args.args + args.kwonlyargs if a.arg != "self"], name
+    pytest.importorskip("mypy.stubtest")
+    done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "sapwise"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
     assert resources.files("sapwise").joinpath("py.typed").is_file()
 
 
