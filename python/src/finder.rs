@@ -3,7 +3,7 @@
 use crate::boxes::boxes;
 use crate::decision::PyDecision;
 use crate::error::{call, exception, failed, unusable, with_cause};
-use crate::frame::{Flat, Frames, Ids};
+use crate::frame::{Flat, Frames, Ids, Shared, State, locked};
 use crate::one_shot::two_columns;
 use crate::start::{self, Start};
 use crate::tuning::PyTuning;
@@ -13,9 +13,6 @@ use pyo3::types::PyDict;
 use sapwise::{Membership, StartOptions};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-/// Frames behind a lock, which is taken without the interpreter's lock only.
-type Shared = Arc<Mutex<Frames>>;
 
 /// Finds the overlapping pairs of frames that follow each other.
 ///
@@ -75,28 +72,6 @@ type Shared = Arc<Mutex<Frames>>;
 pub(crate) struct PyBroadPhase {
     start: Start,
     state: Mutex<State>,
-}
-
-/// Locked by who holds the interpreter's lock, and for an instant: no fork finds it locked.
-struct State {
-    /// The process that made the frames: the threads of another one are not here.
-    pid: u32,
-    /// `None` once it is closed.
-    frames: Option<Shared>,
-    filter: Option<Arc<Vec<Membership>>>,
-}
-
-impl Drop for State {
-    fn drop(&mut self) {
-        if self.pid != std::process::id() {
-            // To drop them would wait for threads that are not here.
-            std::mem::forget(self.frames.take());
-        }
-    }
-}
-
-fn locked(frames: &Shared) -> MutexGuard<'_, Frames> {
-    frames.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl PyBroadPhase {

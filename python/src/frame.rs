@@ -3,7 +3,7 @@
 use crate::one_shot::flat;
 use crate::start::Start;
 use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Filter, Membership, Pairs};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What names the boxes of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -141,4 +141,30 @@ impl Frames {
             Follower::Given(c) => Flat::Given(ids(if begun { c.begun() } else { c.ended() })),
         })
     }
+}
+
+/// Frames behind a lock, which is taken without the interpreter's lock only.
+pub(crate) type Shared = Arc<Mutex<Frames>>;
+
+/// Locked by who holds the interpreter's lock, and for an instant: no fork finds it locked.
+pub(crate) struct State {
+    /// The process that made the frames: the threads of another one are not here.
+    pub(crate) pid: u32,
+    /// `None` once it is closed.
+    pub(crate) frames: Option<Shared>,
+    pub(crate) filter: Option<Arc<Vec<Membership>>>,
+}
+
+impl Drop for State {
+    fn drop(&mut self) {
+        if self.pid != std::process::id() {
+            // To drop them would wait for threads that are not here.
+            std::mem::forget(self.frames.take());
+        }
+    }
+}
+
+/// The frames, once no other call has them.
+pub(crate) fn locked(frames: &Shared) -> MutexGuard<'_, Frames> {
+    frames.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -179,7 +179,7 @@ fn with_engine<'py>(
 /// ordered : bool, default True
 ///     Whether the pairs are sorted, by the first member and then the second: the same array from every machine. False saves the time to sort.
 /// limit : int, optional
-///     The most pairs, beyond which the search ends with an error. By default one for each 256 bytes of memory that is free.
+///     The most pairs, beyond which the search ends with an error. By default one for each 256 bytes of memory that is free (Linux).
 ///
 /// Returns
 /// -------

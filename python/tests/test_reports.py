@@ -50,9 +50,12 @@ def test_all_reports_and_their_hosts():
     table = sapwise.read_reports(DATASETS)
     files = sorted(DATASETS.glob("*.json"))
     assert len(np.unique(table["file"].astype(str))) == len(files)
-    hosts = np.unique(table["host"].astype(str))
-    # The README of the reports names three hosts.
-    assert len(hosts) == 3
+    # One CPU model and one clock of the hypervisor are one host.
+    known = set()
+    for hardware in (json.loads(f.read_text())["hardware"] for f in files):
+        clock = next(p["value"] for p in hardware["parameters"] if p["name"] == "clock_reported_ghz")
+        known.add((hardware["machine"]["physical_id"], round(1000 * clock)))
+    assert len(np.unique(table["host"].astype(str))) == len(known) >= 3
     expected = sum(len(p["timings"]) for f in files for p in json.loads(f.read_text())["points"])
     assert len(table) == expected
 
@@ -69,7 +72,7 @@ def test_time_over_the_number_of_boxes_in_three_lines():
     table = sapwise.read_reports(DATASETS)
     table = table[(table.scenario == "uniform") & (table.profile == "full")]
     times = table.pivot_table(index="objects", columns=["host", "algorithm"], values="median_ns")
-    assert times.shape[0] > 10 and len(times.columns.levels[0]) == 3
+    assert times.shape[0] > 10 and len(times.columns.levels[0]) >= 3
     for column in times:
         # To find the pairs of more boxes takes longer.
         known = times[column].dropna()
