@@ -53,7 +53,7 @@ mesh = trimesh.load_mesh(path)
 for _ in range(int(sys.argv[2]) if len(sys.argv) > 2 else 1):
     mesh = mesh.subdivide()
 triangles = mesh.triangles
-# Shape (n, 2, 3), 64-bit floats: rounded outward, so that sapwise may find some pairs more, which are dropped again.
+# Shape (n, 2, 3), 64-bit floats: rounded to 32 bits, so that sapwise may find some pairs more, which are dropped again.
 bounds = np.stack([triangles.min(axis=1), triangles.max(axis=1)], axis=1)
 ours, seconds = timed(by_sapwise, bounds)
 theirs, seconds_of_tree = timed(by_tree, mesh, bounds)

@@ -57,7 +57,7 @@ def _floats(array, name, which):
     if array.dtype.newbyteorder("=") != np.dtype(wanted) or not array.dtype.isnative:
         why = f"their dtype is {array.dtype.str}"
     elif wanted is np.float64:
-        why = "they are 64-bit floats, which are rounded outward"
+        why = "they are 64-bit floats, which are rounded to 32 bits"
     elif not (array.flags.c_contiguous and array.flags.aligned):
         why = "they are not C-contiguous" if array.flags.aligned else "they are not aligned"
     else:

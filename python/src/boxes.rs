@@ -1,7 +1,7 @@
 //! Boxes of a caller: borrowed where they lie as the library wants them, converted elsewhere.
 
 use crate::error::{call, exception, invalid_box, two};
-use crate::outward::rounded;
+use crate::narrow::rounded;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -77,7 +77,7 @@ fn as_it_lies<'py>(array: &Bound<'py, PyAny>) -> Option<Boxes<'py>> {
     if plain && lies { array.try_readonly().ok().map(Boxes::Borrowed) } else { None }
 }
 
-/// Boxes of 64-bit floats, rounded outward.
+/// Boxes of 64-bit floats, rounded.
 fn owned<'py>(
     py: Python<'py>,
     which: &str,

@@ -7,8 +7,8 @@ mod finder;
 mod frame;
 mod hardware;
 mod memory;
+mod narrow;
 mod one_shot;
-mod outward;
 mod start;
 mod tuning;
 

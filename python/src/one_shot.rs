@@ -200,7 +200,7 @@ fn with_engine<'py>(
 /// Notes
 /// -----
 /// 32-bit floats of shape (n, 6) in C order are read where they lie; nothing may write to them meanwhile. Everything else is copied. 64-bit floats
-/// are rounded outward, so that no pair is lost; a pair may be added of boxes that lie closer to each other than a 32-bit float can tell.
+/// are rounded to 32 bits, which loses no pair; a pair may be added of boxes that lie closer to each other than such floats can tell.
 /// The interpreter's lock is released. Ctrl-C is seen before and after, not within.
 ///
 /// Examples

@@ -4,7 +4,10 @@ import pickle
 
 import numpy as np
 import pytest
-from conftest import cubes, mixed, naive
+from conftest import cubes, naive
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
 
 import sapwise
 
@@ -113,18 +116,20 @@ def test_an_invalid_box_is_named(dtype, index, defect):
         sapwise.pairs(boxes[:, :3], boxes[:, 3:])
 
 
-def test_doubles_that_touch_are_not_lost():
-    tenth = 0.1
-    # As floats 0.1 and 0.3 go up and down: rounded to the nearest, these would part.
-    rng = np.random.default_rng(1)
-    for _ in range(200):
-        edge = rng.uniform(-1000, 1000)
-        boxes = np.array([[edge - 1, 0, 0, edge, tenth, 1], [edge, tenth, 0, edge + 1, 1, 1]])
-        assert sapwise.pairs(boxes).tolist() == [[0, 1]]
-        assert sapwise.pairs(boxes[:, :3], boxes[:, 3:]).tolist() == [[0, 1]]
-    boxes = mixed(500, seed=2).astype(np.float64) + 1e-9
-    found = {tuple(p) for p in sapwise.pairs(boxes).tolist()}
-    assert found >= {tuple(p) for p in naive(boxes).tolist()}
+#: Beside each other, a hair apart, and as far as a 32-bit float can tell.
+near = st.sampled_from([0.1, 0.1 + 1e-17, 0.1 + 1e-12, 0.1 - 1e-12, 0.3, 0.1 + 0.2, 0.1000001, 1e300, -1e300, 1e-300, -np.inf, np.inf]) | st.floats(-1, 1)
+
+
+@settings(max_examples=300, deadline=None)
+@given(arrays.arrays(np.float64, st.tuples(st.integers(0, 20), st.just(2), st.just(3)), elements=near))
+def test_no_pair_of_doubles_is_lost(corners):
+    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    found = sapwise.pairs(boxes)
+    assert {tuple(p) for p in found.tolist()} >= {tuple(p) for p in naive(boxes).tolist()}
+    # And none is added but those that floats can't tell apart.
+    with np.errstate(over="ignore"):
+        assert np.array_equal(found, naive(boxes.astype(np.float32)))
+    assert np.array_equal(found, sapwise.pairs(boxes[:, :3], boxes[:, 3:]))
 
 
 def test_doubles_beyond_floats_and_an_inversion_that_rounding_would_hide():
