@@ -172,8 +172,8 @@ parameters! {
         ForkJoinColdNs = "fork_join_cold_ns" => read(
             "ns",
             50.0,
-            1e9,
-            "one message between cores takes that long, and nobody waits for a second",
+            1e7,
+            "one message between cores takes that long; over several turns of a scheduler it is other programs that are measured",
             "an empty parallel call after a pause of 2 ms",
         );
         /// Work done by two threads over work done by one in the same time.

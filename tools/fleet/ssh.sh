@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# Probes many machines over ssh, each alone and all at once, brings their reports into one folder here, and tells which can be believed.
+#
+#   tools/fleet/ssh.sh NODES REPORTS [OPTION OF probe...]
+#
+# NODES is a file for GNU parallel's --sshloginfile: a host, or user@host, a line; `:` is this machine. No folder need be shared. SAPWISE names the
+# command on the machines where it is not on their PATH, SAPWISE_HERE the one here. Run again, it measures only those whose report is missing, was
+# disturbed or cut short: each machine keeps its own in ~/.cache/sapwise/fleet.
+set -euo pipefail
+usage="usage: tools/fleet/ssh.sh NODES REPORTS [OPTION OF probe...]"
+nodes=${1:?$usage}
+folder=${2:?$usage}
+shift 2
+command -v parallel >/dev/null || { echo "ssh.sh: GNU parallel is missing; install the package parallel" >&2; exit 1; }
+[ -r "$nodes" ] || { echo "ssh.sh: $nodes can't be read; write a host a line into it, or : for this machine" >&2; exit 1; }
+count=$(grep -cvE '^[[:space:]]*(#|$)' "$nodes") || { echo "ssh.sh: $nodes names no machine; write a host a line into it" >&2; exit 1; }
+sapwise=${SAPWISE:-sapwise}
+mkdir -p "$folder"
+brought=$(mktemp -d)
+trap 'rm -rf "$brought"' EXIT
+
+# A machine that fails keeps no other from its end: the table tells. What it says on standard error is shown with its name, and what it prints is its
+# report.
+printf -v options ' %q' "$@"
+[ $# -gt 0 ] || options=
+# shellcheck disable=SC2016 # `$HOME` is that of the machine.
+probe='mkdir -p "$HOME/.cache/sapwise/fleet" && '$(printf %q "$sapwise")' probe --json --out "$HOME/.cache/sapwise/fleet"'$options
+{ TMPDIR=$brought parallel --nonall --tag --files --will-cite --sshloginfile "$nodes" "$probe" || true; } >"$brought/printed"
+
+# One file for each machine; its name is of a hash of the host's.
+while IFS=$'\t' read -r host text; do
+    [ -s "$text" ] || continue
+    cp "$text" "$folder/node-$(printf %s "$host" | sha256sum | cut -c 1-12).json"
+done <"$brought/printed"
+"${SAPWISE_HERE:-sapwise}" fleet "$folder" --nodes "$count"
