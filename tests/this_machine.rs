@@ -97,6 +97,22 @@ fn the_second_start_takes_what_the_first_has_kept() {
 }
 
 #[test]
+fn a_start_that_may_not_measure_takes_what_is_kept_and_else_the_usual_tuning() {
+    let folder = tempfile::tempdir().unwrap();
+    for background in [false, true] {
+        let unmeasured = options(folder.path()).measure(false).background(background).wait_at_most(Duration::from_secs(60));
+        let mut adaptive = start(&unmeasured);
+        assert_eq!((origin(&adaptive), adaptive.tuning().source), (Origin::Usual, Source::Default));
+        assert!(matches!(&adaptive.setup().remarks[..], [why] if why.contains("was not to be measured")));
+        assert!(names(folder.path()).is_empty());
+        frame(&mut adaptive, &boxes(300));
+    }
+    let measured = start(&options(folder.path()));
+    let kept = start(&options(folder.path()).measure(false));
+    assert_eq!((origin(&kept), kept.tuning(), &kept.setup().remarks[..]), (Origin::Cached, measured.tuning(), &[][..]));
+}
+
+#[test]
 fn what_was_learned_is_there_at_the_next_start() {
     let folder = tempfile::tempdir().unwrap();
     let mut first = start(&options(folder.path()));

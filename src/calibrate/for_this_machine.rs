@@ -217,6 +217,13 @@ fn find(
             Err(why) => remarks.push(why),
         }
     }
+    if !options.measure {
+        if before.is_none() {
+            remarks
+                .push("nothing is kept of this machine, and it was not to be measured: the usual tuning stays".to_owned());
+        }
+        return before.map(cached);
+    }
     let mut in_use = false;
     if let (Some(kept), Some(Some(why))) = (&before, doubt) {
         remarks.push(format!("the hardware is measured again: {why}"));

@@ -45,6 +45,10 @@ pub struct StartOptions {
     /// The model that predicts, for a program with algorithms of its own, which the built-in one does not know. `None`, the
     /// default: [`Model::built_in`].
     pub model: Option<Model>,
+    /// Whether the hardware may be measured. Off: what is [kept](Self::cache) is taken however old it is, else what is
+    /// [shipped](Self::tunings), else [`Tuning::usual`](crate::Tuning::usual), and the remarks say so. For a program that runs a frame or two
+    /// and ends, which a measurement of two seconds would never pay for. On by default.
+    pub measure: bool,
     /// The longest that the hardware may be measured, a sample more or less, and each GPU once more. Two seconds by default; where
     /// other programs work meanwhile less than one returns figures that are far off. What is had in the time is used. Pauses in the
     /// [background](Self::background) don't count.
@@ -77,6 +81,7 @@ impl StartOptions {
             tunings: None,
             registry: None,
             model: None,
+            measure: true,
             probe_limit: Duration::from_secs(2),
         }
     }
@@ -127,6 +132,12 @@ impl StartOptions {
     #[must_use]
     pub fn model(self, model: Model) -> Self {
         Self { model: Some(model), ..self }
+    }
+
+    /// The same with leave to [measure](Self::measure) or without.
+    #[must_use]
+    pub fn measure(self, measure: bool) -> Self {
+        Self { measure, ..self }
     }
 
     /// The same with another [`probe_limit`](Self::probe_limit).

@@ -3,11 +3,12 @@
 use super::Arguments;
 use clap::Parser;
 
-const DOCUMENTS: [(&str, &str); 8] = [
+const DOCUMENTS: [(&str, &str); 9] = [
     ("README.md", include_str!("../../../README.md")),
     ("CONTRIBUTING.md", include_str!("../../../CONTRIBUTING.md")),
     ("datasets/README.md", include_str!("../../../datasets/README.md")),
     ("docs/guide.md", include_str!("../../../docs/guide.md")),
+    ("docs/python.md", include_str!("../../../docs/python.md")),
     ("docs/research.md", include_str!("../../../docs/research.md")),
     ("docs/methodology.md", include_str!("../../../docs/methodology.md")),
     ("docs/bias.md", include_str!("../../../docs/bias.md")),

@@ -1,0 +1,165 @@
+"""The figures of the Python package, interleaved in one run: `tools/python.sh bench`.
+
+Overhead: wall clock of `sapwise.pairs` less that of the library's own call on the same boxes, in a process of Rust beside this one; the two take turns.
+
+Other libraries: the pairs of boxes that are there as an array of NumPy. What each is timed with: making its structure and asking for all pairs. Of FCL
+the objects are there already, with the Python callback that counts the pairs: what is timed is `update` and `collide`. SciPy's tree takes the centres, with the largest
+edge as the distance on each axis, and drops what does not overlap.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from pathlib import Path
+
+import fcl
+import numpy as np
+import rtree
+import trimesh
+from scipy.spatial import cKDTree
+
+import sapwise
+
+RUST = sys.argv[1]
+#: No call of the others can take work from the frame before.
+FOLLOWING = "BroadPhase.find, frames that follow each other"
+# What this machine has kept is not part of it: thresholds decide.
+os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="sapwise-figures-")
+FOLDER = Path(tempfile.mkdtemp(prefix="sapwise-figures-"))
+
+
+def scene(objects, frames=1, seed=1):
+    """Frames of `uniform` from the second on, shape (frames, n, 6), and the file they are in."""
+    path = FOLDER / f"{objects}-{frames}.f32"
+    subprocess.run([RUST, "scene", "uniform", str(objects), str(seed), str(frames), str(path)], check=True)
+    return np.fromfile(path, np.float32).reshape(frames, objects, 6), path
+
+
+def quartiles(samples):
+    return np.quantile(np.asarray(samples, float), [0.25, 0.5, 0.75])
+
+
+def text(samples_ns):
+    low, median, high = quartiles(samples_ns)
+    unit, name = (1e3, "us") if median < 1e6 else (1e6, "ms")
+    return f"{median / unit:.4g} {name} ({low / unit:.4g} to {high / unit:.4g})"
+
+
+def overhead(objects, visits, frames):
+    (boxes,), path = scene(objects)
+    found = sapwise.pairs(boxes)
+    algorithm = sapwise.last_decision().algorithm
+    serve = subprocess.Popen([RUST, "serve", str(path), algorithm], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    python, rust = [], []
+    for visit in range(visits + 1):
+        serve.stdin.write(f"{frames + 1}\n")
+        serve.stdin.flush()
+        *times, count = map(int, serve.stdout.readline().split())
+        assert count == len(found)
+        here = []
+        for _ in range(frames + 1):
+            began = time.perf_counter_ns()
+            answer = sapwise.pairs(boxes)
+            here.append(time.perf_counter_ns() - began)
+            assert len(answer) == count
+            del answer
+        # The first frame of a visit is cold, and so is the first visit.
+        if visit > 0:
+            python.append(np.median(here[1:]))
+            rust.append(np.median(times[1:]))
+    serve.stdin.close()
+    serve.wait()
+    more = np.array(python) - np.array(rust)
+    low, median, high = quartiles(more / 1e3)
+    print(f"{objects} boxes, {len(found)} pairs, {algorithm}, {visits} visits of {frames} frames each:")
+    print(f"  Rust {text(rust)}, Python {text(python)}")
+    print(f"  overhead {median:.1f} us ({low:.1f} to {high:.1f}), {100 * np.median(more / rust):.2f} % ({', '.join(f'{100 * q:.2f}' for q in quartiles(more / rust))})")
+
+
+def contestants(frames):
+    boxes = frames[0]
+    wide = boxes.astype(np.float64)
+    low, high = np.ascontiguousarray(wide[:, :3]), np.ascontiguousarray(wide[:, 3:])
+    centres, edges = (low + high) / 2, high - low
+    objects = [fcl.CollisionObject(fcl.Box(*edge), fcl.Transform(centre)) for edge, centre in zip(edges, centres)]
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.registerObjects(objects)
+    manager.setup()
+    broad_phase = sapwise.BroadPhase(cache=False, measure=False)
+    following = iter(frames)
+
+    def by_fcl():
+        count = [0]
+
+        def callback(a, b, counts):
+            counts[0] += 1
+            return False
+
+        manager.update()
+        manager.collide(count, callback)
+        return count[0]
+
+    def by_rtree():
+        tree = rtree.index.Index((np.arange(len(wide)), low, high), properties=rtree.index.Property(dimension=3))
+        found, counts = tree.intersection_v(low, high)
+        return int((found > np.repeat(np.arange(len(wide)), counts.astype(np.int64))).sum())
+
+    def by_scipy():
+        pairs = cKDTree(centres).query_pairs(edges.max(), p=np.inf, output_type="ndarray")
+        a, b = pairs[:, 0], pairs[:, 1]
+        return int(((low[a] <= high[b]) & (low[b] <= high[a])).all(axis=1).sum())
+
+    def by_trimesh():
+        tree = trimesh.util.bounds_tree(wide)
+        return sum(j > k for k, box in enumerate(wide) for j in tree.intersection(box))
+
+    return {
+        "sapwise.pairs": lambda: len(sapwise.pairs(boxes)),
+        "sapwise.pairs, float64": lambda: len(sapwise.pairs(wide)),
+        FOLLOWING: lambda: len(broad_phase.find(next(following))),
+        "python-fcl DynamicAABBTree": by_fcl,
+        "rtree, intersection_v": by_rtree,
+        "scipy cKDTree.query_pairs": by_scipy,
+        "trimesh bounds_tree": by_trimesh,
+    }
+
+
+def others(objects, rounds):
+    frames, _ = scene(objects, rounds + 1)
+    names = contestants(frames)
+    times = {name: [] for name in names}
+    counts = {}
+    order = np.random.default_rng(1)
+    for a_round in range(rounds + 1):
+        for name in order.permutation(list(names)):
+            began = time.perf_counter_ns()
+            counts[name] = names[name]()
+            # The first one is cold: threads and memory are made.
+            if a_round > 0:
+                times[name].append(time.perf_counter_ns() - began)
+    same = {count for name, count in counts.items() if name != FOLLOWING}
+    assert len(same) == 1, counts
+    print(f"{objects} boxes of `uniform`, {same.pop()} pairs of each, n = {rounds}, all in turns:")
+    best = min(np.median(times[name]) for name in names if not name.startswith(("sapwise", "BroadPhase")))
+    for name in names:
+        print(f"  {name}: {text(times[name])}, the best of the others takes {best / np.median(times[name]):.3g} times as long")
+
+
+def imports():
+    script = "import numpy, time; began = time.perf_counter_ns(); import sapwise; print(time.perf_counter_ns() - began)"
+    alone = [int(subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout) for _ in range(21)]
+    print(f"import sapwise after numpy: {text(alone[1:])}, n = 20")
+    script = script.replace("import numpy, time", "import time")
+    alone = [int(subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout) for _ in range(21)]
+    print(f"import sapwise with numpy: {text(alone[1:])}, n = 20")
+
+
+warnings.simplefilter("ignore", sapwise.ConversionWarning)
+imports()
+overhead(1000, 200, 50)
+overhead(1_000_000, 12, 3)
+others(10_000, 31)
+others(100_000, 9)

@@ -1,0 +1,55 @@
+"""The exceptions and warnings of the package."""
+
+import warnings
+from typing import Any
+
+
+class SapwiseError(RuntimeError):
+    """Something failed that is no fault of the arguments; the base of all exceptions of the package."""
+
+
+class InputError(SapwiseError, ValueError):
+    """An argument can't be used; the text says what to give instead."""
+
+
+class InvalidBoxError(InputError):
+    """A box that can't be ordered: a bound is NaN, or a minimum lies above its maximum.
+
+    Attributes
+    ----------
+    index : int
+        Position of the first such box.
+    """
+
+    def __init__(self, text: str, index: int) -> None:
+        super().__init__(text)
+        self.index = index
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.args[0], self.index)
+
+
+class TooManyPairsError(SapwiseError, MemoryError):
+    """More pairs overlap than the limit allows.
+
+    Attributes
+    ----------
+    limit : int
+        The limit.
+    """
+
+    def __init__(self, text: str, limit: int) -> None:
+        super().__init__(text)
+        self.limit = limit
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.args[0], self.limit)
+
+
+class ConversionWarning(UserWarning):
+    """Many boxes were copied because they do not lie as the library reads them; told once in a process."""
+
+
+def warn_unsaved(why: str) -> None:
+    """Tell that what was learned is lost."""
+    warnings.warn(f"what was learned is not kept: {why}", RuntimeWarning, stacklevel=2)

@@ -1,0 +1,90 @@
+//! What was decided for a frame, as a Python object.
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sapwise::{Decision, Load};
+
+/// What was decided for a frame, and why. ``str()`` of it is a sentence.
+///
+/// Attributes
+/// ----------
+/// algorithm : str
+///     The algorithm that ran, for instance ``"grid-sap@cpu2"``: the method, and the threads that it may use.
+/// reason : str
+///     Why, in words.
+/// source : str
+///     Where the expected times come from: ``"default"`` (built-in thresholds), ``"predicted"``, ``"measured"`` or ``"learned"``.
+/// expected_ns : float or None
+///     The expected time of the frame in nanoseconds; None where only the number of boxes decides.
+/// measured_ns : float or None
+///     What the frame took in nanoseconds; None where it was not timed, as most very short frames are.
+/// runner_up : tuple of (str, float) or None
+///     The next best algorithm and its expected time in nanoseconds.
+/// load : dict
+///     What was known of the frame before it ran: ``objects``, ``axis_candidates``, ``strip_candidates``, ``pairs``, ``moved``.
+#[pyclass(frozen, name = "Decision", module = "sapwise")]
+pub(crate) struct PyDecision {
+    #[pyo3(get)]
+    algorithm: String,
+    #[pyo3(get)]
+    reason: String,
+    #[pyo3(get)]
+    source: String,
+    #[pyo3(get)]
+    expected_ns: Option<f64>,
+    #[pyo3(get)]
+    measured_ns: Option<f64>,
+    #[pyo3(get)]
+    runner_up: Option<(String, f64)>,
+    load: Load,
+    sentence: String,
+}
+
+impl From<Decision<'_>> for PyDecision {
+    fn from(decision: Decision<'_>) -> Self {
+        Self {
+            algorithm: decision.algorithm.to_string(),
+            reason: decision.reason.to_string(),
+            source: decision.source.to_string(),
+            expected_ns: decision.predicted_ns,
+            measured_ns: decision.measured_ns,
+            runner_up: decision.runner_up.map(|(id, ns)| (id.to_string(), ns)),
+            load: decision.load,
+            sentence: decision.to_string(),
+        }
+    }
+}
+
+#[pymethods]
+impl PyDecision {
+    #[getter]
+    fn load<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        as_dict(py, &self.load)
+    }
+
+    fn __str__(&self) -> &str {
+        &self.sentence
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<sapwise.Decision: {}>", self.sentence)
+    }
+}
+
+/// A load as a dict.
+pub(crate) fn as_dict<'py>(py: Python<'py>, load: &Load) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("objects", load.objects)?;
+    dict.set_item("axis_candidates", load.axis_candidates)?;
+    dict.set_item("strip_candidates", load.strip_candidates)?;
+    dict.set_item("pairs", load.pairs)?;
+    dict.set_item("moved", load.moved)?;
+    Ok(dict)
+}
+
+impl PyDecision {
+    /// The decision in words.
+    pub(crate) fn sentence(&self) -> &str {
+        &self.sentence
+    }
+}

@@ -1,0 +1,311 @@
+//! `pairs` and `pairs_between`: boxes that have nothing to do with those of the call before.
+
+use crate::boxes::boxes;
+use crate::decision::PyDecision;
+use crate::error::{exception, unusable};
+use crate::start;
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray2};
+use pyo3::prelude::*;
+use sapwise::{
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry, StartOptions, Step,
+    Tuning,
+};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Keeps work from frame to frame, for which boxes of which every call brings others have no use.
+const INCREMENTAL: &str = "pair-cache";
+
+/// Where nothing is known of the machine: where `grid-sap` takes over from `brute`, in boxes, and for `k` threads times `k` squared. Rounded from
+/// `uniform` and `clustered` on the machines of the first reports.
+const GRID_FROM: u32 = 300;
+const THREADS_FROM: u32 = 2500;
+const MOST_THREADS: u32 = 16;
+
+/// What a call leaves behind for the next stays, unless it takes over some hundred megabytes.
+const MOST_BOXES_KEPT: usize = 2_000_000;
+const MOST_PAIRS_KEPT: usize = 16_000_000;
+/// Threads that call at once, beyond which each makes its own again.
+const MOST_KEPT: usize = 8;
+
+/// A broad phase with its lists of pairs, used by one call at a time.
+struct Engine {
+    adaptive: Adaptive,
+    /// In any order, and in canonical order.
+    pairs: [Option<Pairs>; 2],
+    both: Vec<Aabb>,
+}
+
+/// Engines that no call uses. Locked only by who holds the interpreter's lock, and for no longer than it takes to take one: so no fork
+/// ever finds it locked.
+struct Idle {
+    /// The process that made them: the threads of another one are not here.
+    pid: u32,
+    engines: Vec<Engine>,
+}
+
+static IDLE: Mutex<Idle> = Mutex::new(Idle { pid: 0, engines: Vec::new() });
+
+fn idle<T>(_: Python<'_>, with: impl FnOnce(&mut Vec<Engine>) -> T) -> T {
+    let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
+    let pid = std::process::id();
+    if idle.pid != pid {
+        // After a fork. To drop them would wait for threads that are not here.
+        std::mem::forget(std::mem::take(&mut idle.engines));
+        idle.pid = pid;
+    }
+    with(&mut idle.engines)
+}
+
+/// Later calls begin with what is known by then.
+pub(crate) fn start_again(py: Python<'_>) {
+    let engines = idle(py, std::mem::take);
+    py.detach(|| drop(engines));
+}
+
+impl Engine {
+    /// With the tuning that was kept of this machine, or with built-in thresholds. Nothing is measured.
+    fn new() -> Result<Self, Error> {
+        let registry = Arc::new(Registry::new());
+        let options = StartOptions::new().background(false).measure(false).registry(Arc::clone(&registry));
+        let mut tuning = Adaptive::for_this_machine(&options)?.tuning().clone();
+        tuning.costs.retain(|cost| cost.algorithm.method() != INCREMENTAL);
+        let mut adaptive = Adaptive::new(if tuning.costs.is_empty() { usual(&registry)? } else { tuning }, &registry)?;
+        adaptive.set_exploring(false);
+        Ok(Self { adaptive, pairs: [None, None], both: Vec::new() })
+    }
+
+    /// Finds the pairs and returns them as flat as NumPy has them.
+    fn find(&mut self, boxes: Option<&[Aabb]>, order: PairOrder, wants: Wants) -> Result<Vec<u32>, Error> {
+        let pairs = self.pairs[usize::from(order == PairOrder::Canonical)].get_or_insert_with(|| start::pairs(order, None));
+        let usual_limit = pairs.limit();
+        if wants.limit.is_some() {
+            pairs.set_limit(wants.limit);
+        }
+        pairs.set_filter(wants.filter);
+        let found = self.adaptive.find_pairs(boxes.unwrap_or(&self.both), pairs);
+        pairs.set_filter(None);
+        pairs.set_limit(usual_limit);
+        found?;
+        flat(pairs, wants.from_second)
+    }
+
+    fn is_small(&self) -> bool {
+        let pairs = self.pairs.iter().flatten().map(Pairs::len).sum::<usize>();
+        self.both.capacity() <= MOST_BOXES_KEPT && pairs <= MOST_PAIRS_KEPT
+    }
+}
+
+/// What a call wants of its pairs.
+#[derive(Default)]
+struct Wants {
+    limit: Option<usize>,
+    filter: Option<Filter>,
+    /// What to take off each second member.
+    from_second: u32,
+}
+
+/// Thresholds over the number of boxes, without algorithms that keep work.
+fn usual(registry: &Registry) -> Result<Tuning, Error> {
+    let known: Vec<AlgorithmId> = registry.available().into_iter().map(|entry| entry.id).collect();
+    let step = |from: u32, method: &str, threads: u32| {
+        let id = known.iter().find(|id| id.method() == method && id.threads() == threads)?;
+        Some(Step::new(from, id.clone()))
+    };
+    let mut steps: Vec<Step> = step(0, "brute", 1).into_iter().chain(step(GRID_FROM, "grid-sap", 1)).collect();
+    let mut widths: Vec<u32> = known.iter().map(AlgorithmId::threads).filter(|k| (2..=MOST_THREADS).contains(k)).collect();
+    widths.sort_unstable();
+    widths.dedup();
+    steps.extend(widths.into_iter().filter_map(|k| step(THREADS_FROM * k * k, "grid-sap", k)));
+    Tuning::from_steps(steps).map_err(|_| Error::NoAlgorithm)
+}
+
+/// Pairs as numbers, two each.
+pub(crate) fn flat(pairs: &Pairs, from_second: u32) -> Result<Vec<u32>, Error> {
+    let mut numbers = Vec::new();
+    let refused = |_| Error::OutOfMemory { what: "pairs", elements: pairs.len() };
+    numbers.try_reserve_exact(2 * pairs.len()).map_err(refused)?;
+    numbers.extend(pairs.iter().flat_map(|&(a, b)| [a, b - from_second]));
+    Ok(numbers)
+}
+
+/// Two numbers a row.
+pub(crate) fn two_columns<'py, T: numpy::Element>(py: Python<'py>, numbers: Vec<T>) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let rows = Array2::from_shape_vec([numbers.len() / 2, 2], numbers);
+    rows.map(|rows| rows.into_pyarray(py)).map_err(|why| unusable(py, why.to_string()))
+}
+
+/// Runs a call on an engine, without the interpreter's lock, and looks for Ctrl-C before and after.
+fn with_engine<'py>(
+    py: Python<'py>,
+    objects: usize,
+    find: impl FnOnce(&mut Engine) -> Result<Vec<u32>, Error> + Send,
+    error: impl FnOnce(Error) -> PyErr,
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    py.check_signals()?;
+    let engine = idle(py, Vec::pop);
+    let (found, engine) = py.detach(|| {
+        let mut engine = match engine.map_or_else(Engine::new, Ok) {
+            Ok(engine) => engine,
+            Err(why) => return (Err(why), None),
+        };
+        let found = find(&mut engine);
+        let kept = objects <= MOST_BOXES_KEPT && engine.is_small();
+        (found, kept.then_some(engine))
+    });
+    if let Some(engine) = engine {
+        let over = idle(py, |engines| {
+            engines.push(engine);
+            (engines.len() > MOST_KEPT).then(|| engines.remove(0))
+        });
+        py.detach(|| drop(over));
+    }
+    py.check_signals()?;
+    two_columns(py, found.map_err(error)?)
+}
+
+/// Find all pairs of overlapping boxes.
+///
+/// Boxes are closed: those that touch overlap. Each call stands for itself; for frames that follow each other use ``BroadPhase``, which
+/// is faster there. Chooses among the algorithms by the tuning that is kept of this machine, as ``predict`` and ``BroadPhase`` keep it, else
+/// by built-in thresholds; it measures nothing. ``last_decision`` tells what was chosen and why.
+///
+/// Parameters
+/// ----------
+/// boxes : array_like, shape (n, 6) or (n, 2, 3)
+///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners, shape (n, 3).
+/// upper : array_like, shape (n, 3), optional
+///     The upper corners.
+/// ordered : bool, default True
+///     Whether the pairs are sorted, by the first member and then the second: the same array from every machine. False saves the time to sort.
+/// limit : int, optional
+///     The most pairs, beyond which the search ends with an error. By default one for each 256 bytes of memory that is free (Linux).
+///
+/// Returns
+/// -------
+/// ndarray, shape (m, 2), uint32
+///     Positions of the two boxes of each pair, the lower one first. Each pair once.
+///
+/// Raises
+/// ------
+/// InvalidBoxError
+///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are legal.
+/// InputError
+///     The shape is wrong, or there are more boxes than 32 bits can name.
+/// TypeError
+///     The dtype can't be converted: bool, complex, object, text, long double.
+/// TooManyPairsError
+///     More pairs than ``limit``. ``limit`` of the exception has it.
+///
+/// Notes
+/// -----
+/// 32-bit floats of shape (n, 6) in C order are read where they lie; nothing may write to them meanwhile. Everything else is copied. 64-bit floats
+/// are rounded to 32 bits, which loses no pair; a pair may be added of boxes that lie closer to each other than such floats can tell.
+/// The interpreter's lock is released. Ctrl-C is seen before and after, not within.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np, sapwise
+/// >>> boxes = np.array([[0, 0, 0, 1, 1, 1], [1, 0, 0, 2, 1, 1], [5, 5, 5, 6, 6, 6]], dtype=np.float32)
+/// >>> sapwise.pairs(boxes)
+/// array([[0, 1]], dtype=uint32)
+#[pyfunction]
+#[pyo3(signature = (boxes, upper=None, *, ordered=true, limit=None))]
+pub(crate) fn pairs<'py>(
+    boxes: &Bound<'py, PyAny>,
+    upper: Option<&Bound<'py, PyAny>>,
+    ordered: bool,
+    limit: Option<usize>,
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    let py = boxes.py();
+    let given = crate::boxes::boxes(boxes, upper, "")?;
+    let boxes = given.as_slice()?;
+    let wants = Wants { limit, ..Wants::default() };
+    let find = |engine: &mut Engine| engine.find(Some(boxes), start::order(ordered), wants);
+    with_engine(py, boxes.len(), find, |error| exception(py, &error, ""))
+}
+
+/// Find all pairs of a box of ``a`` and an overlapping box of ``b``.
+///
+/// Boxes of one list are not compared with each other, on pain of the time that takes: those of the longer list not at all, those of the shorter
+/// one are found and dropped. Both lists are copied into one.
+///
+/// Parameters
+/// ----------
+/// a : array_like, shape (n, 6) or (n, 2, 3)
+///     One box a row: minx, miny, minz, maxx, maxy, maxz.
+/// b : array_like, shape (k, 6) or (k, 2, 3)
+///     The other boxes.
+/// ordered : bool, default True
+///     Whether the pairs are sorted, by the first member and then the second.
+/// limit : int, optional
+///     The most pairs, as in ``pairs``.
+///
+/// Returns
+/// -------
+/// ndarray, shape (m, 2), uint32
+///     The position in ``a`` and the position in ``b`` of each pair.
+///
+/// Raises
+/// ------
+/// InvalidBoxError
+///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are legal.
+/// InputError
+///     The shape is wrong, or there are more boxes than 32 bits can name.
+/// TypeError
+///     The dtype can't be converted: bool, complex, object, text, long double.
+/// TooManyPairsError
+///     More pairs than ``limit``. ``limit`` of the exception has it.
+///
+/// Examples
+/// --------
+/// >>> sapwise.pairs_between([[0, 0, 0, 1, 1, 1]], [[9, 9, 9, 10, 10, 10], [1, 1, 1, 2, 2, 2]])
+/// array([[0, 1]], dtype=uint32)
+#[pyfunction]
+#[pyo3(signature = (a, b, *, ordered=true, limit=None))]
+pub(crate) fn pairs_between<'py>(
+    a: &Bound<'py, PyAny>,
+    b: &Bound<'py, PyAny>,
+    ordered: bool,
+    limit: Option<usize>,
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    let py = a.py();
+    let (a, b) = (boxes(a, None, " of a")?, boxes(b, None, " of b")?);
+    let (a, b) = (a.as_slice()?, b.as_slice()?);
+    let first = a.len();
+    let objects = first + b.len();
+    let Ok(from_second) = u32::try_from(objects).map(|_| first as u32) else {
+        return Err(exception(py, &Error::TooManyObjects { objects }, ""));
+    };
+    let find = |engine: &mut Engine| {
+        let refused = |_| Error::OutOfMemory { what: "boxes", elements: objects };
+        engine.both.clear();
+        engine.both.try_reserve_exact(objects).map_err(refused)?;
+        engine.both.extend_from_slice(a);
+        engine.both.extend_from_slice(b);
+        // Two fixed boxes are not even compared: of no use within the larger list, where most of the work would be.
+        let of = |groups, mask, fixed| Membership { groups, mask, fixed };
+        let (in_a, in_b) = (of(0b01, 0b10, a.len() > b.len()), of(0b10, 0b01, a.len() <= b.len()));
+        let mut memberships = Vec::new();
+        memberships.try_reserve_exact(objects).map_err(refused)?;
+        memberships.extend(a.iter().map(|_| in_a).chain(b.iter().map(|_| in_b)));
+        let wants = Wants { limit, filter: Some(Filter::new(memberships)), from_second };
+        engine.find(None, start::order(ordered), wants)
+    };
+    with_engine(py, objects, find, |error| match error {
+        Error::InvalidBox { index, defect } if index < first => crate::error::invalid_box(py, " of a", index, defect),
+        Error::InvalidBox { index, defect } => crate::error::invalid_box(py, " of b", index - first, defect),
+        other => exception(py, &other, ""),
+    })
+}
+
+/// Tell what the last call of ``pairs`` or ``pairs_between`` chose and why.
+///
+/// Returns
+/// -------
+/// Decision or None
+///     None before the first call. With calls on several threads it is that of the call which ended last.
+#[pyfunction]
+pub(crate) fn last_decision(py: Python<'_>) -> Option<PyDecision> {
+    idle(py, |engines| engines.last().and_then(|engine| engine.adaptive.last_decision()).map(PyDecision::from))
+}

@@ -1,0 +1,99 @@
+//! How a broad phase of a caller starts.
+
+use crate::error::{exception, failed, unusable};
+use pyo3::prelude::*;
+use sapwise::{Adaptive, Cache, Error, PairOrder, Pairs, Registry, StartOptions, Tuning};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What a caller asked for.
+#[derive(Debug, Clone)]
+pub(crate) struct Start {
+    pub(crate) options: StartOptions,
+    /// The most threads; `None`: all usable cores.
+    pub(crate) threads: Option<u32>,
+    /// Always this algorithm.
+    pub(crate) algorithm: Option<String>,
+    /// A tuning of the caller's.
+    pub(crate) tuning: Option<Tuning>,
+    pub(crate) order: PairOrder,
+    /// The most pairs, where the caller says so.
+    pub(crate) limit: Option<usize>,
+}
+
+impl Start {
+    /// The algorithms to choose from.
+    fn registry(&self) -> Arc<Registry> {
+        Arc::new(self.threads.map_or_else(Registry::new, Registry::with_cores))
+    }
+
+    /// An adaptive broad phase. May take as long as the options let a measurement take.
+    pub(crate) fn adaptive(&self) -> Result<Adaptive, Error> {
+        let registry = self.registry();
+        let mut adaptive = match (&self.algorithm, &self.tuning) {
+            (Some(name), _) => {
+                let parsed = name.parse().map_err(|why: sapwise::ParseIdError| Error::UnknownAlgorithm {
+                    text: name.clone(),
+                    hint: format!("{why}; known here: {}", known(&registry)),
+                })?;
+                Adaptive::only(parsed, &registry)?
+            }
+            (None, Some(tuning)) => Adaptive::new(tuning.clone(), &registry)?,
+            (None, None) => return Adaptive::for_this_machine(&self.options.clone().registry(registry)),
+        };
+        adaptive.set_learning(self.options.learning);
+        adaptive.set_exploring(self.options.exploring);
+        Ok(adaptive)
+    }
+
+    /// An empty list of pairs, limited as the caller wants it or as the memory does.
+    pub(crate) fn pairs(&self) -> Pairs {
+        pairs(self.order, self.limit)
+    }
+}
+
+/// An empty list of pairs.
+pub(crate) fn pairs(order: PairOrder, limit: Option<usize>) -> Pairs {
+    let mut pairs = Pairs::with_order(order);
+    pairs.set_limit(limit.or_else(crate::memory::most_pairs));
+    pairs
+}
+
+/// The order that stands for `ordered`.
+pub(crate) fn order(ordered: bool) -> PairOrder {
+    if ordered { PairOrder::Canonical } else { PairOrder::Any }
+}
+
+fn known(registry: &Registry) -> String {
+    let names: Vec<String> = registry.available().iter().map(|entry| entry.id.to_string()).collect();
+    names.join(", ")
+}
+
+/// Where a caller wants tuning to be kept: `None` for the user's cache folder, `False` for nowhere, or a folder.
+pub(crate) fn cache(given: Option<&Bound<'_, PyAny>>) -> PyResult<Cache> {
+    let Some(given) = given else { return Ok(Cache::User) };
+    match (given.extract::<bool>(), given.extract::<PathBuf>()) {
+        (Ok(false), _) => Ok(Cache::None),
+        (Ok(true), _) => Ok(Cache::User),
+        (_, Ok(folder)) => Ok(Cache::Folder(folder)),
+        _ => Err(unusable(given.py(), "cache is a folder, False for none, or None for the user's cache folder")),
+    }
+}
+
+/// Seconds of a caller as a time.
+pub(crate) fn seconds(py: Python<'_>, name: &str, seconds: f64) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(seconds)
+        .map_err(|_| unusable(py, format!("{name} is {seconds}; give seconds, 0 or more and finite")))
+}
+
+/// Makes it without the interpreter's lock, and looks for Ctrl-C before and after.
+pub(crate) fn adaptive(py: Python<'_>, start: &Start) -> PyResult<Adaptive> {
+    py.check_signals()?;
+    let made = py.detach(|| start.adaptive());
+    py.check_signals()?;
+    made.map_err(|error| match error {
+        Error::Unavailable { .. } => failed(py, error.to_string()),
+        _ => exception(py, &error, ""),
+    })
+}

@@ -1,0 +1,270 @@
+//! `predict` and the class `Tuning`.
+
+use crate::boxes::boxes;
+use crate::error::{failed, unusable, with_cause};
+use crate::start;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use sapwise::{Adaptive, Load, Setup, StartOptions, Tuning, json};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// How often a wait looks for Ctrl-C.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// What each algorithm is expected to cost on a machine, and which is the cheapest under which load.
+///
+/// Attributes
+/// ----------
+/// source : str
+///     ``"default"`` (built-in thresholds), ``"predicted"``, ``"measured"`` or ``"learned"``.
+/// model : str or None
+///     The model that predicted it.
+/// extrapolated : bool
+///     Whether the machine lies outside what the model was trained on; ``warnings`` say how.
+/// scenario : str
+///     The scenario of ``fields`` and ``crossovers``.
+/// algorithms : list of str
+///     The algorithms to choose from.
+/// fields : list of (int, str)
+///     From how many boxes on which algorithm is the cheapest in that scenario.
+/// crossovers : list of dict
+///     ``below``, ``above``: two algorithms; ``objects``: at how many boxes both cost the same; ``low``, ``high``: the ends of the
+///     interval of 90 %, or None.
+/// setup : dict or None
+///     Of a prediction: how it came about.
+#[pyclass(frozen, name = "Tuning", module = "sapwise")]
+pub(crate) struct PyTuning {
+    pub(crate) tuning: Tuning,
+    setup: Option<Setup>,
+}
+
+impl From<Tuning> for PyTuning {
+    fn from(tuning: Tuning) -> Self {
+        Self { tuning, setup: None }
+    }
+}
+
+#[pymethods]
+impl PyTuning {
+    #[getter]
+    fn source(&self) -> String {
+        self.tuning.source.to_string()
+    }
+
+    #[getter]
+    fn model(&self) -> Option<&str> {
+        self.tuning.model.as_deref()
+    }
+
+    #[getter]
+    fn extrapolated(&self) -> bool {
+        self.tuning.extrapolated
+    }
+
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.tuning.warnings.clone()
+    }
+
+    #[getter]
+    fn scenario(&self) -> &str {
+        &self.tuning.scenario
+    }
+
+    #[getter]
+    fn algorithms(&self) -> Vec<String> {
+        self.tuning.algorithms().into_iter().map(ToString::to_string).collect()
+    }
+
+    #[getter]
+    fn fields(&self) -> Vec<(u32, String)> {
+        self.tuning.steps.iter().map(|step| (step.from_objects, step.algorithm.to_string())).collect()
+    }
+
+    #[getter]
+    fn crossovers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let list = PyList::empty(py);
+        for crossover in &self.tuning.crossovers {
+            let dict = PyDict::new(py);
+            dict.set_item("below", crossover.below.to_string())?;
+            dict.set_item("above", crossover.above.to_string())?;
+            dict.set_item("objects", crossover.objects)?;
+            dict.set_item("low", crossover.low)?;
+            dict.set_item("high", crossover.high)?;
+            list.append(dict)?;
+        }
+        Ok(list)
+    }
+
+    #[getter]
+    fn setup<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        self.setup.as_ref().map(|of| setup(py, of)).transpose()
+    }
+
+    /// Tell what a frame costs with each algorithm.
+    ///
+    /// Parameters
+    /// ----------
+    /// objects : int
+    ///     Boxes of the frame.
+    /// pairs : float, default 0.0
+    ///     Pairs that overlap.
+    /// axis_candidates, strip_candidates : float, optional
+    ///     Pairs that overlap on the axis on which the fewest do, and those of them that share a strip of the grid.
+    /// moved : float, default 1.0
+    ///     How far boxes move in a frame, in mean edges; 1 where no frame helps with the next.
+    ///
+    /// Returns
+    /// -------
+    /// dict of str to float
+    ///     Nanoseconds of each algorithm, the cheapest first. Empty for built-in thresholds, which know no costs.
+    #[pyo3(signature = (objects, *, pairs=0.0, axis_candidates=None, strip_candidates=None, moved=1.0))]
+    fn costs<'py>(
+        &self,
+        py: Python<'py>,
+        objects: u32,
+        pairs: f64,
+        axis_candidates: Option<f64>,
+        strip_candidates: Option<f64>,
+        moved: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let axis = axis_candidates.unwrap_or(pairs);
+        let load = Load::of_objects(objects).with_pairs(pairs).with_moved(moved);
+        self.of(py, load.with_candidates(axis, strip_candidates.unwrap_or(axis)))
+    }
+
+    /// Tell what a frame of these boxes costs with each algorithm, by the load that is estimated from a few hundred of them.
+    ///
+    /// Parameters
+    /// ----------
+    /// boxes : array_like, shape (n, 6) or (n, 2, 3)
+    ///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners, shape (n, 3).
+    /// upper : array_like, shape (n, 3), optional
+    ///     The upper corners.
+    /// moved : float, default 1.0
+    ///     How far boxes move in a frame, in mean edges.
+    ///
+    /// Returns
+    /// -------
+    /// dict of str to float
+    ///     Nanoseconds of each algorithm, the cheapest first.
+    #[pyo3(signature = (boxes, upper=None, *, moved=1.0))]
+    fn costs_of<'py>(
+        &self,
+        boxes: &Bound<'py, PyAny>,
+        upper: Option<&Bound<'py, PyAny>>,
+        moved: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let py = boxes.py();
+        let given = self::boxes(boxes, upper, "")?;
+        let boxes = given.as_slice()?;
+        if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| b.defect().map(|d| (k, d))) {
+            return Err(crate::error::invalid_box(py, "", index, defect));
+        }
+        self.of(py, py.detach(|| Load::estimate(boxes, None, Some(moved))))
+    }
+
+    /// Write it as JSON (``tuning/2``), which the library and the command read.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        json::write_tuning(&self.tuning).map_err(|why| failed(py, with_cause(&why)))
+    }
+
+    /// Read what ``to_json`` or ``sapwise predict --out tuning.json`` has written.
+    #[staticmethod]
+    fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
+        json::tuning(text).map(Self::from).map_err(|why| unusable(py, with_cause(&why)))
+    }
+
+    fn __repr__(&self) -> String {
+        let fields: Vec<String> =
+            self.tuning.steps.iter().map(|step| format!("{} from {}", step.algorithm, step.from_objects)).collect();
+        format!("<sapwise.Tuning, {}: {}>", self.tuning.source, fields.join(", "))
+    }
+}
+
+impl PyTuning {
+    /// The cost of each algorithm under a load, in nanoseconds, the cheapest first.
+    fn of<'py>(&self, py: Python<'py>, load: Load) -> PyResult<Bound<'py, PyDict>> {
+        if !load.is_sound() {
+            return Err(unusable(py, format!("{load:?} has figures that are negative or not finite")));
+        }
+        let cost = |c: &sapwise::AlgorithmCost| (c.algorithm.to_string(), c.curve.cost_ns(&load));
+        let mut costs: Vec<(String, f64)> = self.tuning.costs.iter().map(cost).collect();
+        costs.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let dict = PyDict::new(py);
+        for (algorithm, ns) in costs {
+            dict.set_item(algorithm, ns)?;
+        }
+        Ok(dict)
+    }
+}
+
+/// How a start came about, as a dict.
+pub(crate) fn setup<'py>(py: Python<'py>, setup: &Setup) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("origin", format!("{:?}", setup.origin).to_lowercase())?;
+    dict.set_item("remarks", &setup.remarks)?;
+    dict.set_item("seconds", setup.seconds)?;
+    dict.set_item("file", setup.file.as_ref().map(|file| file.to_string_lossy().into_owned()))?;
+    let measured = setup.measured.as_ref();
+    dict.set_item("measured_at_unix_s", measured.map(|m| m.at_unix_s))?;
+    dict.set_item("disturbed", measured.map(|m| m.disturbed.clone()).unwrap_or_default())?;
+    Ok(dict)
+}
+
+/// Predict the tuning of this machine from its hardware.
+///
+/// Takes what is kept of this machine, else measures the hardware and predicts with the built-in model, and keeps that for ``pairs`` and ``BroadPhase``
+/// too. Measure on a quiet machine.
+///
+/// Parameters
+/// ----------
+/// cache : path, False or None
+///     The folder in which the tuning is kept, False for none, None for the user's cache folder.
+/// seconds : float, default 2.0
+///     The longest that the hardware may be measured.
+///
+/// Returns
+/// -------
+/// Tuning
+///
+/// Raises
+/// ------
+/// KeyboardInterrupt
+///     At once on Ctrl-C; the measurement itself ends within the seconds.
+/// SapwiseError
+///     No algorithm can run.
+#[pyfunction]
+#[pyo3(signature = (*, cache=None, seconds=2.0))]
+pub(crate) fn predict(py: Python<'_>, cache: Option<&Bound<'_, PyAny>>, seconds: f64) -> PyResult<PyTuning> {
+    let mut options = StartOptions::new().background(false).probe_limit(start::seconds(py, "seconds", seconds)?);
+    options.cache = start::cache(cache)?;
+    let (done, found) = channel();
+    // On a thread, so that Ctrl-C is seen meanwhile. The thread ends by itself, within the seconds.
+    let thread = std::thread::Builder::new().name("sapwise-predict".to_owned());
+    let work = move || {
+        let made = Adaptive::for_this_machine(&options);
+        let _ = done.send(made.map(|adaptive| (adaptive.tuning().clone(), adaptive.setup().clone())));
+    };
+    let thread = thread.spawn(work).map_err(|why| failed(py, format!("no thread can be started: {why}")))?;
+    // A receiver may be used by one thread only, which this one is.
+    let found = std::sync::Mutex::new(found);
+    let made = loop {
+        let waited = py.detach(|| match found.lock() {
+            Ok(found) => found.recv_timeout(LOOK),
+            Err(_) => Err(RecvTimeoutError::Disconnected),
+        });
+        match waited {
+            Ok(made) => break made,
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(failed(py, "the measurement ended without a result; please report it"));
+            }
+        }
+    };
+    let _ = py.detach(|| thread.join());
+    let (tuning, setup) = made.map_err(|error| failed(py, error.to_string()))?;
+    crate::one_shot::start_again(py);
+    Ok(PyTuning { tuning, setup: Some(setup) })
+}

@@ -1,0 +1,54 @@
+"""The package itself: examples in docstrings, stubs, the index in the documents."""
+
+import doctest
+import importlib.util
+import inspect
+import subprocess
+import sys
+from importlib import resources
+
+import pytest
+from conftest import ROOT, run
+
+import sapwise
+
+PUBLIC = [name for name in sapwise.__all__ if name != "__version__"]
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_everything_is_documented_and_examples_hold(name):
+    of = getattr(sapwise, name)
+    assert inspect.getdoc(of)
+    finder, runner = doctest.DocTestFinder(recurse=False), doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    for example in finder.find(of, name, module=False, globs={"sapwise": sapwise}):
+        runner.run(example)
+    assert runner.failures == 0
+    if name in ("pairs", "pairs_between", "BroadPhase"):
+        assert runner.tries > 0
+
+
+def test_the_stubs_tell_what_there_is():
+    pytest.importorskip("mypy.stubtest")
+    done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "sapwise"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert resources.files("sapwise").joinpath("py.typed").is_file()
+
+
+def test_the_index_in_the_documents_is_that_of_the_docstrings():
+    specification = importlib.util.spec_from_file_location("index", ROOT / "tools/python_index.py")
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    document = (ROOT / "docs/python.md").read_text()
+    assert module.index() in document, "write it again: tools/python.sh index"
+    for name in PUBLIC:
+        assert f"`{name}`" in document
+
+
+def test_nothing_heavy_comes_with_the_import():
+    script = "import sys, numpy; before = set(sys.modules); import sapwise; print(sorted(m.split('.')[0] for m in set(sys.modules) - before))"
+    assert not {"pandas", "scipy", "matplotlib"} & set(eval(run(script)))
+
+
+def test_the_version_is_that_of_the_library():
+    manifest = (ROOT / "Cargo.toml").read_text()
+    assert f'version = "{sapwise.__version__}"' in manifest

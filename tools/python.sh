@@ -1,0 +1,94 @@
+#!/usr/bin/env bash
+# Builds the Python package, installs it into a fresh environment, and tests it there: first without pandas, then with it.
+#
+#   tools/python.sh            # formatting, clippy, wheel, tests
+#   tools/python.sh wheel      # builds the wheel and tells where it is
+#   tools/python.sh bench      # the figures: overhead, other libraries, sizes, time of the import
+#   tools/python.sh examples   # runs python/examples/ and writes their pictures to target/python/examples/
+#   tools/python.sh index      # writes the index of docs/python.md from the docstrings
+#
+# Needs Python 3.10 or later with venv (Debian: python3-venv). Everything goes into target/python/. PYTHON names the interpreter.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+what=${1:-test}
+root=$PWD
+folder=${CARGO_TARGET_DIR:-$PWD/target}/python
+python=${PYTHON:-python3}
+fail() { echo "python: $*" >&2; exit 1; }
+"$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))' 2>/dev/null \
+    || fail "$python must be Python 3.10 or later with venv: install python3-venv, or set PYTHON"
+mkdir -p "$folder"
+export PIP_DISABLE_PIP_VERSION_CHECK=1 CARGO_TARGET_DIR=$folder/build CARGO_INCREMENTAL=0
+pip() { local environment=$1; shift; "$environment/bin/python" -m pip install --quiet "$@"; }
+
+# maturin stays from run to run.
+[ -x "$folder/tools/bin/maturin" ] || { "$python" -m venv "$folder/tools"; pip "$folder/tools" 'maturin>=1.9,<2'; }
+
+wheel() {
+    rm -rf "$folder/wheels"
+    "$folder/tools/bin/maturin" build --quiet --release --locked --strip --manifest-path python/Cargo.toml --out "$folder/wheels" \
+        --interpreter "$python"
+    wheel=$(echo "$folder"/wheels/*.whl)
+}
+
+# A fresh environment with the wheel and these packages.
+fresh() {
+    rm -rf "$folder/fresh"
+    "$python" -m venv "$folder/fresh"
+    pip "$folder/fresh" "$wheel" "$@"
+}
+
+sizes() {
+    local bytes installed
+    bytes=$(stat -c %s "$wheel")
+    installed=$(du -sb "$folder"/fresh/lib/python*/site-packages/sapwise | cut -f 1)
+    echo "python: the wheel has $bytes bytes, installed $installed"
+    [ "$bytes" -le 4000000 ] || fail "the wheel has more than 4 MB"
+    [ "$installed" -le 10000000 ] || fail "installed it has more than 10 MB"
+}
+
+case $what in
+wheel)
+    wheel
+    echo "$wheel"
+    ;;
+test)
+    cargo fmt --manifest-path python/Cargo.toml --check
+    PYO3_PYTHON=$folder/tools/bin/python cargo clippy --quiet --manifest-path python/Cargo.toml --all-targets --locked -- -D warnings
+    wheel
+    fresh pytest scipy hypothesis rtree python-fcl
+    sizes
+    # From outside of python/, so that what is tested is what was installed.
+    cd "$folder"
+    tests=$root/python/tests
+    run() { fresh/bin/python -m pytest -c "$root/python/pyproject.toml" --rootdir "$root/python" -p no:cacheprovider "$@"; }
+    run "$tests/test_reports.py" "$tests/test_package.py" "$tests/test_machine.py"
+    # mypy holds the stubs against the package.
+    pip "$folder/fresh" pandas pandas-stubs mypy
+    run "$tests"
+    ;;
+bench)
+    wheel
+    fresh scipy rtree python-fcl trimesh
+    sizes
+    cargo build --quiet --release --locked --manifest-path python/Cargo.toml --example figures
+    cd "$folder"
+    fresh/bin/python "$root/python/benches/figures.py" "$CARGO_TARGET_DIR/release/examples/figures"
+    ;;
+examples)
+    wheel
+    fresh pandas matplotlib trimesh rtree scipy
+    # For a mesh that it ships: nothing of it is imported, nor what it depends on.
+    pip "$folder/fresh" --no-deps pyvista
+    mkdir -p "$folder/examples"
+    cd "$folder"
+    fresh/bin/python "$root/python/examples/study.py" "$root/datasets" examples/study.png
+    fresh/bin/python "$root/python/examples/trimesh_scene.py"
+    ;;
+index)
+    wheel
+    fresh
+    "$folder/fresh/bin/python" tools/python_index.py docs/python.md
+    ;;
+*) fail "usage: tools/python.sh [test|wheel|bench|examples|index]" ;;
+esac
