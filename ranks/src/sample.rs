@@ -1,0 +1,65 @@
+//! The boxes by which space is cut.
+
+use sapwise::Aabb;
+
+/// One box of a rank, standing for as many as there are for each that was taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// The box, which is valid.
+    pub bounds: Aabb,
+    /// The work that it stands for, in parts of which [`Sample::UNIT`] are one box of the usual cost.
+    pub weight: u64,
+    /// Used while space is cut: which of the parts it is in.
+    pub(crate) part: u32,
+}
+
+impl Sample {
+    /// The weight of one box of the usual cost.
+    pub const UNIT: u64 = 1024;
+
+    /// Boxes of each rank that are taken at most: with 16 384 a share of the work is known to 0.8 %, and to 2.6 % that of the rank of a
+    /// thousand that is met worst.
+    pub const MOST: usize = 16_384;
+
+    /// Up to `most` of the valid boxes, one out of each of as many equal parts of the list. `cost` tells the work of a box over the usual one.
+    #[must_use]
+    pub fn of(boxes: &[Aabb], most: usize, cost: impl Fn(&Aabb) -> f64) -> Vec<Self> {
+        let count = boxes.len().min(most);
+        let start = |k: usize| (k as u128 * boxes.len() as u128 / count as u128) as usize;
+        let take = |k: usize| {
+            let (first, end) = (start(k), start(k + 1));
+            // Not at regular distances: boxes of a kind may follow each other so.
+            let bounds = boxes[first + (mix(k as u64) % (end - first) as u64) as usize];
+            let weight = (cost(&bounds) * (end - first) as f64 * Self::UNIT as f64).clamp(1.0, 1e15) as u64;
+            bounds.defect().is_none().then_some(Self { bounds, weight, part: 0 })
+        };
+        (0..count).filter_map(take).collect()
+    }
+}
+
+/// The finaliser of splitmix64 (Steele, Lea and Flood, 2014).
+fn mix(mut x: u64) -> u64 {
+    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_stands_for_all_boxes_and_leaves_out_the_invalid_ones() {
+        let mut boxes: Vec<Aabb> = (0..1000).map(|k| Aabb::cube([k as f32; 3], 0.5)).collect();
+        for most in [1, 7, 999, 1000, 5000] {
+            let sample = Sample::of(&boxes, most, |_| 1.0);
+            assert_eq!(sample.len(), most.min(1000));
+            assert_eq!(sample.iter().map(|s| s.weight).sum::<u64>(), 1000 * Sample::UNIT);
+            assert!(sample.is_sorted_by(|a, b| a.bounds.min[0] < b.bounds.min[0]));
+        }
+        boxes.iter_mut().step_by(2).for_each(|b| b.min[0] = f32::NAN);
+        assert_eq!(Sample::of(&boxes, 1000, |_| 1.0).len(), 500);
+        assert!(Sample::of(&[], 10, |_| 1.0).is_empty());
+    }
+}

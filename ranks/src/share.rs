@@ -1,0 +1,91 @@
+//! How much of the work each rank is to have: as much as it does in the time that all ranks take.
+
+use sapwise::{Load, Tuning};
+
+/// The loads for which each rank tells its time, as multiples of the mean load of a rank.
+pub const FACTORS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+
+/// What the cheapest algorithm of a tuning is predicted to take for a load, in nanoseconds.
+///
+/// A tuning without costs says nothing of time: a box and a pair count as a nanosecond each, so that only ratios mean something.
+#[must_use]
+pub fn predicted_ns(tuning: &Tuning, load: &Load) -> f64 {
+    let counted = || f64::from(load.objects) + load.pairs;
+    tuning.rank(load, |_| true).map_or_else(counted, |r| r.best_ns).max(1.0)
+}
+
+/// The share of all work for each rank, with which all are predicted to take the same time. They add up to 1.
+///
+/// `times` holds, for each rank, what it takes for each of the [`FACTORS`] of the mean load. Between these it is interpolated. Times that are no
+/// numbers above 0 count as those of a rank of mean speed.
+///
+/// Only sums, products and comparisons, so that all ranks compute the same bits, whatever processors they run on.
+#[must_use]
+pub fn shares(times: &[[f64; FACTORS.len()]]) -> Vec<f64> {
+    let sound = |t: &&[f64; FACTORS.len()]| t.iter().all(|v| v.is_finite() && *v > 0.0);
+    let known: Vec<_> = times.iter().filter(sound).collect();
+    if known.is_empty() {
+        return vec![1.0 / times.len() as f64; times.len()];
+    }
+    let mean = std::array::from_fn(|k| known.iter().map(|t| t[k]).sum::<f64>() / known.len() as f64);
+    let ascending = |t: &[f64; FACTORS.len()]| {
+        let mut t = if sound(&t) { *t } else { mean };
+        // More work takes more time; a curve that says otherwise has no inverse.
+        (1..t.len()).for_each(|k| t[k] = t[k].max(t[k - 1] * 1.001));
+        t
+    };
+    let times: Vec<_> = times.iter().map(ascending).collect();
+    let (mut low, mut high) = (0.0, times.iter().map(|t| t[4]).fold(0.0, f64::max));
+    for _ in 0..100 {
+        let time = (low + high) / 2.0;
+        let done: f64 = times.iter().map(|t| work(t, time)).sum();
+        if done < times.len() as f64 { low = time } else { high = time }
+    }
+    let work: Vec<f64> = times.iter().map(|t| work(t, high)).collect();
+    let all: f64 = work.iter().sum();
+    work.into_iter().map(|w| w / all).collect()
+}
+
+/// What a rank does in a time, as a multiple of the mean load.
+fn work(times: &[f64; FACTORS.len()], time: f64) -> f64 {
+    let at = times.partition_point(|t| *t <= time);
+    match at {
+        0 => FACTORS[0] * time / times[0],
+        9.. => FACTORS[8] * time / times[8],
+        _ => {
+            let (low, high) = (times[at - 1], times[at]);
+            FACTORS[at - 1] + (FACTORS[at] - FACTORS[at - 1]) * (time - low) / (high - low)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sapwise::Registry;
+
+    fn linear(call: f64, unit: f64) -> [f64; 9] {
+        FACTORS.map(|f| call + unit * f)
+    }
+
+    #[test]
+    fn shares_follow_speed_and_what_does_not_depend_on_work() {
+        let near = |found: Vec<f64>, wanted: &[f64]| {
+            assert!(found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < 1e-3), "{found:?} {wanted:?}");
+        };
+        near(shares(&[linear(0.0, 1.0); 4]), &[0.25; 4]);
+        near(shares(&[linear(0.0, 1.0), linear(0.0, 3.0)]), &[0.75, 0.25]);
+        // 1 + 2 f = 0 + 2 g and f + g = 2: the second rank does a half more.
+        near(shares(&[linear(1.0, 2.0), linear(0.0, 2.0)]), &[0.375, 0.625]);
+        near(shares(&[linear(0.0, 1.0), [f64::NAN; 9]]), &[0.5, 0.5]);
+        near(shares(&[[0.0; 9]; 2]), &[0.5, 0.5]);
+        // A thousand times as slow.
+        near(shares(&[linear(0.0, 1.0), linear(0.0, 1000.0)]), &[1000.0 / 1001.0, 1.0 / 1001.0]);
+    }
+
+    #[test]
+    fn a_tuning_without_costs_counts_boxes_and_pairs() {
+        let tuning = Tuning::usual(&Registry::with_cores(1));
+        assert_eq!(predicted_ns(&tuning, &Load::of_objects(10).with_pairs(5.0)), 15.0);
+    }
+}
