@@ -129,13 +129,14 @@ pub(crate) fn play<E: Exchange>(
         let owner = |k: usize| owners.of(k, frame, size, boxes.len());
         let (own, ids): (Vec<Aabb>, Vec<u64>) =
             (0..boxes.len()).filter(|&k| owner(k) == rank).map(|k| (boxes[k], id(k))).unzip();
-        let pairs = &mut lists[(frame % 3 == 0) as usize];
+        let pairs = &mut lists[usize::from(frame % 3 == 0)];
         ranks.find_pairs(&own, &ids, pairs).unwrap_or_else(|e| panic!("{scenario}, frame {frame}: {e}"));
         alone.find_pairs(boxes, &mut all).unwrap();
         if frame % 10 == 0 {
             let mut one: Vec<(u32, u32)> = all.as_slice().to_vec();
             let mut definition = naive(boxes);
-            (one.sort_unstable(), definition.sort_unstable());
+            one.sort_unstable();
+            definition.sort_unstable();
             assert!(one == definition, "{scenario}, frame {frame}: one process is wrong");
         }
         let wanted = expected(all.as_slice(), id, owner, rank, pairs.is_mirrored());
