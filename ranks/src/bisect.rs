@@ -229,7 +229,7 @@ mod tests {
                 shares.iter_mut().for_each(|s| *s /= all);
                 let found = Threads::run(ranks, |mut threads| {
                     let own: Vec<Aabb> = boxes.iter().skip(threads.rank()).step_by(ranks).copied().collect();
-                    bisect(&mut Sample::of(&own, usize::MAX, |_| 1.0), &shares, &mut |v| threads.sum(v))
+                    bisect(&mut Sample::of(&own, usize::MAX), &shares, &mut |v| threads.sum(v))
                 });
                 assert!(found.iter().all(|cuts| *cuts == found[0]));
                 for (count, share) in counts(&found[0], boxes).into_iter().zip(&shares) {
@@ -248,7 +248,7 @@ mod tests {
             let first = threads.rank() == 0;
             let mut cut = |boxes: &[Aabb]| {
                 let own = if first { boxes } else { &[] };
-                bisect(&mut Sample::of(own, usize::MAX, |_| 1.0), &[0.25; 4], &mut |v| threads.sum(v))
+                bisect(&mut Sample::of(own, usize::MAX), &[0.25; 4], &mut |v| threads.sum(v))
             };
             [cut(&row), cut(&point), cut(&[])]
         });
@@ -267,7 +267,9 @@ mod tests {
         let boxes: Vec<Aabb> = (0..8000).map(|_| Aabb::cube([random.uniform() as f32, 0.0, 0.0], 0.0)).collect();
         let found = Threads::run(2, |mut threads| {
             let own: Vec<Aabb> = boxes.iter().skip(threads.rank()).step_by(2).copied().collect();
-            let mut samples = Sample::of(&own, 1000, |b| if b.min[0] < 0.5 { 3.0 } else { 1.0 });
+            let mut samples = Sample::of(&own, 1000);
+            let halves = Cuts::new(vec![Plane { axis: 0, at: 0.5 }]);
+            Sample::weigh(&mut samples, &halves, &[3.0, 1.0]);
             bisect(&mut samples, &[0.5; 2], &mut |v| threads.sum(v))
         });
         // Three times x below one half is two of four parts at one third.

@@ -2,7 +2,7 @@
 
 use crate::balance::Balance;
 use crate::bisect::bisect;
-use crate::cuts::{Cuts, centre};
+use crate::cuts::Cuts;
 use crate::error::{DONE, Error, Outcome, error_of, outcome};
 use crate::exchange::Exchange;
 use crate::outbox::Outbox;
@@ -10,7 +10,7 @@ use crate::pairs::RankPairs;
 use crate::record::{self, RankRecord};
 use crate::sample::Sample;
 use crate::search::{BOX_WORDS, LocalSearch, words};
-use crate::share::{FACTORS, shares};
+use crate::share::{FACTORS, costs, shares};
 use sapwise::{Aabb, Adaptive, Load, Registry, Tuning};
 use std::time::Instant;
 
@@ -226,15 +226,18 @@ impl<E: Exchange> Distributed<E> {
             let objects = (f64::from(mean.objects) * factor).clamp(1.0, f64::from(u32::MAX));
             predict(&mean.rescaled(objects as u32, mean.pairs * factor))
         };
-        // What a box of this region costs over what one of a mean region would cost here: the speed of this rank cancels.
-        let each = |load: &Load| predict(load) / f64::from(load.objects.max(1));
-        let cost = regional.map_or(1.0, |load| (each(&load) / each(&mean)).clamp(0.0625, 16.0));
-        let own = FACTORS.map(time).into_iter().chain([cost]);
-        let all = gather(&mut self.exchange, own, FACTORS.len() + 1);
+        // What this region costs over what a mean one would cost here: the speed of this rank cancels. By its boxes and pairs, which are known; its
+        // candidates are known from a few hundred boxes, and would make noise of even regions.
+        let work = regional.map_or(1.0, |load| predict(&mean.rescaled(load.objects, load.pairs)) / predict(&mean));
+        let all = gather(&mut self.exchange, FACTORS.map(time).into_iter().chain([work]), FACTORS.len() + 1);
         let times: Vec<_> = all.iter().map(|words| std::array::from_fn(|k| words[k])).collect();
-        let costs: Vec<f64> = all.iter().map(|words| words[FACTORS.len()]).collect();
-        let cost_of = |b: &Aabb| costs.get(self.cuts.rank_of(centre(b))).copied().unwrap_or(1.0);
-        let mut samples = Sample::of(boxes, Sample::MOST, cost_of);
+        let mut samples = Sample::of(boxes, Sample::MOST);
+        if self.cuts.regions().len() == ranks {
+            let mut owned = Sample::weights(&samples, &self.cuts);
+            self.exchange.sum(&mut owned);
+            let works: Vec<f64> = all.iter().map(|words| words[FACTORS.len()]).collect();
+            Sample::weigh(&mut samples, &self.cuts, &costs(&works, &owned));
+        }
         self.cuts = bisect(&mut samples, &shares(&times), &mut |values| self.exchange.sum(values));
         self.search.times.clear();
         self.balance.cut();

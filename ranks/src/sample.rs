@@ -1,5 +1,6 @@
 //! The boxes by which space is cut.
 
+use crate::cuts::{Cuts, centre};
 use sapwise::Aabb;
 
 /// One box of a rank, standing for as many as there are for each that was taken.
@@ -21,19 +22,35 @@ impl Sample {
     /// thousand that is met worst.
     pub const MOST: usize = 16_384;
 
-    /// Up to `most` of the valid boxes, one out of each of as many equal parts of the list. `cost` tells the work of a box over the usual one.
+    /// Up to `most` of the valid boxes, one out of each of as many equal parts of the list, with the weight of usual boxes.
     #[must_use]
-    pub fn of(boxes: &[Aabb], most: usize, cost: impl Fn(&Aabb) -> f64) -> Vec<Self> {
+    pub fn of(boxes: &[Aabb], most: usize) -> Vec<Self> {
         let count = boxes.len().min(most);
         let start = |k: usize| (k as u128 * boxes.len() as u128 / count as u128) as usize;
         let take = |k: usize| {
             let (first, end) = (start(k), start(k + 1));
             // Not at regular distances: boxes of a kind may follow each other so.
             let bounds = boxes[first + (mix(k as u64) % (end - first) as u64) as usize];
-            let weight = (cost(&bounds) * (end - first) as f64 * Self::UNIT as f64).clamp(1.0, 1e15) as u64;
+            let weight = (end - first) as u64 * Self::UNIT;
             bounds.defect().is_none().then_some(Self { bounds, weight, part: 0 })
         };
         (0..count).filter_map(take).collect()
+    }
+
+    /// The weight of some samples by the region that each is in.
+    #[must_use]
+    pub fn weights(samples: &[Self], cuts: &Cuts) -> Vec<u64> {
+        let mut weights = vec![0; cuts.regions().len()];
+        samples.iter().for_each(|s| weights[cuts.rank_of(centre(&s.bounds))] += s.weight);
+        weights
+    }
+
+    /// Multiplies the weight of each sample by the cost of a box of its region.
+    pub fn weigh(samples: &mut [Self], cuts: &Cuts, costs: &[f64]) {
+        for s in samples {
+            let cost = costs[cuts.rank_of(centre(&s.bounds))];
+            s.weight = (s.weight as f64 * cost).clamp(1.0, 1e15) as u64;
+        }
     }
 }
 
@@ -53,13 +70,13 @@ mod tests {
     fn a_sample_stands_for_all_boxes_and_leaves_out_the_invalid_ones() {
         let mut boxes: Vec<Aabb> = (0..1000).map(|k| Aabb::cube([k as f32; 3], 0.5)).collect();
         for most in [1, 7, 999, 1000, 5000] {
-            let sample = Sample::of(&boxes, most, |_| 1.0);
+            let sample = Sample::of(&boxes, most);
             assert_eq!(sample.len(), most.min(1000));
             assert_eq!(sample.iter().map(|s| s.weight).sum::<u64>(), 1000 * Sample::UNIT);
             assert!(sample.is_sorted_by(|a, b| a.bounds.min[0] < b.bounds.min[0]));
         }
         boxes.iter_mut().step_by(2).for_each(|b| b.min[0] = f32::NAN);
-        assert_eq!(Sample::of(&boxes, 1000, |_| 1.0).len(), 500);
-        assert!(Sample::of(&[], 10, |_| 1.0).is_empty());
+        assert_eq!(Sample::of(&boxes, 1000).len(), 500);
+        assert!(Sample::of(&[], 10).is_empty());
     }
 }

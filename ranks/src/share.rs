@@ -46,6 +46,18 @@ pub fn shares(times: &[[f64; FACTORS.len()]]) -> Vec<f64> {
     work.into_iter().map(|w| w / all).collect()
 }
 
+/// What a box of each region costs over the mean box: the work of the region, which is that of a mean region times `works`, over the work that its
+/// boxes stood for (`owned`, any unit). So the boxes of a region with many pairs weigh more, and those of one that searches many boxes of others.
+#[must_use]
+pub fn costs(works: &[f64], owned: &[u64]) -> Vec<f64> {
+    let mean = owned.iter().sum::<u64>() as f64 / owned.len().max(1) as f64;
+    let cost = |(work, &owned): (&f64, &u64)| {
+        let cost = work * mean / owned as f64;
+        if cost.is_finite() { cost.clamp(0.0625, 16.0) } else { 1.0 }
+    };
+    works.iter().zip(owned).map(cost).collect()
+}
+
 /// What a rank does in a time, as a multiple of the mean load.
 fn work(times: &[f64; FACTORS.len()], time: f64) -> f64 {
     let at = times.partition_point(|t| *t <= time);
@@ -81,6 +93,13 @@ mod tests {
         near(shares(&[[0.0; 9]; 2]), &[0.5, 0.5]);
         // A thousand times as slow.
         near(shares(&[linear(0.0, 1.0), linear(0.0, 1000.0)]), &[1000.0 / 1001.0, 1.0 / 1001.0]);
+    }
+
+    #[test]
+    fn boxes_cost_what_their_region_does() {
+        assert_eq!(costs(&[1.0, 1.0, 1.0], &[30, 60, 30]), [4.0 / 3.0, 2.0 / 3.0, 4.0 / 3.0]);
+        assert_eq!(costs(&[1.5, 0.5], &[10, 10]), [1.5, 0.5]);
+        assert_eq!(costs(&[1.0, 0.0, f64::NAN], &[0, 5, 5]), [1.0, 0.0625, 1.0]);
     }
 
     #[test]
