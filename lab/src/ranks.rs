@@ -22,6 +22,8 @@ pub struct RankScene {
     scenario: Scenario,
     scene: Scene,
     pairs: Pairs,
+    /// Of each box.
+    pairs_of: Vec<u32>,
     /// How far boxes move in a frame, in edges.
     moved: f64,
 }
@@ -40,7 +42,12 @@ impl RankScene {
         let mut broad_phase = Adaptive::new(Tuning::usual(registry), registry)?;
         let mut pairs = Pairs::new();
         broad_phase.find_pairs(scene.boxes(), &mut pairs).context("the pairs of all ranks can't be found")?;
-        Ok(Self { scenario, scene, pairs, moved: 0.05 })
+        let mut pairs_of = vec![0; scene.boxes().len()];
+        for &(i, j) in &pairs {
+            pairs_of[i as usize] += 1;
+            pairs_of[j as usize] += 1;
+        }
+        Ok(Self { scenario, scene, pairs, pairs_of, moved: 0.05 })
     }
 
     /// The scene over ranks of equal machines, whose times are predicted by `tuning`. Each rank owns the boxes whose middle lies in its region, as it does
@@ -51,8 +58,11 @@ impl RankScene {
         let shares = vec![1.0 / ranks as f64; ranks];
         let mut before: Option<(Cuts, Vec<f64>)> = None;
         let mut best: Option<RanksRow> = None;
+        // Nothing is known of pairs before the first frame.
+        let mut pair_cost = 0.0;
         for _ in 0..ROUNDS {
-            let mut samples = Sample::of(boxes, Sample::MOST.saturating_mul(ranks));
+            let most = Sample::MOST.saturating_mul(ranks);
+            let mut samples = Sample::with_pairs(boxes, most, |k| self.pairs_of[k], pair_cost);
             if let Some((cuts, works)) = &before {
                 let owned = Sample::weights(&samples, cuts);
                 Sample::weigh(&mut samples, cuts, &costs(works, &owned));
@@ -62,6 +72,7 @@ impl RankScene {
             let census = Census::of(&cuts, boxes, self.pairs.as_slice());
             // As `Distributed` weighs regions: by the boxes and pairs of each, and the candidates of a mean one.
             let mean = census.mean_load(boxes, self.moved);
+            pair_cost = sapwise_ranks::pair_cost(&mean, |load| predicted_ns(tuning, load));
             let time = |objects: u64, pairs: f64| {
                 predicted_ns(tuning, &mean.rescaled(objects.min(u64::from(u32::MAX)) as u32, pairs))
             };

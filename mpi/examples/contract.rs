@@ -39,6 +39,8 @@ fn scenarios(world: &impl Communicator) {
     let began = Instant::now();
     let mut ranks: Distributed = distributed::<MpiExchange>(world);
     edge_cases(&mut ranks);
+    ranks.set_cut_every(Some(1));
+    edge_cases(&mut ranks);
     let mut pairs = 0;
     for (k, scenario) in Scenario::ALL.into_iter().enumerate() {
         // Half of them cut when times say so, which in tests they hardly do.

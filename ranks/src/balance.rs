@@ -24,11 +24,13 @@ pub struct Balance {
     was: Option<f64>,
     imbalance: Option<f64>,
     due: bool,
+    /// Whether the last frame was of about as many boxes as the one for which the last cuts were made.
+    same_scene: bool,
 }
 
 impl Default for Balance {
     fn default() -> Self {
-        Self { owed_ns: 0.0, patience: 1.0, cut_at: None, was: None, imbalance: None, due: true }
+        Self { owed_ns: 0.0, patience: 1.0, cut_at: None, was: None, imbalance: None, due: true, same_scene: false }
     }
 }
 
@@ -45,6 +47,11 @@ impl Balance {
         self.imbalance
     }
 
+    /// Whether the last frame says where the boxes of the next one are.
+    pub(crate) fn knows_scene(&self) -> bool {
+        self.same_scene
+    }
+
     /// Notes that cuts were made. The boxes are counted in the frame that follows.
     pub fn cut(&mut self) {
         self.was = self.imbalance.take();
@@ -56,9 +63,8 @@ impl Balance {
         let boxes: u64 = records.iter().map(|r| r.boxes).sum();
         let before = *self.cut_at.get_or_insert(boxes);
         // Cuts of a scene that has begun since, or mostly gone.
-        if boxes > before.saturating_mul(2) || boxes < before / 2 {
-            self.due = true;
-        }
+        self.same_scene = boxes <= before.saturating_mul(2) && boxes >= before / 2;
+        self.due |= !self.same_scene;
         let Some((slowest, even)) = times(records) else { return };
         let imbalance = slowest / even - 1.0;
         self.imbalance = Some(imbalance);

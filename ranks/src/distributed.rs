@@ -10,7 +10,7 @@ use crate::pairs::RankPairs;
 use crate::record::{self, RankRecord};
 use crate::sample::Sample;
 use crate::search::{BOX_WORDS, LocalSearch, words};
-use crate::share::{FACTORS, costs, shares};
+use crate::share::{FACTORS, costs, pair_cost, shares};
 use sapwise::{Aabb, Adaptive, Load, Registry, Tuning};
 use std::time::Instant;
 
@@ -229,9 +229,17 @@ impl<E: Exchange> Distributed<E> {
         // What this region costs over what a mean one would cost here: the speed of this rank cancels. By its boxes and pairs, which are known; its
         // candidates are known from a few hundred boxes, and would make noise of even regions.
         let work = regional.map_or(1.0, |load| predict(&mean.rescaled(load.objects, load.pairs)) / predict(&mean));
-        let all = gather(&mut self.exchange, FACTORS.map(time).into_iter().chain([work]), FACTORS.len() + 1);
+        let own = FACTORS.map(time).into_iter().chain([work, pair_cost(&mean, &predict)]);
+        let all = gather(&mut self.exchange, own, FACTORS.len() + 2);
         let times: Vec<_> = all.iter().map(|words| std::array::from_fn(|k| words[k])).collect();
-        let mut samples = Sample::of(boxes, Sample::MOST);
+        let pair_cost = all.iter().map(|words| words[FACTORS.len() + 1]).sum::<f64>() / ranks as f64;
+        // The boxes of the last frame, of which the pairs are known, unless this is another scene.
+        let known = self.cuts.regions().len() == ranks && self.balance.knows_scene() && self.search.is_whole();
+        let mut samples = if known {
+            self.search.samples(&self.cuts.regions()[self.rank()], pair_cost)
+        } else {
+            Sample::of(boxes, Sample::MOST)
+        };
         if self.cuts.regions().len() == ranks {
             let mut owned = Sample::weights(&samples, &self.cuts);
             self.exchange.sum(&mut owned);

@@ -56,5 +56,5 @@ pub use exchange::Exchange;
 pub use pairs::RankPairs;
 pub use record::RankRecord;
 pub use sample::Sample;
-pub use share::{FACTORS, costs, predicted_ns, shares};
+pub use share::{FACTORS, costs, pair_cost, predicted_ns, shares};
 pub use threads::Threads;

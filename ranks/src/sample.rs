@@ -25,13 +25,22 @@ impl Sample {
     /// Up to `most` of the valid boxes, one out of each of as many equal parts of the list, with the weight of usual boxes.
     #[must_use]
     pub fn of(boxes: &[Aabb], most: usize) -> Vec<Self> {
+        Self::with_pairs(boxes, most, |_| 0, 0.0)
+    }
+
+    /// The same with what boxes cost: as much as one usual box, and `pair_cost` usual boxes for each pair. `pairs_of` tells the pairs of the box at a
+    /// position, each of which counts for both of its boxes by half.
+    #[must_use]
+    pub fn with_pairs(boxes: &[Aabb], most: usize, pairs_of: impl Fn(usize) -> u32, pair_cost: f64) -> Vec<Self> {
         let count = boxes.len().min(most);
         let start = |k: usize| (k as u128 * boxes.len() as u128 / count as u128) as usize;
         let take = |k: usize| {
             let (first, end) = (start(k), start(k + 1));
             // Not at regular distances: boxes of a kind may follow each other so.
-            let bounds = boxes[first + (mix(k as u64) % (end - first) as u64) as usize];
-            let weight = (end - first) as u64 * Self::UNIT;
+            let at = first + (mix(k as u64) % (end - first) as u64) as usize;
+            let bounds = boxes[at];
+            let cost = 1.0 + pair_cost * f64::from(pairs_of(at)) / 2.0;
+            let weight = ((end - first) as f64 * cost * Self::UNIT as f64).clamp(1.0, 1e15) as u64;
             bounds.defect().is_none().then_some(Self { bounds, weight, part: 0 })
         };
         (0..count).filter_map(take).collect()
@@ -75,6 +84,8 @@ mod tests {
             assert_eq!(sample.iter().map(|s| s.weight).sum::<u64>(), 1000 * Sample::UNIT);
             assert!(sample.is_sorted_by(|a, b| a.bounds.min[0] < b.bounds.min[0]));
         }
+        let weighed = Sample::with_pairs(&boxes, 1000, |k| k as u32 % 5, 0.5);
+        assert!(weighed.iter().zip(0..).all(|(s, k)| s.weight == Sample::UNIT + Sample::UNIT / 4 * (k % 5)));
         boxes.iter_mut().step_by(2).for_each(|b| b.min[0] = f32::NAN);
         assert_eq!(Sample::of(&boxes, 1000).len(), 500);
         assert!(Sample::of(&[], 10).is_empty());

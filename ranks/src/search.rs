@@ -1,6 +1,8 @@
 //! The search of one rank: its own boxes of its region, and those that others sent.
 
 use crate::balance::Times;
+use crate::cuts::{Region, centre};
+use crate::sample::Sample;
 use crate::share::predicted_ns;
 use sapwise::{Aabb, Adaptive, BroadPhase, Error, Load, Pairs};
 use std::time::Instant;
@@ -34,6 +36,8 @@ pub(crate) struct LocalSearch {
     ends: Vec<usize>,
     pub(crate) found: Pairs,
     pub(crate) times: Times,
+    /// Whether the pairs are those of the boxes.
+    whole: bool,
     /// What the last search failed with.
     pub(crate) error: Option<Error>,
 }
@@ -47,6 +51,7 @@ impl LocalSearch {
             ends: Vec::new(),
             found: Pairs::new(),
             times: Times::default(),
+            whole: false,
             error: None,
         }
     }
@@ -55,6 +60,12 @@ impl LocalSearch {
         self.boxes.clear();
         self.ids.clear();
         self.ends.clear();
+        self.whole = false;
+    }
+
+    /// Whether the last search has ended well and its boxes are still here.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.whole
     }
 
     #[inline]
@@ -93,6 +104,7 @@ impl LocalSearch {
         let began = Instant::now();
         let result = self.adaptive.find_pairs(&self.boxes, &mut self.found);
         self.times.push(self.boxes.len() as u64, began.elapsed().as_nanos() as u64);
+        self.whole = result.is_ok();
         self.error = result.clone().err();
         result
     }
@@ -125,6 +137,19 @@ impl LocalSearch {
         let measured = self.times.medians().zip(self.load());
         let correction = measured.map_or(1.0, |((_, ns), load)| (ns as f64 / predicted_ns(&tuning, &load)).clamp(1e-3, 1e3));
         move |load| correction * predicted_ns(&tuning, load)
+    }
+
+    /// Samples of the boxes of the last search that are in the middle of the region: it knows the pairs of each. `pair_cost` is what one costs over a box.
+    pub(crate) fn samples(&self, region: &Region, pair_cost: f64) -> Vec<Sample> {
+        let mut pairs = vec![0_u32; self.boxes.len()];
+        for &(i, j) in &self.found {
+            pairs[i as usize] += 1;
+            pairs[j as usize] += 1;
+        }
+        let mut samples = Sample::with_pairs(&self.boxes, Sample::MOST, |k| pairs[k], pair_cost);
+        // Others have the rest as theirs.
+        samples.retain(|s| region.holds(centre(&s.bounds)));
+        samples
     }
 
     /// Bytes of memory that it keeps beside what its algorithms do.

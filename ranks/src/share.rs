@@ -46,6 +46,21 @@ pub fn shares(times: &[[f64; FACTORS.len()]]) -> Vec<f64> {
     work.into_iter().map(|w| w / all).collect()
 }
 
+/// What a pair costs over what a box costs, as a load of this size grows by either.
+///
+/// `predict` tells the time of a load. 0 where more boxes are predicted to take no more time.
+#[must_use]
+pub fn pair_cost(load: &Load, predict: impl Fn(&Load) -> f64) -> f64 {
+    // Wide enough for curves of steps, such as those where another algorithm becomes the cheapest.
+    const MORE: f64 = 1.25;
+    let now = predict(load);
+    let objects = (f64::from(load.objects) * MORE).min(f64::from(u32::MAX)) as u32;
+    let box_ns = (predict(&load.rescaled(objects, load.pairs)) - now) / f64::from(objects - load.objects).max(1.0);
+    let pair_ns = (predict(&load.with_pairs(load.pairs * MORE)) - now) / (load.pairs * (MORE - 1.0)).max(1.0);
+    let cost = pair_ns / box_ns;
+    if cost.is_finite() && box_ns > 0.0 { cost.clamp(0.0, 16.0) } else { 0.0 }
+}
+
 /// What a box of each region costs over the mean box: the work of the region, which is that of a mean region times `works`, over the work that its
 /// boxes stood for (`owned`, any unit). So the boxes of a region with many pairs weigh more, and those of one that searches many boxes of others.
 #[must_use]
@@ -106,5 +121,8 @@ mod tests {
     fn a_tuning_without_costs_counts_boxes_and_pairs() {
         let tuning = Tuning::usual(&Registry::with_cores(1));
         assert_eq!(predicted_ns(&tuning, &Load::of_objects(10).with_pairs(5.0)), 15.0);
+        let load = Load::of_objects(1000).with_pairs(500.0);
+        assert_eq!(pair_cost(&load, |load| predicted_ns(&tuning, load)), 1.0);
+        assert_eq!(pair_cost(&load, |_| 1.0), 0.0);
     }
 }

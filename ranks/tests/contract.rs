@@ -28,7 +28,12 @@ fn every_scenario_has_the_pairs_of_one_process_over_any_ranks() {
 #[test]
 fn edge_cases_and_errors() {
     for size in [1, 2, 3, 4, 7] {
-        Threads::run(size, |threads| edge_cases(&mut distributed::<Threads>(threads)));
+        Threads::run(size, |threads| {
+            let mut ranks = distributed::<Threads>(threads);
+            edge_cases(&mut ranks);
+            ranks.set_cut_every(Some(1));
+            edge_cases(&mut ranks);
+        });
     }
 }
 

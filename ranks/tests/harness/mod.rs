@@ -182,7 +182,9 @@ pub(crate) fn edge_cases<E: Exchange>(ranks: &mut Distributed<E>) {
         let touching = planes
             .iter()
             .flat_map(|&p| [(p, p), (p - 1.0, p), (p, p + 1.0), (p.next_down(), p.next_up()), (p.next_up(), p + 1.0)]);
-        let touching: Vec<Aabb> = touching.map(|(low, high)| Aabb::new([low; 3], [high; 3])).collect();
+        // Beside a plane at the end of the numbers there is no room for all of them.
+        let touching = touching.map(|(low, high)| Aabb::new([low; 3], [high; 3])).filter(|b| b.defect().is_none());
+        let touching: Vec<Aabb> = touching.collect();
         frame(ranks, "bounds on the planes", &touching, id, deal, mirrored);
         frame(ranks, "the highest ids", plain, |k| u64::MAX - k as u64, deal, mirrored);
         frame(ranks, "two boxes with each id", plain, |k| k as u64 / 2, deal, mirrored);
