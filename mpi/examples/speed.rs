@@ -6,11 +6,13 @@
 //! ```
 
 use mpi::Threading;
-use mpi::traits::{Communicator, CommunicatorCollectives};
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Source};
 use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Registry, SimdLevel, Tuning};
-use sapwise_mpi::{Distributed, RankPairs};
+use sapwise_mpi::{Distributed, MpiExchange, RankPairs};
+use sapwise_ranks::Exchange;
 use sapwise_scenes::Scenario;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 const OBJECTS: usize = 100_000;
 const ROUNDS: usize = 15;
@@ -83,6 +85,64 @@ fn all(world: &impl Communicator, own: f64) -> Vec<f64> {
     values
 }
 
+/// Ranks that search one after another, as if each had this machine for itself: with fewer cores than ranks need they would be timed with each other on
+/// them, and equally slow.
+struct Turns {
+    exchange: MpiExchange,
+    world: SimpleCommunicator,
+    /// A frame sends boxes and then pairs; between the two is the search.
+    sent: u64,
+    searching: bool,
+}
+
+impl Exchange for Turns {
+    fn rank(&self) -> usize {
+        self.exchange.rank()
+    }
+
+    fn size(&self) -> usize {
+        self.exchange.size()
+    }
+
+    fn sum(&mut self, values: &mut [u64]) {
+        self.exchange.sum(values);
+    }
+
+    fn all_to_all(&mut self, send: &[u64], receive: &mut [u64]) {
+        let next = self.rank() as i32 + 1;
+        if std::mem::take(&mut self.searching) && next < self.world.size() {
+            self.world.process_at_rank(next).send(&0_u64);
+        }
+        self.exchange.all_to_all(send, receive);
+    }
+
+    fn all_to_all_varcount(
+        &mut self,
+        send: &[u64],
+        send_counts: &[usize],
+        receive: &mut [u64],
+        receive_counts: &[usize],
+        meanwhile: &mut dyn FnMut(),
+    ) {
+        self.exchange.all_to_all_varcount(send, send_counts, receive, receive_counts, meanwhile);
+        self.sent += 1;
+        if self.sent.is_multiple_of(2) {
+            return;
+        }
+        // Nobody begins while another still exchanges.
+        self.exchange.sum(&mut [0]);
+        self.searching = true;
+        if let Some(before) = self.rank().checked_sub(1) {
+            let before = self.world.process_at_rank(before as i32);
+            // MPI would wait on a core that another rank needs.
+            while before.immediate_probe().is_none() {
+                std::thread::sleep(Duration::from_micros(100));
+            }
+            before.receive::<u64>();
+        }
+    }
+}
+
 fn unequal(world: &impl Communicator) {
     let (rank, size) = (world.rank() as usize, world.size() as usize);
     let slow = rank == size - 1;
@@ -97,7 +157,9 @@ fn unequal(world: &impl Communicator) {
     // Nothing is known of the machines: the times of the first frames tell.
     let make = || {
         let steps = vec![sapwise::Step::new(0, id(threads))];
-        Distributed::new(world, &registry, Tuning::from_steps(steps).expect("one step is a tuning")).expect("no broad phase")
+        let exchange = Turns { exchange: MpiExchange::new(world), world: world.duplicate(), sent: 0, searching: false };
+        let tuning = Tuning::from_steps(steps).expect("one step is a tuning");
+        sapwise_ranks::Distributed::<Turns>::new(exchange, &registry, tuning).expect("no broad phase")
     };
     // One that cuts when times say so, and one that cuts once, equally, before anything was timed.
     let mut both = [make(), make()];
@@ -109,7 +171,6 @@ fn unequal(world: &impl Communicator) {
         let (own, ids): (Vec<Aabb>, Vec<u64>) =
             (0..objects).skip(rank).step_by(size).map(|k| (scene.boxes()[k], k as u64)).unzip();
         for (ranks, times) in both.iter_mut().zip(&mut times) {
-            // Ranks take turns on the cores: they are timed as if each had a machine of its own.
             ranks.find_pairs(&own, &ids, &mut pairs).expect("no pairs");
             if frame >= 3 * FRAMES {
                 times.push((

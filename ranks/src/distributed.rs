@@ -204,11 +204,10 @@ impl<E: Exchange> Distributed<E> {
         error_of(0, outcome(&result)).map_or(Ok(()), Err)?;
         self.report.search_ns = began.elapsed().as_nanos() as u64;
         self.report.boxes_searched = boxes.len() as u64;
-        pairs.reserve(self.search.found.len());
-        for &(i, j) in &self.search.found {
+        pairs.extend(self.search.found.iter().map(|&(i, j)| {
             let (a, b) = (ids[i as usize], ids[j as usize]);
-            pairs.push(a.min(b), a.max(b));
-        }
+            (a.min(b), a.max(b))
+        }));
         pairs.finish();
         Ok(())
     }
@@ -377,8 +376,7 @@ impl<E: Exchange> Distributed<E> {
         self.received.resize(more * PAIR_WORDS, 0);
         let send = self.pairs_out.pack();
         self.exchange.all_to_all_varcount(send, &send_counts, &mut self.received, &receive_counts, &mut || ());
-        pairs.reserve(more);
-        self.received.chunks_exact(PAIR_WORDS).for_each(|w| pairs.push(w[0], w[1]));
+        pairs.extend(self.received.chunks_exact(PAIR_WORDS).map(|w| (w[0], w[1])));
         Ok(())
     }
 

@@ -87,8 +87,9 @@ impl RankPairs {
         self.pairs.push((own, other));
     }
 
-    pub(crate) fn reserve(&mut self, more: usize) {
-        self.pairs.reserve(more);
+    /// Adds many, whose number is known: without a look at the room for each.
+    pub(crate) fn extend(&mut self, pairs: impl ExactSizeIterator<Item = (u64, u64)>) {
+        self.pairs.extend(pairs);
     }
 
     /// Whether so many pairs and those that are there fit.
