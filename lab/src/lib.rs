@@ -37,6 +37,7 @@ pub mod model_card;
 pub mod page;
 pub mod paired;
 pub mod progress;
+pub mod ranks;
 pub mod report;
 mod schemas;
 pub mod simulated;

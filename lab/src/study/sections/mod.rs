@@ -5,6 +5,7 @@ mod causes;
 mod frames;
 mod lead;
 mod prediction;
+mod ranks;
 
 use super::claims::{self, Claim, Outcome, PRINTED_SPEED_UP};
 use super::entry::Entry;
@@ -41,6 +42,7 @@ pub(super) fn all(
         causes::influences(study, influence, folder, missing)?,
         paper(claims, folder, missing)?,
         parameters(study, folder, missing)?,
+        ranks::ranks(folder, missing)?,
         notes(study, missing),
     ])
 }

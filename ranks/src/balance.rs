@@ -1,0 +1,210 @@
+//! When the cuts are made again.
+
+use crate::record::RankRecord;
+
+/// What ranks wait for each other while the cuts are as good as that is not counted: it is within the noise of a time.
+const TOLERATED: f64 = 0.05;
+/// Cuts that did no good are made again after so many times as much waiting, at most.
+const MOST_PATIENCE: f64 = 64.0;
+
+/// Decides from the times of all ranks when new cuts would pay, the same on every rank.
+///
+/// What the slowest rank takes beyond the time of equally busy ranks is added up, frame by frame. Once it exceeds what cuts cost they are made
+/// again: so that never more than twice the best is lost, as in the problem of renting or buying skis (Karp, 1992). New cuts that did not help make
+/// the next ones dearer.
+#[derive(Debug, Clone)]
+pub struct Balance {
+    /// Time lost since the last cuts.
+    owed_ns: f64,
+    /// How many times the price of cuts it has to be.
+    patience: f64,
+    /// Boxes of all ranks at the last cuts; `None` before the first.
+    cut_at: Option<u64>,
+    /// The imbalance that those cuts were to end, until it is known whether they did.
+    was: Option<f64>,
+    imbalance: Option<f64>,
+    due: bool,
+    /// Whether the last frame was of about as many boxes as the one for which the last cuts were made.
+    same_scene: bool,
+}
+
+impl Default for Balance {
+    fn default() -> Self {
+        Self { owed_ns: 0.0, patience: 1.0, cut_at: None, was: None, imbalance: None, due: true, same_scene: false }
+    }
+}
+
+impl Balance {
+    /// Whether cuts are to be made before the next frame.
+    #[must_use]
+    pub fn is_due(&self) -> bool {
+        self.due
+    }
+
+    /// The time of the slowest rank over that of equally busy ones, less one; `None` where times are not known.
+    #[must_use]
+    pub fn imbalance(&self) -> Option<f64> {
+        self.imbalance
+    }
+
+    /// Whether the last frame says where the boxes of the next one are.
+    pub(crate) fn knows_scene(&self) -> bool {
+        self.same_scene
+    }
+
+    /// Notes that cuts were made. The boxes are counted in the frame that follows.
+    pub fn cut(&mut self) {
+        self.was = self.imbalance.take();
+        (self.owed_ns, self.cut_at, self.due) = (0.0, None, false);
+    }
+
+    /// Notes what all ranks told in a frame.
+    pub fn observe(&mut self, records: &[RankRecord]) {
+        let boxes: u64 = records.iter().map(|r| r.boxes).sum();
+        let before = *self.cut_at.get_or_insert(boxes);
+        // Cuts of a scene that has begun since, or mostly gone.
+        self.same_scene = boxes <= before.saturating_mul(2) && boxes >= before / 2;
+        self.due |= !self.same_scene;
+        let Some((slowest, even)) = times(records) else { return };
+        let imbalance = slowest / even - 1.0;
+        self.imbalance = Some(imbalance);
+        if let Some(was) = self.was.take() {
+            self.patience = if imbalance > 0.8 * was { (2.0 * self.patience).min(MOST_PATIENCE) } else { 1.0 };
+        }
+        let lost = slowest - even - TOLERATED * even;
+        // What was owed by a scene that has become even by itself is forgotten.
+        self.owed_ns = if lost > 0.0 { self.owed_ns + lost } else { self.owed_ns / 2.0 };
+        let price = records.iter().map(|r| r.cut_ns).max().unwrap_or(0) as f64;
+        if self.owed_ns > self.patience * price.max(even) {
+            self.due = true;
+        }
+    }
+}
+
+/// The time of the slowest rank, and what all would take if they were equally busy. `None` where a rank that has boxes has no time.
+fn times(records: &[RankRecord]) -> Option<(f64, f64)> {
+    let busy = || records.iter().filter(|r| r.searched > 0);
+    if busy().any(|r| r.search_ns == 0) || busy().next().is_none() {
+        return None;
+    }
+    let slowest = busy().map(|r| r.search_ns).max()? as f64;
+    let (mut boxes, mut rates, mut count) = (0.0, 0.0, 0.0);
+    for r in busy() {
+        boxes += r.searched as f64;
+        rates += r.searched as f64 / r.search_ns as f64;
+        count += 1.0;
+    }
+    // Ranks without work are taken to be as fast as the others are.
+    Some((slowest, boxes / (rates * records.len() as f64 / count)))
+}
+
+/// The last times of a rank's search.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Times {
+    last: [(u64, u64); Times::KEPT],
+    count: usize,
+}
+
+impl Times {
+    const KEPT: usize = 8;
+
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    pub(crate) fn push(&mut self, boxes: u64, ns: u64) {
+        self.last[self.count % Self::KEPT] = (boxes, ns.max(1));
+        self.count += 1;
+    }
+
+    /// Medians of boxes and nanoseconds, from three frames on: one that stalls is none.
+    pub(crate) fn medians(&self) -> Option<(u64, u64)> {
+        let known = &self.last[..self.count.min(Self::KEPT)];
+        let median = |of: fn(&(u64, u64)) -> u64| {
+            let mut values = [0; Self::KEPT];
+            values.iter_mut().zip(known).for_each(|(v, k)| *v = of(k));
+            let values = &mut values[..known.len()];
+            values.sort_unstable();
+            values[values.len() / 2]
+        };
+        (known.len() >= 3).then(|| (median(|k| k.0), median(|k| k.1)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(times: &[u64], cut_ns: u64) -> Vec<RankRecord> {
+        times.iter().map(|&ns| RankRecord { cut_ns, ..RankRecord::timed(100, 100, ns) }).collect()
+    }
+
+    #[test]
+    fn cuts_are_made_once_what_was_lost_pays_for_them() {
+        let mut balance = Balance::default();
+        assert!(balance.is_due());
+        balance.cut();
+        // 100 boxes in 100 and in 300 ns: together 200 in 150 ns, so that a frame loses 150 and less 5 %.
+        let frames = (0..).take_while(|_| {
+            balance.observe(&frame(&[100, 300], 10_000));
+            !balance.is_due()
+        });
+        assert_eq!(frames.count(), (10_000.0_f64 / 142.5) as usize);
+        assert!((balance.imbalance().unwrap() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_even_scene_keeps_its_cuts_for_ever_and_so_does_one_of_which_nothing_is_known() {
+        for times in [[100, 104], [0, 0], [0, 100]] {
+            let mut balance = Balance::default();
+            balance.cut();
+            (0..10_000).for_each(|_| balance.observe(&frame(&times, 1)));
+            assert!(!balance.is_due(), "{times:?}");
+        }
+    }
+
+    #[test]
+    fn cuts_that_do_not_help_are_made_ever_more_rarely() {
+        let mut balance = Balance::default();
+        balance.cut();
+        let mut cuts = 0;
+        for _ in 0..10_000 {
+            balance.observe(&frame(&[100, 300], 1000));
+            if balance.is_due() {
+                balance.cut();
+                cuts += 1;
+            }
+        }
+        // Every eighth frame without patience.
+        assert!((10..40).contains(&cuts), "{cuts}");
+    }
+
+    #[test]
+    fn a_scene_of_another_size_is_cut_again() {
+        let of = |boxes| [RankRecord::timed(boxes, 0, 0)];
+        let mut balance = Balance::default();
+        balance.cut();
+        balance.observe(&of(0));
+        balance.observe(&of(1));
+        assert!(balance.is_due());
+        balance.cut();
+        [100, 150, 200, 50].iter().for_each(|&n| balance.observe(&of(n)));
+        assert!(!balance.is_due());
+        balance.observe(&of(49));
+        assert!(balance.is_due());
+    }
+
+    #[test]
+    fn a_median_takes_three_frames() {
+        let mut times = Times::default();
+        times.push(5, 10);
+        times.push(5, 0);
+        assert_eq!(times.medians(), None);
+        times.push(7, 1_000_000);
+        assert_eq!(times.medians(), Some((5, 10)));
+        (0..8).for_each(|k| times.push(k, k));
+        assert_eq!(times.medians(), Some((4, 4)));
+        times.clear();
+        assert_eq!(times.medians(), None);
+    }
+}

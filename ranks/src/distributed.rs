@@ -1,0 +1,407 @@
+//! A broad phase over ranks.
+
+use crate::balance::Balance;
+use crate::bisect::bisect;
+use crate::cuts::Cuts;
+use crate::error::{DONE, Error, Outcome, error_of, outcome};
+use crate::exchange::Exchange;
+use crate::outbox::Outbox;
+use crate::pairs::RankPairs;
+use crate::record::{self, RankRecord};
+use crate::sample::Sample;
+use crate::search::{BOX_WORDS, LocalSearch, words};
+use crate::share::{FACTORS, costs, pair_cost, shares};
+use sapwise::{Aabb, Adaptive, Load, Registry, Tuning};
+use std::time::Instant;
+
+/// Words of a pair on its way to an owner: the id of the owner's box, then the other.
+const PAIR_WORDS: usize = 2;
+/// Words that a rank says before pairs go back: how many, and the outcome of its search.
+const ANSWER_WORDS: usize = 3;
+
+/// Finds the pairs of boxes that are spread over ranks.
+///
+/// Every rank calls [`find_pairs`](Self::find_pairs) equally often, as a collective operation. Which rank owns a box may change from frame to frame.
+/// Frames in which ranks own what lies near each other are cheap, since only boxes of another rank's region cross.
+pub struct Distributed<E> {
+    exchange: E,
+    search: LocalSearch,
+    cuts: Cuts,
+    balance: Balance,
+    /// Cuts are made again after so many frames, whatever the times say.
+    cut_every: Option<u64>,
+    frames: u64,
+    cut_ns: u64,
+    /// What each rank told in this frame.
+    records: Vec<RankRecord>,
+    boxes_out: Outbox<BOX_WORDS>,
+    pairs_out: Outbox<PAIR_WORDS>,
+    told: Vec<u64>,
+    heard: Vec<u64>,
+    received: Vec<u64>,
+    report: FrameReport,
+}
+
+/// What a frame has moved, on this rank.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
+pub struct FrameReport {
+    /// Boxes that the rank came with.
+    pub boxes: u64,
+    /// Copies of them that went to other ranks.
+    pub boxes_sent: u64,
+    /// Boxes that came from other ranks.
+    pub boxes_received: u64,
+    /// Boxes that were searched here: own ones of this region, and all that came.
+    pub boxes_searched: u64,
+    /// Pairs that went to the owners of their boxes.
+    pub pairs_sent: u64,
+    /// Pairs that came from where they were found.
+    pub pairs_received: u64,
+    /// Bytes that went to other ranks: boxes, pairs, counts. Without those of cuts.
+    pub bytes_sent: u64,
+    /// Whether space was cut.
+    pub cut: bool,
+    /// Nanoseconds that the search took here, without any exchange.
+    pub search_ns: u64,
+    /// Bytes of memory that are kept for boxes and messages, without those of the algorithm, of the found pairs and of the exchange.
+    pub memory_bytes: u64,
+}
+
+impl<E: Exchange> Distributed<E> {
+    /// A broad phase over the ranks of `exchange`. Each rank comes with the algorithms and the tuning of its own machine; those that know the costs of
+    /// algorithms, predicted or measured, let the cuts follow the speed of the machines from the first frame on, and
+    /// [`Tuning::usual`] from the first ones that were timed.
+    ///
+    /// # Errors
+    /// The same on all ranks, for the lowest whose tuning names no algorithm that runs there.
+    pub fn new(exchange: impl Into<E>, registry: &Registry, tuning: Tuning) -> Result<Self, Error> {
+        let mut exchange = exchange.into();
+        let made = Adaptive::new(tuning, registry);
+        let own = made.as_ref().map_or_else(|e| outcome(&Err(e.clone())), |_| DONE);
+        agree(&mut exchange, own)?;
+        let ranks = exchange.size();
+        // `agree` has returned the error of this rank, or that of a lower one.
+        let adaptive = made.map_err(|_| Error::Search { rank: exchange.rank(), failure: crate::Failure::NoAlgorithm })?;
+        Ok(Self {
+            exchange,
+            search: LocalSearch::new(adaptive),
+            cuts: Cuts::one(),
+            balance: Balance::default(),
+            cut_every: None,
+            frames: 0,
+            cut_ns: 0,
+            records: vec![RankRecord::default(); ranks],
+            boxes_out: Outbox::new(ranks),
+            pairs_out: Outbox::new(ranks),
+            told: Vec::new(),
+            heard: Vec::new(),
+            received: Vec::new(),
+            report: FrameReport::default(),
+        })
+    }
+
+    /// This rank, from 0.
+    pub fn rank(&self) -> usize {
+        self.exchange.rank()
+    }
+
+    /// How many ranks there are.
+    pub fn ranks(&self) -> usize {
+        self.exchange.size()
+    }
+
+    /// The regions of the ranks. All of space for one before the first frame.
+    #[must_use]
+    pub fn cuts(&self) -> &Cuts {
+        &self.cuts
+    }
+
+    /// What the last frame has moved.
+    #[must_use]
+    pub fn last_frame(&self) -> &FrameReport {
+        &self.report
+    }
+
+    /// How even the times of the ranks are, which decides when space is cut again.
+    #[must_use]
+    pub fn balance(&self) -> &Balance {
+        &self.balance
+    }
+
+    /// The broad phase of this rank's region.
+    #[must_use]
+    pub fn adaptive(&self) -> &Adaptive {
+        self.search.adaptive()
+    }
+
+    /// The same, to say whether it learns and explores.
+    pub fn adaptive_mut(&mut self) -> &mut Adaptive {
+        self.search.adaptive_mut()
+    }
+
+    /// In full, what the last search of this rank failed with, if it did.
+    #[must_use]
+    pub fn search_error(&self) -> Option<&sapwise::Error> {
+        self.search.error.as_ref()
+    }
+
+    /// Cuts space again after every so many frames, or, by default, when the times of the ranks say that it pays. The same on all ranks.
+    ///
+    /// For runs whose cuts are to be the same again: times are not.
+    pub fn set_cut_every(&mut self, frames: Option<u64>) {
+        self.cut_every = frames;
+    }
+
+    /// Replaces the content of `pairs` with the pairs of this rank's boxes: overlapping pairs over the boxes of all ranks, touching ones included.
+    ///
+    /// `ids` has one id for each box. They name boxes in `pairs` and are not compared with each other: two boxes with one id are two boxes.
+    ///
+    /// # Errors
+    /// The same on all ranks: [`Error::InvalidBox`] and [`Error::MissingIds`] before anything is searched, [`Error::Search`] and
+    /// [`Error::TooManyPairs`] after. The content of `pairs` is unspecified then.
+    pub fn find_pairs(&mut self, boxes: &[Aabb], ids: &[u64], pairs: &mut RankPairs) -> Result<(), Error> {
+        pairs.clear();
+        self.report = FrameReport { boxes: boxes.len() as u64, ..FrameReport::default() };
+        if self.ranks() == 1 {
+            return self.find_alone(boxes, ids, pairs);
+        }
+        let due = self.cut_every.map_or(self.balance.is_due(), |every| self.frames.is_multiple_of(every.max(1)));
+        self.frames += 1;
+        if due {
+            self.cut(boxes);
+        }
+        let own = self.route(boxes, ids);
+        self.tell(RankRecord { mirrored: pairs.is_mirrored(), limited: pairs.limit().is_some(), ..own });
+        self.balance.observe(&self.records);
+        if let Some(error) = RankRecord::error(&self.records) {
+            return Err(error);
+        }
+        self.exchange_boxes();
+        let began = Instant::now();
+        let outcome = outcome(&self.search.run());
+        self.report.search_ns = began.elapsed().as_nanos() as u64;
+        self.pairs_out.clear();
+        if outcome == DONE {
+            self.sort_found(pairs);
+        }
+        self.return_pairs(outcome, pairs)?;
+        self.report.memory_bytes = self.bytes() as u64;
+        pairs.finish();
+        Ok(())
+    }
+
+    /// A frame of one rank, which needs no copy.
+    fn find_alone(&mut self, boxes: &[Aabb], ids: &[u64], pairs: &mut RankPairs) -> Result<(), Error> {
+        if ids.len() != boxes.len() {
+            return Err(Error::MissingIds { rank: 0, boxes: boxes.len() as u64, ids: ids.len() as u64 });
+        }
+        let began = Instant::now();
+        let result = self.search.run_on(boxes, pairs.limit());
+        if let Err(sapwise::Error::InvalidBox { index, defect }) = result {
+            return Err(Error::InvalidBox { rank: 0, index: index as u64, defect });
+        }
+        error_of(0, outcome(&result)).map_or(Ok(()), Err)?;
+        self.report.search_ns = began.elapsed().as_nanos() as u64;
+        self.report.boxes_searched = boxes.len() as u64;
+        pairs.extend(self.search.found.iter().map(|&(i, j)| {
+            let (a, b) = (ids[i as usize], ids[j as usize]);
+            (a.min(b), a.max(b))
+        }));
+        pairs.finish();
+        Ok(())
+    }
+
+    /// Cuts space by the boxes and by the loads and speeds of all ranks.
+    fn cut(&mut self, boxes: &[Aabb]) {
+        let began = Instant::now();
+        let ranks = self.ranks();
+        // Before the first cuts no load of a region is known: that of the own boxes, wherever they are, has to do.
+        let regional = self.search.load().filter(|load| load.objects > 0 && self.cuts.regions().len() == ranks);
+        let load = regional.unwrap_or_else(|| Load::estimate(boxes, None, None));
+        let mean = self.mean_load(&load);
+        let predict = self.search.predictor();
+        let time = |factor: f64| {
+            let objects = (f64::from(mean.objects) * factor).clamp(1.0, f64::from(u32::MAX));
+            predict(&mean.rescaled(objects as u32, mean.pairs * factor))
+        };
+        // What this region costs over what a mean one would cost here: the speed of this rank cancels. By its boxes and pairs, which are known; its
+        // candidates are known from a few hundred boxes, and would make noise of even regions.
+        let work = regional.map_or(1.0, |load| predict(&mean.rescaled(load.objects, load.pairs)) / predict(&mean));
+        let own = FACTORS.map(time).into_iter().chain([work, pair_cost(&mean, &predict)]);
+        let all = gather(&mut self.exchange, own, FACTORS.len() + 2);
+        let times: Vec<_> = all.iter().map(|words| std::array::from_fn(|k| words[k])).collect();
+        let pair_cost = all.iter().map(|words| words[FACTORS.len() + 1]).sum::<f64>() / ranks as f64;
+        // The boxes of the last frame, of which the pairs are known, unless this is another scene.
+        let known = self.cuts.regions().len() == ranks && self.balance.knows_scene() && self.search.is_whole();
+        let mut samples = if known {
+            self.search.samples(&self.cuts.regions()[self.rank()], pair_cost)
+        } else {
+            Sample::of(boxes, Sample::MOST)
+        };
+        if self.cuts.regions().len() == ranks {
+            let mut owned = Sample::weights(&samples, &self.cuts);
+            self.exchange.sum(&mut owned);
+            let works: Vec<f64> = all.iter().map(|words| words[FACTORS.len()]).collect();
+            Sample::weigh(&mut samples, &self.cuts, &costs(&works, &owned));
+        }
+        self.cuts = bisect(&mut samples, &shares(&times), &mut |values| self.exchange.sum(values));
+        self.search.times.clear();
+        self.balance.cut();
+        self.cut_ns = began.elapsed().as_nanos() as u64;
+        self.report.cut = true;
+    }
+
+    /// The mean of the loads of all ranks.
+    fn mean_load(&mut self, load: &Load) -> Load {
+        const PARTS: f64 = 1e6;
+        let count = |v: f64| v.clamp(0.0, 1e18) as u64;
+        let objects = f64::from(load.objects);
+        let mut sums = [
+            u64::from(load.objects),
+            count(load.axis_candidates),
+            count(load.strip_candidates),
+            count(load.pairs),
+            count(load.moved * objects * PARTS),
+        ];
+        self.exchange.sum(&mut sums);
+        let [objects, axis, strip, pairs, moved] = sums.map(|s| s as f64);
+        let mean = |v: f64| v / self.ranks() as f64;
+        Load::of_objects(mean(objects).clamp(1.0, f64::from(u32::MAX)) as u32)
+            .with_candidates(mean(axis), mean(strip))
+            .with_pairs(mean(pairs))
+            .with_moved(moved / PARTS / objects.max(1.0))
+    }
+
+    /// Sends each box to where it is searched, as far as the outbox. Ends at the first invalid one.
+    fn route(&mut self, boxes: &[Aabb], ids: &[u64]) -> RankRecord {
+        let own = self.rank();
+        let region = self.cuts.regions()[own];
+        let (search, outbox) = (&mut self.search, &mut self.boxes_out);
+        search.clear();
+        outbox.clear();
+        let medians = search.times.medians().unwrap_or((0, 0));
+        let mut record = RankRecord::timed(boxes.len() as u64, medians.0, medians.1);
+        (record.ids, record.cut_ns) = (ids.len() as u64, self.cut_ns);
+        for ((index, b), &id) in (0..).zip(boxes).zip(ids) {
+            if let Some(defect) = b.defect() {
+                record.defect = Some((index, defect));
+                break;
+            }
+            if region.holds_all_of(b) {
+                search.keep(*b, id);
+            } else {
+                self.cuts.each_rank_of(
+                    b,
+                    |rank| {
+                        if rank == own { search.keep(*b, id) } else { outbox.push(rank, words(b, id)) }
+                    },
+                );
+            }
+        }
+        record
+    }
+
+    /// Tells every rank this record, with how many boxes it gets, and hears those of all.
+    fn tell(&mut self, own: RankRecord) {
+        self.told.clear();
+        for &count in self.boxes_out.counts() {
+            self.told.extend(RankRecord { sends: count as u64, ..own }.words());
+        }
+        self.heard.resize(self.told.len(), 0);
+        self.exchange.all_to_all(&self.told, &mut self.heard);
+        self.report.bytes_sent += 8 * (self.told.len() - record::WORDS) as u64;
+        self.records.clear();
+        self.records.extend(self.heard.chunks_exact(record::WORDS).map(RankRecord::of));
+    }
+
+    fn exchange_boxes(&mut self) {
+        let counts: Vec<usize> = self.records.iter().map(|r| r.sends as usize).collect();
+        let boxes: usize = counts.iter().sum();
+        let (sent, report) = (self.boxes_out.len(), &mut self.report);
+        (report.boxes_sent, report.boxes_received) = (sent as u64, boxes as u64);
+        report.bytes_sent += (8 * BOX_WORDS * sent) as u64;
+        let send_counts: Vec<usize> = self.boxes_out.counts().iter().map(|c| c * BOX_WORDS).collect();
+        let receive_counts: Vec<usize> = counts.iter().map(|c| c * BOX_WORDS).collect();
+        self.received.resize(boxes * BOX_WORDS, 0);
+        let send = self.boxes_out.pack();
+        self.exchange.all_to_all_varcount(send, &send_counts, &mut self.received, &receive_counts, &mut || ());
+        self.search.receive(&self.received, counts.into_iter());
+        self.report.boxes_searched = self.search.boxes.len() as u64;
+    }
+
+    /// Takes the pairs that were found here: those whose place is this region, to the owners of their boxes.
+    fn sort_found(&mut self, pairs: &mut RankPairs) {
+        let own = self.rank();
+        let region = self.cuts.regions()[own];
+        let search = &self.search;
+        let mut deliver = |owner: usize, id: u64, other: u64| {
+            if owner == own { pairs.push(id, other) } else { self.pairs_out.push(owner, [id, other]) }
+        };
+        for &(i, j) in &search.found {
+            let (a, b) = (&search.boxes[i as usize], &search.boxes[j as usize]);
+            if !region.finds(a, b) {
+                continue;
+            }
+            let end = |at: u32| (search.ids[at as usize], search.owner(at, own));
+            let (first, second) = (end(i).min(end(j)), end(i).max(end(j)));
+            deliver(first.1, first.0, second.0);
+            if second.1 != first.1 && self.records[second.1].mirrored {
+                deliver(second.1, second.0, first.0);
+            }
+        }
+    }
+
+    /// Sends pairs to their owners and takes those of own boxes, unless anything failed anywhere.
+    fn return_pairs(&mut self, outcome: Outcome, pairs: &mut RankPairs) -> Result<(), Error> {
+        self.told.clear();
+        for &count in self.pairs_out.counts() {
+            self.told.extend([count as u64, outcome[0], outcome[1]]);
+        }
+        self.heard.resize(self.told.len(), 0);
+        self.exchange.all_to_all(&self.told, &mut self.heard);
+        let answers = || self.heard.chunks_exact(ANSWER_WORDS);
+        if let Some(error) = answers().enumerate().find_map(|(rank, a)| error_of(rank, [a[1], a[2]])) {
+            return Err(error);
+        }
+        let receive_counts: Vec<usize> = answers().map(|a| a[0] as usize * PAIR_WORDS).collect();
+        let more = receive_counts.iter().sum::<usize>() / PAIR_WORDS;
+        if self.records.iter().any(|r| r.limited) {
+            agree(&mut self.exchange, pairs.outcome_with(more))?;
+        }
+        let sent = self.pairs_out.len();
+        self.report.bytes_sent += 8 * (self.told.len() - ANSWER_WORDS + sent * PAIR_WORDS) as u64;
+        (self.report.pairs_sent, self.report.pairs_received) = (sent as u64, more as u64);
+        let send_counts: Vec<usize> = self.pairs_out.counts().iter().map(|c| c * PAIR_WORDS).collect();
+        self.received.resize(more * PAIR_WORDS, 0);
+        let send = self.pairs_out.pack();
+        self.exchange.all_to_all_varcount(send, &send_counts, &mut self.received, &receive_counts, &mut || ());
+        pairs.extend(self.received.chunks_exact(PAIR_WORDS).map(|w| (w[0], w[1])));
+        Ok(())
+    }
+
+    fn bytes(&self) -> usize {
+        let words = self.told.capacity() + self.heard.capacity() + self.received.capacity();
+        8 * words + self.search.bytes() + self.boxes_out.bytes() + self.pairs_out.bytes()
+    }
+}
+
+/// The figures of every rank, so many of each.
+fn gather(exchange: &mut impl Exchange, own: impl Iterator<Item = f64>, each: usize) -> Vec<Vec<f64>> {
+    // A sum in which only one rank has anything else than 0 is what that rank has.
+    let mut words = vec![0; each * exchange.size()];
+    let at = each * exchange.rank();
+    words[at..at + each].iter_mut().zip(own).for_each(|(word, v)| *word = v.to_bits());
+    exchange.sum(&mut words);
+    words.chunks_exact(each).map(|w| w.iter().map(|&v| f64::from_bits(v)).collect()).collect()
+}
+
+/// Returns the same on every rank: the error of the lowest that has one.
+fn agree(exchange: &mut impl Exchange, own: Outcome) -> Result<(), Error> {
+    let mut words = vec![0; 2 * exchange.size()];
+    let at = 2 * exchange.rank();
+    words[at..at + 2].copy_from_slice(&own);
+    exchange.sum(&mut words);
+    let error = words.chunks_exact(2).enumerate().find_map(|(rank, w)| error_of(rank, [w[0], w[1]]));
+    error.map_or(Ok(()), Err)
+}

@@ -1,0 +1,92 @@
+//! What goes to other ranks, collected in any order and packed in the order of the ranks.
+
+/// Messages of `N` words, each for a rank.
+#[derive(Debug, Clone)]
+pub(crate) struct Outbox<const N: usize> {
+    messages: Vec<(u32, [u64; N])>,
+    /// Messages for each rank.
+    counts: Vec<usize>,
+    /// Where the next message for each rank goes.
+    next: Vec<usize>,
+    words: Vec<u64>,
+}
+
+impl<const N: usize> Outbox<N> {
+    pub(crate) fn new(ranks: usize) -> Self {
+        Self { messages: Vec::new(), counts: vec![0; ranks], next: Vec::new(), words: Vec::new() }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.messages.clear();
+        self.counts.fill(0);
+    }
+
+    #[inline]
+    pub(crate) fn push(&mut self, rank: usize, message: [u64; N]) {
+        self.counts[rank] += 1;
+        self.messages.push((rank as u32, message));
+    }
+
+    /// Messages for each rank.
+    pub(crate) fn counts(&self) -> &[usize] {
+        &self.counts
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.messages.len()
+    }
+
+    /// The words of all messages, those for rank 0 first; those for one rank in the order in which they came.
+    pub(crate) fn pack(&mut self) -> &[u64] {
+        self.next.clear();
+        let mut at = 0;
+        for count in &self.counts {
+            self.next.push(at);
+            at += count * N;
+        }
+        self.words.resize(at, 0);
+        for (rank, message) in &self.messages {
+            let next = &mut self.next[*rank as usize];
+            self.words[*next..*next + N].copy_from_slice(message);
+            *next += N;
+        }
+        &self.words
+    }
+
+    /// Bytes of memory that it keeps.
+    pub(crate) fn bytes(&self) -> usize {
+        self.messages.capacity() * size_of::<(u32, [u64; N])>() + self.words.capacity() * 8
+    }
+}
+
+/// Where each of some consecutive parts begins, and at last where they end.
+pub(crate) fn starts(counts: &[usize]) -> Vec<usize> {
+    let mut starts = Vec::with_capacity(counts.len() + 1);
+    let mut at = 0;
+    starts.push(at);
+    for count in counts {
+        at += count;
+        starts.push(at);
+    }
+    starts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_packed_by_rank_and_keep_their_order() {
+        let mut outbox = Outbox::<2>::new(3);
+        for round in 0..2 {
+            outbox.clear();
+            for (rank, word) in [(2, 1), (0, 2), (2, 3), (0, 4)] {
+                outbox.push(rank, [word, word + 10 * round]);
+            }
+            assert_eq!((outbox.counts(), outbox.len()), (&[2, 0, 2][..], 4));
+            let packed = [2, 4, 1, 3].map(|w| [w, w + 10 * round]).concat();
+            assert_eq!(outbox.pack(), packed);
+        }
+        assert_eq!(starts(outbox.counts()), [0, 2, 2, 4]);
+    }
+}

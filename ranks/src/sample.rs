@@ -1,0 +1,93 @@
+//! The boxes by which space is cut.
+
+use crate::cuts::{Cuts, centre};
+use sapwise::Aabb;
+
+/// One box of a rank, standing for as many as there are for each that was taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// The box, which is valid.
+    pub bounds: Aabb,
+    /// The work that it stands for, in parts of which [`Sample::UNIT`] are one box of the usual cost.
+    pub weight: u64,
+    /// Used while space is cut: which of the parts it is in.
+    pub(crate) part: u32,
+}
+
+impl Sample {
+    /// The weight of one box of the usual cost.
+    pub const UNIT: u64 = 1024;
+
+    /// Boxes of each rank that are taken at most: with 16 384 a share of the work is known to 0.8 %, and to 2.6 % that of the rank of a
+    /// thousand that is met worst.
+    pub const MOST: usize = 16_384;
+
+    /// Up to `most` of the valid boxes, one out of each of as many equal parts of the list, with the weight of usual boxes.
+    #[must_use]
+    pub fn of(boxes: &[Aabb], most: usize) -> Vec<Self> {
+        Self::with_pairs(boxes, most, |_| 0, 0.0)
+    }
+
+    /// The same with what boxes cost: as much as one usual box, and `pair_cost` usual boxes for each pair. `pairs_of` tells the pairs of the box at a
+    /// position, each of which counts for both of its boxes by half.
+    #[must_use]
+    pub fn with_pairs(boxes: &[Aabb], most: usize, pairs_of: impl Fn(usize) -> u32, pair_cost: f64) -> Vec<Self> {
+        let count = boxes.len().min(most);
+        let start = |k: usize| (k as u128 * boxes.len() as u128 / count as u128) as usize;
+        let take = |k: usize| {
+            let (first, end) = (start(k), start(k + 1));
+            // Not at regular distances: boxes of a kind may follow each other so.
+            let at = first + (mix(k as u64) % (end - first) as u64) as usize;
+            let bounds = boxes[at];
+            let cost = 1.0 + pair_cost * f64::from(pairs_of(at)) / 2.0;
+            let weight = ((end - first) as f64 * cost * Self::UNIT as f64).clamp(1.0, 1e15) as u64;
+            bounds.defect().is_none().then_some(Self { bounds, weight, part: 0 })
+        };
+        (0..count).filter_map(take).collect()
+    }
+
+    /// The weight of some samples by the region that each is in.
+    #[must_use]
+    pub fn weights(samples: &[Self], cuts: &Cuts) -> Vec<u64> {
+        let mut weights = vec![0; cuts.regions().len()];
+        samples.iter().for_each(|s| weights[cuts.rank_of(centre(&s.bounds))] += s.weight);
+        weights
+    }
+
+    /// Multiplies the weight of each sample by the cost of a box of its region.
+    pub fn weigh(samples: &mut [Self], cuts: &Cuts, costs: &[f64]) {
+        for s in samples {
+            let cost = costs[cuts.rank_of(centre(&s.bounds))];
+            s.weight = (s.weight as f64 * cost).clamp(1.0, 1e15) as u64;
+        }
+    }
+}
+
+/// The finaliser of splitmix64 (Steele, Lea and Flood, 2014).
+fn mix(mut x: u64) -> u64 {
+    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_stands_for_all_boxes_and_leaves_out_the_invalid_ones() {
+        let mut boxes: Vec<Aabb> = (0..1000).map(|k| Aabb::cube([k as f32; 3], 0.5)).collect();
+        for most in [1, 7, 999, 1000, 5000] {
+            let sample = Sample::of(&boxes, most);
+            assert_eq!(sample.len(), most.min(1000));
+            assert_eq!(sample.iter().map(|s| s.weight).sum::<u64>(), 1000 * Sample::UNIT);
+            assert!(sample.is_sorted_by(|a, b| a.bounds.min[0] < b.bounds.min[0]));
+        }
+        let weighed = Sample::with_pairs(&boxes, 1000, |k| k as u32 % 5, 0.5);
+        assert!(weighed.iter().zip(0..).all(|(s, k)| s.weight == Sample::UNIT + Sample::UNIT / 4 * (k % 5)));
+        boxes.iter_mut().step_by(2).for_each(|b| b.min[0] = f32::NAN);
+        assert_eq!(Sample::of(&boxes, 1000).len(), 500);
+        assert!(Sample::of(&[], 10).is_empty());
+    }
+}

@@ -1,0 +1,240 @@
+//! What every exchange has to bring about: the pairs of one process, on the ranks that own the boxes. Shared by the tests over threads, and by
+//! those over MPI.
+//!
+//! Each rank plays the whole scene, hands in its own boxes, and compares what it gets with what all boxes have.
+
+#![allow(dead_code, reason = "each test uses some of it")]
+
+use sapwise::{Aabb, Adaptive, BoxDefect, BroadPhase, PairOrder, Pairs, Registry, Tuning};
+use sapwise_ranks::{Distributed, Error, Exchange, RankPairs};
+use sapwise_scenes::{Random, Scenario};
+
+/// An algorithm for each size, without any measurement.
+pub(crate) fn distributed<E: Exchange>(exchange: impl Into<E>) -> Distributed<E> {
+    let registry = Registry::with_cores(1);
+    Distributed::new(exchange, &registry, Tuning::usual(&registry)).unwrap()
+}
+
+/// Ids that use all 64 bits, in no order.
+pub(crate) fn id(index: usize) -> u64 {
+    (index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(17)
+}
+
+/// Who owns boxes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Owners {
+    /// Any rank, and one box in eight another one in the next frame.
+    Random,
+    /// Contiguous parts of the list.
+    Parts,
+    /// One rank, another one in each frame.
+    One,
+    /// The ranks with even numbers.
+    Even,
+}
+
+impl Owners {
+    pub(crate) fn of(self, index: usize, frame: u64, ranks: usize, all: usize) -> usize {
+        match self {
+            Self::Random => {
+                let epoch = (frame + index as u64) / 8;
+                (Random::new(index as u64 ^ epoch << 32).bits() % ranks as u64) as usize
+            }
+            Self::Parts => index * ranks / all.max(1),
+            Self::One => frame as usize % ranks,
+            Self::Even => 2 * (index % ranks.div_ceil(2)),
+        }
+    }
+}
+
+/// Every pair by the definition of overlap.
+pub(crate) fn naive(boxes: &[Aabb]) -> Vec<(u32, u32)> {
+    let mut pairs = Vec::new();
+    for (j, b) in (0..).zip(boxes) {
+        pairs.extend((0..j).zip(boxes).filter(|(_, a)| a.overlaps(b)).map(|(i, _)| (i, j)));
+    }
+    pairs
+}
+
+/// What a rank is to get of some pairs.
+pub(crate) fn expected(
+    pairs: &[(u32, u32)],
+    id: impl Fn(usize) -> u64,
+    owner: impl Fn(usize) -> usize,
+    rank: usize,
+    mirrored: bool,
+) -> Vec<(u64, u64)> {
+    let mut list = Vec::new();
+    for &(i, j) in pairs {
+        let end = |k: u32| (id(k as usize), owner(k as usize));
+        let (first, second) = (end(i).min(end(j)), end(i).max(end(j)));
+        if first.1 == rank {
+            list.push((first.0, second.0));
+        }
+        if mirrored && second.1 == rank && first.1 != rank {
+            list.push((second.0, first.0));
+        }
+    }
+    list.sort_unstable();
+    list
+}
+
+/// A list of this kind.
+pub(crate) fn list(mirrored: bool) -> RankPairs {
+    let mut pairs = RankPairs::with_order(PairOrder::Canonical);
+    pairs.set_mirrored(mirrored);
+    pairs
+}
+
+/// One frame of boxes, of which this rank hands in its own, against the definition.
+pub(crate) fn frame<E: Exchange>(
+    ranks: &mut Distributed<E>,
+    what: &str,
+    boxes: &[Aabb],
+    id: impl Fn(usize) -> u64,
+    owner: impl Fn(usize) -> usize,
+    mirrored: bool,
+) {
+    let own: Vec<usize> = (0..boxes.len()).filter(|&k| owner(k) == ranks.rank()).collect();
+    let (own_boxes, ids): (Vec<Aabb>, Vec<u64>) = own.iter().map(|&k| (boxes[k], id(k))).unzip();
+    let mut pairs = list(mirrored);
+    ranks.find_pairs(&own_boxes, &ids, &mut pairs).unwrap_or_else(|e| panic!("{what}: {e}"));
+    let wanted = expected(&naive(boxes), id, owner, ranks.rank(), mirrored);
+    let (found, all) = (pairs.as_slice(), ranks.ranks());
+    assert!(
+        found == wanted,
+        "{what}: rank {} of {all} found {} pairs instead of {}",
+        ranks.rank(),
+        found.len(),
+        wanted.len()
+    );
+}
+
+/// Plays a scenario over ranks. Every frame is compared with one process, every tenth with the definition too. Returns the pairs that this rank got.
+pub(crate) fn play<E: Exchange>(
+    ranks: &mut Distributed<E>,
+    scenario: Scenario,
+    objects: usize,
+    frames: u64,
+    owners: Owners,
+) -> u64 {
+    let registry = Registry::with_cores(1);
+    let mut alone = Adaptive::new(Tuning::usual(&registry), &registry).unwrap();
+    let (mut all, mut count) = (Pairs::new(), 0);
+    let mut scene = scenario.start(objects, 1);
+    let (rank, size) = (ranks.rank(), ranks.ranks());
+    let mut lists = [list(false), list(true)];
+    for frame in 0..frames {
+        let boxes = scene.boxes();
+        let owner = |k: usize| owners.of(k, frame, size, boxes.len());
+        let (own, ids): (Vec<Aabb>, Vec<u64>) =
+            (0..boxes.len()).filter(|&k| owner(k) == rank).map(|k| (boxes[k], id(k))).unzip();
+        let pairs = &mut lists[usize::from(frame % 3 == 0)];
+        ranks.find_pairs(&own, &ids, pairs).unwrap_or_else(|e| panic!("{scenario}, frame {frame}: {e}"));
+        alone.find_pairs(boxes, &mut all).unwrap();
+        if frame % 10 == 0 {
+            let mut one: Vec<(u32, u32)> = all.as_slice().to_vec();
+            let mut definition = naive(boxes);
+            one.sort_unstable();
+            definition.sort_unstable();
+            assert!(one == definition, "{scenario}, frame {frame}: one process is wrong");
+        }
+        let wanted = expected(all.as_slice(), id, owner, rank, pairs.is_mirrored());
+        let (found, how) = (pairs.as_slice(), (scenario, owners, frame, rank, size));
+        assert!(found == wanted, "{how:?}: {} pairs instead of {}", found.len(), wanted.len());
+        count += wanted.len() as u64;
+        scene.advance();
+    }
+    count
+}
+
+/// Boxes where a protocol of ranks is easily wrong.
+pub(crate) fn edge_cases<E: Exchange>(ranks: &mut Distributed<E>) {
+    let size = ranks.ranks();
+    let inf = f32::INFINITY;
+    let scene = Scenario::Clustered.start(150, 3);
+    let plain = scene.boxes();
+    let deal = |k: usize| k % size;
+    for mirrored in [false, true] {
+        frame(ranks, "no box at all", &[], id, deal, mirrored);
+        frame(ranks, "one box", &plain[..1], id, deal, mirrored);
+        frame(ranks, "some boxes after none", plain, id, deal, mirrored);
+        for one in 0..size {
+            frame(ranks, "all boxes on one rank", plain, id, |_| one, mirrored);
+        }
+        frame(ranks, "ranks without boxes", plain, id, |k| 2 * (k % size.div_ceil(2)), mirrored);
+        frame(ranks, "all boxes at one point", &vec![Aabb::cube([3.0; 3], 0.5); 90], id, deal, mirrored);
+        frame(ranks, "points", &vec![Aabb::new([-0.0; 3], [0.0; 3]); 40], id, deal, mirrored);
+        let mut infinite = plain.to_vec();
+        for k in 0..9 {
+            let axis = k % 3;
+            let b = &mut infinite[16 * k];
+            (b.min[axis], b.max[axis]) = [(-inf, inf), (b.min[axis], inf), (-inf, b.max[axis])][k / 3];
+        }
+        infinite.extend([Aabb::new([-inf; 3], [inf; 3]), Aabb::new([inf; 3], [inf; 3]), Aabb::new([-inf; 3], [-inf; 3])]);
+        frame(ranks, "infinite boxes", &infinite, id, deal, mirrored);
+        frame(ranks, "only infinite boxes", &[Aabb::new([-inf; 3], [inf; 3]); 30], id, deal, mirrored);
+        let mut large = plain.to_vec();
+        large.iter_mut().step_by(10).for_each(|b| *b = Aabb::new(b.min, b.max.map(|m| m + 1000.0)));
+        frame(ranks, "boxes larger than a region", &large, id, deal, mirrored);
+        // Bounds on the planes that the last frames have left, and beside them.
+        let planes: Vec<f32> = ranks.cuts().regions().iter().flat_map(|r| r.low).filter(|v| v.is_finite()).collect();
+        let touching = planes
+            .iter()
+            .flat_map(|&p| [(p, p), (p - 1.0, p), (p, p + 1.0), (p.next_down(), p.next_up()), (p.next_up(), p + 1.0)]);
+        // Beside a plane at the end of the numbers there is no room for all of them.
+        let touching = touching.map(|(low, high)| Aabb::new([low; 3], [high; 3])).filter(|b| b.defect().is_none());
+        let touching: Vec<Aabb> = touching.collect();
+        frame(ranks, "bounds on the planes", &touching, id, deal, mirrored);
+        frame(ranks, "the highest ids", plain, |k| u64::MAX - k as u64, deal, mirrored);
+        frame(ranks, "two boxes with each id", plain, |k| k as u64 / 2, deal, mirrored);
+        frame(ranks, "one id for all boxes", &plain[..20], |_| 7, deal, mirrored);
+    }
+    for frame_index in 0..20 {
+        frame(
+            ranks,
+            "a rank that comes with boxes now and then",
+            plain,
+            id,
+            |k| (k + frame_index / 3 * (k % 2)) % size,
+            false,
+        );
+    }
+    errors(ranks, plain);
+}
+
+/// What is wrong on one rank is the same error on all, and the next frame is right.
+fn errors<E: Exchange>(ranks: &mut Distributed<E>, plain: &[Aabb]) {
+    let (rank, size) = (ranks.rank(), ranks.ranks());
+    let own: Vec<Aabb> = plain.iter().skip(rank).step_by(size).copied().collect();
+    let ids: Vec<u64> = (0..own.len()).map(|k| id(k * size + rank)).collect();
+    let after = |ranks: &mut Distributed<E>| frame(ranks, "after an error", plain, id, |k| k % size, false);
+    let mut pairs = RankPairs::new();
+    for bad in 0..size {
+        let mut broken = own.clone();
+        if rank >= bad {
+            (broken[5].min[1], broken[9].max[0]) = (f32::NAN, f32::NEG_INFINITY);
+        }
+        let wanted = Error::InvalidBox { rank: bad, index: 5, defect: BoxDefect::NotANumber };
+        assert_eq!(ranks.find_pairs(&broken, &ids, &mut pairs), Err(wanted));
+        after(ranks);
+        broken.clone_from(&own);
+        if rank == bad {
+            broken[9].max[0] = f32::NEG_INFINITY;
+        }
+        let wanted = Error::InvalidBox { rank: bad, index: 9, defect: BoxDefect::Inverted };
+        assert_eq!(ranks.find_pairs(&broken, &ids, &mut pairs), Err(wanted));
+        let few = &ids[..ids.len() - usize::from(rank == bad)];
+        let boxes = plain.iter().skip(bad).step_by(size).count() as u64;
+        let wanted = Error::MissingIds { rank: bad, boxes, ids: boxes - 1 };
+        assert_eq!(ranks.find_pairs(&own, few, &mut pairs), Err(wanted));
+        after(ranks);
+    }
+    // A limit on the last rank, which has more pairs than that with the boxes that all overlap.
+    let same = vec![Aabb::cube([0.0; 3], 1.0); own.len()];
+    pairs.set_limit((rank == size - 1).then_some(3));
+    assert_eq!(ranks.find_pairs(&same, &ids, &mut pairs), Err(Error::TooManyPairs { rank: size - 1, limit: 3 }));
+    pairs.set_limit(Some(1_000_000));
+    assert_eq!(ranks.find_pairs(&same, &ids, &mut pairs), Ok(()));
+    after(ranks);
+}
