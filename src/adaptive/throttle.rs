@@ -42,7 +42,9 @@ impl DecisionThrottle {
     /// Whether a frame with this many objects is to be decided on again.
     pub(super) fn is_due(&self, objects: u32) -> bool {
         let jumps = objects.abs_diff(self.before) > (self.before / JUMP).max(FEWEST);
-        jumps || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * self.telling(drift(objects, self.objects))) >= self.rest
+        jumps
+            || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * self.telling(drift(objects, self.objects)))
+                >= self.rest
     }
 
     /// What of a drift may change which algorithm is the cheapest.
