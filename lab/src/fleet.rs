@@ -4,6 +4,7 @@
 //! up otherwise, and would make the model of all a little worse without a word.
 
 use crate::data::host;
+use crate::label_text;
 use crate::report::{Label, Report, Restricted};
 use sapwise::ParameterId;
 use sapwise::stats::median;
@@ -106,7 +107,9 @@ impl Node {
     fn of((file, report): &(String, Report), kind: usize, others: &[&Times]) -> Self {
         let over_its_kind = over(&times(report), others);
         let foreign_load = report.foreign_load();
-        let problem = if report.is_unfinished() {
+        let problem = if matches!(report.label, Label::Simulated | Label::Published) {
+            Some(format!("{}: {}; leave it out", label_text::kind(report.label), label_text::meaning(report.label)))
+        } else if report.is_unfinished() {
             Some("unfinished: the node failed, or its job was ended; measure it again".to_owned())
         } else if is_shared(report) {
             let share = foreign_load.map_or(String::new(), |share| format!(" took {:.0} % of its CPU", 100.0 * share));
@@ -125,7 +128,7 @@ impl Node {
 type Times<'a> = BTreeMap<(&'a str, u32, String), f64>;
 
 fn sound(report: &Report) -> bool {
-    !report.is_unfinished() && !is_shared(report)
+    !matches!(report.label, Label::Simulated | Label::Published) && !report.is_unfinished() && !is_shared(report)
 }
 
 /// Whether other programs disturbed it than those that it was measured beside on purpose.

@@ -42,6 +42,10 @@ pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
     if path.is_dir() {
         bail!("{} is a folder; name a file", path.display());
     }
+    // `Path` itself takes `reports/` for `reports`.
+    if path.to_string_lossy().ends_with(std::path::is_separator) {
+        bail!("{}: there is no such folder; make it, or name a file", path.display());
+    }
     if path.exists() && !path.is_file() {
         return Ok(());
     }

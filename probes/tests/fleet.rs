@@ -89,6 +89,15 @@ fn a_fleet_is_told_in_a_table_with_whoever_failed_in_it() {
     let json: serde_json::Value = serde_json::from_str(&failure_text(fleet().arg("--json"))).unwrap();
     assert_eq!(json["failed"].as_array().unwrap().len(), 2);
     assert_eq!(json["nodes"][0]["file"], "a.json");
+    change(&at("b.json"), |report| report.label = sapwise_lab::report::Label::Simulated);
+    let told = failure_text(&mut fleet());
+    assert!(
+        told.contains("0 of 4 nodes can be believed") && told.contains("simulated: made from a specification"),
+        "{told}"
+    );
+    let missing =
+        failure(sapwise().args(["probe", "--hardware-only", "--out"]).arg(format!("{}/", at("none").display())), 1);
+    assert!(missing.contains("there is no such folder"), "{missing}");
     let nothing = tempfile::tempdir().unwrap();
     let complaint = failure(sapwise().arg("fleet").arg(nothing.path()), 1);
     assert!(complaint.contains("holds no *.json file"), "{complaint}");

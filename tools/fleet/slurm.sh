@@ -10,7 +10,8 @@
 # REPORTS is made where it is missing. Submitted again, it measures the nodes whose report is missing, was disturbed or cut short. The model goes to
 # REPORTS/model/. SAPWISE names the command where it is not on the PATH.
 set -euo pipefail
-folder=${1:?usage: sbatch --nodes=N tools/fleet/slurm.sh REPORTS [OPTION OF probe...]}
+[ $# -ge 1 ] || { echo "usage: sbatch --nodes=N tools/fleet/slurm.sh REPORTS [OPTION OF probe...]" >&2; exit 2; }
+folder=$1
 shift
 sapwise=${SAPWISE:-sapwise}
 mkdir -p "$folder"

@@ -8,8 +8,8 @@
 # disturbed or cut short: each machine keeps its own in ~/.cache/sapwise/fleet.
 set -euo pipefail
 usage="usage: tools/fleet/ssh.sh NODES REPORTS [OPTION OF probe...]"
-nodes=${1:?$usage}
-folder=${2:?$usage}
+[ $# -ge 2 ] || { echo "$usage" >&2; exit 2; }
+nodes=$1 folder=$2
 shift 2
 command -v parallel >/dev/null || { echo "ssh.sh: GNU parallel is missing; install the package parallel" >&2; exit 1; }
 [ -r "$nodes" ] || { echo "ssh.sh: $nodes can't be read; write a host a line into it, or : for this machine" >&2; exit 1; }
