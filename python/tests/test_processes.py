@@ -10,6 +10,8 @@ import os, signal, sys, threading, time
 import numpy as np, sapwise
 sys.path.insert(0, %r)
 from conftest import cubes, naive
+# Python takes no part in signals that its parent ignores, as that of a job in the background does.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 """ % __file__.rsplit("/", 1)[0]
 
 
