@@ -107,7 +107,7 @@ impl Node {
     fn of((file, report): &(String, Report), kind: usize, others: &[&Times]) -> Self {
         let over_its_kind = over(&times(report), others);
         let foreign_load = report.foreign_load();
-        let problem = if matches!(report.label, Label::Simulated | Label::Published) {
+        let problem = if !is_measured(report) {
             Some(format!("{}: {}; leave it out", label_text::kind(report.label), label_text::meaning(report.label)))
         } else if report.is_unfinished() {
             Some("unfinished: the node failed, or its job was ended; measure it again".to_owned())
@@ -128,7 +128,12 @@ impl Node {
 type Times<'a> = BTreeMap<(&'a str, u32, String), f64>;
 
 fn sound(report: &Report) -> bool {
-    !matches!(report.label, Label::Simulated | Label::Published) && !report.is_unfinished() && !is_shared(report)
+    is_measured(report) && !report.is_unfinished() && !is_shared(report)
+}
+
+/// Whether it is of a machine that there is.
+fn is_measured(report: &Report) -> bool {
+    !matches!(report.label, Label::Simulated | Label::Published)
 }
 
 /// Whether other programs disturbed it than those that it was measured beside on purpose.

@@ -77,14 +77,7 @@ impl Exchange for MpiExchange {
         });
     }
 
-    fn all_to_all_varcount(
-        &mut self,
-        send: &[u64],
-        send_counts: &[usize],
-        receive: &mut [u64],
-        receive_counts: &[usize],
-        meanwhile: &mut dyn FnMut(),
-    ) {
+    fn all_to_all_varcount(&mut self, send: &[u64], send_counts: &[usize], receive: &mut [u64], receive_counts: &[usize]) {
         self.check(send_counts);
         self.check(receive_counts);
         let own = self.rank();
@@ -112,7 +105,6 @@ impl Exchange for MpiExchange {
             for (rank, part) in sends {
                 requests.add(process(rank).immediate_send(scope, part));
             }
-            meanwhile();
             all_within(self.wait_limit, &self.communicator, "boxes or pairs", requests);
         });
     }

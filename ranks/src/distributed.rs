@@ -19,6 +19,13 @@ const PAIR_WORDS: usize = 2;
 /// Words that a rank says before pairs go back: how many, and the outcome of its search.
 const ANSWER_WORDS: usize = 3;
 
+/// Bytes of a box on its way to another rank.
+pub const BOX_BYTES: u64 = 8 * BOX_WORDS as u64;
+/// Bytes of a pair on its way to an owner.
+pub const PAIR_BYTES: u64 = 8 * PAIR_WORDS as u64;
+/// Bytes that each rank tells each other one in a frame, beside boxes and pairs.
+pub const TOLD_BYTES: u64 = 8 * (record::WORDS + ANSWER_WORDS) as u64;
+
 /// Finds the pairs of boxes that are spread over ranks.
 ///
 /// Every rank calls [`find_pairs`](Self::find_pairs) equally often, as a collective operation. Which rank owns a box may change from frame to frame.
@@ -325,7 +332,7 @@ impl<E: Exchange> Distributed<E> {
         let receive_counts: Vec<usize> = counts.iter().map(|c| c * BOX_WORDS).collect();
         self.received.resize(boxes * BOX_WORDS, 0);
         let send = self.boxes_out.pack();
-        self.exchange.all_to_all_varcount(send, &send_counts, &mut self.received, &receive_counts, &mut || ());
+        self.exchange.all_to_all_varcount(send, &send_counts, &mut self.received, &receive_counts);
         self.search.receive(&self.received, counts.into_iter());
         self.report.boxes_searched = self.search.boxes.len() as u64;
     }
@@ -375,7 +382,7 @@ impl<E: Exchange> Distributed<E> {
         let send_counts: Vec<usize> = self.pairs_out.counts().iter().map(|c| c * PAIR_WORDS).collect();
         self.received.resize(more * PAIR_WORDS, 0);
         let send = self.pairs_out.pack();
-        self.exchange.all_to_all_varcount(send, &send_counts, &mut self.received, &receive_counts, &mut || ());
+        self.exchange.all_to_all_varcount(send, &send_counts, &mut self.received, &receive_counts);
         pairs.extend(self.received.chunks_exact(PAIR_WORDS).map(|w| (w[0], w[1])));
         Ok(())
     }

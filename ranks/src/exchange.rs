@@ -19,14 +19,6 @@ pub trait Exchange {
     /// Sends the `k`-th of `size()` equal parts of `send` to rank `k`, and receives the part for this rank from each.
     fn all_to_all(&mut self, send: &[u64], receive: &mut [u64]);
 
-    /// The same with parts of their own lengths, one after another in the order of the ranks. Both ends know the lengths already. `meanwhile` is
-    /// called once while words are under way.
-    fn all_to_all_varcount(
-        &mut self,
-        send: &[u64],
-        send_counts: &[usize],
-        receive: &mut [u64],
-        receive_counts: &[usize],
-        meanwhile: &mut dyn FnMut(),
-    );
+    /// The same with parts of their own lengths, one after another in the order of the ranks. Both ends know the lengths already.
+    fn all_to_all_varcount(&mut self, send: &[u64], send_counts: &[usize], receive: &mut [u64], receive_counts: &[usize]);
 }

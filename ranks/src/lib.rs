@@ -50,7 +50,7 @@ mod threads;
 pub use balance::Balance;
 pub use bisect::bisect;
 pub use cuts::{Cuts, Region, centre};
-pub use distributed::{Distributed, FrameReport};
+pub use distributed::{BOX_BYTES, Distributed, FrameReport, PAIR_BYTES, TOLD_BYTES};
 pub use error::{Error, Failure};
 pub use exchange::Exchange;
 pub use pairs::RankPairs;

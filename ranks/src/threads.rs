@@ -114,21 +114,13 @@ impl Exchange for Threads {
 
     fn all_to_all(&mut self, send: &[u64], receive: &mut [u64]) {
         let counts = vec![send.len() / self.size(); self.size()];
-        self.all_to_all_varcount(send, &counts, receive, &counts, &mut || ());
+        self.all_to_all_varcount(send, &counts, receive, &counts);
     }
 
-    fn all_to_all_varcount(
-        &mut self,
-        send: &[u64],
-        send_counts: &[usize],
-        receive: &mut [u64],
-        receive_counts: &[usize],
-        meanwhile: &mut dyn FnMut(),
-    ) {
+    fn all_to_all_varcount(&mut self, send: &[u64], send_counts: &[usize], receive: &mut [u64], receive_counts: &[usize]) {
         let offer = (send.to_vec(), crate::outbox::starts(send_counts));
         *lock(&self.shared.offers[self.rank]) = offer;
         self.meet();
-        meanwhile();
         let mut at = 0;
         for (offer, &count) in self.shared.offers.iter().zip(receive_counts) {
             let offer = lock(offer);

@@ -1,12 +1,7 @@
 //! What each region holds, finds and sends.
 
 use sapwise::{Aabb, Load};
-use sapwise_ranks::{Cuts, centre};
-
-/// Bytes of a box and of a pair on their way, and of what every two ranks tell each other in a frame.
-const BOX_BYTES: u64 = 32;
-const PAIR_BYTES: u64 = 16;
-const TOLD_BYTES: u64 = 64 + 24;
+use sapwise_ranks::{BOX_BYTES, Cuts, PAIR_BYTES, TOLD_BYTES, centre};
 
 /// Counts for each rank.
 pub(super) struct Census {
