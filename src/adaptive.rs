@@ -5,6 +5,7 @@ mod frame_batch;
 mod instances;
 mod learner;
 mod load_tracker;
+mod passed;
 mod policy;
 #[cfg(feature = "this-machine")]
 mod setup;
@@ -21,13 +22,14 @@ use crate::algorithm::BackendClass;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, Incremental};
 use crate::clock::{self, Instant};
 use crate::error::{Error, Unavailable};
-use crate::load::Load;
+use crate::load::{FramePlan, Load};
 use crate::pairs::Pairs;
 use crate::registry::Registry;
 use crate::tuning::{Source, Step, Tuning};
 use decision::Choice;
 use instances::{Candidate, Instance};
 use load_tracker::LoadTracker;
+use passed::Passed;
 use policy::Policy;
 use std::fmt;
 
@@ -55,6 +57,10 @@ pub struct Adaptive {
     policy: Policy,
     tracker: LoadTracker,
     choice: Option<Choice>,
+    /// The frames since then.
+    passed: Passed,
+    /// An instance gets ready on a thread of its own.
+    any_away: bool,
     /// What the frame of `choice` took, where it was timed, and how the last frame came about, where one may build on the one before.
     measured_ns: Option<f64>,
     work: Option<FrameWork>,
@@ -88,6 +94,8 @@ impl Adaptive {
             instances: made.instances,
             tracker: LoadTracker::default(),
             choice: None,
+            passed: Passed::default(),
+            any_away: false,
             measured_ns: None,
             work: None,
             prepared: 0,
@@ -164,6 +172,7 @@ impl Adaptive {
         if let Some(error) = made.failure() {
             return Err(error);
         }
+        self.catch_up();
         self.policy.remade(&made.kept(), &made.usable());
         self.exchange(made);
         self.prepare(self.prepared);
@@ -186,6 +195,7 @@ impl Adaptive {
         (self.candidates, self.instances) = (made.candidates, made.instances);
         self.decided = None;
         self.choice = None;
+        self.passed = Passed::default();
     }
 
     /// Where its tuning came from, what went wrong on the way and how long it took.
@@ -256,7 +266,17 @@ impl Adaptive {
         self.last_decision()
     }
 
+    /// Takes in the frames since the last decision.
+    fn catch_up(&mut self) {
+        let passed = std::mem::take(&mut self.passed);
+        if let Some(choice) = self.choice.filter(|_| passed.frames > 0) {
+            self.tracker.went_on(&passed);
+            self.policy.went_on(choice.chosen, &passed);
+        }
+    }
+
     fn choose(&mut self, boxes: &[Aabb]) {
+        self.catch_up();
         self.tracker.decide(boxes);
         if let Some(moved) = self.tracker.moved() {
             self.policy.moves(moved);
@@ -268,8 +288,7 @@ impl Adaptive {
     /// Whether the next frame needs a decision of its own.
     fn is_due(&self, boxes: &[Aabb]) -> bool {
         // By the number of objects alone a decision costs next to nothing, and is to depend on no clock.
-        let always = self.choice.is_none() || self.policy.is_by_count();
-        always || self.tracker.is_due(boxes) || self.policy.is_exploring()
+        self.choice.is_none() || self.tracker.is_due(boxes) || self.policy.is_by_count()
     }
 
     /// The choice among those that are here; where none is, among those that are awaited.
@@ -285,17 +304,23 @@ impl Adaptive {
     /// Gets an instance ready. Meanwhile none of its candidates is chosen where that takes a thread of its own.
     fn warm(&mut self, instance: usize, objects: usize) {
         self.instances[instance].warm(objects);
+        self.any_away |= self.instances[instance].is_away();
         self.update(instance);
     }
 
     /// Takes back what has got ready, or with `patience` all that is getting ready. Whether anything has come back.
     fn take_back(&mut self, patience: bool) -> bool {
         let mut any = false;
+        if !self.any_away {
+            return any;
+        }
+        self.any_away = false;
         for k in 0..self.instances.len() {
             if self.instances[k].take_back(patience) {
                 self.update(k);
                 any = true;
             }
+            self.any_away |= self.instances[k].is_away();
         }
         any
     }
@@ -330,15 +355,14 @@ impl BroadPhase for Adaptive {
             self.take_over();
             self.take_back(false);
         }
-        let mut started = (decided || self.is_due(boxes)).then(Instant::now);
+        let due = decided || self.is_due(boxes);
+        let mut started = due.then(Instant::now);
         self.measured_ns = None;
-        if !decided {
-            // What was worked out before was not for this frame.
-            self.tracker.forget_plan();
-            if started.is_some() {
-                self.choose(boxes);
-            }
+        if due && !decided {
+            self.choose(boxes);
         }
+        // What was worked out for the last decision was not for this frame.
+        let unknown = FramePlan::default();
         loop {
             let Some(choice) = self.choice else {
                 // What the last one left is no answer.
@@ -351,30 +375,38 @@ impl BroadPhase for Adaptive {
                 // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
                 return Err(Error::Unavailable { algorithm: candidate.id.clone(), reason: Unavailable::FailedBefore });
             };
-            let running = started.map(|_| Instant::now());
-            match instance.run(&candidate.id, self.tracker.plan(), boxes, pairs) {
+            let running = (due || self.passed.is_timed()).then(Instant::now);
+            let plan = if due { self.tracker.plan() } else { &unknown };
+            match instance.run(&candidate.id, plan, boxes, pairs) {
                 Ok(work) => {
                     self.work = work;
-                    let Some((started, running)) = started.zip(running) else {
-                        self.tracker.ran(boxes, pairs.overlapping(), None);
-                        self.policy.went_on(choice.chosen, work);
+                    let ns = running.map(|running| (running.elapsed().as_nanos() as f64).max(1.0));
+                    self.measured_ns = ns.filter(|_| clock::TICKS);
+                    if started.is_none() && ns.is_none_or(|ns| self.passed.is_usual(ns)) {
+                        self.passed.add(work, ns);
+                        self.tracker.passes(boxes, pairs.overlapping(), &self.passed);
                         return Ok(());
-                    };
-                    let ns = (running.elapsed().as_nanos() as f64).max(1.0);
-                    self.measured_ns = clock::TICKS.then_some(ns);
-                    self.tracker.ran(boxes, pairs.overlapping(), Some(ns));
+                    }
+                    if started.is_none() {
+                        self.catch_up();
+                    }
+                    let ns = ns.unwrap_or(1.0);
+                    self.tracker.ran(boxes, pairs.overlapping(), ns);
                     let dear = self.policy.ran(choice.chosen, ns, work);
-                    let decision_ns = (!decided).then(|| started.elapsed().as_nanos() as f64 - ns);
+                    let decision_ns = started.filter(|_| !decided).map(|started| started.elapsed().as_nanos() as f64 - ns);
                     self.tracker.took(decision_ns, ns, self.policy.lead_ln());
-                    self.policy.decision_took(decision_ns, self.tracker.decision_ns());
-                    let began = !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis);
+                    if started.is_some() {
+                        self.policy.decision_took(decision_ns, self.tracker.decision_ns());
+                    }
+                    self.passed = Passed::expecting(self.policy.usual(choice.chosen));
+                    let began = started.is_some() && !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis);
                     if began {
                         self.tell();
                     }
                     if self.policy.doubts_load() {
                         self.tracker.doubt(boxes);
                     }
-                    if dear || began {
+                    if dear || began || started.is_none() || self.policy.is_exploring() {
                         // What began in this frame is looked at once more before it may rest.
                         self.tracker.wake();
                     }
@@ -383,6 +415,7 @@ impl BroadPhase for Adaptive {
                 }
                 // The algorithm is at fault, not the boxes: the next cheapest runs in this same frame.
                 Err(Error::Unavailable { .. }) => {
+                    self.catch_up();
                     self.candidates[choice.chosen].instance = None;
                     self.policy.set_usable(choice.chosen, false);
                     // The one that runs instead is told apart from what ran before.
@@ -392,6 +425,7 @@ impl BroadPhase for Adaptive {
                 }
                 Err(error) => {
                     // A frame that was to explore has told nothing, and the next one is to run what is cheapest.
+                    self.catch_up();
                     self.tracker.failed();
                     return Err(error);
                 }

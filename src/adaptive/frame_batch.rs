@@ -80,16 +80,15 @@ impl FrameBatch {
         self.frames > 0 && self.frames >= self.room
     }
 
-    /// Adds a frame, of which no more counts than `dearest_ns` allows. Returns the rest.
-    pub(super) fn add(&mut self, ns: f64, predicted: Predicted, (log2_objects, view): (f64, &View), dearest_ns: f64) -> f64 {
-        let counted = ns.min(MOST_OVER * dearest_ns);
-        self.frames += 1;
+    /// Adds some frames of one load, that took so long together.
+    pub(super) fn add(&mut self, frames: u32, ns: f64, predicted: Predicted, (log2_objects, view): (f64, &View)) {
+        let count = f64::from(frames);
+        self.frames += frames;
         self.calls_ns += predicted.calls_ns;
-        self.real_ns += counted;
+        self.real_ns += ns;
         self.predicted_ns += predicted.ns;
-        self.log2_objects += log2_objects;
-        self.view.add(view, 1.0);
-        ns - counted
+        self.log2_objects += count * log2_objects;
+        self.view.add(view, count);
     }
 
     /// An empty one. Where the candidate is the one of before, it has more room than that.
@@ -115,7 +114,7 @@ mod tests {
             if !batch.takes(candidate, log2_objects) {
                 batch = batch.next(candidate);
             }
-            batch.add(150.0, predicted, (log2_objects, &View::default()), 200.0);
+            batch.add(1, 150.0, predicted, (log2_objects, &View::default()));
             if batch.is_full() {
                 assert_eq!((batch.real_ns, batch.calls()), (150.0 * f64::from(batch.frames), 0.5));
                 full.push((frame, batch.frames));
@@ -126,9 +125,10 @@ mod tests {
     }
 
     #[test]
-    fn what_other_programs_took_is_given_back() {
+    fn frames_that_passed_without_a_look_are_added_at_once() {
         let mut batch = FrameBatch::default().next(0);
-        assert_eq!(batch.add(1000.0, Predicted { ns: 0.0, calls_ns: 0.0 }, (3.0, &View::default()), 100.0), 800.0);
-        assert_eq!((batch.real_ns, batch.calls()), (200.0, 0.0));
+        batch.add(40, 1000.0, Predicted { ns: 0.0, calls_ns: 0.0 }, (3.0, &View::default()));
+        assert_eq!((batch.frames, batch.real_ns, batch.calls(), batch.log2_objects()), (40, 1000.0, 0.0, 3.0));
+        assert!(batch.is_full());
     }
 }

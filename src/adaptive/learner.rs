@@ -143,12 +143,13 @@ impl Learner {
         last.is_none_or(|last| frame - last > STALLS_APART)
     }
 
-    /// Takes in that a frame took this many nanoseconds more than any of its kind is expected to, or none.
-    pub(super) fn waited(&mut self, algorithm: usize, ns: f64, frame: u64) {
+    /// Takes in that each of some frames took this many nanoseconds more than any of its kind is expected to, or none.
+    pub(super) fn waited(&mut self, algorithm: usize, frames: u32, ns: f64, frame: u64) {
         if self.knows(algorithm) {
             let before = self.wait_ns(algorithm, frame);
             let wait = &mut self.waits[self.frames[algorithm].wait];
-            (wait.mean_ns, wait.at) = (before + WAIT_SHARE * (ns - before), frame);
+            let stays = (1.0 - WAIT_SHARE).powi(frames.min(1024) as i32);
+            (wait.mean_ns, wait.at) = (ns + stays * (before - ns), frame);
         }
     }
 

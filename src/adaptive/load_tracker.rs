@@ -1,5 +1,6 @@
 //! The load of the next frame: from a sample now and then, from the frame before in between; and when to decide by it.
 
+use super::passed::Passed;
 use super::throttle::{DecisionThrottle, SHARE_OF_DRIFT, drift};
 use crate::aabb::Aabb;
 use crate::clock::Instant;
@@ -7,7 +8,7 @@ use crate::load::{Displacement, FramePlan, Load};
 
 /// Share of the frames' time that samples may take where the number of objects holds still. With [`SHARE_OF_DRIFT`] a scene that doubles is
 /// sampled when ten times the sample's cost has passed, one that grows by a sixteenth after ninety times.
-const SHARE: f64 = 0.005;
+const SHARE: f64 = 0.002;
 
 /// A sample that the system interrupts looks dear. Taken at its word it would put off the next one for seconds of frames, over
 /// which a change of the scene goes unseen.
@@ -20,7 +21,7 @@ const SAMPLE_EVERY: u32 = 32;
 const SHARE_IN_DOUBT: f64 = 0.02;
 
 /// The same for finding out between samples how far boxes move.
-const SHARE_OF_MOTION: f64 = 0.003;
+const SHARE_OF_MOTION: f64 = 0.001;
 
 /// Keeps the estimate of the load up to date.
 #[derive(Debug, Clone, Default)]
@@ -83,14 +84,9 @@ impl LoadTracker {
         &self.plan
     }
 
-    /// The next frame is another one than the last that was decided on.
-    pub(super) fn forget_plan(&mut self) {
-        self.plan = FramePlan::default();
-    }
-
-    /// Whether the next frame is to be decided on again: how far boxes moved shows in no other than the one after a sample.
+    /// Whether the next frame is to be decided on again.
     pub(super) fn is_due(&self, boxes: &[Aabb]) -> bool {
-        self.throttle.is_due(count(boxes)) || self.watching == Watching::Begun || self.is_doubt_due()
+        self.throttle.is_due(count(boxes))
     }
 
     /// Brings the load up to date: sampled where that pays, else scaled from the last sample.
@@ -141,28 +137,54 @@ impl LoadTracker {
         self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.sample_ns
     }
 
-    /// Takes in a frame that was run: its overlapping pairs, those that a filter kept out included, and how long it took in nanoseconds,
-    /// where it was timed.
-    pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: Option<f64>) {
-        let usual_ns = self.throttle.ran(count(boxes));
-        self.before = Some((count(boxes), pairs));
+    /// Takes note of a frame that ran without a decision, the last of those that have `passed`, and of its overlapping pairs, those that a filter kept
+    /// out included.
+    pub(super) fn passes(&mut self, boxes: &[Aabb], pairs: u64, passed: &Passed) {
+        self.throttle.ran(count(boxes), pairs);
+        if passed.is_off(self.throttle.rest()) {
+            self.throttle.wake();
+        }
+    }
+
+    /// Takes in the frames that ran without a decision.
+    pub(super) fn went_on(&mut self, passed: &Passed) {
+        self.before = Some(self.throttle.before());
+        self.age = self.age.saturating_add(passed.frames);
+        let ns = f64::from(passed.frames) * passed.mean_ns().unwrap_or(self.throttle.frame_ns());
+        self.passed_ns += ns;
+        self.unwatched_ns += ns;
+    }
+
+    /// Takes in a frame that was decided on: its overlapping pairs, those that a filter kept out included, and how long it took in nanoseconds.
+    pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: f64) {
+        self.throttle.ran(count(boxes), pairs);
+        self.before = Some(self.throttle.before());
         self.age = self.age.saturating_add(1);
-        self.passed_ns += ns.unwrap_or(usual_ns);
-        self.unwatched_ns += ns.unwrap_or(usual_ns);
+        self.passed_ns += ns;
+        self.unwatched_ns += ns;
         if self.watching == Watching::Done && self.watch_ns > 0.0 && self.unwatched_ns * SHARE_OF_MOTION >= self.watch_ns {
             self.watching = Watching::Due;
         }
         // Not while looking: a frame may be looked at twice before it runs, and it has not moved in between.
         if self.watching == Watching::Due {
-            self.displacement.watch(boxes);
-            self.watching = Watching::Begun;
+            self.watch(boxes);
         }
+    }
+
+    /// How far boxes move shows in the next frame and in no other.
+    fn watch(&mut self, boxes: &[Aabb]) {
+        self.displacement.watch(boxes);
+        self.watching = Watching::Begun;
+        self.wake();
     }
 
     /// What a decision with its sample took, where that is known, and its frame, in nanoseconds; and how far ahead the one that runs is, a logarithm.
     pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64, lead_ln: f64) {
         // Samples have a share of the time of their own.
         self.throttle.took(decision_ns.map(|ns| (ns - self.sampled_ns).max(0.0)), frame_ns, lead_ln);
+        if self.doubted {
+            self.throttle.rest_no_longer_than((self.sample_ns / SHARE_IN_DOUBT - self.passed_ns) / frame_ns.max(1.0));
+        }
     }
 
     /// What a decision takes in the mean, without a sample, in nanoseconds.
@@ -178,8 +200,7 @@ impl LoadTracker {
     /// The frame that ran contradicts the load: it is to be looked at again, as soon as that may be paid.
     pub(super) fn doubt(&mut self, boxes: &[Aabb]) {
         if self.watching != Watching::Begun {
-            self.displacement.watch(boxes);
-            self.watching = Watching::Begun;
+            self.watch(boxes);
         }
         self.doubted = true;
         self.wake();

@@ -1,8 +1,9 @@
 //! Which algorithm runs the next frame: the cheapest by all that is known, seldom another one to learn what it costs.
 
 use super::decision::{Choice, Reason};
-use super::frame_batch::{FrameBatch, Predicted};
+use super::frame_batch::{FrameBatch, MOST_OVER, Predicted};
 use super::learner::Learner;
+use super::passed::{Passed, Usual};
 use super::shelter::Shelter;
 use super::switching::{Expected, SwitchingCosts};
 use super::trials::{HORIZON, Offer, Trials, expected_gain};
@@ -306,10 +307,29 @@ impl Policy {
         Choice { chosen, predicted_ns: Some(self.mean_ns[chosen]), runner_up, reason }
     }
 
-    /// Takes in that a candidate ran a frame that was neither decided on nor timed, and how it came about.
-    pub(super) fn went_on(&mut self, candidate: usize, work: Option<FrameWork>) {
-        self.switching.ran(candidate, self.frame, work);
-        self.frame += 1;
+    /// What is expected of the frames of a candidate until the next decision.
+    pub(super) fn usual(&self, candidate: usize) -> Usual {
+        if self.is_by_count() {
+            return Usual::default();
+        }
+        let dearest_ns = self.switching.rebuild_ns(candidate, self.expected[candidate]);
+        Usual { mean_ns: self.mean_ns[candidate], most_ns: MOST_OVER * dearest_ns }
+    }
+
+    /// Takes in that a candidate ran some frames that were not decided on, none of which took longer than is usual.
+    pub(super) fn went_on(&mut self, candidate: usize, passed: &Passed) {
+        self.frame += u64::from(passed.frames);
+        self.switching.ran(candidate, self.frame - 1, passed.work);
+        if !self.learns || passed.timed == 0 || self.learner.is_none() {
+            return;
+        }
+        self.make_room(candidate);
+        let predicted = self.predicted[candidate].times(passed.over_mean);
+        self.batch.add(passed.timed, passed.ns, predicted, (self.log2_objects, &self.view));
+        if let Some(learner) = &mut self.learner {
+            learner.waited(candidate, passed.timed, 0.0, self.frame);
+        }
+        self.observe_full(candidate);
     }
 
     /// Takes in that a candidate ran the frame that was decided, what that took and how it came about; `None` where it builds on no frame
@@ -343,23 +363,36 @@ impl Policy {
         if work.map_or(entered, |work| work.kind == FrameKind::Rebuilt) {
             self.switching.learn(candidate, ns, expected);
         }
-        if !self.batch.takes(candidate, self.log2_objects) {
-            if self.batch.frames > 0 {
-                let runs_on = self.settled == Some(self.batch.candidate);
-                self.doubts_load |= !learner.observe(&self.batch, self.frame, runs_on);
-            }
-            self.batch = self.batch.next(candidate);
-        }
+        self.make_room(candidate);
+        let Some(learner) = &mut self.learner else { return };
         // The first one is cold, and tells nothing of the rest.
         if !entered {
             // Until it is known what is dear, all of a frame counts.
             let known = learner.knows(candidate);
             let dearest_ns = if known { self.switching.rebuild_ns(candidate, expected) } else { f64::INFINITY };
+            let counted_ns = ns.min(MOST_OVER * dearest_ns);
             let predicted = self.predicted[candidate].times(work.map_or(1.0, |work| work.over_mean));
-            let waited_ns =
-                self.batch.add(ns, predicted, (self.log2_objects, &self.view), dearest_ns).min(MOST_WAIT * dearest_ns);
-            learner.waited(candidate, waited_ns, self.frame);
+            self.batch.add(1, counted_ns, predicted, (self.log2_objects, &self.view));
+            learner.waited(candidate, 1, (ns - counted_ns).min(MOST_WAIT * dearest_ns), self.frame);
         }
+        self.observe_full(candidate);
+    }
+
+    /// Makes the batch one to which frames of a candidate under the present load can be added. What was added up of others is observed.
+    fn make_room(&mut self, candidate: usize) {
+        if self.batch.takes(candidate, self.log2_objects) {
+            return;
+        }
+        if let Some(learner) = self.learner.as_mut().filter(|_| self.batch.frames > 0) {
+            let runs_on = self.settled == Some(self.batch.candidate);
+            self.doubts_load |= !learner.observe(&self.batch, self.frame, runs_on);
+        }
+        self.batch = self.batch.next(candidate);
+    }
+
+    /// Observes the batch, of frames of a candidate, where it is full or no other frame of a trial follows.
+    fn observe_full(&mut self, candidate: usize) {
+        let Some(learner) = &mut self.learner else { return };
         if self.batch.is_full() || self.batch.frames > 0 && self.trials.is_over() {
             let believed = learner.observe(&self.batch, self.frame, self.settled == Some(candidate));
             self.doubts_load |= !believed;

@@ -187,7 +187,7 @@ fn looked(tracker: &mut LoadTracker, frames: usize, shift: f32) {
         let boxes: Vec<Aabb> =
             row(500).iter().map(|b| Aabb::new(b.min.map(|x| x + shift), b.max.map(|x| x + shift))).collect();
         tracker.decide(&boxes);
-        tracker.ran(&boxes, 100, Some(1e9));
+        tracker.ran(&boxes, 100, 1e9);
     }
 }
 

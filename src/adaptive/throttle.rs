@@ -1,7 +1,7 @@
 //! How often to decide: in short frames not in each of them, unless their number of objects changes.
 
 /// Share of the frames' time that decisions and their clock may take.
-const SHARE: f64 = 0.01;
+const SHARE: f64 = 0.004;
 /// Share of a decision in the mean, and how many times the mean it counts at most.
 const MEAN: f64 = 1.0 / 8.0;
 const MOST_RISE: f64 = 4.0;
@@ -16,6 +16,9 @@ const POWERS_APART: f64 = 2.0;
 /// A number that differs from that of the frame before by a quarter, and by so many, is decided on at once.
 const JUMP: u32 = 4;
 const FEWEST: u32 = 16;
+/// The same for the pairs of the frame before and those at the last decision.
+const PAIRS_JUMP: u64 = 2;
+const FEWEST_PAIRS: u64 = 64;
 
 /// How far a number of objects is from another: the ratio of the greater to the less, less one.
 pub(super) fn drift(objects: u32, before: u32) -> f64 {
@@ -30,7 +33,12 @@ pub(super) struct DecisionThrottle {
     objects: u32,
     before: u32,
     frames: u32,
+    /// Pairs of the frame that was decided on, once that is known, and of the last frame.
+    pairs: Option<u64>,
+    pairs_before: u64,
+    /// Frames that need no decision where nothing changes, and whether the next one needs one for another reason.
     rest: f64,
+    due: bool,
     /// What a decision takes, learning and the clock included.
     decision_ns: f64,
     frame_ns: f64,
@@ -42,7 +50,8 @@ impl DecisionThrottle {
     /// Whether a frame with this many objects is to be decided on again.
     pub(super) fn is_due(&self, objects: u32) -> bool {
         let jumps = objects.abs_diff(self.before) > (self.before / JUMP).max(FEWEST);
-        jumps
+        self.due
+            || jumps
             || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * self.telling(drift(objects, self.objects)))
                 >= self.rest
     }
@@ -57,21 +66,44 @@ impl DecisionThrottle {
         self.decision_ns
     }
 
-    /// Counts a frame of so many objects. Returns about how long frames take now, in nanoseconds.
-    pub(super) fn ran(&mut self, objects: u32) -> f64 {
-        self.before = objects;
-        self.frames = self.frames.saturating_add(1);
+    /// About how long frames take now, in nanoseconds.
+    pub(super) fn frame_ns(&self) -> f64 {
         self.frame_ns
+    }
+
+    /// Frames that need no decision where nothing changes.
+    pub(super) fn rest(&self) -> f64 {
+        self.rest
+    }
+
+    /// Objects and pairs of the last frame.
+    pub(super) fn before(&self) -> (u32, u64) {
+        (self.before, self.pairs_before)
+    }
+
+    /// Counts a frame of so many objects and pairs.
+    pub(super) fn ran(&mut self, objects: u32, pairs: u64) {
+        self.frames = self.frames.saturating_add(1);
+        (self.before, self.pairs_before) = (objects, pairs);
+        let decided = *self.pairs.get_or_insert(pairs);
+        if pairs.abs_diff(decided) > (decided / PAIRS_JUMP).max(FEWEST_PAIRS) {
+            self.wake();
+        }
     }
 
     /// Begins a decision.
     pub(super) fn decide(&mut self, objects: u32) {
-        (self.objects, self.frames) = (objects, 0);
+        (self.objects, self.frames, self.pairs, self.due) = (objects, 0, None, false);
     }
 
     /// The next frame is to be decided on again.
     pub(super) fn wake(&mut self) {
-        self.rest = 0.0;
+        self.due = true;
+    }
+
+    /// The next decision is that many frames away at most.
+    pub(super) fn rest_no_longer_than(&mut self, frames: f64) {
+        self.rest = self.rest.min(frames);
     }
 
     /// What the decision took, where that is known, and its frame; and how far ahead the one that ran is, as the logarithm of a ratio of costs.

@@ -2,6 +2,7 @@
 
 use super::super::decision::Reason;
 use super::super::learner::Learner;
+use super::super::passed::{Passed, Usual};
 use super::super::policy::Policy;
 use super::tuning;
 use crate::{AlgorithmId, FrameKind, FrameWork, Load, Tuning};
@@ -35,6 +36,13 @@ impl Chance {
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.next()).sum::<f64>() - 6.0
     }
+}
+
+/// Frames that ran without a decision and were not timed.
+fn passed(frames: u32, work: Option<FrameWork>) -> Passed {
+    let mut passed = Passed::expecting(Usual::default());
+    (0..frames).for_each(|_| passed.add(work, None));
+    passed
 }
 
 fn policy(tuning: Tuning) -> Policy {
@@ -194,7 +202,7 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
     let waits = |policy: &mut Policy, frames: usize| {
         (0..100).find(|_| {
             let reason = policy.choose(&load(1000)).unwrap().reason;
-            (0..frames).for_each(|_| policy.went_on(0, None));
+            policy.went_on(0, &passed(frames as u32, None));
             reason == Reason::Switched
         })
     };
@@ -209,7 +217,7 @@ fn a_switch_waits_until_it_has_saved_its_price_and_flicker_never_saves_one() {
     let mut flicker = start(tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 50_000.0, 50.0)]));
     for k in 0..2000 {
         let choice = flicker.choose(&load(1000 + [10, 0, 0][k % 3] - [0, 0, 12][k % 3])).unwrap();
-        flicker.went_on(0, None);
+        flicker.went_on(0, &passed(1, None));
         assert_eq!(choice.chosen, 0, "frame {k}");
     }
 }
@@ -228,7 +236,7 @@ fn what_keeps_work_is_left_once_that_is_paid_for_and_at_once_where_it_keeps_none
         policy.set_usable(1, true);
         (0..100).find(|_| {
             let left = policy.choose(&load).unwrap().chosen == 1;
-            policy.went_on(0, work);
+            policy.went_on(0, &passed(1, work));
             left
         })
     };

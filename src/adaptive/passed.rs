@@ -1,0 +1,124 @@
+//! Frames between two decisions: what they tell is added up, and taken in by the next decision.
+//!
+//! What is believed of costs lies in no cache when a frame of a program begins. A frame that only adds to a few sums leaves it there.
+
+use crate::broad_phase::FrameWork;
+
+/// Two looks at a clock, in nanoseconds, in code that lies in no cache, and the share of the frames' time that they may take.
+const CLOCK_NS: f64 = 100.0;
+const SHARE: f64 = 0.0025;
+/// One frame in so many is timed at least.
+const MOST_APART: f64 = 32.0;
+
+/// After so many timed frames, and this share of those until the next decision, they call for one where their mean is off by this factor.
+const ENOUGH: u32 = 8;
+const EARLIEST: f64 = 0.25;
+const OFF: f64 = 1.2;
+
+/// What is expected of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Usual {
+    /// What a frame of the mean work takes, in nanoseconds.
+    pub(super) mean_ns: f64,
+    /// A frame that takes longer tells more than its time: it waited, or something changed.
+    pub(super) most_ns: f64,
+}
+
+impl Default for Usual {
+    fn default() -> Self {
+        Self { mean_ns: 0.0, most_ns: 0.0 }
+    }
+}
+
+/// The frames since the last decision.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Passed {
+    pub(super) frames: u32,
+    /// How the last one came about.
+    pub(super) work: Option<FrameWork>,
+    /// Of those that were timed: their number, time in nanoseconds, and work in frames of the mean one.
+    pub(super) timed: u32,
+    pub(super) ns: f64,
+    pub(super) over_mean: f64,
+    usual: Usual,
+    /// One frame in so many is timed.
+    apart: u32,
+}
+
+impl Passed {
+    /// Of frames of which so much is expected; none has passed yet.
+    pub(super) fn expecting(usual: Usual) -> Self {
+        let apart = (CLOCK_NS / (SHARE * usual.mean_ns)).clamp(1.0, MOST_APART) as u32;
+        Self { usual, apart, ..Self::default() }
+    }
+
+    /// Whether the next frame is to be timed.
+    pub(super) fn is_timed(&self) -> bool {
+        self.frames.is_multiple_of(self.apart.max(1))
+    }
+
+    /// Whether a frame that took so long tells no more than that.
+    pub(super) fn is_usual(&self, ns: f64) -> bool {
+        ns <= self.usual.most_ns
+    }
+
+    /// Adds a frame.
+    pub(super) fn add(&mut self, work: Option<FrameWork>, ns: Option<f64>) {
+        self.frames += 1;
+        self.work = work;
+        if let Some(ns) = ns {
+            self.timed += 1;
+            self.ns += ns;
+            self.over_mean += work.map_or(1.0, |work| work.over_mean);
+        }
+    }
+
+    /// Whether the times differ so much from what was expected that the decision may have to be another, of which `rest` frames were to be the next.
+    pub(super) fn is_off(&self, rest: f64) -> bool {
+        if self.timed < ENOUGH || f64::from(self.frames) < EARLIEST * rest {
+            return false;
+        }
+        let expected_ns = self.usual.mean_ns * self.over_mean;
+        self.ns > OFF * expected_ns || expected_ns > OFF * self.ns
+    }
+
+    /// Mean time of those that were timed, in nanoseconds, if any was.
+    pub(super) fn mean_ns(&self) -> Option<f64> {
+        (self.timed > 0).then(|| self.ns / f64::from(self.timed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::broad_phase::FrameKind;
+
+    #[test]
+    fn the_clock_is_asked_the_less_the_shorter_frames_are() {
+        let timed = |mean_ns: f64| {
+            let mut passed = Passed::expecting(Usual { mean_ns, most_ns: f64::INFINITY });
+            let timed = |_| {
+                let timed = passed.is_timed();
+                passed.add(None, timed.then_some(mean_ns));
+                timed
+            };
+            (0..96).map(timed).filter(|timed| *timed).count()
+        };
+        assert_eq!([50_000.0, 20_000.0, 4000.0, 100.0, 0.0].map(timed), [96, 48, 10, 3, 3]);
+        assert!(Passed::default().is_timed() && !Passed::default().is_usual(1.0));
+    }
+
+    #[test]
+    fn frames_that_differ_from_what_was_expected_call_for_a_decision() {
+        let is_off = |frames: u32, ns: f64, rest: f64| {
+            let mut passed = Passed::expecting(Usual { mean_ns: 1e6, most_ns: 4e6 });
+            let work = Some(FrameWork::new(FrameKind::Updated, 0.5));
+            (0..frames).for_each(|_| passed.add(work, Some(ns)));
+            assert_eq!((passed.mean_ns(), passed.work), (Some(ns), work));
+            passed.is_off(rest)
+        };
+        // Half of the mean work is expected to take half a millisecond.
+        assert!(!is_off(8, 0.55e6, 8.0) && is_off(8, 0.65e6, 8.0) && is_off(8, 0.4e6, 8.0));
+        assert!(!is_off(7, 0.65e6, 8.0) && !is_off(8, 0.65e6, 40.0) && is_off(10, 0.65e6, 40.0));
+    }
+}
