@@ -49,7 +49,7 @@ pub struct Decision<'a> {
     /// Its expected cost in nanoseconds, corrected by what was learned; `None` where only the number of objects decides.
     pub predicted_ns: Option<f64>,
     /// What the frame took in nanoseconds. `None` where it was not timed: in frames so short that the clock would cost more than
-    /// one part in a hundred of them only some are.
+    /// 0.25 % of them only some are.
     pub measured_ns: Option<f64>,
     /// The cheapest of the others and its expected cost in nanoseconds.
     pub runner_up: Option<(&'a AlgorithmId, f64)>,
