@@ -16,18 +16,12 @@ const EARLIEST: f64 = 0.25;
 const OFF: f64 = 1.2;
 
 /// What is expected of a frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Usual {
     /// What a frame of the mean work takes, in nanoseconds.
     pub(super) mean_ns: f64,
     /// A frame that takes longer tells more than its time: it waited, or something changed.
     pub(super) most_ns: f64,
-}
-
-impl Default for Usual {
-    fn default() -> Self {
-        Self { mean_ns: 0.0, most_ns: 0.0 }
-    }
 }
 
 /// The frames since the last decision.
