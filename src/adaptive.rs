@@ -22,7 +22,7 @@ use crate::algorithm::BackendClass;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, Incremental};
 use crate::clock::{self, Instant};
 use crate::error::{Error, Unavailable};
-use crate::load::{FramePlan, Load};
+use crate::load::Load;
 use crate::pairs::Pairs;
 use crate::registry::Registry;
 use crate::tuning::{Source, Step, Tuning};
@@ -46,24 +46,41 @@ const WARM_WITHIN: f64 = 1.5;
 /// Sizes of the slice that learned tuning shows: four a decade from ten to a million, in quarters of a decade.
 const SLICE: std::ops::RangeInclusive<u32> = 4..=24;
 
+/// When the frame that ran was decided on.
+#[derive(Debug, Clone, Copy)]
+enum Decided {
+    /// It went on as the one before.
+    Never,
+    /// By a call of [`decide`](Adaptive::decide).
+    Before,
+    /// Right before it ran, from then on.
+    At(Instant),
+}
+
 /// A broad phase that runs whichever algorithm is expected to be cheapest for each frame.
 ///
 /// Every algorithm takes the same boxes and returns the same pairs, so a switch is invisible but for its speed. What is expected comes from
 /// [`Tuning`] and, where these have cost curves, from the times of the frames that were run: [`set_learning`](Self::set_learning).
+// A frame without a decision looks at what stands first and at the beginning of `tracker`, and at nothing else: between two frames of a program all of it
+// leaves the caches, and ten lines of memory here and there take as long as some frames.
+#[repr(C, align(64))]
 pub struct Adaptive {
-    /// In the order of [`Tuning::algorithms`].
-    candidates: Vec<Candidate>,
+    /// The throttle alone tells whether the next frame needs a decision, and the instance that goes on where it needs none.
+    steady: bool,
+    running: usize,
     instances: Vec<Instance>,
-    policy: Policy,
-    tracker: LoadTracker,
-    choice: Option<Choice>,
-    /// The frames since then.
-    passed: Passed,
-    /// An instance gets ready on a thread of its own.
-    any_away: bool,
-    /// What the frame of `choice` took, where it was timed, and how the last frame came about, where one may build on the one before.
+    /// The last frame: what it took, where it was timed, and how it came about, where one may build on the one before.
     measured_ns: Option<f64>,
     work: Option<FrameWork>,
+    /// The frames since the last decision.
+    passed: Passed,
+    tracker: LoadTracker,
+    /// In the order of [`Tuning::algorithms`].
+    candidates: Vec<Candidate>,
+    policy: Policy,
+    choice: Option<Choice>,
+    /// An instance gets ready on a thread of its own.
+    any_away: bool,
     /// The most objects that were to be prepared for.
     prepared: usize,
     /// [`decide`](Self::decide) was called for a frame of this many boxes that has not run yet.
@@ -89,15 +106,17 @@ impl Adaptive {
     /// Over instances that are there already.
     pub(crate) fn with(tuning: Tuning, made: Instances) -> Self {
         Self {
+            steady: false,
+            running: 0,
             policy: policy(tuning, &made),
-            candidates: made.candidates,
             instances: made.instances,
-            tracker: LoadTracker::default(),
-            choice: None,
-            passed: Passed::default(),
-            any_away: false,
             measured_ns: None,
             work: None,
+            passed: Passed::default(),
+            tracker: LoadTracker::default(),
+            candidates: made.candidates,
+            choice: None,
+            any_away: false,
             prepared: 0,
             decided: None,
             #[cfg(feature = "this-machine")]
@@ -195,6 +214,7 @@ impl Adaptive {
         (self.candidates, self.instances) = (made.candidates, made.instances);
         self.decided = None;
         self.choice = None;
+        self.steady = false;
         self.passed = Passed::default();
     }
 
@@ -258,11 +278,10 @@ impl Adaptive {
 
     /// Estimates the load of the next frame and decides, without running anything.
     pub fn decide(&mut self, boxes: &[Aabb]) -> Option<Decision<'_>> {
-        #[cfg(feature = "this-machine")]
-        self.take_over();
-        self.take_back(false);
+        self.look_up();
         self.choose(boxes);
         self.decided = Some(boxes.len());
+        self.steady = false;
         self.last_decision()
     }
 
@@ -285,10 +304,33 @@ impl Adaptive {
         self.measured_ns = None;
     }
 
-    /// Whether the next frame needs a decision of its own.
-    fn is_due(&self, boxes: &[Aabb]) -> bool {
+    /// Takes in what has come from other threads.
+    fn look_up(&mut self) {
+        #[cfg(feature = "this-machine")]
+        self.take_over();
+        self.take_back(false);
+    }
+
+    /// Whether the next frame needs a decision of its own, or was decided on already.
+    #[inline(never)]
+    fn is_due(&mut self, boxes: &[Aabb]) -> bool {
+        if self.decided.is_some() {
+            // What was decided for another frame than this one is decided again.
+            self.decided = self.decided.filter(|&decided| decided == boxes.len());
+            return true;
+        }
+        self.look_up();
         // By the number of objects alone a decision costs next to nothing, and is to depend on no clock.
         self.choice.is_none() || self.tracker.is_due(boxes) || self.policy.is_by_count()
+    }
+
+    /// Whether nothing but the load can call for a decision before the next frame.
+    fn is_steady(&self) -> bool {
+        #[cfg(feature = "this-machine")]
+        let awaits = self.start.awaited.is_some();
+        #[cfg(not(feature = "this-machine"))]
+        let awaits = false;
+        !(awaits || self.any_away || self.policy.is_by_count())
     }
 
     /// The choice among those that are here; where none is, among those that are awaited.
@@ -336,6 +378,128 @@ impl Adaptive {
         }
     }
 
+    /// Runs a frame that needs no decision.
+    fn go_on(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        let running = self.passed.is_timed().then(Instant::now);
+        match self.instances[self.running].go_on(boxes, pairs).unwrap_or_else(|| Err(self.gone())) {
+            Ok(work) => {
+                let ns = running.map(|running| (running.elapsed().as_nanos() as f64).max(1.0));
+                (self.work, self.measured_ns) = (work, ns.filter(|_| clock::TICKS));
+                match ns.filter(|&ns| !self.passed.is_usual(ns)) {
+                    None => {
+                        self.passed.add(work, ns);
+                        self.tracker.passes(boxes, pairs.overlapping(), &self.passed);
+                    }
+                    Some(ns) => {
+                        self.catch_up();
+                        self.learn(Decided::Never, ns, boxes, pairs);
+                    }
+                }
+                Ok(())
+            }
+            Err(error) => {
+                self.catch_up();
+                self.failed(error)?;
+                self.run_chosen(Decided::At(Instant::now()), boxes, pairs)
+            }
+        }
+    }
+
+    /// Decides, where that was not done before, and runs the frame.
+    #[inline(never)]
+    fn run_best(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        let decided = match self.decided.take() {
+            Some(_) => Decided::Before,
+            None => {
+                let started = Instant::now();
+                self.choose(boxes);
+                Decided::At(started)
+            }
+        };
+        self.run_chosen(decided, boxes, pairs)
+    }
+
+    /// Runs what was chosen, and where that fails the next cheapest in this same frame.
+    fn run_chosen(&mut self, decided: Decided, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        loop {
+            let Some(choice) = self.choice else {
+                // What the last one left is no answer.
+                pairs.clear();
+                let algorithm = self.candidates[0].id.clone();
+                return Err(Error::Unavailable { algorithm, reason: Unavailable::AllFailed });
+            };
+            let candidate = &self.candidates[choice.chosen];
+            let Some(instance) = candidate.instance else {
+                // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
+                return Err(self.gone());
+            };
+            let running = Instant::now();
+            match self.instances[instance].run(&candidate.id, self.tracker.plan(), boxes, pairs) {
+                Ok(work) => {
+                    let ns = (running.elapsed().as_nanos() as f64).max(1.0);
+                    (self.work, self.measured_ns, self.running) = (work, clock::TICKS.then_some(ns), instance);
+                    self.learn(decided, ns, boxes, pairs);
+                    return Ok(());
+                }
+                Err(error) => self.failed(error)?,
+            }
+        }
+    }
+
+    /// Learns from the frame that ran, which took so long.
+    #[inline(never)]
+    fn learn(&mut self, decided: Decided, ns: f64, boxes: &[Aabb], pairs: &Pairs) {
+        let Some(choice) = self.choice else { return };
+        self.tracker.ran(boxes, pairs.overlapping(), ns);
+        let dear = self.policy.ran(choice.chosen, ns, self.work);
+        let decision_ns = match decided {
+            Decided::At(started) => Some(started.elapsed().as_nanos() as f64 - ns),
+            Decided::Before | Decided::Never => None,
+        };
+        self.tracker.took(decision_ns, ns, self.policy.lead_ln());
+        if !matches!(decided, Decided::Never) {
+            self.policy.decision_took(decision_ns, self.tracker.decision_ns());
+        }
+        self.passed = Passed::expecting(self.policy.usual(choice.chosen));
+        let stood_out = matches!(decided, Decided::Never);
+        let began = !stood_out && !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis);
+        if began {
+            self.tell();
+        }
+        if self.policy.doubts_load() {
+            self.tracker.doubt(boxes);
+        }
+        if dear || began || stood_out || self.policy.is_exploring() {
+            // What began in this frame is looked at once more before it may rest.
+            self.tracker.wake();
+        }
+        self.warm_runner_up(boxes.len());
+        self.steady = self.is_steady();
+    }
+
+    /// What to say where the algorithm that runs is not there any more.
+    #[cold]
+    fn gone(&self) -> Error {
+        let algorithm = self.candidates[self.choice.map_or(0, |choice| choice.chosen)].id.clone();
+        Error::Unavailable { algorithm, reason: Unavailable::FailedBefore }
+    }
+
+    /// Takes in that the frame failed. Where the algorithm is at fault, and not the boxes, another one is chosen.
+    #[cold]
+    fn failed(&mut self, error: Error) -> Result<(), Error> {
+        self.steady = false;
+        self.measured_ns = None;
+        let Some(choice) = self.choice.filter(|_| matches!(error, Error::Unavailable { .. })) else {
+            // A frame that was to explore has told nothing, and the next one is to run what is cheapest.
+            self.tracker.failed();
+            return Err(error);
+        };
+        self.candidates[choice.chosen].instance = None;
+        self.policy.set_usable(choice.chosen, false);
+        self.choice = self.choose_among().map(|c| Choice { reason: Reason::FellBack, ..c });
+        Ok(())
+    }
+
     /// Gets the runner-up ready when its turn may come soon.
     fn warm_runner_up(&mut self, boxes: usize) {
         let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), .. }) = self.choice else { return };
@@ -349,88 +513,8 @@ impl Adaptive {
 
 impl BroadPhase for Adaptive {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        let decided = self.decided.take() == Some(boxes.len());
-        if !decided {
-            #[cfg(feature = "this-machine")]
-            self.take_over();
-            self.take_back(false);
-        }
-        let due = decided || self.is_due(boxes);
-        let mut started = due.then(Instant::now);
-        self.measured_ns = None;
-        if due && !decided {
-            self.choose(boxes);
-        }
-        // What was worked out for the last decision was not for this frame.
-        let unknown = FramePlan::default();
-        loop {
-            let Some(choice) = self.choice else {
-                // What the last one left is no answer.
-                pairs.clear();
-                let algorithm = self.candidates[0].id.clone();
-                return Err(Error::Unavailable { algorithm, reason: Unavailable::AllFailed });
-            };
-            let candidate = &self.candidates[choice.chosen];
-            let Some(instance) = candidate.instance.map(|k| &mut self.instances[k]) else {
-                // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
-                return Err(Error::Unavailable { algorithm: candidate.id.clone(), reason: Unavailable::FailedBefore });
-            };
-            let running = (due || self.passed.is_timed()).then(Instant::now);
-            let plan = if due { self.tracker.plan() } else { &unknown };
-            match instance.run(&candidate.id, plan, boxes, pairs) {
-                Ok(work) => {
-                    self.work = work;
-                    let ns = running.map(|running| (running.elapsed().as_nanos() as f64).max(1.0));
-                    self.measured_ns = ns.filter(|_| clock::TICKS);
-                    if started.is_none() && ns.is_none_or(|ns| self.passed.is_usual(ns)) {
-                        self.passed.add(work, ns);
-                        self.tracker.passes(boxes, pairs.overlapping(), &self.passed);
-                        return Ok(());
-                    }
-                    if started.is_none() {
-                        self.catch_up();
-                    }
-                    let ns = ns.unwrap_or(1.0);
-                    self.tracker.ran(boxes, pairs.overlapping(), ns);
-                    let dear = self.policy.ran(choice.chosen, ns, work);
-                    let decision_ns = started.filter(|_| !decided).map(|started| started.elapsed().as_nanos() as f64 - ns);
-                    self.tracker.took(decision_ns, ns, self.policy.lead_ln());
-                    if started.is_some() {
-                        self.policy.decision_took(decision_ns, self.tracker.decision_ns());
-                    }
-                    self.passed = Passed::expecting(self.policy.usual(choice.chosen));
-                    let began = started.is_some() && !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis);
-                    if began {
-                        self.tell();
-                    }
-                    if self.policy.doubts_load() {
-                        self.tracker.doubt(boxes);
-                    }
-                    if dear || began || started.is_none() || self.policy.is_exploring() {
-                        // What began in this frame is looked at once more before it may rest.
-                        self.tracker.wake();
-                    }
-                    self.warm_runner_up(boxes.len());
-                    return Ok(());
-                }
-                // The algorithm is at fault, not the boxes: the next cheapest runs in this same frame.
-                Err(Error::Unavailable { .. }) => {
-                    self.catch_up();
-                    self.candidates[choice.chosen].instance = None;
-                    self.policy.set_usable(choice.chosen, false);
-                    // The one that runs instead is told apart from what ran before.
-                    started.get_or_insert_with(Instant::now);
-                    let next = self.choose_among();
-                    self.choice = next.map(|c| Choice { reason: Reason::FellBack, ..c });
-                }
-                Err(error) => {
-                    // A frame that was to explore has told nothing, and the next one is to run what is cheapest.
-                    self.catch_up();
-                    self.tracker.failed();
-                    return Err(error);
-                }
-            }
-        }
+        let due = if self.steady { self.tracker.is_due(boxes) } else { self.is_due(boxes) };
+        if due { self.run_best(boxes, pairs) } else { self.go_on(boxes, pairs) }
     }
 
     fn prepare(&mut self, objects: usize) {

@@ -106,10 +106,22 @@ impl Instance {
         }
         algorithm.find_pairs_with(plan, boxes, pairs)?;
         self.ready = self.ready.max(boxes.len());
-        // Checked once more: the fields are anybody's to set.
-        let checked = |work: FrameWork| FrameWork::new(work.kind, work.over_mean);
-        Ok(algorithm.as_incremental().map(|algorithm| checked(algorithm.last_frame())))
+        Ok(work(&mut **algorithm))
     }
+
+    /// Finds the pairs of a frame of which nothing was worked out, for the same candidate as in the last frame. `None` where that can't run.
+    pub(super) fn go_on(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Option<Result<Option<FrameWork>, Error>> {
+        let algorithm = self.place.here()?;
+        let found = algorithm.find_pairs(boxes, pairs);
+        let found = found.map(|()| work(&mut **algorithm));
+        self.ready = self.ready.max(boxes.len());
+        Some(found)
+    }
+}
+
+/// How the last frame came about. Checked once more: the fields are anybody's to set.
+fn work(algorithm: &mut dyn BroadPhase) -> Option<FrameWork> {
+    algorithm.as_incremental().map(|algorithm| algorithm.last_frame()).map(|work| FrameWork::new(work.kind, work.over_mean))
 }
 
 /// What runs the algorithms of some tuning, and why the last of those that can't run can't.

@@ -24,8 +24,11 @@ const SHARE_IN_DOUBT: f64 = 0.02;
 const SHARE_OF_MOTION: f64 = 0.001;
 
 /// Keeps the estimate of the load up to date.
+// A frame without a decision looks at what stands first alone: see `Adaptive`.
+#[repr(C)]
 #[derive(Debug, Clone, Default)]
 pub(super) struct LoadTracker {
+    throttle: DecisionThrottle,
     load: Load,
     /// What was worked out about the next frame.
     plan: FramePlan,
@@ -48,7 +51,6 @@ pub(super) struct LoadTracker {
     moved: Option<f64>,
     /// Objects and pairs of the frame before.
     before: Option<(u32, u64)>,
-    throttle: DecisionThrottle,
 }
 
 /// How far the boxes move is found out in the frame after each sample, and in between as often as its share of the time allows.
@@ -157,6 +159,8 @@ impl LoadTracker {
 
     /// Takes in a frame that was decided on: its overlapping pairs, those that a filter kept out included, and how long it took in nanoseconds.
     pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: f64) {
+        // What was worked out for this frame holds for no other.
+        self.plan = FramePlan::default();
         self.throttle.ran(count(boxes), pairs);
         self.before = Some(self.throttle.before());
         self.age = self.age.saturating_add(1);
