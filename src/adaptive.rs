@@ -5,6 +5,7 @@ mod frame_batch;
 mod instances;
 mod learner;
 mod load_tracker;
+mod motion_watch;
 mod passed;
 mod policy;
 #[cfg(feature = "this-machine")]

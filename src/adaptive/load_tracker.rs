@@ -1,13 +1,14 @@
 //! The load of the next frame: from a sample now and then, from the frame before in between; and when to decide by it.
 
+use super::motion_watch::MotionWatch;
 use super::passed::Passed;
 use super::throttle::{DecisionThrottle, SHARE_OF_DRIFT, drift};
 use crate::aabb::Aabb;
 use crate::clock::Instant;
-use crate::load::{Displacement, FramePlan, Load};
+use crate::load::{FramePlan, Load};
 
 /// Share of the frames' time that samples may take where the number of objects holds still. With [`SHARE_OF_DRIFT`] a scene that doubles is
-/// sampled when ten times the sample's cost has passed, one that grows by a sixteenth after ninety times.
+/// sampled when 24 times the sample's cost has passed, one that grows by a sixteenth after 220 times.
 const SHARE: f64 = 0.002;
 
 /// A sample that the system interrupts looks dear. Taken at its word it would put off the next one for seconds of frames, over
@@ -19,9 +20,6 @@ const SAMPLE_EVERY: u32 = 32;
 
 /// The same share for a sample of a load that frames contradict.
 const SHARE_IN_DOUBT: f64 = 0.02;
-
-/// The same for finding out between samples how far boxes move.
-const SHARE_OF_MOTION: f64 = 0.001;
 
 /// Keeps the estimate of the load up to date.
 // A frame without a decision looks at what stands first alone: see `Adaptive`.
@@ -40,35 +38,17 @@ pub(super) struct LoadTracker {
     sample_ns: f64,
     /// What the sample of the last decision took, where it had one.
     sampled_ns: f64,
-    displacement: Displacement,
-    watching: Watching,
-    /// What it takes to find out how far boxes move, and the time of the frames since that was known last.
-    watch_ns: f64,
-    unwatched_ns: f64,
+    motion: MotionWatch,
     /// Frames contradict the load since the last sample.
     doubted: bool,
-    /// How far the boxes moved when that was last found out.
-    moved: Option<f64>,
     /// Objects and pairs of the frame before.
     before: Option<(u32, u64)>,
-}
-
-/// How far the boxes move is found out in the frame after each sample, and in between as often as its share of the time allows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum Watching {
-    /// It is known.
-    #[default]
-    Done,
-    /// This frame is to be watched when its pairs are found.
-    Due,
-    /// The next frame is to be compared with what was watched.
-    Begun,
 }
 
 impl LoadTracker {
     /// How far the boxes move in a frame, in edges, where that was found out.
     pub(super) fn moved(&self) -> Option<f64> {
-        self.moved
+        self.motion.moved()
     }
 
     /// Whether a load that is in doubt may be paid a sample.
@@ -95,16 +75,8 @@ impl LoadTracker {
     pub(super) fn decide(&mut self, boxes: &[Aabb]) {
         let objects = count(boxes);
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
-        if self.watching == Watching::Begun {
-            let started = Instant::now();
-            self.moved = self.displacement.moved(boxes);
-            // To watch the boxes takes about as long as to compare them, and this decision is made for it.
-            let took = 2.0 * started.elapsed().as_nanos() as f64 + self.throttle.decision_ns();
-            self.watch_ns = if self.watch_ns > 0.0 { took.min(self.watch_ns * COST_RISES) } else { took };
-            self.unwatched_ns = 0.0;
-            self.watching = Watching::Done;
-        }
-        let moved = self.moved;
+        self.motion.look(boxes, self.throttle.decision_ns());
+        let moved = self.motion.moved();
         self.sampled_ns = 0.0;
         let mut plan = FramePlan::default();
         if self.is_sample_due(objects) {
@@ -113,7 +85,7 @@ impl LoadTracker {
             let took = started.elapsed().as_nanos() as f64;
             self.sampled_ns = took;
             self.sample_ns = if self.sample_ns > 0.0 { took.min(self.sample_ns * COST_RISES) } else { took };
-            self.watching = Watching::Due;
+            self.motion.want();
             (self.sampled, self.age, self.passed_ns) = (objects, 0, 0.0);
             self.doubted = false;
         } else {
@@ -144,6 +116,7 @@ impl LoadTracker {
     pub(super) fn passes(&mut self, boxes: &[Aabb], pairs: u64, passed: &Passed) {
         self.throttle.ran(count(boxes), pairs);
         if passed.is_off(self.throttle.rest()) {
+            self.motion.doubt();
             self.throttle.wake();
         }
     }
@@ -154,7 +127,7 @@ impl LoadTracker {
         self.age = self.age.saturating_add(passed.frames);
         let ns = f64::from(passed.frames) * passed.mean_ns().unwrap_or(self.throttle.frame_ns());
         self.passed_ns += ns;
-        self.unwatched_ns += ns;
+        self.motion.passed(ns);
     }
 
     /// Takes in a frame that was decided on: its overlapping pairs, those that a filter kept out included, and how long it took in nanoseconds.
@@ -165,21 +138,10 @@ impl LoadTracker {
         self.before = Some(self.throttle.before());
         self.age = self.age.saturating_add(1);
         self.passed_ns += ns;
-        self.unwatched_ns += ns;
-        if self.watching == Watching::Done && self.watch_ns > 0.0 && self.unwatched_ns * SHARE_OF_MOTION >= self.watch_ns {
-            self.watching = Watching::Due;
+        self.motion.passed(ns);
+        if self.motion.ran(boxes) {
+            self.wake();
         }
-        // Not while looking: a frame may be looked at twice before it runs, and it has not moved in between.
-        if self.watching == Watching::Due {
-            self.watch(boxes);
-        }
-    }
-
-    /// How far boxes move shows in the next frame and in no other.
-    fn watch(&mut self, boxes: &[Aabb]) {
-        self.displacement.watch(boxes);
-        self.watching = Watching::Begun;
-        self.wake();
     }
 
     /// What a decision with its sample took, where that is known, and its frame, in nanoseconds; and how far ahead the one that runs is, a logarithm.
@@ -203,17 +165,17 @@ impl LoadTracker {
 
     /// The frame that ran contradicts the load: it is to be looked at again, as soon as that may be paid.
     pub(super) fn doubt(&mut self, boxes: &[Aabb]) {
-        if self.watching != Watching::Begun {
-            self.watch(boxes);
-        }
+        self.motion.doubt();
+        self.motion.want();
+        self.motion.ran(boxes);
         self.doubted = true;
         self.wake();
     }
 
     /// After a frame that failed nothing is known of the one before, and the next one is decided on again.
     pub(super) fn failed(&mut self) {
-        (self.before, self.moved) = (None, None);
-        self.watching = Watching::Done;
+        self.before = None;
+        self.motion.failed();
         self.wake();
     }
 }

@@ -335,8 +335,11 @@ impl Policy {
     /// Takes in that a candidate ran the frame that was decided, what that took and how it came about; `None` where it builds on no frame
     /// before. Whether that was so much that the next frame is to be decided on, whatever it was before.
     pub(super) fn ran(&mut self, candidate: usize, ns: f64, work: Option<FrameWork>) -> bool {
-        let entered = self.ran != Some(candidate);
-        self.ran = Some(candidate);
+        let entered = self.ran.replace(candidate) != Some(candidate);
+        if let Some(learner) = self.learner.as_mut().filter(|_| entered && !self.switching.remembers(candidate, self.frame))
+        {
+            learner.begins(candidate);
+        }
         self.switching.ran(candidate, self.frame, work);
         let dear = !self.is_by_count() && self.is_dear(candidate, ns);
         if self.learns {

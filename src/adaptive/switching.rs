@@ -112,7 +112,8 @@ impl SwitchingCosts {
         cost.over += if seen.is_finite() { SHARE * (seen - cost.over) } else { 0.0 };
     }
 
-    fn remembers(&self, candidate: usize, frame: u64) -> bool {
+    /// Whether a candidate goes on with what was kept for it before this frame.
+    pub(super) fn remembers(&self, candidate: usize, frame: u64) -> bool {
         let last = self.costs[candidate].kept.and_then(|work| self.last[work]);
         last.is_some_and(|last| frame - last <= FORGOTTEN)
     }

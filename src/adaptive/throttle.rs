@@ -9,7 +9,7 @@ const MOST_RISE: f64 = 4.0;
 const MOST_FRAMES: f64 = 128.0;
 
 /// By how much such a share rises with the [`drift`] of the number of objects since the last decision.
-pub(super) const SHARE_OF_DRIFT: f64 = 0.1;
+pub(super) const SHARE_OF_DRIFT: f64 = 0.04;
 /// Costs of two methods grow with powers of the number of objects that differ by no more than this: a drift can't change which is cheaper before it has
 /// used up the lead.
 const POWERS_APART: f64 = 2.0;

@@ -9,6 +9,14 @@ const WATCHED: usize = 64;
 /// Edges of infinite boxes count as this, so that every ratio of two lengths is a number.
 const MOST_EDGE: f32 = 1.0e30;
 
+/// Boxes that move by less than this share of an edge in a frame are as good as still.
+const STILL: f64 = 0.01;
+
+/// How far two paces are apart, each in edges of a box in a frame: the natural logarithm of their ratio, 0 where boxes are as good as still at both.
+pub(crate) fn paces_apart_ln(one: f64, other: f64) -> f64 {
+    ((one + STILL) / (other + STILL)).ln().abs()
+}
+
 /// Where a few boxes were in the frame before.
 ///
 /// Boxes are known by their position in the list: one that is exchanged for another counts as one that moved.

@@ -14,6 +14,7 @@ mod observed;
 use super::AlgorithmCost;
 use crate::algorithm::BackendClass;
 use crate::cost::{Frame, Places, Residual};
+use crate::load::paces_apart_ln;
 use basis::Basis;
 use std::sync::Arc;
 
@@ -38,9 +39,11 @@ pub(crate) struct Deviations {
 impl Deviations {
     /// Of a prediction for this machine, about as on machines held out.
     const PREDICTED: Self = Self { class_ln: 0.3, kept_ln: 0.1, width_ln: 0.1, calls_ln: 0.3 };
-    /// Of a machine unlike those of the training, and in line: tuning may be of another machine and off by a factor of several for all algorithms at once, a core that is taken doubles the time of
-    /// those that use it, and a scene spares incremental algorithms more or less of their work.
+    /// Of a machine unlike those of the training.
     pub(crate) const UNLIKE: Self = Self { class_ln: 0.8, kept_ln: 0.5, width_ln: 0.2, calls_ln: 0.7 };
+    /// In line: tuning may be of another machine and off by a factor of several for all algorithms at once, a core that is taken doubles the time of
+    /// those that use it, and a scene spares incremental algorithms more or less of their work.
+    pub(crate) const IN_LINE: Self = Self { kept_ln: 0.8, ..Self::UNLIKE };
 }
 
 /// Of what a method has for all of its algorithms, its constant and its curve: about what was left of predictions on machines held out.
@@ -48,20 +51,19 @@ const METHOD_LN: [f64; 2] = [0.1, 0.1];
 /// Of an own part, its constant and its curve: tuning that was measured a minute ago is off by this in the next scene.
 const OWN_LN: [f64; 2] = [0.05, 0.15];
 
-/// Frames after which what was observed counts for half. In a hundred frames a class may change by 15 %, what keeping saves by 15 %, a width
+/// Frames after which what was observed counts for half. In a hundred frames a class may change by 15 %, what keeping saves by 24 %, a width
 /// by 7 % and an own part by 2 % (standard deviations); a faster change shows in surprises.
 const CLASS_FRAMES: f64 = 10_000.0;
-const KEPT_FRAMES: f64 = 400.0;
+const KEPT_FRAMES: f64 = 1000.0;
 const WIDTH_FRAMES: f64 = 800.0;
 const OWN_FRAMES: f64 = 6000.0;
 
 /// So many frames are forgotten at once: that goes through all covariances, which between two frames of a program lie in no cache.
 const FEWEST_FRAMES: f64 = 16.0;
 
-/// Where boxes move e times as far as before, or an e-th of that, an e-th stays of what was observed of keeping. This much of an edge is added to
-/// both: below it the boxes are as good as still. Less than the third is the noise of [`Displacement`](crate::Displacement), which watches few boxes.
+/// Where boxes move e times as far as before, or an e-th of that, an e-th stays of what was observed of keeping. Less than the
+/// second is the noise of [`Displacement`](crate::Displacement), which watches few boxes.
 const PACE_LN: f64 = 1.0;
-const STILL: f64 = 0.01;
 const SAME_PACE_LN: f64 = 0.5;
 
 /// No more than this many standard deviations of a surprise are believed at once: frames whose threads waited for a core take fifty times as long.
@@ -397,7 +399,7 @@ impl Belief {
     /// Boxes moved so far in a frame, in edges, when it was observed how much keeping work spares, and move so far now. What a scene spares at one
     /// pace tells the less of another the further that is. False where it is about the same pace, and nothing is forgotten.
     pub(crate) fn change_pace(&mut self, before: f64, now: f64) -> bool {
-        let away = ((before + STILL) / (now + STILL)).ln().abs();
+        let away = paces_apart_ln(before, now);
         if away < SAME_PACE_LN {
             return false;
         }
