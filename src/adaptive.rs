@@ -451,6 +451,7 @@ impl Adaptive {
     #[inline(never)]
     fn learn(&mut self, decided: Decided, ns: f64, boxes: &[Aabb], pairs: &Pairs) {
         let Some(choice) = self.choice else { return };
+        let stood_out = matches!(decided, Decided::Never);
         self.tracker.ran(boxes, pairs.overlapping(), ns);
         let dear = self.policy.ran(choice.chosen, ns, self.work);
         let decision_ns = match decided {
@@ -458,11 +459,10 @@ impl Adaptive {
             Decided::Before | Decided::Never => None,
         };
         self.tracker.took(decision_ns, ns, self.policy.lead_ln());
-        if !matches!(decided, Decided::Never) {
+        if !stood_out {
             self.policy.decision_took(decision_ns, self.tracker.decision_ns());
         }
         self.passed = Passed::expecting(self.policy.usual(choice.chosen));
-        let stood_out = matches!(decided, Decided::Never);
         let began = !stood_out && !matches!(choice.reason, Reason::Stayed | Reason::Hysteresis);
         if began {
             self.tell();
