@@ -5,6 +5,7 @@ mod recorded;
 mod replay;
 mod warming;
 
+use super::load_tracker::LoadTracker;
 use super::*;
 use crate::scene::{Scenario, Scene};
 use crate::{AlgorithmCost, CostCurve, CostTerm, Term};
@@ -164,7 +165,7 @@ fn samples_until(adaptive: &mut Adaptive, scene: &mut Scene, algorithm: &str) ->
     for _ in 0..1_000_000 {
         adaptive.find_pairs(scene.boxes(), &mut pairs).unwrap();
         scene.advance();
-        samples += u32::from(adaptive.tracker.age() == 1);
+        samples += u32::from(adaptive.runner.tracker.age() == 1);
         if adaptive.last_decision().unwrap().algorithm.to_string() == algorithm {
             return samples;
         }

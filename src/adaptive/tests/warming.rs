@@ -1,6 +1,7 @@
 //! No frame waits for an algorithm that gets ready.
 
 use super::*;
+use crate::clock::Instant;
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 
