@@ -115,7 +115,7 @@ impl LoadTracker {
     /// out included.
     pub(super) fn passes(&mut self, boxes: &[Aabb], pairs: u64, passed: &Passed) {
         self.throttle.ran(count(boxes), pairs);
-        if passed.is_off(self.throttle.rest()) {
+        if passed.is_off(self.throttle.rest_ns()) {
             self.motion.doubt();
             self.throttle.wake();
         }

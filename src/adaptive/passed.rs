@@ -10,7 +10,7 @@ const SHARE: f64 = 0.0025;
 /// One frame in so many is timed at least.
 const MOST_APART: f64 = 32.0;
 
-/// After so many timed frames, and this share of those until the next decision, they call for one where their mean is off by this factor.
+/// After so many timed frames, and this share of the time until the next decision, they call for one where their mean is off by this factor.
 const ENOUGH: u32 = 8;
 const EARLIEST: f64 = 0.25;
 const OFF: f64 = 1.2;
@@ -67,9 +67,11 @@ impl Passed {
         }
     }
 
-    /// Whether the times differ so much from what was expected that the decision may have to be another, of which `rest` frames were to be the next.
-    pub(super) fn is_off(&self, rest: f64) -> bool {
-        if self.timed < ENOUGH || f64::from(self.frames) < EARLIEST * rest {
+    /// Whether the times differ so much from what was expected that the decision may have to be another, where the next one was to be so many
+    /// nanoseconds away. In time, for that is what is lost: frames that are ten times as long as expected are looked at ten times as soon.
+    pub(super) fn is_off(&self, rest_ns: f64) -> bool {
+        let passed_ns = self.mean_ns().unwrap_or_default() * f64::from(self.frames);
+        if self.timed < ENOUGH || passed_ns < EARLIEST * rest_ns {
             return false;
         }
         let expected_ns = self.usual.mean_ns * self.over_mean;
@@ -104,15 +106,17 @@ mod tests {
 
     #[test]
     fn frames_that_differ_from_what_was_expected_call_for_a_decision() {
-        let is_off = |frames: u32, ns: f64, rest: f64| {
+        let is_off = |frames: u32, ns: f64, rest_ns: f64| {
             let mut passed = Passed::expecting(Usual { mean_ns: 1e6, most_ns: 4e6 });
             let work = Some(FrameWork::new(FrameKind::Updated, 0.5));
             (0..frames).for_each(|_| passed.add(work, Some(ns)));
             assert_eq!((passed.mean_ns(), passed.work), (Some(ns), work));
-            passed.is_off(rest)
+            passed.is_off(rest_ns)
         };
         // Half of the mean work is expected to take half a millisecond.
-        assert!(!is_off(8, 0.55e6, 8.0) && is_off(8, 0.65e6, 8.0) && is_off(8, 0.4e6, 8.0));
-        assert!(!is_off(7, 0.65e6, 8.0) && !is_off(8, 0.65e6, 40.0) && is_off(10, 0.65e6, 40.0));
+        assert!(!is_off(8, 0.55e6, 8e6) && is_off(8, 0.65e6, 8e6) && is_off(8, 0.4e6, 8e6));
+        assert!(!is_off(7, 0.65e6, 8e6) && !is_off(8, 0.65e6, 24e6) && is_off(10, 0.65e6, 24e6));
+        // The dearer they are the sooner.
+        assert!(is_off(8, 6.5e6, 200e6) && !is_off(8, 0.65e6, 200e6));
     }
 }

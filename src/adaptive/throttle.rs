@@ -71,9 +71,9 @@ impl DecisionThrottle {
         self.frame_ns
     }
 
-    /// Frames that need no decision where nothing changes.
-    pub(super) fn rest(&self) -> f64 {
-        self.rest
+    /// About how long frames take that need no decision where nothing changes, in nanoseconds.
+    pub(super) fn rest_ns(&self) -> f64 {
+        self.rest * self.frame_ns
     }
 
     /// Objects and pairs of the last frame.

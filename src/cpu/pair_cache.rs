@@ -63,10 +63,14 @@ enum Kept {
 
 /// One instance that can run on any of these numbers of threads, ascending. It begins with the least.
 pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
+    Ok(Box::new(pair_cache(threads, pools, simd)?))
+}
+
+fn pair_cache(threads: &[u32], pools: &Threads, simd: Simd) -> Result<PairCache, Error> {
     let widths: Vec<Workers> = threads.iter().map(|&k| Workers::new("pair-cache", k, pools)).collect::<Result<_, _>>()?;
     let widest = &widths[widths.len() - 1];
     let tasks = widest.tasks();
-    Ok(Box::new(PairCache {
+    Ok(PairCache {
         outputs: Outputs::default(),
         motion: Motion::default(),
         grown: Grown::new(simd),
@@ -79,7 +83,7 @@ pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box
         fitted_for: None,
         width: 0,
         widths,
-    }))
+    })
 }
 
 impl BroadPhase for PairCache {
@@ -193,7 +197,7 @@ impl PairCache {
         let rebuilt = motion.wants_rebuild(boxes.len(), &changes);
         *last_frame = if rebuilt { FrameKind::Rebuilt } else { FrameKind::Updated };
         if rebuilt {
-            grown.grow_all(workers, boxes, motion.renew(plan, boxes), shares);
+            grown.grow_all(workers, boxes, motion.renew(plan, boxes, &changes), shares);
             let sample = Sample::of(grown.as_slice());
             tree.build(workers, grown.as_slice(), &sample, pairs.filter())?;
             let most = most_of_task(motion.most_kept(boxes.len()), kept.len());
@@ -277,6 +281,48 @@ mod tests {
         assert_eq!(kinds(Scenario::Uniform, &unknown), [FromScratch, Rebuilt, Updated, Updated]);
         assert_eq!(kinds(Scenario::Uniform, &known), [Rebuilt, Updated, Updated, Updated]);
         assert_eq!(kinds(Scenario::Fast, &unknown), [FromScratch; 4]);
+    }
+
+    /// Kept pairs after each frame of boxes that move by so much of an edge in it.
+    fn kept(method: &mut PairCache, shifts: impl Iterator<Item = f32>, told: bool) -> Vec<usize> {
+        let mut boxes = Scene::start(Scenario::Resting, 1000, 1).boxes().to_vec();
+        let mut pairs = Pairs::new();
+        let frame = |shift: f32| {
+            for (k, b) in boxes.iter_mut().enumerate() {
+                // Neighbours move apart and together again.
+                let shift = if k % 2 == 0 { shift } else { -shift } * (b.max[0] - b.min[0]);
+                (b.min[0], b.max[0]) = (b.min[0] + shift, b.max[0] + shift);
+            }
+            let plan = FramePlan::default().with_moved(told.then_some(f64::from(shift.abs())));
+            method.find_pairs_with(&plan, &boxes, &mut pairs).unwrap();
+            method.kept.iter().map(Pairs::len).sum()
+        };
+        shifts.map(frame).collect()
+    }
+
+    #[test]
+    fn boxes_that_come_to_rest_keep_as_many_pairs_as_if_they_had_always_rested() {
+        let method = || pair_cache(&[1], &Threads::default(), Simd::Portable).unwrap();
+        let rested = *kept(&mut method(), (0..100).map(|_| 0.0), false).last().unwrap();
+        let to_and_fro = |k: usize| if (k / 8).is_multiple_of(2) { 0.08 } else { -0.08 };
+        let kept = kept(&mut method(), (0..160).map(to_and_fro).chain((0..200).map(|_| 0.0)), false);
+        let (moved, late) = (kept[150], kept[359]);
+        assert!(rested > 0 && moved > 2 * rested, "{rested} at rest, {moved} moving");
+        assert!(late < rested * 3 / 2, "{late} are kept long after, {rested} at rest");
+    }
+
+    #[test]
+    fn where_it_goes_on_after_a_while_it_begins_with_what_boxes_move_by_then() {
+        let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable).unwrap();
+        let to_and_fro = |k: usize| if (k / 8).is_multiple_of(2) { 0.08 } else { -0.08 };
+        let moving = *kept(&mut method, (0..160).map(to_and_fro), true).last().unwrap();
+        // As after a hundred frames of another method, in which all of them went elsewhere.
+        let mut pairs = Pairs::new();
+        let boxes = Scene::start(Scenario::Resting, 1000, 2).boxes().to_vec();
+        let plan = FramePlan::default().with_moved(Some(0.0)).with_pairs(Some(500.0));
+        method.find_pairs_with(&plan, &boxes, &mut pairs).unwrap();
+        let kept: usize = method.kept.iter().map(Pairs::len).sum();
+        assert!(kept > 0 && 2 * kept < moving, "{kept} where {moving} were kept before");
     }
 
     #[test]

@@ -49,6 +49,9 @@ const KEPT_WELL: u32 = 32;
 const LEARNING: f32 = 64.0;
 const MARGIN_STEP: f32 = 1.005;
 
+/// Of the boxes so many leave at once where the scene jumped, or where this method has not seen its last frames.
+const JUMP: f32 = 0.5;
+
 /// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
 const PROVEN: u32 = 256;
 
@@ -108,9 +111,37 @@ struct Keeping {
     nodes: f32,
     /// Boxes that left since all were made again, over all boxes.
     left: f32,
+    /// The margin that the grown boxes have in the mean, and what half of it would have saved for each box since it would.
+    grown: f32,
+    missed: f32,
     /// Frames since keeping began.
     frames: u32,
     work: MeanWork,
+}
+
+impl Keeping {
+    /// Half the margin of the grown boxes.
+    fn narrower(&self) -> f32 {
+        (0.5 * self.grown).max(MARGINS[0])
+    }
+
+    /// Pairs that are kept with that over those that are kept now.
+    fn narrower_keeps(&self) -> f32 {
+        ((1.0 + 2.0 * self.narrower()) / (1.0 + 2.0 * self.grown)).powi(3).min(1.0)
+    }
+
+    /// What it would have saved for each box in a frame with so many kept pairs each, in which that share of the boxes left. As many more would have left as
+    /// of boxes that wander.
+    fn narrower_saves(&self, far: f32, kept: f32, left: f32) -> f32 {
+        let more = (left * (self.grown / self.narrower()).powi(2)).min(1.0) - left;
+        tests(far, kept) - tests(far, kept * self.narrower_keeps()) - self::left(far, self.nodes) * more.max(0.0)
+    }
+
+    /// Whether it would have saved by now what it costs to grow all boxes again. Boxes that come to rest never leave by themselves: without this their
+    /// wide grown boxes would stay for ever, and with them five times the pairs.
+    fn is_too_wide(&self, objects: usize) -> bool {
+        self.missed > 1.5 * scratch(far(objects), self.kept * self.narrower_keeps())
+    }
 }
 
 /// The mean cost of a box over the frames from one in which all is made again to the next. A promise counts for as many frames as
@@ -217,13 +248,22 @@ impl Motion {
         let Some(keeping) = self.keeping else { return false };
         let left = changes.left as f32 / objects.max(1) as f32;
         // Pairs of boxes that left are found at a higher price and stand apart from their neighbours in space.
-        left > 0.2 || keeping.left + worn(objects, changes) > 1.5
+        left > 0.2 || keeping.left + worn(objects, changes) > 1.5 || keeping.is_too_wide(objects)
     }
 
-    /// The margin with which all boxes are grown again: the scene may have changed its sizes since the last time.
-    pub(super) fn renew(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Margin {
+    /// The margin with which all boxes are grown again in a frame in which boxes left as `changes` says: the scene may have changed its sizes since the
+    /// last time.
+    pub(super) fn renew(&mut self, plan: &FramePlan, boxes: &[Aabb], changes: &Changes) -> Margin {
+        let jumped = changes.left as f32 > JUMP * boxes.len() as f32;
+        if jumped && plan.moved().is_some() {
+            // What was kept was of another motion.
+            self.keeping = self.begin(plan, boxes).or(self.keeping);
+        }
         let longest_edge = longest_edge(plan, boxes);
         self.keeping.as_mut().map_or(Margin { share: MARGINS[0], longest_edge }, |keeping| {
+            if keeping.is_too_wide(boxes.len()) {
+                keeping.margin.share = keeping.narrower();
+            }
             keeping.margin.longest_edge = longest_edge;
             keeping.margin
         })
@@ -244,12 +284,15 @@ impl Motion {
         k.cost += (now - k.cost) / 16.0;
         k.work.add(now, rebuilt);
         k.kept += (kept - k.kept) / LEARNING;
+        // Boxes that move alike leave together, in frames in which all is made again.
+        k.leaving += if k.frames > 0 { (left - k.leaving) / LEARNING } else { 0.0 };
         if rebuilt {
-            k.left = 0.0;
+            (k.left, k.grown, k.missed) = (0.0, k.margin.share, 0.0);
         } else {
             k.left += worn(objects, changes);
-            k.leaving += (left - k.leaving) / LEARNING;
+            k.grown += (k.margin.share - k.grown) * left.min(1.0);
             k.nodes += if changes.left > 0 { (nodes - k.nodes) / LEARNING } else { 0.0 };
+            k.missed = (k.missed + k.narrower_saves(far, kept, left)).max(0.0);
         }
         // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p with p
         // between 1, for those that fly straight on, and 2, for those that wander.
@@ -313,6 +356,8 @@ impl Motion {
             kept,
             nodes: NODES,
             left: 0.0,
+            grown: best,
+            missed: 0.0,
             frames: 0,
             work: MeanWork::promised(cost(best)),
         })
