@@ -21,7 +21,7 @@ const STALL: [f64; 2] = [MOST_OVER, 64.0];
 const STALLS_APART: u64 = 50;
 
 /// The noise of a frame is learned for each algorithm; it starts here, and is never believed to be less.
-const NOISE_LN: f64 = 0.1;
+const NOISE_LN: f64 = 0.2;
 const LEAST_NOISE_LN: f64 = 0.02;
 /// Of this many frames in a row the mean is as noisy as of this power of their number far apart.
 const ALIKE: f64 = 0.7;

@@ -27,6 +27,8 @@ const SHARE_IN_DOUBT: f64 = 0.02;
 #[derive(Debug, Clone, Default)]
 pub(super) struct LoadTracker {
     throttle: DecisionThrottle,
+    /// The next frame is to show how far boxes move.
+    watching: bool,
     load: Load,
     /// What was worked out about the next frame.
     plan: FramePlan,
@@ -75,7 +77,9 @@ impl LoadTracker {
     pub(super) fn decide(&mut self, boxes: &[Aabb]) {
         let objects = count(boxes);
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
-        self.motion.look(boxes, self.throttle.decision_ns());
+        if std::mem::take(&mut self.watching) {
+            self.motion.look(boxes);
+        }
         let moved = self.motion.moved();
         self.sampled_ns = 0.0;
         let mut plan = FramePlan::default();
@@ -115,6 +119,10 @@ impl LoadTracker {
     /// out included.
     pub(super) fn passes(&mut self, boxes: &[Aabb], pairs: u64, passed: &Passed) {
         self.throttle.ran(count(boxes), pairs);
+        // A look alone takes a tenth of a decision, and most looks find the pace of before.
+        if std::mem::take(&mut self.watching) && self.motion.look(boxes) {
+            self.throttle.wake();
+        }
         if passed.is_off(self.throttle.rest_ns()) {
             self.motion.doubt();
             self.throttle.wake();
@@ -139,9 +147,7 @@ impl LoadTracker {
         self.age = self.age.saturating_add(1);
         self.passed_ns += ns;
         self.motion.passed(ns);
-        if self.motion.ran(boxes) {
-            self.wake();
-        }
+        self.watching |= self.motion.ran(boxes);
     }
 
     /// What a decision with its sample took, where that is known, and its frame, in nanoseconds; and how far ahead the one that runs is, a logarithm.
@@ -167,7 +173,7 @@ impl LoadTracker {
     pub(super) fn doubt(&mut self, boxes: &[Aabb]) {
         self.motion.doubt();
         self.motion.want();
-        self.motion.ran(boxes);
+        self.watching |= self.motion.ran(boxes);
         self.doubted = true;
         self.wake();
     }
@@ -176,6 +182,7 @@ impl LoadTracker {
     pub(super) fn failed(&mut self) {
         self.before = None;
         self.motion.failed();
+        self.watching = false;
         self.wake();
     }
 }

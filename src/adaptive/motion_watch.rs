@@ -25,7 +25,7 @@ pub(super) struct MotionWatch {
     /// How far the boxes moved when that was last found out.
     moved: Option<f64>,
     share: f64,
-    /// What a look takes with the decision that is made for it, and the time of the frames since the last one, in nanoseconds.
+    /// What a look takes, and the time of the frames since the last one, in nanoseconds.
     look_ns: f64,
     passed_ns: f64,
 }
@@ -60,24 +60,25 @@ impl MotionWatch {
         self.moved
     }
 
-    /// Compares the boxes of the frame that is decided on, which takes so long without this, with those of the frame before, where they were remembered.
-    pub(super) fn look(&mut self, boxes: &[Aabb], decision_ns: f64) {
+    /// Compares the boxes of a frame with those of the frame before, where they were remembered. Whether they move at another pace than when this was
+    /// looked at last.
+    pub(super) fn look(&mut self, boxes: &[Aabb]) -> bool {
         if self.state != State::Watching {
-            return;
+            return false;
         }
         let started = Instant::now();
         let moved = self.displacement.moved(boxes);
         // To remember the boxes takes about as long as to compare them.
-        let took = 2.0 * started.elapsed().as_nanos() as f64 + decision_ns;
-        self.found(moved, took);
+        self.found(moved, 2.0 * started.elapsed().as_nanos() as f64)
     }
 
-    /// Takes in what a look has found, and how long it took.
-    fn found(&mut self, moved: Option<f64>, took_ns: f64) {
+    /// Takes in what a look has found, and how long it took. Whether that is another pace.
+    fn found(&mut self, moved: Option<f64>, took_ns: f64) -> bool {
         let as_before = self.moved.zip(moved).is_some_and(|(before, now)| paces_apart_ln(before, now) < SAME_PACE_LN);
         self.share = if as_before { (self.share / 2.0).max(SHARES[0]) } else { SHARES[1] };
         self.look_ns = if self.look_ns > 0.0 { took_ns.min(self.look_ns * COST_RISES) } else { took_ns };
         (self.moved, self.passed_ns, self.state) = (moved, 0.0, State::Resting);
+        !as_before
     }
 
     /// Frames have passed that took so long.
@@ -97,7 +98,7 @@ impl MotionWatch {
         self.share = SHARES[1];
     }
 
-    /// Remembers the boxes of a frame that was decided on and has run, where that is due or pays. Whether the next frame is to be decided on for that.
+    /// Remembers the boxes of a frame that was decided on and has run, where that is due or pays. Whether the next frame is to be [looked at](Self::look) for that.
     pub(super) fn ran(&mut self, boxes: &[Aabb]) -> bool {
         // Not when it is decided: a frame may be decided on twice before it runs, and the boxes have not moved in between.
         let due = self.state == State::Due || self.pays();
@@ -130,7 +131,7 @@ mod tests {
     /// Time between two looks of a microsecond, in nanoseconds, where the last ones have found this.
     fn between(looks: &[f64]) -> f64 {
         let mut watch = MotionWatch::default();
-        looks.iter().for_each(|&moved| watch.found(Some(moved), 1000.0));
+        looks.iter().for_each(|&moved| _ = watch.found(Some(moved), 1000.0));
         let mut passed = 0.0;
         while !watch.ran(&[Aabb::cube([0.0; 3], 1.0)]) {
             watch.passed(1e4);
@@ -150,7 +151,7 @@ mod tests {
     #[test]
     fn where_frames_contradict_it_is_looked_as_often_as_at_first() {
         let mut watch = MotionWatch::default();
-        (0..9).for_each(|_| watch.found(Some(0.1), 1000.0));
+        (0..9).for_each(|_| _ = watch.found(Some(0.1), 1000.0));
         watch.passed(2e5);
         assert!(!watch.pays());
         watch.doubt();
@@ -160,7 +161,7 @@ mod tests {
     #[test]
     fn a_look_that_is_interrupted_puts_off_the_next_one_for_twice_as_long_at_most() {
         let mut watch = MotionWatch::default();
-        [1000.0, 1e9].into_iter().for_each(|took| watch.found(Some(0.1), took));
+        [1000.0, 1e9].into_iter().for_each(|took| _ = watch.found(Some(0.1), took));
         watch.passed(4.1e5);
         assert!(watch.pays());
     }

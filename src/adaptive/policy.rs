@@ -279,8 +279,8 @@ impl Policy {
     /// Begins a trial of the candidate that is expected to save the most by it, if there is one.
     fn offer_trial(&mut self, settled: usize) {
         let Some(learner) = self.learner.as_ref().filter(|_| self.learns && self.explores) else { return };
-        let Some(allowance_ns) = self.trials.allowance_ns(self.frame) else { return };
         let now_ns = self.mean_ns[settled];
+        let Some(allowance) = self.trials.allowance(self.frame, now_ns) else { return };
         let running = learner.running(settled, &self.view, self.predicted[settled].calls());
         let offer = |k: usize| {
             if k == settled || !self.usable[k] || self.is_avoided(k) || self.mean_ns[k] > HOPELESS * now_ns {
@@ -289,12 +289,12 @@ impl Policy {
             let begins = self.switching.keeps(k) && !self.switching.share(k, settled);
             let enter_ns = self.switching.enter_ns(k, self.frame, self.expected[k]);
             let offer = Offer::of(k, begins, enter_ns, self.mean_ns[k], now_ns, self.decision_ns);
-            if offer.price_ns > allowance_ns {
+            if !allowance.may_pay(offer.price_ns) {
                 return None;
             }
             let deviation = learner.told_of_ratio(&running, k, &self.view, self.predicted[k].calls(), offer.telling());
-            let gain_ns = now_ns * expected_gain((self.mean_ns[k] / now_ns).ln(), deviation) * HORIZON - offer.price_ns;
-            (gain_ns > 0.0).then_some((offer, gain_ns))
+            let saved_ns = now_ns * expected_gain((self.mean_ns[k] / now_ns).ln(), deviation) * HORIZON;
+            allowance.pays(offer.price_ns, saved_ns).then_some((offer, saved_ns - offer.price_ns))
         };
         let best = (0..self.usable.len()).filter_map(offer).max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((offer, _)) = best {
