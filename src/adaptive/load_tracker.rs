@@ -77,9 +77,7 @@ impl LoadTracker {
     pub(super) fn decide(&mut self, boxes: &[Aabb]) {
         let objects = count(boxes);
         let pairs = self.before.map(|(n, pairs)| scaled(pairs as f64, objects, n));
-        if std::mem::take(&mut self.watching) {
-            self.motion.look(boxes);
-        }
+        self.look(boxes);
         let moved = self.motion.moved();
         self.sampled_ns = 0.0;
         let mut plan = FramePlan::default();
@@ -98,6 +96,11 @@ impl LoadTracker {
         }
         self.plan = plan.with_moved(moved).with_pairs(pairs);
         self.throttle.decide(objects);
+    }
+
+    /// Looks how far the boxes of a frame have moved, where those of the frame before were remembered. Whether they move at another pace.
+    fn look(&mut self, boxes: &[Aabb]) -> bool {
+        std::mem::take(&mut self.watching) && self.motion.look(boxes)
     }
 
     /// Frames since the last sample.
@@ -120,7 +123,7 @@ impl LoadTracker {
     pub(super) fn passes(&mut self, boxes: &[Aabb], pairs: u64, passed: &Passed) {
         self.throttle.ran(count(boxes), pairs);
         // A look alone takes a tenth of a decision, and most looks find the pace of before.
-        if std::mem::take(&mut self.watching) && self.motion.look(boxes) {
+        if self.look(boxes) {
             self.throttle.wake();
         }
         if passed.is_off(self.throttle.rest_ns()) {
@@ -138,8 +141,11 @@ impl LoadTracker {
         self.motion.passed(ns);
     }
 
-    /// Takes in a frame that was decided on: its overlapping pairs, those that a filter kept out included, and how long it took in nanoseconds.
+    /// Takes in a frame that was decided on, or stood out among those that were not: its overlapping pairs, those that a filter kept out included, and how long
+    /// it took in nanoseconds.
     pub(super) fn ran(&mut self, boxes: &[Aabb], pairs: u64, ns: f64) {
+        // One that was not decided on: the next one would be compared with the one before it.
+        self.look(boxes);
         // What was worked out for this frame holds for no other.
         self.plan = FramePlan::default();
         self.throttle.ran(count(boxes), pairs);

@@ -219,6 +219,22 @@ fn how_far_boxes_move_is_found_out_between_samples() {
 }
 
 #[test]
+fn a_frame_that_stands_out_is_compared_with_the_one_before_it() {
+    let at = |k: u32| -> Vec<Aabb> {
+        let by = |x: f32| x + 0.25 * k as f32;
+        row(500).iter().map(|b| Aabb::new(b.min.map(by), b.max.map(by))).collect()
+    };
+    let mut tracker = LoadTracker::default();
+    tracker.decide(&at(0));
+    tracker.ran(&at(0), 100, 1e9);
+    // Nobody has decided on this one.
+    tracker.ran(&at(1), 100, 1e9);
+    tracker.decide(&at(2));
+    let moved = tracker.moved().unwrap();
+    assert!((moved - 0.25).abs() < 0.01, "{moved}");
+}
+
+#[test]
 fn deciding_before_a_frame_does_not_make_it_look_at_rest() {
     let mut adaptive = grid_sap_or_pair_cache();
     let mut scene = Scene::start(Scenario::Fast, 2000, 1);
