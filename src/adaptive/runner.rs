@@ -20,7 +20,7 @@ const WARM_WITHIN: f64 = 1.5;
 enum Decided {
     /// It went on as the one before.
     Never,
-    /// By a call of [`decide`](Adaptive::decide).
+    /// By a call of [`decide`](crate::Adaptive::decide).
     Before,
     /// Right before it ran, from then on.
     At(Instant),
@@ -33,6 +33,8 @@ enum Decided {
 pub(super) struct Runner {
     /// The throttle alone tells whether the next frame needs a decision, and the instance that goes on where it needs none.
     steady: bool,
+    /// Another tuning may arrive before any frame.
+    awaits: bool,
     running: usize,
     instances: Vec<Instance>,
     /// The last frame: what it took, where it was timed, and how it came about, where one may build on the one before.
@@ -51,14 +53,13 @@ pub(super) struct Runner {
     prepared: usize,
     /// A decision was made for a frame of this many boxes that has not run yet.
     decided: Option<usize>,
-    /// Another tuning may arrive before any frame.
-    awaits: bool,
 }
 
 impl Runner {
     pub(super) fn new(tuning: Tuning, made: Instances) -> Self {
         Self {
             steady: false,
+            awaits: false,
             running: 0,
             policy: policy(tuning, &made),
             instances: made.instances,
@@ -71,7 +72,6 @@ impl Runner {
             any_away: false,
             prepared: 0,
             decided: None,
-            awaits: false,
         }
     }
 
