@@ -2,6 +2,7 @@
 //! learned too.
 
 use super::frame_batch::{FrameBatch, MOST_OVER};
+use super::switching::works;
 use crate::algorithm::BackendClass;
 use crate::cost::Frame;
 use crate::tuning::AlgorithmCost;
@@ -102,7 +103,7 @@ impl Learner {
             belief: Belief::new(costs, kept, Deviations::IN_LINE),
             frames,
             waits: vec![Wait::default(); widths.len()],
-            since: vec![0; kept.iter().flatten().max().map_or(0, |most| most + 1)],
+            since: vec![0; works(kept)],
             observed: 0,
             moved: None,
         }

@@ -22,12 +22,12 @@ const SAMPLE_EVERY: u32 = 32;
 const SHARE_IN_DOUBT: f64 = 0.02;
 
 /// Keeps the estimate of the load up to date.
-// A frame without a decision looks at what stands first alone: see `Adaptive`.
+// A frame without a decision looks at what stands first alone: see `Runner`.
 #[repr(C)]
 #[derive(Debug, Clone, Default)]
 pub(super) struct LoadTracker {
     throttle: DecisionThrottle,
-    /// The next frame is to show how far boxes move.
+    /// The next frame is to show how far boxes move. Stands here, for a frame without a decision does not ask `motion`, which lies in other lines of memory.
     watching: bool,
     load: Load,
     /// What was worked out about the next frame.

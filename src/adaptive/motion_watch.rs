@@ -60,12 +60,9 @@ impl MotionWatch {
         self.moved
     }
 
-    /// Compares the boxes of a frame with those of the frame before, where they were remembered. Whether they move at another pace than when this was
+    /// Compares the boxes of a frame with those of the frame before, which are [remembered](Self::ran). Whether they move at another pace than when this was
     /// looked at last.
     pub(super) fn look(&mut self, boxes: &[Aabb]) -> bool {
-        if self.state != State::Watching {
-            return false;
-        }
         let started = Instant::now();
         let moved = self.displacement.moved(boxes);
         // To remember the boxes takes about as long as to compare them.

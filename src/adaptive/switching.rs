@@ -20,6 +20,11 @@ const MOST: f64 = 4.0;
 /// Share of the frames that are made again where nobody has seen any: cost curves come from medians, which leave those frames out.
 const REBUILDS: f64 = 0.02;
 
+/// How many there are to keep, where `kept` is as [`Policy::new`](super::policy::Policy::new) has it.
+pub(super) fn works(kept: &[Option<usize>]) -> usize {
+    kept.iter().flatten().max().map_or(0, |most| most + 1)
+}
+
 /// What it costs to switch to each of the candidates.
 #[derive(Debug, Clone)]
 pub(super) struct SwitchingCosts {
@@ -50,8 +55,7 @@ impl SwitchingCosts {
     pub(super) fn new(kept: &[Option<usize>]) -> Self {
         let cost =
             |&kept: &Option<usize>| SwitchingCost { kept, over: if kept.is_some() { FROM_NOTHING } else { 1.0 + COLD } };
-        let works = kept.iter().flatten().max().map_or(0, |most| most + 1);
-        Self { costs: kept.iter().map(cost).collect(), last: vec![None; works] }
+        Self { costs: kept.iter().map(cost).collect(), last: vec![None; works(kept)] }
     }
 
     /// Other instances keep, shared by the same candidates as before, nothing yet. False where other candidates share it.

@@ -283,6 +283,11 @@ mod tests {
         assert_eq!(kinds(Scenario::Fast, &unknown), [FromScratch; 4]);
     }
 
+    /// By how much of an edge boxes move in a frame that go one way for eight frames and then back.
+    fn to_and_fro(frame: usize) -> f32 {
+        if (frame / 8).is_multiple_of(2) { 0.08 } else { -0.08 }
+    }
+
     /// Kept pairs after each frame of boxes that move by so much of an edge in it.
     fn kept(method: &mut PairCache, shifts: impl Iterator<Item = f32>, told: bool) -> Vec<usize> {
         let mut boxes = Scene::start(Scenario::Resting, 1000, 1).boxes().to_vec();
@@ -304,7 +309,6 @@ mod tests {
     fn boxes_that_come_to_rest_keep_as_many_pairs_as_if_they_had_always_rested() {
         let method = || pair_cache(&[1], &Threads::default(), Simd::Portable).unwrap();
         let rested = *kept(&mut method(), (0..100).map(|_| 0.0), false).last().unwrap();
-        let to_and_fro = |k: usize| if (k / 8).is_multiple_of(2) { 0.08 } else { -0.08 };
         let kept = kept(&mut method(), (0..160).map(to_and_fro).chain((0..200).map(|_| 0.0)), false);
         let (moved, late) = (kept[150], kept[359]);
         assert!(rested > 0 && moved > 2 * rested, "{rested} at rest, {moved} moving");
@@ -314,7 +318,6 @@ mod tests {
     #[test]
     fn where_it_goes_on_after_a_while_it_begins_with_what_boxes_move_by_then() {
         let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable).unwrap();
-        let to_and_fro = |k: usize| if (k / 8).is_multiple_of(2) { 0.08 } else { -0.08 };
         let moving = *kept(&mut method, (0..160).map(to_and_fro), true).last().unwrap();
         // As after a hundred frames of another method, in which all of them went elsewhere.
         let mut pairs = Pairs::new();

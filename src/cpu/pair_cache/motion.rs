@@ -140,7 +140,7 @@ impl Keeping {
     /// Whether it would have saved by now what it costs to grow all boxes again. Boxes that come to rest never leave by themselves: without this their
     /// wide grown boxes would stay for ever, and with them five times the pairs.
     fn is_too_wide(&self, objects: usize) -> bool {
-        self.missed > 1.5 * scratch(far(objects), self.kept * self.narrower_keeps())
+        self.missed > rebuild(far(objects), self.kept * self.narrower_keeps())
     }
 }
 
@@ -278,7 +278,7 @@ impl Motion {
         let (left, kept, rebuilt) = (share(changes.left), share(did.kept_pairs), did.rebuilt);
         let nodes = did.nodes as f32 / changes.left.max(1) as f32;
         let leaving = if left > 0.0 { cost::AGAIN + self::left(far, nodes) * left } else { 0.0 };
-        let work = if rebuilt { 1.5 * self::scratch(far, kept) } else { leaving };
+        let work = if rebuilt { rebuild(far, kept) } else { leaving };
         k.tests = tests(far, kept);
         let now = k.tests + work;
         k.cost += (now - k.cost) / 16.0;
@@ -379,6 +379,11 @@ fn worn(objects: usize, changes: &Changes) -> f32 {
 /// The cost of a box from scratch.
 fn scratch(far: f32, density: f32) -> f32 {
     far.sqrt() * (cost::SCRATCH[0] + cost::SCRATCH[1] * density)
+}
+
+/// The cost of a box where all are grown again and so many pairs of each are kept: those of a tree from scratch, of larger boxes.
+fn rebuild(far: f32, kept: f32) -> f32 {
+    1.5 * scratch(far, kept)
 }
 
 /// The cost of a box whose kept pairs are tested.
