@@ -3,10 +3,12 @@
 //! The natural logarithm of real over predicted time is taken to be a sum of parts. Some are shared: by a class of processor (a clock that
 //! throttles, tuning of another machine), by a number of threads or GPUs, on all of a frame and on what calling them takes (cores that moved apart, a core
 //! that is taken), by incremental algorithms that keep the same from frame to frame, and by the algorithms of a method. One is the
-//! algorithm's own. Those of methods and algorithms are a constant and a function of the load, a Gaussian process at the first of the places
-//! of the residuals. A Kalman filter follows all of them: the shared ones with all their covariances, those of an algorithm by themselves. That
-//! leaves out what observations tell of the difference between a shared part and an own one, so that a sum of both is believed to be less sure than it
-//! is.
+//! algorithm's own: a constant and a function of the load, a Gaussian process at the first of the places of the residuals. A Kalman filter follows all of
+//! them: the shared ones with all their covariances, those of an algorithm by themselves. That leaves out what observations tell of the difference between a
+//! shared part and an own one, so that a sum of both is believed to be less sure than it is.
+//!
+//! A frame that decides goes through all covariances, and between two frames of a program these lie in no cache. So methods have no function of the load for
+//! all of their algorithms: in 88 replayed runs it changed costs by 0.0 +- 0.4 %, and made the covariances of the shared parts thirty times as large.
 
 mod basis;
 mod observed;
@@ -43,13 +45,13 @@ impl Deviations {
     pub(crate) const UNLIKE: Self = Self { class_ln: 0.8, kept_ln: 0.5, width_ln: 0.2, calls_ln: 0.7 };
     /// In line: tuning may be of another machine and off by a factor of several for all algorithms at once, a core that is taken doubles the time of
     /// those that use it, and a scene spares incremental algorithms more or less of their work.
-    pub(crate) const IN_LINE: Self = Self { kept_ln: 0.8, ..Self::UNLIKE };
+    pub(crate) const IN_LINE: Self = Self { kept_ln: 0.8, width_ln: 0.25, ..Self::UNLIKE };
 }
 
-/// Of what a method has for all of its algorithms, its constant and its curve: about what was left of predictions on machines held out.
-const METHOD_LN: [f64; 2] = [0.1, 0.1];
+/// Of what a method has for all of its algorithms: about what was left of predictions on machines held out.
+const METHOD_LN: f64 = 0.1;
 /// Of an own part, its constant and its curve: tuning that was measured a minute ago is off by this in the next scene.
-const OWN_LN: [f64; 2] = [0.05, 0.15];
+const OWN_LN: [f64; 2] = [0.05, 0.18];
 
 /// Frames after which what was observed counts for half. In a hundred frames a class may change by 15 %, what keeping saves by 24 %, a width
 /// by 7 % and an own part by 2 % (standard deviations); a faster change shows in surprises.
@@ -95,7 +97,6 @@ struct Parts {
     kept: Option<usize>,
     /// Of its width, if that is more than one: on all of its cost, and behind it on its calls.
     width: Option<usize>,
-    /// Of its method, as many entries as an own part has.
     method: usize,
     by_motion: bool,
 }
@@ -111,7 +112,7 @@ struct Own {
 }
 
 /// Entries of the shared parts that count for one algorithm at most, and how the logarithm of its cost hangs on each.
-const SHARED: usize = 4 + SIZE;
+const SHARED: usize = 5;
 type Slopes = [(usize, f64); SHARED];
 
 /// An algorithm that runs, as what is believed of others is held against it: how the logarithm of its cost hangs on shared parts, and its variance.
@@ -161,7 +162,7 @@ enum Part<'a> {
     Kept(usize),
     Width(BackendClass, u32),
     Calls(BackendClass, u32),
-    Method(BackendClass, &'a str, usize),
+    Method(BackendClass, &'a str),
 }
 
 impl Part<'_> {
@@ -171,7 +172,7 @@ impl Part<'_> {
             Self::Kept(_) => deviations.kept_ln,
             Self::Width(..) => deviations.width_ln,
             Self::Calls(..) => deviations.calls_ln,
-            Self::Method(_, _, entry) => METHOD_LN[usize::from(*entry > 0)],
+            Self::Method(..) => METHOD_LN,
         }
     }
 
@@ -191,21 +192,16 @@ impl Belief {
     pub(crate) fn new(costs: &[AlgorithmCost], kept: &[Option<usize>], deviations: Deviations) -> Self {
         let places = costs.iter().flat_map(AlgorithmCost::residuals).map(|r| Arc::clone(&r.places)).next();
         let mut parts: Vec<Part<'_>> = Vec::new();
-        let mut at = |part: Part<'static>| -> usize {
-            parts.iter().position(|p| *p == part).unwrap_or_else(|| {
-                parts.push(part);
-                parts.len() - 1
-            })
-        };
-        let mut methods: Vec<(BackendClass, &str)> = Vec::new();
         let mut algorithms = Vec::new();
         for (cost, kept) in costs.iter().zip(kept) {
-            let (backend, name) = (cost.algorithm.backend(), cost.algorithm.method());
+            let mut at = |part| -> usize {
+                parts.iter().position(|p| *p == part).unwrap_or_else(|| {
+                    parts.push(part);
+                    parts.len() - 1
+                })
+            };
+            let backend = cost.algorithm.backend();
             let class = backend.class();
-            let method = methods.iter().position(|m| *m == (class, name)).unwrap_or_else(|| {
-                methods.push((class, name));
-                methods.len() - 1
-            });
             let width = (backend.width() > 1).then(|| {
                 let all = at(Part::Width(class, backend.width()));
                 // Always next to each other: no other adds one in between.
@@ -213,20 +209,14 @@ impl Belief {
                 all
             });
             let by_motion = cost.residuals().next().map_or(kept.is_some(), |r| r.by_motion);
-            // Until all are known, which of the methods.
             algorithms.push(Parts {
                 class: at(Part::Class(class)),
                 kept: kept.map(|k| at(Part::Kept(k))),
                 width,
-                method,
+                method: at(Part::Method(class, cost.algorithm.method())),
                 by_motion,
             });
         }
-        let first = parts.len();
-        for (class, name) in methods {
-            parts.extend((0..SIZE).map(|entry| Part::Method(class, name, entry)));
-        }
-        algorithms.iter_mut().for_each(|a| a.method = first + SIZE * a.method);
         let before: Vec<f64> = parts.iter().map(|p| p.deviation_ln(deviations).powi(2)).collect();
         let mut belief = Self {
             basis: Basis::new(places.unwrap_or_else(Places::usual)),
@@ -250,7 +240,7 @@ impl Belief {
     }
 
     /// What the shared parts add to the logarithm of an algorithm's cost of which calls are that share, and which parts do with their slopes.
-    fn shared(&self, algorithm: usize, view: &View, calls: f64) -> (f64, Slopes) {
+    fn shared(&self, algorithm: usize, calls: f64) -> (f64, Slopes) {
         let parts = &self.algorithms[algorithm];
         let mut slopes = [(0, 0.0); SHARED];
         slopes[0] = (parts.class, 1.0);
@@ -265,19 +255,14 @@ impl Belief {
             ln += self.mean[width] + whole.ln();
         }
         slopes[4] = (parts.method, 1.0);
-        ln += self.mean[parts.method];
-        for (k, value) in view.of(parts.by_motion).iter().enumerate() {
-            slopes[5 + k] = (parts.method + 1 + k, *value);
-            ln += value * self.mean[parts.method + 1 + k];
-        }
-        (ln, slopes)
+        (ln + self.mean[parts.method], slopes)
     }
 
     /// Expected natural logarithm of real over predicted time of an algorithm of whose predicted time calls are that share.
     pub(crate) fn deviation_ln(&self, algorithm: usize, view: &View, calls: f64) -> f64 {
         let own = &self.own[algorithm].mean;
         let curve = view.of(self.algorithms[algorithm].by_motion);
-        self.shared(algorithm, view, calls).0 + own[0] + curve.iter().zip(&own[1..]).map(|(a, b)| a * b).sum::<f64>()
+        self.shared(algorithm, calls).0 + own[0] + curve.iter().zip(&own[1..]).map(|(a, b)| a * b).sum::<f64>()
     }
 
     /// What the part of an algorithm's class of processor adds to the logarithm of its cost.
@@ -288,7 +273,7 @@ impl Belief {
 
     /// What is expected of an observation of an algorithm, which is then to be [taken in](Self::absorb).
     pub(crate) fn expect(&mut self, algorithm: usize, view: &View, calls: f64) -> Expected {
-        let (ln, slopes) = self.shared(algorithm, view, calls);
+        let (ln, slopes) = self.shared(algorithm, calls);
         let size = self.mean.len();
         self.with.fill(0.0);
         for (entry, weight) in slopes.into_iter().filter(|s| s.1 != 0.0) {
@@ -335,7 +320,7 @@ impl Belief {
 
     /// An algorithm that runs, under a load at which calls are that share of its time, for others to be held against.
     pub(crate) fn running(&self, algorithm: usize, view: &View, calls: f64) -> Running {
-        let slopes = self.shared(algorithm, view, calls).1;
+        let slopes = self.shared(algorithm, calls).1;
         Running { variance: self.between(&slopes, &slopes) + self.own_variance(algorithm, view), slopes }
     }
 
@@ -343,7 +328,7 @@ impl Belief {
     /// deviation of by how much they are expected to correct it. `noise` is the variance of the mean of their logarithms. What both have in common says
     /// nothing of the ratio.
     pub(crate) fn told_of_ratio(&self, running: &Running, tried: usize, view: &View, calls: f64, noise: f64) -> f64 {
-        let slopes = self.shared(tried, view, calls).1;
+        let slopes = self.shared(tried, calls).1;
         let in_common = self.between(&slopes, &running.slopes).powi(2) / running.variance.max(f64::MIN_POSITIVE);
         let variance = (self.between(&slopes, &slopes) + self.own_variance(tried, view) - in_common).max(0.0);
         if variance + noise > 0.0 { variance / (variance + noise).sqrt() } else { 0.0 }
@@ -465,7 +450,7 @@ impl Belief {
                     cost.curve.scale_calls(self.mean[width + 1].exp());
                 }
             }
-            let of_basis = std::array::from_fn(|i| self.mean[parts.method + 1 + i] + own.mean[1 + i]);
+            let of_basis = std::array::from_fn(|i| own.mean[1 + i]);
             let weights = self.basis.weights(&of_basis, parts.by_motion)[..self.basis.count].to_vec();
             let now = Residual::new(Arc::clone(&self.basis.places), weights, parts.by_motion).with_constant(constant);
             cost.curve.observed = Some(match cost.curve.observed.take() {

@@ -65,7 +65,7 @@ impl Observed {
         let (predicted_ns, calls) = shares(&self.costs[algorithm].curve, &frame);
         let view = self.belief.view(&frame);
         let ln = predicted_ns.ln() + self.belief.deviation_ln(algorithm, &view, calls);
-        let shared = self.belief.shared(algorithm, &view, calls).1;
+        let shared = self.belief.shared(algorithm, calls).1;
         let own = values(view.of(self.belief.algorithms[algorithm].by_motion));
         (if ln.is_finite() { ln } else { f64::INFINITY }, Slope { algorithm, shared, own, view, calls })
     }
