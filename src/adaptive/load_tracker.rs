@@ -5,10 +5,12 @@ use super::passed::Passed;
 use super::throttle::{DecisionThrottle, SHARE_OF_DRIFT, drift};
 use crate::aabb::Aabb;
 use crate::clock::Instant;
+#[cfg(test)]
+use crate::clock::counted;
 use crate::load::{FramePlan, Load};
 
 /// Share of the frames' time that samples may take where the number of objects holds still. With [`SHARE_OF_DRIFT`] a scene that doubles is
-/// sampled when 24 times the sample's cost has passed, one that grows by a sixteenth after 220 times.
+/// sampled when 45 times the sample's cost has passed, one that grows by a sixteenth after 310 times.
 const SHARE: f64 = 0.002;
 
 /// A sample that the system interrupts looks dear. Taken at its word it would put off the next one for seconds of frames, over
@@ -84,6 +86,8 @@ impl LoadTracker {
         if self.is_sample_due(objects) {
             let started = Instant::now();
             (self.load, plan) = Load::planned(boxes, pairs, moved);
+            #[cfg(test)]
+            counted::spend(counted::sample_ns(boxes.len()));
             let took = started.elapsed().as_nanos() as f64;
             self.sampled_ns = took;
             self.sample_ns = if self.sample_ns > 0.0 { took.min(self.sample_ns * COST_RISES) } else { took };
@@ -168,6 +172,11 @@ impl LoadTracker {
     /// What a decision takes in the mean, without a sample, in nanoseconds.
     pub(super) fn decision_ns(&self) -> f64 {
         self.throttle.decision_ns()
+    }
+
+    /// The next decision is that many frames away at most.
+    pub(super) fn rest_no_longer_than(&mut self, frames: f64) {
+        self.throttle.rest_no_longer_than(frames);
     }
 
     /// The next frame is to be decided on again.

@@ -5,6 +5,8 @@
 
 use crate::aabb::Aabb;
 use crate::clock::Instant;
+#[cfg(test)]
+use crate::clock::counted;
 use crate::load::{Displacement, paces_apart_ln};
 
 /// Share of the frames' time for looking how far boxes move: at the least, and at the most, which holds at first, after they were found to move at another
@@ -65,6 +67,8 @@ impl MotionWatch {
     pub(super) fn look(&mut self, boxes: &[Aabb]) -> bool {
         let started = Instant::now();
         let moved = self.displacement.moved(boxes);
+        #[cfg(test)]
+        counted::spend(counted::LOOK_NS);
         // To remember the boxes takes about as long as to compare them.
         self.found(moved, 2.0 * started.elapsed().as_nanos() as f64)
     }

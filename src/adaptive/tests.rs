@@ -3,6 +3,8 @@ mod learning;
 mod recorded;
 #[cfg(feature = "model")]
 mod replay;
+#[cfg(feature = "model")]
+mod traces;
 mod warming;
 
 use super::load_tracker::LoadTracker;
