@@ -193,7 +193,7 @@ impl Policy {
         if reason == Reason::Stayed {
             self.offer_trial(settled);
         }
-        Some(match self.trials.next() {
+        Some(match self.trials.candidate() {
             Some(other) => self.choice(other, Reason::Explored),
             None => self.choice(settled, reason),
         })
@@ -320,8 +320,13 @@ impl Policy {
     pub(super) fn went_on(&mut self, candidate: usize, passed: &Passed) {
         self.frame += u64::from(passed.frames);
         self.switching.ran(candidate, self.frame - 1, passed.work);
+        self.trials.ran(candidate, passed.frames);
         if !self.learns || passed.timed == 0 || self.learner.is_none() {
             return;
+        }
+        if self.tried {
+            let all = f64::from(passed.frames) / f64::from(passed.timed);
+            self.pay_for_trial(candidate, all * passed.ns, all * passed.over_mean, passed.frames, false);
         }
         self.make_room(candidate);
         let predicted = self.predicted[candidate].times(passed.over_mean);
@@ -341,6 +346,7 @@ impl Policy {
             learner.begins(candidate);
         }
         self.switching.ran(candidate, self.frame, work);
+        self.trials.ran(candidate, 1);
         let dear = !self.is_by_count() && self.is_dear(candidate, ns);
         if self.learns {
             self.learn(candidate, entered, ns, work);
@@ -356,11 +362,8 @@ impl Policy {
         if learner.is_stall(candidate, ns / dearest_ns, self.frame) {
             return;
         }
-        if let Some(settled) = self.settled.filter(|&k| k != candidate || entered && self.tried) {
-            // What is made again in this frame would have been made again in any other way.
-            let shares = candidate == settled || self.switching.share(candidate, settled);
-            let work = work.filter(|_| shares).map_or(1.0, |work| work.over_mean);
-            self.trials.pay(ns - work * self.mean_ns[settled], entered);
+        if self.settled != Some(candidate) || entered && self.tried {
+            self.pay_for_trial(candidate, ns, work.map_or(1.0, |work| work.over_mean), 1, entered);
         }
         self.tried = self.settled != Some(candidate);
         if work.map_or(entered, |work| work.kind == FrameKind::Rebuilt) {
@@ -379,6 +382,15 @@ impl Policy {
             learner.waited(candidate, 1, (ns - counted_ns).min(MOST_WAIT * dearest_ns), self.frame);
         }
         self.observe_full(candidate);
+    }
+
+    /// Pays for frames of a trial, or the first one after it: what so many took of a candidate, with so much work in frames of its mean one.
+    fn pay_for_trial(&mut self, candidate: usize, ns: f64, over_mean: f64, frames: u32, first: bool) {
+        let Some(settled) = self.settled else { return };
+        // What is made again in a frame would have been made again in any other way.
+        let shares = candidate == settled || self.switching.share(candidate, settled);
+        let work = if shares { over_mean } else { f64::from(frames) };
+        self.trials.pay(ns - work * self.mean_ns[settled], first);
     }
 
     /// Makes the batch one to which frames of a candidate under the present load can be added. What was added up of others is observed.
@@ -424,9 +436,9 @@ impl Policy {
         std::mem::take(&mut self.doubts_load)
     }
 
-    /// Whether the next frame has to be decided: this one explored.
-    pub(super) fn is_exploring(&self) -> bool {
-        self.ran.is_some() && self.ran != self.settled
+    /// Frames of a trial until the next decision, the one that ran counted; `None` where none runs.
+    pub(super) fn trial_rests(&self) -> Option<u32> {
+        self.trials.rests()
     }
 
     /// The step that holds at this number of objects, or the nearest below or above that can run.

@@ -180,6 +180,8 @@ impl Runner {
     }
 
     fn choose(&mut self, boxes: &[Aabb]) {
+        #[cfg(test)]
+        clock::counted::spend(clock::counted::DECISION_NS);
         self.catch_up();
         self.tracker.decide(boxes);
         if let Some(moved) = self.tracker.moved() {
@@ -343,7 +345,11 @@ impl Runner {
         if self.policy.doubts_load() {
             self.tracker.doubt(boxes);
         }
-        if dear || began || stood_out || self.policy.is_exploring() {
+        let trial = self.policy.trial_rests();
+        if let Some(frames) = trial {
+            self.tracker.rest_no_longer_than(f64::from(frames));
+        }
+        if dear || began && trial.is_none() || stood_out {
             // What began in this frame is looked at once more before it may rest.
             self.tracker.wake();
         }

@@ -5,11 +5,11 @@ const SHARE: f64 = 0.004;
 /// Share of a decision in the mean, and how many times the mean it counts at most.
 const MEAN: f64 = 1.0 / 8.0;
 const MOST_RISE: f64 = 4.0;
-/// Frames between two decisions, at most.
-const MOST_FRAMES: f64 = 128.0;
+/// Frames between two decisions, at most. A frame that stands out, frames that are off and numbers that jump call for one all the same.
+const MOST_FRAMES: f64 = 1024.0;
 
 /// By how much such a share rises with the [`drift`] of the number of objects since the last decision.
-pub(super) const SHARE_OF_DRIFT: f64 = 0.04;
+pub(super) const SHARE_OF_DRIFT: f64 = 0.02;
 /// Costs of two methods grow with powers of the number of objects that differ by no more than this: a drift can't change which is cheaper before it has
 /// used up the lead.
 const POWERS_APART: f64 = 2.0;
