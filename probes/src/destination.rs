@@ -50,6 +50,18 @@ impl Destination {
         }
     }
 
+    /// Writes the report of a measurement that was interrupted. What stands under its name already may be hours of measuring, and stays: then it goes beside it.
+    ///
+    /// # Errors
+    /// As [`save`](Self::save).
+    pub(crate) fn save_interrupted(&self, report: &Report) -> anyhow::Result<&Path> {
+        if !self.path.is_file() || self.unfinished == self.path {
+            return self.save(report);
+        }
+        write(&self.unfinished, report)?;
+        Ok(&self.unfinished)
+    }
+
     /// Writes the finished report, in the folder for temporary files when its own path fails.
     ///
     /// # Errors

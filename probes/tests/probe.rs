@@ -116,6 +116,21 @@ fn an_interrupt_keeps_what_was_measured() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "a temporary file is left");
 }
 
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_a_report_that_is_there_and_keeps_what_was_measured_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report.json");
+    fs::write(&out, "hours of measuring").unwrap();
+    let probe = under_way(&out);
+    send("-TERM", &probe);
+    let complaint = String::from_utf8_lossy(&probe.wait_with_output().unwrap().stderr).into_owned();
+    let beside = folder.path().join("report.json.unfinished");
+    assert!(complaint.contains(&format!("error: interrupted: {} holds", beside.display())), "{complaint}");
+    assert_eq!(fs::read_to_string(&out).unwrap(), "hours of measuring");
+    assert!(read(&beside).remarks.iter().any(|r| r.starts_with("interrupted after ")));
+}
+
 /// As `nohup` starts it.
 #[cfg(unix)]
 #[test]

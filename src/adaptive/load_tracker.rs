@@ -160,10 +160,14 @@ impl LoadTracker {
         self.watching |= self.motion.ran(boxes);
     }
 
-    /// What a decision with its sample took, where that is known, and its frame, in nanoseconds; and how far ahead the one that runs is, a logarithm.
+    /// What of the last decision, which took so many nanoseconds, was no sample: samples have a share of the time of their own.
+    pub(super) fn without_sample(&self, decision_ns: f64) -> f64 {
+        (decision_ns - self.sampled_ns).max(0.0)
+    }
+
+    /// What a decision without its sample took, where that is known, and its frame, in nanoseconds; and how far ahead the one that runs is, a logarithm.
     pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64, lead_ln: f64) {
-        // Samples have a share of the time of their own.
-        self.throttle.took(decision_ns.map(|ns| (ns - self.sampled_ns).max(0.0)), frame_ns, lead_ln);
+        self.throttle.took(decision_ns, frame_ns, lead_ln);
         if self.doubted {
             self.throttle.rest_no_longer_than((self.sample_ns / SHARE_IN_DOUBT - self.passed_ns) / frame_ns.max(1.0));
         }

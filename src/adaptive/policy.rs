@@ -143,6 +143,11 @@ impl Policy {
         }
     }
 
+    /// The frame failed. One of a trial has told nothing, and the next one would not either.
+    pub(super) fn failed(&mut self) {
+        self.trials.stop(self.frame);
+    }
+
     /// Whether the number of objects alone decides.
     pub(super) fn is_by_count(&self) -> bool {
         self.tuning.costs.is_empty()
@@ -358,14 +363,14 @@ impl Policy {
     fn learn(&mut self, candidate: usize, entered: bool, ns: f64, work: Option<FrameWork>) {
         let expected = self.expected[candidate];
         let dearest_ns = self.switching.rebuild_ns(candidate, expected);
+        let tried = std::mem::replace(&mut self.tried, self.settled != Some(candidate));
         let Some(learner) = &mut self.learner else { return };
         if learner.is_stall(candidate, ns / dearest_ns, self.frame) {
             return;
         }
-        if self.settled != Some(candidate) || entered && self.tried {
+        if self.tried || entered && tried {
             self.pay_for_trial(candidate, ns, work.map_or(1.0, |work| work.over_mean), 1, entered);
         }
-        self.tried = self.settled != Some(candidate);
         if work.map_or(entered, |work| work.kind == FrameKind::Rebuilt) {
             self.switching.learn(candidate, ns, expected);
         }

@@ -90,6 +90,7 @@ impl Runner {
     /// Goes on with another tuning and its algorithms. The estimate of the load stays.
     #[cfg(feature = "this-machine")]
     pub(super) fn replace(&mut self, tuning: Tuning, made: Instances) {
+        self.catch_up();
         let before = std::mem::replace(&mut self.policy, policy(tuning, &made));
         self.policy.set_as(&before);
         self.exchange(made);
@@ -330,7 +331,7 @@ impl Runner {
         self.tracker.ran(boxes, pairs.overlapping(), ns);
         let dear = self.policy.ran(choice.chosen, ns, self.work);
         let decision_ns = match decided {
-            Decided::At(started) => Some(started.elapsed().as_nanos() as f64 - ns),
+            Decided::At(started) => Some(self.tracker.without_sample(started.elapsed().as_nanos() as f64 - ns)),
             Decided::Before | Decided::Never => None,
         };
         self.tracker.took(decision_ns, ns, self.policy.lead_ln());
@@ -372,6 +373,7 @@ impl Runner {
         let Some(choice) = self.choice.filter(|_| matches!(error, Error::Unavailable { .. })) else {
             // A frame that was to explore has told nothing, and the next one is to run what is cheapest.
             self.tracker.failed();
+            self.policy.failed();
             return Err(error);
         };
         self.candidates[choice.chosen].instance = None;

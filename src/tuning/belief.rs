@@ -53,8 +53,8 @@ const METHOD_LN: f64 = 0.1;
 /// Of an own part, its constant and its curve: tuning that was measured a minute ago is off by this in the next scene.
 const OWN_LN: [f64; 2] = [0.05, 0.18];
 
-/// Frames after which what was observed counts for half. In a hundred frames a class may change by 15 %, what keeping saves by 24 %, a width
-/// by 7 % and an own part by 2 % (standard deviations); a faster change shows in surprises.
+/// Frames after which what was observed counts for less than half. In a hundred frames a class may change by 8 %, what keeping saves by 24 %, a width
+/// by 8 % and an own part by 2 % (standard deviations); a faster change shows in surprises.
 const CLASS_FRAMES: f64 = 10_000.0;
 const KEPT_FRAMES: f64 = 1000.0;
 const WIDTH_FRAMES: f64 = 800.0;
@@ -411,7 +411,7 @@ impl Belief {
         }
     }
 
-    /// What was observed of shared parts holds no longer.
+    /// What was observed of shared parts is as uncertain as before anything was. The means stay: nothing better is known.
     pub(crate) fn doubt_shared(&mut self) {
         self.covariance.fill(0.0);
         for (k, &variance) in self.before.iter().enumerate() {

@@ -80,7 +80,8 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     drop(contention);
     let (failed, interrupted) = (found.failed, found.interrupted);
     let report = assemble(found);
-    let saved = destination.as_ref().map(|d| d.save(&report)).transpose();
+    let save = |d| if interrupted { Destination::save_interrupted(d, &report) } else { Destination::save(d, &report) };
+    let saved = destination.as_ref().map(save).transpose();
     let text = if arguments.json {
         report::write(&report)?
     } else {
@@ -90,9 +91,10 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     };
     // A standard output that is closed or full is told last: what went wrong with the report matters more.
     let printed = output::print(&text);
-    saved?;
+    let saved = saved?;
     if interrupted {
-        anyhow::bail!("interrupted: the report holds what was measured until then");
+        let told = saved.map_or("the report".to_owned(), |path| path.display().to_string());
+        anyhow::bail!("interrupted: {told} holds what was measured until then");
     }
     if failed {
         anyhow::bail!("the sweep has gaps or wrong answers; the remarks of the report say which");

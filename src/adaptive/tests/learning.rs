@@ -102,6 +102,23 @@ fn tuning_of_another_machine_are_corrected_by_the_frames_that_run() {
 }
 
 #[test]
+fn a_frame_of_a_trial_that_fails_ends_the_trial() {
+    let mut policy = policy(tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 0.0, 110.0)]));
+    let load = Load::of_objects(1000);
+    let explores = |policy: &mut Policy| policy.choose(&load).unwrap().reason == Reason::Explored;
+    let began = (0..300).any(|_| {
+        let explored = explores(&mut policy);
+        if !explored {
+            policy.ran(0, 1e5, None);
+        }
+        explored
+    });
+    assert!(began && explores(&mut policy));
+    policy.failed();
+    assert!(!explores(&mut policy));
+}
+
+#[test]
 fn without_learning_wrong_tuning_stay_wrong() {
     let wrong = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("brute@cpu1", 0.0, 120.0)]);
     let truth = |k: usize, n: f64, _: usize| n * [300.0, 100.0][k];

@@ -11,11 +11,11 @@ use crate::stats::mean;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// An incremental algorithm that was away for more frames than these begins again: that costs so many frames of `bvh`. The first frame of any other is cold.
+/// An incremental algorithm whose last frame is further back than these begins again: that costs so many frames of `bvh`. The first frame of any other is cold.
 const FORGOTTEN: usize = 3;
 const FROM_NOTHING: f64 = 2.0;
 const COLD: f64 = 1.15;
-/// Frames to each side over which kinds of frames of an incremental algorithm are told apart.
+/// Frames before, and about as many after, over which kinds of frames of an incremental algorithm are told apart.
 const NEAR: usize = 16;
 
 /// A trace. Its name is that of the scenario, the number of objects and the seed of the scene and what else may follow, joined by dashes: `mixed-3000-1-swing.csv`.
@@ -210,7 +210,7 @@ const HOST: &str = "amd-epyc-zen5-2c-full--2026-11-24";
 const ANOTHER: &str = "intel-xeon-2c-full--2026-11-23";
 
 /// The promise is no more than 3 % over the best single algorithm. It does not hold yet, least in scenes that grow and shrink again within milliseconds of frames;
-/// this holds what was reached.
+/// what was reached are geometric means of 1.089 to 1.091.
 #[test]
 fn over_traces_the_choice_costs_little_more_than_the_best_single_algorithm() {
     let traces: Vec<Arc<Trace>> = Trace::all().into_iter().map(Arc::new).collect();
