@@ -80,8 +80,8 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
     drop(contention);
     let (failed, interrupted) = (found.failed, found.interrupted);
     let report = assemble(found);
-    let save = |d| if interrupted { Destination::save_interrupted(d, &report) } else { Destination::save(d, &report) };
-    let saved = destination.as_ref().map(save).transpose();
+    let saved = destination.as_ref().map(|d| if interrupted { d.save_interrupted(&report) } else { d.save(&report) });
+    let saved = saved.transpose();
     let text = if arguments.json {
         report::write(&report)?
     } else {

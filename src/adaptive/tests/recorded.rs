@@ -38,6 +38,12 @@ pub(super) struct Kinds {
     rebuilt: f64,
 }
 
+/// An incremental algorithm whose last frame is further back than these begins again.
+pub(super) const FORGOTTEN: usize = 3;
+/// What that costs over `bvh`, and the first frame of any other over the usual one.
+pub(super) const FROM_NOTHING: f64 = 2.0;
+pub(super) const COLD: f64 = 1.15;
+
 /// A recorded frame over so many medians of its timing is taken for one in which all was made again.
 const REBUILT: f64 = 2.5;
 

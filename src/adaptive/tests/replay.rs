@@ -2,7 +2,7 @@
 
 use super::super::policy::Policy;
 use super::learning::Chance;
-use super::recorded::{Kinds, Recorded, Spot};
+use super::recorded::{COLD, FORGOTTEN, FROM_NOTHING, Kinds, Recorded, Spot};
 use crate::stats::mean;
 use crate::{FrameKind, FrameWork, Tuning};
 
@@ -38,12 +38,6 @@ impl Spent {
         self.total_ns() / self.oracle_ns - 1.0
     }
 }
-
-/// An incremental algorithm that was away for more frames than these begins again.
-const FORGOTTEN: usize = 3;
-/// What that costs over `bvh`, and the first frame of any other over the usual one.
-const FROM_NOTHING: f64 = 2.0;
-const COLD: f64 = 1.15;
 
 fn run(machine: &Recorded, tuning: Tuning, course: &[Stretch<'_>], seed: u64, disturbed: &Disturbance<'_>) -> Spent {
     let ids = &machine.ids;

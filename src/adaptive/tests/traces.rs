@@ -2,7 +2,7 @@
 //! machine, frame by frame. The clock counts these and what decisions take, so that the same code loses the same in every run: what a change is worth shows to
 //! half a percent in seconds, where real runs differ from one another by several.
 
-use super::recorded::{Kinds, Recorded};
+use super::recorded::{COLD, FORGOTTEN, FROM_NOTHING, Kinds, Recorded};
 use super::*;
 use crate::FrameWork;
 use crate::broad_phase::Incremental;
@@ -11,10 +11,6 @@ use crate::stats::mean;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// An incremental algorithm whose last frame is further back than these begins again: that costs so many frames of `bvh`. The first frame of any other is cold.
-const FORGOTTEN: usize = 3;
-const FROM_NOTHING: f64 = 2.0;
-const COLD: f64 = 1.15;
 /// Frames before, and about as many after, over which kinds of frames of an incremental algorithm are told apart.
 const NEAR: usize = 16;
 
@@ -117,7 +113,6 @@ impl Stage {
 /// An algorithm that takes the times of a trace.
 struct Played {
     stage: Arc<Stage>,
-    method: String,
     column: usize,
     /// The last frame that it ran, and how that came about.
     last: Option<usize>,
@@ -128,7 +123,11 @@ impl Played {
     fn new(stage: &Arc<Stage>, id: &AlgorithmId) -> Self {
         let column = stage.trace.column(&id.to_string());
         let work = FrameWork::new(FrameKind::FromScratch, 1.0);
-        Self { stage: Arc::clone(stage), method: id.method().to_owned(), column, last: None, work }
+        Self { stage: Arc::clone(stage), column, last: None, work }
+    }
+
+    fn id(&self) -> &AlgorithmId {
+        &self.stage.trace.ids[self.column]
     }
 }
 
@@ -137,7 +136,7 @@ impl BroadPhase for Played {
         let (trace, at) = (&self.stage.trace, self.stage.frame());
         let mut ns = trace.ns[self.column][at];
         let before = self.stage.before.swap(self.column, Ordering::Relaxed);
-        if keeps(&trace.ids[self.column]) {
+        if keeps(self.id()) {
             self.work = trace.works[self.column][at];
             if self.last.is_none_or(|last| at - last > FORGOTTEN) {
                 let from_nothing_ns = ns.max(FROM_NOTHING * trace.ns[trace.column("bvh@cpu1")][at]);
@@ -155,7 +154,7 @@ impl BroadPhase for Played {
     }
 
     fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-        if self.method == "pair-cache" { Some(self) } else { None }
+        if keeps(self.id()) { Some(self) } else { None }
     }
 }
 
@@ -165,7 +164,7 @@ impl Incremental for Played {
     }
 
     fn set_threads(&mut self, threads: u32) -> bool {
-        self.column = self.stage.trace.column(&format!("{}@cpu{threads}", self.method));
+        self.column = self.stage.trace.column(&format!("{}@cpu{threads}", self.id().method()));
         true
     }
 }
