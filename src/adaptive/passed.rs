@@ -2,7 +2,7 @@
 //!
 //! What is believed of costs lies in no cache when a frame of a program begins. A frame that only adds to a few sums leaves it there.
 
-use crate::broad_phase::FrameWork;
+use crate::broad_phase::{FrameKind, FrameWork};
 
 /// Two looks at a clock, in nanoseconds, in code that lies in no cache, and the share of the frames' time that they may take.
 const CLOCK_NS: f64 = 100.0;
@@ -28,8 +28,9 @@ pub(super) struct Usual {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Passed {
     pub(super) frames: u32,
-    /// How the last one came about.
+    /// How the last one came about, and in how many all was made again.
     pub(super) work: Option<FrameWork>,
+    pub(super) rebuilt: u32,
     /// Of those that were timed: their number, time in nanoseconds, and work in frames of the mean one.
     pub(super) timed: u32,
     pub(super) ns: f64,
@@ -60,6 +61,7 @@ impl Passed {
     pub(super) fn add(&mut self, work: Option<FrameWork>, ns: Option<f64>) {
         self.frames += 1;
         self.work = work;
+        self.rebuilt += u32::from(work.is_some_and(|work| work.kind == FrameKind::Rebuilt));
         if let Some(ns) = ns {
             self.timed += 1;
             self.ns += ns;

@@ -6,7 +6,7 @@ use super::learner::Learner;
 use super::passed::{Passed, Usual};
 use super::shelter::Shelter;
 use super::switching::{Expected, SwitchingCosts};
-use super::trials::{HORIZON, Offer, Trials, expected_gain};
+use super::trials::{HORIZON, OF_KEPT, OF_OTHERS, OF_SHARED, Offer, Trials, expected_gain};
 use crate::broad_phase::{FrameKind, FrameWork};
 use crate::cost::Frame;
 use crate::load::Load;
@@ -21,7 +21,7 @@ const SOON: f64 = 4.0;
 
 /// An algorithm that is expected to cost so many times as much is not tried: beliefs are seldom off by that, and to ask how likely it is takes longer
 /// than the rest of a decision.
-const HOPELESS: f64 = 4.0;
+const HOPELESS: f64 = 2.0;
 
 /// What was worked out for a load holds for another that differs by no more than this share: costs are known less well than that. It holds for so
 /// many frames: waits pass, whether anything is observed or not.
@@ -231,7 +231,7 @@ impl Policy {
         for (k, cost) in self.tuning.costs.iter().enumerate() {
             let ns = cost.curve.cost_of(&frame);
             let alone_ns = cost.curve.fallback_of(&frame).unwrap_or(ns).max(ns);
-            let mean_ns = self.switching.mean_ns(k, ns, alone_ns);
+            let mean_ns = self.switching.mean_ns(k, self.frame, ns, alone_ns);
             let predicted = Predicted { ns: mean_ns, calls_ns: cost.curve.calls_of(&frame).min(ns) };
             let factor = learner.map_or(1.0, |l| l.correction_ln(k, &self.view, predicted.calls()).exp());
             let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));
@@ -291,9 +291,13 @@ impl Policy {
             if k == settled || !self.usable[k] || self.is_avoided(k) || self.mean_ns[k] > HOPELESS * now_ns {
                 return None;
             }
-            let begins = self.switching.keeps(k) && !self.switching.share(k, settled);
+            let frames = match (self.switching.keeps(k), self.switching.share(k, settled)) {
+                (_, true) => OF_SHARED,
+                (true, false) => OF_KEPT,
+                (false, false) => OF_OTHERS,
+            };
             let enter_ns = self.switching.enter_ns(k, self.frame, self.expected[k]);
-            let offer = Offer::of(k, begins, enter_ns, self.mean_ns[k], now_ns, self.decision_ns);
+            let offer = Offer::of(k, frames, enter_ns, self.mean_ns[k], now_ns, self.decision_ns);
             if !allowance.may_pay(offer.price_ns) {
                 return None;
             }
@@ -324,7 +328,7 @@ impl Policy {
     /// Takes in that a candidate ran some frames that were not decided on, none of which took longer than is usual.
     pub(super) fn went_on(&mut self, candidate: usize, passed: &Passed) {
         self.frame += u64::from(passed.frames);
-        self.switching.ran(candidate, self.frame - 1, passed.work);
+        self.switching.ran(candidate, self.frame - 1, passed.frames, passed.rebuilt, passed.work);
         self.trials.ran(candidate, passed.frames);
         if !self.learns || passed.timed == 0 || self.learner.is_none() {
             return;
@@ -350,7 +354,8 @@ impl Policy {
         {
             learner.begins(candidate);
         }
-        self.switching.ran(candidate, self.frame, work);
+        let rebuilt = work.is_some_and(|work| work.kind == FrameKind::Rebuilt);
+        self.switching.ran(candidate, self.frame, 1, u32::from(rebuilt), work);
         self.trials.ran(candidate, 1);
         let dear = !self.is_by_count() && self.is_dear(candidate, ns);
         if self.learns {

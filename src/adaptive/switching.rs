@@ -17,8 +17,12 @@ const FORGOTTEN: u64 = 3;
 const SHARE: f64 = 0.25;
 const MOST: f64 = 4.0;
 
-/// Share of the frames that are made again where nobody has seen any: cost curves come from medians, which leave those frames out.
+/// Share of the frames that are made again: cost curves come from medians, which leave those frames out. What is seen counts where it is more by so much:
+/// a few frames more or less of these are in what is believed of keeping, and to count all that are seen costs 0.5 to 1.0 % in replayed traces.
 const REBUILDS: f64 = 0.02;
+const MANY_REBUILDS: f64 = 0.15;
+/// Of the share that is seen half is forgotten after so many frames that run, or so many without any.
+const REBUILDS_LAST: [f64; 2] = [100.0, 1000.0];
 
 /// How many there are to keep, where `kept` is as [`Policy::new`](super::policy::Policy::new) has it.
 pub(super) fn works(kept: &[Option<usize>]) -> usize {
@@ -29,13 +33,23 @@ pub(super) fn works(kept: &[Option<usize>]) -> usize {
 #[derive(Debug, Clone)]
 pub(super) struct SwitchingCosts {
     costs: Vec<SwitchingCost>,
-    /// By what is kept, the frame that kept it last.
-    last: Vec<Option<u64>>,
+    /// By what is kept.
+    works: Vec<KeptWork>,
+}
+
+/// What is kept from frame to frame.
+#[derive(Debug, Clone)]
+struct KeptWork {
+    /// The frame that kept it last.
+    last: Option<u64>,
+    /// The share of frames that made it again of late, and the frame at which that held.
+    rebuilds: f64,
+    at: u64,
 }
 
 #[derive(Debug, Clone)]
 struct SwitchingCost {
-    /// Where it finds what the frame before left: a position in `SwitchingCosts::last`. `None` where every frame is made from scratch.
+    /// Where it finds what the frame before left: a position in `SwitchingCosts::works`. `None` where every frame is made from scratch.
     kept: Option<usize>,
     /// A frame with nothing to build upon over one of the other way.
     over: f64,
@@ -55,12 +69,13 @@ impl SwitchingCosts {
     pub(super) fn new(kept: &[Option<usize>]) -> Self {
         let cost =
             |&kept: &Option<usize>| SwitchingCost { kept, over: if kept.is_some() { FROM_NOTHING } else { 1.0 + COLD } };
-        Self { costs: kept.iter().map(cost).collect(), last: vec![None; works(kept)] }
+        let work = KeptWork { last: None, rebuilds: 0.0, at: 0 };
+        Self { costs: kept.iter().map(cost).collect(), works: vec![work; works(kept)] }
     }
 
     /// Other instances keep, shared by the same candidates as before, nothing yet. False where other candidates share it.
     pub(super) fn remade(&mut self, kept: &[Option<usize>]) -> bool {
-        self.last.fill(None);
+        self.works.iter_mut().for_each(|work| work.last = None);
         self.costs.iter().map(|p| p.kept).eq(kept.iter().copied())
     }
 
@@ -75,9 +90,10 @@ impl SwitchingCosts {
     }
 
     /// What a frame of a candidate takes in the mean, where its cost curve says so much of it and of the other way of it.
-    pub(super) fn mean_ns(&self, candidate: usize, built_ns: f64, alone_ns: f64) -> f64 {
-        let rebuilds_ns = if self.keeps(candidate) { (FROM_NOTHING * alone_ns - built_ns).max(0.0) } else { 0.0 };
-        built_ns + REBUILDS * rebuilds_ns
+    pub(super) fn mean_ns(&self, candidate: usize, frame: u64, built_ns: f64, alone_ns: f64) -> f64 {
+        let Some(kept) = self.costs[candidate].kept else { return built_ns };
+        let rebuilds = (self.works[kept].rebuilds_at(frame) - MANY_REBUILDS).max(REBUILDS);
+        built_ns + rebuilds * (FROM_NOTHING * alone_ns - built_ns).max(0.0)
     }
 
     /// What the first frame of a candidate costs beside the mean of its frames, were it to begin now.
@@ -102,11 +118,19 @@ impl SwitchingCosts {
         (self.costs[candidate].over * expected.alone_ns).max(expected.mean_ns)
     }
 
-    /// Takes in that a candidate ran a frame, and how that came about.
-    pub(super) fn ran(&mut self, candidate: usize, frame: u64, work: Option<FrameWork>) {
-        if let Some(kept) = self.costs[candidate].kept {
-            self.last[kept] = work.filter(|work| work.kind != FrameKind::FromScratch).map(|_| frame);
+    /// Takes in that a candidate ran so many frames up to this one, in how many of them all was made again, and how the last one came about.
+    pub(super) fn ran(&mut self, candidate: usize, frame: u64, frames: u32, rebuilt: u32, work: Option<FrameWork>) {
+        let Some(kept) = self.costs[candidate].kept else { return };
+        let goes_on = self.remembers(candidate, frame + 1 - u64::from(frames));
+        let kept = &mut self.works[kept];
+        let keeps = work.is_some_and(|work| work.kind != FrameKind::FromScratch);
+        // One that begins makes all in any case.
+        if keeps && goes_on {
+            let (before, frames) = (kept.rebuilds_at(frame), f64::from(frames));
+            kept.rebuilds = before + (f64::from(rebuilt) - before * frames) / (REBUILDS_LAST[0] + frames);
+            kept.at = frame;
         }
+        kept.last = keeps.then_some(frame);
     }
 
     /// Learns from a frame of a candidate that had nothing to build upon.
@@ -118,7 +142,14 @@ impl SwitchingCosts {
 
     /// Whether a candidate goes on with what was kept for it before this frame.
     pub(super) fn remembers(&self, candidate: usize, frame: u64) -> bool {
-        let last = self.costs[candidate].kept.and_then(|work| self.last[work]);
+        let last = self.costs[candidate].kept.and_then(|work| self.works[work].last);
         last.is_some_and(|last| frame - last <= FORGOTTEN)
+    }
+}
+
+impl KeptWork {
+    /// The share of frames that make it again, as far as it is not forgotten by this frame.
+    fn rebuilds_at(&self, frame: u64) -> f64 {
+        self.rebuilds / (1.0 + frame.saturating_sub(self.at) as f64 / REBUILDS_LAST[1])
     }
 }

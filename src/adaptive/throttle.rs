@@ -16,9 +16,10 @@ const POWERS_APART: f64 = 2.0;
 /// A number that differs from that of the frame before by a quarter, and by so many, is decided on at once.
 const JUMP: u32 = 4;
 const FEWEST: u32 = 16;
-/// The same for the pairs of the frame before and those at the last decision.
-const PAIRS_JUMP: u64 = 2;
-const FEWEST_PAIRS: u64 = 64;
+/// Pairs of the frame before that differ from those at the last decision by half, and by so many, are decided on at once. Of what lies between no change and
+/// the square of that of the objects, as in a world that fills up, the drift of the objects tells already.
+const PAIRS_JUMP: f64 = 0.5;
+const FEWEST_PAIRS: f64 = 64.0;
 
 /// How far a number of objects is from another: the ratio of the greater to the less, less one.
 pub(super) fn drift(objects: u32, before: u32) -> f64 {
@@ -86,9 +87,16 @@ impl DecisionThrottle {
         self.frames = self.frames.saturating_add(1);
         (self.before, self.pairs_before) = (objects, pairs);
         let decided = *self.pairs.get_or_insert(pairs);
-        if pairs.abs_diff(decided) > (decided / PAIRS_JUMP).max(FEWEST_PAIRS) {
+        if pairs != decided && self.pairs_jump(objects, pairs as f64, decided as f64) {
             self.wake();
         }
+    }
+
+    /// Whether so many pairs of so many objects are others than those at the last decision, beyond what the number of objects tells.
+    fn pairs_jump(&self, objects: u32, pairs: f64, decided: f64) -> bool {
+        let filled = decided * (f64::from(objects.max(1)) / f64::from(self.objects.max(1))).powi(2);
+        let off = (decided.min(filled) - pairs).max(pairs - decided.max(filled));
+        off > (PAIRS_JUMP * decided).max(FEWEST_PAIRS)
     }
 
     /// Begins a decision.
@@ -117,5 +125,27 @@ impl DecisionThrottle {
         }
         self.frame_ns = frame_ns;
         self.rest = (self.decision_ns / (SHARE * frame_ns.max(1.0))).min(MOST_FRAMES).floor();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_that_the_number_of_objects_explains_call_for_no_decision() {
+        let is_due = |objects: u32, pairs: u64| {
+            let mut throttle = DecisionThrottle::default();
+            throttle.decide(1000);
+            throttle.took(Some(1e4), 1e5, f64::INFINITY);
+            throttle.ran(1000, 1000);
+            throttle.ran(objects, pairs);
+            throttle.is_due(objects)
+        };
+        // A scene that crowds, or thins out.
+        assert!(!is_due(1000, 1400) && is_due(1000, 1600) && !is_due(1000, 600) && is_due(1000, 400));
+        // One that grows has as many pairs each, or fills up.
+        assert!(!is_due(1200, 1200) && !is_due(1200, 1440) && !is_due(1200, 1900) && is_due(1200, 2000));
+        assert!(!is_due(800, 400) && is_due(800, 100) && is_due(800, 1600));
     }
 }

@@ -43,9 +43,10 @@ impl Deviations {
     const PREDICTED: Self = Self { class_ln: 0.3, kept_ln: 0.1, width_ln: 0.1, calls_ln: 0.3 };
     /// Of a machine unlike those of the training.
     pub(crate) const UNLIKE: Self = Self { class_ln: 0.8, kept_ln: 0.5, width_ln: 0.2, calls_ln: 0.7 };
-    /// In line: tuning may be of another machine and off by a factor of several for all algorithms at once, a core that is taken doubles the time of
-    /// those that use it, and a scene spares incremental algorithms more or less of their work.
-    pub(crate) const IN_LINE: Self = Self { kept_ln: 0.8, width_ln: 0.25, ..Self::UNLIKE };
+    /// In line: tuning may be of another machine and off by a factor of several for all algorithms at once, and a core that is taken doubles the time of
+    /// those that use it. What keeping work spares is predicted about as well as anywhere: where that was doubted more, incremental algorithms were left
+    /// after a few dear frames.
+    pub(crate) const IN_LINE: Self = Self { kept_ln: 0.1, width_ln: 0.25, ..Self::UNLIKE };
 }
 
 /// Of what a method has for all of its algorithms: about what was left of predictions on machines held out.
@@ -53,12 +54,16 @@ const METHOD_LN: f64 = 0.1;
 /// Of an own part, its constant and its curve: tuning that was measured a minute ago is off by this in the next scene.
 const OWN_LN: [f64; 2] = [0.05, 0.18];
 
-/// Frames after which what was observed counts for less than half. In a hundred frames a class may change by 8 %, what keeping saves by 24 %, a width
-/// by 8 % and an own part by 2 % (standard deviations); a faster change shows in surprises.
+/// Frames after which what was observed counts for less than half. In a hundred frames a class may change by 8 %, what keeping saves by
+/// 11 %, a width by 8 % and an own part by 2 % (standard deviations); a faster change shows in surprises.
 const CLASS_FRAMES: f64 = 10_000.0;
-const KEPT_FRAMES: f64 = 1000.0;
+const KEPT_FRAMES: f64 = 3000.0;
 const WIDTH_FRAMES: f64 = 800.0;
 const OWN_FRAMES: f64 = 6000.0;
+
+/// What forgetting leaves of what keeping work spares is believed no better than this. As it is predicted it is believed at first: but frames of what keeps work alone
+/// never tell it from the speed of the machine, and in the end it is to be tried whether the rest is cheaper.
+const KEPT_LATER_LN: f64 = 0.6;
 
 /// So many frames are forgotten at once: that goes through all covariances, which between two frames of a program lie in no cache.
 const FEWEST_FRAMES: f64 = 16.0;
@@ -77,10 +82,12 @@ pub(crate) struct Belief {
     basis: Basis,
     algorithms: Vec<Parts>,
     own: Vec<Own>,
-    /// The shared parts: means, covariance row by row, the variances before anything was observed, and frames after which each counts for half.
+    /// The shared parts: means, covariance row by row, the variances before anything was observed and once that is forgotten, and frames after which each
+    /// counts for half.
     mean: Vec<f64>,
     covariance: Vec<f64>,
     before: Vec<f64>,
+    later: Vec<f64>,
     lasts: Vec<f64>,
     /// Of the observation at hand: covariance of each shared part with it, and of each entry of the own part. `fading` is room for a passage of time.
     with: Vec<f64>,
@@ -106,7 +113,6 @@ struct Parts {
 struct Own {
     mean: [f64; SIZE],
     covariance: [[f64; SIZE]; SIZE],
-    before: [f64; SIZE],
     /// The frame at which that held.
     at: u64,
 }
@@ -133,9 +139,7 @@ pub(crate) struct Expected {
 
 impl Own {
     fn new() -> Self {
-        let mut before = [OWN_LN[1].powi(2); SIZE];
-        before[0] = OWN_LN[0].powi(2);
-        let mut own = Self { mean: [0.0; SIZE], covariance: [[0.0; SIZE]; SIZE], before, at: 0 };
+        let mut own = Self { mean: [0.0; SIZE], covariance: [[0.0; SIZE]; SIZE], at: 0 };
         own.age(1.0);
         own
     }
@@ -144,8 +148,13 @@ impl Own {
     fn age(&mut self, share: f64) {
         for (i, row) in self.covariance.iter_mut().enumerate() {
             row.iter_mut().for_each(|entry| *entry *= 1.0 - share);
-            row[i] += share * self.before[i];
+            row[i] += share * Self::before(i);
         }
+    }
+
+    /// The variance of an entry before anything was observed.
+    fn before(entry: usize) -> f64 {
+        OWN_LN[usize::from(entry > 0)].powi(2)
     }
 }
 
@@ -174,6 +183,11 @@ impl Part<'_> {
             Self::Calls(..) => deviations.calls_ln,
             Self::Method(..) => METHOD_LN,
         }
+    }
+
+    /// By how much it may be off at least once what was observed is forgotten.
+    fn later_ln(&self) -> f64 {
+        if matches!(self, Self::Kept(_)) { KEPT_LATER_LN } else { 0.0 }
     }
 
     fn frames(&self) -> f64 {
@@ -218,6 +232,7 @@ impl Belief {
             });
         }
         let before: Vec<f64> = parts.iter().map(|p| p.deviation_ln(deviations).powi(2)).collect();
+        let later = |(part, &before): (&Part<'_>, &f64)| before.max(part.later_ln().powi(2));
         let mut belief = Self {
             basis: Basis::new(places.unwrap_or_else(Places::usual)),
             algorithms,
@@ -228,6 +243,7 @@ impl Belief {
             with: vec![0.0; parts.len()],
             own_with: [0.0; SIZE],
             fading: vec![0.0; parts.len()],
+            later: parts.iter().zip(&before).map(later).collect(),
             before,
             frame: 0,
         };
@@ -304,7 +320,7 @@ impl Belief {
         let (age, values) = (aged(self.frame - own.at), values(view.of(self.algorithms[algorithm].by_motion)));
         let row = |i: usize| {
             let sum: f64 = own.covariance[i].iter().zip(&values).map(|(c, v)| c * v).sum();
-            values[i] * ((1.0 - age) * sum + age * own.before[i] * values[i])
+            values[i] * ((1.0 - age) * sum + age * Own::before(i) * values[i])
         };
         (0..SIZE).map(row).sum()
     }
@@ -396,7 +412,7 @@ impl Belief {
         true
     }
 
-    /// Of each part that share in `fading` stays; the rest is as before anything was observed.
+    /// Of each part that share in `fading` stays; of the rest nothing is known any more.
     fn fade(&mut self) {
         let size = self.mean.len();
         for (mean, fading) in self.mean.iter_mut().zip(&mut self.fading) {
@@ -407,7 +423,7 @@ impl Belief {
         for (i, row) in self.covariance.chunks_exact_mut(size.max(1)).enumerate() {
             let own = self.fading[i];
             row.iter_mut().zip(&self.fading).for_each(|(entry, other)| *entry *= own * other);
-            row[i] += (1.0 - own * own) * self.before[i];
+            row[i] += (1.0 - own * own) * self.later[i];
         }
     }
 
@@ -428,7 +444,7 @@ impl Belief {
         let own = &mut self.own[algorithm];
         for (i, row) in own.covariance.iter_mut().enumerate() {
             row.fill(0.0);
-            row[i] = own.before[i].max(ln * ln);
+            row[i] = Own::before(i).max(ln * ln);
         }
     }
 

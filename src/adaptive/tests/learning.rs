@@ -288,6 +288,19 @@ fn what_rebuilds_too_often_is_left_and_taken_up_again() {
     assert!(kept(2500..3000) > 450, "{} of 500", kept(2500..3000));
 }
 
+/// Frames of what keeps work alone never tell whether the machine is slower than believed, or this scene spares it less.
+#[test]
+fn what_keeps_work_and_spares_less_than_believed_is_left_in_the_end() {
+    let mut costs = tuning(&[("sap@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 0.0, 20.0)]);
+    costs.costs[0].curve = costs.costs[0].curve.clone().with_fallback(Arc::clone(&costs.costs[1].curve.work), 1.0);
+    let mut policy = Policy::new(costs, &[Some(0), None], vec![true; 2]);
+    let truth = |k: usize, n: f64, _: usize| n * [35.0, 20.0][k];
+    let work = |k: usize, _: usize| (k == 0).then(|| FrameWork::new(FrameKind::Updated, 1.0));
+    let frames = run_told(&mut policy, 0..10_000, 1000, &truth, &work);
+    let kept = |range: std::ops::Range<usize>| frames[range].iter().filter(|f| f.chosen == 0).count();
+    assert!(kept(0..100) == 100 && kept(6000..10_000) < 1000, "{} of 4000", kept(6000..10_000));
+}
+
 /// A second at a breakpoint, in a frame on two threads, says nothing of the frames that follow.
 #[test]
 fn one_long_frame_bans_no_number_of_threads() {
