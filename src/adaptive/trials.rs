@@ -26,9 +26,9 @@ const LOOK_AGAIN: u64 = 8;
 
 /// Frames of a trial of an algorithm that keeps work from frame to frame, at most: its first one makes that, the others show what it saves, and `pair-cache`
 /// finds the size of its margin in a hundred. Where it costs no more than the one that runs, they cost nothing. One that goes on with what the one that
-/// runs keeps is that with another number of threads, which shows slowly: its first frame wakes the others and takes 1.6 times as long (median, n 166, twice as
-/// long in the mean), and after that frames differ among themselves by more than the two do. Any other algorithm shows what it costs in its second frame; the first
-/// one is cold.
+/// runs keeps is that with another number of threads, which shows slowly: its first frame wakes them and takes 1.6 times as long as in another instance (median
+/// of 413; 2.4 in the mean), and later ones differ among themselves by more than the two numbers do. Any other algorithm shows what it costs in its second
+/// frame; the first one is cold.
 pub(super) const OF_KEPT: u32 = 128;
 pub(super) const OF_SHARED: u32 = 8;
 pub(super) const OF_OTHERS: u32 = 2;

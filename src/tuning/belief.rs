@@ -44,9 +44,9 @@ impl Deviations {
     /// Of a machine unlike those of the training.
     pub(crate) const UNLIKE: Self = Self { class_ln: 0.8, kept_ln: 0.5, width_ln: 0.2, calls_ln: 0.7 };
     /// In line: tuning may be of another machine and off by a factor of several for all algorithms at once, and a core that is taken doubles the time of
-    /// those that use it. What keeping work spares is predicted about as well as anywhere: where that was doubted more, incremental algorithms were left
-    /// after a few dear frames.
-    pub(crate) const IN_LINE: Self = Self { kept_ln: 0.1, width_ln: 0.25, ..Self::UNLIKE };
+    /// those that use it. What keeping work spares is predicted as well for other machines: where it was doubted more, incremental algorithms were left after
+    /// a few dear frames.
+    pub(crate) const IN_LINE: Self = Self { kept_ln: Self::PREDICTED.kept_ln, width_ln: 0.25, ..Self::UNLIKE };
 }
 
 /// Of what a method has for all of its algorithms: about what was left of predictions on machines held out.
@@ -61,8 +61,8 @@ const KEPT_FRAMES: f64 = 3000.0;
 const WIDTH_FRAMES: f64 = 800.0;
 const OWN_FRAMES: f64 = 6000.0;
 
-/// What forgetting leaves of what keeping work spares is believed no better than this. As it is predicted it is believed at first: but frames of what keeps work alone
-/// never tell it from the speed of the machine, and in the end it is to be tried whether the rest is cheaper.
+/// By how much what keeping work spares may be off once that is forgotten, at least. It is believed as it is predicted at first; but frames of what keeps work
+/// never tell it from the speed of the machine, and in the end it is to be tried whether another algorithm is cheaper.
 const KEPT_LATER_LN: f64 = 0.6;
 
 /// So many frames are forgotten at once: that goes through all covariances, which between two frames of a program lie in no cache.
