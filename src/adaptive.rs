@@ -92,8 +92,8 @@ impl Adaptive {
         self.runner.policy.set_learning(learns && clock::TICKS);
     }
 
-    /// Whether now and then another algorithm than the cheapest is tried, to learn what that one costs: in two frames, or in up to 128 where it keeps
-    /// work from frame to frame, until they have cost as much as two of the cheapest. Only where what the trial is expected to tell may save more in the next 300 frames than it costs. What
+    /// Whether now and then another algorithm than the cheapest is tried, to learn what that one costs: in two frames, in eight where it goes on with what the
+    /// cheapest keeps, on another number of threads, or in up to 128 where it has to make first what it keeps, until they have cost two frames of the cheapest more than it would have. Only where what the trial is expected to tell may save more in the next 300 frames than it costs. What
     /// trials and their decisions have cost is measured, and no other is made until that is no more than 0.5 % of the time of the frames and four frames, unless it
     /// is expected to save 17 times its price and no more than eight frames are owed; a scene that suddenly is larger than all before counts as one that begins. On unless it is turned off; without [learning](Self::set_learning) it does nothing.
     pub fn set_exploring(&mut self, explores: bool) {

@@ -21,7 +21,7 @@ const SOON: f64 = 4.0;
 
 /// An algorithm that is expected to cost so many times as much is not tried: beliefs are seldom off by that, and to ask how likely it is takes longer
 /// than the rest of a decision.
-const HOPELESS: f64 = 2.0;
+const HOPELESS: f64 = 4.0;
 
 /// What was worked out for a load holds for another that differs by no more than this share: costs are known less well than that. It holds for so
 /// many frames: waits pass, whether anything is observed or not.

@@ -17,12 +17,13 @@ const FORGOTTEN: u64 = 3;
 const SHARE: f64 = 0.25;
 const MOST: f64 = 4.0;
 
-/// Share of the frames that are made again: cost curves come from medians, which leave those frames out. What is seen counts where it is more by so much:
-/// a few frames more or less of these are in what is believed of keeping, and to count all that are seen costs 0.5 to 1.0 % in replayed traces.
+/// Share of the frames that are made again: cost curves come from medians, which leave those frames out. Of what is seen that counts which is beyond the second: a
+/// few frames more or less of these are in what is believed of keeping, and to count all that are seen costs 0.5 to 1.0 % in replayed traces.
 const REBUILDS: f64 = 0.02;
 const MANY_REBUILDS: f64 = 0.15;
-/// Of the share that is seen half is forgotten after so many frames that run, or so many without any.
-const REBUILDS_LAST: [f64; 2] = [100.0, 1000.0];
+/// Frames over which the share that is seen is the mean, and frames after which half of it is forgotten where none of these run.
+const REBUILDS_OVER: f64 = 100.0;
+const REBUILDS_LAST: f64 = 1000.0;
 
 /// How many there are to keep, where `kept` is as [`Policy::new`](super::policy::Policy::new) has it.
 pub(super) fn works(kept: &[Option<usize>]) -> usize {
@@ -42,7 +43,7 @@ pub(super) struct SwitchingCosts {
 struct KeptWork {
     /// The frame that kept it last.
     last: Option<u64>,
-    /// The share of frames that made it again of late, and the frame at which that held.
+    /// The share of frames that made it again of late, and the frame before which that held.
     rebuilds: f64,
     at: u64,
 }
@@ -121,14 +122,15 @@ impl SwitchingCosts {
     /// Takes in that a candidate ran so many frames up to this one, in how many of them all was made again, and how the last one came about.
     pub(super) fn ran(&mut self, candidate: usize, frame: u64, frames: u32, rebuilt: u32, work: Option<FrameWork>) {
         let Some(kept) = self.costs[candidate].kept else { return };
-        let goes_on = self.remembers(candidate, frame + 1 - u64::from(frames));
+        let first = frame + 1 - u64::from(frames);
+        let goes_on = self.remembers(candidate, first);
         let kept = &mut self.works[kept];
         let keeps = work.is_some_and(|work| work.kind != FrameKind::FromScratch);
         // One that begins makes all in any case.
         if keeps && goes_on {
-            let (before, frames) = (kept.rebuilds_at(frame), f64::from(frames));
-            kept.rebuilds = before + (f64::from(rebuilt) - before * frames) / (REBUILDS_LAST[0] + frames);
-            kept.at = frame;
+            let (frames, seen) = (f64::from(frames), f64::from(rebuilt) / f64::from(frames));
+            kept.rebuilds = seen + (kept.rebuilds_at(first) - seen) * (-frames / REBUILDS_OVER).exp();
+            kept.at = frame + 1;
         }
         kept.last = keeps.then_some(frame);
     }
@@ -150,6 +152,42 @@ impl SwitchingCosts {
 impl KeptWork {
     /// The share of frames that make it again, as far as it is not forgotten by this frame.
     fn rebuilds_at(&self, frame: u64) -> f64 {
-        self.rebuilds / (1.0 + frame.saturating_sub(self.at) as f64 / REBUILDS_LAST[1])
+        self.rebuilds / (1.0 + frame.saturating_sub(self.at) as f64 / REBUILDS_LAST)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs frames of which one of so many is made again, so many at once. What a frame is expected to take then, where one that goes on takes 10 and one of the
+    /// other way 20.
+    fn mean_ns(costs: &mut SwitchingCosts, frames: std::ops::Range<u64>, one_in: u64, at_once: u32) -> f64 {
+        let work = |kind| Some(FrameWork::new(kind, 1.0));
+        for first in frames.step_by(at_once as usize) {
+            let rebuilt = (first..first + u64::from(at_once)).filter(|frame| frame.is_multiple_of(one_in)).count() as u32;
+            let last = first + u64::from(at_once) - 1;
+            costs.ran(0, last, at_once, rebuilt, work(FrameKind::Updated));
+        }
+        costs.mean_ns(0, costs.works[0].at, 10.0, 20.0)
+    }
+
+    #[test]
+    fn frames_that_are_made_again_count_where_they_are_many() {
+        for at_once in [1, 6, 30] {
+            let after = |one_in: u64| mean_ns(&mut SwitchingCosts::new(&[Some(0)]), 0..1800, one_in, at_once);
+            assert!((after(50) - 10.6).abs() < 1e-9 && (after(10) - 10.6).abs() < 1e-9, "{at_once}: {}", after(10));
+            // A third less 15 % of them takes 30 more each.
+            assert!((after(3) - 15.5).abs() < 0.3, "{at_once}: {}", after(3));
+        }
+        // They are forgotten with a scene that has none, and in absence.
+        let mut costs = SwitchingCosts::new(&[Some(0)]);
+        let (many, few) = (mean_ns(&mut costs, 0..600, 3, 1), mean_ns(&mut costs, 601..1000, 1000, 1));
+        assert!(many > 15.0 && few < 10.7, "{many} {few}");
+        let mut costs = SwitchingCosts::new(&[Some(0)]);
+        mean_ns(&mut costs, 0..600, 3, 1);
+        assert!(costs.mean_ns(0, 1600, 10.0, 20.0) < 11.0);
+        // What is not kept from frame to frame is never made again.
+        assert_eq!(SwitchingCosts::new(&[None]).mean_ns(0, 0, 10.0, 20.0), 10.0);
     }
 }

@@ -96,7 +96,7 @@ impl DecisionThrottle {
     fn pairs_jump(&self, objects: u32, pairs: f64, decided: f64) -> bool {
         let filled = decided * (f64::from(objects.max(1)) / f64::from(self.objects.max(1))).powi(2);
         let off = (decided.min(filled) - pairs).max(pairs - decided.max(filled));
-        off > (PAIRS_JUMP * decided).max(FEWEST_PAIRS)
+        off > (PAIRS_JUMP * decided.min(filled)).max(FEWEST_PAIRS)
     }
 
     /// Begins a decision.
@@ -146,6 +146,6 @@ mod tests {
         assert!(!is_due(1000, 1400) && is_due(1000, 1600) && !is_due(1000, 600) && is_due(1000, 400));
         // One that grows has as many pairs each, or fills up.
         assert!(!is_due(1200, 1200) && !is_due(1200, 1440) && !is_due(1200, 1900) && is_due(1200, 2000));
-        assert!(!is_due(800, 400) && is_due(800, 100) && is_due(800, 1600));
+        assert!(!is_due(800, 400) && is_due(800, 300) && is_due(800, 1400) && is_due(600, 0));
     }
 }

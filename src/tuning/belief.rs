@@ -82,11 +82,9 @@ pub(crate) struct Belief {
     basis: Basis,
     algorithms: Vec<Parts>,
     own: Vec<Own>,
-    /// The shared parts: means, covariance row by row, the variances before anything was observed and once that is forgotten, and frames after which each
-    /// counts for half.
+    /// The shared parts: means, covariance row by row, the variances once what was observed is forgotten, and frames after which each counts for half.
     mean: Vec<f64>,
     covariance: Vec<f64>,
-    before: Vec<f64>,
     later: Vec<f64>,
     lasts: Vec<f64>,
     /// Of the observation at hand: covariance of each shared part with it, and of each entry of the own part. `fading` is room for a passage of time.
@@ -244,10 +242,9 @@ impl Belief {
             own_with: [0.0; SIZE],
             fading: vec![0.0; parts.len()],
             later: parts.iter().zip(&before).map(later).collect(),
-            before,
             frame: 0,
         };
-        belief.doubt_shared();
+        belief.set_variances(&before);
         belief
     }
 
@@ -427,11 +424,18 @@ impl Belief {
         }
     }
 
-    /// What was observed of shared parts is as uncertain as before anything was. The means stay: nothing better is known.
+    /// What was observed of shared parts is as uncertain as if it was forgotten. The means stay: nothing better is known.
     pub(crate) fn doubt_shared(&mut self) {
+        let later = std::mem::take(&mut self.later);
+        self.set_variances(&later);
+        self.later = later;
+    }
+
+    /// Gives each shared part its variance, and none of them anything in common with another.
+    fn set_variances(&mut self, variances: &[f64]) {
         self.covariance.fill(0.0);
-        for (k, &variance) in self.before.iter().enumerate() {
-            self.covariance[k * self.before.len() + k] = variance;
+        for (k, &variance) in variances.iter().enumerate() {
+            self.covariance[k * variances.len() + k] = variance;
         }
     }
 
