@@ -163,11 +163,11 @@ mod tests {
     /// Runs frames of which one of so many is made again, so many at once. What a frame is expected to take then, where one that goes on takes 10 and one of the
     /// other way 20.
     fn mean_ns(costs: &mut SwitchingCosts, frames: std::ops::Range<u64>, one_in: u64, at_once: u32) -> f64 {
-        let work = |kind| Some(FrameWork::new(kind, 1.0));
+        let work = Some(FrameWork::new(FrameKind::Updated, 1.0));
         for first in frames.step_by(at_once as usize) {
             let rebuilt = (first..first + u64::from(at_once)).filter(|frame| frame.is_multiple_of(one_in)).count() as u32;
             let last = first + u64::from(at_once) - 1;
-            costs.ran(0, last, at_once, rebuilt, work(FrameKind::Updated));
+            costs.ran(0, last, at_once, rebuilt, work);
         }
         costs.mean_ns(0, costs.works[0].at, 10.0, 20.0)
     }

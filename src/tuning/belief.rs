@@ -183,9 +183,12 @@ impl Part<'_> {
         }
     }
 
-    /// By how much it may be off at least once what was observed is forgotten.
-    fn later_ln(&self) -> f64 {
-        if matches!(self, Self::Kept(_)) { KEPT_LATER_LN } else { 0.0 }
+    /// By how much it may be off once what was observed is forgotten.
+    fn later_ln(&self, deviations: Deviations) -> f64 {
+        match self {
+            Self::Kept(_) => deviations.kept_ln.max(KEPT_LATER_LN),
+            _ => self.deviation_ln(deviations),
+        }
     }
 
     fn frames(&self) -> f64 {
@@ -229,23 +232,21 @@ impl Belief {
                 by_motion,
             });
         }
-        let before: Vec<f64> = parts.iter().map(|p| p.deviation_ln(deviations).powi(2)).collect();
-        let later = |(part, &before): (&Part<'_>, &f64)| before.max(part.later_ln().powi(2));
-        let mut belief = Self {
+        let mut covariance = vec![0.0; parts.len() * parts.len()];
+        set_diagonal(&mut covariance, parts.iter().map(|p| p.deviation_ln(deviations).powi(2)));
+        Self {
             basis: Basis::new(places.unwrap_or_else(Places::usual)),
             algorithms,
             own: costs.iter().map(|_| Own::new()).collect(),
             mean: vec![0.0; parts.len()],
-            covariance: vec![0.0; parts.len() * parts.len()],
+            covariance,
             lasts: parts.iter().map(Part::frames).collect(),
             with: vec![0.0; parts.len()],
             own_with: [0.0; SIZE],
             fading: vec![0.0; parts.len()],
-            later: parts.iter().zip(&before).map(later).collect(),
+            later: parts.iter().map(|p| p.later_ln(deviations).powi(2)).collect(),
             frame: 0,
-        };
-        belief.set_variances(&before);
-        belief
+        }
     }
 
     pub(crate) fn view(&self, frame: &Frame<'_>) -> View {
@@ -426,17 +427,7 @@ impl Belief {
 
     /// What was observed of shared parts is as uncertain as if it was forgotten. The means stay: nothing better is known.
     pub(crate) fn doubt_shared(&mut self) {
-        let later = std::mem::take(&mut self.later);
-        self.set_variances(&later);
-        self.later = later;
-    }
-
-    /// Gives each shared part its variance, and none of them anything in common with another.
-    fn set_variances(&mut self, variances: &[f64]) {
-        self.covariance.fill(0.0);
-        for (k, &variance) in variances.iter().enumerate() {
-            self.covariance[k * variances.len() + k] = variance;
-        }
+        set_diagonal(&mut self.covariance, self.later.iter().copied());
     }
 
     /// What was observed of an algorithm's own part holds no longer, and it may be off by this much. Not of one that keeps work from frame to
@@ -483,6 +474,13 @@ impl Belief {
         };
         costs.iter().enumerate().map(corrected).collect()
     }
+}
+
+/// Covariances of parts with these variances, which have nothing in common.
+fn set_diagonal(covariance: &mut [f64], variances: impl ExactSizeIterator<Item = f64>) {
+    covariance.fill(0.0);
+    let next = variances.len() + 1;
+    covariance.iter_mut().step_by(next).zip(variances).for_each(|(entry, variance)| *entry = variance);
 }
 
 /// The values of an own part's entries.

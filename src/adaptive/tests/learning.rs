@@ -261,12 +261,17 @@ fn what_keeps_work_is_left_once_that_is_paid_for_and_at_once_where_it_keeps_none
     assert_eq!((frames_until_left(FrameKind::Updated), frames_until_left(FrameKind::FromScratch)), (Some(9), Some(0)));
 }
 
-#[test]
-fn what_rebuilds_too_often_is_left_and_taken_up_again() {
-    // The first is incremental. Up to frame 600 it rebuilds in one frame of three, which the tuning knows nothing of.
+/// The first is incremental, and takes half of what the other does, which is its other way.
+fn policy_with_incremental() -> Policy {
     let mut costs = tuning(&[("sap@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 0.0, 20.0)]);
     costs.costs[0].curve = costs.costs[0].curve.clone().with_fallback(Arc::clone(&costs.costs[1].curve.work), 1.0);
-    let mut policy = Policy::new(costs, &[Some(0), None], vec![true; 2]);
+    Policy::new(costs, &[Some(0), None], vec![true; 2])
+}
+
+#[test]
+fn what_rebuilds_too_often_is_left_and_taken_up_again() {
+    // Up to frame 600 the first rebuilds in one frame of three, which the tuning knows nothing of.
+    let mut policy = policy_with_incremental();
     let truth = |k: usize, n: f64, at: usize| {
         let rebuilds = at < 600 && at.is_multiple_of(3);
         n * if k == 1 {
@@ -291,9 +296,7 @@ fn what_rebuilds_too_often_is_left_and_taken_up_again() {
 /// Frames of what keeps work alone never tell whether the machine is slower than believed, or this scene spares it less.
 #[test]
 fn what_keeps_work_and_spares_less_than_believed_is_left_in_the_end() {
-    let mut costs = tuning(&[("sap@cpu1", 0.0, 10.0), ("grid-sap@cpu1", 0.0, 20.0)]);
-    costs.costs[0].curve = costs.costs[0].curve.clone().with_fallback(Arc::clone(&costs.costs[1].curve.work), 1.0);
-    let mut policy = Policy::new(costs, &[Some(0), None], vec![true; 2]);
+    let mut policy = policy_with_incremental();
     let truth = |k: usize, n: f64, _: usize| n * [35.0, 20.0][k];
     let work = |k: usize, _: usize| (k == 0).then(|| FrameWork::new(FrameKind::Updated, 1.0));
     let frames = run_told(&mut policy, 0..10_000, 1000, &truth, &work);
