@@ -8,8 +8,6 @@ use crate::tuning::belief::View;
 /// Frames that are added up where an algorithm runs on, and right after it began.
 const MOST: u32 = 32;
 const FEWEST: u32 = 2;
-/// Octaves of objects over which a batch goes at most.
-const OCTAVES: f64 = 0.5;
 /// What counts of a frame, at most: this many times what the dearest kind of frame is expected to cost. The rest is another program's.
 pub(super) const MOST_OVER: f64 = 2.0;
 
@@ -46,18 +44,12 @@ pub(super) struct FrameBatch {
     pub(super) real_ns: f64,
     pub(super) predicted_ns: f64,
     calls_ns: f64,
-    log2_objects: f64,
     view: View,
     /// Frames until it is full.
     room: u32,
 }
 
 impl FrameBatch {
-    /// Mean logarithm of the number of objects.
-    pub(super) fn log2_objects(&self) -> f64 {
-        self.log2_objects / f64::from(self.frames.max(1))
-    }
-
     /// The mean load, as what is learned sees it.
     pub(super) fn view(&self) -> View {
         let mut mean = View::default();
@@ -71,9 +63,8 @@ impl FrameBatch {
     }
 
     /// Whether a frame belongs to it.
-    pub(super) fn takes(&self, candidate: usize, log2_objects: f64) -> bool {
-        let near = self.frames == 0 || (self.log2_objects() - log2_objects).abs() <= OCTAVES;
-        self.room > 0 && self.candidate == candidate && near
+    pub(super) fn takes(&self, candidate: usize) -> bool {
+        self.room > 0 && self.candidate == candidate
     }
 
     pub(super) fn is_full(&self) -> bool {
@@ -81,14 +72,12 @@ impl FrameBatch {
     }
 
     /// Adds some frames of one load, that took so long together.
-    pub(super) fn add(&mut self, frames: u32, ns: f64, predicted: Predicted, (log2_objects, view): (f64, &View)) {
-        let count = f64::from(frames);
+    pub(super) fn add(&mut self, frames: u32, ns: f64, predicted: Predicted, view: &View) {
         self.frames += frames;
         self.calls_ns += predicted.calls_ns;
         self.real_ns += ns;
         self.predicted_ns += predicted.ns;
-        self.log2_objects += count * log2_objects;
-        self.view.add(view, count);
+        self.view.add(view, f64::from(frames));
     }
 
     /// An empty one. Where the candidate is the one of before, it has more room than that.
@@ -109,26 +98,24 @@ mod tests {
         let mut full = Vec::new();
         for frame in 0..80 {
             let candidate = usize::from(frame >= 70);
-            // Twice the objects from frame 75 on: another batch, with more room than the one before.
-            let log2_objects = if frame < 75 { 10.0 } else { 11.0 };
-            if !batch.takes(candidate, log2_objects) {
+            if !batch.takes(candidate) {
                 batch = batch.next(candidate);
             }
-            batch.add(1, 150.0, predicted, (log2_objects, &View::default()));
+            batch.add(1, 150.0, predicted, &View::default());
             if batch.is_full() {
                 assert_eq!((batch.real_ns, batch.calls()), (150.0 * f64::from(batch.frames), 0.5));
                 full.push((frame, batch.frames));
                 batch = batch.next(candidate);
             }
         }
-        assert_eq!(full, [(1, 2), (5, 4), (13, 8), (29, 16), (61, 32), (71, 2)]);
+        assert_eq!(full, [(1, 2), (5, 4), (13, 8), (29, 16), (61, 32), (71, 2), (75, 4)]);
     }
 
     #[test]
     fn frames_that_passed_without_a_look_are_added_at_once() {
         let mut batch = FrameBatch::default().next(0);
-        batch.add(40, 1000.0, Predicted { ns: 0.0, calls_ns: 0.0 }, (3.0, &View::default()));
-        assert_eq!((batch.frames, batch.real_ns, batch.calls(), batch.log2_objects()), (40, 1000.0, 0.0, 3.0));
+        batch.add(40, 1000.0, Predicted { ns: 0.0, calls_ns: 0.0 }, &View::default());
+        assert_eq!((batch.frames, batch.real_ns, batch.calls()), (40, 1000.0, 0.0));
         assert!(batch.is_full());
     }
 }

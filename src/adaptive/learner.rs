@@ -1,5 +1,4 @@
-//! What the frames that were run tell about the cost of every algorithm: the [`Belief`] observes them, in batches, each with a noise that is
-//! learned too.
+//! What the frames that were run tell about the cost of every algorithm: the [`Belief`] observes them, in batches.
 
 use super::frame_batch::{FrameBatch, MOST_OVER};
 use super::switching::works;
@@ -21,13 +20,11 @@ const KNOWN: u32 = 4;
 const STALL: [f64; 2] = [MOST_OVER, 64.0];
 const STALLS_APART: u64 = 50;
 
-/// The noise of a frame is learned for each algorithm; it starts here, and is never believed to be less.
+/// The noise of a frame: standard deviation of its logarithm around what is expected of it. To learn it for each algorithm is worth nothing: docs/methodology.md.
+/// With twice as much, one frame of a trial tells so little that the same algorithm is tried again and again.
 const NOISE_LN: f64 = 0.2;
-const LEAST_NOISE_LN: f64 = 0.02;
 /// Of this many frames in a row the mean is as noisy as of this power of their number far apart.
 const ALIKE: f64 = 0.7;
-/// Share of each new deviation in the noise.
-const NOISE_SHARE: f64 = 1.0 / 8.0;
 
 /// What keeps work takes another time in its first frames than later: it is yet to find what to keep. In a level of 3000 boxes that loads, `pair-cache` took
 /// 220 to 280 us a frame in its first thirty and 185 from then on. So the first ones count for less: standard deviation of the logarithm by which they are
@@ -38,27 +35,21 @@ const SETTLING_FRAMES: f64 = 32.0;
 /// This many surprises in a row that are too large to be believed, all to the same side, are no accident: the machine or the scene has changed.
 const NO_ACCIDENT: u32 = 3;
 
-/// After the load was in doubt so many observations of the algorithm are believed, whatever they are.
-const BELIEVED: u32 = 16;
-
 /// What is known about one algorithm's frames beside their cost.
 #[derive(Debug, Clone)]
 struct Frames {
-    noise: f64,
     /// Where in the list of waits its width stands, and how often it was observed.
     wait: usize,
     batches: u32,
     /// Surprises in a row, counted with their sign.
     run: i32,
-    /// Observations that are to be believed before the load can be in doubt again.
-    believed: u32,
     /// Where in the list of kept work that stands which it keeps, if it does.
     kept: Option<usize>,
 }
 
-/// Frames in a row are alike, so that many of them tell less than as many that were far apart.
-fn worth(frames: u32) -> f64 {
-    f64::from(frames).powf(ALIKE)
+/// Variance of the mean of the logarithms of so many frames in a row. They are alike, so that many of them tell less than as many that were far apart.
+fn noise(frames: u32) -> f64 {
+    NOISE_LN.powi(2) / f64::from(frames).powf(ALIKE)
 }
 
 /// Follows the costs of all algorithms. Allocates when it is made.
@@ -68,7 +59,7 @@ pub(super) struct Learner {
     frames: Vec<Frames>,
     /// One for each class and width.
     waits: Vec<Wait>,
-    /// By what is kept, frames that were observed since that was begun.
+    /// By what is kept, frames that were observed.
     since: Vec<u32>,
     observed: u64,
     /// How far boxes moved when what is known of keeping was observed.
@@ -96,7 +87,7 @@ impl Learner {
                 widths.push(width);
                 widths.len() - 1
             });
-            Frames { noise: NOISE_LN.powi(2), wait, batches: 0, run: 0, believed: 0, kept: *kept }
+            Frames { wait, batches: 0, run: 0, kept: *kept }
         });
         let frames = frames.collect();
         Self {
@@ -139,13 +130,6 @@ impl Learner {
     pub(super) fn wait_ns(&self, algorithm: usize, frame: u64) -> f64 {
         let Wait { mean_ns, at, .. } = self.waits[self.frames[algorithm].wait];
         mean_ns / (1.0 + frame.saturating_sub(at) as f64 / WAIT_FRAMES)
-    }
-
-    /// Takes in that an algorithm begins with this frame, and if it keeps work, to keep it.
-    pub(super) fn begins(&mut self, algorithm: usize) {
-        if let Some(kept) = self.frames[algorithm].kept {
-            self.since[kept] = 0;
-        }
     }
 
     /// By how much the mean of the next so many frames of an algorithm may be off for being among its first: the variance of its logarithm.
@@ -195,12 +179,12 @@ impl Learner {
     /// What so many frames in a row of another algorithm would tell of the logarithm of its cost over that of the one that runs: the standard deviation of
     /// by how much they correct it.
     pub(super) fn told_of_ratio(&self, running: &Running, tried: usize, view: &View, calls: f64, frames: u32) -> f64 {
-        self.belief.told_of_ratio(running, tried, view, calls, self.frames[tried].noise / worth(frames))
+        self.belief.told_of_ratio(running, tried, view, calls, noise(frames))
     }
 
-    /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction. False, and nothing is learned, where
-    /// that surprises so much of an algorithm that `runs_on` that rather the load is another one than was estimated: then it is believed for a while.
-    pub(super) fn observe(&mut self, batch: &FrameBatch, frame: u64, runs_on: bool) -> bool {
+    /// Takes in that some frames took the algorithm longer or shorter than was predicted without correction. Whether that surprised no more than can be
+    /// believed at once.
+    pub(super) fn observe(&mut self, batch: &FrameBatch, frame: u64) -> bool {
         let (algorithm, ratio) = (batch.candidate, batch.real_ns / batch.predicted_ns);
         if !(ratio.is_finite() && ratio > 0.0) {
             return true;
@@ -208,44 +192,31 @@ impl Learner {
         self.belief.pass(frame);
         let expected = self.belief.expect(algorithm, &batch.view(), batch.calls());
         let surprise = ratio.ln() - expected.ln;
+        let variance = expected.shared + expected.own + noise(batch.frames) + self.settle(algorithm, batch.frames);
+        let most = MOST_SURPRISE * variance.sqrt();
+        let believed = surprise.abs() <= most;
         self.observed += 1;
-        let unsettled = self.settle(algorithm, batch.frames);
         let a = &mut self.frames[algorithm];
         a.batches = a.batches.saturating_add(1);
-        let worth = worth(batch.frames);
-        let variance = expected.shared + expected.own + a.noise / worth + unsettled;
-        let most = MOST_SURPRISE * variance.sqrt();
-        let error = surprise.clamp(-most, most);
-        if error != surprise && runs_on && a.believed == 0 {
-            a.believed = BELIEVED;
-            return false;
-        }
-        a.believed = a.believed.saturating_sub(1);
-        let side = if error == surprise { 0 } else { surprise.signum() as i32 };
-        a.run = if side == 0 {
-            0
-        } else if a.run.signum() == -side {
-            side
-        } else {
-            a.run + side
+        a.run = match surprise.signum() as i32 {
+            _ if believed => 0,
+            side if a.run.signum() == -side => side,
+            side => a.run + side,
         };
-        let deviation = (error * error - expected.shared - expected.own - unsettled) * worth;
-        a.noise += NOISE_SHARE * (deviation.max(0.0) - a.noise);
-        a.noise = a.noise.max(LEAST_NOISE_LN.powi(2));
         if a.run.unsigned_abs() < NO_ACCIDENT {
-            self.belief.absorb(algorithm, error, variance);
-            return true;
+            self.belief.absorb(algorithm, surprise.clamp(-most, most), variance);
+        } else {
+            // What was observed holds no longer: the next frames count as if they were the first. And what shared parts have not explained until now is more
+            // likely the algorithm's own.
+            a.run = 0;
+            self.belief.doubt_shared();
+            self.belief.doubt_own(algorithm, surprise);
         }
-        // What was observed holds no longer: the next frames count as if they were the first. And what shared parts have not explained until now
-        // is more likely the algorithm's own.
-        a.run = 0;
-        self.belief.doubt_shared();
-        self.belief.doubt_own(algorithm, surprise);
-        true
+        believed
     }
 
     /// The costs as they are expected now, without what passes.
     pub(super) fn lasting(&self, costs: &[AlgorithmCost]) -> Vec<AlgorithmCost> {
-        self.belief.costs(costs, true, |k| self.frames[k].noise.sqrt())
+        self.belief.costs(costs, true)
     }
 }

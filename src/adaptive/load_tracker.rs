@@ -20,9 +20,6 @@ const COST_RISES: f64 = 2.0;
 /// Samples are at least this many frames apart where nothing drifts: what `moved` tells changes slowly.
 const SAMPLE_EVERY: u32 = 32;
 
-/// The same share for a sample of a load that frames contradict.
-const SHARE_IN_DOUBT: f64 = 0.02;
-
 /// Keeps the estimate of the load up to date.
 // A frame without a decision looks at what stands first alone: see `Runner`.
 #[repr(C)]
@@ -43,8 +40,6 @@ pub(super) struct LoadTracker {
     /// What the sample of the last decision took, where it had one.
     sampled_ns: f64,
     motion: MotionWatch,
-    /// Frames contradict the load since the last sample.
-    doubted: bool,
     /// Objects and pairs of the frame before.
     before: Option<(u32, u64)>,
 }
@@ -53,11 +48,6 @@ impl LoadTracker {
     /// How far the boxes move in a frame, in edges, where that was found out.
     pub(super) fn moved(&self) -> Option<f64> {
         self.motion.moved()
-    }
-
-    /// Whether a load that is in doubt may be paid a sample.
-    fn is_doubt_due(&self) -> bool {
-        self.doubted && self.passed_ns * SHARE_IN_DOUBT >= self.sample_ns
     }
 
     /// The load that was estimated last.
@@ -93,7 +83,6 @@ impl LoadTracker {
             self.sample_ns = if self.sample_ns > 0.0 { took.min(self.sample_ns * COST_RISES) } else { took };
             self.motion.want();
             (self.sampled, self.age, self.passed_ns) = (objects, 0, 0.0);
-            self.doubted = false;
         } else {
             self.load = self.load.rescaled(objects, pairs.unwrap_or(self.load.pairs));
             self.load.moved = moved.unwrap_or(self.load.moved);
@@ -114,10 +103,7 @@ impl LoadTracker {
     }
 
     fn is_sample_due(&self, objects: u32) -> bool {
-        let drift = self.throttle.telling(drift(objects, self.sampled));
-        if self.is_doubt_due() {
-            return true;
-        }
+        let drift = drift(objects, self.sampled);
         let rested = self.age >= SAMPLE_EVERY || drift > 1.0 / 16.0;
         self.before.is_none() || rested && self.passed_ns * (SHARE + SHARE_OF_DRIFT * drift) >= self.sample_ns
     }
@@ -131,7 +117,8 @@ impl LoadTracker {
             self.throttle.wake();
         }
         if passed.is_off(self.throttle.rest_ns()) {
-            self.motion.doubt();
+            // Boxes may move at another pace.
+            self.motion.want();
             self.throttle.wake();
         }
     }
@@ -165,12 +152,9 @@ impl LoadTracker {
         (decision_ns - self.sampled_ns).max(0.0)
     }
 
-    /// What a decision without its sample took, where that is known, and its frame, in nanoseconds; and how far ahead the one that runs is, a logarithm.
-    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64, lead_ln: f64) {
-        self.throttle.took(decision_ns, frame_ns, lead_ln);
-        if self.doubted {
-            self.throttle.rest_no_longer_than((self.sample_ns / SHARE_IN_DOUBT - self.passed_ns) / frame_ns.max(1.0));
-        }
+    /// What a decision without its sample took, where that is known, and its frame, in nanoseconds.
+    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64) {
+        self.throttle.took(decision_ns, frame_ns);
     }
 
     /// What a decision takes in the mean, without a sample, in nanoseconds.
@@ -186,15 +170,6 @@ impl LoadTracker {
     /// The next frame is to be decided on again.
     pub(super) fn wake(&mut self) {
         self.throttle.wake();
-    }
-
-    /// The frame that ran contradicts the load: it is to be looked at again, as soon as that may be paid.
-    pub(super) fn doubt(&mut self, boxes: &[Aabb]) {
-        self.motion.doubt();
-        self.motion.want();
-        self.watching |= self.motion.ran(boxes);
-        self.doubted = true;
-        self.wake();
     }
 
     /// After a frame that failed nothing is known of the one before, and the next one is decided on again.

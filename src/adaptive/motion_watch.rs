@@ -1,4 +1,4 @@
-//! How far boxes move in a frame: looked at the more often, the more lately that has changed.
+//! How far boxes move in a frame: looked at now and then.
 //!
 //! Where boxes speed up, what an incremental algorithm was predicted to cost changes by factors within a few dozen frames, and a prediction for the pace of
 //! before would be taken for a machine that is slower.
@@ -9,9 +9,8 @@ use crate::clock::Instant;
 use crate::clock::counted;
 use crate::load::{Displacement, paces_apart_ln};
 
-/// Share of the frames' time for looking how far boxes move: at the least, and at the most, which holds at first, after they were found to move at another
-/// pace, and after frames that took another time than expected. It halves with every look that finds the pace of before.
-const SHARES: [f64; 2] = [0.001, 0.01];
+/// Share of the frames' time for looking how far boxes move.
+const SHARE: f64 = 0.002;
 
 /// Looks that differ by less may be of the same pace: few boxes are watched.
 const SAME_PACE_LN: f64 = 0.25;
@@ -20,13 +19,12 @@ const SAME_PACE_LN: f64 = 0.25;
 const COST_RISES: f64 = 2.0;
 
 /// Finds out how far boxes move, where that pays.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct MotionWatch {
     displacement: Displacement,
     state: State,
     /// How far the boxes moved when that was last found out.
     moved: Option<f64>,
-    share: f64,
     /// What a look takes, and the time of the frames since the last one, in nanoseconds.
     look_ns: f64,
     passed_ns: f64,
@@ -41,19 +39,6 @@ enum State {
     Due,
     /// Those of the next frame are to be compared with them.
     Watching,
-}
-
-impl Default for MotionWatch {
-    fn default() -> Self {
-        Self {
-            displacement: Displacement::default(),
-            state: State::default(),
-            moved: None,
-            share: SHARES[1],
-            look_ns: 0.0,
-            passed_ns: 0.0,
-        }
-    }
 }
 
 impl MotionWatch {
@@ -76,7 +61,6 @@ impl MotionWatch {
     /// Takes in what a look has found, and how long it took. Whether that is another pace.
     fn found(&mut self, moved: Option<f64>, took_ns: f64) -> bool {
         let as_before = self.moved.zip(moved).is_some_and(|(before, now)| paces_apart_ln(before, now) < SAME_PACE_LN);
-        self.share = if as_before { (self.share / 2.0).max(SHARES[0]) } else { SHARES[1] };
         self.look_ns = if self.look_ns > 0.0 { took_ns.min(self.look_ns * COST_RISES) } else { took_ns };
         (self.moved, self.passed_ns, self.state) = (moved, 0.0, State::Resting);
         !as_before
@@ -94,11 +78,6 @@ impl MotionWatch {
         }
     }
 
-    /// Frames took another time than expected: the boxes may move at another pace.
-    pub(super) fn doubt(&mut self) {
-        self.share = SHARES[1];
-    }
-
     /// Remembers the boxes of a frame that was decided on and has run, where that is due or pays. Whether the next frame is to be [looked at](Self::look) for that.
     pub(super) fn ran(&mut self, boxes: &[Aabb]) -> bool {
         // Not when it is decided: a frame may be decided on twice before it runs, and the boxes have not moved in between.
@@ -110,7 +89,7 @@ impl MotionWatch {
     }
 
     fn pays(&self) -> bool {
-        self.state == State::Resting && self.look_ns > 0.0 && self.passed_ns * self.share >= self.look_ns
+        self.state == State::Resting && self.look_ns > 0.0 && self.passed_ns * SHARE >= self.look_ns
     }
 
     /// Remembers these boxes: the next frame is to show how far they move.
@@ -129,41 +108,11 @@ impl MotionWatch {
 mod tests {
     use super::*;
 
-    /// Time between two looks of a microsecond, in nanoseconds, where the last ones have found this.
-    fn between(looks: &[f64]) -> f64 {
-        let mut watch = MotionWatch::default();
-        looks.iter().for_each(|&moved| _ = watch.found(Some(moved), 1000.0));
-        let mut passed = 0.0;
-        while !watch.ran(&[Aabb::cube([0.0; 3], 1.0)]) {
-            watch.passed(1e4);
-            passed += 1e4;
-        }
-        passed
-    }
-
-    #[test]
-    fn it_is_looked_the_more_seldom_the_longer_boxes_move_as_before_and_often_at_once_when_they_do_not() {
-        assert_eq!([1, 2, 3, 4].map(|looks| between(&vec![0.1; looks])), [1e5, 2e5, 4e5, 8e5]);
-        assert_eq!((between(&[0.1; 9]), between(&[0.1, 0.1, 0.1, 0.2])), (1e6, 1e5));
-        // Noise of few boxes, and what is as good as still.
-        assert_eq!((between(&[0.1, 0.12]), between(&[0.0, 0.002])), (2e5, 2e5));
-    }
-
-    #[test]
-    fn where_frames_contradict_it_is_looked_as_often_as_at_first() {
-        let mut watch = MotionWatch::default();
-        (0..9).for_each(|_| _ = watch.found(Some(0.1), 1000.0));
-        watch.passed(2e5);
-        assert!(!watch.pays());
-        watch.doubt();
-        assert!(watch.pays());
-    }
-
     #[test]
     fn a_look_that_is_interrupted_puts_off_the_next_one_for_twice_as_long_at_most() {
         let mut watch = MotionWatch::default();
         [1000.0, 1e9].into_iter().for_each(|took| _ = watch.found(Some(0.1), took));
-        watch.passed(4.1e5);
+        watch.passed(2.0 * 1000.0 / SHARE + 1.0);
         assert!(watch.pays());
     }
 }

@@ -54,7 +54,6 @@ pub(super) struct Policy {
     mean_ns: Vec<f64>,
     expected: Vec<Expected>,
     predicted: Vec<Predicted>,
-    log2_objects: f64,
     view: View,
     /// The load and the frame for which that was worked out, and how much was observed by then.
     worked_out: Option<(Load, u64, u64)>,
@@ -67,8 +66,6 @@ pub(super) struct Policy {
     trials: Trials,
     /// The last frame that was timed was one of a trial.
     tried: bool,
-    /// Frames took so much more or less than expected that their load is in doubt.
-    doubts_load: bool,
     /// What a decision takes in the mean, in nanoseconds.
     decision_ns: f64,
 }
@@ -93,7 +90,6 @@ impl Policy {
             mean_ns: vec![f64::INFINITY; count],
             expected: vec![Expected { mean_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
             predicted: vec![Predicted::default(); count],
-            log2_objects: 0.0,
             view: View::default(),
             worked_out: None,
             batch: FrameBatch::default(),
@@ -102,7 +98,6 @@ impl Policy {
             decided: 0,
             trials: Trials::default(),
             tried: false,
-            doubts_load: false,
             decision_ns: 0.0,
             tuning,
             usable,
@@ -188,7 +183,9 @@ impl Policy {
             Some(settled) if self.is_avoided(settled) => (best, Reason::Sheltered),
             Some(settled) => self.settle(settled, best, frames),
         };
-        let (settled, reason) = self.after_trial(settled).map_or((settled, reason), |other| (other, Reason::Switched));
+        if self.trials.is_over() || self.trials.candidate().is_some_and(|other| self.is_avoided(other)) {
+            self.trials.stop(self.frame);
+        }
         if self.settled != Some(settled) {
             self.saved_ns.fill(0.0);
             self.settled = Some(settled);
@@ -204,18 +201,6 @@ impl Policy {
         })
     }
 
-    /// Ends a trial that is over. The one that was tried, where it is expected to be cheaper by now and keeps work, which it has made
-    /// in the trial: nothing is left to be paid for a switch.
-    fn after_trial(&mut self, settled: usize) -> Option<usize> {
-        let other = self.trials.candidate()?;
-        let avoided = self.is_avoided(other);
-        if !avoided && !self.trials.is_over() {
-            return None;
-        }
-        self.trials.stop(self.frame);
-        (self.mean_ns[other] < self.mean_ns[settled] && !avoided && self.switching.keeps(other)).then_some(other)
-    }
-
     /// Fills in what every candidate is expected to cost, where that is not known from a load that was alike.
     fn expect(&mut self, load: &Load) {
         let observed = self.learner.as_ref().map_or(0, Learner::observed);
@@ -225,7 +210,6 @@ impl Policy {
         }
         self.worked_out = Some((*load, self.frame, observed));
         let frame = Frame::new(load);
-        self.log2_objects = f64::from(load.objects.max(1)).log2();
         self.view = self.learner.as_ref().map_or_else(View::default, |l| l.view(&frame));
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
         for (k, cost) in self.tuning.costs.iter().enumerate() {
@@ -339,7 +323,7 @@ impl Policy {
         }
         self.make_room(candidate);
         let predicted = self.predicted[candidate].times(passed.over_mean);
-        self.batch.add(passed.timed, passed.ns, predicted, (self.log2_objects, &self.view));
+        self.batch.add(passed.timed, passed.ns, predicted, &self.view);
         if let Some(learner) = &mut self.learner {
             learner.waited(candidate, passed.timed, 0.0, self.frame);
         }
@@ -350,10 +334,6 @@ impl Policy {
     /// before. Whether that was so much that the next frame is to be decided on, whatever it was before.
     pub(super) fn ran(&mut self, candidate: usize, ns: f64, work: Option<FrameWork>) -> bool {
         let entered = self.ran.replace(candidate) != Some(candidate);
-        if let Some(learner) = self.learner.as_mut().filter(|_| entered && !self.switching.remembers(candidate, self.frame))
-        {
-            learner.begins(candidate);
-        }
         let rebuilt = work.is_some_and(|work| work.kind == FrameKind::Rebuilt);
         self.switching.ran(candidate, self.frame, 1, u32::from(rebuilt), work);
         self.trials.ran(candidate, 1);
@@ -388,7 +368,7 @@ impl Policy {
             let dearest_ns = if known { self.switching.rebuild_ns(candidate, expected) } else { f64::INFINITY };
             let counted_ns = ns.min(MOST_OVER * dearest_ns);
             let predicted = self.predicted[candidate].times(work.map_or(1.0, |work| work.over_mean));
-            self.batch.add(1, counted_ns, predicted, (self.log2_objects, &self.view));
+            self.batch.add(1, counted_ns, predicted, &self.view);
             learner.waited(candidate, 1, (ns - counted_ns).min(MOST_WAIT * dearest_ns), self.frame);
         }
         self.observe_full(candidate);
@@ -405,12 +385,11 @@ impl Policy {
 
     /// Makes the batch one to which frames of a candidate under the present load can be added. What was added up of others is observed.
     fn make_room(&mut self, candidate: usize) {
-        if self.batch.takes(candidate, self.log2_objects) {
+        if self.batch.takes(candidate) {
             return;
         }
         if let Some(learner) = self.learner.as_mut().filter(|_| self.batch.frames > 0) {
-            let runs_on = self.settled == Some(self.batch.candidate);
-            self.doubts_load |= !learner.observe(&self.batch, self.frame, runs_on);
+            learner.observe(&self.batch, self.frame);
         }
         self.batch = self.batch.next(candidate);
     }
@@ -419,9 +398,8 @@ impl Policy {
     fn observe_full(&mut self, candidate: usize) {
         let Some(learner) = &mut self.learner else { return };
         if self.batch.is_full() || self.batch.frames > 0 && self.trials.is_over() {
-            let believed = learner.observe(&self.batch, self.frame, self.settled == Some(candidate));
-            self.doubts_load |= !believed;
-            // What is in doubt is looked at again soon.
+            let believed = learner.observe(&self.batch, self.frame);
+            // What surprises is looked at again soon.
             self.batch = if believed { self.batch } else { FrameBatch::default() }.next(candidate);
         }
     }
@@ -432,18 +410,6 @@ impl Policy {
         if self.tried {
             self.trials.pay(ns.unwrap_or(mean_ns), true);
         }
-    }
-
-    /// How far ahead of all that share nothing with it the one is that runs: the natural logarithm of the ratio of costs. Infinite where there is no other.
-    pub(super) fn lead_ln(&self) -> f64 {
-        let Some(settled) = self.settled.filter(|_| !self.is_by_count()) else { return 0.0 };
-        let next = self.cheapest(|k| k != settled && !self.switching.share(k, settled));
-        next.map_or(f64::INFINITY, |k| (self.mean_ns[k] / self.mean_ns[settled]).ln().max(0.0))
-    }
-
-    /// Whether the load of the frames since this was asked last is in doubt.
-    pub(super) fn doubts_load(&mut self) -> bool {
-        std::mem::take(&mut self.doubts_load)
     }
 
     /// Frames of a trial until the next decision, the one that ran counted; `None` where none runs.

@@ -334,7 +334,7 @@ impl Runner {
             Decided::At(started) => Some(self.tracker.without_sample(started.elapsed().as_nanos() as f64 - ns)),
             Decided::Before | Decided::Never => None,
         };
-        self.tracker.took(decision_ns, ns, self.policy.lead_ln());
+        self.tracker.took(decision_ns, ns);
         if !stood_out {
             self.policy.decision_took(decision_ns, self.tracker.decision_ns());
         }
@@ -343,15 +343,13 @@ impl Runner {
         if began {
             self.tell();
         }
-        if self.policy.doubts_load() {
-            self.tracker.doubt(boxes);
-        }
         let trial = self.policy.trial_rests();
         if let Some(frames) = trial {
             self.tracker.rest_no_longer_than(f64::from(frames));
         }
         if dear || began && trial.is_none() || stood_out {
-            // What began in this frame is looked at once more before it may rest.
+            // What began in this frame is decided on, and gets a plan of its frame, once more before it may rest. Without, `pair-cache` in `uniform` of 800 took
+            // 1.19 times what it takes alone in place of 1.05 (n 8, one host): it has found its margin without knowing how far boxes move.
             self.tracker.wake();
         }
         self.warm_runner_up(boxes.len());

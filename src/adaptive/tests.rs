@@ -196,19 +196,6 @@ fn looked(tracker: &mut LoadTracker, frames: usize, shift: f32) {
 }
 
 #[test]
-fn a_load_in_doubt_is_sampled_before_its_time() {
-    let mut tracker = LoadTracker::default();
-    looked(&mut tracker, 5, 0.0);
-    assert_eq!(tracker.age(), 5);
-    tracker.doubt(&row(500));
-    assert!(tracker.is_due(&row(500)));
-    looked(&mut tracker, 1, 0.0);
-    assert_eq!(tracker.age(), 1);
-    looked(&mut tracker, 5, 0.0);
-    assert_eq!(tracker.age(), 6);
-}
-
-#[test]
 fn how_far_boxes_move_is_found_out_between_samples() {
     let mut tracker = LoadTracker::default();
     looked(&mut tracker, 5, 0.0);

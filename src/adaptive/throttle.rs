@@ -10,16 +10,9 @@ const MOST_FRAMES: f64 = 1024.0;
 
 /// By how much such a share rises with the [`drift`] of the number of objects since the last decision.
 pub(super) const SHARE_OF_DRIFT: f64 = 0.02;
-/// Costs of two methods grow with powers of the number of objects that differ by no more than this: a drift can't change which is cheaper before it has
-/// used up the lead.
-const POWERS_APART: f64 = 2.0;
 /// A number that differs from that of the frame before by a quarter, and by so many, is decided on at once.
 const JUMP: u32 = 4;
 const FEWEST: u32 = 16;
-/// Pairs of the frame before that differ from those at the last decision by half, and by so many, are decided on at once. Of what lies between no change and
-/// the square of that of the objects, as in a world that fills up, the drift of the objects tells already.
-const PAIRS_JUMP: f64 = 0.5;
-const FEWEST_PAIRS: f64 = 64.0;
 
 /// How far a number of objects is from another: the ratio of the greater to the less, less one.
 pub(super) fn drift(objects: u32, before: u32) -> f64 {
@@ -30,12 +23,10 @@ pub(super) fn drift(objects: u32, before: u32) -> f64 {
 /// Counts the frames until the next decision.
 #[derive(Debug, Clone, Default)]
 pub(super) struct DecisionThrottle {
-    /// Objects at the last decision and in the last frame, and frames since that decision.
+    /// Objects at the last decision, objects and pairs in the last frame, and frames since that decision.
     objects: u32,
     before: u32,
     frames: u32,
-    /// Pairs of the frame that was decided on, once that is known, and of the last frame.
-    pairs: Option<u64>,
     pairs_before: u64,
     /// Frames that need no decision where nothing changes, and whether the next one needs one for another reason.
     rest: f64,
@@ -43,8 +34,6 @@ pub(super) struct DecisionThrottle {
     /// What a decision takes, learning and the clock included.
     decision_ns: f64,
     frame_ns: f64,
-    /// How far the number of objects may drift before it tells anything.
-    slack: f64,
 }
 
 impl DecisionThrottle {
@@ -53,13 +42,7 @@ impl DecisionThrottle {
         let jumps = objects.abs_diff(self.before) > (self.before / JUMP).max(FEWEST);
         self.due
             || jumps
-            || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * self.telling(drift(objects, self.objects)))
-                >= self.rest
-    }
-
-    /// What of a drift may change which algorithm is the cheapest.
-    pub(super) fn telling(&self, drift: f64) -> f64 {
-        (drift - self.slack).max(0.0)
+            || f64::from(self.frames) * (1.0 + SHARE_OF_DRIFT / SHARE * drift(objects, self.objects)) >= self.rest
     }
 
     /// What a decision takes, without a sample, in nanoseconds.
@@ -86,22 +69,11 @@ impl DecisionThrottle {
     pub(super) fn ran(&mut self, objects: u32, pairs: u64) {
         self.frames = self.frames.saturating_add(1);
         (self.before, self.pairs_before) = (objects, pairs);
-        let decided = *self.pairs.get_or_insert(pairs);
-        if pairs != decided && self.pairs_jump(objects, pairs as f64, decided as f64) {
-            self.wake();
-        }
-    }
-
-    /// Whether so many pairs of so many objects are others than those at the last decision, beyond what the number of objects tells.
-    fn pairs_jump(&self, objects: u32, pairs: f64, decided: f64) -> bool {
-        let filled = decided * (f64::from(objects.max(1)) / f64::from(self.objects.max(1))).powi(2);
-        let off = (decided.min(filled) - pairs).max(pairs - decided.max(filled));
-        off > (PAIRS_JUMP * decided.min(filled)).max(FEWEST_PAIRS)
     }
 
     /// Begins a decision.
     pub(super) fn decide(&mut self, objects: u32) {
-        (self.objects, self.frames, self.pairs, self.due) = (objects, 0, None, false);
+        (self.objects, self.frames, self.due) = (objects, 0, false);
     }
 
     /// The next frame is to be decided on again.
@@ -114,9 +86,8 @@ impl DecisionThrottle {
         self.rest = self.rest.min(frames);
     }
 
-    /// What the decision took, where that is known, and its frame; and how far ahead the one that ran is, as the logarithm of a ratio of costs.
-    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64, lead_ln: f64) {
-        self.slack = (lead_ln / POWERS_APART).exp_m1();
+    /// What the decision took, where that is known, and its frame.
+    pub(super) fn took(&mut self, decision_ns: Option<f64>, frame_ns: f64) {
         if let Some(ns) = decision_ns {
             // The mean of late, for that is what is paid: between two frames a program needs the caches for itself, and a decision waits for memory
             // then. One that was interrupted counts for little.
@@ -125,27 +96,5 @@ impl DecisionThrottle {
         }
         self.frame_ns = frame_ns;
         self.rest = (self.decision_ns / (SHARE * frame_ns.max(1.0))).min(MOST_FRAMES).floor();
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pairs_that_the_number_of_objects_explains_call_for_no_decision() {
-        let is_due = |objects: u32, pairs: u64| {
-            let mut throttle = DecisionThrottle::default();
-            throttle.decide(1000);
-            throttle.took(Some(1e4), 1e5, f64::INFINITY);
-            throttle.ran(1000, 1000);
-            throttle.ran(objects, pairs);
-            throttle.is_due(objects)
-        };
-        // A scene that crowds, or thins out.
-        assert!(!is_due(1000, 1400) && is_due(1000, 1600) && !is_due(1000, 600) && is_due(1000, 400));
-        // One that grows has as many pairs each, or fills up.
-        assert!(!is_due(1200, 1200) && !is_due(1200, 1440) && !is_due(1200, 1900) && is_due(1200, 2000));
-        assert!(!is_due(800, 400) && is_due(800, 300) && is_due(800, 1400) && is_due(600, 0));
     }
 }
