@@ -10,7 +10,7 @@ const SHARE: f64 = 0.005;
 /// Frames' worth of that which is there at the start: one frame in which an incremental algorithm begins costs two or three.
 const AT_FIRST: f64 = 4.0;
 /// Where the objects are suddenly so many times the most so far, a level that loads, the difference is a start of its own: without it a level of 3000 boxes took
-/// 1.38 times the best single algorithm in place of 1.09 (n 4 each). A scene that grows slowly brings along what it has learned.
+/// 1.38 times the best single algorithm (n 8) in place of 1.09 (n 4). A scene that grows slowly brings along what it has learned.
 const SUDDENLY: f64 = 1.25;
 /// No more frames' worth than these are saved up: else a long rest would be followed by one trial after the other.
 const MOST: f64 = 12.0;
