@@ -8,6 +8,7 @@ mod traces;
 mod warming;
 
 use super::load_tracker::LoadTracker;
+use super::passed::{Passed, Usual};
 use super::*;
 use crate::scene::{Scenario, Scene};
 use crate::{AlgorithmCost, CostCurve, CostTerm, Term};
@@ -221,6 +222,29 @@ fn a_frame_that_stands_out_is_compared_with_the_one_before_it() {
     tracker.decide(&at(2));
     let moved = tracker.moved().unwrap();
     assert!((moved - 0.25).abs() < 0.01, "{moved}");
+}
+
+#[test]
+fn frames_that_are_off_let_the_next_ones_show_how_far_boxes_move() {
+    let at = |k: u32| -> Vec<Aabb> {
+        let by = |x: f32| x + 0.25 * k as f32;
+        row(500).iter().map(|b| Aabb::new(b.min.map(by), b.max.map(by))).collect()
+    };
+    let moved = |is_off: bool| {
+        let mut tracker = LoadTracker::default();
+        // A microsecond each, which pays for no look but the first.
+        let frame = |tracker: &mut LoadTracker, k: u32| {
+            tracker.decide(&at(k));
+            tracker.ran(&at(k), 100, 1000.0);
+        };
+        (0..5).for_each(|_| frame(&mut tracker, 0));
+        let mut passed = Passed::expecting(Usual { mean_ns: 1000.0, most_ns: 9000.0 });
+        (0..8).for_each(|_| passed.add(None, Some(if is_off { 2000.0 } else { 1000.0 })));
+        tracker.passes(&at(0), 100, &passed);
+        (1..4).for_each(|k| frame(&mut tracker, k));
+        tracker.moved().unwrap()
+    };
+    assert!(moved(false) == 0.0 && moved(true) > 0.2, "{} {}", moved(false), moved(true));
 }
 
 #[test]
