@@ -8,6 +8,7 @@ mod measurement;
 mod parameter;
 mod plausible;
 mod statistic;
+mod unit;
 
 pub use error::HardwareError;
 pub use figure::{How, Parameter};
@@ -16,6 +17,7 @@ pub use gpu::{GpuGroup, GpuHardware, GpuIdentity, GpuKind};
 pub use measurement::Measurement;
 pub use parameter::{Bounds, GpuParameterId, ParameterId, Quantity};
 pub use statistic::Statistic;
+pub use unit::with_unit;
 
 /// What is known about a machine: who made it, and a list of parameters, each with where it came from.
 #[derive(Debug, Clone, PartialEq)]

@@ -50,7 +50,6 @@ mod synthetic;
 pub mod text;
 mod train;
 mod training;
-pub mod units;
 pub mod write;
 
 pub use report::Report;

@@ -2,8 +2,8 @@
 
 use crate::label_text::kind;
 use crate::text::count;
-use crate::units;
 use crate::{Regrets, Split, Training, Validation};
+use sapwise::hardware::with_unit;
 use sapwise::model::MethodModel;
 use sapwise::{BackendClass, Model};
 
@@ -98,7 +98,7 @@ pub fn page(model: &Model, training: &Training, notes: &[String]) -> String {
     let mut rows = vec![["parameter", "lowest", "highest"].map(str::to_owned).to_vec()];
     for range in &model.ranges {
         let name = range.parameter.to_string();
-        let [lowest, highest] = [range.min, range.max].map(|value| units::value(&name, value));
+        let [lowest, highest] = [range.min, range.max].map(|value| with_unit(&name, value));
         rows.push(vec![name, lowest, highest]);
     }
     text.push_str(&markdown(&rows));

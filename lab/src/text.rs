@@ -36,19 +36,6 @@ pub fn duration(ns: f64) -> String {
     }
 }
 
-/// Bytes with a binary unit.
-pub fn bytes(count: f64) -> String {
-    let units = ["B", "KiB", "MiB", "GiB", "TiB"];
-    let mut value = count;
-    let mut unit = 0;
-    while value >= 1024.0 && unit + 1 < units.len() {
-        value /= 1024.0;
-        unit += 1;
-    }
-    let decimals = usize::from(value < 100.0 && unit > 0 && value.fract() != 0.0);
-    format!("{value:.decimals$} {}", units[unit])
-}
-
 /// A whole number with a blank between groups of three digits.
 pub fn grouped(number: u64) -> String {
     let digits = number.to_string();
@@ -81,9 +68,6 @@ mod tests {
     fn figures_have_readable_units() {
         assert_eq!(duration(512.4), "512 ns");
         assert_eq!(duration(1_234_567.0), "1.23 ms");
-        assert_eq!(bytes(49152.0), "48 KiB");
-        assert_eq!(bytes(1.5 * 1024.0 * 1024.0), "1.5 MiB");
-        assert_eq!(bytes(12.0), "12 B");
         assert_eq!(grouped(1_000_000), "1 000 000");
         assert_eq!(grouped(12), "12");
     }

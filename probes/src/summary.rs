@@ -4,13 +4,13 @@ use crate::gpus::GpuChoice;
 use crate::prediction::is_whole_slice;
 use crate::shell;
 use crate::terminal::Terminal;
+use sapwise::hardware::with_unit;
 use sapwise::{Backend, Crossover, GpuHardware, GpuIdentity, Hardware, How, Model, Parameter, Tuning};
 use sapwise_lab::data::usual_scenario;
 use sapwise_lab::fit::measured_tuning;
 use sapwise_lab::label_text;
 use sapwise_lab::report::{Label, Report};
 use sapwise_lab::text::{columns, count, duration, grouped};
-use sapwise_lab::units::value;
 use std::path::Path;
 
 /// The hardware, then the tuning of every scenario that was swept.
@@ -106,7 +106,7 @@ fn parameters(parameters: &[Parameter], terminal: Terminal) -> String {
             How::Missing => format!("missing: {}", p.source),
             _ => p.how.to_string(),
         };
-        rows.push(vec![name, p.value.map_or("-".to_owned(), |v| value(&p.name, v)), spread, how]);
+        rows.push(vec![name, p.value.map_or("-".to_owned(), |v| with_unit(&p.name, v)), spread, how]);
     }
     terminal.table(&rows)
 }

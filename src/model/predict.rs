@@ -2,7 +2,7 @@
 
 use super::gpu_set::GpuSet;
 use super::{GPU_PREFIX, MethodModel, Model, PredictError, Range};
-use crate::hardware::{GpuKind, Hardware};
+use crate::hardware::{GpuKind, Hardware, with_unit};
 use crate::stats::NORMAL_90;
 use crate::{AlgorithmCost, AlgorithmId, Backend, BackendClass, Entry, Fallback, GpuHardware, Load, Source, Tuning, Work};
 use std::sync::Arc;
@@ -232,8 +232,10 @@ impl Range {
     /// would count as outside.
     fn excess(&self, name: &str, of: &str, value: Option<f64>) -> Option<String> {
         let value = value?;
-        (value < self.min / 1.1 || value > self.max * 1.1)
-            .then(|| format!("{name}{of} is {value:.4}, outside the {:.4} to {:.4} of training", self.min, self.max))
+        (value < self.min / 1.1 || value > self.max * 1.1).then(|| {
+            let [value, least, most] = [value, self.min, self.max].map(|figure| with_unit(name, figure));
+            format!("{name}{of} is {value}, outside the {least} to {most} of training")
+        })
     }
 }
 

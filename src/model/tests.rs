@@ -147,7 +147,7 @@ fn what_a_gpu_lacks_is_told_and_costs_its_algorithms_only() {
     for text in [
         "brute@gpu2 is left out: the hardware holds no gpu2",
         "not trained on it: sap@gpu0, brute@cpu1",
-        "copy_gb_per_s of gpu0 is 500.0000, outside",
+        "copy_gb_per_s of gpu0 is 500.0 GB/s, outside",
         "brute@gpu0+1: the model has seen 1 GPUs at most",
         "gpu0+1: how these GPUs work together was not measured",
     ] {

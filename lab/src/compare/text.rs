@@ -4,7 +4,7 @@ use super::{Comparison, CrossoverSpread, ParameterSpread};
 use crate::spread;
 use crate::steadiness::Steadiness;
 use crate::text::{count, grouped};
-use crate::units;
+use sapwise::hardware::with_unit;
 
 impl Comparison {
     /// The comparison in words and in tables that `draw` draws from rows, the first of which is the head.
@@ -69,7 +69,7 @@ fn parameter(s: &ParameterSpread) -> Vec<String> {
     let over = |v: f64| if s.median == 0.0 { "-".to_owned() } else { format!("{:.3}", v / s.median) };
     vec![
         s.name.clone(),
-        units::value(&s.name, s.median),
+        with_unit(&s.name, s.median),
         s.dispersion.map_or("-".to_owned(), percent),
         format!("{} to {}", over(s.low), over(s.high)),
     ]

@@ -4,8 +4,7 @@ use super::entry::Entry;
 use crate::data::{COMPARED, COMPARED_OF_GPUS};
 use crate::data_table::{Cell, Column, DataTable};
 use crate::label_text::kind;
-use sapwise::hardware::GpuParameterId;
-use sapwise::hardware::How;
+use sapwise::hardware::{GpuParameterId, How, with_unit};
 use sapwise::{GpuHardware, Parameter};
 
 /// Letters of a value that is sound, at most.
@@ -117,7 +116,7 @@ fn cell(id: impl AsRef<str>, parameters: &[Parameter]) -> Cell {
     match parameters.iter().find(|p| p.name == name) {
         None => Cell::Missing("the report does not have it".to_owned()),
         Some(Parameter { value: Some(value), .. }) => {
-            let shown = crate::units::value(name, *value);
+            let shown = with_unit(name, *value);
             // A value that can't be, such as 1e300, has hundreds of digits.
             let shown = if shown.len() > MOST_LETTERS { format!("{value:e}") } else { shown };
             Cell::Number { value: *value, shown }

@@ -1,7 +1,7 @@
 //! Figures of a report that are impossible, doubtful or suspicious.
 
 use crate::date;
-use sapwise::hardware::ParameterId;
+use sapwise::hardware::{ParameterId, with_unit};
 use sapwise::measure::Watch;
 use sapwise::stats::median;
 use sapwise::{GpuHardware, Hardware, How, Parameter, SimdLevel};
@@ -244,7 +244,10 @@ fn contradictions(hardware: &Hardware) -> Vec<String> {
     ];
     let contradicts = |&(a, b, factor): &(ParameterId, ParameterId, f64)| {
         let (x, y) = (hardware.value(a)?, hardware.value(b)?);
-        (x > y * factor).then(|| format!("{a} is {x} and {b} is {y}: one of them may be in another unit"))
+        (x > y * factor).then(|| {
+            let (x, y) = (with_unit(a.as_str(), x), with_unit(b.as_str(), y));
+            format!("{a} is {x} and {b} is {y}: one of them may be in another unit")
+        })
     };
     most.iter().filter_map(contradicts).collect()
 }

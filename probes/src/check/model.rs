@@ -2,8 +2,8 @@
 
 use super::{Finding, Here};
 use crate::revisions;
+use sapwise::hardware::with_unit;
 use sapwise::measure::{self, Family, Options};
-use sapwise::model::Range;
 use sapwise::{BackendClass, How, Model, Parameter, usable_cores};
 use sapwise_lab::StoredModel;
 
@@ -46,8 +46,9 @@ fn outside(model: &Model) -> Vec<String> {
         let Some(value) = reported.and_then(|p| p.value) else { continue };
         // The same tolerance as that of a prediction.
         if value < range.min / 1.1 || value > range.max * 1.1 {
-            let Range { parameter, min, max } = range;
-            notes.push(format!("extrapolates: {parameter} is {value}, in training it was {min} to {max}"));
+            let parameter = &range.parameter;
+            let [value, least, most] = [value, range.min, range.max].map(|figure| with_unit(parameter, figure));
+            notes.push(format!("extrapolates: {parameter} is {value}, in training it was {least} to {most}"));
         }
     }
     notes

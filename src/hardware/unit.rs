@@ -1,0 +1,62 @@
+//! Figures of hardware parameters with their units.
+
+use super::GpuParameterId;
+
+/// A figure as people read it, rounded and with the unit that the end of its parameter's name says.
+#[must_use]
+pub fn with_unit(name: &str, value: f64) -> String {
+    match name {
+        _ if name.ends_with("_gb_per_s") => format!("{value:.1} GB/s"),
+        _ if name.ends_with("_gflop_per_s") => format!("{value:.0} GFLOP/s"),
+        _ if name.ends_with("_g_per_s") => format!("{value:.2} G/s"),
+        _ if name == GpuParameterId::UnifiedMemory.as_str() => if value > 0.0 { "yes" } else { "no" }.to_owned(),
+        _ if name.ends_with("_bytes") => bytes(value),
+        _ if name.ends_with("_ghz") => format!("{value:.2} GHz"),
+        _ if name.ends_with("_ns") => nanoseconds(value),
+        _ if name.ends_with("_ratio") => format!("{value:.2} x"),
+        _ => format!("{value}"),
+    }
+}
+
+fn nanoseconds(ns: f64) -> String {
+    match ns {
+        _ if ns < 1e3 => format!("{ns:.1} ns"),
+        _ if ns < 1e6 => format!("{:.2} us", ns / 1e3),
+        _ if ns < 1e9 => format!("{:.2} ms", ns / 1e6),
+        _ => format!("{:.2} s", ns / 1e9),
+    }
+}
+
+/// Bytes with a binary unit.
+fn bytes(count: f64) -> String {
+    let units = ["B", "KiB", "MiB", "GiB", "TiB"];
+    let mut value = count;
+    let mut unit = 0;
+    while value >= 1024.0 && unit + 1 < units.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    let decimals = usize::from(value < 100.0 && unit > 0 && value.fract() != 0.0);
+    format!("{value:.decimals$} {}", units[unit])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_have_the_unit_of_their_name() {
+        assert_eq!(with_unit("cache_l2_bytes", 2_097_152.0), "2 MiB");
+        assert_eq!(with_unit("cache_l1d_bytes", 49152.0), "48 KiB");
+        assert_eq!(with_unit("cache_llc_bytes", 1.5 * 1024.0 * 1024.0), "1.5 MiB");
+        assert_eq!(with_unit("cache_llc_bytes", 12.0), "12 B");
+        assert_eq!(with_unit("bandwidth_one_thread_gb_per_s", 12.345), "12.3 GB/s");
+        assert_eq!(with_unit("latency_16_kib_ns", 1.26), "1.3 ns");
+        assert_eq!(with_unit("fork_join_cold_ns", 12_500.0), "12.50 us");
+        assert_eq!(with_unit("scaling_two_threads_ratio", 1.9), "1.90 x");
+        assert_eq!(with_unit("usable_cores", 2.0), "2");
+        assert_eq!(with_unit("arithmetic_gflop_per_s", 51_234.5), "51234 GFLOP/s");
+        assert_eq!(with_unit("atomic_g_per_s", 0.25), "0.25 G/s");
+        assert_eq!(with_unit("unified_memory", 1.0), "yes");
+    }
+}
