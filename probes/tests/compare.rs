@@ -81,6 +81,8 @@ fn compare_tells_how_well_reports_agree_and_refuses_what_can_not_be_compared() {
 
     let refused = |paths: &[&PathBuf]| failure(sapwise().arg("compare").args(paths), 1);
     assert!(refused(&[&alike[0]]).contains("two or more"));
+    let complaint = refused(&[&alike[0], &alike[1], &folder.join(".").join("a.json")]);
+    assert!(complaint.contains("a.json is given twice"), "{complaint}");
     let complaint = refused(&[&alike[0], &other]);
     assert!(complaint.contains("other.json and a.json differ in the physical machine"), "{complaint}");
     assert!(refused(&[&alike[0], &folder.join("absent.json")]).contains("absent.json"));

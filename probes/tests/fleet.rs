@@ -73,6 +73,8 @@ fn a_fleet_is_told_in_a_table_with_whoever_failed_in_it() {
     assert!(told.contains("2 of 2 nodes can be believed") && told.contains("Kind 1: ") && told.contains("1.00"), "{told}");
     let told = failure_text(fleet().args(["--nodes", "3"]));
     assert!(told.contains("2 of 3 nodes can be believed; 1 left no report"), "{told}");
+    let complaint = failure(fleet().arg(at("a.json")), 1);
+    assert!(complaint.contains("a.json is given twice"), "{complaint}");
     change(&at("a.json"), |report| {
         let samples = report.points.iter_mut().flat_map(|p| &mut p.timings).flat_map(|t| &mut t.samples_ns);
         samples.for_each(|ns| *ns *= 2);
@@ -81,6 +83,7 @@ fn a_fleet_is_told_in_a_table_with_whoever_failed_in_it() {
     fs::write(at("d.json.unfinished"), "{").unwrap();
     let told = failure_text(&mut fleet());
     assert!(told.contains("1 of 4 nodes can be believed"), "{told}");
+    assert!(told.contains("Not to be believed: a.json, d.json.unfinished, c.json; take"), "{told}");
     let row =
         |name: &str| told.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{name}: {told}")).to_owned();
     assert!(row("a.json").contains("slow: it takes 2.00"), "{told}");

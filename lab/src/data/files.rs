@@ -81,9 +81,10 @@ fn without_indices(place: &str) -> String {
 /// The reports with their file names, of files and of the `*.json` files of folders, in the order of their names.
 ///
 /// # Errors
-/// As [`report_files`] and [`read_report`]; when the user asked to stop.
+/// As [`report_files`], [`refuse_twice`] and [`read_report`]; when the user asked to stop.
 pub fn read_reports(paths: &[PathBuf], progress: &dyn Progress) -> anyhow::Result<Vec<(String, Report)>> {
     let files = report_files(paths)?;
+    refuse_twice(&files)?;
     progress.start(files.len() as u64);
     progress.message("reading");
     let read = |file: &PathBuf| {
@@ -113,6 +114,17 @@ pub fn report_files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
         }
     }
     Ok(files)
+}
+
+/// Refuses a file that is given twice, under whatever name: it agrees with itself, and would count for two measurements.
+///
+/// # Errors
+/// Names the file.
+pub fn refuse_twice(files: &[PathBuf]) -> anyhow::Result<()> {
+    let mut seen = BTreeSet::new();
+    // What can't be found is told where it is read.
+    let twice = files.iter().find(|file| file.canonicalize().is_ok_and(|place| !seen.insert(place)));
+    twice.map_or(Ok(()), |file| bail!("{} is given twice; name each file once", file.display()))
 }
 
 /// A report with the name of its file. `warn` is that of [`read_document`].

@@ -7,7 +7,7 @@ use crate::destination::UNFINISHED;
 use crate::exit::Outcome;
 use crate::terminal::Terminal;
 use crate::{output, shell};
-use sapwise_lab::data::{read_report, report_files};
+use sapwise_lab::data::{read_report, refuse_twice, report_files};
 use sapwise_lab::fleet::{Fleet, Kind};
 use sapwise_lab::report::Report;
 use sapwise_lab::text::count;
@@ -41,6 +41,7 @@ pub(crate) fn run(arguments: &args::Fleet, algorithms: &Algorithms) -> anyhow::R
     // A folder where every node has failed holds no report at all.
     let files =
         report_files(&arguments.reports).or_else(|why| if unfinished.is_empty() { Err(why) } else { Ok(Vec::new()) })?;
+    refuse_twice(&files)?;
     for file in unfinished {
         fail(&file, "unfinished: the node failed, its job was ended, or it measures still".to_owned());
     }
@@ -70,11 +71,23 @@ pub(crate) fn run(arguments: &args::Fleet, algorithms: &Algorithms) -> anyhow::R
         text += &if bad + missing == 0 {
             format!("Next: sapwise train {} --out model.json", paths.join(" "))
         } else {
-            "Next: measure the others again; what is complete is kept".to_owned()
+            let bad = bad_files(&answer);
+            let apart = if bad.is_empty() {
+                String::new()
+            } else {
+                format!("Not to be believed: {}; take these files away before `sapwise train`.\n", bad.join(", "))
+            };
+            format!("{apart}Next: measure on those nodes again; what is complete is kept")
         };
         output::print(&text)?;
     }
     Ok(if bad + missing == 0 { Outcome::Done } else { Outcome::Failed })
+}
+
+/// The names of the files that can't be believed, in the order of the table.
+fn bad_files(answer: &Answer) -> Vec<&str> {
+    let nodes = answer.fleet.nodes.iter().filter(|node| node.problem.is_some()).map(|node| node.file.as_str());
+    nodes.chain(answer.failed.iter().map(|failed| failed.file.as_str())).collect()
 }
 
 /// What nodes have left in folders that did not finish, but for those that have a report of before.
