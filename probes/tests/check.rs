@@ -75,6 +75,10 @@ fn sound_files_pass() {
     let report = write(folder.path(), "report.json", report().to_string());
     let steps = json!([{"from_objects": 0, "algorithm": "brute@cpu1"}]);
     let tuning = write(folder.path(), "tuning.json", tuning(&steps).to_string());
+    let again = write(folder.path(), "again.json", fs::read(&report).unwrap());
+    let told = success(sapwise().arg("check").args([&report, &tuning, &again]));
+    let next = format!("Next: sapwise study {} {} --out study", report.display(), again.display());
+    assert!(told.contains(&next), "{told}");
     let (status, findings) = check(&[report, tuning]);
     assert_eq!(status, 0, "{findings:?}");
     assert!(findings.iter().all(|f| f["sound"] == true && f["current"] == true), "{findings:?}");
@@ -291,15 +295,29 @@ fn doubtful_and_suspicious_figures_are_told_and_the_file_stays_sound() {
     let cases: Vec<Case> = vec![
         ("/points", loaded, "over 5 % of the CPU at 2 of 4 points (50 %)"),
         ("/hardware/parameters/5/dispersion", 0.5.into(), "dispersion over 20 %: bandwidth_one_thread_gb_per_s (50 %)"),
-        ("/hardware/parameters/3/value", 3e6.into(), "one of them may be in another unit"),
+        (
+            "/remarks",
+            json!(["interrupted after uniform at 10 objects; the rest is missing"]),
+            "it was cut short: interrupted after uniform",
+        ),
+        (
+            "/hardware/parameters/3/value",
+            3e6.into(),
+            "cache_l1d_bytes is 2.9 MiB and cache_l2_bytes is 1 MiB: one of them may be in another unit",
+        ),
         ("/provenance/restriction/proof/0/shows", false.into(), "the restriction threads does not show: usable_cores is 64"),
         ("/provenance/date", "9999-01-01".into(), "its date is to come"),
     ];
     for ((pointer, value, text), finding) in cases.iter().zip(damaged(&cases)) {
         assert_eq!(finding["problems"], json!([]), "{pointer} as {value}");
-        let kind = if *pointer == "/points" { "doubts" } else { "notes" };
+        let kind = if ["/points", "/remarks"].contains(pointer) { "doubts" } else { "notes" };
         assert!(finding[kind].to_string().contains(text), "{pointer} as {value}: {finding}");
     }
+        assert_eq!(
+            finding.to_string().matches("interrupted after").count(),
+            usize::from(*pointer == "/remarks"),
+            "{finding}"
+        );
     // A disturbed measurement of one thread makes several look better than they are.
     let impossible = |k: usize| {
         let mut parameters = measured()["hardware"]["parameters"].clone();

@@ -203,7 +203,13 @@ impl Report {
     /// Whether it was cut short, as its remarks say.
     #[must_use]
     pub fn is_unfinished(&self) -> bool {
-        self.remarks.iter().any(|r| r.starts_with("unfinished") || r.starts_with("interrupted"))
+        self.remarks.iter().any(|remark| Self::is_cut_short(remark))
+    }
+
+    /// Whether a remark says that the measurement was cut short.
+    #[must_use]
+    pub fn is_cut_short(remark: &str) -> bool {
+        remark.starts_with("unfinished") || remark.starts_with("interrupted")
     }
 
     /// The share of the CPU, 0 to 1, that other programs took at half of the points, or of the parameters where there are no points. `None` where it

@@ -96,6 +96,11 @@ impl Here {
 }
 
 impl Finding {
+    /// The name of the schema without its version: `report`.
+    pub(crate) fn kind(&self) -> Option<&'static str> {
+        self.schema.and_then(|schema| schema.split('/').next())
+    }
+
     fn set_current(&mut self, stale: Vec<String>, remedy: &str) {
         self.current = Some(stale.is_empty());
         self.problems.extend(stale.into_iter().map(|s| format!("stale: {s}; {remedy}")));

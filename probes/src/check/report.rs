@@ -46,7 +46,8 @@ impl Here {
         finding.doubts.extend(figures::doubts(report));
         finding.notes.extend(figures::suspicious(report));
         let not_shown = report.provenance.restriction.as_ref().map_or(Vec::new(), restriction::not_shown);
-        finding.notes.extend(report.remarks.iter().filter(|r| !not_shown.contains(r)).map(|r| format!("remark: {r}")));
+        let told = |remark: &&String| Report::is_cut_short(remark) || not_shown.contains(remark);
+        finding.notes.extend(report.remarks.iter().filter(|r| !told(r)).map(|r| format!("remark: {r}")));
         finding.notes.extend(not_shown);
     }
 

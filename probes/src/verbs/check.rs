@@ -38,22 +38,29 @@ pub(crate) fn run(arguments: &Check, algorithms: &Algorithms) -> anyhow::Result<
     Ok(if failed { Outcome::Failed } else { Outcome::Done })
 }
 
-/// The next command to try: for the first file with a problem, else for the first of all.
+/// The next command to try: for the files with problems, else for all files of the kind of the first.
 fn next_step(files: &[Finding]) -> String {
-    let bad = files.iter().find(|f| !f.problems.is_empty());
-    let Some(file) = bad.or(files.first()) else { return "sapwise predict".to_owned() };
-    let (name, schema) = (shell::quoted(&file.file), file.schema.unwrap_or(""));
-    if file.problems.iter().any(|p| p.contains("`sapwise convert")) {
-        return format!("sapwise convert {name} --out converted");
+    let is_bad = |f: &&Finding| !f.problems.is_empty();
+    let is_old = |f: &&Finding| f.problems.iter().any(|p| p.contains("`sapwise convert"));
+    if files.iter().any(|f| is_old(&f)) {
+        return format!("sapwise convert {} --out converted", names(files.iter().filter(is_old)));
     }
-    match (bad.is_some(), schema.split('/').next()) {
+    let bad = files.iter().find(is_bad);
+    let Some(file) = bad.or(files.first()) else { return "sapwise predict".to_owned() };
+    let (name, kind) = (shell::quoted(&file.file), file.kind());
+    match (bad.is_some(), kind) {
         (true, Some("model")) => "sapwise predict".to_owned(),
         (true, Some("tuning")) => "sapwise predict --out tuning.json".to_owned(),
         (true, _) => "sapwise probe --out report.json".to_owned(),
         (false, Some("model")) => format!("sapwise predict --model {name}"),
         (false, Some("tuning")) => format!("sapwise run fragmentation --tuning {name}"),
-        (false, _) => format!("sapwise study {name} --out study"),
+        (false, _) => format!("sapwise study {} --out study", names(files.iter().filter(|f| f.kind() == kind))),
     }
+}
+
+/// The files as words of a command.
+fn names<'a>(files: impl Iterator<Item = &'a Finding>) -> String {
+    files.map(|f| shell::quoted(&f.file)).collect::<Vec<_>>().join(" ")
 }
 
 fn text(finding: &Finding, terminal: Terminal) -> String {
