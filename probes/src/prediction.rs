@@ -74,6 +74,11 @@ impl Slice {
     }
 }
 
+/// Puts a sentence in the place of the library's advice for a machine unlike those of training, where `predict --samples` is not what helps.
+pub(crate) fn advise(tuning: &mut Tuning, instead: &str) {
+    tuning.warnings.iter_mut().filter(|w| *w == ASK).for_each(|w| instead.clone_into(w));
+}
+
 /// The model in a file, or the one that is built in, with what training says of it.
 ///
 /// # Errors
@@ -206,5 +211,13 @@ mod tests {
         assert!(Slice::as_far_as_known(Scenario::Uniform, known.clone(), Ok(())).unwrap().cut.is_none());
         assert!(Slice::as_far_as_known(Scenario::Uniform, Vec::new(), short()).is_err());
         assert!(Slice::as_far_as_known(Scenario::Uniform, known, Err(anyhow::anyhow!("interrupted"))).is_err());
+    }
+
+    #[test]
+    fn the_advice_of_the_library_is_replaced_and_no_other_warning() {
+        let mut tuning = Tuning::usual(&Registry::with_cores(1));
+        tuning.warnings = vec!["left out".to_owned(), ASK.to_owned()];
+        advise(&mut tuning, "measure it");
+        assert_eq!(tuning.warnings, ["left out", "measure it"]);
     }
 }

@@ -105,7 +105,13 @@ pub(super) fn of_report(
         let gpus = report.hardware.gpus.iter().map(|g| g.gpu.clone());
         let taken: Vec<_> = gpus.filter(|g| arguments.gpus.takes(g)).collect();
         let slice = Slice::of(arguments.scenario.unwrap_or(Scenario::Uniform))?;
-        prediction::predict(model, &report.hardware, &taken, &slice, algorithms)?
+        let mut tuning = prediction::predict(model, &report.hardware, &taken, &slice, algorithms)?;
+        // No sample is taken of it: it may be another machine than this one.
+        prediction::advise(
+            &mut tuning,
+            "the machine of the report is unlike those of training: predict with --measured from a report that `sapwise probe` has made there",
+        );
+        tuning
     };
     // What a model predicts does not rest on the timings of the report.
     if arguments.measured {

@@ -74,6 +74,11 @@ pub(super) fn predicted(arguments: &Run, algorithms: &Algorithms) -> anyhow::Res
         0 => (prediction::predict(&model.model, &hardware, usable, &slice, algorithms)?, false),
         most => prediction::predict_and_sample(&model.model, &hardware, usable, &slice, algorithms, most)?,
     };
+    prediction::advise(
+        &mut tuning,
+        "this machine is unlike those of training: correct the prediction with --samples 8, or measure everything with `sapwise probe --out R.json` \
+         and give that report with --tuning",
+    );
     tuning.warnings.extend(measured.remarks);
     Ok(Origin { tuning, from: OriginKind::Prediction, other_machine: None, wrong })
 }
