@@ -26,6 +26,11 @@ pub fn count(number: usize, thing: &str) -> String {
     format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
 }
 
+/// As [`count`], of a number that may be large.
+pub fn grouped_count(number: usize, thing: &str) -> String {
+    format!("{} {thing}{}", grouped(number as u64), if number == 1 { "" } else { "s" })
+}
+
 /// Nanoseconds with the unit that keeps one to three digits before the point.
 pub fn duration(ns: f64) -> String {
     match ns {
@@ -62,6 +67,7 @@ mod tests {
     #[test]
     fn one_thing_has_no_plural() {
         assert_eq!([0, 1, 2].map(|k| count(k, "repeat")), ["0 repeats", "1 repeat", "2 repeats"]);
+        assert_eq!([1, 20_000].map(|k| grouped_count(k, "object")), ["1 object", "20 000 objects"]);
     }
 
     #[test]

@@ -91,6 +91,9 @@ fn a_run_tells_its_figures_by_parts() {
     {
         assert!(text.contains(needed), "{needed}: {text}");
     }
+    assert!(!text.contains(" 0.00 ms"), "{text}");
+    let text = success(&mut run("uniform", &tuning, &["--objects", "1", "--frames", "1", "--repeats", "1"]));
+    assert!(text.starts_with("uniform, 1 frame of 1 object, medians of 1 repeat"), "{text}");
 }
 
 #[test]
@@ -143,6 +146,8 @@ fn every_frame_is_traced_and_drawn() {
         let text =
             success(run("fragmentation", &tuning, &words).arg("--trace").arg(file(trace)).arg("--plot").arg(file(plot)));
         assert!(text.contains(trace) && text.contains(plot), "{text}");
+        // Two of five methods ran, and one more at most is the fastest on a number of threads.
+        assert!(text.contains("Not in the picture: ") && text.contains("it shows the algorithms that ran"), "{text}");
     };
     both("a.csv", "a.svg");
     both("b.csv", "a.png");
@@ -150,7 +155,12 @@ fn every_frame_is_traced_and_drawn() {
     assert_eq!(csv.lines().count(), 13);
     assert!(csv.starts_with("frame,objects,") && csv.lines().nth(1).unwrap().contains("brute@cpu1"), "{csv}");
     let svg = fs::read_to_string(file("a.svg")).unwrap();
-    for needed in ["brute@cpu1: ran in ", "Made by: sapwise run fragmentation --tuning steps.json", "written by hand"] {
+    for needed in [
+        "brute@cpu1: ran in ",
+        "Made by: sapwise run fragmentation --tuning steps.json",
+        "written by hand",
+        "Not in the picture: ",
+    ] {
         assert!(svg.contains(needed), "{needed}");
     }
     // The folder is of this machine alone.

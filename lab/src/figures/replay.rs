@@ -161,6 +161,14 @@ impl ReplayPicture {
         all.into_iter().filter(|p| !alone || !p.shown.is_empty()).collect()
     }
 
+    /// The algorithms that no panel shows: they ran in few frames or in none, and others on as many threads or GPUs are faster.
+    #[must_use]
+    pub fn not_drawn(&self) -> Vec<&AlgorithmId> {
+        let panels = self.panels();
+        let is_shown = |k: &usize| panels.iter().any(|panel| panel.shown.contains(k));
+        (0..self.algorithms.len()).filter(|k| !is_shown(k)).map(|k| &self.algorithms[k]).collect()
+    }
+
     fn legend(&self, panel: &Panel, width: i32) -> Legend {
         let counts = self.frames_run();
         let entry = |(at, &k): (usize, &usize)| {

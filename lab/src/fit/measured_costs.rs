@@ -7,6 +7,7 @@ use crate::fit::model::model;
 use crate::fit::rows::{Row, rows};
 use crate::paired::{PairedComparison, PairedSamples};
 use crate::report::{Label, Point, Report};
+use crate::text::count;
 use anyhow::{Result, bail};
 use sapwise::hardware::{GpuParameterId, ParameterId, Quantity};
 use sapwise::{AlgorithmCost, AlgorithmId, Crossover, Entry, Hardware, Load, Model, Observed, Parameter, Source, Tuning};
@@ -87,7 +88,7 @@ pub fn measured_costs_over(profile: &Profile, base: Option<&Model>) -> (Vec<Algo
     costs.sort_by_key(|c| profile.position(&c.algorithm));
     let lacking = profile.algorithms.iter().enumerate().filter(|(_, t)| costs.iter().all(|c| c.algorithm != t.id));
     let warning = |(k, timed): (usize, &crate::report::Timed)| match points(k) {
-        few if few < FEWEST_POINTS => format!("{} has no cost: it was timed at {few} points only", timed.id),
+        few if few < FEWEST_POINTS => format!("{} has no cost: it was timed at {} only", timed.id, count(few, "point")),
         _ => format!("{} has no cost: no term explains its time", timed.id),
     };
     let warnings = lacking.map(warning).collect();

@@ -25,8 +25,10 @@ pub(crate) struct Swing {
 impl Swing {
     /// Objects of a frame where there are at most so many: a straight line in their logarithm, up and down.
     fn objects(self, at: usize, most: usize) -> usize {
-        let half = (self.frames.max(2) - 1) as f64 / 2.0;
-        let share = (1.0 - (at as f64 - half).abs() / half).clamp(0.0, 1.0);
+        let last = self.frames.saturating_sub(1);
+        // Of an even number of frames the two in the middle have all: halfway between them no frame would.
+        let steps = (last / 2).max(1);
+        let share = at.min(last.saturating_sub(at)) as f64 / steps as f64;
         let (low, high) = ((self.least.max(1) as f64).ln(), (most.max(1) as f64).ln());
         ((low + share * (high - low)).exp().round() as usize).min(most)
     }
@@ -127,6 +129,10 @@ mod tests {
         }
         assert_eq!([counts[0], counts[10], counts[20], counts[30], counts[40]], [10, 100, 1000, 100, 10]);
         assert!(counts[..21].is_sorted() && counts[20..].is_sorted_by(|a, b| a >= b));
+        let even = Swing { least: 10, frames: 6 };
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|at| even.objects(at, 1000)), [10, 100, 1000, 1000, 100, 10]);
+        let short = [1, 2].map(|frames| Swing { least: 10, frames }.objects(frames - 1, 1000));
+        assert_eq!(short, [10, 10]);
     }
 
     #[test]

@@ -14,6 +14,7 @@ use crate::{interrupt, output, outputs};
 use anyhow::{Context, bail};
 use sapwise::usable_cores;
 use sapwise_lab::figures::Figure;
+use sapwise_lab::text::count;
 use sapwise_lab::write::write_atomically;
 use sapwise_scenes::{Frames, Scenario};
 use std::ops::Range;
@@ -64,14 +65,17 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     if let Some(path) = &arguments.trace {
         write_trace(path, &outcome)?;
     }
+    let mut not_drawn = None;
     if let Some((path, format)) = plot {
-        let drawn = picture(&settings, &outcome).draw(format, &text::caption(arguments, &answer, &origin))?;
+        let picture = picture(&settings, &outcome);
+        not_drawn = text::not_drawn(&picture);
+        let drawn = picture.draw(format, &text::caption(arguments, &answer, &origin, not_drawn.as_deref()))?;
         write_atomically(path, |out| Ok(out.write_all(&drawn)?))?;
     }
     if arguments.json {
         output::print_json(&answer)?;
     } else {
-        output::print(&text::text(arguments, &answer, &origin, Terminal::of_standard_output()))?;
+        output::print(&text::text(arguments, &answer, &origin, not_drawn.as_deref(), Terminal::of_standard_output()))?;
     }
     Ok(if outcome.interrupted || origin.wrong { Outcome::Failed } else { Outcome::Done })
 }
@@ -102,7 +106,11 @@ fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
             let usual = if *scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as usize } else { FRAMES };
             let frames = asked.unwrap_or(usual);
             if let Some(least) = arguments.swing.filter(|&least| least as usize > objects) {
-                return Err(WrongUsage(format!("--swing {least}: more than the {objects} objects; raise --objects")).into());
+                return Err(WrongUsage(format!(
+                    "--swing {least}: more than the {}; raise --objects",
+                    count(objects, "object")
+                ))
+                .into());
             }
             let swing = arguments.swing.map(|least| Swing { least: least as usize, frames });
             (FrameSource::Scene { scenario: *scenario, objects, seed: arguments.seed, swing }, frames)
@@ -120,13 +128,13 @@ fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
                 wrong("--record")?;
             }
             let frames = read_stream(path)?;
-            let count = frames.len();
-            if let Some(asked) = asked.filter(|&asked| asked > count) {
-                let why = format!("--frames {asked}: {} has {count} frames; ask for no more", path.display());
+            let own = frames.len();
+            if let Some(asked) = asked.filter(|&asked| asked > own) {
+                let why = format!("--frames {asked}: {} has {}; ask for no more", path.display(), count(own, "frame"));
                 return Err(WrongUsage(why).into());
             }
             let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-            (FrameSource::Stream { name, frames }, asked.unwrap_or(count))
+            (FrameSource::Stream { name, frames }, asked.unwrap_or(own))
         }
     };
     Ok(ReplaySettings {

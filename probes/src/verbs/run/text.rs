@@ -6,13 +6,20 @@ use crate::args::{Run, Scene};
 use crate::replay::WINDOW;
 use crate::shell;
 use crate::terminal::Terminal;
-use sapwise_lab::text::{count, grouped};
+use sapwise_lab::figures::ReplayPicture;
+use sapwise_lab::text::{count, duration, grouped, grouped_count};
 use std::path::Path;
 
-/// Totals, figures, what there is to say about them, and what to do next.
-pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, terminal: Terminal) -> String {
+/// Totals, figures, what there is to say about them and about the picture, and what to do next.
+pub(super) fn text(
+    arguments: &Run,
+    answer: &Answer<'_>,
+    origin: &Origin,
+    not_drawn: Option<&str>,
+    terminal: Terminal,
+) -> String {
     let head = format!(
-        "{}, {} of {} objects, medians of {}, verified against each other",
+        "{}, {} of {}, medians of {}, verified against each other",
         answer.scenario,
         count(answer.frames, "frame"),
         extent(answer),
@@ -25,7 +32,8 @@ pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, termin
         let after = after_frame.map_or("from the first on".to_owned(), |frame| format!("after frame {frame}"));
         let missing = count(*frames, "frame");
         text += &format!(
-            "{id} was not timed in {missing} {after}, because it failed or was far slower than the best; {at_least_ms:.2} ms in the others\n"
+            "{id} was not timed in {missing} {after}, because it failed or was far slower than the best; {} in the others\n",
+            duration(at_least_ms * 1e6)
         );
     }
     text += &format!("\n{}\n", figures(answer, terminal));
@@ -45,6 +53,9 @@ pub(super) fn text(arguments: &Run, answer: &Answer<'_>, origin: &Origin, termin
     for (verb, path) in [("Recorded", &arguments.record), ("Traced", &arguments.trace), ("Drawn", &arguments.plot)] {
         text += &path.as_ref().map(|p| format!("\n{verb} in {}.", p.display())).unwrap_or_default();
     }
+    if let Some(not_drawn) = not_drawn {
+        text += &format!(" {not_drawn}");
+    }
     text + &format!("\nNext: {}", next_step(arguments, origin))
 }
 
@@ -61,11 +72,18 @@ fn next_step(arguments: &Run, origin: &Origin) -> String {
     }
 }
 
-/// What stands below the picture: the figures, where the tuning comes from, and the command that makes it again.
-pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> [String; 3] {
+/// Which algorithms a picture leaves out and why, where it leaves out any.
+pub(super) fn not_drawn(picture: &ReplayPicture) -> Option<String> {
+    let names: Vec<String> = picture.not_drawn().iter().map(ToString::to_string).collect();
+    let why = "it shows the algorithms that ran in most frames, and the fastest on each number of threads or GPUs";
+    (!names.is_empty()).then(|| format!("Not in the picture: {}; {why}.", names.join(", ")))
+}
+
+/// What stands below the picture: the figures, where the tuning comes from, what is not drawn, and the command that makes it again.
+pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin, not_drawn: Option<&str>) -> Vec<String> {
     let Figures { switches, explored, .. } = answer.figures;
     let name = answer.scenario;
-    [
+    let mut caption = vec![
         format!(
             "{name}: regret {}; {switches} switch{}, {} explored; times over {}, decisions of the last",
             spread(&answer.figures),
@@ -74,13 +92,16 @@ pub(super) fn caption(arguments: &Run, answer: &Answer<'_>, origin: &Origin) -> 
             count(answer.repeats, "repeat")
         ),
         format!("Tuning: {}. {}", origin.text(), learning(answer)),
-        format!("Made by: {}", command(arguments)),
-    ]
+    ];
+    caption.extend(not_drawn.map(str::to_owned));
+    caption.push(format!("Made by: {}", command(arguments)));
+    caption
 }
 
 fn extent(answer: &Answer<'_>) -> String {
-    let [min, max] = [answer.objects.min, answer.objects.max].map(|n| grouped(n as u64));
-    if min == max { max } else { format!("{min} to {max}") }
+    let (least, most) = (answer.objects.min, answer.objects.max);
+    let most_of_them = grouped_count(most, "object");
+    if least == most { most_of_them } else { format!("{} to {most_of_them}", grouped(least as u64)) }
 }
 
 fn learning(answer: &Answer<'_>) -> &'static str {
@@ -96,13 +117,14 @@ fn totals(answer: &Answer<'_>, terminal: Terminal) -> String {
     let oracle = answer.total_ms.oracle;
     let row = |name: &str, ms: Option<f64>, frames: String| {
         let ratio = ms.map_or("-".to_owned(), |ms| format!("{:.3}", ms / oracle));
-        vec![name.to_owned(), ms.map_or("-".to_owned(), |ms| format!("{ms:.2} ms")), ratio, frames]
+        vec![name.to_owned(), ms.map_or("-".to_owned(), |ms| duration(ms * 1e6)), ratio, frames]
     };
     let mut names: Vec<(&String, Option<f64>)> = answer.total_ms.fixed.iter().map(|(id, ms)| (id, Some(*ms))).collect();
     names.extend(answer.left_out.keys().map(|id| (id, None)));
     let total = |ms: Option<f64>| ms.unwrap_or(f64::INFINITY);
     names.sort_by(|a, b| total(a.1).total_cmp(&total(b.1)));
-    let mut rows = vec![["run by", "total", "over the oracle", "adaptive ran it in"].map(str::to_owned).to_vec()];
+    let mut rows =
+        vec![["run by", "total", "over the oracle", "adaptive ran it in (last repeat)"].map(str::to_owned).to_vec()];
     rows.push(row("oracle (best at every frame)", Some(oracle), String::new()));
     rows.push(row("adaptive", Some(answer.total_ms.adaptive), String::new()));
     rows.extend(names.into_iter().map(|(id, ms)| {
