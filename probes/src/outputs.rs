@@ -60,6 +60,17 @@ pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Makes a folder for several files, where it is missing.
+///
+/// # Errors
+/// Names the folder and what to do.
+pub(crate) fn make_folder(folder: &Path) -> anyhow::Result<()> {
+    if folder.exists() && !folder.is_dir() {
+        bail!("{} is a file; name a folder, which is made where it is missing", folder.display());
+    }
+    std::fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made; name another", folder.display()))
+}
+
 /// The format that the name of a picture asks for.
 ///
 /// # Errors

@@ -125,6 +125,7 @@ fn damaged_files_are_told_with_their_place_and_do_not_hide_the_others() {
     huge.set_len(65 << 20).unwrap();
     let cases: Vec<(PathBuf, &str)> = vec![
         (path("truncated.json", &good.as_bytes()[..good.len() / 2]), "line 1 column"),
+        (path("cut.json", &good.as_bytes()[..good.len() / 3]), "the text ends too early"),
         (path("empty.json", b""), "line 1 column 0"),
         (path("future.json", with("/schema", "report/3".into()).as_bytes()), "report/3"),
         (path("nested.json", nested.as_bytes()), "line 1 column"),
@@ -312,12 +313,12 @@ fn doubtful_and_suspicious_figures_are_told_and_the_file_stays_sound() {
         assert_eq!(finding["problems"], json!([]), "{pointer} as {value}");
         let kind = if ["/points", "/remarks"].contains(pointer) { "doubts" } else { "notes" };
         assert!(finding[kind].to_string().contains(text), "{pointer} as {value}: {finding}");
-    }
         assert_eq!(
             finding.to_string().matches("interrupted after").count(),
             usize::from(*pointer == "/remarks"),
             "{finding}"
         );
+    }
     // A disturbed measurement of one thread makes several look better than they are.
     let impossible = |k: usize| {
         let mut parameters = measured()["hardware"]["parameters"].clone();

@@ -113,6 +113,8 @@ fn pairs_takes_no_and_one_box() {
         let answer: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert!(answer["pairs"].as_array().unwrap().iter().all(|p| p == 0), "{shape}: {text}");
     }
+    let one = npy(folder.path(), "one.npy", "<f4", "1, 6", &[0.0; 6]);
+    assert!(success(sapwise().arg("pairs").arg(&one)).contains(": 1 box, 1 frame\n"));
 }
 
 #[test]
@@ -144,9 +146,14 @@ fn bad_boxes_are_told_with_file_frame_and_position() {
 fn an_unknown_algorithm_is_wrong_usage_and_names_the_known() {
     let folder = tempfile::tempdir().unwrap();
     let boxes = npy(folder.path(), "boxes.npy", "<f4", "1, 6", &[0.0; 6]);
-    for (id, told) in [("octree@cpu1", "brute@cpu1"), ("brute@gpu99", "this machine has no gpu99")] {
+    for (id, told) in [
+        ("octree@cpu1", "brute@cpu1"),
+        ("brute@gpu99", "this machine has no gpu99"),
+        ("brute@cpu4096", "`sapwise devices` lists what can"),
+    ] {
         let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--algorithm", id]), 2);
-        assert!(complaint.contains(told), "{complaint}");
+        // Nothing that only a program can do.
+        assert!(complaint.contains(told) && !complaint.contains("Registry"), "{complaint}");
     }
 }
 
@@ -160,6 +167,8 @@ fn an_output_that_can_not_be_written_is_a_failure_that_names_it() {
     assert!(complaint.contains("pairs.npy"), "{complaint}");
     let complaint = failure(sapwise().args(["schema", "--out"]).arg(&out), 1);
     assert!(complaint.contains("pairs.npy"), "{complaint}");
+    let complaint = failure(sapwise().args(["schema", "--out"]).arg(&boxes), 1);
+    assert!(complaint.contains("boxes.npy is a file; name a folder"), "{complaint}");
 }
 
 #[cfg(target_os = "linux")]

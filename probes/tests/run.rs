@@ -180,7 +180,7 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
     let empty = folder.path().join("empty.npy");
     fs::write(&empty, []).unwrap();
     let scene = file("good.npy", "2, 1, 6", &[good, good]);
-    let cases: [(PathBuf, &[&str], i32, &[&str]); 13] = [
+    let cases: [(PathBuf, &[&str], i32, &[&str]); 15] = [
         (file("flat.npy", "2, 3", &[good]), &[], 1, &["flat.npy", "shape is [2, 3]"]),
         (file("gap.npy", "1, 3, 6", &[good, nan, good]), &[], 1, &["gap.npy", "frame 0: row 1", "at the end of a frame"]),
         (file("broken.npy", "2, 1, 6", &[good, broken]), &[], 1, &["broken.npy", "frame 1", "box 0", "NaN"]),
@@ -190,6 +190,8 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
         (tuning.clone(), &[], 1, &["steps.json", "no .npy file"]),
         ("unifrom".into(), &[], 2, &["no scenario", "uniform", "name a file"]),
         (scene.clone(), &["--frames", "3"], 2, &["--frames 3", "2 frames"]),
+        ("uniform".into(), &["--objects", "-5"], 2, &["--objects", "a whole number from 1 to 10000000"]),
+        ("uniform".into(), &["--objects", "500.5"], 2, &["--objects", "a whole number from 1 to 10000000"]),
         (scene.clone(), &["--objects", "3"], 2, &["--objects", "stream"]),
         ("uniform".into(), &["--frames", "5", "--after", "5"], 2, &["--after 5", "1 to 4"]),
         ("uniform".into(), &["--frames", "5", "--co-runner", "5:1"], 2, &["--co-runner 5", "0 to 4"]),

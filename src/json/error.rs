@@ -53,8 +53,16 @@ impl Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Data { path, source } if path == "." => source.fmt(f),
-            Self::Data { path, source } => write!(f, "{path}: {source}"),
+            Self::Data { path, source } => {
+                if path != "." {
+                    write!(f, "{path}: ")?;
+                }
+                source.fmt(f)?;
+                if source.is_eof() {
+                    f.write_str(": the text ends too early, as one that was cut off while it was written or copied; copy or make it again")?;
+                }
+                Ok(())
+            }
             Self::UnknownKey { path, schema } => write!(f, "{path} is no key of {schema}"),
             Self::OtherSchema { found, expected } => {
                 write!(f, "the schema is {found:?}; this version reads {:?}", expected.to_string())

@@ -1,5 +1,6 @@
 //! The arguments of `sapwise fleet`.
 
+use super::known;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -17,7 +18,7 @@ pub(crate) struct Fleet {
     #[arg(required = true, value_name = "R.json")]
     pub(crate) reports: Vec<PathBuf>,
     /// How many nodes there should be: fewer fail.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = known::whole(1..=u32::MAX), allow_negative_numbers = true)]
     pub(crate) nodes: Option<u32>,
     /// One JSON object on standard output instead of a table.
     #[arg(long)]

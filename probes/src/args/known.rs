@@ -5,6 +5,7 @@ use clap::error::Error;
 use clap::{Arg, Command};
 use sapwise_scenes::Scenario;
 use std::ffi::OsStr;
+use std::ops::RangeInclusive;
 
 /// Reads values as the parser does, with its errors, which say more than that a value is none of a list.
 #[derive(Clone)]
@@ -19,6 +20,14 @@ impl<P: TypedValueParser> TypedValueParser for Scenarios<P> {
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
         Some(Box::new(Scenario::ALL.into_iter().map(|s| PossibleValue::new(s.name()))))
+    }
+}
+
+/// A whole number within a range. The texts of the parser for integers name digits and tell no range.
+pub(super) fn whole(range: RangeInclusive<u32>) -> impl TypedValueParser<Value = u32> {
+    move |text: &str| match text.parse() {
+        Ok(number) if range.contains(&number) => Ok(number),
+        _ => Err(format!("give a whole number from {} to {}", range.start(), range.end())),
     }
 }
 

@@ -88,14 +88,14 @@ pub(crate) struct Predict {
     /// Correct the prediction by timing up to this many algorithms, each at the size where a sample reduces the expected regret most, in two
     /// seconds at most. That pays on a machine unlike those of training, which the prediction tells; on others it changes little. For the machine of a
     /// report none is taken.
-    #[arg(long, value_name = "K", default_value_t = 0, conflicts_with = "measured", value_parser = clap::value_parser!(u32).range(0..=100))]
+    #[arg(long, value_name = "K", default_value_t = 0, conflicts_with = "measured", value_parser = known::whole(0..=100), allow_negative_numbers = true)]
     pub(crate) samples: u32,
     /// Scenario of the slice that is shown; the choice itself depends on the load of each frame. Without this option uniform, with
     /// --measured the first of a report that lacks it.
     #[arg(long, value_name = "NAME", value_parser = known::scenario())]
     pub(crate) scenario: Option<Scenario>,
     /// Use this many cores at most, as if the machine had no more.
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(long, value_name = "K", value_parser = known::whole(1..=4096), allow_negative_numbers = true)]
     pub(crate) threads: Option<u32>,
     #[command(flatten)]
     pub(crate) gpus: GpuChoice,
@@ -158,7 +158,7 @@ pub(crate) struct Pairs {
     #[arg(long, value_name = "ID")]
     pub(crate) algorithm: Option<AlgorithmId>,
     /// Run all frames this many times.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = known::whole(1..=1_000_000), allow_negative_numbers = true)]
     pub(crate) repeat: u32,
     /// Where the pairs of the last frame go, 32-bit unsigned integers of shape m x 2, sorted.
     #[arg(long, value_name = "PAIRS.npy")]
@@ -235,7 +235,7 @@ pub(crate) struct Simulate {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// How many machines. Without this option one for each CPU.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", value_parser = known::whole(1..=10_000), allow_negative_numbers = true)]
     pub(crate) machines: Option<u32>,
     /// Seed of the pairing of CPUs and GPUs, of the hidden factors, of the scenes and of the noise.
     #[arg(long, default_value_t = 1)]

@@ -37,7 +37,7 @@ pub(crate) struct Probe {
     #[arg(long)]
     pub(crate) quick: bool,
     /// Use this many cores at most, as if the machine had no more.
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(long, value_name = "K", value_parser = known::whole(1..=4096), allow_negative_numbers = true)]
     pub(crate) threads: Option<u32>,
     /// Run threads on half of the cores that take memory bandwidth or cache while everything is measured.
     #[arg(long, value_name = "KIND", num_args = 0..=1, require_equals = true, default_missing_value = "memory")]
@@ -48,7 +48,7 @@ pub(crate) struct Probe {
     #[command(flatten)]
     pub(crate) gpus: GpuChoice,
     /// The largest size in the sweep.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(10..=10_000_000))]
+    #[arg(long, value_name = "N", value_parser = known::whole(10..=10_000_000), allow_negative_numbers = true)]
     pub(crate) max_objects: Option<u32>,
     /// Sweep this scenario instead of the usual ones; may be given several times.
     #[arg(long = "scenario", value_name = "NAME", value_parser = known::scenario())]

@@ -33,7 +33,7 @@ pub(crate) struct Run {
     #[arg(long, value_name = "T.json")]
     pub(crate) tuning: Option<PathBuf>,
     /// Correct the prediction by up to this many samples before the first frame, as `predict --samples` does.
-    #[arg(long, value_name = "K", default_value_t = 0, conflicts_with = "tuning", value_parser = clap::value_parser!(u32).range(0..=100))]
+    #[arg(long, value_name = "K", default_value_t = 0, conflicts_with = "tuning", value_parser = known::whole(0..=100), allow_negative_numbers = true)]
     pub(crate) samples: u32,
     /// Do not correct the expected costs by the times of the frames.
     #[arg(long)]
@@ -42,16 +42,16 @@ pub(crate) struct Run {
     #[arg(long)]
     pub(crate) no_exploring: bool,
     /// Objects; in fragmentation the largest number of them. Without this option 20 000. A stream has its own.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(long, value_name = "N", value_parser = known::whole(1..=10_000_000), allow_negative_numbers = true)]
     pub(crate) objects: Option<u32>,
     /// Let the number of objects grow from this one up to --objects and back over the frames.
-    #[arg(long, value_name = "LEAST", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(long, value_name = "LEAST", value_parser = known::whole(1..=10_000_000), allow_negative_numbers = true)]
     pub(crate) swing: Option<u32>,
     /// Frames. Without this option 200, in fragmentation one cycle of 600, of a stream all.
-    #[arg(long, value_name = "F", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "F", value_parser = known::whole(1..=1_000_000), allow_negative_numbers = true)]
     pub(crate) frames: Option<u32>,
     /// How often the whole simulation is run. With one, the oracle has the least time of every frame.
-    #[arg(long, value_name = "R", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "R", default_value_t = 6, value_parser = known::whole(1..=1000), allow_negative_numbers = true)]
     pub(crate) repeats: u32,
     /// Seed of the scene and of the order in which algorithms run.
     #[arg(long, default_value_t = 1)]

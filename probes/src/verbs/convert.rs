@@ -3,7 +3,6 @@
 use crate::args::Convert;
 use crate::exit::{Outcome, WrongUsage};
 use crate::{output, outputs};
-use anyhow::Context;
 use sapwise_lab::convert::convert;
 use sapwise_lab::write::write_text;
 use serde::Serialize;
@@ -39,7 +38,7 @@ pub(crate) fn run(arguments: &Convert) -> anyhow::Result<Outcome> {
     };
     let places = arguments.files.iter().map(place).collect::<Result<Vec<PathBuf>, _>>()?;
     outputs::refuse_overwriting(&arguments.files, &places.iter().collect::<Vec<_>>())?;
-    std::fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made", folder.display()))?;
+    outputs::make_folder(folder)?;
     let files: Vec<Line> = arguments.files.iter().zip(&places).map(|(file, out)| converted(file, out)).collect();
     let failed = files.iter().any(|line| line.problem.is_some());
     if arguments.json {

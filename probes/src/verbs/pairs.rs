@@ -6,7 +6,7 @@ use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::{gpus, interrupt, output, outputs, shell};
 use anyhow::Context;
-use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry, usable_cores};
+use sapwise::{AlgorithmId, BroadPhase, Pairs, Registry, Unavailable, usable_cores};
 use sapwise_lab::sweep::median;
 use sapwise_lab::text::{count, duration, grouped};
 use sapwise_lab::write::write_atomically;
@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Res
     interrupt::listen()?;
     let mut pairs = Pairs::new();
     pairs.set_limit(Some(arguments.limit.unwrap_or_else(|| memory_limit(id.threads()))));
-    let mut algorithm = registry.create(&id).map_err(|e| WrongUsage(e.to_string()))?;
+    let mut algorithm = registry.create(&id).map_err(|error| refused(&id, &error))?;
     let (counts, samples_ns) = measure(arguments, &frames, &mut *algorithm, &mut pairs)?;
     let fingerprint = format!("{:016x}", pairs.fingerprint());
     if let Some(path) = &arguments.out {
@@ -91,6 +91,17 @@ fn algorithm(arguments: &Arguments, registry: &Registry) -> anyhow::Result<Algor
     let available = registry.available();
     let usual = available.iter().find(|e| e.id.to_string() == DEFAULT).or(available.last());
     Ok(usual.context("this build has no algorithm that runs here")?.id.clone())
+}
+
+/// Why an algorithm that was asked for can't be had. The library's advice for too many threads is for programs.
+fn refused(id: &AlgorithmId, error: &sapwise::Error) -> WrongUsage {
+    match error {
+        sapwise::Error::Unavailable { reason: Unavailable::TooFewCores { threads, most }, .. } => WrongUsage(format!(
+            "{id} can't run here: it has {threads} threads, and this process may use {}; `sapwise devices` lists what can",
+            count(*most as usize, "core")
+        )),
+        _ => WrongUsage(error.to_string()),
+    }
 }
 
 /// Adds the algorithms on GPUs where one is asked for.
@@ -143,10 +154,11 @@ fn text(answer: &Answer, median_ns: f64) -> String {
     let Answer { algorithm, objects, frames, pairs, samples_ms, fingerprint, .. } = answer;
     let last = grouped(pairs.last().copied().unwrap_or(0));
     format!(
-        "{algorithm}: {} boxes, {}\n\
+        "{algorithm}: {} {}, {}\n\
          pairs in the last frame: {last} (fingerprint {fingerprint})\n\
          median of {}: {}",
         grouped(*objects as u64),
+        if *objects == 1 { "box" } else { "boxes" },
         count(*frames, "frame"),
         count(samples_ms.len(), "sample"),
         duration(median_ns)

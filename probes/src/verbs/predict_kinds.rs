@@ -6,7 +6,7 @@ use crate::args::Predict;
 use crate::exit::{Outcome, WrongUsage};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
-use crate::{interrupt, output, prediction, shell};
+use crate::{interrupt, output, outputs, prediction, shell};
 use anyhow::{Context, bail};
 use sapwise::{GpuIdentity, json};
 use sapwise_lab::data::read_reports;
@@ -41,7 +41,7 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     let progress = Progress::new(0);
     let reports = read_reports(&[folder.to_owned()], &progress)?;
     drop(progress);
-    std::fs::create_dir_all(out).with_context(|| format!("the folder {} can't be made; name another", out.display()))?;
+    outputs::make_folder(out)?;
     let terminal = Terminal::of_standard_output();
     let mut rows = vec![["tuning", "machine", "from", ""].map(str::to_owned).to_vec()];
     let mut without = 0;

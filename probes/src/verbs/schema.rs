@@ -2,8 +2,7 @@
 
 use crate::args::Schema;
 use crate::exit::Outcome;
-use crate::output;
-use anyhow::Context;
+use crate::{output, outputs};
 use sapwise_lab::write::write_text;
 use serde::Serialize;
 
@@ -16,7 +15,7 @@ struct Answer {
 
 pub(crate) fn run(arguments: &Schema) -> anyhow::Result<Outcome> {
     let folder = &arguments.out;
-    std::fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made", folder.display()))?;
+    outputs::make_folder(folder)?;
     let mut files = Vec::new();
     for (name, text) in sapwise_lab::schemas()?.into_iter().chain([sapwise::cache_schema()?]) {
         let path = folder.join(name);

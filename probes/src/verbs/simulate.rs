@@ -3,7 +3,7 @@
 use crate::args::Simulate;
 use crate::exit::Outcome;
 use crate::progress::Progress;
-use crate::{output, shell};
+use crate::{output, outputs, shell};
 use anyhow::{Context, bail};
 use sapwise_lab::data::{json_files, read_text};
 use sapwise_lab::report;
@@ -32,7 +32,7 @@ pub(crate) fn run(arguments: &Simulate) -> anyhow::Result<Outcome> {
     let machines = arguments.machines.map_or(specifications.cpus.len(), |n| n as usize);
     let loads = Loads::of_a_sweep(arguments.seed, None)?;
     let reports = simulate(&specifications, machines, &loads, arguments.seed, &Progress::new(0))?;
-    std::fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made", folder.display()))?;
+    outputs::make_folder(folder)?;
     let mut written = Vec::new();
     for (name, report) in &reports {
         let path = folder.join(format!("{name}.json"));
