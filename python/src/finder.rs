@@ -224,7 +224,7 @@ impl PyBroadPhase {
         match found {
             None => Err(unusable(
                 py,
-                "ids were given for one of two frames that follow each other; give them for each, or for none",
+                "ids were given for one of two frames that follow each other; give them for each or for none, or make a new BroadPhase to change that",
             )),
             Some(found) => two_columns(py, found.map_err(|error| exception(py, &error, ""))?),
         }
