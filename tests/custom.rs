@@ -84,8 +84,10 @@ fn one_whose_cost_was_far_too_low_is_left() {
     let boxes = resting(40);
     let ran: Vec<String> = (0..300).map(|_| run(&mut adaptive, &boxes).0).collect();
     assert_eq!(ran[0], "slow@cpu1");
-    let slow = ran.iter().filter(|id| *id == "slow@cpu1").count();
-    assert!(ran[299] == "quick@cpu1" && slow < 150, "{slow} of 300 frames by the slow one, the last by {}", ran[299]);
+    let slow = |frames: &[String]| frames.iter().filter(|id| *id == "slow@cpu1").count();
+    // Whether it is tried once more depends on how long the others take beside what else runs here.
+    let (all, late) = (slow(&ran), slow(&ran[100..]));
+    assert!(all < 100 && late <= 4, "{all} of 300 frames by the slow one, {late} of the last 200");
     // What was learned is tuning like any others.
     let learned = adaptive.learned();
     let mut again = Adaptive::new(learned, &registry).unwrap();

@@ -50,10 +50,10 @@ pub(super) struct FrameBatch {
 }
 
 impl FrameBatch {
-    /// The mean load, as what is learned sees it.
+    /// The mean load, as what is learned sees it: each frame counts by what is predicted of it, as it does in the ratio of the sums.
     pub(super) fn view(&self) -> View {
         let mut mean = View::default();
-        mean.add(&self.view, 1.0 / f64::from(self.frames.max(1)));
+        mean.add(&self.view, share(1.0, self.predicted_ns));
         mean
     }
 
@@ -77,7 +77,7 @@ impl FrameBatch {
         self.calls_ns += predicted.calls_ns;
         self.real_ns += ns;
         self.predicted_ns += predicted.ns;
-        self.view.add(view, f64::from(frames));
+        self.view.add(view, predicted.ns);
     }
 
     /// An empty one. Where the candidate is the one of before, it has more room than that.

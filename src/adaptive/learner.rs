@@ -21,7 +21,7 @@ const STALL: [f64; 2] = [MOST_OVER, 64.0];
 const STALLS_APART: u64 = 50;
 
 /// The noise of a frame: standard deviation of its logarithm around what is expected of it. To learn it for each algorithm is worth nothing: docs/methodology.md.
-/// With twice as much, one frame of a trial tells so little that the same algorithm is tried again and again.
+/// With twice as much, one frame of a trial tells so little that the same algorithm was tried five times in one real run.
 const NOISE_LN: f64 = 0.2;
 /// Of this many frames in a row the mean is as noisy as of this power of their number far apart.
 const ALIKE: f64 = 0.7;
@@ -217,6 +217,6 @@ impl Learner {
 
     /// The costs as they are expected now, without what passes.
     pub(super) fn lasting(&self, costs: &[AlgorithmCost]) -> Vec<AlgorithmCost> {
-        self.belief.costs(costs, true)
+        self.belief.costs(costs, true, NOISE_LN)
     }
 }

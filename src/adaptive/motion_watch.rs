@@ -112,7 +112,9 @@ mod tests {
     fn a_look_that_is_interrupted_puts_off_the_next_one_for_twice_as_long_at_most() {
         let mut watch = MotionWatch::default();
         [1000.0, 1e9].into_iter().for_each(|took| _ = watch.found(Some(0.1), took));
-        watch.passed(2.0 * 1000.0 / SHARE + 1.0);
+        watch.passed(2.0 * 1000.0 / SHARE - 1.0);
+        assert!(!watch.pays());
+        watch.passed(2.0);
         assert!(watch.pays());
     }
 }

@@ -383,7 +383,7 @@ impl Policy {
         self.trials.pay(ns - work * self.mean_ns[settled], first);
     }
 
-    /// Makes the batch one to which frames of a candidate under the present load can be added. What was added up of others is observed.
+    /// Makes the batch one to which frames of a candidate can be added. What was added up of others is observed.
     fn make_room(&mut self, candidate: usize) {
         if self.batch.takes(candidate) {
             return;

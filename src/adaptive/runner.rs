@@ -349,7 +349,7 @@ impl Runner {
         }
         if dear || began && trial.is_none() || stood_out {
             // What began in this frame is decided on, and gets a plan of its frame, once more before it may rest. Without, `pair-cache` in `uniform` of 800 took
-            // 1.19 times what it takes alone (n 8) in place of 1.05 (n 12): it has found its margin without knowing how far boxes move.
+            // 1.19 times the best single algorithm (n 8) in place of 1.05 (n 12); presumably it finds its margin without knowing how far boxes move.
             self.tracker.wake();
         }
         self.warm_runner_up(boxes.len());

@@ -443,9 +443,9 @@ impl Belief {
         }
     }
 
-    /// The costs as they are expected now, with the spread that is left in their own parts. What passes is left out where only what lasts is asked for: the
-    /// parts of widths and of what is kept.
-    pub(crate) fn costs(&self, costs: &[AlgorithmCost], lasting: bool) -> Vec<AlgorithmCost> {
+    /// The costs as they are expected now, with the spread that is left in their own parts and the noise of an observation, a standard deviation of its
+    /// logarithm. What passes is left out where only what lasts is asked for: the parts of widths and of what is kept.
+    pub(crate) fn costs(&self, costs: &[AlgorithmCost], lasting: bool, noise_ln: f64) -> Vec<AlgorithmCost> {
         let corrected = |(k, cost): (usize, &AlgorithmCost)| {
             let (parts, own) = (&self.algorithms[k], &self.own[k]);
             let mut cost = cost.clone();
@@ -464,7 +464,7 @@ impl Belief {
                 None => now,
             });
             let variance = own.covariance.iter().enumerate().map(|(i, row)| row[i]).sum::<f64>() / SIZE as f64;
-            cost.spread_ln = variance.sqrt();
+            cost.spread_ln = variance.sqrt().hypot(noise_ln);
             cost
         };
         costs.iter().enumerate().map(corrected).collect()

@@ -170,11 +170,14 @@ fn rounds(points: &[Point]) -> Vec<String> {
     found
 }
 
+/// How the doubt begins in a report whose measurement ended before its time.
+pub(super) const CUT_SHORT: &str = "it was cut short";
+
 /// Why the figures of a report should not be relied on, one sentence each: an end before its time, disturbed points, and a scaling that no machine has.
 pub(crate) fn doubts(report: &Report) -> Vec<String> {
     let cut_short = report.remarks.iter().filter(|remark| Report::is_cut_short(remark));
     let mut found: Vec<String> =
-        cut_short.map(|remark| format!("it was cut short: {remark}; measure again for all of it")).collect();
+        cut_short.map(|remark| format!("{CUT_SHORT}: {remark}; measure again for all of it")).collect();
     found.extend(hardware_doubts(&report.hardware));
     let loads: Vec<f64> = report.points.iter().filter_map(|p| p.foreign_load).collect();
     let disturbed = loads.iter().filter(|&&load| load > Watch::SPOILING).count();

@@ -101,6 +101,11 @@ impl Finding {
         self.schema.and_then(|schema| schema.split('/').next())
     }
 
+    /// Whether it is a report that was cut short.
+    pub(crate) fn is_cut_short(&self) -> bool {
+        self.doubts.iter().any(|doubt| doubt.starts_with(figures::CUT_SHORT))
+    }
+
     fn set_current(&mut self, stale: Vec<String>, remedy: &str) {
         self.current = Some(stale.is_empty());
         self.problems.extend(stale.into_iter().map(|s| format!("stale: {s}; {remedy}")));

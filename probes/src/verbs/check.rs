@@ -40,7 +40,8 @@ pub(crate) fn run(arguments: &Check, algorithms: &Algorithms) -> anyhow::Result<
 
 /// The next command to try: for the files with problems, else for all files of the kind of the first.
 fn next_step(files: &[Finding]) -> String {
-    let is_bad = |f: &&Finding| !f.problems.is_empty();
+    // One that was cut short is to be measured again, as one with a problem.
+    let is_bad = |f: &&Finding| !f.problems.is_empty() || f.is_cut_short();
     let is_old = |f: &&Finding| f.problems.iter().any(|p| p.contains("`sapwise convert"));
     if files.iter().any(|f| is_old(&f)) {
         return format!("sapwise convert {} --out converted", names(files.iter().filter(is_old)));

@@ -71,23 +71,12 @@ pub(crate) fn run(arguments: &args::Fleet, algorithms: &Algorithms) -> anyhow::R
         text += &if bad + missing == 0 {
             format!("Next: sapwise train {} --out model.json", paths.join(" "))
         } else {
-            let bad = bad_files(&answer);
-            let apart = if bad.is_empty() {
-                String::new()
-            } else {
-                format!("Not to be believed: {}; take these files away before `sapwise train`.\n", bad.join(", "))
-            };
-            format!("{apart}Next: measure on those nodes again; what is complete is kept")
+            "Next: measure on the others again, or take their files away before `sapwise train`; what is complete is kept"
+                .to_owned()
         };
         output::print(&text)?;
     }
     Ok(if bad + missing == 0 { Outcome::Done } else { Outcome::Failed })
-}
-
-/// The names of the files that can't be believed, in the order of the table.
-fn bad_files(answer: &Answer) -> Vec<&str> {
-    let nodes = answer.fleet.nodes.iter().filter(|node| node.problem.is_some()).map(|node| node.file.as_str());
-    nodes.chain(answer.failed.iter().map(|failed| failed.file.as_str())).collect()
 }
 
 /// What nodes have left in folders that did not finish, but for those that have a report of before.

@@ -214,9 +214,11 @@ const ANOTHER: &str = "intel-xeon-2c-full--2026-11-23";
 fn over_traces_the_choice_costs_little_more_than_the_best_single_algorithm() {
     let traces: Vec<Arc<Trace>> = Trace::all().into_iter().map(Arc::new).collect();
     let (host, another) = (Recorded::of(HOST), Recorded::of(ANOTHER));
-    for (tuning, what) in
-        [(host.measured(), "measured"), (host.predicted(), "predicted"), (another.predicted(), "of another machine")]
-    {
+    for (tuning, what, most) in [
+        (host.measured(), "measured", 1.09),
+        (host.predicted(), "predicted", 1.08),
+        (another.predicted(), "of another machine", 1.10),
+    ] {
         let over: Vec<f64> = traces
             .iter()
             .map(|trace| {
@@ -233,6 +235,6 @@ fn over_traces_the_choice_costs_little_more_than_the_best_single_algorithm() {
         println!("{told}");
         // Of other traces than ours nobody knows what can be reached.
         let others = std::env::var_os("TRACES").is_some();
-        assert!(!over.is_empty() && (others || geometric < 1.10 && worst < 1.35), "{told}");
+        assert!(!over.is_empty() && (others || geometric < most && worst < 1.35), "{told}");
     }
 }

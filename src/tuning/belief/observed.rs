@@ -85,7 +85,7 @@ impl Observed {
     /// The costs as they are expected now.
     #[must_use]
     pub fn costs(&self) -> Vec<AlgorithmCost> {
-        self.belief.costs(&self.costs, false)
+        self.belief.costs(&self.costs, false, 0.0)
     }
 }
 
