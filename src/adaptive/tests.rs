@@ -186,11 +186,15 @@ fn a_change_of_how_far_boxes_move_is_seen_within_two_samples() {
     assert!(adaptive.last_decision().unwrap().load.moved <= 0.01);
 }
 
+/// A row of boxes, shifted by so much along each axis.
+fn shifted(by: f32) -> Vec<Aabb> {
+    row(500).iter().map(|b| Aabb::new(b.min.map(|x| x + by), b.max.map(|x| x + by))).collect()
+}
+
 /// Frames of a second each, which pay for any look at the load.
 fn looked(tracker: &mut LoadTracker, frames: usize, shift: f32) {
     for _ in 0..frames {
-        let boxes: Vec<Aabb> =
-            row(500).iter().map(|b| Aabb::new(b.min.map(|x| x + shift), b.max.map(|x| x + shift))).collect();
+        let boxes = shifted(shift);
         tracker.decide(&boxes);
         tracker.ran(&boxes, 100, 1e9);
     }
@@ -210,10 +214,7 @@ fn how_far_boxes_move_is_found_out_between_samples() {
 
 #[test]
 fn a_frame_that_stands_out_is_compared_with_the_one_before_it() {
-    let at = |k: u32| -> Vec<Aabb> {
-        let by = |x: f32| x + 0.25 * k as f32;
-        row(500).iter().map(|b| Aabb::new(b.min.map(by), b.max.map(by))).collect()
-    };
+    let at = |k: u32| shifted(0.25 * k as f32);
     let mut tracker = LoadTracker::default();
     tracker.decide(&at(0));
     tracker.ran(&at(0), 100, 1e9);
@@ -226,10 +227,7 @@ fn a_frame_that_stands_out_is_compared_with_the_one_before_it() {
 
 #[test]
 fn frames_that_are_off_let_the_next_ones_show_how_far_boxes_move() {
-    let at = |k: u32| -> Vec<Aabb> {
-        let by = |x: f32| x + 0.25 * k as f32;
-        row(500).iter().map(|b| Aabb::new(b.min.map(by), b.max.map(by))).collect()
-    };
+    let at = |k: u32| shifted(0.25 * k as f32);
     let moved = |is_off: bool| {
         let mut tracker = LoadTracker::default();
         // A microsecond each, which pays for no look but the first.
