@@ -87,6 +87,10 @@ pub trait Incremental: BroadPhase {
         FrameWork::new(FrameKind::Updated, 1.0)
     }
 
+    /// Other algorithms ran the frames since the last one: [`Adaptive`](crate::Adaptive) calls this before the next frame. What was concluded from earlier frames, such as
+    /// that keeping work does not pay, may hold no longer.
+    fn missed_frames(&mut self) {}
+
     /// Runs on this many threads from the next frame on, with all that it keeps. `false` where it can't, and then nothing changes.
     ///
     /// One instance for several numbers of threads comes from [`Registry::create_family`](crate::Registry::create_family).

@@ -85,10 +85,11 @@ impl Instance {
         self.place.here().is_some()
     }
 
-    /// Finds the pairs. Returns how the frame came about where one may build on the one before.
+    /// Finds the pairs; `entered` where another instance ran the frame before. Returns how the frame came about where one may build on the one before.
     pub(super) fn run(
         &mut self,
         id: &AlgorithmId,
+        entered: bool,
         plan: &FramePlan,
         boxes: &[Aabb],
         pairs: &mut Pairs,
@@ -103,6 +104,9 @@ impl Instance {
                 return Err(Error::Unavailable { algorithm: id.clone(), reason });
             }
             self.threads = Some(wanted);
+        }
+        if let Some(algorithm) = algorithm.as_incremental().filter(|_| entered) {
+            algorithm.missed_frames();
         }
         algorithm.find_pairs_with(plan, boxes, pairs)?;
         self.ready = self.ready.max(boxes.len());

@@ -310,8 +310,9 @@ impl Runner {
                 // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
                 return Err(self.gone());
             };
+            let entered = self.running != instance;
             let running = Instant::now();
-            match self.instances[instance].run(&candidate.id, self.tracker.plan(), boxes, pairs) {
+            match self.instances[instance].run(&candidate.id, entered, self.tracker.plan(), boxes, pairs) {
                 Ok(work) => {
                     let ns = (running.elapsed().as_nanos() as f64).max(1.0);
                     (self.work, self.measured_ns, self.running) = (work, clock::TICKS.then_some(ns), instance);

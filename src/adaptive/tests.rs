@@ -11,7 +11,9 @@ use super::load_tracker::LoadTracker;
 use super::passed::{Passed, Usual};
 use super::*;
 use crate::scene::{Scenario, Scene};
-use crate::{AlgorithmCost, CostCurve, CostTerm, Term};
+use crate::{AlgorithmCost, CostCurve, CostTerm, Incremental, Term};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 fn tuning(costs: &[(&str, f64, f64)]) -> Tuning {
     tuning_of([Term::Call, Term::Objects], costs)
@@ -113,6 +115,47 @@ fn a_lost_algorithm_is_replaced_within_the_frame() {
     assert_eq!(pairs.len(), 29);
     assert_eq!(adaptive.last_decision().unwrap().reason, Reason::FellBack);
     assert_eq!(chosen(&mut adaptive, 30), ("brute@cpu1".to_owned(), Reason::Stayed));
+}
+
+/// Counts how often it was told that it missed frames.
+struct Told(Arc<AtomicU32>);
+
+impl BroadPhase for Told {
+    fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        pairs.clear();
+        pairs.finish()
+    }
+
+    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
+        Some(self)
+    }
+}
+
+impl Incremental for Told {
+    fn missed_frames(&mut self) {
+        self.0.fetch_add(1, Relaxed);
+    }
+}
+
+#[test]
+fn one_that_keeps_work_is_told_once_that_it_missed_frames() {
+    let told = Arc::new(AtomicU32::new(0));
+    let mut registry = Registry::with_cores(1);
+    let shared = Arc::clone(&told);
+    registry.add("told@cpu1".parse().unwrap(), 1, move || Ok(Box::new(Told(Arc::clone(&shared)))));
+    let mut adaptive = Adaptive::new(tuning(&[("told@cpu1", 1000.0, 0.0), ("brute@cpu1", 0.0, 10.0)]), &registry).unwrap();
+    adaptive.set_learning(false);
+    // So many objects until it runs, and once more; then so few until it does not.
+    for (objects, algorithm, times) in [
+        (1000, "told@cpu1", 0),
+        (1000, "told@cpu1", 0),
+        (10, "brute@cpu1", 0),
+        (1000, "told@cpu1", 1),
+        (1000, "told@cpu1", 1),
+    ] {
+        assert!((0..100).any(|_| chosen(&mut adaptive, objects).0 == algorithm), "{algorithm} never runs");
+        assert_eq!(told.load(Relaxed), times);
+    }
 }
 
 #[test]

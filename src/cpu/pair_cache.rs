@@ -134,6 +134,10 @@ impl Incremental for PairCache {
         FrameWork::new(self.last_frame, if keeps { f64::from(self.motion.work_over_mean()) } else { 1.0 })
     }
 
+    fn missed_frames(&mut self) {
+        self.motion.missed_frames();
+    }
+
     fn set_threads(&mut self, threads: u32) -> bool {
         let Some(width) = self.widths.iter().position(|w| w.threads() == threads as usize) else { return false };
         if width != self.width {

@@ -226,6 +226,12 @@ impl Motion {
         self.next_pause = (self.next_pause * 2).min(PAUSE[1]);
     }
 
+    /// Other algorithms ran the frames since the last one. That keeping did not pay before says nothing of now: a pause counts frames of this method, and would
+    /// go on for ever where none of them has its turn.
+    pub(super) fn missed_frames(&mut self) {
+        (self.pause, self.next_pause, self.most_margin) = (0, PAUSE[0], MARGINS[MARGINS.len() - 1]);
+    }
+
     /// A frame failed for no fault of keeping.
     pub(super) fn interrupt(&mut self) {
         self.keeping = None;
@@ -437,9 +443,15 @@ mod tests {
             motion.advise(&FramePlan::default(), &boxes);
             assert_eq!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)), pairs == 1000);
         }
-        motion.stop(false);
-        assert!((0..PAUSE[0]).all(|_| matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Scratch)));
-        assert!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)));
+        for _ in 0..2 {
+            motion.stop(false);
+            assert!((0..PAUSE[0]).all(|_| matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Scratch)));
+            assert!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)));
+            // The next pause would be twice as long, and one is over where others ran meanwhile.
+            motion.stop(false);
+            motion.missed_frames();
+            assert!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)));
+        }
     }
 
     #[test]
