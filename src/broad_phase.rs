@@ -87,9 +87,11 @@ pub trait Incremental: BroadPhase {
         FrameWork::new(FrameKind::Updated, 1.0)
     }
 
-    /// Other algorithms ran the frames since the last one: [`Adaptive`](crate::Adaptive) calls this before the next frame. What was concluded from earlier frames, such as
-    /// that keeping work does not pay, may hold no longer.
-    fn missed_frames(&mut self) {}
+    /// Other algorithms ran so many frames since the last one: [`Adaptive`](crate::Adaptive) calls this before the next frame. What was concluded from earlier frames,
+    /// such as that keeping work does not pay, may hold no longer.
+    fn missed_frames(&mut self, frames: u64) {
+        let _ = frames;
+    }
 
     /// Runs on this many threads from the next frame on, with all that it keeps. `false` where it can't, and then nothing changes.
     ///

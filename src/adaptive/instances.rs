@@ -28,13 +28,15 @@ pub(crate) struct Instance {
     threads: Option<u32>,
     /// Objects that its buffers are ready for.
     ready: usize,
+    /// The frame that another one ran after it, and `None` while it goes on.
+    left_at: Option<u64>,
 }
 
 impl Instance {
     fn new(id: &AlgorithmId, mut algorithm: Box<dyn BroadPhase>, threads: Option<u32>) -> Self {
         let is_incremental = algorithm.is_incremental();
         let waits = matches!(id.backend(), Backend::Gpu(_));
-        Self { place: Place::Here(algorithm), waits, is_incremental, threads, ready: 0 }
+        Self { place: Place::Here(algorithm), waits, is_incremental, threads, ready: 0, left_at: None }
     }
 
     /// Gets it ready for frames of that many objects, now.
@@ -85,11 +87,16 @@ impl Instance {
         self.place.here().is_some()
     }
 
-    /// Finds the pairs; `entered` where another instance ran the frame before. Returns how the frame came about where one may build on the one before.
+    /// Another one runs this frame in place of it.
+    pub(super) fn leave(&mut self, frame: u64) {
+        self.left_at = Some(frame);
+    }
+
+    /// Finds the pairs of this frame. Returns how the frame came about where one may build on the one before.
     pub(super) fn run(
         &mut self,
         id: &AlgorithmId,
-        entered: bool,
+        frame: u64,
         plan: &FramePlan,
         boxes: &[Aabb],
         pairs: &mut Pairs,
@@ -105,8 +112,8 @@ impl Instance {
             }
             self.threads = Some(wanted);
         }
-        if let Some(algorithm) = algorithm.as_incremental().filter(|_| entered) {
-            algorithm.missed_frames();
+        if let (Some(left_at), Some(algorithm)) = (self.left_at.take(), algorithm.as_incremental()) {
+            algorithm.missed_frames(frame - left_at);
         }
         algorithm.find_pairs_with(plan, boxes, pairs)?;
         self.ready = self.ready.max(boxes.len());

@@ -60,6 +60,8 @@ pub(super) struct Policy {
     batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
+    /// Frames in which the one that is cheapest will have saved what a switch to it costs.
+    pays_in: Option<f64>,
     /// The number of the frame that is to run, and of the one that was decided last.
     frame: u64,
     decided: u64,
@@ -94,6 +96,7 @@ impl Policy {
             worked_out: None,
             batch: FrameBatch::default(),
             saved_ns: vec![0.0; count],
+            pays_in: None,
             frame: 0,
             decided: 0,
             trials: Trials::default(),
@@ -168,9 +171,15 @@ impl Policy {
         }
     }
 
+    /// The number of the frame that is to run.
+    pub(super) fn frame(&self) -> u64 {
+        self.frame
+    }
+
     /// The candidate that is to run the next frame. `None` when none can run.
     pub(super) fn choose(&mut self, load: &Load) -> Option<Choice> {
         let frames = (self.frame - std::mem::replace(&mut self.decided, self.frame)) as f64;
+        self.pays_in = None;
         if self.is_by_count() {
             return self.choose_by_count(load.objects);
         }
@@ -256,13 +265,26 @@ impl Policy {
         if best == settled {
             return (settled, Reason::Stayed);
         }
-        let paid = |k: usize| {
-            let saved_ns = self.saved_ns[k].max(SOON * (now - self.mean_ns[k]));
-            let price_ns = self.switching.leave_ns(settled, k, self.frame, self.expected[settled])
-                + self.switching.enter_ns(k, self.frame, self.expected[k]);
-            self.mean_ns[k] < now && saved_ns >= price_ns && !self.is_avoided(k)
+        let price_ns = |k: usize| {
+            self.switching.leave_ns(settled, k, self.frame, self.expected[settled])
+                + self.switching.enter_ns(k, self.frame, self.expected[k])
         };
-        self.cheapest(paid).map_or((settled, Reason::Hysteresis), |k| (k, Reason::Switched))
+        let pays = |k: usize| {
+            let gain_ns = now - self.mean_ns[k];
+            gain_ns > 0.0 && self.saved_ns[k].max(SOON * gain_ns) >= price_ns(k) && !self.is_avoided(k)
+        };
+        if let Some(k) = self.cheapest(pays) {
+            return (k, Reason::Switched);
+        }
+        // Where the next decision would come later, the time in between would be lost; one that comes sooner would cost more than is lost.
+        let left_ns = (price_ns(best) - self.saved_ns[best]).max(self.decision_ns);
+        self.pays_in = Some(left_ns / (now - self.mean_ns[best])).filter(|frames| *frames > 0.0);
+        (settled, Reason::Hysteresis)
+    }
+
+    /// In how many frames the next decision may be for a switch, where one waits for it to pay.
+    pub(super) fn pays_in(&self) -> Option<f64> {
+        self.pays_in
     }
 
     /// Begins a trial of the candidate that is expected to save the most by it, if there is one.

@@ -108,7 +108,7 @@ impl Runner {
 
     /// Other candidates take the place of those of before. What was decided goes with them.
     fn exchange(&mut self, made: Instances) {
-        (self.candidates, self.instances) = (made.candidates, made.instances);
+        (self.candidates, self.instances, self.running) = (made.candidates, made.instances, 0);
         self.decided = None;
         self.choice = None;
         self.steady = false;
@@ -310,9 +310,12 @@ impl Runner {
                 // Choosing leaves out what failed. Were it to come here all the same, no answer is better than an old one.
                 return Err(self.gone());
             };
-            let entered = self.running != instance;
+            let frame = self.policy.frame();
+            if self.running != instance {
+                self.instances[self.running].leave(frame);
+            }
             let running = Instant::now();
-            match self.instances[instance].run(&candidate.id, entered, self.tracker.plan(), boxes, pairs) {
+            match self.instances[instance].run(&candidate.id, frame, self.tracker.plan(), boxes, pairs) {
                 Ok(work) => {
                     let ns = (running.elapsed().as_nanos() as f64).max(1.0);
                     (self.work, self.measured_ns, self.running) = (work, clock::TICKS.then_some(ns), instance);
@@ -345,6 +348,9 @@ impl Runner {
             self.tell();
         }
         let trial = self.policy.trial_rests();
+        if let Some(frames) = self.policy.pays_in() {
+            self.tracker.rest_no_longer_than(frames);
+        }
         if let Some(frames) = trial {
             self.tracker.rest_no_longer_than(f64::from(frames));
         }

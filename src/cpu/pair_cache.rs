@@ -134,8 +134,8 @@ impl Incremental for PairCache {
         FrameWork::new(self.last_frame, if keeps { f64::from(self.motion.work_over_mean()) } else { 1.0 })
     }
 
-    fn missed_frames(&mut self) {
-        self.motion.missed_frames();
+    fn missed_frames(&mut self, frames: u64) {
+        self.motion.missed(frames);
     }
 
     fn set_threads(&mut self, threads: u32) -> bool {

@@ -2,7 +2,7 @@
 
 use super::grown::{Changes, Margin};
 use crate::aabb::Aabb;
-use crate::load::{Displacement, FramePlan};
+use crate::load::{Displacement, FramePlan, paces_apart_ln};
 
 /// Costs of the parts of a frame in nanoseconds, on the machine in `datasets/`. Only their ratios matter here, and only for
 /// the choice of a margin: they need not be those of the machine at hand.
@@ -51,6 +51,9 @@ const MARGIN_STEP: f32 = 1.005;
 
 /// Of the boxes so many leave at once where the scene jumped, or where this method has not seen its last frames.
 const JUMP: f32 = 0.5;
+/// The margin is chosen anew then where they move at another pace than when it was chosen, farther apart than this natural logarithm. Else it stays: it was found in
+/// many frames, and boxes that are only taken from a pool and put back move as before.
+const OTHER_PACE_LN: f64 = 0.25;
 
 /// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
 const PROVEN: u32 = 256;
@@ -92,6 +95,8 @@ pub(super) struct Motion {
     /// The pause is over as soon as boxes move less, and how far they moved at its first look.
     ends_early: bool,
     paused_at: Option<f32>,
+    /// How far they moved when that was told last.
+    pace: f32,
     /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap yet.
     most_margin: f32,
 }
@@ -100,6 +105,8 @@ pub(super) struct Motion {
 #[derive(Debug, Clone, Copy)]
 struct Keeping {
     margin: Margin,
+    /// How far boxes moved in a frame when it was begun with, in edges.
+    pace: f32,
     /// Cost for each box, averaged over the last frames.
     cost: f32,
     /// What of that the kept pairs took in the last frame.
@@ -193,6 +200,7 @@ impl Default for Motion {
             next_pause: PAUSE[0],
             ends_early: false,
             paused_at: None,
+            pace: 0.0,
             most_margin: MARGINS[MARGINS.len() - 1],
         }
     }
@@ -201,10 +209,12 @@ impl Default for Motion {
 impl Motion {
     /// What to do about this frame.
     pub(super) fn advise(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Advice {
+        let pace = plan.moved().map_or(self.pace, |moved| moved as f32);
         if self.keeping.is_none() {
             self.keeping = self.begin(plan, boxes);
             self.displacement.watch(boxes);
         }
+        self.pace = pace;
         self.keeping.map_or(Advice::Scratch, |k| Advice::Keep(k.margin))
     }
 
@@ -226,10 +236,13 @@ impl Motion {
         self.next_pause = (self.next_pause * 2).min(PAUSE[1]);
     }
 
-    /// Other algorithms ran the frames since the last one. That keeping did not pay before says nothing of now: a pause counts frames of this method, and would
-    /// go on for ever where none of them has its turn.
-    pub(super) fn missed_frames(&mut self) {
-        (self.pause, self.next_pause, self.most_margin) = (0, PAUSE[0], MARGINS[MARGINS.len() - 1]);
+    /// Other algorithms ran so many frames since the last one. They count for the pause, and it is over where boxes move less now than when keeping ceased to
+    /// pay: where this method has its turn in a few frames at a time, its pause would go on for ever.
+    pub(super) fn missed(&mut self, frames: u64) {
+        let left = u64::from(self.pause).saturating_sub(frames) as u32;
+        // So that the next frame looks.
+        self.pause = if left == 0 { 0 } else { left - left % LOOK + 1 };
+        self.ends_early = true;
     }
 
     /// A frame failed for no fault of keeping.
@@ -261,8 +274,9 @@ impl Motion {
     /// last time.
     pub(super) fn renew(&mut self, plan: &FramePlan, boxes: &[Aabb], changes: &Changes) -> Margin {
         let jumped = changes.left as f32 > JUMP * boxes.len() as f32;
-        if jumped && plan.moved().is_some() {
-            // What was kept was of another motion.
+        let another =
+            |keeping: Keeping| plan.moved().is_some_and(|now| paces_apart_ln(keeping.pace.into(), now) > OTHER_PACE_LN);
+        if jumped && self.keeping.is_some_and(another) {
             self.keeping = self.begin(plan, boxes).or(self.keeping);
         }
         let longest_edge = longest_edge(plan, boxes);
@@ -331,7 +345,7 @@ impl Motion {
             return false;
         }
         let Some(moved) = plan.moved().or_else(|| self.displacement.moved(boxes)) else { return false };
-        let before = *self.paused_at.get_or_insert(moved as f32);
+        let before = *self.paused_at.get_or_insert(self.pace.max(moved as f32));
         (moved as f32) < (CALMER * before).max(STILL)
     }
 
@@ -356,6 +370,7 @@ impl Motion {
         let kept = kept(best);
         (cost(best) < scratch && kept < MOST_KEPT).then(|| Keeping {
             margin: Margin { share: best, longest_edge: longest_edge(plan, boxes) },
+            pace: motion,
             cost: cost(best),
             tests: 0.0,
             leaving: leaving(motion, best),
@@ -443,13 +458,13 @@ mod tests {
             motion.advise(&FramePlan::default(), &boxes);
             assert_eq!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)), pairs == 1000);
         }
-        for _ in 0..2 {
+        for pause in [PAUSE[0], 4 * PAUSE[0]] {
             motion.stop(false);
-            assert!((0..PAUSE[0]).all(|_| matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Scratch)));
+            assert!((0..pause).all(|_| matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Scratch)));
             assert!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)));
-            // The next pause would be twice as long, and one is over where others ran meanwhile.
+            // The next pause is twice as long, and frames that others run count.
             motion.stop(false);
-            motion.missed_frames();
+            motion.missed(u64::from(2 * pause));
             assert!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)));
         }
     }
