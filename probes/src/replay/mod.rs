@@ -5,6 +5,7 @@ mod contestant;
 mod frame;
 mod frame_source;
 mod oracle;
+mod other_work;
 mod outcome;
 mod picture;
 mod race;

@@ -4,6 +4,7 @@ use super::co_runner::{Slowdown, time_a_loop};
 use super::contestant::{Contestant, best};
 use super::frame::{Frame, Taken, Told};
 use super::oracle::Oracle;
+use super::other_work::OtherWork;
 use super::outcome::Outcome;
 use super::samples::Samples;
 use super::settings::ReplaySettings;
@@ -82,6 +83,7 @@ struct Replay {
     loops: Vec<(usize, f64)>,
     notes: Vec<String>,
     shuffle: Random,
+    other_work: OtherWork,
     pairs: Pairs,
     learning: bool,
     exploring: bool,
@@ -119,6 +121,7 @@ impl Replay {
             loops: Vec::new(),
             notes,
             shuffle: Random::new(settings.seed),
+            other_work: OtherWork::new(),
             pairs: Pairs::new(),
             learning: settings.learning,
             exploring: settings.exploring,
@@ -150,6 +153,7 @@ impl Replay {
             if self.contestants.get(k).is_some_and(|c| c.is_skipped(frame, boxes.len(), best_before)) {
                 continue;
             }
+            self.other_work.run();
             let started = Instant::now();
             let result = match self.contestants.get_mut(k).and_then(|c| c.algorithm.as_mut()) {
                 Some(algorithm) => algorithm.find_pairs(boxes, &mut self.pairs),
