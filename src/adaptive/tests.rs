@@ -13,7 +13,7 @@ use super::*;
 use crate::scene::{Scenario, Scene};
 use crate::{AlgorithmCost, CostCurve, CostTerm, Incremental, Term};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 fn tuning(costs: &[(&str, f64, f64)]) -> Tuning {
     tuning_of([Term::Call, Term::Objects], costs)
@@ -133,7 +133,7 @@ impl BroadPhase for Told {
 
 impl Incremental for Told {
     fn missed_frames(&mut self, frames: u64) {
-        self.0.fetch_add(frames, Relaxed);
+        self.0.fetch_add(frames, Ordering::Relaxed);
     }
 }
 
@@ -149,7 +149,7 @@ fn one_that_keeps_work_is_told_how_many_frames_it_missed() {
     for objects in [10, 1000, 10, 1000, 1000, 10, 1000] {
         (0..50).for_each(|_| _ = chosen(&mut adaptive, objects));
     }
-    let told = told.load(Relaxed);
+    let told = told.load(Ordering::Relaxed);
     assert!((95..=105).contains(&told), "{told}");
 }
 
