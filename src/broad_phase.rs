@@ -87,8 +87,8 @@ pub trait Incremental: BroadPhase {
         FrameWork::new(FrameKind::Updated, 1.0)
     }
 
-    /// Other algorithms ran so many frames since the last one: [`Adaptive`](crate::Adaptive) calls this before the next frame. What was concluded from earlier frames,
-    /// such as that keeping work does not pay, may hold no longer.
+    /// Other algorithms ran so many frames, one at least, since this one's last frame: [`Adaptive`](crate::Adaptive) calls this before its next one. What was concluded
+    /// from earlier frames, such as that keeping work does not pay, may hold no longer.
     fn missed_frames(&mut self, frames: u64) {
         let _ = frames;
     }

@@ -28,7 +28,7 @@ pub(crate) struct Instance {
     threads: Option<u32>,
     /// Objects that its buffers are ready for.
     ready: usize,
-    /// The frame that another one ran after it, and `None` while it goes on.
+    /// The first frame since its last one that another one ran and of which it was not told; `None` while it goes on, and before its first.
     left_at: Option<u64>,
 }
 
@@ -87,7 +87,7 @@ impl Instance {
         self.place.here().is_some()
     }
 
-    /// Another one runs this frame in place of it.
+    /// Another one ran this frame, and it the one before.
     pub(super) fn leave(&mut self, frame: u64) {
         self.left_at = Some(frame);
     }
@@ -112,10 +112,13 @@ impl Instance {
             }
             self.threads = Some(wanted);
         }
-        if let (Some(left_at), Some(algorithm)) = (self.left_at.take(), algorithm.as_incremental()) {
+        if let (Some(left_at), Some(algorithm)) = (self.left_at, algorithm.as_incremental()) {
             algorithm.missed_frames(frame - left_at);
+            // Should this frame fail, those up to it are told.
+            self.left_at = Some(frame);
         }
         algorithm.find_pairs_with(plan, boxes, pairs)?;
+        self.left_at = None;
         self.ready = self.ready.max(boxes.len());
         Ok(work(&mut **algorithm))
     }

@@ -60,8 +60,8 @@ pub(super) struct Policy {
     batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
-    /// Frames in which the one that is cheapest will have saved what a switch to it costs.
-    pays_in: Option<f64>,
+    /// Where a switch waits until it would have saved its price, the frames until then, and as many at least as lose what a decision takes.
+    frames_until_paid: Option<f64>,
     /// The number of the frame that is to run, and of the one that was decided last.
     frame: u64,
     decided: u64,
@@ -96,7 +96,7 @@ impl Policy {
             worked_out: None,
             batch: FrameBatch::default(),
             saved_ns: vec![0.0; count],
-            pays_in: None,
+            frames_until_paid: None,
             frame: 0,
             decided: 0,
             trials: Trials::default(),
@@ -179,7 +179,7 @@ impl Policy {
     /// The candidate that is to run the next frame. `None` when none can run.
     pub(super) fn choose(&mut self, load: &Load) -> Option<Choice> {
         let frames = (self.frame - std::mem::replace(&mut self.decided, self.frame)) as f64;
-        self.pays_in = None;
+        self.frames_until_paid = None;
         if self.is_by_count() {
             return self.choose_by_count(load.objects);
         }
@@ -276,15 +276,16 @@ impl Policy {
         if let Some(k) = self.cheapest(pays) {
             return (k, Reason::Switched);
         }
-        // Where the next decision would come later, the time in between would be lost; one that comes sooner would cost more than is lost.
+        // A decision that comes later than the switch has paid loses the gain of each frame in between. One that comes sooner costs no more than the frames before it
+        // lose by waiting.
         let left_ns = (price_ns(best) - self.saved_ns[best]).max(self.decision_ns);
-        self.pays_in = Some(left_ns / (now - self.mean_ns[best])).filter(|frames| *frames > 0.0);
+        self.frames_until_paid = Some(left_ns / (now - self.mean_ns[best])).filter(|frames| *frames > 0.0);
         (settled, Reason::Hysteresis)
     }
 
-    /// In how many frames the next decision may be for a switch, where one waits for it to pay.
-    pub(super) fn pays_in(&self) -> Option<f64> {
-        self.pays_in
+    /// Frames until the next decision, at most, where a switch waits until it has saved its price.
+    pub(super) fn frames_until_paid(&self) -> Option<f64> {
+        self.frames_until_paid
     }
 
     /// Begins a trial of the candidate that is expected to save the most by it, if there is one.

@@ -35,7 +35,8 @@ pub(super) struct Runner {
     steady: bool,
     /// Another tuning may arrive before any frame.
     awaits: bool,
-    running: usize,
+    /// `None` before the first frame.
+    running: Option<usize>,
     instances: Vec<Instance>,
     /// The last frame: what it took, where it was timed, and how it came about, where one may build on the one before.
     measured_ns: Option<f64>,
@@ -60,7 +61,7 @@ impl Runner {
         Self {
             steady: false,
             awaits: false,
-            running: 0,
+            running: None,
             policy: policy(tuning, &made),
             instances: made.instances,
             measured_ns: None,
@@ -108,7 +109,7 @@ impl Runner {
 
     /// Other candidates take the place of those of before. What was decided goes with them.
     fn exchange(&mut self, made: Instances) {
-        (self.candidates, self.instances, self.running) = (made.candidates, made.instances, 0);
+        (self.candidates, self.instances, self.running) = (made.candidates, made.instances, None);
         self.decided = None;
         self.choice = None;
         self.steady = false;
@@ -257,10 +258,11 @@ impl Runner {
 
     /// Runs a frame that needs no decision.
     fn go_on(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        let running = self.passed.is_timed().then(Instant::now);
-        match self.instances[self.running].go_on(boxes, pairs).unwrap_or_else(|| Err(self.gone())) {
+        let started = self.passed.is_timed().then(Instant::now);
+        let instance = self.running.map(|running| &mut self.instances[running]);
+        match instance.and_then(|i| i.go_on(boxes, pairs)).unwrap_or_else(|| Err(self.gone())) {
             Ok(work) => {
-                let ns = running.map(|running| (running.elapsed().as_nanos() as f64).max(1.0));
+                let ns = started.map(|started| (started.elapsed().as_nanos() as f64).max(1.0));
                 (self.work, self.measured_ns) = (work, ns.filter(|_| clock::TICKS));
                 match ns.filter(|&ns| !self.passed.is_usual(ns)) {
                     None => {
@@ -311,14 +313,14 @@ impl Runner {
                 return Err(self.gone());
             };
             let frame = self.policy.frame();
-            if self.running != instance {
-                self.instances[self.running].leave(frame);
-            }
             let running = Instant::now();
             match self.instances[instance].run(&candidate.id, frame, self.tracker.plan(), boxes, pairs) {
                 Ok(work) => {
                     let ns = (running.elapsed().as_nanos() as f64).max(1.0);
-                    (self.work, self.measured_ns, self.running) = (work, clock::TICKS.then_some(ns), instance);
+                    (self.work, self.measured_ns) = (work, clock::TICKS.then_some(ns));
+                    if let Some(before) = self.running.replace(instance).filter(|before| *before != instance) {
+                        self.instances[before].leave(frame);
+                    }
                     self.learn(decided, ns, boxes, pairs);
                     return Ok(());
                 }
@@ -348,11 +350,8 @@ impl Runner {
             self.tell();
         }
         let trial = self.policy.trial_rests();
-        if let Some(frames) = self.policy.pays_in() {
+        if let Some(frames) = trial.map(f64::from).or(self.policy.frames_until_paid()) {
             self.tracker.rest_no_longer_than(frames);
-        }
-        if let Some(frames) = trial {
-            self.tracker.rest_no_longer_than(f64::from(frames));
         }
         if dear || began && trial.is_none() || stood_out {
             // What began in this frame is decided on, and gets a plan of its frame, once more before it may rest. Without, `pair-cache` in `uniform` of 800 took

@@ -1,6 +1,6 @@
 //! How often to decide: in short frames not in each of them, unless their number of objects changes.
 
-/// Share of the frames' time that decisions and their clock may take.
+/// Share of the frames' time that decisions and their clock may take, but for those for which a switch waits to be paid.
 const SHARE: f64 = 0.004;
 /// Share of a decision in the mean, and how many times the mean it counts at most.
 const MEAN: f64 = 1.0 / 8.0;

@@ -10,8 +10,8 @@ use std::str::FromStr;
 
 /// Runs a scenario, or a recorded stream of boxes, with the adaptive choice and with every fixed algorithm, and compares their times.
 ///
-/// All of them run on the same frames in turn, with other work in between as in a program, so that a machine that slows down slows all of them, and start every repeat without what
-/// they kept. Times are medians over the repeats. They are compared with an oracle that runs the best algorithm of every frame, chosen on
+/// All of them run on the same frames in turn, so that a machine that slows down slows all of them, and start every repeat without what
+/// they kept. Between two turns other work is done, as a program does between two frames. Times are medians over the repeats. They are compared with an oracle that runs the best algorithm of every frame, chosen on
 /// one half of the repeats and timed on the other: the minimum of many noisy times would be less than any algorithm takes.
 #[derive(Debug, Args)]
 #[command(after_help = "\

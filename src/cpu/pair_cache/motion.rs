@@ -51,8 +51,8 @@ const MARGIN_STEP: f32 = 1.005;
 
 /// Of the boxes so many leave at once where the scene jumped, or where this method has not seen its last frames.
 const JUMP: f32 = 0.5;
-/// The margin is chosen anew then where they move at another pace than when it was chosen, farther apart than this natural logarithm. Else it stays: it was found in
-/// many frames, and boxes that are only taken from a pool and put back move as before.
+/// The margin is chosen anew then where they move at another pace than when that was told before: natural logarithm of the ratio. Else it stays, for it was found in many
+/// frames: boxes that are only taken from a pool and put back move as before.
 const OTHER_PACE_LN: f64 = 0.25;
 
 /// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
@@ -92,11 +92,13 @@ pub(super) struct Motion {
     /// Frames for which nothing is kept, and how many that will be the next time.
     pause: u32,
     next_pause: u32,
-    /// The pause is over as soon as boxes move less, and how far they moved at its first look.
+    /// The pause is over as soon as boxes move less than the most that they moved when it began, as far as that was told, and at its looks.
     ends_early: bool,
-    paused_at: Option<f32>,
-    /// How far they moved when that was told last.
-    pace: f32,
+    paused_at: f32,
+    /// Keeping ceased to pay for its many pairs, and not for how far boxes move.
+    crowded: bool,
+    /// How far they move in this frame, where that was told.
+    told: Option<f32>,
     /// No larger margin is begun with: that one kept too many pairs, of boxes near one another that do not overlap yet.
     most_margin: f32,
 }
@@ -105,7 +107,7 @@ pub(super) struct Motion {
 #[derive(Debug, Clone, Copy)]
 struct Keeping {
     margin: Margin,
-    /// How far boxes moved in a frame when it was begun with, in edges.
+    /// How far boxes moved in a frame when that was told last, in edges.
     pace: f32,
     /// Cost for each box, averaged over the last frames.
     cost: f32,
@@ -199,8 +201,9 @@ impl Default for Motion {
             pause: 0,
             next_pause: PAUSE[0],
             ends_early: false,
-            paused_at: None,
-            pace: 0.0,
+            paused_at: 0.0,
+            crowded: false,
+            told: None,
             most_margin: MARGINS[MARGINS.len() - 1],
         }
     }
@@ -209,12 +212,11 @@ impl Default for Motion {
 impl Motion {
     /// What to do about this frame.
     pub(super) fn advise(&mut self, plan: &FramePlan, boxes: &[Aabb]) -> Advice {
-        let pace = plan.moved().map_or(self.pace, |moved| moved as f32);
+        self.told = plan.moved().map(|moved| moved as f32);
         if self.keeping.is_none() {
             self.keeping = self.begin(plan, boxes);
             self.displacement.watch(boxes);
         }
-        self.pace = pace;
         self.keeping.map_or(Advice::Scratch, |k| Advice::Keep(k.margin))
     }
 
@@ -228,7 +230,8 @@ impl Motion {
         let kept = self.keeping.take();
         let crowded = kept.filter(|failed| too_many || failed.tests > 0.5 * failed.cost);
         let well = kept.is_some_and(|kept| kept.frames >= KEPT_WELL);
-        (self.ends_early, self.paused_at) = (well && crowded.is_none(), None);
+        self.crowded = crowded.is_some();
+        (self.ends_early, self.paused_at) = (well && !self.crowded, kept.map_or(0.0, |kept| kept.pace));
         if let Some(failed) = crowded {
             self.most_margin = (0.5 * failed.margin.share).max(MARGINS[0]);
         }
@@ -236,13 +239,15 @@ impl Motion {
         self.next_pause = (self.next_pause * 2).min(PAUSE[1]);
     }
 
-    /// Other algorithms ran so many frames since the last one. They count for the pause, and it is over where boxes move less now than when keeping ceased to
-    /// pay: where this method has its turn in a few frames at a time, its pause would go on for ever.
+    /// Other algorithms ran so many frames since the last one of this. They count for the pause, and where no crowd caused it, it is over if boxes move less by now: a
+    /// method that has its turn for a few frames at a time would never get to its end.
     pub(super) fn missed(&mut self, frames: u64) {
+        // Of boxes before all of these.
+        self.displacement = Displacement::default();
         let left = u64::from(self.pause).saturating_sub(frames) as u32;
         // So that the next frame looks.
-        self.pause = if left == 0 { 0 } else { left - left % LOOK + 1 };
-        self.ends_early = true;
+        self.pause = left.checked_sub(1).map_or(0, |left| left - left % LOOK + 1);
+        self.ends_early = !self.crowded;
     }
 
     /// A frame failed for no fault of keeping.
@@ -324,6 +329,7 @@ impl Motion {
         } else if keep > 1.2 * leave {
             k.margin.share = (m / MARGIN_STEP).max(MARGINS[0]);
         }
+        k.pace = self.told.unwrap_or(k.pace);
         k.frames = k.frames.saturating_add(1);
         if k.frames == PROVEN {
             (self.next_pause, self.most_margin) = (PAUSE[0], MARGINS[MARGINS.len() - 1]);
@@ -345,8 +351,8 @@ impl Motion {
             return false;
         }
         let Some(moved) = plan.moved().or_else(|| self.displacement.moved(boxes)) else { return false };
-        let before = *self.paused_at.get_or_insert(self.pace.max(moved as f32));
-        (moved as f32) < (CALMER * before).max(STILL)
+        self.paused_at = self.paused_at.max(moved as f32);
+        (moved as f32) < (CALMER * self.paused_at).max(STILL)
     }
 
     /// Begins to keep pairs if that promises to pay.
@@ -465,7 +471,8 @@ mod tests {
             // The next pause is twice as long, and frames that others run count.
             motion.stop(false);
             motion.missed(u64::from(2 * pause));
-            assert!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)));
+            let known = FramePlan::default().with_moved(Some(0.0));
+            assert!(matches!(motion.advise(&known, &boxes), Advice::Keep(_)));
         }
     }
 
@@ -492,6 +499,49 @@ mod tests {
         // Crowds stay crowds, a little less is no rest, and what never paid is left alone.
         let waited = [(KEPT_WELL, true, 0.01), (KEPT_WELL, false, 0.15), (1, false, 0.01)];
         assert_eq!(waited.map(|(kept, too_many, moved)| paused(kept, too_many, [0.2, moved])), [PAUSE[0]; 3]);
+    }
+
+    #[test]
+    fn frames_that_others_ran_count_for_a_pause_and_end_it_where_boxes_have_come_to_rest_and_are_no_crowd() {
+        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
+        let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
+        let changes = Changes { left: 0, far_away: 0, new: 0..0, gone: 0..0 };
+        let did = Work { kept_pairs: 500, nodes: 0, rebuilt: false };
+        // Frames from scratch after so many of others, where boxes moved so far before and move so far now.
+        let paused = |too_many: bool, missed: u64, moves: [f64; 2]| {
+            let mut motion = Motion::default();
+            motion.advise(&plan(moves[0]), &boxes);
+            motion.learn(1000, &changes, &did);
+            motion.keeping.as_mut().unwrap().tests = 0.0;
+            motion.stop(too_many);
+            motion.missed(missed);
+            let scratch = |_: &u32| matches!(motion.advise(&plan(moves[1]), &boxes), Advice::Scratch);
+            (0..2 * PAUSE[0]).take_while(scratch).count() as u32
+        };
+        assert_eq!((paused(false, 1, [0.05, 0.0]), paused(false, 1, [0.05, 0.02])), (0, 0));
+        // At the same pace only the frames count, and in a crowd at rest too.
+        for (too_many, moves) in [(false, [0.05, 0.05]), (true, [0.05, 0.0]), (true, [0.0, 0.0])] {
+            let left = [1, 8, 100].map(|missed| paused(too_many, missed, moves));
+            assert!((PAUSE[0] - LOOK..PAUSE[0]).contains(&left[0]) && (8 - LOOK..=8).contains(&left[1]), "{left:?}");
+            assert_eq!(left[2], 0);
+        }
+    }
+
+    #[test]
+    fn where_half_of_the_boxes_leave_at_once_the_margin_stays_unless_they_move_at_another_pace() {
+        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
+        let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
+        let share_after = |moved: f64| {
+            let mut motion = Motion::default();
+            motion.advise(&plan(0.02), &boxes);
+            // As found in many frames.
+            motion.keeping.as_mut().unwrap().margin.share = 0.123;
+            motion.advise(&plan(moved), &boxes);
+            let left = Changes { left: 600, far_away: 600, new: 400..1000, gone: 0..0 };
+            motion.renew(&plan(moved), &boxes, &left).share
+        };
+        assert_eq!(share_after(0.021), 0.123);
+        assert!(share_after(0.1) > 0.123 && share_after(0.0) < 0.123);
     }
 
     #[test]
