@@ -8,7 +8,7 @@ mod strip_grid;
 use crate::aabb::Aabb;
 
 pub use displacement::Displacement;
-pub(crate) use displacement::paces_apart_ln;
+pub(crate) use displacement::{is_same_pace, paces_apart_ln};
 pub use plan::FramePlan;
 pub(crate) use sample::{Chosen, Sample};
 pub(crate) use strip_grid::{StripGrid, StripSpan};

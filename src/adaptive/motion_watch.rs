@@ -7,13 +7,10 @@ use crate::aabb::Aabb;
 use crate::clock::Instant;
 #[cfg(test)]
 use crate::clock::counted;
-use crate::load::{Displacement, paces_apart_ln};
+use crate::load::{Displacement, is_same_pace};
 
 /// Share of the frames' time for looking how far boxes move.
 const SHARE: f64 = 0.002;
-
-/// Looks that differ by less may be of the same pace: few boxes are watched.
-const SAME_PACE_LN: f64 = 0.25;
 
 /// A look that the system interrupts seems dear. No look counts as more than so many times the one before.
 const COST_RISES: f64 = 2.0;
@@ -60,7 +57,7 @@ impl MotionWatch {
 
     /// Takes in what a look has found, and how long it took. Whether that is another pace.
     fn found(&mut self, moved: Option<f64>, took_ns: f64) -> bool {
-        let as_before = self.moved.zip(moved).is_some_and(|(before, now)| paces_apart_ln(before, now) < SAME_PACE_LN);
+        let as_before = self.moved.zip(moved).is_some_and(|(before, now)| is_same_pace(before, now));
         self.look_ns = if self.look_ns > 0.0 { took_ns.min(self.look_ns * COST_RISES) } else { took_ns };
         (self.moved, self.passed_ns, self.state) = (moved, 0.0, State::Resting);
         !as_before

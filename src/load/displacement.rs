@@ -17,6 +17,14 @@ pub(crate) fn paces_apart_ln(one: f64, other: f64) -> f64 {
     ((one + STILL) / (other + STILL)).ln().abs()
 }
 
+/// Paces that are less far apart may be the same: few boxes are watched.
+const SAME_PACE_LN: f64 = 0.25;
+
+/// Whether two paces that were [looked at](Displacement::moved) may be the same.
+pub(crate) fn is_same_pace(one: f64, other: f64) -> bool {
+    paces_apart_ln(one, other) < SAME_PACE_LN
+}
+
 /// Where a few boxes were in the frame before.
 ///
 /// Boxes are known by their position in the list: one that is exchanged for another counts as one that moved.

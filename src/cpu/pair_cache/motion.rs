@@ -2,7 +2,7 @@
 
 use super::grown::{Changes, Margin};
 use crate::aabb::Aabb;
-use crate::load::{Displacement, FramePlan, paces_apart_ln};
+use crate::load::{Displacement, FramePlan, is_same_pace};
 
 /// Costs of the parts of a frame in nanoseconds, on the machine in `datasets/`. Only their ratios matter here, and only for
 /// the choice of a margin: they need not be those of the machine at hand.
@@ -51,9 +51,6 @@ const MARGIN_STEP: f32 = 1.005;
 
 /// Of the boxes so many leave at once where the scene jumped, or where this method has not seen its last frames.
 const JUMP: f32 = 0.5;
-/// The margin is chosen anew then where they move at another pace than when that was told before: natural logarithm of the ratio. Else it stays, for it was found in many
-/// frames: boxes that are only taken from a pool and put back move as before.
-const OTHER_PACE_LN: f64 = 0.25;
 
 /// Frames after which keeping has paid: when it ceases to, that is because the scene changed.
 const PROVEN: u32 = 256;
@@ -279,8 +276,8 @@ impl Motion {
     /// last time.
     pub(super) fn renew(&mut self, plan: &FramePlan, boxes: &[Aabb], changes: &Changes) -> Margin {
         let jumped = changes.left as f32 > JUMP * boxes.len() as f32;
-        let another =
-            |keeping: Keeping| plan.moved().is_some_and(|now| paces_apart_ln(keeping.pace.into(), now) > OTHER_PACE_LN);
+        // At the same pace the margin stays, for it was found in many frames: boxes that are only taken from a pool and put back move as before.
+        let another = |keeping: Keeping| plan.moved().is_some_and(|now| !is_same_pace(keeping.pace.into(), now));
         if jumped && self.keeping.is_some_and(another) {
             self.keeping = self.begin(plan, boxes).or(self.keeping);
         }
