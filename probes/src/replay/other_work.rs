@@ -4,6 +4,7 @@
 //! that knows the way through the frame (counters to prove it are not to be had in a virtual machine). In `uniform` of up to 3000 boxes the `pair-cache` of the adaptive choice, whose margin was another, took 1.15 to 1.19 times as
 //! long as each of the two fixed ones, which were alike, for no more work; beside one fixed one alone 0.98 to 1.09 times (medians of the frames, three seeds each, Zen 5). No program runs a frame twice.
 
+use sapwise_scenes::Random;
 use std::hint::black_box;
 
 /// Memory that it walks through, in words of eight bytes: as much as second-level caches have.
@@ -14,25 +15,25 @@ const LINE: usize = 8;
 /// Takes what the caches and the branch predictor of the calling thread have of the turn before. Those of other cores keep it, and so do caches that are larger.
 pub(super) struct OtherWork {
     words: Vec<u64>,
-    state: u64,
+    random: Random,
 }
 
 impl OtherWork {
     pub(super) fn new() -> Self {
-        Self { words: vec![0; WORDS], state: 1 }
+        Self { words: vec![0; WORDS], random: Random::new(1) }
     }
 
     /// Reads each line of the memory and writes to three quarters of them, with two branches for each that nobody can predict.
     pub(super) fn run(&mut self) {
         for word in self.words.iter_mut().step_by(LINE) {
-            self.state = self.state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let bits = self.random.bits();
             let before = black_box(*word);
             // Without the black boxes these would become arithmetic.
-            if self.state >> 63 == 0 {
+            if bits >> 63 == 0 {
                 *word = black_box(before.wrapping_add(1));
             }
-            if self.state >> 62 & 1 == 0 {
-                *word = black_box(*word ^ self.state);
+            if bits >> 62 & 1 == 0 {
+                *word = black_box(*word ^ bits);
             }
         }
     }
