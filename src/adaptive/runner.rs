@@ -388,8 +388,9 @@ impl Runner {
 
     /// Gets the runner-up ready when its turn may come soon.
     fn warm_runner_up(&mut self, boxes: usize) {
-        let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), .. }) = self.choice else { return };
-        let Some(instance) = self.candidates[next].instance else { return };
+        let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), reason, .. }) = self.choice else { return };
+        // Behind a trial stands what is settled on, and is to be here when that ends.
+        let Some(instance) = self.candidates[next].instance.filter(|_| reason != Reason::Explored) else { return };
         if ns <= best * WARM_WITHIN && self.instances[instance].is_cold(boxes) {
             // By powers of two, so that a growing scene pays for this a few times in all.
             self.warm(instance, boxes.checked_next_power_of_two().unwrap_or(boxes));
