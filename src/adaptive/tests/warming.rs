@@ -136,3 +136,37 @@ fn one_that_panics_while_it_gets_ready_is_never_chosen() {
         assert_eq!(chosen(&mut adaptive, 128).0, "brute@cpu1");
     }
 }
+
+/// Takes so many nanoseconds of the counted clock, and its driver as long as the gate says to get it ready.
+struct Timed(f64, Arc<Gate>);
+
+impl BroadPhase for Timed {
+    fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
+        clock::counted::spend(self.0);
+        pairs.clear();
+        pairs.finish()
+    }
+
+    fn prepare(&mut self, _: usize) {
+        self.1.pass();
+    }
+}
+
+#[test]
+fn what_is_settled_on_is_here_when_a_trial_of_another_one_ends() {
+    let (gate, open) = (Arc::<Gate>::default(), Arc::<Gate>::default());
+    open.open();
+    let mut registry = Registry::with_cores(1);
+    for (id, ns, gate) in [("settled@gpu0", 1e6, &gate), ("near@cpu1", 1.2e6, &open)] {
+        let gate = Arc::clone(gate);
+        registry.add(id.parse().unwrap(), 1, move || Ok(Box::new(Timed(ns, Arc::clone(&gate)))));
+    }
+    let tuning = tuning(&[("settled@gpu0", 1e6, 0.0), ("near@cpu1", 1.2e6, 0.0)]);
+    let mut adaptive = Adaptive::new(tuning, &registry).unwrap();
+    let frames: Vec<_> = clock::counted::run(|| (100..400).map(|n| chosen(&mut adaptive, n)).collect());
+    gate.open();
+    assert!(frames.iter().any(|(_, reason)| *reason == Reason::Explored));
+    // More boxes than it has run are no reason to get it ready for them meanwhile: it would be away.
+    assert_eq!(gate.state.lock().unwrap().0, 0);
+    assert!(frames.iter().all(|(_, reason)| *reason != Reason::FellBack));
+}
