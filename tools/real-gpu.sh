@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# All that is to be learnt on a machine with a real GPU, in one command and under ten minutes:
+# What can be learnt on a machine with a real GPU in one command and under ten minutes; what did not fit is named at the end:
 #
 #     tools/real-gpu.sh OUT_DIR
 #
@@ -16,7 +16,7 @@
 #
 #     python3 -c 'import tarfile; tarfile.open("DIR.tar.xz").extractall("DIR")'
 #
-# The reports of every profile of the machine, for datasets/, take longer. In runs of under ten minutes, until it says that all are
+# The reports of every profile of the machine, quick ones, for datasets/, take longer. In runs of under ten minutes, until it says that all are
 # there:
 #
 #     tools/real-gpu.sh --profiles OUT_DIR

@@ -5,7 +5,7 @@ use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile};
 use crate::report::Label;
 use anyhow::{Result, bail};
 use sapwise::model::{GPU_PREFIX, Range};
-use sapwise::{Backend, GpuHardware, Model};
+use sapwise::{Backend, GpuHardware, GpuKind, Model};
 
 /// A model of what is chosen of the profiles, and in sentences what was left out and why.
 ///
@@ -28,16 +28,24 @@ pub fn model(
     Ok((model, notes))
 }
 
-/// Where the parameters lie in the profiles that have them: those of the machine, then those of the GPUs that were timed.
+/// Where the parameters lie in the profiles that have them: those of the machine, then those of the GPUs that were timed. Where some of these are real, software
+/// adapters have no part in what is fitted, and none in the ranges: between them and one card any other would pass for known.
 fn ranges(profiles: &[&Profile]) -> Vec<Range> {
     let machine = COMPARED
         .into_iter()
         .filter_map(|name| range(name.to_string(), profiles.iter().filter_map(|p| p.hardware.value(name)).collect()));
-    let timed: Vec<&GpuHardware> = profiles.iter().flat_map(|p| timed_gpus(p)).collect();
+    let mut timed: Vec<&GpuHardware> = profiles.iter().flat_map(|p| timed_gpus(p)).collect();
+    if timed.iter().any(|g| is_real(g)) {
+        timed.retain(|g| is_real(g));
+    }
     let gpus = COMPARED_OF_GPUS
         .into_iter()
         .filter_map(|name| range(format!("{GPU_PREFIX}{name}"), timed.iter().filter_map(|g| g.value(name)).collect()));
     machine.chain(gpus).collect()
+}
+
+fn is_real(gpu: &GpuHardware) -> bool {
+    gpu.gpu.kind != GpuKind::Software
 }
 
 fn range(parameter: String, values: Vec<f64>) -> Option<Range> {
