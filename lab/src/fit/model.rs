@@ -62,3 +62,30 @@ fn timed_gpus(profile: &Profile) -> impl Iterator<Item = &GpuHardware> {
     };
     profile.hardware.gpus.iter().filter(move |g| used(g.gpu.index))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthetic::Machine;
+
+    #[test]
+    fn the_ranges_of_gpus_are_of_the_real_ones_where_there_is_one() {
+        let mut all: Vec<Profile> = Machine::family_with_gpus()
+            .into_iter()
+            .take(2)
+            .map(|m| Profile::of(&format!("{}.json", m.name), &m.report()))
+            .collect();
+        let of_gpus = |profiles: &[Profile]| -> Vec<(f64, f64)> {
+            let ranges = ranges(&profiles.iter().collect::<Vec<_>>());
+            ranges.iter().filter(|r| r.parameter.starts_with(GPU_PREFIX)).map(|r| (r.min, r.max)).collect()
+        };
+        let software = |p: &mut Profile| p.hardware.gpus.iter_mut().for_each(|g| g.gpu.kind = GpuKind::Software);
+        let both = of_gpus(&all);
+        software(&mut all[0]);
+        let second = of_gpus(&all[1..]);
+        assert_eq!(of_gpus(&all), second);
+        assert_ne!(both, second);
+        software(&mut all[1]);
+        assert_eq!(of_gpus(&all), both);
+    }
+}
