@@ -64,7 +64,6 @@ pub(crate) mod counted {
     }
 
     /// Runs something on this thread under a clock that starts at nought.
-    #[cfg(feature = "model")]
     pub(crate) fn run<T>(what: impl FnOnce() -> T) -> T {
         NOW.set(Some(Duration::ZERO));
         let result = what();
