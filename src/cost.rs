@@ -72,7 +72,24 @@ pub(crate) struct Frame<'a> {
     /// Of the places that were asked for first; the methods of a tuning share theirs.
     likeness: OnceCell<(*const Places, Likeness)>,
     /// What some works take, which the algorithms of a method share.
-    known: [Cell<(*const Work, f64)>; 8],
+    known: [Cell<(*const Work, WorkCost)>; 8],
+}
+
+/// Nanoseconds of a work, and the factor of its residual in them.
+#[derive(Debug, Clone, Copy, Default)]
+struct WorkCost {
+    ns: f64,
+    factor: f64,
+}
+
+/// What a frame of one algorithm takes under one load, in nanoseconds.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct FrameCost {
+    pub(crate) ns: f64,
+    /// With the fallback, where there is one.
+    pub(crate) fallback_ns: Option<f64>,
+    /// What is due to calls: of several threads what it takes to call helpers and to wait for them, else [`Term::Call`].
+    pub(crate) calls_ns: f64,
 }
 
 impl<'a> Frame<'a> {
@@ -81,7 +98,7 @@ impl<'a> Frame<'a> {
             counts: Counts::new(load),
             load,
             likeness: OnceCell::new(),
-            known: [const { Cell::new((ptr::null(), 0.0)) }; 8],
+            known: [const { Cell::new((ptr::null(), WorkCost { ns: 0.0, factor: 1.0 })) }; 8],
         }
     }
 
@@ -92,21 +109,22 @@ impl<'a> Frame<'a> {
         if *of == wanted { look(likeness) } else { look(&places.likeness_of(self.load)) }
     }
 
-    fn residual_ln(&self, residual: &Residual) -> f64 {
-        self.likeness(&residual.places, |likeness| residual.ln_of(likeness))
+    /// What a residual multiplies a cost by.
+    fn factor(&self, residual: Option<&Residual>) -> f64 {
+        residual.map_or(1.0, |residual| self.likeness(&residual.places, |likeness| residual.ln_of(likeness)).exp())
     }
 
-    fn work_ns(&self, work: &Arc<Work>) -> f64 {
+    fn work(&self, work: &Arc<Work>) -> WorkCost {
         let of = Arc::as_ptr(work);
-        let free = |known: &&Cell<(*const Work, f64)>| known.get().0 == of || known.get().0.is_null();
+        let free = |known: &&Cell<(*const Work, WorkCost)>| known.get().0 == of || known.get().0.is_null();
         match self.known.iter().find(free).map(|known| (known, known.get())) {
-            Some((_, (known, ns))) if known == of => ns,
+            Some((_, (known, cost))) if known == of => cost,
             Some((known, _)) => {
-                let ns = work.ns_of(self);
-                known.set((of, ns));
-                ns
+                let cost = work.cost_of(self);
+                known.set((of, cost));
+                cost
             }
-            None => work.ns_of(self),
+            None => work.cost_of(self),
         }
     }
 }
@@ -129,17 +147,14 @@ impl Work {
     /// Nanoseconds of a frame under `load`.
     #[must_use]
     pub fn ns(&self, load: &Load) -> f64 {
-        self.ns_of(&Frame::new(load))
+        self.cost_of(&Frame::new(load)).ns
     }
 
-    pub(crate) fn ns_of(&self, frame: &Frame<'_>) -> f64 {
+    fn cost_of(&self, frame: &Frame<'_>) -> WorkCost {
         let sum: f64 = self.terms.iter().map(|t| t.unit_ns * frame.counts.of(t.term, self.cache_bytes)).sum();
-        let least = self.fallback.as_ref().map_or(sum, |f| sum.min(f.factor * frame.work_ns(&f.work)));
-        least * self.factor(frame)
-    }
-
-    fn factor(&self, frame: &Frame<'_>) -> f64 {
-        self.residual.as_ref().map_or(1.0, |residual| frame.residual_ln(residual).exp())
+        let least = self.fallback.as_ref().map_or(sum, |f| sum.min(f.factor * frame.work(&f.work).ns));
+        let factor = frame.factor(self.residual.as_ref());
+        WorkCost { ns: least * factor, factor }
     }
 
     /// What makes it unusable, if anything.
@@ -218,36 +233,34 @@ impl CostCurve {
     }
 
     pub(crate) fn cost_of(&self, frame: &Frame<'_>) -> f64 {
-        self.after(frame.work_ns(&self.work), frame)
+        self.on_helpers(frame.work(&self.work).ns, frame) * frame.factor(self.observed.as_ref())
     }
 
-    /// Its cost where the work takes so long.
-    fn after(&self, work_ns: f64, frame: &Frame<'_>) -> f64 {
-        let ns = self.helpers.map_or(work_ns, |h| h.cost_ns(frame.load.objects, work_ns));
-        self.observed.as_ref().map_or(ns, |observed| ns * frame.residual_ln(observed).exp())
+    /// What several threads make of work that takes so long.
+    fn on_helpers(&self, work_ns: f64, frame: &Frame<'_>) -> f64 {
+        self.helpers.map_or(work_ns, |h| h.cost_ns(frame.load.objects, work_ns))
     }
 
-    /// Predicted nanoseconds of the fallback, where there is one.
-    pub(crate) fn fallback_of(&self, frame: &Frame<'_>) -> Option<f64> {
-        let fallback = self.work.fallback.as_ref()?;
-        let ns = fallback.factor * frame.work_ns(&fallback.work) * self.work.factor(frame);
-        Some(self.after(ns, frame))
-    }
-
-    /// What of the predicted nanoseconds is due to calls: of several threads what it takes to call helpers and to wait for them, else
-    /// [`Term::Call`].
-    pub(crate) fn calls_of(&self, frame: &Frame<'_>) -> f64 {
-        let ns = match self.helpers {
-            Some(helpers) => helpers.calls_ns(frame.load.objects, frame.work_ns(&self.work)),
+    /// Its cost, and what it consists of.
+    pub(crate) fn parts_of(&self, frame: &Frame<'_>) -> FrameCost {
+        let work = frame.work(&self.work);
+        let observed = frame.factor(self.observed.as_ref());
+        let calls_ns = match self.helpers {
+            Some(helpers) => helpers.calls_ns(frame.load.objects, work.ns),
             None => {
                 let calls = self.work.terms.iter().filter(|t| t.term == Term::Call);
-                calls.map(|t| t.unit_ns).sum::<f64>() * self.work.factor(frame)
+                calls.map(|t| t.unit_ns).sum::<f64>() * work.factor
             }
         };
-        self.observed.as_ref().map_or(ns, |observed| ns * frame.residual_ln(observed).exp())
+        let fallback_ns = |f: &Fallback| self.on_helpers(f.factor * frame.work(&f.work).ns * work.factor, frame);
+        FrameCost {
+            ns: self.on_helpers(work.ns, frame) * observed,
+            fallback_ns: self.work.fallback.as_ref().map(|f| fallback_ns(f) * observed),
+            calls_ns: calls_ns * observed,
+        }
     }
 
-    /// Multiplies that by a factor.
+    /// Multiplies by a factor what of it is due to [calls](FrameCost::calls_ns).
     pub(crate) fn scale_calls(&mut self, factor: f64) {
         match &mut self.helpers {
             Some(helpers) => {
@@ -314,7 +327,7 @@ mod tests {
         assert_eq!((one.cost_ns(&load(1000)), two.cost_ns(&load(1000))), (10_050.0, 6025.0));
         let large = load(1000);
         let frame = Frame::new(&large);
-        assert_eq!((one.calls_of(&frame), two.calls_of(&frame)), (50.0, 1000.0));
+        assert_eq!((one.parts_of(&frame).calls_ns, two.parts_of(&frame).calls_ns), (50.0, 1000.0));
         // Both look at the same work, which is worked out once.
         assert!(Arc::ptr_eq(&one.work, &two.work));
     }

@@ -8,7 +8,7 @@ use super::shelter::Shelter;
 use super::switching::{Expected, SwitchingCosts};
 use super::trials::{HORIZON, OF_KEPT, OF_OTHERS, OF_SHARED, Offer, Trials, expected_gain};
 use crate::broad_phase::{FrameKind, FrameWork};
-use crate::cost::Frame;
+use crate::cost::{Frame, FrameCost};
 use crate::load::Load;
 use crate::tuning::Tuning;
 use crate::tuning::belief::View;
@@ -23,8 +23,8 @@ const SOON: f64 = 4.0;
 /// than the rest of a decision.
 const HOPELESS: f64 = 4.0;
 
-/// What was worked out for a load holds for another that differs by no more than this share: costs are known less well than that. It holds for so
-/// many frames: waits pass, whether anything is observed or not.
+/// What is predicted of a load holds for another that differs by no more than this share: costs are known less well than that. Its correction holds for
+/// so many frames: waits pass, whether anything is observed or not.
 const ALIKE: f64 = 0.01;
 const HOLDS: u64 = 64;
 
@@ -55,8 +55,11 @@ pub(super) struct Policy {
     expected: Vec<Expected>,
     predicted: Vec<Predicted>,
     view: View,
-    /// The load and the frame for which that was worked out, and how much was observed by then.
-    worked_out: Option<(Load, u64, u64)>,
+    /// What its tuning says of a frame of each candidate that goes on, and under which load.
+    built: Vec<FrameCost>,
+    predicted_for: Option<Load>,
+    /// The frame for which that was corrected, and how much was observed by then.
+    corrected: Option<(u64, u64)>,
     batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
@@ -93,7 +96,9 @@ impl Policy {
             expected: vec![Expected { mean_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
             predicted: vec![Predicted::default(); count],
             view: View::default(),
-            worked_out: None,
+            built: vec![FrameCost::default(); tuning.costs.len()],
+            predicted_for: None,
+            corrected: None,
             batch: FrameBatch::default(),
             saved_ns: vec![0.0; count],
             frames_until_paid: None,
@@ -155,7 +160,7 @@ impl Policy {
     pub(super) fn remade(&mut self, kept: &[Option<usize>], usable: &[bool]) {
         (0..usable.len()).for_each(|k| self.set_usable(k, usable[k]));
         // A frame with them is a first one, and begins a batch of its own.
-        (self.ran, self.worked_out) = (None, None);
+        (self.ran, self.corrected) = (None, None);
         self.trials.stop(self.frame);
         self.batch = FrameBatch::default();
         if !self.switching.remade(kept) {
@@ -210,22 +215,26 @@ impl Policy {
         })
     }
 
-    /// Fills in what every candidate is expected to cost, where that is not known from a load that was alike.
+    /// Fills in what every candidate is expected to cost, as far as that is not known from a load that was alike.
     fn expect(&mut self, load: &Load) {
+        let alike = self.predicted_for.is_some_and(|of| load.is_within(ALIKE, &of));
+        if !alike {
+            let frame = Frame::new(load);
+            self.view = self.learner.as_ref().map_or_else(View::default, |l| l.view(&frame));
+            self.built.iter_mut().zip(&self.tuning.costs).for_each(|(built, cost)| *built = cost.curve.parts_of(&frame));
+            self.predicted_for = Some(*load);
+        }
         let observed = self.learner.as_ref().map_or(0, Learner::observed);
-        let holds = |(of, at, then)| then == observed && self.frame - at < HOLDS && load.is_within(ALIKE, &of);
-        if self.worked_out.is_some_and(holds) {
+        let holds = |(at, then)| then == observed && self.frame - at < HOLDS;
+        if alike && self.corrected.is_some_and(holds) {
             return;
         }
-        self.worked_out = Some((*load, self.frame, observed));
-        let frame = Frame::new(load);
-        self.view = self.learner.as_ref().map_or_else(View::default, |l| l.view(&frame));
+        self.corrected = Some((self.frame, observed));
         let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
-        for (k, cost) in self.tuning.costs.iter().enumerate() {
-            let ns = cost.curve.cost_of(&frame);
-            let alone_ns = cost.curve.fallback_of(&frame).unwrap_or(ns).max(ns);
+        for (k, &FrameCost { ns, fallback_ns, calls_ns }) in self.built.iter().enumerate() {
+            let alone_ns = fallback_ns.unwrap_or(ns).max(ns);
             let mean_ns = self.switching.mean_ns(k, self.frame, ns, alone_ns);
-            let predicted = Predicted { ns: mean_ns, calls_ns: cost.curve.calls_of(&frame).min(ns) };
+            let predicted = Predicted { ns: mean_ns, calls_ns: calls_ns.min(ns) };
             let factor = learner.map_or(1.0, |l| l.correction_ln(k, &self.view, predicted.calls()).exp());
             let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));
             self.predicted[k] = predicted;

@@ -2,7 +2,7 @@
 
 use super::basis::View;
 use super::{Belief, Deviations, Expected, SIZE, Slopes, values};
-use crate::cost::Frame;
+use crate::cost::{Frame, FrameCost};
 use crate::{AlgorithmCost, CostCurve, Load};
 
 /// How the logarithm of one algorithm's cost under one load hangs on what is believed.
@@ -91,6 +91,6 @@ impl Observed {
 
 /// Nanoseconds of a frame, and the share of calls in them.
 fn shares(curve: &CostCurve, frame: &Frame<'_>) -> (f64, f64) {
-    let ns = curve.cost_of(frame);
-    (ns, if ns > 0.0 { (curve.calls_of(frame) / ns).min(1.0) } else { 0.0 })
+    let FrameCost { ns, calls_ns, .. } = curve.parts_of(frame);
+    (ns, if ns > 0.0 { (calls_ns / ns).min(1.0) } else { 0.0 })
 }
