@@ -121,6 +121,9 @@ impl LoadTracker {
             self.motion.want();
             self.throttle.wake();
         }
+        if passed.is_spent() {
+            self.throttle.wake();
+        }
     }
 
     /// Takes in the frames that ran without a decision.

@@ -22,6 +22,18 @@ pub(super) struct Usual {
     pub(super) mean_ns: f64,
     /// A frame that takes longer tells more than its time: it waited, or something changed.
     pub(super) most_ns: f64,
+    /// Of frames of a trial.
+    pub(super) trial: Option<Budget>,
+}
+
+/// What the frames of a trial may cost beside what frames cost otherwise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Budget {
+    /// What a frame of the mean work takes otherwise, and what is left, in nanoseconds.
+    pub(super) now_ns: f64,
+    pub(super) left_ns: f64,
+    /// What is made again in a frame would be made again in any other way.
+    pub(super) shares: bool,
 }
 
 /// The frames since the last decision.
@@ -69,6 +81,13 @@ impl Passed {
         }
     }
 
+    /// Whether they have cost more than a trial may. A trial that needed a decision to find that out every few frames would cost more by these than by its frames.
+    pub(super) fn is_spent(&self) -> bool {
+        let Some(Budget { now_ns, left_ns, shares }) = self.usual.trial.filter(|_| self.timed > 0) else { return false };
+        let work = if shares { self.over_mean } else { f64::from(self.timed) };
+        (self.ns - work * now_ns) * f64::from(self.frames) > left_ns * f64::from(self.timed)
+    }
+
     /// Whether the times differ so much from what was expected that the decision may have to be another, where the next one was to be so many
     /// nanoseconds away. In time, for that is what is lost: frames that are ten times as long as expected are looked at ten times as soon.
     pub(super) fn is_off(&self, rest_ns: f64) -> bool {
@@ -94,7 +113,7 @@ mod tests {
     #[test]
     fn the_clock_is_asked_the_less_the_shorter_frames_are() {
         let timed = |mean_ns: f64| {
-            let mut passed = Passed::expecting(Usual { mean_ns, most_ns: f64::INFINITY });
+            let mut passed = Passed::expecting(Usual { mean_ns, most_ns: f64::INFINITY, trial: None });
             let timed = |_| {
                 let timed = passed.is_timed();
                 passed.add(None, timed.then_some(mean_ns));
@@ -107,9 +126,29 @@ mod tests {
     }
 
     #[test]
+    fn a_trial_is_spent_once_its_frames_have_cost_more_than_it_may() {
+        let lasts = |ns: f64, apart: u32, shares: bool| {
+            let trial = Some(Budget { now_ns: 100.0, left_ns: 200.0, shares });
+            let mut passed = Passed::expecting(Usual { mean_ns: 1e6, most_ns: 4e6, trial });
+            let work = Some(FrameWork::new(FrameKind::Updated, 1.5));
+            let mut frame = |k: u32| {
+                passed.add(work, k.is_multiple_of(apart).then_some(ns));
+                passed.is_spent()
+            };
+            (0..1000).find(|&k| frame(k))
+        };
+        // 50 each, and where it shares what it keeps with the one that runs, that one would have taken as long for their work.
+        assert_eq!((lasts(150.0, 1, false), lasts(150.0, 1, true)), (Some(4), None));
+        assert_eq!((lasts(150.0, 4, false), lasts(99.0, 1, false), lasts(900.0, 1, false)), (Some(4), None, Some(0)));
+        let mut passed = Passed::expecting(Usual { mean_ns: 1e6, most_ns: 4e6, trial: None });
+        passed.add(None, Some(1e9));
+        assert!(!passed.is_spent());
+    }
+
+    #[test]
     fn frames_that_differ_from_what_was_expected_call_for_a_decision() {
         let is_off = |frames: u32, ns: f64, rest_ns: f64| {
-            let mut passed = Passed::expecting(Usual { mean_ns: 1e6, most_ns: 4e6 });
+            let mut passed = Passed::expecting(Usual { mean_ns: 1e6, most_ns: 4e6, trial: None });
             let work = Some(FrameWork::new(FrameKind::Updated, 0.5));
             (0..frames).for_each(|_| passed.add(work, Some(ns)));
             assert_eq!((passed.mean_ns(), passed.work), (Some(ns), work));

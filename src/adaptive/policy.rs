@@ -3,7 +3,7 @@
 use super::decision::{Choice, Reason};
 use super::frame_batch::{FrameBatch, MOST_OVER, Predicted};
 use super::learner::Learner;
-use super::passed::{Passed, Usual};
+use super::passed::{Budget, Passed, Usual};
 use super::shelter::Shelter;
 use super::switching::{Expected, SwitchingCosts};
 use super::trials::{HORIZON, OF_KEPT, OF_OTHERS, OF_SHARED, Offer, Trials, expected_gain};
@@ -338,7 +338,13 @@ impl Policy {
             return Usual::default();
         }
         let dearest_ns = self.switching.rebuild_ns(candidate, self.expected[candidate]);
-        Usual { mean_ns: self.mean_ns[candidate], most_ns: MOST_OVER * dearest_ns }
+        let trial = self.settled.zip(self.trials.rest()).filter(|_| self.trials.candidate() == Some(candidate));
+        let trial = trial.map(|(settled, (_, left_ns))| Budget {
+            now_ns: self.mean_ns[settled],
+            left_ns,
+            shares: self.switching.share(candidate, settled),
+        });
+        Usual { mean_ns: self.mean_ns[candidate], most_ns: MOST_OVER * dearest_ns, trial }
     }
 
     /// Takes in that a candidate ran some frames that were not decided on, none of which took longer than is usual.
@@ -444,9 +450,9 @@ impl Policy {
         }
     }
 
-    /// Frames of a trial until the next decision, the one that ran counted; `None` where none runs.
+    /// Frames of a trial until its end, the one that ran counted; `None` where none runs.
     pub(super) fn trial_rests(&self) -> Option<u32> {
-        self.trials.rests()
+        self.trials.rest().map(|(frames, _)| frames)
     }
 
     /// The step that holds at this number of objects, or the nearest below or above that can run.

@@ -353,9 +353,12 @@ impl Runner {
         if let Some(frames) = trial.map(f64::from).or(self.policy.frames_until_paid()) {
             self.tracker.rest_no_longer_than(frames);
         }
-        if dear || began && trial.is_none() || stood_out {
-            // What began in this frame is decided on, and gets a plan of its frame, once more before it may rest. Without, `pair-cache` in `uniform` of 800 took
-            // 1.19 times the best single algorithm (n 8) in place of 1.05 (n 12); presumably it finds its margin without knowing how far boxes move.
+        // What began before it was known how far boxes move is decided on, and gets a plan of its frame, once more before it may rest. Without, `pair-cache` in
+        // `uniform` of 800 took 1.19 times the best single algorithm (n 8) in place of 1.05 (n 12). And a shelter is for some frames only.
+        let again = began
+            && (matches!(choice.reason, Reason::Sheltered | Reason::FellBack)
+                || trial.is_none() && self.tracker.moved().is_none());
+        if dear || again || stood_out {
             self.tracker.wake();
         }
         self.warm_runner_up(boxes.len());

@@ -273,7 +273,7 @@ fn frames_that_are_off_let_the_next_ones_show_how_far_boxes_move() {
             tracker.ran(&at(k), 100, 1000.0);
         };
         (0..5).for_each(|_| frame(&mut tracker, 0));
-        let mut passed = Passed::expecting(Usual { mean_ns: 1000.0, most_ns: 9000.0 });
+        let mut passed = Passed::expecting(Usual { mean_ns: 1000.0, most_ns: 9000.0, trial: None });
         (0..8).for_each(|_| passed.add(None, Some(if is_off { 2000.0 } else { 1000.0 })));
         tracker.passes(&at(0), 100, &passed);
         (1..4).for_each(|k| frame(&mut tracker, k));

@@ -50,8 +50,7 @@ pub(super) struct Trials {
 #[derive(Debug, Clone, Copy)]
 struct Trial {
     candidate: usize,
-    /// Frames that it ran, and that are left.
-    ran: u32,
+    /// Frames that are left.
     left: u32,
     /// What it may cost still, in nanoseconds.
     left_ns: f64,
@@ -94,9 +93,8 @@ impl Offer {
     pub(super) fn of(candidate: usize, frames: u32, switch_ns: f64, mean_ns: f64, now_ns: f64, decision_ns: f64) -> Self {
         // One that turns out dear ends early.
         let dear_ns = (f64::from(frames) * (mean_ns - now_ns).max(0.0)).min(ENOUGH * now_ns);
-        // After two, four, eight frames and so on it is looked whether to go on. The decision before the first is made in any case.
-        let decisions = f64::from(frames.ilog2());
-        Self { candidate, frames, price_ns: switch_ns + dear_ns + decisions * decision_ns, now_ns }
+        // The one behind its last frame. That before its first is made in any case.
+        Self { candidate, frames, price_ns: switch_ns + dear_ns + decision_ns, now_ns }
     }
 
     /// Frames that tell what it costs: all but the first.
@@ -136,7 +134,7 @@ impl Trials {
     /// Begins a trial.
     pub(super) fn begin(&mut self, offer: Offer) {
         let Offer { candidate, frames, now_ns, .. } = offer;
-        self.running = Some(Trial { candidate, ran: 0, left: frames, left_ns: ENOUGH * now_ns });
+        self.running = Some(Trial { candidate, left: frames, left_ns: ENOUGH * now_ns });
     }
 
     /// Takes in what a decision, or a frame of a trial, its `first` or another, or the first one after it has cost beside what frames cost otherwise.
@@ -151,15 +149,13 @@ impl Trials {
     /// Takes in that a candidate ran some frames.
     pub(super) fn ran(&mut self, candidate: usize, frames: u32) {
         if let Some(trial) = self.running.as_mut().filter(|t| t.candidate == candidate) {
-            trial.ran += frames;
             trial.left = trial.left.saturating_sub(frames);
         }
     }
 
-    /// Frames from the last one of a trial, that one counted, until it is to be looked whether to go on: twice as many as so far each time, for each look
-    /// is a decision, and takes as long as a short frame. What the frames cost is known to within a factor of two all the same when it is looked.
-    pub(super) fn rests(&self) -> Option<u32> {
-        self.running.map(|t| ((t.ran + 1).next_power_of_two() - t.ran + 1).min(t.left + 1))
+    /// Frames from the last one of a trial, that one counted, until its end, and what they may cost beside what frames cost otherwise, in nanoseconds.
+    pub(super) fn rest(&self) -> Option<(u32, f64)> {
+        self.running.map(|t| (t.left + 1, t.left_ns))
     }
 
     /// Whether a trial runs that is over.
@@ -260,32 +256,13 @@ mod tests {
         trials.ran(1, 9);
         trials.ran(0, 1);
         assert!(!trials.is_over());
+        // The last one, and one behind it in which it is over.
+        assert_eq!(trials.rest(), Some((2, 200.0)));
         trials.ran(0, 1);
         assert!(trials.is_over());
         trials.stop(7);
         trials.allow(100.0, 1.0, 9);
         assert!(trials.allowance(26, 100.0).is_none() && trials.allowance(27, 100.0).is_some());
-    }
-
-    #[test]
-    fn whether_a_trial_goes_on_is_looked_the_more_seldom_the_longer_it_runs() {
-        let looks = |frames: u32| {
-            let mut trials = Trials::default();
-            trials.begin(Offer::of(0, frames, 100.0, 100.0, 100.0, 1.0));
-            let mut looks = Vec::new();
-            let mut frames = 0;
-            while !trials.is_over() {
-                looks.push(frames);
-                trials.ran(0, 1);
-                let rests = trials.rests().unwrap();
-                trials.ran(0, rests - 1);
-                frames += rests;
-            }
-            (looks, frames)
-        };
-        assert_eq!(looks(OF_OTHERS), (vec![0], 2));
-        assert_eq!(looks(OF_SHARED), (vec![0, 2, 4], 8));
-        assert_eq!(looks(OF_KEPT), (vec![0, 2, 4, 8, 16, 32, 64], 128));
     }
 
     #[test]
