@@ -78,7 +78,7 @@ fn every_scenario_at_the_edges_of_blocks() {
 }
 
 #[test]
-#[ignore = "takes an hour on a software adapter; tools/real-gpu.sh runs it on real ones"]
+#[ignore = "takes very long on a software adapter; tools/real-gpu.sh runs it on real ones"]
 fn every_algorithm_on_every_scenario_at_every_size() {
     let Some(gpus) = gpus() else { return };
     let mut algorithms = every_algorithm(&gpus);
