@@ -97,7 +97,7 @@ fn stale_and_inapplicable_files_fail_and_say_which_algorithm() {
     let old = write(folder.path(), "old.json", old.to_string());
     let steps = json!([
         {"from_objects": 0, "algorithm": "brute@cpu4096"}, {"from_objects": 9, "algorithm": "octree@cpu1"},
-        {"from_objects": 99, "algorithm": "grid-sap@gpu99"}
+        {"from_objects": 99, "algorithm": "grid-sap@gpu99"}, {"from_objects": 999, "algorithm": "sap@cpu2048"}
     ]);
     let elsewhere = write(folder.path(), "elsewhere.json", tuning(&steps).to_string());
     let (status, findings) = check(&[old, elsewhere]);
@@ -105,7 +105,9 @@ fn stale_and_inapplicable_files_fail_and_say_which_algorithm() {
     assert_eq!((&findings[0]["sound"], &findings[0]["current"]), (&true.into(), &false.into()));
     assert!(findings[0]["problems"].to_string().contains("brute has revision 999999"), "{findings:?}");
     assert_eq!(findings[1]["applicable"], false);
-    for text in ["brute@cpu4096", "octree@cpu1", "grid-sap@gpu99"] {
+    // A line for what wants more cores, however many algorithms that are.
+    assert_eq!(findings[1]["problems"].as_array().map(Vec::len), Some(3), "{findings:?}");
+    for text in ["brute@cpu4096, sap@cpu2048", "of a machine with 4096 cores or more", "octree@cpu1", "grid-sap@gpu99"] {
         assert!(findings[1]["problems"].to_string().contains(text), "{findings:?}");
     }
 }

@@ -3,7 +3,7 @@
 use super::{Finding, Here};
 use crate::gpus::uses;
 use crate::revisions;
-use sapwise::{AlgorithmId, Backend, GpuKind, Tuning};
+use sapwise::{AlgorithmId, Backend, Error, GpuIdentity, GpuKind, Tuning, Unavailable, usable_cores};
 
 impl Here {
     pub(super) fn tuning(&self, tuning: &Tuning, finding: &mut Finding) {
@@ -14,15 +14,29 @@ impl Here {
         );
         let mut wanted = tuning.algorithms();
         wanted.extend(tuning.steps.iter().map(|s| &s.algorithm));
-        let mut missing: Vec<String> = wanted.into_iter().filter_map(|id| self.unavailable(id)).collect();
-        missing.sort_unstable();
-        missing.dedup();
-        finding.applicable = Some(missing.is_empty());
+        wanted.sort_unstable();
+        wanted.dedup();
+        let (wide, others): (Vec<_>, Vec<_>) = wanted.into_iter().partition(|id| self.is_too_wide(id));
+        let missing: Vec<String> = others.into_iter().filter_map(|id| self.unavailable(id)).collect();
+        finding.applicable = Some(missing.is_empty() && wide.is_empty());
         finding.problems.extend(missing);
+        if let Some(most) = wide.iter().map(|id| id.threads()).max() {
+            let wide: Vec<String> = wide.iter().map(ToString::to_string).collect();
+            finding.problems.push(format!(
+                "it is of a machine with {most} cores or more, and this one has {}: {} can't run here; predict again on this machine",
+                usable_cores(),
+                wide.join(", ")
+            ));
+        }
         finding.notes.extend(self.on_software_adapters(tuning));
         if tuning.extrapolated {
             finding.notes.push("predicted for a machine outside what the model was trained on".to_owned());
         }
+    }
+
+    /// Whether an algorithm wants more threads than there are cores.
+    fn is_too_wide(&self, id: &AlgorithmId) -> bool {
+        matches!(self.registry.create(id), Err(Error::Unavailable { reason: Unavailable::TooFewCores { .. }, .. }))
     }
 
     /// Why an algorithm can't run here, if it can't.
@@ -42,13 +56,16 @@ impl Here {
 
     /// Which algorithms of tuning run on software adapters here.
     fn on_software_adapters(&self, tuning: &Tuning) -> Vec<String> {
-        let mut notes = Vec::new();
-        for id in tuning.algorithms().into_iter().filter(|id| !uses(id).is_empty()) {
-            let gpus = self.gpus().identities.iter().filter(|g| uses(id).contains(&g.index));
-            for gpu in gpus.filter(|g| g.kind == GpuKind::Software) {
-                notes.push(format!("{id}: gpu{} is a software adapter here: {}", gpu.index, gpu.name));
-            }
+        let on_gpus: Vec<&AlgorithmId> = tuning.algorithms().into_iter().filter(|id| !uses(id).is_empty()).collect();
+        if on_gpus.is_empty() {
+            return Vec::new();
         }
-        notes
+        let note = |gpu: &GpuIdentity| {
+            let on_it: Vec<String> =
+                on_gpus.iter().filter(|id| uses(id).contains(&gpu.index)).map(ToString::to_string).collect();
+            (!on_it.is_empty())
+                .then(|| format!("{}: gpu{} is a software adapter here: {}", on_it.join(", "), gpu.index, gpu.name))
+        };
+        self.gpus().identities.iter().filter(|g| g.kind == GpuKind::Software).filter_map(note).collect()
     }
 }

@@ -1,23 +1,14 @@
 //! Whether keeping pairs pays, and with which margin.
 
+mod cost;
+mod mean_work;
+#[cfg(test)]
+mod tests;
+
 use super::grown::{Changes, Margin};
 use crate::aabb::Aabb;
 use crate::load::{Displacement, FramePlan, is_same_pace};
-
-/// Costs of the parts of a frame in nanoseconds, on the machine in `datasets/`. Only their ratios matter here, and only for
-/// the choice of a margin: they need not be those of the machine at hand.
-mod cost {
-    /// A box looked at.
-    pub(super) const BOX: f32 = 1.5;
-    /// A kept pair tested.
-    pub(super) const KEPT: f32 = 2.5;
-    /// A box looked at again in a frame in which some box left.
-    pub(super) const AGAIN: f32 = 1.0;
-    /// A box that left, and each node of the tree that is looked at for it, while the tree is in the cache.
-    pub(super) const LEFT: [f32; 2] = [60.0, 10.0];
-    /// A box and a pair found by a tree from scratch.
-    pub(super) const SCRATCH: [f32; 2] = [40.0, 7.0];
-}
+use mean_work::MeanWork;
 
 /// Margins that are compared, as shares of a mean edge.
 const MARGINS: [f32; 8] = [0.04, 0.07, 0.1, 0.15, 0.22, 0.33, 0.5, 0.75];
@@ -140,52 +131,13 @@ impl Keeping {
     /// of boxes that wander.
     fn narrower_saves(&self, far: f32, kept: f32, left: f32) -> f32 {
         let more = (left * (self.grown / self.narrower()).powi(2)).min(1.0) - left;
-        tests(far, kept) - tests(far, kept * self.narrower_keeps()) - self::left(far, self.nodes) * more.max(0.0)
+        cost::tests(far, kept) - cost::tests(far, kept * self.narrower_keeps()) - cost::left(far, self.nodes) * more.max(0.0)
     }
 
     /// Whether it would have saved by now what it costs to grow all boxes again. Boxes that come to rest never leave by themselves: without this their
     /// wide grown boxes would stay for ever, and with them five times the pairs.
     fn is_too_wide(&self, objects: usize) -> bool {
-        self.missed > rebuild(far(objects), self.kept * self.narrower_keeps())
-    }
-}
-
-/// The mean cost of a box over the frames from one in which all is made again to the next. A promise counts for as many frames as
-/// [`FEWEST`](Self::FEWEST).
-#[derive(Debug, Clone, Copy)]
-struct MeanWork {
-    /// Over the frames up to the last in which all was made again, and how many frames that counts for.
-    before: f32,
-    weight: f32,
-    /// Sum over the frames since, their number, and the last one.
-    sum: f32,
-    frames: f32,
-    last: f32,
-}
-
-impl MeanWork {
-    const FEWEST: f32 = 16.0;
-    const MOST: f32 = 64.0;
-    /// Where nothing moves nothing is ever made again: the sum is kept where `f32` adds up.
-    const LONGEST: f32 = 1024.0;
-
-    fn promised(cost: f32) -> Self {
-        Self { before: cost, weight: Self::FEWEST, sum: 0.0, frames: 0.0, last: cost }
-    }
-
-    fn mean(&self) -> f32 {
-        (self.before * self.weight + self.sum) / (self.weight + self.frames)
-    }
-
-    fn add(&mut self, cost: f32, rebuilt: bool) {
-        if rebuilt {
-            let weight = (self.weight + self.frames).min(Self::MOST);
-            *self = Self { before: self.mean(), weight, sum: 0.0, frames: 0.0, last: cost };
-        }
-        if self.frames >= Self::LONGEST {
-            (self.sum, self.frames) = (self.sum / 2.0, self.frames / 2.0);
-        }
-        (self.sum, self.frames, self.last) = (self.sum + cost, self.frames + 1.0, cost);
+        self.missed > cost::rebuild(cost::far(objects), self.kept * self.narrower_keeps())
     }
 }
 
@@ -293,15 +245,15 @@ impl Motion {
 
     /// Learns from a frame in which boxes left as `changes` says. `false` when keeping does not pay any more.
     pub(super) fn learn(&mut self, objects: usize, changes: &Changes, did: &Work) -> bool {
-        let far = far(objects);
-        let scratch = scratch(far, self.density.unwrap_or_default());
+        let far = cost::far(objects);
+        let scratch = cost::scratch(far, self.density.unwrap_or_default());
         let Some(k) = &mut self.keeping else { return false };
         let share = |count: usize| count as f32 / objects.max(1) as f32;
         let (left, kept, rebuilt) = (share(changes.left), share(did.kept_pairs), did.rebuilt);
         let nodes = did.nodes as f32 / changes.left.max(1) as f32;
-        let leaving = if left > 0.0 { cost::AGAIN + self::left(far, nodes) * left } else { 0.0 };
-        let work = if rebuilt { rebuild(far, kept) } else { leaving };
-        k.tests = tests(far, kept);
+        let leaving = if left > 0.0 { cost::AGAIN + cost::left(far, nodes) * left } else { 0.0 };
+        let work = if rebuilt { cost::rebuild(far, kept) } else { leaving };
+        k.tests = cost::tests(far, kept);
         let now = k.tests + work;
         k.cost += (now - k.cost) / 16.0;
         k.work.add(now, rebuilt);
@@ -320,7 +272,7 @@ impl Motion {
         // between 1, for those that fly straight on, and 2, for those that wander.
         let m = k.margin.share;
         let (keep, leave) =
-            ((tests(far, k.kept) - cost::BOX) * 6.0 * m / (1.0 + 2.0 * m), 1.5 * self::left(far, k.nodes) * k.leaving);
+            ((cost::tests(far, k.kept) - cost::BOX) * 6.0 * m / (1.0 + 2.0 * m), 1.5 * cost::left(far, k.nodes) * k.leaving);
         if leave > 1.2 * keep {
             k.margin.share = (m * MARGIN_STEP).min(MARGINS[MARGINS.len() - 1]);
         } else if keep > 1.2 * leave {
@@ -363,11 +315,11 @@ impl Motion {
         }
         let (motion, density) = self.known(plan, boxes)?;
         self.density = Some(density);
-        let far = far(boxes.len());
-        let scratch = scratch(far, density);
+        let far = cost::far(boxes.len());
+        let scratch = cost::scratch(far, density);
         let density = density.max(FEWEST_PAIRS);
         let kept = |m: f32| density * (1.0 + 2.0 * m).powi(3);
-        let cost = |m: f32| tests(far, kept(m)) + cost::AGAIN + left(far, NODES) * leaving(motion, m);
+        let cost = |m: f32| cost::tests(far, kept(m)) + cost::AGAIN + cost::left(far, NODES) * cost::leaving(motion, m);
         let margins = MARGINS.into_iter().filter(|&m| m <= self.most_margin);
         let best = margins.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(MARGINS[0]);
         let kept = kept(best);
@@ -376,7 +328,7 @@ impl Motion {
             pace: motion,
             cost: cost(best),
             tests: 0.0,
-            leaving: leaving(motion, best),
+            leaving: cost::leaving(motion, best),
             kept,
             nodes: NODES,
             left: 0.0,
@@ -398,212 +350,4 @@ fn longest_edge(plan: &FramePlan, boxes: &[Aabb]) -> f32 {
 fn worn(objects: usize, changes: &Changes) -> f32 {
     const FAR_AWAY: f32 = 16.0;
     (changes.left as f32 + FAR_AWAY * changes.far_away as f32) / objects.max(1) as f32
-}
-
-/// The cost of a box from scratch.
-fn scratch(far: f32, density: f32) -> f32 {
-    far.sqrt() * (cost::SCRATCH[0] + cost::SCRATCH[1] * density)
-}
-
-/// The cost of a box where all are grown again and so many pairs of each are kept: those of a tree from scratch, of larger boxes.
-fn rebuild(far: f32, kept: f32) -> f32 {
-    1.5 * scratch(far, kept)
-}
-
-/// The cost of a box whose kept pairs are tested.
-fn tests(far: f32, kept: f32) -> f32 {
-    cost::BOX + far.sqrt() * cost::KEPT * kept
-}
-
-/// The cost of a box that left when this many nodes are looked at for each.
-fn left(far: f32, nodes: f32) -> f32 {
-    far * (cost::LEFT[0] + cost::LEFT[1] * nodes)
-}
-
-/// How many times as much a look at a node of the tree costs than in a small scene: with the number of objects the tree
-/// moves out of the caches. What reads memory in order suffers less, by the root of this.
-fn far(objects: usize) -> f32 {
-    (1.0 + 0.8 * (objects as f32 / 30_000.0).log2()).clamp(1.0, 5.0)
-}
-
-/// The share of boxes that leave in a frame, when they move by `motion` and may by `margin`, as of those that wander. More
-/// leave of those that fly straight on, which shows in a few frames.
-fn leaving(motion: f32, margin: f32) -> f32 {
-    (motion / margin).powi(2).min(1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{Scenario, Scene};
-
-    fn keeps(scenario: Scenario) -> bool {
-        let mut scene = Scene::start(scenario, 2000, 1);
-        let mut motion = Motion::default();
-        motion.advise(&FramePlan::default(), scene.boxes());
-        motion.found(2000, 1000);
-        scene.advance();
-        matches!(motion.advise(&FramePlan::default(), scene.boxes()), Advice::Keep(_))
-    }
-
-    #[test]
-    fn pairs_are_kept_where_boxes_move_little_and_not_where_they_move_far() {
-        assert!(keeps(Scenario::Resting) && keeps(Scenario::Uniform));
-        assert!(!keeps(Scenario::Fast));
-    }
-
-    #[test]
-    fn too_many_pairs_are_not_kept_and_a_failure_is_not_tried_again_at_once() {
-        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 500];
-        let mut motion = Motion::default();
-        for pairs in [500 * 499 / 2, 1000] {
-            motion.found(500, pairs);
-            motion.advise(&FramePlan::default(), &boxes);
-            assert_eq!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)), pairs == 1000);
-        }
-        for pause in [PAUSE[0], 4 * PAUSE[0]] {
-            motion.stop(false);
-            assert!((0..pause).all(|_| matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Scratch)));
-            assert!(matches!(motion.advise(&FramePlan::default(), &boxes), Advice::Keep(_)));
-            // The next pause is twice as long, and frames that others run count.
-            motion.stop(false);
-            motion.missed(u64::from(2 * pause));
-            let known = FramePlan::default().with_moved(Some(0.0));
-            assert!(matches!(motion.advise(&known, &boxes), Advice::Keep(_)));
-        }
-    }
-
-    #[test]
-    fn a_pause_ends_when_boxes_that_moved_too_far_come_to_rest() {
-        let paused = |kept: u32, too_many: bool, moves: [f64; 2]| {
-            let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
-            let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
-            let mut motion = Motion::default();
-            motion.advise(&plan(0.001), &boxes);
-            let changes = Changes { left: 0, far_away: 0, new: 0..0, gone: 0..0 };
-            let did = Work { kept_pairs: 500, nodes: 0, rebuilt: false };
-            assert!((0..kept).all(|_| motion.learn(1000, &changes, &did)));
-            motion.keeping.as_mut().unwrap().tests = 0.0;
-            motion.stop(too_many);
-            let paused = |at: &u32| {
-                let moved = if *at < 8 { moves[0] } else { moves[1] };
-                matches!(motion.advise(&plan(moved), &boxes), Advice::Scratch)
-            };
-            (0..PAUSE[0]).take_while(paused).count() as u32
-        };
-        assert!((8..8 + LOOK).contains(&paused(KEPT_WELL, false, [0.2, 0.01])));
-        assert!(paused(KEPT_WELL, false, [0.0, 0.0]) <= LOOK);
-        // Crowds stay crowds, a little less is no rest, and what never paid is left alone.
-        let waited = [(KEPT_WELL, true, 0.01), (KEPT_WELL, false, 0.15), (1, false, 0.01)];
-        assert_eq!(waited.map(|(kept, too_many, moved)| paused(kept, too_many, [0.2, moved])), [PAUSE[0]; 3]);
-    }
-
-    #[test]
-    fn frames_that_others_ran_count_for_a_pause_and_end_it_where_boxes_have_come_to_rest_and_are_no_crowd() {
-        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
-        let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
-        let changes = Changes { left: 0, far_away: 0, new: 0..0, gone: 0..0 };
-        let did = Work { kept_pairs: 500, nodes: 0, rebuilt: false };
-        // Frames from scratch after so many of others, where boxes moved so far before and move so far now.
-        let paused = |too_many: bool, missed: u64, moves: [f64; 2]| {
-            let mut motion = Motion::default();
-            motion.advise(&plan(moves[0]), &boxes);
-            motion.learn(1000, &changes, &did);
-            motion.keeping.as_mut().unwrap().tests = 0.0;
-            motion.stop(too_many);
-            motion.missed(missed);
-            let scratch = |_: &u32| matches!(motion.advise(&plan(moves[1]), &boxes), Advice::Scratch);
-            (0..2 * PAUSE[0]).take_while(scratch).count() as u32
-        };
-        assert_eq!((paused(false, 1, [0.05, 0.0]), paused(false, 1, [0.05, 0.02])), (0, 0));
-        // At the same pace only the frames count, and in a crowd at rest too.
-        for (too_many, moves) in [(false, [0.05, 0.05]), (true, [0.05, 0.0]), (true, [0.0, 0.0])] {
-            let left = [1, 8, 100].map(|missed| paused(too_many, missed, moves));
-            assert!((PAUSE[0] - LOOK..PAUSE[0]).contains(&left[0]) && (8 - LOOK..=8).contains(&left[1]), "{left:?}");
-            assert_eq!(left[2], 0);
-        }
-    }
-
-    #[test]
-    fn where_half_of_the_boxes_leave_at_once_the_margin_stays_unless_they_move_at_another_pace() {
-        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
-        let plan = |moved| FramePlan::default().with_moved(Some(moved)).with_pairs(Some(500.0));
-        let share_after = |moved: f64| {
-            let mut motion = Motion::default();
-            motion.advise(&plan(0.02), &boxes);
-            // As found in many frames.
-            motion.keeping.as_mut().unwrap().margin.share = 0.123;
-            motion.advise(&plan(moved), &boxes);
-            let left = Changes { left: 600, far_away: 600, new: 400..1000, gone: 0..0 };
-            motion.renew(&plan(moved), &boxes, &left).share
-        };
-        assert_eq!(share_after(0.021), 0.123);
-        assert!(share_after(0.1) > 0.123 && share_after(0.0) < 0.123);
-    }
-
-    #[test]
-    fn the_mean_work_is_that_of_whole_rounds_and_does_not_drift_where_there_are_none() {
-        let mut work = MeanWork::promised(20.0);
-        (0..50).for_each(|k| work.add(if k % 10 == 0 { 100.0 } else { 10.0 }, k % 10 == 0));
-        assert!((work.mean() - 19.0).abs() < 2.0, "{}", work.mean());
-        (0..20_000_000).for_each(|_| work.add(10.0, false));
-        assert!((work.mean() - 10.0).abs() < 1.0, "{}", work.mean());
-    }
-
-    #[test]
-    fn boxes_that_go_far_wear_the_order_sooner_than_those_that_wander() {
-        let mut motion = Motion::default();
-        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
-        motion.found(1000, 0);
-        (0..2).for_each(|_| _ = motion.advise(&FramePlan::default(), &boxes));
-        let frames = |far_away: usize, motion: &mut Motion| {
-            let changes = Changes { left: 10, far_away, new: 0..0, gone: 0..0 };
-            let did = |rebuilt| Work { kept_pairs: 1000, nodes: 120, rebuilt };
-            motion.learn(1000, &changes, &did(true));
-            (0..1000)
-                .take_while(|_| {
-                    motion.learn(1000, &changes, &did(false));
-                    !motion.wants_rebuild(1000, &changes)
-                })
-                .count()
-        };
-        let (wandering, jumping) = (frames(0, &mut motion), frames(10, &mut motion));
-        assert!(wandering > 100 && jumping < 12, "{wandering} and {jumping} frames");
-    }
-
-    #[test]
-    fn where_no_boxes_overlap_the_margin_is_no_larger_than_slow_boxes_need_and_few_pairs_may_be_kept() {
-        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
-        let mut motion = Motion::default();
-        motion.found(1000, 0);
-        let plan = FramePlan::default().with_moved(Some(0.005));
-        motion.advise(&plan, &boxes);
-        let Advice::Keep(margin) = motion.advise(&plan, &boxes) else { panic!("slow boxes are worth keeping") };
-        assert!((MARGINS[0]..=0.15).contains(&margin.share), "{}", margin.share);
-        assert!(motion.most_kept(1000) < 10_000, "{}", motion.most_kept(1000));
-    }
-
-    #[test]
-    fn a_margin_that_keeps_too_many_pairs_is_halved_and_one_that_too_many_leave_is_not() {
-        let boxes = vec![Aabb::cube([0.0; 3], 1.0); 1000];
-        let margin_after = |kept_pairs: usize, left: usize| {
-            let mut motion = Motion::default();
-            motion.found(1000, 0);
-            let plan = FramePlan::default().with_moved(Some(0.05));
-            let keep = |motion: &mut Motion| loop {
-                if let Advice::Keep(margin) = motion.advise(&plan, &boxes) {
-                    return margin.share;
-                }
-            };
-            let first = keep(&mut motion);
-            let changes = Changes { left, far_away: 0, new: 0..0, gone: 0..0 };
-            let did = Work { kept_pairs, nodes: 12 * left as u64, rebuilt: false };
-            assert!((0..100).any(|_| !motion.learn(1000, &changes, &did)), "it never ceases to pay");
-            motion.stop(false);
-            keep(&mut motion) / first
-        };
-        let (crowded, restless) = (margin_after(40_000, 0), margin_after(0, 1000));
-        assert!(crowded <= 0.5, "{crowded}");
-        assert!(restless > 0.9, "{restless}");
-    }
 }
