@@ -1,6 +1,7 @@
 //! The in-line module: the cheapest algorithm for this frame, chosen before it runs.
 
 mod decision;
+mod estimates;
 mod frame_batch;
 mod instances;
 mod learner;

@@ -1,17 +1,16 @@
 //! Which algorithm runs the next frame: the cheapest by all that is known, seldom another one to learn what it costs.
 
 use super::decision::{Choice, Reason};
-use super::frame_batch::{FrameBatch, MOST_OVER, Predicted};
+use super::estimates::Estimates;
+use super::frame_batch::{FrameBatch, MOST_OVER};
 use super::learner::Learner;
 use super::passed::{Budget, Passed, Usual};
 use super::shelter::Shelter;
-use super::switching::{Expected, SwitchingCosts};
+use super::switching::SwitchingCosts;
 use super::trials::{HORIZON, OF_KEPT, OF_OTHERS, OF_SHARED, Offer, Trials, expected_gain};
 use crate::broad_phase::{FrameKind, FrameWork};
-use crate::cost::{Frame, FrameCost};
 use crate::load::Load;
 use crate::tuning::Tuning;
-use crate::tuning::belief::View;
 
 /// By number of objects alone, the algorithm of before stays while its own step is within this share.
 const STEP_SLACK: f64 = 0.05;
@@ -22,11 +21,6 @@ const SOON: f64 = 4.0;
 /// An algorithm that is expected to cost so many times as much is not tried: beliefs are seldom off by that, and to ask how likely it is takes longer
 /// than the rest of a decision.
 const HOPELESS: f64 = 4.0;
-
-/// What is predicted of a load holds for another that differs by no more than this share: costs are known less well than that. Its correction holds for
-/// so many frames: waits pass, whether anything is observed or not.
-const ALIKE: f64 = 0.01;
-const HOLDS: u64 = 64;
 
 /// A frame waits for other programs no longer than this many times what it takes at most, as far as that counts: a breakpoint or a page
 /// from disk tells nothing of the frames that follow.
@@ -49,17 +43,7 @@ pub(super) struct Policy {
     /// The candidate that runs unless one explores, and what ran last.
     settled: Option<usize>,
     ran: Option<usize>,
-    /// What each candidate is expected to cost under the present load, in the mean over its frames with all waits and by kinds of frames, and
-    /// what the tuning says of it without correction.
-    mean_ns: Vec<f64>,
-    expected: Vec<Expected>,
-    predicted: Vec<Predicted>,
-    view: View,
-    /// What its tuning says of a frame of each candidate that goes on, and under which load.
-    built: Vec<FrameCost>,
-    predicted_for: Option<Load>,
-    /// The frame for which that was corrected, and how much was observed by then.
-    corrected: Option<(u64, u64)>,
+    estimates: Estimates,
     batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
@@ -92,13 +76,7 @@ impl Policy {
             shelter: Shelter::new(ids.iter().copied()),
             settled: None,
             ran: None,
-            mean_ns: vec![f64::INFINITY; count],
-            expected: vec![Expected { mean_ns: f64::INFINITY, alone_ns: f64::INFINITY }; count],
-            predicted: vec![Predicted::default(); count],
-            view: View::default(),
-            built: vec![FrameCost::default(); tuning.costs.len()],
-            predicted_for: None,
-            corrected: None,
+            estimates: Estimates::new(count, tuning.costs.len()),
             batch: FrameBatch::default(),
             saved_ns: vec![0.0; count],
             frames_until_paid: None,
@@ -160,7 +138,8 @@ impl Policy {
     pub(super) fn remade(&mut self, kept: &[Option<usize>], usable: &[bool]) {
         (0..usable.len()).for_each(|k| self.set_usable(k, usable[k]));
         // A frame with them is a first one, and begins a batch of its own.
-        (self.ran, self.corrected) = (None, None);
+        self.ran = None;
+        self.estimates.doubt();
         self.trials.stop(self.frame);
         self.batch = FrameBatch::default();
         if !self.switching.remade(kept) {
@@ -188,7 +167,7 @@ impl Policy {
         if self.is_by_count() {
             return self.choose_by_count(load.objects);
         }
-        self.expect(load);
+        self.estimates.update(load, &self.tuning.costs, self.learner.as_ref(), &self.switching, self.frame);
         // Where all are avoided, all are as good as before.
         let best = self.cheapest(|k| !self.is_avoided(k)).or_else(|| self.cheapest(|_| true))?;
         let (settled, reason) = match self.settled {
@@ -205,7 +184,7 @@ impl Policy {
             self.settled = Some(settled);
             self.trials.stop(self.frame);
         }
-        self.trials.allow(self.mean_ns[settled], frames, load.objects);
+        self.trials.allow(self.estimates.mean_ns[settled], frames, load.objects);
         if reason == Reason::Stayed {
             self.offer_trial(settled);
         }
@@ -213,34 +192,6 @@ impl Policy {
             Some(other) => self.choice(other, Reason::Explored),
             None => self.choice(settled, reason),
         })
-    }
-
-    /// Fills in what every candidate is expected to cost, as far as that is not known from a load that was alike.
-    fn expect(&mut self, load: &Load) {
-        let alike = self.predicted_for.is_some_and(|of| load.is_within(ALIKE, &of));
-        if !alike {
-            let frame = Frame::new(load);
-            self.view = self.learner.as_ref().map_or_else(View::default, |l| l.view(&frame));
-            self.built.iter_mut().zip(&self.tuning.costs).for_each(|(built, cost)| *built = cost.curve.parts_of(&frame));
-            self.predicted_for = Some(*load);
-        }
-        let observed = self.learner.as_ref().map_or(0, Learner::observed);
-        let holds = |(at, then)| then == observed && self.frame - at < HOLDS;
-        if alike && self.corrected.is_some_and(holds) {
-            return;
-        }
-        self.corrected = Some((self.frame, observed));
-        let learner = self.learner.as_ref().filter(|l| l.observed() > 0);
-        for (k, &FrameCost { ns, fallback_ns, calls_ns }) in self.built.iter().enumerate() {
-            let alone_ns = fallback_ns.unwrap_or(ns).max(ns);
-            let mean_ns = self.switching.mean_ns(k, self.frame, ns, alone_ns);
-            let predicted = Predicted { ns: mean_ns, calls_ns: calls_ns.min(ns) };
-            let factor = learner.map_or(1.0, |l| l.correction_ln(k, &self.view, predicted.calls()).exp());
-            let wait_ns = learner.map_or(0.0, |l| l.wait_ns(k, self.frame));
-            self.predicted[k] = predicted;
-            self.expected[k] = Expected { mean_ns: mean_ns * factor, alone_ns: alone_ns * factor };
-            self.mean_ns[k] = mean_ns * factor + wait_ns;
-        }
     }
 
     /// Whether a candidate is not to run in this frame, since a frame of its method was far dearer than expected.
@@ -251,14 +202,15 @@ impl Policy {
     /// What a candidate took in the frame that ran, by all that is expected at most.
     fn is_dear(&mut self, candidate: usize, ns: f64) -> bool {
         let shelters = (0..self.usable.len()).filter(|&k| self.usable[k] && self.shelter.is_shelter(k));
-        let Some(shelter_ns) = shelters.map(|k| self.mean_ns[k]).min_by(f64::total_cmp) else { return false };
-        let most_ns = self.mean_ns[candidate].max(self.switching.rebuild_ns(candidate, self.expected[candidate]));
+        let Some(shelter_ns) = shelters.map(|k| self.estimates.mean_ns[k]).min_by(f64::total_cmp) else { return false };
+        let most_ns =
+            self.estimates.mean_ns[candidate].max(self.switching.rebuild_ns(candidate, self.estimates.expected[candidate]));
         self.shelter.ran(candidate, self.frame, ns, most_ns, shelter_ns)
     }
 
     fn cheapest(&self, among: impl Fn(usize) -> bool) -> Option<usize> {
         let usable = (0..self.usable.len()).filter(|&k| self.usable[k] && among(k));
-        usable.min_by(|&a, &b| self.mean_ns[a].total_cmp(&self.mean_ns[b]))
+        usable.min_by(|&a, &b| self.estimates.mean_ns[a].total_cmp(&self.estimates.mean_ns[b]))
     }
 
     /// Whether to go on with the one that runs, or to which one to switch.
@@ -266,8 +218,8 @@ impl Policy {
     /// A switch is made once the frames since the other became cheaper would have saved what it costs. Where costs hold still that
     /// loses at most twice what knowing the future would, and where they flicker about a border nothing is ever saved for long.
     fn settle(&mut self, settled: usize, best: usize, frames: f64) -> (usize, Reason) {
-        let now = self.mean_ns[settled];
-        for (saved, mean_ns) in self.saved_ns.iter_mut().zip(&self.mean_ns) {
+        let now = self.estimates.mean_ns[settled];
+        for (saved, mean_ns) in self.saved_ns.iter_mut().zip(&self.estimates.mean_ns) {
             let gain = (now - mean_ns) * frames;
             *saved = if gain.is_finite() { (*saved + gain).max(0.0) } else { 0.0 };
         }
@@ -275,11 +227,11 @@ impl Policy {
             return (settled, Reason::Stayed);
         }
         let price_ns = |k: usize| {
-            self.switching.leave_ns(settled, k, self.frame, self.expected[settled])
-                + self.switching.enter_ns(k, self.frame, self.expected[k])
+            self.switching.leave_ns(settled, k, self.frame, self.estimates.expected[settled])
+                + self.switching.enter_ns(k, self.frame, self.estimates.expected[k])
         };
         let pays = |k: usize| {
-            let gain_ns = now - self.mean_ns[k];
+            let gain_ns = now - self.estimates.mean_ns[k];
             gain_ns > 0.0 && self.saved_ns[k].max(SOON * gain_ns) >= price_ns(k) && !self.is_avoided(k)
         };
         if let Some(k) = self.cheapest(pays) {
@@ -288,7 +240,7 @@ impl Policy {
         // A decision that comes later than the switch has paid loses the gain of each frame in between. One that comes sooner costs no more than the frames before it
         // lose by waiting.
         let left_ns = (price_ns(best) - self.saved_ns[best]).max(self.decision_ns);
-        self.frames_until_paid = Some(left_ns / (now - self.mean_ns[best])).filter(|frames| *frames > 0.0);
+        self.frames_until_paid = Some(left_ns / (now - self.estimates.mean_ns[best])).filter(|frames| *frames > 0.0);
         (settled, Reason::Hysteresis)
     }
 
@@ -300,11 +252,11 @@ impl Policy {
     /// Begins a trial of the candidate that is expected to save the most by it, if there is one.
     fn offer_trial(&mut self, settled: usize) {
         let Some(learner) = self.learner.as_ref().filter(|_| self.learns && self.explores) else { return };
-        let now_ns = self.mean_ns[settled];
+        let now_ns = self.estimates.mean_ns[settled];
         let Some(allowance) = self.trials.allowance(self.frame, now_ns) else { return };
-        let running = learner.running(settled, &self.view, self.predicted[settled].calls());
+        let running = learner.running(settled, &self.estimates.view, self.estimates.predicted[settled].calls());
         let offer = |k: usize| {
-            if k == settled || !self.usable[k] || self.is_avoided(k) || self.mean_ns[k] > HOPELESS * now_ns {
+            if k == settled || !self.usable[k] || self.is_avoided(k) || self.estimates.mean_ns[k] > HOPELESS * now_ns {
                 return None;
             }
             let frames = match (self.switching.keeps(k), self.switching.share(k, settled)) {
@@ -312,13 +264,19 @@ impl Policy {
                 (true, false) => OF_KEPT,
                 (false, false) => OF_OTHERS,
             };
-            let enter_ns = self.switching.enter_ns(k, self.frame, self.expected[k]);
-            let offer = Offer::of(k, frames, enter_ns, self.mean_ns[k], now_ns, self.decision_ns);
+            let enter_ns = self.switching.enter_ns(k, self.frame, self.estimates.expected[k]);
+            let offer = Offer::of(k, frames, enter_ns, self.estimates.mean_ns[k], now_ns, self.decision_ns);
             if !allowance.may_pay(offer.price_ns) {
                 return None;
             }
-            let deviation = learner.told_of_ratio(&running, k, &self.view, self.predicted[k].calls(), offer.telling());
-            let saved_ns = now_ns * expected_gain((self.mean_ns[k] / now_ns).ln(), deviation) * HORIZON;
+            let deviation = learner.told_of_ratio(
+                &running,
+                k,
+                &self.estimates.view,
+                self.estimates.predicted[k].calls(),
+                offer.telling(),
+            );
+            let saved_ns = now_ns * expected_gain((self.estimates.mean_ns[k] / now_ns).ln(), deviation) * HORIZON;
             allowance.pays(offer.price_ns, saved_ns).then_some((offer, saved_ns - offer.price_ns))
         };
         let best = (0..self.usable.len()).filter_map(offer).max_by(|a, b| a.1.total_cmp(&b.1));
@@ -328,8 +286,8 @@ impl Policy {
     }
 
     fn choice(&self, chosen: usize, reason: Reason) -> Choice {
-        let runner_up = self.cheapest(|k| k != chosen).map(|k| (k, self.mean_ns[k]));
-        Choice { chosen, predicted_ns: Some(self.mean_ns[chosen]), runner_up, reason }
+        let runner_up = self.cheapest(|k| k != chosen).map(|k| (k, self.estimates.mean_ns[k]));
+        Choice { chosen, predicted_ns: Some(self.estimates.mean_ns[chosen]), runner_up, reason }
     }
 
     /// What is expected of the frames of a candidate until the next decision.
@@ -337,14 +295,14 @@ impl Policy {
         if self.is_by_count() {
             return Usual::default();
         }
-        let dearest_ns = self.switching.rebuild_ns(candidate, self.expected[candidate]);
+        let dearest_ns = self.switching.rebuild_ns(candidate, self.estimates.expected[candidate]);
         let trial = self.settled.zip(self.trials.rest()).filter(|_| self.trials.candidate() == Some(candidate));
         let trial = trial.map(|(settled, (_, left_ns))| Budget {
-            now_ns: self.mean_ns[settled],
+            now_ns: self.estimates.mean_ns[settled],
             left_ns,
             shares: self.switching.share(candidate, settled),
         });
-        Usual { mean_ns: self.mean_ns[candidate], most_ns: MOST_OVER * dearest_ns, trial }
+        Usual { mean_ns: self.estimates.mean_ns[candidate], most_ns: MOST_OVER * dearest_ns, trial }
     }
 
     /// Takes in that a candidate ran some frames that were not decided on, none of which took longer than is usual.
@@ -360,8 +318,8 @@ impl Policy {
             self.pay_for_trial(candidate, all * passed.ns, all * passed.over_mean, passed.frames, false);
         }
         self.make_room(candidate);
-        let predicted = self.predicted[candidate].times(passed.over_mean);
-        self.batch.add(passed.timed, passed.ns, predicted, &self.view);
+        let predicted = self.estimates.predicted[candidate].times(passed.over_mean);
+        self.batch.add(passed.timed, passed.ns, predicted, &self.estimates.view);
         if let Some(learner) = &mut self.learner {
             learner.waited(candidate, passed.timed, 0.0, self.frame);
         }
@@ -384,7 +342,7 @@ impl Policy {
     }
 
     fn learn(&mut self, candidate: usize, entered: bool, ns: f64, work: Option<FrameWork>) {
-        let expected = self.expected[candidate];
+        let expected = self.estimates.expected[candidate];
         let dearest_ns = self.switching.rebuild_ns(candidate, expected);
         let tried = std::mem::replace(&mut self.tried, self.settled != Some(candidate));
         let Some(learner) = &mut self.learner else { return };
@@ -405,8 +363,8 @@ impl Policy {
             let known = learner.knows(candidate);
             let dearest_ns = if known { self.switching.rebuild_ns(candidate, expected) } else { f64::INFINITY };
             let counted_ns = ns.min(MOST_OVER * dearest_ns);
-            let predicted = self.predicted[candidate].times(work.map_or(1.0, |work| work.over_mean));
-            self.batch.add(1, counted_ns, predicted, &self.view);
+            let predicted = self.estimates.predicted[candidate].times(work.map_or(1.0, |work| work.over_mean));
+            self.batch.add(1, counted_ns, predicted, &self.estimates.view);
             learner.waited(candidate, 1, (ns - counted_ns).min(MOST_WAIT * dearest_ns), self.frame);
         }
         self.observe_full(candidate);
@@ -418,7 +376,7 @@ impl Policy {
         // What is made again in a frame would have been made again in any other way.
         let shares = candidate == settled || self.switching.share(candidate, settled);
         let work = if shares { over_mean } else { f64::from(frames) };
-        self.trials.pay(ns - work * self.mean_ns[settled], first);
+        self.trials.pay(ns - work * self.estimates.mean_ns[settled], first);
     }
 
     /// Makes the batch one to which frames of a candidate can be added. What was added up of others is observed.
