@@ -86,7 +86,7 @@ struct WorkCost {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct FrameCost {
     pub(crate) ns: f64,
-    /// With the fallback, where there is one.
+    /// Were the fallback done, where there is one.
     pub(crate) fallback_ns: Option<f64>,
     /// What is due to calls: of several threads what it takes to call helpers and to wait for them, else [`Term::Call`].
     pub(crate) calls_ns: f64,
@@ -241,7 +241,7 @@ impl CostCurve {
         self.helpers.map_or(work_ns, |h| h.cost_ns(frame.load.objects, work_ns))
     }
 
-    /// Its cost, and what it consists of.
+    /// Its cost, what of it is due to calls, and what it were with the fallback.
     pub(crate) fn parts_of(&self, frame: &Frame<'_>) -> FrameCost {
         let work = frame.work(&self.work);
         let observed = frame.factor(self.observed.as_ref());

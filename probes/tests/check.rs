@@ -107,7 +107,7 @@ fn stale_and_inapplicable_files_fail_and_say_which_algorithm() {
     assert_eq!(findings[1]["applicable"], false);
     // A line for what wants more cores, however many algorithms that are.
     assert_eq!(findings[1]["problems"].as_array().map(Vec::len), Some(3), "{findings:?}");
-    for text in ["brute@cpu4096, sap@cpu2048", "of a machine with 4096 cores or more", "octree@cpu1", "grid-sap@gpu99"] {
+    for text in ["brute@cpu4096, sap@cpu2048", "up to 4096 threads", "octree@cpu1", "grid-sap@gpu99"] {
         assert!(findings[1]["problems"].to_string().contains(text), "{findings:?}");
     }
 }

@@ -121,7 +121,7 @@ impl LoadTracker {
             self.motion.want();
             self.throttle.wake();
         }
-        if passed.is_spent() {
+        if passed.is_over_budget() {
             self.throttle.wake();
         }
     }

@@ -22,7 +22,7 @@ pub(super) struct Usual {
     pub(super) mean_ns: f64,
     /// A frame that takes longer tells more than its time: it waited, or something changed.
     pub(super) most_ns: f64,
-    /// Of frames of a trial.
+    /// What they may cost, where they are of a trial.
     pub(super) trial: Option<Budget>,
 }
 
@@ -32,7 +32,7 @@ pub(super) struct Budget {
     /// What a frame of the mean work takes otherwise, and what is left, in nanoseconds.
     pub(super) now_ns: f64,
     pub(super) left_ns: f64,
-    /// What is made again in a frame would be made again in any other way.
+    /// It goes on with what the one that is settled on keeps: what is made again in a frame would have been made again by either.
     pub(super) shares: bool,
 }
 
@@ -55,7 +55,9 @@ pub(super) struct Passed {
 impl Passed {
     /// Of frames of which so much is expected; none has passed yet.
     pub(super) fn expecting(usual: Usual) -> Self {
-        let apart = (CLOCK_NS / (SHARE * usual.mean_ns)).clamp(1.0, MOST_APART) as u32;
+        // A trial is made for what its frames tell.
+        let most_apart = if usual.trial.is_some() { 1.0 } else { MOST_APART };
+        let apart = (CLOCK_NS / (SHARE * usual.mean_ns)).clamp(1.0, most_apart) as u32;
         Self { usual, apart, ..Self::default() }
     }
 
@@ -81,11 +83,11 @@ impl Passed {
         }
     }
 
-    /// Whether they have cost more than a trial may. A trial that needed a decision to find that out every few frames would cost more by these than by its frames.
-    pub(super) fn is_spent(&self) -> bool {
-        let Some(Budget { now_ns, left_ns, shares }) = self.usual.trial.filter(|_| self.timed > 0) else { return false };
+    /// Whether they have cost more than a trial may. Looked at here after each frame: decisions every few frames would cost more than the trial.
+    pub(super) fn is_over_budget(&self) -> bool {
+        let Some(Budget { now_ns, left_ns, shares }) = self.usual.trial else { return false };
         let work = if shares { self.over_mean } else { f64::from(self.timed) };
-        (self.ns - work * now_ns) * f64::from(self.frames) > left_ns * f64::from(self.timed)
+        self.ns - work * now_ns > left_ns
     }
 
     /// Whether the times differ so much from what was expected that the decision may have to be another, where the next one was to be so many
@@ -126,23 +128,24 @@ mod tests {
     }
 
     #[test]
-    fn a_trial_is_spent_once_its_frames_have_cost_more_than_it_may() {
-        let lasts = |ns: f64, apart: u32, shares: bool| {
+    fn a_trial_is_over_once_its_frames_all_of_which_are_timed_have_cost_more_than_it_may() {
+        let lasts = |ns: f64, shares: bool| {
             let trial = Some(Budget { now_ns: 100.0, left_ns: 200.0, shares });
-            let mut passed = Passed::expecting(Usual { mean_ns: 1e6, most_ns: 4e6, trial });
+            let mut passed = Passed::expecting(Usual { mean_ns: 100.0, most_ns: 4e6, trial });
             let work = Some(FrameWork::new(FrameKind::Updated, 1.5));
-            let mut frame = |k: u32| {
-                passed.add(work, k.is_multiple_of(apart).then_some(ns));
-                passed.is_spent()
+            let mut frame = |_: &u32| {
+                assert!(passed.is_timed());
+                passed.add(work, Some(ns));
+                passed.is_over_budget()
             };
-            (0..1000).find(|&k| frame(k))
+            (0..1000).find(|k| frame(k))
         };
         // 50 each, and where it shares what it keeps with the one that runs, that one would have taken as long for their work.
-        assert_eq!((lasts(150.0, 1, false), lasts(150.0, 1, true)), (Some(4), None));
-        assert_eq!((lasts(150.0, 4, false), lasts(99.0, 1, false), lasts(900.0, 1, false)), (Some(4), None, Some(0)));
+        assert_eq!((lasts(150.0, false), lasts(150.0, true)), (Some(4), None));
+        assert_eq!((lasts(99.0, false), lasts(900.0, false)), (None, Some(0)));
         let mut passed = Passed::expecting(Usual { mean_ns: 1e6, most_ns: 4e6, trial: None });
         passed.add(None, Some(1e9));
-        assert!(!passed.is_spent());
+        assert!(!passed.is_over_budget());
     }
 
     #[test]

@@ -47,8 +47,9 @@ pub(super) struct Policy {
     batch: FrameBatch,
     /// What each candidate would have saved since it became cheaper than the one that runs.
     saved_ns: Vec<f64>,
-    /// Where a switch waits until it would have saved its price, the frames until then, and as many at least as lose what a decision takes.
-    frames_until_paid: Option<f64>,
+    /// Frames until the next decision at most: where a switch waits until it would have saved its price, until then, and as many at least as lose what a
+    /// decision takes; where what would be cheapest is sheltered from, until it may run again.
+    rests_at_most: Option<f64>,
     /// The number of the frame that is to run, and of the one that was decided last.
     frame: u64,
     decided: u64,
@@ -79,7 +80,7 @@ impl Policy {
             estimates: Estimates::new(count, tuning.costs.len()),
             batch: FrameBatch::default(),
             saved_ns: vec![0.0; count],
-            frames_until_paid: None,
+            rests_at_most: None,
             frame: 0,
             decided: 0,
             trials: Trials::default(),
@@ -96,6 +97,8 @@ impl Policy {
 
     pub(super) fn set_learning(&mut self, learns: bool) {
         self.learns = learns;
+        // It would not be paid for.
+        self.trials.stop(self.frame);
     }
 
     pub(super) fn set_exploring(&mut self, explores: bool) {
@@ -163,7 +166,7 @@ impl Policy {
     /// The candidate that is to run the next frame. `None` when none can run.
     pub(super) fn choose(&mut self, load: &Load) -> Option<Choice> {
         let frames = (self.frame - std::mem::replace(&mut self.decided, self.frame)) as f64;
-        self.frames_until_paid = None;
+        self.rests_at_most = None;
         if self.is_by_count() {
             return self.choose_by_count(load.objects);
         }
@@ -176,6 +179,10 @@ impl Policy {
             Some(settled) if self.is_avoided(settled) => (best, Reason::Sheltered),
             Some(settled) => self.settle(settled, best, frames),
         };
+        if let Some(sheltered) = self.cheapest(|_| true).filter(|&k| self.is_avoided(k)) {
+            let lasts = self.shelter.lasts(sheltered, self.frame) as f64;
+            self.rests_at_most = Some(self.rests_at_most.map_or(lasts, |most| most.min(lasts)));
+        }
         if self.trials.is_over() || self.trials.candidate().is_some_and(|other| self.is_avoided(other)) {
             self.trials.stop(self.frame);
         }
@@ -240,13 +247,13 @@ impl Policy {
         // A decision that comes later than the switch has paid loses the gain of each frame in between. One that comes sooner costs no more than the frames before it
         // lose by waiting.
         let left_ns = (price_ns(best) - self.saved_ns[best]).max(self.decision_ns);
-        self.frames_until_paid = Some(left_ns / (now - self.estimates.mean_ns[best])).filter(|frames| *frames > 0.0);
+        self.rests_at_most = Some(left_ns / (now - self.estimates.mean_ns[best])).filter(|frames| *frames > 0.0);
         (settled, Reason::Hysteresis)
     }
 
-    /// Frames until the next decision, at most, where a switch waits until it has saved its price.
-    pub(super) fn frames_until_paid(&self) -> Option<f64> {
-        self.frames_until_paid
+    /// Frames until the next decision, at most, where a switch waits until it has saved its price or until a shelter ends.
+    pub(super) fn rests_at_most(&self) -> Option<f64> {
+        self.rests_at_most
     }
 
     /// Begins a trial of the candidate that is expected to save the most by it, if there is one.

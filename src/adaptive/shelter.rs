@@ -61,6 +61,11 @@ impl Shelter {
         frame < self.pauses[self.methods[candidate]].until
     }
 
+    /// Frames from this one until a candidate may run again.
+    pub(super) fn lasts(&self, candidate: usize, frame: u64) -> u64 {
+        self.pauses[self.methods[candidate]].until.saturating_sub(frame)
+    }
+
     /// Takes in that a candidate ran a frame of which `expected_ns` was expected, while a shelter would have taken `shelter_ns`. Whether the
     /// next frame is not to be spent on it.
     pub(super) fn ran(&mut self, candidate: usize, frame: u64, ns: f64, expected_ns: f64, shelter_ns: f64) -> bool {

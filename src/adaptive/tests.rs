@@ -8,7 +8,7 @@ mod traces;
 mod warming;
 
 use super::load_tracker::LoadTracker;
-use super::passed::{Passed, Usual};
+use super::passed::{Budget, Passed, Usual};
 use super::*;
 use crate::scene::{Scenario, Scene};
 use crate::{AlgorithmCost, CostCurve, CostTerm, Incremental, Term};
@@ -280,6 +280,25 @@ fn frames_that_are_off_let_the_next_ones_show_how_far_boxes_move() {
         tracker.moved().unwrap()
     };
     assert!(moved(false) == 0.0 && moved(true) > 0.2, "{} {}", moved(false), moved(true));
+}
+
+#[test]
+fn a_trial_that_has_cost_more_than_it_may_calls_for_a_decision() {
+    let is_due = |ns: f64| {
+        let mut tracker = LoadTracker::default();
+        for _ in 0..5 {
+            tracker.decide(&shifted(0.0));
+            tracker.ran(&shifted(0.0), 100, 1000.0);
+            // A decision is paid for by a hundred frames.
+            tracker.took(Some(400.0), 1000.0);
+        }
+        let trial = Some(Budget { now_ns: 1000.0, left_ns: 2000.0, shares: false });
+        let mut passed = Passed::expecting(Usual { mean_ns: 1000.0, most_ns: 9000.0, trial });
+        (0..3).for_each(|_| passed.add(None, Some(ns)));
+        tracker.passes(&shifted(0.0), 100, &passed);
+        tracker.is_due(&shifted(0.0))
+    };
+    assert!(is_due(1700.0) && !is_due(1600.0));
 }
 
 #[test]

@@ -93,7 +93,7 @@ impl Offer {
     pub(super) fn of(candidate: usize, frames: u32, switch_ns: f64, mean_ns: f64, now_ns: f64, decision_ns: f64) -> Self {
         // One that turns out dear ends early.
         let dear_ns = (f64::from(frames) * (mean_ns - now_ns).max(0.0)).min(ENOUGH * now_ns);
-        // The one behind its last frame. That before its first is made in any case.
+        // One decision, after its last frame. That before its first is made in any case.
         Self { candidate, frames, price_ns: switch_ns + dear_ns + decision_ns, now_ns }
     }
 
@@ -138,7 +138,7 @@ impl Trials {
     }
 
     /// Takes in what a decision, or a frame of a trial, its `first` or another, or the first one after it has cost beside what frames cost otherwise.
-    /// What decisions and first frames cost ends no trial: it is spent.
+    /// What decisions and first frames cost can't be saved any more, and ends no trial.
     pub(super) fn pay(&mut self, ns: f64, first: bool) {
         self.allowance_ns -= ns;
         if let Some(trial) = self.running.as_mut().filter(|_| !first) {
@@ -256,7 +256,7 @@ mod tests {
         trials.ran(1, 9);
         trials.ran(0, 1);
         assert!(!trials.is_over());
-        // The last one, and one behind it in which it is over.
+        // The one that ran, and the one that is left.
         assert_eq!(trials.rest(), Some((2, 200.0)));
         trials.ran(0, 1);
         assert!(trials.is_over());

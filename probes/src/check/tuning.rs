@@ -23,7 +23,7 @@ impl Here {
         if let Some(most) = wide.iter().map(|id| id.threads()).max() {
             let wide: Vec<String> = wide.iter().map(ToString::to_string).collect();
             finding.problems.push(format!(
-                "it is of a machine with {most} cores or more, and this one has {}: {} can't run here; predict again on this machine",
+                "it names up to {most} threads, and {} may be used here: {} can't run; predict again on this machine",
                 usable_cores(),
                 wide.join(", ")
             ));
@@ -36,7 +36,10 @@ impl Here {
 
     /// Whether an algorithm wants more threads than there are cores.
     fn is_too_wide(&self, id: &AlgorithmId) -> bool {
-        matches!(self.registry.create(id), Err(Error::Unavailable { reason: Unavailable::TooFewCores { .. }, .. }))
+        // One that is listed can be told without making it.
+        let is_listed = self.registry.entries().iter().any(|e| e.id == *id);
+        !is_listed
+            && matches!(self.registry.create(id), Err(Error::Unavailable { reason: Unavailable::TooFewCores { .. }, .. }))
     }
 
     /// Why an algorithm can't run here, if it can't.

@@ -350,7 +350,7 @@ fn where_a_switch_waits_for_its_price_the_next_decision_is_asked_for_when_that_i
     let choose = |policy: &mut Policy, objects: u32| {
         let choice = policy.choose(&Load::of_objects(objects)).unwrap();
         policy.ran(choice.chosen, 1.0, None);
-        (choice.chosen, choice.reason, policy.frames_until_paid())
+        (choice.chosen, choice.reason, policy.rests_at_most())
     };
     assert_eq!(choose(&mut policy, 100), (0, Reason::First, None));
     let (chosen, reason, frames) = choose(&mut policy, 1000);

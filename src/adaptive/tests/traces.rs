@@ -209,13 +209,13 @@ const HOST: &str = "amd-epyc-zen5-2c-full--2026-11-24";
 const ANOTHER: &str = "intel-xeon-2c-full--2026-11-23";
 
 /// The promise is no more than 3 % over the best single algorithm. It does not hold yet, least in scenes that grow and shrink again within milliseconds of frames;
-/// what was reached are geometric means of 1.050 to 1.068, and 1.19 at the worst but for one run, `fragmentation` of 2000 with tuning that was measured, that has 1.46.
+/// what was reached are geometric means of 1.053 to 1.056, and 1.19 at the worst.
 #[test]
 fn over_traces_the_choice_costs_little_more_than_the_best_single_algorithm() {
     let traces: Vec<Arc<Trace>> = Trace::all().into_iter().map(Arc::new).collect();
     let (host, another) = (Recorded::of(HOST), Recorded::of(ANOTHER));
     for (tuning, what, most) in [
-        (host.measured(), "measured", 1.07),
+        (host.measured(), "measured", 1.06),
         (host.predicted(), "predicted", 1.06),
         (another.predicted(), "of another machine", 1.06),
     ] {
@@ -235,6 +235,6 @@ fn over_traces_the_choice_costs_little_more_than_the_best_single_algorithm() {
         println!("{told}");
         // Of other traces than ours nobody knows what can be reached.
         let others = std::env::var_os("TRACES").is_some();
-        assert!(!over.is_empty() && (others || geometric < most && worst < 1.5), "{told}");
+        assert!(!over.is_empty() && (others || geometric < most && worst < 1.25), "{told}");
     }
 }
