@@ -76,7 +76,7 @@ pub(crate) struct Frame<'a> {
 }
 
 /// Nanoseconds of a work, and the factor of its residual in them.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct WorkCost {
     ns: f64,
     factor: f64,

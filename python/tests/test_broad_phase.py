@@ -138,7 +138,7 @@ def test_it_saves_when_the_block_ends(tmp_path):
     boxes = cubes(500)
     with sapwise.BroadPhase(cache=tmp_path, background=False) as broad_phase:
         assert broad_phase.setup["origin"] == "probed" and broad_phase.setup["measured_at_unix_s"] > 1.7e9
-        # More than any frames between two decisions, with the second of which what passed is learned.
+        # More than ever pass between two decisions: the second one learns from the frames since the first.
         for _ in range(1500):
             broad_phase.find(boxes)
     assert broad_phase.closed

@@ -58,7 +58,7 @@ impl Shelter {
 
     /// Whether a candidate is not to run in this frame.
     pub(super) fn avoids(&self, candidate: usize, frame: u64) -> bool {
-        frame < self.pauses[self.methods[candidate]].until
+        self.lasts(candidate, frame) > 0
     }
 
     /// Frames from this one until a candidate may run again.

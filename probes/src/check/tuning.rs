@@ -5,6 +5,14 @@ use crate::gpus::uses;
 use crate::revisions;
 use sapwise::{AlgorithmId, Backend, Error, GpuIdentity, GpuKind, Tuning, Unavailable, usable_cores};
 
+/// What keeps an algorithm from running here.
+enum Obstacle {
+    /// It wants more threads than there are cores.
+    Threads,
+    /// Anything else, in a sentence.
+    Other(String),
+}
+
 impl Here {
     pub(super) fn tuning(&self, tuning: &Tuning, finding: &mut Finding) {
         finding.schema = Some("tuning/2");
@@ -16,45 +24,50 @@ impl Here {
         wanted.extend(tuning.steps.iter().map(|s| &s.algorithm));
         wanted.sort_unstable();
         wanted.dedup();
-        let (wide, others): (Vec<_>, Vec<_>) = wanted.into_iter().partition(|id| self.is_too_wide(id));
-        let missing: Vec<String> = others.into_iter().filter_map(|id| self.unavailable(id)).collect();
-        finding.applicable = Some(missing.is_empty() && wide.is_empty());
-        finding.problems.extend(missing);
-        if let Some(most) = wide.iter().map(|id| id.threads()).max() {
-            let wide: Vec<String> = wide.iter().map(ToString::to_string).collect();
-            finding.problems.push(format!(
+        let (mut missing, mut wide) = (Vec::new(), Vec::new());
+        let mut most = 0;
+        for id in wanted {
+            match self.obstacle(id) {
+                None => {}
+                Some(Obstacle::Threads) => {
+                    most = most.max(id.threads());
+                    wide.push(id.to_string());
+                }
+                Some(Obstacle::Other(why)) => missing.push(why),
+            }
+        }
+        if !wide.is_empty() {
+            missing.push(format!(
                 "it names up to {most} threads, and {} may be used here: {} can't run; predict again on this machine",
                 usable_cores(),
                 wide.join(", ")
             ));
         }
+        finding.applicable = Some(missing.is_empty());
+        finding.problems.extend(missing);
         finding.notes.extend(self.on_software_adapters(tuning));
         if tuning.extrapolated {
             finding.notes.push("predicted for a machine outside what the model was trained on".to_owned());
         }
     }
 
-    /// Whether an algorithm wants more threads than there are cores.
-    fn is_too_wide(&self, id: &AlgorithmId) -> bool {
-        // One that is listed can be told without making it.
-        let is_listed = self.registry.entries().iter().any(|e| e.id == *id);
-        !is_listed
-            && matches!(self.registry.create(id), Err(Error::Unavailable { reason: Unavailable::TooFewCores { .. }, .. }))
-    }
-
     /// Why an algorithm can't run here, if it can't.
-    fn unavailable(&self, id: &AlgorithmId) -> Option<String> {
+    fn obstacle(&self, id: &AlgorithmId) -> Option<Obstacle> {
         if let Some(entry) = self.registry.entries().iter().find(|e| e.id == *id) {
-            return entry.unavailable.as_ref().map(|why| format!("{id} can't run here: {why}"));
+            return entry.unavailable.as_ref().map(|why| Obstacle::Other(format!("{id} can't run here: {why}")));
         }
-        match id.backend() {
+        let why = match id.backend() {
             // The revision check reports an unknown method already, but tuning without costs has no revisions.
             _ if !revisions::is_known(revisions::of(id), &self.registry) => Some(format!("{id} is not in this build")),
             // Ours can be made on any number of threads, a user's only on those that are listed.
-            Backend::Cpu(_) => self.registry.create(id).err().map(|e| e.to_string()),
+            Backend::Cpu(_) => match self.registry.create(id).err()? {
+                Error::Unavailable { reason: Unavailable::TooFewCores { .. }, .. } => return Some(Obstacle::Threads),
+                error => Some(error.to_string()),
+            },
             Backend::Gpu(indices) => self.gpus().lacks(indices).map(|why| format!("{id} can't run here: {why}")),
             _ => Some(format!("{id} can't run here: this version does not know this kind of processor")),
-        }
+        };
+        why.map(Obstacle::Other)
     }
 
     /// Which algorithms of tuning run on software adapters here.
