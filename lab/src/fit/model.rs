@@ -1,11 +1,11 @@
 //! Puts a model together from the profiles that it is trained on.
 
 use super::designs::{Designs, Fitted, TrainingSet};
-use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile};
+use crate::data::{COMPARED, COMPARED_OF_GPUS, Profile, is_real};
 use crate::report::Label;
 use anyhow::{Result, bail};
 use sapwise::model::{GPU_PREFIX, Range};
-use sapwise::{Backend, GpuHardware, GpuKind, Model};
+use sapwise::{Backend, GpuHardware, Model};
 
 /// A model of what is chosen of the profiles, and in sentences what was left out and why.
 ///
@@ -44,10 +44,6 @@ fn ranges(profiles: &[&Profile]) -> Vec<Range> {
     machine.chain(gpus).collect()
 }
 
-fn is_real(gpu: &GpuHardware) -> bool {
-    gpu.gpu.kind != GpuKind::Software
-}
-
 fn range(parameter: String, values: Vec<f64>) -> Option<Range> {
     let min = values.iter().copied().min_by(f64::total_cmp)?;
     let max = values.iter().copied().max_by(f64::total_cmp)?;
@@ -67,6 +63,7 @@ fn timed_gpus(profile: &Profile) -> impl Iterator<Item = &GpuHardware> {
 mod tests {
     use super::*;
     use crate::synthetic::Machine;
+    use sapwise::GpuKind;
 
     #[test]
     fn the_ranges_of_gpus_are_of_the_real_ones_where_there_is_one() {

@@ -1,9 +1,9 @@
 //! One report of a study: what the page tells of it, and its medians.
 
-use crate::data::{Profile, figure};
+use crate::data::{Profile, figure, first_real_gpu, is_real};
 use crate::report::{Label, Provenance, Report};
 use sapwise::hardware::ParameterId;
-use sapwise::{AlgorithmId, Backend, BackendClass, GpuHardware, GpuKind, Hardware};
+use sapwise::{AlgorithmId, Backend, BackendClass, GpuHardware, Hardware};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -76,7 +76,7 @@ impl Entry {
 
     /// The first GPU that is no software adapter.
     pub(super) fn gpu(&self) -> Option<&GpuHardware> {
-        self.hardware.gpus.iter().find(|g| g.gpu.kind != GpuKind::Software)
+        first_real_gpu(&self.hardware)
     }
 
     /// A parameter of the machine, or with `gpu/` before its name one of its first GPU that is no software adapter.
@@ -86,7 +86,7 @@ impl Entry {
 
     /// Numbers of the GPUs that are software adapters.
     pub(super) fn software_gpus(&self) -> Vec<u32> {
-        let software_gpus = self.hardware.gpus.iter().filter(|g| g.gpu.kind == GpuKind::Software);
+        let software_gpus = self.hardware.gpus.iter().filter(|g| !is_real(g));
         software_gpus.map(|g| g.gpu.index).collect()
     }
 

@@ -1,9 +1,9 @@
 //! The parameters of a machine that its predicted costs depend on, and what it would be with another value of one.
 
-use crate::data::Profile;
+use crate::data::{Profile, first_real_gpu};
 use sapwise::hardware::{GpuParameterId, ParameterId};
 use sapwise::model::GPU_PREFIX;
-use sapwise::{GpuKind, Hardware, Parameter};
+use sapwise::{Hardware, Parameter};
 
 /// A parameter that a term or a residual reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,7 +56,7 @@ impl Figure {
     pub(super) fn value(self, hardware: &Hardware) -> Option<f64> {
         let of = |name: &&str| match self.of_gpus {
             false => hardware.value_named(name),
-            true => hardware.gpus.iter().find(|g| g.gpu.kind != GpuKind::Software)?.value_named(name),
+            true => first_real_gpu(hardware)?.value_named(name),
         };
         self.names.iter().find_map(of).filter(|v| *v > 0.0)
     }
