@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Its cost is guessed here, and corrected by the frames that it runs. A cost that was measured comes from a command of your own:
-//! `probes/examples/parry.rs`.
+//! `probes/examples/own_algorithm.rs`.
 
 use sapwise::{
     Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs, Product,

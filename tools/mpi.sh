@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds `mpi/` and tests it over 1, 2, 3, 4 and 7 ranks of this machine: every scenario against one process, the edge cases, agreed errors, a rank that is
+# Builds `bindings/mpi/` and tests it over 1, 2, 3, 4 and 7 ranks of this machine: every scenario against one process, the edge cases, agreed errors, a rank that is
 # killed and one that stops.
 #
 #   tools/mpi.sh
@@ -14,7 +14,7 @@ has_libclang() { compgen -G '/usr/lib/llvm-*/lib/libclang.so*' >/dev/null || [ -
     apt-get install -qy --no-install-recommends openmpi-bin libopenmpi-dev libclang-dev
 }
 
-manifest=mpi/Cargo.toml
+manifest=bindings/mpi/Cargo.toml
 export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-target}/mpi
 cargo fmt --manifest-path $manifest --check
 cargo clippy --manifest-path $manifest --all-targets --locked --quiet -- -D warnings

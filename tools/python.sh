@@ -4,7 +4,7 @@
 #   tools/python.sh            # formatting, clippy, wheel, tests
 #   tools/python.sh wheel      # builds the wheel and tells where it is
 #   tools/python.sh bench      # the figures: overhead, other libraries, sizes, time of the import
-#   tools/python.sh examples   # runs python/examples/ and writes their pictures to target/python/examples/
+#   tools/python.sh examples   # runs bindings/python/examples/ and writes their pictures to target/python/examples/
 #   tools/python.sh index      # writes the index of docs/python.md from the docstrings
 #
 # Needs Python 3.10 or later with venv (Debian: python3-venv). Everything goes into target/python/. PYTHON names the interpreter.
@@ -26,7 +26,7 @@ pip() { local environment=$1; shift; "$environment/bin/python" -m pip install --
 
 wheel() {
     rm -rf "$folder/wheels"
-    "$folder/tools/bin/maturin" build --quiet --release --locked --strip --manifest-path python/Cargo.toml --out "$folder/wheels" \
+    "$folder/tools/bin/maturin" build --quiet --release --locked --strip --manifest-path bindings/python/Cargo.toml --out "$folder/wheels" \
         --interpreter "$python"
     wheel=$(echo "$folder"/wheels/*.whl)
 }
@@ -53,15 +53,15 @@ wheel)
     echo "$wheel"
     ;;
 test)
-    cargo fmt --manifest-path python/Cargo.toml --check
-    PYO3_PYTHON=$folder/tools/bin/python cargo clippy --quiet --manifest-path python/Cargo.toml --all-targets --locked -- -D warnings
+    cargo fmt --manifest-path bindings/python/Cargo.toml --check
+    PYO3_PYTHON=$folder/tools/bin/python cargo clippy --quiet --manifest-path bindings/python/Cargo.toml --all-targets --locked -- -D warnings
     wheel
     fresh pytest scipy hypothesis rtree python-fcl
     sizes
-    # From outside of python/, so that what is tested is what was installed.
+    # From outside of bindings/python/, so that what is tested is what was installed.
     cd "$folder"
-    tests=$root/python/tests
-    run() { fresh/bin/python -m pytest -c "$root/python/pyproject.toml" --rootdir "$root/python" -p no:cacheprovider "$@"; }
+    tests=$root/bindings/python/tests
+    run() { fresh/bin/python -m pytest -c "$root/bindings/python/pyproject.toml" --rootdir "$root/bindings/python" -p no:cacheprovider "$@"; }
     run "$tests/test_reports.py" "$tests/test_package.py" "$tests/test_machine.py"
     # mypy holds the stubs against the package.
     pip "$folder/fresh" pandas pandas-stubs mypy
@@ -71,9 +71,9 @@ bench)
     wheel
     fresh scipy rtree python-fcl trimesh
     sizes
-    cargo build --quiet --release --locked --manifest-path python/Cargo.toml --example figures
+    cargo build --quiet --release --locked --manifest-path bindings/python/Cargo.toml --example figures
     cd "$folder"
-    fresh/bin/python "$root/python/benches/figures.py" "$CARGO_TARGET_DIR/release/examples/figures"
+    fresh/bin/python "$root/bindings/python/benches/figures.py" "$CARGO_TARGET_DIR/release/examples/figures"
     ;;
 examples)
     wheel
@@ -82,8 +82,8 @@ examples)
     pip "$folder/fresh" --no-deps pyvista
     mkdir -p "$folder/examples"
     cd "$folder"
-    fresh/bin/python "$root/python/examples/study.py" "$root/datasets" examples/study.png
-    fresh/bin/python "$root/python/examples/trimesh_scene.py"
+    fresh/bin/python "$root/bindings/python/examples/study.py" "$root/datasets" examples/study.png
+    fresh/bin/python "$root/bindings/python/examples/trimesh_scene.py"
     ;;
 index)
     wheel

@@ -32,7 +32,7 @@ static PREDICTED: LazyLock<Tuning> = LazyLock::new(|| {
 /// When the report that comes with the tests is damaged.
 #[must_use]
 pub fn hardware() -> Hardware {
-    sapwise_lab::report::read(include_str!("../../lab/tests/fixtures/report-2.json")).unwrap().value.hardware
+    sapwise_lab::report::read(include_str!("../../crates/lab/tests/fixtures/report-2.json")).unwrap().value.hardware
 }
 
 /// Algorithms under their names.

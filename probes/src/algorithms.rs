@@ -54,7 +54,7 @@ impl UserAlgorithm {
     /// What the time of a frame grows with, and what of the hardware it takes: `train` fits a unit for each of these terms to the timings.
     /// Without them the terms are used that fit most methods: calls, objects, sorting, all pairs, candidates on an axis and pairs.
     ///
-    /// `examples/parry.rs` says that a tree takes `log2 n` steps for each object and for each pair.
+    /// `probes/examples/own_algorithm.rs` says that a sort takes `log2 n` steps for each object.
     #[must_use]
     pub fn terms(mut self, terms: &[(Term, Scale)]) -> Self {
         self.terms = terms.to_vec();

@@ -25,7 +25,7 @@
 //! let status = sapwise_cli::Command::new().with(double_loop).run();
 //! ```
 //!
-//! `examples/parry.rs` is such a program with the tree of parry3d.
+//! `probes/examples/own_algorithm.rs` is such a program with a sweep.
 
 mod algorithms;
 mod args;

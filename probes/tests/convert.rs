@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 fn old(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../lab/tests/fixtures/old").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/lab/tests/fixtures/old").join(name)
 }
 
 #[test]

@@ -22,7 +22,7 @@ fn report(command: &mut assert_cmd::Command) -> Report {
 
 /// A made-up report of a machine with two GPUs, with what `change` does to it. Enough points for a model.
 fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
-    let mut report: Value = serde_json::from_str(include_str!("../../lab/tests/fixtures/report-2-gpu.json")).unwrap();
+    let mut report: Value = serde_json::from_str(include_str!("../../crates/lab/tests/fixtures/report-2-gpu.json")).unwrap();
     report["label"] = "real_full".into();
     // The fixture is old; this is a report of this build.
     let registry = sapwise::Registry::with_cores(1);

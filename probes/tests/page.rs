@@ -1,6 +1,6 @@
 //! The page of a study, in a browser.
 
-#[path = "../../lab/tests/browser/mod.rs"]
+#[path = "../../crates/lab/tests/browser/mod.rs"]
 mod browser;
 mod common;
 

@@ -1,11 +1,11 @@
-//! A user's program with an algorithm of its own: the example `parry` from the probe to the run, beside the plain command.
+//! A user's program with an algorithm of its own: the example `own_algorithm` from the probe to the run, beside the plain command.
 //!
 //! This program has a `main` of its own (`harness = false`): verbs start parts of a measurement as processes of the program that
 //! they are in, and one made by the usual harness would run tests there. Started with [`AS_COMMAND`] it is the example.
 
 mod common;
-#[path = "../examples/parry.rs"]
-mod parry;
+#[path = "../examples/own_algorithm.rs"]
+mod own_algorithm;
 
 use assert_cmd::Command;
 use common::{failure, npy, sapwise, success};
@@ -30,7 +30,7 @@ const TESTS: [(&str, fn()); 5] = [
 
 fn main() -> ExitCode {
     match env::var(AS_COMMAND).as_deref() {
-        Ok("parry") => return parry::main(),
+        Ok("sweep") => return own_algorithm::main(),
         Ok("clash") => return clash(),
         Ok("threads") => return on_threads(),
         _ => {}
@@ -72,7 +72,7 @@ fn program(name: &str) -> Command {
 }
 
 fn user() -> Command {
-    program("parry")
+    program("sweep")
 }
 
 fn read(path: &Path) -> Value {
@@ -108,22 +108,22 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
         .iter()
         .map(|t| (t["id"].as_str().unwrap(), t["revision"].as_u64().unwrap()))
         .collect();
-    assert!(swept.contains(&("parry@cpu1", 1)) && swept.iter().any(|t| t.0 == "brute@cpu1"), "{swept:?}");
-    let timed = told["algorithms"].as_array().unwrap().iter().find(|t| t["id"] == "parry@cpu1").unwrap();
+    assert!(swept.contains(&("sweep@cpu1", 1)) && swept.iter().any(|t| t.0 == "brute@cpu1"), "{swept:?}");
+    let timed = told["algorithms"].as_array().unwrap().iter().find(|t| t["id"] == "sweep@cpu1").unwrap();
     assert_eq!(timed["terms"].as_array().unwrap().len(), 4, "{timed}");
     assert!(
-        told["algorithms"].as_array().unwrap().iter().all(|t| t["id"] == "parry@cpu1" || t.get("terms").is_none()),
+        told["algorithms"].as_array().unwrap().iter().all(|t| t["id"] == "sweep@cpu1" || t.get("terms").is_none()),
         "{told}"
     );
     let points = told["points"].as_array().unwrap();
     let timings = points.iter().flat_map(|p| p["timings"].as_array().unwrap());
-    let own: Vec<&Value> = timings.filter(|t| t["algorithm"] == "parry@cpu1").collect();
+    let own: Vec<&Value> = timings.filter(|t| t["algorithm"] == "sweep@cpu1").collect();
     assert!(own.len() >= 8 && own.iter().all(|t| t["error"].is_null()), "{own:?}");
 
     let model = file("model.json");
     success(user().arg("train").arg(&report).arg("--out").arg(&model));
     let fitted = read(&model);
-    let of_user = fitted["methods"].as_array().unwrap().iter().find(|m| m["method"] == "parry").expect("a cost of parry");
+    let of_user = fitted["methods"].as_array().unwrap().iter().find(|m| m["method"] == "sweep").expect("a cost of sweep");
     assert_eq!((&of_user["revision"], &of_user["backend"]), (&1.into(), &"cpu".into()));
     // Of a sweep as short as this the fit may find no share of some; others than the user's are never fitted.
     let named = |fitted: &Value| timed["terms"].as_array().unwrap().iter().any(|t| t["term"] == fitted["term"]);
@@ -137,37 +137,37 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     };
     // The plain command predicts ours, and says what it can't choose.
     let plain: Value = serde_json::from_str(&predict(sapwise())).unwrap();
-    assert!(!plain["costs"].to_string().contains("parry"), "{plain}");
-    let warned = names(&plain["warnings"]).iter().any(|w| w.contains("knows parry, which is not in this build"));
+    assert!(!plain["costs"].to_string().contains("sweep"), "{plain}");
+    let warned = names(&plain["warnings"]).iter().any(|w| w.contains("knows sweep, which is not in this build"));
     assert!(warned, "{}", plain["warnings"]);
     let own: Value = serde_json::from_str(&predict(user())).unwrap();
-    assert!(own["costs"].as_array().unwrap().iter().any(|c| c["algorithm"] == "parry@cpu1"), "{own}");
-    assert!(!own["warnings"].to_string().contains("parry"), "{}", own["warnings"]);
+    assert!(own["costs"].as_array().unwrap().iter().any(|c| c["algorithm"] == "sweep@cpu1"), "{own}");
+    assert!(!own["warnings"].to_string().contains("sweep"), "{}", own["warnings"]);
     // The built-in model does not know it, and says what to do.
     let built_in = success(user().args(["predict", "--json", "--report"]).arg(&report));
-    assert!(built_in.contains("parry is not predicted") && built_in.contains("own-model.json"), "{built_in}");
+    assert!(built_in.contains("sweep is not predicted") && built_in.contains("own-model.json"), "{built_in}");
 
     let run = ["run", "uniform", "--json", "--objects", "200", "--frames", "20", "--repeats", "1", "--tuning"];
     let told: Value = serde_json::from_str(&success(user().args(run).arg(&tuning))).unwrap();
-    assert!(told["total_ms"]["fixed"]["parry@cpu1"].as_f64().unwrap() > 0.0, "{told}");
+    assert!(told["total_ms"]["fixed"]["sweep@cpu1"].as_f64().unwrap() > 0.0, "{told}");
     let complaint = failure(sapwise().args(run).arg(&tuning), 1);
-    assert!(complaint.contains("is stale: parry is not in this build"), "{complaint}");
+    assert!(complaint.contains("is stale: sweep is not in this build"), "{complaint}");
 
     check_names_a_number_of_threads_that_it_can_not_be_made_on(&tuning);
     for path in [&report, &model, &tuning] {
         success(user().arg("check").arg(path));
         let told = sapwise().arg("check").arg(path).output().unwrap();
         let text = String::from_utf8(told.stdout).unwrap();
-        assert!(told.status.code() == Some(1) && text.contains("stale: parry is not in this build"), "{text}");
+        assert!(told.status.code() == Some(1) && text.contains("stale: sweep is not in this build"), "{text}");
     }
 }
 
 fn check_names_a_number_of_threads_that_it_can_not_be_made_on(tuning: &Path) {
     let other = tuning.with_file_name("two-threads.json");
-    fs::write(&other, fs::read_to_string(tuning).unwrap().replace("parry@cpu1", "parry@cpu2")).unwrap();
+    fs::write(&other, fs::read_to_string(tuning).unwrap().replace("sweep@cpu1", "sweep@cpu2")).unwrap();
     let told = user().arg("check").arg(&other).output().unwrap();
     let text = String::from_utf8(told.stdout).unwrap();
-    assert!(told.status.code() == Some(1) && text.contains("parry@cpu2") && !text.contains("stale"), "{text}");
+    assert!(told.status.code() == Some(1) && text.contains("sweep@cpu2") && !text.contains("stale"), "{text}");
 }
 
 fn the_pairs_are_those_of_ours() {
@@ -191,7 +191,7 @@ fn the_pairs_are_those_of_ours() {
             let words = ["--json", "--repeat", "3", "--algorithm", id];
             serde_json::from_str(&success(user().arg("pairs").arg(&path).args(words))).unwrap()
         };
-        let (ours, own) = (pairs("brute@cpu1"), pairs("parry@cpu1"));
+        let (ours, own) = (pairs("brute@cpu1"), pairs("sweep@cpu1"));
         assert_eq!(ours["pairs"].as_array().unwrap().len(), frames);
         assert_eq!((&own["pairs"], &own["fingerprint"]), (&ours["pairs"], &ours["fingerprint"]), "{}", path.display());
     }
@@ -202,10 +202,10 @@ fn boxes_that_ours_refuse_are_refused() {
     let boxes = [[0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0], [0.0, f32::NAN, 0.0, 1.0, 1.0, 1.0]];
     let path = npy(folder.path(), "nan.npy", "<f4", "2, 6", &boxes.concat());
     let complaints =
-        ["brute@cpu1", "parry@cpu1"].map(|id| failure(user().arg("pairs").arg(&path).args(["--algorithm", id]), 1));
+        ["brute@cpu1", "sweep@cpu1"].map(|id| failure(user().arg("pairs").arg(&path).args(["--algorithm", id]), 1));
     assert!(complaints[0].contains("box 1") && complaints[0] == complaints[1], "{complaints:?}");
-    let unknown = failure(sapwise().arg("pairs").arg(&path).args(["--algorithm", "parry@cpu1"]), 2);
-    assert!(unknown.contains("no algorithm is called \"parry@cpu1\""), "{unknown}");
+    let unknown = failure(sapwise().arg("pairs").arg(&path).args(["--algorithm", "sweep@cpu1"]), 2);
+    assert!(unknown.contains("no algorithm is called \"sweep@cpu1\""), "{unknown}");
 }
 
 fn one_on_several_threads_gets_their_number() {

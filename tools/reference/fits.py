@@ -2,9 +2,9 @@
 """Answers of SciPy, scikit-learn and NumPy to the fits of `sapwise train`, for the tests of the lab.
 
     python3 -m venv V && V/bin/pip install numpy scipy scikit-learn
-    V/bin/python tools/reference/fits.py > lab/tests/fixtures/fits.json
+    V/bin/python tools/reference/fits.py > crates/lab/tests/fixtures/fits.json
 
-The stored numbers are the output of this script and are not edited; `lab/src/evaluate/reference.rs` holds the fits in Rust
+The stored numbers are the output of this script and are not edited; `crates/lab/src/evaluate/reference.rs` holds the fits in Rust
 against them, so that a test needs no Python. The problems are the same on every run, and the versions that gave the answers
 stand in the file. Inputs have few digits, so that both sides solve the same problem exactly as it is written.
 """
@@ -22,7 +22,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, RationalQuadratic
 from sklearn.linear_model import LinearRegression
 
 SEED = 2011
-# The constants of lab/src/fit/robust.rs.
+# The constants of crates/lab/src/fit/robust.rs.
 HUBER, MAD_TO_SD, SMALLEST_SPREAD = 1.345, 1.4826, 1e-3
 
 

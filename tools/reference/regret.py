@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Regret of tunings on reports, by a program of its own: a check of `lab/src/evaluate/regret_table.rs`, and of a model on reports that came after it.
+"""Regret of tunings on reports, by a program of its own: a check of `crates/lab/src/evaluate/regret_table.rs`, and of a model on reports that came after it.
 
     sapwise predict --report R.json --json > tunings/R.json     # for each report
     tools/reference/regret.py tunings R.json ...

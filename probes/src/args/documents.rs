@@ -15,13 +15,13 @@ const DOCUMENTS: [(&str, &str); 9] = [
     ("BENCHMARKS.md", include_str!("../../../BENCHMARKS.md")),
 ];
 
-/// How a line of a shell calls this program. `parry` is the example of a program with an algorithm of its own.
+/// How a line of a shell calls this program. `own` is the example of a program with an algorithm of its own.
 const CALLS: [&str; 5] = [
     "cargo run --release -p sapwise-cli -- ",
-    "cargo run --release -p sapwise-cli --example parry -- ",
+    "cargo run --release -p sapwise-cli --example own_algorithm -- ",
     "cargo run --release -- ",
     "sapwise ",
-    "parry ",
+    "own ",
 ];
 
 /// The arguments of a line of a shell that calls this program.

@@ -1,0 +1,1 @@
+//! Benchmarks and an example only; nothing here is a library.

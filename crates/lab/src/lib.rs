@@ -1,0 +1,66 @@
+//! What follows from reports: cost models, their validation on machines held out, studies, figures and pages.
+//!
+//! A [`report`](report::Report) holds what was measured on one machine. The way from reports to a model is
+//!
+//! 1. [`data`]: a report becomes a [`Profile`](data::Profile), and a [`Selection`](data::Selection) of them what can be trained on;
+//! 2. [`fit`]: cost terms are fitted to the profiles, which makes a [`Model`](sapwise::Model);
+//! 3. [`evaluate`]: each machine is held out in turn, and every strategy is judged on it by its regret;
+//! 4. [`train()`]: all of it, with what [`Training`] says of itself.
+//!
+//! ```no_run
+//! use sapwise_lab::data::{Evidence, read_reports};
+//! use sapwise_lab::progress::Silent;
+//!
+//! let reports = read_reports(&["datasets".into()], &Silent)?;
+//! let trained = sapwise_lab::train(sapwise_lab::data::Selection::of(&reports, Evidence::Real), "mine", &Silent)?;
+//! for score in &trained.training.validation.methods {
+//!     println!("{}: {}", score.name, sapwise_lab::spread::percent(score.mean_regret, score.regret_range(), 1));
+//! }
+//! # Ok::<(), anyhow::Error>(())
+//! ```
+//!
+//! `examples/leave_one_out.rs` trains without one report and prints the regrets on it.
+//!
+//! Times are in nanoseconds, and a regret is the time of the choice over that of the best choice, less one.
+
+pub mod belief;
+pub mod compare;
+pub mod convert;
+pub mod data;
+pub mod data_table;
+pub mod evaluate;
+pub mod figures;
+pub mod fit;
+pub mod fleet;
+pub mod label_text;
+pub mod model_card;
+pub mod page;
+pub mod paired;
+pub mod progress;
+pub mod ranks;
+pub mod report;
+mod schemas;
+pub mod simulated;
+pub mod spread;
+pub mod steadiness;
+pub mod study;
+pub mod sweep;
+#[cfg(test)]
+mod synthetic;
+pub mod text;
+mod train;
+mod training;
+pub mod write;
+
+pub use report::Report;
+pub use schemas::schemas;
+pub use train::{Trained, train, without};
+pub use training::{
+    Coverage, Floor, MethodScore, Regrets, Split, StoredModel, Training, TrainingCount, TrainingReport, Validation,
+    read_model, write_model,
+};
+
+/// The example of the guide for researchers as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/research.md")]
+struct Research;

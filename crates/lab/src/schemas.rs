@@ -1,0 +1,47 @@
+//! The JSON Schemas of files.
+
+use crate::report::{self, Report};
+use crate::training::Training;
+use sapwise::json::{self, Error};
+use serde_json::Value;
+
+/// File names and texts of the JSON Schemas of tuning, models and reports. That of models holds what training says of itself too.
+///
+/// # Errors
+/// When a schema can't be written.
+pub fn schemas() -> Result<Vec<(String, String)>, Error> {
+    let mut schemas = json::schemas()?;
+    for (_, text) in schemas.iter_mut().filter(|(name, _)| name.starts_with("model-")) {
+        *text = with_training(text)?;
+    }
+    schemas.push(report::FORMAT.json_schema::<Report>()?);
+    Ok(schemas)
+}
+
+/// The schema of the engine's part of a model, with that of the training in its place.
+fn with_training(model: &str) -> Result<String, Error> {
+    let mut model: Value = serde_json::from_str(model).map_err(Error::Write)?;
+    let mut training = schemars::schema_for!(Training).to_value();
+    if let Some(training) = training.as_object_mut() {
+        training.remove("$schema");
+        if let (Some(Value::Object(own)), Some(all)) = (training.remove("$defs"), model["$defs"].as_object_mut()) {
+            all.extend(own);
+        }
+    }
+    model["properties"]["training"] = training;
+    json::write(&model)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    #[test]
+    fn the_committed_schemas_are_those_of_the_types() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../schemas");
+        for (name, text) in super::schemas().unwrap() {
+            let committed = std::fs::read_to_string(folder.join(&name)).unwrap_or_default();
+            assert!(committed == text, "{name} is stale: run `cargo run -- schema --out schemas`");
+        }
+    }
+}

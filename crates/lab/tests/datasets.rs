@@ -1,0 +1,119 @@
+//! Every report in the repository is sound and current, its label is true, and the built-in model leads to a choice on its machine.
+
+use sapwise::hardware::{GpuParameterId, ParameterId};
+use sapwise::{BackendClass, Entry, Hardware, Model, Registry};
+use sapwise_lab::data::host;
+use sapwise_lab::report::{self, Label, Report};
+use sapwise_lab::{Training, read_model};
+use std::path::{Path, PathBuf};
+
+fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
+}
+
+fn reports(folder: &str) -> Vec<(PathBuf, Report)> {
+    let entries = std::fs::read_dir(repository(folder)).unwrap();
+    let files = entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "json"));
+    let reports: Vec<(PathBuf, Report)> =
+        files.map(|p| (p.clone(), report::read(&std::fs::read_to_string(&p).unwrap()).unwrap().value)).collect();
+    assert!(!reports.is_empty(), "no report in {folder}");
+    reports
+}
+
+fn training() -> Training {
+    read_model(&std::fs::read_to_string(repository("models/default.json")).unwrap()).unwrap().training
+}
+
+/// Our algorithms on a machine of that many cores, also those that this build lacks a feature for.
+fn algorithms(cores: u32) -> Vec<Entry> {
+    Registry::with_cores(cores).entries().to_vec()
+}
+
+#[test]
+fn every_report_is_complete_and_its_label_is_true() {
+    for (path, report) in ["datasets", "datasets/earlier"].into_iter().flat_map(reports) {
+        let path = path.display();
+        assert!(report.provenance.optimised, "{path}");
+        let names: Vec<&str> = report.hardware.parameters.iter().map(|p| p.name.as_str()).collect();
+        assert_eq!(names, ParameterId::ALL.map(ParameterId::as_str), "{path}");
+        let restricted = report.provenance.threads.is_some() || report.provenance.simd.is_some();
+        let stronger = [Label::RealContended, Label::RealSoftwareGpu].contains(&report.label);
+        assert_eq!(report.label == Label::RealRestricted, restricted && !stronger, "{path}");
+        for gpu in &report.hardware.gpus {
+            let names: Vec<&str> = gpu.parameters.iter().map(|p| p.name.as_str()).collect();
+            // Those that came later are in no older report.
+            let first = GpuParameterId::OF_ONE.map(GpuParameterId::as_str);
+            let later = first.iter().position(|&n| n == GpuParameterId::DeviceLocalBytes).unwrap();
+            let all = names.len() > later;
+            assert_eq!(names, first[..if all { first.len() } else { later }], "{path}: gpu{}", gpu.gpu.index);
+        }
+        for group in &report.hardware.gpu_groups {
+            let names: Vec<&str> = group.parameters.iter().map(|p| p.name.as_str()).collect();
+            assert_eq!(names, GpuParameterId::GROUP.map(GpuParameterId::as_str), "{path}: {:?}", group.gpus);
+        }
+        for point in &report.points {
+            let samples: Vec<usize> =
+                point.timings.iter().filter(|t| t.error.is_none()).map(|t| t.samples_ns.len()).collect();
+            assert!(samples.iter().all(|n| (3..=40).contains(n)), "{path}: {samples:?} samples in {}", point.scenario);
+        }
+        // What was written is what is read, to the last digit.
+        assert!(report::read(&report::write(&report).unwrap()).unwrap().value == report, "{path}");
+    }
+}
+
+#[test]
+fn the_built_in_model_knows_every_method_and_predicts_for_every_report() {
+    let (model, training) = (Model::built_in().unwrap(), training());
+    for entry in Registry::with_cores(1).entries().iter().filter(|e| e.id.backend().class() == BackendClass::Cpu) {
+        assert_eq!(model.method(&entry.id).map(|m| m.revision), Some(entry.revision), "{}: train on new reports", entry.id);
+    }
+    let reports = reports("datasets");
+    for trained_on in &training.trained_on {
+        assert!(reports.iter().any(|(path, _)| path.ends_with(&trained_on.file)), "{} is gone", trained_on.file);
+    }
+    let cores = |report: &Report| report.hardware.value(ParameterId::UsableCores).unwrap() as u32;
+    let is_known = |report: &Report| training.trained_on.iter().any(|t| t.host == host(&report.hardware));
+    let most_known = reports.iter().map(|(_, r)| r).filter(|r| is_known(r)).map(cores).max().unwrap();
+    for (path, report) in reports {
+        let path = path.display();
+        let (cores, known) = (cores(&report), is_known(&report));
+        let algorithms = algorithms(cores);
+        let prediction = model.predict(&report.hardware, &algorithms).unwrap();
+        assert_eq!(prediction.costs.len(), algorithms.len(), "{path}: {:?}", prediction.warnings);
+        let on_its_own = report.label != Label::RealContended || report.provenance.threads.is_some();
+        assert!(!known || !on_its_own || !prediction.extrapolated, "{path}: {:?}", prediction.warnings);
+        // The whole of a host that the model was not trained on lies outside its ranges, and so do more cores than it has seen. Of fewer threads
+        // each parameter may lie within: a host on one thread is like others on one.
+        let is_strange = !known && (report.label == Label::RealFull || cores > most_known);
+        assert!(!is_strange || prediction.extrapolated, "{path}");
+    }
+}
+
+#[test]
+fn a_machine_outside_the_training_is_told_and_a_missing_parameter_leaves_out_what_needs_it() {
+    let model = Model::built_in().unwrap();
+    let known = training().trained_on.iter().find(|t| t.label == Label::RealFull).unwrap().file.clone();
+    let (_, report) = reports("datasets").into_iter().find(|(path, _)| path.ends_with(&known)).unwrap();
+    let mut hardware = report.hardware;
+    let algorithms = algorithms(2);
+    let set = |hardware: &mut Hardware, id: ParameterId, value: Option<f64>| {
+        hardware.parameters.iter_mut().find(|p| p.name == id.as_str()).unwrap().value = value;
+    };
+    let without = |id: ParameterId| {
+        let mut hardware = hardware.clone();
+        set(&mut hardware, id, None);
+        let prediction = model.predict(&hardware, &algorithms).ok()?;
+        (prediction.costs.len() < algorithms.len()).then_some((id, prediction))
+    };
+    let (id, prediction) = ParameterId::ALL.into_iter().find_map(without).expect("some methods need what others do not");
+    assert!(!prediction.costs.is_empty());
+    assert!(prediction.warnings.iter().any(|w| w.contains(id.as_str())), "{id}: {:?}", prediction.warnings);
+    set(&mut hardware, ParameterId::ClockMeasuredGhz, Some(9.0));
+    assert!(model.predict(&hardware, &algorithms).unwrap().extrapolated);
+    let other_revision: Vec<_> = algorithms.iter().map(|e| Entry::new(e.id.clone(), e.revision + 1)).collect();
+    let error = model.predict(&hardware, &other_revision).unwrap_err().to_string();
+    assert!(error.contains("train on new reports"), "{error}");
+    set(&mut hardware, ParameterId::ClockMeasuredGhz, Some(4500.0));
+    let error = model.predict(&hardware, &algorithms).unwrap_err().to_string();
+    assert!(error.contains("clock_measured_ghz is 4500"), "{error}");
+}
