@@ -39,9 +39,14 @@ fn changes(c: &mut Criterion) {
         let ids: Vec<u64> = (1..=objects as u64).map(|k| k.wrapping_mul(0x9e37_79b9_7f4a_7c15)).collect();
         let (any, canonical) = (found(&boxes, PairOrder::Any), found(&boxes, PairOrder::Canonical));
         let mut group = c.benchmark_group("pairs");
-        group.throughput(Throughput::Elements(any[0].len() as u64)).sample_size(if objects > 100_000 { 10 } else { 100 });
+        group.throughput(Throughput::Elements(any[0].len() as u64)).sample_size(if objects > 100_000 {
+            10
+        } else {
+            100
+        });
         // Half of the pairs pass.
-        let membership = |k: usize| Membership { groups: 1 << (k % 2), mask: 1 << (k / 2 % 2) | 1 << (k % 2), fixed: false };
+        let membership =
+            |k: usize| Membership { groups: 1 << (k % 2), mask: 1 << (k / 2 % 2) | 1 << (k % 2), fixed: false };
         let filter = Filter::new((0..objects).map(|k| k.wrapping_mul(0x9e37_79b9) >> 7).map(membership).collect());
         for (name, filter) in [("find", None), ("find, filtered", Some(filter))] {
             let (mut algorithm, mut pairs, mut frames) = (strips(), Pairs::new(), walk(&boxes));

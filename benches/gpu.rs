@@ -147,7 +147,8 @@ fn on_gpus(registry: &Registry) -> Result<Vec<AlgorithmId>, String> {
     let entries = registry.entries().iter().filter(|e| matches!(e.id.backend(), Backend::Gpu(_)));
     let known: Vec<AlgorithmId> = entries.map(|e| e.id.clone()).collect();
     let Ok(named) = std::env::var("SAPWISE_GPUS") else { return Ok(known) };
-    let backends = named.split(',').map(|text| text.trim().parse::<Backend>().map_err(|e| format!("SAPWISE_GPUS: {e}")));
+    let backends =
+        named.split(',').map(|text| text.trim().parse::<Backend>().map_err(|e| format!("SAPWISE_GPUS: {e}")));
     let mut wanted = Vec::new();
     for backend in backends {
         let backend = backend?;

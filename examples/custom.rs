@@ -8,8 +8,8 @@
 //! `probes/examples/own_algorithm.rs`.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs, Product,
-    Registry, Source, Term, Tuning,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs,
+    Product, Registry, Source, Term, Tuning,
 };
 use sapwise_scenes::Scenario;
 
@@ -85,7 +85,11 @@ fn main() -> Result<(), Error> {
     // and more. A product of counts makes a term of its own: here that of the pairs.
     let tuning = tuning(vec![
         cost(&registry, "grid-sap@cpu1", &[(Term::Objects, 60.0)]),
-        cost(&registry, ID, &[(Term::Objects, 2.0), (Term::Product(Product::ONE.pairs(1)), 1.0), (Term::Moved, 1000.0)]),
+        cost(
+            &registry,
+            ID,
+            &[(Term::Objects, 2.0), (Term::Product(Product::ONE.pairs(1)), 1.0), (Term::Moved, 1000.0)],
+        ),
     ]);
     let mut adaptive = Adaptive::new(tuning, &registry)?;
     let mut scene = Scenario::Uniform.start(5000, 1);

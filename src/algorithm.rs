@@ -53,7 +53,9 @@ impl AlgorithmId {
         }
         // Numbers too high, no thread at all, devices out of order: whatever could not be read back.
         if backend.to_string().parse().as_ref() != Ok(&backend) {
-            return Err(ParseIdError(format!("{backend} is no backend; use cpu1 to cpu{MOST_THREADS}, gpu0 or gpu0+1")));
+            return Err(ParseIdError(format!(
+                "{backend} is no backend; use cpu1 to cpu{MOST_THREADS}, gpu0 or gpu0+1"
+            )));
         }
         Ok(Self { method: method.to_owned(), backend })
     }
@@ -144,8 +146,9 @@ impl FromStr for Backend {
     type Err = ParseIdError;
 
     fn from_str(text: &str) -> Result<Self, ParseIdError> {
-        let bad =
-            || ParseIdError(format!("{text:?} is no backend; use cpu1, cpu4, gpu0, or gpu0+1 with the numbers ascending"));
+        let bad = || {
+            ParseIdError(format!("{text:?} is no backend; use cpu1, cpu4, gpu0, or gpu0+1 with the numbers ascending"))
+        };
         if let Some(threads) = text.strip_prefix("cpu") {
             return number(threads).filter(|&k| (1..=MOST_THREADS).contains(&k)).map(Backend::Cpu).ok_or_else(bad);
         }
@@ -161,9 +164,9 @@ impl FromStr for AlgorithmId {
     type Err = ParseIdError;
 
     fn from_str(text: &str) -> Result<Self, ParseIdError> {
-        let (method, backend) = text
-            .split_once('@')
-            .ok_or_else(|| ParseIdError(format!("{text:?} is no algorithm; write method@backend, such as grid-sap@cpu1")))?;
+        let (method, backend) = text.split_once('@').ok_or_else(|| {
+            ParseIdError(format!("{text:?} is no algorithm; write method@backend, such as grid-sap@cpu1"))
+        })?;
         Self::new(method, backend.parse()?)
     }
 }
@@ -219,9 +222,18 @@ mod tests {
         for backend in [Backend::Cpu(0), Backend::Cpu(5000), Backend::Gpu(vec![]), Backend::Gpu(vec![1, 0])] {
             assert!(AlgorithmId::new("brute", backend.clone()).is_err(), "{backend:?}");
         }
-        for text in
-            ["", "brute", "brute@", "@cpu1", "brute@cpu0", "brute@cpu01", "brute@cpu-1", "b@gpu1+0", "b@gpu0+0", "Ä@cpu1"]
-        {
+        for text in [
+            "",
+            "brute",
+            "brute@",
+            "@cpu1",
+            "brute@cpu0",
+            "brute@cpu01",
+            "brute@cpu-1",
+            "b@gpu1+0",
+            "b@gpu0+0",
+            "Ä@cpu1",
+        ] {
             assert!(text.parse::<AlgorithmId>().is_err(), "{text}");
         }
     }

@@ -42,7 +42,9 @@ impl Limit {
         let mut files = Vec::new();
         for line in membership.lines() {
             let mut fields = line.splitn(3, ':');
-            let (Some(_), Some(controllers), Some(group)) = (fields.next(), fields.next(), fields.next()) else { continue };
+            let (Some(_), Some(controllers), Some(group)) = (fields.next(), fields.next(), fields.next()) else {
+                continue;
+            };
             let (mounts, name) = if controllers.is_empty() {
                 (vec!["", "unified"], self.file)
             } else if controllers == self.controller {
@@ -56,7 +58,9 @@ impl Limit {
             for mount in mounts {
                 let mut relative = group.trim_matches('/');
                 loop {
-                    files.push(["/sys/fs/cgroup", mount, relative, name].iter().filter(|part| !part.is_empty()).collect());
+                    files.push(
+                        ["/sys/fs/cgroup", mount, relative, name].iter().filter(|part| !part.is_empty()).collect(),
+                    );
                     if relative.is_empty() {
                         break;
                     }
@@ -108,7 +112,8 @@ mod tests {
     fn version_one_takes_the_controller_of_the_limit_only() {
         let membership = "9:cpu,cpuacct:/docker\n4:hugetlb,memory:/docker\n3:cpuset:/\n1:name=systemd:/memory";
         let at = |mounts: [&str; 2], name: &str| -> Vec<String> {
-            let of = |mount| [format!("/sys/fs/cgroup/{mount}/docker/{name}"), format!("/sys/fs/cgroup/{mount}/{name}")];
+            let of =
+                |mount| [format!("/sys/fs/cgroup/{mount}/docker/{name}"), format!("/sys/fs/cgroup/{mount}/{name}")];
             mounts.into_iter().flat_map(of).collect()
         };
         assert_eq!(paths(&MEMORY, membership), at(["hugetlb,memory", "memory"], "memory.limit_in_bytes"));

@@ -68,7 +68,9 @@ impl<Id: Copy + Ord> Changes<Id> {
         }
         let missing = |position: u32| Error::MissingId { position, ids: ids.len() };
         let ranks = &self.ranks;
-        fill_keys(&mut self.keys, &mut self.sorter, pairs, |at| ranks.get(at as usize).copied().ok_or_else(|| missing(at)))?;
+        fill_keys(&mut self.keys, &mut self.sorter, pairs, |at| {
+            ranks.get(at as usize).copied().ok_or_else(|| missing(at))
+        })?;
         let sorted = &self.sorted;
         fill(&mut self.next, &self.keys, |rank| sorted[rank as usize].0)?;
         self.compare()

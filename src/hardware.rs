@@ -207,13 +207,16 @@ mod tests {
 
     #[test]
     fn disturbances_are_told() {
-        let loaded = |name: &str, load| Parameter { foreign_load: Some(load), ..Parameter::reported(name, 1.0, "test") };
+        let loaded =
+            |name: &str, load| Parameter { foreign_load: Some(load), ..Parameter::reported(name, 1.0, "test") };
         let told = |parameters| hardware(parameters).disturbed();
         assert!(told(vec![loaded("a", 0.1), Parameter::reported("b", 1.0, "test")]).is_empty());
         let one = told(vec![loaded("a", 0.25), loaded("b", 0.16), loaded("c", 0.01)]);
         assert!(one.len() == 1 && one[0].contains("while 2 of") && one[0].contains("25 % with a;"), "{one:?}");
-        let distance =
-            |raw: &[f64]| Parameter { raw: raw.to_vec(), ..Parameter::reported(ParameterId::CoreToCoreNs, 1.0, "test") };
+        let distance = |raw: &[f64]| Parameter {
+            raw: raw.to_vec(),
+            ..Parameter::reported(ParameterId::CoreToCoreNs, 1.0, "test")
+        };
         assert!(told(vec![distance(&[38.0, 37.0, 41.0, 60.0])]).is_empty());
         // One sample of many that an interruption spoiled is no other place.
         assert!(told(vec![distance(&[&[38.0; 30][..], &[900.0]].concat())]).is_empty());

@@ -99,7 +99,10 @@ impl Load {
             strip_share(&chosen, &grid, shares[axis], pairs / independent.max(1.0)) * all
         };
         let strip_candidates = strip_candidates.max(pairs).min(axis_candidates.max(pairs));
-        (Self { objects: boxes.len() as u32, axis_candidates, strip_candidates, pairs, moved: moved.unwrap_or(1.0) }, plan)
+        (
+            Self { objects: boxes.len() as u32, axis_candidates, strip_candidates, pairs, moved: moved.unwrap_or(1.0) },
+            plan,
+        )
     }
 
     /// The load of a frame that looks and moves like this one but has another number of objects and pairs.

@@ -217,7 +217,8 @@ impl Model {
             let found =
                 |f: &FallbackModel| self.of_method(&f.method, m.backend).is_some_and(|other| other.fallback.is_none());
             if let Some(f) = m.fallback.as_ref().filter(|f| !found(f) || !(0.01..=100.0).contains(&f.factor)) {
-                let why = format!("it falls back to {} at {} times its cost, which is no such method", f.method, f.factor);
+                let why =
+                    format!("it falls back to {} at {} times its cost, which is no such method", f.method, f.factor);
                 return Some(ModelError::Method { method, why });
             }
             m.defect(self.places.loads().len()).map(|why| ModelError::Method { method, why })

@@ -118,7 +118,8 @@ impl Registry {
     pub fn add_gpus(&mut self, gpus: &crate::gpu::Gpus) {
         self.gpus = gpus.clone();
         // GPUs that were added before and are not among these go; what the user added stays.
-        let stays = |k: usize| !matches!((&self.makers[k], self.entries[k].id.backend()), (Maker::Ours, Backend::Gpu(_)));
+        let stays =
+            |k: usize| !matches!((&self.makers[k], self.entries[k].id.backend()), (Maker::Ours, Backend::Gpu(_)));
         let stays: Vec<bool> = (0..self.entries.len()).map(stays).collect();
         let (mut entry, mut maker) = (stays.iter(), stays.iter());
         self.entries.retain(|_| entry.next() == Some(&true));
@@ -175,7 +176,8 @@ impl Registry {
         self.threads = Threads::of(pool);
         let most = self.threads.most().unwrap_or(1);
         for method in cpu::METHODS {
-            let wider = |e: &Entry| e.id.method() == method.name && matches!(*e.id.backend(), Backend::Cpu(k) if k > most);
+            let wider =
+                |e: &Entry| e.id.method() == method.name && matches!(*e.id.backend(), Backend::Cpu(k) if k > most);
             let id = AlgorithmId::cpu(method.name, most);
             if let Some(at) = self.entries.iter().position(wider).filter(|_| self.position(&id).is_none()) {
                 self.entries.insert(at, Entry::new(id, method.revision));

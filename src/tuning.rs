@@ -186,7 +186,8 @@ impl Tuning {
         let spread = |below: usize, above: usize, _: &Load| spreads[below].hypot(spreads[above]);
         let mut tuning = Self::from_costs_with(source, scenario, costs, loads, spread);
         tuning.interval_basis =
-            "90 % of a normal distribution with the spread of measured over modelled time of the two algorithms".to_owned();
+            "90 % of a normal distribution with the spread of measured over modelled time of the two algorithms"
+                .to_owned();
         tuning
     }
 
@@ -247,7 +248,9 @@ impl Tuning {
             ranking = Some(match ranking {
                 None => Ranking { best: k, best_ns: ns, runner_up: None },
                 Some(r) if ns < r.best_ns => Ranking { best: k, best_ns: ns, runner_up: Some((r.best, r.best_ns)) },
-                Some(r) if r.runner_up.is_none_or(|(_, second)| ns < second) => Ranking { runner_up: Some((k, ns)), ..r },
+                Some(r) if r.runner_up.is_none_or(|(_, second)| ns < second) => {
+                    Ranking { runner_up: Some((k, ns)), ..r }
+                }
                 Some(r) => r,
             });
         }
@@ -281,7 +284,8 @@ impl Tuning {
         let places = || self.costs.iter().flat_map(AlgorithmCost::residuals).map(|r| &r.places);
         for (k, cost) in self.costs.iter().enumerate() {
             let algorithm = || cost.algorithm.clone();
-            let other = |own: &Residual| places().next().is_some_and(|p| !Arc::ptr_eq(p, &own.places) && **p != *own.places);
+            let other =
+                |own: &Residual| places().next().is_some_and(|p| !Arc::ptr_eq(p, &own.places) && **p != *own.places);
             if cost.residuals().any(other) {
                 return Some(TuningError::Places { algorithm: algorithm() });
             }

@@ -5,8 +5,8 @@ mod common;
 use common::{Random, every_algorithm, naive};
 use proptest::prelude::*;
 use sapwise::{
-    Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Filter, Membership, Pair, PairOrder, Pairs, Registry, Step,
-    Tuning,
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Changes, Error, Filter, Membership, Pair, PairOrder, Pairs, Registry,
+    Step, Tuning,
 };
 use std::collections::BTreeSet;
 

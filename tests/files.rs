@@ -7,7 +7,12 @@ use sapwise::{BackendClass, Load, Model, Registry};
 fn the_built_in_model_knows_every_method_of_this_build() {
     let model = Model::built_in().unwrap();
     for entry in Registry::with_cores(1).entries().iter().filter(|e| e.id.backend().class() == BackendClass::Cpu) {
-        assert_eq!(model.method(&entry.id).map(|m| m.revision), Some(entry.revision), "{}: train on new reports", entry.id);
+        assert_eq!(
+            model.method(&entry.id).map(|m| m.revision),
+            Some(entry.revision),
+            "{}: train on new reports",
+            entry.id
+        );
     }
     #[cfg(feature = "gpu")]
     {

@@ -66,8 +66,10 @@ impl Frames {
     /// The hash of the pairs that is kept.
     fn golden(self, scenario: Scenario) -> u64 {
         let begin = format!("{scenario},{},{},", self.objects, self.every);
-        let line =
-            GOLDEN.lines().find(|line| line.starts_with(&begin)).unwrap_or_else(|| panic!("there is no line {begin}..."));
+        let line = GOLDEN
+            .lines()
+            .find(|line| line.starts_with(&begin))
+            .unwrap_or_else(|| panic!("there is no line {begin}..."));
         u64::from_str_radix(line.rsplit(',').next().unwrap(), 16).unwrap()
     }
 }

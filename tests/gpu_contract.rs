@@ -159,7 +159,12 @@ fn a_filter_keeps_pairs_out_and_the_limit_counts_the_others() {
             pairs.filter_mut().unwrap().memberships = memberships;
             pairs.set_limit(Some(expected.len()));
             algorithm.find_pairs(boxes, &mut pairs).unwrap_or_else(|e| panic!("{id} on scene {scene}: {e}"));
-            assert!(pairs.as_slice() == expected, "{id} on scene {scene}: {} pairs, not {}", pairs.len(), expected.len());
+            assert!(
+                pairs.as_slice() == expected,
+                "{id} on scene {scene}: {} pairs, not {}",
+                pairs.len(),
+                expected.len()
+            );
             assert_eq!(pairs.overlapping(), all as u64, "{id} on scene {scene}");
             let limit = expected.len() - 1;
             pairs.set_limit(Some(limit));
@@ -227,7 +232,11 @@ fn rows_of_very_many_candidates_lose_no_pair() {
     for (id, mut algorithm) in every_algorithm(&gpus).into_iter().filter(|(id, _)| !id.contains("brute")) {
         let mut pairs = Pairs::with_order(PairOrder::Canonical);
         algorithm.find_pairs(&row, &mut pairs).unwrap();
-        assert!(pairs.len() == hits && pairs.iter().all(|&(i, j)| i % 7 == 0 && j == 70_000), "{id}: {} pairs", pairs.len());
+        assert!(
+            pairs.len() == hits && pairs.iter().all(|&(i, j)| i % 7 == 0 && j == 70_000),
+            "{id}: {} pairs",
+            pairs.len()
+        );
         // Quadratic, so once for each method and GPU.
         if !id.contains('+') && !id.contains("twice") {
             pairs.set_limit(Some(1000));

@@ -5,8 +5,8 @@ mod common;
 use common::{Random, gpus, naive};
 use sapwise::gpu::{Gpu, Gpus, broad_phase, wgpu30 as wgpu};
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Entry, Error, GpuIdentity, GpuKind, Load,
-    PairOrder, Pairs, Reason, Registry, Source, Term, Tuning,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Entry, Error, GpuIdentity, GpuKind,
+    Load, PairOrder, Pairs, Reason, Registry, Source, Term, Tuning,
 };
 use sapwise_scenes::Scenario;
 
@@ -129,7 +129,11 @@ fn a_device_that_is_lost_and_back_is_taken_up_again() {
         assert!(pairs_of(&mut adaptive, scene.boxes()).unwrap() == naive(scene.boxes()), "frame {frame}");
         let decision = adaptive.last_decision().unwrap();
         let present = !(7..15).contains(&(frame % 20));
-        assert_eq!(decision.algorithm.to_string(), if present { "grid-sap@gpu0" } else { "grid-sap@cpu1" }, "frame {frame}");
+        assert_eq!(
+            decision.algorithm.to_string(),
+            if present { "grid-sap@gpu0" } else { "grid-sap@cpu1" },
+            "frame {frame}"
+        );
         assert!(!lost || decision.reason == Reason::FellBack, "frame {frame}: {:?}", decision.reason);
     }
 }

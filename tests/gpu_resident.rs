@@ -8,8 +8,12 @@ use sapwise::{Aabb, BoxDefect, Error, Pair};
 
 fn buffer(gpu: &Gpu, boxes: &[Aabb], usage: wgpu::BufferUsages) -> wgpu::Buffer {
     let size = (size_of_val(boxes) as u64).max(24);
-    let descriptor =
-        wgpu::BufferDescriptor { label: None, size, usage: usage | wgpu::BufferUsages::COPY_DST, mapped_at_creation: false };
+    let descriptor = wgpu::BufferDescriptor {
+        label: None,
+        size,
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    };
     let buffer = gpu.device().create_buffer(&descriptor);
     let bytes: Vec<u8> = boxes.iter().flat_map(|b| [b.min, b.max]).flatten().flat_map(f32::to_le_bytes).collect();
     gpu.queue().write_buffer(&buffer, 0, &bytes);
@@ -24,8 +28,12 @@ fn found(gpu: &Gpu, resident: &mut Resident, boxes: &wgpu::Buffer, objects: usiz
         return Vec::new();
     }
     let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-    let copy =
-        gpu.device().create_buffer(&wgpu::BufferDescriptor { label: None, size: bytes, usage, mapped_at_creation: false });
+    let copy = gpu.device().create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: bytes,
+        usage,
+        mapped_at_creation: false,
+    });
     let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     encoder.copy_buffer_to_buffer(pairs.buffer, 0, &copy, 0, bytes);
     let submission = gpu.queue().submit([encoder.finish()]);
@@ -94,7 +102,11 @@ fn frames_that_nobody_waits_for_leave_their_number_on_the_gpu() {
                 let submitted = resident.submit(&buffer(&gpu, &boxes, wgpu::BufferUsages::STORAGE), 800).unwrap();
                 let counts = words(&gpu, submitted.counts, 9);
                 let count = expected.len() as u32;
-                assert_eq!((counts[0], counts[1], counts[2], counts[3]), (count, 0, u32::MAX, 0), "{method}, frame {frame}");
+                assert_eq!(
+                    (counts[0], counts[1], counts[2], counts[3]),
+                    (count, 0, u32::MAX, 0),
+                    "{method}, frame {frame}"
+                );
                 assert_eq!((counts[5], counts[6], counts[7], counts[8]), (count.div_ceil(64), 1, 1, count), "{method}");
                 let found = words(&gpu, submitted.pairs, 2 * u64::from(count));
                 let mut found: Vec<Pair> = found.chunks(2).map(|p| (p[0], p[1])).collect();

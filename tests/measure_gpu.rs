@@ -58,9 +58,12 @@ fn every_parameter_once_and_in_order() {
         for name in [GpuParameterId::UploadGbPerS, GpuParameterId::RoundTripNs, GpuParameterId::ArithmeticGflopPerS] {
             assert!(hardware.value(name).is_some_and(|value| value > 0.0), "{name}");
         }
-        let [all, host, device] =
-            [GpuParameterId::UploadGbPerS, GpuParameterId::UploadHostCopyGbPerS, GpuParameterId::UploadDeviceCopyGbPerS]
-                .map(|name| hardware.value(name).unwrap());
+        let [all, host, device] = [
+            GpuParameterId::UploadGbPerS,
+            GpuParameterId::UploadHostCopyGbPerS,
+            GpuParameterId::UploadDeviceCopyGbPerS,
+        ]
+        .map(|name| hardware.value(name).unwrap());
         assert!(all <= host && all <= device, "{all} {host} {device}");
         if hardware.gpu.kind == GpuKind::Software {
             for name in [GpuParameterId::ClockGhz, GpuParameterId::Processors, GpuParameterId::Lanes] {

@@ -201,7 +201,9 @@ fn more_threads_than_the_pool_has_are_unavailable_with_a_reason() {
     // All that there are stand in the list, as without a pool.
     assert_eq!((counts(&registry, true), counts(&registry, false)), (vec![1, 2, 4, 5], vec![8]));
     for text in ["brute@cpu8", "pair-cache@cpu6"] {
-        let Err(Error::Unavailable { reason, .. }) = registry.create(&text.parse().unwrap()) else { panic!("made {text}") };
+        let Err(Error::Unavailable { reason, .. }) = registry.create(&text.parse().unwrap()) else {
+            panic!("made {text}")
+        };
         assert!(reason.to_string().contains("has 4 threads, with the calling one 5"), "{reason}");
     }
     registry.use_pool(self::pool(1));

@@ -18,8 +18,8 @@ mod kept;
 
 use common::{Random, naive};
 use sapwise::{
-    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Load, PairOrder, Pairs, Reason, Registry, Source, Term,
-    Tuning,
+    Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Error, Load, PairOrder, Pairs, Reason, Registry, Source,
+    Term, Tuning,
 };
 use sapwise_scenes::Scenario;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -271,8 +271,8 @@ fn live_bytes(lowest: isize) -> isize {
 
 #[test]
 fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
-    let told =
-        std::env::var("SAPWISE_SOAK_FRAMES").map(|text| text.parse().expect("SAPWISE_SOAK_FRAMES is a number of frames"));
+    let told = std::env::var("SAPWISE_SOAK_FRAMES")
+        .map(|text| text.parse().expect("SAPWISE_SOAK_FRAMES is a number of frames"));
     let frames: u64 = told.unwrap_or(FRAMES);
     let began = Instant::now();
     let mut random = Random(0x5eed_50a4);
@@ -299,7 +299,12 @@ fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
     let least = |bytes: &[isize]| bytes.iter().copied().min().unwrap();
     let seconds = began.elapsed().as_secs_f64();
     println!("{tally:#?}\n{seconds:.1} s, {} bytes in use early on, {} at the end", least(early), least(late));
-    assert!(least(late) <= least(early) + SLACK_BYTES, "{} bytes in use early on, {} at the end", least(early), least(late));
+    assert!(
+        least(late) <= least(early) + SLACK_BYTES,
+        "{} bytes in use early on, {} at the end",
+        least(early),
+        least(late)
+    );
     for (what, times) in [
         ("a GPU was lost", tally.gpus_lost),
         ("it was lost in a frame of its own", tally.fell_back),

@@ -4,8 +4,8 @@
 //! One test only, because the counter sees every thread of the process.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, Changes, CostCurve, CostTerm, Error, Filter, Load, Membership,
-    PairOrder, Pairs, Registry, Source, Term, Tuning,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, Changes, CostCurve, CostTerm, Error, Filter, Load,
+    Membership, PairOrder, Pairs, Registry, Source, Term, Tuning,
 };
 use sapwise_scenes::Scenario;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -53,7 +53,13 @@ static COUNTING: Counting = Counting;
 /// its margin in them, and what it keeps varies with the margin.
 ///
 /// With `extras` the canonical order, a filter that changes in each frame, and changes by ids of which two do.
-fn allocations(scenario: Scenario, objects: usize, frames: usize, run: &mut dyn BroadPhase, extras: bool) -> (usize, usize) {
+fn allocations(
+    scenario: Scenario,
+    objects: usize,
+    frames: usize,
+    run: &mut dyn BroadPhase,
+    extras: bool,
+) -> (usize, usize) {
     let mut pairs = Pairs::with_order(if extras { PairOrder::Canonical } else { PairOrder::Any });
     let membership = |k: usize| Membership { groups: 1 << (k % 5), mask: !(1 << (k % 7)), fixed: k.is_multiple_of(11) };
     let mut changes = Changes::new();
@@ -90,7 +96,8 @@ fn tuning(registry: &Registry) -> Tuning {
         AlgorithmCost::new(id.parse().unwrap(), revision, CostCurve::new(terms.to_vec()), 0.0)
     };
     let loads: Vec<Load> = (0..16).map(|k| Load::of_objects(1 << k)).collect();
-    let costs = vec![cost("brute@cpu1", 0.0, 60.0), cost("sap@cpu1", 5_000.0, 30.0), cost("grid-sap@cpu1", 30_000.0, 10.0)];
+    let costs =
+        vec![cost("brute@cpu1", 0.0, 60.0), cost("sap@cpu1", 5_000.0, 30.0), cost("grid-sap@cpu1", 30_000.0, 10.0)];
     Tuning::from_costs(Source::Measured, "uniform", costs, &loads)
 }
 

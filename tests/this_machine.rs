@@ -8,8 +8,8 @@ mod shipped;
 
 use common::{Random, naive};
 use sapwise::{
-    Aabb, Adaptive, AlgorithmId, BroadPhase, Cache, Error, Origin, PairOrder, Pairs, Registry, Setup, Source, StartOptions,
-    Tuning,
+    Aabb, Adaptive, AlgorithmId, BroadPhase, Cache, Error, Origin, PairOrder, Pairs, Registry, Setup, Source,
+    StartOptions, Tuning,
 };
 use std::fs;
 use std::path::Path;
@@ -100,7 +100,8 @@ fn the_second_start_takes_what_the_first_has_kept() {
 fn a_start_that_may_not_measure_takes_what_is_kept_and_else_the_usual_tuning() {
     let folder = tempfile::tempdir().unwrap();
     for background in [false, true] {
-        let unmeasured = options(folder.path()).measure(false).background(background).wait_at_most(Duration::from_secs(60));
+        let unmeasured =
+            options(folder.path()).measure(false).background(background).wait_at_most(Duration::from_secs(60));
         let mut adaptive = start(&unmeasured);
         assert_eq!((origin(&adaptive), adaptive.tuning().source), (Origin::Usual, Source::Default));
         assert!(matches!(&adaptive.setup().remarks[..], [why] if why.contains("was not to be measured")));
@@ -137,7 +138,11 @@ fn a_damaged_file_is_told_replaced_and_harmless() {
         fs::write(&file, text).unwrap();
         let mut again = start(&options(folder.path()));
         assert_eq!(origin(&again), Origin::Probed);
-        assert!(again.setup().remarks.len() == 1 && again.setup().remarks[0].contains("is ignored"), "{:?}", again.setup());
+        assert!(
+            again.setup().remarks.len() == 1 && again.setup().remarks[0].contains("is ignored"),
+            "{:?}",
+            again.setup()
+        );
         frame(&mut again, &boxes(200));
         assert_eq!(origin(&start(&options(folder.path()))), Origin::Cached);
     }
@@ -272,8 +277,9 @@ fn who_waits_at_the_start_begins_with_the_tuning() {
     let mut patient = start(&background.clone().wait_at_most(Duration::from_secs(600)));
     assert_eq!((origin(&patient), patient.tuning().source), (Origin::Probed, Source::Predicted));
     frame(&mut patient, &boxes(200));
-    let short =
-        start(&background.cache(Cache::None).probe_limit(Duration::from_secs(1000)).wait_at_most(Duration::from_millis(1)));
+    let short = start(
+        &background.cache(Cache::None).probe_limit(Duration::from_secs(1000)).wait_at_most(Duration::from_millis(1)),
+    );
     assert_eq!(origin(&short), Origin::Awaited);
 }
 
@@ -394,7 +400,10 @@ fn a_process_of_the_user() {
         frame(&mut adaptive, &boxes(200));
         assert_eq!(origin(&adaptive), Origin::Probed);
         let told = &adaptive.setup().remarks;
-        assert!(told.iter().any(|r| r.contains("/dev/null/.cache/sapwise") && r.contains("can't be written")), "{told:?}");
+        assert!(
+            told.iter().any(|r| r.contains("/dev/null/.cache/sapwise") && r.contains("can't be written")),
+            "{told:?}"
+        );
         return;
     };
     let mut adaptive = start(&options(Path::new("")).cache(Cache::User));
@@ -466,7 +475,10 @@ fn the_users_folder_is_shared_by_processes() {
     let folder = tempfile::tempdir().unwrap();
     let process = |variable: &str, value: &Path| {
         let mut command = std::process::Command::new(std::env::current_exe().unwrap());
-        command.args(["--exact", "a_process_of_the_user", "--ignored"]).env_remove("XDG_CACHE_HOME").env(variable, value);
+        command
+            .args(["--exact", "a_process_of_the_user", "--ignored"])
+            .env_remove("XDG_CACHE_HOME")
+            .env(variable, value);
         command.stdout(std::process::Stdio::null()).spawn().unwrap()
     };
     let shared = [0, 1].map(|_| process("XDG_CACHE_HOME", folder.path()));

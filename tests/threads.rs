@@ -20,9 +20,12 @@ fn what_an_engine_holds_is_send_and_sync() {
 /// How many threads of our pools there are, and how many of them may run on one CPU only.
 #[cfg(all(feature = "parallel", target_os = "linux"))]
 fn pool_threads() -> (usize, usize) {
-    let status = |task: std::io::Result<std::fs::DirEntry>| std::fs::read_to_string(task.ok()?.path().join("status")).ok();
-    let ours =
-        std::fs::read_dir("/proc/self/task").unwrap().filter_map(status).filter(|text| text.starts_with("Name:\tsapwise-"));
+    let status =
+        |task: std::io::Result<std::fs::DirEntry>| std::fs::read_to_string(task.ok()?.path().join("status")).ok();
+    let ours = std::fs::read_dir("/proc/self/task")
+        .unwrap()
+        .filter_map(status)
+        .filter(|text| text.starts_with("Name:\tsapwise-"));
     let allowed = |text: &String| {
         let list = text.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:")).unwrap().trim();
         list.bytes().all(|b| b.is_ascii_digit())

@@ -18,8 +18,9 @@ pub fn answer(boxes: &[Aabb], memberships: Option<&[Membership]>, limit: Option<
     if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| Some((k, defect(b)?))) {
         return Answer { pairs: Err(Error::InvalidBox { index, defect }), overlapping: 0 };
     }
-    let of =
-        |k: usize| memberships.and_then(|m| m.get(k)).copied().unwrap_or(Membership { groups: !0, mask: !0, fixed: false });
+    let of = |k: usize| {
+        memberships.and_then(|m| m.get(k)).copied().unwrap_or(Membership { groups: !0, mask: !0, fixed: false })
+    };
     let mut pairs = Vec::new();
     let mut overlapping = 0;
     for i in 0..boxes.len() {

@@ -119,7 +119,8 @@ impl Dialogue {
     pub(crate) fn begin(arguments: &[&str]) -> anyhow::Result<Self> {
         let mut command = own_program()?;
         command.arg("part").args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = EndedOnDrop(command.spawn().context("a part of the measurement can't be started as a process")?);
+        let mut child =
+            EndedOnDrop(command.spawn().context("a part of the measurement can't be started as a process")?);
         let requests = child.0.stdin.take().context("a part of the measurement has no standard input")?;
         let answers = child.0.stdout.take().context("a part of the measurement has no standard output")?;
         let complaints = child.0.stderr.take().map(last_line);

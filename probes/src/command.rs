@@ -48,7 +48,9 @@ impl Command {
         match Arguments::try_parse() {
             Ok(arguments) => exit::report(verbs::run(arguments.verb, &self.algorithms)),
             // Help and the version were asked for, and are lost where standard output takes nothing.
-            Err(help) if !help.use_stderr() => exit::report(help.print().map_err(output::refused).map(|()| Outcome::Done)),
+            Err(help) if !help.use_stderr() => {
+                exit::report(help.print().map_err(output::refused).map(|()| Outcome::Done))
+            }
             Err(wrong_usage) => wrong_usage.exit(),
         }
     }

@@ -68,7 +68,8 @@ pub(crate) fn make_folder(folder: &Path) -> anyhow::Result<()> {
     if folder.exists() && !folder.is_dir() {
         bail!("{} is a file; name a folder, which is made where it is missing", folder.display());
     }
-    std::fs::create_dir_all(folder).with_context(|| format!("the folder {} can't be made; name another", folder.display()))
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("the folder {} can't be made; name another", folder.display()))
 }
 
 /// The format that the name of a picture asks for.

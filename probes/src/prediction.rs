@@ -182,7 +182,12 @@ fn cores(hardware: &Hardware) -> u32 {
 }
 
 /// Costs of every algorithm of the registry and on these GPUs.
-fn prediction(model: &Model, hardware: &Hardware, gpus: &[GpuIdentity], registry: &Registry) -> anyhow::Result<Prediction> {
+fn prediction(
+    model: &Model,
+    hardware: &Hardware,
+    gpus: &[GpuIdentity],
+    registry: &Registry,
+) -> anyhow::Result<Prediction> {
     let mut known = registry.available();
     known.extend(sapwise::gpu::algorithms(gpus));
     model.predict(hardware, &known).map_err(anyhow::Error::msg)
@@ -203,7 +208,8 @@ mod tests {
 
     #[test]
     fn a_slice_ends_where_memory_does_and_no_other_error_is_passed_over() {
-        let short = || Err(anyhow::Error::from(sapwise::Error::OutOfMemory { what: "boxes", elements: 9 }).context("at 90"));
+        let short =
+            || Err(anyhow::Error::from(sapwise::Error::OutOfMemory { what: "boxes", elements: 9 }).context("at 90"));
         let known = vec![Load::of_objects(10), Load::of_objects(50)];
         let slice = Slice::as_far_as_known(Scenario::Uniform, known.clone(), short()).unwrap();
         let told = slice.cut.unwrap();

@@ -37,8 +37,10 @@ pub(crate) fn provenance(
 /// What kind of evidence these points are.
 pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) -> Label {
     let software = |k: &u32| hardware.gpu(*k).is_some_and(|g| g.gpu.kind == GpuKind::Software);
-    let on_software_gpu =
-        points.iter().flat_map(|p| &p.timings).any(|t| !t.samples_ns.is_empty() && uses(&t.algorithm).iter().any(software));
+    let on_software_gpu = points
+        .iter()
+        .flat_map(|p| &p.timings)
+        .any(|t| !t.samples_ns.is_empty() && uses(&t.algorithm).iter().any(software));
     let fewer_cores = arguments.threads.is_some_and(|k| k < usable_cores());
     let lower_level = requested_level().is_some_and(|level| level < SimdLevel::detected());
     // Contention first: a restricted machine that is disturbed shows what no restriction explains.
@@ -54,7 +56,12 @@ pub(crate) fn label(arguments: &Probe, points: &[Point], hardware: &Hardware) ->
 }
 
 /// The algorithms that have timings at these points, in the order of the registry, then those of the GPUs.
-pub(crate) fn timed(points: &[Point], threads: Option<u32>, hardware: &Hardware, algorithms: &Algorithms) -> Vec<Timed> {
+pub(crate) fn timed(
+    points: &[Point],
+    threads: Option<u32>,
+    hardware: &Hardware,
+    algorithms: &Algorithms,
+) -> Vec<Timed> {
     let registry = algorithms.registry(threads.unwrap_or_else(usable_cores));
     let raced = |id| points.iter().any(|p| p.timings.iter().any(|t| t.algorithm == id));
     let on_gpus = sapwise::gpu::algorithms(hardware.gpus.iter().map(|g| &g.gpu));
@@ -161,7 +168,8 @@ mod tests {
 
     #[test]
     fn a_swept_software_adapter_is_labelled() {
-        let timing = |samples_ns: Vec<u64>| Timing { algorithm: "brute@gpu0".parse().unwrap(), samples_ns, error: None };
+        let timing =
+            |samples_ns: Vec<u64>| Timing { algorithm: "brute@gpu0".parse().unwrap(), samples_ns, error: None };
         let swept = [Point { timings: vec![timing(vec![1, 2, 3])], ..point(None) }];
         let failed = [Point { timings: vec![timing(Vec::new())], ..point(None) }];
         let software = hardware(GpuKind::Software);

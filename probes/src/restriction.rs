@@ -152,7 +152,9 @@ fn prove(kind: Restricted, without: &Hardware, with: &Hardware) -> Vec<Proof> {
             let llc = with.value(ParameterId::CacheLlcBytes).unwrap_or(ASSUMED_LLC_BYTES);
             vec![on_cpu(latency_below(llc), Change::Higher)]
         }
-        Restricted::GpuThreads => with.gpus.iter().filter(|g| is_lavapipe(&g.gpu)).map(|g| on_gpu(g, without)).collect(),
+        Restricted::GpuThreads => {
+            with.gpus.iter().filter(|g| is_lavapipe(&g.gpu)).map(|g| on_gpu(g, without)).collect()
+        }
     }
 }
 
@@ -168,7 +170,10 @@ fn on_gpu(with: &GpuHardware, without: &Hardware) -> Proof {
         let values = (without.and_then(|g| g.value(id)), with.value(id));
         proof(Restricted::GpuThreads, id.as_str(), Some(with.gpu.index), change, values)
     };
-    first_shown([by(GpuParameterId::ArithmeticGflopPerS, Change::Lower), by(GpuParameterId::ParallelUnits, Change::Lower)])
+    first_shown([
+        by(GpuParameterId::ArithmeticGflopPerS, Change::Lower),
+        by(GpuParameterId::ParallelUnits, Change::Lower),
+    ])
 }
 
 fn proof(

@@ -308,7 +308,11 @@ fn doubtful_and_suspicious_figures_are_told_and_the_file_stays_sound() {
             3e6.into(),
             "cache_l1d_bytes is 2.9 MiB and cache_l2_bytes is 1 MiB: one of them may be in another unit",
         ),
-        ("/provenance/restriction/proof/0/shows", false.into(), "the restriction threads does not show: usable_cores is 64"),
+        (
+            "/provenance/restriction/proof/0/shows",
+            false.into(),
+            "the restriction threads does not show: usable_cores is 64",
+        ),
         ("/provenance/date", "9999-01-01".into(), "its date is to come"),
     ];
     for ((pointer, value, text), finding) in cases.iter().zip(damaged(&cases)) {
@@ -338,7 +342,8 @@ fn doubtful_and_suspicious_figures_are_told_and_the_file_stays_sound() {
     };
     let by_whom: Vec<Case> =
         vec![("", labelled("probe --seed 1"), ""), ("", labelled("probe --contended=cache --seed 1"), "")];
-    let told: Vec<bool> = damaged(&by_whom).iter().map(|f| f["doubts"].to_string().contains("other programs")).collect();
+    let told: Vec<bool> =
+        damaged(&by_whom).iter().map(|f| f["doubts"].to_string().contains("other programs")).collect();
     assert_eq!(told, [true, false]);
     // One that was surely beaten rests and has fewer samples than the others.
     let timings = json!([
@@ -381,8 +386,9 @@ fn simulated_machines_train_apart_and_are_told_to_be_simulated() {
     let complaint = failure(&mut simulate, 1);
     assert!(complaint.contains("machines holds *.json files already; name another with --out"), "{complaint}");
     let (status, findings) = check(&files);
-    let told =
-        |f: &Value| f["notes"].as_array().unwrap().iter().any(|n| n.as_str().unwrap().contains("no evidence of accuracy"));
+    let told = |f: &Value| {
+        f["notes"].as_array().unwrap().iter().any(|n| n.as_str().unwrap().contains("no evidence of accuracy"))
+    };
     assert!(status == 0 && findings.iter().all(told), "{findings:?}");
     let model = folder.path().join("model.json");
     let train = |words: &[&str]| {
@@ -395,7 +401,8 @@ fn simulated_machines_train_apart_and_are_told_to_be_simulated() {
     success(&mut train(&["--simulated"]));
     let (status, findings) = check(std::slice::from_ref(&model));
     assert!(status == 0 && told(&findings[0]), "{findings:?}");
-    let predicted = success(sapwise().args(["predict", "--json", "--report"]).arg(&files[0]).arg("--model").arg(&model));
+    let predicted =
+        success(sapwise().args(["predict", "--json", "--report"]).arg(&files[0]).arg("--model").arg(&model));
     assert!(predicted.contains("trained on simulated machines"), "{predicted}");
 }
 

@@ -10,7 +10,9 @@ use std::fs;
 #[test]
 fn every_verb_has_help_with_an_example() {
     let all = success(sapwise().arg("--help"));
-    for verb in ["predict", "devices", "probe", "run", "train", "study", "pairs", "check", "compare", "simulate", "schema"] {
+    for verb in
+        ["predict", "devices", "probe", "run", "train", "study", "pairs", "check", "compare", "simulate", "schema"]
+    {
         assert!(all.contains(verb), "{verb}");
         let help = success(sapwise().args([verb, "--help"]));
         assert!(help.contains("Example") && help.contains(&format!("sapwise {verb}")), "{verb}: {help}");
@@ -179,13 +181,19 @@ fn a_full_disk_is_a_failure_and_a_closed_pipe_is_none() {
     let complaint = failure(sapwise().arg("pairs").arg(&boxes).args(["--out", "/dev/full"]), 1);
     assert!(complaint.contains("/dev/full"), "{complaint}");
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let ended =
-        std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise")).arg("devices").stdout(full).output().unwrap();
+    let ended = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"))
+        .arg("devices")
+        .stdout(full)
+        .output()
+        .unwrap();
     assert_eq!(ended.status.code(), Some(1));
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
-    let ended =
-        std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise")).arg("devices").stdout(writer).output().unwrap();
+    let ended = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"))
+        .arg("devices")
+        .stdout(writer)
+        .output()
+        .unwrap();
     assert_eq!((ended.status.code(), ended.stderr.len()), (Some(0), 0));
 }
 
@@ -239,7 +247,8 @@ fn a_second_signal_ends_it_as_if_it_were_not_caught() {
     use std::os::unix::process::ExitStatusExt;
     let folder = tempfile::tempdir().unwrap();
     // A frame of them takes seconds, and within it no verb looks whether it is to stop.
-    let apart: Vec<f32> = (0..300_000).flat_map(|k| [k as f32 * 2.0, 0.0, 0.0, k as f32 * 2.0 + 1.0, 1.0, 1.0]).collect();
+    let apart: Vec<f32> =
+        (0..300_000).flat_map(|k| [k as f32 * 2.0, 0.0, 0.0, k as f32 * 2.0 + 1.0, 1.0, 1.0]).collect();
     let boxes = npy(folder.path(), "apart.npy", "<f4", "300000, 6", &apart);
     let mut wait = std::time::Duration::from_millis(300);
     loop {

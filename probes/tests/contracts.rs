@@ -153,7 +153,8 @@ fn train_refuses_timings_of_an_unoptimised_build() {
 #[test]
 fn run_keeps_its_contract() {
     let folder = tempfile::tempdir().unwrap();
-    let elsewhere = report(folder.path(), "other.json", &[("/hardware/machine/physical_id", "00000000000000cc".into())]);
+    let elsewhere =
+        report(folder.path(), "other.json", &[("/hardware/machine/physical_id", "00000000000000cc".into())]);
     let mut run = sapwise();
     run.args(["run", "fragmentation", "--objects", "300", "--frames", "30", "--repeats", "2", "--json", "--tuning"]);
     let told = answer(run.arg(&elsewhere));
@@ -177,7 +178,10 @@ fn run_keeps_its_contract() {
         "decisions",
     ];
     assert_keys(&told, &keys);
-    assert_eq!((&told["scenario"], &told["frames"], &told["repeats"]), (&"fragmentation".into(), &30.into(), &2.into()));
+    assert_eq!(
+        (&told["scenario"], &told["frames"], &told["repeats"]),
+        (&"fragmentation".into(), &30.into(), &2.into())
+    );
     assert_eq!((&told["source"], &told["interrupted"]), (&"measured".into(), &false.into()));
     assert_keys(&told["objects"], &["min", "max"]);
     assert_keys(&told["total_ms"], &["adaptive", "oracle", "fixed"]);

@@ -24,7 +24,9 @@ fn folder() -> tempfile::TempDir {
         fs::create_dir_all(to.parent().unwrap()).unwrap();
         fs::copy(from, to).unwrap();
     };
-    for name in ["report.json", "this-machine.json", "other-machine.json", "elsewhere.json", "first.json", "second.json"] {
+    for name in
+        ["report.json", "this-machine.json", "other-machine.json", "elsewhere.json", "first.json", "second.json"]
+    {
         put(&report("full"), name);
     }
     for name in ["datasets/a.json", "reports/a.json"] {
@@ -60,7 +62,8 @@ fn verb(line: &str) -> &str {
 /// Runs a line to its end where that is short; else only its words are read, for which `--help` stands behind them.
 fn run(line: &str, folder: &Path) -> String {
     let is_short = SHORT.contains(&verb(line)) || line.starts_with("sapwise predict --report");
-    let line = if is_short { line.to_owned() } else { format!("{} --help", line.split('#').next().unwrap_or_default()) };
+    let line =
+        if is_short { line.to_owned() } else { format!("{} --help", line.split('#').next().unwrap_or_default()) };
     let ended = shell(&line, folder);
     let complaint = String::from_utf8_lossy(&ended.stderr).into_owned();
     assert_eq!(ended.status.code(), Some(0), "{line}: {complaint}");
@@ -81,7 +84,8 @@ fn every_example_works_as_it_is_printed_and_so_does_what_is_said_to_be_next() {
     assert!(verbs.len() >= 12, "{verbs:?}");
     for verb in verbs {
         let help = success(sapwise().args([&verb, "--help"]));
-        let lines = help.lines().filter_map(|line| Some(&line[line.find("sapwise ")?..]).filter(|_| line.starts_with("  ")));
+        let lines =
+            help.lines().filter_map(|line| Some(&line[line.find("sapwise ")?..]).filter(|_| line.starts_with("  ")));
         let examples: Vec<&str> =
             lines.filter(|line| line.starts_with(&format!("sapwise {verb}")) || verb == "simulate").collect();
         assert!(!examples.is_empty(), "{verb} has no example: {help}");

@@ -28,7 +28,11 @@ fn with(card: &str) -> Option<assert_cmd::Command> {
         return None;
     };
     let mut command = sapwise();
-    command.env("AMDGPU_GPU_ID", card).env("LD_PRELOAD", shim).env("VK_DRIVER_FILES", &icd).env("VK_ICD_FILENAMES", &icd);
+    command
+        .env("AMDGPU_GPU_ID", card)
+        .env("LD_PRELOAD", shim)
+        .env("VK_DRIVER_FILES", &icd)
+        .env("VK_ICD_FILENAMES", &icd);
     Some(command)
 }
 
@@ -46,7 +50,8 @@ fn parameters_of_four_cards_agree_with_their_specifications_and_nothing_is_timed
         let bytes = gib * f64::from(1 << 30);
         let memory = gpu.value(Id::MemoryBytes).unwrap();
         assert!((memory / bytes - 1.0).abs() < 0.01, "{card}: {memory}");
-        let (local, visible) = (gpu.value(Id::DeviceLocalBytes).unwrap(), gpu.value(Id::HostVisibleLocalBytes).unwrap());
+        let (local, visible) =
+            (gpu.value(Id::DeviceLocalBytes).unwrap(), gpu.value(Id::HostVisibleLocalBytes).unwrap());
         assert!(local > 0.95 * bytes && local <= memory && visible > 0.0, "{card}: {local}, {visible}");
         assert_eq!(gpu.value(Id::ResizableBar), Some(if visible >= local { 1.0 } else { 0.0 }), "{card}");
         for p in &gpu.parameters {

@@ -70,7 +70,10 @@ fn a_fleet_is_told_in_a_table_with_whoever_failed_in_it() {
         command
     };
     let told = success(fleet().args(["--nodes", "2"]));
-    assert!(told.contains("2 of 2 nodes can be believed") && told.contains("Kind 1: ") && told.contains("1.00"), "{told}");
+    assert!(
+        told.contains("2 of 2 nodes can be believed") && told.contains("Kind 1: ") && told.contains("1.00"),
+        "{told}"
+    );
     let told = failure_text(fleet().args(["--nodes", "3"]));
     assert!(told.contains("2 of 3 nodes can be believed; 1 left no report"), "{told}");
     let complaint = failure(fleet().arg(at("a.json")), 1);
@@ -84,8 +87,9 @@ fn a_fleet_is_told_in_a_table_with_whoever_failed_in_it() {
     let told = failure_text(&mut fleet());
     assert!(told.contains("1 of 4 nodes can be believed"), "{told}");
     assert!(told.contains("Next: measure on the others again, or take their files away"), "{told}");
-    let row =
-        |name: &str| told.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{name}: {told}")).to_owned();
+    let row = |name: &str| {
+        told.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{name}: {told}")).to_owned()
+    };
     assert!(row("a.json").contains("slow: it takes 2.00"), "{told}");
     assert!(row("b.json").contains("good") && row("d.json.unfinished").contains("unfinished"), "{told}");
     assert!(row("c.json").contains("is no sound file"), "{told}");

@@ -22,7 +22,8 @@ fn report(command: &mut assert_cmd::Command) -> Report {
 
 /// A made-up report of a machine with two GPUs, with what `change` does to it. Enough points for a model.
 fn made_up(folder: &Path, name: &str, change: impl Fn(&mut Value)) -> PathBuf {
-    let mut report: Value = serde_json::from_str(include_str!("../../crates/lab/tests/fixtures/report-2-gpu.json")).unwrap();
+    let mut report: Value =
+        serde_json::from_str(include_str!("../../crates/lab/tests/fixtures/report-2-gpu.json")).unwrap();
     report["label"] = "real_full".into();
     // The fixture is old; this is a report of this build.
     let registry = sapwise::Registry::with_cores(1);
@@ -165,8 +166,9 @@ fn measured_tuning_leave_out_programs_that_act_as_gpus() {
     let programs = made_up(folder.path(), "programs.json", |report| {
         report["hardware"]["gpus"][0]["gpu"]["kind"] = "software".into();
     });
-    let measured =
-        |words: &[&str]| answer(sapwise().args(["predict", "--measured", "--json", "--report"]).arg(&programs).args(words));
+    let measured = |words: &[&str]| {
+        answer(sapwise().args(["predict", "--measured", "--json", "--report"]).arg(&programs).args(words))
+    };
     assert!(ids(&measured(&[])).iter().all(|id| !id.contains("gpu0")));
     assert!(ids(&measured(&["--software-gpus"])).contains(&"brute@gpu0"));
 }

@@ -157,15 +157,18 @@ fn a_study_that_is_killed_leaves_the_one_of_before() {
 fn a_prediction_that_is_killed_leaves_the_tuning_of_before() {
     let folder = tempfile::tempdir().unwrap();
     let report = stored("datasets/earlier/amd-epyc-2c-full--2026-11-21.json");
-    kill_and_look(&["predict", "--no-gpus", "--report", &report, "--measured", "--out", "tuning.json"], folder.path(), 2);
+    kill_and_look(
+        &["predict", "--no-gpus", "--report", &report, "--measured", "--out", "tuning.json"],
+        folder.path(),
+        2,
+    );
 }
 
 #[test]
 fn a_run_that_is_killed_leaves_its_files_of_before() {
     let folder = tempfile::tempdir().unwrap();
     let report = stored("datasets/intel-xeon-2c-full--2026-11-23.json");
-    let words =
-        "run uniform --objects 300 --frames 40 --repeats 2 --no-gpus --record r.npy --trace t.csv --plot p.svg --tuning";
+    let words = "run uniform --objects 300 --frames 40 --repeats 2 --no-gpus --record r.npy --trace t.csv --plot p.svg --tuning";
     let words: Vec<&str> = words.split(' ').chain([report.as_str()]).collect();
     kill_and_look(&words, folder.path(), 3);
 }
@@ -177,7 +180,8 @@ fn a_training_that_is_killed_leaves_the_model_of_before() {
     let out = folder.path().join("out");
     fs::create_dir(&out).unwrap();
     let reports = folder.path().join("simulated").display().to_string();
-    let words = ["train", "--simulated", &reports, "--out", "model.json", "--card", "card.md", "--plot", "held-out.png"];
+    let words =
+        ["train", "--simulated", &reports, "--out", "model.json", "--card", "card.md", "--plot", "held-out.png"];
     kill_and_look(&words, &out, 4);
 }
 

@@ -18,8 +18,8 @@ fn datasets() -> PathBuf {
 
 /// A few stored reports, the paper's, and one of a machine with an odd name in a file with one.
 fn reports(folder: &Path) -> Vec<PathBuf> {
-    let stored =
-        ["full", "1t", "lavapipe", "two-gpus"].map(|n| datasets().join(format!("earlier/amd-epyc-2c-{n}--2026-11-21.json")));
+    let stored = ["full", "1t", "lavapipe", "two-gpus"]
+        .map(|n| datasets().join(format!("earlier/amd-epyc-2c-{n}--2026-11-21.json")));
     let mut report: Value = serde_json::from_slice(&std::fs::read(&stored[0]).unwrap()).unwrap();
     report["hardware"]["machine"]["cpu"] = json!(format!("Ödd CPU </script><img src=x onerror=alert(1)> {ODD}"));
     report["hardware"]["machine"]["physical_id"] = json!("0123456789abcdef");

@@ -26,7 +26,8 @@ fn reports(folder: &Path, profile: &str) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let of = |path: &PathBuf| {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        name.ends_with(".json") && name.split_once("--").is_some_and(|(stem, _)| stem.ends_with(&format!("c-{profile}")))
+        name.ends_with(".json")
+            && name.split_once("--").is_some_and(|(stem, _)| stem.ends_with(&format!("c-{profile}")))
     };
     entries.map(|e| e.unwrap().path()).filter(of).collect()
 }
@@ -119,7 +120,8 @@ fn after_an_interrupt_the_same_command_goes_on() {
     let until = |profile: &str| {
         let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
         command.env_remove("SAPWISE_SIMD").env_remove("LP_NUM_THREADS").args(TINY).arg("--out").arg(&out);
-        let mut family = command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+        let mut family =
+            command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
         while reports(&out, profile).is_empty() {
             assert_eq!(family.try_wait().unwrap(), None, "it ended before {profile} was there");
             std::thread::sleep(std::time::Duration::from_millis(20));
@@ -148,7 +150,8 @@ fn after_an_interrupt_the_same_command_goes_on() {
     assert_eq!(read(&full[0]).provenance.restriction, None);
     // Whichever is the second on this machine.
     let simd = sapwise::SimdLevel::ALL.into_iter().rev().find(|&l| l < sapwise::SimdLevel::detected());
-    let second = simd.map(|l| l.to_string()).unwrap_or(if sapwise::usable_cores() > 1 { "1t" } else { "memory" }.to_owned());
+    let second =
+        simd.map(|l| l.to_string()).unwrap_or(if sapwise::usable_cores() > 1 { "1t" } else { "memory" }.to_owned());
     if simd.is_none() && sapwise::usable_cores() > 2 {
         eprintln!("skipped: the second profile has another name here");
         return;

@@ -81,13 +81,17 @@ fn a_run_tells_its_figures_by_parts() {
     }
     let switches = |f: &Value| f["switches"].as_u64().unwrap();
     assert_eq!(parts.iter().map(switches).sum::<u64>(), switches(&told));
-    assert_eq!((&told["oracle"], &told["learning"], &told["exploring"]), (&"halves".into(), &false.into(), &false.into()));
+    assert_eq!(
+        (&told["oracle"], &told["learning"], &told["exploring"]),
+        (&"halves".into(), &false.into(), &false.into())
+    );
     assert_eq!(told["regret_of_repeats"].as_array().unwrap().len(), 4);
     // Every frame was run by one of them.
     let ran = told["frames_run"].as_object().unwrap();
     assert_eq!(ran.values().map(|count| count.as_u64().unwrap()).sum::<u64>(), 30, "{told}");
     let text = success(&mut run("uniform", &tuning, &["--objects", "50", "--frames", "3", "--repeats", "1"]));
-    for needed in ["One repeat: the oracle takes the minimum", "Without learning.", "written by hand", "adaptive ran it in"]
+    for needed in
+        ["One repeat: the oracle takes the minimum", "Without learning.", "written by hand", "adaptive ran it in"]
     {
         assert!(text.contains(needed), "{needed}: {text}");
     }
@@ -116,8 +120,20 @@ fn tuning_of_another_machine_is_used_and_what_is_missing_here_is_named() {
 
 #[test]
 fn a_prediction_without_samples_is_told_as_such() {
-    let words =
-        ["run", "uniform", "--samples", "0", "--no-gpus", "--objects", "100", "--frames", "3", "--repeats", "2", "--json"];
+    let words = [
+        "run",
+        "uniform",
+        "--samples",
+        "0",
+        "--no-gpus",
+        "--objects",
+        "100",
+        "--frames",
+        "3",
+        "--repeats",
+        "2",
+        "--json",
+    ];
     let told = answer(sapwise().args(words));
     assert_eq!((&told["source"], &told["tuning"]["from"]), (&"predicted".into(), &"prediction".into()));
     assert_eq!(told["tuning"]["samples"], 0);
@@ -143,8 +159,9 @@ fn every_frame_is_traced_and_drawn() {
     let file = |name: &str| folder.path().join(name);
     let words = ["--objects", "200", "--frames", "12", "--repeats", "2"];
     let both = |trace: &str, plot: &str| {
-        let text =
-            success(run("fragmentation", &tuning, &words).arg("--trace").arg(file(trace)).arg("--plot").arg(file(plot)));
+        let text = success(
+            run("fragmentation", &tuning, &words).arg("--trace").arg(file(trace)).arg("--plot").arg(file(plot)),
+        );
         assert!(text.contains(trace) && text.contains(plot), "{text}");
         // Two of five methods ran, and one more at most is the fastest on a number of threads.
         assert!(text.contains("Not in the picture: ") && text.contains("it shows the algorithms that ran"), "{text}");
@@ -182,7 +199,12 @@ fn what_can_not_be_run_is_refused_with_what_to_do() {
     let scene = file("good.npy", "2, 1, 6", &[good, good]);
     let cases: [(PathBuf, &[&str], i32, &[&str]); 15] = [
         (file("flat.npy", "2, 3", &[good]), &[], 1, &["flat.npy", "shape is [2, 3]"]),
-        (file("gap.npy", "1, 3, 6", &[good, nan, good]), &[], 1, &["gap.npy", "frame 0: row 1", "at the end of a frame"]),
+        (
+            file("gap.npy", "1, 3, 6", &[good, nan, good]),
+            &[],
+            1,
+            &["gap.npy", "frame 0: row 1", "at the end of a frame"],
+        ),
         (file("broken.npy", "2, 1, 6", &[good, broken]), &[], 1, &["broken.npy", "frame 1", "box 0", "NaN"]),
         (file("none.npy", "0, 5, 6", &[]), &[], 1, &["none.npy has no frames", "--record"]),
         (empty, &[], 1, &["empty.npy", "empty"]),
@@ -219,7 +241,8 @@ fn an_interrupt_ends_the_co_runner_and_keeps_the_repeats_that_are_complete() {
     let tuning = steps(folder.path(), "brute@cpu1", 60, "grid-sap@cpu1");
     let trace = folder.path().join("trace.csv");
     // More repeats than it lives for; the first is over in a hundredth of a second.
-    let words = ["--objects", "30", "--frames", "40", "--repeats", "1000", "--co-runner", "1:1", "--seed", "3", "--json"];
+    let words =
+        ["--objects", "30", "--frames", "40", "--repeats", "1000", "--co-runner", "1:1", "--seed", "3", "--json"];
     let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("sapwise"));
     command.args(["run", "uniform", "--tuning"]).arg(&tuning).args(words).arg("--trace").arg(&trace);
     let mut child = command.stdout(std::process::Stdio::piped()).spawn().unwrap();

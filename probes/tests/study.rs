@@ -67,7 +67,8 @@ fn figures_come_from_the_reports_that_they_name() {
     let mut looked_at = 0;
     for row in rows(&out.join("tables/parameters.csv")).iter().filter(|r| r["processor"] == "machine") {
         let file = files[row["reports"].as_str()];
-        let own = reports.iter().find(|r| r.ends_with(file)).cloned().unwrap_or_else(|| dataset("published").join(file));
+        let own =
+            reports.iter().find(|r| r.ends_with(file)).cloned().unwrap_or_else(|| dataset("published").join(file));
         let own = read(&own);
         let mut parameters = own["hardware"]["parameters"].as_array().unwrap().iter();
         let p = parameters.find(|p| p["name"] == row["parameter"].as_str()).unwrap();
@@ -80,9 +81,12 @@ fn figures_come_from_the_reports_that_they_name() {
     assert!(looked_at > 150, "{looked_at}");
     // Every median time stands in one row, with what it is of.
     let timings = rows(&out.join("tables/timings.csv"));
-    let named =
-        |r: &BTreeMap<String, String>| r["algorithm"] == "grid-sap@cpu2" && r["threads"] == "2" && r["method"] == "grid-sap";
-    assert!(timings.iter().any(|r| named(r) && r["scenario"] == "uniform" && r["median_ns"].parse::<f64>().unwrap() > 0.0));
+    let named = |r: &BTreeMap<String, String>| {
+        r["algorithm"] == "grid-sap@cpu2" && r["threads"] == "2" && r["method"] == "grid-sap"
+    };
+    assert!(
+        timings.iter().any(|r| named(r) && r["scenario"] == "uniform" && r["median_ns"].parse::<f64>().unwrap() > 0.0)
+    );
     // Vectors were taken from two threads and from one, and both reports show it; two pairs are too few for a verdict.
     let taken = rows(&out.join("tables/restrictions.csv"));
     let own = |algorithm: &str| {
@@ -127,10 +131,12 @@ fn simulated_machines_are_studied_by_themselves() {
     let machines = folder.path().join("machines");
     success(sapwise().args(["simulate", "--machines", "7", "--out"]).arg(&machines));
     let out = folder.path().join("study");
-    let text = success(sapwise().args(["study", "--simulated"]).args([&machines, &stored("1t")]).arg("--out").arg(&out));
+    let text =
+        success(sapwise().args(["study", "--simulated"]).args([&machines, &stored("1t")]).arg("--out").arg(&out));
     assert!(text.contains("8 reports read, the timings of 7 studied; simulated machines"), "{text}");
     let links = rows(&out.join("tables/influence.csv"));
-    let link = |parameter: &str, of: &str| links.iter().find(|l| l["parameter"] == parameter && l["outcome"] == of).unwrap();
+    let link =
+        |parameter: &str, of: &str| links.iter().find(|l| l["parameter"] == parameter && l["outcome"] == of).unwrap();
     let clock = link("clock_measured_ghz", "time of brute@cpu1");
     assert!(clock["rank_correlation"].parse::<f64>().unwrap() < 0.0, "{clock:?}");
     assert_eq!(clock["rank_machines"], "7");

@@ -49,7 +49,9 @@ fn main() -> ExitCode {
 
 /// A program whose algorithm has the name of one of ours.
 fn clash() -> ExitCode {
-    sapwise_cli::Command::new().with(UserAlgorithm::on_one_thread("grid-sap", 1, || unreachable!("it was refused"))).run()
+    sapwise_cli::Command::new()
+        .with(UserAlgorithm::on_one_thread("grid-sap", 1, || unreachable!("it was refused")))
+        .run()
 }
 
 /// A program whose algorithm finds as many pairs as it has threads, whatever the boxes.
@@ -62,7 +64,9 @@ fn on_threads() -> ExitCode {
             pairs.finish()
         }
     }
-    sapwise_cli::Command::new().with(UserAlgorithm::on_threads("threads", 1, |threads| Ok(Box::new(Threads(threads))))).run()
+    sapwise_cli::Command::new()
+        .with(UserAlgorithm::on_threads("threads", 1, |threads| Ok(Box::new(Threads(threads)))))
+        .run()
 }
 
 fn program(name: &str) -> Command {
@@ -123,7 +127,8 @@ fn from_the_probe_to_the_run_as_one_of_ours() {
     let model = file("model.json");
     success(user().arg("train").arg(&report).arg("--out").arg(&model));
     let fitted = read(&model);
-    let of_user = fitted["methods"].as_array().unwrap().iter().find(|m| m["method"] == "sweep").expect("a cost of sweep");
+    let of_user =
+        fitted["methods"].as_array().unwrap().iter().find(|m| m["method"] == "sweep").expect("a cost of sweep");
     assert_eq!((&of_user["revision"], &of_user["backend"]), (&1.into(), &"cpu".into()));
     // Of a sweep as short as this the fit may find no share of some; others than the user's are never fitted.
     let named = |fitted: &Value| timed["terms"].as_array().unwrap().iter().any(|t| t["term"] == fitted["term"]);
@@ -211,7 +216,8 @@ fn boxes_that_ours_refuse_are_refused() {
 fn one_on_several_threads_gets_their_number() {
     let folder = tempfile::tempdir().unwrap();
     let boxes = npy(folder.path(), "one.npy", "<f4", "1, 6", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
-    let told: Value = serde_json::from_str(&success(program("threads").args(["devices", "--no-gpus", "--json"]))).unwrap();
+    let told: Value =
+        serde_json::from_str(&success(program("threads").args(["devices", "--no-gpus", "--json"]))).unwrap();
     let ids = told["algorithms"].as_array().unwrap().iter().map(|a| a["id"].as_str().unwrap());
     let on = |method: &str| -> Vec<u32> {
         let id = |text: &str| text.parse::<AlgorithmId>().unwrap();
@@ -220,7 +226,8 @@ fn one_on_several_threads_gets_their_number() {
     assert!(!on("threads").is_empty() && on("threads") == on("brute"), "{told}");
     for threads in on("threads") {
         let words = ["--json", "--algorithm", &format!("threads@cpu{threads}")];
-        let told: Value = serde_json::from_str(&success(program("threads").arg("pairs").arg(&boxes).args(words))).unwrap();
+        let told: Value =
+            serde_json::from_str(&success(program("threads").arg("pairs").arg(&boxes).args(words))).unwrap();
         assert_eq!(told["pairs"][0], threads);
     }
 }

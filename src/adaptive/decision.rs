@@ -121,6 +121,8 @@ mod tests {
             800 boxes, about 410 pairs, boxes move by 0.03 of an edge";
         assert_eq!(decision.to_string(), told);
         let by_count = Decision { predicted_ns: None, measured_ns: None, runner_up: None, ..decision };
-        assert!(by_count.to_string().starts_with("sap@cpu2, still the cheapest, decided by the number of boxes; 800 boxes"));
+        assert!(
+            by_count.to_string().starts_with("sap@cpu2, still the cheapest, decided by the number of boxes; 800 boxes")
+        );
     }
 }

@@ -135,7 +135,10 @@ impl Instance {
 
 /// How the last frame came about. Checked once more: the fields are anybody's to set.
 fn work(algorithm: &mut dyn BroadPhase) -> Option<FrameWork> {
-    algorithm.as_incremental().map(|algorithm| algorithm.last_frame()).map(|work| FrameWork::new(work.kind, work.over_mean))
+    algorithm
+        .as_incremental()
+        .map(|algorithm| algorithm.last_frame())
+        .map(|work| FrameWork::new(work.kind, work.over_mean))
 }
 
 /// What runs the algorithms of some tuning, and why the last of those that can't run can't.

@@ -210,8 +210,8 @@ impl Policy {
     fn is_dear(&mut self, candidate: usize, ns: f64) -> bool {
         let shelters = (0..self.usable.len()).filter(|&k| self.usable[k] && self.shelter.is_shelter(k));
         let Some(shelter_ns) = shelters.map(|k| self.estimates.mean_ns[k]).min_by(f64::total_cmp) else { return false };
-        let most_ns =
-            self.estimates.mean_ns[candidate].max(self.switching.rebuild_ns(candidate, self.estimates.expected[candidate]));
+        let most_ns = self.estimates.mean_ns[candidate]
+            .max(self.switching.rebuild_ns(candidate, self.estimates.expected[candidate]));
         self.shelter.ran(candidate, self.frame, ns, most_ns, shelter_ns)
     }
 

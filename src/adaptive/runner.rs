@@ -389,7 +389,9 @@ impl Runner {
 
     /// Gets the runner-up ready when its turn may come soon.
     fn warm_runner_up(&mut self, boxes: usize) {
-        let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), reason, .. }) = self.choice else { return };
+        let Some(Choice { predicted_ns: Some(best), runner_up: Some((next, ns)), reason, .. }) = self.choice else {
+            return;
+        };
         // Behind a trial stands what is settled on, and is to be here when that ends.
         let Some(instance) = self.candidates[next].instance.filter(|_| reason != Reason::Explored) else { return };
         if ns <= best * WARM_WITHIN && self.instances[instance].is_cold(boxes) {

@@ -102,7 +102,9 @@ mod tests {
                 assert!(shelter.ran(0, frame, 100.0, 10.0, 20.0) && shelter.avoids(0, frame + 1));
                 ran.push(frame);
             }
-            assert!(!shelter.ran(2, frame, 1000.0, 10.0, 10.0) && !shelter.avoids(2, frame) && !shelter.avoids(3, frame));
+            assert!(
+                !shelter.ran(2, frame, 1000.0, 10.0, 10.0) && !shelter.avoids(2, frame) && !shelter.avoids(3, frame)
+            );
         }
         assert_eq!(ran[..5], [0, 2, 7, 24, 89]);
         assert!(ran.len() < 20, "{ran:?}");

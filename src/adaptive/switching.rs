@@ -68,8 +68,10 @@ pub(super) struct Expected {
 impl SwitchingCosts {
     /// `kept` as [`Policy::new`](super::policy::Policy::new) has it.
     pub(super) fn new(kept: &[Option<usize>]) -> Self {
-        let cost =
-            |&kept: &Option<usize>| SwitchingCost { kept, over: if kept.is_some() { FROM_NOTHING } else { 1.0 + COLD } };
+        let cost = |&kept: &Option<usize>| SwitchingCost {
+            kept,
+            over: if kept.is_some() { FROM_NOTHING } else { 1.0 + COLD },
+        };
         let work = KeptWork { last: None, rebuilds: 0.0, at: 0 };
         Self { costs: kept.iter().map(cost).collect(), works: vec![work; works(kept)] }
     }
@@ -165,7 +167,8 @@ mod tests {
     fn mean_ns(costs: &mut SwitchingCosts, frames: std::ops::Range<u64>, one_in: u64, at_once: u32) -> f64 {
         let work = Some(FrameWork::new(FrameKind::Updated, 1.0));
         for first in frames.step_by(at_once as usize) {
-            let rebuilt = (first..first + u64::from(at_once)).filter(|frame| frame.is_multiple_of(one_in)).count() as u32;
+            let rebuilt =
+                (first..first + u64::from(at_once)).filter(|frame| frame.is_multiple_of(one_in)).count() as u32;
             let last = first + u64::from(at_once) - 1;
             costs.ran(0, last, at_once, rebuilt, work);
         }

@@ -143,7 +143,8 @@ fn one_that_keeps_work_is_told_how_many_frames_it_missed() {
     let mut registry = Registry::with_cores(1);
     let shared = Arc::clone(&told);
     registry.add("told@cpu1".parse().unwrap(), 1, move || Ok(Box::new(Told(Arc::clone(&shared)))));
-    let mut adaptive = Adaptive::new(tuning(&[("told@cpu1", 1000.0, 0.0), ("brute@cpu1", 0.0, 10.0)]), &registry).unwrap();
+    let mut adaptive =
+        Adaptive::new(tuning(&[("told@cpu1", 1000.0, 0.0), ("brute@cpu1", 0.0, 10.0)]), &registry).unwrap();
     adaptive.set_learning(false);
     // In the first 50 frames it has not run yet, and has missed none.
     for objects in [10, 1000, 10, 1000, 1000, 10, 1000] {
@@ -175,7 +176,8 @@ fn course(adaptive: &mut Adaptive, scenario: Scenario, frames: usize) -> Vec<(St
 
 /// 40 n, and 15 n + 100 n moved.
 fn grid_sap_or_pair_cache() -> Adaptive {
-    let tuning = tuning_of([Term::Objects, Term::Moved], &[("grid-sap@cpu1", 40.0, 0.0), ("pair-cache@cpu1", 15.0, 100.0)]);
+    let tuning =
+        tuning_of([Term::Objects, Term::Moved], &[("grid-sap@cpu1", 40.0, 0.0), ("pair-cache@cpu1", 15.0, 100.0)]);
     fixed(tuning)
 }
 

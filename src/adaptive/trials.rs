@@ -90,7 +90,14 @@ pub(super) struct Offer {
 impl Offer {
     /// Of so many frames of a candidate, of which one is expected to take `mean_ns` and the first one `switch_ns` more, where one takes `now_ns`.
     /// A decision takes `decision_ns`.
-    pub(super) fn of(candidate: usize, frames: u32, switch_ns: f64, mean_ns: f64, now_ns: f64, decision_ns: f64) -> Self {
+    pub(super) fn of(
+        candidate: usize,
+        frames: u32,
+        switch_ns: f64,
+        mean_ns: f64,
+        now_ns: f64,
+        decision_ns: f64,
+    ) -> Self {
         // One that turns out dear ends early.
         let dear_ns = (f64::from(frames) * (mean_ns - now_ns).max(0.0)).min(ENOUGH * now_ns);
         // One decision, after its last frame. That before its first is made in any case.

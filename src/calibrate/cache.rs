@@ -170,7 +170,9 @@ impl CacheFile {
         loop {
             match lock.try_lock() {
                 Ok(()) => return Some(lock),
-                Err(TryLockError::WouldBlock) if began.elapsed() < patience && !stop() => std::thread::sleep(LOOK_AGAIN),
+                Err(TryLockError::WouldBlock) if began.elapsed() < patience && !stop() => {
+                    std::thread::sleep(LOOK_AGAIN)
+                }
                 Err(_) => return None,
             }
         }
@@ -214,7 +216,8 @@ impl CacheFile {
                 _ if name.starts_with("tuning-") && name.ends_with(".json") => UNUSED,
                 _ => continue,
             };
-            let age = entry.metadata().ok().filter(fs::Metadata::is_file).and_then(|m| m.modified().ok()?.elapsed().ok());
+            let age =
+                entry.metadata().ok().filter(fs::Metadata::is_file).and_then(|m| m.modified().ok()?.elapsed().ok());
             if age.is_some_and(|age| age > most) {
                 // Another process may have been quicker.
                 let _ = fs::remove_file(entry.path());

@@ -219,8 +219,9 @@ fn find(
     }
     if !options.measure {
         if before.is_none() {
-            remarks
-                .push("nothing is kept of this machine, and it was not to be measured: the usual tuning stays".to_owned());
+            remarks.push(
+                "nothing is kept of this machine, and it was not to be measured: the usual tuning stays".to_owned(),
+            );
         }
         return before.map(cached);
     }

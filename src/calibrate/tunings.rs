@@ -33,7 +33,8 @@ pub(super) fn of_this_machine(folder: &Path, registry: &Registry) -> Result<Opti
     let tuning = json::tuning(&text).map_err(|e| ignored(&e))?;
     // An algorithm that this registry lacks is left out when they are made.
     let stale = tuning.costs.iter().filter_map(|cost| registry.mismatch(&cost.algorithm, cost.revision));
-    let of_other_build = |why: &Error| matches!(why, Error::Unavailable { reason: Unavailable::OtherRevision { .. }, .. });
+    let of_other_build =
+        |why: &Error| matches!(why, Error::Unavailable { reason: Unavailable::OtherRevision { .. }, .. });
     match stale.into_iter().find(of_other_build) {
         Some(why) => Err(ignored(&why)),
         None => Ok(Some(tuning)),

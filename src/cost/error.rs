@@ -40,7 +40,9 @@ impl fmt::Display for CurveError {
             Self::Unit { term, unit_ns } => write!(f, "the term {term:?} has {unit_ns} ns a unit"),
             Self::Powers { term } => write!(f, "{term:?} has more than {} powers", Product::MOST_POWERS),
             Self::Cache { bytes } => write!(f, "a cache of {bytes} bytes"),
-            Self::Residual => f.write_str("a residual with more weights than places, or with one beyond every measurement"),
+            Self::Residual => {
+                f.write_str("a residual with more weights than places, or with one beyond every measurement")
+            }
             Self::Fallback => f.write_str("a fallback that falls back itself, or costs a factor that none does"),
             Self::Helpers => f.write_str("helpers of fewer than two threads, with a time that can't be or no speed-up"),
             Self::Nothing => f.write_str("no term above zero, so the cost is always nothing"),

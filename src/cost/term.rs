@@ -51,7 +51,8 @@ pub struct Product {
 
 impl Product {
     /// The empty product, 1.
-    pub const ONE: Self = Self { objects: 0, log2_objects: 0, pairs: 0, axis_candidates: 0, strip_candidates: 0, moved: 0 };
+    pub const ONE: Self =
+        Self { objects: 0, log2_objects: 0, pairs: 0, axis_candidates: 0, strip_candidates: 0, moved: 0 };
 
     /// Powers that a product may have together: more of 2^64 candidates each would end in infinities.
     pub const MOST_POWERS: u32 = 8;
@@ -202,7 +203,10 @@ mod tests {
         assert_eq!(count(Product::ONE), 1.0);
         assert_eq!(count(Product::ONE.objects(1).log2_objects(1)), Term::Sort.count(&load, 0.0));
         assert_eq!(count(Product::ONE.pairs(1).log2_objects(2)), 5.0 * 9.0);
-        assert_eq!(count(Product::ONE.objects(2).axis_candidates(1).strip_candidates(1).moved(1)), 64.0 * 3.0 * 2.0 * 0.5);
+        assert_eq!(
+            count(Product::ONE.objects(2).axis_candidates(1).strip_candidates(1).moved(1)),
+            64.0 * 3.0 * 2.0 * 0.5
+        );
         let nothing = Load::default();
         assert_eq!(Term::Product(Product::ONE.objects(1).log2_objects(1)).count(&nothing, 0.0), 0.0);
         assert!(Product::ONE.pairs(8).is_sound() && !Product::ONE.pairs(8).moved(1).is_sound());

@@ -83,7 +83,8 @@ mod tests {
         for rows in [boxes, 5000, 300] {
             assert_eq!((row(rows, boxes, 0, parts), row(rows, boxes, parts, parts)), (0, rows));
             for k in 0..parts {
-                let share = area(row(rows, boxes, k, parts), row(rows, boxes, k + 1, parts)) as f64 / area(0, rows) as f64;
+                let share =
+                    area(row(rows, boxes, k, parts), row(rows, boxes, k + 1, parts)) as f64 / area(0, rows) as f64;
                 assert!((share * parts as f64 - 1.0).abs() < 0.06, "part {k} of {rows} rows has {share}");
             }
         }

@@ -157,7 +157,12 @@ impl<'a> View<'a> {
 
     #[inline(always)]
     fn query(&self, row: usize) -> Query {
-        Query { low: self.low.map(|c| c[row]), high: self.high.map(|c| c[row]), id: self.ids[row], begins: self.begins[row] }
+        Query {
+            low: self.low.map(|c| c[row]),
+            high: self.high.map(|c| c[row]),
+            id: self.ids[row],
+            begins: self.begins[row],
+        }
     }
 }
 
@@ -365,8 +370,9 @@ mod tests {
             columns.as_mut().set(row, &boxes[id], 0, id as u32);
         }
         let mut expected = Pairs::new();
-        (0..boxes.len())
-            .for_each(|j| (0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).for_each(|i| expected.push(i as u32, j as u32)));
+        (0..boxes.len()).for_each(|j| {
+            (0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).for_each(|i| expected.push(i as u32, j as u32))
+        });
         let view = View::new(&columns);
         let (mut swept, mut tested) = (Pairs::new(), Pairs::new());
         sweep::<_, All>(portable::Portable, &view, 0..boxes.len(), |row, _| row + 1, &mut swept);

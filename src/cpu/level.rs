@@ -108,7 +108,9 @@ impl fmt::Display for SimdLevelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unknown { text } => write!(f, "{VARIABLE}={text}: no such level; use portable, avx2 or avx512"),
-            Self::Unsupported { level, detected } => write!(f, "{VARIABLE}={level}: this CPU offers {detected} at most"),
+            Self::Unsupported { level, detected } => {
+                write!(f, "{VARIABLE}={level}: this CPU offers {detected} at most")
+            }
         }
     }
 }

@@ -67,7 +67,8 @@ pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box
 }
 
 fn pair_cache(threads: &[u32], pools: &Threads, simd: Simd) -> Result<PairCache, Error> {
-    let widths: Vec<Workers> = threads.iter().map(|&k| Workers::new("pair-cache", k, pools)).collect::<Result<_, _>>()?;
+    let widths: Vec<Workers> =
+        threads.iter().map(|&k| Workers::new("pair-cache", k, pools)).collect::<Result<_, _>>()?;
     let widest = &widths[widths.len() - 1];
     let tasks = widest.tasks();
     Ok(PairCache {

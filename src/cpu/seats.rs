@@ -83,7 +83,8 @@ impl Seats {
     /// Moves this helper to the free seat if that is farther from the caller than its own.
     pub(crate) fn make_way(&self) {
         let (seat, free) = (SEAT.get(), self.free.load(Relaxed));
-        if self.nearness(seat) > self.nearness(free) && self.free.compare_exchange(free, seat, Relaxed, Relaxed).is_ok() {
+        if self.nearness(seat) > self.nearness(free) && self.free.compare_exchange(free, seat, Relaxed, Relaxed).is_ok()
+        {
             self.bind(free);
         }
     }

@@ -300,7 +300,11 @@ mod tests {
             (usize::MAX, 128, 1024),
         ] {
             let fit = wide.fit(boxes);
-            assert_eq!((fit.threads(), fit.tasks(), fit.helpers.is_some()), (threads, tasks, threads > 1), "{boxes} boxes");
+            assert_eq!(
+                (fit.threads(), fit.tasks(), fit.helpers.is_some()),
+                (threads, tasks, threads > 1),
+                "{boxes} boxes"
+            );
             let narrow = Workers::new("test", 2, &Threads::default()).unwrap().fit(boxes);
             assert_eq!((narrow.threads(), narrow.tasks()), (threads.min(2), tasks.min(16)), "{boxes} boxes");
         }

@@ -37,8 +37,9 @@ impl Gpus {
         let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
         adapters.retain(|a| a.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS));
         let infos: Vec<wgpu::AdapterInfo> = adapters.iter().map(wgpu::Adapter::get_info).collect();
-        let keep =
-            |k: usize| !infos[..k].iter().any(|b| same_card(&infos[k], b)) && !infos.iter().any(|b| twins(&infos[k], b));
+        let keep = |k: usize| {
+            !infos[..k].iter().any(|b| same_card(&infos[k], b)) && !infos.iter().any(|b| twins(&infos[k], b))
+        };
         let mut adapters: Vec<(wgpu::AdapterInfo, wgpu::Adapter)> =
             infos.iter().cloned().zip(adapters).enumerate().filter(|(k, _)| keep(*k)).map(|(_, found)| found).collect();
         adapters.sort_by_key(|(info, _)| kind(info.device_type));
@@ -212,13 +213,16 @@ impl GpuIdentity {
 
 /// Windows shows each card through DX12 and through Vulkan; the latter is taken.
 fn twins(a: &wgpu::AdapterInfo, b: &wgpu::AdapterInfo) -> bool {
-    a.backend == wgpu::Backend::Dx12 && b.backend == wgpu::Backend::Vulkan && (a.vendor, a.device) == (b.vendor, b.device)
+    a.backend == wgpu::Backend::Dx12
+        && b.backend == wgpu::Backend::Vulkan
+        && (a.vendor, a.device) == (b.vendor, b.device)
 }
 
 /// Two drivers for one card show it twice; the first one is taken.
 fn same_card(a: &wgpu::AdapterInfo, b: &wgpu::AdapterInfo) -> bool {
     !a.device_pci_bus_id.is_empty()
-        && (a.backend, &a.device_pci_bus_id, a.vendor, a.device) == (b.backend, &b.device_pci_bus_id, b.vendor, b.device)
+        && (a.backend, &a.device_pci_bus_id, a.vendor, a.device)
+            == (b.backend, &b.device_pci_bus_id, b.vendor, b.device)
 }
 
 fn kind(device_type: wgpu::DeviceType) -> GpuKind {

@@ -48,8 +48,9 @@ impl Gpu {
             memory_hints: wgpu::MemoryHints::Performance,
             ..Default::default()
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|e| GpuError::caused(GpuErrorKind::NotFound, format!("gpu{} can't be opened", identity.index), e))?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| {
+            GpuError::caused(GpuErrorKind::NotFound, format!("gpu{} can't be opened", identity.index), e)
+        })?;
         let gpu = Self::from_parts(device, queue, identity);
         gpu.listen();
         Ok(gpu)
@@ -125,7 +126,8 @@ impl Gpu {
         let scope = Scope::new(&self.shared.device);
         let submission = self.shared.queue.submit([]);
         let _ = scope.end();
-        let polled = self.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(Duration::ZERO) });
+        let polled =
+            self.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(Duration::ZERO) });
         match polled {
             Err(wgpu::PollError::WrongSubmissionIndex(..)) => note(&self.shared.fault, lost()),
             // It is at work.
@@ -275,7 +277,10 @@ fn fault_by_panic(panic: &(dyn std::any::Any + Send)) -> Option<GpuErrorKind> {
 
 impl fmt::Debug for Gpu {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Gpu").field("identity", &self.shared.identity).field("fault", &self.fault()).finish_non_exhaustive()
+        f.debug_struct("Gpu")
+            .field("identity", &self.shared.identity)
+            .field("fault", &self.fault())
+            .finish_non_exhaustive()
     }
 }
 

@@ -50,8 +50,11 @@ impl Parts {
         let part = |first: usize, last: usize| (first, last, sharpest(centres, first, last));
         let mut straight = vec![part(0, end)];
         while straight.len() < PARTS
-            && let Some((k, corner)) =
-                straight.iter().enumerate().filter_map(|(k, part)| Some((k, part.2?))).max_by(|a, b| a.1.1.total_cmp(&b.1.1))
+            && let Some((k, corner)) = straight
+                .iter()
+                .enumerate()
+                .filter_map(|(k, part)| Some((k, part.2?)))
+                .max_by(|a, b| a.1.1.total_cmp(&b.1.1))
         {
             let (first, last, _) = straight[k];
             straight.splice(k..=k, [part(first, corner.0), part(corner.0, last)]);
@@ -151,8 +154,9 @@ mod tests {
         centres.splice(0..0, [-1.0e30; 12]);
         let parts = Parts::of(&centres);
         let division = parts.divide(|_, share| 1000.0 * share);
-        let in_cluster =
-            |low: f32| (0..100).map(|k| cell(&division, low + k as f32)).collect::<std::collections::BTreeSet<_>>().len();
+        let in_cluster = |low: f32| {
+            (0..100).map(|k| cell(&division, low + k as f32)).collect::<std::collections::BTreeSet<_>>().len()
+        };
         assert!(in_cluster(0.0) > 90 && in_cluster(1.0e6) > 90, "{division:?}");
         assert!((4..=7).contains(&parts.count), "{parts:?}");
     }
@@ -164,7 +168,8 @@ mod tests {
             let centres: Vec<f32> =
                 evenly(seed, 1.0).iter().map(|v| (v * 40.0 * ((seed % 7) as f32 + 0.1)).exp() - 5.0).collect();
             let division = Parts::of(&centres).divide(|width, share| (width * 3.0).min(share * 5000.0));
-            let mut bounds: Vec<f32> = centres.iter().flat_map(|&v| [v.next_down(), v, v.next_up(), v * 1.5, -v]).collect();
+            let mut bounds: Vec<f32> =
+                centres.iter().flat_map(|&v| [v.next_down(), v, v.next_up(), v * 1.5, -v]).collect();
             bounds.extend(division.segments.iter().flat_map(|s| [s.begin.next_down(), s.begin, s.begin.next_up()]));
             bounds.extend([-1.0e38, 1.0e38, 0.0]);
             bounds.retain(|v| v.abs() <= 1.0e38);

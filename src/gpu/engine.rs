@@ -170,7 +170,12 @@ impl Engine {
 
     /// Makes room for the frame, and binds the kernels again where a buffer is another one now. `external`: boxes that are on
     /// the GPU already.
-    pub(super) fn prepare(&mut self, params: &Params, ids: bool, external: Option<&wgpu::Buffer>) -> Result<(), GpuError> {
+    pub(super) fn prepare(
+        &mut self,
+        params: &Params,
+        ids: bool,
+        external: Option<&wgpu::Buffer>,
+    ) -> Result<(), GpuError> {
         let prepared = self.make_room(params, ids, external);
         if prepared.is_err() {
             // Some buffers may be new, some given back: everything is bound again before it is used again.
@@ -220,7 +225,8 @@ impl Engine {
 
     fn bind(&mut self, boxes: &wgpu::Buffer) -> Result<(), GpuError> {
         self.bound_to = None;
-        let inputs = Inputs { params: self.params.buffer(), boxes, ids: self.ids.buffer(), header: self.header.buffer() };
+        let inputs =
+            Inputs { params: self.params.buffer(), boxes, ids: self.ids.buffer(), header: self.header.buffer() };
         self.output.bind(&self.gpu, inputs.params, inputs.header)?;
         if let Some(sampler) = &mut self.sampler {
             sampler.bind(&self.gpu, inputs.params, boxes)?;

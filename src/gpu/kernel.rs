@@ -45,13 +45,15 @@ pub(super) mod source {
     const WALK: &str = include_str!("shaders/walk.wgsl");
 
     pub(in crate::gpu) const BRUTE: Source = &[COMMON, INPUT, PREFIX, include_str!("shaders/brute.wgsl")];
-    pub(in crate::gpu) const KEYS: Source = &[COMMON, INPUT, DIVISION, CURVE, include_str!("shaders/keys.wgsl"), DIGITS];
+    pub(in crate::gpu) const KEYS: Source =
+        &[COMMON, INPUT, DIVISION, CURVE, include_str!("shaders/keys.wgsl"), DIGITS];
     pub(in crate::gpu) const CELLS: Source = &[COMMON, PREFIX, include_str!("shaders/cells.wgsl")];
     pub(in crate::gpu) const GATHER: Source = &[COMMON, INPUT, include_str!("shaders/gather.wgsl")];
     pub(in crate::gpu) const SAMPLE: Source = &[COMMON, INPUT, include_str!("shaders/sample.wgsl")];
     pub(in crate::gpu) const SCAN: Source = &[COMMON, include_str!("shaders/scan.wgsl")];
     pub(in crate::gpu) const SORT: Source = &[COMMON, PREFIX, include_str!("shaders/sort.wgsl"), DIGITS];
-    pub(in crate::gpu) const GRID_SAP: Source = &[COMMON, PREFIX, ROWS, LEVELS, WALK, include_str!("shaders/grid_sap.wgsl")];
+    pub(in crate::gpu) const GRID_SAP: Source =
+        &[COMMON, PREFIX, ROWS, LEVELS, WALK, include_str!("shaders/grid_sap.wgsl")];
     pub(in crate::gpu) const BVH: Source = &[COMMON, PREFIX, ROWS, LEVELS, WALK, include_str!("shaders/bvh.wgsl")];
     pub(in crate::gpu) const SAP: Source = &[COMMON, PREFIX, ROWS, include_str!("shaders/sap.wgsl")];
     pub(in crate::gpu) const TREE: Source = &[COMMON, LEVELS, include_str!("shaders/tree.wgsl")];

@@ -39,9 +39,9 @@ pub fn algorithms<'a>(gpus: impl IntoIterator<Item = &'a GpuIdentity>) -> Vec<En
     }
     let on = |set: &Vec<u32>| {
         let set = set.clone();
-        METHODS
-            .iter()
-            .filter_map(move |m| Some(Entry::new(AlgorithmId::new(m.name, Backend::Gpu(set.clone())).ok()?, m.revision)))
+        METHODS.iter().filter_map(move |m| {
+            Some(Entry::new(AlgorithmId::new(m.name, Backend::Gpu(set.clone())).ok()?, m.revision))
+        })
     };
     sets.iter().flat_map(on).collect()
 }
@@ -60,8 +60,12 @@ mod tests {
             api: String::new(),
             kind,
         };
-        let gpus =
-            [gpu(0, GpuKind::Discrete), gpu(1, GpuKind::Integrated), gpu(2, GpuKind::Software), gpu(3, GpuKind::Software)];
+        let gpus = [
+            gpu(0, GpuKind::Discrete),
+            gpu(1, GpuKind::Integrated),
+            gpu(2, GpuKind::Software),
+            gpu(3, GpuKind::Software),
+        ];
         let ids = algorithms(&gpus).into_iter().map(|entry| entry.id.to_string());
         let strips: Vec<String> = ids.filter(|id| id.starts_with("grid-sap")).collect();
         assert_eq!(

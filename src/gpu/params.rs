@@ -98,8 +98,9 @@ impl Params {
             budget: (MOST_TESTS / objects.max(1)).clamp(FEWEST_OF_ROW, MOST_OF_ROW),
             top: 3 * raises(objects),
             usual: if usual.is_finite() { usual } else { 1.0 },
-            curve: turned
-                .map(|a| look.parts[a].divide(|width, share| curve_cells(width, share, look.sample.extent[a])).segments),
+            curve: turned.map(|a| {
+                look.parts[a].divide(|width, share| curve_cells(width, share, look.sample.extent[a])).segments
+            }),
             ..Self::default()
         }
     }

@@ -124,8 +124,12 @@ impl Resident {
         self.check(boxes, objects)?;
         if let Some((header, look)) = self.engine.arrived()? {
             let whole = header.more == 0 && header.total() == u64::from(header.held);
-            self.last =
-                Some(SubmittedCounts { submission: header.ran, pairs: header.total(), whole, invalid: header.invalid() });
+            self.last = Some(SubmittedCounts {
+                submission: header.ran,
+                pairs: header.total(),
+                whole,
+                invalid: header.invalid(),
+            });
             self.look = Some(look);
         }
         if objects == 0 {

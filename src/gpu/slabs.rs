@@ -59,7 +59,13 @@ impl Slabs {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub(super) fn gather(&self, slab: usize, boxes: &[Aabb], most: usize, members: &mut Members) -> Result<bool, Error> {
+    pub(super) fn gather(
+        &self,
+        slab: usize,
+        boxes: &[Aabb],
+        most: usize,
+        members: &mut Members,
+    ) -> Result<bool, Error> {
         let low = slab.checked_sub(1).map(|k| self.cuts[k]);
         let high = self.cuts.get(slab).copied();
         members.boxes.clear();
@@ -121,7 +127,8 @@ mod tests {
                 }
             }
         }
-        let all = (0..3000).flat_map(|j| (0..j).map(move |i| (i, j))).filter(|&(i, j)| boxes[i].overlaps(&boxes[j])).count();
+        let all =
+            (0..3000).flat_map(|j| (0..j).map(move |i| (i, j))).filter(|&(i, j)| boxes[i].overlaps(&boxes[j])).count();
         assert_eq!(owners.len(), all);
         assert!(owners.values().all(|&count| count == 1));
     }

@@ -105,7 +105,8 @@ impl Storage {
         }
         // A quarter more than asked for, so that a growing scene grows the buffer a few times in all.
         let wanted = (bytes + bytes / 4).next_multiple_of(256).min(most);
-        self.buffer = create(gpu, self.label, self.usage, wanted).or_else(|_| create(gpu, self.label, self.usage, bytes))?;
+        self.buffer =
+            create(gpu, self.label, self.usage, wanted).or_else(|_| create(gpu, self.label, self.usage, bytes))?;
         self.bytes = self.buffer.size();
         Ok(())
     }
@@ -121,8 +122,12 @@ pub(super) fn largest(gpu: &Gpu, usage: wgpu::BufferUsages) -> u64 {
 
 fn create(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
     gpu.check()?;
-    let descriptor =
-        wgpu::BufferDescriptor { label: Some(label), size: bytes.next_multiple_of(4), usage, mapped_at_creation: false };
+    let descriptor = wgpu::BufferDescriptor {
+        label: Some(label),
+        size: bytes.next_multiple_of(4),
+        usage,
+        mapped_at_creation: false,
+    };
     gpu.try_make(|device| device.create_buffer(&descriptor))
         .map_err(|e| e.of(format!("gpu{} has no memory of {bytes} bytes for {label}", gpu.identity().index)))
 }

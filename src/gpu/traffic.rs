@@ -102,7 +102,8 @@ fn kernels(method: &str, objects: u32, pairs: u64) -> Option<Vec<(&'static str, 
                 // The positions come into being in the first pass, and the last one counts no further digit.
                 let values = if pass == 0 { 1.0 } else { 2.0 };
                 let digits = if pass == 3 { 0.0 } else { 2.0 * counts };
-                kernels.extend([("add_counts", 2.0 * counts), ("scatter", counts + n * (2.0 + values) * WORD + digits)]);
+                kernels
+                    .extend([("add_counts", 2.0 * counts), ("scatter", counts + n * (2.0 + values) * WORD + digits)]);
             }
             kernels.push(("gather", n * (WORD + BOX + SORTED)));
         }
@@ -126,7 +127,9 @@ fn kernels(method: &str, objects: u32, pairs: u64) -> Option<Vec<(&'static str, 
         "sap" => kernels.push(("count", count)),
         "bvh" => {
             // Of the tree only the nodes are written again.
-            kernels.extend((0..raises(objects)).map(|k| ("raise_all", n * SORTED * (1.0 + NODES) / 512_f64.powi(k as i32))));
+            kernels.extend(
+                (0..raises(objects)).map(|k| ("raise_all", n * SORTED * (1.0 + NODES) / 512_f64.powi(k as i32))),
+            );
             kernels.push(("count", count + n * NODES * SORTED));
         }
         _ => {
@@ -224,7 +227,10 @@ mod tests {
             for method in ["sap", "grid-sap", "bvh"] {
                 let bytes = said_and_marked(&gpu, method, scenario, 20_000);
                 let [said, marked] = [0, 1].map(|k| bytes.values().map(|b| b[k]).sum::<f64>());
-                assert!((said / marked - 1.0).abs() < off, "{method}, {scenario:?}: {said} and {marked} bytes, {bytes:?}");
+                assert!(
+                    (said / marked - 1.0).abs() < off,
+                    "{method}, {scenario:?}: {said} and {marked} bytes, {bytes:?}"
+                );
                 for (kernel, [said, of_marks]) in &bytes {
                     let share = (said - of_marks).abs() / marked;
                     assert!(

@@ -342,9 +342,13 @@ mod tests {
 
     #[test]
     fn names_read_back_and_end_with_their_unit() {
-        let names =
-            ParameterId::ALL.map(ParameterId::as_str).into_iter().chain(GpuParameterId::ALL.map(GpuParameterId::as_str));
-        assert!(names.into_iter().all(|n| n.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_')));
+        let names = ParameterId::ALL
+            .map(ParameterId::as_str)
+            .into_iter()
+            .chain(GpuParameterId::ALL.map(GpuParameterId::as_str));
+        assert!(
+            names.into_iter().all(|n| n.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_'))
+        );
         for id in ParameterId::ALL {
             assert_eq!(id.as_str().parse(), Ok(id));
         }

@@ -20,7 +20,10 @@ fn an_unknown_key_is_an_error_that_names_it_but_in_a_newer_minor_version_it_is_t
     file["colour"] = json!("green");
     file["steps"][0]["why"] = json!({ "deep": [1, 2] });
     let error = tuning(&file.to_string()).unwrap_err();
-    assert!(matches!(&error, Error::UnknownKey { .. }) && error.to_string().contains("is no key of tuning/2"), "{error}");
+    assert!(
+        matches!(&error, Error::UnknownKey { .. }) && error.to_string().contains("is no key of tuning/2"),
+        "{error}"
+    );
     file["schema"] = json!("tuning/2.3");
     let read = Format::TUNING.read::<Tuning>(&file.to_string()).unwrap();
     assert_eq!((read.schema.minor(), read.value), (3, tuning(&sample().to_string()).unwrap()));

@@ -230,7 +230,8 @@ mod tests {
         let inf = f32::INFINITY;
         let boxes = [Aabb::new([-inf; 3], [inf; 3]), Aabb::new([inf; 3], [inf; 3]), Aabb::cube([0.0; 3], 1.0)];
         let sample = Sample::of(&boxes);
-        let all = sample.ranges.iter().flat_map(|&(low, length)| [low, length]).chain(sample.extent).chain(sample.shares);
+        let all =
+            sample.ranges.iter().flat_map(|&(low, length)| [low, length]).chain(sample.extent).chain(sample.shares);
         assert!(all.into_iter().all(f64::is_finite), "{sample:?}");
     }
 }

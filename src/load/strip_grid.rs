@@ -90,7 +90,8 @@ impl StripGrid {
 
     /// The first and the last cell that a box covers on each grid axis. Cell numbers stay below 2^16, which f32 holds.
     pub(super) fn cells_of(&self, b: &Aabb) -> [(f32, f32); 2] {
-        let bound = |d: usize, v: f32| ((v - self.origin[d]) * self.inverse_width[d]).max(0.0).min(self.last[d]).floor();
+        let bound =
+            |d: usize, v: f32| ((v - self.origin[d]) * self.inverse_width[d]).max(0.0).min(self.last[d]).floor();
         [0, 1].map(|d| (bound(d, b.min[self.across[d]]), bound(d, b.max[self.across[d]])))
     }
 
@@ -176,8 +177,9 @@ mod tests {
 
     #[test]
     fn cells_ascend_with_bounds_and_outliers_go_to_the_border() {
-        let boxes: Vec<Aabb> =
-            (0..10_000).map(|k| Aabb::cube([(k % 100) as f32 * 4.0, (k / 100) as f32, (k * 7 % 100) as f32], 0.5)).collect();
+        let boxes: Vec<Aabb> = (0..10_000)
+            .map(|k| Aabb::cube([(k % 100) as f32 * 4.0, (k / 100) as f32, (k * 7 % 100) as f32], 0.5))
+            .collect();
         let grid = grid(&boxes);
         assert_eq!(grid.axis, 0);
         assert!(grid.strips() > 20, "{grid:?}");
@@ -202,7 +204,8 @@ mod tests {
 
     #[test]
     fn degenerate_scenes_get_one_strip() {
-        let tiny = (0..5000).map(|k| Aabb::cube([(k % 7) as f32 * 1e-39, (k % 11) as f32 * 1e-39, k as f32 * 1e-39], 0.0));
+        let tiny =
+            (0..5000).map(|k| Aabb::cube([(k % 7) as f32 * 1e-39, (k % 11) as f32 * 1e-39, k as f32 * 1e-39], 0.0));
         let point = vec![Aabb::default(); 5000];
         for boxes in [vec![], point, vec![Aabb::cube([f32::INFINITY; 3], 1.0); 5000], tiny.collect()] {
             assert_eq!(grid(&boxes).strips(), 1);
@@ -219,8 +222,9 @@ mod tests {
     #[test]
     fn a_pair_is_reported_by_the_strip_where_the_later_box_begins() {
         let grid = StripGrid { cells: [5, 5], ..StripGrid::default() };
-        let span =
-            |x: u32, y: u32, more_x: u32, more_y: u32| strips(&grid, StripSpan((y * 5 + x) | more_x << 16 | more_y << 24));
+        let span = |x: u32, y: u32, more_x: u32, more_y: u32| {
+            strips(&grid, StripSpan((y * 5 + x) | more_x << 16 | more_y << 24))
+        };
         let (a, b) = (span(1, 2, 2, 1), span(2, 1, 0, 2));
         let shared = a
             .iter()

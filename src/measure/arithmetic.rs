@@ -142,8 +142,8 @@ macro_rules! chains {
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use std::arch::x86_64::{
-        _mm_add_ps, _mm_mul_ps, _mm_set1_ps, _mm256_add_ps, _mm256_fmadd_ps, _mm256_mul_ps, _mm256_set1_ps, _mm512_fmadd_ps,
-        _mm512_set1_ps,
+        _mm_add_ps, _mm_mul_ps, _mm_set1_ps, _mm256_add_ps, _mm256_fmadd_ps, _mm256_mul_ps, _mm256_set1_ps,
+        _mm512_fmadd_ps, _mm512_set1_ps,
     };
     use std::hint::black_box;
 

@@ -266,7 +266,8 @@ fn parse_stat(text: &str) -> Option<(u32, u64)> {
     let field = |index: usize| total.split_ascii_whitespace().nth(index)?.parse::<u64>().ok();
     // user nice system idle iowait irq softirq steal. Kernels before 2.5.41 have no iowait.
     let idle = field(3)?.saturating_add(field(4).unwrap_or(0));
-    let is_cpu = |line: &&str| line.strip_prefix("cpu").is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
+    let is_cpu =
+        |line: &&str| line.strip_prefix("cpu").is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
     let cpus = u32::try_from(text.lines().filter(is_cpu).count()).ok()?;
     (cpus > 0).then_some((cpus, idle))
 }
@@ -335,7 +336,10 @@ mod tests {
 
     #[test]
     fn six_digits_of_any_size() {
-        assert_eq!([123_456_789.0, 0.000_123_456_78, 0.0, -2.0].map(six_digits), [123_457_000.0, 0.000_123_457, 0.0, -2.0]);
+        assert_eq!(
+            [123_456_789.0, 0.000_123_456_78, 0.0, -2.0].map(six_digits),
+            [123_457_000.0, 0.000_123_457, 0.0, -2.0]
+        );
     }
 
     #[test]

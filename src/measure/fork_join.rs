@@ -52,7 +52,8 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
             "phase of {threads} bodies of 20 us, one on the calling thread and the others on {helpers} awake helpers, minus one body; \
              a sample is the median of {PHASES}"
         ),
-        "the same with bodies of 300 us, after the helpers were idle for 2 ms while the calling thread worked".to_owned(),
+        "the same with bodies of 300 us, after the helpers were idle for 2 ms while the calling thread worked"
+            .to_owned(),
     ];
     foreign_load::into_parameters(figures, NAMES.into_iter().zip(methods))
 }

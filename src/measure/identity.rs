@@ -66,7 +66,8 @@ impl Cpu {
     /// `/proc/cpuinfo` on Linux, else what sysinfo finds.
     #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
     fn of_this_machine() -> Self {
-        let mut cpu = std::fs::read_to_string("/proc/cpuinfo").map_or_else(|_| Self::default(), |text| parse_cpuinfo(&text));
+        let mut cpu =
+            std::fs::read_to_string("/proc/cpuinfo").map_or_else(|_| Self::default(), |text| parse_cpuinfo(&text));
         if let Ok(mut system) = sysinfo::System::new() {
             system.refresh_cpu_list(sysinfo::CpuRefreshKind::nothing());
             if let Some(first) = system.cpus().first() {

@@ -35,7 +35,9 @@ impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoMethod => f.write_str("it holds no method"),
-            Self::Range { parameter } => write!(f, "the range of {parameter} has ends that are no numbers or not ascending"),
+            Self::Range { parameter } => {
+                write!(f, "the range of {parameter} has ends that are no numbers or not ascending")
+            }
             Self::Intervals => f.write_str("its intervals have a width that is negative or no number"),
             Self::Place { position } => write!(f, "places[{position}] is a load that is negative or not finite"),
             Self::Method { method, why } => write!(f, "{method}: {why}"),

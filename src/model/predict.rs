@@ -4,7 +4,9 @@ use super::gpu_set::GpuSet;
 use super::{GPU_PREFIX, MethodModel, Model, PredictError, Range};
 use crate::hardware::{GpuKind, Hardware, with_unit};
 use crate::stats::NORMAL_90;
-use crate::{AlgorithmCost, AlgorithmId, Backend, BackendClass, Entry, Fallback, GpuHardware, Load, Source, Tuning, Work};
+use crate::{
+    AlgorithmCost, AlgorithmId, Backend, BackendClass, Entry, Fallback, GpuHardware, Load, Source, Tuning, Work,
+};
 use std::sync::Arc;
 
 /// Cost curves for one machine.
@@ -57,8 +59,8 @@ impl Model {
                 self.name
             ));
         }
-        let mut unlike =
-            p.outside(self.ranges.iter().filter_map(|r| r.excess(&r.parameter, "", hardware.value_named(&r.parameter))));
+        let mut unlike = p
+            .outside(self.ranges.iter().filter_map(|r| r.excess(&r.parameter, "", hardware.value_named(&r.parameter))));
         if self.ranges.is_empty() {
             p.outside([format!("the model {} does not say what it was trained on", self.name)]);
         }

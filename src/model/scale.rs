@@ -115,8 +115,10 @@ impl Scale {
                 )?
             }
             Self::GpuMemoryByte => {
-                1.0 / set
-                    .rate(&[GpuParameterId::ReadGbPerS, GpuParameterId::CopyGbPerS], GpuParameterId::GroupArithmeticRatio)?
+                1.0 / set.rate(
+                    &[GpuParameterId::ReadGbPerS, GpuParameterId::CopyGbPerS],
+                    GpuParameterId::GroupArithmeticRatio,
+                )?
             }
             Self::GpuOperation => {
                 1.0 / set.rate(&[GpuParameterId::ArithmeticGflopPerS], GpuParameterId::GroupArithmeticRatio)?

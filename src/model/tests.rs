@@ -115,11 +115,15 @@ fn several_gpus_have_the_slowest_latency_and_added_rates_within_what_was_measure
 fn scales_and_helpers_of_the_other_processor_are_refused() {
     let h = hardware();
     assert!(Scale::Lane.nanoseconds(&h, &Backend::Gpu(vec![0])).unwrap_err().to_string().contains("gpu0 has no scale"));
-    assert!(Scale::GpuDispatch.nanoseconds(&h, &Backend::Cpu(2)).unwrap_err().to_string().contains("cpu2 has no scale"));
+    assert!(
+        Scale::GpuDispatch.nanoseconds(&h, &Backend::Cpu(2)).unwrap_err().to_string().contains("cpu2 has no scale")
+    );
     let wrong = model(vec![method(BackendClass::Cpu, Scale::GpuDispatch)]);
     assert!(wrong.defect().unwrap().to_string().contains("gpu_dispatch"));
-    let helped =
-        MethodModel { helpers: Some(HelpersModel::new(0.0, 0.0, 0.0, 0)), ..method(BackendClass::Gpu, Scale::GpuDispatch) };
+    let helped = MethodModel {
+        helpers: Some(HelpersModel::new(0.0, 0.0, 0.0, 0)),
+        ..method(BackendClass::Gpu, Scale::GpuDispatch)
+    };
     assert!(model(vec![helped]).defect().unwrap().to_string().contains("helpers are of the CPU"));
 }
 

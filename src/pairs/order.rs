@@ -132,8 +132,11 @@ impl Sorter {
         let layout = Layout::of(on, list);
         let len = list.len();
         // Sixteen of each bucket in each share at least, so that bringing them together copies whole cache lines.
-        let shares =
-            if on.threads() == 1 { 1 } else { (on.threads() * SHARES_PER_THREAD).min(len / layout.buckets / 16).max(1) };
+        let shares = if on.threads() == 1 {
+            1
+        } else {
+            (on.threads() * SHARES_PER_THREAD).min(len / layout.buckets / 16).max(1)
+        };
         let starts = ensure(starts, shares * (layout.buckets + 1))?;
         if layout.rest <= u32::BITS {
             by_buckets(on, list, ensure(narrow, len)?, starts, layout);
@@ -203,7 +206,13 @@ impl Layout {
 }
 
 /// Sorts `list` by way of `rests`, which is as long. `starts` says into how many shares it is divided first.
-fn by_buckets<T: Keyed, K: Keyed>(on: &impl Parallel, list: &mut [T], rests: &mut [K], starts: &mut [u32], layout: Layout) {
+fn by_buckets<T: Keyed, K: Keyed>(
+    on: &impl Parallel,
+    list: &mut [T],
+    rests: &mut [K],
+    starts: &mut [u32],
+    layout: Layout,
+) {
     if layout.buckets == 1 {
         return sort_bucket(list, rests, true, 0, layout);
     }
@@ -255,7 +264,13 @@ fn split<T>(list: &mut [T], sizes: impl Iterator<Item = usize>) -> impl Iterator
 /// Counts how many of `from` belong to each digit into `starts`, which is all zero, and writes what `make` makes of them to `to`, digit by
 /// digit and otherwise in their order. Each start ends as the end of its digit.
 #[inline(always)]
-fn scatter<F: Copy, T>(from: &[F], to: &mut [T], starts: &mut [u32], digit: impl Fn(F) -> usize, make: impl Fn(F) -> T) {
+fn scatter<F: Copy, T>(
+    from: &[F],
+    to: &mut [T],
+    starts: &mut [u32],
+    digit: impl Fn(F) -> usize,
+    make: impl Fn(F) -> T,
+) {
     from.iter().for_each(|&f| starts[digit(f)] += 1);
     let mut total = 0;
     starts.iter_mut().for_each(|start| total += std::mem::replace(start, total));
@@ -353,8 +368,9 @@ mod tests {
             assert_sorts(&ascending, "a sorted list");
             assert_sorts(&ascending.iter().rev().copied().collect::<Vec<Pair>>(), "a reversed list");
             // One box meets half of all others, and all the rest is even.
-            let skewed =
-                |k: usize| if k.is_multiple_of(2) { (5, k as u32) } else { ((mix(k as u64) % 100_000) as u32, k as u32) };
+            let skewed = |k: usize| {
+                if k.is_multiple_of(2) { (5, k as u32) } else { ((mix(k as u64) % 100_000) as u32, k as u32) }
+            };
             assert_sorts(&(0..len).map(|k| skewed(k * 7919 % len.max(1))).collect::<Vec<Pair>>(), "a skewed list");
         }
     }

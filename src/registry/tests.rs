@@ -58,7 +58,8 @@ fn a_family_is_one_instance_on_any_of_its_numbers_of_threads() {
     let mut registry = Registry::with_cores(1);
     registry.add_family("mine", &[1, 2, 4], 3, |threads| Ok(Box::new(Wide(threads.to_vec(), 1)))).unwrap();
     assert!(registry.add_family("Mine", &[1], 3, |_| unreachable!()).is_err());
-    let ids: Vec<AlgorithmId> = ["mine@cpu4", "mine@cpu1", "brute@cpu1", "mine@cpu2"].map(|t| t.parse().unwrap()).into();
+    let ids: Vec<AlgorithmId> =
+        ["mine@cpu4", "mine@cpu1", "brute@cpu1", "mine@cpu2"].map(|t| t.parse().unwrap()).into();
     let mut family = registry.create_family(&[&ids[0], &ids[1]]).unwrap().unwrap();
     let incremental = family.as_incremental().unwrap();
     assert_eq!([1, 2, 4].map(|k| incremental.set_threads(k)), [true, false, true]);

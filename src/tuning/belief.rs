@@ -195,7 +195,11 @@ impl Belief {
         for (w, row) in self.own_with.iter_mut().zip(&own.covariance) {
             *w = row.iter().zip(&values).map(|(c, v)| c * v).sum();
         }
-        Expected { ln: ln + dot(&own.mean, &values), shared: shared.max(0.0), own: dot(&self.own_with, &values).max(0.0) }
+        Expected {
+            ln: ln + dot(&own.mean, &values),
+            shared: shared.max(0.0),
+            own: dot(&self.own_with, &values).max(0.0),
+        }
     }
 
     /// Covariance of an algorithm's cost with the observation that was [expected](Self::expect) last, of algorithm `observed`.

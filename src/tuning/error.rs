@@ -76,9 +76,14 @@ impl fmt::Display for TuningError {
                 write!(f, "the sample of {algorithm} at {objects} objects has no time above zero")
             }
             Self::NoWork { algorithm, work } => write!(f, "the cost of {algorithm}: there is no work {work}"),
-            Self::NoFallback { work } => write!(f, "a work falls back to the work {work}, which does not stand before it"),
+            Self::NoFallback { work } => {
+                write!(f, "a work falls back to the work {work}, which does not stand before it")
+            }
             Self::Places { algorithm } => {
-                write!(f, "the cost of {algorithm}: its residual is known at other places than that of the first algorithm")
+                write!(
+                    f,
+                    "the cost of {algorithm}: its residual is known at other places than that of the first algorithm"
+                )
             }
             Self::Curve { algorithm, source } => write!(f, "the cost of {algorithm}: {source}"),
             Self::Spread { algorithm, spread_ln } => write!(f, "the cost of {algorithm}: a spread of {spread_ln}"),

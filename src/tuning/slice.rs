@@ -225,7 +225,8 @@ mod tests {
     fn a_reach_ends_where_its_condition_begins_or_where_the_slice_ends() {
         let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
         let slice = Slice::new(&loads);
-        let from = |objects: f64, upwards, limit: u32| slice.reach(objects, upwards, |l| (l.objects > limit) == upwards);
+        let from =
+            |objects: f64, upwards, limit: u32| slice.reach(objects, upwards, |l| (l.objects > limit) == upwards);
         assert!((from(1000.0, true, 5000) / 5000.0 - 1.0).abs() < 0.01);
         assert!((from(1000.0, false, 70) / 70.0 - 1.0).abs() < 0.02);
         assert_eq!((from(1000.0, true, u32::MAX), from(1000.0, false, 0)), (1_048_576.0, 2.0));

@@ -34,7 +34,8 @@ fn crossovers_lie_where_the_curves_cross_and_intervals_around_them() {
 /// Found by the fuzz target `files`: what was written could not be read again.
 #[test]
 fn a_slice_through_no_load_leaves_sound_tuning() {
-    let costs = vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sap@cpu1", &[(Term::Objects, 100.0)], 0.05)];
+    let costs =
+        vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sap@cpu1", &[(Term::Objects, 100.0)], 0.05)];
     let tuning = Tuning::from_costs(Source::Predicted, "uniform", costs, &[]);
     assert!(tuning.steps.is_empty() && tuning.defect().is_none());
     assert_eq!(tuning.rank(&Load::of_objects(1000), |_| true).unwrap().best, 1);
@@ -43,7 +44,8 @@ fn a_slice_through_no_load_leaves_sound_tuning() {
 
 #[test]
 fn an_interval_has_both_ends_or_none_and_holds_its_border() {
-    let costs = vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sap@cpu1", &[(Term::Objects, 100.0)], 0.05)];
+    let costs =
+        vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sap@cpu1", &[(Term::Objects, 100.0)], 0.05)];
     let tuning = Tuning::from_costs(Source::Measured, "uniform", costs, &loads());
     let defect = |low, high| {
         let mut tuning = tuning.clone();

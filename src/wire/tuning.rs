@@ -191,8 +191,9 @@ impl TryFrom<TuningKeys> for Tuning {
             let Some(work) = works.get(cost.work) else {
                 return Err(TuningError::NoWork { algorithm: cost.algorithm, work: cost.work });
             };
-            let observed =
-                cost.observed.map(|o| Residual::new(Arc::clone(&places), o.weights, o.by_motion).with_constant(o.constant));
+            let observed = cost
+                .observed
+                .map(|o| Residual::new(Arc::clone(&places), o.weights, o.by_motion).with_constant(o.constant));
             let curve = CostCurve { work: Arc::clone(work), helpers: cost.helpers, observed };
             Ok(AlgorithmCost::new(cost.algorithm, cost.revision, curve, cost.spread_ln))
         };

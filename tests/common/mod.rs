@@ -103,8 +103,15 @@ impl Random {
 }
 
 /// Sizes of worlds that are flat, thin, deep, empty and plain.
-pub(crate) const WORLDS: [[f32; 3]; 7] =
-    [[400.0, 1.0, 1.0], [1.0, 300.0, 2.0], [60.0, 60.0, 0.0], [2.0, 50.0, 50.0], [40.0, 40.0, 0.0], [0.0; 3], [16.0; 3]];
+pub(crate) const WORLDS: [[f32; 3]; 7] = [
+    [400.0, 1.0, 1.0],
+    [1.0, 300.0, 2.0],
+    [60.0, 60.0, 0.0],
+    [2.0, 50.0, 50.0],
+    [40.0, 40.0, 0.0],
+    [0.0; 3],
+    [16.0; 3],
+];
 
 /// A world all of whose bounds are denormal.
 pub(crate) fn denormals(random: &mut Random) -> Vec<Aabb> {

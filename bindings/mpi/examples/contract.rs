@@ -20,7 +20,8 @@ const OWNERS: [Owners; 4] = [Owners::Random, Owners::Parts, Owners::One, Owners:
 const FRAMES: u64 = 200;
 
 fn main() {
-    let (universe, threading) = mpi::initialize_with_threading(Threading::Funneled).expect("MPI was initialised before");
+    let (universe, threading) =
+        mpi::initialize_with_threading(Threading::Funneled).expect("MPI was initialised before");
     assert!(threading >= Threading::Funneled, "this MPI allows no threads");
     let world = universe.world();
     let what = std::env::args().nth(1);

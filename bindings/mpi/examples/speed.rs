@@ -116,7 +116,13 @@ impl Exchange for Turns {
         self.exchange.all_to_all(send, receive);
     }
 
-    fn all_to_all_varcount(&mut self, send: &[u64], send_counts: &[usize], receive: &mut [u64], receive_counts: &[usize]) {
+    fn all_to_all_varcount(
+        &mut self,
+        send: &[u64],
+        send_counts: &[usize],
+        receive: &mut [u64],
+        receive_counts: &[usize],
+    ) {
         self.exchange.all_to_all_varcount(send, send_counts, receive, receive_counts);
         self.sent += 1;
         if self.sent.is_multiple_of(2) {

@@ -77,7 +77,13 @@ impl Exchange for MpiExchange {
         });
     }
 
-    fn all_to_all_varcount(&mut self, send: &[u64], send_counts: &[usize], receive: &mut [u64], receive_counts: &[usize]) {
+    fn all_to_all_varcount(
+        &mut self,
+        send: &[u64],
+        send_counts: &[usize],
+        receive: &mut [u64],
+        receive_counts: &[usize],
+    ) {
         self.check(send_counts);
         self.check(receive_counts);
         let own = self.rank();

@@ -45,7 +45,9 @@ fn until(limit: Duration, communicator: &impl Communicator, what: &str, mut is_d
             let (rank, seconds) = (communicator.rank(), limit.as_secs_f64());
             end(
                 communicator,
-                &format!("rank {rank} has waited for {seconds} s for {what} of the others: one of them hangs or is gone"),
+                &format!(
+                    "rank {rank} has waited for {seconds} s for {what} of the others: one of them hangs or is gone"
+                ),
             );
         }
         if waited > BRIEF {

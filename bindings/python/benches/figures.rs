@@ -32,7 +32,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// What `sapwise.pairs` calls, on the same boxes.
 fn serve(bytes: &[u8], algorithm: &str) -> Result<(), Box<dyn Error>> {
     let floats: Vec<f32> = bytes.as_chunks().0.iter().map(|&b| f32::from_le_bytes(b)).collect();
-    let boxes: Vec<Aabb> = floats.as_chunks().0.iter().map(|&[a, b, c, d, e, f]| Aabb::new([a, b, c], [d, e, f])).collect();
+    let boxes: Vec<Aabb> =
+        floats.as_chunks().0.iter().map(|&[a, b, c, d, e, f]| Aabb::new([a, b, c], [d, e, f])).collect();
     let mut broad_phase = Adaptive::only(algorithm.parse()?, &Registry::new())?;
     let mut pairs = Pairs::with_order(PairOrder::Canonical);
     for line in stdin().lock().lines() {

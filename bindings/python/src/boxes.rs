@@ -35,7 +35,11 @@ impl Boxes<'_> {
 }
 
 /// The boxes that a caller gave: one array, or lower and upper corners apart. `which` stands behind "box 3" in errors.
-pub(crate) fn boxes<'py>(boxes: &Bound<'py, PyAny>, upper: Option<&Bound<'py, PyAny>>, which: &str) -> PyResult<Boxes<'py>> {
+pub(crate) fn boxes<'py>(
+    boxes: &Bound<'py, PyAny>,
+    upper: Option<&Bound<'py, PyAny>>,
+    which: &str,
+) -> PyResult<Boxes<'py>> {
     let py = boxes.py();
     if upper.is_none()
         && let Some(borrowed) = as_it_lies(boxes)

@@ -77,7 +77,8 @@ impl Engine {
 
     /// Finds the pairs and returns them as flat as NumPy has them.
     fn find(&mut self, boxes: Option<&[Aabb]>, order: PairOrder, wants: Wants) -> Result<Vec<u32>, Error> {
-        let pairs = self.pairs[usize::from(order == PairOrder::Canonical)].get_or_insert_with(|| start::pairs(order, None));
+        let pairs =
+            self.pairs[usize::from(order == PairOrder::Canonical)].get_or_insert_with(|| start::pairs(order, None));
         let usual_limit = pairs.limit();
         if wants.limit.is_some() {
             pairs.set_limit(wants.limit);
@@ -113,7 +114,8 @@ fn usual(registry: &Registry) -> Result<Tuning, Error> {
         Some(Step::new(from, id.clone()))
     };
     let mut steps: Vec<Step> = step(0, "brute", 1).into_iter().chain(step(GRID_FROM, "grid-sap", 1)).collect();
-    let mut widths: Vec<u32> = known.iter().map(AlgorithmId::threads).filter(|k| (2..=MOST_THREADS).contains(k)).collect();
+    let mut widths: Vec<u32> =
+        known.iter().map(AlgorithmId::threads).filter(|k| (2..=MOST_THREADS).contains(k)).collect();
     widths.sort_unstable();
     widths.dedup();
     steps.extend(widths.into_iter().filter_map(|k| step(THREADS_FROM * k * k, "grid-sap", k)));
@@ -130,7 +132,10 @@ pub(crate) fn flat(pairs: &Pairs, from_second: u32) -> Result<Vec<u32>, Error> {
 }
 
 /// Two numbers a row.
-pub(crate) fn two_columns<'py, T: numpy::Element>(py: Python<'py>, numbers: Vec<T>) -> PyResult<Bound<'py, PyArray2<T>>> {
+pub(crate) fn two_columns<'py, T: numpy::Element>(
+    py: Python<'py>,
+    numbers: Vec<T>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
     let rows = Array2::from_shape_vec([numbers.len() / 2, 2], numbers);
     rows.map(|rows| rows.into_pyarray(py)).map_err(|why| unusable(py, why.to_string()))
 }

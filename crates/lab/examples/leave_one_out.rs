@@ -31,8 +31,10 @@ pub(crate) fn leave_one_out(folder: &Path, file: &str) -> Result<String> {
     let table = RegretTable::new(profile);
     let regret = table.regret(profile, &by_costs(costs, &available));
     let line = |name: &str, regret: &Regret| format!("{name:20} {}\n", spread::percent(regret.mean, regret.range(), 1));
-    let mut text =
-        format!("{file}, held out: {held_out}; mean regret (least to largest of a cell)\n{}", line("the model", &regret));
+    let mut text = format!(
+        "{file}, held out: {held_out}; mean regret (least to largest of a cell)\n{}",
+        line("the model", &regret)
+    );
     for (algorithm, regret) in profile.algorithms.iter().zip(table.always(None)) {
         text += &line(&algorithm.id.to_string(), &regret);
     }

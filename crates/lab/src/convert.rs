@@ -87,7 +87,8 @@ type Unsound = Box<dyn std::error::Error + Send + Sync>;
 /// Puts what each algorithm costs into a list of works, and tells what is left out.
 fn share_works(tuning: &mut Map<String, Value>) -> Vec<String> {
     let (mut works, mut corrected) = (Vec::new(), 0);
-    let costs = tuning.get_mut("costs").and_then(Value::as_array_mut).into_iter().flatten().filter_map(Value::as_object_mut);
+    let costs =
+        tuning.get_mut("costs").and_then(Value::as_array_mut).into_iter().flatten().filter_map(Value::as_object_mut);
     for cost in costs {
         let Some(Value::Object(mut curve)) = cost.remove("curve") else { continue };
         let cache = curve.get("cache_bytes").cloned().unwrap_or(Value::Null);
@@ -96,7 +97,8 @@ fn share_works(tuning: &mut Map<String, Value>) -> Vec<String> {
             works.push(json!({ "terms": terms, "fallback": null, "cache_bytes": cache }));
             json!({ "work": works.len() - 1, "factor": 1.0 })
         });
-        corrected += usize::from(curve.get("correction").and_then(Value::as_array).is_some_and(|knots| !knots.is_empty()));
+        corrected +=
+            usize::from(curve.get("correction").and_then(Value::as_array).is_some_and(|knots| !knots.is_empty()));
         works.push(json!({ "terms": curve.remove("terms"), "fallback": fallback, "cache_bytes": cache }));
         let more = [("work", json!(works.len() - 1)), ("helpers", Value::Null), ("observed", Value::Null)];
         cost.extend(more.map(|(key, value)| (key.to_owned(), value)));

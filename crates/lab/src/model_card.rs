@@ -130,7 +130,9 @@ fn trained_on(training: &Training) -> String {
     if !training.trained_on_counts.is_empty() {
         rows = vec![["reports", "physical machines", "label"].map(str::to_owned).to_vec()];
         let counts = training.trained_on_counts.iter();
-        rows.extend(counts.map(|c| vec![c.reports.to_string(), c.physical_machines.to_string(), kind(c.label).to_owned()]));
+        rows.extend(
+            counts.map(|c| vec![c.reports.to_string(), c.physical_machines.to_string(), kind(c.label).to_owned()]),
+        );
     }
     format!("\n## Trained on\n\n{}", markdown(&rows))
 }
@@ -197,12 +199,19 @@ pub fn scores(validation: &Validation, draw: impl Fn(&[Vec<String>]) -> String) 
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for m in methods {
         let seen = Regrets { all: m.mean_regret, in_games: m.mean_regret_in_games.unwrap_or_default() };
-        let octaves = m.crossing_error_octaves.map_or_else(|| "-".to_owned(), |octaves| format!("{octaves:.2} octaves"));
+        let octaves =
+            m.crossing_error_octaves.map_or_else(|| "-".to_owned(), |octaves| format!("{octaves:.2} octaves"));
         let range =
             m.regret_range().map_or_else(|| "-".to_owned(), |[a, b]| format!("{:.1} to {:.1}", 100.0 * a, 100.0 * b));
         let mut row = vec![m.name.clone()];
         row.extend(split(m.unseen_scenario.as_ref()));
-        row.extend([regrets(Some(seen)), range, regrets(m.one_thread), regrets(m.several_threads), regrets(m.by_means)]);
+        row.extend([
+            regrets(Some(seen)),
+            range,
+            regrets(m.one_thread),
+            regrets(m.several_threads),
+            regrets(m.by_means),
+        ]);
         row.extend([octaves, percent(m.share_over_10_percent)]);
         rows.push(row);
     }
@@ -258,7 +267,10 @@ mod tests {
             coverage: None,
         };
         let text = scores(&validation, markdown);
-        assert!(text.contains("1 physical machine of 1 CPU model in 2 profiles") && text.contains("says little"), "{text}");
+        assert!(
+            text.contains("1 physical machine of 1 CPU model in 2 profiles") && text.contains("says little"),
+            "{text}"
+        );
         let row = "| physics | - | - | - | 5.0 % (4.0) | 0.4 to 30.0 | - | - | - | 0.25 octaves | 0.0 % |";
         assert!(text.contains(row) && text.contains("| floor, 1 pair | - | - | - | 2.0 % (1.0) |"), "{text}");
         validation.methods.clear();
@@ -278,6 +290,9 @@ mod tests {
         let coverage =
             crate::Coverage { physical_machines: 3, times_90_ln: 0.5, times: 0.91, ratios_90_ln: 0.2, ratios: 0.88 };
         let told = intervals(&Validation { coverage: Some(coverage), ..Validation::default() });
-        assert!(told.contains("3 physical machines") && told.contains("within 1.22") && told.contains("88.0 %"), "{told}");
+        assert!(
+            told.contains("3 physical machines") && told.contains("within 1.22") && told.contains("88.0 %"),
+            "{told}"
+        );
     }
 }

@@ -78,7 +78,10 @@ impl Machine {
         use GpuKind::{Discrete, Integrated};
         let gpus = [
             vec![gpu(Integrated, (60e3, 3e3), (9.0, 6.0), 40.0, 800.0)],
-            vec![gpu(Discrete, (30e3, 2e3), (12.0, 11.0), 400.0, 9e3), gpu(Discrete, (40e3, 1.5e3), (5.0, 9.0), 250.0, 6e3)],
+            vec![
+                gpu(Discrete, (30e3, 2e3), (12.0, 11.0), 400.0, 9e3),
+                gpu(Discrete, (40e3, 1.5e3), (5.0, 9.0), 250.0, 6e3),
+            ],
             vec![gpu(Discrete, (25e3, 4e3), (24.0, 15.0), 700.0, 3e4)],
             vec![gpu(Integrated, (90e3, 9e3), (15.0, 22.0), 80.0, 2e3)],
             vec![

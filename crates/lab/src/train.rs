@@ -76,7 +76,8 @@ pub fn train(selection: Selection, name: &str, progress: &dyn Progress) -> Resul
 /// What a training says of the reports behind it, before any validation.
 fn behind(profiles: &[Profile]) -> Training {
     if profiles.len() <= MOST_LISTED {
-        let report = |p: &Profile| TrainingReport { file: p.file.clone(), host: p.machine().to_owned(), label: p.label };
+        let report =
+            |p: &Profile| TrainingReport { file: p.file.clone(), host: p.machine().to_owned(), label: p.label };
         return Training { trained_on: profiles.iter().map(report).collect(), ..Training::default() };
     }
     // By the name of the label, since labels have no order.
@@ -133,8 +134,9 @@ mod tests {
         let range = model.ranges.iter().find(|r| r.parameter == "gpu/upload_rate_gb_per_s").unwrap();
         assert_eq!((range.min, range.max), (5.0, 24.0));
         let all = |ids: &[&str]| ids.iter().map(|id| Entry::new(id.parse().unwrap(), 1)).collect::<Vec<_>>();
-        let within =
-            model.predict(&machines[1].hardware(), &all(&["grid-sap@cpu1", "grid-sap@gpu0", "grid-sap@gpu0+1"])).unwrap();
+        let within = model
+            .predict(&machines[1].hardware(), &all(&["grid-sap@cpu1", "grid-sap@gpu0", "grid-sap@gpu0+1"]))
+            .unwrap();
         assert!(within.costs.len() == 3 && !within.extrapolated, "{:?}", within.warnings);
         let outside = model.predict(&machines[4].hardware(), &all(&["grid-sap@gpu0"])).unwrap();
         let told = |text: &str| outside.warnings.iter().any(|w| w.contains(text));

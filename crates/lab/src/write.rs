@@ -191,7 +191,10 @@ mod tests {
             fs::create_dir(&killed).unwrap();
             File::create(killed.join("half")).unwrap();
             File::open(&killed).unwrap().set_modified(std::time::SystemTime::now() - 2 * ABANDONED_AFTER).unwrap();
-            File::open(beside.path()).unwrap().set_modified(std::time::SystemTime::now() - 2 * ABANDONED_AFTER).unwrap();
+            File::open(beside.path())
+                .unwrap()
+                .set_modified(std::time::SystemTime::now() - 2 * ABANDONED_AFTER)
+                .unwrap();
             write_atomically(&path("out"), hello).unwrap();
             assert_eq!(names(folder.path()), left);
         }

@@ -71,9 +71,13 @@ fn a_current_file_is_not_converted_again() {
 
 #[test]
 fn a_fallback_and_names_in_texts_are_renamed() {
+    let text = OLD[2].0.replacen(
+        "\"cache_bytes\"",
+        "\"otherwise\": [{\"term\": \"sort\", \"unit_ns\": 3.5}], \"cache_bytes\"",
+        1,
+    );
     let text =
-        OLD[2].0.replacen("\"cache_bytes\"", "\"otherwise\": [{\"term\": \"sort\", \"unit_ns\": 3.5}], \"cache_bytes\"", 1);
-    let text = text.replacen("bandwidth_one_thread_gb_per_s is", "verlet@cpu2, unlike one sweep of (sweep@gpu0+1), is", 1);
+        text.replacen("bandwidth_one_thread_gb_per_s is", "verlet@cpu2, unlike one sweep of (sweep@gpu0+1), is", 1);
     let tuning: Value = serde_json::from_str(&convert(&text).unwrap().text).unwrap();
     let fallback = &tuning["works"][tuning["costs"][0]["work"].as_u64().unwrap() as usize]["fallback"];
     assert_eq!(tuning["works"][fallback["work"].as_u64().unwrap() as usize]["terms"][0]["unit_ns"], 3.5);

@@ -65,7 +65,12 @@ fn every_report_is_complete_and_its_label_is_true() {
 fn the_built_in_model_knows_every_method_and_predicts_for_every_report() {
     let (model, training) = (Model::built_in().unwrap(), training());
     for entry in Registry::with_cores(1).entries().iter().filter(|e| e.id.backend().class() == BackendClass::Cpu) {
-        assert_eq!(model.method(&entry.id).map(|m| m.revision), Some(entry.revision), "{}: train on new reports", entry.id);
+        assert_eq!(
+            model.method(&entry.id).map(|m| m.revision),
+            Some(entry.revision),
+            "{}: train on new reports",
+            entry.id
+        );
     }
     let reports = reports("datasets");
     for trained_on in &training.trained_on {
@@ -105,7 +110,8 @@ fn a_machine_outside_the_training_is_told_and_a_missing_parameter_leaves_out_wha
         let prediction = model.predict(&hardware, &algorithms).ok()?;
         (prediction.costs.len() < algorithms.len()).then_some((id, prediction))
     };
-    let (id, prediction) = ParameterId::ALL.into_iter().find_map(without).expect("some methods need what others do not");
+    let (id, prediction) =
+        ParameterId::ALL.into_iter().find_map(without).expect("some methods need what others do not");
     assert!(!prediction.costs.is_empty());
     assert!(prediction.warnings.iter().any(|w| w.contains(id.as_str())), "{id}: {:?}", prediction.warnings);
     set(&mut hardware, ParameterId::ClockMeasuredGhz, Some(9.0));

@@ -66,7 +66,10 @@ fn the_cards_hold_the_figures_of_the_paper_and_nothing_else() {
         let report = report(printed.file);
         let file = printed.file;
         assert_eq!(report.label, Label::Published, "{file}");
-        assert!(report.points.is_empty() && report.algorithms.is_empty(), "{file}: timings that the paper does not print");
+        assert!(
+            report.points.is_empty() && report.algorithms.is_empty(),
+            "{file}: timings that the paper does not print"
+        );
         let [card] = &report.hardware.gpus[..] else { panic!("{file}: not one card") };
         assert_eq!(card.gpu.name, printed.card);
         let [up, down] = printed.transfers;
@@ -100,7 +103,11 @@ fn the_cards_hold_the_figures_of_the_paper_and_nothing_else() {
                         assert!(p.source.contains("ISVRI 2011"), "{file}: {name}: {}", p.source);
                     }
                     None => {
-                        assert!(p.value.is_none() && p.how == How::Missing && !p.source.is_empty(), "{file}: {}", p.name);
+                        assert!(
+                            p.value.is_none() && p.how == How::Missing && !p.source.is_empty(),
+                            "{file}: {}",
+                            p.name
+                        );
                     }
                 }
             }

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 #[test]
 fn the_stored_reports_make_a_study_whose_files_are_all_there() {
     let datasets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets");
-    let few = ["full", "1t", "avx2", "two-gpus"].map(|p| datasets.join(format!("earlier/amd-epyc-2c-{p}--2026-11-21.json")));
+    let few =
+        ["full", "1t", "avx2", "two-gpus"].map(|p| datasets.join(format!("earlier/amd-epyc-2c-{p}--2026-11-21.json")));
     let all = std::env::var_os("SAPWISE_STUDY");
     let folder = tempfile::tempdir().unwrap();
     let out = all.as_ref().map_or_else(|| folder.path().join("study"), PathBuf::from);

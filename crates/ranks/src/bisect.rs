@@ -139,7 +139,8 @@ impl Search {
             if above >= self.target || bin + 1 == BINS {
                 let (under, over) = (self.target.abs_diff(below), self.target.abs_diff(above));
                 if shift == 0 || under.min(over) <= fine {
-                    self.found = Some(if under <= over { (edge(bin), below) } else { (edge(bin) + (1 << shift), above) });
+                    self.found =
+                        Some(if under <= over { (edge(bin), below) } else { (edge(bin) + (1 << shift), above) });
                 } else {
                     self.prefix = self.prefix << 8 | bin as u64;
                     self.below = below;
@@ -177,7 +178,8 @@ fn axes(samples: &[Sample], parts: &[Part], sum: &mut dyn FnMut(&mut [u64])) -> 
     // What one side has too much of is done by it alone, while all ranks wait: it counts for every rank of the part.
     let cost = |k: usize, a: usize| {
         let (part, cut) = (&parts[k], &parts[k].cuts[a]);
-        crossed[3 * k + a].saturating_add(cut.below().abs_diff(cut.target).saturating_mul((part.end - part.first) as u64))
+        crossed[3 * k + a]
+            .saturating_add(cut.below().abs_diff(cut.target).saturating_mul((part.end - part.first) as u64))
     };
     (0..parts.len()).map(|k| (0..3).min_by_key(|&a| cost(k, a)).unwrap_or(0)).collect()
 }
@@ -220,7 +222,8 @@ mod tests {
 
     #[test]
     fn every_rank_gets_its_share_in_every_scenario_and_all_ranks_the_same_cuts() {
-        for scenario in [Scenario::Uniform, Scenario::Clustered, Scenario::Parked, Scenario::Stations, Scenario::Tower] {
+        for scenario in [Scenario::Uniform, Scenario::Clustered, Scenario::Parked, Scenario::Stations, Scenario::Tower]
+        {
             let scene = scenario.start(7000, 1);
             let boxes = scene.boxes();
             for ranks in [2, 3, 7, 16] {
@@ -234,7 +237,10 @@ mod tests {
                 assert!(found.iter().all(|cuts| *cuts == found[0]));
                 for (count, share) in counts(&found[0], boxes).into_iter().zip(&shares) {
                     let wanted = share * boxes.len() as f64;
-                    assert!((count as f64 - wanted).abs() < 0.01 * wanted + 4.0, "{scenario} {ranks}: {count} of {wanted}");
+                    assert!(
+                        (count as f64 - wanted).abs() < 0.01 * wanted + 4.0,
+                        "{scenario} {ranks}: {count} of {wanted}"
+                    );
                 }
             }
         }

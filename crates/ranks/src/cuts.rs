@@ -96,8 +96,11 @@ impl Cuts {
         let (mut plane, mut first, mut end) = (0, 0, self.regions.len());
         while end - first > 1 {
             let (Plane { axis, at }, half) = (self.planes[plane], middle(first, end));
-            (plane, first, end) =
-                if point[usize::from(axis)] < at { (plane + 1, first, half) } else { (plane + half - first, half, end) };
+            (plane, first, end) = if point[usize::from(axis)] < at {
+                (plane + 1, first, half)
+            } else {
+                (plane + half - first, half, end)
+            };
         }
         first
     }
@@ -178,12 +181,16 @@ mod tests {
                 let b = Aabb::new([0, 1, 2].map(|a| p[a].min(q[a])), [0, 1, 2].map(|a| p[a].max(q[a])));
                 let mut reached = Vec::new();
                 cuts.each_rank_of(&b, |r| reached.push(r));
-                assert!(reached.is_sorted_by(|x, y| x < y) && reached.contains(&own) && reached.contains(&cuts.rank_of(q)));
+                assert!(
+                    reached.is_sorted_by(|x, y| x < y) && reached.contains(&own) && reached.contains(&cuts.rank_of(q))
+                );
                 let inside = cuts.regions()[reached[0]].holds_all_of(&b);
                 assert!(!inside || reached.len() == 1, "{b:?} {reached:?}");
                 // A region that a plane through the box has made empty of it by another plane is reached by no point of it.
                 let region = |r: &usize| cuts.regions()[*r];
-                assert!(reached.iter().map(region).all(|r| (0..3).all(|a| b.min[a] <= r.high[a] && b.max[a] >= r.low[a])));
+                assert!(
+                    reached.iter().map(region).all(|r| (0..3).all(|a| b.min[a] <= r.high[a] && b.max[a] >= r.low[a]))
+                );
             }
         }
     }

@@ -89,7 +89,8 @@ impl<E: Exchange> Distributed<E> {
         agree(&mut exchange, own)?;
         let ranks = exchange.size();
         // `agree` has returned the error of this rank, or that of a lower one.
-        let adaptive = made.map_err(|_| Error::Search { rank: exchange.rank(), failure: crate::Failure::NoAlgorithm })?;
+        let adaptive =
+            made.map_err(|_| Error::Search { rank: exchange.rank(), failure: crate::Failure::NoAlgorithm })?;
         Ok(Self {
             exchange,
             search: LocalSearch::new(adaptive),
@@ -298,12 +299,9 @@ impl<E: Exchange> Distributed<E> {
             if region.holds_all_of(b) {
                 search.keep(*b, id);
             } else {
-                self.cuts.each_rank_of(
-                    b,
-                    |rank| {
-                        if rank == own { search.keep(*b, id) } else { outbox.push(rank, words(b, id)) }
-                    },
-                );
+                self.cuts.each_rank_of(b, |rank| {
+                    if rank == own { search.keep(*b, id) } else { outbox.push(rank, words(b, id)) }
+                });
             }
         }
         record

@@ -82,9 +82,9 @@ pub(crate) fn outcome(result: &Result<(), sapwise::Error>) -> Outcome {
         Err(sapwise::Error::TooManyPairs { limit }) => [1, *limit as u64],
         Err(sapwise::Error::TooManyObjects { objects }) => [2, *objects as u64],
         Err(sapwise::Error::OutOfMemory { elements, .. }) => [3, *elements as u64],
-        Err(sapwise::Error::Unavailable { .. } | sapwise::Error::UnknownAlgorithm { .. } | sapwise::Error::NoAlgorithm) => {
-            [4, 0]
-        }
+        Err(
+            sapwise::Error::Unavailable { .. } | sapwise::Error::UnknownAlgorithm { .. } | sapwise::Error::NoAlgorithm,
+        ) => [4, 0],
         Err(_) => [5, 0],
     }
 }

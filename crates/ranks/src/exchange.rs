@@ -20,5 +20,11 @@ pub trait Exchange {
     fn all_to_all(&mut self, send: &[u64], receive: &mut [u64]);
 
     /// The same with parts of their own lengths, one after another in the order of the ranks. Both ends know the lengths already.
-    fn all_to_all_varcount(&mut self, send: &[u64], send_counts: &[usize], receive: &mut [u64], receive_counts: &[usize]);
+    fn all_to_all_varcount(
+        &mut self,
+        send: &[u64],
+        send_counts: &[usize],
+        receive: &mut [u64],
+        receive_counts: &[usize],
+    );
 }

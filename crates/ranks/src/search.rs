@@ -96,7 +96,11 @@ impl LocalSearch {
     pub(crate) fn owner(&self, at: u32, own: usize) -> usize {
         let at = at as usize;
         // `ends` is empty where no other rank is.
-        if self.ends.first().is_none_or(|end| at < *end) { own } else { self.ends.partition_point(|end| *end <= at) - 1 }
+        if self.ends.first().is_none_or(|end| at < *end) {
+            own
+        } else {
+            self.ends.partition_point(|end| *end <= at) - 1
+        }
     }
 
     /// Finds the pairs of these boxes, for [`found`](Self::found), and takes the time.
@@ -135,7 +139,8 @@ impl LocalSearch {
     pub(crate) fn predictor(&self) -> impl Fn(&Load) -> f64 + use<> {
         let tuning = self.adaptive.learned();
         let measured = self.times.medians().zip(self.load());
-        let correction = measured.map_or(1.0, |((_, ns), load)| (ns as f64 / predicted_ns(&tuning, &load)).clamp(1e-3, 1e3));
+        let correction =
+            measured.map_or(1.0, |((_, ns), load)| (ns as f64 / predicted_ns(&tuning, &load)).clamp(1e-3, 1e3));
         move |load| correction * predicted_ns(&tuning, load)
     }
 

@@ -54,7 +54,8 @@ impl Threads {
                 scope.spawn(move || work(own))
             };
             let threads: Vec<_> = (0..ranks).map(start).collect();
-            let join = |t: std::thread::ScopedJoinHandle<'_, T>| t.join().unwrap_or_else(|p| std::panic::resume_unwind(p));
+            let join =
+                |t: std::thread::ScopedJoinHandle<'_, T>| t.join().unwrap_or_else(|p| std::panic::resume_unwind(p));
             threads.into_iter().map(join).collect()
         })
     }
@@ -117,7 +118,13 @@ impl Exchange for Threads {
         self.all_to_all_varcount(send, &counts, receive, &counts);
     }
 
-    fn all_to_all_varcount(&mut self, send: &[u64], send_counts: &[usize], receive: &mut [u64], receive_counts: &[usize]) {
+    fn all_to_all_varcount(
+        &mut self,
+        send: &[u64],
+        send_counts: &[usize],
+        receive: &mut [u64],
+        receive_counts: &[usize],
+    ) {
         let offer = (send.to_vec(), crate::outbox::starts(send_counts));
         *lock(&self.shared.offers[self.rank]) = offer;
         self.meet();

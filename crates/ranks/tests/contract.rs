@@ -100,7 +100,8 @@ fn only_what_crosses_is_sent() {
 fn a_rank_that_has_no_algorithm_is_told_on_all() {
     let errors = Threads::run(3, |threads| {
         let registry = Registry::with_cores(1);
-        let unknown = Tuning::from_steps(vec![sapwise::Step::new(0, "bvh@cpu64".parse::<AlgorithmId>().unwrap())]).unwrap();
+        let unknown =
+            Tuning::from_steps(vec![sapwise::Step::new(0, "bvh@cpu64".parse::<AlgorithmId>().unwrap())]).unwrap();
         let tuning = if threads.rank() == 2 { unknown } else { Tuning::usual(&registry) };
         Distributed::<Threads>::new(threads, &registry, tuning).map(|_| ()).unwrap_err()
     });

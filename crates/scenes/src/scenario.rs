@@ -179,7 +179,9 @@ impl Scenario {
             Self::Layers => "thin floors of flat boxes, none of which touches another",
             Self::Plates => "unit cubes between packs of plates as wide as the world",
             Self::Rods => "unit cubes and rods of length 30 along random axes",
-            Self::StaticWorld => "a hilly ground of overlapping boxes that never move, and one object in twenty that does",
+            Self::StaticWorld => {
+                "a hilly ground of overlapping boxes that never move, and one object in twenty that does"
+            }
             Self::Asleep => "unit cubes, one in fifty of them four million edges below",
             Self::Tower => "unit cubes stacked on one line",
             Self::Aliased => "unit cubes, and far ones wherever an evenly spaced sample looks",

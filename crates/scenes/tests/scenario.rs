@@ -34,7 +34,10 @@ fn names_are_read_back_and_others_refused_with_a_list() {
         assert!(!scenario.description().is_empty() && !scenario.description().contains('\n'));
     }
     let error = "Uniform".parse::<Scenario>().unwrap_err().to_string();
-    assert!(error.contains("\"Uniform\"") && error.contains("uniform, fast,") && error.contains("free-fall"), "{error}");
+    assert!(
+        error.contains("\"Uniform\"") && error.contains("uniform, fast,") && error.contains("free-fall"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -113,7 +116,11 @@ fn nothing_drifts_away_in_a_hundred_thousand_frames() {
                 advance(&mut scene, 1000);
                 assert_sound(&scene, &format!("{scenario} with {objects}"));
                 let far = |(now, then): (&Aabb, &Aabb)| (0..3).any(|a| (now.min[a] - then.min[a]).abs() > 100.0);
-                assert!(!scene.boxes().iter().zip(&began).any(far), "{scenario} with {objects}, frame {}", scene.frame());
+                assert!(
+                    !scene.boxes().iter().zip(&began).any(far),
+                    "{scenario} with {objects}, frame {}",
+                    scene.frame()
+                );
             }
         }
     }
@@ -134,7 +141,9 @@ fn pairs_per_object_stay_in_the_documented_band() {
             Scenario::StaticWorld => (10.0, 11.0),
             Scenario::Tower => (0.999, 1.0),
             Scenario::Rods => (0.06, 0.12),
-            Scenario::Parked | Scenario::Plates | Scenario::Asleep | Scenario::Aliased | Scenario::Teleport => (0.06, 0.13),
+            Scenario::Parked | Scenario::Plates | Scenario::Asleep | Scenario::Aliased | Scenario::Teleport => {
+                (0.06, 0.13)
+            }
             _ => (0.4, 0.55),
         };
         let mut scene = scenario.start(2000, 2);
@@ -192,7 +201,10 @@ fn those_that_never_move_are_named() {
         for _ in 0..620 {
             scene.advance();
             // The number of objects changes in `fragmentation`, and with it who is where.
-            moved.iter_mut().zip(scene.boxes().iter().zip(&began)).for_each(|(moved, (now, then))| *moved |= now != then);
+            moved
+                .iter_mut()
+                .zip(scene.boxes().iter().zip(&began))
+                .for_each(|(moved, (now, then))| *moved |= now != then);
         }
         let still = (0..2000).filter(|&k| scene.is_fixed(k)).count();
         let expected = match scenario {
@@ -202,7 +214,10 @@ fn those_that_never_move_are_named() {
             _ => 0,
         };
         assert_eq!(still, expected, "{scenario}");
-        assert!(moved.iter().enumerate().all(|(k, &moved)| moved != scene.is_fixed(k) || k >= began.len()), "{scenario}");
+        assert!(
+            moved.iter().enumerate().all(|(k, &moved)| moved != scene.is_fixed(k) || k >= began.len()),
+            "{scenario}"
+        );
         assert!(!scene.is_fixed(2000), "{scenario}");
     }
 }

@@ -105,7 +105,12 @@ fn main() -> ExitCode {
     };
     println!("{:>6} {:>9} {:>9} {:>9} {:>9}  algorithm", "step", "entities", "pairs", "begun", "ended");
     let exit = App::new()
-        .add_plugins((TaskPoolPlugin::default(), TimePlugin, ScheduleRunnerPlugin::run_loop(Duration::ZERO), SapwisePlugin))
+        .add_plugins((
+            TaskPoolPlugin::default(),
+            TimePlugin,
+            ScheduleRunnerPlugin::run_loop(Duration::ZERO),
+            SapwisePlugin,
+        ))
         // One fixed step for each turn of the loop, however long that takes.
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
         .insert_resource(Course { steps, step: 0, random: 0x5eed, begun: 0, ended: 0 })

@@ -110,7 +110,11 @@ fn pairs_and_their_changes_are_those_of_the_double_loop_in_every_step() {
         gone += ended.iter().filter(|(a, b)| [a, b].iter().any(|&&e| app.world().get_entity(e).is_err())).count();
         before = now;
     }
-    assert!(before.len() > 20 && gone > 100, "{} pairs at last, {gone} ended by entities that were despawned", before.len());
+    assert!(
+        before.len() > 20 && gone > 100,
+        "{} pairs at last, {gone} ended by entities that were despawned",
+        before.len()
+    );
 }
 
 #[test]

@@ -181,10 +181,21 @@ impl Comparison {
         self.step += 1;
         let boxes = self.colliders.len();
         let found = &self.own.pairs;
-        Ok(Counts { boxes, overlapping: found.overlapping(), wanted: found.len(), own: own.len(), rapier: rapier.len() })
+        Ok(Counts {
+            boxes,
+            overlapping: found.overlapping(),
+            wanted: found.len(),
+            own: own.len(),
+            rapier: rapier.len(),
+        })
     }
 
-    fn differ(&self, ours: &HashSet<(usize, usize)>, theirs: &HashSet<(usize, usize)>, kept: bool) -> Result<(), Mismatch> {
+    fn differ(
+        &self,
+        ours: &HashSet<(usize, usize)>,
+        theirs: &HashSet<(usize, usize)>,
+        kept: bool,
+    ) -> Result<(), Mismatch> {
         // The first in the order of the boxes, so that the same fault is told by the same words.
         let Some(&pair) = ours.symmetric_difference(theirs).min() else { return Ok(()) };
         let boxes = if kept { &self.kept.boxes } else { &self.own.boxes };

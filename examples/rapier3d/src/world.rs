@@ -72,7 +72,8 @@ impl World {
     pub fn new(settings: Settings) -> Self {
         let mut physics = PhysicsWorld::new();
         let slab = |x: f32, y: f32, z: f32| ColliderBuilder::cuboid(x, y, z).restitution(0.2);
-        let mut fixed = |at: Vector, slab: ColliderBuilder| physics.insert(RigidBodyBuilder::fixed().translation(at), slab);
+        let mut fixed =
+            |at: Vector, slab: ColliderBuilder| physics.insert(RigidBodyBuilder::fixed().translation(at), slab);
         fixed(Vector::new(0.0, -0.5, 0.0), slab(PIT + 1.0, 0.5, PIT + 1.0));
         for side in [-1.0, 1.0] {
             let away = side * (PIT + 0.5);

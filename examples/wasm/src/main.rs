@@ -4,7 +4,8 @@
 //! `tools/wasm.sh` builds it for wasm32-unknown-unknown and runs it in Node.js; `cargo run -p sapwise-example-wasm` runs it here.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Load, PairOrder, Pairs, Registry, Source, Term, Tuning,
+    Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Load, PairOrder, Pairs, Registry, Source, Term,
+    Tuning,
 };
 
 /// The last frame has 1500 boxes.
@@ -45,7 +46,8 @@ fn main() {
 /// Brute force is cheaper below a few hundred boxes, the grid above.
 fn tuning(registry: &Registry) -> Tuning {
     let cost = |id: &str, term: Term, unit_ns: f64| {
-        let entry = registry.available().into_iter().find(|entry| entry.id.to_string() == id).expect("a method of ours");
+        let entry =
+            registry.available().into_iter().find(|entry| entry.id.to_string() == id).expect("a method of ours");
         AlgorithmCost::new(entry.id, entry.revision, CostCurve::new(vec![CostTerm { term, unit_ns }]), 0.1)
     };
     let loads: Vec<Load> = (1..=14).map(|k| Load::of_objects(1 << k)).collect();
@@ -74,8 +76,9 @@ fn boxes(frame: usize) -> Vec<Aabb> {
 
 fn overlapping(boxes: &[Aabb]) -> Vec<(u32, u32)> {
     let all = 0..boxes.len();
-    let after =
-        |i: usize| (i + 1..boxes.len()).filter(move |&j| boxes[i].overlaps(&boxes[j])).map(move |j| (i as u32, j as u32));
+    let after = |i: usize| {
+        (i + 1..boxes.len()).filter(move |&j| boxes[i].overlaps(&boxes[j])).map(move |j| (i as u32, j as u32))
+    };
     all.flat_map(after).collect()
 }
 

@@ -37,8 +37,9 @@ fn lines(text: &str) -> Vec<&str> {
     for (k, part) in text.split("```").enumerate() {
         match part.strip_prefix("sh\n") {
             Some(shell) if k % 2 == 1 => found.extend(shell.lines()),
-            _ if k % 2 == 0 => found
-                .extend(part.split('`').skip(1).step_by(2).filter(|code| code.contains(" --") && !code.contains("--help"))),
+            _ if k % 2 == 0 => found.extend(
+                part.split('`').skip(1).step_by(2).filter(|code| code.contains(" --") && !code.contains("--help")),
+            ),
             _ => {}
         }
     }

@@ -97,7 +97,9 @@ impl FromStr for Scene {
         match text.parse() {
             Ok(scenario) => Ok(Self::Scenario(scenario)),
             // A file that is missing or of another format is reported by the code that reads it.
-            Err(_) if path.extension().is_some_and(|e| e == "npy") || path.exists() => Ok(Self::Stream(path.to_owned())),
+            Err(_) if path.extension().is_some_and(|e| e == "npy") || path.exists() => {
+                Ok(Self::Stream(path.to_owned()))
+            }
             Err(why) => Err(format!("{why}; or name a file of boxes, as `--record S.npy` writes it")),
         }
     }

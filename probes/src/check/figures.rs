@@ -100,7 +100,8 @@ fn impossible_provenance(report: &Report) -> Vec<String> {
     if let Some(simd) = provenance.simd.as_ref().filter(|simd| **simd != hardware.machine.simd) {
         found.push(format!("{simd} was forced, and {} was in use", hardware.machine.simd));
     }
-    if let (Ok(level), Some(lanes)) = (hardware.machine.simd.parse::<SimdLevel>(), hardware.value(ParameterId::SimdLanes))
+    if let (Ok(level), Some(lanes)) =
+        (hardware.machine.simd.parse::<SimdLevel>(), hardware.value(ParameterId::SimdLanes))
         && lanes != f64::from(level.lanes())
     {
         found.push(format!("simd_lanes is {lanes}, and {level} has {}", level.lanes()));

@@ -25,7 +25,8 @@ pub(super) fn revealing(report: &Report) -> Vec<String> {
 fn is_told_anyway(report: &Report, host: &str) -> bool {
     let machine = &report.hardware.machine;
     let gpus = report.hardware.gpus.iter().flat_map(|g| [&g.gpu.name, &g.gpu.device, &g.gpu.driver, &g.gpu.api]);
-    let names = [&machine.cpu, &machine.vendor].into_iter().chain(gpus).chain(report.points.iter().map(|p| &p.scenario));
+    let names =
+        [&machine.cpu, &machine.vendor].into_iter().chain(gpus).chain(report.points.iter().map(|p| &p.scenario));
     names.into_iter().any(|name| holds_host(name, host))
 }
 
@@ -39,7 +40,8 @@ fn host() -> Option<String> {
 fn walk(value: &Value, field: &str, host: Option<&str>, found: &mut Vec<String>) {
     match value {
         Value::String(text) => {
-            found.extend(reveals(text, host).map(|what| format!("{field} holds {what}: {text:?}; take it out by hand")));
+            found
+                .extend(reveals(text, host).map(|what| format!("{field} holds {what}: {text:?}; take it out by hand")));
         }
         Value::Array(list) => {
             list.iter().enumerate().for_each(|(k, v)| walk(v, &format!("{field}[{k}]"), host, found));

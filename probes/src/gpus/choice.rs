@@ -42,7 +42,8 @@ impl GpuChoice {
 
     /// Removes GPUs that are not wanted from the timings of a report; its hardware stays as it is.
     pub(crate) fn restrict(&self, report: &mut Report) {
-        let wanted: Vec<u32> = report.hardware.gpus.iter().filter(|g| self.takes(&g.gpu)).map(|g| g.gpu.index).collect();
+        let wanted: Vec<u32> =
+            report.hardware.gpus.iter().filter(|g| self.takes(&g.gpu)).map(|g| g.gpu.index).collect();
         let stays = |id: &AlgorithmId| uses(id).iter().all(|k| wanted.contains(k));
         report.algorithms.retain(|t| stays(&t.id));
         report.points.iter_mut().for_each(|p| p.timings.retain(|t| stays(&t.algorithm)));
@@ -57,7 +58,9 @@ impl GpuChoice {
         let (verb, what, them) =
             if names.len() == 1 { ("is", "a software adapter", "it") } else { ("are", "software adapters", "them") };
         let names = names.join(", ");
-        Some(format!("Not used: {names} {verb} {what}, slower than the CPU. Use --software-gpus to measure {them} anyway."))
+        Some(format!(
+            "Not used: {names} {verb} {what}, slower than the CPU. Use --software-gpus to measure {them} anyway."
+        ))
     }
 }
 

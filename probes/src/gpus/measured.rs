@@ -86,8 +86,11 @@ impl Measured {
 
     /// Every set of several GPUs that our algorithms run on.
     fn measure_groups(&mut self, threads: Option<u32>) -> anyhow::Result<()> {
-        let mut sets: Vec<Vec<u32>> =
-            sapwise::gpu::algorithms(&self.usable).iter().map(|e| uses(&e.id).to_vec()).filter(|s| s.len() > 1).collect();
+        let mut sets: Vec<Vec<u32>> = sapwise::gpu::algorithms(&self.usable)
+            .iter()
+            .map(|e| uses(&e.id).to_vec())
+            .filter(|s| s.len() > 1)
+            .collect();
         sets.dedup();
         for set in sets {
             if self.groups.iter().any(|g| g.gpus == set) {

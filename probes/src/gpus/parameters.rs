@@ -19,7 +19,8 @@ pub(crate) fn print_identities() -> anyhow::Result<()> {
 /// When there is no such GPU, or standard output can't be written.
 pub(crate) fn print_parameters(index: u32, options: &Options) -> anyhow::Result<()> {
     let gpus = Gpus::find();
-    let identity = gpus.identities().find(|g| g.index == index).ok_or_else(|| anyhow!("there is no gpu{index} any more"))?;
+    let identity =
+        gpus.identities().find(|g| g.index == index).ok_or_else(|| anyhow!("there is no gpu{index} any more"))?;
     let hardware = sapwise::measure::gpu(&gpus, index, options)
         .unwrap_or_else(|why| without_parameters(identity.clone(), &why.to_string()));
     crate::output::print_json(&hardware)

@@ -120,7 +120,8 @@ mod tests {
     #[test]
     fn two_cores_with_two_programs_are_as_in_the_datasets() {
         let undisturbed = ["full", "avx2", "portable", "1t", "avx2-1t", "portable-1t"];
-        let contended = |kind: &str| undisturbed.map(|n| if n == "full" { kind.to_owned() } else { format!("{kind}-{n}") });
+        let contended =
+            |kind: &str| undisturbed.map(|n| if n == "full" { kind.to_owned() } else { format!("{kind}-{n}") });
         let on_gpus = [
             "lavapipe",
             "lavapipe-1t",

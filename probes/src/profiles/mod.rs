@@ -91,14 +91,21 @@ fn take_files(folder: &Path) -> anyhow::Result<()> {
 }
 
 /// The profiles, what each of them is and how long it takes.
-fn listing(family: &[Profile], done: &[Option<PathBuf>], arguments: &Probe, scenarios: &[Scenario], stem: &str) -> String {
+fn listing(
+    family: &[Profile],
+    done: &[Option<PathBuf>],
+    arguments: &Probe,
+    scenarios: &[Scenario],
+    stem: &str,
+) -> String {
     let mut rows = vec![["profile", "at most", "command"].map(str::to_owned).to_vec()];
     let mut left = Duration::ZERO;
     for (profile, done) in family.iter().zip(done) {
         let time = profile.time(scenarios, arguments.max_objects);
         left += if done.is_some() { Duration::ZERO } else { time };
         let numbers: Vec<u32> = profile.gpus.iter().map(|g| g.index).collect();
-        let variables = profile.variables().into_iter().map(|(name, value)| format!("{name}={value} ")).collect::<String>();
+        let variables =
+            profile.variables().into_iter().map(|(name, value)| format!("{name}={value} ")).collect::<String>();
         let command = format!("{variables}sapwise {}", profile.arguments(arguments, &numbers).join(" "));
         let time = if done.is_some() { "complete".to_owned() } else { HumanDuration(time).to_string() };
         rows.push(vec![format!("{stem}-{}", profile.name), time, command]);

@@ -116,7 +116,8 @@ mod tests {
         assert_eq!(machine_stem("AMD EPYC", 2), "amd-epyc-2c");
         let named = |name: &str| is_named(&Path::new("reports").join(name), "amd-epyc-2c-avx2");
         assert!(named("amd-epyc-2c-avx2--2026-11-21.json"));
-        for other in ["amd-epyc-2c-avx2-1t--2026-11-21.json", "amd-epyc-2c-avx2--old.json", "amd-epyc-2c-avx2.json", ""] {
+        for other in ["amd-epyc-2c-avx2-1t--2026-11-21.json", "amd-epyc-2c-avx2--old.json", "amd-epyc-2c-avx2.json", ""]
+        {
             assert!(!named(other), "{other}");
         }
     }

@@ -46,12 +46,13 @@ impl Existing<'_> {
             return None;
         }
         match read_document(path, &output::warn) {
-            Ok(Document::Report(report)) if report.hardware.machine.physical_id == self.physical_id => {
-                self.keeps(&report, profile).map(|why| format!("{}: {why}; name another folder with --out", path.display()))
-            }
-            _ => {
-                Some(format!("{} is no report of this machine; move it, or name another folder with --out", path.display()))
-            }
+            Ok(Document::Report(report)) if report.hardware.machine.physical_id == self.physical_id => self
+                .keeps(&report, profile)
+                .map(|why| format!("{}: {why}; name another folder with --out", path.display())),
+            _ => Some(format!(
+                "{} is no report of this machine; move it, or name another folder with --out",
+                path.display()
+            )),
         }
     }
 
@@ -173,7 +174,8 @@ mod tests {
         report.provenance.gpu_threads = None;
         let physical_id = report.hardware.machine.physical_id.clone();
         let folder = Path::new("reports");
-        let existing = Existing { folder, stem: "x-2c", physical_id: &physical_id, registry: &registry, family: &family_of };
+        let existing =
+            Existing { folder, stem: "x-2c", physical_id: &physical_id, registry: &registry, family: &family_of };
         let whole = Whole { cores: 2, level: SimdLevel::Portable, gpus: Vec::new() };
         let profile = family(&whole, false).into_iter().find(|p| p.name == "1t").unwrap();
         let mut own = report.clone();

@@ -119,8 +119,11 @@ impl<'a> ProfileRunner<'a> {
         match ended {
             Ended::Interrupted => return Ok(None),
             Ended::Badly(how) => {
-                let kept =
-                    if unfinished.exists() { format!("; {} is what it left", unfinished.display()) } else { String::new() };
+                let kept = if unfinished.exists() {
+                    format!("; {} is what it left", unfinished.display())
+                } else {
+                    String::new()
+                };
                 return failed(format!("its process {how}{kept}"));
             }
             // It ends well where Ctrl-C came too late for it.
@@ -189,6 +192,7 @@ fn read(path: &Path) -> anyhow::Result<Report> {
 
 /// A path as an argument.
 fn text(path: &Path) -> anyhow::Result<&str> {
-    let shown = || format!("{} holds characters that can't be handed on; name another folder with --out", path.display());
+    let shown =
+        || format!("{} holds characters that can't be handed on; name another folder with --out", path.display());
     path.to_str().ok_or_else(|| anyhow::anyhow!(shown()))
 }

@@ -120,7 +120,8 @@ impl Slowdown {
     /// `loops` are the times of the loop with the frames beside which it ran.
     pub(super) fn new(co_runner: CoRunner, loops: &[(usize, f64)]) -> Self {
         let mean = |after: bool| {
-            let times: Vec<f64> = loops.iter().filter(|l| (l.0 >= co_runner.from_frame) == after).map(|l| l.1).collect();
+            let times: Vec<f64> =
+                loops.iter().filter(|l| (l.0 >= co_runner.from_frame) == after).map(|l| l.1).collect();
             (!times.is_empty()).then(|| times.iter().sum::<f64>() / times.len() as f64)
         };
         Self { co_runner, of_a_loop: mean(true).zip(mean(false)).map(|(after, before)| after / before) }

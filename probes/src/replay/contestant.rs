@@ -46,7 +46,9 @@ impl Contestant {
     /// Whether another sample at this frame would tell nothing. `best` is the fastest sample of all contestants there.
     pub(super) fn is_skipped(&self, frame: usize, objects: usize, best: f64) -> bool {
         let samples = &self.samples[frame];
-        self.algorithm.is_none() || objects >= self.too_many || samples.len() >= 2 && samples.fastest() > HOPELESS * best
+        self.algorithm.is_none()
+            || objects >= self.too_many
+            || samples.len() >= 2 && samples.fastest() > HOPELESS * best
     }
 
     /// Notes whether a frame with so many objects took too long.

@@ -37,7 +37,12 @@ pub(crate) struct Told {
 
 impl Frame {
     /// `taken` is what ran at this frame and at the one before it, in each repeat.
-    pub(super) fn new(objects: usize, adaptive: Samples, fixed: Vec<Samples>, taken: &[(Taken, Option<Taken>)]) -> Self {
+    pub(super) fn new(
+        objects: usize,
+        adaptive: Samples,
+        fixed: Vec<Samples>,
+        taken: &[(Taken, Option<Taken>)],
+    ) -> Self {
         Self {
             objects,
             adaptive_ns: mean_over_kinds(&adaptive, taken),

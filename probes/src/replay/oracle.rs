@@ -75,7 +75,8 @@ impl Oracle {
 
 /// What one half of the repeats holds for the best at each frame. With one repeat there is one half, which decides for both.
 fn choices(frames: &[Frame], half: usize, sight: Sight) -> Vec<Option<usize>> {
-    let half = if frames.iter().any(|f| f.fixed.iter().any(|s| s.half(half).next().is_some())) { half } else { 1 - half };
+    let half =
+        if frames.iter().any(|f| f.fixed.iter().any(|s| s.half(half).next().is_some())) { half } else { 1 - half };
     let least = |time: &dyn Fn(usize) -> Option<f64>| {
         let count = frames.first().map_or(0, |f| f.fixed.len());
         let times = (0..count).filter_map(|k| Some((k, time(k)?)));
@@ -146,8 +147,9 @@ mod tests {
     #[test]
     fn in_a_window_an_algorithm_pays_for_what_it_keeps() {
         // The first is cheap but for one frame in eight; the second is always as dear as the mean of a little less.
-        let frames: Vec<Frame> =
-            (0..WINDOW).map(|at| frame(100, &[if at % 8 == 0 { &[90.0; 4] } else { &[10.0; 4] }, &[18.0; 4]])).collect();
+        let frames: Vec<Frame> = (0..WINDOW)
+            .map(|at| frame(100, &[if at % 8 == 0 { &[90.0; 4] } else { &[10.0; 4] }, &[18.0; 4]]))
+            .collect();
         let total = |oracle: Oracle| oracle.ns.iter().sum::<f64>();
         assert_eq!(total(Oracle::new(&frames)), 4.0 * (18.0 + 7.0 * 10.0));
         assert_eq!(total(Oracle::of_windows(&frames)), 32.0 * 18.0);
@@ -157,7 +159,8 @@ mod tests {
     fn frames_about_it_choose_better_than_a_noisy_one() {
         let (quiet, noisy) = ([10.0; 4], [10.0, 30.0, 10.0, 30.0]);
         let other = [12.0; 4];
-        let frames: Vec<Frame> = (0..9).map(|at| frame(100, &[if at == 4 { &noisy } else { &quiet }, &other])).collect();
+        let frames: Vec<Frame> =
+            (0..9).map(|at| frame(100, &[if at == 4 { &noisy } else { &quiet }, &other])).collect();
         // By itself the odd half prefers the second in the noisy frame, and pays for it in the even one.
         let by_frame = Oracle::with(&frames, Sight::Frame);
         assert_eq!((by_frame.ns[3], by_frame.ns[4]), (10.0, 21.0));

@@ -99,7 +99,8 @@ fn a_recorded_stream_runs_like_the_scene_that_it_was_recorded_from() {
     scene.source.record(&path, 80).unwrap();
     let source = FrameSource::Stream { name: "scene.npy".to_owned(), frames: Frames::read(&path).unwrap() };
     let (registry, tuning) = (Registry::with_cores(1), steps(&[(0, "brute@cpu1"), (60, "grid-sap@cpu1")]));
-    let stream = replay(&ReplaySettings { source, ..settings(Scenario::Uniform, 0, 80, 1) }, &tuning, &registry).unwrap();
+    let stream =
+        replay(&ReplaySettings { source, ..settings(Scenario::Uniform, 0, 80, 1) }, &tuning, &registry).unwrap();
     let scene = replay(&scene, &tuning, &registry).unwrap();
     let objects = |o: &Outcome| o.frames.iter().map(|f| f.objects).collect::<Vec<_>>();
     assert_eq!(objects(&stream), objects(&scene));

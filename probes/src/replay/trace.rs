@@ -93,7 +93,10 @@ mod tests {
         assert_eq!((cell(1, "objects"), cell(1, "algorithm"), cell(1, "measured_ns")), ("10", "brute@gpu0+1", ""));
         assert_eq!((cell(1, "grid-sap@cpu1_ns"), cell(1, "brute@gpu0+1_ns")), ("1000000", "4000000"));
         assert_eq!((cell(2, "grid-sap@cpu1_ns"), cell(2, "brute@gpu0+1_ns")), ("", "2000000"));
-        assert_eq!((cell(2, "reason"), cell(2, "runner_up"), cell(2, "runner_up_ns")), ("explored", "sap@cpu2", "7000000"));
+        assert_eq!(
+            (cell(2, "reason"), cell(2, "runner_up"), cell(2, "runner_up_ns")),
+            ("explored", "sap@cpu2", "7000000")
+        );
         assert_eq!((cell(2, "adaptive_ns"), cell(2, "oracle_ns")), ("3000000", "2000000"));
     }
 

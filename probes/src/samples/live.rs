@@ -40,7 +40,16 @@ impl Live {
         let incremental = IncrementalMethods::find();
         let progress = Progress::new((SECONDS * 1e3) as u64);
         progress.message(if session.gpus.is_empty() { "samples" } else { "opening GPUs for samples" });
-        Self { session, dialogue: None, incremental, end: None, foreign_load, remarks: Vec::new(), wrong: false, progress }
+        Self {
+            session,
+            dialogue: None,
+            incremental,
+            end: None,
+            foreign_load,
+            remarks: Vec::new(),
+            wrong: false,
+            progress,
+        }
     }
 
     /// What the user should know of how the samples were taken, and whether an algorithm returned a wrong answer.

@@ -106,7 +106,8 @@ impl Sampler {
         let Some(ns) = median(&samples) else { return Ok(Reply::TooSlow) };
         let spread = relative_iqr(&samples.iter().map(|&s| s as f64).collect::<Vec<f64>>());
         // With fewer than four frames there is no range between quartiles; a tenth is what single frames differ by.
-        let noise_ln = MEDIAN_OVER_MEAN * spread.map_or(0.1, |s| s / IQR_OVER_DEVIATION) / (samples.len() as f64).sqrt();
+        let noise_ln =
+            MEDIAN_OVER_MEAN * spread.map_or(0.1, |s| s / IQR_OVER_DEVIATION) / (samples.len() as f64).sqrt();
         Ok(Reply::Taken { ns, noise_ln, foreign_load: None })
     }
 
@@ -129,8 +130,9 @@ impl Sampler {
             return Some(format!("wrong pairs: {found} where {} are right", request.pairs));
         }
         let known = *self.fingerprints.entry(request.objects).or_insert(fingerprint);
-        (known != fingerprint)
-            .then(|| format!("wrong pairs: their fingerprint is {fingerprint:016x}, that of another algorithm {known:016x}"))
+        (known != fingerprint).then(|| {
+            format!("wrong pairs: their fingerprint is {fingerprint:016x}, that of another algorithm {known:016x}")
+        })
     }
 }
 

@@ -149,7 +149,8 @@ fn candidate<'a>(scenario: &'a str, objects: u32, rivals: &[Rival]) -> Option<Ca
         // Not known here is which algorithms are incremental and need a warm-up. Every one gets time for it: a visit that ends early costs nothing.
         ns += rival.log.exp() * (FRAMES + WARM_UP as f64);
         if gap > 0.0 {
-            candidate.worth = f64::max(candidate.worth, expected_loss(gap, error(0.0)) - expected_loss(gap, error(1.0)));
+            candidate.worth =
+                f64::max(candidate.worth, expected_loss(gap, error(0.0)) - expected_loss(gap, error(1.0)));
         }
     }
     candidate.seconds = ns / 1e9;
@@ -190,7 +191,11 @@ mod tests {
     /// Costs n^2 / 10 and 30 n, which cross at 300, and one that is far behind.
     fn course(scenario: &str, sizes: &[u32]) -> Vec<Point> {
         let costs = |n: u32| {
-            [("brute", f64::from(n) * f64::from(n) / 10.0), ("grid-sap", 30.0 * f64::from(n)), ("sap", 900.0 * f64::from(n))]
+            [
+                ("brute", f64::from(n) * f64::from(n) / 10.0),
+                ("grid-sap", 30.0 * f64::from(n)),
+                ("sap", 900.0 * f64::from(n)),
+            ]
         };
         sizes.iter().map(|&n| point(scenario, n, &costs(n))).collect()
     }

@@ -105,7 +105,8 @@ mod tests {
         let same: Vec<u64> = one.iter().map(|ns| ns + ns / 1000).collect();
         assert!(Contest::judge(&[&one, &same]).decided);
         // Two per cent faster or slower from frame to frame, with a difference of 1 % at the median.
-        let doubtful: Vec<u64> = one.iter().enumerate().map(|(k, ns)| ns * (950 + (k as u64 % 5) * 30) / 1000).collect();
+        let doubtful: Vec<u64> =
+            one.iter().enumerate().map(|(k, ns)| ns * (950 + (k as u64 % 5) * 30) / 1000).collect();
         assert!(!Contest::judge(&[&one, &doubtful]).decided);
     }
 }

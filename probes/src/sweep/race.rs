@@ -219,8 +219,11 @@ impl Race {
     fn point(&self, racers: &[Racer], scene: &Scene, load: Load) -> Point {
         let answer = racers.iter().filter(|r| r.error.is_none()).find_map(|r| r.answer);
         let answer = answer.unwrap_or(Answer { pairs: 0, fingerprint: 0 });
-        let timings =
-            racers.iter().map(|r| Timing { algorithm: r.id.clone(), samples_ns: r.samples.clone(), error: r.error.clone() });
+        let timings = racers.iter().map(|r| Timing {
+            algorithm: r.id.clone(),
+            samples_ns: r.samples.clone(),
+            error: r.error.clone(),
+        });
         Point {
             scenario: scene.scenario().to_string(),
             load,
@@ -359,7 +362,10 @@ mod tests {
         let [without, with] = {
             let frames = [(); 2].map(|()| Arc::<AtomicUsize>::default());
             let racer = |k: usize| {
-                Racer::new(format!("counting@cpu{}", k + 1).parse().unwrap(), Box::new(Counting(frames[k].clone(), k == 1)))
+                Racer::new(
+                    format!("counting@cpu{}", k + 1).parse().unwrap(),
+                    Box::new(Counting(frames[k].clone(), k == 1)),
+                )
             };
             let mut racers = vec![racer(0), racer(1)];
             let mut scene = sapwise_scenes::Scenario::Resting.start(1, 1);

@@ -238,7 +238,8 @@ mod tests {
     #[test]
     fn visits_race_only_those_who_were_asked() {
         let algorithms: Vec<AlgorithmId> = ["brute@cpu1", "sap@cpu1"].map(|id| id.parse().unwrap()).into();
-        let visit = |objects, algorithms: &[AlgorithmId]| Visit { objects, seconds: 0.0, algorithms: algorithms.into() };
+        let visit =
+            |objects, algorithms: &[AlgorithmId]| Visit { objects, seconds: 0.0, algorithms: algorithms.into() };
         // With one alone no choice is in doubt.
         let visits = vec![visit(300, &algorithms), visit(20, &algorithms), visit(50, &algorithms[..1])];
         let request = SweepRequest { schedule: Schedule::Visits(visits), ..request("clustered", &[], 60.0) };

@@ -35,12 +35,15 @@ pub(crate) fn run(arguments: &args::Fleet, algorithms: &Algorithms) -> anyhow::R
     let here = Here::new(algorithms);
     let mut failed: Vec<Failed> = Vec::new();
     let mut fail = |file: &Path, problem: String| {
-        failed.push(Failed { file: file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned(), problem });
+        failed.push(Failed {
+            file: file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned(),
+            problem,
+        });
     };
     let unfinished = unfinished(&arguments.reports)?;
     // A folder where every node has failed holds no report at all.
-    let files =
-        report_files(&arguments.reports).or_else(|why| if unfinished.is_empty() { Err(why) } else { Ok(Vec::new()) })?;
+    let files = report_files(&arguments.reports)
+        .or_else(|why| if unfinished.is_empty() { Err(why) } else { Ok(Vec::new()) })?;
     refuse_twice(&files)?;
     for file in unfinished {
         fail(&file, "unfinished: the node failed, its job was ended, or it measures still".to_owned());
@@ -111,8 +114,13 @@ fn table(answer: &Answer, terminal: Terminal) -> String {
         let dash = || "-".to_owned();
         rows.push(vec![file.clone(), dash(), dash(), dash(), dash(), terminal.bad(problem)]);
     }
-    let kinds: String =
-        answer.fleet.kinds.iter().enumerate().map(|(k, kind)| format!("Kind {}: {}\n", k + 1, sentence(kind))).collect();
+    let kinds: String = answer
+        .fleet
+        .kinds
+        .iter()
+        .enumerate()
+        .map(|(k, kind)| format!("Kind {}: {}\n", k + 1, sentence(kind)))
+        .collect();
     format!("{}\n{kinds}", terminal.table(&rows))
 }
 

@@ -138,8 +138,11 @@ fn measure(
             samples.push(started.elapsed().as_nanos() as u64);
             let ours = arguments.limit.is_none() && matches!(result, Err(sapwise::Error::TooManyPairs { .. }));
             let result = result.map_err(anyhow::Error::from);
-            let result =
-                if ours { result.context("the limit comes from the free memory; set another with --limit") } else { result };
+            let result = if ours {
+                result.context("the limit comes from the free memory; set another with --limit")
+            } else {
+                result
+            };
             result.with_context(|| format!("{}, frame {k}", arguments.boxes.display()))?;
             if repetition == 0 {
                 counts.push(pairs.len() as u64);

@@ -110,7 +110,8 @@ pub(crate) fn run(arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<
 fn good(path: &Path, arguments: &Probe, algorithms: &Algorithms) -> anyhow::Result<Option<Report>> {
     let (_, there) = read_report(path, &output::warn).context("name a file, or another folder, with --out")?;
     let now = measure::machine();
-    if there.hardware.machine.physical_id != now.physical_id || flaw(&there, &algorithms.registry(usable_cores())).is_some()
+    if there.hardware.machine.physical_id != now.physical_id
+        || flaw(&there, &algorithms.registry(usable_cores())).is_some()
     {
         return Ok(None);
     }
@@ -119,7 +120,10 @@ fn good(path: &Path, arguments: &Probe, algorithms: &Algorithms) -> anyhow::Resu
     if as_then != as_now {
         let told = |(command, simd): (&String, &String)| format!("`sapwise {command}` at {simd}");
         let (then, now) = (told(as_then), told(as_now));
-        anyhow::bail!("{} was measured by {then}, not by {now}; name a file, or another folder, with --out", path.display());
+        anyhow::bail!(
+            "{} was measured by {then}, not by {now}; name a file, or another folder, with --out",
+            path.display()
+        );
     }
     Ok(Some(there))
 }

@@ -88,7 +88,9 @@ fn text(summary: &Summary, out: &Path, simulated: bool) -> String {
         text.push_str(&format!("{sentence}\n"));
     }
     let mut rows = vec![["the paper says", "by its own table", "by these reports"].map(str::to_owned).to_vec()];
-    rows.extend(summary.claims.iter().map(|c| vec![c.claim.clone(), c.by_its_table.clone(), c.by_these_reports.clone()]));
+    rows.extend(
+        summary.claims.iter().map(|c| vec![c.claim.clone(), c.by_its_table.clone(), c.by_these_reports.clone()]),
+    );
     text.push_str(&format!("\n{}", Terminal::of_standard_output().table(&rows)));
     if let Some(ours) = summary.strategies.first() {
         text.push_str(&format!(

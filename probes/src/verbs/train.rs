@@ -34,7 +34,8 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
     let plot = arguments.plot.as_deref().map(|path| Ok::<_, WrongUsage>((path, picture_format(path)?))).transpose()?;
     let evidence = if arguments.simulated { Evidence::Simulated } else { Evidence::Real };
     let reports = report_files(&arguments.reports)?;
-    let outputs = [Some(&arguments.out), arguments.card.as_ref(), arguments.plot.as_ref(), arguments.importance.as_ref()];
+    let outputs =
+        [Some(&arguments.out), arguments.card.as_ref(), arguments.plot.as_ref(), arguments.importance.as_ref()];
     let outputs: Vec<_> = outputs.into_iter().flatten().collect();
     outputs::check(&reports, &outputs)?;
     interrupt::listen()?;
@@ -67,7 +68,10 @@ pub(crate) fn run(arguments: &Train) -> anyhow::Result<Outcome> {
         let terminal = Terminal::of_standard_output();
         let importance = importance.map_or_else(String::new, |i| format!("{}\n", i.page(|rows| terminal.table(rows))));
         let drawn = arguments.plot.as_ref().map_or(String::new(), |path| format!("\nDrawn in {}.", path.display()));
-        output::print(&format!("{importance}{}", summary(&model, &training, &notes, &arguments.out, &drawn, terminal)))?;
+        output::print(&format!(
+            "{importance}{}",
+            summary(&model, &training, &notes, &arguments.out, &drawn, terminal)
+        ))?;
     }
     Ok(Outcome::Done)
 }
@@ -150,7 +154,14 @@ const COLUMNS: &str = "Regret is time over the best time, less one; in parenthes
 have them (log-normal\naround 800). Crossovers off by: the median distance in octaves between measured and predicted crossovers. --card explains \
 every column.\n";
 
-fn summary(model: &Model, training: &Training, notes: &[String], path: &Path, drawn: &str, terminal: Terminal) -> String {
+fn summary(
+    model: &Model,
+    training: &Training,
+    notes: &[String],
+    path: &Path,
+    drawn: &str,
+    terminal: Terminal,
+) -> String {
     let table = |rows: &[Vec<String>]| terminal.table(rows);
     let mut text = model_card::scores(&training.validation, table);
     if !training.validation.methods.is_empty() {

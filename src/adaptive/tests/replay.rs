@@ -106,7 +106,8 @@ const SCENARIOS: [&str; 7] = ["uniform", "clustered", "slab", "mixed", "fast", "
 /// Scenes that stay as they are, scenes that grow and shrink, and streams of our own: levels that load, bursts, fights that start and end, chases,
 /// and objects that are pooled and returned.
 fn courses(machine: &Recorded) -> Vec<Vec<Stretch<'_>>> {
-    let steady = SCENARIOS.iter().flat_map(|s| [100.0, 800.0, 3000.0, 20_000.0].map(|n| vec![(machine.spot(s, n), 1500)]));
+    let steady =
+        SCENARIOS.iter().flat_map(|s| [100.0, 800.0, 3000.0, 20_000.0].map(|n| vec![(machine.spot(s, n), 1500)]));
     let swings = SCENARIOS.iter().map(|s| swing(machine, s, [30.0, 30_000.0], 30));
     let turns = [300.0, 1000.0, 5000.0].into_iter().flat_map(|n| {
         let between = |scenarios: [&str; 2]| (0..6).map(|k| (machine.spot(scenarios[k % 2], n), 250)).collect();
@@ -114,7 +115,8 @@ fn courses(machine: &Recorded) -> Vec<Vec<Stretch<'_>>> {
         [between(["uniform", "gravity"]), between(["clustered", "fast"]), pooled]
     });
     let loads = SCENARIOS.map(|s| vec![(machine.spot(s, 50.0), 200), (machine.spot(s, 10_000.0), 600)]);
-    let bursts = SCENARIOS.map(|s| (0..12).map(|k| (machine.spot(s, [300.0, 20_000.0][k % 2]), [60, 30][k % 2])).collect());
+    let bursts =
+        SCENARIOS.map(|s| (0..12).map(|k| (machine.spot(s, [300.0, 20_000.0][k % 2]), [60, 30][k % 2])).collect());
     steady.chain(swings).chain(turns).chain(loads).chain(bursts).collect()
 }
 
@@ -174,8 +176,12 @@ fn after_a_stall_the_choices_are_what_they_were() {
             }
         }
         lost.sort_by(f64::total_cmp);
-        let told =
-            format!("{file}: mean {:.4}, 95th percentile {:.3} of {}", mean(&lost), lost[lost.len() * 95 / 100], lost.len());
+        let told = format!(
+            "{file}: mean {:.4}, 95th percentile {:.3} of {}",
+            mean(&lost),
+            lost[lost.len() * 95 / 100],
+            lost.len()
+        );
         println!("{told}");
         assert!(mean(&lost).abs() < 0.01 && lost[lost.len() * 95 / 100] < 0.05, "{told}");
     }
@@ -188,7 +194,8 @@ fn lost_beside(disturbed: (f64, f64), least_objects: u32) -> [f64; 3] {
     let mut lost = [Vec::new(), Vec::new(), Vec::new()];
     for file in [XEON, ZEN3] {
         let machine = Recorded::of(file);
-        let shared = |threads: u32, at: usize| if threads > 1 && (500..1100).contains(&at) { disturbed } else { (1.0, 0.0) };
+        let shared =
+            |threads: u32, at: usize| if threads > 1 && (500..1100).contains(&at) { disturbed } else { (1.0, 0.0) };
         for course in courses(&machine).iter().filter(|c| c.len() == 1 && c[0].0.load.objects >= least_objects) {
             let means: Vec<f64> = (0..machine.ids.len()).map(|k| course[0].0.mean_ns(k)).collect();
             let ns = |k: usize, at: usize| {

@@ -230,8 +230,10 @@ fn over_traces_the_choice_costs_little_more_than_the_best_single_algorithm() {
         let geometric = mean(&over.iter().map(|o| o.ln()).collect::<Vec<_>>()).exp();
         let within = over.iter().filter(|o| **o <= 1.03).count();
         let worst = over.iter().copied().fold(0.0, f64::max);
-        let told =
-            format!("{what}, {} traces: geometric mean {geometric:.4}, within 1.03 {within}, worst {worst:.3}", over.len());
+        let told = format!(
+            "{what}, {} traces: geometric mean {geometric:.4}, within 1.03 {within}, worst {worst:.3}",
+            over.len()
+        );
         println!("{told}");
         // Of other traces than ours nobody knows what can be reached.
         let others = std::env::var_os("TRACES").is_some();

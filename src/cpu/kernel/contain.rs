@@ -10,7 +10,12 @@ pub(crate) const BLOCK: usize = 8;
 /// the position at which the block begins.
 ///
 /// `outer` is as long as `boxes`.
-pub(crate) fn each_doubtful_block(simd: Simd, boxes: &[Aabb], outer: &mut [Aabb], doubtful: impl FnMut(usize, &mut [Aabb])) {
+pub(crate) fn each_doubtful_block(
+    simd: Simd,
+    boxes: &[Aabb],
+    outer: &mut [Aabb],
+    doubtful: impl FnMut(usize, &mut [Aabb]),
+) {
     match simd {
         // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
@@ -108,9 +113,12 @@ mod x86 {
                     let (inner, bound) = (_mm256_loadu_ps(b.add(k)), _mm256_loadu_ps(o.add(k)));
                     let upper = _mm256_maskload_ps(b.add(k).wrapping_add(3), lower);
                     let lower = _mm256_castsi256_ps(lower);
-                    let from =
-                        _mm256_and_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(inner, bound), _mm256_cmp_ps::<_CMP_LE_OQ>(inner, upper));
-                    good = _mm256_and_ps(good, _mm256_blendv_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(inner, bound), from, lower));
+                    let from = _mm256_and_ps(
+                        _mm256_cmp_ps::<_CMP_GE_OQ>(inner, bound),
+                        _mm256_cmp_ps::<_CMP_LE_OQ>(inner, upper),
+                    );
+                    good =
+                        _mm256_and_ps(good, _mm256_blendv_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(inner, bound), from, lower));
                 }
             }
             _mm256_movemask_ps(good) == 0xff

@@ -19,7 +19,10 @@ impl Lanes for Portable {
         let (low1, high1) = (four(view.low[1]), four(view.high[1]));
         let (low2, high2) = (four(view.low[2]), four(view.high[2]));
         let hits = [0, 1, 2, 3].map(|k| {
-            (low1[k] <= query.high[1]) & (high1[k] >= query.low[1]) & (low2[k] <= query.high[2]) & (high2[k] >= query.low[2])
+            (low1[k] <= query.high[1])
+                & (high1[k] >= query.low[1])
+                & (low2[k] <= query.high[2])
+                & (high2[k] >= query.low[2])
         });
         (reach, reach & mask(hits))
     }

@@ -88,7 +88,9 @@ impl Walk<'_> {
                 }
             }
             let bounds = self.bounds_of(leaf);
-            self.each(&bounds, leaf + 1, 1, overlapping, |other| self.meet(node, &bounds, ids, other, overlapping, pairs));
+            self.each(&bounds, leaf + 1, 1, overlapping, |other| {
+                self.meet(node, &bounds, ids, other, overlapping, pairs)
+            });
             // As a sweep ends: a caller who wants a thousand pairs does not wait for all.
             if pairs.is_over() {
                 return;
@@ -226,7 +228,8 @@ mod x86 {
         let mut mask = u16::MAX;
         for a in 0..3 {
             // SAFETY: each column has 16 floats.
-            let (low, high) = unsafe { (_mm512_loadu_ps(node.low[a].as_ptr()), _mm512_loadu_ps(node.high[a].as_ptr())) };
+            let (low, high) =
+                unsafe { (_mm512_loadu_ps(node.low[a].as_ptr()), _mm512_loadu_ps(node.high[a].as_ptr())) };
             mask &= _mm512_cmp_ps_mask::<_CMP_LE_OQ>(low, _mm512_set1_ps(b.max[a]));
             mask &= _mm512_cmp_ps_mask::<_CMP_GE_OQ>(high, _mm512_set1_ps(b.min[a]));
         }
@@ -242,7 +245,10 @@ mod x86 {
             for (k, all) in halves.iter_mut().enumerate() {
                 // SAFETY: each column has 16 floats.
                 let (low, high) = unsafe {
-                    (_mm256_loadu_ps(node.low[a].as_ptr().add(8 * k)), _mm256_loadu_ps(node.high[a].as_ptr().add(8 * k)))
+                    (
+                        _mm256_loadu_ps(node.low[a].as_ptr().add(8 * k)),
+                        _mm256_loadu_ps(node.high[a].as_ptr().add(8 * k)),
+                    )
                 };
                 let below = _mm256_cmp_ps::<_CMP_LE_OQ>(low, from);
                 *all = _mm256_and_ps(*all, _mm256_and_ps(below, _mm256_cmp_ps::<_CMP_GE_OQ>(high, to)));
@@ -336,7 +342,10 @@ mod tests {
             assert_eq!(found.fingerprint(), expected.fingerprint(), "{simd:?}");
             found.clear();
             walk.pairs_with(simd, &group, &mut found);
-            assert!(found.len() == across && found.iter().all(|&(a, b)| a < 300 && (1000..1015).contains(&b)), "{simd:?}");
+            assert!(
+                found.len() == across && found.iter().all(|&(a, b)| a < 300 && (1000..1015).contains(&b)),
+                "{simd:?}"
+            );
         }
     }
 }

@@ -20,8 +20,10 @@ impl Lanes for Sse2 {
         let half = |at: usize| {
             // SAFETY: every column has 16 values behind `view.len >= at`.
             unsafe {
-                let below = |column: &[f32], bound| _mm_cmple_ps(_mm_loadu_ps(column.as_ptr().add(at)), _mm_set1_ps(bound));
-                let above = |column: &[f32], bound| _mm_cmpge_ps(_mm_loadu_ps(column.as_ptr().add(at)), _mm_set1_ps(bound));
+                let below =
+                    |column: &[f32], bound| _mm_cmple_ps(_mm_loadu_ps(column.as_ptr().add(at)), _mm_set1_ps(bound));
+                let above =
+                    |column: &[f32], bound| _mm_cmpge_ps(_mm_loadu_ps(column.as_ptr().add(at)), _mm_set1_ps(bound));
                 let reach = below(view.low[0], query.high[0]);
                 let second = _mm_and_ps(below(view.low[1], query.high[1]), above(view.high[1], query.low[1]));
                 let third = _mm_and_ps(below(view.low[2], query.high[2]), above(view.high[2], query.low[2]));

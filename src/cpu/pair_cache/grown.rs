@@ -133,7 +133,8 @@ impl Grown {
     pub(super) fn grow_all(&mut self, workers: &Workers, boxes: &[Aabb], margin: Margin, shares: &mut [Share]) {
         let size = self.share_len(shares.len());
         shares.iter_mut().for_each(|share| share.left.clear());
-        let (grown, flags) = ((&mut self.boxes[..self.len], size), (&mut self.flags[..self.len.div_ceil(64)], size / 64));
+        let (grown, flags) =
+            ((&mut self.boxes[..self.len], size), (&mut self.flags[..self.len.div_ceil(64)], size / 64));
         workers.each_share(shares, grown, flags, |k, _, grown, flags| {
             flags.iter_mut().for_each(|flags| flags.dirty = 0);
             for (grown, b) in grown.iter_mut().zip(&boxes[k * size..]) {
@@ -175,7 +176,8 @@ impl Grown {
 /// Takes in which boxes are fixed now. One that is no longer has pairs that are not kept: it is given a grown box that it has left.
 fn free(flags: &mut [Flags], grown: &mut [Aabb], first: usize, filter: Option<&Filter>) {
     for ((flags, grown), first) in flags.iter_mut().zip(grown.chunks_mut(64)).zip((first..).step_by(64)) {
-        let fixed = filter.map_or(0, |f| (0..grown.len()).fold(0, |bits, k| bits | u64::from(f.is_fixed(first + k)) << k));
+        let fixed =
+            filter.map_or(0, |f| (0..grown.len()).fold(0, |bits, k| bits | u64::from(f.is_fixed(first + k)) << k));
         let freed = flags.fixed & !fixed;
         flags.fixed = fixed;
         if freed != 0 {

@@ -131,7 +131,9 @@ impl Keeping {
     /// of boxes that wander.
     fn narrower_saves(&self, far: f32, kept: f32, left: f32) -> f32 {
         let more = (left * (self.grown / self.narrower()).powi(2)).min(1.0) - left;
-        cost::tests(far, kept) - cost::tests(far, kept * self.narrower_keeps()) - cost::left(far, self.nodes) * more.max(0.0)
+        cost::tests(far, kept)
+            - cost::tests(far, kept * self.narrower_keeps())
+            - cost::left(far, self.nodes) * more.max(0.0)
     }
 
     /// Whether it would have saved by now what it costs to grow all boxes again. Boxes that come to rest never leave by themselves: without this their
@@ -271,8 +273,10 @@ impl Motion {
         // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p with p
         // between 1, for those that fly straight on, and 2, for those that wander.
         let m = k.margin.share;
-        let (keep, leave) =
-            ((cost::tests(far, k.kept) - cost::BOX) * 6.0 * m / (1.0 + 2.0 * m), 1.5 * cost::left(far, k.nodes) * k.leaving);
+        let (keep, leave) = (
+            (cost::tests(far, k.kept) - cost::BOX) * 6.0 * m / (1.0 + 2.0 * m),
+            1.5 * cost::left(far, k.nodes) * k.leaving,
+        );
         if leave > 1.2 * keep {
             k.margin.share = (m * MARGIN_STEP).min(MARGINS[MARGINS.len() - 1]);
         } else if keep > 1.2 * leave {

@@ -95,7 +95,8 @@ impl Curve {
 #[cold]
 fn class(edges: [f32; 3], ratio: f32) -> u32 {
     // Not a number, of infinity over infinity, is in the largest class.
-    let step = [4.0, 16.0, 64.0, 256.0, 1024.0].iter().take_while(|&&limit| ratio > limit || ratio.is_nan()).count() as u32;
+    let step =
+        [4.0, 16.0, 64.0, 256.0, 1024.0].iter().take_while(|&&limit| ratio > limit || ratio.is_nan()).count() as u32;
     if step > 2 {
         return 10 + step;
     }
@@ -188,7 +189,8 @@ impl Order {
             let size = keys.len().div_ceil(workers.tasks());
             bounds.clear();
             bounds.resize(workers.tasks(), Aabb::default());
-            workers.each_of(bounds.iter_mut().zip(keys.chunks(size)), |(bounds, keys)| *bounds = bounds_of(keys, boxes));
+            workers
+                .each_of(bounds.iter_mut().zip(keys.chunks(size)), |(bounds, keys)| *bounds = bounds_of(keys, boxes));
             let all = bounds[..keys.len().div_ceil(size)].iter().fold(bounds[0], |all, b| all.union(b));
             if let Some(curve) = Curve::within(&all) {
                 workers.each_of(keys.chunks_mut(size), |keys| curve.recode(keys, boxes));

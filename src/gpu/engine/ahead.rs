@@ -12,8 +12,10 @@ impl Engine {
     pub(in crate::gpu) fn submit_ahead(&mut self, boxes: &wgpu::Buffer, mut params: Params) -> Result<(), GpuError> {
         let (blocks, tile_pairs_left) = self.search.blocks(params.objects);
         if tile_pairs_left > 0 {
-            let text =
-                format!("brute takes several submissions for {} boxes, and waits between them: use bvh", params.objects);
+            let text = format!(
+                "brute takes several submissions for {} boxes, and waits between them: use bvh",
+                params.objects
+            );
             return Err(GpuError::new(GpuErrorKind::Limit, text));
         }
         self.prepare(&params, false, Some(boxes))?;

@@ -73,7 +73,10 @@ mod tests {
             engine.output = output;
             start(&mut engine, &boxes());
             assert_eq!(kind(finish(&mut engine)), GpuErrorKind::Inert, "{method}");
-            assert!(gpu.fault().is_some_and(|why| why.contains("gpu0 (") && why.contains("executes nothing")), "{method}");
+            assert!(
+                gpu.fault().is_some_and(|why| why.contains("gpu0 (") && why.contains("executes nothing")),
+                "{method}"
+            );
             assert_eq!(gpu.check().unwrap_err().kind(), GpuErrorKind::Inert);
         }
     }

@@ -101,7 +101,8 @@ fn mark_both(list: u32, at: u32) -> u32 {
 /// The array that a line declares, if it declares one in a buffer. The header is none.
 fn declared(line: &str) -> Option<Array> {
     let (binding, rest) = line.split_once(" var<storage, ")?;
-    let (name, kind) = rest.split_once("> ").and_then(|(_, rest)| rest.split_once(": ")).expect("a declaration has a type");
+    let (name, kind) =
+        rest.split_once("> ").and_then(|(_, rest)| rest.split_once(": ")).expect("a declaration has a type");
     let element = match kind {
         "Header;" => return None,
         "array<u32>;" | "array<atomic<u32>>;" => 4,
@@ -162,7 +163,8 @@ fn access(before: &str, after: &str) -> Access {
             _ => Access::Both,
         };
     }
-    let behind_members = after.trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '.' || c == '_').trim_start();
+    let behind_members =
+        after.trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '.' || c == '_').trim_start();
     let operator: String = behind_members.chars().take_while(|c| "=+-*/%&|^<>!".contains(*c)).collect();
     match operator.as_str() {
         "=" => Access::Write,
@@ -173,7 +175,12 @@ fn access(before: &str, after: &str) -> Access {
 
 impl Arrays {
     /// Marks for a kernel with these buffers.
-    pub(super) fn bind(&self, gpu: &Gpu, kernel: &Kernel, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Arc<Marks>, GpuError> {
+    pub(super) fn bind(
+        &self,
+        gpu: &Gpu,
+        kernel: &Kernel,
+        buffers: &[(u32, &wgpu::Buffer)],
+    ) -> Result<Arc<Marks>, GpuError> {
         let mut begins = vec![2 * self.0.len()];
         for array in self.0.iter() {
             let bound = buffers.iter().find(|(binding, _)| *binding == array.binding);

@@ -47,7 +47,8 @@ impl<'a> Bench<'a> {
 
     pub(super) fn buffer(&self, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, String> {
         let mapped_at_creation = usage.contains(wgpu::BufferUsages::MAP_WRITE);
-        let descriptor = wgpu::BufferDescriptor { label: Some("sapwise measure"), size: bytes, usage, mapped_at_creation };
+        let descriptor =
+            wgpu::BufferDescriptor { label: Some("sapwise measure"), size: bytes, usage, mapped_at_creation };
         self.gpu.try_make(|device| device.create_buffer(&descriptor)).map_err(words)
     }
 
@@ -70,7 +71,12 @@ impl<'a> Bench<'a> {
     }
 
     /// Compiles an entry point, with constants for its overrides.
-    pub(super) fn kernel(&self, source: &str, entry: &'static str, constants: &[(&str, f64)]) -> Result<Kernel, String> {
+    pub(super) fn kernel(
+        &self,
+        source: &str,
+        entry: &'static str,
+        constants: &[(&str, f64)],
+    ) -> Result<Kernel, String> {
         Kernel::compile(self.gpu, source.to_owned(), entry, constants).map_err(words)
     }
 
@@ -80,7 +86,10 @@ impl<'a> Bench<'a> {
     }
 
     /// Records commands and submits them.
-    pub(super) fn submit(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<wgpu::SubmissionIndex, String> {
+    pub(super) fn submit(
+        &self,
+        record: impl FnOnce(&mut wgpu::CommandEncoder),
+    ) -> Result<wgpu::SubmissionIndex, String> {
         let mut commands = self.gpu.record();
         record(&mut commands);
         self.gpu.submit(commands).map_err(words)

@@ -77,8 +77,10 @@ fn arithmetic(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     let work = Arithmetic::new(bench)?;
     let rounds = work.calibrate(bench, target(bench, 4000, 12_000))?;
     let bound = work.bind(bench, rounds)?;
-    let figures = bench.collect(bench.plan(9, bench.pick(150, 250)), || Ok(vec![work.rate(bench, &bound, rounds, 1)?]))?;
-    let method = "multiply-adds in eight independent chains of four lanes an invocation, each counted as two operations";
+    let figures =
+        bench.collect(bench.plan(9, bench.pick(150, 250)), || Ok(vec![work.rate(bench, &bound, rounds, 1)?]))?;
+    let method =
+        "multiply-adds in eight independent chains of four lanes an invocation, each counted as two operations";
     Ok(figures.into_iter().map(|f| f.into_parameter(GpuParameterId::ArithmeticGflopPerS, method)).collect())
 }
 
@@ -103,8 +105,9 @@ fn atomics(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
     if counted != added {
         return Err(format!("of {added} atomic additions {counted} took effect: the driver is broken"));
     }
-    let method =
-        format!("atomicAdd of 1 to {words} words in turn, neighbouring invocations to neighbouring words, result not used");
+    let method = format!(
+        "atomicAdd of 1 to {words} words in turn, neighbouring invocations to neighbouring words, result not used"
+    );
     Ok(figures.into_iter().map(|f| f.into_parameter(GpuParameterId::AtomicGPerS, &method)).collect())
 }
 

@@ -144,7 +144,8 @@ fn round_trips(benches: &[Bench<'_>]) -> Result<Vec<Parameter>, String> {
         let slowest = alone.into_iter().max().unwrap_or_default();
         Ok::<_, String>(vec![together.as_secs_f64() / slowest.as_secs_f64()])
     })?;
-    let method = "empty dispatch submitted to each GPU in turn by one thread, then waited for, over the slowest one alone";
+    let method =
+        "empty dispatch submitted to each GPU in turn by one thread, then waited for, over the slowest one alone";
     Ok(one(figures, GpuParameterId::GroupRoundTripRatio, method))
 }
 

@@ -118,7 +118,9 @@ struct Buffers {
 
 impl Buffers {
     fn copy(&self, bench: &Bench<'_>, bytes: u64, count: u32) -> Result<Duration, String> {
-        bench.time(|encoder| (0..count).for_each(|_| encoder.copy_buffer_to_buffer(&self.data, 0, &self.other, 0, bytes)))
+        bench.time(|encoder| {
+            (0..count).for_each(|_| encoder.copy_buffer_to_buffer(&self.data, 0, &self.other, 0, bytes))
+        })
     }
 }
 
@@ -161,8 +163,11 @@ mod tests {
 
     #[test]
     fn sets_are_powers_of_two_within_the_limits() {
-        let limits =
-            wgpu::Limits { max_buffer_size: u64::MAX, max_storage_buffer_binding_size: 134_217_727, ..Default::default() };
+        let limits = wgpu::Limits {
+            max_buffer_size: u64::MAX,
+            max_storage_buffer_binding_size: 134_217_727,
+            ..Default::default()
+        };
         assert_eq!(set_bytes(LARGEST, &limits, None), 64 << 20);
         assert_eq!(set_bytes(LARGEST, &limits, Some(256 << 20)), 32 << 20);
         assert_eq!(set_bytes(BRIEF, &limits, None), BRIEF);

@@ -81,8 +81,9 @@ impl Load {
 
 fn limits(bench: &Bench<'_>) -> Vec<Parameter> {
     let limits = bench.gpu.limits();
-    let told =
-        |id: GpuParameterId, value: u64, limit: &str| Parameter::reported(id, value as f64, &format!("wgpu limit {limit}"));
+    let told = |id: GpuParameterId, value: u64, limit: &str| {
+        Parameter::reported(id, value as f64, &format!("wgpu limit {limit}"))
+    };
     vec![
         told(
             GpuParameterId::WorkgroupInvocations,
@@ -112,7 +113,8 @@ fn memory(bench: &Bench<'_>, raw: &Raw, nvml: Option<&Nvml>, sysfs: Option<&Sysf
     match (raw.local_bytes(), bench.is_software()) {
         (Some(bytes), false) => Parameter::reported(name, bytes as f64, "Vulkan, sum of the device-local heaps"),
         (Some(bytes), true) => {
-            let source = "Vulkan, sum of the device-local heaps: what the program allows itself of the machine's memory";
+            let source =
+                "Vulkan, sum of the device-local heaps: what the program allows itself of the machine's memory";
             Parameter::reported(name, bytes as f64, source)
         }
         (None, _) => {
@@ -159,11 +161,12 @@ fn processors(
     }
     let kfd = sysfs.and_then(Sysfs::compute);
     let told = |id: GpuParameterId, (count, source): (u32, &str)| Parameter::reported(id, f64::from(count), source);
-    let or_why = |id: GpuParameterId, found: Option<(u32, &str)>, nvml: Option<&Result<u32, String>>| match (found, nvml) {
-        (Some(found), _) => told(id, found),
-        (None, Some(Err(why))) => Parameter::missing(id, why),
-        _ => Parameter::missing(id, unknown(info)),
-    };
+    let or_why =
+        |id: GpuParameterId, found: Option<(u32, &str)>, nvml: Option<&Result<u32, String>>| match (found, nvml) {
+            (Some(found), _) => told(id, found),
+            (None, Some(Err(why))) => Parameter::missing(id, why),
+            _ => Parameter::missing(id, unknown(info)),
+        };
     let units = nvml.map(|nvml| &nvml.processors);
     let by_nvml = |count: Option<&Result<u32, String>>, source: &'static str| Some((*count?.as_ref().ok()?, source));
     let found = raw
@@ -209,7 +212,9 @@ fn subgroup(bench: &Bench<'_>, info: &wgpu::AdapterInfo, raw: &Raw, executes: bo
         }
         _ if low == high && low > 0 => Parameter::reported(name, f64::from(low), "wgpu, adapter"),
         Ok(_) => Parameter::missing(name, &format!("the kernel saw none; the adapter reports {low} to {high} lanes")),
-        Err(why) => Parameter::missing(name, &format!("the adapter reports {low} to {high} lanes, and: {}", one_line(&why))),
+        Err(why) => {
+            Parameter::missing(name, &format!("the adapter reports {low} to {high} lanes, and: {}", one_line(&why)))
+        }
     }
 }
 

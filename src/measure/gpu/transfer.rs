@@ -74,7 +74,9 @@ fn parameters(figures: Vec<Figure>, sizes: &[u64]) -> Vec<Parameter> {
         mib(sizes.iter().copied().max().unwrap_or(0))
     );
     let methods = [
-        format!("{TOTAL_BYTES} random bytes: copy into a kept staging buffer, recording, copy command, wait, mapping again"),
+        format!(
+            "{TOTAL_BYTES} random bytes: copy into a kept staging buffer, recording, copy command, wait, mapping again"
+        ),
         "the CPU's copy into mapped memory, of that upload".to_owned(),
         "recording, copy command, wait and mapping again, of that upload".to_owned(),
         line.clone(),

@@ -26,7 +26,9 @@ pub(super) fn query(adapter: &wgpu::Adapter) -> Raw {
     let capabilities = hal.physical_device_capabilities();
     let shared = hal.shared_instance();
     // The functions below belong to version 1.1: on an older instance they may not be loaded, and calling them panics.
-    if shared.instance_api_version() < vk::API_VERSION_1_1 || capabilities.properties().api_version < vk::API_VERSION_1_1 {
+    if shared.instance_api_version() < vk::API_VERSION_1_1
+        || capabilities.properties().api_version < vk::API_VERSION_1_1
+    {
         return Raw::default();
     }
     let (instance, device) = (shared.raw_instance(), hal.raw_physical_device());

@@ -69,8 +69,10 @@ fn figures_that_no_machine_has_are_refused_by_name() {
         (ParameterId::ScalingTwoThreadsRatio, &[190.0]),
     ] {
         for &value in values {
-            let error =
-                both().predict(&machine(&[(name, value)]), &ids(&["brute@cpu1", "brute@gpu0"])).unwrap_err().to_string();
+            let error = both()
+                .predict(&machine(&[(name, value)]), &ids(&["brute@cpu1", "brute@gpu0"]))
+                .unwrap_err()
+                .to_string();
             assert!(error.contains(name.as_str()) && error.contains("check its unit"), "{value}: {error}");
         }
     }
@@ -82,7 +84,8 @@ fn a_gpu_without_a_figure_or_with_one_that_no_gpu_has_costs_its_own_algorithms_o
     let mut machine = machine(&[]);
     assert_eq!(both().predict(&machine, &all).unwrap().costs.len(), 2);
     let dispatch = machine.gpus[0].parameters.iter().position(|p| p.name == GpuParameterId::DispatchNs).unwrap();
-    for (value, text) in [(None, "dispatch_ns of gpu0 is missing"), (Some(2.0), "dispatch_ns of gpu0 is 2, and no machine")]
+    for (value, text) in
+        [(None, "dispatch_ns of gpu0 is missing"), (Some(2.0), "dispatch_ns of gpu0 is 2, and no machine")]
     {
         machine.gpus[0].parameters[dispatch].value = value;
         let p = both().predict(&machine, &all).unwrap();

@@ -24,7 +24,8 @@ impl Deviations {
     /// made all others look as dear, and they were not tried. Tuning that is off by a factor of several for all is believed to be after some batches more.
     /// GPUs of a kind that the model had not seen were four to eight times as fast as predicted. What keeping work spares is predicted as well for other machines:
     /// where it was doubted more, incremental algorithms were left after a few dear frames.
-    pub(crate) const IN_LINE: Self = Self { cpu_ln: 0.4, kept_ln: Self::PREDICTED.kept_ln, width_ln: 0.25, ..Self::UNLIKE };
+    pub(crate) const IN_LINE: Self =
+        Self { cpu_ln: 0.4, kept_ln: Self::PREDICTED.kept_ln, width_ln: 0.25, ..Self::UNLIKE };
 }
 
 /// Of what a method has for all of its algorithms: about what was left of predictions on machines held out.

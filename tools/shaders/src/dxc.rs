@@ -41,10 +41,11 @@ type Size = unsafe extern "C" fn(Object) -> usize;
 /// Compiles every file of a folder to DXIL. Its name holds the entry point: `NAME.ENTRY.hlsl`.
 pub(crate) fn all(library: &Path, dir: &Path) -> Result<()> {
     // SAFETY: DXC has initialisers that set up LLVM and nothing else. It stays loaded to the end of the process.
-    let loaded =
-        unsafe { libloading::Library::new(library) }.map_err(|e| format!("{} does not load: {e}", library.display()))?;
+    let loaded = unsafe { libloading::Library::new(library) }
+        .map_err(|e| format!("{} does not load: {e}", library.display()))?;
     // SAFETY: dxcapi.h declares it so.
-    let create = unsafe { loaded.get::<Create>(b"DxcCreateInstance") }.map_err(|e| format!("{}: {e}", library.display()))?;
+    let create =
+        unsafe { loaded.get::<Create>(b"DxcCreateInstance") }.map_err(|e| format!("{}: {e}", library.display()))?;
     let mut compiler: Object = null_mut();
     // SAFETY: as above.
     let status = unsafe { create(&COMPILER, &I_COMPILER, &mut compiler) };
@@ -79,7 +80,8 @@ unsafe fn compile(compiler: Object, text: &str, entry: &str) -> Result<()> {
     // are never released: there are a few dozen, and the process ends soon.
     unsafe {
         let call: Compile = std::mem::transmute((**compiler).first);
-        let failed = call(compiler, &source, arguments.as_ptr(), arguments.len() as u32, null_mut(), &I_RESULT, &mut result);
+        let failed =
+            call(compiler, &source, arguments.as_ptr(), arguments.len() as u32, null_mut(), &I_RESULT, &mut result);
         if failed != 0 {
             return Err(format!("it does not run ({failed:#x})"));
         }

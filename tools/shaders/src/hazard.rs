@@ -22,10 +22,13 @@ pub(crate) fn provoke() -> Result<()> {
                 .memory_type_index(needs.memory_type_bits.trailing_zeros());
             let memory = device.allocate_memory(&info, None).map_err(refused("memory"))?;
             device.bind_buffer_memory(buffer, memory, 0).map_err(refused("to bind memory"))?;
-            let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).map_err(refused("a pool"))?;
+            let pool =
+                device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).map_err(refused("a pool"))?;
             let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
             let commands = device.allocate_command_buffers(&info).map_err(refused("commands"))?[0];
-            device.begin_command_buffer(commands, &vk::CommandBufferBeginInfo::default()).map_err(refused("commands"))?;
+            device
+                .begin_command_buffer(commands, &vk::CommandBufferBeginInfo::default())
+                .map_err(refused("commands"))?;
             device.cmd_fill_buffer(commands, buffer, 0, 1024, 1);
             device.cmd_fill_buffer(commands, buffer, 0, 1024, 2);
             device.end_command_buffer(commands).map_err(refused("commands"))?;

@@ -72,7 +72,8 @@ impl Driver {
         // With both, RADV checks the bounds of buffers, which costs instructions.
         let core = vk::PhysicalDeviceFeatures::default().robust_buffer_access(true);
         let mut robustness = vk::PhysicalDeviceRobustness2FeaturesEXT::default().robust_buffer_access2(true);
-        let mut infos = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+        let mut infos =
+            vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
         let mut sizes = vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true);
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
@@ -136,7 +137,8 @@ impl Driver {
                 .stage(stage)
                 .layout(layout);
             let made = self.device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None);
-            let made = made.map_err(|(_, e)| format!("{}.{}: {}", kernel.name, kernel.entry, refused("the pipeline")(e)))?;
+            let made =
+                made.map_err(|(_, e)| format!("{}.{}: {}", kernel.name, kernel.entry, refused("the pipeline")(e)))?;
             Ok(made[0])
         }
     }

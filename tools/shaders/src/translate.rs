@@ -114,7 +114,8 @@ impl Kernel {
             ..Default::default()
         };
         let pipeline = spv::PipelineOptions { shader_stage: ShaderStage::Compute, entry_point: self.entry.clone() };
-        spv::write_vec(&module, &info, &options, Some(&pipeline)).map_err(|e| format!("{}: no SPIR-V: {e}", self.label()))
+        spv::write_vec(&module, &info, &options, Some(&pipeline))
+            .map_err(|e| format!("{}: no SPIR-V: {e}", self.label()))
     }
 
     /// What wgpu hands to DXC, whose shader model is the oldest that has DXIL, and the name of its entry point.

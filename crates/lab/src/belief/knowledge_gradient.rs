@@ -92,8 +92,10 @@ impl KnowledgeGradient {
             lines.clear();
             lines.push(Line { behind: 0.0, slope: 0.0 });
             for (slope, mean) in slopes.iter().zip(mean_ln) {
-                let line =
-                    Line { behind: mean - mean_ln[*best], slope: (observed.covariance(&with, slope) - of_best) / deviation };
+                let line = Line {
+                    behind: mean - mean_ln[*best],
+                    slope: (observed.covariance(&with, slope) - of_best) / deviation,
+                };
                 if line.behind < REACH * line.slope.abs() {
                     lines.push(line);
                 }

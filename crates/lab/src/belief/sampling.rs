@@ -136,12 +136,12 @@ pub fn learn(mut observed: Observed, slice: &[Load], source: &mut dyn Source, mo
             Answer::Skipped => {}
             Answer::Failed { why, gpus } => {
                 for (other, usable) in observed.predicted().iter().zip(&mut usable) {
-                    let lost =
-                        matches!(other.algorithm.backend(), Backend::Gpu(used) if used.iter().any(|k| gpus.contains(k)));
+                    let lost = matches!(other.algorithm.backend(), Backend::Gpu(used) if used.iter().any(|k| gpus.contains(k)));
                     *usable &= !lost && other.algorithm != algorithm;
                 }
                 open.retain(|o| usable[o.0]);
-                let with = if gpus.is_empty() { String::new() } else { format!(" with all on {}", algorithm.backend()) };
+                let with =
+                    if gpus.is_empty() { String::new() } else { format!(" with all on {}", algorithm.backend()) };
                 remarks.push(format!("{algorithm} is left out{with}: {why}"));
             }
             Answer::Taken(sample) => {

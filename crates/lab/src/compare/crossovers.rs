@@ -82,7 +82,8 @@ fn crossover(
 ) -> Option<CrossoverSpread> {
     let positions: Vec<f64> = group.iter().map(|b| b.objects).collect();
     let objects = median(&positions)?;
-    let holding = group.iter().filter(|b| b.interval().is_some_and(|(low, high)| (low..=high).contains(&objects))).count();
+    let holding =
+        group.iter().filter(|b| b.interval().is_some_and(|(low, high)| (low..=high).contains(&objects))).count();
     let points = reports.iter().flat_map(|r| &r.points).filter(|p| p.scenario == scenario);
     Some(CrossoverSpread {
         scenario: scenario.to_owned(),

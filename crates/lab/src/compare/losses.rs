@@ -34,7 +34,8 @@ fn evidence(report: &Report) -> Evidence {
 /// `None` with fewer than two reports that hold usable timings.
 pub(super) fn losses(reports: &[(String, Report)]) -> Option<Losses> {
     // One by one: together, a repeated report would be left out.
-    let profiles: Vec<Profile> = reports.iter().flat_map(|r| usable(std::slice::from_ref(r), evidence(&r.1)).0).collect();
+    let profiles: Vec<Profile> =
+        reports.iter().flat_map(|r| usable(std::slice::from_ref(r), evidence(&r.1)).0).collect();
     if profiles.len() < 2 {
         return None;
     }

@@ -39,6 +39,7 @@ pub(super) fn spreads(reports: &[&Report]) -> Vec<ParameterSpread> {
 fn parameters(report: &Report) -> Vec<(String, &Parameter)> {
     let hardware = &report.hardware;
     let cpu = hardware.parameters.iter().map(|p| (p.name.clone(), p));
-    let gpus = hardware.gpus.iter().flat_map(|g| g.parameters.iter().map(|p| (format!("gpu{}/{}", g.gpu.index, p.name), p)));
+    let gpus =
+        hardware.gpus.iter().flat_map(|g| g.parameters.iter().map(|p| (format!("gpu{}/{}", g.gpu.index, p.name), p)));
     cpu.chain(gpus).collect()
 }

@@ -15,7 +15,8 @@ impl Comparison {
         }
         let known: Vec<&Steadiness> = self.steadiness.iter().flatten().collect();
         if let Some(first) = known.first() {
-            let of = |pick: fn(f64, f64) -> f64| known.iter().map(|s| s.core_to_core_ns).fold(first.core_to_core_ns, pick);
+            let of =
+                |pick: fn(f64, f64) -> f64| known.iter().map(|s| s.core_to_core_ns).fold(first.core_to_core_ns, pick);
             let moved = known.iter().filter(|s| !s.is_steady()).count();
             text.push_str(&format!(
                 "\nlatency between cores {:.0} to {:.0} ns from report to report; it changed within {moved} of them",

@@ -173,7 +173,8 @@ impl Profile {
 /// machines of one model count as one.
 pub fn host(hardware: &Hardware) -> String {
     let machine = &hardware.machine;
-    let clock = hardware.value(ParameterId::ClockReportedGhz).filter(|_| !matches!(&machine.hypervisor[..], "" | "none"));
+    let clock =
+        hardware.value(ParameterId::ClockReportedGhz).filter(|_| !matches!(&machine.hypervisor[..], "" | "none"));
     clock.map_or_else(|| machine.physical_id.clone(), |ghz| format!("{}-{:.0}", machine.physical_id, 1000.0 * ghz))
 }
 

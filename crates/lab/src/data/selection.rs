@@ -80,7 +80,9 @@ impl Selection {
             Err(left_out) => return self.notes.push(left_out.to_string()),
         };
         match self.known.get(&profile.fingerprint()) {
-            Some(twin) => self.notes.push(format!("{} is left out: it holds the same measurement as {twin}", profile.file)),
+            Some(twin) => {
+                self.notes.push(format!("{} is left out: it holds the same measurement as {twin}", profile.file))
+            }
             None => {
                 self.known.insert(profile.fingerprint(), profile.file.clone());
                 self.profiles.push(profile);
@@ -103,7 +105,8 @@ impl Selection {
         self.profiles.retain(|p| {
             if p.points.is_empty() {
                 let file = &p.file;
-                self.notes.push(format!("{file} is left out: no point has {FEWEST_SAMPLES} samples of a current algorithm"));
+                self.notes
+                    .push(format!("{file} is left out: no point has {FEWEST_SAMPLES} samples of a current algorithm"));
             }
             !p.points.is_empty()
         });
@@ -183,7 +186,8 @@ mod tests {
         published.label = Label::Published;
         debug.provenance.optimised = false;
         empty.points.clear();
-        let (profiles, notes) = usable(&[simulated, published, debug, empty, good.clone(), good].map(named), Evidence::Real);
+        let (profiles, notes) =
+            usable(&[simulated, published, debug, empty, good.clone(), good].map(named), Evidence::Real);
         assert_eq!(profiles.len(), 1);
         let told = ["simulated", "published", "unoptimised", "--hardware-only", "the same measurement"];
         assert!(told.iter().all(|t| notes.iter().any(|n| n.contains(t))) && notes.len() == 5, "{notes:?}");

@@ -65,7 +65,8 @@ pub fn by_costs(costs: Vec<AlgorithmCost>, available: &[AlgorithmId]) -> Strateg
 
 /// The available algorithm of the same method and class of processor whose number of threads or GPUs is nearest.
 pub(super) fn closest(id: &AlgorithmId, available: &[AlgorithmId]) -> Option<AlgorithmId> {
-    let distance = |other: &&AlgorithmId| (f64::from(other.backend().width()) / f64::from(id.backend().width())).ln().abs();
+    let distance =
+        |other: &&AlgorithmId| (f64::from(other.backend().width()) / f64::from(id.backend().width())).ln().abs();
     let alike = |a: &&AlgorithmId| a.method() == id.method() && a.backend().class() == id.backend().class();
     // The same GPU first, where there are several of equal number.
     let same = available.iter().find(|a| *a == id);

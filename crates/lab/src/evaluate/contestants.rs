@@ -118,7 +118,8 @@ impl<'a> Material<'a> {
         let crossed = known.iter().map(|&k| (&self.profiles[k], &self.outcomes[k][..]));
         let crossed: Vec<_> = crossed.filter(|(_, outcomes)| !outcomes.is_empty()).collect();
         let step = crossed.len().div_ceil(MOST_SEEN).max(1);
-        let left_out = |k: usize, spot: u32| without.is_some_and(|w| self.profiles[k].points[spot as usize].scenario == w);
+        let left_out =
+            |k: usize, spot: u32| without.is_some_and(|w| self.profiles[k].points[spot as usize].scenario == w);
         Ok(Fitted {
             without,
             likeness: known.iter().map(|&k| &self.likeness[k]).collect(),

@@ -106,7 +106,8 @@ mod tests {
         assert!(!crossovers.crossovers.is_empty());
         assert!(crossovers.errors(&costs).iter().all(|e| *e < 0.03), "{:?}", crossovers.errors(&costs));
         let crossover = crossovers.crossovers[0].clone();
-        let (first, last) = (f64::from(crossovers.loads[0].objects), f64::from(crossovers.loads.last().unwrap().objects));
+        let (first, last) =
+            (f64::from(crossovers.loads[0].objects), f64::from(crossovers.loads.last().unwrap().objects));
         // Who is cheaper below is said to be cheaper everywhere, and the other way round.
         let ever = crossovers.errors(&slower(&costs, &crossover.above, 1e6))[0];
         assert!((ever - (last / crossover.objects).log2()).abs() < 0.03, "{ever}");

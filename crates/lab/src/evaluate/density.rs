@@ -33,7 +33,8 @@ fn where_the_number_of_objects_alone_is_wrong_by_a_factor_of_two_the_load_is_not
         // The best for as many objects in the scenario of the thresholds, which are what the number alone has to go by.
         let of_slice = report.points.iter().find(|p| p.scenario == "uniform" && p.load.objects == point.load.objects);
         let (_, least) = best(point);
-        let Some(wrong) = of_slice.and_then(|p| time(point, best(p).0)).map(|ns| ns / least).filter(|&over| over >= 2.0)
+        let Some(wrong) =
+            of_slice.and_then(|p| time(point, best(p).0)).map(|ns| ns / least).filter(|&over| over >= 2.0)
         else {
             continue;
         };

@@ -209,8 +209,9 @@ fn estimate(names: &[&str], machines: &[&Hardware], values: &[f64], hardware: &H
     let there = |name: &&str| machines.iter().chain([&hardware]).all(|h| logarithm(h, name).is_some());
     let names: Vec<&str> = names.iter().copied().filter(there).collect();
     let row = |h: &Hardware| names.iter().map(|name| logarithm(h, name).unwrap_or_default()).collect::<Vec<f64>>();
-    let table =
-        Array2::from_shape_fn((machines.len(), names.len()), |(k, j)| logarithm(machines[k], names[j]).unwrap_or_default());
+    let table = Array2::from_shape_fn((machines.len(), names.len()), |(k, j)| {
+        logarithm(machines[k], names[j]).unwrap_or_default()
+    });
     let (line, far_rows) = Line::least_squares(&table, values)?;
     Ok(Estimate { value: line.at(&row(hardware)), mean: line.columns.kept.is_empty(), far_rows })
 }
@@ -282,7 +283,8 @@ mod tests {
     fn least_squares_find_a_power_law_and_too_few_rows_give_the_mean() {
         // A crossover that goes down with the lanes.
         let machines: Vec<Hardware> = Machine::family().iter().map(Machine::hardware).collect();
-        let values: Vec<f64> = machines.iter().map(|h| 5.0 - 0.7 * h.value(ParameterId::SimdLanes).unwrap().ln()).collect();
+        let values: Vec<f64> =
+            machines.iter().map(|h| 5.0 - 0.7 * h.value(ParameterId::SimdLanes).unwrap().ln()).collect();
         let known: Vec<&Hardware> = machines[..6].iter().collect();
         let of = |count: usize| estimate(&PARAMETERS, &known[..count], &values[..count], &machines[6]).unwrap();
         let found = of(6);

@@ -102,7 +102,8 @@ impl Forest {
     fn grow(examples: &[&Example]) -> Result<Self> {
         let columns = examples.first().map_or(0, |e| e.features.len());
         let values = examples.iter().flat_map(|e| e.features.iter().copied()).collect();
-        let x = DenseMatrix::new(examples.len(), columns, values, false).context("the rows of a random forest differ")?;
+        let x =
+            DenseMatrix::new(examples.len(), columns, values, false).context("the rows of a random forest differ")?;
         let y: Vec<f64> = examples.iter().map(|e| e.ln_ns).collect();
         let parameters = RandomForestRegressorParameters::default()
             .with_n_trees(TREES)

@@ -99,7 +99,10 @@ pub fn importance(profiles: &[Profile], progress: &dyn Progress) -> Result<Impor
     let one = |figure: Figure| -> Result<OfParameter> {
         let mut values = ByMachine::new();
         for profile in &some {
-            figure.value(&profile.hardware).into_iter().for_each(|v| values.entry(profile.machine()).or_default().push(v));
+            figure
+                .value(&profile.hardware)
+                .into_iter()
+                .for_each(|v| values.entry(profile.machine()).or_default().push(v));
         }
         let values: BTreeMap<&str, f64> = values.into_iter().filter_map(|(m, own)| Some((m, median(&own)?))).collect();
         let (mut of_choice, mut of_methods) = (ByMachine::new(), BTreeMap::<String, ByMachine<'_>>::new());
@@ -136,7 +139,8 @@ pub fn importance(profiles: &[Profile], progress: &dyn Progress) -> Result<Impor
             "these are {told} verdicts by intervals of 90 %: up to one in ten of those that hold nothing, more with few machines, is `linked` by \
              chance"
         ),
-        "a link is one of the model that was fitted, on these machines; it says what predicts, not what causes".to_owned(),
+        "a link is one of the model that was fitted, on these machines; it says what predicts, not what causes"
+            .to_owned(),
         "the intervals are over machines, each with the models that were fitted without it; the models are not drawn"
             .to_owned(),
     ];

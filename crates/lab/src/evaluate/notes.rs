@@ -92,7 +92,10 @@ mod tests {
         assert_eq!(told(&stays), stays);
         let files =
             ["a.json is left out: it is old", "one", "b.json is left out: it is old", "c.json is left out: it is new"];
-        assert_eq!(told(&files), ["a.json, b.json: each is left out: it is old", "one", "c.json is left out: it is new"]);
+        assert_eq!(
+            told(&files),
+            ["a.json, b.json: each is left out: it is old", "one", "c.json is left out: it is new"]
+        );
         let many: Vec<String> = (0..5).map(|k| format!("{k}.json is left out: it is old")).collect();
         assert_eq!(folded(many), ["0.json, 1.json, 2.json, 3.json, 4.json: each is left out: it is old"]);
     }

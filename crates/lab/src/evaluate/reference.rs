@@ -162,7 +162,12 @@ fn least_squares_and_leverages_agree_with_scikit_learn_and_numpy() {
         let table = matrix(&problem.x);
         let (line, far_rows) = Line::least_squares(&table, &problem.y).unwrap();
         assert_eq!(line.columns.kept.len(), 4);
-        assert!(near(line.at(&problem.at), problem.prediction, DIRECT), "{} {}", line.at(&problem.at), problem.prediction);
+        assert!(
+            near(line.at(&problem.at), problem.prediction, DIRECT),
+            "{} {}",
+            line.at(&problem.at),
+            problem.prediction
+        );
         let columns = Columns::new(&table, &vec![1.0; problem.y.len()]);
         for (ours, theirs) in columns.leverages().iter().zip(&problem.leverages) {
             assert!(near(*ours, *theirs, DIRECT), "{ours} {theirs}");
@@ -195,7 +200,8 @@ fn robust_units_are_at_the_minimum_that_scipy_finds() {
         let units = problem.units();
         let modelled = problem.terms.dot(&Array1::from(units.clone()));
         let bend = HUBER
-            * robust_deviation(&modelled.iter().zip(&problem.ns).map(|(m, t)| (m / t).ln()).collect::<Vec<_>>()).unwrap();
+            * robust_deviation(&modelled.iter().zip(&problem.ns).map(|(m, t)| (m / t).ln()).collect::<Vec<_>>())
+                .unwrap();
         assert!(near(bend / stored.bend, 1.0, BEND), "{}: {bend} {}", stored.name, stored.bend);
         let [ours, theirs] = [&units, &stored.units].map(|units| cost(&problem, stored.bend, units));
         assert!(near(theirs / stored.cost, 1.0, DIRECT), "{}: {theirs} {}", stored.name, stored.cost);

@@ -113,7 +113,9 @@ impl RegretTable {
             loads: spots.iter().map(|s| s.load).collect(),
             // Who was not timed here may have been timed in the next cell: how far behind changes little from one to the other.
             over_best: (0..algorithms)
-                .map(|k| [0, -1, 1].into_iter().find_map(|d| over_best((scenario, quarter + d), k)).unwrap_or(NOT_TIMED))
+                .map(|k| {
+                    [0, -1, 1].into_iter().find_map(|d| over_best((scenario, quarter + d), k)).unwrap_or(NOT_TIMED)
+                })
                 .collect(),
         });
         Self { cells: cells.collect(), algorithms }
@@ -146,7 +148,8 @@ impl RegretTable {
         let alike = |cell: &Cell| other.cells.iter().find(|c| c.scenario == cell.scenario && c.decade == cell.decade);
         let chosen = |cell: &Cell| -> Option<f64> {
             let theirs = alike(cell)?;
-            let best = (0..theirs.over_best.len()).min_by(|&a, &b| theirs.over_best[a].total_cmp(&theirs.over_best[b]))?;
+            let best =
+                (0..theirs.over_best.len()).min_by(|&a, &b| theirs.over_best[a].total_cmp(&theirs.over_best[b]))?;
             let own = profile.position(&of_other.algorithms[best].id)?;
             Some(cell.over_best[usize::from(own)] - 1.0)
         };
@@ -186,7 +189,8 @@ fn ln_costs(spots: &[Vec<(u16, f64)>], algorithms: usize) -> Vec<Option<f64>> {
         }
         costs = sums.into_iter().map(|(sum, count)| (count > 0.0).then(|| sum / count)).collect();
         for (spot, shared) in spots.iter().zip(&mut shared) {
-            let left: Vec<f64> = spot.iter().map(|&(k, ns)| ns.ln() - costs[usize::from(k)].unwrap_or_default()).collect();
+            let left: Vec<f64> =
+                spot.iter().map(|&(k, ns)| ns.ln() - costs[usize::from(k)].unwrap_or_default()).collect();
             *shared = mean(&left);
         }
     }

@@ -55,6 +55,11 @@ mod tests {
         let available = profile.available();
         let regret = |costs: &[AlgorithmCost]| table.regret(&profile, &by_costs(costs.to_vec(), &available)).mean;
         let mended = corrected(&profile, Observed::of_unlike_machine(costs.clone())).unwrap().unwrap();
-        assert!(regret(&costs) > 0.03 && regret(&mended) < 0.5 * regret(&costs), "{} {}", regret(&costs), regret(&mended));
+        assert!(
+            regret(&costs) > 0.03 && regret(&mended) < 0.5 * regret(&costs),
+            "{} {}",
+            regret(&costs),
+            regret(&mended)
+        );
     }
 }

@@ -74,7 +74,9 @@ pub(super) fn regrets_of_units(all: &[Judged], by_machine: bool) -> Vec<(&'stati
 /// The mean of a regret of a strategy on each held-out machine or profile.
 fn of_units(all: &[Judged], name: &str, by_machine: bool, of: impl Fn(&Regret) -> f64) -> Vec<f64> {
     let mut units: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    all.iter().filter(|j| j.name == name).for_each(|j| units.entry(j.unit(by_machine)).or_default().push(of(&j.regret)));
+    all.iter()
+        .filter(|j| j.name == name)
+        .for_each(|j| units.entry(j.unit(by_machine)).or_default().push(of(&j.regret)));
     units.values().map(|regrets| stats::mean(regrets)).collect()
 }
 
@@ -134,7 +136,8 @@ pub(super) struct Part<'a> {
 }
 
 fn of<'a>(own: &[&'a Judged], which: impl Fn(&'a Judged) -> Option<&'a Regret>) -> Vec<Part<'a>> {
-    let part = |j: &&'a Judged| Some(Part { machine: &j.machine, several_threads: j.several_threads, regret: which(j)? });
+    let part =
+        |j: &&'a Judged| Some(Part { machine: &j.machine, several_threads: j.several_threads, regret: which(j)? });
     own.iter().filter_map(part).collect()
 }
 
@@ -150,7 +153,11 @@ pub(super) fn split(parts: &[Part<'_>]) -> Option<Split> {
         };
         (!machines.is_empty()).then(|| Regrets { all: over(|r| r.mean), in_games: over(|r| r.as_in_games) })
     };
-    Some(Split { all: of(&|_| true)?, one_thread: of(&|p| !p.several_threads), several_threads: of(&|p| p.several_threads) })
+    Some(Split {
+        all: of(&|_| true)?,
+        one_thread: of(&|p| !p.several_threads),
+        several_threads: of(&|p| p.several_threads),
+    })
 }
 
 /// Mean of values with their weights.
@@ -193,7 +200,10 @@ mod tests {
         let scores = scores(&all, true);
         let ours = scores.iter().find(|s| s.name == "ours").unwrap();
         assert!((ours.mean_regret - 0.155).abs() < 1e-12 && ours.p95_regret == 0.3, "{ours:?}");
-        assert!((ours.closed_gap - 0.845).abs() < 1e-12 && (ours.share_over_10_percent - 0.275).abs() < 1e-12, "{ours:?}");
+        assert!(
+            (ours.closed_gap - 0.845).abs() < 1e-12 && (ours.share_over_10_percent - 0.275).abs() < 1e-12,
+            "{ours:?}"
+        );
         assert!((ours.mean_regret_in_games.unwrap() - 0.0775).abs() < 1e-12 && ours.p95_regret_in_games == Some(0.15));
         // Only "b" has several threads.
         assert_eq!((ours.one_thread.map(|r| r.all), ours.several_threads.map(|r| r.all)), (Some(0.01), Some(0.3)));

@@ -102,7 +102,8 @@ impl Agreement {
 
 impl Legended for Agreement {
     fn legend(&self, width: i32) -> Legend {
-        let mut entries: Vec<(Sign, String)> = self.groups.iter().map(|g| (Sign::Mark(g.style), g.name.clone())).collect();
+        let mut entries: Vec<(Sign, String)> =
+            self.groups.iter().map(|g| (Sign::Mark(g.style), g.name.clone())).collect();
         let lines = [(EXACT, "the prediction is right"), (TWICE, "it is off by a factor of two")];
         entries.extend(lines.map(|(stroke, name)| (Sign::Stroke(stroke), name.to_owned())));
         let without = self.points().count() - self.drawn().count();

@@ -112,7 +112,8 @@ impl Axis {
             Lies::Flat => font::width(&tick.label, LABEL) + 12,
             Lies::Upright => line_height(LABEL) + 4,
         };
-        let apart = |pair: &[Tick]| place(&pair[1]) - place(&pair[0]) >= f64::from(needs(&pair[0]) + needs(&pair[1])) / 2.0;
+        let apart =
+            |pair: &[Tick]| place(&pair[1]) - place(&pair[0]) >= f64::from(needs(&pair[0]) + needs(&pair[1])) / 2.0;
         ticks.windows(2).all(apart)
     }
 
@@ -121,7 +122,8 @@ impl Axis {
         let digits: &[f64] = if coarser == 0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let every = coarser.max(1);
         let (first, last) = (self.low.log10().floor() as i32, self.high.log10().ceil() as i32);
-        let values = (first..=last).filter(|k| k.rem_euclid(every) == 0).flat_map(|k| digits.iter().map(move |d| (*d, k)));
+        let values =
+            (first..=last).filter(|k| k.rem_euclid(every) == 0).flat_map(|k| digits.iter().map(move |d| (*d, k)));
         // A power with a negative exponent is not the nearest number, and would be written with all its digits.
         let values = values.map(|(d, k)| if k < 0 { d / 10_f64.powi(-k) } else { d * 10_f64.powi(k) });
         self.ticks_at(values)
@@ -199,8 +201,10 @@ mod tests {
     #[test]
     fn numbers_are_short() {
         let numbers = [0.0, 0.02, 0.1, 1.0, 2.5, 50.0, 1000.0, 5000.0, 1e4, 2.5e5, 1e6, 2e9, 1e12, 1e15, 1e-7, -20.0];
-        let expected =
-            ["0", "0.02", "0.1", "1", "2.5", "50", "1000", "5000", "10k", "250k", "1M", "2G", "1T", "1e15", "1e-7", "-20"];
+        let expected = [
+            "0", "0.02", "0.1", "1", "2.5", "50", "1000", "5000", "10k", "250k", "1M", "2G", "1T", "1e15", "1e-7",
+            "-20",
+        ];
         assert_eq!(numbers.map(number), expected);
     }
 

@@ -107,7 +107,8 @@ impl CurvePanel {
         let chart = Chart::new(area, frame.within(LEFT, ABOVE + strip, RIGHT, BELOW), axes.0.clone(), axes.1.clone());
         let drawn = |p: &CurvePoint| chart.place(p.objects, p.ns / unit.1).is_some();
         if !self.series.iter().flat_map(|s| &s.points).any(drawn) {
-            let sentence = if self.title.is_empty() { NOTHING.to_owned() } else { format!("{}: {NOTHING}", self.title) };
+            let sentence =
+                if self.title.is_empty() { NOTHING.to_owned() } else { format!("{}: {NOTHING}", self.title) };
             return chart.missing(&sentence);
         }
         for field in &self.fields {

@@ -35,8 +35,10 @@ pub trait Figure {
     fn draw(&self, format: Picture, caption: &[String]) -> anyhow::Result<Vec<u8>> {
         let (width, height) = self.size();
         let room = width as i32 - 2 * GAP;
-        let title = if self.title().is_empty() { Vec::new() } else { font::wrapped(self.title(), TITLE, room, TITLE_LINES) };
-        let caption: Vec<String> = caption.iter().flat_map(|text| font::wrapped(text, SMALL, room, CAPTION_LINES)).collect();
+        let title =
+            if self.title().is_empty() { Vec::new() } else { font::wrapped(self.title(), TITLE, room, TITLE_LINES) };
+        let caption: Vec<String> =
+            caption.iter().flat_map(|text| font::wrapped(text, SMALL, room, CAPTION_LINES)).collect();
         let top = block(&title, TITLE);
         let bottom = block(&caption, SMALL);
         canvas::picture(format, (width, top + height + bottom), |root| {

@@ -51,7 +51,9 @@ impl<C, D: DrawingBackend> Drawable<D> for Shape<C> {
         match self.mark {
             Mark::Disc | Mark::Ground => backend.draw_circle((x, y), r as u32, &self.colour, true),
             Mark::Ring => backend.draw_circle((x, y), r as u32, &line, false),
-            Mark::Triangle => backend.fill_polygon([(x - r - 1, y + r), (x + r + 1, y + r), (x, y - r - 1)], &self.colour),
+            Mark::Triangle => {
+                backend.fill_polygon([(x - r - 1, y + r), (x + r + 1, y + r), (x, y - r - 1)], &self.colour)
+            }
             Mark::Square => backend.draw_rect((x - r, y - r), (x + r, y + r), &line, false),
             Mark::Cross => {
                 backend.draw_line((x - r, y - r), (x + r, y + r), &line)?;

@@ -46,8 +46,9 @@ impl RanksPicture {
     }
 
     fn legend(&self) -> Legend {
-        let name =
-            |(k, (scenario, boxes)): (usize, (&str, u64))| (Sign::Curve(k), format!("{scenario}, {} M boxes", boxes >> 20));
+        let name = |(k, (scenario, boxes)): (usize, (&str, u64))| {
+            (Sign::Curve(k), format!("{scenario}, {} M boxes", boxes >> 20))
+        };
         Legend::new(self.series().into_iter().enumerate().map(name).collect(), WIDTH as i32 - 2 * GAP)
     }
 
@@ -61,8 +62,9 @@ impl RanksPicture {
         }
         chart.grid(title, "ranks", name)?;
         for (k, (scenario, boxes)) in self.series().into_iter().enumerate() {
-            let points =
-                || self.rows.iter().filter(|r| r.scenario == scenario && r.boxes == boxes).map(|r| (ranks(r), value(r)));
+            let points = || {
+                self.rows.iter().filter(|r| r.scenario == scenario && r.boxes == boxes).map(|r| (ranks(r), value(r)))
+            };
             chart.line(points(), Stroke::of(k))?;
             for (x, y) in points() {
                 chart.mark(x, y, style::mark(k), style::colour(k), 4)?;
@@ -107,9 +109,12 @@ mod tests {
             efficiency: 0.9,
             ..RanksRow::default()
         };
-        let draw = |rows: &[RanksRow]| String::from_utf8(RanksPicture::new(rows).draw(Picture::Svg, &[]).unwrap()).unwrap();
+        let draw =
+            |rows: &[RanksRow]| String::from_utf8(RanksPicture::new(rows).draw(Picture::Svg, &[]).unwrap()).unwrap();
         let svg = draw(&[row("uniform", 2), row("uniform", 64), row("clustered", 64)]);
-        assert!(svg.contains("uniform, 4 M boxes") && svg.contains("clustered, 4 M boxes") && svg.contains("Weak scaling"));
+        assert!(
+            svg.contains("uniform, 4 M boxes") && svg.contains("clustered, 4 M boxes") && svg.contains("Weak scaling")
+        );
         assert!(draw(&[]).contains("no ranks were counted"));
     }
 }

@@ -148,7 +148,8 @@ impl ReplayPicture {
         widths.dedup();
         let total = |k: usize| self.fixed_ns[k].iter().sum::<f64>();
         let best = |of: u32| {
-            let own = (0..self.algorithms.len()).filter(|&k| self.is_on(k, class) && width(k) == of && total(k).is_finite());
+            let own =
+                (0..self.algorithms.len()).filter(|&k| self.is_on(k, class) && width(k) == of && total(k).is_finite());
             own.min_by(|&a, &b| total(a).total_cmp(&total(b)))
         };
         widths.into_iter().filter_map(best).collect()
@@ -172,7 +173,8 @@ impl ReplayPicture {
     fn legend(&self, panel: &Panel, width: i32) -> Legend {
         let counts = self.frames_run();
         let entry = |(at, &k): (usize, &usize)| {
-            let ran = if counts[k] == 0 { "never ran".to_owned() } else { format!("ran in {}", count(counts[k], "frame")) };
+            let ran =
+                if counts[k] == 0 { "never ran".to_owned() } else { format!("ran in {}", count(counts[k], "frame")) };
             (Sign::Marked(at), format!("{}: {ran}", self.algorithms[k]))
         };
         let mut entries: Vec<(Sign, String)> = panel.shown.iter().enumerate().map(entry).collect();

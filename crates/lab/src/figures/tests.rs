@@ -198,7 +198,8 @@ fn ratios_are_beside_their_names_and_parameters_apart_from_algorithms() {
     let value = |ratio: f64| Some(RatioValue { ratio, low: Some(0.9 * ratio), high: Some(1.1 * ratio) });
     let figure = ratios(vec![value(0.5), None, value(3.0)]);
     let (svg, _) = drawn(&figure);
-    let order = ["Hardware parameters", "clock (MHz)", "Algorithms", "grid-sap@gpu0"].map(|text| svg.find(text).unwrap());
+    let order =
+        ["Hardware parameters", "clock (MHz)", "Algorithms", "grid-sap@gpu0"].map(|text| svg.find(text).unwrap());
     assert!(order.is_sorted(), "{order:?}");
     let needed = ["times the reference", "(the reference)", "no mark: a value is missing", ">\nmissing\n"];
     assert!(needed.iter().all(|text| svg.contains(text)), "{svg}");
@@ -224,7 +225,14 @@ fn map(points: Vec<MapPoint>, grid: Vec<MapCell>) -> FieldMap {
     let names = (0..7).map(|k| (format!("field {k} {ODD}"), k)).collect();
     let panel = MapPanel { title: "measured".to_owned(), grid, points };
     let panels = vec![panel.clone(), MapPanel { title: "predicted".to_owned(), ..panel }];
-    FieldMap { title: String::new(), names, x: (10.0, 1e5), y: (0.1, 10.0), y_name: "pairs per object".to_owned(), panels }
+    FieldMap {
+        title: String::new(),
+        names,
+        x: (10.0, 1e5),
+        y: (0.1, 10.0),
+        y_name: "pairs per object".to_owned(),
+        panels,
+    }
 }
 
 #[test]
@@ -239,7 +247,9 @@ fn a_map_has_fields_points_and_rings() {
     let figure = map(vec![point(Some(0.05)), point(Some(0.2))], grid);
     let (svg, _) = drawn(&figure);
     let needed = ["measured", "predicted", "pairs per object", "regret over 10 %"];
-    assert!(needed.iter().all(|text| svg.contains(text)) && (0..7).all(|k| svg.contains(&format!("field {k} {ESCAPED}"))));
+    assert!(
+        needed.iter().all(|text| svg.contains(text)) && (0..7).all(|k| svg.contains(&format!("field {k} {ESCAPED}")))
+    );
     // The sign in the legend and a ring in each panel.
     assert_eq!((svg.matches(" r=\"9\"").count(), svg.matches(" r=\"7\"").count()), (2, 1), "{svg}");
     // Two fields that the grid is made of, and two points, in each of two panels.
@@ -269,13 +279,16 @@ fn any_map_is_drawn() {
 #[test]
 fn a_matrix_tells_verdicts_by_sign_and_text() {
     let cell = |verdict, text: &str| InfluenceCell { verdict: Some(verdict), text: text.to_owned() };
-    let cells =
-        vec![vec![cell(Verdict::Linked, "-0.80"), cell(Verdict::NotLinked, "weak")], vec![cell(Verdict::CannotBeTold, "")]];
+    let cells = vec![
+        vec![cell(Verdict::Linked, "-0.80"), cell(Verdict::NotLinked, "weak")],
+        vec![cell(Verdict::CannotBeTold, "")],
+    ];
     let names = |names: [&str; 2]| names.map(str::to_owned).to_vec();
     let columns = names(["sap@cpu1", ODD]);
     let figure = Influence { title: "Influence".to_owned(), columns, rows: names(["clock (MHz)", ODD]), cells };
     let (svg, _) = drawn(&figure);
-    let needed = ["-0.80\n", "weak\n", "?\n", "clock (MHz)\n", "sap@cpu1\n", "not linked\n", "cannot be told", "absent"];
+    let needed =
+        ["-0.80\n", "weak\n", "?\n", "clock (MHz)\n", "sap@cpu1\n", "not linked\n", "cannot be told", "absent"];
     assert!(needed.iter().all(|text| svg.contains(text)), "{svg}");
     assert_eq!(svg.matches(&format!("{ESCAPED}\n")).count(), 2);
     let long: Vec<String> = (0..60).map(|k| format!("crossover of algorithm number {k} and {ODD}").repeat(4)).collect();
@@ -292,10 +305,14 @@ fn crossovers(points: Vec<AgreementPoint>) -> Agreement {
 
 #[test]
 fn predictions_are_drawn_where_both_values_are_known() {
-    let point =
-        |measured: f64, predicted| AgreementPoint { measured, predicted, interval: Some((0.8 * measured, 1.3 * measured)) };
+    let point = |measured: f64, predicted| AgreementPoint {
+        measured,
+        predicted,
+        interval: Some((0.8 * measured, 1.3 * measured)),
+    };
     let (svg, _) = drawn(&crossovers(vec![point(100.0, 150.0), point(1e5, 3e4), point(f64::INFINITY, 10.0)]));
-    let needed = ["measured crossover (objects)", "predicted crossover (objects)", "factor of two", "1 without a position"];
+    let needed =
+        ["measured crossover (objects)", "predicted crossover (objects)", "factor of two", "1 without a position"];
     assert!(needed.iter().all(|text| svg.contains(text)), "{svg}");
     assert_eq!(svg.matches(&format!("crossover {ESCAPED}")).count(), 1);
     let awkward: Vec<AgreementPoint> = every_pair().into_iter().map(|(a, b)| point(a, b)).collect();
@@ -316,7 +333,8 @@ fn the_figures_of_a_training_stand_alone() {
     let group = AgreementGroup { name: format!("sap {ODD}"), style: 3, points: points.collect() };
     let times = Agreement { title: "Times".to_owned(), values: Values::TimesNs, groups: vec![group] };
     let strategy = StrategyRegrets { name: format!("strategy {ODD}"), style: 1, regrets: AWKWARD.to_vec() };
-    let regrets = Regrets { title: "Regrets".to_owned(), unit: "physical machine".to_owned(), strategies: vec![strategy] };
+    let regrets =
+        Regrets { title: "Regrets".to_owned(), unit: "physical machine".to_owned(), strategies: vec![strategy] };
     let units = ["measured time of a frame (", "quantile over the held-out physical machines"];
     let figures: [&dyn Figure; 2] = [&times, &regrets];
     for (figure, unit) in figures.into_iter().zip(units) {

@@ -11,7 +11,8 @@ use sapwise::BackendClass;
 const WIDTH: i32 = 1400;
 const HEIGHT: i32 = 640;
 /// Strategies that are drawn; their positions decide colours and marks.
-const STRATEGIES: [&str; 6] = [OURS, "random forest", "nearest machine", "direct regression", "single best", "full sweep"];
+const STRATEGIES: [&str; 6] =
+    [OURS, "random forest", "nearest machine", "direct regression", "single best", "full sweep"];
 
 /// Predicted over measured times of what was held out, and the regret on each held-out machine.
 #[derive(Debug, Clone, Default, PartialEq)]

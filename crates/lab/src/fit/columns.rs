@@ -70,7 +70,9 @@ impl Columns {
             let leverages = self.leverages();
             let lone = (0..leverages.len()).max_by(|&a, &b| leverages[a].total_cmp(&leverages[b]));
             let Some(row) = lone.filter(|&row| leverages[row] > ALONE) else { return self };
-            let Some((worst, _)) = base.iter().max_by(|a, b| a.1[row].abs().total_cmp(&b.1[row].abs())) else { return self };
+            let Some((worst, _)) = base.iter().max_by(|a, b| a.1[row].abs().total_cmp(&b.1[row].abs())) else {
+                return self;
+            };
             let rest: Vec<usize> = (0..self.kept.len()).filter(|j| j != worst).collect();
             self = self.select(&rest);
         }
@@ -149,7 +151,11 @@ mod tests {
         // 1 / M + (x - mean)^2 / sum of squares, under the weights.
         let columns = Columns::new(&array![[1.0], [2.0], [3.0], [6.0]], &[1.0; 4]);
         let expected = [0.25 + 4.0 / 14.0, 0.25 + 1.0 / 14.0, 0.25, 0.25 + 9.0 / 14.0];
-        assert!(columns.leverages().iter().zip(expected).all(|(h, e)| (h - e).abs() < 1e-12), "{:?}", columns.leverages());
+        assert!(
+            columns.leverages().iter().zip(expected).all(|(h, e)| (h - e).abs() < 1e-12),
+            "{:?}",
+            columns.leverages()
+        );
         // A row of weight two has the leverage of two rows.
         let twice = Columns::new(&array![[1.0], [2.0], [3.0], [3.0], [6.0]], &[1.0; 5]).leverages();
         let weighted = Columns::new(&array![[1.0], [2.0], [3.0], [6.0]], &[1.0, 1.0, 2.0, 1.0]).leverages();

@@ -126,12 +126,21 @@ impl<'a> Designs<'a> {
                 (0..design.rows.len()).filter(|&k| training.holds(&design.rows[k], self.profiles)).collect();
             let name = design.name();
             if design.leave_out_software(&mut rows, self.profiles) {
-                notes.push(format!("{name}: timings on software adapters are left out, there being timings on real GPUs"));
+                notes.push(format!(
+                    "{name}: timings on software adapters are left out, there being timings on real GPUs"
+                ));
             }
             let fitted = design.fit(&rows, self.profiles, &self.machines, other.as_ref(), &places)?;
             match fitted {
                 Some(mut model) => {
-                    design.call_helpers(&mut model, other.as_ref(), training, self.profiles, &self.machines, &places)?;
+                    design.call_helpers(
+                        &mut model,
+                        other.as_ref(),
+                        training,
+                        self.profiles,
+                        &self.machines,
+                        &places,
+                    )?;
                     models.push(model);
                 }
                 // None of the chosen profiles knows it.
@@ -409,16 +418,17 @@ fn nanoseconds(
     let backend = id.backend();
     let cache = hardware.value(ParameterId::CacheLlcBytes).filter(|c| *c > 0.0);
     let cache = match backend.class() {
-        BackendClass::Cpu => {
-            cache.ok_or_else(|| PredictError::Missing { parameter: ParameterId::CacheLlcBytes.to_string(), why: None })?
-        }
+        BackendClass::Cpu => cache
+            .ok_or_else(|| PredictError::Missing { parameter: ParameterId::CacheLlcBytes.to_string(), why: None })?,
         BackendClass::Gpu => 0.0,
     };
     let sum = |component: &Component| -> Result<f64, PredictError> {
         component
             .0
             .iter()
-            .map(|&(times, term, scale)| Ok(times * term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?))
+            .map(|&(times, term, scale)| {
+                Ok(times * term.count(&row.load, cache) * scale.nanoseconds(hardware, backend)?)
+            })
             .sum()
     };
     components.iter().map(sum).collect()

@@ -75,7 +75,8 @@ mod tests {
                     let threads = [2, 4][k as usize % 2];
                     let work_ns = 300.0 + (30.0 + f64::from(k % 8)) * f64::from(objects);
                     let figures = ThreadFigures::new(0.3, 8000.0 + 500.0 * f64::from(k % 5), 0.95 * f64::from(threads));
-                    let ns = truth.with(figures, threads).cost_ns(objects, work_ns) * if k % 17 == 0 { 5.0 } else { 1.0 };
+                    let ns =
+                        truth.with(figures, threads).cost_ns(objects, work_ns) * if k % 17 == 0 { 5.0 } else { 1.0 };
                     Called { objects, threads, work_ns, ns, weight: 1.0, figures }
                 })
                 .collect();

@@ -137,8 +137,9 @@ mod tests {
     fn a_smooth_remainder_is_found_and_a_far_timing_is_held_back() {
         let all = profiles();
         let found = places(all.iter(), None);
-        let truth =
-            |l: &Load| 0.3 * (f64::from(l.objects).log2() / 4.0).sin() + 0.1 * (l.pairs / f64::from(l.objects)).min(1.0);
+        let truth = |l: &Load| {
+            0.3 * (f64::from(l.objects).log2() / 4.0).sin() + 0.1 * (l.pairs / f64::from(l.objects)).min(1.0)
+        };
         let mut remainders: Vec<Remainder> = all[0]
             .points
             .iter()

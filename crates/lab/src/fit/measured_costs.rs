@@ -10,7 +10,9 @@ use crate::report::{Label, Point, Report};
 use crate::text::count;
 use anyhow::{Result, bail};
 use sapwise::hardware::{GpuParameterId, ParameterId, Quantity};
-use sapwise::{AlgorithmCost, AlgorithmId, Crossover, Entry, Hardware, Load, Model, Observed, Parameter, Source, Tuning};
+use sapwise::{
+    AlgorithmCost, AlgorithmId, Crossover, Entry, Hardware, Load, Model, Observed, Parameter, Source, Tuning,
+};
 use sapwise_scenes::Random;
 
 /// Points that a cost needs.
@@ -269,7 +271,8 @@ mod tests {
         let mut report = Machine::family()[0].clone().exact().report();
         let from = |p: &Point| p.scenario == "clustered" && p.load.objects > 5000;
         for point in &mut report.points {
-            let one = point.timings.iter().find(|t| t.algorithm.to_string() == "grid-sap@cpu1").unwrap().samples_ns.clone();
+            let one =
+                point.timings.iter().find(|t| t.algorithm.to_string() == "grid-sap@cpu1").unwrap().samples_ns.clone();
             let two = point.timings.iter_mut().find(|t| t.algorithm.to_string() == "grid-sap@cpu2").unwrap();
             let slower = if point.scenario == "clustered" && point.load.objects > 3000 { 8 } else { 1 };
             two.samples_ns = one.iter().map(|ns| ns * slower + ns / 50).collect();
@@ -310,12 +313,15 @@ mod tests {
             let timing = |id: &AlgorithmId, exponent: f64| Timing {
                 algorithm: id.clone(),
                 // Spread by 2 % to either side, and the other way round for the other.
-                samples_ns: (-2..=2).map(|k| (1e6 * n * ((n / to).powf(exponent) + 0.01 * f64::from(k))) as u64).collect(),
+                samples_ns: (-2..=2)
+                    .map(|k| (1e6 * n * ((n / to).powf(exponent) + 0.01 * f64::from(k))) as u64)
+                    .collect(),
                 error: None,
             };
             point.timings = vec![timing(&above, 0.0), timing(&below, 0.5)];
         }
-        let mut crossover = measured_tuning(&Machine::family()[0].report(), "uniform", None).unwrap().crossovers.remove(0);
+        let mut crossover =
+            measured_tuning(&Machine::family()[0].report(), "uniform", None).unwrap().crossovers.remove(0);
         (crossover.below, crossover.above) = (below, above);
         (crossover.objects, crossover.low, crossover.high) = (1000.0, Some(900.0), Some(1100.0));
         (report, crossover)

@@ -38,8 +38,9 @@ impl MinOfTwo {
             let floors = (0..rows).map(|k| problem.floors[k] || other[k]).collect();
             found.units = Problem { floors, ..problem.clone() }.units();
             let first = problem.terms.dot(&Array1::from(found.units.clone()));
-            let now: Vec<bool> =
-                (0..rows).map(|k| !problem.floors[k] && off(k, other_ns[k] * found.factor) < off(k, first[k])).collect();
+            let now: Vec<bool> = (0..rows)
+                .map(|k| !problem.floors[k] && off(k, other_ns[k] * found.factor) < off(k, first[k]))
+                .collect();
             if now == other {
                 break;
             }

@@ -83,7 +83,8 @@ fn retreat(a: &Array2<f64>, b: &Array1<f64>, solution: Vec<f64>, active: &mut Ve
     let mut z = solution;
     let mut dropped = false;
     while z.iter().any(|&v| v <= 0.0) {
-        let step = active.iter().zip(&z).filter(|(_, v)| **v <= 0.0).map(|(&k, v)| x[k] / (x[k] - v)).fold(1.0, f64::min);
+        let step =
+            active.iter().zip(&z).filter(|(_, v)| **v <= 0.0).map(|(&k, v)| x[k] / (x[k] - v)).fold(1.0, f64::min);
         for (&k, v) in active.iter().zip(&z) {
             x[k] += step * (v - x[k]);
         }

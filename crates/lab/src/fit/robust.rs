@@ -104,8 +104,10 @@ impl Problem {
         for _ in 0..ROUNDS {
             units = self.weighted(&weights).to_vec();
             let modelled = self.terms.dot(&Array1::from(units.clone()));
-            let moved =
-                modelled.iter().zip(&before).any(|(now, before): (&f64, &f64)| (now - before).abs() > STILL * now.abs());
+            let moved = modelled
+                .iter()
+                .zip(&before)
+                .any(|(now, before): (&f64, &f64)| (now - before).abs() > STILL * now.abs());
             if !moved {
                 break;
             }

@@ -53,8 +53,10 @@ pub fn rows(profile: &Profile, position: usize) -> Vec<Row> {
         // A GPU has a large fixed cost: it starts far behind and gains. One that left the race while it gained, for want of
         // time, may be ahead beyond.
         ratios.retain(|_, course| !(on_gpu && gains(course)));
-        let last: BTreeMap<&str, (u32, f64)> =
-            ratios.iter().filter_map(|(s, course)| course.last_key_value().map(|(&n, &ratio)| (*s, (n, ratio)))).collect();
+        let last: BTreeMap<&str, (u32, f64)> = ratios
+            .iter()
+            .filter_map(|(s, course)| course.last_key_value().map(|(&n, &ratio)| (*s, (n, ratio))))
+            .collect();
         for (k, spot) in profile.points.iter().enumerate() {
             let Some(&(objects, behind)) = last.get(spot.scenario.as_str()) else { continue };
             if let Some(best) = spot.best().filter(|_| spot.load.objects > objects) {

@@ -21,7 +21,10 @@ pub(super) fn inline(svg: &str, id: &str, alt: &str) -> Option<String> {
     let title: Markup = html! { title id={ (id) "-title" } { (alt) } };
     let view = view.render().into_string();
     let title = title.into_string();
-    Some(format!("<svg role=\"img\" aria-labelledby=\"{id}-title\" viewBox=\"{view}\">{title}{}</svg>", apart(body, id)))
+    Some(format!(
+        "<svg role=\"img\" aria-labelledby=\"{id}-title\" viewBox=\"{view}\">{title}{}</svg>",
+        apart(body, id)
+    ))
 }
 
 /// The body with `id` before each of its own names, so that two figures do not share one: a browser would take the first of them for
@@ -65,8 +68,7 @@ mod tests {
 
     #[test]
     fn names_differ_between_figures() {
-        let file =
-            "<svg width=\"1\" height=\"1\"><clipPath id=\"c\"/><g clip-path=\"url(#c)\"><use href=\"#c\"/>url(#d)</g></svg>";
+        let file = "<svg width=\"1\" height=\"1\"><clipPath id=\"c\"/><g clip-path=\"url(#c)\"><use href=\"#c\"/>url(#d)</g></svg>";
         let element = inline(file, "f", "").unwrap();
         assert!(
             element.ends_with("<clipPath id=\"f-c\"/><g clip-path=\"url(#f-c)\"><use href=\"#f-c\"/>url(#d)</g></svg>"),

@@ -18,11 +18,17 @@ const WIDE: usize = 12;
 const WORDS: usize = 32;
 
 /// The table below the caption `{id}-caption`. `row_id` returns the name of a row's place, by its position.
-pub(super) fn table(id: &str, data: &DataTable, reports: &Reports<'_>, row_id: &dyn Fn(usize) -> Option<String>) -> Markup {
+pub(super) fn table(
+    id: &str,
+    data: &DataTable,
+    reports: &Reports<'_>,
+    row_id: &dyn Fn(usize) -> Option<String>,
+) -> Markup {
     let traced = data.rows.iter().any(|r| !r.reports.is_empty());
     let numeric: Vec<bool> = (0..data.columns.len()).map(|k| is_numeric(&data.rows, k)).collect();
     let (tall, wide) = (data.rows.len() > TALL, data.columns.len() + usize::from(traced) > WIDE);
-    let class = [("scroll", true), ("tall", tall), ("wide", wide)].map(|(name, is)| if is { name } else { "" }).join(" ");
+    let class =
+        [("scroll", true), ("tall", tall), ("wide", wide)].map(|(name, is)| if is { name } else { "" }).join(" ");
     html! {
         div class=(class.trim_end()) tabindex="0" role="region" aria-labelledby={ (id) "-caption" } {
             table aria-labelledby={ (id) "-caption" } data-filter[data.rows.len() > FILTERED] {
@@ -83,6 +89,7 @@ fn is_long(text: &str) -> bool {
 }
 
 fn is_numeric(rows: &[Row], column: usize) -> bool {
-    let mut cells = rows.iter().filter_map(|r| r.cells.get(column)).filter(|c| !matches!(c, Cell::Missing(_))).peekable();
+    let mut cells =
+        rows.iter().filter_map(|r| r.cells.get(column)).filter(|c| !matches!(c, Cell::Missing(_))).peekable();
     cells.peek().is_some() && cells.all(|c| matches!(c, Cell::Number { .. }))
 }

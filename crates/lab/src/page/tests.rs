@@ -66,7 +66,10 @@ fn small() -> DataTable {
         ("c", Some((-1.0, "-1 ns"))),
     ];
     let cell = |c: Option<(f64, &str)>| c.map_or_else(missing_cell, |(value, shown)| number(value, shown));
-    DataTable { columns: columns(&["name", "time"]), rows: cells.map(|(name, c)| row(vec![text(name), cell(c)])).to_vec() }
+    DataTable {
+        columns: columns(&["name", "time"]),
+        rows: cells.map(|(name, c)| row(vec![text(name), cell(c)])).to_vec(),
+    }
 }
 
 fn large(rows: usize, columns: usize) -> DataTable {
@@ -83,7 +86,9 @@ fn large(rows: usize, columns: usize) -> DataTable {
     let titles: Vec<String> = (0..columns).map(|c| format!("column {c} in ns")).collect();
     DataTable {
         columns: titles.iter().map(|t| Column { title: t.clone(), key: t.clone() }).collect(),
-        rows: (0..rows).map(|r| Row { cells: (0..columns).map(|c| cell(r, c)).collect(), reports: vec![r % 30] }).collect(),
+        rows: (0..rows)
+            .map(|r| Row { cells: (0..columns).map(|c| cell(r, c)).collect(), reports: vec![r % 30] })
+            .collect(),
     }
 }
 
@@ -129,7 +134,10 @@ fn rich() -> Page {
     hostile.rows[1].reports = (0..26).collect();
     let figure = |id: &str| Block::Figure {
         id: id.to_owned(),
-        caption: format!("Time of a frame over the number of objects. From R1 to R26, by `sapwise study`. {}", HOSTILE[0]),
+        caption: format!(
+            "Time of a frame over the number of objects. From R1 to R26, by `sapwise study`. {}",
+            HOSTILE[0]
+        ),
         svg: picture(),
         links: ["SVG", "PNG", "CSV"].map(|t| (t.to_owned(), format!("figures/a b.{}", t.to_lowercase()))).to_vec(),
         alt: format!("Rising curves {}", HOSTILE[1]),
@@ -141,8 +149,16 @@ fn rich() -> Page {
         command: format!("sapwise study datasets/*.json --out 'a \"folder\" <b>' {long}"),
         reports: reports.collect(),
         sections: vec![
-            section("small", "A small table", vec![Block::Text("Some words. ".repeat(40)), table_block("small", small())]),
-            section("figures", "Figures", vec![figure("f"), figure("f"), Block::List(HOSTILE.map(str::to_owned).to_vec())]),
+            section(
+                "small",
+                "A small table",
+                vec![Block::Text("Some words. ".repeat(40)), table_block("small", small())],
+            ),
+            section(
+                "figures",
+                "Figures",
+                vec![figure("f"), figure("f"), Block::List(HOSTILE.map(str::to_owned).to_vec())],
+            ),
             section(
                 "large",
                 "A large table",
@@ -219,7 +235,10 @@ fn columns_sort() {
         // By value and not by text, ties as they were, the missing one last.
         assert_eq!((names(), sorted()), (["c", "a", "b", "R9", "R10"].map(str::to_owned).to_vec(), json!("ascending")));
         browser.type_into(&time, ENTER);
-        assert_eq!((names(), sorted()), (["b", "R9", "a", "c", "R10"].map(str::to_owned).to_vec(), json!("descending")));
+        assert_eq!(
+            (names(), sorted()),
+            (["b", "R9", "a", "c", "R10"].map(str::to_owned).to_vec(), json!("descending"))
+        );
         browser.type_into(&time, " ");
         assert_eq!((names(), sorted()), (as_made.map(str::to_owned).to_vec(), json!("none")));
         // Words as people order them.
@@ -227,10 +246,14 @@ fn columns_sort() {
         assert_eq!(names(), ["a", "b", "c", "R9", "R10"]);
         // A large one, from within its box.
         browser.click("#large-2 th:nth-child(2) button");
-        let values =
-            browser.value("[...document.querySelectorAll('#large-2 tbody tr')].map(r => r.cells[1].dataset.value || null)");
-        let values: Vec<f64> =
-            values.as_array().unwrap().iter().map(|v| v.as_str().map_or(f64::INFINITY, |v| v.parse().unwrap())).collect();
+        let values = browser
+            .value("[...document.querySelectorAll('#large-2 tbody tr')].map(r => r.cells[1].dataset.value || null)");
+        let values: Vec<f64> = values
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|v| v.as_str().map_or(f64::INFINITY, |v| v.parse().unwrap()))
+            .collect();
         assert!(values.len() == 200 && values.is_sorted() && values[199].is_infinite(), "{values:?}");
         assert_eq!(browser.console(), [""; 0]);
     });
@@ -247,7 +270,10 @@ fn rows_are_filtered() {
         browser.type_into(field, "datasets MACHINE-7");
         // 7 and 70 to 79.
         assert_eq!(column(browser, "reports-table", 0).len(), 11);
-        assert_eq!(browser.value("document.querySelector('#reports-table output').textContent"), json!("11 of 90 rows"));
+        assert_eq!(
+            browser.value("document.querySelector('#reports-table output').textContent"),
+            json!("11 of 90 rows")
+        );
         browser.click("#reports-table th:first-child button");
         assert_eq!(column(browser, "reports-table", 0)[..2], ["R7", "R70"]);
         // A link to a row that is filtered away shows it.
@@ -301,7 +327,8 @@ fn all_of_it_is_printed_and_in_light() {
         assert_eq!(style(".tall thead button", "display"), json!("contents"));
         assert_eq!(style("main a", "textDecorationLine"), json!("none"));
         assert_eq!(
-            browser.value("document.querySelector('#hostile details a').checkVisibility({ contentVisibilityAuto: true })"),
+            browser
+                .value("document.querySelector('#hostile details a').checkVisibility({ contentVisibilityAuto: true })"),
             json!(true)
         );
         browser.print("page");
@@ -316,7 +343,10 @@ fn it_can_be_read_without_scripts() {
         browser.screenshot("page-1600-without-scripts");
         assert_eq!(browser.value("document.querySelectorAll('button, input').length"), json!(0));
         assert_eq!(browser.value("document.querySelectorAll('#large-2 tbody tr').length"), json!(200));
-        assert_eq!(column(browser, "small-2", 1), ["2.00 ms", "900 us", "–this machine has no \"GPU\"", "2.00 ms", "-1 ns"]);
+        assert_eq!(
+            column(browser, "small-2", 1),
+            ["2.00 ms", "900 us", "–this machine has no \"GPU\"", "2.00 ms", "-1 ns"]
+        );
     });
 }
 

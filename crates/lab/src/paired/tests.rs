@@ -144,8 +144,11 @@ fn without_noise_the_crossing_is_exact_and_its_interval_too() {
     let sizes = [10_u32, 40, 160, 640, 2560];
     let samples: Vec<(Vec<u64>, Vec<u64>)> =
         sizes.iter().map(|&n| (vec![u64::from(n) * 1_000_000; 5], vec![320_000_000; 5])).collect();
-    let points: Vec<PairedSamples<'_>> =
-        sizes.iter().zip(&samples).map(|(&objects, (a, b))| PairedSamples { objects, first_ns: a, second_ns: b }).collect();
+    let points: Vec<PairedSamples<'_>> = sizes
+        .iter()
+        .zip(&samples)
+        .map(|(&objects, (a, b))| PairedSamples { objects, first_ns: a, second_ns: b })
+        .collect();
     let found = compare(&points).unwrap();
     let p = found.positions()[0];
     assert!((p.objects / 320.0 - 1.0).abs() < 1e-6 && p.high / p.low < 1.0 + 1e-6, "{p:?}");

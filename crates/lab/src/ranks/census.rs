@@ -25,8 +25,13 @@ impl Census {
         let ranks = cuts.regions().len();
         let zeros = || vec![0_u64; ranks];
         let step = (boxes.len() as u64 / ranks as u64 / MEMBERS).max(1);
-        let mut census =
-            Self { searched: zeros(), sent: zeros(), found: zeros(), returned: zeros(), members: vec![Vec::new(); ranks] };
+        let mut census = Self {
+            searched: zeros(),
+            sent: zeros(),
+            found: zeros(),
+            returned: zeros(),
+            members: vec![Vec::new(); ranks],
+        };
         for (k, b) in (0..).zip(boxes) {
             let home = cuts.rank_of(centre(b));
             cuts.each_rank_of(b, |rank| {

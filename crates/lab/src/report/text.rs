@@ -34,7 +34,8 @@ pub fn write(report: &Report) -> Result<String, Error> {
     if report.points.is_empty() {
         return Ok(frame);
     }
-    let points = report.points.iter().map(serde_json::to_string).collect::<Result<Vec<_>, _>>().map_err(Error::Write)?;
+    let points =
+        report.points.iter().map(serde_json::to_string).collect::<Result<Vec<_>, _>>().map_err(Error::Write)?;
     let points = format!("\n  \"points\": [\n    {}\n  ]", points.join(",\n    "));
     // A line break within a text is written as an escape, so this can only be the key of the report itself.
     Ok(frame.replacen("\n  \"points\": []", &points, 1))

@@ -103,8 +103,9 @@ impl<'a> Costs<'a> {
     fn keeping(&self, threads: f64, load: &Load) -> f64 {
         let n = f64::from(load.objects);
         let divided = 14.0 * n + 34.0 * load.pairs * self.cpu.pairs + 130.0 * n * load.moved;
-        let sum =
-            self.cycles(365.0 + 14.0 * n) + self.cycles(divided) / self.speed_up(threads) + self.moving(n, 56.0, threads);
+        let sum = self.cycles(365.0 + 14.0 * n)
+            + self.cycles(divided) / self.speed_up(threads)
+            + self.moving(n, 56.0, threads);
         sum * self.of_method("pair-cache") + self.forking(threads)
     }
 
@@ -188,7 +189,10 @@ mod tests {
 
     fn load(objects: u32, moved: f64) -> Load {
         let n = f64::from(objects);
-        Load::of_objects(objects).with_candidates(0.3 * n.powf(5.0 / 3.0), 4.0 * n).with_pairs(0.5 * n).with_moved(moved)
+        Load::of_objects(objects)
+            .with_candidates(0.3 * n.powf(5.0 / 3.0), 4.0 * n)
+            .with_pairs(0.5 * n)
+            .with_moved(moved)
     }
 
     fn machines() -> Vec<TrueMachine> {
@@ -210,7 +214,10 @@ mod tests {
             for id in ids.into_iter().map(|e| e.id) {
                 let costs = Costs::new(&machine);
                 let course = [10, 1000, 100_000].map(|n| costs.frame_ns(&id, &load(n, 0.04)).unwrap());
-                assert!(course[0] > 0.0 && course.is_sorted() && course[2].is_finite(), "{id} on {machine:?}: {course:?}");
+                assert!(
+                    course[0] > 0.0 && course.is_sorted() && course[2].is_finite(),
+                    "{id} on {machine:?}: {course:?}"
+                );
             }
         }
     }
@@ -222,7 +229,10 @@ mod tests {
                 let (still, fast) = (load(n, 0.0), load(n, 1.0));
                 let look = ns(&machine, "bvh@cpu1", &fast) * 0.5 + 10_000.0;
                 assert!(ns(&machine, "pair-cache@cpu1", &fast) <= ns(&machine, "bvh@cpu1", &fast) + look);
-                assert!(ns(&machine, "pair-cache@cpu1", &still) < ns(&machine, "bvh@cpu1", &still), "{n} on {machine:?}");
+                assert!(
+                    ns(&machine, "pair-cache@cpu1", &still) < ns(&machine, "bvh@cpu1", &still),
+                    "{n} on {machine:?}"
+                );
             }
         }
     }

@@ -38,7 +38,8 @@ pub(super) fn hardware(build: &Build<'_>, machine: &TrueMachine) -> Hardware {
         (ParameterId::BandwidthOneThreadGbPerS, Measured(cpu.one_thread_gb_per_s, 0.05)),
         (ParameterId::BandwidthAllThreadsGbPerS, Measured(cpu.all_threads_gb_per_s, 0.08)),
     ];
-    figures.extend(ParameterId::LATENCIES.map(|(kib, id)| (id, Measured(cpu.latency_of(f64::from(kib) * 1024.0), 0.04))));
+    figures
+        .extend(ParameterId::LATENCIES.map(|(kib, id)| (id, Measured(cpu.latency_of(f64::from(kib) * 1024.0), 0.04))));
     if cpu.threads > 1.0 {
         figures.extend([
             (ParameterId::ForkJoinWarmNs, Measured(cpu.fork_join_warm_ns, 0.4)),

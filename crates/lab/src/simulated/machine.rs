@@ -114,7 +114,8 @@ impl TrueCpu {
             cores,
             threads,
             ghz,
-            all_cores_ghz: (cpu.base_ghz + (cpu.boost_ghz - cpu.base_ghz) * between("all cores' clock", 0.3, 0.8)).min(ghz),
+            all_cores_ghz: (cpu.base_ghz + (cpu.boost_ghz - cpu.base_ghz) * between("all cores' clock", 0.3, 0.8))
+                .min(ghz),
             lanes: f64::from(cpu.simd.level().1),
             cache_bytes: [cpu.l1d_bytes, cpu.l2_bytes, cpu.llc_bytes],
             latency_ns,
@@ -156,7 +157,8 @@ impl TrueGpu {
         // One inside a CPU shares its memory, which it reads as fast as all cores do.
         let memory_gb_per_s = gpu.card.as_ref().map_or(cpu.all_threads_gb_per_s, |c| c.memory_gb_per_s);
         // The boxes are copied twice: by the CPU into memory that the GPU sees, then over the bus.
-        let bus = gpu.card.as_ref().map_or(memory_gb_per_s / 2.0, pcie_gb_per_s) * between("share of the bus", 0.75, 0.9);
+        let bus =
+            gpu.card.as_ref().map_or(memory_gb_per_s / 2.0, pcie_gb_per_s) * between("share of the bus", 0.75, 0.9);
         let twice = |bus: f64| 1.0 / (1.0 / bus + 1.0 / cpu.one_thread_gb_per_s);
         // Drivers of earlier years take longer.
         let age = 1.0 + (2020.0 - f64::from(gpu.year)).max(0.0) / 12.0;

@@ -119,7 +119,9 @@ mod tests {
             for gpu in &build.gpus {
                 match &gpu.inside {
                     Some(cpu) => assert_eq!(*cpu, build.cpu.name),
-                    None => assert!(gpu.year.abs_diff(build.cpu.year) <= 3 && build.cpu.form != Form::Board, "{build:?}"),
+                    None => {
+                        assert!(gpu.year.abs_diff(build.cpu.year) <= 3 && build.cpu.form != Form::Board, "{build:?}")
+                    }
                 }
             }
             assert!(build.gpus.len() <= 2 && build.gpus.is_sorted_by_key(|g| g.inside.is_some()), "{build:?}");

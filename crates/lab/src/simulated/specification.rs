@@ -146,7 +146,11 @@ pub fn built_in() -> Result<Specifications> {
 pub fn read(text: &str) -> Result<Specifications> {
     let read: Specifications = serde_json::from_str(text).context("no file of specifications/1")?;
     if read.cpus.is_empty() || read.cpus.len() > MOST || read.gpus.len() > MOST {
-        bail!("{} CPUs and {} GPUs: one CPU is needed, and {MOST} of each is the most", read.cpus.len(), read.gpus.len());
+        bail!(
+            "{} CPUs and {} GPUs: one CPU is needed, and {MOST} of each is the most",
+            read.cpus.len(),
+            read.gpus.len()
+        );
     }
     let date = read.date.as_bytes();
     let digits = date.iter().enumerate().all(|(k, b)| if k == 4 || k == 7 { *b == b'-' } else { b.is_ascii_digit() });
@@ -172,14 +176,16 @@ pub fn read(text: &str) -> Result<Specifications> {
 
 impl Cpu {
     fn defect(&self) -> Option<String> {
-        let figures = [self.base_ghz, self.boost_ghz, self.l1d_bytes, self.l2_bytes, self.llc_bytes, self.memory_gb_per_s];
+        let figures =
+            [self.base_ghz, self.boost_ghz, self.l1d_bytes, self.l2_bytes, self.llc_bytes, self.memory_gb_per_s];
         if let Some(why) = common_defect(&self.name, &self.source, self.year, &figures) {
             return Some(why);
         }
         let counts = (1..=4096).contains(&self.cores) && (self.cores..=4096).contains(&self.threads);
         let wrong = !counts || self.boost_ghz < self.base_ghz || self.l1d_bytes > self.l2_bytes;
         wrong.then(|| {
-            "no cores, fewer threads than cores, a boost below the base clock, or a first cache above the second".to_owned()
+            "no cores, fewer threads than cores, a boost below the base clock, or a first cache above the second"
+                .to_owned()
         })
     }
 }
@@ -218,9 +224,17 @@ mod tests {
         let specifications = built_in().unwrap();
         let cards = specifications.gpus.iter().filter(|g| g.card.is_some()).count();
         assert!(specifications.cpus.len() >= 28 && cards >= 20, "{} {cards}", specifications.cpus.len());
-        let sources = specifications.cpus.iter().map(|c| &c.source).chain(specifications.gpus.iter().map(|g| &g.source));
-        let titles =
-            ["Wikipedia, ", "Intel ARK, ", "NVIDIA ", "AMD ", "Ampere ", "Raspberry Pi ", "Avril, Gouranton and Arnaldi"];
+        let sources =
+            specifications.cpus.iter().map(|c| &c.source).chain(specifications.gpus.iter().map(|g| &g.source));
+        let titles = [
+            "Wikipedia, ",
+            "Intel ARK, ",
+            "NVIDIA ",
+            "AMD ",
+            "Ampere ",
+            "Raspberry Pi ",
+            "Avril, Gouranton and Arnaldi",
+        ];
         for source in sources {
             assert!(titles.iter().any(|t| source.starts_with(t)), "{source}");
         }

@@ -152,7 +152,8 @@ pub(super) fn crossovers(held_out: &HeldOut, measured: &Measured, entries: &[Ent
     groups.iter_mut().enumerate().for_each(|(k, group)| group.style = k);
     for HeldOutCrossover { file, compared } in &held_out.crossovers {
         let own = entries.iter().position(|e| e.file == *file);
-        let interval = measured.get(file).and_then(|b| interval(b, &compared.below, &compared.above, compared.measured));
+        let interval =
+            measured.get(file).and_then(|b| interval(b, &compared.below, &compared.above, compared.measured));
         let why = "its interval does not follow from the paired samples";
         let objects = |value: f64| Cell::number(value, 0);
         let cells = vec![

@@ -207,7 +207,10 @@ mod tests {
     fn the_papers_table_decides_little() {
         let of = |said, values: [f64; 3]| by_its_table(said, values.map(Some));
         let (outcome, why) = of(Said::NotLinked, [1.25, 1.2, 1.296]);
-        assert!(outcome == Outcome::Undecidable && why.contains("1.08 times") && why.contains("hardly varies"), "{why}");
+        assert!(
+            outcome == Outcome::Undecidable && why.contains("1.08 times") && why.contains("hardly varies"),
+            "{why}"
+        );
         let (outcome, why) = of(Said::Linked, [31.99, 44.36, 71.11]);
         assert!(outcome == Outcome::Undecidable && why.contains("1.60 times") && why.contains("power -0.86"), "{why}");
         let (outcome, why) = of(Said::AlikeOnAll, [1.856, 2.496, 2.463]);

@@ -148,7 +148,8 @@ pub(super) fn keep(report: &mut Report, takes: impl Fn(&AlgorithmId) -> bool) {
 fn envelope(report: &Report, scenario: &str, of: impl Fn(&AlgorithmId) -> bool) -> Vec<CurvePoint> {
     let mut sizes: BTreeMap<u32, BTreeMap<&AlgorithmId, Vec<u64>>> = BTreeMap::new();
     for point in report.points.iter().filter(|p| p.scenario == scenario && p.load.objects > 0) {
-        for timing in point.timings.iter().filter(|t| of(&t.algorithm) && t.error.is_none() && !t.samples_ns.is_empty()) {
+        for timing in point.timings.iter().filter(|t| of(&t.algorithm) && t.error.is_none() && !t.samples_ns.is_empty())
+        {
             let samples = sizes.entry(point.load.objects).or_default().entry(&timing.algorithm).or_default();
             samples.extend(&timing.samples_ns);
         }
@@ -261,10 +262,15 @@ mod tests {
             let timings = report.points.iter().filter(of).flat_map(|p| &p.timings);
             let single = timings.filter(|t| *t.algorithm.backend() == Backend::Cpu(1));
             let least = single.filter_map(|t| median(&t.samples_ns)).min_by(f64::total_cmp).unwrap();
-            assert!(point.ns <= least * 1.001 && point.low_ns <= point.ns && point.ns <= point.high_ns, "{point:?} {least}");
+            assert!(
+                point.ns <= least * 1.001 && point.low_ns <= point.ns && point.ns <= point.high_ns,
+                "{point:?} {least}"
+            );
         }
         // Bands follow each other, and between two of them is a crossover.
-        assert!(panel.fields.len() > 1 && panel.fields.windows(2).all(|w| w[0].to == w[1].from && w[0].style != w[1].style));
+        assert!(
+            panel.fields.len() > 1 && panel.fields.windows(2).all(|w| w[0].to == w[1].from && w[0].style != w[1].style)
+        );
         assert!(panel.crossovers.len() >= panel.fields.len() - 1);
         assert!(!Compared::Gpus.is_in(&entry) && !Compared::CpuAndGpu.is_in(&entry) && Compared::Threads.is_in(&entry));
     }

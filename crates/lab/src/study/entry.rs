@@ -38,7 +38,8 @@ impl Entry {
     pub(crate) fn new(path: &Path, file: &str, mut report: Report, studied: Result<(), String>) -> Self {
         let machine = &mut report.hardware.machine;
         let of_gpus = report.hardware.gpus.iter_mut().map(|g| &mut g.gpu.name);
-        let told = [&mut machine.cpu, &mut machine.simd, &mut report.provenance.command, &mut report.provenance.version];
+        let told =
+            [&mut machine.cpu, &mut machine.simd, &mut report.provenance.command, &mut report.provenance.version];
         told.into_iter().chain(of_gpus).for_each(|text| *text = legible(text));
         let profile = Profile::of(file, &report);
         Self {

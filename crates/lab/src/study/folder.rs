@@ -146,7 +146,8 @@ impl<'a> Folder<'a> {
         }
 
         // First, with all that is there for a while: what is stopped half-way is taken for a study the next time, and no file is forgotten.
-        let leaving = before.iter().map(|name| StudyFile { path: name.clone(), holds: "Of an earlier study".to_owned() });
+        let leaving =
+            before.iter().map(|name| StudyFile { path: name.clone(), holds: "Of an earlier study".to_owned() });
         let both = Summary { files: summary.files.iter().cloned().chain(leaving).collect(), ..summary.clone() };
         write_text(&folder.join(SUMMARY), &text(&both)?)?;
         for part in [FIGURES, TABLES] {
@@ -282,7 +283,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         of_one_table(&Silent).write(folder.path(), "old", Summary::default()).unwrap();
         let before = held(folder.path());
-        assert!(of_one_table(&Stopped).write(folder.path(), "new", Summary::default()).unwrap_err().is::<Interrupted>());
+        assert!(
+            of_one_table(&Stopped).write(folder.path(), "new", Summary::default()).unwrap_err().is::<Interrupted>()
+        );
         assert_eq!(held(folder.path()), before);
         // A folder where a file is to be: found out when the others are in their places.
         fs::remove_file(folder.path().join(PAGE)).unwrap();

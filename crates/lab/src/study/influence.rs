@@ -78,7 +78,8 @@ impl Influence {
         let parameters = parameters();
         let values: Vec<Vec<Option<f64>>> =
             parameters.iter().map(|name| chosen.iter().map(|e| e.value(name)).collect()).collect();
-        let cells: Vec<(usize, &On)> = (0..parameters.len()).flat_map(|k| outcomes.keys().map(move |on| (k, on))).collect();
+        let cells: Vec<(usize, &On)> =
+            (0..parameters.len()).flat_map(|k| outcomes.keys().map(move |on| (k, on))).collect();
         let mut ranks: Vec<Option<Rank>> = cells
             .par_iter()
             .map(|&(k, on)| {
@@ -87,12 +88,17 @@ impl Influence {
             })
             .collect();
         rank::judge(&mut ranks.iter_mut().flatten().collect::<Vec<_>>());
-        let mut links: Vec<Link> =
-            cells.into_iter().zip(ranks).map(|((k, on), rank)| link(&parameters[k], on.clone(), rank, importance)).collect();
+        let mut links: Vec<Link> = cells
+            .into_iter()
+            .zip(ranks)
+            .map(|((k, on), rank)| link(&parameters[k], on.clone(), rank, importance))
+            .collect();
         let methods: BTreeSet<&String> =
             importance.iter().flat_map(|i| &i.parameters).flat_map(|p| p.distance_rise_ln.keys()).collect();
         for method in methods {
-            links.extend(parameters.iter().map(|parameter| link(parameter, On::Method(method.clone()), None, importance)));
+            links.extend(
+                parameters.iter().map(|parameter| link(parameter, On::Method(method.clone()), None, importance)),
+            );
         }
         // Ranks see what goes together, whatever the cause; the effect what a parameter adds to those that predictions read.
         for link in &mut links {

@@ -48,10 +48,15 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
     let ids = profile.available();
     let predicted = model.predict(&profile.hardware, &profile.with_revisions(&ids)).map_err(anyhow::Error::msg)?.costs;
     let density = |load: &Load| load.pairs / f64::from(load.objects.max(1));
-    let places: Vec<(f64, f64)> =
-        profile.points.iter().map(|p| (f64::from(p.load.objects), density(&p.load))).filter(|(_, y)| *y > 0.0).collect();
-    let ends =
-        |of: fn(&(f64, f64)) -> f64| places.iter().map(of).fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));
+    let places: Vec<(f64, f64)> = profile
+        .points
+        .iter()
+        .map(|p| (f64::from(p.load.objects), density(&p.load)))
+        .filter(|(_, y)| *y > 0.0)
+        .collect();
+    let ends = |of: fn(&(f64, f64)) -> f64| {
+        places.iter().map(of).fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)))
+    };
     let (x, y) = (ends(|p| p.0), ends(|p| p.1));
     anyhow::ensure!(x.0 < x.1 && y.0 < y.1, "its points have one number of objects or one density only");
     let moved = profile.points.iter().filter(|p| p.scenario == "uniform").map(|p| p.load.moved).collect::<Vec<_>>();
@@ -78,7 +83,8 @@ pub(super) fn map(entry: &Entry, profiles: &[Profile]) -> Result<Map> {
         let position = |k: u16| ids.iter().position(|id| id == profile.id(k));
         let own = spot.medians.iter().filter_map(|&(k, ns)| Some((position(k)?, ns)));
         let Some((fastest, least)) = own.clone().min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
-        let at = |algorithm, loss| MapPoint { x: f64::from(spot.load.objects), y: density(&spot.load), algorithm, loss };
+        let at =
+            |algorithm, loss| MapPoint { x: f64::from(spot.load.objects), y: density(&spot.load), algorithm, loss };
         points[0].push(at(fastest, None));
         let Some(chosen) = best(&predicted, &spot.load) else { continue };
         // What was chosen and not timed had left the race; how much it loses is not known.

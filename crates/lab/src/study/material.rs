@@ -71,7 +71,8 @@ impl Study {
         progress.message("reading what is drawn");
         let draw = |compared: Compared| {
             let drawn = compared.drawn(&entries, &wanted);
-            let drawn = drawn.into_iter().map(|k| Ok((k, read_report(&entries[k].path, &|_| ())?.1))).collect::<Result<_>>();
+            let drawn =
+                drawn.into_iter().map(|k| Ok((k, read_report(&entries[k].path, &|_| ())?.1))).collect::<Result<_>>();
             progress.advance(1);
             Ok((compared, drawn?))
         };
@@ -80,7 +81,19 @@ impl Study {
         let crossovers = trained.as_ref().map(|t| measured_crossovers(&t.held_out, &entries)).unwrap_or_default();
         progress.advance(1);
         let wanted = if asked.is_empty() { representatives(&entries) } else { asked };
-        Ok(Self { entries, wanted, reference, profiles, notes, trained, importance, drawn, crossovers, unreadable, command })
+        Ok(Self {
+            entries,
+            wanted,
+            reference,
+            profiles,
+            notes,
+            trained,
+            importance,
+            drawn,
+            crossovers,
+            unreadable,
+            command,
+        })
     }
 
     /// Names of the files that can't be read, and why.

@@ -131,8 +131,10 @@ mod tests {
 
     #[test]
     fn links_are_told_from_none_and_from_what_cannot_be_told() {
-        let mut found: Vec<Rank> =
-            [(60, 0.9), (200, 0.0), (8, 0.3)].iter().map(|&(n, share)| Rank::of(&pairs(n, share, 7)).unwrap()).collect();
+        let mut found: Vec<Rank> = [(60, 0.9), (200, 0.0), (8, 0.3)]
+            .iter()
+            .map(|&(n, share)| Rank::of(&pairs(n, share, 7)).unwrap())
+            .collect();
         judge(&mut found.iter_mut().collect::<Vec<_>>());
         let verdicts: Vec<Verdict> = found.iter().map(|f| f.verdict).collect();
         assert_eq!(verdicts, [Verdict::Linked, Verdict::NotLinked, Verdict::CannotBeTold], "{found:?}");

@@ -62,7 +62,8 @@ impl<'a> Comparison<'a> {
             }
             for (name, s) in speed_ups {
                 let figures = [s.median, s.low, s.high].map(|r| Cell::number(r, 3)).to_vec();
-                let cells = [heads("speed-up", name), figures, vec![Cell::count(s.points as u64)], reference()].concat();
+                let cells =
+                    [heads("speed-up", name), figures, vec![Cell::count(s.points as u64)], reference()].concat();
                 table.push(cells, &[self.reference, *k]);
             }
         }

@@ -103,7 +103,8 @@ mod tests {
         assert_eq!(names, ["brute@cpu1, grid-sap@cpu1", all[0], all[1], "CPU, GPU"]);
         let slice: Vec<Load> = (3..=13).map(|k| Load::of_objects(1 << k)).collect();
         // 10 n = 1000 + 5 n at n = 200, which is 4.64 octaves above 8.
-        let costs = [cost("brute@cpu1", 0.0, 10.0), cost("grid-sap@cpu1", 1000.0, 5.0), cost("grid-sap@cpu4", 900.0, 1.0)];
+        let costs =
+            [cost("brute@cpu1", 0.0, 10.0), cost("grid-sap@cpu1", 1000.0, 5.0), cost("grid-sap@cpu4", 900.0, 1.0)];
         assert!((pairs[0].octaves(&costs, &slice).unwrap() - (200.0_f64 / 8.0).log2()).abs() < 0.05);
         assert_eq!(pairs[1].octaves(&costs, &slice), None);
         // All threads are always cheaper, a GPU never is.

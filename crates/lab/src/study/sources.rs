@@ -72,7 +72,9 @@ impl Sources {
             progress.check()?;
             let read = |&(place, file): &(usize, &PathBuf)| match read_report(file, &|text| progress.warn(text)) {
                 // By the name that the page has, which is no path of this machine.
-                Err(why) => (place, Err(why.root_cause().to_string().replace(&file.display().to_string(), &names[place]))),
+                Err(why) => {
+                    (place, Err(why.root_cause().to_string().replace(&file.display().to_string(), &names[place])))
+                }
                 Ok((_, report)) => {
                     let reduced = found.selection.reduce(&names[place], &report);
                     let studied = reduced.as_ref().map(|_| ()).map_err(ToString::to_string);

@@ -48,7 +48,10 @@ pub(super) fn speed_ups(reference: &Entry, other: &Entry, sizes: Range<u32>) -> 
 pub(super) fn slownesses(entries: &[&Entry]) -> BTreeMap<String, Vec<Option<f64>>> {
     let times: Vec<_> = entries.iter().map(|e| e.times()).collect();
     let names: BTreeSet<&String> = times.iter().flat_map(BTreeMap::keys).collect();
-    names.into_iter().map(|name| (name.clone(), effects(&times.iter().map(|t| t.get(name)).collect::<Vec<_>>()))).collect()
+    names
+        .into_iter()
+        .map(|name| (name.clone(), effects(&times.iter().map(|t| t.get(name)).collect::<Vec<_>>())))
+        .collect()
 }
 
 fn effects(times: &[Option<&BTreeMap<PointKey<'_>, f64>>]) -> Vec<Option<f64>> {

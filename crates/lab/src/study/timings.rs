@@ -28,7 +28,8 @@ pub(super) fn write(entries: &[Entry], folder: &mut Folder) -> Result<()> {
             for (id, ns) in spot.medians.iter().map(|&(k, ns)| (entry.profile.id(k), ns)) {
                 let on_gpus = id.backend().class() == BackendClass::Gpu;
                 let (threads, gpus) = if on_gpus { (0, id.backend().width()) } else { (id.threads(), 0) };
-                let words = [&entry.name, &spot.scenario, &id.to_string(), id.method(), &id.backend().class().to_string()];
+                let words =
+                    [&entry.name, &spot.scenario, &id.to_string(), id.method(), &id.backend().class().to_string()];
                 let mut cells: Vec<Cell> = words.into_iter().map(Cell::text).collect();
                 cells.extend([threads, gpus, spot.load.objects].map(|n| Cell::count(n.into())));
                 cells.extend([spot.load.pairs, ns].map(Cell::exact));

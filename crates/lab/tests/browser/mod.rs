@@ -62,7 +62,8 @@ impl Browser {
         let config = ureq::Agent::config_builder().proxy(None).http_status_as_error(false).timeout_global(Some(LIMIT));
         let agent = config.build().new_agent();
         let profile = tempfile::tempdir().unwrap();
-        let mut browser = Self { agent, session: format!("http://127.0.0.1:{port}/session"), driver, _profile: profile };
+        let mut browser =
+            Self { agent, session: format!("http://127.0.0.1:{port}/session"), driver, _profile: profile };
         let arguments = [
             "--headless=new",
             // Root, which continuous integration often is, may use no sandbox; /dev/shm of a container is too small.
@@ -147,7 +148,8 @@ impl Browser {
         let events = entries.as_array().unwrap().iter().map(|e| e["message"].as_str().unwrap());
         let events = events.map(|e| serde_json::from_str::<Value>(e).unwrap()["message"].take());
         let sent = events.filter(|e| e["method"] == "Network.requestWillBeSent");
-        let of_page = sent.filter(|e| !e["params"]["documentURL"].as_str().unwrap_or_default().starts_with("chrome://"));
+        let of_page =
+            sent.filter(|e| !e["params"]["documentURL"].as_str().unwrap_or_default().starts_with("chrome://"));
         of_page.map(|e| e["params"]["request"]["url"].as_str().unwrap().to_owned()).collect()
     }
 

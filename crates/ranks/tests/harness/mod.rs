@@ -171,7 +171,11 @@ pub(crate) fn edge_cases<E: Exchange>(ranks: &mut Distributed<E>) {
             let b = &mut infinite[16 * k];
             (b.min[axis], b.max[axis]) = [(-inf, inf), (b.min[axis], inf), (-inf, b.max[axis])][k / 3];
         }
-        infinite.extend([Aabb::new([-inf; 3], [inf; 3]), Aabb::new([inf; 3], [inf; 3]), Aabb::new([-inf; 3], [-inf; 3])]);
+        infinite.extend([
+            Aabb::new([-inf; 3], [inf; 3]),
+            Aabb::new([inf; 3], [inf; 3]),
+            Aabb::new([-inf; 3], [-inf; 3]),
+        ]);
         frame(ranks, "infinite boxes", &infinite, id, deal, mirrored);
         frame(ranks, "only infinite boxes", &[Aabb::new([-inf; 3], [inf; 3]); 30], id, deal, mirrored);
         let mut large = plain.to_vec();

@@ -83,7 +83,8 @@ impl Header {
                 "shape" => {
                     let (axes, rest) = after(value, '(')?.split_once(')').ok_or("no ) after the shape")?;
                     // Python 2 wrote an L after long integers; a comma may follow the last.
-                    let axes = axes.split(',').map(|axis| axis.trim().trim_end_matches('L')).filter(|axis| !axis.is_empty());
+                    let axes =
+                        axes.split(',').map(|axis| axis.trim().trim_end_matches('L')).filter(|axis| !axis.is_empty());
                     let axes: Result<Vec<u64>, _> = axes.map(str::parse).collect();
                     shape = Some(axes.map_err(|e| format!("the shape holds something other than lengths: {e}"))?);
                     rest.trim_start()
@@ -133,7 +134,8 @@ mod tests {
 
     #[test]
     fn the_spellings_of_numpy_are_read() {
-        let header = |fortran_order, shape: &[u64]| Header { descr: "<f4".into(), fortran_order, shape: shape.to_vec() };
+        let header =
+            |fortran_order, shape: &[u64]| Header { descr: "<f4".into(), fortran_order, shape: shape.to_vec() };
         let read = |text| Header::parse(text).unwrap();
         assert_eq!(read("{'descr': '<f4', 'fortran_order': False, 'shape': (3, 6), }  \n"), header(false, &[3, 6]));
         assert_eq!(read("{\"shape\":(7L,),\"descr\":\"<f4\",\"fortran_order\":True}"), header(true, &[7]));

@@ -62,7 +62,8 @@ impl Frames {
             return Err(NpyError::EmptyFrames(frames as u64));
         }
         let count = frames.checked_mul(objects);
-        let Some((count, bytes)) = count.and_then(|boxes| Some((boxes, (boxes as u64).checked_mul(4 * BOUNDS)?))) else {
+        let Some((count, bytes)) = count.and_then(|boxes| Some((boxes, (boxes as u64).checked_mul(4 * BOUNDS)?)))
+        else {
             return Err(NpyError::TooLarge { shape, limit: "any file holds" });
         };
         if held < bytes {

@@ -170,7 +170,8 @@ fn a_stream_with_a_varying_number_of_boxes_comes_back_as_it_was_written() {
     let bytes = fs::read(&path).unwrap();
     assert_eq!((bytes.len() - 4 * 5 * 24) % 64, 0);
     // The same stream in the order of Fortran, by another implementation of the format.
-    let row = |f: usize, i: usize| scene(f, counts[f]).get(i).copied().unwrap_or(Aabb::new([f32::NAN; 3], [f32::NAN; 3]));
+    let row =
+        |f: usize, i: usize| scene(f, counts[f]).get(i).copied().unwrap_or(Aabb::new([f32::NAN; 3], [f32::NAN; 3]));
     let bound = |b: Aabb, k: usize| if k < 3 { b.min[k] } else { b.max[k - 3] };
     let fortran = Array3::from_shape_fn((4, 5, 6).f(), |(f, i, k)| bound(row(f, i), k));
     let mut bytes = Vec::new();

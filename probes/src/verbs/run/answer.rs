@@ -159,8 +159,11 @@ impl<'a> Answer<'a> {
         let frames_run = outcome.frames_run();
         let adaptive = outcome.adaptive_ms();
         let best = outcome.best_fixed();
-        let segment =
-            |p: &Segment| SegmentAnswer { from_frame: p.frames.start, to_frame: p.frames.end - 1, figures: Figures::new(p) };
+        let segment = |p: &Segment| SegmentAnswer {
+            from_frame: p.frames.start,
+            to_frame: p.frames.end - 1,
+            figures: Figures::new(p),
+        };
         let repeats = outcome.repeats.len();
         let mut warnings = origin.tuning.warnings.clone();
         warnings.extend(warnings_of(origin, &too_wide));
@@ -226,11 +229,13 @@ impl Figures {
 /// What the reader should know about tuning that was not made for this machine.
 fn warnings_of(origin: &Origin, too_wide: &[&AlgorithmId]) -> Vec<String> {
     let mut warnings = Vec::new();
-    warnings.extend(origin.other_machine.as_ref().map(|cpu| format!("the report was measured on another machine: {cpu}")));
+    warnings
+        .extend(origin.other_machine.as_ref().map(|cpu| format!("the report was measured on another machine: {cpu}")));
     if !too_wide.is_empty() {
         let names: Vec<String> = too_wide.iter().map(ToString::to_string).collect();
         let names = names.join(", ");
-        warnings.push(format!("the tuning names more threads than this machine has cores, which are left out: {names}"));
+        warnings
+            .push(format!("the tuning names more threads than this machine has cores, which are left out: {names}"));
     }
     warnings
 }

@@ -103,7 +103,8 @@ fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
     let (source, frames) = match &arguments.scene {
         Scene::Scenario(scenario) => {
             let objects = arguments.objects.unwrap_or(OBJECTS) as usize;
-            let usual = if *scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as usize } else { FRAMES };
+            let usual =
+                if *scenario == Scenario::Fragmentation { Scenario::FRAGMENTATION_FRAMES as usize } else { FRAMES };
             let frames = asked.unwrap_or(usual);
             if let Some(least) = arguments.swing.filter(|&least| least as usize > objects) {
                 return Err(WrongUsage(format!(
@@ -116,8 +117,9 @@ fn settings(arguments: &Run) -> anyhow::Result<ReplaySettings> {
             (FrameSource::Scene { scenario: *scenario, objects, seed: arguments.seed, swing }, frames)
         }
         Scene::Stream(path) => {
-            let wrong =
-                |what: &str| Err(WrongUsage(format!("{what}: {} is a stream, whose boxes are recorded", path.display())));
+            let wrong = |what: &str| {
+                Err(WrongUsage(format!("{what}: {} is a stream, whose boxes are recorded", path.display())))
+            };
             if arguments.objects.is_some() {
                 wrong("--objects")?;
             }

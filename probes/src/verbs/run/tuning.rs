@@ -55,7 +55,9 @@ impl Origin {
             (OriginKind::Tuning, Source::Default) => "from a file, written by hand".to_owned(),
             (OriginKind::Tuning, Source::Predicted) => format!("from a file, predicted{model}"),
             (OriginKind::Tuning, Source::Measured) => "from a file, measured".to_owned(),
-            (OriginKind::Tuning, Source::Learned) if samples.is_empty() => format!("from a file, learned on line{model}"),
+            (OriginKind::Tuning, Source::Learned) if samples.is_empty() => {
+                format!("from a file, learned on line{model}")
+            }
             (OriginKind::Tuning, Source::Learned) => format!("from a file, predicted{model}{corrected}"),
             (OriginKind::Tuning, _) => "from a file".to_owned(),
         }
@@ -133,7 +135,10 @@ pub(super) fn add_gpus(registry: &mut Registry, tuning: &Tuning, choice: &GpuCho
         warnings.extend(seen.lacks(gpus::uses(id)).map(|why| format!("{id} is left out: {why}")));
         warnings.extend(out.map(|g| match choice.only[..] {
             [] => {
-                format!("{id} is left out: gpu{} ({}) is a software adapter; use --software-gpus to run it", g.index, g.name)
+                format!(
+                    "{id} is left out: gpu{} ({}) is a software adapter; use --software-gpus to run it",
+                    g.index, g.name
+                )
             }
             _ => format!("{id} is left out: --gpu does not name gpu{}", g.index),
         }));

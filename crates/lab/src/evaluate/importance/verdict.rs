@@ -33,7 +33,8 @@ impl Interval {
         let mut random = Random::new(SEED);
         let mut draw = || values[(random.bits() % values.len() as u64) as usize];
         let count = if values.is_empty() { 0 } else { DRAWS };
-        let means: Vec<f64> = (0..count).map(|_| values.iter().map(|_| draw()).sum::<f64>() / values.len() as f64).collect();
+        let means: Vec<f64> =
+            (0..count).map(|_| values.iter().map(|_| draw()).sum::<f64>() / values.len() as f64).collect();
         Some(Self { low: quantile(&means, 0.05)?, high: quantile(&means, 0.95)?, mean: mean(values) })
     }
 }
@@ -113,7 +114,8 @@ mod tests {
 
     #[test]
     fn verdicts_follow_from_the_interval() {
-        let of = |low: f64, high: f64, deviation| verdict(Interval { mean: (low + high) / 2.0, low, high }, deviation, 0.1);
+        let of =
+            |low: f64, high: f64, deviation| verdict(Interval { mean: (low + high) / 2.0, low, high }, deviation, 0.1);
         assert_eq!(of(-0.01, 0.01, 1.0), Verdict::NotLinked);
         assert_eq!(of(0.05, 0.5, 1.0), Verdict::Linked);
         // What is surely there and too small to matter.

@@ -22,7 +22,8 @@ pub(super) fn influences(
     folder: &mut Folder,
     missing: &mut Vec<String>,
 ) -> Result<Section> {
-    let mut section = SectionBuilder::new("influence", "Which parameters matter for which algorithm and crossover", missing);
+    let mut section =
+        SectionBuilder::new("influence", "Which parameters matter for which algorithm and crossover", missing);
     let links: Vec<&Link> = influence.links.iter().collect();
     if links.is_empty() {
         let few = influence.machines < rank::FEWEST_MACHINES;
@@ -168,7 +169,8 @@ pub(super) fn restrictions(study: &Study, folder: &mut Folder, missing: &mut Vec
     ]);
     for e in &effects {
         let sizes = if e.large { "1000 or more" } else { "fewer than 1000" };
-        let mut cells = vec![Cell::text(&e.taken), Cell::text(&e.algorithm), Cell::text(sizes), Cell::number(e.slowdown, 3)];
+        let mut cells =
+            vec![Cell::text(&e.taken), Cell::text(&e.algorithm), Cell::text(sizes), Cell::number(e.slowdown, 3)];
         cells.extend([Cell::text(e.verdict.to_string()), Cell::number(e.least, 3), Cell::number(e.most, 3)]);
         cells.push(Cell::count(e.pairs as u64));
         table.push(cells, &e.reports);

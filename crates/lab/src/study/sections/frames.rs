@@ -25,8 +25,10 @@ pub(super) fn curves(study: &Study, folder: &mut Folder, missing: &mut Vec<Strin
         }
         let reports: Vec<(usize, &Entry, &Report)> = drawn.iter().map(|(k, r)| (*k, &study.entries[*k], r)).collect();
         let of: Vec<usize> = drawn.iter().map(|d| d.0).collect();
-        let told =
-            format!("{}: measured time of a frame over the number of objects, of up to four machines.", compared.title());
+        let told = format!(
+            "{}: measured time of a frame over the number of objects, of up to four machines.",
+            compared.title()
+        );
         let figure = compared.figure(&reports);
         let id = compared.id();
         let [times, fields, crossovers] = curves::tables(&figure, &reports);

@@ -66,7 +66,11 @@ fn paper(claims: &[Claim], folder: &mut Folder, missing: &mut Vec<String>) -> Re
             let decided = claims.iter().filter(decided).count();
             format!("these reports decide {decided} of {} claims: {}", claims.len(), first.by_reports.1)
         } else {
-            format!("these reports leave {} of {} claims open; the table says why for each", undecided.len(), claims.len())
+            format!(
+                "these reports leave {} of {} claims open; the table says why for each",
+                undecided.len(),
+                claims.len()
+            )
         });
     }
     let mut table = DataTable::new([
@@ -91,7 +95,9 @@ fn parameters(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> 
     let mut section = SectionBuilder::new("parameters", "Hardware parameters", missing);
     let entries = &study.entries;
     if !entries.iter().any(Entry::is_published) {
-        section.lacks("the paper's three cards are not among the reports; add datasets/published to see them beside these");
+        section.lacks(
+            "the paper's three cards are not among the reports; add datasets/published to see them beside these",
+        );
     }
     let paper = hardware::as_in_the_paper(entries);
     if paper.rows.is_empty() {
@@ -142,8 +148,8 @@ fn ratios(study: &Study, folder: &mut Folder, missing: &mut Vec<String>) -> Resu
         let ten = Comparison::new(&study.entries, smallest, &[slower, faster]);
         let told = "Figure 10 of the paper: its cards over the smallest of them. It prints no times in figures to compare with these.";
         draw(&mut section, "figure-10-paper", &ten, told)?;
-        let eleven =
-            Comparison::new(&study.entries, slower, &[faster]).with_printed("broad phase, as printed", PRINTED_SPEED_UP);
+        let eleven = Comparison::new(&study.entries, slower, &[faster])
+            .with_printed("broad phase, as printed", PRINTED_SPEED_UP);
         let told = "Figure 11 of the paper: the 5800 over the 4600, with the one speed-up that it prints in figures.";
         draw(&mut section, "figure-11-paper", &eleven, told)?;
     }

@@ -38,7 +38,8 @@ pub(super) fn prediction(study: &Study, folder: &mut Folder, missing: &mut Vec<S
     }
     let studied = study.studied();
     let TrainingPicture { times, regrets } = TrainingPicture::new(held_out);
-    let [of_regrets, of_times] = [accuracy::regrets(held_out, &study.entries), accuracy::times(held_out, &study.entries)];
+    let [of_regrets, of_times] =
+        [accuracy::regrets(held_out, &study.entries), accuracy::times(held_out, &study.entries)];
     let told = "Mean regret on each of what was held out, from the least to the most, for each strategy by itself.";
     section.push(folder.figure("regrets", &regrets, told, &studied, &[("regrets", &of_regrets)]))?;
     section.push(folder.table("scores", SCORES, accuracy::scores(validation, &studied)))?;
@@ -49,8 +50,11 @@ pub(super) fn prediction(study: &Study, folder: &mut Folder, missing: &mut Vec<S
         section.lacks("no crossover was measured on what was held out");
     } else {
         let ends = held_out.crossovers.iter().filter(|b| !b.compared.crosses).count();
-        let twice =
-            if held_out.by_machine { "" } else { " A report is held out twice: with its vectors and with its threads." };
+        let twice = if held_out.by_machine {
+            ""
+        } else {
+            " A report is held out twice: with its vectors and with its threads."
+        };
         let told = format!(
             "Crossovers between fields, measured with 90 % intervals where these are known. Of {} predicted ones {ends} do not cross within the \
              sizes that were measured; the end beyond which they would stands for them, drawn apart.{twice}",
