@@ -47,7 +47,8 @@ pub(crate) fn describe() -> String {
     let m = &hardware.machine;
     let cores = hardware.value(ParameterId::UsableCores).unwrap_or(f64::NAN);
     let compiler = Command::new("rustc").arg("--version").output().ok();
-    let compiler = compiler.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_else(|| "rustc unknown".to_owned());
+    let compiler =
+        compiler.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_else(|| "rustc unknown".to_owned());
     format!(
         "{}, {cores} usable cores, {} {}, hypervisor {}, SIMD level {}; {}; {}.",
         m.cpu,

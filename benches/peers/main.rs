@@ -24,7 +24,7 @@ mod contestants;
     dead_code,
     reason = "its tests run with the command: without a harness there are none, and no checks of days"
 )]
-#[path = "../../src/date.rs"]
+#[path = "../../probes/src/date.rs"]
 mod date;
 mod document;
 mod machine;

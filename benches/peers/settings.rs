@@ -44,7 +44,8 @@ impl Settings {
         sizes.sort_unstable();
         Ok(Self {
             full,
-            scenarios: list("SAPWISE_SCENARIOS")?.unwrap_or_else(|| SCENARIOS.into_iter().chain(Scenario::HARD).collect()),
+            scenarios: list("SAPWISE_SCENARIOS")?
+                .unwrap_or_else(|| SCENARIOS.into_iter().chain(Scenario::HARD).collect()),
             sizes,
             threads: list("SAPWISE_THREADS")?.unwrap_or_else(|| vec![1, 2]),
             time: Duration::try_from_secs_f64(seconds).map_err(|e| format!("SAPWISE_BENCH_SECONDS: {e}"))?,
