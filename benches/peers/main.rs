@@ -1,8 +1,8 @@
 //! Our algorithms on the CPU beside those of other crates, on the same boxes in turn.
 //!
 //! ```sh
-//! cargo bench -p sapwise-cli --bench peers
-//! SAPWISE_BENCHMARKS=BENCHMARKS.md cargo bench -p sapwise-cli --bench peers   # writes the tables into the document
+//! cargo bench -p sapwise-bench --bench peers
+//! SAPWISE_RESULTS=results cargo bench -p sapwise-bench --bench peers   # writes peers.csv and peers.md into the folder
 //! ```
 //!
 //! | variable | meaning |
@@ -11,7 +11,7 @@
 //! | `SAPWISE_SIZES` | numbers of objects |
 //! | `SAPWISE_THREADS` | `1`, `2` or `1,2` |
 //! | `SAPWISE_BENCH_SECONDS` | time for the timed frames of a scenario at a size |
-//! | `SAPWISE_BENCHMARKS` | the document that takes the tables, between its two marks; else they are printed |
+//! | `SAPWISE_RESULTS` | folder for `peers.csv` and `peers.md`; without it the ratios are printed |
 //!
 //! Method and bias stand at the head of `BENCHMARKS.md`. Prints a line for each scenario and size as soon as it is measured.
 //! Criterion times its candidates one after the other, which is why it is not used here. Without `--bench`, which `cargo
@@ -26,7 +26,6 @@ mod contestants;
 )]
 #[path = "../../probes/src/date.rs"]
 mod date;
-mod document;
 mod machine;
 mod naive;
 mod obvhs_tree;
@@ -92,14 +91,17 @@ fn bench() -> Result<(), String> {
     for &threads in &settings.threads {
         compared.push((threads, compare(threads, &settings)?));
     }
-    let text = table::all(&compared);
-    match &settings.document {
-        Some(path) => document::put(path, &text),
-        None => {
-            println!("\n{text}");
-            Ok(())
-        }
-    }
+    let summary = table::summary(&compared);
+    let Some(folder) = &settings.results else {
+        println!("\n{summary}");
+        return Ok(());
+    };
+    let put = |name: &str, text: String| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
+    };
+    put("peers.csv", table::csv(&compared))?;
+    put("peers.md", summary)
 }
 
 fn main() -> ExitCode {

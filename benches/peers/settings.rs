@@ -30,8 +30,8 @@ pub(crate) struct Settings {
     pub(crate) threads: Vec<u32>,
     /// Time for the timed frames of a scenario at a size.
     pub(crate) time: Duration,
-    /// The document that holds the tables.
-    pub(crate) document: Option<PathBuf>,
+    /// The folder that the results go into.
+    pub(crate) results: Option<PathBuf>,
 }
 
 impl Settings {
@@ -49,7 +49,7 @@ impl Settings {
             sizes,
             threads: list("SAPWISE_THREADS")?.unwrap_or_else(|| vec![1, 2]),
             time: Duration::try_from_secs_f64(seconds).map_err(|e| format!("SAPWISE_BENCH_SECONDS: {e}"))?,
-            document: path("SAPWISE_BENCHMARKS"),
+            results: path("SAPWISE_RESULTS"),
         })
     }
 }

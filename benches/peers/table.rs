@@ -1,4 +1,4 @@
-//! The comparison as tables in Markdown.
+//! The comparison as a table of ratios in Markdown and as CSV with every time.
 
 use crate::contestants::Side;
 use crate::machine;
@@ -96,77 +96,43 @@ fn by_scenario(points: &[Point], cell: impl Fn(&Point) -> Option<String>) -> Str
     grid("scenario", &sizes, &scenarios.into_iter().map(row).collect::<Vec<_>>())
 }
 
-/// The absolute times of a scenario, one row for each contestant.
-fn times(points: &[&Point]) -> String {
-    let sizes: Vec<usize> = points.iter().map(|p| p.objects).collect();
-    let mut names: Vec<&str> = Vec::new();
-    for lane in points.iter().flat_map(|p| &p.lanes) {
-        if !names.contains(&lane.name.as_str()) {
-            names.push(&lane.name);
+/// All times of all points in milliseconds: one row for each contestant.
+pub(crate) fn csv(results: &[(u32, Vec<Point>)]) -> String {
+    let mut text = "threads,scenario,objects,contestant,median_ms,quartile_1_ms,quartile_3_ms,frames\n".to_owned();
+    for (threads, points) in results {
+        for point in points {
+            for lane in &point.lanes {
+                let [low, median, high] = lane.quartiles().map(|s| digits(s * 1e3));
+                let (scenario, objects, name, frames) = (point.scenario, point.objects, &lane.name, lane.seconds.len());
+                let _ = writeln!(text, "{threads},{scenario},{objects},{name},{median},{low},{high},{frames}");
+            }
         }
-    }
-    let row = |name: &str| {
-        let cell = |p: &&Point| {
-            let lane = p.lanes.iter().find(|lane| lane.name == name);
-            lane.map_or_else(|| "-".to_owned(), |lane| spread(lane.quartiles().map(|s| s * 1e3)))
-        };
-        (name.to_owned(), points.iter().map(cell).collect())
-    };
-    grid("contestant", &sizes, &names.into_iter().map(row).collect::<Vec<_>>())
-}
-
-fn compared(threads: u32, points: &[Point]) -> String {
-    let on = if threads == 1 { "one thread".to_owned() } else { format!("{threads} threads") };
-    let gain = |p: &Point| {
-        let gain = p.gain()?;
-        let text = spread(gain);
-        Some(if goal(threads, p.objects).is_some_and(|goal| gain[1] < goal) { format!("**{text}**") } else { text })
-    };
-    let who = |p: &Point| {
-        let (choice, share) = p.choice()?;
-        let share = if share < 1.0 { format!(" in {:.0} %", share * 100.0) } else { String::new() };
-        Some(format!("{}; {choice}{share}", p.best(Side::Peer)?.name))
-    };
-    let regret = |p: &Point| {
-        let [low, median, high] = p.best(Side::Adaptive)?.over(p.best(Side::Fixed)?).map(|r| (r - 1.0) * 100.0);
-        Some(format!("{median:.1} ({low:.1} to {high:.1}), {}", p.best(Side::Fixed)?.name))
-    };
-    let mut text = format!(
-        "### Adaptive over the fastest peer, {on}\n\n\
-         Time of the fastest peer over that of `adaptive`, frame by frame: median (quartiles). Bold: below the goal of {}.\n\n{}\
-         ### The fastest peer, and what `adaptive` chose, {on}\n\n{}\
-         ### What the choice costs, {on}\n\n\
-         Time of `adaptive` over that of our fastest fixed method, less one, in percent, frame by frame: median (quartiles), and \
-         that method.\n\n{}",
-        goals(threads),
-        by_scenario(points, gain),
-        by_scenario(points, who),
-        by_scenario(points, regret),
-    );
-    text += &format!("### Times, {on}\n\nMilliseconds a frame: median (quartiles).\n\n");
-    let mut scenarios: Vec<Scenario> = points.iter().map(|p| p.scenario).collect();
-    scenarios.dedup();
-    for scenario in scenarios {
-        let of: Vec<&Point> = points.iter().filter(|p| p.scenario == scenario).collect();
-        text += &format!("`{scenario}`:\n\n{}", times(&of));
     }
     text
 }
 
-/// All tables of the comparison with peers, by number of threads.
-pub(crate) fn all(results: &[(u32, Vec<Point>)]) -> String {
+/// The ratios to the fastest peer, by number of threads, under a line that says where and when they were measured.
+pub(crate) fn summary(results: &[(u32, Vec<Point>)]) -> String {
     let mut loads: Vec<f64> = results.iter().flat_map(|r| &r.1).filter_map(|p| p.foreign_load).collect();
     loads.sort_by(f64::total_cmp);
-    let mut text = format!("{}\n\n", machine::describe());
+    let mut text = format!("# Beside peers\n\n{}\n\n", machine::describe());
     if let Some(highest) = loads.last() {
-        text += &format!(
-            "Other programs took {:.1} % of the CPU at the median of the points at which that can be told, and {:.1} % at the worst.\n\n",
-            loads[loads.len() / 2] * 100.0,
-            highest * 100.0
-        );
+        let median = loads[loads.len() / 2];
+        let _ = writeln!(text, "Foreign load: median {:.1} %, at most {:.1} %.\n", median * 100.0, highest * 100.0);
     }
     for (threads, points) in results.iter().filter(|r| !r.1.is_empty()) {
-        text += &compared(*threads, points);
+        let gain = |p: &Point| {
+            let median = p.gain()?[1];
+            let below = goal(*threads, p.objects).is_some_and(|goal| median < goal);
+            Some(if below { format!("**{}**", digits(median)) } else { digits(median) })
+        };
+        let _ = write!(
+            text,
+            "## Threads: {threads}\n\nTime of the fastest peer over that of `adaptive`, frame by frame, median. \
+             Bold: below the goal of {}.\n\n{}",
+            goals(*threads),
+            by_scenario(points, gain),
+        );
     }
     text
 }
