@@ -8,8 +8,8 @@
 //! `probes/examples/own_algorithm.rs`.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs,
-    Product, Registry, Source, Term, Tuning,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Load, Pairs, Product, Registry,
+    Source, Term, Tuning,
 };
 use sapwise_scenes::Scenario;
 
@@ -45,13 +45,11 @@ impl BroadPhase for Rested {
         pairs.finish()
     }
 
-    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-        Some(self)
+    /// A frame is cheaper after a similar one.
+    fn is_incremental(&self) -> bool {
+        true
     }
 }
-
-/// A frame is cheaper after one that was alike.
-impl Incremental for Rested {}
 
 /// A registry of ours with [`Rested`] in it, which leaves frames to `other`.
 pub(crate) fn registry(other: &'static str) -> Registry {

@@ -30,8 +30,7 @@ struct Roaming(Box<dyn BroadPhase>, Random);
 
 impl BroadPhase for Roaming {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        let incremental = self.0.as_incremental().unwrap();
-        assert!(incremental.set_threads(1 + (self.1.next() * 3.0) as u32) && !incremental.set_threads(4));
+        assert!(self.0.set_threads(1 + (self.1.next() * 3.0) as u32) && !self.0.set_threads(4));
         self.0.find_pairs(boxes, pairs)
     }
 }
@@ -70,7 +69,7 @@ fn no_kept_pair_is_lost_on_the_way_from_many_threads_to_one() {
     let mut boxes = random.cubes(400, [11.0; 3], 0.5);
     let middle = boxes[0].min;
     for frame in 0..400 {
-        assert!(pair_cache.as_incremental().unwrap().set_threads(if frame % 3 == 2 { 1 } else { 8 }));
+        assert!(pair_cache.set_threads(if frame % 3 == 2 { 1 } else { 8 }));
         for (k, b) in boxes.iter_mut().enumerate() {
             // Towards each other until they are crowded, and a few that leave their grown box in every frame.
             let pull = if frame < 330 { 0.006 } else { 0.0 };

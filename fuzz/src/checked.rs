@@ -68,9 +68,7 @@ impl Checked {
     pub fn set_threads(&mut self, source: &mut Source<'_>) {
         let threads = 1 + u32::from(source.byte()) % CORES;
         for (_, algorithm) in &mut self.0 {
-            if let Some(incremental) = algorithm.as_incremental() {
-                incremental.set_threads(threads);
-            }
+            algorithm.set_threads(threads);
         }
     }
 

@@ -11,7 +11,7 @@ use super::load_tracker::LoadTracker;
 use super::passed::{Budget, Passed, Usual};
 use super::*;
 use crate::scene::{Scenario, Scene};
-use crate::{AlgorithmCost, CostCurve, CostTerm, Incremental, Term};
+use crate::{AlgorithmCost, CostCurve, CostTerm, Term};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -126,12 +126,10 @@ impl BroadPhase for Told {
         pairs.finish()
     }
 
-    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-        Some(self)
+    fn is_incremental(&self) -> bool {
+        true
     }
-}
 
-impl Incremental for Told {
     fn missed_frames(&mut self, frames: u64) {
         self.0.fetch_add(frames, Ordering::Relaxed);
     }
@@ -317,7 +315,7 @@ fn deciding_before_a_frame_does_not_make_it_look_at_rest() {
 
 #[test]
 fn it_is_incremental_when_any_of_its_algorithms_is() {
-    assert!(grid_sap_or_pair_cache().as_incremental().is_some());
+    assert!(grid_sap_or_pair_cache().is_incremental());
     let without = tuning(&[("grid-sap@cpu1", 1.0, 1.0), ("brute@cpu1", 1.0, 2.0)]);
-    assert!(Adaptive::new(without, &Registry::with_cores(1)).unwrap().as_incremental().is_none());
+    assert!(!Adaptive::new(without, &Registry::with_cores(1)).unwrap().is_incremental());
 }

@@ -5,7 +5,6 @@
 use super::recorded::{COLD, FORGOTTEN, FROM_NOTHING, Kinds, Recorded};
 use super::*;
 use crate::FrameWork;
-use crate::broad_phase::Incremental;
 use crate::clock::counted;
 use crate::stats::mean;
 use std::sync::Arc;
@@ -153,12 +152,10 @@ impl BroadPhase for Played {
         Ok(())
     }
 
-    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-        if keeps(self.id()) { Some(self) } else { None }
+    fn is_incremental(&self) -> bool {
+        keeps(self.id())
     }
-}
 
-impl Incremental for Played {
     fn last_frame(&self) -> FrameWork {
         self.work
     }

@@ -346,7 +346,7 @@ impl Motion {
 
 /// Mean edges count as no longer than four times that which nine boxes in ten don't exceed.
 fn longest_edge(plan: &FramePlan, boxes: &[Aabb]) -> f32 {
-    4.0 * (plan.sample(boxes).extent.iter().sum::<f64>() / 3.0) as f32
+    4.0 * (plan.stats(boxes).extent.iter().sum::<f64>() / 3.0) as f32
 }
 
 /// How much of the order in space is lost, as a share of the boxes that left. One that went far widens every node above its leaf,
