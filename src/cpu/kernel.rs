@@ -328,7 +328,7 @@ mod tests {
         }
         let mut expected = Pairs::new();
         (0..boxes.len()).for_each(|j| {
-            (0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).for_each(|i| expected.push(i as u32, j as u32))
+            (0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).for_each(|i| expected.push(i as u32, j as u32));
         });
         let view = View::new(&columns);
         let (mut swept, mut tested) = (Pairs::new(), Pairs::new());

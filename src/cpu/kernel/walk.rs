@@ -89,7 +89,7 @@ impl Walk<'_> {
             }
             let bounds = self.bounds_of(leaf);
             self.each(&bounds, leaf + 1, 1, overlapping, |other| {
-                self.meet(node, &bounds, ids, other, overlapping, pairs)
+                self.meet(node, &bounds, ids, other, overlapping, pairs);
             });
             // A caller who wants a thousand pairs must not wait for all.
             if pairs.is_over() {
