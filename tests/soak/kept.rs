@@ -1,4 +1,4 @@
-//! Starts on this machine, with a cache to which everything happens that can happen to files.
+//! Programs that start from a cache whose files get damaged.
 
 use super::{Machine, Tally, below, life, registry};
 use crate::common::Random;

@@ -60,7 +60,7 @@ def test_ids_in_one_frame_and_none_in_the_next_are_refused():
     boxes = cubes(50)
     with quiet() as broad_phase:
         broad_phase.find(boxes)
-        with pytest.raises(sapwise.InputError, match="ids were given for one of two"):
+        with pytest.raises(sapwise.InputError, match="only one of two consecutive frames"):
             broad_phase.find(boxes, ids=range(50))
         assert np.array_equal(broad_phase.find(boxes), naive(boxes))
 
@@ -130,7 +130,7 @@ def test_filters_that_can_not_be(arguments, why):
 def test_a_filter_of_another_length_is_refused():
     with quiet() as broad_phase:
         broad_phase.set_filter(fixed=[True] * 5)
-        with pytest.raises(sapwise.InputError, match="filter is of 5 boxes and there are 6"):
+        with pytest.raises(sapwise.InputError, match="filter is for 5 boxes and there are 6"):
             broad_phase.find(cubes(6))
 
 
