@@ -78,8 +78,8 @@ pub(crate) fn tuning(costs: Vec<AlgorithmCost>) -> Tuning {
 #[allow(dead_code, reason = "the tests of this example have no use for its main")]
 fn main() -> Result<(), Error> {
     let registry = registry("grid-sap@cpu1");
-    // Comparing a box takes about a nanosecond, and so does copying a pair. If boxes move, it costs more than the other one. A product of
-    // counts makes a user's own term: here that of the pairs.
+    // Comparing a box takes about a nanosecond, and so does copying a pair. If boxes move, it costs more than the other
+    // one. A product of counts makes a user's own term: here that of the pairs.
     let tuning = tuning(vec![
         cost(&registry, "grid-sap@cpu1", &[(Term::Objects, 60.0)]),
         cost(

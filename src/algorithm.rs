@@ -45,8 +45,8 @@ impl AlgorithmId {
     /// Makes the id of `method` on `backend`.
     ///
     /// # Errors
-    /// `method` must be 1 to 32 of `a-z`, `0-9`, `-` and `_`, and begin with a letter. `backend` must have 1 to 4096 threads, or GPUs in ascending
-    /// order. Otherwise the text could not be read back.
+    /// `method` must be 1 to 32 of `a-z`, `0-9`, `-` and `_`, and begin with a letter. `backend` must have 1 to 4096
+    /// threads, or GPUs in ascending order. Otherwise the text could not be read back.
     pub fn new(method: &str, backend: Backend) -> Result<Self, ParseIdError> {
         let letters = method.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_');
         if method.len() > 32 || !letters || !method.starts_with(|c: char| c.is_ascii_lowercase()) {

@@ -7,19 +7,20 @@ use crate::pairs::Pairs;
 
 /// Finds all pairs of overlapping boxes.
 ///
-/// Every implementation returns the same set of pairs for the same boxes: each overlapping pair once, the lower position first, touching boxes
-/// included.
+/// Every implementation returns the same set of pairs for the same boxes: each overlapping pair once, the lower
+/// position first, touching boxes included.
 ///
-/// Implementations keep their buffers between calls, and allocate nothing after a frame as large and as dense. Two exceptions: with
-/// several threads rayon allocates small jobs, and `pair-cache` takes some frames more, until its margin has settled.
+/// Implementations keep their buffers between calls, and allocate nothing after a frame as large and as dense. Two
+/// exceptions: with several threads rayon allocates small jobs, and `pair-cache` takes some frames more, until its
+/// margin has settled.
 pub trait BroadPhase: Send + Sync {
     /// Replaces the content of `pairs` with the overlapping pairs of `boxes`.
     ///
     /// An implementation begins with [`Pairs::clear`], adds with [`Pairs::push`] and ends with [`Pairs::finish`].
     ///
     /// # Errors
-    /// [`Error::InvalidBox`] names the first box with a NaN or inverted bound. [`Error::TooManyObjects`], [`Error::TooManyPairs`] and
-    /// [`Error::OutOfMemory`] as they say. After an error the next call starts afresh.
+    /// [`Error::InvalidBox`] names the first box with a NaN or inverted bound. [`Error::TooManyObjects`],
+    /// [`Error::TooManyPairs`] and [`Error::OutOfMemory`] as they say. After an error the next call starts afresh.
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error>;
 
     /// Does the same as [`find_pairs`](Self::find_pairs), and reuses what the caller knows about this frame.
@@ -33,33 +34,37 @@ pub trait BroadPhase: Send + Sync {
         self.find_pairs(boxes, pairs)
     }
 
-    /// Gets ready for frames of up to `objects` boxes, so that the first of them costs no more than the next. The default does nothing.
+    /// Gets ready for frames of up to `objects` boxes, so that the first of them costs no more than the next. The
+    /// default does nothing.
     ///
-    /// [`Adaptive`](crate::Adaptive) calls this between frames, before it switches to this algorithm. It calls an algorithm on a GPU on a
-    /// thread of its own, because a driver may block, and runs others until the call returns. It calls any other algorithm on the
-    /// thread of the frames: there it should only reserve memory.
+    /// [`Adaptive`](crate::Adaptive) calls this between frames, before it switches to this algorithm. It calls an
+    /// algorithm on a GPU on a thread of its own, because a driver may block, and runs others until the call returns.
+    /// It calls any other algorithm on the thread of the frames: there it should only reserve memory.
     fn prepare(&mut self, objects: usize) {
         let _ = objects;
     }
 
-    /// Returns whether a frame is cheaper after a similar one. To time such an algorithm, warm it up for some frames. The default is `false`.
+    /// Returns whether a frame is cheaper after a similar one. To time such an algorithm, warm it up for some frames.
+    /// The default is `false`.
     fn is_incremental(&self) -> bool {
         false
     }
 
-    /// Returns how the last frame came about. [`Adaptive`](crate::Adaptive) asks incremental algorithms only, and compares the time of a frame with
-    /// the time that its work lets expect. By default every frame counts alike.
+    /// Returns how the last frame came about. [`Adaptive`](crate::Adaptive) asks incremental algorithms only, and
+    /// compares the time of a frame with the time that its work lets expect. By default every frame counts alike.
     fn last_frame(&self) -> FrameWork {
         FrameWork::new(if self.is_incremental() { FrameKind::Updated } else { FrameKind::FromScratch }, 1.0)
     }
 
-    /// Reports that other algorithms ran `frames` frames, at least one, since this one's last frame. [`Adaptive`](crate::Adaptive) calls this before
-    /// the next frame of an incremental algorithm. Conclusions from earlier frames, such as that keeping work does not pay, may no longer hold.
+    /// Reports that other algorithms ran `frames` frames, at least one, since this one's last frame.
+    /// [`Adaptive`](crate::Adaptive) calls this before the next frame of an incremental algorithm. Conclusions from
+    /// earlier frames, such as that keeping work does not pay, may no longer hold.
     fn missed_frames(&mut self, frames: u64) {
         let _ = frames;
     }
 
-    /// Runs on this many threads from the next frame on, and keeps its state. Returns `false`, and changes nothing, if it can't: the default.
+    /// Runs on this many threads from the next frame on, and keeps its state. Returns `false`, and changes nothing, if
+    /// it can't: the default.
     ///
     /// [`Registry::create_family`](crate::Registry::create_family) makes one instance for several numbers of threads.
     fn set_threads(&mut self, threads: u32) -> bool {
@@ -86,8 +91,8 @@ pub enum FrameKind {
 pub struct FrameWork {
     /// How the frame came about.
     pub kind: FrameKind,
-    /// Its work over the mean work of a frame of this scene, rebuilds included; 1 if unknown. Frames right after a rebuild are cheap, so a few
-    /// of them say little about the mean.
+    /// Its work over the mean work of a frame of this scene, rebuilds included; 1 if unknown. Frames right after a
+    /// rebuild are cheap, so a few of them say little about the mean.
     pub over_mean: f64,
 }
 

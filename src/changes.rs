@@ -5,16 +5,16 @@ use crate::pairs::{Alone, Pairs, Sorter};
 
 /// Follows pairs from frame to frame by the caller's ids: the pairs that began, those that ended, and all of them.
 ///
-/// Every list is sorted, and each pair has its lower id first. So the lists are the same, bit for bit, whatever algorithm found the pairs and
-/// in whatever order, also with [`PairOrder::Any`](crate::PairOrder::Any).
+/// Every list is sorted, and each pair has its lower id first. So the lists are the same, bit for bit, whatever
+/// algorithm found the pairs and in whatever order, also with [`PairOrder::Any`](crate::PairOrder::Any).
 ///
-/// Positions may change from frame to frame, as with `swap_remove`: a pair lasts while both ids do. Boxes with the same id count as one: a
-/// pair of two of them is left out, and two ids are one pair however many of their boxes overlap.
+/// Positions may change from frame to frame, as with `swap_remove`: a pair lasts while both ids do. Boxes with the same
+/// id count as one: a pair of two of them is left out, and two ids are one pair however many of their boxes overlap.
 ///
-/// An update sorts the pairs as 64-bit numbers and compares them with those of the previous update. On one core of an AMD EPYC this takes 10
-/// to 20 ns a pair with 1000 to 100 000 pairs, or a third of that if the pairs have canonical order and ids ascend with positions. When
-/// ids have changed, the update sorts them too. Memory for each pair: 12 bytes and two pairs of ids, and another pair if it began
-/// or ended. Memory for each box: 8 bytes and two ids.
+/// An update sorts the pairs as 64-bit numbers and compares them with those of the previous update. On one core of an
+/// AMD EPYC this takes 10 to 20 ns a pair with 1000 to 100 000 pairs, or a third of that if the pairs have canonical
+/// order and ids ascend with positions. When ids have changed, the update sorts them too. Memory for each pair: 12
+/// bytes and two pairs of ids, and another pair if it began or ended. Memory for each box: 8 bytes and two ids.
 #[derive(Debug, Clone)]
 pub struct Changes<Id = u32> {
     /// The ids of the last update.
@@ -23,7 +23,8 @@ pub struct Changes<Id = u32> {
     sorted: Vec<(Id, u32)>,
     /// For each position, the first place of its id in `sorted`.
     ranks: Vec<u32>,
-    /// The new pairs: the rank of the lower id in the upper half, that of the other in the lower. Numbers sort faster than pairs of ids.
+    /// The new pairs: the rank of the lower id in the upper half, that of the other in the lower. Numbers sort faster
+    /// than pairs of ids.
     keys: Vec<u64>,
     sorter: Sorter,
     pairs: Vec<(Id, Id)>,
@@ -53,8 +54,8 @@ impl<Id: Copy + Ord> Changes<Id> {
     /// Updates to the pairs of a frame, in which the box at position `k` has the id `ids[k]`.
     ///
     /// # Errors
-    /// [`Error::MissingId`] names a position in `pairs` that has no id. [`Error::OutOfMemory`]. After an error nothing has begun or ended, and the
-    /// next update compares with the last one that succeeded.
+    /// [`Error::MissingId`] names a position in `pairs` that has no id. [`Error::OutOfMemory`]. After an error nothing
+    /// has begun or ended, and the next update compares with the last one that succeeded.
     pub fn update(&mut self, pairs: &Pairs, ids: &[Id]) -> Result<(), Error> {
         self.begun.clear();
         self.ended.clear();

@@ -7,7 +7,8 @@ use crate::pair::Pair;
 pub struct Membership {
     /// The groups of the box, one bit each. Bullet calls them a group, rapier and avian memberships, Godot a layer.
     pub groups: u32,
-    /// The groups that the box collides with, one bit each. Rapier and avian call it a filter. The masks of both boxes of a pair must allow the other.
+    /// The groups that the box collides with, one bit each. Rapier and avian call it a filter. The masks of both boxes
+    /// of a pair must allow the other.
     pub mask: u32,
     /// Whether the box never moves. Two fixed boxes are no pair.
     pub fixed: bool,
@@ -34,8 +35,9 @@ impl Default for Membership {
 
 /// Drops unwanted pairs before they are written to a [`Pairs`](crate::Pairs).
 ///
-/// It takes 12 bytes for each box, and reads two memberships for each overlapping pair. In a dense scene of which half the pairs pass, this
-/// adds half to the time of `grid-sap@cpu1` while the memberships fit into the caches, and 1.5 times with 850 000 boxes.
+/// It takes 12 bytes for each box, and reads two memberships for each overlapping pair. In a dense scene of which half
+/// the pairs pass, this adds half to the time of `grid-sap@cpu1` while the memberships fit into the caches, and 1.5
+/// times with 850 000 boxes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
     /// The membership of each box, by its position in the input. A box beyond the end is [`Membership::ALL`].
@@ -63,8 +65,8 @@ impl Filter {
         self.memberships.get(id).is_some_and(|m| m.fixed)
     }
 
-    /// Moves the wanted ones of `pairs` to its head, in their order. Returns their number, and the number of the others that have a member which may
-    /// move.
+    /// Moves the wanted ones of `pairs` to its head, in their order. Returns their number, and the number of the others
+    /// that have a member which may move.
     pub(crate) fn keep_wanted(&self, pairs: &mut [Pair]) -> (usize, usize) {
         let (mut kept, mut unwanted) = (0, 0);
         for at in 0..pairs.len() {

@@ -1,7 +1,7 @@
 //! Broad-phase collision detection with whichever algorithm is fastest on this machine, for this frame.
 //!
-//! An engine passes its [`Aabb`]s to [`Adaptive`] every frame and gets [`Pairs`] back. By its [`Tuning`], [`Adaptive`] runs the algorithm of the
-//! [`Registry`] that is cheapest for the [`Load`] of the frame.
+//! An engine passes its [`Aabb`]s to [`Adaptive`] every frame and gets [`Pairs`] back. By its [`Tuning`], [`Adaptive`]
+//! runs the algorithm of the [`Registry`] that is cheapest for the [`Load`] of the frame.
 //!
 //! ```
 //! use sapwise::{Aabb, Adaptive, BroadPhase, Tuning, Pairs, Registry};
@@ -14,11 +14,12 @@
 //! # Ok::<(), sapwise::Error>(())
 //! ```
 //!
-//! With the feature `this-machine`, `Adaptive::for_this_machine` does all of that: it measures the hardware once, predicts the tuning and
-//! saves it for the next start.
+//! With the feature `this-machine`, `Adaptive::for_this_machine` does all of that: it measures the hardware once,
+//! predicts the tuning and saves it for the next start.
 //!
-//! A tuning is written by hand ([`Tuning::usual`], [`Tuning::from_steps`]), predicted by a [`Model`] from the parameters of the [`Hardware`], or
-//! measured, from the timings in a report. The feature `model` reads and writes models and tunings as files. The command `sapwise` makes them.
+//! A tuning is written by hand ([`Tuning::usual`], [`Tuning::from_steps`]), predicted by a [`Model`] from the
+//! parameters of the [`Hardware`], or measured, from the timings in a report. The feature `model` reads and writes
+//! models and tunings as files. The command `sapwise` makes them.
 //!
 //! # Features
 //!
@@ -105,8 +106,9 @@ pub use model::Model;
 pub use named::UnknownName;
 pub use pair::Pair;
 pub use pairs::{PairOrder, Pairs};
-/// The version of rayon whose pools [`Registry::use_pool`] takes. The number is part of the name, because another version has other types: a
-/// release of this library that takes a newer rayon is a breaking one, and exports it under a new name.
+/// The version of rayon whose pools [`Registry::use_pool`] takes. The number is part of the name, because another
+/// version has other types: a release of this library that takes a newer rayon is a breaking one, and exports it under
+/// a new name.
 #[cfg(feature = "parallel")]
 pub use rayon as rayon1;
 pub use registry::{Registry, usable_cores};

@@ -17,7 +17,8 @@ pub(crate) use strip_grid::{StripGrid, StripSpan};
 
 /// The counts of a frame that decide the cost of each algorithm, estimated from a sample and the previous frame.
 ///
-/// The number of boxes alone decides badly: measured crossovers differ by a factor of five between uniform and clustered scenes.
+/// The number of boxes alone decides badly: measured crossovers differ by a factor of five between uniform and
+/// clustered scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Load {
@@ -29,9 +30,9 @@ pub struct Load {
     pub strip_candidates: f64,
     /// Overlapping pairs: those of the previous frame, or an estimate from the sample if there is none.
     pub pairs: f64,
-    /// Motion in a frame, 0 to 1, as [`Displacement::moved`](crate::Displacement::moved) returns it: the mean over a sample of the greatest
-    /// displacement of a bound since the previous frame, in mean edges of the box, at most 1 each. 0: nothing moves. 1: no frame helps with
-    /// the next, or the previous frame is unknown.
+    /// Motion in a frame, 0 to 1, as [`Displacement::moved`](crate::Displacement::moved) returns it: the mean over a
+    /// sample of the greatest displacement of a bound since the previous frame, in mean edges of the box, at most 1
+    /// each. 0: nothing moves. 1: no frame helps with the next, or the previous frame is unknown.
     pub moved: f64,
 }
 
@@ -42,8 +43,8 @@ impl Load {
         Self { objects, ..Self::default() }
     }
 
-    /// Returns whether a frame of another load takes about as long. Each count may differ by `share` of itself plus `share` of the objects,
-    /// because a box takes as long as some pairs.
+    /// Returns whether a frame of another load takes about as long. Each count may differ by `share` of itself plus
+    /// `share` of the objects, because a box takes as long as some pairs.
     pub(crate) fn is_within(&self, share: f64, other: &Self) -> bool {
         let objects = f64::from(self.objects);
         let counts = |l: &Self| [f64::from(l.objects), l.axis_candidates, l.strip_candidates, l.pairs];
@@ -58,7 +59,8 @@ impl Load {
         Self { pairs, ..self }
     }
 
-    /// Returns the load with this many candidates: pairs that overlap on the sweep axis, and those of them that share a strip.
+    /// Returns the load with this many candidates: pairs that overlap on the sweep axis, and those of them that share a
+    /// strip.
     #[must_use]
     pub fn with_candidates(self, axis: f64, strip: f64) -> Self {
         Self { axis_candidates: axis, strip_candidates: strip, ..self }
@@ -78,7 +80,8 @@ impl Load {
 
     /// Estimates the load of a frame from up to 256 of its boxes, in a time that is constant above 16 000 boxes.
     ///
-    /// `pairs` is the number of pairs of the previous frame, and `moved` the motion since; both `None` if there was none.
+    /// `pairs` is the number of pairs of the previous frame, and `moved` the motion since; both `None` if there was
+    /// none.
     #[must_use]
     pub fn estimate(boxes: &[Aabb], pairs: Option<f64>, moved: Option<f64>) -> Self {
         Self::planned(boxes, pairs, moved).0
@@ -119,9 +122,9 @@ impl Load {
 
 /// Estimates the share of all pairs that overlap on the sweep axis and share a strip.
 ///
-/// The sample counts it, but in a large scene it counts too few. There the expected share assumes independent axes, times the root of the
-/// clumping that the pairs of the previous frame show. A gamma prior of shape 4 around the expected share joins the two, as for a
-/// Poisson count.
+/// The sample counts it, but in a large scene it counts too few. There the expected share assumes independent axes,
+/// times the root of the clumping that the pairs of the previous frame show. A gamma prior of shape 4 around the
+/// expected share joins the two, as for a Poisson count.
 fn strip_share(sample: &SampledBoxes, grid: &StripGrid, axis_share: f64, clumping: f64) -> f64 {
     const SHAPE: f64 = 4.0;
     let cells = |b: &Aabb| grid.cells_of(b);

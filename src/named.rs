@@ -25,7 +25,8 @@ impl fmt::Display for UnknownName {
 
 impl std::error::Error for UnknownName {}
 
-/// Defines an enum without data whose variants have names: `ALL`, `as_str`, `Display`, `FromStr`, and the same names in files.
+/// Defines an enum without data whose variants have names: `ALL`, `as_str`, `Display`, `FromStr`, and the same names in
+/// files.
 macro_rules! named {
     ($(#[$meta:meta])* $seen:vis enum $name:ident($kind:literal) {
         $($(#[$doc:meta])* $variant:ident = $text:literal,)+

@@ -19,7 +19,8 @@ pub enum PairOrder {
     /// The order in which the algorithm finds them: the least work.
     #[default]
     Any,
-    /// Ascending by first, then second member: the same list, bit for bit, from every algorithm, as lockstep games need.
+    /// Ascending by first, then second member: the same list, bit for bit, from every algorithm, as lockstep games
+    /// need.
     Canonical,
 }
 
@@ -63,9 +64,10 @@ impl Pairs {
 
     /// Sets the most pairs that may be stored, 8 bytes each, or lifts that limit.
     ///
-    /// A frame with more wanted pairs is [`Error::TooManyPairs`]. The built-in algorithms stop soon after the limit, so the number of pairs is
-    /// unknown then. On `k` threads, `k` above 1, an algorithm may hold up to `8 k + 1` times the limit while it works, because each
-    /// task has its own list. `pair-cache` also keeps up to 32 pairs for each box, whatever the limit.
+    /// A frame with more wanted pairs is [`Error::TooManyPairs`]. The built-in algorithms stop soon after the limit, so
+    /// the number of pairs is unknown then. On `k` threads, `k` above 1, an algorithm may hold up to `8 k + 1` times
+    /// the limit while it works, because each task has its own list. `pair-cache` also keeps up to 32 pairs for each
+    /// box, whatever the limit.
     pub fn set_limit(&mut self, limit: Option<usize>) {
         self.limit = limit;
     }
@@ -121,7 +123,8 @@ impl Pairs {
         self.as_slice().iter()
     }
 
-    /// Returns the number of overlapping pairs in the last frame. It includes those that the filter dropped, but for pairs of two fixed boxes.
+    /// Returns the number of overlapping pairs in the last frame. It includes those that the filter dropped, but for
+    /// pairs of two fixed boxes.
     #[must_use]
     pub fn overlapping(&self) -> u64 {
         self.len as u64 + self.unwanted
@@ -161,9 +164,11 @@ impl Pairs {
         !self.over && self.refused.is_none()
     }
 
-    /// Sorts the pairs if the caller wants that, and reports pairs that did not fit. Every [`BroadPhase`](crate::BroadPhase) ends with this.
+    /// Sorts the pairs if the caller wants that, and reports pairs that did not fit. Every
+    /// [`BroadPhase`](crate::BroadPhase) ends with this.
     ///
-    /// Sorting takes 4 bytes for each pair, or 8 if pairs are few or boxes many millions. Without that memory it takes longer.
+    /// Sorting takes 4 bytes for each pair, or 8 if pairs are few or boxes many millions. Without that memory it takes
+    /// longer.
     ///
     /// # Errors
     /// [`Error::TooManyPairs`] and [`Error::OutOfMemory`].

@@ -74,11 +74,11 @@ impl Registry {
         self.set(Entry::new(id, revision), Maker::One(Box::new(factory)));
     }
 
-    /// Adds a user's [incremental](BroadPhase::is_incremental) algorithm that runs on any of these numbers of CPU threads and keeps its state when
-    /// the number changes. Replaces algorithms with the same ids.
+    /// Adds a user's [incremental](BroadPhase::is_incremental) algorithm that runs on any of these numbers of CPU
+    /// threads and keeps its state when the number changes. Replaces algorithms with the same ids.
     ///
-    /// `factory` gets the wanted numbers of threads, ascending. Its instance must accept each of them in [`BroadPhase::set_threads`], and begin with
-    /// the least.
+    /// `factory` gets the wanted numbers of threads, ascending. Its instance must accept each of them in
+    /// [`BroadPhase::set_threads`], and begin with the least.
     ///
     /// # Errors
     /// As [`AlgorithmId::new`]; nothing is added then.
@@ -115,13 +115,14 @@ impl Registry {
         self.position(id).map(|at| &self.makers[at]).filter(|maker| !matches!(maker, Maker::BuiltIn))
     }
 
-    /// Adds the built-in algorithms on these GPUs: on each of them, and on the first two, three and so on together. They replace the GPUs of an
-    /// earlier call. No GPU is opened before an algorithm is created.
+    /// Adds the built-in algorithms on these GPUs: on each of them, and on the first two, three and so on together.
+    /// They replace the GPUs of an earlier call. No GPU is opened before an algorithm is created.
     #[cfg(feature = "gpu")]
     pub fn add_gpus(&mut self, gpus: &crate::gpu::Gpus) {
         self.gpus = gpus.clone();
         let before = std::mem::take(&mut self.entries).into_iter().zip(std::mem::take(&mut self.makers));
-        let stays = |(entry, maker): &(Entry, Maker)| !matches!((maker, entry.id.backend()), (Maker::BuiltIn, Backend::Gpu(_)));
+        let stays =
+            |(entry, maker): &(Entry, Maker)| !matches!((maker, entry.id.backend()), (Maker::BuiltIn, Backend::Gpu(_)));
         (self.entries, self.makers) = before.filter(stays).unzip();
         for entry in crate::gpu::algorithms(gpus.identities()) {
             if self.position(&entry.id).is_none() {
@@ -135,29 +136,32 @@ impl Registry {
         self.simd = self.simd.min(level);
     }
 
-    /// Pins each helper thread of pools made from now on to its own CPU: one to each physical core before any has two. Each process and
-    /// each pool begins at another core.
+    /// Pins each helper thread of pools made from now on to its own CPU: one to each physical core before any has two.
+    /// Each process and each pool begins at another core.
     ///
-    /// The calling thread is not pinned, because threads that it starts would inherit that. On Linux a helper moves to a free CPU when it finds
-    /// the caller on its own core. Under the CPU quota of a cgroup no thread is pinned: the quota is for any CPU, and a pinned thread could
-    /// not leave those that other containers use.
+    /// The calling thread is not pinned, because threads that it starts would inherit that. On Linux a helper moves to
+    /// a free CPU when it finds the caller on its own core. Under the CPU quota of a cgroup no thread is pinned: the
+    /// quota is for any CPU, and a pinned thread could not leave those that other containers use.
     ///
-    /// Use this in a program that has the machine to itself. Some schedulers, above all those of virtual machines, wake two threads of a pool on
-    /// one core and leave another idle for milliseconds. The command measures and runs with pinned threads. It is off by default, also in
-    /// `Adaptive::for_this_machine`, because a pinned thread can't leave a core that another thread of the program keeps busy.
+    /// Use this in a program that has the machine to itself. Some schedulers, above all those of virtual machines, wake
+    /// two threads of a pool on one core and leave another idle for milliseconds. The command measures and runs with
+    /// pinned threads. It is off by default, also in `Adaptive::for_this_machine`, because a pinned thread can't leave
+    /// a core that another thread of the program keeps busy.
     pub fn pin_threads(&mut self) {
         self.threads.pinned = true;
     }
 
-    /// Makes the threads of a program's own pool the helpers of built-in algorithms that are created from now on, in place of own
-    /// pools. Algorithms on GPUs keep their own threads, which wait for drivers.
+    /// Makes the threads of a program's own pool the helpers of built-in algorithms that are created from now on, in
+    /// place of own pools. Algorithms on GPUs keep their own threads, which wait for drivers.
     ///
-    /// An algorithm on K threads uses the calling thread and K - 1 of the pool, so the most is one more than the pool has. A larger number is
-    /// [unavailable](Entry::unavailable). Called from within the pool (`install`, `scope`, a job), a frame uses at most the threads of the pool.
+    /// An algorithm on K threads uses the calling thread and K - 1 of the pool, so the most is one more than the pool
+    /// has. A larger number is [unavailable](Entry::unavailable). Called from within the pool (`install`, `scope`, a
+    /// job), a frame uses at most the threads of the pool.
     ///
-    /// Threads of the pool are invited and not awaited: free ones help, and the caller does the rest. Beside a busy pool a frame takes as
-    /// long as on one thread. A caller in a pool runs no other job meanwhile, so it may hold a lock that such jobs want.
-    /// [Pinning](Self::pin_threads) does not apply. The pool is of [the version of rayon](crate::rayon1) that this library exports.
+    /// Threads of the pool are invited and not awaited: free ones help, and the caller does the rest. Beside a busy
+    /// pool a frame takes as long as on one thread. A caller in a pool runs no other job meanwhile, so it may hold a
+    /// lock that such jobs want. [Pinning](Self::pin_threads) does not apply. The pool is of [the version of
+    /// rayon](crate::rayon1) that this library exports.
     ///
     /// ```
     /// use sapwise::{Registry, rayon1 as rayon};
@@ -250,11 +254,12 @@ impl Registry {
         }
     }
 
-    /// Makes an instance of an algorithm: a listed one, a built-in one on any number of CPU threads up to the most that is listed, or one on any
-    /// of the added GPUs.
+    /// Makes an instance of an algorithm: a listed one, a built-in one on any number of CPU threads up to the most that
+    /// is listed, or one on any of the added GPUs.
     ///
     /// # Errors
-    /// [`Error::UnknownAlgorithm`]. [`Error::Unavailable`], for example if a file from a larger machine names more threads than this one has cores.
+    /// [`Error::UnknownAlgorithm`]. [`Error::Unavailable`], for example if a file from a larger machine names more
+    /// threads than this one has cores.
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
         match (self.users_maker(id), built_in(id), id.backend()) {
             (Some(Maker::One(factory)), ..) => factory(),
@@ -275,9 +280,9 @@ impl Registry {
         }
     }
 
-    /// Makes one instance for all of `ids`, which keeps its state when [`BroadPhase::set_threads`] changes the number of threads. Returns `None`,
-    /// so that each must be [created](Self::create) by itself, unless they are one incremental method on several numbers of threads: a
-    /// built-in one, or one [added as a family](Self::add_family).
+    /// Makes one instance for all of `ids`, which keeps its state when [`BroadPhase::set_threads`] changes the number
+    /// of threads. Returns `None`, so that each must be [created](Self::create) by itself, unless they are one
+    /// incremental method on several numbers of threads: a built-in one, or one [added as a family](Self::add_family).
     ///
     /// # Errors
     /// As [`create`](Self::create).
@@ -328,7 +333,8 @@ impl Family<'_> {
     }
 }
 
-/// Returns why a built-in algorithm can't have `threads` threads of `pool` in a registry of `cores` cores, or `None` if it can.
+/// Returns why a built-in algorithm can't have `threads` threads of `pool` in a registry of `cores` cores, or `None` if
+/// it can.
 fn unavailable(pool: &Threads, cores: u32, threads: u32) -> Option<Unavailable> {
     pool.unavailable(threads).or_else(|| (threads > cores).then_some(Unavailable::TooFewCores { threads, most: cores }))
 }
@@ -350,7 +356,8 @@ impl fmt::Debug for Registry {
     }
 }
 
-/// Returns the number of threads that may run at once on this machine, with affinity and cgroup quota respected; 1 if the system does not tell.
+/// Returns the number of threads that may run at once on this machine, with affinity and cgroup quota respected; 1 if
+/// the system does not tell.
 #[must_use]
 pub fn usable_cores() -> u32 {
     std::thread::available_parallelism().map_or(1, |n| u32::try_from(n.get()).unwrap_or(u32::MAX))

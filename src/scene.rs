@@ -1,6 +1,7 @@
 //! Scenes for the unit tests.
 //!
-//! `sapwise-scenes` depends on the normal build of this library, whose `Aabb` is another type than that of the library under test.
+//! `sapwise-scenes` depends on the normal build of this library, whose `Aabb` is another type than that of the library
+//! under test.
 
 use crate::Aabb;
 pub(crate) use sapwise_scenes::Scenario;

@@ -99,7 +99,8 @@ fn algorithm_with_a_cost_too_high_is_tried_and_stays() {
     let mut adaptive = calls(&with_sleepers(), &[("slow@cpu1", 2_000_000.0), ("quick@cpu1", 2_010_000.0)]);
     let boxes = resting(40);
     assert_eq!(run(&mut adaptive, &boxes), ("slow@cpu1".to_owned(), Reason::First));
-    // Usually in the first hundred frames. Later if other programs delay the sleeper, so that its cost is unclear for longer.
+    // Usually in the first hundred frames. Later if other programs delay the sleeper, so that its cost is unclear for
+    // longer.
     let tried = (0..3000).position(|_| run(&mut adaptive, &boxes).0 == "quick@cpu1");
     assert!(tried.is_some(), "in 3000 frames by the slow one the quick one was not tried");
     let quick = (0..300).filter(|_| run(&mut adaptive, &boxes).0 == "quick@cpu1").count();

@@ -1,7 +1,9 @@
-//! The pairs of every scenario over 500 frames, as stored hashes: the same from every algorithm, on every platform and in every version.
+//! The pairs of every scenario over 500 frames, as stored hashes: the same from every algorithm, on every platform and
+//! in every version.
 //!
-//! A line of tests/fixtures/golden.csv has a scenario, the selection of its frames, a hash of the bits of their boxes, and a hash of their pairs
-//! in canonical order, both by the oracle. After a change of the scenes, `SAPWISE_WRITE_GOLDEN=1 cargo test --test golden` writes the file.
+//! A line of tests/fixtures/golden.csv has a scenario, the selection of its frames, a hash of the bits of their boxes,
+//! and a hash of their pairs in canonical order, both by the oracle. After a change of the scenes,
+//! `SAPWISE_WRITE_GOLDEN=1 cargo test --test golden` writes the file.
 
 mod common;
 

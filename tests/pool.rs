@@ -112,8 +112,8 @@ fn frames_in_every_thread_of_the_pool_end() {
     }
 }
 
-/// A rayon worker calls while it holds a lock, and a job that wants the lock is next in its queue: to run other jobs while waiting would
-/// deadlock.
+/// A rayon worker calls while it holds a lock, and a job that wants the lock is next in its queue: to run other jobs
+/// while waiting would deadlock.
 #[test]
 fn worker_that_holds_a_lock_runs_no_other_job() {
     ends(|| {

@@ -46,7 +46,10 @@ proptest! {
     }
 
     #[test]
-    fn reused_instances_forget_the_previous_frame(sizes in prop::collection::vec(0_usize..700, 1..6), seed in any::<u32>()) {
+    fn reused_instances_forget_the_previous_frame(
+        sizes in prop::collection::vec(0_usize..700, 1..6),
+        seed in any::<u32>(),
+    ) {
         let (registry, ids) = registry();
         for id in ids {
             let mut kept = registry.create(&id).unwrap();
@@ -67,7 +70,12 @@ proptest! {
     }
 
     #[test]
-    fn load_of_any_boxes_is_finite(boxes in prop::collection::vec((prop::array::uniform3(any::<f32>()), prop::array::uniform3(any::<f32>())), 0..300)) {
+    fn load_of_any_boxes_is_finite(
+        boxes in prop::collection::vec(
+            (prop::array::uniform3(any::<f32>()), prop::array::uniform3(any::<f32>())),
+            0..300,
+        ),
+    ) {
         let boxes: Vec<Aabb> = boxes.into_iter().map(|(min, max)| Aabb::new(min, max)).collect();
         for pairs in [None, Some(0.0), Some(1.0e6)] {
             let load = Load::estimate(&boxes, pairs, None);

@@ -1,11 +1,13 @@
-//! Every algorithm on a few dozen boxes of every kind that come, move and go: small enough for Miri and valgrind (`tools/sanitize.sh`).
+//! Every algorithm on a few dozen boxes of every kind that come, move and go: small enough for Miri and valgrind
+//! (`tools/sanitize.sh`).
 
 mod common;
 
 use common::{Random, WORLDS, denormals, every_algorithm, lattice, naive_filtered};
 use sapwise::{Aabb, BroadPhase, Filter, Membership, PairOrder, Pairs};
 
-/// Boxes of a scene: more than any vector has lanes, and enough for a tree of several levels. Miri takes a second for such a frame.
+/// Boxes of a scene: more than any vector has lanes, and enough for a tree of several levels. Miri takes a second for
+/// such a frame.
 const BOXES: usize = if cfg!(miri) { 18 } else { 40 };
 
 /// Frames of a scene.

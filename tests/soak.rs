@@ -1,8 +1,9 @@
 //! Many frames in which things go wrong at random: no pair is lost and no memory leaks.
 //!
-//! `Adaptive` runs `fragmentation` at small sizes, and each frame is compared with the double loop. At random, a GPU is lost and comes back, pools change
-//! their size, frames fail, and the program restarts with what it has learned. With the feature `this-machine` every fourth program starts from a
-//! cache whose files are damaged, truncated, replaced by folders or not writable. A run of a million frames takes minutes:
+//! `Adaptive` runs `fragmentation` at small sizes, and each frame is compared with the double loop. At random, a GPU is
+//! lost and comes back, pools change their size, frames fail, and the program restarts with what it has learned. With
+//! the feature `this-machine` every fourth program starts from a cache whose files are damaged, truncated, replaced by
+//! folders or not writable. A run of a million frames takes minutes:
 //!
 //! ```sh
 //! SAPWISE_SOAK_FRAMES=1000000 cargo test -p sapwise --features this-machine --test soak -- --nocapture
@@ -257,7 +258,8 @@ fn life(adaptive: &mut Adaptive, machine: &mut Machine, frames: u64, random: &mu
     }
 }
 
-/// Returns the bytes in use, once they are no more than `lowest` or 50 milliseconds have passed: threads of the last program may still end.
+/// Returns the bytes in use, once they are no more than `lowest` or 50 milliseconds have passed: threads of the last
+/// program may still end.
 fn live_bytes(lowest: isize) -> isize {
     for _ in 0..50 {
         if LIVE.load(Relaxed) <= lowest {

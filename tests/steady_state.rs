@@ -48,8 +48,8 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// Returns the number of allocations, and of large ones, of `run` in `frames` frames of a scene, after seven rounds of the same frames:
-/// `pair-cache` settles its margin in them, and its memory depends on the margin.
+/// Returns the number of allocations, and of large ones, of `run` in `frames` frames of a scene, after seven rounds of
+/// the same frames: `pair-cache` settles its margin in them, and its memory depends on the margin.
 ///
 /// `extras` adds canonical order, a filter that changes in each frame, and `Changes` by ids of which two are swapped.
 fn allocations(
@@ -87,7 +87,8 @@ fn allocations(
     (counted, large)
 }
 
-/// Returns a tuning whose crossovers `fragmentation` passes: 60 n = 5000 + 30 n at 167, 5000 + 30 n = 30 000 + 10 n at 1250.
+/// Returns a tuning whose crossovers `fragmentation` passes: 60 n = 5000 + 30 n at 167, 5000 + 30 n = 30 000 + 10 n at
+/// 1250.
 fn tuning(registry: &Registry) -> Tuning {
     let cost = |id: &str, call: f64, object: f64| {
         let revision = registry.entries().iter().find(|e| e.id.to_string() == id).unwrap().revision;
@@ -112,7 +113,8 @@ fn steady_state_allocates_nothing() {
             // Fewer would not keep four threads busy.
             let objects = if id.threads() > 2 { 4096 } else { 3000 };
             let (counted, large) = allocations(scenario, objects, FRAMES, algorithm.as_mut(), extras);
-            // rayon allocates a job of about 100 bytes for each helper in each phase, and sometimes a block of its queue.
+            // rayon allocates a job of about 100 bytes for each helper in each phase, and sometimes a block of its
+            // queue.
             let phases = match id.method() {
                 "brute" => 4,
                 "grid-sap" => 3,
@@ -141,7 +143,8 @@ fn steady_state_allocates_nothing() {
     assert!(switched.load(Relaxed) > 10, "they took {} turns", switched.load(Relaxed));
 }
 
-/// Returns an `Adaptive` that learns, over algorithms that allocate nothing and whose speed changes, and the number of switches.
+/// Returns an `Adaptive` that learns, over algorithms that allocate nothing and whose speed changes, and the number of
+/// switches.
 fn idle_candidates() -> (Adaptive, Arc<AtomicUsize>) {
     struct Idle(usize, Arc<[AtomicUsize; 2]>, Arc<AtomicUsize>, u64);
     impl BroadPhase for Idle {

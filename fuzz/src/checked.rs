@@ -39,7 +39,8 @@ pub fn hardware() -> Hardware {
 pub struct Checked(Vec<(String, Box<dyn BroadPhase>)>);
 
 impl Checked {
-    /// Makes all methods at the SIMD level and on the number of threads that the input names, sometimes with an `Adaptive` over all of them.
+    /// Makes all methods at the SIMD level and on the number of threads that the input names, sometimes with an
+    /// `Adaptive` over all of them.
     ///
     /// # Panics
     /// An available algorithm can't be made.

@@ -1,5 +1,5 @@
-//! Any boxes, filters, limits, orders and numbers of threads from frame to frame: every method, `Adaptive` and `Changes` against the
-//! definitions.
+//! Any boxes, filters, limits, orders and numbers of threads from frame to frame: every method, `Adaptive` and
+//! `Changes` against the definitions.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,5 @@
-//! Any text as the name of an algorithm, a backend, a SIMD level or a schema: it is written as it was read, and an available algorithm can be made.
+//! Any text as the name of an algorithm, a backend, a SIMD level or a schema: it is written as it was read, and an
+//! available algorithm can be made.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

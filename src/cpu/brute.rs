@@ -61,8 +61,8 @@ impl BroadPhase for Brute {
     }
 }
 
-/// Writes the positions of `count` boxes to `order`: first those that may move, then the fixed ones. Returns how many may move, or `None`,
-/// and leaves `order` alone, if all may.
+/// Writes the positions of `count` boxes to `order`: first those that may move, then the fixed ones. Returns how many
+/// may move, or `None`, and leaves `order` alone, if all may.
 fn moving_first(order: &mut Vec<u32>, filter: Option<&Filter>, count: usize) -> Result<Option<usize>, Error> {
     let is_fixed = |id: usize| filter.is_some_and(|f| f.is_fixed(id));
     let fixed = filter.map_or(0, |_| (0..count).filter(|&id| is_fixed(id)).count());
@@ -79,7 +79,8 @@ fn moving_first(order: &mut Vec<u32>, filter: Option<&Filter>, count: usize) -> 
     Ok(Some(count - fixed))
 }
 
-/// Returns the first row of part `k` when the first `rows` rows of the triangle of the pairs of `boxes` are cut into `parts` parts of equal area.
+/// Returns the first row of part `k` when the first `rows` rows of the triangle of the pairs of `boxes` are cut into
+/// `parts` parts of equal area.
 fn row(rows: usize, boxes: usize, k: usize, parts: usize) -> usize {
     let (rows_f, n) = (rows as f64, boxes as f64);
     let area = rows_f * (n - rows_f / 2.0) * k as f64 / parts as f64;

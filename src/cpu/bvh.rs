@@ -1,6 +1,7 @@
 //! A bounding volume hierarchy, built from scratch every frame. Each leaf is compared with the leaves behind it.
 //!
-//! The cost of a frame follows the numbers of boxes and pairs, wherever the boxes lie and whatever their sizes: see [`tree`](super::tree).
+//! The cost of a frame follows the numbers of boxes and pairs, wherever the boxes lie and whatever their sizes: see
+//! [`tree`](super::tree).
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};

@@ -91,8 +91,8 @@ impl<'a> ColumnsMut<'a> {
 
 /// Grows `list` to at least `len` elements, and by a sixteenth more. Reports a refused allocation.
 ///
-/// It never shrinks, and its elements stay initialised, so that a steady state writes each element once. `Vec` alone would double its
-/// memory, which no frame of that size needs.
+/// It never shrinks, and its elements stay initialised, so that a steady state writes each element once. `Vec` alone
+/// would double its memory, which no frame of that size needs.
 pub(crate) fn ensure<T: Clone + Default>(list: &mut Vec<T>, len: usize, what: &'static str) -> Result<(), Error> {
     if list.len() < len {
         let len = len + len / 16;

@@ -10,11 +10,12 @@
 //!   +----------------> grid axis 0
 //! ```
 //!
-//! Phase one has one task a thread: each sorts its share of the boxes into its own bins, one for each strip. Phase two has several
-//! tasks a thread: for each strip, a task gathers the bins of all threads, sorts them along the sweep axis and sweeps.
+//! Phase one has one task a thread: each sorts its share of the boxes into its own bins, one for each strip. Phase two
+//! has several tasks a thread: for each strip, a task gathers the bins of all threads, sorts them along the sweep axis
+//! and sweeps.
 //!
-//! Oversized boxes, the boxes of overfull strips and fixed boxes go into a separate [tree](super::tree). Its boxes are compared with each
-//! other, but for two fixed ones, and with the boxes of every strip.
+//! Oversized boxes, the boxes of overfull strips and fixed boxes go into a separate [tree](super::tree). Its boxes are
+//! compared with each other, but for two fixed ones, and with the boxes of every strip.
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
@@ -31,8 +32,9 @@ use crate::load::{FramePlan, SceneStats, StripGrid, StripSpan};
 use crate::pairs::Pairs;
 use std::ops::Range;
 
-/// Most boxes of a strip. The boxes of a fuller one go into the tree. This is sixteen times the number in a strip of evenly spread boxes: up to
-/// there sweeping a dense strip costs less than the tree and its comparison with the other strips.
+/// Most boxes of a strip. The boxes of a fuller one go into the tree. This is sixteen times the number in a strip of
+/// evenly spread boxes: up to there sweeping a dense strip costs less than the tree and its comparison with the other
+/// strips.
 const MOST_BOXES: usize = 4096;
 
 /// Most boxes of a strip in the share of one thread, which need not be an equal part of every strip.
@@ -169,7 +171,8 @@ fn balanced(bins: &[Bins], strips: usize, k: usize, parts: usize) -> usize {
 }
 
 impl Bins {
-    /// Sorts a share of the boxes into bins. The pass that counts works out the strips of each box; the second pass reuses them.
+    /// Sorts a share of the boxes into bins. The pass that counts works out the strips of each box; the second pass
+    /// reuses them.
     fn fill(
         &mut self,
         grid: &StripGrid,
@@ -325,8 +328,8 @@ impl Task {
         Ok(())
     }
 
-    /// Returns up to 16 boxes that follow each other along the sweep, without those that began in an earlier strip: each box is in one group of
-    /// one strip. `None` if none is left.
+    /// Returns up to 16 boxes that follow each other along the sweep, without those that began in an earlier strip:
+    /// each box is in one group of one strip. `None` if none is left.
     fn group(&self, at: usize, axis: usize) -> Option<Group> {
         let of = &self.columns;
         let rows = at..(at + LANES).min(of.len());

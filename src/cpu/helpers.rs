@@ -23,7 +23,8 @@ struct Shared {
 }
 
 impl Helpers {
-    /// Makes `count` helpers. Pins each to its own CPU if that is wanted and allowed, and if there is one CPU more than helpers.
+    /// Makes `count` helpers. Pins each to its own CPU if that is wanted and allowed, and if there is one CPU more than
+    /// helpers.
     ///
     /// # Errors
     /// [`Unavailable::ThreadsRefused`].
@@ -41,9 +42,11 @@ impl Helpers {
         Self { pool, shared: Arc::new(Shared { phases: Phases::default(), placement }), may_call }
     }
 
-    /// Runs `work` here and on up to `count` helpers that come while it lasts. Returns when nobody works on it any more.
+    /// Runs `work` here and on up to `count` helpers that come while it lasts. Returns when nobody works on it any
+    /// more.
     ///
-    /// A caller that is a thread of the pool can't help itself, so there is one helper less. It runs no other job of its pool meanwhile.
+    /// A caller that is a thread of the pool can't help itself, so there is one helper less. It runs no other job of
+    /// its pool meanwhile.
     pub(crate) fn run(&self, count: usize, work: &(dyn Fn() + Sync)) {
         if let Some(placement) = &self.shared.placement {
             placement.follow_caller();
@@ -68,7 +71,8 @@ impl Helpers {
     }
 }
 
-/// Makes a pool of `threads` threads. Pins each to its own CPU if there are enough and [that is allowed](crate::cpu::placement::may_pin).
+/// Makes a pool of `threads` threads. Pins each to its own CPU if there are enough and [that is
+/// allowed](crate::cpu::placement::may_pin).
 ///
 /// # Errors
 /// [`Unavailable::ThreadsRefused`].

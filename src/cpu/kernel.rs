@@ -1,6 +1,7 @@
 //! The inner loops: one box against several at a time, at every SIMD level.
 //!
-//! Each loop is written once over [`Lanes`], and compiled for each level inside a function that enables its instructions.
+//! Each loop is written once over [`Lanes`], and compiled for each level inside a function that enables its
+//! instructions.
 
 pub(crate) mod contain;
 pub(crate) mod node;
@@ -24,7 +25,8 @@ use x86::Sse2 as Baseline;
 #[cfg(not(target_arch = "x86_64"))]
 use portable::Portable as Baseline;
 
-/// Tests every row of `rows` against the rows behind it, up to the first that begins beyond its end on the sweep axis, and adds the pairs.
+/// Tests every row of `rows` against the rows behind it, up to the first that begins beyond its end on the sweep axis,
+/// and adds the pairs.
 ///
 /// The columns must ascend by lower bound on the sweep axis.
 pub(crate) fn sweep_rows<R: Rows>(simd: Simd, columns: &Columns, rows: Range<usize>, pairs: &mut Pairs) {
@@ -132,8 +134,8 @@ trait Lanes: Copy {
     const COUNT: usize;
     /// The mask of all rows.
     const ALL: u32 = ((1_u64 << Self::COUNT) - 1) as u32;
-    /// Tests rows `at..at + COUNT` against a box that begins no later on the sweep axis. Returns which begin before its end, and which of
-    /// those overlap it on the other two axes too.
+    /// Tests rows `at..at + COUNT` against a box that begins no later on the sweep axis. Returns which begin before its
+    /// end, and which of those overlap it on the other two axes too.
     ///
     /// # Safety
     /// `at <= view.len`, and the calling function has the instructions enabled.
@@ -156,8 +158,8 @@ trait Lanes: Copy {
         }
         owned
     }
-    /// Writes the pairs of `id` with the rows `at + k`, k the bits of `hits`, to the head of `room`, which holds `COUNT` pairs. The
-    /// rest of `room` is unspecified afterwards.
+    /// Writes the pairs of `id` with the rows `at + k`, k the bits of `hits`, to the head of `room`, which holds
+    /// `COUNT` pairs. The rest of `room` is unspecified afterwards.
     ///
     /// # Safety
     /// As above.
@@ -188,12 +190,7 @@ fn add<L: Lanes, R: Rows>(lanes: L, view: &View<'_>, at: usize, query: &Query, h
 }
 
 #[inline(always)]
-fn sweep<L: Lanes, R: Rows>(
-    lanes: L,
-    view: &View<'_>,
-    rows: Range<usize>,
-    pairs: &mut Pairs,
-) {
+fn sweep<L: Lanes, R: Rows>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
     debug_assert!(rows.end <= view.len);
     for i in rows {
         let query = view.query(i);
@@ -237,7 +234,8 @@ fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs: &mut Pa
     }
 }
 
-/// Returns whether two boxes overlap, without the branches of [`Aabb::overlaps`]: no CPU predicts them if every other pair is a hit.
+/// Returns whether two boxes overlap, without the branches of [`Aabb::overlaps`]: no CPU predicts them if every other
+/// pair is a hit.
 #[inline(always)]
 pub(crate) fn overlap(a: &Aabb, b: &Aabb) -> bool {
     #[cfg(target_arch = "x86_64")]

@@ -10,7 +10,8 @@ const VARIABLE: &str = "SAPWISE_SIMD";
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum SimdLevel {
-    /// The vectors that every CPU of the target has: SSE2 on x86-64, elsewhere those that the compiler makes of plain Rust.
+    /// The vectors that every CPU of the target has: SSE2 on x86-64, elsewhere those that the compiler makes of plain
+    /// Rust.
     Portable,
     /// 256-bit AVX2 of x86-64.
     Avx2,
@@ -48,8 +49,9 @@ impl SimdLevel {
 
     /// Returns the level in use: the detected one, or a lower one that the environment variable `SAPWISE_SIMD` names.
     ///
-    /// Each new [`Registry`](crate::Registry) reads the variable once. A level that the CPU lacks and a name of no level are ignored, because a
-    /// library can't refuse to load. Programs that want to refuse call [`SimdLevel::requested`].
+    /// Each new [`Registry`](crate::Registry) reads the variable once. A level that the CPU lacks and a name of no
+    /// level are ignored, because a library can't refuse to load. Programs that want to refuse call
+    /// [`SimdLevel::requested`].
     #[must_use]
     pub fn in_use() -> Self {
         match Self::requested() {
@@ -116,8 +118,8 @@ impl fmt::Display for SimdLevelError {
 
 impl std::error::Error for SimdLevelError {}
 
-/// The level of a kernel. A level above the lowest proves that this CPU has its instructions: only [`Simd::at_most`], which asks the CPU, makes
-/// one. The `unsafe` of the kernels rests on that.
+/// The level of a kernel. A level above the lowest proves that this CPU has its instructions: only [`Simd::at_most`],
+/// which asks the CPU, makes one. The `unsafe` of the kernels rests on that.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Simd {
     Portable,

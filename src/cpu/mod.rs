@@ -47,7 +47,8 @@ pub(crate) type Made = Result<Box<dyn BroadPhase>, Error>;
 pub(crate) enum Create {
     /// It runs on that many threads.
     OneWidth(fn(u32, &Threads, Simd) -> Made),
-    /// It is incremental, runs on any of these numbers of threads, ascending, and keeps its state when they change. It begins with the least.
+    /// It is incremental, runs on any of these numbers of threads, ascending, and keeps its state when they change. It
+    /// begins with the least.
     AnyWidth(fn(&[u32], &Threads, Simd) -> Made),
 }
 

@@ -1,9 +1,10 @@
-//! The pairs of fat AABBs, kept from frame to frame. A fat AABB is a box grown by a margin; here it is called a grown box.
+//! The pairs of fat AABBs, kept from frame to frame. A fat AABB is a box grown by a margin; here it is called a grown
+//! box.
 //!
-//! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes. So a frame costs one test of each box
-//! and one of each kept pair. A box that leaves its grown box gets a new one, and a tree of the grown boxes finds its new neighbours.
-//! After many of these, tree and list are rebuilt. If the boxes move too far for that to pay, a tree of the boxes themselves finds the
-//! pairs, until the boxes slow down.
+//! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes. So a frame
+//! costs one test of each box and one of each kept pair. A box that leaves its grown box gets a new one, and a tree of
+//! the grown boxes finds its new neighbours. After many of these, tree and list are rebuilt. If the boxes move too far
+//! for that to pay, a tree of the boxes themselves finds the pairs, until the boxes slow down.
 //!
 //! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules.
 
@@ -33,7 +34,8 @@ struct PairCache {
     /// The workers for each number of threads, ascending, and the position of those in use.
     widths: Vec<Workers>,
     width: usize,
-    /// As many of these threads as the frames keep busy, and the number of boxes for which they were fitted. `None`: not yet for this width.
+    /// As many of these threads as the frames keep busy, and the number of boxes for which they were fitted. `None`:
+    /// not yet for this width.
     workers: Workers,
     fitted_for: Option<usize>,
     outputs: Outputs,
@@ -102,7 +104,11 @@ impl BroadPhase for PairCache {
                 if kept != Ok(Kept::Pays) {
                     // The grown boxes may be half of this frame and half of the previous one.
                     self.grown.forget();
-                    if let Ok(kept) = kept { self.motion.stop(kept == Kept::Incomplete) } else { self.motion.interrupt() }
+                    if let Ok(kept) = kept {
+                        self.motion.stop(kept == Kept::Incomplete)
+                    } else {
+                        self.motion.interrupt()
+                    }
                 }
                 kept?
             }
@@ -146,14 +152,15 @@ impl BroadPhase for PairCache {
     }
 }
 
-/// Returns the most pairs that one of `tasks` tasks may keep: four equal shares, because a dense place may lie in the part of one task.
+/// Returns the most pairs that one of `tasks` tasks may keep: four equal shares, because a dense place may lie in the
+/// part of one task.
 fn most_of_task(most_kept: usize, tasks: usize) -> usize {
     (most_kept / tasks).saturating_mul(4).min(most_kept)
 }
 
 impl PairCache {
-    /// Takes as many threads of this width as a frame of `boxes` boxes keeps busy. They stay until that number changes by a factor of two,
-    /// because dealing the kept pairs out to other tasks takes time.
+    /// Takes as many threads of this width as a frame of `boxes` boxes keeps busy. They stay until that number changes
+    /// by a factor of two, because dealing the kept pairs out to other tasks takes time.
     fn fit(&mut self, boxes: usize) {
         if self.fitted_for.is_some_and(|before| boxes <= 2 * before.max(1) && before <= 2 * boxes.max(1)) {
             return;

@@ -1,11 +1,13 @@
 //! Work that a caller shares with helpers who may come late, or never.
 //!
-//! A phase borrows from the caller's stack, but a job of a pool must own its data. The scopes of rayon bridge that by waiting for every
-//! job, and while they wait they run other jobs of the caller's pool, any of which may want a lock that the caller holds. Here a job is an
-//! invitation and owns no part of a phase: a helper gets the closure from the list of open phases, under its lock, and is counted from then
-//! on. When nothing is left to do, the caller takes its phase off the list and waits for the counted helpers only.
+//! A phase borrows from the caller's stack, but a job of a pool must own its data. The scopes of rayon bridge that by
+//! waiting for every job, and while they wait they run other jobs of the caller's pool, any of which may want a lock
+//! that the caller holds. Here a job is an invitation and owns no part of a phase: a helper gets the closure from the
+//! list of open phases, under its lock, and is counted from then on. When nothing is left to do, the caller takes its
+//! phase off the list and waits for the counted helpers only.
 //!
-//! This needs `unsafe`: a closure that borrows stands in a shared list. Safe code has only scopes, which wait for jobs that never ran.
+//! This needs `unsafe`: a closure that borrows stands in a shared list. Safe code has only scopes, which wait for jobs
+//! that never ran.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -15,7 +17,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 /// Work of caller and helpers: each calls it once, and it returns when nothing is left to do.
 type Work<'a> = &'a (dyn Fn() + Sync);
 
-/// Rounds in which the caller spins for its helpers before it sleeps: about 20 µs. Waking it takes longer than most tasks have left by then.
+/// Rounds in which the caller spins for its helpers before it sleeps: about 20 µs. Waking it takes longer than most
+/// tasks have left by then.
 const SPINS: u32 = 1000;
 
 /// In [`Latch::state`]: the caller sleeps.
@@ -58,8 +61,8 @@ struct Latch {
 }
 
 impl Phases {
-    /// Runs `work` here and on up to `helpers` helpers that come while it lasts. `invite` makes one [come](Self::join) at some time, or
-    /// never; at most `most` are on their way at once. Returns when nobody works on it any more.
+    /// Runs `work` here and on up to `helpers` helpers that come while it lasts. `invite` makes one [come](Self::join)
+    /// at some time, or never; at most `most` are on their way at once. Returns when nobody works on it any more.
     ///
     /// # Panics
     /// With the panic of `work` here, else with the first one on a helper.
@@ -67,9 +70,10 @@ impl Phases {
         let latch = self.list().spare.pop().unwrap_or_default();
         // Made first: nothing leaves this function, not even a panic, before the phase is closed.
         let phase = Joinable { phases: self, latch: &latch };
-        // SAFETY: only the lifetime changes. The reference stands in the list until `phase` is dropped, which is within this function,
-        // where `work` lives. A helper copies it from the list under the lock, and is counted in the latch under that same lock;
-        // it counts itself off after its last use. Dropping `phase` takes the reference off the list and returns when none is counted.
+        // SAFETY: only the lifetime changes. The reference stands in the list until `phase` is dropped, which is within
+        // this function, where `work` lives. A helper copies it from the list under the lock, and is counted in the
+        // latch under that same lock; it counts itself off after its last use. Dropping `phase` takes the reference off
+        // the list and returns when none is counted.
         let work_for_helpers = unsafe { std::mem::transmute::<Work<'_>, Work<'static>>(work) };
         let missing = {
             let mut list = self.list();
@@ -89,7 +93,8 @@ impl Phases {
         }
     }
 
-    /// Works on the phase that has been open the longest and lacks helpers, if there is one. Call this once for each invitation.
+    /// Works on the phase that has been open the longest and lacks helpers, if there is one. Call this once for each
+    /// invitation.
     pub(crate) fn join(&self) {
         let joined = {
             let mut list = self.list();

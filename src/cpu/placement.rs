@@ -1,4 +1,5 @@
-//! Pins threads, for callers who ask for that: one to each physical core before any has two, and to other cores in each process.
+//! Pins threads, for callers who ask for that: one to each physical core before any has two, and to other cores in each
+//! process.
 
 use crate::cgroup;
 use crate::splitmix::mix;
@@ -19,8 +20,8 @@ static HANDED_OUT: AtomicUsize = AtomicUsize::new(0);
 
 /// The CPUs of a pool whose threads are pinned, one each.
 ///
-/// A pool of helpers has one CPU more than helpers. A scheduler that wakes a pinned helper on the core of the caller would make them take turns
-/// there while another core idles.
+/// A pool of helpers has one CPU more than helpers. A scheduler that wakes a pinned helper on the core of the caller
+/// would make them take turns there while another core idles.
 #[derive(Debug)]
 pub(crate) struct CpuPlacement {
     cpus: Vec<Cpu>,
@@ -37,14 +38,15 @@ thread_local! {
     static POSITION: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Returns whether threads may be pinned: not under a CPU quota. A quota is for time on any CPU, containers all begin with the same CPUs,
-/// and a pinned thread can't move away from a busy one.
+/// Returns whether threads may be pinned: not under a CPU quota. A quota is for time on any CPU, containers all begin
+/// with the same CPUs, and a pinned thread can't move away from a busy one.
 pub(crate) fn may_pin() -> bool {
     !cgroup::has_cpu_quota()
 }
 
 impl CpuPlacement {
-    /// Chooses `count` CPUs. `None` if the calling thread may run on fewer, or if [threads must not be pinned](may_pin).
+    /// Chooses `count` CPUs. `None` if the calling thread may run on fewer, or if [threads must not be
+    /// pinned](may_pin).
     pub(crate) fn choose(count: usize) -> Option<Self> {
         let usable = if may_pin() { usable() } else { Vec::new() };
         let first = (mix(number_of_process()) as usize).wrapping_add(HANDED_OUT.fetch_add(count, Relaxed));
@@ -92,7 +94,8 @@ impl CpuPlacement {
     }
 }
 
-/// Returns `count` of the CPUs, one of each physical core before any has two, beginning with core number `first`, cyclically.
+/// Returns `count` of the CPUs, one of each physical core before any has two, beginning with core number `first`,
+/// cyclically.
 fn spread(usable: &[Cpu], count: usize, first: usize) -> Vec<Cpu> {
     let mut cores: Vec<usize> = usable.iter().map(|cpu| cpu.physical).collect();
     cores.sort_unstable();

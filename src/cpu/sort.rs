@@ -16,7 +16,8 @@ const DIGITS: usize = 3;
 
 /// Sorts keys by their upper halves, then by their lower ones.
 ///
-/// Keys with the same upper half must come with ascending lower halves, as positions in the input do. `scratch` may have any length and content.
+/// Keys with the same upper half must come with ascending lower halves, as positions in the input do. `scratch` may
+/// have any length and content.
 pub(crate) fn sort(workers: &Workers, keys: &mut [u64], scratch: &mut Vec<u64>) -> Result<(), Error> {
     let len = keys.len();
     if len < SMALLEST_RADIX {

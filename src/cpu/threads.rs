@@ -9,10 +9,12 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-/// One rayon pool for each number of helpers, made on first use and shared by all algorithms; or the program's own pool for all.
+/// One rayon pool for each number of helpers, made on first use and shared by all algorithms; or the program's own pool
+/// for all.
 #[derive(Debug, Default)]
 pub(crate) struct Threads {
-    /// Whether the threads of pools made from now on are pinned; see [`Registry::pin_threads`](crate::Registry::pin_threads).
+    /// Whether the threads of pools made from now on are pinned; see
+    /// [`Registry::pin_threads`](crate::Registry::pin_threads).
     pub(crate) pinned: bool,
     #[cfg(feature = "parallel")]
     pools: Mutex<BTreeMap<u32, Arc<Helpers>>>,

@@ -1,7 +1,8 @@
 //! A tree of boxes with 16 children a node, built in the order of a space-filling curve.
 //!
-//! Sixteen boxes that are near in space share a leaf, sixteen leaves a node, and so on. One test compares a box with all 16. Dense places
-//! don't matter: if more than two leaves of boxes share a cell of the curve, a finer curve orders them.
+//! Sixteen boxes that are near in space share a leaf, sixteen leaves a node, and so on. One test compares a box with
+//! all 16. Dense places don't matter: if more than two leaves of boxes share a cell of the curve, a finer curve orders
+//! them.
 
 mod curve;
 
@@ -22,7 +23,8 @@ use std::ops::Range;
 /// The id of an empty lane. No box has it: there are at most this many boxes.
 pub(crate) const NOBODY: u32 = u32::MAX;
 
-/// Number of boxes above which the tree is likely not in the second-level cache: 1.2 MB of boxes, and as much in the tree.
+/// Number of boxes above which the tree is likely not in the second-level cache: 1.2 MB of boxes, and as much in the
+/// tree.
 pub(crate) const FAR: usize = 50_000;
 
 /// Boxes to prefetch ahead.
@@ -38,8 +40,8 @@ pub(crate) struct Tree {
     ids: Vec<u32>,
     /// Places in use, those of removed boxes included.
     places: usize,
-    /// The leaves, then nodes with the bounds of the leaves, and so on. There are at least two levels. The last level that is not empty had at
-    /// most 16 nodes when the tree was built.
+    /// The leaves, then nodes with the bounds of the leaves, and so on. There are at least two levels. The last level
+    /// that is not empty had at most 16 nodes when the tree was built.
     levels: Vec<Vec<Node>>,
     /// Leaves with boxes that may move. The leaves behind them hold fixed boxes.
     moving: usize,
@@ -66,7 +68,8 @@ impl Tree {
         self.order.reserve(objects)
     }
 
-    /// Builds the tree of the members of `boxes`, of which `stats` are the statistics. Boxes that `filter` calls fixed come last.
+    /// Builds the tree of the members of `boxes`, of which `stats` are the statistics. Boxes that `filter` calls fixed
+    /// come last.
     ///
     /// # Errors
     /// [`Error::InvalidBox`] for the first invalid member, and [`Error::OutOfMemory`].
@@ -194,7 +197,8 @@ impl Tree {
     }
 }
 
-/// Makes room for this many places and for the nodes above them, with unspecified content. Returns the number of levels.
+/// Makes room for this many places and for the nodes above them, with unspecified content. Returns the number of
+/// levels.
 fn lay_out(levels: &mut Vec<Vec<Node>>, ids: &mut Vec<u32>, places: usize) -> Result<usize, Error> {
     let mut nodes = places.div_ceil(LANES);
     ids.truncate(nodes * LANES);

@@ -28,8 +28,8 @@ pub(crate) struct Workers {
 /// Tasks for each thread: enough to even out tasks of unequal length, few enough to cost nothing.
 const TASKS_PER_THREAD: usize = 8;
 
-/// Boxes that make it worth waking one more thread. With 1800 boxes of `grid-sap` a second thread saved half of the time on one
-/// machine of `datasets/`, and nothing on another.
+/// Boxes that make it worth waking one more thread. With 1800 boxes of `grid-sap` a second thread saved half of the
+/// time on one machine of `datasets/`, and nothing on another.
 const BOXES_PER_THREAD: usize = 1024;
 
 /// Fewest boxes of a task: half of [`BOXES_PER_THREAD`], so that two tasks of unequal length even out.
@@ -68,8 +68,8 @@ impl Workers {
         self.tasks
     }
 
-    /// Returns as many of these threads as a frame of `boxes` boxes keeps busy, with as many tasks. A method that takes more or less time for
-    /// a box than `grid-sap` passes the number of boxes for which `grid-sap` takes as long.
+    /// Returns as many of these threads as a frame of `boxes` boxes keeps busy, with as many tasks. A method that takes
+    /// more or less time for a box than `grid-sap` passes the number of boxes for which `grid-sap` takes as long.
     pub(crate) fn fit(&self, boxes: usize) -> Self {
         let threads = self.threads.min(boxes / BOXES_PER_THREAD).max(1);
         Self {
@@ -196,7 +196,8 @@ pub(crate) struct Outputs {
 }
 
 impl Outputs {
-    /// Returns one list for each task of `workers`, empty and under the caller's limit and filter. Lists of more tasks stay for later frames.
+    /// Returns one list for each task of `workers`, empty and under the caller's limit and filter. Lists of more tasks
+    /// stay for later frames.
     fn ready(&mut self, workers: &Workers, pairs: &Pairs) -> &mut [Pairs] {
         if self.lists.len() < workers.tasks() {
             self.lists.resize_with(workers.tasks(), Pairs::new);
@@ -207,7 +208,8 @@ impl Outputs {
         lists
     }
 
-    /// Lets `find` fill one list for each task of `workers`, then joins them in order. With one thread the one list is the caller's.
+    /// Lets `find` fill one list for each task of `workers`, then joins them in order. With one thread the one list is
+    /// the caller's.
     pub(crate) fn collect(
         &mut self,
         workers: &Workers,
@@ -243,8 +245,8 @@ impl Outputs {
         }
     }
 
-    /// Runs one phase: `find` on every part, each into its own list, then joins the lists in order. `find` gets the number of the part and the
-    /// number of parts.
+    /// Runs one phase: `find` on every part, each into its own list, then joins the lists in order. `find` gets the
+    /// number of the part and the number of parts.
     pub(crate) fn find(
         &mut self,
         workers: &Workers,

@@ -10,7 +10,7 @@ use crate::algorithm::{AlgorithmId, Backend, ParseIdError};
 use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::{Threads, Workers};
 use crate::error::{Error, GpuError};
-use crate::load::{SampledBoxes, FramePlan, SceneStats};
+use crate::load::{FramePlan, SampledBoxes, SceneStats};
 use crate::pairs::Pairs;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -123,7 +123,13 @@ impl OnGpus {
     }
 
     /// In slabs: as many as there are GPUs, or that many times `rounds`. `false` when a slab is too large for its GPU.
-    fn slabs(&mut self, rounds: usize, sample: &SceneStats, boxes: &[Aabb], pairs: &mut Pairs) -> Result<bool, Failure> {
+    fn slabs(
+        &mut self,
+        rounds: usize,
+        sample: &SceneStats,
+        boxes: &[Aabb],
+        pairs: &mut Pairs,
+    ) -> Result<bool, Failure> {
         let Self { parts, slabs, workers, any_over, exponent, .. } = self;
         any_over.store(false, Ordering::Relaxed);
         let exponent = *exponent;

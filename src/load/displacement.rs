@@ -12,7 +12,8 @@ const MOST_EDGE: f32 = 1.0e30;
 /// Slower boxes than this, in edges a frame, count as still.
 const STILL: f64 = 0.01;
 
-/// Returns the distance of two speeds, in edges a frame: the absolute logarithm of their ratio, about 0 if boxes count as still at both.
+/// Returns the distance of two speeds, in edges a frame: the absolute logarithm of their ratio, about 0 if boxes count
+/// as still at both.
 pub(crate) fn paces_apart_ln(one: f64, other: f64) -> f64 {
     ((one + STILL) / (other + STILL)).ln().abs()
 }
@@ -50,19 +51,19 @@ impl Displacement {
         self.watching = boxes.len().min(WATCHED);
         let start = |part: usize| (part as u64 * boxes.len() as u64 / self.watching as u64) as usize;
         for (k, watched) in self.watched[..self.watching].iter_mut().enumerate() {
-            // One box of each of 64 equal parts, at a random place: boxes that move may follow each other at regular distances, and an even
-            // spacing could meet all or none of them.
+            // One box of each of 64 equal parts, at a random place: boxes that move may follow each other at regular
+            // distances, and an even spacing could meet all or none of them.
             let (first, end) = (start(k), start(k + 1));
             let id = first + (mix(self.rounds << 8 | k as u64) % (end - first) as u64) as usize;
             *watched = (id as u32, boxes[id]);
         }
     }
 
-    /// Returns the motion of the watched boxes since, 0 to 1: the mean over them of the greatest displacement of a bound, in mean edges of the
-    /// box, at most 1 each. `None` if no watched box is valid and still there.
+    /// Returns the motion of the watched boxes since, 0 to 1: the mean over them of the greatest displacement of a
+    /// bound, in mean edges of the box, at most 1 each. `None` if no watched box is valid and still there.
     ///
-    /// Edges are clamped to four times their 0.9 quantile: a box as large as the world moves far when it passes many others, however
-    /// small a share of its edge that is.
+    /// Edges are clamped to four times their 0.9 quantile: a box as large as the world moves far when it passes many
+    /// others, however small a share of its edge that is.
     #[must_use]
     pub fn moved(&self, boxes: &[Aabb]) -> Option<f64> {
         let (mut moves, mut edges) = ([(0.0, 0.0); WATCHED], [0.0; WATCHED]);

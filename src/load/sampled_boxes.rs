@@ -3,7 +3,8 @@
 use crate::aabb::Aabb;
 use crate::splitmix::mix;
 
-/// Most boxes of a sample. 256 boxes have 32 640 pairs: if 1 % of them overlap on an axis, the sample shows that to about 10 %.
+/// Most boxes of a sample. 256 boxes have 32 640 pairs: if 1 % of them overlap on an axis, the sample shows that to
+/// about 10 %.
 pub(super) const MOST: usize = 256;
 
 /// Fewest boxes of a sample: the quantile of the extents needs a few.
@@ -24,8 +25,8 @@ impl SampledBoxes {
     /// Samples `count` boxes, of which `of` returns number k.
     pub(super) fn among<'a>(count: usize, of: impl Fn(usize) -> &'a Aabb) -> Self {
         let mut sample = Self { boxes: [Aabb::default(); MOST], count: 0 };
-        // Twice the root of the count: the sample costs a small share of the frame at every size, and the share of overlapping pairs, which
-        // falls with the count, stays countable.
+        // Twice the root of the count: the sample costs a small share of the frame at every size, and the share of
+        // overlapping pairs, which falls with the count, stays countable.
         let wanted = count.min((2 * count.isqrt()).clamp(FEWEST, MOST));
         if wanted == 0 {
             return sample;
@@ -35,8 +36,8 @@ impl SampledBoxes {
         let seed = mix(u64::from(x) << 32 | u64::from(y));
         let start = |k: usize| (k as u64 * count as u64 / wanted as u64) as usize;
         for k in 0..wanted {
-            // One box of each of `wanted` equal parts, at a random place: boxes of a kind may follow each other at regular distances, and
-            // an even spacing could meet all or none of them.
+            // One box of each of `wanted` equal parts, at a random place: boxes of a kind may follow each other at
+            // regular distances, and an even spacing could meet all or none of them.
             let (first, end) = (start(k), start(k + 1));
             let b = of(first + (mix(seed ^ k as u64) % (end - first) as u64) as usize);
             if b.defect().is_none() {
@@ -62,7 +63,8 @@ impl SampledBoxes {
         &self.boxes[..self.count]
     }
 
-    /// Returns the share of all pairs whose intervals meet on every axis. `interval` returns the intervals of a box, ends included.
+    /// Returns the share of all pairs whose intervals meet on every axis. `interval` returns the intervals of a box,
+    /// ends included.
     pub(crate) fn share_of_pairs<const N: usize, T: PartialOrd + Copy + Default>(
         &self,
         interval: impl Fn(&Aabb) -> [(T, T); N],

@@ -4,8 +4,8 @@ use super::sampled_boxes::{MOST, SampledBoxes};
 use crate::aabb::Aabb;
 use std::cmp::Ordering;
 
-/// Divisor for the share of the sample at either end that says nothing about where boxes lie: boxes pooled far away, or asleep below
-/// the floor.
+/// Divisor for the share of the sample at either end that says nothing about where boxes lie: boxes pooled far away, or
+/// asleep below the floor.
 const TAIL: usize = 16;
 
 /// Bounds are clamped to this, so that their differences are finite in `f64`.
@@ -33,15 +33,16 @@ impl SceneStats {
         Self::of_sample(&SampledBoxes::among(members.len(), |k| &boxes[members[k] as usize]))
     }
 
-    /// Returns start and length of the range that cells of a grid on this axis share: that of most boxes. The cells at the ends take the
-    /// boxes beyond.
+    /// Returns start and length of the range that cells of a grid on this axis share: that of most boxes. The cells at
+    /// the ends take the boxes beyond.
     pub(crate) fn range(&self, axis: usize) -> (f64, f64) {
         self.ranges[axis]
     }
 
     /// Returns the axis on which the fewest pairs overlap: a sweep along it has the fewest candidates.
     pub(crate) fn sweep_axis(&self) -> usize {
-        // The sample of a large world may hold no overlapping pair. Then take the axis on which boxes are shortest for their range.
+        // The sample of a large world may hold no overlapping pair. Then take the axis on which boxes are shortest for
+        // their range.
         let order = |a: usize| (self.shares[a], self.extent[a] / self.ranges[a].1);
         (0..3).min_by(|&a, &b| order(a).partial_cmp(&order(b)).unwrap_or(Ordering::Equal)).unwrap_or(0)
     }
@@ -133,8 +134,7 @@ mod tests {
         let inf = f32::INFINITY;
         let boxes = [Aabb::new([-inf; 3], [inf; 3]), Aabb::new([inf; 3], [inf; 3]), Aabb::cube([0.0; 3], 1.0)];
         let stats = SceneStats::of(&boxes);
-        let all =
-            stats.ranges.iter().flat_map(|&(low, length)| [low, length]).chain(stats.extent).chain(stats.shares);
+        let all = stats.ranges.iter().flat_map(|&(low, length)| [low, length]).chain(stats.extent).chain(stats.shares);
         assert!(all.into_iter().all(f64::is_finite), "{stats:?}");
     }
 }

@@ -3,8 +3,8 @@
 use super::scene_stats::SceneStats;
 use crate::aabb::Aabb;
 
-/// Mean number of boxes in a strip. Their columns take 28 bytes each: a strip fits the first-level cache, and there are enough strips to
-/// reduce the candidates.
+/// Mean number of boxes in a strip. Their columns take 28 bytes each: a strip fits the first-level cache, and there are
+/// enough strips to reduce the candidates.
 const BOXES_PER_STRIP: f64 = 256.0;
 
 /// Most cells on one axis: strip numbers stay below 2^16, and a histogram of all strips fits the second-level cache.
@@ -13,7 +13,8 @@ const MOST_CELLS: f64 = 256.0;
 /// Longest box across the sweep, in cells. A longer one is oversized: it would stand in too many strips.
 const LARGE_CELLS: f64 = 4.0;
 
-/// Longest box on the sweep axis, in usual lengths. A longer one is oversized: it would be a candidate for the whole strip.
+/// Longest box on the sweep axis, in usual lengths. A longer one is oversized: it would be a candidate for the whole
+/// strip.
 const LARGE_LENGTHS: f64 = 16.0;
 
 /// Maps boxes to strips. All choices come from a sample: a bad one costs speed, never a pair.
@@ -87,7 +88,8 @@ impl StripGrid {
         (self.cells[0] * self.cells[1]) as usize
     }
 
-    /// Returns the first and the last cell of a box on each grid axis. Cell numbers stay below 2^16, which `f32` represents exactly.
+    /// Returns the first and the last cell of a box on each grid axis. Cell numbers stay below 2^16, which `f32`
+    /// represents exactly.
     pub(super) fn cells_of(&self, b: &Aabb) -> [(f32, f32); 2] {
         let bound =
             |d: usize, v: f32| ((v - self.origin[d]) * self.inverse_width[d]).max(0.0).min(self.last[d]).floor();
@@ -105,17 +107,19 @@ impl StripGrid {
         let cell = |k: usize| (bounds[k] - self.origin[k % 2]) * self.inverse_width[k % 2];
         let [x, y, x1, y1] = cell_numbers([cell(0), cell(1), cell(2), cell(3)], self.last);
         let (more_x, more_y) = (x1 - x, y1 - y);
-        // A box that is not oversized has few further cells, unless its bounds are so far out that cell numbers are rounded.
+        // A box that is not oversized has few further cells, unless its bounds are so far out that cell numbers are
+        // rounded.
         if large | (more_x | more_y > MOST_MORE) {
             return StripSpan::APART;
         }
         StripSpan((y * self.cells[0] + x) | more_x << 16 | more_y << 24)
     }
 
-    /// Calls `f` for each strip of a span, with a mask: bit d is set if the strip is the first of this box on grid axis d.
+    /// Calls `f` for each strip of a span, with a mask: bit d is set if the strip is the first of this box on grid axis
+    /// d.
     ///
-    /// On each grid axis, two boxes that share several strips first meet in the cell in which the later of them begins. So exactly one strip has
-    /// both bits set in either box: it reports the pair.
+    /// On each grid axis, two boxes that share several strips first meet in the cell in which the later of them begins.
+    /// So exactly one strip has both bits set in either box: it reports the pair.
     #[inline(always)]
     pub(crate) fn each_strip(&self, span: StripSpan, mut f: impl FnMut(usize, u32)) {
         let StripSpan(packed) = span;
@@ -138,7 +142,8 @@ impl StripGrid {
 
 /// Returns four cell numbers along two alternating axes: `cells` clamped to 0 and `last`, NaN to 0, without fractions.
 ///
-/// The function is monotonic, which alone makes the strips correct. Bounds outside the grid go to the cells at its border.
+/// The function is monotonic, which alone makes the strips correct. Bounds outside the grid go to the cells at its
+/// border.
 #[inline(always)]
 fn cell_numbers(cells: [f32; 4], last: [f32; 2]) -> [u32; 4] {
     let mut at = [0.0_f32; 4];

@@ -6,7 +6,8 @@ use crate::pair::Pair;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Pairs prefetched together, then tested together: few enough for the first-level cache, and enough to hide the latency of memory.
+/// Pairs prefetched together, then tested together: few enough for the first-level cache, and enough to hide the
+/// latency of memory.
 const SIFTED_TOGETHER: usize = 64;
 
 /// Calls `f` for each set bit of a mask, ascending.
@@ -25,8 +26,8 @@ impl Pairs {
         each_bit(mask, |bit| self.push(id, others[bit]));
     }
 
-    /// Adds those of `pairs`, which stand lower member first, for which `wanted` holds. Calls `fetch` for each pair some time before `wanted`,
-    /// so that it can prefetch.
+    /// Adds those of `pairs`, which stand lower member first, for which `wanted` holds. Calls `fetch` for each pair
+    /// some time before `wanted`, so that it can prefetch.
     #[inline]
     pub(crate) fn extend_where(&mut self, pairs: &[Pair], fetch: impl Fn(Pair), wanted: impl Fn(Pair) -> bool) {
         let mut ahead = pairs.iter();
@@ -37,8 +38,8 @@ impl Pairs {
         }
     }
 
-    /// Drops the pairs for which `dropped` holds, and adds to `out` those of the rest for which `wanted` holds. `fetch` is as in
-    /// [`extend_where`](Self::extend_where).
+    /// Drops the pairs for which `dropped` holds, and adds to `out` those of the rest for which `wanted` holds. `fetch`
+    /// is as in [`extend_where`](Self::extend_where).
     #[inline]
     pub(crate) fn sift(
         &mut self,
@@ -80,8 +81,8 @@ impl Pairs {
         }
     }
 
-    /// Makes room for an eighth more pairs if there is room for less than a sixteenth: then a list that grows and shrinks around a size
-    /// allocates once.
+    /// Makes room for an eighth more pairs if there is room for less than a sixteenth: then a list that grows and
+    /// shrinks around a size allocates once.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -141,7 +142,8 @@ impl Pairs {
         Ok(())
     }
 
-    /// Returns whether a wanted pair could not be stored in this list. Then the frame has no answer, and the search may stop.
+    /// Returns whether a wanted pair could not be stored in this list. Then the frame has no answer, and the search may
+    /// stop.
     #[inline]
     pub(crate) fn is_over(&self) -> bool {
         self.over
@@ -168,7 +170,8 @@ impl Pairs {
         self.filter.is_none() && self.limit.is_some_and(|limit| self.len as u64 + more > limit as u64)
     }
 
-    /// Begins a list that takes a part of the pairs of `whole`, under the same limit and filter. All parts share `any_over`, which is `false`.
+    /// Begins a list that takes a part of the pairs of `whole`, under the same limit and filter. All parts share
+    /// `any_over`, which is `false`.
     pub(crate) fn begin_part(&mut self, whole: &Pairs, any_over: &Arc<AtomicBool>) {
         self.clear();
         self.any_over = Some(Arc::clone(any_over));

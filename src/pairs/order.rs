@@ -1,7 +1,8 @@
-//! Sorts pairs by radix: into buckets by the highest bits, then each bucket, which fits into a cache, from the lowest bits on.
+//! Sorts pairs by radix: into buckets by the highest bits, then each bucket, which fits into a cache, from the lowest
+//! bits on.
 //!
-//! Within a bucket only the rest of a key counts. It usually has 32 bits, which halves the bytes moved. With several threads, each first sorts its
-//! own share into buckets, and then all shares of a bucket are joined.
+//! Within a bucket only the rest of a key counts. It usually has 32 bits, which halves the bytes moved. With several
+//! threads, each first sorts its own share into buckets, and then all shares of a bucket are joined.
 
 use crate::pair::Pair;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -146,7 +147,8 @@ impl Sorter {
     }
 }
 
-/// The layout of packed keys: their two numbers without the leading zeros that all of them share. The upper bits are the bucket.
+/// The layout of packed keys: their two numbers without the leading zeros that all of them share. The upper bits are
+/// the bucket.
 #[derive(Debug, Clone, Copy)]
 struct Layout {
     /// Bits of the second number.
@@ -260,8 +262,8 @@ fn split<T>(list: &mut [T], sizes: impl Iterator<Item = usize>) -> impl Iterator
     })
 }
 
-/// Sorts `from` by digit, stably, and writes `make` of each element to `to`. `starts` has a counter for each digit: all 0 before, and the end
-/// of each digit in `to` afterwards.
+/// Sorts `from` by digit, stably, and writes `make` of each element to `to`. `starts` has a counter for each digit: all
+/// 0 before, and the end of each digit in `to` afterwards.
 #[inline(always)]
 fn scatter<F: Copy, T>(
     from: &[F],
@@ -280,7 +282,8 @@ fn scatter<F: Copy, T>(
     }
 }
 
-/// Sorts a bucket into `list`. It stands in `list` if `whole`, else as rests of keys in `rests`. Each pass sorts some bits from one to the other.
+/// Sorts a bucket into `list`. It stands in `list` if `whole`, else as rests of keys in `rests`. Each pass sorts some
+/// bits from one to the other.
 fn sort_bucket<T: Keyed, K: Keyed>(list: &mut [T], rests: &mut [K], mut whole: bool, base: u64, layout: Layout) {
     let most = if list.len() < BUCKET / 2 { BITS_OF_FEW } else { MOST_BITS };
     let passes = if list.len() < FEW { 0 } else { layout.rest.div_ceil(most) };

@@ -16,8 +16,8 @@ pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {
     pairs
 }
 
-/// The oracle for frames in which a double loop takes seconds: sorts the boxes by their begin on an axis, and tests each against those that
-/// begin before it ends. No NaN.
+/// The oracle for frames in which a double loop takes seconds: sorts the boxes by their begin on an axis, and tests
+/// each against those that begin before it ends. No NaN.
 pub(crate) fn swept(boxes: &[Aabb]) -> Vec<Pair> {
     // On the axis with the fewest tests: on another one all boxes of a tower are candidates.
     let axes = [0, 1, 2].map(|axis| along(boxes, axis));
@@ -34,7 +34,8 @@ pub(crate) fn swept(boxes: &[Aabb]) -> Vec<Pair> {
     pairs
 }
 
-/// Returns the boxes in the order in which they begin on an axis, and for each place how many boxes begin before its box ends.
+/// Returns the boxes in the order in which they begin on an axis, and for each place how many boxes begin before its
+/// box ends.
 fn along(boxes: &[Aabb], axis: usize) -> (Vec<u32>, Vec<usize>) {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     order.sort_by(|&a, &b| boxes[a as usize].min[axis].total_cmp(&boxes[b as usize].min[axis]));
@@ -88,7 +89,8 @@ impl Random {
         (self.0 >> 40) as f32 / (1_u64 << 24) as f32
     }
 
-    /// Returns one or two of eight groups and a mask without some of them. One box in four is fixed, one in sixteen is in every group.
+    /// Returns one or two of eight groups and a mask without some of them. One box in four is fixed, one in sixteen is
+    /// in every group.
     pub(crate) fn membership(&mut self) -> Membership {
         let group = |at: f32| 1 << (at * 8.0) as u32;
         let (groups, mask) = (group(self.next()) | group(self.next()), !(group(self.next()) | group(self.next())));

@@ -22,7 +22,7 @@ def _warn(count, why):
     if count < _WORTH_A_WARNING or _has_warned:
         return
     _has_warned = True
-    text = f"{count} boxes were copied: {why}. C-contiguous float32 of shape (n, 6) is read in place. This warning comes once."
+    text = f"{count} boxes were copied: {why}. C-contiguous float32 of shape (n, 6) is read in place. Warned once."
     warnings.warn(text, ConversionWarning, stacklevel=3)
 
 
@@ -37,7 +37,7 @@ def _array(given, name):
 
 
 def _floats(array, name, which):
-    """Return the numbers as C-contiguous, aligned, native float32 if that is exact, else float64, and why they were copied."""
+    """Return C-contiguous, aligned, native float32 if that is exact, else float64, and why the array was copied."""
     kind, size = array.dtype.kind, array.dtype.itemsize
     if kind == "f" and size == 4 or kind == "f" and size == 2 or kind in "iu" and size <= 2:
         wanted = np.float32
@@ -52,7 +52,7 @@ def _floats(array, name, which):
         if too_large.any():
             index = int(np.argmax(too_large.reshape(len(array), -1).any(axis=1)))
             raise InputError(
-                f"box {index}{which} has an integer beyond 2**53, which is not exact as a float; scale or shift the boxes"
+                f"box {index}{which} has an integer beyond 2**53, which no float represents; scale or shift the boxes"
             )
     if array.dtype.newbyteorder("=") != np.dtype(wanted) or not array.dtype.isnative:
         why = f"their dtype is {array.dtype.str}"
@@ -129,7 +129,8 @@ def ids(given, count):
     array = _whole(given, "ids", count)
     most = np.iinfo(np.int64).max
     if array.dtype.kind == "u" and array.size and array.max() > most:
-        raise InputError(f"the id of box {int(np.argmax(array > most))} does not fit into 63 bits; number the boxes anew")
+        index = int(np.argmax(array > most))
+        raise InputError(f"the id of box {index} does not fit into 63 bits; number the boxes anew")
     return np.ascontiguousarray(array, np.int64)
 
 

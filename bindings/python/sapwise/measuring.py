@@ -19,17 +19,18 @@ def probe(quick=True, progress=None):
     Parameters
     ----------
     quick : bool, default True
-        Whether to take about two seconds, without latencies of loads. Otherwise it takes about ten seconds, as for a report.
+        Whether to take about two seconds, without latencies of loads. Otherwise it takes about ten seconds, as for a
+        report.
     progress : callable, optional
-        Called as ``progress(done, of, what)`` before each family of parameters, and once at the end. An exception in it ends the
-        measurement.
+        Called as ``progress(done, of, what)`` before each family of parameters, and once at the end. An exception in it
+        ends the measurement.
 
     Returns
     -------
     Hardware
-        ``machine``, a dict: the machine's description, without names of hosts or users. ``parameters``, a pandas.DataFrame or
-        numpy.recarray: ``name``, ``value``, ``unit``, ``dispersion`` (interquartile range over median), ``samples``, ``spoiled``,
-        ``foreign_load`` (0 to 1), ``how``, ``source``.
+        ``machine``, a dict: the machine's description, without names of hosts or users. ``parameters``, a
+        pandas.DataFrame or numpy.recarray: ``name``, ``value``, ``unit``, ``dispersion`` (interquartile range over
+        median), ``samples``, ``spoiled``, ``foreign_load`` (0 to 1), ``how``, ``source``.
 
     Raises
     ------
@@ -56,7 +57,8 @@ def probe_report(path, quick=True, progress=None, command="sapwise", arguments=(
     progress : callable, optional
         Called with each line of progress of the command. An exception in it ends the command.
     command : str, default "sapwise"
-        The command, on the PATH or as a path. It is not in this package: ``cargo install --path probes`` in the repository.
+        The command, on the PATH or as a path. It is not in this package: ``cargo install --path probes`` in the
+        repository.
     arguments : sequence of str, optional
         More arguments, for instance ``["--threads", "1"]``.
 
@@ -75,7 +77,8 @@ def probe_report(path, quick=True, progress=None, command="sapwise", arguments=(
     program = shutil.which(command)
     if program is None:
         raise SapwiseError(
-            f"there is no command {command!r}; run `cargo install --path probes` in the repository, or give its path as command="
+            f"there is no command {command!r}; "
+            "run `cargo install --path probes` in the repository, or give its path as command="
         )
     call = [program, "probe", "--out", str(path), *(["--quick"] if quick else []), *arguments]
     last = collections.deque(maxlen=20)

@@ -27,11 +27,12 @@ def read_report(path):
     Returns
     -------
     pandas.DataFrame or numpy.recarray
-        One row for each algorithm, scenario and number of boxes; a record array with the same names where pandas is not installed.
-        ``file``; ``host`` (all profiles of one host share it), ``cpu``, ``simd``, ``hypervisor``; ``profile`` (the restriction), ``label``,
-        ``date``; ``scenario``, ``objects`` and ``pairs`` (counts), ``axis_candidates``, ``strip_candidates``, ``moved`` (the load);
-        ``algorithm``, ``method``, ``backend``, ``threads`` (of the CPU; 0 on GPUs), ``revision``; ``median_ns``, ``q25_ns``, ``q75_ns`` (of
-        the time of a frame, nanoseconds), ``samples``, ``foreign_load`` (0 to 1), ``error``, ``gpus``; and a column for each hardware
+        One row for each algorithm, scenario and number of boxes; a record array with the same names where pandas is not
+        installed. ``file``; ``host`` (all profiles of one host share it), ``cpu``, ``simd``, ``hypervisor``;
+        ``profile`` (the restriction), ``label``, ``date``; ``scenario``, ``objects`` and ``pairs`` (counts),
+        ``axis_candidates``, ``strip_candidates``, ``moved`` (the load); ``algorithm``, ``method``, ``backend``,
+        ``threads`` (of the CPU; 0 on GPUs), ``revision``; ``median_ns``, ``q25_ns``, ``q75_ns`` (of the time of a
+        frame, nanoseconds), ``samples``, ``foreign_load`` (0 to 1), ``error``, ``gpus``; and a column for each hardware
         parameter with its unit in its name. Unknown values are NaN, or an empty text.
 
     Raises
@@ -54,7 +55,8 @@ def read_reports(folder):
     Parameters
     ----------
     folder : path
-        Each ``*.json`` in it whose schema is ``report/...`` is read, in the order of the names. Folders in it are not read.
+        Each ``*.json`` in it whose schema is ``report/...`` is read, in the order of the names. Folders in it are not
+        read.
 
     Returns
     -------
@@ -99,7 +101,7 @@ def _rows(path, among_others=False):
             return []
         raise InputError(f"{path} is no report, its schema is {schema!r}; `sapwise probe --out` makes one")
     if schema.split("/")[1].split(".")[0] != "2":
-        raise InputError(f"{path} is of the form {schema}, and only report/2 can be read; measure again with `sapwise probe --out`")
+        raise InputError(f"{path} is {schema}, and only report/2 can be read; measure again with `sapwise probe --out`")
     try:
         return list(_timings(path, report))
     except (KeyError, TypeError, IndexError, AttributeError) as why:
@@ -158,7 +160,7 @@ def _known(value):
 
 
 def _host(machine, parameters):
-    """Return the id of a host, as the command does: the CPU and its caches, and in a guest the clock of its hypervisor, in MHz."""
+    """Return the id of a host: the CPU and its caches, and in a guest the clock of its hypervisor in MHz."""
     clock = parameters.get("clock_reported_ghz", np.nan)
     if machine["hypervisor"] in ("", "none") or np.isnan(clock):
         return machine["physical_id"]
@@ -166,7 +168,7 @@ def _host(machine, parameters):
 
 
 def _profile(path, report):
-    """Return the name of a restriction: from the name ``<cpu>-<cores>c-<profile>--<date>.json``, else from the provenance."""
+    """Return the restriction, from the name ``<cpu>-<cores>c-<profile>--<date>.json``, else from the provenance."""
     named = re.fullmatch(r".+?-\d+c-(.+)--\d{4}-\d\d-\d\d", path.stem)
     if named:
         return named.group(1)
@@ -193,7 +195,9 @@ def _table(rows):
     try:
         import pandas
     except ImportError:
-        return np.rec.fromarrays(list(columns.values()), names=names) if names else np.recarray(0, dtype=[("file", "U1")])
+        if not names:
+            return np.recarray(0, dtype=[("file", "U1")])
+        return np.rec.fromarrays(list(columns.values()), names=names)
     return pandas.DataFrame(columns)
 
 

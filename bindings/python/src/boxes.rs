@@ -9,8 +9,8 @@ use sapwise::{Aabb, BoxDefect, Error};
 
 /// The boxes of a caller during a call.
 pub(crate) enum Boxes<'py> {
-    /// The memory of an array of shape (n, 6), 32-bit floats in C order. The borrow keeps it alive, and keeps other Rust extensions from writing
-    /// to it; nothing keeps Python from that.
+    /// The memory of an array of shape (n, 6), 32-bit floats in C order. The borrow keeps it alive, and keeps other
+    /// Rust extensions from writing to it; nothing keeps Python from that.
     Borrowed(PyReadonlyArray2<'py, f32>),
     /// A copy of any other input.
     Owned(Vec<Aabb>),
@@ -26,8 +26,8 @@ impl Boxes<'_> {
             Self::Owned(boxes) => Ok(boxes),
             Self::Borrowed(array) => {
                 let floats = array.as_slice()?;
-                // SAFETY: `Aabb` is `repr(C)` of twice three floats, with their alignment and without padding, as asserted above. All bit
-                // patterns are valid. `floats` has 6 floats a box.
+                // SAFETY: `Aabb` is `repr(C)` of twice three floats, with their alignment and without padding, as
+                // asserted above. All bit patterns are valid. `floats` has 6 floats a box.
                 Ok(unsafe { std::slice::from_raw_parts(floats.as_ptr().cast::<Aabb>(), floats.len() / 6) })
             }
         }
@@ -72,7 +72,8 @@ fn triples<T>(floats: &[T]) -> &[[T; 3]] {
     floats.as_chunks().0
 }
 
-/// Borrows an aligned array of shape (n, 6) of 32-bit floats in C order. `None` for other arrays, and for subclasses, such as masked arrays.
+/// Borrows an aligned array of shape (n, 6) of 32-bit floats in C order. `None` for other arrays, and for subclasses,
+/// such as masked arrays.
 fn as_it_lies<'py>(array: &Bound<'py, PyAny>) -> Option<Boxes<'py>> {
     let array = array.cast::<PyArray2<f32>>().ok()?;
     let plain = array.get_type().is(array.py().get_type::<PyUntypedArray>());

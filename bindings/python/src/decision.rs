@@ -13,7 +13,8 @@ use sapwise::{Decision, Load};
 /// reason : str
 ///     The reason, in words.
 /// source : str
-///     The source of the expected times: ``"default"`` (built-in thresholds), ``"predicted"``, ``"measured"`` or ``"learned"``.
+///     The source of the expected times: ``"default"`` (built-in thresholds), ``"predicted"``, ``"measured"`` or
+///     ``"learned"``.
 /// expected_ns : float or None
 ///     The expected time of the frame in nanoseconds; None if only the number of boxes decides.
 /// measured_ns : float or None

@@ -16,17 +16,20 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Finds the overlapping pairs of frames that follow each other.
 ///
-/// In each frame it runs the algorithm that it expects to be fastest on this machine for these boxes, and learns from the times of frames. Some
-/// algorithms keep work from frame to frame. As a context manager it saves what it has learned when the block ends.
+/// In each frame it runs the algorithm that it expects to be fastest on this machine for these boxes, and learns from
+/// the times of frames. Some algorithms keep work from frame to frame. As a context manager it saves what it has
+/// learned when the block ends.
 ///
 /// Parameters
 /// ----------
 /// cache : path, False or None
 ///     The folder of the saved tuning of this machine, False for none, None for the user's cache folder.
 /// measure : bool, default True
-///     Whether the hardware may be measured, for about two seconds, where no tuning is kept. Otherwise built-in thresholds decide.
+///     Whether the hardware may be measured, for about two seconds, where no tuning is kept. Otherwise built-in
+///     thresholds decide.
 /// background : bool, default True
-///     Whether that happens on a thread of its own that works a tenth of the time, while built-in thresholds decide. False waits here.
+///     Whether that happens on a thread of its own that works a tenth of the time, while built-in thresholds decide.
+///     False waits here.
 /// wait : float, default 0.0
 ///     Seconds to wait for that thread, which until then works all the time.
 /// tunings : path, optional
@@ -51,10 +54,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// SapwiseError
 ///     No algorithm can run.
 ///
-/// Notes
-/// -----
-/// Several threads may use it: a call waits until the previous one has ended, without the interpreter's lock. After a fork the child starts
-/// anew with the same arguments, the same filter and its own threads.
+/// Notes ----- Several threads may use it: a call waits until the previous one has ended, without the interpreter's
+/// lock. After a fork the child starts anew with the same arguments, the same filter and its own threads.
 ///
 /// Examples
 /// --------
@@ -159,12 +160,13 @@ impl PyBroadPhase {
     /// Parameters
     /// ----------
     /// boxes : array_like, shape (n, 6) or (n, 2, 3)
-    ///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners, shape (n, 3).
+    ///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners,
+    ///     shape (n, 3).
     /// upper : array_like, shape (n, 3), optional
     ///     The upper corners.
     /// ids : array_like of int, shape (n,), optional
-    ///     An id for each box, if boxes change their positions: ``begun`` and ``ended`` then hold ids. Boxes with the same id count as
-    ///     one there. Give ids in each frame or in none.
+    ///     An id for each box, if boxes change their positions: ``begun`` and ``ended`` then hold ids. Boxes with the
+    ///     same id count as one there. Give ids in each frame or in none.
     ///
     /// Returns
     /// -------
@@ -174,7 +176,8 @@ impl PyBroadPhase {
     /// Raises
     /// ------
     /// InvalidBoxError
-    ///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are legal.
+    ///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are
+    ///     legal.
     /// InputError
     ///     The shape is wrong, or there are more boxes than 32 bits can name.
     /// TypeError
@@ -182,10 +185,8 @@ impl PyBroadPhase {
     /// TooManyPairsError
     ///     More pairs than ``limit``. ``limit`` of the exception has it.
     ///
-    /// Notes
-    /// -----
-    /// After an error nothing has begun or ended, and the next frame is compared with the last one that succeeded. ``pairs`` says which input is
-    /// copied. Ctrl-C works before and after a frame, not within.
+    /// Notes ----- After an error nothing has begun or ended, and the next frame is compared with the last one that
+    /// succeeded. ``pairs`` says which input is copied. Ctrl-C works before and after a frame, not within.
     #[pyo3(signature = (boxes, upper=None, *, ids=None))]
     fn find<'py>(
         &self,
@@ -207,7 +208,8 @@ impl PyBroadPhase {
         let (frames, filter) = self.shared(py)?;
         if let Some(filter) = filter.as_ref().filter(|f| f.len() != boxes.len()) {
             let text = format!(
-                "the filter is for {} boxes and there are {}; call set_filter with one entry a box, or without arguments to lift it",
+                "the filter is for {} boxes and there are {}; call set_filter with one entry a box, \
+                 or without arguments to lift it",
                 filter.len(),
                 boxes.len()
             );
@@ -224,7 +226,8 @@ impl PyBroadPhase {
         match found {
             None => Err(unusable(
                 py,
-                "only one of two consecutive frames has ids; give them for each frame or for none, or make a new BroadPhase",
+                "only one of two consecutive frames has ids; give them for each frame or for none, \
+                 or make a new BroadPhase",
             )),
             Some(found) => two_columns(py, found.map_err(|error| exception(py, &error, ""))?),
         }
@@ -244,7 +247,8 @@ impl PyBroadPhase {
     /// Raises
     /// ------
     /// InputError
-    ///     The lengths differ, or a number does not fit into 32 bits. ``find`` raises it if it gets more or fewer boxes.
+    ///     The lengths differ, or a number does not fit into 32 bits. ``find`` raises it if it gets more or fewer
+    ///     boxes.
     #[pyo3(signature = (*, groups=None, masks=None, fixed=None))]
     fn set_filter(
         &self,
@@ -269,7 +273,8 @@ impl PyBroadPhase {
         Ok(())
     }
 
-    /// ndarray, shape (k, 2): the pairs of the last frame that the previous one did not have, sorted; ids (int64) if the frames have ids.
+    /// ndarray, shape (k, 2): the pairs of the last frame that the previous one did not have, sorted; ids (int64) if
+    /// the frames have ids.
     #[getter]
     fn begun<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.changed(py, true)
@@ -293,7 +298,8 @@ impl PyBroadPhase {
         self.with(py, |frames| PyTuning::from(frames.adaptive.learned()))
     }
 
-    /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the ``file`` of the cache, when the hardware was measured.
+    /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the ``file`` of the
+    /// cache, when the hardware was measured.
     #[getter]
     fn setup<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let setup = self.with(py, |frames| frames.adaptive.setup().clone())?;

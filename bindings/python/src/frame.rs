@@ -38,7 +38,8 @@ pub(crate) struct Frames {
     frames: [Frame; 2],
     /// The position in `frames` of the last frame that succeeded.
     now: usize,
-    /// Number of frames that succeeded, and how many of them the follower has seen. It is updated only when the caller asks.
+    /// Number of frames that succeeded, and how many of them the follower has seen. It is updated only when the caller
+    /// asks.
     count: u64,
     followed: u64,
     follower: Follower,

@@ -11,7 +11,8 @@ use std::time::Duration;
 /// Time limit of a quick measurement.
 const QUICK: Duration = Duration::from_secs(2);
 
-/// Returns the machine, and a list of its parameters, as dicts. Checks for Ctrl-C between families, each of which takes up to a second.
+/// Returns the machine, and a list of its parameters, as dicts. Checks for Ctrl-C between families, each of which takes
+/// up to a second.
 #[pyfunction]
 #[pyo3(signature = (quick, progress))]
 pub(crate) fn measure_hardware<'py>(

@@ -2,8 +2,8 @@
 
 use sapwise::{Aabb, BoxDefect};
 
-/// Rounds each bound to the nearest 32-bit float. Rounding is monotonic: no pair is lost, and nearly touching boxes may gain one. Rounding outward
-/// would add more. Defects are checked before rounding, which may hide an inverted box.
+/// Rounds each bound to the nearest 32-bit float. Rounding is monotonic: no pair is lost, and nearly touching boxes may
+/// gain one. Rounding outward would add more. Defects are checked before rounding, which may hide an inverted box.
 pub(crate) fn rounded(min: [f64; 3], max: [f64; 3]) -> Result<Aabb, BoxDefect> {
     if !(0..3).all(|a| min[a] <= max[a]) {
         let nan = min.iter().chain(&max).any(|v| v.is_nan());

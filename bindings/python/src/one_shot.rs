@@ -16,8 +16,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// The method that keeps work from frame to frame: of no use here.
 const INCREMENTAL: &str = "pair-cache";
 
-/// Built-in thresholds, in boxes, for an unknown machine: `grid-sap` replaces `brute` from the first on, and runs on `k` threads from `k` squared times the
-/// second on. Rounded from `uniform` and `clustered` in `datasets/`.
+/// Built-in thresholds, in boxes, for an unknown machine: `grid-sap` replaces `brute` from the first on, and runs on
+/// `k` threads from `k` squared times the second on. Rounded from `uniform` and `clustered` in `datasets/`.
 const GRID_FROM: u32 = 300;
 const THREADS_FROM: u32 = 2500;
 const MOST_THREADS: u32 = 16;
@@ -36,7 +36,8 @@ struct Engine {
     both: Vec<Aabb>,
 }
 
-/// Engines that no call uses. Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it locked.
+/// Engines that no call uses. Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it
+/// locked.
 struct Idle {
     /// The process that made the engines. Their threads are not in a forked one.
     pid: u32,
@@ -170,20 +171,23 @@ fn with_engine<'py>(
 
 /// Find all pairs of overlapping boxes.
 ///
-/// Boxes are closed: those that touch overlap. Each call stands for itself. For consecutive frames use ``BroadPhase``, which is faster there. Chooses
-/// the algorithm by the tuning of this machine that ``predict`` or ``BroadPhase`` has saved, else by built-in thresholds. It measures
-/// nothing. ``last_decision`` returns the choice and its reason.
+/// Boxes are closed: those that touch overlap. Each call stands for itself. For consecutive frames use ``BroadPhase``,
+/// which is faster there. Chooses the algorithm by the tuning of this machine that ``predict`` or ``BroadPhase`` has
+/// saved, else by built-in thresholds. It measures nothing. ``last_decision`` returns the choice and its reason.
 ///
 /// Parameters
 /// ----------
 /// boxes : array_like, shape (n, 6) or (n, 2, 3)
-///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners, shape (n, 3).
+///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners,
+///     shape (n, 3).
 /// upper : array_like, shape (n, 3), optional
 ///     The upper corners.
 /// ordered : bool, default True
-///     Whether the pairs are sorted, by the first member and then the second: the same array from every machine. False saves the sort.
+///     Whether the pairs are sorted, by the first member and then the second: the same array from every machine. False
+///     saves the sort.
 /// limit : int, optional
-///     The most pairs: with more, the search ends with an error. By default one pair for each 256 bytes of free memory (Linux).
+///     The most pairs: with more, the search ends with an error. By default one pair for each 256 bytes of free memory
+///     (Linux).
 ///
 /// Returns
 /// -------
@@ -193,7 +197,8 @@ fn with_engine<'py>(
 /// Raises
 /// ------
 /// InvalidBoxError
-///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are legal.
+///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are
+///     legal.
 /// InputError
 ///     The shape is wrong, or there are more boxes than 32 bits can name.
 /// TypeError
@@ -201,11 +206,9 @@ fn with_engine<'py>(
 /// TooManyPairsError
 ///     More pairs than ``limit``. ``limit`` of the exception has it.
 ///
-/// Notes
-/// -----
-/// 32-bit floats of shape (n, 6) in C order are read in place; nothing may write to them meanwhile. Everything else is copied. 64-bit floats are
-/// rounded to 32 bits: no pair is lost, and nearly touching boxes may gain one. The interpreter's lock is released. Ctrl-C works before and
-/// after, not within.
+/// Notes ----- 32-bit floats of shape (n, 6) in C order are read in place; nothing may write to them meanwhile.
+/// Everything else is copied. 64-bit floats are rounded to 32 bits: no pair is lost, and nearly touching boxes may gain
+/// one. The interpreter's lock is released. Ctrl-C works before and after, not within.
 ///
 /// Examples
 /// --------
@@ -231,7 +234,8 @@ pub(crate) fn pairs<'py>(
 
 /// Find all pairs of a box of ``a`` and an overlapping box of ``b``.
 ///
-/// Pairs within the longer list are not searched; those within the shorter list are found and dropped. Both lists are copied into one.
+/// Pairs within the longer list are not searched; those within the shorter list are found and dropped. Both lists are
+/// copied into one.
 ///
 /// Parameters
 /// ----------
@@ -252,7 +256,8 @@ pub(crate) fn pairs<'py>(
 /// Raises
 /// ------
 /// InvalidBoxError
-///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are legal.
+///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are
+///     legal.
 /// InputError
 ///     The shape is wrong, or there are more boxes than 32 bits can name.
 /// TypeError

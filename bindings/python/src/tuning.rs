@@ -29,8 +29,8 @@ const LOOK: Duration = Duration::from_millis(20);
 /// fields : list of (int, str)
 ///     From each number of boxes on, the cheapest algorithm in that scenario.
 /// crossovers : list of dict
-///     ``below``, ``above``: two algorithms; ``objects``: the number of boxes at which both cost the same; ``low``, ``high``: the ends of the
-///     90 % interval, or None.
+///     ``below``, ``above``: two algorithms; ``objects``: the number of boxes at which both cost the same; ``low``,
+///     ``high``: the ends of the 90 % interval, or None.
 /// setup : dict or None
 ///     How a prediction came about.
 #[pyclass(frozen, name = "Tuning", module = "sapwise")]
@@ -139,7 +139,8 @@ impl PyTuning {
     /// Parameters
     /// ----------
     /// boxes : array_like, shape (n, 6) or (n, 2, 3)
-    ///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners, shape (n, 3).
+    ///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners,
+    ///     shape (n, 3).
     /// upper : array_like, shape (n, 3), optional
     ///     The upper corners.
     /// moved : float, default 1.0
@@ -187,7 +188,7 @@ impl PyTuning {
     /// Returns the cost of each algorithm under a load, in nanoseconds, the cheapest first.
     fn of<'py>(&self, py: Python<'py>, load: Load) -> PyResult<Bound<'py, PyDict>> {
         if !load.is_sound() {
-            return Err(unusable(py, format!("{load:?} has a negative or infinite number; give finite ones, 0 or more")));
+            return Err(unusable(py, format!("{load:?} is negative or not finite; give finite numbers, 0 or more")));
         }
         let cost = |c: &sapwise::AlgorithmCost| (c.algorithm.to_string(), c.curve.cost_ns(&load));
         let mut costs: Vec<(String, f64)> = self.tuning.costs.iter().map(cost).collect();
@@ -215,8 +216,8 @@ pub(crate) fn setup<'py>(py: Python<'py>, setup: &Setup) -> PyResult<Bound<'py, 
 
 /// Predict the tuning of this machine from its hardware.
 ///
-/// Returns the saved tuning of this machine. If there is none, measures the hardware, predicts with the built-in model, and saves the tuning for
-/// ``pairs`` and ``BroadPhase``. Measure on a quiet machine.
+/// Returns the saved tuning of this machine. If there is none, measures the hardware, predicts with the built-in model,
+/// and saves the tuning for ``pairs`` and ``BroadPhase``. Measure on a quiet machine.
 ///
 /// Parameters
 /// ----------

@@ -1,4 +1,5 @@
-//! Courses on machines that are made up: what the policy learns, when it switches and when it explores. No clock is read.
+//! Courses on machines that are made up: what the policy learns, when it switches and when it explores. No clock is
+//! read.
 
 use super::super::decision::Reason;
 use super::super::policy::Policy;
@@ -77,8 +78,8 @@ fn regret(frames: &[Frame], truth: &Truth, objects: f64) -> f64 {
 
 #[test]
 fn tuning_of_another_machine_are_corrected_by_the_frames_that_run() {
-    // All are three to four times dearer here, and the one that was predicted to be the cheapest is not. The third is out of reach: to try what
-    // is expected to be 40 % dearer is not allowed.
+    // All are three to four times dearer here, and the one that was predicted to be the cheapest is not. The third is
+    // out of reach: to try what is expected to be 40 % dearer is not allowed.
     let wrong = tuning(&[("grid-sap@cpu1", 0.0, 100.0), ("sap@cpu1", 0.0, 110.0), ("brute@cpu1", 0.0, 140.0)]);
     let truth = |k: usize, n: f64, _: usize| n * [390.0, 330.0, 480.0][k];
     let mut policy = policy(wrong);
@@ -236,7 +237,8 @@ fn what_rebuilds_too_often_is_left_and_taken_up_again() {
     assert!(kept(2500..3000) > 450, "{} of 500", kept(2500..3000));
 }
 
-/// Frames of what keeps work alone never tell whether the machine is slower than believed, or this scene spares it less.
+/// Frames of what keeps work alone never tell whether the machine is slower than believed, or this scene spares it
+/// less.
 #[test]
 fn what_keeps_work_and_spares_less_than_believed_is_left_in_the_end() {
     let mut policy = policy_with_incremental();
@@ -285,4 +287,3 @@ fn a_machine_that_becomes_four_times_as_slow_is_believed_within_a_hundred_frames
     let expected_ns = run(&mut policy, 300..301, 1000, &truth)[0].predicted_ns;
     assert!((0.8..1.2).contains(&(expected_ns / 80_000.0)), "{expected_ns}");
 }
-

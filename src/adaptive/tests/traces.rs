@@ -1,6 +1,7 @@
-//! Replays traces through the whole of [`Adaptive`]: the boxes of scenes, with algorithms that take the times that `tools/traces.sh` recorded on a
-//! real machine, frame by frame. The clock counts these times and those of decisions, so that every run of the same code takes the same time.
-//! A change shows to half a percent in seconds, where real runs differ by several percent.
+//! Replays traces through the whole of [`Adaptive`]: the boxes of scenes, with algorithms that take the times that
+//! `tools/traces.sh` recorded on a real machine, frame by frame. The clock counts these times and those of decisions,
+//! so that every run of the same code takes the same time. A change shows to half a percent in seconds, where real runs
+//! differ by several percent.
 
 use super::*;
 use crate::broad_phase::{FrameKind, FrameWork};
@@ -23,7 +24,8 @@ const FROM_NOTHING: f64 = 2.0;
 /// The first frame of any other algorithm over its usual frame.
 const COLD: f64 = 1.15;
 
-/// A trace. Its name is that of the scenario, the number of objects, the seed and what else follows, joined by dashes: `mixed-3000-1-swing.csv`.
+/// A trace. Its name is that of the scenario, the number of objects, the seed and what else follows, joined by dashes:
+/// `mixed-3000-1-swing.csv`.
 struct Trace {
     name: String,
     scenario: Scenario,
@@ -114,7 +116,8 @@ fn works(ns: &[f64]) -> Vec<FrameWork> {
         let around = &ns[at.saturating_sub(NEAR)..(at + NEAR).min(ns.len())];
         let limit = REBUILT * median(around).unwrap();
         let kind = if ns[at] > limit { FrameKind::Rebuilt } else { FrameKind::Updated };
-        let same: Vec<f64> = around.iter().copied().filter(|&ns| (ns > limit) == (kind == FrameKind::Rebuilt)).collect();
+        let same: Vec<f64> =
+            around.iter().copied().filter(|&ns| (ns > limit) == (kind == FrameKind::Rebuilt)).collect();
         FrameWork::new(kind, mean(&same) / mean(around))
     };
     (0..ns.len()).map(work).collect()
@@ -201,7 +204,9 @@ fn play(trace: &Arc<Trace>, mut costs: Vec<AlgorithmCost>) -> f64 {
         if keeps(id) {
             let threads: Vec<u32> =
                 trace.ids.iter().filter(|i| i.method() == id.method()).map(AlgorithmId::threads).collect();
-            registry.add_family(id.method(), &threads, 1, move |_| Ok(Box::new(Played::new(&made.0, &made.1)))).unwrap();
+            registry
+                .add_family(id.method(), &threads, 1, move |_| Ok(Box::new(Played::new(&made.0, &made.1))))
+                .unwrap();
         } else {
             registry.add(id.clone(), 1, move || Ok(Box::new(Played::new(&made.0, &made.1))));
         }

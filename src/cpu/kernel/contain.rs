@@ -6,8 +6,8 @@ use crate::cpu::level::Simd;
 /// Boxes tested together. Eight have 48 bounds: three vectors of 16, or six of eight.
 pub(crate) const BLOCK: usize = 8;
 
-/// Calls `doubtful`, with the position and the outer boxes of the block, for every block of up to [`BLOCK`] boxes of which one is invalid or
-/// reaches out of its outer box. `outer` has the length of `boxes`.
+/// Calls `doubtful`, with the position and the outer boxes of the block, for every block of up to [`BLOCK`] boxes of
+/// which one is invalid or reaches out of its outer box. `outer` has the length of `boxes`.
 pub(crate) fn each_doubtful_block(
     simd: Simd,
     boxes: &[Aabb],
@@ -83,8 +83,8 @@ mod x86 {
             let mut bad = 0;
             for k in [0_usize, 16, 32] {
                 let lower = (LOWER >> k) as __mmask16;
-                // SAFETY: a block has 48 floats; `Aabb` is `repr(C)`. The upper bound follows its lower one three floats later, and
-                // the mask leaves out the lanes beyond the block.
+                // SAFETY: a block has 48 floats; `Aabb` is `repr(C)`. The upper bound follows its lower one three
+                // floats later, and the mask leaves out the lanes beyond the block.
                 unsafe {
                     let (inner, bound) = (_mm512_loadu_ps(b.add(k)), _mm512_loadu_ps(o.add(k)));
                     let upper = _mm512_maskz_loadu_ps(lower, b.add(k).wrapping_add(3));

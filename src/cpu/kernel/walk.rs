@@ -9,8 +9,8 @@ use std::ops::Range;
 
 /// The nodes of a tree, and the box in each lane of its leaves.
 ///
-/// Lane k of node n in a level above the leaves contains node 16 n + k of the level below. The last level that has nodes is the top. There
-/// is at least one level above the leaves.
+/// Lane k of node n in a level above the leaves contains node 16 n + k of the level below. The last level that has
+/// nodes is the top. There is at least one level above the leaves.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Walk<'a> {
     pub(crate) levels: &'a [Vec<Node>],
@@ -24,7 +24,8 @@ pub(crate) struct Walk<'a> {
 const MOST_LEVELS: usize = 9;
 
 impl Walk<'_> {
-    /// Calls `found` for every place in the leaves whose box overlaps `b`. Returns the number of nodes compared with it.
+    /// Calls `found` for every place in the leaves whose box overlaps `b`. Returns the number of nodes compared with
+    /// it.
     #[inline]
     pub(crate) fn each_overlapping(&self, simd: Simd, b: &Aabb, found: impl FnMut(usize)) -> u32 {
         match simd {
@@ -144,8 +145,8 @@ impl Walk<'_> {
         &self.ids.as_chunks().0[leaf]
     }
 
-    /// Calls `found` for every lane of level `bottom`, from number `first` on, that overlaps a box. Lane k of node n has the number 16 n + k.
-    /// Returns the number of nodes compared with the box.
+    /// Calls `found` for every lane of level `bottom`, from number `first` on, that overlaps a box. Lane k of node n
+    /// has the number 16 n + k. Returns the number of nodes compared with the box.
     #[inline(always)]
     fn each(
         &self,

@@ -143,8 +143,8 @@ impl Grown {
         });
     }
 
-    /// Calls `found` for every box whose grown box overlaps the new one of box `i`, unless both are fixed. If both have new ones, only the call
-    /// for the lower box finds the pair. Returns the number of visited nodes of the tree.
+    /// Calls `found` for every box whose grown box overlaps the new one of box `i`, unless both are fixed. If both have
+    /// new ones, only the call for the lower box finds the pair. Returns the number of visited nodes of the tree.
     #[inline]
     pub(super) fn meet(&self, tree: &GrownTree, i: u32, mut found: impl FnMut(u32)) -> u32 {
         let (bounds, fixed) = (&self.boxes[i as usize], self.is_fixed(i));
@@ -173,7 +173,8 @@ impl Grown {
     }
 }
 
-/// Updates the fixed flags. Not all pairs of a box that is no longer fixed are kept, so it gets a grown box that it has left.
+/// Updates the fixed flags. Not all pairs of a box that is no longer fixed are kept, so it gets a grown box that it has
+/// left.
 fn update_fixed(flags: &mut [Flags], grown: &mut [Aabb], first: usize, filter: Option<&Filter>) {
     for ((flags, grown), first) in flags.iter_mut().zip(grown.chunks_mut(64)).zip((first..).step_by(64)) {
         let fixed =

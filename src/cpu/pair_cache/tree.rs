@@ -1,6 +1,7 @@
 //! The tree of the grown boxes, refitted for boxes that get a new one.
 //!
-//! A box that moves widens the nodes above its leaf and never changes its leaf, so the tree gets worse until it is rebuilt.
+//! A box that moves widens the nodes above its leaf and never changes its leaf, so the tree gets worse until it is
+//! rebuilt.
 
 use crate::aabb::Aabb;
 use crate::cpu::columns::{ensure, part};

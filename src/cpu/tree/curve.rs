@@ -80,8 +80,8 @@ impl Curve {
         interleave(cell(0)) | interleave(cell(1)) << 1 | interleave(cell(2)) << 2
     }
 
-    /// Returns the sort key of a box: its class, then its cell. Large boxes, and boxes long on an axis, would widen the leaves that they shared
-    /// with others.
+    /// Returns the sort key of a box: its class, then its cell. Large boxes, and boxes long on an axis, would widen the
+    /// leaves that they shared with others.
     #[inline]
     fn code(&self, b: &Aabb) -> u32 {
         let edges = [0, 1, 2].map(|a| b.max[a] - b.min[a]);
@@ -90,8 +90,8 @@ impl Curve {
     }
 }
 
-/// Returns the class, 1 to 15, of an unusually large box: by size in steps of four, and in the lower three steps by the axis on which it is
-/// long.
+/// Returns the class, 1 to 15, of an unusually large box: by size in steps of four, and in the lower three steps by the
+/// axis on which it is long.
 #[cold]
 fn class(edges: [f32; 3], ratio: f32) -> u32 {
     // NaN, of infinity over infinity, is in the largest class.
@@ -173,7 +173,8 @@ impl Order {
         Ok(moving)
     }
 
-    /// Sorts the boxes of each dense cell along a curve through their own bounds, and so on with the dense cells of that curve.
+    /// Sorts the boxes of each dense cell along a curve through their own bounds, and so on with the dense cells of
+    /// that curve.
     fn sort_dense_cells(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<(), Error> {
         let Self { keys, len, scratch, large, small, bounds } = self;
         let keys = &mut keys[..*len];
@@ -220,7 +221,8 @@ fn code(key: u64) -> u32 {
 
 /// Sorts a dense cell, then the dense cells of its own curve.
 fn sort_dense_cell(keys: &mut [u64], boxes: &[Aabb]) {
-    // Each curve is a thousand times finer than the previous one: the range of floats ends the recursion after 28 of them.
+    // Each curve is a thousand times finer than the previous one: the range of floats ends the recursion after 28 of
+    // them.
     let Some(curve) = Curve::within(&bounds_of(keys, boxes)) else { return };
     curve.recode(keys, boxes);
     keys.sort_unstable();
@@ -296,8 +298,8 @@ mod tests {
     fn neighbours_in_space_are_neighbours_in_the_order() {
         let most = if cfg!(feature = "parallel") { 3 } else { 1 };
         let one = |k: u64| at(k, 100.0, [0.0; 3]);
-        // Many equal worlds on a line, a million edges apart, so that each is a dense cell; worlds in one corner, each a thousand times
-        // smaller than the last; and a world with a large dense cell far away.
+        // Many equal worlds on a line, a million edges apart, so that each is a dense cell; worlds in one corner, each
+        // a thousand times smaller than the last; and a world with a large dense cell far away.
         let row = |k: u64| at(k, 100.0, [1.0e8 * (k % 40) as f32, 0.0, 0.0]);
         let nested = |k: u64| at(k, 100.0 * 1.0e-3_f32.powi((k % 5) as i32), [0.0; 3]);
         let pooled = |k: u64| if k.is_multiple_of(2) { one(k) } else { at(k, 100.0, [3.0e9, -8.0e9, 5.0e9]) };
