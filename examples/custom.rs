@@ -1,22 +1,21 @@
-//! An algorithm of your own, which the adaptive module chooses where it is cheapest: for scenes in which nothing moves at times.
+//! A user's algorithm, which `Adaptive` runs when it is cheapest: for scenes in which nothing moves at times.
 //!
 //! ```sh
 //! cargo run --release -p sapwise --example custom
 //! ```
 //!
-//! Its cost is guessed here, and corrected by the frames that it runs. A cost that was measured comes from a command of your own:
-//! `probes/examples/own_algorithm.rs`.
+//! The cost here is a guess, which its frames correct. `probes/examples/own_algorithm.rs` measures one.
 
 use sapwise::{
-    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Incremental, Load, Pairs,
-    Product, Registry, Source, Term, Tuning,
+    Aabb, Adaptive, AlgorithmCost, AlgorithmId, BroadPhase, CostCurve, CostTerm, Error, Load, Pairs, Product, Registry,
+    Source, Term, Tuning,
 };
 use sapwise_scenes::Scenario;
 
-/// What it is called in tuning, reports and decisions.
+/// Its name in tunings, reports and decisions.
 pub(crate) const ID: &str = "rested@cpu1";
 
-/// Returns the pairs of the frame before where no box has changed, and leaves other frames to another algorithm.
+/// Returns the pairs of the previous frame if no box has changed, and runs another algorithm otherwise.
 pub(crate) struct Rested {
     other: Box<dyn BroadPhase>,
     before: Vec<Aabb>,
@@ -32,31 +31,29 @@ impl Rested {
 impl BroadPhase for Rested {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
         pairs.clear();
-        // A bound that is NaN differs from itself, so an invalid box is always left to the other one, which names it.
+        // A NaN bound differs from itself, so the other algorithm gets every invalid box, and names it.
         if self.before != boxes {
-            // Were there an error, nothing would be known of the frame before.
+            // Forget the previous frame first: after an error nothing is known.
             self.before.clear();
             self.pairs.clear();
             self.other.find_pairs(boxes, &mut self.pairs)?;
             self.before.extend_from_slice(boxes);
         }
-        // One by one and not the list as a whole: the order, the limit and whatever else the caller wants are matters of `pairs`.
+        // One by one: `pairs` handles the order, the limit and the filter.
         self.pairs.iter().for_each(|&(i, j)| pairs.push(i, j));
         pairs.finish()
     }
 
-    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-        Some(self)
+    /// A frame is cheaper after a similar one.
+    fn is_incremental(&self) -> bool {
+        true
     }
 }
 
-/// A frame is cheaper after one that was alike.
-impl Incremental for Rested {}
-
-/// A registry of ours with [`Rested`] in it, which leaves frames to `other`.
+/// Returns a registry with [`Rested`], which runs `other` otherwise.
 pub(crate) fn registry(other: &'static str) -> Registry {
     let mut registry = Registry::with_cores(1);
-    // The 1 is the revision: counted up whenever it gets faster or slower, so that what was measured before is told to be stale.
+    // The 1 is the revision: raise it when the algorithm gets faster or slower, so that old timings count as stale.
     registry.add(ID.parse().expect("a method and a backend"), 1, move || {
         let other = other.parse().expect("a method and a backend");
         Ok(Box::new(Rested::new(Registry::with_cores(1).create(&other)?)))
@@ -64,7 +61,7 @@ pub(crate) fn registry(other: &'static str) -> Registry {
     registry
 }
 
-/// The cost of an algorithm: nanoseconds for each unit of some terms.
+/// Returns the cost of an algorithm: nanoseconds for each unit of some terms.
 pub(crate) fn cost(registry: &Registry, id: &str, terms: &[(Term, f64)]) -> AlgorithmCost {
     let algorithm: AlgorithmId = id.parse().expect("a method and a backend");
     let revision = registry.entries().iter().find(|e| e.id == algorithm).map_or(1, |e| e.revision);
@@ -72,7 +69,7 @@ pub(crate) fn cost(registry: &Registry, id: &str, terms: &[(Term, f64)]) -> Algo
     AlgorithmCost::new(algorithm, revision, CostCurve::new(terms), 0.5)
 }
 
-/// Tuning from these costs, with the borders of scenes from 10 to a million objects.
+/// Returns a tuning with these costs, and its steps for 10 to a million boxes.
 pub(crate) fn tuning(costs: Vec<AlgorithmCost>) -> Tuning {
     let load = |k: u32| Load::of_objects(10_u32.pow(k));
     Tuning::from_costs(Source::Default, "", costs, &(1..=6).map(load).collect::<Vec<Load>>())
@@ -81,8 +78,8 @@ pub(crate) fn tuning(costs: Vec<AlgorithmCost>) -> Tuning {
 #[allow(dead_code, reason = "the tests of this example have no use for its main")]
 fn main() -> Result<(), Error> {
     let registry = registry("grid-sap@cpu1");
-    // Comparing a box takes a nanosecond or so, and so does a pair that is handed on; where boxes move, it costs what the other one does,
-    // and more. A product of counts makes a term of its own: here that of the pairs.
+    // Comparing a box takes about a nanosecond, and so does copying a pair. If boxes move, it costs more than the other
+    // one. A product of counts makes a user's own term: here that of the pairs.
     let tuning = tuning(vec![
         cost(&registry, "grid-sap@cpu1", &[(Term::Objects, 60.0)]),
         cost(
@@ -95,7 +92,7 @@ fn main() -> Result<(), Error> {
     let mut scene = Scenario::Uniform.start(5000, 1);
     let mut pairs = Pairs::new();
     for frame in 0..600 {
-        // Three times in turn everything moves for a hundred frames and rests for a hundred.
+        // Everything moves for a hundred frames, then rests for a hundred, three times.
         if frame % 200 < 100 {
             scene.advance();
         }

@@ -22,7 +22,7 @@ use crate::aabb::Aabb;
 use crate::algorithm::AlgorithmId;
 #[cfg(feature = "this-machine")]
 use crate::algorithm::BackendClass;
-use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, Incremental};
+use crate::broad_phase::{BroadPhase, FrameKind, FrameWork};
 use crate::clock;
 use crate::error::Error;
 use crate::load::Load;
@@ -217,13 +217,11 @@ impl BroadPhase for Adaptive {
         self.runner.prepare(objects);
     }
 
-    /// Where any of its algorithms is one.
-    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-        if self.runner.is_incremental() { Some(self) } else { None }
+    /// Whether any of its algorithms is incremental.
+    fn is_incremental(&self) -> bool {
+        self.runner.is_incremental()
     }
-}
 
-impl Incremental for Adaptive {
     /// Of an algorithm that keeps nothing every frame is from scratch.
     fn last_frame(&self) -> FrameWork {
         self.runner.work().unwrap_or(FrameWork::new(FrameKind::FromScratch, 1.0))

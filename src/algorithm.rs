@@ -1,28 +1,28 @@
-//! How algorithms are named.
+//! The names of algorithms.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// A method and where it runs, written `method@backend`: `brute@cpu1`, `grid-sap@cpu8`, `sap@gpu0`, `grid-sap@gpu0+1`.
+/// A method and its backend, written `method@backend`: `brute@cpu1`, `grid-sap@cpu8`, `sap@gpu0`, `grid-sap@gpu0+1`.
 ///
-/// The same text stands in JSON, on the command line and in logs.
+/// JSON, the command line and logs use this text.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct AlgorithmId {
     method: String,
     backend: Backend,
 }
 
-/// The processor that an algorithm runs on.
+/// The processor of an algorithm.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Backend {
-    /// That many threads of the CPU, at least one.
+    /// This many threads of the CPU, at least one.
     Cpu(u32),
-    /// These GPUs, numbered as in `sapwise devices`, ascending.
+    /// These GPUs, ascending, numbered as in `sapwise devices`.
     Gpu(Vec<u32>),
 }
 
-/// The class of a processor: cost models are shared within one, and revisions count in each by itself.
+/// The class of a processor. A method has one cost model and one revision in each class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 #[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -34,24 +34,25 @@ pub enum BackendClass {
     Gpu,
 }
 
-/// Threads that an algorithm may have, at most.
+/// The most threads of an algorithm.
 pub(crate) const MOST_THREADS: u32 = 4096;
 
-/// The text of an algorithm that can't be read.
+/// The error of a text that is no algorithm.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ParseIdError(String);
 
 impl AlgorithmId {
-    /// The algorithm `method` on `backend`.
+    /// Makes the id of `method` on `backend`.
     ///
     /// # Errors
-    /// The backend must have 1 to 4096 threads, or devices in ascending order; `method` must be 1 to 32 of `a-z`, `0-9`, `-` and `_`, beginning with a letter, so that the text can be read back.
+    /// `method` must be 1 to 32 of `a-z`, `0-9`, `-` and `_`, and begin with a letter. `backend` must have 1 to 4096
+    /// threads, or GPUs in ascending order. Otherwise the text could not be read back.
     pub fn new(method: &str, backend: Backend) -> Result<Self, ParseIdError> {
         let letters = method.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_');
         if method.len() > 32 || !letters || !method.starts_with(|c: char| c.is_ascii_lowercase()) {
             return Err(ParseIdError(format!("{method:?} is no method name; use up to 32 of a-z, 0-9, - and _")));
         }
-        // Numbers too high, no thread at all, devices out of order: whatever could not be read back.
+        // Too many threads, no thread, GPUs out of order: all that could not be read back.
         if backend.to_string().parse().as_ref() != Ok(&backend) {
             return Err(ParseIdError(format!(
                 "{backend} is no backend; use cpu1 to cpu{MOST_THREADS}, gpu0 or gpu0+1"
@@ -60,24 +61,24 @@ impl AlgorithmId {
         Ok(Self { method: method.to_owned(), backend })
     }
 
-    /// An id of our own, whose method name is known to be well-formed.
+    /// Makes the id of a built-in method on the CPU.
     pub(crate) fn cpu(method: &'static str, threads: u32) -> Self {
         Self { method: method.to_owned(), backend: Backend::Cpu(threads) }
     }
 
-    /// The part before the `@`.
+    /// Returns the part before the `@`.
     #[must_use]
     pub fn method(&self) -> &str {
         &self.method
     }
 
-    /// The part after the `@`.
+    /// Returns the part after the `@`.
     #[must_use]
     pub fn backend(&self) -> &Backend {
         &self.backend
     }
 
-    /// CPU threads that the algorithm keeps busy; one for a GPU.
+    /// Returns the number of CPU threads that the algorithm keeps busy: one for GPUs.
     #[must_use]
     pub fn threads(&self) -> u32 {
         match self.backend {
@@ -88,7 +89,7 @@ impl AlgorithmId {
 }
 
 impl Backend {
-    /// Which class of processor it is.
+    /// Returns the class of the processor.
     #[must_use]
     pub fn class(&self) -> BackendClass {
         match self {
@@ -97,7 +98,7 @@ impl Backend {
         }
     }
 
-    /// How many work at the same time: threads of the CPU, or GPUs.
+    /// Returns the number of CPU threads, or of GPUs.
     #[must_use]
     pub fn width(&self) -> u32 {
         match self {
@@ -171,7 +172,7 @@ impl FromStr for AlgorithmId {
     }
 }
 
-/// A number in its one accepted spelling, so that an id has one text only.
+/// Parses a number in its one accepted spelling, so that an id has one text only.
 fn number(text: &str) -> Option<u32> {
     text.parse().ok().filter(|n: &u32| n.to_string() == text)
 }

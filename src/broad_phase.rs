@@ -1,4 +1,4 @@
-//! What every algorithm promises, and what those do that build on the frame before.
+//! The interface of every algorithm.
 
 use crate::aabb::Aabb;
 use crate::error::Error;
@@ -7,24 +7,25 @@ use crate::pairs::Pairs;
 
 /// Finds all pairs of overlapping boxes.
 ///
-/// Every implementation returns the same set of pairs for the same boxes: each overlapping pair once, the lower position
-/// first, touching boxes included. Implementations keep their buffers between calls and allocate nothing once they have
-/// seen a frame as large and as dense; but with more than one thread rayon allocates small jobs, and what `pair-cache` keeps follows
-/// its margin, so that it settles over some frames more.
+/// Every implementation returns the same set of pairs for the same boxes: each overlapping pair once, the lower
+/// position first, touching boxes included.
+///
+/// Implementations keep their buffers between calls, and allocate nothing after a frame as large and as dense. Two
+/// exceptions: with several threads rayon allocates small jobs, and `pair-cache` takes some frames more, until its
+/// margin has settled.
 pub trait BroadPhase: Send + Sync {
     /// Replaces the content of `pairs` with the overlapping pairs of `boxes`.
     ///
     /// An implementation begins with [`Pairs::clear`], adds with [`Pairs::push`] and ends with [`Pairs::finish`].
     ///
     /// # Errors
-    /// [`Error::InvalidBox`] names the first box with a NaN or inverted bound; [`Error::TooManyObjects`],
+    /// [`Error::InvalidBox`] names the first box with a NaN or inverted bound. [`Error::TooManyObjects`],
     /// [`Error::TooManyPairs`] and [`Error::OutOfMemory`] as they say. After an error the next call starts afresh.
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error>;
 
-    /// As [`find_pairs`](Self::find_pairs), with what is known of this frame already, so that it need not be worked out twice.
+    /// Does the same as [`find_pairs`](Self::find_pairs), and reuses what the caller knows about this frame.
     ///
-    /// The plan may change how fast the pairs are found and in which order, never which. An algorithm that has no use for it leaves
-    /// this as it is.
+    /// The plan may change the speed and the order of the pairs, never the set. The default ignores it.
     ///
     /// # Errors
     /// As [`find_pairs`](Self::find_pairs).
@@ -33,18 +34,42 @@ pub trait BroadPhase: Send + Sync {
         self.find_pairs(boxes, pairs)
     }
 
-    /// Gets ready for frames of up to `objects` boxes, so that the first of them costs no more than the next.
+    /// Gets ready for frames of up to `objects` boxes, so that the first of them costs no more than the next. The
+    /// default does nothing.
     ///
-    /// Called ahead of a switch to this algorithm. Cheap when there is nothing to do; doing nothing is allowed. [`Adaptive`](crate::Adaptive)
-    /// calls it between frames: of an algorithm on a GPU, whose driver may keep it waiting, on a thread of its own, and chooses others until it
-    /// returns; of any other on the thread of the frames, where it is to reserve memory at most.
+    /// [`Adaptive`](crate::Adaptive) calls this between frames, before it switches to this algorithm. It calls an
+    /// algorithm on a GPU on a thread of its own, because a driver may block, and runs others until the call returns.
+    /// It calls any other algorithm on the thread of the frames: there it should only reserve memory.
     fn prepare(&mut self, objects: usize) {
         let _ = objects;
     }
 
-    /// This algorithm as one that builds on the frame before, if it is one: `Some(self)`.
-    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-        None
+    /// Returns whether a frame is cheaper after a similar one. To time such an algorithm, warm it up for some frames.
+    /// The default is `false`.
+    fn is_incremental(&self) -> bool {
+        false
+    }
+
+    /// Returns how the last frame came about. [`Adaptive`](crate::Adaptive) asks incremental algorithms only, and
+    /// compares the time of a frame with the time that its work lets expect. By default every frame counts alike.
+    fn last_frame(&self) -> FrameWork {
+        FrameWork::new(if self.is_incremental() { FrameKind::Updated } else { FrameKind::FromScratch }, 1.0)
+    }
+
+    /// Reports that other algorithms ran `frames` frames, at least one, since this one's last frame.
+    /// [`Adaptive`](crate::Adaptive) calls this before the next frame of an incremental algorithm. Conclusions from
+    /// earlier frames, such as that keeping work does not pay, may no longer hold.
+    fn missed_frames(&mut self, frames: u64) {
+        let _ = frames;
+    }
+
+    /// Runs on this many threads from the next frame on, and keeps its state. Returns `false`, and changes nothing, if
+    /// it can't: the default.
+    ///
+    /// [`Registry::create_family`](crate::Registry::create_family) makes one instance for several numbers of threads.
+    fn set_threads(&mut self, threads: u32) -> bool {
+        let _ = threads;
+        false
     }
 }
 
@@ -52,11 +77,11 @@ pub trait BroadPhase: Send + Sync {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FrameKind {
-    /// It built on what the frame before had left.
+    /// It updated the state that the previous frame left.
     Updated,
-    /// It made again what it keeps, for the frames that follow.
+    /// It rebuilt its state for the frames that follow.
     Rebuilt,
-    /// It found the pairs from scratch, and keeps nothing.
+    /// It found the pairs from scratch and keeps nothing.
     FromScratch,
 }
 
@@ -66,50 +91,20 @@ pub enum FrameKind {
 pub struct FrameWork {
     /// How the frame came about.
     pub kind: FrameKind,
-    /// Its work over that of the mean frame of the present scene, those included in which all is made again; 1 where nobody knows. Frames right after
-    /// one of these are cheap, so that a few of them tell little of the mean.
+    /// Its work over the mean work of a frame of this scene, rebuilds included; 1 if unknown. Frames right after a
+    /// rebuild are cheap, so a few of them say little about the mean.
     pub over_mean: f64,
 }
 
 impl FrameWork {
-    /// Of a frame of this kind and so many times the work of the mean frame; what is no positive number counts as 1.
+    /// Makes the work of a frame. `over_mean` counts as 1 unless it is a positive number.
     #[must_use]
     pub fn new(kind: FrameKind, over_mean: f64) -> Self {
         Self { kind, over_mean: if over_mean.is_finite() && over_mean > 0.0 { over_mean } else { 1.0 } }
     }
 }
 
-/// An algorithm whose frame is cheaper after one that was alike. Time it after some frames, not on the first.
-pub trait Incremental: BroadPhase {
-    /// How the last frame came about. [`Adaptive`](crate::Adaptive) compares what a frame took with what its work lets expect; of an algorithm that
-    /// does not tell, every frame counts alike.
-    fn last_frame(&self) -> FrameWork {
-        FrameWork::new(FrameKind::Updated, 1.0)
-    }
-
-    /// Other algorithms ran so many frames, one at least, since this one's last frame: [`Adaptive`](crate::Adaptive) calls this before its next one. What was concluded
-    /// from earlier frames, such as that keeping work does not pay, may hold no longer.
-    fn missed_frames(&mut self, frames: u64) {
-        let _ = frames;
-    }
-
-    /// Runs on this many threads from the next frame on, with all that it keeps. `false` where it can't, and then nothing changes.
-    ///
-    /// One instance for several numbers of threads comes from [`Registry::create_family`](crate::Registry::create_family).
-    fn set_threads(&mut self, threads: u32) -> bool {
-        let _ = threads;
-        false
-    }
-}
-
-impl dyn BroadPhase {
-    /// Whether a frame is cheaper after one that was alike.
-    pub fn is_incremental(&mut self) -> bool {
-        self.as_incremental().is_some()
-    }
-}
-
-/// `Ok` when 32-bit pair members can name `objects` boxes.
+/// Returns an error if 32 bits can't number `objects` boxes.
 pub(crate) fn check_count(objects: usize) -> Result<(), Error> {
     if u32::try_from(objects).is_err() { Err(Error::TooManyObjects { objects }) } else { Ok(()) }
 }

@@ -1,32 +1,30 @@
-//! What began and what ended between two frames.
+//! The pairs that began and ended between two frames.
 
 use crate::error::Error;
 use crate::pairs::{Alone, Pairs, Sorter};
 
-/// Follows pairs from frame to frame by ids of the caller's: which began, which ended, and all there are.
+/// Follows pairs from frame to frame by the caller's ids: the pairs that began, those that ended, and all of them.
 ///
-/// Every list is sorted, and each pair has its lower id first. So they are the same bit for bit whatever algorithm found the
-/// pairs and in whatever order, with [`PairOrder::Any`](crate::PairOrder::Any) too.
+/// Every list is sorted, and each pair has its lower id first. So the lists are the same, bit for bit, whatever
+/// algorithm found the pairs and in whatever order, also with [`PairOrder::Any`](crate::PairOrder::Any).
 ///
-/// Positions may change from frame to frame, as with `swap_remove`: a pair lasts while both ids do. Boxes with the same id
-/// count as one: a pair between two of them is left out, and two ids are one pair however many of their boxes overlap.
+/// Positions may change from frame to frame, as with `swap_remove`: a pair lasts while both ids do. Boxes with the same
+/// id count as one: a pair of two of them is left out, and two ids are one pair however many of their boxes overlap.
 ///
-/// An update sorts the pairs as numbers of 64 bits and runs along those of the update before. On one core of an AMD EPYC that
-/// takes 10 to 20 ns a pair with 1000 to 100 000 pairs: about as long as `grid-sap@cpu1` takes to find the pairs of a crowded scene,
-/// and a third of it where they come in canonical order and ids ascend with the positions. When ids have changed it sorts them
-/// too. Memory for each pair: 12 bytes and two pairs of ids, and another for each that began or ended; for each box 8 bytes and
-/// two ids.
-// A hash table of the pairs took two thirds of that time with 1000 pairs, at least as long with 100 000, more than twice as long with 3
-// million, and leaves them in no order.
+/// An update sorts the pairs as 64-bit numbers and compares them with those of the previous update. On one core of an
+/// AMD EPYC this takes 10 to 20 ns a pair with 1000 to 100 000 pairs, or a third of that if the pairs have canonical
+/// order and ids ascend with positions. When ids have changed, the update sorts them too. Memory for each pair: 12
+/// bytes and two pairs of ids, and another pair if it began or ended. Memory for each box: 8 bytes and two ids.
 #[derive(Debug, Clone)]
 pub struct Changes<Id = u32> {
-    /// Those of the last update.
+    /// The ids of the last update.
     ids: Vec<Id>,
-    /// The same, ascending, each with its position.
+    /// The same ids, ascending, each with its position.
     sorted: Vec<(Id, u32)>,
-    /// For each position where its id stands first in `sorted`.
+    /// For each position, the first place of its id in `sorted`.
     ranks: Vec<u32>,
-    /// The new pairs: the rank of the lower id, and below it that of the other. Numbers sort faster than pairs of ids.
+    /// The new pairs: the rank of the lower id in the upper half, that of the other in the lower. Numbers sort faster
+    /// than pairs of ids.
     keys: Vec<u64>,
     sorter: Sorter,
     pairs: Vec<(Id, Id)>,
@@ -37,7 +35,7 @@ pub struct Changes<Id = u32> {
 }
 
 impl<Id: Copy + Ord> Changes<Id> {
-    /// No pairs yet: all those of the first update begin.
+    /// Makes a list without pairs: all pairs of the first update begin.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -53,15 +51,15 @@ impl<Id: Copy + Ord> Changes<Id> {
         }
     }
 
-    /// Takes in the pairs of a frame, in which the box at position `k` was `ids[k]`.
+    /// Updates to the pairs of a frame, in which the box at position `k` has the id `ids[k]`.
     ///
     /// # Errors
-    /// [`Error::MissingId`] names a position in `pairs` at which `ids` has none; [`Error::OutOfMemory`]. Nothing has begun or ended
-    /// then, and the next update is held against the last one that succeeded.
+    /// [`Error::MissingId`] names a position in `pairs` that has no id. [`Error::OutOfMemory`]. After an error nothing
+    /// has begun or ended, and the next update compares with the last one that succeeded.
     pub fn update(&mut self, pairs: &Pairs, ids: &[Id]) -> Result<(), Error> {
         self.begun.clear();
         self.ended.clear();
-        // No member of a pair lies beyond.
+        // No pair has a member beyond 32 bits.
         let ids = &ids[..ids.len().min(u32::MAX as usize)];
         if self.ids != ids {
             self.rank(ids)?;
@@ -76,25 +74,25 @@ impl<Id: Copy + Ord> Changes<Id> {
         self.compare()
     }
 
-    /// The pairs of the last update that were not among those before.
+    /// Returns the pairs of the last update that the previous one did not have.
     #[must_use]
     pub fn begun(&self) -> &[(Id, Id)] {
         &self.begun
     }
 
-    /// The pairs that are not among those of the last update, but were before.
+    /// Returns the pairs of the previous update that the last one does not have.
     #[must_use]
     pub fn ended(&self) -> &[(Id, Id)] {
         &self.ended
     }
 
-    /// How many pairs of the last update were among those before.
+    /// Returns the number of pairs that the last two updates share.
     #[must_use]
     pub fn lasting(&self) -> usize {
         self.pairs.len() - self.begun.len()
     }
 
-    /// All pairs of the last update.
+    /// Returns all pairs of the last update.
     #[must_use]
     pub fn pairs(&self) -> &[(Id, Id)] {
         &self.pairs
@@ -103,7 +101,7 @@ impl<Id: Copy + Ord> Changes<Id> {
     /// Finds the rank of each id.
     fn rank(&mut self, ids: &[Id]) -> Result<(), Error> {
         let Self { ids: known, sorted, ranks, .. } = self;
-        // Emptied first: after a refused allocation none is known.
+        // Emptied first: after a refused allocation no id is known.
         known.clear();
         sorted.clear();
         ranks.clear();
@@ -124,7 +122,7 @@ impl<Id: Copy + Ord> Changes<Id> {
         Ok(())
     }
 
-    /// Holds the next pairs against the present ones and takes their place.
+    /// Compares the next pairs with the present ones, then replaces them.
     fn compare(&mut self) -> Result<(), Error> {
         let found = differences(&self.next, &self.pairs, &mut self.begun, &mut self.ended);
         if found.is_ok() {
@@ -138,10 +136,10 @@ impl<Id: Copy + Ord> Changes<Id> {
 }
 
 impl Changes<u32> {
-    /// Takes in the pairs of a frame in which positions name the boxes: no box has changed its position.
+    /// Updates to the pairs of a frame in which positions are ids: no box has changed its position.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`], as in [`update`](Self::update).
+    /// [`Error::OutOfMemory`], as for [`update`](Self::update).
     pub fn update_positions(&mut self, pairs: &Pairs) -> Result<(), Error> {
         self.begun.clear();
         self.ended.clear();
@@ -157,7 +155,7 @@ impl<Id: Copy + Ord> Default for Changes<Id> {
     }
 }
 
-/// Fills `keys` with the pairs in terms of ranks, ascending, each once, those of a rank with itself left out.
+/// Fills `keys` with the pairs of ranks, ascending, each once, without pairs of a rank with itself.
 fn fill_keys(
     keys: &mut Vec<u64>,
     sorter: &mut Sorter,
@@ -177,7 +175,7 @@ fn fill_keys(
     Ok(())
 }
 
-/// Fills `pairs` with what the keys stand for.
+/// Fills `pairs` with the pairs of ids of the keys.
 fn fill<Id: Copy>(pairs: &mut Vec<(Id, Id)>, keys: &[u64], id: impl Fn(u32) -> Id) -> Result<(), Error> {
     pairs.clear();
     reserve(pairs, keys.len())?;
@@ -185,12 +183,12 @@ fn fill<Id: Copy>(pairs: &mut Vec<(Id, Id)>, keys: &[u64], id: impl Fn(u32) -> I
     Ok(())
 }
 
-/// Adds what only `now` has to `begun` and what only `before` has to `ended`. Both ascend.
+/// Adds the elements that only `now` has to `begun`, and those that only `before` has to `ended`. Both lists ascend.
 fn differences<T: Copy + Ord>(now: &[T], before: &[T], begun: &mut Vec<T>, ended: &mut Vec<T>) -> Result<(), Error> {
     let (mut now, mut before) = (now.iter().peekable(), before.iter().peekable());
     loop {
         match (now.peek(), before.peek()) {
-            // Most last: they are asked for first.
+            // First, because most pairs last.
             (Some(a), Some(b)) if a == b => {
                 now.next();
                 before.next();
@@ -226,11 +224,11 @@ mod tests {
     }
 
     #[test]
-    fn pairs_are_followed_by_their_ids_wherever_these_stand() {
+    fn pairs_are_followed_by_ids() {
         let mut changes = Changes::new();
         changes.update(&pairs(&[(0, 3), (1, 2)]), &["d", "a", "c", "b"]).unwrap();
         assert_eq!(changes.begun(), [("a", "c"), ("b", "d")]);
-        // "a" went, and "b" took its position.
+        // "a" was removed, and "b" took its position.
         changes.update(&pairs(&[(0, 1), (1, 2)]), &["d", "b", "c"]).unwrap();
         assert_eq!(changes.begun(), [("b", "c")]);
         assert_eq!(changes.ended(), [("a", "c")]);
@@ -248,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_id_is_named_and_nothing_is_lost() {
+    fn missing_id_is_an_error_and_changes_nothing() {
         let mut changes = Changes::new();
         changes.update(&pairs(&[(0, 1)]), &[10, 20]).unwrap();
         let error = changes.update(&pairs(&[(0, 1), (1, 2)]), &[10, 20]).unwrap_err();
@@ -259,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn positions_may_stand_for_ids() {
+    fn positions_may_be_ids() {
         let mut changes = Changes::new();
         changes.update_positions(&pairs(&[(8, 3), (1, 2)])).unwrap();
         assert_eq!(changes.begun(), [(1, 2), (3, 8)]);

@@ -1,22 +1,22 @@
-//! An algorithm as a registry lists it.
+//! An algorithm in a registry.
 
 use crate::algorithm::AlgorithmId;
 use crate::error::Unavailable;
 
-/// One algorithm of a registry.
+/// An algorithm in a registry.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Entry {
     /// The algorithm.
     pub id: AlgorithmId,
-    /// Counts up when its speed changes; timings of other revisions are stale.
+    /// Rises when its speed changes: timings of other revisions are stale.
     pub revision: u32,
-    /// Why it can't run here, if it can't.
+    /// Why it can't run here; `None` if it can.
     pub unavailable: Option<Unavailable>,
 }
 
 impl Entry {
-    /// An algorithm that can run.
+    /// Makes the entry of an algorithm that can run.
     #[must_use]
     pub fn new(id: AlgorithmId, revision: u32) -> Self {
         Self { id, revision, unavailable: None }

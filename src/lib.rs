@@ -1,7 +1,7 @@
-//! Broad-phase collision detection that knows which algorithm is fastest on this machine, for this frame.
+//! Broad-phase collision detection with whichever algorithm is fastest on this machine, for this frame.
 //!
-//! An engine hands its [`Aabb`]s to [`Adaptive`] every frame and gets [`Pairs`] back. Which algorithm of the [`Registry`]
-//! ran was decided by [`Tuning`]: the cheapest for the [`Load`] of the frame.
+//! An engine passes its [`Aabb`]s to [`Adaptive`] every frame and gets [`Pairs`] back. By its [`Tuning`], [`Adaptive`]
+//! runs the algorithm of the [`Registry`] that is cheapest for the [`Load`] of the frame.
 //!
 //! ```
 //! use sapwise::{Aabb, Adaptive, BroadPhase, Tuning, Pairs, Registry};
@@ -14,22 +14,22 @@
 //! # Ok::<(), sapwise::Error>(())
 //! ```
 //!
-//! With the feature `this-machine`, `Adaptive::for_this_machine` does all of that: it measures the hardware once, predicts the tuning and
-//! keeps them for the next start.
+//! With the feature `this-machine`, `Adaptive::for_this_machine` does all of that: it measures the hardware once,
+//! predicts the tuning and saves it for the next start.
 //!
-//! Where tuning comes from, in ascending order of trust: written by hand ([`Tuning::usual`], [`Tuning::from_steps`]),
-//! predicted by a [`Model`] from the parameters of the [`Hardware`], or measured, from the timings in a report. Models
-//! and tuning are files of the feature `model`; the command `sapwise` makes them.
+//! A tuning is written by hand ([`Tuning::usual`], [`Tuning::from_steps`]), predicted by a [`Model`] from the
+//! parameters of the [`Hardware`], or measured, from the timings in a report. The feature `model` reads and writes
+//! models and tunings as files. The command `sapwise` makes them.
 //!
 //! # Features
 //!
-//! - `parallel` (default): the algorithms on several cores, through rayon. Without it only `@cpu1`.
-//! - `gpu`: the algorithms on GPUs, through wgpu; see the module `gpu`.
-//! - `model`: models and tuning as JSON; prediction.
+//! - `parallel` (default): algorithms on several cores, with rayon. Without it only `@cpu1`.
+//! - `gpu`: algorithms on GPUs, with wgpu; see the module `gpu`.
+//! - `model`: models and tunings as JSON; prediction.
 //! - `measure`: measures the hardware parameters of this machine.
-//! - `measure-gpu`: those of its GPUs too.
-//! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and keeps the tuning for the next start.
-//! - `tracing`: events that tell each switch of `Adaptive` with its reason.
+//! - `measure-gpu`: measures those of its GPUs too.
+//! - `this-machine`: `Adaptive::for_this_machine`, which measures, predicts and saves the tuning for the next start.
+//! - `tracing`: an event for each switch of `Adaptive`, with its reason.
 //! - `schema`: the JSON Schemas of the files, for tools.
 
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -51,7 +51,7 @@ mod error;
 mod filter;
 #[cfg(feature = "gpu")]
 pub mod gpu;
-// Without the feature only which algorithms there are and what they ask of a GPU: reports name them, and nothing of them can run.
+// Without the feature only the names of the algorithms and their requirements: reports name them, and none can run.
 #[cfg(not(feature = "gpu"))]
 #[path = "gpu/without_gpus.rs"]
 pub mod gpu;
@@ -79,7 +79,7 @@ pub use adaptive::{Adaptive, Decision, Reason};
 #[cfg(feature = "this-machine")]
 pub use adaptive::{Origin, SaveError, Setup};
 pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
-pub use broad_phase::{BroadPhase, FrameKind, FrameWork, Incremental};
+pub use broad_phase::{BroadPhase, FrameKind, FrameWork};
 #[cfg(feature = "schema")]
 pub use calibrate::cache_schema;
 #[cfg(all(fuzzing, feature = "this-machine"))]
@@ -106,14 +106,15 @@ pub use model::Model;
 pub use named::UnknownName;
 pub use pair::Pair;
 pub use pairs::{PairOrder, Pairs};
-/// The version of rayon whose pools this library takes: [`Registry::use_pool`]. Its number is part of the name, because another one
-/// would be other types: a release of this library that takes a newer rayon exports it under a new name, and is a breaking one.
+/// The version of rayon whose pools [`Registry::use_pool`] takes. The number is part of the name, because another
+/// version has other types: a release of this library that takes a newer rayon is a breaking one, and exports it under
+/// a new name.
 #[cfg(feature = "parallel")]
 pub use rayon as rayon1;
 pub use registry::{Registry, usable_cores};
 pub use tuning::{AlgorithmCost, Crossover, Observation, Observed, Ranking, Source, Step, Tuning, TuningError};
 
-/// The example of the README as a test, with the feature that it needs.
+/// The example of the README as a test.
 #[cfg(all(doctest, feature = "this-machine"))]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,8 +1,8 @@
-//! Enums whose variants are words in files.
+//! Enums whose variants have names in files.
 
 use std::fmt;
 
-/// A word that names nothing of its kind, or nothing that this version knows.
+/// The error of a name that this version does not know.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnknownName {
     pub(crate) kind: &'static str,
@@ -10,7 +10,7 @@ pub struct UnknownName {
 }
 
 impl UnknownName {
-    /// The word.
+    /// Returns the name.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
@@ -25,7 +25,8 @@ impl fmt::Display for UnknownName {
 
 impl std::error::Error for UnknownName {}
 
-/// Defines an enum without data whose variants have names: `ALL`, `as_str`, `Display`, `FromStr`, and the same words in files.
+/// Defines an enum without data whose variants have names: `ALL`, `as_str`, `Display`, `FromStr`, and the same names in
+/// files.
 macro_rules! named {
     ($(#[$meta:meta])* $seen:vis enum $name:ident($kind:literal) {
         $($(#[$doc:meta])* $variant:ident = $text:literal,)+
@@ -36,10 +37,10 @@ macro_rules! named {
         }
 
         impl $name {
-            /// Every one, in order.
+            /// All variants, in order.
             pub const ALL: [Self; [$($text),+].len()] = [$(Self::$variant),+];
 
-            /// The name, as in files.
+            /// Returns the name in files.
             #[must_use]
             pub const fn as_str(self) -> &'static str {
                 match self {

@@ -1,4 +1,4 @@
-//! How a pair is written.
+//! A pair of boxes.
 
-/// Two positions in the input, the lower one first.
+/// A pair of boxes: two positions in the input, the lower one first.
 pub type Pair = (u32, u32);

@@ -1,4 +1,4 @@
-//! The one output of every algorithm.
+//! The pairs of a frame: the output of every algorithm.
 
 mod fill;
 mod order;
@@ -16,46 +16,47 @@ pub(crate) use order::{Alone, Parallel, Sorter};
 /// The order in which a caller wants the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PairOrder {
-    /// Whatever order the algorithm produces: the same set, the least work.
+    /// The order in which the algorithm finds them: the least work.
     #[default]
     Any,
-    /// Ascending by first, then second member: the same list bit for bit from every algorithm, as lockstep games need.
+    /// Ascending by first, then second member: the same list, bit for bit, from every algorithm, as lockstep games
+    /// need.
     Canonical,
 }
 
 /// The overlapping pairs of one frame: each pair once, the lower position first.
 ///
-/// Owned by the caller and reused from frame to frame: its memory grows to the largest frame seen and stays.
+/// The caller owns the list and reuses it for every frame. Its memory grows to the largest frame and stays.
 ///
-/// With a [`Filter`] only the wanted pairs are written, counted and limited, whatever algorithm finds them.
+/// With a [`Filter`], the list writes, counts and limits only the wanted pairs, whatever algorithm finds them.
 #[derive(Debug, Clone, Default)]
 pub struct Pairs {
-    /// Initialised up to the largest frame seen, so that growth within it writes each pair just once.
+    /// Initialised up to the largest frame, so that growth within it writes each pair once.
     buffer: Vec<Pair>,
     len: usize,
-    /// Whether there are more wanted pairs than could be stored.
+    /// There are more wanted pairs than could be stored.
     over: bool,
-    /// Where this list takes a part of the pairs: whether any of the parts is over.
+    /// If this list is a part of a frame: whether any of the parts is over.
     any_over: Option<Arc<AtomicBool>>,
-    /// Pairs that the filter kept out, without those of two fixed boxes, which most algorithms never look for.
+    /// Pairs that the filter dropped, without those of two fixed boxes, which most algorithms never look for.
     unwanted: u64,
     /// Shared with the lists of tasks while they work.
     filter: Option<Arc<Filter>>,
     order: PairOrder,
     limit: Option<usize>,
-    /// Elements of the allocation that was refused, if one was.
+    /// Elements of the refused allocation, if one was refused.
     refused: Option<usize>,
     sorter: Sorter,
 }
 
 impl Pairs {
-    /// An empty list in any order and without a limit.
+    /// Makes an empty list in any order and without a limit.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// An empty list that wants its pairs in `order`.
+    /// Makes an empty list that wants its pairs in `order`.
     #[must_use]
     pub fn with_order(order: PairOrder) -> Self {
         Self { order, ..Self::default() }
@@ -63,15 +64,15 @@ impl Pairs {
 
     /// Sets the most pairs that may be stored, 8 bytes each, or lifts that limit.
     ///
-    /// A frame with more wanted pairs is [`Error::TooManyPairs`]. Our algorithms end soon after the limit was exceeded, so how many there are
-    /// is not known. An algorithm on `k` threads, `k` above 1,
-    /// may hold up to `8 k + 1` times the limit while it works: each of its tasks has a list of its own. `pair-cache` keeps up to 32 pairs
-    /// for each box beside that, whatever the limit.
+    /// A frame with more wanted pairs is [`Error::TooManyPairs`]. The built-in algorithms stop soon after the limit, so
+    /// the number of pairs is unknown then. On `k` threads, `k` above 1, an algorithm may hold up to `8 k + 1` times
+    /// the limit while it works, because each task has its own list. `pair-cache` also keeps up to 32 pairs for each
+    /// box, whatever the limit.
     pub fn set_limit(&mut self, limit: Option<usize>) {
         self.limit = limit;
     }
 
-    /// The limit set by [`set_limit`](Self::set_limit).
+    /// Returns the limit set by [`set_limit`](Self::set_limit).
     #[must_use]
     pub fn limit(&self) -> Option<usize> {
         self.limit
@@ -82,54 +83,54 @@ impl Pairs {
         self.filter = filter.map(Arc::new);
     }
 
-    /// The filter set by [`set_filter`](Self::set_filter).
+    /// Returns the filter set by [`set_filter`](Self::set_filter).
     #[must_use]
     pub fn filter(&self) -> Option<&Filter> {
         self.filter.as_deref()
     }
 
-    /// The same, to be changed between frames: in place, without a copy unless this list was cloned.
+    /// Returns the filter for changes between frames: in place, without a copy unless this list was cloned.
     pub fn filter_mut(&mut self) -> Option<&mut Filter> {
         self.filter.as_mut().map(Arc::make_mut)
     }
 
-    /// The order that the caller wants.
+    /// Returns the order that the caller wants.
     #[must_use]
     pub fn order(&self) -> PairOrder {
         self.order
     }
 
-    /// The pairs of the last frame.
+    /// Returns the pairs of the last frame.
     #[must_use]
     pub fn as_slice(&self) -> &[Pair] {
         &self.buffer[..self.len]
     }
 
-    /// How many pairs the last frame has.
+    /// Returns the number of pairs of the last frame.
     #[must_use]
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether the last frame has no pair.
+    /// Returns whether the last frame has no pair.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// The pairs of the last frame, one by one.
+    /// Iterates over the pairs of the last frame.
     pub fn iter(&self) -> std::slice::Iter<'_, Pair> {
         self.as_slice().iter()
     }
 
-    /// How many pairs of boxes overlap in the last frame, those included that the filter kept out, but for pairs of two fixed boxes: those are
-    /// not looked for.
+    /// Returns the number of overlapping pairs in the last frame. It includes those that the filter dropped, but for
+    /// pairs of two fixed boxes.
     #[must_use]
     pub fn overlapping(&self) -> u64 {
         self.len as u64 + self.unwanted
     }
 
-    /// A 64-bit hash of the set of pairs that does not depend on their order.
+    /// Returns a 64-bit hash of the set of pairs, which does not depend on their order.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
         self.iter().fold(self.len as u64, |sum, &(i, j)| sum.wrapping_add(mix(u64::from(i) << 32 | u64::from(j))))
@@ -143,7 +144,7 @@ impl Pairs {
         self.refused = None;
     }
 
-    /// Adds one pair, in either order of its members, if the filter wants it. Beyond the limit it is not stored.
+    /// Adds one pair, in either order of its members, if the filter wants it. A pair beyond the limit is not stored.
     #[inline]
     pub fn push(&mut self, a: u32, b: u32) {
         if let Some(filter) = self.filter.as_ref().filter(|filter| !filter.wants((a, b))) {
@@ -158,14 +159,16 @@ impl Pairs {
         self.len += 1;
     }
 
-    /// Whether every wanted pair is stored.
+    /// Returns whether every wanted pair is stored.
     pub(crate) fn is_complete(&self) -> bool {
         !self.over && self.refused.is_none()
     }
 
-    /// Sorts if the caller wants it, and reports what did not fit. Every [`BroadPhase`](crate::BroadPhase) ends with this.
+    /// Sorts the pairs if the caller wants that, and reports pairs that did not fit. Every
+    /// [`BroadPhase`](crate::BroadPhase) ends with this.
     ///
-    /// To sort takes 4 bytes for each pair, and 8 where pairs are few or objects many millions. Where they are refused it takes longer.
+    /// Sorting takes 4 bytes for each pair, or 8 if pairs are few or boxes many millions. Without that memory it takes
+    /// longer.
     ///
     /// # Errors
     /// [`Error::TooManyPairs`] and [`Error::OutOfMemory`].
@@ -173,7 +176,7 @@ impl Pairs {
         self.finish_on(&Alone)
     }
 
-    /// As [`finish`](Self::finish), on several threads where it pays.
+    /// Does the same as [`finish`](Self::finish), on several threads if that pays.
     pub(crate) fn finish_on(&mut self, threads: &impl Parallel) -> Result<(), Error> {
         if let Some(elements) = self.refused {
             return Err(Error::OutOfMemory { what: "pairs", elements });
@@ -187,7 +190,7 @@ impl Pairs {
         Ok(())
     }
 
-    /// Makes room for `pairs` in all, so that frames up to that size allocate nothing.
+    /// Makes room for `pairs` pairs in all, so that frames up to that size allocate nothing.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -225,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn canonical_order_sorts_and_fingerprints_ignore_order() {
+    fn fingerprint_ignores_the_order() {
         let any = filled(PairOrder::Any, &[(7, 3), (1, 2), (0, 9)]);
         let canonical = filled(PairOrder::Canonical, &[(0, 9), (3, 7), (2, 1)]);
         assert_eq!(canonical.as_slice(), [(0, 9), (1, 2), (3, 7)]);
@@ -234,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_bounds_memory_and_more_pairs_are_an_error() {
+    fn limit_bounds_memory() {
         let mut list = Pairs::new();
         list.set_limit(Some(10));
         (0..1000).for_each(|j| list.push(0, j + 1));

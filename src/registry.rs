@@ -2,47 +2,47 @@
 
 use crate::algorithm::{AlgorithmId, Backend, MOST_THREADS, ParseIdError};
 use crate::broad_phase::BroadPhase;
-use crate::cpu::{self, Create, Method, Simd, SimdLevel, Threads};
+use crate::cpu::{self, Create, Made, Method, Simd, SimdLevel, Threads};
 use crate::entry::Entry;
 use crate::error::{Error, Unavailable};
 use std::fmt;
 use std::sync::Arc;
 
-/// Makes an instance of an algorithm.
-type Factory = Box<dyn Fn() -> Result<Box<dyn BroadPhase>, Error> + Send + Sync>;
-/// Makes an instance of an algorithm that runs on any of some numbers of threads, ascending.
-type FamilyFactory = Arc<dyn Fn(&[u32]) -> Result<Box<dyn BroadPhase>, Error> + Send + Sync>;
+/// Makes an instance of a user's algorithm.
+type Factory = Box<dyn Fn() -> Made + Send + Sync>;
+/// Makes an instance of a user's algorithm for these numbers of threads, ascending.
+type FamilyFactory = Arc<dyn Fn(&[u32]) -> Made + Send + Sync>;
 
-/// All algorithms that are known, each with the reason when it can't run here.
+/// All known algorithms, each with the reason if it can't run here.
 ///
-/// Starts with ours and is open: what a user adds is swept, modelled and chosen like the rest.
+/// A registry starts with the built-in algorithms. Those that a user adds are swept, modelled and chosen like the rest.
 pub struct Registry {
     entries: Vec<Entry>,
     makers: Vec<Maker>,
     threads: Threads,
-    /// The most threads that an algorithm of ours may have.
+    /// The most threads of a built-in algorithm.
     cores: u32,
     simd: SimdLevel,
     #[cfg(feature = "gpu")]
     gpus: crate::gpu::Gpus,
 }
 
-/// What makes the algorithm of an entry.
+/// Makes the algorithm of an entry.
 enum Maker {
-    Ours,
+    BuiltIn,
     One(Factory),
     Family(FamilyFactory),
 }
 
 impl Registry {
-    /// Our algorithms on 1, 2, 4, ... and all usable cores of this machine.
+    /// Makes a registry of the built-in algorithms on 1, 2, 4, ... and all usable cores of this machine.
     #[must_use]
     pub fn new() -> Self {
         Self::with_cores(usable_cores())
     }
 
-    /// Our algorithms on 1, 2, 4, ... and `cores` threads. They can be had on any number up to `cores`, which may be more than the machine
-    /// has: that is for tests.
+    /// Makes a registry of the built-in algorithms on 1, 2, 4, ... and `cores` threads. Any number up to `cores` can be
+    /// [created](Self::create). `cores` may exceed the cores of this machine, for tests.
     #[must_use]
     pub fn with_cores(cores: u32) -> Self {
         let mut registry = Self {
@@ -58,13 +58,13 @@ impl Registry {
             for threads in thread_counts(cores) {
                 let unavailable = registry.unavailable(threads);
                 let entry = Entry::new(AlgorithmId::cpu(method.name, threads), method.revision);
-                registry.set(Entry { unavailable, ..entry }, Maker::Ours);
+                registry.set(Entry { unavailable, ..entry }, Maker::BuiltIn);
             }
         }
         registry
     }
 
-    /// Adds an algorithm of the user's, or replaces the one with the same id.
+    /// Adds a user's algorithm, or replaces the one with the same id.
     pub fn add(
         &mut self,
         id: AlgorithmId,
@@ -74,14 +74,14 @@ impl Registry {
         self.set(Entry::new(id, revision), Maker::One(Box::new(factory)));
     }
 
-    /// Adds an [incremental](crate::Incremental) algorithm of the user's that runs on any of these numbers of threads of the CPU and
-    /// takes along what it keeps from one to the next, or replaces those with the same ids.
+    /// Adds a user's [incremental](BroadPhase::is_incremental) algorithm that runs on any of these numbers of CPU
+    /// threads and keeps its state when the number changes. Replaces algorithms with the same ids.
     ///
-    /// `factory` gets the numbers of threads that are wanted, ascending; what it makes takes each of them in
-    /// [`Incremental::set_threads`](crate::Incremental::set_threads), and begins with the least.
+    /// `factory` gets the wanted numbers of threads, ascending. Its instance must accept each of them in
+    /// [`BroadPhase::set_threads`], and begin with the least.
     ///
     /// # Errors
-    /// As [`AlgorithmId::new`]; nothing was added then.
+    /// As [`AlgorithmId::new`]; nothing is added then.
     pub fn add_family(
         &mut self,
         method: &str,
@@ -95,7 +95,7 @@ impl Registry {
         Ok(())
     }
 
-    /// Puts an entry in the place of the one with the same id, or behind all.
+    /// Replaces the entry with the same id, or appends it.
     fn set(&mut self, entry: Entry, maker: Maker) {
         match self.position(&entry.id) {
             Some(at) => (self.entries[at], self.makers[at]) = (entry, maker),
@@ -110,55 +110,58 @@ impl Registry {
         self.entries.iter().position(|e| e.id == *id)
     }
 
-    /// Adds our algorithms on these GPUs: on each of them, and on the first two, three and so on together. They take the place of
-    /// GPUs that were added before.
-    ///
-    /// Nothing is opened before an algorithm is created.
+    /// Returns the maker of an algorithm; `None` also if it is built in.
+    fn users_maker(&self, id: &AlgorithmId) -> Option<&Maker> {
+        self.position(id).map(|at| &self.makers[at]).filter(|maker| !matches!(maker, Maker::BuiltIn))
+    }
+
+    /// Adds the built-in algorithms on these GPUs: on each of them, and on the first two, three and so on together.
+    /// They replace the GPUs of an earlier call. No GPU is opened before an algorithm is created.
     #[cfg(feature = "gpu")]
     pub fn add_gpus(&mut self, gpus: &crate::gpu::Gpus) {
         self.gpus = gpus.clone();
-        // GPUs that were added before and are not among these go; what the user added stays.
+        let before = std::mem::take(&mut self.entries).into_iter().zip(std::mem::take(&mut self.makers));
         let stays =
-            |k: usize| !matches!((&self.makers[k], self.entries[k].id.backend()), (Maker::Ours, Backend::Gpu(_)));
-        let stays: Vec<bool> = (0..self.entries.len()).map(stays).collect();
-        let (mut entry, mut maker) = (stays.iter(), stays.iter());
-        self.entries.retain(|_| entry.next() == Some(&true));
-        self.makers.retain(|_| maker.next() == Some(&true));
+            |(entry, maker): &(Entry, Maker)| !matches!((maker, entry.id.backend()), (Maker::BuiltIn, Backend::Gpu(_)));
+        (self.entries, self.makers) = before.filter(stays).unzip();
         for entry in crate::gpu::algorithms(gpus.identities()) {
             if self.position(&entry.id).is_none() {
-                self.set(entry, Maker::Ours);
+                self.set(entry, Maker::BuiltIn);
             }
         }
     }
 
-    /// Makes our algorithms use no higher SIMD level than this from now on.
+    /// Limits the SIMD level of the built-in algorithms that are created from now on.
     pub fn limit_simd(&mut self, level: SimdLevel) {
         self.simd = self.simd.min(level);
     }
 
-    /// Binds each thread that helps the calling one, in the pools that are made from now on, to a CPU of its own: one for each physical
-    /// core before any has two, on Linux, beginning at another core in each process and with other CPUs for each pool of a process where
-    /// there are enough. The calling thread is not bound, because what it starts would be bound with it; on Linux a helper moves to a free CPU
-    /// when it finds the caller on its own core. Where a cgroup limits the time on the CPUs no thread is bound: the quota is for any of
-    /// them, and a bound thread could not move away from those that other containers use.
+    /// Pins each helper thread of pools made from now on to its own CPU: one to each physical core before any has two.
+    /// Each process and each pool begins at another core.
     ///
-    /// For a program that has the machine to itself. Some schedulers, those of virtual machines above all, wake two threads of a pool on one
-    /// core and leave the other idle for milliseconds: on the machine of the first reports nothing under 3 ms gained from a second thread. The
-    /// command measures and runs with pinned threads. It is off unless asked for, `Adaptive::for_this_machine` included, because a pinned
-    /// thread can't move away from a core that another thread of the program keeps busy.
+    /// The calling thread is not pinned, because threads that it starts would inherit that. On Linux a helper moves to
+    /// a free CPU when it finds the caller on its own core. Under the CPU quota of a cgroup no thread is pinned: the
+    /// quota is for any CPU, and a pinned thread could not leave those that other containers use.
+    ///
+    /// Use this in a program that has the machine to itself. Some schedulers, above all those of virtual machines, wake
+    /// two threads of a pool on one core and leave another idle for milliseconds. The command measures and runs with
+    /// pinned threads. It is off by default, also in `Adaptive::for_this_machine`, because a pinned thread can't leave
+    /// a core that another thread of the program keeps busy.
     pub fn pin_threads(&mut self) {
         self.threads.pinned = true;
     }
 
-    /// Makes the threads of a program's own pool the helpers of our algorithms on several cores that are made from now on, in
-    /// place of pools of ours. Algorithms on GPUs keep threads of their own, which wait for drivers.
+    /// Makes the threads of a program's own pool the helpers of built-in algorithms that are created from now on, in
+    /// place of own pools. Algorithms on GPUs keep their own threads, which wait for drivers.
     ///
-    /// An algorithm on K threads has the calling thread and K - 1 of the pool, so the most is one more than the pool has; beyond that
-    /// it is [unavailable](Entry::unavailable). Called from within the pool (`install`, `scope`, a job), a frame takes no more
-    /// threads than the pool has. The pool's threads are invited and not waited for: those that are free help, the caller does what is left,
-    /// and a frame beside a pool that is busy with other jobs takes as long as on one thread. A caller that is a thread of a pool runs none of
-    /// its other jobs meanwhile, so it may hold a lock that they want. [Pinning](Self::pin_threads) does not apply: where the pool's threads run is the
-    /// program's business. The pool is of [the version of rayon](crate::rayon1) that this library exports.
+    /// An algorithm on K threads uses the calling thread and K - 1 of the pool, so the most is one more than the pool
+    /// has. A larger number is [unavailable](Entry::unavailable). Called from within the pool (`install`, `scope`, a
+    /// job), a frame uses at most the threads of the pool.
+    ///
+    /// Threads of the pool are invited and not awaited: free ones help, and the caller does the rest. Beside a busy
+    /// pool a frame takes as long as on one thread. A caller in a pool runs no other job meanwhile, so it may hold a
+    /// lock that such jobs want. [Pinning](Self::pin_threads) does not apply. The pool is of [the version of
+    /// rayon](crate::rayon1) that this library exports.
     ///
     /// ```
     /// use sapwise::{Registry, rayon1 as rayon};
@@ -181,52 +184,51 @@ impl Registry {
             let id = AlgorithmId::cpu(method.name, most);
             if let Some(at) = self.entries.iter().position(wider).filter(|_| self.position(&id).is_none()) {
                 self.entries.insert(at, Entry::new(id, method.revision));
-                self.makers.insert(at, Maker::Ours);
+                self.makers.insert(at, Maker::BuiltIn);
             }
         }
         for (entry, maker) in self.entries.iter_mut().zip(&self.makers) {
-            if let (&Backend::Cpu(threads), Maker::Ours) = (entry.id.backend(), maker) {
+            if let (&Backend::Cpu(threads), Maker::BuiltIn) = (entry.id.backend(), maker) {
                 entry.unavailable = unavailable(&self.threads, self.cores, threads);
             }
         }
     }
 
-    /// Why an algorithm of ours can't have `threads` threads, if it can't.
     fn unavailable(&self, threads: u32) -> Option<Unavailable> {
         unavailable(&self.threads, self.cores, threads)
     }
 
-    /// Every algorithm, ours first.
+    /// Returns every algorithm, the built-in ones first.
     #[must_use]
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
-    /// The algorithms that can run here.
+    /// Returns the algorithms that can run here.
     #[must_use]
     pub fn available(&self) -> Vec<Entry> {
         self.entries.iter().filter(|e| e.unavailable.is_none()).cloned().collect()
     }
 
-    /// The SIMD level that algorithms use.
+    /// Returns the SIMD level of the built-in algorithms.
     #[cfg(feature = "this-machine")]
     pub(crate) fn simd(&self) -> SimdLevel {
         self.simd
     }
 
-    /// Which threads help the calling one, in a word.
+    /// Returns the kind of helper threads, in a word.
     #[cfg(feature = "this-machine")]
     pub(crate) fn helpers(&self) -> &'static str {
         self.threads.kind()
     }
 
-    /// The GPUs that were added.
+    /// Returns the GPUs of [`add_gpus`](Self::add_gpus).
     #[cfg(all(feature = "measure-gpu", feature = "this-machine"))]
     pub(crate) fn gpus(&self) -> &crate::gpu::Gpus {
         &self.gpus
     }
 
-    /// What the GPUs that were added say of themselves.
+    /// Returns the identities of these GPUs.
     #[cfg(feature = "this-machine")]
     pub(crate) fn gpu_identities(&self) -> Vec<crate::GpuIdentity> {
         #[cfg(feature = "gpu")]
@@ -235,7 +237,7 @@ impl Registry {
         Vec::new()
     }
 
-    /// Why a cost of `revision` of an algorithm says nothing here, if it doesn't.
+    /// Returns why a cost for this revision of an algorithm does not apply here, or `None` if it does.
     pub(crate) fn mismatch(&self, id: &AlgorithmId, revision: u32) -> Option<Error> {
         let unavailable = |reason| Some(Error::Unavailable { algorithm: id.clone(), reason });
         let class = id.backend().class();
@@ -252,27 +254,25 @@ impl Registry {
         }
     }
 
-    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads up to the most that is listed, and on any
-    /// of the GPUs that were added.
+    /// Makes an instance of an algorithm: a listed one, a built-in one on any number of CPU threads up to the most that
+    /// is listed, or one on any of the added GPUs.
     ///
     /// # Errors
-    /// [`Error::UnknownAlgorithm`] and [`Error::Unavailable`]: a file from a larger machine names threads that this one has no cores for.
+    /// [`Error::UnknownAlgorithm`]. [`Error::Unavailable`], for example if a file from a larger machine names more
+    /// threads than this one has cores.
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
-        match self.position(id).map(|at| &self.makers[at]) {
-            Some(Maker::One(factory)) => return factory(),
-            Some(Maker::Family(factory)) => return factory(&[id.threads()]),
-            Some(Maker::Ours) | None => {}
-        }
-        match (ours(id), id.backend()) {
-            (Some(method), &Backend::Cpu(threads)) => match self.unavailable(threads) {
-                None => match method.create {
-                    Create::OneWidth(create) => create(threads, &self.threads, Simd::at_most(self.simd)),
-                    Create::AnyWidth(create) => create(&[threads], &self.threads, Simd::at_most(self.simd)),
-                },
-                Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
+        match (self.users_maker(id), built_in(id), id.backend()) {
+            (Some(Maker::One(factory)), ..) => factory(),
+            (Some(Maker::Family(factory)), ..) => factory(&[id.threads()]),
+            (_, Some(method), &Backend::Cpu(threads)) => match (self.unavailable(threads), method.create) {
+                (Some(reason), _) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
+                (None, Create::OneWidth(create)) => create(threads, &self.threads, Simd::at_most(self.simd)),
+                (None, Create::AnyWidth(create)) => create(&[threads], &self.threads, Simd::at_most(self.simd)),
             },
             #[cfg(feature = "gpu")]
-            (_, Backend::Gpu(_)) if crate::gpu::has_method(id.method()) => crate::gpu::OnGpus::create(id, &self.gpus),
+            (_, _, Backend::Gpu(_)) if crate::gpu::has_method(id.method()) => {
+                crate::gpu::OnGpus::create(id, &self.gpus)
+            }
             _ => {
                 let known: Vec<String> = self.entries.iter().map(|e| e.id.to_string()).collect();
                 Err(Error::UnknownAlgorithm { text: id.to_string(), hint: format!("known here: {}", known.join(", ")) })
@@ -280,9 +280,9 @@ impl Registry {
         }
     }
 
-    /// One instance for all of `ids`, which takes along what it keeps from one number of threads to the next by
-    /// [`Incremental::set_threads`](crate::Incremental::set_threads). `None` where they are not one incremental method on several
-    /// numbers of threads, ours or [added as a family](Self::add_family); then each is [created](Self::create) by itself.
+    /// Makes one instance for all of `ids`, which keeps its state when [`BroadPhase::set_threads`] changes the number
+    /// of threads. Returns `None`, so that each must be [created](Self::create) by itself, unless they are one
+    /// incremental method on several numbers of threads: a built-in one, or one [added as a family](Self::add_family).
     ///
     /// # Errors
     /// As [`create`](Self::create).
@@ -296,50 +296,51 @@ impl Registry {
         threads.sort_unstable();
         threads.dedup();
         match family {
-            Family::Ours(create) => create(&threads, &self.threads, Simd::at_most(self.simd)),
+            Family::BuiltIn(create) => create(&threads, &self.threads, Simd::at_most(self.simd)),
             Family::Users(factory) => factory(&threads),
         }
         .map(Some)
     }
 
-    /// The family of an algorithm that can run here, if it has one.
+    /// Returns the family of an algorithm that can run here, if it has one.
     fn family(&self, id: &AlgorithmId) -> Option<Family<'_>> {
         let &Backend::Cpu(threads) = id.backend() else { return None };
-        match self.position(id).map(|at| &self.makers[at]) {
-            Some(Maker::One(_)) => None,
+        match self.users_maker(id) {
             Some(Maker::Family(factory)) => Some(Family::Users(factory)),
-            Some(Maker::Ours) | None => match ours(id)?.create {
-                Create::AnyWidth(create) if self.unavailable(threads).is_none() => Some(Family::Ours(create)),
+            Some(_) => None,
+            None => match built_in(id)?.create {
+                Create::AnyWidth(create) if self.unavailable(threads).is_none() => Some(Family::BuiltIn(create)),
                 _ => None,
             },
         }
     }
 }
 
-/// What makes one instance for several numbers of threads.
+/// Makes one instance for several numbers of threads.
 enum Family<'a> {
-    Ours(fn(&[u32], &Threads, Simd) -> cpu::Made),
+    BuiltIn(fn(&[u32], &Threads, Simd) -> Made),
     Users(&'a FamilyFactory),
 }
 
 impl Family<'_> {
-    /// Whether two algorithms of one method are of the same family.
+    /// Returns whether two algorithms of one method belong to the same family.
     fn is(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Ours(_), Self::Ours(_)) => true,
+            (Self::BuiltIn(_), Self::BuiltIn(_)) => true,
             (Self::Users(a), Self::Users(b)) => Arc::ptr_eq(a, b),
             _ => false,
         }
     }
 }
 
-/// Why an algorithm of ours can't have that many of `pool` in a registry of `cores` cores, if it can't.
+/// Returns why a built-in algorithm can't have `threads` threads of `pool` in a registry of `cores` cores, or `None` if
+/// it can.
 fn unavailable(pool: &Threads, cores: u32, threads: u32) -> Option<Unavailable> {
     pool.unavailable(threads).or_else(|| (threads > cores).then_some(Unavailable::TooFewCores { threads, most: cores }))
 }
 
-/// The method of ours of this name on the CPU.
-fn ours(id: &AlgorithmId) -> Option<&'static Method> {
+/// Returns the built-in CPU method of an algorithm.
+fn built_in(id: &AlgorithmId) -> Option<&'static Method> {
     cpu::METHODS.iter().find(|m| m.name == id.method())
 }
 
@@ -355,13 +356,14 @@ impl fmt::Debug for Registry {
     }
 }
 
-/// Threads that may run at once on this machine: affinity and cgroup quota respected; 1 when that can't be told.
+/// Returns the number of threads that may run at once on this machine, with affinity and cgroup quota respected; 1 if
+/// the system does not tell.
 #[must_use]
 pub fn usable_cores() -> u32 {
     std::thread::available_parallelism().map_or(1, |n| u32::try_from(n.get()).unwrap_or(u32::MAX))
 }
 
-/// 1, 2, 4, ... below `cores`, then `cores`.
+/// Returns 1, 2, 4, ... below `cores`, then `cores`.
 fn thread_counts(cores: u32) -> impl Iterator<Item = u32> {
     let cores = cores.clamp(1, MOST_THREADS);
     std::iter::successors(Some(1_u32), |k| k.checked_mul(2)).take_while(move |&k| k < cores).chain([cores])

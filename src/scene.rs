@@ -1,11 +1,12 @@
 //! Scenes for the unit tests.
 //!
-//! The package of the scenes rests on this library as others use it, whose boxes are another type than those of the library under test.
+//! `sapwise-scenes` depends on the normal build of this library, whose `Aabb` is another type than that of the library
+//! under test.
 
 use crate::Aabb;
 pub(crate) use sapwise_scenes::Scenario;
 
-/// A scene whose boxes are those of the library under test.
+/// A scene with the box type of the library under test.
 pub(crate) struct Scene {
     scene: sapwise_scenes::Scene,
     boxes: Vec<Aabb>,

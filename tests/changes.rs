@@ -1,4 +1,4 @@
-//! Pairs followed from frame to frame by ids, against sets; and the whole chain from boxes to changes, bit for bit.
+//! Pairs followed from frame to frame by ids, against sets; and the chain from boxes to changes, bit for bit.
 
 mod common;
 
@@ -10,13 +10,13 @@ use sapwise::{
 };
 use std::collections::BTreeSet;
 
-/// Boxes with ids, of which some come, some go and all move.
+/// Boxes with ids. Some are added, some removed, and all move.
 struct World {
     random: Random,
     boxes: Vec<Aabb>,
     ids: Vec<u64>,
     memberships: Vec<Membership>,
-    /// How often an id was given out.
+    /// Number of ids given out.
     given: u64,
 }
 
@@ -38,7 +38,7 @@ impl World {
         }
         for _ in 0..come {
             self.given += 1;
-            // Not ascending, and never the same: the factor is odd.
+            // Not ascending, and never repeated, because the factor is odd.
             self.ids.push(self.given.wrapping_mul(0x9e37_79b9_7f4a_7c15));
             self.boxes.extend(self.random.cubes(1, [9.0; 3], 0.7));
             self.memberships.push(self.random.membership());
@@ -61,7 +61,7 @@ fn assert_changes(changes: &Changes<u64>, now: &BTreeSet<(u64, u64)>, before: &B
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Any lists of pairs, and ids that repeat, come, go and change places.
+    /// Any lists of pairs, with ids that repeat, come, go and change places.
     #[test]
     fn changes_are_the_differences_of_sets(
         frames in prop::collection::vec(
@@ -86,7 +86,7 @@ proptest! {
     }
 
     #[test]
-    fn boxes_come_and_go_and_their_pairs_are_followed(
+    fn changes_follow_added_and_removed_boxes(
         seed in 1_u64..u64::MAX,
         frames in prop::collection::vec((0_usize..60, 0_usize..40), 1..12),
     ) {
@@ -107,7 +107,7 @@ proptest! {
     }
 
     #[test]
-    fn a_list_of_ids_that_is_too_short_is_an_error_and_changes_nothing(short in 0_usize..50, seed in 1_u64..u64::MAX) {
+    fn missing_ids_are_an_error_and_change_nothing(short in 0_usize..50, seed in 1_u64..u64::MAX) {
         let mut world = World::new(seed);
         world.frame(50, 0);
         let mut pairs = Pairs::new();
@@ -126,7 +126,7 @@ proptest! {
 }
 
 #[test]
-fn every_algorithm_in_any_order_gives_the_same_changes() {
+fn changes_are_the_same_for_every_algorithm() {
     let mut algorithms = every_algorithm();
     let mut followed: Vec<Changes<u64>> = algorithms.iter().map(|_| Changes::new()).collect();
     let mut world = World::new(0xc4a9);
@@ -145,7 +145,7 @@ fn every_algorithm_in_any_order_gives_the_same_changes() {
     }
 }
 
-/// All that an engine gets of a frame.
+/// The output of a frame.
 #[derive(Debug, Default, PartialEq)]
 struct Output {
     pairs: Vec<Pair>,
@@ -154,7 +154,7 @@ struct Output {
     all: Vec<(u64, u64)>,
 }
 
-/// Every frame of one world, and the algorithms that ran, with `steps` as tuning.
+/// Returns the output of every frame of one world, and the algorithms that ran, with `steps` as tuning.
 fn run(order: PairOrder, steps: &[(u32, &str)]) -> (Vec<Output>, BTreeSet<AlgorithmId>) {
     let step = |&(from_objects, id): &(u32, &str)| Step { from_objects, algorithm: id.parse().unwrap() };
     let tuning = Tuning::from_steps(steps.iter().map(step).collect()).unwrap();
@@ -165,7 +165,7 @@ fn run(order: PairOrder, steps: &[(u32, &str)]) -> (Vec<Output>, BTreeSet<Algori
     let mut changes = Changes::new();
     let (mut outputs, mut ran) = (Vec::new(), BTreeSet::new());
     for frame in 0..120 {
-        // Up to some 900 boxes and down again, through every border.
+        // Up to about 900 boxes and down again, through every step.
         if frame < 60 {
             world.frame(20, 5);
         } else {
@@ -186,7 +186,7 @@ fn run(order: PairOrder, steps: &[(u32, &str)]) -> (Vec<Output>, BTreeSet<Algori
 }
 
 #[test]
-fn runs_with_different_algorithms_and_switches_are_the_same_bit_for_bit() {
+fn output_is_the_same_whatever_ran() {
     let parallel = if cfg!(feature = "parallel") { "grid-sap@cpu2" } else { "grid-sap@cpu1" };
     let courses: [&[(u32, &str)]; 3] = [
         &[(0, "brute@cpu1"), (150, "sap@cpu1")],
@@ -203,7 +203,7 @@ fn runs_with_different_algorithms_and_switches_are_the_same_bit_for_bit() {
             assert!(a == b, "{course:?}, frame {frame}");
         }
     }
-    // In any order the pairs may stand elsewhere; what is said in ids may not.
+    // In any order the pairs may stand elsewhere, but the lists of ids may not.
     for (frame, (a, b)) in first.0.iter().zip(run(PairOrder::Any, courses[2]).0).enumerate() {
         assert!((&a.begun, &a.ended, &a.all) == (&b.begun, &b.ended, &b.all), "in any order, frame {frame}");
     }

@@ -35,7 +35,7 @@ fn every_scenario_on_several_frames() {
             let mut scene = scenario.start(objects, 42);
             for frame in 0..3 {
                 assert_all_agree(&format!("{scenario} frame {frame}"), scene.boxes(), &mut algorithms);
-                // Fragmentation begins with ten boxes: its frames are taken far apart.
+                // Fragmentation begins with ten boxes and grows slowly.
                 (0..if scenario == Scenario::Fragmentation { 90 } else { 2 }).for_each(|_| scene.advance());
             }
         }
@@ -43,8 +43,8 @@ fn every_scenario_on_several_frames() {
 }
 
 #[test]
-fn a_search_ends_when_there_are_more_pairs_than_wanted() {
-    // 5 * 10^11 pairs: whoever counts them all does not return within this test.
+fn search_ends_soon_after_the_limit() {
+    // 5 * 10^11 pairs: counting all would take minutes.
     let boxes = vec![Aabb::cube([1.0; 3], 0.0); 1 << 20];
     let fastest = SimdLevel::detected().to_string();
     for (id, mut algorithm) in every_algorithm().into_iter().filter(|(id, _)| id.contains(&fastest)) {
@@ -102,7 +102,7 @@ fn clusters_and_outliers() {
     assert_all_agree("clusters", &boxes, &mut algorithms);
 }
 
-/// Below these numbers of boxes not all of seven threads have work.
+/// Fewer boxes do not keep seven threads busy.
 #[test]
 fn scenes_for_seven_threads() {
     let mut algorithms = every_algorithm();

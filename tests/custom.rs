@@ -1,4 +1,4 @@
-//! An algorithm of a user's: chosen by its cost, and learned where its cost was wrong.
+//! A user's algorithm: chosen by its cost, and corrected if the cost was wrong.
 
 mod common;
 #[path = "../examples/custom.rs"]
@@ -24,7 +24,7 @@ fn run(adaptive: &mut Adaptive, boxes: &[Aabb]) -> (String, Reason) {
 }
 
 #[test]
-fn it_runs_where_the_tuning_say_that_it_is_cheapest() {
+fn users_algorithm_runs_when_cheapest() {
     let registry = registry("brute@cpu1");
     let costs = vec![
         cost(&registry, "brute@cpu1", &[(Term::Objects, 60.0)]),
@@ -36,7 +36,7 @@ fn it_runs_where_the_tuning_say_that_it_is_cheapest() {
     for phase in 0..6 {
         let rests = phase % 2 == 1;
         let expected = if rests { ID } else { "brute@cpu1" };
-        // A change is seen when the boxes are looked at again; how many frames that takes depends on the clock.
+        // The clock decides when `Adaptive` samples the boxes again.
         let seen = (0..100_000).any(|_| {
             if !rests {
                 scene.advance();
@@ -47,8 +47,7 @@ fn it_runs_where_the_tuning_say_that_it_is_cheapest() {
     }
 }
 
-/// The double loop of brute force, after a sleep: two milliseconds are so much more than 40 boxes take that no noise of any machine
-/// turns the order round.
+/// Brute force after a sleep. Two milliseconds are far more than 40 boxes take, so that noise can't reverse the order.
 struct Sleeper(Box<dyn BroadPhase>, Duration);
 
 impl BroadPhase for Sleeper {
@@ -58,7 +57,7 @@ impl BroadPhase for Sleeper {
     }
 }
 
-/// Beside ours `slow@cpu1`, which sleeps, and `quick@cpu1`, which does not.
+/// Returns a registry with `slow@cpu1`, which sleeps, and `quick@cpu1`, which does not.
 fn with_sleepers() -> Registry {
     let mut registry = Registry::with_cores(1);
     for (id, ms) in [("slow@cpu1", 2), ("quick@cpu1", 0)] {
@@ -78,17 +77,17 @@ fn calls(registry: &Registry, costs: &[(&str, f64)]) -> Adaptive {
 }
 
 #[test]
-fn one_whose_cost_was_far_too_low_is_left() {
+fn algorithm_with_a_cost_far_too_low_is_left() {
     let registry = with_sleepers();
     let mut adaptive = calls(&registry, &[("quick@cpu1", 50_000.0), ("slow@cpu1", 10_000.0)]);
     let boxes = resting(40);
     let ran: Vec<String> = (0..300).map(|_| run(&mut adaptive, &boxes).0).collect();
     assert_eq!(ran[0], "slow@cpu1");
     let slow = |frames: &[String]| frames.iter().filter(|id| *id == "slow@cpu1").count();
-    // Whether it is tried once more depends on how long the others take beside what else runs here.
+    // Whether it is tried once more depends on what else runs on this machine.
     let (all, late) = (slow(&ran), slow(&ran[100..]));
     assert!(all < 100 && late <= 4, "{all} of 300 frames by the slow one, {late} of the last 200");
-    // What was learned is tuning like any others.
+    // The learned tuning works like any other.
     let learned = adaptive.learned();
     let mut again = Adaptive::new(learned, &registry).unwrap();
     again.set_learning(false);
@@ -96,12 +95,12 @@ fn one_whose_cost_was_far_too_low_is_left() {
 }
 
 #[test]
-fn one_whose_cost_was_too_high_is_tried_and_stays() {
+fn algorithm_with_a_cost_too_high_is_tried_and_stays() {
     let mut adaptive = calls(&with_sleepers(), &[("slow@cpu1", 2_000_000.0), ("quick@cpu1", 2_010_000.0)]);
     let boxes = resting(40);
     assert_eq!(run(&mut adaptive, &boxes), ("slow@cpu1".to_owned(), Reason::First));
-    // Usually in the first hundred frames. Where other programs delay the sleeper, it is some time until what it costs is clear enough
-    // for another to be worth a try.
+    // Usually in the first hundred frames. Later if other programs delay the sleeper, so that its cost is unclear for
+    // longer.
     let tried = (0..3000).position(|_| run(&mut adaptive, &boxes).0 == "quick@cpu1");
     assert!(tried.is_some(), "in 3000 frames by the slow one the quick one was not tried");
     let quick = (0..300).filter(|_| run(&mut adaptive, &boxes).0 == "quick@cpu1").count();
@@ -109,7 +108,7 @@ fn one_whose_cost_was_too_high_is_tried_and_stays() {
 }
 
 #[test]
-fn an_invalid_box_is_named_and_the_next_frame_is_right() {
+fn frame_after_an_invalid_box_is_right() {
     let mut adaptive = Adaptive::only(ID.parse().unwrap(), &registry("brute@cpu1")).unwrap();
     let boxes = resting(100);
     let mut wrong = boxes.clone();

@@ -1,4 +1,4 @@
-//! A filter on the pairs: every algorithm against the double loop that applies its definition.
+//! Filters: every algorithm against the double loop with the definition of the filter.
 
 mod common;
 
@@ -6,13 +6,13 @@ use common::{Random, every_algorithm, naive, naive_filtered};
 use sapwise::{Aabb, BroadPhase, Error, Filter, Membership, PairOrder, Pairs, Registry};
 use sapwise_scenes::Scenario;
 
-/// That many random memberships.
+/// Returns random memberships.
 fn memberships(count: usize, random: &mut Random) -> Vec<Membership> {
     (0..count).map(|_| random.membership()).collect()
 }
 
 #[test]
-fn every_algorithm_gives_the_wanted_pairs_of_every_scenario() {
+fn wanted_pairs_of_every_scenario() {
     let mut algorithms = every_algorithm();
     let mut random = Random(0xf117);
     let mut canonical = Pairs::with_order(PairOrder::Canonical);
@@ -22,7 +22,7 @@ fn every_algorithm_gives_the_wanted_pairs_of_every_scenario() {
             let mut scene = scenario.start(objects, 42);
             for frame in 0..2 {
                 let boxes = scene.boxes();
-                // The last boxes have none.
+                // The last boxes have no membership.
                 let memberships = memberships(boxes.len() - boxes.len() / 50, &mut random);
                 let expected = naive_filtered(boxes, &memberships);
                 let is_fixed = |id: u32| memberships.get(id as usize).is_some_and(|m| m.fixed);
@@ -51,7 +51,7 @@ fn every_algorithm_gives_the_wanted_pairs_of_every_scenario() {
 }
 
 #[test]
-fn the_ground_of_a_static_world_is_in_no_pair_with_itself() {
+fn fixed_ground_has_no_pair_with_itself() {
     let mut scene = Scenario::StaticWorld.start(3000, 42);
     let fixed = |k| Membership { fixed: scene.is_fixed(k), ..Membership::ALL };
     let memberships: Vec<Membership> = (0..3000).map(fixed).collect();
@@ -69,7 +69,7 @@ fn the_ground_of_a_static_world_is_in_no_pair_with_itself() {
     }
 }
 
-/// Long enough for pairs to be kept from frame to frame: those that are kept must not have passed a filter that has changed.
+/// Long enough for pairs to be kept from frame to frame: an old filter must not decide which pairs are kept.
 #[test]
 fn memberships_change_while_pairs_are_kept() {
     let mut algorithms = every_algorithm();
@@ -108,16 +108,16 @@ fn memberships_change_while_pairs_are_kept() {
     }
 }
 
-/// Nothing moves, so that pairs are kept as they are: those of two boxes that were fixed must be found once one of them may move.
+/// Nothing moves, so that pairs are kept: those of two fixed boxes must be found once one of them may move.
 #[test]
-fn boxes_are_set_free_while_pairs_are_kept() {
+fn fixed_boxes_are_freed_while_pairs_are_kept() {
     let boxes = Random(5).cubes(1000, [10.0; 3], 0.6);
     let mut pairs = Pairs::with_order(PairOrder::Canonical);
     let all = |fixed: &dyn Fn(usize) -> bool| -> Vec<Membership> {
         (0..1000).map(|k| Membership { fixed: fixed(k), ..Membership::ALL }).collect()
     };
     let mut algorithms = every_algorithm();
-    // Each for some frames: a ground, one of its boxes free, all free, and fixed again.
+    // Each for some frames: a ground, one of its boxes free, all free, all fixed, all but one fixed.
     for (stage, memberships) in
         [all(&|k| k % 10 != 0), all(&|k| k % 10 != 0 && k != 77), Vec::new(), all(&|_| true), all(&|k| k != 500)]
             .into_iter()
@@ -135,7 +135,7 @@ fn boxes_are_set_free_while_pairs_are_kept() {
 }
 
 #[test]
-fn a_scene_of_fixed_boxes_has_no_pair_however_small_the_limit() {
+fn fixed_boxes_have_no_pair_under_limit_0() {
     let boxes = [Aabb::cube([3.0; 3], 1.0); 2000];
     let mut pairs = Pairs::new();
     pairs.set_filter(Some(Filter::new(vec![Membership { fixed: true, ..Membership::ALL }; 2000])));
@@ -148,8 +148,8 @@ fn a_scene_of_fixed_boxes_has_no_pair_however_small_the_limit() {
 }
 
 #[test]
-fn the_limit_counts_the_wanted_pairs_only() {
-    // All overlap; of 1200 boxes the 100 of the second group collide with the 1100 of the first, and with nothing else.
+fn limit_counts_wanted_pairs_only() {
+    // All overlap. Of 1200 boxes the 100 of the second group collide with the 1100 of the first, and with nothing else.
     let boxes = [Aabb::cube([3.0; 3], 1.0); 1200];
     let of = |k: usize| if k % 12 == 5 { (2, 1) } else { (1, 2) };
     let membership = |k: usize| Membership { groups: of(k).0, mask: of(k).1, fixed: false };
@@ -178,7 +178,7 @@ impl BroadPhase for Everything {
 }
 
 #[test]
-fn an_algorithm_of_the_users_is_filtered_like_ours() {
+fn users_algorithm_is_filtered() {
     let mut registry = Registry::with_cores(1);
     registry.add("everything@cpu1".parse().unwrap(), 1, || Ok(Box::new(Everything)));
     let mut algorithm = registry.create(&"everything@cpu1".parse().unwrap()).unwrap();
@@ -191,7 +191,7 @@ fn an_algorithm_of_the_users_is_filtered_like_ours() {
 }
 
 #[test]
-fn a_clone_has_a_filter_of_its_own() {
+fn clone_has_its_own_filter() {
     let mut pairs = Pairs::new();
     pairs.set_filter(Some(Filter::new(vec![Membership::ALL; 2])));
     let clone = pairs.clone();

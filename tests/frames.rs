@@ -1,12 +1,11 @@
-//! Courses of frames that resemble one another, for incremental algorithms: every algorithm
-//! against the naive oracle in every frame, whatever happens between two of them.
+//! Sequences of similar frames, for incremental algorithms: every algorithm against the oracle in every frame.
 
 mod common;
 
 use common::{Random, naive};
 use sapwise::{Aabb, BroadPhase, Error, PairOrder, Pairs, Registry, SimdLevel};
 
-/// Every method on one and on three threads at every SIMD level of this machine.
+/// Returns every method on one and on three threads at every SIMD level of this machine.
 fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
     let mut all = Vec::new();
     for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
@@ -25,13 +24,12 @@ fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
     all
 }
 
-/// Runs on another number of threads now and then, with all that it keeps.
+/// Changes its number of threads at random, and keeps its state.
 struct Roaming(Box<dyn BroadPhase>, Random);
 
 impl BroadPhase for Roaming {
     fn find_pairs(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
-        let incremental = self.0.as_incremental().unwrap();
-        assert!(incremental.set_threads(1 + (self.1.next() * 3.0) as u32) && !incremental.set_threads(4));
+        assert!(self.0.set_threads(1 + (self.1.next() * 3.0) as u32) && !self.0.set_threads(4));
         self.0.find_pairs(boxes, pairs)
     }
 }
@@ -57,7 +55,7 @@ fn wander(boxes: &mut [Aabb], step: f32, random: &mut Random) {
 }
 
 #[test]
-fn no_kept_pair_is_lost_on_the_way_from_many_threads_to_one() {
+fn kept_pairs_survive_a_change_from_8_threads_to_1() {
     let registry = Registry::with_cores(8);
     let ids = ["pair-cache@cpu1", "pair-cache@cpu8"].map(|id| id.parse().unwrap());
     let Ok(Some(mut pair_cache)) = registry.create_family(&ids.each_ref()) else {
@@ -66,13 +64,13 @@ fn no_kept_pair_is_lost_on_the_way_from_many_threads_to_one() {
     };
     let mut random = Random(0xdea1);
     let mut pairs = Pairs::with_order(PairOrder::Canonical);
-    // So many pairs a box as the lists of eight threads have room for and that of one has not.
+    // So many pairs that the lists of eight threads have room for them, and that of one has not.
     let mut boxes = random.cubes(400, [11.0; 3], 0.5);
     let middle = boxes[0].min;
     for frame in 0..400 {
-        assert!(pair_cache.as_incremental().unwrap().set_threads(if frame % 3 == 2 { 1 } else { 8 }));
+        assert!(pair_cache.set_threads(if frame % 3 == 2 { 1 } else { 8 }));
         for (k, b) in boxes.iter_mut().enumerate() {
-            // Towards each other until they are crowded, and a few that leave their grown box in every frame.
+            // Towards each other until they are dense, and a few leave their grown box in every frame.
             let pull = if frame < 330 { 0.006 } else { 0.0 };
             for (a, middle) in middle.into_iter().enumerate() {
                 let by = (middle - b.min[a]) * pull + if k % 40 == frame % 40 { 0.2 } else { 0.0 };
@@ -88,7 +86,7 @@ fn no_kept_pair_is_lost_on_the_way_from_many_threads_to_one() {
 }
 
 #[test]
-fn whatever_happens_between_two_frames_no_pair_is_lost_or_doubled() {
+fn events_between_frames_lose_no_pair() {
     let mut algorithms = every_algorithm();
     let mut random = Random(0x5eed);
     let mut boxes = random.cubes(600, [11.0; 3], 0.6);
@@ -98,7 +96,7 @@ fn whatever_happens_between_two_frames_no_pair_is_lost_or_doubled() {
             // Long enough between events for pairs to be kept again.
             3 => boxes.extend(random.cubes(25, [11.0; 3], 0.6)),
             5 => boxes.truncate(boxes.len() - 40),
-            // Fewer and more again: the same numbers stand for other boxes.
+            // Fewer and more again: the same positions stand for other boxes.
             6 => boxes.extend(random.cubes(30, [11.0; 3], 0.6)),
             8 => {
                 let last = boxes.len() - 1;
@@ -130,7 +128,7 @@ fn whatever_happens_between_two_frames_no_pair_is_lost_or_doubled() {
 }
 
 #[test]
-fn a_scene_far_from_the_origin_in_which_a_step_is_as_small_as_rounding() {
+fn scene_far_from_the_origin() {
     let mut algorithms = every_algorithm();
     let mut random = Random(17);
     let mut boxes = random.cubes(400, [9.0; 3], 0.6);
@@ -144,7 +142,7 @@ fn a_scene_far_from_the_origin_in_which_a_step_is_as_small_as_rounding() {
 }
 
 #[test]
-fn an_error_in_one_frame_does_no_harm_to_the_next() {
+fn frame_after_an_error_is_right() {
     let mut random = Random(23);
     for (id, mut algorithm) in every_algorithm() {
         let mut boxes = random.cubes(500, [10.0; 3], 0.6);
@@ -152,7 +150,7 @@ fn an_error_in_one_frame_does_no_harm_to_the_next() {
         for frame in 0..48 {
             wander(&mut boxes, 0.04, &mut random);
             if frame % 12 == 5 {
-                // The lowest of them is named, and most of the others have moved on by then.
+                // The error names the lowest of them.
                 let mut wrong = boxes.clone();
                 wrong[123].max[1] = f32::NAN;
                 wrong[124].min[0] = 1.0e9;
@@ -173,7 +171,7 @@ fn an_error_in_one_frame_does_no_harm_to_the_next() {
 }
 
 #[test]
-fn errors_in_several_parts_of_a_frame_are_forgotten_in_the_next() {
+fn frame_after_errors_in_several_parts_is_right() {
     let mut random = Random(31);
     for (id, mut algorithm) in every_algorithm() {
         let mut boxes = random.cubes(1500, [15.0; 3], 0.6);
@@ -194,7 +192,7 @@ fn errors_in_several_parts_of_a_frame_are_forgotten_in_the_next() {
 }
 
 #[test]
-fn boxes_that_jump_in_every_frame_while_the_others_rest() {
+fn few_boxes_jump_in_every_frame() {
     let mut algorithms = every_algorithm();
     let mut random = Random(37);
     let mut boxes = random.cubes(900, [13.0; 3], 0.6);
@@ -206,9 +204,9 @@ fn boxes_that_jump_in_every_frame_while_the_others_rest() {
     }
 }
 
-/// Too many boxes for the double loop: held against the strips, which start from scratch in each frame.
+/// Too many boxes for the double loop: `grid-sap` is the oracle.
 #[test]
-fn many_boxes_of_which_many_leave_at_once() {
+fn many_boxes_leave_at_once() {
     let registry = Registry::with_cores(3);
     let create = |id: &str| registry.create(&id.parse().unwrap());
     let mut strips = create("grid-sap@cpu1").unwrap();
@@ -220,7 +218,7 @@ fn many_boxes_of_which_many_leave_at_once() {
         for frame in 0..24 {
             wander(&mut boxes, 0.02, &mut random);
             if frame % 3 == 2 {
-                // A slab of the input: one share of it has all the work.
+                // Consecutive boxes: one task has all the work.
                 wander(&mut boxes[frame * 1000..frame * 1000 + 9000], 0.8, &mut random);
             }
             strips.find_pairs(&boxes, &mut expected).unwrap();
@@ -231,7 +229,7 @@ fn many_boxes_of_which_many_leave_at_once() {
 }
 
 #[test]
-fn boxes_that_all_overlap_are_found_though_too_many_to_keep() {
+fn too_many_pairs_to_keep_are_found() {
     let mut algorithms = every_algorithm();
     let mut random = Random(29);
     let mut boxes = random.cubes(700, [1.0; 3], 2.0);

@@ -1,4 +1,4 @@
-//! Algorithms on several cores with the threads of a program's own pool, called from outside it and from within.
+//! Algorithms on several threads of a program's own pool, called from outside the pool and from within.
 
 mod common;
 
@@ -9,7 +9,7 @@ use sapwise_scenes::Scenario;
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
-/// Fails instead of hanging. The time is no measure of anything: it is thousands of times what this takes; under ThreadSanitizer it takes a minute.
+/// Fails instead of hanging. The time is thousands of times what this takes; under ThreadSanitizer it takes a minute.
 fn ends(test: impl FnOnce() + Send + 'static) {
     let (done, end) = mpsc::channel();
     let thread = std::thread::spawn(move || {
@@ -21,7 +21,7 @@ fn ends(test: impl FnOnce() + Send + 'static) {
     thread.join().unwrap();
 }
 
-/// Occupies every thread of the pool until what it returns is dropped.
+/// Occupies every thread of the pool until the returned gates are dropped.
 fn occupied(pool: &ThreadPool) -> Vec<mpsc::Sender<()>> {
     let (came, here) = mpsc::channel();
     let occupy = |_| {
@@ -47,7 +47,7 @@ fn registry(cores: u32, pool: &Arc<ThreadPool>) -> Registry {
     registry
 }
 
-/// Every algorithm on every number of threads that the pool allows.
+/// Returns every algorithm on every number of threads that the pool allows.
 fn every_algorithm(registry: &Registry, most: u32) -> Vec<(AlgorithmId, Box<dyn BroadPhase>)> {
     let mut methods: Vec<&str> = registry.entries().iter().map(|e| e.id.method()).collect();
     methods.dedup();
@@ -55,7 +55,7 @@ fn every_algorithm(registry: &Registry, most: u32) -> Vec<(AlgorithmId, Box<dyn 
     ids.map(|id| (id.clone(), registry.create(&id).unwrap())).collect()
 }
 
-/// Scenes with enough in them for every phase to have tasks for all threads.
+/// Returns scenes with enough boxes for every phase to have tasks for all threads.
 fn scenes() -> Vec<(&'static str, Vec<Aabb>)> {
     let clustered = Scenario::Clustered.start(6000, 1).boxes().to_vec();
     vec![
@@ -67,7 +67,7 @@ fn scenes() -> Vec<(&'static str, Vec<Aabb>)> {
 }
 
 #[test]
-fn every_algorithm_on_the_programs_threads_agrees_with_the_oracle() {
+fn every_algorithm_is_right_in_a_programs_pool() {
     let scenes: Vec<_> = scenes().into_iter().map(|(name, boxes)| (name, naive(&boxes), boxes)).collect();
     for threads in [1, 2, 4] {
         let pool = pool(threads);
@@ -90,7 +90,7 @@ fn every_algorithm_on_the_programs_threads_agrees_with_the_oracle() {
     }
 }
 
-/// More frames at once than threads: each of them waits for helpers that run a frame themselves.
+/// More frames at once than threads: each waits for helpers that run a frame themselves.
 #[test]
 fn frames_in_every_thread_of_the_pool_end() {
     let pool = pool(2);
@@ -112,13 +112,13 @@ fn frames_in_every_thread_of_the_pool_end() {
     }
 }
 
-/// A worker of rayon's that holds a lock calls, while a job that wants the lock stands first in its queue: to wait by running other jobs would
-/// be to wait for oneself.
+/// A rayon worker calls while it holds a lock, and a job that wants the lock is next in its queue: to run other jobs
+/// while waiting would deadlock.
 #[test]
-fn a_worker_that_holds_a_lock_runs_no_other_job() {
+fn worker_that_holds_a_lock_runs_no_other_job() {
     ends(|| {
         let pool = pool(2);
-        // With helpers of ours and with those of the pool.
+        // With own helpers and with those of the pool.
         for registry in [Registry::with_cores(7), registry(3, &pool)] {
             let boxes = Random(7).cubes(12_000, [50.0; 3], 0.5);
             let most = registry.available().iter().map(|e| e.id.threads()).max().unwrap();
@@ -141,7 +141,7 @@ fn a_worker_that_holds_a_lock_runs_no_other_job() {
 }
 
 #[test]
-fn frames_end_without_a_pool_whose_threads_are_all_busy() {
+fn frames_end_beside_a_busy_pool() {
     ends(|| {
         let pool = pool(2);
         let registry = registry(8, &pool);
@@ -159,7 +159,7 @@ fn frames_end_without_a_pool_whose_threads_are_all_busy() {
     });
 }
 
-/// More callers than threads, on threads of their own and in the pool.
+/// More callers than threads, on their own threads and in the pool.
 #[test]
 fn many_callers_share_a_pool() {
     ends(|| {
@@ -190,7 +190,7 @@ fn many_callers_share_a_pool() {
 }
 
 #[test]
-fn more_threads_than_the_pool_has_are_unavailable_with_a_reason() {
+fn more_threads_than_the_pool_has_are_unavailable() {
     let pool = pool(4);
     let mut registry = registry(8, &pool);
     let counts = |registry: &Registry, available: bool| -> Vec<u32> {
@@ -198,7 +198,7 @@ fn more_threads_than_the_pool_has_are_unavailable_with_a_reason() {
             registry.entries().iter().filter(|e| e.id.method() == "brute" && e.unavailable.is_none() == available);
         of_brute.map(|e| e.id.threads()).collect()
     };
-    // All that there are stand in the list, as without a pool.
+    // The list has all numbers of threads, as without a pool.
     assert_eq!((counts(&registry, true), counts(&registry, false)), (vec![1, 2, 4, 5], vec![8]));
     for text in ["brute@cpu8", "pair-cache@cpu6"] {
         let Err(Error::Unavailable { reason, .. }) = registry.create(&text.parse().unwrap()) else {
@@ -210,12 +210,12 @@ fn more_threads_than_the_pool_has_are_unavailable_with_a_reason() {
     assert_eq!((counts(&registry, true), counts(&registry, false)), (vec![1, 2], vec![4, 5, 8]));
     registry.use_pool(self::pool(30));
     assert_eq!(counts(&registry, true), [1, 2, 4, 5, 8]);
-    // A pool on a machine of one core helps nobody.
+    // On a machine with one core a pool adds nothing.
     assert_eq!(counts(&self::registry(1, &pool), true), [1]);
 }
 
 #[test]
-fn the_choice_keeps_to_the_pool() {
+fn adaptive_keeps_to_the_pool() {
     let pool = pool(2);
     let registry = registry(8, &pool);
     let mut adaptive = Adaptive::new(Tuning::usual(&registry), &registry).unwrap();
@@ -224,7 +224,7 @@ fn the_choice_keeps_to_the_pool() {
     pool.install(|| adaptive.find_pairs(&boxes, &mut pairs)).unwrap();
     assert!(pairs.as_slice() == naive(&boxes));
     assert_eq!(adaptive.last_decision().unwrap().algorithm.to_string(), "pair-cache@cpu3");
-    // The pool outlives what used it.
+    // The pool outlives its users.
     drop((adaptive, registry));
     assert_eq!(pool.install(rayon::current_num_threads), 2);
 }

@@ -1,4 +1,4 @@
-//! What must hold for any boxes at all.
+//! Properties that hold for any boxes.
 
 use proptest::prelude::*;
 use sapwise::{Aabb, Adaptive, AlgorithmId, BroadPhase, Displacement, Load, PairOrder, Pairs, Registry, Step, Tuning};
@@ -27,7 +27,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn every_algorithm_finds_exactly_the_overlapping_pairs(boxes in prop::collection::vec(valid_box(), 0..600)) {
+    fn every_algorithm_finds_the_overlapping_pairs(boxes in prop::collection::vec(valid_box(), 0..600)) {
         let mut expected = Vec::new();
         for j in 0..boxes.len() {
             for i in 0..j {
@@ -46,7 +46,10 @@ proptest! {
     }
 
     #[test]
-    fn reused_instances_forget_the_frame_before(sizes in prop::collection::vec(0_usize..700, 1..6), seed in any::<u32>()) {
+    fn reused_instances_forget_the_previous_frame(
+        sizes in prop::collection::vec(0_usize..700, 1..6),
+        seed in any::<u32>(),
+    ) {
         let (registry, ids) = registry();
         for id in ids {
             let mut kept = registry.create(&id).unwrap();
@@ -67,7 +70,12 @@ proptest! {
     }
 
     #[test]
-    fn a_load_is_finite_whatever_the_boxes(boxes in prop::collection::vec((prop::array::uniform3(any::<f32>()), prop::array::uniform3(any::<f32>())), 0..300)) {
+    fn load_of_any_boxes_is_finite(
+        boxes in prop::collection::vec(
+            (prop::array::uniform3(any::<f32>()), prop::array::uniform3(any::<f32>())),
+            0..300,
+        ),
+    ) {
         let boxes: Vec<Aabb> = boxes.into_iter().map(|(min, max)| Aabb::new(min, max)).collect();
         for pairs in [None, Some(0.0), Some(1.0e6)] {
             let load = Load::estimate(&boxes, pairs, None);
@@ -84,7 +92,7 @@ proptest! {
     }
 
     #[test]
-    fn adaptive_gives_the_same_pairs_whatever_the_borders(
+    fn adaptive_is_right_with_any_step(
         border in 1_u32..400,
         frames in prop::collection::vec(prop::collection::vec(valid_box(), 0..400), 1..4),
     ) {

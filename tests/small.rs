@@ -1,17 +1,19 @@
-//! Every algorithm on a few dozen boxes of every kind, which come, move and go: little enough for Miri and valgrind (`tools/sanitize.sh`).
+//! Every algorithm on a few dozen boxes of every kind that come, move and go: small enough for Miri and valgrind
+//! (`tools/sanitize.sh`).
 
 mod common;
 
 use common::{Random, WORLDS, denormals, every_algorithm, lattice, naive_filtered};
 use sapwise::{Aabb, BroadPhase, Filter, Membership, PairOrder, Pairs};
 
-/// Boxes of a scene: more than any vector has lanes, enough for a tree of several levels. Miri takes a second for a frame of as many.
+/// Boxes of a scene: more than any vector has lanes, and enough for a tree of several levels. Miri takes a second for
+/// such a frame.
 const BOXES: usize = if cfg!(miri) { 18 } else { 40 };
 
 /// Frames of a scene.
 const FRAMES: usize = if cfg!(miri) { 2 } else { 4 };
 
-/// Held against the double loop past a filter, then moved, with two boxes less and one more.
+/// Compares each frame with the double loop, without and with a filter, then moves the boxes, removes two and adds one.
 fn assert_frames_agree(name: &str, mut boxes: Vec<Aabb>, algorithms: &mut [(String, Box<dyn BroadPhase>)]) {
     let mut random = Random(41);
     for frame in 0..FRAMES {
@@ -25,10 +27,10 @@ fn assert_frames_agree(name: &str, mut boxes: Vec<Aabb>, algorithms: &mut [(Stri
                 assert!(pairs.as_slice() == expected, "{id} on {name}, frame {frame}");
             }
         }
-        // One in four, so that what has been kept is of use.
+        // One box in four, so that kept pairs are of use.
         for b in boxes.iter_mut().step_by(4) {
             let by = (random.next() - 0.5) * (b.max[0] - b.min[0]);
-            // What is infinite stays.
+            // Infinite boxes stay.
             if by.is_finite() {
                 *b = Aabb::new(b.min.map(|x| x + by), b.max.map(|x| x + by));
             }
@@ -49,7 +51,7 @@ fn worlds_of_every_shape() {
 }
 
 #[test]
-fn boxes_that_touch_are_infinite_denormal_or_the_same() {
+fn odd_boxes() {
     let mut algorithms = every_algorithm();
     let mut random = Random(3);
     let inf = f32::INFINITY;

@@ -1,9 +1,9 @@
 //! Many frames in which things go wrong at random: no pair is lost and no memory leaks.
 //!
-//! `fragmentation` at small sizes runs through the adaptive module, each frame held against the double loop. From a seed a GPU is lost and
-//! comes back, pools are made anew with other sizes, frames are refused, and the program starts again with what it has learned. With the
-//! feature `this-machine` every fourth program starts from a cache whose files are damaged, cut off, replaced by folders or can't be
-//! written. A run of a million frames takes minutes:
+//! `Adaptive` runs `fragmentation` at small sizes, and each frame is compared with the double loop. At random, a GPU is
+//! lost and comes back, pools change their size, frames fail, and the program restarts with what it has learned. With
+//! the feature `this-machine` every fourth program starts from a cache whose files are damaged, truncated, replaced by
+//! folders or not writable. A run of a million frames takes minutes:
 //!
 //! ```sh
 //! SAPWISE_SOAK_FRAMES=1000000 cargo test -p sapwise --features this-machine --test soak -- --nocapture
@@ -28,13 +28,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicIsize, AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// Frames unless the environment tells another number.
-const FRAMES: u64 = 50_000;
+/// Default number of frames.
+const FRAMES: u64 = if cfg!(feature = "long-tests") { 50_000 } else { 5000 };
 
-/// Frames from one start of the program to the next, on average.
-const LIFE: u64 = 1000;
+/// Mean number of frames of a program.
+const LIFE: u64 = if cfg!(feature = "long-tests") { 1000 } else { 250 };
 
-/// Live memory may end so much above where it was early on: rayon frees what its threads leave when it comes to it.
+/// Memory that may be in use at the end beyond that early on: rayon frees memory of ended threads late.
 const SLACK_BYTES: isize = 64 << 10;
 
 /// The system's allocator, counting the bytes that are in use.
@@ -66,7 +66,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// A place for a GPU: even while there is none, odd while there is one, another number for each device.
+/// A slot for a GPU: even while it is empty, odd while there is one. The number differs for each device.
 #[derive(Default)]
 struct Slot(AtomicU64);
 
@@ -80,7 +80,7 @@ impl Slot {
     }
 }
 
-/// An algorithm on a GPU that is an act, of the device that was there when it was made.
+/// An algorithm on a mock GPU: the device in the slot when it was created.
 struct OnGpu {
     slot: Arc<Slot>,
     device: u64,
@@ -98,7 +98,7 @@ impl BroadPhase for OnGpu {
         if self.slot.0.load(Relaxed) == self.device {
             return self.inner.find_pairs(boxes, pairs);
         }
-        // Lost in the middle of its work: what it has left is no answer.
+        // Lost in the middle of its work: it leaves wrong pairs.
         pairs.clear();
         (1..boxes.len() as u32).for_each(|k| pairs.push(0, k));
         Err(lost())
@@ -116,7 +116,7 @@ fn registry(cores: u32, slot: &Arc<Slot>) -> Registry {
     registry
 }
 
-/// Tuning in which few boxes are for brute force, many for the GPU, and for several threads where it is lost.
+/// Returns a tuning of brute force for few boxes, and the GPU for many, or several threads if it is lost.
 fn tuning() -> Tuning {
     let registry = Registry::with_cores(1);
     let cost = |id: &str, call: f64, object: f64| {
@@ -139,7 +139,7 @@ fn tuning() -> Tuning {
     Tuning::from_costs(Source::Default, "fragmentation", costs, &loads)
 }
 
-/// What has happened so far.
+/// Counts of events.
 #[derive(Debug, Default)]
 struct Tally {
     starts: u64,
@@ -158,12 +158,12 @@ struct Tally {
     ran: BTreeMap<String, u64>,
 }
 
-/// Uniform below `most`.
+/// Returns a uniform number below `most`.
 fn below(random: &mut Random, most: u64) -> u64 {
     (f64::from(random.next()) * most as f64) as u64
 }
 
-/// A machine whose GPU comes and goes, and whose cores the program may use this many of.
+/// A machine whose GPU comes and goes, and the number of usable cores.
 struct Machine {
     slot: Arc<Slot>,
     cores: u32,
@@ -179,11 +179,11 @@ impl Machine {
     }
 }
 
-/// One program from start to end. Gives the tuning that it ends with.
+/// Runs a program from start to end. Returns its last tuning.
 fn program(tuning: Tuning, frames: u64, random: &mut Random, tally: &mut Tally) -> Tuning {
     let mut machine = Machine::new(random);
     let mut adaptive = Adaptive::new(tuning, &registry(machine.cores, &machine.slot)).unwrap();
-    // The costs that it starts with hold on machines that nobody has: they keep all algorithms busy where nothing is learned.
+    // The costs are those of no machine: without learning they keep all algorithms busy.
     adaptive.set_learning(below(random, 4) == 0);
     tally.starts += 1;
     life(&mut adaptive, &mut machine, frames, random, tally);
@@ -193,7 +193,7 @@ fn program(tuning: Tuning, frames: u64, random: &mut Random, tally: &mut Tally) 
     learned
 }
 
-/// So many frames of a scene, each held against the double loop.
+/// Runs frames of a scene, and compares each with the double loop.
 fn life(adaptive: &mut Adaptive, machine: &mut Machine, frames: u64, random: &mut Random, tally: &mut Tally) {
     let Machine { slot, cores } = machine;
     let mut scene = Scenario::Fragmentation.start(10 + below(random, 400) as usize, below(random, 1 << 20));
@@ -208,7 +208,7 @@ fn life(adaptive: &mut Adaptive, machine: &mut Machine, frames: u64, random: &mu
             adaptive.decide(boxes);
         }
         match below(random, 400) {
-            // Now and then anyway, more often while it is at work.
+            // Rarely, and more often while it is in use.
             0 | 1 if slot.is_present() => {
                 slot.turn();
                 tally.gpus_lost += 1;
@@ -258,7 +258,8 @@ fn life(adaptive: &mut Adaptive, machine: &mut Machine, frames: u64, random: &mu
     }
 }
 
-/// Bytes in use once the threads of the last start have ended; or this many milliseconds later, where they are more than ever.
+/// Returns the bytes in use, once they are no more than `lowest` or 50 milliseconds have passed: threads of the last
+/// program may still end.
 fn live_bytes(lowest: isize) -> isize {
     for _ in 0..50 {
         if LIVE.load(Relaxed) <= lowest {
@@ -270,7 +271,7 @@ fn live_bytes(lowest: isize) -> isize {
 }
 
 #[test]
-fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
+fn failures_lose_no_pair_and_leak_no_memory() {
     let told = std::env::var("SAPWISE_SOAK_FRAMES")
         .map(|text| text.parse().expect("SAPWISE_SOAK_FRAMES is a number of frames"));
     let frames: u64 = told.unwrap_or(FRAMES);
@@ -289,7 +290,7 @@ fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
             kept.program(length, &mut random, &mut tally);
         } else {
             let learned = program(known, length, &mut random, &mut tally);
-            // A start goes on with what the one before has learned, until somebody deletes it.
+            // A program uses what the previous one has learned, unless it was deleted.
             known = if below(&mut random, 2) == 0 { tuning() } else { learned };
         }
         lowest = lowest.min(live_bytes(lowest));
@@ -314,7 +315,7 @@ fn no_pair_is_lost_and_no_memory_leaks_whatever_fails() {
         ("a limit on the pairs", tally.over_limit),
         ("learned tuning", tally.learned),
     ] {
-        // One in some thousands of frames each, or the seed has hit upon nothing that this test is for.
+        // Otherwise the seed misses what this test is for.
         assert!(times >= frames / 20_000, "{what}: {times} times in {frames} frames");
     }
     assert!(tally.ran.len() >= if cfg!(feature = "parallel") { 6 } else { 4 }, "{:?}", tally.ran);

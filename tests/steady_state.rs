@@ -1,5 +1,4 @@
-//! In a steady state no algorithm allocates, and neither does the choice between them, a filter that changes, or following the
-//! pairs by ids.
+//! In a steady state nothing allocates: no algorithm, no choice between them, no filter that changes, no `Changes`.
 //!
 //! One test only, because the counter sees every thread of the process.
 
@@ -18,7 +17,7 @@ struct Counting;
 static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
 static LARGE: AtomicUsize = AtomicUsize::new(0);
 
-/// Bytes from which on an allocation is no job of rayon's and no block of its queue.
+/// Smallest allocation that is no job of rayon and no block of its queue.
 const LARGE_BYTES: usize = 4096;
 
 fn count(size: usize) {
@@ -49,10 +48,10 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// Allocations, and large ones, of `run` in all of `frames` further frames of a scene, after seven rounds of the same frames: `pair-cache` finds
-/// its margin in them, and what it keeps varies with the margin.
+/// Returns the number of allocations, and of large ones, of `run` in `frames` frames of a scene, after seven rounds of
+/// the same frames: `pair-cache` settles its margin in them, and its memory depends on the margin.
 ///
-/// With `extras` the canonical order, a filter that changes in each frame, and changes by ids of which two do.
+/// `extras` adds canonical order, a filter that changes in each frame, and `Changes` by ids of which two are swapped.
 fn allocations(
     scenario: Scenario,
     objects: usize,
@@ -88,7 +87,8 @@ fn allocations(
     (counted, large)
 }
 
-/// Tuning whose borders `fragmentation` crosses: 30 n = 5000 + 5 n at n = 200, 0.05 n^2 = 30 n at n = 600.
+/// Returns a tuning whose crossovers `fragmentation` passes: 60 n = 5000 + 30 n at 167, 5000 + 30 n = 30 000 + 10 n at
+/// 1250.
 fn tuning(registry: &Registry) -> Tuning {
     let cost = |id: &str, call: f64, object: f64| {
         let revision = registry.entries().iter().find(|e| e.id.to_string() == id).unwrap().revision;
@@ -102,25 +102,26 @@ fn tuning(registry: &Registry) -> Tuning {
 }
 
 #[test]
-fn a_steady_state_allocates_nothing() {
+fn steady_state_allocates_nothing() {
     const FRAMES: usize = 40;
     let registry = Registry::with_cores(4);
     for id in registry.available().into_iter().map(|e| e.id) {
         let mut algorithm = registry.create(&id).unwrap();
         for scenario in [Scenario::Uniform, Scenario::Mixed, Scenario::Gravity, Scenario::Fragmentation] {
-            // Half of them with all extras, and each algorithm with and without.
+            // Each algorithm with and without extras.
             let extras = matches!(scenario, Scenario::Mixed | Scenario::Gravity);
             // Fewer would not keep four threads busy.
             let objects = if id.threads() > 2 { 4096 } else { 3000 };
             let (counted, large) = allocations(scenario, objects, FRAMES, algorithm.as_mut(), extras);
-            // rayon allocates a job of some 100 bytes for each helper in each phase, and now and then a block of its queue.
+            // rayon allocates a job of about 100 bytes for each helper in each phase, and sometimes a block of its
+            // queue.
             let phases = match id.method() {
                 "brute" => 4,
                 "grid-sap" => 3,
                 "sap" => 6,
                 _ => 12,
             };
-            // The canonical order of many pairs has four phases of its own.
+            // Sorting many pairs takes four more phases.
             let phases = if extras { phases + 4 } else { phases };
             let jobs = FRAMES * (id.threads() as usize - 1) * phases;
             assert!(counted <= jobs + jobs / 32, "{id} on {scenario}: {counted} allocations in {FRAMES} frames");
@@ -128,10 +129,10 @@ fn a_steady_state_allocates_nothing() {
         }
     }
     for extras in [false, true] {
-        // What learns switches when timings say so, to an algorithm that may not have had so large a frame.
+        // With learning, times could switch to an algorithm that has not had so large a frame yet.
         let mut adaptive = Adaptive::new(tuning(&registry), &registry).unwrap();
         adaptive.set_learning(false);
-        // With a clear lead the choice is looked at seldom, and the clock says when: the frame of a switch may be the largest of the one that it is to.
+        // The clock decides when to switch: the first frame of an algorithm may be its largest.
         adaptive.prepare(3000);
         let (counted, _) = allocations(Scenario::Fragmentation, 3000, 600, &mut adaptive, extras);
         assert_eq!(counted, 0, "adaptive, switches included, extras: {extras}");
@@ -142,8 +143,8 @@ fn a_steady_state_allocates_nothing() {
     assert!(switched.load(Relaxed) > 10, "they took {} turns", switched.load(Relaxed));
 }
 
-/// An adaptive module that learns, over algorithms that allocate nothing and take as long as they like; and how often one of them ran that
-/// had not run the frame before.
+/// Returns an `Adaptive` that learns, over algorithms that allocate nothing and whose speed changes, and the number of
+/// switches.
 fn idle_candidates() -> (Adaptive, Arc<AtomicUsize>) {
     struct Idle(usize, Arc<[AtomicUsize; 2]>, Arc<AtomicUsize>, u64);
     impl BroadPhase for Idle {

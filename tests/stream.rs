@@ -1,11 +1,11 @@
-//! Boxes of a real engine: cubes that fall, collide and break into pieces in rapier3d, 300 consecutive frames of up to 155 boxes.
+//! Boxes of a real engine: cubes that fall, collide and break into pieces in rapier3d, 300 frames of up to 155 boxes.
 //!
-//! Made by
 //! ```sh
 //! cargo run --release -p sapwise-example-rapier3d -- --frames 300 --bodies 110 --record tests/fixtures/fragments.npy
 //! ```
-//! In the order in which rapier has its colliders: a piece takes the place of one that was cleared away, so that one place stands for
-//! other boxes from one frame to the next; and the octants of a whole cube touch each other, as no scenario of ours does.
+//!
+//! The boxes have the order of rapier's colliders. A new piece takes the place of a removed one, so that a position
+//! stands for other boxes from frame to frame. The octants of a whole cube touch each other, as in no scenario.
 
 mod common;
 
@@ -19,7 +19,7 @@ fn frames() -> Frames {
 }
 
 #[test]
-fn the_stream_is_what_this_test_takes_it_for() {
+fn fixture_is_as_expected() {
     let frames = frames();
     let counts: Vec<usize> = frames.iter().map(<[_]>::len).collect();
     assert_eq!((counts.len(), counts[0], counts.iter().max(), counts[299]), (300, 85, Some(&155), 5));
@@ -29,7 +29,7 @@ fn the_stream_is_what_this_test_takes_it_for() {
 }
 
 #[test]
-fn every_algorithm_finds_the_pairs_of_the_double_loop_in_every_frame() {
+fn every_algorithm_matches_the_double_loop() {
     let mut algorithms = every_algorithm();
     for (at, boxes) in frames().iter().enumerate() {
         let expected = naive(boxes);
@@ -42,7 +42,7 @@ fn every_algorithm_finds_the_pairs_of_the_double_loop_in_every_frame() {
 }
 
 #[test]
-fn the_adaptive_module_finds_them_too_as_it_switches() {
+fn adaptive_matches_the_double_loop() {
     let registry = Registry::with_cores(2);
     let mut adaptive = Adaptive::new(Tuning::usual(&registry), &registry).unwrap();
     let mut pairs = Pairs::with_order(PairOrder::Canonical);

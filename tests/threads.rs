@@ -1,10 +1,9 @@
-//! What an engine may share between its threads, and where ours run.
+//! The types that threads may share, and the pinning of helper threads.
 
 use sapwise::{Adaptive, BroadPhase, Changes, Error, Load, Model, Pairs, Registry, Tuning};
 
-/// Compiles where all of these may be sent to another thread and looked at from several.
 #[test]
-fn what_an_engine_holds_is_send_and_sync() {
+fn public_types_are_send_and_sync() {
     fn both<T: Send + Sync + ?Sized>() {}
     both::<Adaptive>();
     both::<dyn BroadPhase>();
@@ -17,7 +16,7 @@ fn what_an_engine_holds_is_send_and_sync() {
     both::<Error>();
 }
 
-/// How many threads of our pools there are, and how many of them may run on one CPU only.
+/// Returns the number of helper threads, and the number of those that may run on one CPU only.
 #[cfg(all(feature = "parallel", target_os = "linux"))]
 fn pool_threads() -> (usize, usize) {
     let status =
@@ -39,7 +38,7 @@ fn pool_threads() -> (usize, usize) {
 fn no_thread_is_pinned_unless_asked() {
     use sapwise::{Aabb, usable_cores};
     if usable_cores() < 2 {
-        // One CPU is all that any thread may run on.
+        // Every thread runs on the one CPU.
         return;
     }
     let boxes: Vec<Aabb> = (0..20_000).map(|k| Aabb::cube([(k % 100) as f32, (k / 100) as f32, 0.0], 0.4)).collect();
@@ -53,7 +52,7 @@ fn no_thread_is_pinned_unless_asked() {
     assert_eq!(pool_threads(), (2, 0));
     registry.pin_threads();
     let pinned = run(&registry, "grid-sap@cpu2");
-    // That of two threads, which the registry makes now. Under a quota it is not bound either; where that is so, tests in the library tell.
+    // The one helper of `grid-sap@cpu2`, unless there is a quota.
     assert!(matches!(pool_threads(), (3, 0 | 1)), "{:?}", pool_threads());
     drop((free, pinned));
 }

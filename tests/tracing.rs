@@ -1,4 +1,4 @@
-//! What a program's subscriber is told of switches.
+//! Events for switches.
 
 use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, Registry, Step, Tuning};
 use std::fmt;
@@ -7,7 +7,7 @@ use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Level, Metadata, Subscriber};
 
-/// Level, target and message of every event.
+/// A subscriber that stores level, target and message of every event.
 #[derive(Clone, Default)]
 struct Told(Arc<Mutex<Vec<(Level, String, String)>>>);
 
@@ -47,7 +47,7 @@ impl Subscriber for Told {
 }
 
 #[test]
-fn each_switch_is_an_event_with_its_reason_and_frames_between_are_none() {
+fn each_switch_is_an_event_with_its_reason() {
     let step = |from_objects, id: &str| Step { from_objects, algorithm: id.parse().unwrap() };
     let tuning = Tuning::from_steps(vec![step(0, "brute@cpu1"), step(64, "sap@cpu1")]).unwrap();
     let mut adaptive = Adaptive::new(tuning, &Registry::with_cores(1)).unwrap();

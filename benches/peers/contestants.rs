@@ -50,7 +50,7 @@ impl Contestant {
             "sap" => 100_000,
             _ => usize::MAX,
         };
-        let mut algorithm = registry.create(id)?;
+        let algorithm = registry.create(id)?;
         let keeps = algorithm.is_incremental();
         let algorithm = Algorithm::Other(algorithm);
         Ok(Self { name: id.to_string(), side: Side::Fixed, keeps, most, hopeless_frames: 0, algorithm })

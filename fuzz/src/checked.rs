@@ -1,4 +1,4 @@
-//! Algorithms whose every answer is held against the oracle.
+//! Algorithms whose every answer is compared with the oracle.
 
 use crate::oracle::Answer;
 use crate::scene::Scene;
@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 /// Threads of the widest algorithm.
 const CORES: u32 = 3;
 
-/// A registry for each SIMD level of this machine, kept since its pools of threads are dear.
+/// A registry for each SIMD level of this machine, kept because its pools of threads are expensive.
 static REGISTRIES: LazyLock<Vec<Registry>> = LazyLock::new(|| {
     let at_most = |level| {
         let mut registry = Registry::with_cores(CORES);
@@ -19,30 +19,31 @@ static REGISTRIES: LazyLock<Vec<Registry>> = LazyLock::new(|| {
     SimdLevel::ALL.into_iter().filter(|&level| level <= SimdLevel::detected()).map(at_most).collect()
 });
 
-/// Tuning with a cost for each algorithm, so that the choice learns and explores.
+/// A tuning with a cost for each algorithm, so that the choice learns and explores.
 static PREDICTED: LazyLock<Tuning> = LazyLock::new(|| {
     let entries = REGISTRIES[0].available();
     let prediction = Model::built_in().unwrap().predict(&hardware(), &entries).unwrap();
     prediction.tuning("uniform", &[])
 });
 
-/// Hardware parameters of some machine.
+/// Returns the hardware parameters of some machine.
 ///
 /// # Panics
-/// When the report that comes with the tests is damaged.
+/// The report in the tests is damaged.
 #[must_use]
 pub fn hardware() -> Hardware {
     sapwise_lab::report::read(include_str!("../../crates/lab/tests/fixtures/report-2.json")).unwrap().value.hardware
 }
 
-/// Algorithms under their names.
+/// Algorithms with their names.
 pub struct Checked(Vec<(String, Box<dyn BroadPhase>)>);
 
 impl Checked {
-    /// All methods at a SIMD level and on a number of threads that the input names, and now and then `Adaptive` over all of them.
+    /// Makes all methods at the SIMD level and on the number of threads that the input names, sometimes with an
+    /// `Adaptive` over all of them.
     ///
     /// # Panics
-    /// When an algorithm that is said to be available is not.
+    /// An available algorithm can't be made.
     #[must_use]
     pub fn of(source: &mut Source<'_>) -> Self {
         let registry = &REGISTRIES[usize::from(source.byte()) % REGISTRIES.len()];
@@ -51,7 +52,7 @@ impl Checked {
         let threads = [1, 1, 2, CORES][usize::from(kind % 4)];
         let mut all: Vec<(String, Box<dyn BroadPhase>)> = Vec::new();
         for id in ids.iter().filter(|id| id.threads() == threads) {
-            // One that can change its threads does so later.
+            // If possible, one that can change its number of threads later.
             let family: Vec<&AlgorithmId> = ids.iter().filter(|other| other.method() == id.method()).collect();
             let made = registry.create_family(&family).unwrap().map_or_else(|| registry.create(id), Ok);
             all.push((id.to_string(), made.unwrap()));
@@ -64,20 +65,18 @@ impl Checked {
         Self(all)
     }
 
-    /// Moves those that can to another number of threads.
+    /// Changes the number of threads of those that can.
     pub fn set_threads(&mut self, source: &mut Source<'_>) {
         let threads = 1 + u32::from(source.byte()) % CORES;
         for (_, algorithm) in &mut self.0 {
-            if let Some(incremental) = algorithm.as_incremental() {
-                incremental.set_threads(threads);
-            }
+            algorithm.set_threads(threads);
         }
     }
 
-    /// Runs a frame with each, and returns the pairs where there are any.
+    /// Runs a frame with each. Returns the pairs, unless the answer is an error.
     ///
     /// # Panics
-    /// At a wrong answer.
+    /// An answer is wrong.
     pub fn frame(&mut self, scene: &mut Scene) -> Option<Pairs> {
         let right = scene.answer();
         let mut room = scene.room();
@@ -89,8 +88,10 @@ impl Checked {
     }
 }
 
+/// Compares an answer with the right one.
+///
 /// # Panics
-/// At a wrong answer.
+/// The answer is wrong.
 pub fn check(name: &str, right: &Answer, found: Result<(), sapwise::Error>, room: &Pairs) {
     match (&right.pairs, found) {
         (Ok(pairs), Ok(())) => {

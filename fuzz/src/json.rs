@@ -1,22 +1,22 @@
-//! Damages to JSON texts that keep them JSON, so that inputs come past the parser.
+//! Damages JSON texts so that they stay JSON, and get past the parser.
 
 use crate::source::Random;
 use serde_json::{Value, json};
 
-/// The text with one to four damages; `None` where it is no JSON.
+/// Returns the text with one to four damages; `None` if it is no JSON.
 #[must_use]
 pub fn damaged(text: &[u8], seed: u32) -> Option<String> {
     let mut whole: Value = serde_json::from_slice(text).ok()?;
     let mut random = Random::new(seed);
     for _ in 0..1 + random.below(4) {
-        // Something of another place of the same file may come to stand where it should not.
+        // A value may replace one at another place of the file.
         let other = pick(&mut whole, &mut random).clone();
         damage(pick(&mut whole, &mut random), other, &mut random);
     }
     Some(whole.to_string())
 }
 
-/// A value anywhere in the file: at each level it goes on more likely than not.
+/// Picks a value anywhere in the file: at each level it usually descends.
 fn pick<'a>(value: &'a mut Value, random: &mut Random) -> &'a mut Value {
     let children = match value {
         Value::Array(items) => items.len(),
@@ -32,7 +32,7 @@ fn pick<'a>(value: &'a mut Value, random: &mut Random) -> &'a mut Value {
         Value::Object(keys) => keys.values_mut().nth(at),
         _ => None,
     };
-    pick(child.expect("it has as many children"), random)
+    pick(child.expect("`at` is below the number of children"), random)
 }
 
 fn damage(value: &mut Value, other: Value, random: &mut Random) {

@@ -1,18 +1,18 @@
-//! Answers by the definitions alone.
+//! Answers by definition.
 
 use sapwise::{Aabb, BoxDefect, Error, Membership, Pair};
 use std::collections::BTreeSet;
 
-/// What every algorithm must answer.
+/// The answer that every algorithm must give.
 #[derive(Debug)]
 pub struct Answer {
     /// The wanted pairs in canonical order, or the error.
     pub pairs: Result<Vec<Pair>, Error>,
-    /// How many pairs overlap that aren't of two fixed boxes.
+    /// Number of overlapping pairs, but for those of two fixed boxes.
     pub overlapping: u64,
 }
 
-/// The answer to these boxes past a filter and within a limit.
+/// Returns the answer for these boxes with a filter and a limit.
 #[must_use]
 pub fn answer(boxes: &[Aabb], memberships: Option<&[Membership]>, limit: Option<usize>) -> Answer {
     if let Some((index, defect)) = boxes.iter().enumerate().find_map(|(k, b)| Some((k, defect(b)?))) {
@@ -42,7 +42,7 @@ pub fn answer(boxes: &[Aabb], memberships: Option<&[Membership]>, limit: Option<
 }
 
 fn overlap(a: &Aabb, b: &Aabb) -> bool {
-    // Without branches, which would each be a place of their own for the fuzzer to cover.
+    // Without branches: the fuzzer would try to cover each.
     (0..3).fold(true, |meet, k| meet & (a.min[k] <= b.max[k]) & (b.min[k] <= a.max[k]))
 }
 
@@ -52,7 +52,7 @@ fn defect(b: &Aabb) -> Option<BoxDefect> {
     if nan { Some(BoxDefect::NotANumber) } else { inverted.then_some(BoxDefect::Inverted) }
 }
 
-/// The pairs of ids that some pairs of positions stand for: those of two ids, each once.
+/// Returns the pairs of two ids that these pairs of positions stand for, each once.
 #[must_use]
 pub fn of_ids(pairs: &[Pair], ids: &[u8]) -> BTreeSet<(u8, u8)> {
     let named = pairs.iter().map(|&(i, j)| (ids[i as usize], ids[j as usize]));

@@ -1,16 +1,16 @@
-//! Boxes, and what a caller asks of their pairs, as an input changes them from frame to frame.
+//! Boxes, filter, limit and order, which an input changes from frame to frame.
 
 use crate::oracle::{Answer, answer};
 use crate::source::{Random, Source};
 use sapwise::{Aabb, Filter, Membership, PairOrder, Pairs};
 
-/// The most boxes: enough for three threads to share a frame, and few enough for the oracle to take milliseconds.
+/// Most boxes: enough for three threads to share a frame, and few enough for the oracle to take milliseconds.
 const MOST_BOXES: usize = 4000;
 
-/// The most pairs, since each is compared with that of the oracle for every algorithm.
+/// Most pairs: each is compared with the oracle for every algorithm.
 const MOST_PAIRS: u64 = 4000;
 
-/// Bounds that algorithms are likely to get wrong.
+/// Bounds at the limits of what can be ordered.
 const SPECIAL: [f32; 12] = [
     f32::NAN,
     f32::INFINITY,
@@ -36,13 +36,12 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The boxes.
     #[must_use]
     pub fn boxes(&self) -> &[Aabb] {
         &self.boxes
     }
 
-    /// Room for the answer, with everything that the caller asks of it.
+    /// Returns an empty list with the order, limit and filter.
     #[must_use]
     pub fn room(&self) -> Pairs {
         let mut pairs = Pairs::with_order(if self.canonical { PairOrder::Canonical } else { PairOrder::Any });
@@ -51,7 +50,7 @@ impl Scene {
         pairs
     }
 
-    /// The right answer. A scene of too many pairs loses boxes first.
+    /// Returns the right answer. First removes boxes from a scene with too many pairs.
     pub fn answer(&mut self) -> Answer {
         loop {
             let answer = answer(&self.boxes, self.memberships.as_deref(), self.limit);
@@ -62,7 +61,7 @@ impl Scene {
         }
     }
 
-    /// Changes the scene as the next bytes say.
+    /// Changes the scene as the next bytes of the input say.
     pub fn edit(&mut self, source: &mut Source<'_>) {
         match source.byte() % 14 {
             0 => self.add(source),
@@ -82,7 +81,7 @@ impl Scene {
         }
     }
 
-    /// A few boxes, each of four bytes.
+    /// Adds a few boxes, each of four bytes.
     fn add(&mut self, source: &mut Source<'_>) {
         for _ in 0..source.byte() % 16 {
             let centre = [0; 3].map(|_| source.signed() * 16.0);
@@ -90,7 +89,7 @@ impl Scene {
         }
     }
 
-    /// Up to two hundred boxes in a world of some size, and now and then two thousand: few find as much, and sooner.
+    /// Adds up to 255 boxes, sometimes up to 2048: few boxes find as much, and sooner.
     fn add_many(&mut self, source: &mut Source<'_>) {
         let (mut random, few) = (source.random(), usize::from(source.byte()));
         let count = if few % 32 == 31 { source.below(2048) } else { few };
@@ -119,7 +118,7 @@ impl Scene {
         }
     }
 
-    /// As engines do, with the last one in the place of the one that goes.
+    /// Removes boxes by `swap_remove`, as engines do.
     fn remove(&mut self, source: &mut Source<'_>) {
         for _ in 0..source.byte() {
             if !self.boxes.is_empty() {
@@ -153,7 +152,7 @@ impl Scene {
         self.memberships = Some((0..count).map(|_| membership(&mut random)).collect());
     }
 
-    /// A bound that is hard or impossible to order.
+    /// Writes a special bound, or removes invalid boxes.
     fn spoil(&mut self, source: &mut Source<'_>) {
         if self.boxes.is_empty() {
             return;
@@ -166,12 +165,11 @@ impl Scene {
             0 => b.min[axis] = value,
             1 => b.max[axis] = value,
             2 => (b.min[axis], b.max[axis]) = (value, value),
-            // Makes good what was spoilt before.
             _ => self.boxes.retain(|b| (0..3).all(|k| b.min[k] <= b.max[k])),
         }
     }
 
-    /// By a power of two along an axis: to infinity, to nothing, or somewhere between.
+    /// Scales by a power of two along an axis: to infinity, to nothing, or between.
     fn scale(&mut self, source: &mut Source<'_>) {
         let (axis, by) = (usize::from(source.byte() % 3), 2.0_f32.powi(i32::from(source.byte() as i8)));
         for b in &mut self.boxes {
@@ -198,7 +196,7 @@ impl Scene {
     }
 }
 
-/// In one or two of four groups, blind to one or two, one in four fixed.
+/// Returns one or two of four groups, and a mask without one or two. One box in four is fixed.
 fn membership(random: &mut Random) -> Membership {
     let mut groups = || 1 << random.below(4) | 1 << random.below(4);
     let (groups, mask) = (groups(), !groups());

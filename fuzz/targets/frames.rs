@@ -1,5 +1,5 @@
-//! Any boxes, filters, limits, orders and changes of threads from frame to frame: every method, `Adaptive` and `Changes` against the
-//! definitions.
+//! Any boxes, filters, limits, orders and numbers of threads from frame to frame: every method, `Adaptive` and
+//! `Changes` against the definitions.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -10,7 +10,7 @@ use sapwise_fuzz::oracle::of_ids;
 use sapwise_fuzz::scene::Scene;
 use std::collections::BTreeSet;
 
-/// The most frames, and the most pairs of boxes that the oracle looks at in all of them.
+/// Most frames, and most pairs of boxes that the oracle tests in all of them.
 const MOST: (usize, usize) = (12, 3_000_000);
 
 fuzz_target!(|bytes: &[u8]| {

@@ -1,4 +1,5 @@
-//! Any text as the name of an algorithm, a backend, a SIMD level, a schema: what is read is written as it stood, and is never run where it can't.
+//! Any text as the name of an algorithm, a backend, a SIMD level or a schema: it is written as it was read, and an
+//! available algorithm can be made.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -26,7 +27,7 @@ fuzz_target!(|text: &str| {
     }
 });
 
-/// What a text says, which is written as that text.
+/// Parses a text, and checks that the value is written as that text.
 fn same<T: FromStr + Display>(text: &str) -> Option<T> {
     let value = T::from_str(text).ok()?;
     assert_eq!(value.to_string(), text);

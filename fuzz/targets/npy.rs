@@ -1,4 +1,5 @@
-//! Any bytes as a recorded stream of boxes: what is read and sound is found alike by all methods, and reads back as it was written.
+//! Any bytes as a recorded stream of boxes: all methods find the same pairs, and a valid stream reads back as it was
+//! written.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

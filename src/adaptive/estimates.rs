@@ -84,33 +84,3 @@ impl Estimates {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cost::{CostCurve, CostTerm, Term};
-    use crate::tuning::AlgorithmCost;
-
-    #[test]
-    fn what_is_predicted_holds_for_loads_alike_and_its_correction_until_more_is_observed_or_waits_have_passed() {
-        let curve = CostCurve::new(vec![CostTerm::new(Term::Objects, 10.0)]);
-        let costs = [AlgorithmCost::new("sap@cpu1".parse().unwrap(), 1, curve, 0.1)];
-        let switching = SwitchingCosts::new(&[None]);
-        let mut learner = Learner::new(&costs, &[None]);
-        let mut estimates = Estimates::new(1, 1);
-        let mut of = |objects: u32, learner: &Learner, frame: u64| {
-            estimates.update(&Load::of_objects(objects), &costs, Some(learner), &switching, frame);
-            (estimates.mean_ns[0], estimates.corrected.map(|(at, _)| at))
-        };
-        assert_eq!(of(1000, &learner, 0), (10_000.0, Some(0)));
-        assert_eq!(of(1004, &learner, 1), (10_000.0, Some(0)));
-        assert_eq!(of(1100, &learner, 2), (11_000.0, Some(2)));
-        assert_eq!(of(1100, &learner, 65), (11_000.0, Some(2)));
-        assert_eq!(of(1100, &learner, 66), (11_000.0, Some(66)));
-        let mut batch = crate::adaptive::frame_batch::FrameBatch::default().next(0);
-        batch.add(2, 44_000.0, Predicted { ns: 11_000.0, calls_ns: 0.0 }.times(2.0), &View::default());
-        learner.observe(&batch, 67);
-        let (ns, at) = of(1100, &learner, 67);
-        assert!(ns > 13_000.0 && ns < 22_000.0 && at == Some(67), "{ns} {at:?}");
-    }
-}

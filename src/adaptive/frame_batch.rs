@@ -86,36 +86,3 @@ impl FrameBatch {
         Self { candidate, room, ..Self::default() }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn batches_grow_while_an_algorithm_runs_on_and_begin_small_with_another() {
-        let predicted = Predicted { ns: 100.0, calls_ns: 50.0 };
-        let mut batch = FrameBatch::default();
-        let mut full = Vec::new();
-        for frame in 0..80 {
-            let candidate = usize::from(frame >= 70);
-            if !batch.takes(candidate) {
-                batch = batch.next(candidate);
-            }
-            batch.add(1, 150.0, predicted, &View::default());
-            if batch.is_full() {
-                assert_eq!((batch.real_ns, batch.calls()), (150.0 * f64::from(batch.frames), 0.5));
-                full.push((frame, batch.frames));
-                batch = batch.next(candidate);
-            }
-        }
-        assert_eq!(full, [(1, 2), (5, 4), (13, 8), (29, 16), (61, 32), (71, 2), (75, 4)]);
-    }
-
-    #[test]
-    fn frames_that_passed_without_a_look_are_added_at_once() {
-        let mut batch = FrameBatch::default().next(0);
-        batch.add(40, 1000.0, Predicted { ns: 0.0, calls_ns: 0.0 }, &View::default());
-        assert_eq!((batch.frames, batch.real_ns, batch.calls()), (40, 1000.0, 0.0));
-        assert!(batch.is_full());
-    }
-}

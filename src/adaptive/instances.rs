@@ -33,7 +33,7 @@ pub(crate) struct Instance {
 }
 
 impl Instance {
-    fn new(id: &AlgorithmId, mut algorithm: Box<dyn BroadPhase>, threads: Option<u32>) -> Self {
+    fn new(id: &AlgorithmId, algorithm: Box<dyn BroadPhase>, threads: Option<u32>) -> Self {
         let is_incremental = algorithm.is_incremental();
         let waits = matches!(id.backend(), Backend::Gpu(_));
         Self { place: Place::Here(algorithm), waits, is_incremental, threads, ready: 0, left_at: None }
@@ -106,13 +106,13 @@ impl Instance {
         };
         let wanted = id.threads();
         if self.threads.is_some_and(|threads| threads != wanted) {
-            if !algorithm.as_incremental().is_some_and(|algorithm| algorithm.set_threads(wanted)) {
+            if !algorithm.set_threads(wanted) {
                 let reason = Unavailable::FixedThreads { wanted };
                 return Err(Error::Unavailable { algorithm: id.clone(), reason });
             }
             self.threads = Some(wanted);
         }
-        if let (Some(left_at), Some(algorithm)) = (self.left_at, algorithm.as_incremental()) {
+        if let Some(left_at) = self.left_at.filter(|_| self.is_incremental) {
             algorithm.missed_frames(frame - left_at);
             // Should this frame fail, those up to it are told.
             self.left_at = Some(frame);
@@ -120,25 +120,23 @@ impl Instance {
         algorithm.find_pairs_with(plan, boxes, pairs)?;
         self.left_at = None;
         self.ready = self.ready.max(boxes.len());
-        Ok(work(&mut **algorithm))
+        Ok(self.work())
     }
 
     /// Finds the pairs of a frame of which nothing was worked out, for the same candidate as in the last frame. `None` where that can't run.
     pub(super) fn go_on(&mut self, boxes: &[Aabb], pairs: &mut Pairs) -> Option<Result<Option<FrameWork>, Error>> {
         let algorithm = self.place.here()?;
-        let found = algorithm.find_pairs(boxes, pairs);
-        let found = found.map(|()| work(&mut **algorithm));
+        let found = algorithm.find_pairs(boxes, pairs).map(|()| self.work());
         self.ready = self.ready.max(boxes.len());
         Some(found)
     }
-}
 
-/// How the last frame came about. Checked once more: the fields are anybody's to set.
-fn work(algorithm: &mut dyn BroadPhase) -> Option<FrameWork> {
-    algorithm
-        .as_incremental()
-        .map(|algorithm| algorithm.last_frame())
-        .map(|work| FrameWork::new(work.kind, work.over_mean))
+    /// How the last frame came about, where one may build on the one before. Checked once more: the fields are anybody's to set.
+    fn work(&mut self) -> Option<FrameWork> {
+        let algorithm = self.place.here().filter(|_| self.is_incremental)?;
+        let work = algorithm.last_frame();
+        Some(FrameWork::new(work.kind, work.over_mean))
+    }
 }
 
 /// What runs the algorithms of some tuning, and why the last of those that can't run can't.

@@ -100,29 +100,3 @@ impl MotionWatch {
         (self.moved, self.state) = (None, State::Resting);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn looks_that_differ_by_little_are_of_the_same_pace() {
-        let changes = |before: f64, now: f64| {
-            let mut watch = MotionWatch::default();
-            watch.found(Some(before), 1000.0);
-            watch.found(Some(now), 1000.0)
-        };
-        // Noise of few boxes, and what is as good as still.
-        assert!(!changes(0.1, 0.12) && !changes(0.0, 0.002) && changes(0.1, 0.2));
-    }
-
-    #[test]
-    fn a_look_that_is_interrupted_puts_off_the_next_one_for_twice_as_long_at_most() {
-        let mut watch = MotionWatch::default();
-        [1000.0, 1e9].into_iter().for_each(|took| _ = watch.found(Some(0.1), took));
-        watch.passed(2.0 * 1000.0 / SHARE - 1.0);
-        assert!(!watch.pays());
-        watch.passed(2.0);
-        assert!(watch.pays());
-    }
-}

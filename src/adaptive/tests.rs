@@ -1,17 +1,11 @@
 mod learning;
-#[cfg(feature = "model")]
-mod recorded;
-#[cfg(feature = "model")]
-mod replay;
-#[cfg(feature = "model")]
 mod traces;
 mod warming;
 
 use super::load_tracker::LoadTracker;
-use super::passed::{Budget, Passed, Usual};
 use super::*;
 use crate::scene::{Scenario, Scene};
-use crate::{AlgorithmCost, CostCurve, CostTerm, Incremental, Term};
+use crate::{AlgorithmCost, CostCurve, CostTerm, Term};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -126,12 +120,10 @@ impl BroadPhase for Told {
         pairs.finish()
     }
 
-    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-        Some(self)
+    fn is_incremental(&self) -> bool {
+        true
     }
-}
 
-impl Incremental for Told {
     fn missed_frames(&mut self, frames: u64) {
         self.0.fetch_add(frames, Ordering::Relaxed);
     }
@@ -230,27 +222,6 @@ fn shifted(by: f32) -> Vec<Aabb> {
     row(500).iter().map(|b| Aabb::new(b.min.map(|x| x + by), b.max.map(|x| x + by))).collect()
 }
 
-/// Frames of a second each, which pay for any look at the load.
-fn looked(tracker: &mut LoadTracker, frames: usize, shift: f32) {
-    for _ in 0..frames {
-        let boxes = shifted(shift);
-        tracker.decide(&boxes);
-        tracker.ran(&boxes, 100, 1e9);
-    }
-}
-
-#[test]
-fn how_far_boxes_move_is_found_out_between_samples() {
-    let mut tracker = LoadTracker::default();
-    looked(&mut tracker, 5, 0.0);
-    assert_eq!(tracker.moved(), Some(0.0));
-    let seen = (1..=4).filter(|&k| {
-        looked(&mut tracker, 1, 0.25 * k as f32);
-        tracker.moved() > Some(0.1)
-    });
-    assert!(seen.count() > 0 && tracker.age() == 9, "{:?}", tracker.moved());
-}
-
 #[test]
 fn a_frame_that_stands_out_is_compared_with_the_one_before_it() {
     let at = |k: u32| shifted(0.25 * k as f32);
@@ -262,45 +233,6 @@ fn a_frame_that_stands_out_is_compared_with_the_one_before_it() {
     tracker.decide(&at(2));
     let moved = tracker.moved().unwrap();
     assert!((moved - 0.25).abs() < 0.01, "{moved}");
-}
-
-#[test]
-fn frames_that_are_off_let_the_next_ones_show_how_far_boxes_move() {
-    let at = |k: u32| shifted(0.25 * k as f32);
-    let moved = |is_off: bool| {
-        let mut tracker = LoadTracker::default();
-        // A microsecond each, which pays for no look but the first.
-        let frame = |tracker: &mut LoadTracker, k: u32| {
-            tracker.decide(&at(k));
-            tracker.ran(&at(k), 100, 1000.0);
-        };
-        (0..5).for_each(|_| frame(&mut tracker, 0));
-        let mut passed = Passed::expecting(Usual { mean_ns: 1000.0, most_ns: 9000.0, trial: None });
-        (0..8).for_each(|_| passed.add(None, Some(if is_off { 2000.0 } else { 1000.0 })));
-        tracker.passes(&at(0), 100, &passed);
-        (1..4).for_each(|k| frame(&mut tracker, k));
-        tracker.moved().unwrap()
-    };
-    assert!(moved(false) == 0.0 && moved(true) > 0.2, "{} {}", moved(false), moved(true));
-}
-
-#[test]
-fn a_trial_that_has_cost_more_than_it_may_calls_for_a_decision() {
-    let is_due = |ns: f64| {
-        let mut tracker = LoadTracker::default();
-        for _ in 0..5 {
-            tracker.decide(&shifted(0.0));
-            tracker.ran(&shifted(0.0), 100, 1000.0);
-            // A decision is paid for by a hundred frames.
-            tracker.took(Some(400.0), 1000.0);
-        }
-        let trial = Some(Budget { now_ns: 1000.0, left_ns: 2000.0, shares: false });
-        let mut passed = Passed::expecting(Usual { mean_ns: 1000.0, most_ns: 9000.0, trial });
-        (0..3).for_each(|_| passed.add(None, Some(ns)));
-        tracker.passes(&shifted(0.0), 100, &passed);
-        tracker.is_due(&shifted(0.0))
-    };
-    assert!(is_due(1700.0) && !is_due(1600.0));
 }
 
 #[test]
@@ -317,7 +249,7 @@ fn deciding_before_a_frame_does_not_make_it_look_at_rest() {
 
 #[test]
 fn it_is_incremental_when_any_of_its_algorithms_is() {
-    assert!(grid_sap_or_pair_cache().as_incremental().is_some());
+    assert!(grid_sap_or_pair_cache().is_incremental());
     let without = tuning(&[("grid-sap@cpu1", 1.0, 1.0), ("brute@cpu1", 1.0, 2.0)]);
-    assert!(Adaptive::new(without, &Registry::with_cores(1)).unwrap().as_incremental().is_none());
+    assert!(!Adaptive::new(without, &Registry::with_cores(1)).unwrap().is_incremental());
 }

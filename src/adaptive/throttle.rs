@@ -98,28 +98,3 @@ impl DecisionThrottle {
         self.rest = (self.decision_ns / (SHARE * frame_ns.max(1.0))).min(MOST_FRAMES).floor();
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_more_the_number_of_objects_drifts_the_sooner_it_is_decided_and_at_once_where_it_jumps() {
-        let after = |objects: u32| {
-            let mut throttle = DecisionThrottle::default();
-            throttle.decide(1000);
-            // A decision is paid for by a hundred frames.
-            throttle.took(Some(4e4), 1e5);
-            throttle.ran(1000, 0);
-            let first = throttle.is_due(objects);
-            let mut frames = 1;
-            while !throttle.is_due(objects) {
-                throttle.ran(objects, 0);
-                frames += 1;
-            }
-            (first, frames)
-        };
-        assert_eq!([1000, 1100, 1150].map(after), [(false, 100), (false, 67), (false, 58)]);
-        assert_eq!([749, 1251].map(after), [(true, 1), (true, 1)]);
-    }
-}

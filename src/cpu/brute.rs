@@ -1,24 +1,25 @@
-//! Every one of the n (n - 1) / 2 pairs tested on three axes, as in the paper.
+//! Tests each of the n (n - 1) / 2 pairs on three axes, as in the paper.
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::Threads;
-use crate::cpu::columns::Columns;
+use crate::cpu::columns::{Columns, ensure};
 use crate::cpu::kernel::brute_rows;
 use crate::cpu::level::Simd;
-use crate::cpu::moving_first::MovingFirst;
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
+use crate::filter::Filter;
 use crate::pairs::Pairs;
 
-/// Pairs that are tested in the time that a box takes in a grid, in round numbers.
+/// Pairs that are tested in the time that `grid-sap` takes for a box, in round numbers.
 const PAIRS_PER_BOX: usize = 512;
 
 /// The method; see the module.
 #[derive(Debug)]
 struct Brute {
     workers: Workers,
-    order: MovingFirst,
+    /// Positions in the input: boxes that may move, then fixed ones.
+    order: Vec<u32>,
     columns: Columns,
     outputs: Outputs,
     simd: Simd,
@@ -26,13 +27,8 @@ struct Brute {
 
 pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
     let workers = Workers::new("brute", threads, pools)?;
-    Ok(Box::new(Brute {
-        workers,
-        order: MovingFirst::default(),
-        columns: Columns::default(),
-        outputs: Outputs::default(),
-        simd,
-    }))
+    let (columns, outputs) = (Columns::default(), Outputs::default());
+    Ok(Box::new(Brute { workers, order: Vec::new(), columns, outputs, simd }))
 }
 
 impl BroadPhase for Brute {
@@ -43,15 +39,15 @@ impl BroadPhase for Brute {
         let Self { workers, order, columns, outputs, simd } = self;
         let workers = &workers.fit(boxes.len().saturating_mul(boxes.len()) / (2 * PAIRS_PER_BOX));
         workers.check(boxes)?;
-        let order = order.order(pairs.filter(), boxes.len())?;
+        let moving = moving_first(order, pairs.filter(), boxes.len())?;
         workers.fill(columns.as_mut(), |first, mut part| {
             for at in 0..part.len() {
-                let id = order.map_or((first + at) as u32, |(ids, _)| ids[first + at]);
+                let id = if moving.is_some() { order[first + at] } else { (first + at) as u32 };
                 part.set(at, &boxes[id as usize], 0, id);
             }
         });
-        // A fixed box is compared with those before it alone, which may move.
-        let moving = order.map_or(boxes.len(), |(_, moving)| moving);
+        // A fixed box is compared only with those before it that may move.
+        let moving = moving.unwrap_or(boxes.len());
         outputs.find(workers, pairs, |k, parts, list| {
             let row = |k: usize| row(moving, boxes.len(), k, parts);
             brute_rows(*simd, columns, row(k)..row(k + 1), list);
@@ -60,12 +56,31 @@ impl BroadPhase for Brute {
     }
 
     fn prepare(&mut self, objects: usize) {
-        // A refused allocation is reported by the frame that needs it.
+        // The frame that needs the memory reports a refused allocation.
         let _ = self.columns.resize(objects);
     }
 }
 
-/// The first row of part `k` when the first `rows` rows of the triangle of the pairs of `boxes` are cut into `parts` parts of equal area.
+/// Writes the positions of `count` boxes to `order`: first those that may move, then the fixed ones. Returns how many
+/// may move, or `None`, and leaves `order` alone, if all may.
+fn moving_first(order: &mut Vec<u32>, filter: Option<&Filter>, count: usize) -> Result<Option<usize>, Error> {
+    let is_fixed = |id: usize| filter.is_some_and(|f| f.is_fixed(id));
+    let fixed = filter.map_or(0, |_| (0..count).filter(|&id| is_fixed(id)).count());
+    if fixed == 0 {
+        return Ok(None);
+    }
+    ensure(order, count, "positions of boxes")?;
+    let mut next = [0, count - fixed];
+    for id in 0..count {
+        let next = &mut next[usize::from(is_fixed(id))];
+        order[*next] = id as u32;
+        *next += 1;
+    }
+    Ok(Some(count - fixed))
+}
+
+/// Returns the first row of part `k` when the first `rows` rows of the triangle of the pairs of `boxes` are cut into
+/// `parts` parts of equal area.
 fn row(rows: usize, boxes: usize, k: usize, parts: usize) -> usize {
     let (rows_f, n) = (rows as f64, boxes as f64);
     let area = rows_f * (n - rows_f / 2.0) * k as f64 / parts as f64;
@@ -77,7 +92,7 @@ mod tests {
     use super::row;
 
     #[test]
-    fn parts_of_the_triangle_cover_all_rows_with_equal_areas() {
+    fn parts_of_the_triangle_have_equal_areas() {
         let (boxes, parts) = (10_000, 16);
         let area = |from: usize, to: usize| (from..to).map(|i| boxes - 1 - i).sum::<usize>();
         for rows in [boxes, 5000, 300] {

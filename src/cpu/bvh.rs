@@ -1,6 +1,7 @@
-//! A bounding volume hierarchy made from scratch every frame, each of whose leaves is compared with those behind it.
+//! A bounding volume hierarchy, built from scratch every frame. Each leaf is compared with the leaves behind it.
 //!
-//! What a frame costs follows the numbers of boxes and pairs wherever the boxes lie and whatever their sizes: see [`tree`](super::tree).
+//! The cost of a frame follows the numbers of boxes and pairs, wherever the boxes lie and whatever their sizes: see
+//! [`tree`](super::tree).
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
@@ -35,13 +36,13 @@ impl BroadPhase for Bvh {
         check_count(boxes.len())?;
         let Self { workers, tree, outputs } = self;
         let workers = &workers.fit(boxes.len());
-        tree.build(workers, boxes, Members::All, &plan.sample(boxes), pairs.filter())?;
+        tree.build(workers, boxes, Members::All, &plan.stats(boxes), pairs.filter())?;
         outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(tree.part(k, parts), list));
         pairs.finish_on(workers)
     }
 
     fn prepare(&mut self, objects: usize) {
-        // A refused allocation is reported by the frame that needs it.
+        // The frame that needs the memory reports a refused allocation.
         let _ = self.tree.reserve(objects);
     }
 }

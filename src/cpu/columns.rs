@@ -1,31 +1,23 @@
-//! Boxes turned into columns, so that one vector instruction tests several of them.
+//! Boxes as columns, so that one vector instruction tests several of them.
 
 use crate::aabb::Aabb;
 use crate::error::Error;
 use std::ops::Range;
 
-/// Readable boxes behind the last one: the widest vector may start at any box and run past the end.
+/// Readable values behind the last box: the widest vector may start at any box and run past the end.
 pub(super) const PADDING: usize = 16;
 
-/// Boxes as eight columns: three lower bounds, three upper bounds, positions in the input, and for a strip
-/// the mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip).
+/// Boxes as eight columns: three lower bounds, three upper bounds, positions in the input, and for a strip the mask of
+/// [`StripGrid::each_strip`](crate::load::StripGrid::each_strip).
 ///
-/// Axis 0 is the sweep axis, whichever axis of the input that is.
+/// Axis 0 is the sweep axis, whichever axis of the input that is. Each column has at least `len() + PADDING` values.
 #[derive(Debug, Default)]
 pub(crate) struct Columns {
-    low: [Vec<f32>; 3],
-    high: [Vec<f32>; 3],
-    ids: Vec<u32>,
-    begins: Vec<u32>,
+    pub(super) low: [Vec<f32>; 3],
+    pub(super) high: [Vec<f32>; 3],
+    pub(super) ids: Vec<u32>,
+    pub(super) begins: Vec<u32>,
     len: usize,
-}
-
-/// The columns with their padding: at least `len() + 16` values each.
-pub(crate) struct Padded<'a> {
-    pub(crate) low: [&'a [f32]; 3],
-    pub(crate) high: [&'a [f32]; 3],
-    pub(crate) ids: &'a [u32],
-    pub(crate) begins: &'a [u32],
 }
 
 /// A contiguous part of the columns, open for writing.
@@ -54,36 +46,12 @@ impl Columns {
         self.len
     }
 
-    pub(crate) fn low(&self, axis: usize) -> &[f32] {
-        &self.low[axis][..self.len]
-    }
-
-    pub(crate) fn high(&self, axis: usize) -> &[f32] {
-        &self.high[axis][..self.len]
-    }
-
-    pub(crate) fn ids(&self) -> &[u32] {
-        &self.ids[..self.len]
-    }
-
-    pub(crate) fn padded(&self) -> Padded<'_> {
-        let end = self.len + PADDING;
-        Padded {
-            low: self.low.each_ref().map(|c| &c[..end]),
-            high: self.high.each_ref().map(|c| &c[..end]),
-            ids: &self.ids[..end],
-            begins: &self.begins[..end],
-        }
-    }
-
     /// All boxes, open for writing.
     pub(crate) fn as_mut(&mut self) -> ColumnsMut<'_> {
         let len = self.len;
-        let [a, b, c] = &mut self.low;
-        let [d, e, f] = &mut self.high;
         ColumnsMut {
-            low: [&mut a[..len], &mut b[..len], &mut c[..len]],
-            high: [&mut d[..len], &mut e[..len], &mut f[..len]],
+            low: self.low.each_mut().map(|c| &mut c[..len]),
+            high: self.high.each_mut().map(|c| &mut c[..len]),
             ids: &mut self.ids[..len],
             begins: &mut self.begins[..len],
         }
@@ -106,13 +74,12 @@ impl<'a> ColumnsMut<'a> {
         self.ids[at] = id;
     }
 
-    /// The parts before and from `middle`.
+    /// Splits the columns before `middle`.
     #[cfg(feature = "parallel")]
     pub(crate) fn split(self, middle: usize) -> (ColumnsMut<'a>, ColumnsMut<'a>) {
-        let ([a, b, c], [d, e, f]) = (self.low, self.high);
         let cut = |v: &'a mut [f32]| v.split_at_mut(middle);
-        let ((a0, a1), (b0, b1), (c0, c1)) = (cut(a), cut(b), cut(c));
-        let ((d0, d1), (e0, e1), (f0, f1)) = (cut(d), cut(e), cut(f));
+        let [(a0, a1), (b0, b1), (c0, c1)] = self.low.map(cut);
+        let [(d0, d1), (e0, e1), (f0, f1)] = self.high.map(cut);
         let (i0, i1) = self.ids.split_at_mut(middle);
         let (g0, g1) = self.begins.split_at_mut(middle);
         (
@@ -122,10 +89,10 @@ impl<'a> ColumnsMut<'a> {
     }
 }
 
-/// Grows `list` to at least `len` elements, a sixteenth more, and reports a refused allocation.
+/// Grows `list` to at least `len` elements, and by a sixteenth more. Reports a refused allocation.
 ///
-/// It never shrinks, and elements once there stay initialised, so that a steady state writes each element just once. Twice the length, as
-/// lists grow by themselves, would hold memory that no frame of that size needs.
+/// It never shrinks, and its elements stay initialised, so that a steady state writes each element once. `Vec` alone
+/// would double its memory, which no frame of that size needs.
 pub(crate) fn ensure<T: Clone + Default>(list: &mut Vec<T>, len: usize, what: &'static str) -> Result<(), Error> {
     if list.len() < len {
         let len = len + len / 16;
@@ -135,13 +102,13 @@ pub(crate) fn ensure<T: Clone + Default>(list: &mut Vec<T>, len: usize, what: &'
     Ok(())
 }
 
-/// Part `k` of `parts` equal parts of `0..len`.
+/// Returns part `k` of `parts` equal parts of `0..len`.
 pub(crate) fn part(len: usize, k: usize, parts: usize) -> Range<usize> {
     let at = |k: usize| (len as u64 * k as u64 / parts as u64) as usize;
     at(k)..at(k + 1)
 }
 
-/// Maps a bound to an integer of the same order. NaN must not come here.
+/// Maps a bound, which is not NaN, to an integer of the same order.
 #[inline]
 pub(crate) fn order_key(v: f32) -> u32 {
     let bits = v.to_bits();
@@ -154,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn order_keys_ascend_with_the_bounds() {
+    fn order_keys_ascend_with_bounds() {
         let values = [f32::NEG_INFINITY, -1.0e30, -1.0, -1.0e-40, -0.0, 0.0, 1.0e-40, 1.0, 1.0e30, f32::INFINITY];
         assert!(values.map(order_key).is_sorted_by(|a, b| a < b));
     }

@@ -1,10 +1,21 @@
-//! A grid of strips over two axes, a sweep along the third inside each strip. From scratch every frame.
+//! A grid of strips over two axes, with a sweep along the third axis in each strip. From scratch every frame.
 //!
-//! Phase one, one task a thread: each thread sorts its share of the boxes into bins of its own, one for each strip that a box touches. Phase
-//! two, several tasks a thread: each strip gathers its bins from all threads, sorts them along the sweep axis and sweeps.
+//! ```text
+//!   grid axis 1
+//!   ^  +---+---+---+      Each cell is a strip: it runs along the sweep axis, which points out of the page.
+//!   |  |   | a | a |      Box a covers two cells and stands in both strips. So does b.
+//!   |  +---+---+-b-+      Both meet in one strip or several; the one in which the later of them begins
+//!   |  |   |   | b |      on each grid axis reports the pair: see `StripGrid::each_strip`.
+//!   |  +---+---+---+
+//!   +----------------> grid axis 0
+//! ```
 //!
-//! What a strip is no good for stands apart, in a [tree](super::tree) of the frame: boxes much larger than a cell, the boxes of strips that hold
-//! far more than others, and fixed boxes, of which no two are a pair. The tree is compared with itself, and with the boxes of each strip.
+//! Phase one has one task a thread: each sorts its share of the boxes into its own bins, one for each strip. Phase two
+//! has several tasks a thread: for each strip, a task gathers the bins of all threads, sorts them along the sweep axis
+//! and sweeps.
+//!
+//! Oversized boxes, the boxes of overfull strips and fixed boxes go into a separate [tree](super::tree). Its boxes are
+//! compared with each other, but for two fixed ones, and with the boxes of every strip.
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
@@ -17,21 +28,22 @@ use crate::cpu::tree::{Members, Tree};
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
 use crate::filter::Filter;
-use crate::load::{FramePlan, Sample, StripGrid, StripSpan};
+use crate::load::{FramePlan, SceneStats, StripGrid, StripSpan};
 use crate::pairs::Pairs;
 use std::ops::Range;
 
-/// Boxes that a strip holds at most; those of a fuller one stand apart. Sixteen times as many as one holds of boxes that are spread evenly: up to
-/// there a sweep of one dense strip among others costs less than the tree and what the other strips have to do with it.
+/// Most boxes of a strip. The boxes of a fuller one go into the tree. This is sixteen times the number in a strip of
+/// evenly spread boxes: up to there sweeping a dense strip costs less than the tree and its comparison with the other
+/// strips.
 const MOST_BOXES: usize = 4096;
 
-/// The same of the boxes of one thread's share, which need not be an equal part of every strip.
+/// Most boxes of a strip in the share of one thread, which need not be an equal part of every strip.
 const MOST_OF_SHARE: usize = 1024;
 
-/// The mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip) in the first of a box's strips.
+/// The mask of [`StripGrid::each_strip`] in the first strip of a box.
 const BOTH: u32 = 3;
 
-/// Marks the count of a strip whose boxes stand apart.
+/// Marks the count of an overfull strip.
 const OVERFULL: u32 = 1 << 31;
 
 /// The method; see the module.
@@ -39,7 +51,7 @@ const OVERFULL: u32 = 1 << 31;
 struct GridSap {
     workers: Workers,
     bins: Vec<Bins>,
-    /// Positions in the input of the boxes that stand apart, ascending, and the tree of them.
+    /// Positions in the input of the boxes in the tree, ascending.
     apart: Vec<u32>,
     tree: Tree,
     tasks: Vec<Task>,
@@ -47,18 +59,18 @@ struct GridSap {
     simd: Simd,
 }
 
-/// What one thread makes of its share of the boxes.
+/// The bins of one thread: its share of the boxes by strips.
 #[derive(Debug, Default)]
 struct Bins {
-    /// Where the bin of each strip begins in `entries`; one more than there are strips.
+    /// Start of the bin of each strip in `entries`, and the end of the last bin.
     starts: Vec<u32>,
-    /// The strips in which each box of the share stands.
+    /// The strips of each box of the share.
     spans: Vec<StripSpan>,
     entries: Vec<Entry>,
-    /// Positions in the input of the boxes that stand apart; only the first `apart_count` are of this frame.
+    /// Positions in the input of the boxes that go into the tree. The first `apart_count` are of this frame.
     apart: Vec<u32>,
     apart_count: usize,
-    /// What went wrong, to be reported after the phase.
+    /// The error of this frame, reported after the phase.
     error: Option<Error>,
 }
 
@@ -71,7 +83,7 @@ struct Entry {
     begins: u32,
 }
 
-/// Memory of one task of phase two.
+/// The buffers of one task of phase two.
 #[derive(Debug, Default)]
 struct Task {
     entries: Vec<Entry>,
@@ -112,12 +124,12 @@ impl BroadPhase for GridSap {
         bins.iter_mut().find_map(|b| b.error.take()).map_or(Ok(()), Err)?;
         apart.clear();
         let count = bins.iter().map(|b| b.apart_count).sum();
-        apart.try_reserve(count).map_err(|_| Error::OutOfMemory { what: "boxes that stand apart", elements: count })?;
+        apart.try_reserve(count).map_err(|_| Error::OutOfMemory { what: "boxes in a tree", elements: count })?;
         bins.iter().for_each(|b| apart.extend_from_slice(&b.apart[..b.apart_count]));
         let tree = if apart.is_empty() {
             None
         } else {
-            tree.build(workers, boxes, Members::Of(apart), &Sample::of_members(boxes, apart), filter)?;
+            tree.build(workers, boxes, Members::Of(apart), &SceneStats::of_members(boxes, apart), filter)?;
             Some(&*tree)
         };
         let (bins, strips, count) = (&*bins, grid.strips(), tasks.len());
@@ -135,7 +147,7 @@ impl BroadPhase for GridSap {
     }
 
     fn prepare(&mut self, objects: usize) {
-        // A refused allocation is reported by the frame that needs it. Boxes stand in 1.6 strips on average.
+        // The frame that needs the memory reports a refused allocation. A box stands in 1.6 strips on average.
         let share = objects / self.bins.len();
         for bin in &mut self.bins {
             let _ = ensure(&mut bin.entries, share + share * 5 / 8, "boxes in strips");
@@ -143,7 +155,7 @@ impl BroadPhase for GridSap {
     }
 }
 
-/// The first strip of part `k` of `parts` parts that hold equally many entries.
+/// Returns the first strip of part `k` of `parts` parts with about equally many entries.
 fn balanced(bins: &[Bins], strips: usize, k: usize, parts: usize) -> usize {
     let before = |strip: usize| bins.iter().map(|b| u64::from(b.starts[strip])).sum::<u64>();
     let wanted = before(strips) * k as u64 / parts as u64;
@@ -159,7 +171,8 @@ fn balanced(bins: &[Bins], strips: usize, k: usize, parts: usize) -> usize {
 }
 
 impl Bins {
-    /// Sorts a share of the boxes into bins. Where each goes is worked out once, in the pass that counts.
+    /// Sorts a share of the boxes into bins. The pass that counts works out the strips of each box; the second pass
+    /// reuses them.
     fn fill(
         &mut self,
         grid: &StripGrid,
@@ -173,7 +186,7 @@ impl Bins {
         let strips = grid.strips();
         ensure(&mut self.starts, strips + 1, "strips")?;
         ensure(&mut self.spans, share.len(), "boxes in strips")?;
-        // The axes are constants in each of the three, so that no index is computed.
+        // The axes are constants in each of the three calls, so that no index is computed.
         match grid.axis {
             0 => self.count::<0>(grid, share, first, filter)?,
             1 => self.count::<1>(grid, share, first, filter)?,
@@ -204,13 +217,13 @@ impl Bins {
                 *at += 1;
             });
         }
-        // Every start has moved to its bin's end, which is the start of the next.
+        // Every start has moved to the end of its bin, which is the start of the next bin.
         starts.copy_within(..strips, 1);
         starts[0] = 0;
         Ok(())
     }
 
-    /// Finds the strips of each box and counts how many go into each bin.
+    /// Finds the strips of each box and counts the boxes of each bin.
     fn count<const AXIS: usize>(
         &mut self,
         grid: &StripGrid,
@@ -233,7 +246,7 @@ impl Bins {
         Ok(())
     }
 
-    /// Takes the boxes of strips with more than `most` of them out of all their strips, and lists the boxes that stand apart.
+    /// Takes the boxes of strips with more than `most` boxes out of all their strips, and lists the boxes for the tree.
     fn set_apart(&mut self, grid: &StripGrid, most: u32, first: usize, len: usize) -> Result<(), Error> {
         let Self { starts, spans, apart, apart_count, .. } = self;
         let starts = &mut starts[..grid.strips()];
@@ -247,7 +260,7 @@ impl Bins {
                 *span = StripSpan::APART;
             }
             if *span == StripSpan::APART {
-                ensure(apart, *apart_count + 1, "boxes that stand apart")?;
+                ensure(apart, *apart_count + 1, "boxes in a tree")?;
                 apart[*apart_count] = id as u32;
                 *apart_count += 1;
             }
@@ -256,14 +269,14 @@ impl Bins {
         Ok(())
     }
 
-    /// The bin of a strip.
+    /// Returns the bin of a strip.
     fn bin(&self, strip: usize) -> &[Entry] {
         &self.entries[self.starts[strip] as usize..self.starts[strip + 1] as usize]
     }
 }
 
 impl Task {
-    /// Adds the pairs of the boxes in these strips with one another and with those in the tree.
+    /// Adds the pairs of the boxes in these strips with each other and with those in the tree.
     fn find(
         &mut self,
         bins: &[Bins],
@@ -287,7 +300,7 @@ impl Task {
         Ok(())
     }
 
-    /// Brings the boxes of a strip into columns that ascend on the sweep axis.
+    /// Writes the boxes of a strip to the columns, ascending on the sweep axis.
     fn sort(&mut self, bins: &[Bins], strip: usize, axis: usize) -> Result<(), Error> {
         let entries: &[Entry] = if let [only] = bins {
             only.bin(strip)
@@ -315,19 +328,20 @@ impl Task {
         Ok(())
     }
 
-    /// Up to 16 boxes that follow one another along the sweep, those of them that begin in this strip: each box is in one group of one strip.
+    /// Returns up to 16 boxes that follow each other along the sweep, without those that began in an earlier strip:
+    /// each box is in one group of one strip. `None` if none is left.
     fn group(&self, at: usize, axis: usize) -> Option<Group> {
         let of = &self.columns;
         let rows = at..(at + LANES).min(of.len());
-        let begins = &of.padded().begins[rows.clone()];
+        let begins = &of.begins[rows.clone()];
         let mut group: Option<Group> = None;
         for (lane, row) in rows.enumerate().filter(|&(lane, _)| begins[lane] == BOTH) {
             let mut b = Aabb::default();
             for k in 0..3 {
-                (b.min[(axis + k) % 3], b.max[(axis + k) % 3]) = (of.low(k)[row], of.high(k)[row]);
+                (b.min[(axis + k) % 3], b.max[(axis + k) % 3]) = (of.low[k][row], of.high[k][row]);
             }
             let group = group.get_or_insert_with(|| Group::of(&b));
-            group.set(lane, &b, of.ids()[row]);
+            group.set(lane, &b, of.ids[row]);
         }
         group
     }

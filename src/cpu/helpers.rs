@@ -1,91 +1,99 @@
-//! The threads that help the calling one, and where they run.
+//! The threads that help the calling one.
 
 use crate::cpu::phases::Phases;
-use crate::cpu::seats::Seats;
+use crate::cpu::placement::CpuPlacement;
 use crate::error::Unavailable;
 use std::sync::Arc;
 
-/// A pool of ours, or one that a program gave.
+/// A pool of helpers: ours, or the program's.
 #[derive(Debug)]
 pub(crate) struct Helpers {
     pool: Arc<rayon::ThreadPool>,
     shared: Arc<Shared>,
-    /// Whether the caller may be a thread of the pool itself, as it may be of a pool that the program gave.
+    /// Whether the caller may itself be a thread of the pool, as with the program's pool.
     may_call: bool,
 }
 
-/// What a helper that was invited finds when it comes, which may be after all else of this is gone.
+/// The part of [`Helpers`] that an invited helper holds: it may come after the rest is gone.
 #[derive(Debug)]
 struct Shared {
     phases: Phases,
-    /// Where the helpers are bound, and one seat more for the caller.
-    seats: Option<Arc<Seats>>,
+    /// CPUs of the helpers, and one more for the caller.
+    placement: Option<Arc<CpuPlacement>>,
 }
 
 impl Helpers {
-    /// `count` helpers, each bound to a CPU of its own where that is wanted, allowed, and there is one more CPU than that.
+    /// Makes `count` helpers. Pins each to its own CPU if that is wanted and allowed, and if there is one CPU more than
+    /// helpers.
     ///
     /// # Errors
     /// [`Unavailable::ThreadsRefused`].
     pub(crate) fn new(count: u32, pinned: bool) -> Result<Self, Unavailable> {
-        let seats = if pinned { Seats::take(count as usize + 1).map(Arc::new) } else { None };
-        Ok(Self::over(Arc::new(build_pool(count, seats.clone(), 1)?), seats, false))
+        let placement = if pinned { CpuPlacement::choose(count as usize + 1).map(Arc::new) } else { None };
+        Ok(Self::over(Arc::new(build_pool(count, placement.clone(), 1)?), placement, false))
     }
 
-    /// The threads of a program's pool, which may run on any core.
+    /// Takes the threads of a program's pool, which may run on any core.
     pub(crate) fn of(pool: Arc<rayon::ThreadPool>) -> Self {
         Self::over(pool, None, true)
     }
 
-    fn over(pool: Arc<rayon::ThreadPool>, seats: Option<Arc<Seats>>, may_call: bool) -> Self {
-        Self { pool, shared: Arc::new(Shared { phases: Phases::default(), seats }), may_call }
+    fn over(pool: Arc<rayon::ThreadPool>, placement: Option<Arc<CpuPlacement>>, may_call: bool) -> Self {
+        Self { pool, shared: Arc::new(Shared { phases: Phases::default(), placement }), may_call }
     }
 
-    /// Runs `work` here and on up to `count` helpers, those that come while it lasts. Returns when no one works on it any more.
+    /// Runs `work` here and on up to `count` helpers that come while it lasts. Returns when nobody works on it any
+    /// more.
     ///
-    /// A caller that is one of them can't help itself: then there is one less to help. It runs no other job of its pool meanwhile.
+    /// A caller that is a thread of the pool can't help itself, so there is one helper less. It runs no other job of
+    /// its pool meanwhile.
     pub(crate) fn run(&self, count: usize, work: &(dyn Fn() + Sync)) {
-        if let Some(seats) = &self.shared.seats {
-            seats.follow_caller();
+        if let Some(placement) = &self.shared.placement {
+            placement.follow_caller();
         }
         let most = self.pool.current_num_threads();
         let most = if self.may_call && self.pool.current_thread_index().is_some() { most - 1 } else { most };
         self.shared.phases.run(count.min(most), most, work, || {
             let shared = Arc::clone(&self.shared);
             self.pool.spawn(move || {
-                if let Some(seats) = &shared.seats {
-                    seats.make_way();
+                if let Some(placement) = &shared.placement {
+                    placement.make_way();
                 }
                 shared.phases.join();
             });
         });
     }
 
-    /// Invitations that no helper has come upon yet.
+    /// Returns the invitations that no helper has taken yet.
     #[cfg(test)]
     pub(crate) fn invited(&self) -> usize {
         self.shared.phases.invited()
     }
 }
 
-/// A pool of `threads` threads, each bound to a CPU of its own where there are enough and [that is allowed](crate::cpu::seats::may_bind).
+/// Makes a pool of `threads` threads. Pins each to its own CPU if there are enough and [that is
+/// allowed](crate::cpu::placement::may_pin).
 ///
 /// # Errors
 /// [`Unavailable::ThreadsRefused`].
 #[cfg(feature = "measure")]
-pub(crate) fn seated_pool(threads: u32) -> Result<rayon::ThreadPool, Unavailable> {
-    build_pool(threads, Seats::take(threads as usize).map(Arc::new), 0)
+pub(crate) fn pinned_pool(threads: u32) -> Result<rayon::ThreadPool, Unavailable> {
+    build_pool(threads, CpuPlacement::choose(threads as usize).map(Arc::new), 0)
 }
 
-/// A pool of `threads` threads, of which number k has seat `first` + k.
-fn build_pool(threads: u32, seats: Option<Arc<Seats>>, first: usize) -> Result<rayon::ThreadPool, Unavailable> {
-    let bind = move |k: usize| {
-        if let Some(seats) = &seats {
-            seats.bind(first + k);
+/// Makes a pool of `threads` threads, of which number k has position `first` + k of the placement.
+fn build_pool(
+    threads: u32,
+    placement: Option<Arc<CpuPlacement>>,
+    first: usize,
+) -> Result<rayon::ThreadPool, Unavailable> {
+    let pin = move |k: usize| {
+        if let Some(placement) = &placement {
+            placement.pin(first + k);
         }
     };
     let named = move |k| format!("sapwise-{threads}-{k}");
-    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).thread_name(named).start_handler(bind);
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).thread_name(named).start_handler(pin);
     builder.build().map_err(|e| Unavailable::ThreadsRefused { threads, message: e.to_string() })
 }
 
@@ -96,19 +104,19 @@ mod tests {
     use std::sync::{Barrier, Mutex, mpsc};
     use std::thread::{ThreadId, current};
 
-    /// The threads that work where `threads` helpers are wanted and `all` are there at once, the caller among them.
+    /// Returns the threads that work if `threads` helpers are wanted, `all` of them at once, the caller among them.
     fn working(helpers: &Helpers, threads: usize, all: usize) -> Vec<ThreadId> {
         let (seen, all) = (Mutex::new(Vec::new()), Barrier::new(all));
         helpers.run(threads, &|| {
             seen.lock().unwrap().push(current().id());
-            // Were it one less, no one would get past this; were it one more, that one would be left behind.
+            // With one thread less, nobody would get past this; with one more, that one would be left behind.
             all.wait();
         });
         seen.into_inner().unwrap()
     }
 
     #[test]
-    fn a_programs_threads_help_and_a_caller_among_them_does_not_help_itself() {
+    fn threads_of_a_program_help_a_caller_among_them() {
         for size in [1, 2, 4] {
             let pool = Arc::new(build_pool(size, None, 0).unwrap());
             let size = size as usize;
@@ -121,9 +129,9 @@ mod tests {
         }
     }
 
-    /// As many invitations as the pool has threads wait in its queue, however many frames call meanwhile.
+    /// However many frames call meanwhile, only as many invitations as the pool has threads wait in its queue.
     #[test]
-    fn a_busy_pool_is_neither_waited_for_nor_flooded() {
+    fn busy_pool_is_neither_waited_for_nor_flooded() {
         let pool = Arc::new(build_pool(2, None, 0).unwrap());
         let helpers = Helpers::of(Arc::clone(&pool));
         let (came, here) = mpsc::channel();
@@ -149,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_in_the_programs_pool_reaches_the_caller() {
+    fn panic_in_the_programs_pool_reaches_the_caller() {
         let pool = Arc::new(build_pool(1, None, 0).unwrap());
         let helpers = Helpers::of(Arc::clone(&pool));
         let (both, done) = (Barrier::new(2), AtomicBool::new(false));
@@ -163,27 +171,26 @@ mod tests {
         };
         let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_err();
         assert_eq!((caught.downcast_ref(), done.into_inner()), (Some(&"a helper panics"), true));
-        // The pool's thread is none the worse.
+        // The pool's thread still works.
         assert_eq!(working(&helpers, 1, 2).len(), 2);
     }
 
-    /// Each is bound before it works, and says where it works.
     #[cfg(target_os = "linux")]
     #[test]
-    fn helpers_are_bound_where_that_is_wanted_allowed_and_possible() {
+    fn helpers_are_pinned_if_wanted_allowed_and_possible() {
         for pinned in [false, true] {
             let helpers = Helpers::new(1, pinned).unwrap();
             let usable = core_affinity::get_core_ids().unwrap().len();
-            let bound = Mutex::new(Vec::new());
+            let cpus = Mutex::new(Vec::new());
             let (all, caller) = (Barrier::new(2), current().id());
             helpers.run(1, &|| {
                 all.wait();
                 if current().id() != caller {
-                    bound.lock().unwrap().push(core_affinity::get_core_ids().unwrap().len());
+                    cpus.lock().unwrap().push(core_affinity::get_core_ids().unwrap().len());
                 }
             });
-            let one = pinned && crate::cpu::seats::may_bind() && usable > 1;
-            assert_eq!(bound.into_inner().unwrap(), [if one { 1 } else { usable }]);
+            let one = pinned && crate::cpu::placement::may_pin() && usable > 1;
+            assert_eq!(cpus.into_inner().unwrap(), [if one { 1 } else { usable }]);
         }
     }
 }

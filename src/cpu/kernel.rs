@@ -1,6 +1,7 @@
 //! The inner loops: one box against several at a time, at every SIMD level.
 //!
-//! A loop is written once over [`Lanes`] and compiled for each level inside a function that enables its instructions.
+//! Each loop is written once over [`Lanes`], and compiled for each level inside a function that enables its
+//! instructions.
 
 pub(crate) mod contain;
 pub(crate) mod node;
@@ -11,80 +12,37 @@ pub(crate) mod walk;
 mod x86;
 
 use crate::aabb::Aabb;
-use crate::cpu::columns::Columns;
+use crate::cpu::columns::{Columns, PADDING};
 use crate::cpu::level::Simd;
 use crate::pair::Pair;
 use crate::pairs::{Pairs, each_bit};
 use std::ops::Range;
 
-/// What [`SimdLevel::Portable`] stands for: the vectors that every CPU of the target has.
+/// The vectors of [`SimdLevel::Portable`]: those that every CPU of the target has.
 #[cfg(target_arch = "x86_64")]
 use x86::Sse2 as Baseline;
 
 #[cfg(not(target_arch = "x86_64"))]
 use portable::Portable as Baseline;
 
-/// Tests every row of `rows` against the rows behind it until one begins beyond its end on the sweep axis, and adds the pairs.
+/// Tests every row of `rows` against the rows behind it, up to the first that begins beyond its end on the sweep axis,
+/// and adds the pairs.
 ///
 /// The columns must ascend by lower bound on the sweep axis.
 pub(crate) fn sweep_rows<R: Rows>(simd: Simd, columns: &Columns, rows: Range<usize>, pairs: &mut Pairs) {
-    sweep_at::<R>(simd, &View::new(columns), rows, |row, _| row + 1, pairs);
-}
-
-/// A sweep that begins for each row where `start` says.
-fn sweep_at<R: Rows>(
-    simd: Simd,
-    view: &View<'_>,
-    rows: Range<usize>,
-    start: impl FnMut(usize, &Query) -> usize,
-    pairs: &mut Pairs,
-) {
     if pairs.is_any_over() {
         return;
     }
+    let view = View::new(columns);
     match simd {
         // SAFETY: the proof says that this CPU has the instructions.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx512(proof) => unsafe { x86::sweep_avx512::<R>(proof, view, rows, start, pairs) },
+        Simd::Avx512(proof) => unsafe { x86::sweep_avx512::<R>(proof, &view, rows, pairs) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx2(proof) => unsafe { x86::sweep_avx2::<R>(proof, view, rows, start, pairs) },
-        Simd::Portable => sweep::<_, R>(Baseline, view, rows, start, pairs),
+        Simd::Avx2(proof) => unsafe { x86::sweep_avx2::<R>(proof, &view, rows, pairs) },
+        Simd::Portable => sweep::<_, R>(Baseline, &view, rows, pairs),
     }
-}
-
-/// Whether a row counts that begins where the one before which it would stand begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Ties {
-    Count,
-    Skip,
-}
-
-/// Tests every row of `rows` against those of `others` that begin no earlier than it, until one begins beyond its end on the sweep axis,
-/// and adds the pairs. With both directions, one of which skips ties, these are all pairs of the two.
-///
-/// Rows of both ranges must ascend by lower bound on the sweep axis, and a gap or the end must follow `others`.
-pub(crate) fn sweep_across(
-    simd: Simd,
-    columns: &Columns,
-    rows: Range<usize>,
-    others: Range<usize>,
-    ties: Ties,
-    pairs: &mut Pairs,
-) {
-    let view = View::new(columns);
-    let low = &columns.low(0)[..others.end];
-    let Some(&first) = columns.low(0).get(rows.start).filter(|_| !rows.is_empty()) else { return };
-    let before = |other: f32, row: f32| if ties == Ties::Count { other < row } else { other <= row };
-    let mut at = others.start + low[others.start..].partition_point(|&other| before(other, first));
-    // Both ascend: where one row begins, those before it have passed.
-    let start = |_: usize, query: &Query| {
-        while at < others.end && before(low[at], query.low[0]) {
-            at += 1;
-        }
-        at
-    };
-    sweep_at::<All>(simd, &view, rows, start, pairs);
 }
 
 /// Tests every row of `rows` against all rows behind it, on all three axes, and adds the pairs.
@@ -104,16 +62,17 @@ pub(crate) fn brute_rows(simd: Simd, columns: &Columns, rows: Range<usize>, pair
     }
 }
 
-/// What the rows of a sweep are.
+/// Which pairs of rows count.
 pub(crate) trait Rows {
-    /// Whether a pair counts only where both bits of the mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip) are set in either box.
+    /// Whether this strip reports only the pairs for which both bits of the mask of
+    /// [`StripGrid::each_strip`](crate::load::StripGrid::each_strip) are set in either box.
     const IN_STRIP: bool;
 }
 
-/// All boxes there are: every pair counts.
+/// The rows are all boxes: every pair counts.
 pub(crate) struct All;
 
-/// The boxes of a strip, which share others: a pair counts in one of them.
+/// The rows are the boxes of a strip. Two boxes may share several strips, and one of these reports the pair.
 pub(crate) struct InStrip;
 
 impl Rows for All {
@@ -135,24 +94,27 @@ struct Query {
     begins: u32,
 }
 
-/// The columns as pointers of one common length.
+/// The columns with their padding.
 struct View<'a> {
     low: [&'a [f32]; 3],
     high: [&'a [f32]; 3],
     ids: &'a [u32],
     begins: &'a [u32],
-    /// Rows that hold boxes; every column has 16 more values behind them.
+    /// Rows that hold boxes. Every column has [`PADDING`] more values behind them.
     len: usize,
 }
 
 impl<'a> View<'a> {
     fn new(columns: &'a Columns) -> Self {
-        let view = columns.padded();
-        // The unchecked loads below rest on this.
-        let end = columns.len() + 16;
-        assert!(view.low.iter().chain(&view.high).all(|c| c.len() >= end), "columns without padding");
-        assert!(view.ids.len() >= end && view.begins.len() >= end, "columns without padding");
-        Self { low: view.low, high: view.high, ids: view.ids, begins: view.begins, len: columns.len() }
+        // The unchecked loads below rest on these lengths.
+        let end = columns.len() + PADDING;
+        Self {
+            low: columns.low.each_ref().map(|c| &c[..end]),
+            high: columns.high.each_ref().map(|c| &c[..end]),
+            ids: &columns.ids[..end],
+            begins: &columns.begins[..end],
+            len: columns.len(),
+        }
     }
 
     #[inline(always)]
@@ -172,33 +134,32 @@ trait Lanes: Copy {
     const COUNT: usize;
     /// The mask of all rows.
     const ALL: u32 = ((1_u64 << Self::COUNT) - 1) as u32;
-    /// Rows `at..at + COUNT` against a box that begins no later on the sweep axis: which begin before its end, and
-    /// which of those overlap it on the other two axes too.
+    /// Tests rows `at..at + COUNT` against a box that begins no later on the sweep axis. Returns which begin before its
+    /// end, and which of those overlap it on the other two axes too.
     ///
     /// # Safety
     /// `at <= view.len`, and the calling function has the instructions enabled.
     unsafe fn reach_and_hits(self, view: &View<'_>, at: usize, query: &Query) -> (u32, u32);
-    /// Rows `at..at + COUNT` that end on the sweep axis no earlier than the box begins.
+    /// Returns which of the rows `at..at + COUNT` end on the sweep axis no earlier than the box begins.
     ///
     /// # Safety
     /// As above.
     unsafe fn ends_after(self, view: &View<'_>, at: usize, low: f32) -> u32;
-    /// Those of `hits` whose pair with the box that this strip has to report; see
-    /// the mask of [`StripGrid::each_strip`](crate::load::StripGrid::each_strip).
+    /// Returns the rows of `hits` whose pair with the box this strip has to report: see [`Rows::IN_STRIP`].
     ///
     /// # Safety
     /// As above.
     #[inline(always)]
     unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
         let mut owned = hits;
-        // With both bits set in the one box, as in most strips, the others don't matter.
+        // Most boxes stand in one strip: both bits are set, and those of the others don't matter.
         if begins != 3 {
             each_bit(hits, |bit| owned &= !(u32::from(begins | view.begins[at + bit] != 3) << bit));
         }
         owned
     }
-    /// Writes the pairs of `id` with the rows `at + k`, k the bits of `hits`, to the head of `room`, which has room for
-    /// `COUNT` pairs; what follows them there is unspecified.
+    /// Writes the pairs of `id` with the rows `at + k`, k the bits of `hits`, to the head of `room`, which holds
+    /// `COUNT` pairs. The rest of `room` is unspecified afterwards.
     ///
     /// # Safety
     /// As above.
@@ -214,7 +175,7 @@ trait Lanes: Copy {
     }
 }
 
-/// Adds the pairs of a row with the rows that it hits.
+/// Adds the pairs of a row and the rows that it hits.
 #[inline(always)]
 fn add<L: Lanes, R: Rows>(lanes: L, view: &View<'_>, at: usize, query: &Query, hits: u32, pairs: &mut Pairs) {
     // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
@@ -229,17 +190,11 @@ fn add<L: Lanes, R: Rows>(lanes: L, view: &View<'_>, at: usize, query: &Query, h
 }
 
 #[inline(always)]
-fn sweep<L: Lanes, R: Rows>(
-    lanes: L,
-    view: &View<'_>,
-    rows: Range<usize>,
-    mut start: impl FnMut(usize, &Query) -> usize,
-    pairs: &mut Pairs,
-) {
+fn sweep<L: Lanes, R: Rows>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
     debug_assert!(rows.end <= view.len);
     for i in rows {
         let query = view.query(i);
-        let mut at = start(i, &query);
+        let mut at = i + 1;
         while at < view.len {
             // SAFETY: `at < view.len`; the caller enabled the instructions of `L`.
             let (reach, hits) = unsafe { lanes.reach_and_hits(view, at, &query) };
@@ -251,7 +206,7 @@ fn sweep<L: Lanes, R: Rows>(
             }
             at += L::COUNT;
         }
-        // 2^20 boxes in one point have 5 * 10^11 pairs: a caller who wants a thousand does not wait for all.
+        // 2^20 boxes in one point have 5 * 10^11 pairs: a caller who wants a thousand must not wait for all.
         if pairs.is_over() {
             return;
         }
@@ -272,20 +227,21 @@ fn brute<L: Lanes>(lanes: L, view: &View<'_>, rows: Range<usize>, pairs: &mut Pa
             }
             at += L::COUNT;
         }
-        // As above.
+        // As in `sweep`.
         if pairs.is_over() {
             return;
         }
     }
 }
 
-/// Whether two boxes overlap, without the branches of [`Aabb::overlaps`]: where every other pair is a hit no branch can be guessed.
+/// Returns whether two boxes overlap, without the branches of [`Aabb::overlaps`]: no CPU predicts them if every other
+/// pair is a hit.
 #[inline(always)]
 pub(crate) fn overlap(a: &Aabb, b: &Aabb) -> bool {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::*;
-        // SAFETY: SSE is part of x86-64; floats 0 to 3 and 2 to 5 of an `Aabb`, which is `repr(C)`.
+        // SAFETY: SSE is part of x86-64. The loads read floats 0 to 3 and 2 to 5 of an `Aabb`, which is `repr(C)`.
         unsafe {
             let halves = |b: &Aabb| {
                 let at = std::ptr::from_ref(b).cast::<f32>();
@@ -305,7 +261,7 @@ pub(crate) fn overlap(a: &Aabb, b: &Aabb) -> bool {
     }
 }
 
-/// Asks for a value that is needed soon. Where there is no such instruction, nothing happens.
+/// Prefetches a value that is needed soon; does nothing on targets without such an instruction.
 #[inline(always)]
 pub(crate) fn prefetch<T>(value: &T) {
     #[cfg(target_arch = "x86_64")]
@@ -327,10 +283,9 @@ mod tests {
     use crate::{Aabb, Filter, Membership};
     use std::sync::Arc;
 
-    /// On targets without kernels of their own; here it only has to be right.
-    /// Pairs that the filter keeps out are counted, and tell how many were found at all.
+    /// `overlapping` counts the pairs that the filter drops too: it shows how many were found.
     #[test]
-    fn a_search_ends_with_the_row_that_exceeds_the_limit() {
+    fn search_over_limit_ends_with_its_row() {
         let boxes = vec![Aabb::cube([1.0; 3], 0.5); 1000];
         let mut columns = Columns::default();
         columns.resize(boxes.len()).unwrap();
@@ -347,8 +302,8 @@ mod tests {
             search(Simd::Portable, &columns, 0..1000, &mut pairs);
             assert!(pairs.is_over() && pairs.overlapping() == 10, "{}", pairs.overlapping());
             search(Simd::Portable, &columns, 600..1000, &mut pairs);
-            assert_eq!(pairs.overlapping(), 10, "what is over is not gone on with");
-            // Nor is it with another part of the same frame.
+            assert_eq!(pairs.overlapping(), 10, "a list over the limit is left alone");
+            // So is another part of the same frame.
             let any_over = Arc::default();
             let mut parts = [Pairs::new(), Pairs::new()];
             parts.iter_mut().for_each(|part| part.begin_part(&whole, &any_over));
@@ -358,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_rust_gives_the_pairs_of_the_double_loop() {
+    fn portable_kernels_match_the_double_loop() {
         let boxes: Vec<Aabb> = (0..203)
             .map(|k| Aabb::cube([k as f32 / 8.0, (k * 7 % 13) as f32, (k * 5 % 11) as f32], 0.5 + (k % 5) as f32))
             .collect();
@@ -371,11 +326,11 @@ mod tests {
         }
         let mut expected = Pairs::new();
         (0..boxes.len()).for_each(|j| {
-            (0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).for_each(|i| expected.push(i as u32, j as u32))
+            (0..j).filter(|&i| boxes[i].overlaps(&boxes[j])).for_each(|i| expected.push(i as u32, j as u32));
         });
         let view = View::new(&columns);
         let (mut swept, mut tested) = (Pairs::new(), Pairs::new());
-        sweep::<_, All>(portable::Portable, &view, 0..boxes.len(), |row, _| row + 1, &mut swept);
+        sweep::<_, All>(portable::Portable, &view, 0..boxes.len(), &mut swept);
         brute(portable::Portable, &view, 0..boxes.len(), &mut tested);
         assert_eq!(swept.fingerprint(), expected.fingerprint());
         assert_eq!(tested.fingerprint(), expected.fingerprint());

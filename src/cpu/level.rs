@@ -1,4 +1,4 @@
-//! Which vector instructions the algorithms use, and the proof that this CPU has them.
+//! SIMD levels, and the proof that this CPU has one.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,11 +6,12 @@ use std::str::FromStr;
 /// The environment variable that [`SimdLevel::in_use`] reads.
 const VARIABLE: &str = "SAPWISE_SIMD";
 
-/// A set of vector instructions. A higher level needs everything that the lower ones need.
+/// A set of vector instructions. Each level includes the lower ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum SimdLevel {
-    /// What every CPU of the target has: SSE2 on x86-64, elsewhere what the compiler makes of plain Rust.
+    /// The vectors that every CPU of the target has: SSE2 on x86-64, elsewhere those that the compiler makes of plain
+    /// Rust.
     Portable,
     /// 256-bit AVX2 of x86-64.
     Avx2,
@@ -24,12 +25,12 @@ pub enum SimdLevel {
 pub enum SimdLevelError {
     /// No level has this name.
     Unknown {
-        /// The text that was given.
+        /// The name.
         text: String,
     },
     /// This CPU lacks the level.
     Unsupported {
-        /// The level that was asked for.
+        /// The requested level.
         level: SimdLevel,
         /// The highest level that this CPU has.
         detected: SimdLevel,
@@ -40,17 +41,17 @@ impl SimdLevel {
     /// Every level, ascending.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
-    /// The highest level that this CPU has.
+    /// Returns the highest level that this CPU has.
     #[must_use]
     pub fn detected() -> Self {
         Simd::at_most(Self::Avx512).level()
     }
 
-    /// The level in use: the detected one, or a lower one that the environment variable `SAPWISE_SIMD` names.
+    /// Returns the level in use: the detected one, or a lower one that the environment variable `SAPWISE_SIMD` names.
     ///
-    /// The variable is read whenever this is called, once for each [`Registry`](crate::Registry) that is made. A level that the CPU
-    /// lacks falls back to the detected one, and a name that is no level is ignored: a library can't refuse to load.
-    /// [`SimdLevel::requested`] is for programs that want to refuse.
+    /// Each new [`Registry`](crate::Registry) reads the variable once. A level that the CPU lacks and a name of no
+    /// level are ignored, because a library can't refuse to load. Programs that want to refuse call
+    /// [`SimdLevel::requested`].
     #[must_use]
     pub fn in_use() -> Self {
         match Self::requested() {
@@ -59,10 +60,10 @@ impl SimdLevel {
         }
     }
 
-    /// What `SAPWISE_SIMD` asks for, if anything.
+    /// Returns the level that `SAPWISE_SIMD` names, if it is set.
     ///
     /// # Errors
-    /// When the variable holds no level, or one that this CPU lacks.
+    /// The variable names no level, or one that this CPU lacks.
     pub fn requested() -> Result<Option<Self>, SimdLevelError> {
         match std::env::var(VARIABLE) {
             Err(_) => Ok(None),
@@ -74,7 +75,7 @@ impl SimdLevel {
         }
     }
 
-    /// 32-bit floats in one vector of this level.
+    /// Returns the number of 32-bit floats in a vector of this level.
     #[must_use]
     pub fn lanes(self) -> u32 {
         match self {
@@ -109,7 +110,7 @@ impl fmt::Display for SimdLevelError {
         match self {
             Self::Unknown { text } => write!(f, "{VARIABLE}={text}: no such level; use portable, avx2 or avx512"),
             Self::Unsupported { level, detected } => {
-                write!(f, "{VARIABLE}={level}: this CPU offers {detected} at most")
+                write!(f, "{VARIABLE}={level}: this CPU has no level above {detected}; use that or a lower one")
             }
         }
     }
@@ -117,8 +118,8 @@ impl fmt::Display for SimdLevelError {
 
 impl std::error::Error for SimdLevelError {}
 
-/// The level that a kernel runs at. A level above the lowest is a proof that this CPU has its instructions: only
-/// [`Simd::at_most`], which asks the CPU, can make one. The kernels' `unsafe` rests on that.
+/// The level of a kernel. A level above the lowest proves that this CPU has its instructions: only [`Simd::at_most`],
+/// which asks the CPU, makes one. The `unsafe` of the kernels rests on that.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Simd {
     Portable,
@@ -128,18 +129,18 @@ pub(crate) enum Simd {
     Avx512(Avx512),
 }
 
-/// This CPU has AVX2.
+/// Proves that this CPU has AVX2.
 #[cfg(target_arch = "x86_64")]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Avx2(());
 
-/// This CPU has AVX-512F.
+/// Proves that this CPU has AVX-512F.
 #[cfg(target_arch = "x86_64")]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Avx512(());
 
 impl Simd {
-    /// The highest level that this CPU has and that is not above `level`.
+    /// Returns the highest level that this CPU has, up to `level`.
     #[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables, reason = "there is one level only"))]
     pub(crate) fn at_most(level: SimdLevel) -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -154,7 +155,6 @@ impl Simd {
         Self::Portable
     }
 
-    /// Which level it is.
     pub(crate) fn level(self) -> SimdLevel {
         match self {
             Self::Portable => SimdLevel::Portable,
@@ -165,7 +165,7 @@ impl Simd {
         }
     }
 
-    /// Every level that this CPU has, ascending.
+    /// Returns every level that this CPU has, ascending.
     #[cfg(test)]
     pub(crate) fn every() -> impl Iterator<Item = Self> {
         SimdLevel::ALL.into_iter().filter(|&level| level <= SimdLevel::detected()).map(Self::at_most)

@@ -1,4 +1,4 @@
-//! Algorithms on the CPU, one file per method.
+//! The algorithms on the CPU, one file for each method.
 
 mod brute;
 mod bvh;
@@ -8,20 +8,19 @@ mod grid_sap;
 mod helpers;
 mod kernel;
 mod level;
-mod moving_first;
 mod pair_cache;
 #[cfg(feature = "parallel")]
 mod phases;
-mod sap;
 #[cfg(feature = "parallel")]
-mod seats;
+mod placement;
+mod sap;
 mod sort;
 mod threads;
 mod tree;
 mod workers;
 
 #[cfg(feature = "measure")]
-pub(crate) use helpers::seated_pool;
+pub(crate) use helpers::pinned_pool;
 pub(crate) use level::Simd;
 pub use level::{SimdLevel, SimdLevelError};
 pub(crate) use threads::Threads;
@@ -31,26 +30,25 @@ pub(crate) use workers::Workers;
 use crate::broad_phase::BroadPhase;
 use crate::error::Error;
 
-/// A method of ours: one row here puts it into every test, probe, sweep and figure.
+/// A built-in method: one row here puts it into every test, probe, sweep and figure.
 pub(crate) struct Method {
     /// The part of the id before the `@`.
     pub(crate) name: &'static str,
-    /// Counts up when its speed changes.
+    /// Rises when its speed changes.
     pub(crate) revision: u32,
-    /// Makes an instance.
     pub(crate) create: Create,
 }
 
-/// An instance of a method, or why there is none.
+/// An instance of a method.
 pub(crate) type Made = Result<Box<dyn BroadPhase>, Error>;
 
-/// How a method makes an instance at a SIMD level.
+/// Makes an instance at a SIMD level.
 #[derive(Clone, Copy)]
 pub(crate) enum Create {
-    /// One that runs on that many threads.
+    /// It runs on that many threads.
     OneWidth(fn(u32, &Threads, Simd) -> Made),
-    /// An [incremental](crate::Incremental) one that runs on any of these numbers of threads, ascending, and takes along what it
-    /// keeps. It begins with the least.
+    /// It is incremental, runs on any of these numbers of threads, ascending, and keeps its state when they change. It
+    /// begins with the least.
     AnyWidth(fn(&[u32], &Threads, Simd) -> Made),
 }
 

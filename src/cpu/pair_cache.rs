@@ -1,19 +1,19 @@
-//! The pairs of boxes grown by a margin, kept from frame to frame.
+//! The pairs of fat AABBs, kept from frame to frame. A fat AABB is a box grown by a margin; here it is called a grown
+//! box.
 //!
-//! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes, so a frame costs
-//! one look at each box and one test of each kept pair. A box that leaves its grown box gets a new one, and a tree of the
-//! grown boxes finds its new neighbours. After many of those tree and list are made again. Where the boxes move too far for
-//! that to pay, a tree of the boxes themselves finds their pairs, and a few boxes are watched for it to end.
+//! While every box stays within its grown box, every overlapping pair is among the pairs of grown boxes. So a frame
+//! costs one test of each box and one of each kept pair. A box that leaves its grown box gets a new one, and a tree of
+//! the grown boxes finds its new neighbours. After many of these, tree and list are rebuilt. If the boxes move too far
+//! for that to pay, a tree of the boxes themselves finds the pairs, until the boxes slow down.
 //!
-//! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules; physics engines know the grown boxes as fat
-//! boxes.
+//! Verlet (Phys. Rev. 159, 1967) kept such lists of neighbours for molecules.
 
 mod grown;
 mod motion;
 mod tree;
 
 use crate::aabb::Aabb;
-use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, Incremental, check_count};
+use crate::broad_phase::{BroadPhase, FrameKind, FrameWork, check_count};
 use crate::cpu::Threads;
 use crate::cpu::columns::part;
 use crate::cpu::kernel::{overlap, prefetch};
@@ -21,7 +21,7 @@ use crate::cpu::level::Simd;
 use crate::cpu::tree::FAR;
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
-use crate::load::{FramePlan, Sample};
+use crate::load::{FramePlan, SceneStats};
 use crate::pairs::Pairs;
 use grown::{Grown, Margin, Share};
 use motion::{Advice, Motion, Work};
@@ -31,37 +31,38 @@ use tree::GrownTree;
 /// The method; see the module.
 #[derive(Debug)]
 struct PairCache {
-    /// One for each number of threads that it may run on, ascending, and which of them runs it now.
+    /// The workers for each number of threads, ascending, and the position of those in use.
     widths: Vec<Workers>,
     width: usize,
-    /// As many of those threads as the frames keep busy, and for how many boxes that was found out; `None`: not for this width yet.
+    /// As many of these threads as the frames keep busy, and the number of boxes for which they were fitted. `None`:
+    /// not yet for this width.
     workers: Workers,
     fitted_for: Option<usize>,
     outputs: Outputs,
     motion: Motion,
     grown: Grown,
     tree: GrownTree,
-    /// One for each task: its share of the boxes.
+    /// The share of the boxes of each task.
     shares: Vec<Share>,
-    /// One for each task: its share of the kept pairs. Tasks beyond those of the present frame have none.
+    /// The share of the kept pairs of each task. Tasks beyond those of this frame have none.
     kept: Vec<Pairs>,
-    /// The kept pairs of all tasks, while they are dealt out to another number of them.
+    /// The kept pairs of all tasks, while they are dealt out to another number of tasks.
     dealt: Pairs,
     last_frame: FrameKind,
 }
 
-/// What came of keeping pairs in a frame.
+/// The result of keeping pairs in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kept {
     /// The pairs are complete, and keeping pays.
-    Well,
+    Pays,
     /// The pairs are complete, but finding them from scratch would be cheaper.
-    Dearly,
-    /// Nothing is kept, or there were too many to keep: the pairs are not complete.
-    Not,
+    CostsMore,
+    /// The pairs are incomplete: nothing is kept, or there were too many pairs to keep.
+    Incomplete,
 }
 
-/// One instance that can run on any of these numbers of threads, ascending. It begins with the least.
+/// Makes an instance for any of these numbers of threads, ascending. It begins with the least.
 pub(super) fn create(threads: &[u32], pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
     Ok(Box::new(pair_cache(threads, pools, simd)?))
 }
@@ -97,21 +98,25 @@ impl BroadPhase for PairCache {
         check_count(boxes.len())?;
         self.fit(boxes.len());
         let kept = match self.motion.advise(plan, boxes) {
-            Advice::Scratch => Kept::Not,
+            Advice::Scratch => Kept::Incomplete,
             Advice::Keep(margin) => {
                 let kept = self.keep(plan, boxes, margin, pairs);
-                if kept != Ok(Kept::Well) {
-                    // What is known of the grown boxes may be half of this frame and half of the one before.
+                if kept != Ok(Kept::Pays) {
+                    // The grown boxes may be half of this frame and half of the previous one.
                     self.grown.forget();
-                    if let Ok(kept) = kept { self.motion.stop(kept == Kept::Not) } else { self.motion.interrupt() }
+                    if let Ok(kept) = kept {
+                        self.motion.stop(kept == Kept::Incomplete)
+                    } else {
+                        self.motion.interrupt()
+                    }
                 }
                 kept?
             }
         };
-        if kept == Kept::Not {
+        if kept == Kept::Incomplete {
             pairs.clear();
             let Self { workers, tree, outputs, .. } = self;
-            tree.build(workers, boxes, &plan.sample(boxes), pairs.filter())?;
+            tree.build(workers, boxes, &plan.stats(boxes), pairs.filter())?;
             outputs.find(workers, pairs, |k, parts, list| tree.self_pairs(k, parts, list));
             self.last_frame = FrameKind::FromScratch;
         }
@@ -120,16 +125,14 @@ impl BroadPhase for PairCache {
     }
 
     fn prepare(&mut self, objects: usize) {
-        // A refused allocation is reported by the frame that needs it.
+        // The frame that needs the memory reports a refused allocation.
         let _ = self.tree.reserve(objects).and_then(|()| self.grown.reserve(objects));
     }
 
-    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-        Some(self)
+    fn is_incremental(&self) -> bool {
+        true
     }
-}
 
-impl Incremental for PairCache {
     fn last_frame(&self) -> FrameWork {
         let keeps = self.last_frame != FrameKind::FromScratch;
         FrameWork::new(self.last_frame, if keeps { f64::from(self.motion.work_over_mean()) } else { 1.0 })
@@ -149,14 +152,15 @@ impl Incremental for PairCache {
     }
 }
 
-/// How many of the pairs that may be kept one of these tasks may keep: a crowd may lie in the part of one.
+/// Returns the most pairs that one of `tasks` tasks may keep: four equal shares, because a dense place may lie in the
+/// part of one task.
 fn most_of_task(most_kept: usize, tasks: usize) -> usize {
     (most_kept / tasks).saturating_mul(4).min(most_kept)
 }
 
 impl PairCache {
-    /// Takes as many threads of the present width as a frame of this many boxes keeps busy. They stay while that number is about the same:
-    /// to deal the kept pairs out to another number of tasks takes time.
+    /// Takes as many threads of this width as a frame of `boxes` boxes keeps busy. They stay until that number changes
+    /// by a factor of two, because dealing the kept pairs out to other tasks takes time.
     fn fit(&mut self, boxes: usize) {
         if self.fitted_for.is_some_and(|before| boxes <= 2 * before.max(1) && before <= 2 * boxes.max(1)) {
             return;
@@ -169,12 +173,12 @@ impl PairCache {
         }
     }
 
-    /// Deals the kept pairs of this many tasks out to those of the present frame.
+    /// Deals the kept pairs of `before` tasks out to the tasks of this frame.
     fn deal(&mut self, before: usize) {
         let Self { workers, kept, dealt, grown, motion, .. } = self;
         let tasks = workers.tasks();
         dealt.clear();
-        // After a frame that forgot all the lists hold nothing of use.
+        // Without grown boxes the lists are of no use.
         if !grown.as_slice().is_empty() {
             kept[..before].iter().for_each(|list| dealt.append(list));
         }
@@ -182,18 +186,18 @@ impl PairCache {
         let most = most_of_task(motion.most_kept(grown.as_slice().len()), tasks);
         for (k, list) in kept[..tasks].iter_mut().enumerate() {
             let share = part(dealt.len(), k, tasks);
-            // Many narrow tasks may keep more than a wide one: none of that is to be lost.
+            // Many small tasks may keep more than a few large ones: nothing of that may be lost.
             list.set_limit(Some(most.max(share.len())));
             dealt.as_slice()[share].iter().for_each(|&(i, j)| list.push(i, j));
         }
         if !(dealt.is_complete() && kept.iter().all(Pairs::is_complete)) {
-            // Without memory for them the next frame makes them again, and tells if it has none either.
+            // Out of memory: the next frame rebuilds, and reports an error if it lacks the memory too.
             grown.forget();
             motion.interrupt();
         }
     }
 
-    /// Finds the pairs among the kept ones, as far as those can be kept.
+    /// Finds the pairs among the kept ones.
     fn keep(&mut self, plan: &FramePlan, boxes: &[Aabb], margin: Margin, pairs: &mut Pairs) -> Result<Kept, Error> {
         let Self { workers, outputs, motion, grown, tree, shares, kept, last_frame, .. } = self;
         let workers = &*workers;
@@ -203,8 +207,8 @@ impl PairCache {
         *last_frame = if rebuilt { FrameKind::Rebuilt } else { FrameKind::Updated };
         if rebuilt {
             grown.grow_all(workers, boxes, motion.renew(plan, boxes, &changes), shares);
-            let sample = Sample::of(grown.as_slice());
-            tree.build(workers, grown.as_slice(), &sample, pairs.filter())?;
+            let stats = SceneStats::of(grown.as_slice());
+            tree.build(workers, grown.as_slice(), &stats, pairs.filter())?;
             let most = most_of_task(motion.most_kept(boxes.len()), kept.len());
             for list in kept.iter_mut() {
                 list.clear();
@@ -213,12 +217,12 @@ impl PairCache {
             let parts = kept.len();
             workers.each(kept, |k, list| tree.self_pairs(k, parts, list));
             if !kept.iter_mut().all(|list| list.is_complete() && list.reserve_some_more().is_ok()) {
-                return Ok(Kept::Not);
+                return Ok(Kept::Incomplete);
             }
         } else {
             changes.gone.clone().for_each(|id| tree.remove(id as u32));
             changes.new.clone().try_for_each(|id| tree.insert(id as u32))?;
-            tree.follow(workers, grown.as_slice(), shares.iter().flat_map(|s| s.left.iter().copied()))?;
+            tree.refit(workers, grown.as_slice(), shares.iter().flat_map(|s| s.left.iter().copied()))?;
         }
         let (grown, tree, tasks) = (&*grown, &*tree, kept.len());
         let far = boxes.len() > FAR;
@@ -228,7 +232,7 @@ impl PairCache {
                 let overlap = |(i, j): (u32, u32)| overlap(&boxes[i as usize], &boxes[j as usize]);
                 let fetch = |(i, j): (u32, u32)| {
                     if far {
-                        // Among those that will be dropped are pairs of boxes that are gone.
+                        // Pairs of removed boxes are still in the list.
                         [i, j].iter().filter_map(|&id| boxes.get(id as usize)).for_each(|b| prefetch(&b.min));
                     }
                 };
@@ -253,9 +257,9 @@ impl PairCache {
         let kept_pairs = kept.iter().map(Pairs::len).sum();
         let pays = motion.learn(boxes.len(), &changes, &Work { kept_pairs, nodes: looked.into_inner(), rebuilt });
         Ok(match (kept.iter().all(Pairs::is_complete), pays) {
-            (false, _) => Kept::Not,
-            (true, false) => Kept::Dearly,
-            (true, true) => Kept::Well,
+            (false, _) => Kept::Incomplete,
+            (true, false) => Kept::CostsMore,
+            (true, true) => Kept::Pays,
         })
     }
 }
@@ -273,13 +277,13 @@ mod tests {
         let frame = |_| {
             method.find_pairs_with(plan, scene.boxes(), &mut pairs).unwrap();
             scene.advance();
-            method.as_incremental().unwrap().last_frame()
+            method.last_frame()
         };
         (0..count).map(frame).collect()
     }
 
     #[test]
-    fn it_tells_how_each_frame_came_about() {
+    fn last_frame_reports_the_kind() {
         let kinds = |scenario, plan| frames(scenario, 4, plan).iter().map(|work| work.kind).collect::<Vec<_>>();
         let known = FramePlan::default().with_moved(Some(0.03)).with_pairs(Some(500.0));
         let unknown = FramePlan::default();
@@ -288,13 +292,13 @@ mod tests {
         assert_eq!(kinds(Scenario::Fast, &unknown), [FromScratch; 4]);
     }
 
-    /// By how much of an edge boxes move in a frame that go one way for eight frames and then back.
+    /// Returns the shift, in edges, of boxes that go one way for eight frames and then back.
     fn to_and_fro(frame: usize) -> f32 {
         if (frame / 8).is_multiple_of(2) { 0.08 } else { -0.08 }
     }
 
-    /// Kept pairs after each frame of boxes that move by so much of an edge in it.
-    fn kept(method: &mut PairCache, shifts: impl Iterator<Item = f32>, told: bool) -> Vec<usize> {
+    /// Returns the kept pairs after each frame, in which boxes move by that shift. `known`: the plan has the motion.
+    fn kept(method: &mut PairCache, shifts: impl Iterator<Item = f32>, known: bool) -> Vec<usize> {
         let mut boxes = Scene::start(Scenario::Resting, 1000, 1).boxes().to_vec();
         let mut pairs = Pairs::new();
         let frame = |shift: f32| {
@@ -303,7 +307,7 @@ mod tests {
                 let shift = if k % 2 == 0 { shift } else { -shift } * (b.max[0] - b.min[0]);
                 (b.min[0], b.max[0]) = (b.min[0] + shift, b.max[0] + shift);
             }
-            let plan = FramePlan::default().with_moved(told.then_some(f64::from(shift.abs())));
+            let plan = FramePlan::default().with_moved(known.then_some(f64::from(shift.abs())));
             method.find_pairs_with(&plan, &boxes, &mut pairs).unwrap();
             method.kept.iter().map(Pairs::len).sum()
         };
@@ -311,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_that_come_to_rest_keep_as_many_pairs_as_if_they_had_always_rested() {
+    fn boxes_that_come_to_rest_keep_few_pairs() {
         let method = || pair_cache(&[1], &Threads::default(), Simd::Portable).unwrap();
         let rested = *kept(&mut method(), (0..100).map(|_| 0.0), false).last().unwrap();
         let kept = kept(&mut method(), (0..160).map(to_and_fro).chain((0..200).map(|_| 0.0)), false);
@@ -321,10 +325,10 @@ mod tests {
     }
 
     #[test]
-    fn where_it_goes_on_after_a_while_it_begins_with_what_boxes_move_by_then() {
+    fn margin_after_a_pause_follows_the_new_motion() {
         let mut method = pair_cache(&[1], &Threads::default(), Simd::Portable).unwrap();
         let moving = *kept(&mut method, (0..160).map(to_and_fro), true).last().unwrap();
-        // As after a hundred frames of another method, in which all of them went elsewhere.
+        // As after a hundred frames of another method, in which all boxes went elsewhere.
         let mut pairs = Pairs::new();
         let boxes = Scene::start(Scenario::Resting, 1000, 2).boxes().to_vec();
         let plan = FramePlan::default().with_moved(Some(0.0)).with_pairs(Some(500.0));
@@ -334,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn the_work_of_the_frames_is_that_of_the_mean_one_in_the_mean() {
+    fn work_over_mean_has_the_mean_1() {
         for scenario in [Scenario::Uniform, Scenario::Clustered, Scenario::Slab] {
             let works = frames(scenario, 400, &FramePlan::default());
             let mean = works[100..].iter().map(|work| work.over_mean).sum::<f64>() / 300.0;

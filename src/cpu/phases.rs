@@ -1,23 +1,24 @@
 //! Work that a caller shares with helpers who may come late, or never.
 //!
-//! A phase borrows from the caller's stack, and a job of a pool must own what it holds. The scopes of rayon bridge that by waiting for
-//! every job, and while they wait they run other jobs of the caller's pool, any of which may want a lock that the caller holds. Here a job
-//! is an invitation and owns no part of a phase: whoever comes gets the closure from the list of open phases, under its lock, and is counted
-//! from then on. The caller takes its phase off the list once nothing is left to do, and waits for those who are counted and for no one else.
+//! A phase borrows from the caller's stack, but a job of a pool must own its data. The scopes of rayon bridge that by
+//! waiting for every job, and while they wait they run other jobs of the caller's pool, any of which may want a lock
+//! that the caller holds. Here a job is an invitation and owns no part of a phase: a helper gets the closure from the
+//! list of open phases, under its lock, and is counted from then on. When nothing is left to do, the caller takes its
+//! phase off the list and waits for the counted helpers only.
 //!
-//! That takes the one `unsafe` of the library that is neither a kernel nor a query of a driver: a closure that borrows stands in a list
-//! which is shared. Safe code has nothing for that but scopes, which wait for jobs that never ran.
+//! This needs `unsafe`: a closure that borrows stands in a shared list. Safe code has only scopes, which wait for jobs
+//! that never ran.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// What caller and helpers do, each until nothing is left to do.
+/// Work of caller and helpers: each calls it once, and it returns when nothing is left to do.
 type Work<'a> = &'a (dyn Fn() + Sync);
 
-/// Rounds for which the caller looks whether its helpers are done before it goes to sleep: some 20 us on the machine of the
-/// first reports. To be woken takes longer than most of what is left of a task by then.
+/// Rounds in which the caller spins for its helpers before it sleeps: about 20 µs. Waking it takes longer than most
+/// tasks have left by then.
 const SPINS: u32 = 1000;
 
 /// In [`Latch::state`]: the caller sleeps.
@@ -25,7 +26,7 @@ const ASLEEP: usize = 1;
 /// In [`Latch::state`]: one helper.
 const HELPER: usize = 2;
 
-/// The phases that can be joined, and how many helpers are on their way.
+/// The open phases, and the helpers on their way.
 #[derive(Default)]
 pub(crate) struct Phases {
     list: Mutex<List>,
@@ -34,18 +35,18 @@ pub(crate) struct Phases {
 #[derive(Default)]
 struct List {
     open: Vec<Open>,
-    /// Latches of phases that are over: a frame allocates none.
+    /// Latches of phases that are over, for reuse: a frame allocates none.
     spare: Vec<Arc<Latch>>,
-    /// Invitations that nobody has come upon yet. They name no phase, so an old one serves a new phase.
+    /// Invitations that no helper has taken yet. They name no phase, so an old one serves a new phase.
     invited: usize,
 }
 
 /// A phase that can be joined.
 struct Open {
-    /// Lives for as long as this stands in the list, and as long as `latch` counts a helper.
+    /// Valid while this stands in the list, and while `latch` counts a helper.
     work: Work<'static>,
     /// Helpers that may still join.
-    seats: usize,
+    vacant: usize,
     latch: Arc<Latch>,
 }
 
@@ -54,29 +55,30 @@ struct Open {
 struct Latch {
     /// [`ASLEEP`], and [`HELPER`] times the helpers that have joined and not left.
     state: AtomicUsize,
-    /// What the first helper panicked with.
+    /// The first panic of a helper.
     panic: Mutex<Option<Box<dyn Any + Send>>>,
     left: Condvar,
 }
 
 impl Phases {
-    /// Runs `work` here and on as many as `helpers` that come while it lasts. `invite` makes one [come](Self::join) some time, or never; no
-    /// more than `most` are on their way at once. Returns when no one works on it any more.
+    /// Runs `work` here and on up to `helpers` helpers that come while it lasts. `invite` makes one [come](Self::join)
+    /// at some time, or never; at most `most` are on their way at once. Returns when nobody works on it any more.
     ///
     /// # Panics
-    /// With what `work` panics here, else with what it panics on a helper.
+    /// With the panic of `work` here, else with the first one on a helper.
     pub(crate) fn run(&self, helpers: usize, most: usize, work: Work<'_>, invite: impl Fn()) {
         let latch = self.list().spare.pop().unwrap_or_default();
-        // Made first: from here on nothing leaves this function, not even a panic, before the phase is closed.
+        // Made first: nothing leaves this function, not even a panic, before the phase is closed.
         let phase = Joinable { phases: self, latch: &latch };
-        // SAFETY: only the lifetime changes. The reference stands in the list until `phase` is dropped, which is within this function,
-        // where `work` lives. A helper copies it from the list under the lock, and is counted in the latch under that same lock;
-        // it counts itself off after its last use. Dropping `phase` takes the reference off the list and returns when none is counted.
+        // SAFETY: only the lifetime changes. The reference stands in the list until `phase` is dropped, which is within
+        // this function, where `work` lives. A helper copies it from the list under the lock, and is counted in the
+        // latch under that same lock; it counts itself off after its last use. Dropping `phase` takes the reference off
+        // the list and returns when none is counted.
         let work_for_helpers = unsafe { std::mem::transmute::<Work<'_>, Work<'static>>(work) };
         let missing = {
             let mut list = self.list();
-            list.open.push(Open { work: work_for_helpers, seats: helpers, latch: Arc::clone(&latch) });
-            let wanted = list.open.iter().map(|open| open.seats).sum::<usize>().min(most);
+            list.open.push(Open { work: work_for_helpers, vacant: helpers, latch: Arc::clone(&latch) });
+            let wanted = list.open.iter().map(|open| open.vacant).sum::<usize>().min(most);
             let missing = wanted.saturating_sub(list.invited);
             list.invited += missing;
             missing
@@ -91,19 +93,20 @@ impl Phases {
         }
     }
 
-    /// Works on the phase that has been open the longest, if there is one with a seat. To be called once for each invitation.
+    /// Works on the phase that has been open the longest and lacks helpers, if there is one. Call this once for each
+    /// invitation.
     pub(crate) fn join(&self) {
         let joined = {
             let mut list = self.list();
             list.invited -= 1;
-            list.open.iter_mut().find(|open| open.seats > 0).map(|open| {
-                open.seats -= 1;
+            list.open.iter_mut().find(|open| open.vacant > 0).map(|open| {
+                open.vacant -= 1;
                 open.latch.state.fetch_add(HELPER, Ordering::Relaxed);
                 (open.work, Arc::clone(&open.latch))
             })
         };
         let Some((work, latch)) = joined else { return };
-        // The caller works on after a panic here, and tells of it when all is done.
+        // The caller works on after a panic here, and resumes it when all is done.
         let mut end = catch_unwind(AssertUnwindSafe(work));
         if end.is_err() {
             let mut first = lock(&latch.panic);
@@ -118,14 +121,14 @@ impl Phases {
         lock(&self.list)
     }
 
-    /// Invitations that nobody has come upon yet.
+    /// Returns the invitations that no helper has taken yet.
     #[cfg(test)]
     pub(crate) fn invited(&self) -> usize {
         self.list().invited
     }
 }
 
-/// A phase for as long as helpers may join it or work on it.
+/// An open phase. Dropping it closes the phase and waits for its helpers.
 struct Joinable<'a> {
     phases: &'a Phases,
     latch: &'a Arc<Latch>,
@@ -139,10 +142,10 @@ impl Drop for Joinable<'_> {
 }
 
 impl Latch {
-    /// Counts a helper off. The last one wakes the caller if that sleeps.
+    /// Counts a helper off. The last one wakes the caller if it sleeps.
     fn leave(&self) {
         if self.state.fetch_sub(HELPER, Ordering::AcqRel) == HELPER | ASLEEP {
-            // Taken and released, so that the caller is either not yet asleep, and will look again, or can be woken.
+            // Take and release the lock: then the caller either looks at the state again, or sleeps and can be woken.
             drop(lock(&self.panic));
             self.left.notify_one();
         }
@@ -165,7 +168,7 @@ impl Latch {
     }
 }
 
-/// A panic never happens while one of these is held, and would leave nothing half-done.
+/// Locks. A poisoned mutex is fine: nothing panics while it holds one, and a panic would leave nothing half-done.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -201,9 +204,9 @@ mod tests {
         }
     }
 
-    /// Every phase borrows from a frame of the stack that is gone soon after, and helpers come at any time, most of them too late.
+    /// Every phase borrows from a stack frame that is gone soon after, and most helpers come too late.
     #[test]
-    fn helpers_that_come_at_any_time_touch_no_phase_that_is_over() {
+    fn late_helpers_touch_no_closed_phase() {
         let phases = Phases::default();
         let (invite, invitations) = mpsc::channel();
         let invitations = Mutex::new(invitations);
@@ -237,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_waited_for_who_did_not_come_and_no_one_is_asked_twice() {
+    fn absent_helpers_are_neither_awaited_nor_invited_twice() {
         let (phases, asked, worked) = (Phases::default(), AtomicUsize::new(0), AtomicUsize::new(0));
         let work = || _ = worked.fetch_add(1, Ordering::Relaxed);
         for _ in 0..100 {
@@ -250,9 +253,9 @@ mod tests {
         assert_eq!((phases.invited(), worked.load(Ordering::Relaxed)), (0, 100));
     }
 
-    /// The helper is let go only when the caller is about to sleep or asleep: it has nothing else to do any more.
+    /// The helper goes on only when the caller is asleep or about to be.
     #[test]
-    fn a_caller_sleeps_until_the_last_helper_is_done() {
+    fn caller_sleeps_until_the_last_helper_is_done() {
         let phases = Phases::default();
         for _ in 0..if cfg!(miri) { 5 } else { 200 } {
             let (came, left) = (AtomicBool::new(false), AtomicBool::new(false));
@@ -267,7 +270,7 @@ mod tests {
                         return;
                     }
                     came.store(true, Ordering::Release);
-                    // Long after the caller has stopped looking, were it not for a latch that sleeps.
+                    // Until long after the caller has stopped spinning.
                     while !phases.list().open.is_empty() {
                         thread::yield_now();
                     }
@@ -281,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_of_a_helper_or_of_the_caller_ends_the_phase_for_both() {
+    fn panic_of_helper_or_caller_ends_the_phase() {
         let phases = Phases::default();
         let caller = thread::current().id();
         for on_caller in [false, true] {
@@ -300,7 +303,7 @@ mod tests {
             assert!(here.into_inner(), "the other went on");
             assert_eq!((phases.invited(), phases.list().open.len()), (0, 0));
         }
-        // What panicked before is forgotten.
+        // The panics are forgotten.
         phases.run(1, 1, &|| (), || phases.join());
     }
 }

@@ -1,13 +1,13 @@
-//! Sort on the axis on which the fewest pairs overlap, then sweep along it. From scratch every frame, as in the paper, which takes the axis of
-//! greatest variance: a few boxes far away decide that one.
+//! Sorts on the axis on which the fewest pairs overlap, then sweeps along it. From scratch every frame.
+//!
+//! The paper sweeps along the axis of greatest variance, which a few boxes far away decide.
 
 use crate::aabb::Aabb;
 use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::Threads;
-use crate::cpu::columns::{Columns, PADDING, ensure, order_key, part};
-use crate::cpu::kernel::{All, Ties, sweep_across, sweep_rows};
+use crate::cpu::columns::{Columns, ensure, order_key, part};
+use crate::cpu::kernel::{All, sweep_rows};
 use crate::cpu::level::Simd;
-use crate::cpu::moving_first::MovingFirst;
 use crate::cpu::sort::sort;
 use crate::cpu::workers::{Outputs, Workers};
 use crate::error::Error;
@@ -18,7 +18,6 @@ use crate::pairs::Pairs;
 #[derive(Debug)]
 struct Sap {
     workers: Workers,
-    order: MovingFirst,
     /// Lower bound on the sweep axis in the upper half, position in the input in the lower.
     keys: Vec<u64>,
     scratch: Vec<u64>,
@@ -29,15 +28,8 @@ struct Sap {
 
 pub(super) fn create(threads: u32, pools: &Threads, simd: Simd) -> Result<Box<dyn BroadPhase>, Error> {
     let workers = Workers::new("sap", threads, pools)?;
-    Ok(Box::new(Sap {
-        workers,
-        order: MovingFirst::default(),
-        keys: Vec::new(),
-        scratch: Vec::new(),
-        columns: Columns::default(),
-        outputs: Outputs::default(),
-        simd,
-    }))
+    let (columns, outputs) = (Columns::default(), Outputs::default());
+    Ok(Box::new(Sap { workers, keys: Vec::new(), scratch: Vec::new(), columns, outputs, simd }))
 }
 
 impl Sap {
@@ -56,52 +48,27 @@ impl BroadPhase for Sap {
         pairs.clear();
         check_count(boxes.len())?;
         self.resize(boxes.len())?;
-        let axis = plan.sample(boxes).sweep_axis();
-        let Self { workers, order, keys, scratch, columns, outputs, simd } = self;
+        let axis = plan.stats(boxes).sweep_axis();
+        let Self { workers, keys, scratch, columns, outputs, simd } = self;
         let workers = &workers.fit(boxes.len());
         workers.check(boxes)?;
         let keys = &mut keys[..boxes.len()];
-        let key = |id: usize, b: &Aabb| u64::from(order_key(b.min[axis])) << 32 | id as u64;
-        let moving = match order.order(pairs.filter(), boxes.len())? {
-            None => {
-                workers.map(boxes, keys, key);
-                boxes.len()
-            }
-            Some((ids, moving)) => {
-                workers.map(ids, keys, |_, &id| key(id as usize, &boxes[id as usize]));
-                moving
-            }
-        };
-        let (moving_keys, fixed_keys) = keys.split_at_mut(moving);
-        sort(workers, moving_keys, scratch)?;
-        sort(workers, fixed_keys, scratch)?;
-        // A sweep along the boxes that may move ends in the gap before the fixed ones.
-        let gap = if fixed_keys.is_empty() { 0 } else { PADDING };
-        let fixed = moving + gap..boxes.len() + gap;
-        columns.resize(fixed.end)?;
+        workers.map(boxes, keys, |id, b| u64::from(order_key(b.min[axis])) << 32 | id as u64);
+        sort(workers, keys, scratch)?;
         workers.fill(columns.as_mut(), |first, mut rows| {
             for at in 0..rows.len() {
-                let row = first + at;
-                if (moving..fixed.start).contains(&row) {
-                    rows.low[0][at] = f32::NAN;
-                } else {
-                    let id = keys[if row < moving { row } else { row - gap }] as u32;
-                    rows.set(at, &boxes[id as usize], axis, id);
-                }
+                let id = keys[first + at] as u32;
+                rows.set(at, &boxes[id as usize], axis, id);
             }
         });
         outputs.find(workers, pairs, |k, parts, list| {
-            let rows = part(moving, k, parts);
-            sweep_rows::<All>(*simd, columns, rows.clone(), list);
-            sweep_across(*simd, columns, rows, fixed.clone(), Ties::Count, list);
-            let rows = part(fixed.len(), k, parts);
-            sweep_across(*simd, columns, fixed.start + rows.start..fixed.start + rows.end, 0..moving, Ties::Skip, list);
+            sweep_rows::<All>(*simd, columns, part(boxes.len(), k, parts), list);
         });
         pairs.finish_on(workers)
     }
 
     fn prepare(&mut self, objects: usize) {
-        // A refused allocation is reported by the frame that needs it.
+        // The frame that needs the memory reports a refused allocation.
         let _ = self.resize(objects);
     }
 }

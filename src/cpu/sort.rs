@@ -1,23 +1,23 @@
-//! Sorts keys on all threads: each part on its own by its digits, then parts merged two by two.
+//! Sorts keys on all threads: each part by a radix sort, then merges the parts two by two.
 
 use crate::cpu::columns::ensure;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 
-/// Keys that one task merges at the least; below, a task costs more than it saves.
+/// Fewest keys of a merging task: a smaller task costs more than it saves.
 const SMALLEST_MERGE: usize = 4096;
 
-/// Keys from which on counting digits costs less than comparing.
+/// Fewest keys for a radix sort: fewer are compared sooner than their digits are counted.
 const SMALLEST_RADIX: usize = 512;
 
-/// Bits of a digit: 2048 counts fit into the first-level cache, and three digits hold what is sorted by.
+/// Bits of a digit: 2048 counts fit into the first-level cache, and three digits hold the upper half of a key.
 const DIGIT: u32 = 11;
 const DIGITS: usize = 3;
 
-/// Sorts keys by their upper halves, and those with the same upper half by their lower ones.
+/// Sorts keys by their upper halves, then by their lower ones.
 ///
-/// The lower halves of keys with the same upper half must ascend, as positions in the order of the input do. `scratch` may be of any
-/// length and hold anything, and is left so.
+/// Keys with the same upper half must come with ascending lower halves, as positions in the input do. `scratch` may
+/// have any length and content.
 pub(crate) fn sort(workers: &Workers, keys: &mut [u64], scratch: &mut Vec<u64>) -> Result<(), Error> {
     let len = keys.len();
     if len < SMALLEST_RADIX {
@@ -31,7 +31,7 @@ pub(crate) fn sort(workers: &Workers, keys: &mut [u64], scratch: &mut Vec<u64>) 
     let part = (len / workers.tasks()).max(SMALLEST_MERGE);
     let (mut from, mut to, mut swapped) = (&mut *keys, &mut *scratch, false);
     while run < len {
-        // Each run of two ends in a part that may be short.
+        // The last part of each two runs may be short.
         let most = len.div_ceil(part) + len.div_ceil(2 * run);
         let pairs_of_runs = from.chunks(2 * run).zip(to.chunks_mut(2 * run));
         let parts = pairs_of_runs.flat_map(|(from, to)| {
@@ -48,7 +48,7 @@ pub(crate) fn sort(workers: &Workers, keys: &mut [u64], scratch: &mut Vec<u64>) 
     Ok(())
 }
 
-/// Sorts keys by their upper halves and leaves those with the same upper half in their order. `scratch` is as long.
+/// Sorts keys by their upper halves and keeps the order of those with the same one. `scratch` has the length of `keys`.
 fn radix(keys: &mut [u64], scratch: &mut [u64]) {
     if keys.len() < SMALLEST_RADIX {
         return keys.sort_unstable();
@@ -61,7 +61,7 @@ fn radix(keys: &mut [u64], scratch: &mut [u64]) {
     let (mut from, mut to) = (&mut *keys, &mut *scratch);
     let mut swapped = false;
     for (k, starts) in starts.iter_mut().enumerate() {
-        // A digit that all keys share leaves their order as it is.
+        // A digit that all keys share changes nothing.
         if starts[digit(from[0], k)] as usize == from.len() {
             continue;
         }
@@ -80,9 +80,9 @@ fn radix(keys: &mut [u64], scratch: &mut [u64]) {
     }
 }
 
-/// Writes to `to` what stands from position `first` on when `a` and `b`, both ascending, are merged.
+/// Merges `a` and `b`, both ascending, and writes the part from position `first` on to `to`.
 fn merge_part(a: &[u64], b: &[u64], first: usize, to: &mut [u64]) {
-    // How many of the first come from `a`: the fewest such that what is left of it does not belong before them.
+    // The number of keys of `a` before position `first`.
     let (mut low, mut high) = (first.saturating_sub(b.len()), first.min(a.len()));
     while low < high {
         let middle = (low + high) / 2;
@@ -107,7 +107,7 @@ mod tests {
     use crate::splitmix::mix;
 
     #[test]
-    fn keys_are_sorted_with_any_number_of_threads() {
+    fn keys_are_sorted_on_any_number_of_threads() {
         let most = if cfg!(feature = "parallel") { 5 } else { 1 };
         for threads in 1..=most {
             let workers = Workers::new("sort", threads, &Threads::default()).unwrap();

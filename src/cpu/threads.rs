@@ -1,4 +1,4 @@
-//! Thread pools, shared by all algorithms of the same width, or the one pool of the program's.
+//! The thread pools of a registry.
 
 #[cfg(feature = "parallel")]
 use crate::cpu::helpers::Helpers;
@@ -9,10 +9,12 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-/// One rayon pool for each number of helpers that was asked for, made on first use; or the program's own pool for all.
+/// One rayon pool for each number of helpers, made on first use and shared by all algorithms; or the program's own pool
+/// for all.
 #[derive(Debug, Default)]
 pub(crate) struct Threads {
-    /// Whether pools made from now on are pinned; see [`Registry::pin_threads`](crate::Registry::pin_threads).
+    /// Whether the threads of pools made from now on are pinned; see
+    /// [`Registry::pin_threads`](crate::Registry::pin_threads).
     pub(crate) pinned: bool,
     #[cfg(feature = "parallel")]
     pools: Mutex<BTreeMap<u32, Arc<Helpers>>>,
@@ -22,30 +24,30 @@ pub(crate) struct Threads {
 }
 
 impl Threads {
-    /// Pools that are pinned.
+    /// Makes pools whose threads are pinned.
     #[cfg(feature = "measure")]
     pub(crate) fn pinned() -> Self {
         Self { pinned: true, ..Self::default() }
     }
 
-    /// The threads of a program's pool. They stay where the program has them.
+    /// Takes a program's pool. Its threads run where the program has them.
     #[cfg(feature = "parallel")]
     pub(crate) fn of(pool: Arc<rayon::ThreadPool>) -> Self {
         let threads = u32::try_from(pool.current_num_threads()).unwrap_or(u32::MAX);
         Self { given: Some((threads, Arc::new(Helpers::of(pool)))), ..Self::default() }
     }
 
-    /// Which threads these are: `pinned`, `free`, or `given` by the program.
+    /// Returns what these threads are: `pinned`, `free`, or `given` by the program.
     #[cfg(feature = "this-machine")]
     pub(crate) fn kind(&self) -> &'static str {
-        match (&self.given, self.pinned && crate::cpu::seats::may_bind()) {
+        match (&self.given, self.pinned && crate::cpu::placement::may_pin()) {
             (Some(_), _) => "given",
             (None, true) => "pinned",
             (None, false) => "free",
         }
     }
 
-    /// The most threads that an algorithm may have, its caller's among them, where a program's pool says so.
+    /// Returns the most threads of an algorithm, its caller among them, if the program's pool bounds them.
     pub(crate) fn most(&self) -> Option<u32> {
         #[cfg(feature = "parallel")]
         return self.given.as_ref().map(|(threads, _)| threads.saturating_add(1));
@@ -53,7 +55,7 @@ impl Threads {
         None
     }
 
-    /// Why an algorithm can't have `threads` threads, if it can't.
+    /// Returns why an algorithm can't have `threads` threads, or `None` if it can.
     pub(crate) fn unavailable(&self, threads: u32) -> Option<Unavailable> {
         if threads > 1 && !cfg!(feature = "parallel") {
             return Some(Unavailable::NotParallel);
@@ -62,7 +64,7 @@ impl Threads {
         Some(Unavailable::PoolTooSmall { pool: most - 1 })
     }
 
-    /// A pool of `count` threads that help a caller. More than `count` where the program gave one.
+    /// Returns a pool of `count` helpers; the program's own pool may have more.
     ///
     /// # Errors
     /// [`Unavailable::ThreadsRefused`].

@@ -1,7 +1,8 @@
-//! A tree of boxes with 16 children a node, made in the order of a curve through space.
+//! A tree of boxes with 16 children a node, built in the order of a space-filling curve.
 //!
-//! Sixteen boxes that are near in space share a leaf, sixteen leaves a node, and so on; one test compares a box with all 16. Where boxes
-//! lie does not matter: the curve begins anew, on a scale of its own, wherever more than two leaves of boxes share one of its cells.
+//! Sixteen boxes that are near in space share a leaf, sixteen leaves a node, and so on. One test compares a box with
+//! all 16. Dense places don't matter: if more than two leaves of boxes share a cell of the curve, a finer curve orders
+//! them.
 
 mod curve;
 
@@ -14,21 +15,22 @@ use crate::cpu::level::Simd;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::filter::Filter;
-use crate::load::Sample;
+use crate::load::SceneStats;
 use crate::pairs::Pairs;
 use curve::{Curve, Order};
 use std::ops::Range;
 
-/// In place of a box where a lane of a leaf has none. No box has this number: there are at most this many.
+/// The id of an empty lane. No box has it: there are at most this many boxes.
 pub(crate) const NOBODY: u32 = u32::MAX;
 
-/// Boxes from which on what belongs to them is likely not in the second-level cache: 1.2 MB of boxes, and as much in the tree.
+/// Number of boxes above which the tree is likely not in the second-level cache: 1.2 MB of boxes, and as much in the
+/// tree.
 pub(crate) const FAR: usize = 50_000;
 
-/// Boxes that are asked for before they are needed.
+/// Boxes to prefetch ahead.
 const AHEAD: usize = 16;
 
-/// Nodes above the leaves that one task fills at the least, with their 256 boxes each.
+/// Fewest nodes above the leaves that a task fills, with their 256 boxes each.
 const SMALLEST_FILL: usize = 4;
 
 /// See the module.
@@ -36,23 +38,23 @@ const SMALLEST_FILL: usize = 4;
 pub(crate) struct Tree {
     /// The box in each lane of the leaves, leaf after leaf.
     ids: Vec<u32>,
-    /// Places in use, those of boxes that were taken out included.
+    /// Places in use, those of removed boxes included.
     places: usize,
-    /// The leaves, which hold boxes; then nodes that hold bounds of the leaves, and so on. There are two levels at least, and the last one
-    /// that is not empty had 16 nodes at most when the tree was made.
+    /// The leaves, then nodes with the bounds of the leaves, and so on. There are at least two levels. The last level
+    /// that is not empty had at most 16 nodes when the tree was built.
     levels: Vec<Vec<Node>>,
-    /// Leaves that hold boxes that may move; those behind them hold fixed ones.
+    /// Leaves with boxes that may move. The leaves behind them hold fixed boxes.
     moving: usize,
     order: Order,
     simd: Simd,
 }
 
-/// Which boxes of a frame are in a tree.
+/// The boxes of a frame that are in a tree.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Members<'a> {
     /// Every box.
     All,
-    /// Those at these positions, which ascend.
+    /// The boxes at these positions, which ascend.
     Of(&'a [u32]),
 }
 
@@ -61,27 +63,28 @@ impl Tree {
         Self { ids: Vec::new(), places: 0, levels: Vec::new(), moving: 0, order: Order::default(), simd }
     }
 
-    /// Makes room for a tree of this many boxes.
+    /// Reserves memory for a tree of this many boxes.
     pub(crate) fn reserve(&mut self, objects: usize) -> Result<(), Error> {
         self.order.reserve(objects)
     }
 
-    /// Makes the tree of the members among `boxes`, which look like the sample. Boxes that `filter` calls fixed come last.
+    /// Builds the tree of the members of `boxes`, of which `stats` are the statistics. Boxes that `filter` calls fixed
+    /// come last.
     ///
     /// # Errors
-    /// [`Error::InvalidBox`] for the first member that is one, and [`Error::OutOfMemory`].
+    /// [`Error::InvalidBox`] for the first invalid member, and [`Error::OutOfMemory`].
     pub(crate) fn build(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
         members: Members<'_>,
-        sample: &Sample,
+        stats: &SceneStats,
         filter: Option<&Filter>,
     ) -> Result<(), Error> {
         let Self { ids, places: in_use, levels, moving, order, .. } = self;
-        let split = order.sort(workers, boxes, members, &Curve::over(sample), filter)?;
+        let split = order.sort(workers, boxes, members, &Curve::over(stats), filter)?;
         let sorted = order.ids();
-        // The fixed boxes begin with a leaf of their own.
+        // The fixed boxes begin a new leaf.
         *moving = split.div_ceil(LANES);
         let fixed_from = if split == sorted.len() { split } else { *moving * LANES };
         let places = fixed_from + sorted.len() - split;
@@ -106,7 +109,7 @@ impl Tree {
                         ids[at * LANES + lane] = NOBODY;
                         continue;
                     };
-                    // In the order of the curve boxes lie anywhere in memory.
+                    // Neighbours on the curve lie anywhere in memory.
                     if let Some(&next) = sorted.get(from + AHEAD) {
                         prefetch(&boxes[next as u32 as usize]);
                     }
@@ -134,22 +137,22 @@ impl Tree {
         Ok(())
     }
 
-    /// Part `k` of `parts` of the leaves that hold boxes that may move: all pairs are found from those.
+    /// Returns part `k` of `parts` of the leaves with boxes that may move. All pairs are found from these leaves.
     pub(crate) fn part(&self, k: usize, parts: usize) -> Range<usize> {
         part(self.moving, k, parts)
     }
 
-    /// Adds the pairs of the boxes in these leaves, which hold moving boxes, with one another and with those in all leaves behind.
+    /// Adds the pairs of the boxes in these leaves with each other and with those in all leaves behind.
     pub(crate) fn self_pairs(&self, leaves: Range<usize>, pairs: &mut Pairs) {
         self.walk().self_pairs(self.simd, leaves, pairs);
     }
 
-    /// Adds the pairs of the boxes of a group, none of which is in the tree, with those in the tree.
+    /// Adds the pairs of the boxes of a group with those in the tree. None of the group is in the tree.
     pub(crate) fn pairs_with(&self, group: &Group, pairs: &mut Pairs) {
         self.walk().pairs_with(self.simd, group, pairs);
     }
 
-    /// Calls `found` for every box that overlaps these bounds. Returns how many nodes it looked at.
+    /// Calls `found` for every box that overlaps these bounds. Returns the number of visited nodes.
     #[inline]
     pub(crate) fn overlapping(&self, bounds: &Aabb, mut found: impl FnMut(u32)) -> u32 {
         self.walk().each_overlapping(self.simd, bounds, |place| found(self.ids[place]))
@@ -159,21 +162,21 @@ impl Tree {
         Walk { levels: &self.levels, ids: &self.ids, far: self.ids.len() > FAR }
     }
 
-    /// The box at each place: lane `p % 16` of leaf `p / 16`.
+    /// Returns the box at each place: place `p` is lane `p % 16` of leaf `p / 16`.
     pub(crate) fn ids(&self) -> &[u32] {
         &self.ids
     }
 
-    /// Adds a box behind all others, at the place that is returned, without bounds.
+    /// Adds a box without bounds behind all others, and returns its place.
     pub(crate) fn append(&mut self, id: u32) -> Result<usize, Error> {
         let place = self.places;
         if place == self.ids.len() {
             let places = (place / LANES + 1) * LANES;
-            grow_list(&mut self.ids, places)?;
+            grow(&mut self.ids, places, NOBODY)?;
             let mut nodes = places / LANES;
-            // The last level takes whatever is added, so that no new level has to be made of what is there.
+            // The last level grows beyond 16 nodes, so that no level has to be added.
             for level in self.levels.iter_mut().take_while(|level| !level.is_empty()) {
-                grow(level, nodes)?;
+                grow(level, nodes, Node::EMPTY)?;
                 nodes = nodes.div_ceil(LANES);
             }
         }
@@ -182,30 +185,31 @@ impl Tree {
         Ok(place)
     }
 
-    /// Takes the box at a place out of the tree.
+    /// Removes the box at a place.
     pub(crate) fn remove(&mut self, place: usize) {
         self.levels[0][place / LANES].empty(place % LANES);
         self.ids[place] = NOBODY;
     }
 
-    /// The leaves, and the levels above them from the lowest on.
+    /// Returns the leaves, and the levels above them from the lowest on.
     pub(crate) fn levels_mut(&mut self) -> Option<(&mut Vec<Node>, &mut [Vec<Node>])> {
         self.levels.split_first_mut()
     }
 }
 
-/// Makes room for this many places and for the nodes over them, and leaves what is in them as it is. Returns the number of levels.
+/// Makes room for this many places and for the nodes above them, with unspecified content. Returns the number of
+/// levels.
 fn lay_out(levels: &mut Vec<Vec<Node>>, ids: &mut Vec<u32>, places: usize) -> Result<usize, Error> {
     let mut nodes = places.div_ceil(LANES);
     ids.truncate(nodes * LANES);
-    grow_list(ids, nodes * LANES)?;
+    grow(ids, nodes * LANES, NOBODY)?;
     let mut level = 0;
     loop {
         if levels.len() == level {
             levels.push(Vec::new());
         }
         levels[level].truncate(nodes);
-        grow(&mut levels[level], nodes)?;
+        grow(&mut levels[level], nodes, Node::EMPTY)?;
         if level > 0 && nodes <= LANES {
             break;
         }
@@ -217,19 +221,12 @@ fn lay_out(levels: &mut Vec<Vec<Node>>, ids: &mut Vec<u32>, places: usize) -> Re
     Ok(level + 1)
 }
 
-fn grow_list(ids: &mut Vec<u32>, places: usize) -> Result<(), Error> {
-    ids.try_reserve(places.saturating_sub(ids.len()))
-        .map_err(|_| Error::OutOfMemory { what: "boxes in a tree", elements: places })?;
-    ids.resize(places, NOBODY);
-    Ok(())
-}
-
-/// Adds empty nodes to a level until it has this many.
-fn grow(level: &mut Vec<Node>, nodes: usize) -> Result<(), Error> {
-    if level.len() < nodes {
-        let refused = |_| Error::OutOfMemory { what: "nodes of a tree", elements: nodes };
-        level.try_reserve(nodes - level.len()).map_err(refused)?;
-        level.resize(nodes, Node::EMPTY);
+/// Adds empty elements to a list until it has at least this many.
+fn grow<T: Copy>(list: &mut Vec<T>, len: usize, empty: T) -> Result<(), Error> {
+    if list.len() < len {
+        let refused = |_| Error::OutOfMemory { what: "boxes in a tree", elements: len };
+        list.try_reserve(len - list.len()).map_err(refused)?;
+        list.resize(len, empty);
     }
     Ok(())
 }

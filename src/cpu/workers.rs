@@ -1,4 +1,4 @@
-//! How a frame is spread over threads: phases of independent tasks, each with its own memory.
+//! Spreads a frame over threads: phases of independent tasks, each with its own memory.
 
 use crate::aabb::Aabb;
 #[cfg(feature = "parallel")]
@@ -16,7 +16,7 @@ use std::sync::{
 #[cfg(feature = "parallel")]
 use std::sync::{Mutex, PoisonError};
 
-/// The threads of one algorithm: the caller's own, and those of a pool that help it.
+/// The threads of one algorithm: the calling one, and its helpers from a pool.
 #[derive(Debug)]
 pub(crate) struct Workers {
     threads: usize,
@@ -28,21 +28,21 @@ pub(crate) struct Workers {
 /// Tasks for each thread: enough to even out tasks of unequal length, few enough to cost nothing.
 const TASKS_PER_THREAD: usize = 8;
 
-/// Boxes for which one more thread is worth its waking. Of the machines of the first reports one gained half from a second thread at 1800 boxes
-/// of `grid-sap`, the other nothing.
+/// Boxes that make it worth waking one more thread. With 1800 boxes of `grid-sap` a second thread saved half of the
+/// time on one machine of `datasets/`, and nothing on another.
 const BOXES_PER_THREAD: usize = 1024;
 
-/// Boxes in a task at the least. With half of what a thread is worth, two tasks of unequal length even out.
+/// Fewest boxes of a task: half of [`BOXES_PER_THREAD`], so that two tasks of unequal length even out.
 const SMALLEST_TASK: usize = BOXES_PER_THREAD / 2;
 
-/// Boxes that one task of a filling phase writes at the least; below, a task costs more than it saves.
+/// Fewest boxes that a task of a filling phase writes: a smaller task costs more than it saves.
 const SMALLEST_FILL: usize = 1024;
 
-/// Pairs that are joined on all threads; fewer are copied in less time than a phase takes.
+/// Fewest pairs that all threads join: fewer are copied in less time than a phase takes.
 const SMALLEST_JOIN: usize = 16_384;
 
 impl Workers {
-    /// `threads` threads for the algorithm `method`.
+    /// Makes `threads` threads for the algorithm `method`.
     pub(crate) fn new(method: &'static str, threads: u32, pools: &Threads) -> Result<Self, Error> {
         #[cfg(not(feature = "parallel"))]
         let _ = (method, pools);
@@ -63,13 +63,13 @@ impl Workers {
         self.threads
     }
 
-    /// Tasks into which a phase is best divided: one when there is one thread.
+    /// Returns the best number of tasks of a phase: one if there is one thread.
     pub(crate) fn tasks(&self) -> usize {
         self.tasks
     }
 
-    /// As many of these threads as a frame of `boxes` boxes keeps busy, and as many tasks. A frame that costs more or less for each box than that of
-    /// a grid says by how many boxes it is outweighed.
+    /// Returns as many of these threads as a frame of `boxes` boxes keeps busy, with as many tasks. A method that takes
+    /// more or less time for a box than `grid-sap` passes the number of boxes for which `grid-sap` takes as long.
     pub(crate) fn fit(&self, boxes: usize) -> Self {
         let threads = self.threads.min(boxes / BOXES_PER_THREAD).max(1);
         Self {
@@ -80,13 +80,13 @@ impl Workers {
         }
     }
 
-    /// One phase: hands out the tasks one by one to the caller and to its helpers. Returns when all are done.
+    /// Runs one phase: hands out the tasks one by one to the caller and its helpers. Returns when all are done.
     ///
-    /// The caller works too instead of sleeping: waking a thread takes tens of microseconds, which a frame would pay twice.
+    /// The caller works instead of sleeping: waking a thread takes tens of microseconds, which a frame would pay twice.
     #[cfg_attr(not(feature = "parallel"), expect(clippy::unused_self, reason = "without threads nobody helps"))]
     pub(crate) fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync) {
         #[cfg(feature = "parallel")]
-        // A single task needs no help, and no task more than one thread.
+        // A single task needs no help.
         if let (Some(helpers), most @ 2..) = (&self.helpers, tasks.size_hint().1.unwrap_or(usize::MAX)) {
             let queue = Mutex::new(tasks);
             let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
@@ -95,12 +95,12 @@ impl Workers {
         tasks.for_each(work);
     }
 
-    /// One phase: `work` on every task, side by side.
+    /// Runs one phase: `work` on every task.
     pub(crate) fn each<T: Send>(&self, tasks: &mut [T], work: impl Fn(usize, &mut T) + Sync) {
         self.each_of(tasks.iter_mut().enumerate(), |(k, task)| work(k, task));
     }
 
-    /// One phase: `work` on every task and what belongs to it, side by side.
+    /// Runs one phase: `work` on every task and its element of `with`.
     pub(crate) fn each_with<T: Send, U: Send>(
         &self,
         tasks: &mut [T],
@@ -110,7 +110,7 @@ impl Workers {
         self.each_of(tasks.iter_mut().zip(with).enumerate(), |(k, (task, with))| work(k, task, with));
     }
 
-    /// One phase: `work` on every task and its part of two lists, which are given with the length of a part.
+    /// Runs one phase: `work` on every task and its parts of two lists, each given with the length of a part.
     pub(crate) fn each_share<T: Send, A: Send, B: Send>(
         &self,
         tasks: &mut [T],
@@ -122,7 +122,7 @@ impl Workers {
         self.each_of(tasks.iter_mut().zip(parts).enumerate(), |(k, (task, (a, b)))| work(k, task, a, b));
     }
 
-    /// One phase: `fill` on parts of the columns, with the position at which each part begins.
+    /// Runs one phase: `fill` on parts of the columns, each with its first position.
     pub(crate) fn fill(&self, columns: ColumnsMut<'_>, fill: impl Fn(usize, ColumnsMut<'_>) + Sync) {
         #[cfg(feature = "parallel")]
         if self.helpers.is_some() {
@@ -143,7 +143,7 @@ impl Workers {
         fill(0, columns);
     }
 
-    /// One phase: `make` for every input, at its position.
+    /// Runs one phase: writes `make` of every input, with its position, to `out`.
     pub(crate) fn map<I: Sync, T: Send>(&self, inputs: &[I], out: &mut [T], make: impl Fn(usize, &I) -> T + Sync) {
         let size = self.part_of(inputs.len());
         self.each_of(out.chunks_mut(size).zip(inputs.chunks(size)).enumerate(), |(k, (out, inputs))| {
@@ -151,17 +151,17 @@ impl Workers {
         });
     }
 
-    /// Elements in a part of a list of this many.
+    /// Returns the length of a part of a list of `len` elements.
     fn part_of(&self, len: usize) -> usize {
         if self.threads == 1 { len.max(1) } else { (len / self.tasks()).max(SMALLEST_FILL) }
     }
 
-    /// One phase: the error for the first invalid box, if there is one.
+    /// Runs one phase: returns the error for the first invalid box, if there is one.
     pub(crate) fn check(&self, boxes: &[Aabb]) -> Result<(), Error> {
         #[cfg(feature = "parallel")]
         if self.helpers.is_some() {
             let size = self.part_of(boxes.len());
-            // Errors are rare and told by the lowest position: what the parts find is joined under a lock.
+            // The parts join their lowest positions under a lock: errors are rare.
             let first = Mutex::new(usize::MAX);
             self.each_of(boxes.chunks(size).zip((0..).step_by(size)), |(part, at)| {
                 if let Some(k) = part.iter().position(|b| b.defect().is_some()) {
@@ -189,15 +189,15 @@ impl Parallel for Workers {
 /// The pairs that the tasks find.
 #[derive(Debug, Default)]
 pub(crate) struct Outputs {
-    /// One for each task.
+    /// One list for each task.
     lists: Vec<Pairs>,
-    /// Whether one of them has exceeded the limit in this frame.
+    /// Whether a list has exceeded the limit in this frame.
     any_over: Arc<AtomicBool>,
 }
 
 impl Outputs {
-    /// As many lists as `workers` has tasks, each empty and under the caller's limit and filter. Those of more tasks stay for when there
-    /// are as many again.
+    /// Returns one list for each task of `workers`, empty and under the caller's limit and filter. Lists of more tasks
+    /// stay for later frames.
     fn ready(&mut self, workers: &Workers, pairs: &Pairs) -> &mut [Pairs] {
         if self.lists.len() < workers.tasks() {
             self.lists.resize_with(workers.tasks(), Pairs::new);
@@ -208,9 +208,8 @@ impl Outputs {
         lists
     }
 
-    /// Lets `find` add to as many lists as `workers` has tasks, then joins them in order.
-    ///
-    /// With one thread the one list is the caller's.
+    /// Lets `find` fill one list for each task of `workers`, then joins them in order. With one thread the one list is
+    /// the caller's.
     pub(crate) fn collect(
         &mut self,
         workers: &Workers,
@@ -229,7 +228,7 @@ impl Outputs {
         found
     }
 
-    /// One phase where it pays: copies all lists behind one another.
+    /// Copies all lists behind each other, in one phase if that pays.
     fn join(lists: &[Pairs], workers: &Workers, pairs: &mut Pairs) {
         let total: usize = lists.iter().map(Pairs::len).sum();
         let complete = lists.iter().all(Pairs::is_complete);
@@ -246,8 +245,8 @@ impl Outputs {
         }
     }
 
-    /// One phase: `find` on every part, each into a list of its own, then all lists joined in order. It gets the number of the part and of all
-    /// parts.
+    /// Runs one phase: `find` on every part, each into its own list, then joins the lists in order. `find` gets the
+    /// number of the part and the number of parts.
     pub(crate) fn find(
         &mut self,
         workers: &Workers,
@@ -259,7 +258,7 @@ impl Outputs {
             workers.each(lists, |k, list| find(k, parts, list));
             Ok(())
         });
-        debug_assert!(found.is_ok(), "nothing above fails");
+        debug_assert!(found.is_ok(), "the closure returns Ok");
     }
 }
 
@@ -272,7 +271,7 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
     use std::sync::mpsc;
 
-    /// The helpers of 128 threads, none of which comes before what is returned with them is dropped: whoever is invited is counted.
+    /// Returns 127 helpers that are busy until the returned gates are dropped, so that invitations can be counted.
     fn busy_helpers() -> (Threads, Arc<Helpers>, Vec<mpsc::Sender<()>>) {
         let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(127).build().unwrap());
         let gates = (0..127).map(|_| {
@@ -312,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_helpers_are_invited_than_there_are_tasks_for() {
+    fn helpers_invited_are_at_most_the_tasks() {
         let (threads, helpers, _gates) = busy_helpers();
         let wide = Workers::new("test", 128, &threads).unwrap();
         let done = AtomicUsize::new(0);
@@ -323,9 +322,8 @@ mod tests {
         assert_eq!([run(1), run(2), run(5), run(1000)], [(1, 0), (2, 1), (5, 4), (1000, 127)]);
     }
 
-    /// From the sources of a frame of 3000 boxes to its pairs, one of 127 helpers is asked.
     #[test]
-    fn a_small_frame_of_many_threads_is_left_to_a_few() {
+    fn small_frame_of_many_threads_invites_few_helpers() {
         let scene = |count: u64| -> Vec<Aabb> {
             let at = |k: u64| (mix(k) >> 40) as f32 / 1_048_576.0;
             (0..count).map(|k| Aabb::cube([at(3 * k), at(3 * k + 1), at(3 * k + 2)], 0.1)).collect()
@@ -341,7 +339,7 @@ mod tests {
             algorithm.find_pairs(&scene(1000), &mut pairs).unwrap();
             assert_eq!(helpers.invited(), 0, "{name}: 1000 boxes");
             algorithm.find_pairs(&scene(3000), &mut pairs).unwrap();
-            // For brute force they are as much as 9000.
+            // Brute force takes as long for them as `grid-sap` for 9000.
             assert_eq!(helpers.invited(), if name == "brute" { 7 } else { 1 }, "{name}: 3000 boxes");
         }
     }

@@ -19,7 +19,7 @@ use super::storage::{Storage, largest};
 use super::transfer::Transfer;
 use crate::aabb::Aabb;
 use crate::error::{GpuError, GpuErrorKind};
-use crate::load::Chosen;
+use crate::load::SampledBoxes;
 
 /// Bytes of a box.
 const BOX: u64 = size_of::<Aabb>() as u64;
@@ -353,7 +353,7 @@ impl Engine {
     /// What the sampler of the last submission saw.
     fn seen(&self) -> Result<Look, GpuError> {
         let view = self.download.readable(&self.gpu, PAIRS_AT..PAIRS_AT + sampler::BYTES)?;
-        Ok(Look::at(&Chosen::given(bytemuck::cast_slice(&view))))
+        Ok(Look::at(&SampledBoxes::given(bytemuck::cast_slice(&view))))
     }
 
     /// Submits, and asks for the first `bytes` of the download.

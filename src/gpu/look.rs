@@ -1,19 +1,19 @@
 //! What a plan for a GPU is made of: a glance at a frame.
 
 use super::division::Parts;
-use crate::load::{Chosen, Sample};
+use crate::load::{SampledBoxes, SceneStats};
 
 /// Statistics of a sample of boxes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Look {
-    pub(super) sample: Sample,
+    pub(super) sample: SceneStats,
     /// For each axis the parts in which the boxes lie evenly.
     pub(super) parts: [Parts; 3],
 }
 
 impl Look {
     /// At boxes that were chosen from a frame, whose statistics are known.
-    pub(super) fn of(chosen: &Chosen, sample: Sample) -> Self {
+    pub(super) fn of(chosen: &SampledBoxes, sample: SceneStats) -> Self {
         let boxes = chosen.as_slice();
         let parts = |axis: usize| {
             let centre = |low: f32, high: f32| low + (high - low) * 0.5;
@@ -25,8 +25,8 @@ impl Look {
     }
 
     /// At these boxes themselves.
-    pub(super) fn at(chosen: &Chosen) -> Self {
-        Self::of(chosen, Sample::statistics(chosen))
+    pub(super) fn at(chosen: &SampledBoxes) -> Self {
+        Self::of(chosen, SceneStats::of_sample(chosen))
     }
 }
 

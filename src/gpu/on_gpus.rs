@@ -10,7 +10,7 @@ use crate::algorithm::{AlgorithmId, Backend, ParseIdError};
 use crate::broad_phase::{BroadPhase, check_count};
 use crate::cpu::{Threads, Workers};
 use crate::error::{Error, GpuError};
-use crate::load::{Chosen, FramePlan, Sample};
+use crate::load::{FramePlan, SampledBoxes, SceneStats};
 use crate::pairs::Pairs;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -117,13 +117,19 @@ impl OnGpus {
 
     /// All boxes at once on the one GPU that there is.
     fn whole(part: &mut Share, plan: &FramePlan, boxes: &[Aabb], pairs: &mut Pairs) -> Result<(), Failure> {
-        let params = part.engine.plan(boxes.len() as u32, || Look::of(&Chosen::from(boxes), plan.sample(boxes)));
+        let params = part.engine.plan(boxes.len() as u32, || Look::of(&SampledBoxes::from(boxes), plan.stats(boxes)));
         part.engine.start(Piece { boxes, ids: None }, params)?;
         part.engine.finish(pairs)
     }
 
     /// In slabs: as many as there are GPUs, or that many times `rounds`. `false` when a slab is too large for its GPU.
-    fn slabs(&mut self, rounds: usize, sample: &Sample, boxes: &[Aabb], pairs: &mut Pairs) -> Result<bool, Failure> {
+    fn slabs(
+        &mut self,
+        rounds: usize,
+        sample: &SceneStats,
+        boxes: &[Aabb],
+        pairs: &mut Pairs,
+    ) -> Result<bool, Failure> {
         let Self { parts, slabs, workers, any_over, exponent, .. } = self;
         any_over.store(false, Ordering::Relaxed);
         let exponent = *exponent;
@@ -169,7 +175,7 @@ impl Share {
         }
         let Members { boxes, ids } = &self.members;
         self.work += (boxes.len() as f64).powf(exponent);
-        let params = self.engine.plan(boxes.len() as u32, || Look::at(&Chosen::from(boxes)));
+        let params = self.engine.plan(boxes.len() as u32, || Look::at(&SampledBoxes::from(boxes)));
         self.failure = self.engine.start(Piece { boxes, ids: Some(ids) }, params).err().map(Failure::Gpu);
     }
 
@@ -222,7 +228,7 @@ impl BroadPhase for OnGpus {
         let found = match self.parts.as_mut_slice() {
             [part] if boxes.len() <= part.engine.most_objects() => Self::whole(part, plan, boxes, pairs),
             parts => {
-                let sample = plan.sample(boxes);
+                let sample = plan.stats(boxes);
                 let room: usize = parts.iter().map(|p| p.engine.most_objects()).sum();
                 let mut rounds = boxes.len().div_ceil(room.max(1)).max(1);
                 let found = loop {

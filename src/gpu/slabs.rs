@@ -2,7 +2,7 @@
 
 use crate::aabb::Aabb;
 use crate::error::Error;
-use crate::load::Sample;
+use crate::load::SceneStats;
 
 /// Boxes whose lower bounds place the cuts: with 4096 a slab is off by 2 % of all boxes at most, nearly always.
 const MOST_SAMPLED: usize = 4096;
@@ -33,7 +33,7 @@ impl Slabs {
     /// Cuts the boxes into slabs that hold these shares of all boxes, ascending along the axis on which the fewest pairs overlap.
     ///
     /// The cuts follow the density of the boxes and not the space: half of the space may hold a hundredth of them.
-    pub(super) fn plan(&mut self, sample: &Sample, boxes: &[Aabb], shares: impl ExactSizeIterator<Item = f64>) {
+    pub(super) fn plan(&mut self, sample: &SceneStats, boxes: &[Aabb], shares: impl ExactSizeIterator<Item = f64>) {
         self.axis = sample.sweep_axis();
         let count = boxes.len().min(MOST_SAMPLED);
         self.sampled.clear();
@@ -110,7 +110,7 @@ mod tests {
         scene.advance();
         let boxes = scene.boxes();
         let mut slabs = Slabs::default();
-        slabs.plan(&Sample::of(boxes), boxes, [0.5, 0.3, 0.2].into_iter());
+        slabs.plan(&SceneStats::of(boxes), boxes, [0.5, 0.3, 0.2].into_iter());
         assert_eq!(slabs.count(), 3);
         let mut owners = std::collections::BTreeMap::new();
         for (slab, share) in [0.5, 0.3, 0.2].into_iter().enumerate() {
@@ -141,7 +141,7 @@ mod tests {
         let mut boxes = vec![Aabb::cube([2.0; 3], 0.5); 50];
         boxes.extend([nan, inverted, far]);
         let mut slabs = Slabs::default();
-        slabs.plan(&Sample::of(&boxes), &boxes, [0.25; 4].into_iter());
+        slabs.plan(&SceneStats::of(&boxes), &boxes, [0.25; 4].into_iter());
         let mut begun = 0;
         for slab in 0..4 {
             let mut m = Members::default();

@@ -177,7 +177,7 @@ mod tests {
     use crate::gpu::engine::{Engine, Piece};
     use crate::gpu::kernel::{dispatched, marked};
     use crate::gpu::{Gpu, look::Look};
-    use crate::load::Chosen;
+    use crate::load::SampledBoxes;
     use crate::pairs::Pairs;
     use crate::scene::{Scenario, Scene};
     use std::collections::BTreeMap;
@@ -193,7 +193,7 @@ mod tests {
         scene.advance();
         let boxes = scene.boxes();
         let mut engine = marked::marking(|| Engine::new(gpu.clone(), method)).unwrap();
-        let params = engine.plan(objects, || Look::at(&Chosen::from(boxes)));
+        let params = engine.plan(objects, || Look::at(&SampledBoxes::from(boxes)));
         // The first frame makes room for all pairs.
         let mut pairs = Pairs::new();
         engine.start(Piece { boxes, ids: None }, params).unwrap();
@@ -251,7 +251,7 @@ mod tests {
             let boxes = scene.boxes();
             for method in ["sap", "grid-sap", "bvh"] {
                 let mut engine = Engine::new(gpu.clone(), method).unwrap();
-                let params = engine.plan(objects as u32, || Look::at(&Chosen::from(boxes)));
+                let params = engine.plan(objects as u32, || Look::at(&SampledBoxes::from(boxes)));
                 let before = dispatched();
                 engine.start(Piece { boxes, ids: None }, params).unwrap();
                 let cleared = 1;

@@ -1,74 +1,75 @@
-//! How far boxes move from one frame to the next.
+//! Measures how far boxes move from one frame to the next.
 
 use crate::aabb::Aabb;
 use crate::splitmix::mix;
 
-/// Boxes watched. Their mean displacement is known to about an eighth of the standard deviation over all boxes.
+/// Boxes watched. The standard error of their mean displacement is an eighth of the standard deviation over all boxes.
 const WATCHED: usize = 64;
 
-/// Edges of infinite boxes count as this, so that every ratio of two lengths is a number.
+/// Longest edge: those of infinite boxes are clamped to this, so that every ratio of two lengths is finite.
 const MOST_EDGE: f32 = 1.0e30;
 
-/// Boxes that move by less than this share of an edge in a frame are as good as still.
+/// Slower boxes than this, in edges a frame, count as still.
 const STILL: f64 = 0.01;
 
-/// How far two paces are apart, each in edges of a box in a frame: the natural logarithm of their ratio, 0 where boxes are as good as still at both.
+/// Returns the distance of two speeds, in edges a frame: the absolute logarithm of their ratio, about 0 if boxes count
+/// as still at both.
 pub(crate) fn paces_apart_ln(one: f64, other: f64) -> f64 {
     ((one + STILL) / (other + STILL)).ln().abs()
 }
 
-/// Paces that are less far apart may be the same: few boxes are watched.
+/// Speeds closer than this may be the same: few boxes are watched.
 const SAME_PACE_LN: f64 = 0.25;
 
-/// Whether two paces that were [looked at](Displacement::moved) may be the same.
+/// Returns whether two results of [`Displacement::moved`] may stand for the same speed.
 pub(crate) fn is_same_pace(one: f64, other: f64) -> bool {
     paces_apart_ln(one, other) < SAME_PACE_LN
 }
 
-/// Where a few boxes were in the frame before.
+/// The positions of a few boxes in the previous frame.
 ///
-/// Boxes are known by their position in the list: one that is exchanged for another counts as one that moved.
+/// A box is known by its position in the list: one exchanged for another counts as moved.
 #[derive(Debug, Clone)]
 pub struct Displacement {
     watched: [(u32, Aabb); WATCHED],
     watching: usize,
-    /// How often boxes were watched.
+    /// Number of calls of [`watch`](Self::watch).
     rounds: u64,
 }
 
 impl Default for Displacement {
-    /// Of a frame that has no frame before.
+    /// Watches no box.
     fn default() -> Self {
         Self { watched: [(0, Aabb::default()); WATCHED], watching: 0, rounds: 0 }
     }
 }
 
 impl Displacement {
-    /// Remembers where up to 64 boxes are, other ones each time, for the next frame to compare with. Allocates nothing.
+    /// Remembers up to 64 boxes, other ones each time, to compare the next frame with. Allocates nothing.
     pub fn watch(&mut self, boxes: &[Aabb]) {
         self.rounds = self.rounds.wrapping_add(1);
         self.watching = boxes.len().min(WATCHED);
         let start = |part: usize| (part as u64 * boxes.len() as u64 / self.watching as u64) as usize;
         for (k, watched) in self.watched[..self.watching].iter_mut().enumerate() {
-            // One box out of each of 64 equal parts, at a place that differs from part to part and from time to time: boxes that move may
-            // follow each other at regular distances, and an even spacing could meet all of them or none.
+            // One box of each of 64 equal parts, at a random place: boxes that move may follow each other at regular
+            // distances, and an even spacing could meet all or none of them.
             let (first, end) = (start(k), start(k + 1));
             let id = first + (mix(self.rounds << 8 | k as u64) % (end - first) as u64) as usize;
             *watched = (id as u32, boxes[id]);
         }
     }
 
-    /// How far the watched boxes have moved since, 0 to 1: the mean over them of the greatest displacement of a bound, in mean
-    /// edges of the box and no more than 1. `None` when no valid box was watched that is still there.
+    /// Returns the motion of the watched boxes since, 0 to 1: the mean over them of the greatest displacement of a
+    /// bound, in mean edges of the box, at most 1 each. `None` if no watched box is valid and still there.
     ///
-    /// An edge counts as no longer than four times that which nine boxes in ten don't exceed: a box as large as the world
-    /// moves far when it passes many others, however small a share of its edge that is.
+    /// Edges are clamped to four times their 0.9 quantile: a box as large as the world moves far when it passes many
+    /// others, however small a share of its edge that is.
     #[must_use]
     pub fn moved(&self, boxes: &[Aabb]) -> Option<f64> {
         let (mut moves, mut edges) = ([(0.0, 0.0); WATCHED], [0.0; WATCHED]);
         let mut count = 0;
         for (id, before) in &self.watched[..self.watching] {
-            // The algorithm that finds the pairs reports invalid boxes; here they would make a ratio negative.
+            // Skips invalid boxes, which could make a ratio negative. The algorithm reports them.
             let valid = |b: &&Aabb| b.defect().is_none() && before.defect().is_none();
             if let Some(now) = boxes.get(*id as usize).filter(valid) {
                 edges[count] = mean_edge(now);
@@ -85,16 +86,16 @@ impl Displacement {
     }
 }
 
-/// The greatest displacement of a bound.
+/// Returns the greatest displacement of a bound.
 fn greatest(before: &Aabb, now: &Aabb) -> f32 {
     let bound = |a: usize| (now.min[a] - before.min[a]).abs().max((now.max[a] - before.max[a]).abs());
-    // An infinite bound that stays where it is yields NaN, which `max` passes over.
+    // An infinite bound that stays yields NaN, which `max` ignores.
     (0..3).map(bound).fold(0.0, f32::max)
 }
 
 fn mean_edge(b: &Aabb) -> f32 {
     let mean = (0..3).map(|a| b.max[a] - b.min[a]).sum::<f32>() / 3.0;
-    // False for NaN too: a box that lies at infinity has such an edge.
+    // False for NaN too, the edge of a box at infinity.
     if mean < MOST_EDGE { mean } else { MOST_EDGE }
 }
 
@@ -113,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn displacements_are_in_edges_of_the_box_and_end_at_one() {
+    fn displacements_are_in_edges_and_at_most_1() {
         for count in [1, 7, 64, 65, 10_000] {
             assert_eq!(moved(&row(count, 0.0), &row(count, 0.0)), Some(0.0));
             assert_eq!(moved(&row(count, 0.0), &row(count, 0.25)), Some(0.25));
@@ -125,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_without_one_before_tells_nothing() {
+    fn first_frame_has_no_motion() {
         assert_eq!(Displacement::default().moved(&row(9, 0.0)), None);
         assert_eq!(moved(&[], &row(9, 0.0)), None);
         assert_eq!(moved(&row(9, 0.0), &[]), None);
@@ -138,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_that_move_at_regular_distances_are_met_by_their_share() {
+    fn regularly_spaced_boxes_are_met_by_their_share() {
         let before = row(64 * 400, 0.0);
         let met = |first: usize| {
             let mut now = before.clone();
@@ -151,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn in_time_every_box_is_watched() {
+    fn every_box_is_watched_in_time() {
         let before = row(640, 0.0);
         let mut now = before.clone();
         now[333] = Aabb::cube([-9.0; 3], 0.5);
@@ -164,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn infinite_and_invalid_boxes_leave_a_share() {
+    fn motion_of_odd_boxes_is_from_0_to_1() {
         let inf = f32::INFINITY;
         let odd = [
             Aabb::new([-inf; 3], [inf; 3]),

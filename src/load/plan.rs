@@ -1,58 +1,59 @@
-//! What is known of a frame before its pairs are searched.
+//! What the choice of an algorithm has worked out about a frame.
 
-use super::sample::{Chosen, Sample};
+use super::sampled_boxes::SampledBoxes;
+use super::scene_stats::SceneStats;
 use super::strip_grid::StripGrid;
 use crate::aabb::Aabb;
 
-/// What was worked out about a frame to choose an algorithm, handed on to the one that runs it:
+/// What the choice of an algorithm has worked out about a frame, for the algorithm that runs it:
 /// [`BroadPhase::find_pairs_with`](crate::BroadPhase::find_pairs_with).
 ///
-/// An algorithm works out itself what is not known. The default knows nothing.
+/// An algorithm works out the rest itself. The default plan is empty.
 #[derive(Debug, Clone, Default)]
 pub struct FramePlan {
-    seen: Option<(Sample, StripGrid)>,
+    stats: Option<(SceneStats, StripGrid)>,
     moved: Option<f64>,
     pairs: Option<f64>,
 }
 
 impl FramePlan {
-    /// The sample of a frame and the grid laid for it.
-    pub(super) fn seen(chosen: &Chosen, objects: usize) -> (Self, Sample, StripGrid) {
-        let sample = Sample::statistics(chosen);
-        let grid = StripGrid::plan(&sample, objects);
-        (Self { seen: Some((sample, grid)), ..Self::default() }, sample, grid)
+    /// Makes a plan with the statistics of a sample and the grid for them.
+    pub(super) fn of_sample(sample: &SampledBoxes, objects: usize) -> (Self, SceneStats, StripGrid) {
+        let stats = SceneStats::of_sample(sample);
+        let grid = StripGrid::plan(&stats, objects);
+        (Self { stats: Some((stats, grid)), ..Self::default() }, stats, grid)
     }
 
-    /// The same plan of a frame in which the boxes moved so far.
+    /// Returns the plan with this motion.
     pub(crate) fn with_moved(self, moved: Option<f64>) -> Self {
         Self { moved, ..self }
     }
 
-    /// The same plan of a frame in which about so many pairs overlap.
+    /// Returns the plan with about this many overlapping pairs.
     pub(crate) fn with_pairs(self, pairs: Option<f64>) -> Self {
         Self { pairs, ..self }
     }
 
-    /// How far the boxes move from a frame to the next, where that is known: [`Displacement::moved`](crate::Displacement::moved) of this
-    /// frame, or of one not long before.
+    /// Returns the motion in a frame, [`Displacement::moved`](crate::Displacement::moved) of this frame or of a recent
+    /// one; `None` if unknown.
     #[must_use]
     pub fn moved(&self) -> Option<f64> {
         self.moved
     }
 
-    /// How many pairs overlap in a frame, where that is known of one not long before.
+    /// Returns the number of overlapping pairs in a recent frame; `None` if unknown.
     #[must_use]
     pub fn pairs(&self) -> Option<f64> {
         self.pairs
     }
 
-    /// The sample of this frame.
-    pub(crate) fn sample(&self, boxes: &[Aabb]) -> Sample {
-        self.seen.map_or_else(|| Sample::of(boxes), |(sample, _)| sample)
+    /// Returns the statistics of this frame.
+    pub(crate) fn stats(&self, boxes: &[Aabb]) -> SceneStats {
+        self.stats.map_or_else(|| SceneStats::of(boxes), |(stats, _)| stats)
     }
 
-    /// The grid for this frame.
+    /// Returns the grid for this frame.
     pub(crate) fn grid(&self, boxes: &[Aabb]) -> StripGrid {
-        self.seen.map_or_else(|| StripGrid::plan(&Sample::of(boxes), boxes.len()), |(_, grid)| grid)
+        self.stats.map_or_else(|| StripGrid::plan(&SceneStats::of(boxes), boxes.len()), |(_, grid)| grid)
     }
 }

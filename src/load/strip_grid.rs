@@ -1,23 +1,23 @@
 //! The grid of strips: cells over the two axes across the sweep.
 
-use super::sample::Sample;
+use super::scene_stats::SceneStats;
 use crate::aabb::Aabb;
 
-/// Boxes that a strip holds on average. Their columns take 28 bytes each, so that a strip fits the first-level cache
-/// while there are enough strips to cut down the candidates.
+/// Mean number of boxes in a strip. Their columns take 28 bytes each: a strip fits the first-level cache, and there are
+/// enough strips to reduce the candidates.
 const BOXES_PER_STRIP: f64 = 256.0;
 
-/// Most cells on one axis: cell numbers stay below 2^16 and a histogram of all cells within the second-level cache.
+/// Most cells on one axis: strip numbers stay below 2^16, and a histogram of all strips fits the second-level cache.
 const MOST_CELLS: f64 = 256.0;
 
-/// A box longer than this many cells across the sweep is kept apart instead of standing in that many strips.
+/// Longest box across the sweep, in cells. A longer one is oversized: it would stand in too many strips.
 const LARGE_CELLS: f64 = 4.0;
 
-/// A box longer on the sweep axis than this many times the usual length is kept apart: it would be a candidate for all
-/// the strip.
+/// Longest box on the sweep axis, in usual lengths. A longer one is oversized: it would be a candidate for the whole
+/// strip.
 const LARGE_LENGTHS: f64 = 16.0;
 
-/// Maps boxes to the strips they stand in. All choices come from a sample and cost speed at worst, never a pair.
+/// Maps boxes to strips. All choices come from a sample: a bad one costs speed, never a pair.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StripGrid {
     /// The sweep axis.
@@ -29,34 +29,34 @@ pub(crate) struct StripGrid {
     cells: [u32; 2],
     /// The number of the last cell on each grid axis.
     last: [f32; 2],
-    /// Extents above which a box is large: on the sweep axis, then on the grid axes.
+    /// Extents above which a box is oversized: on the sweep axis, then on the grid axes.
     large: [f32; 3],
 }
 
-/// The strips in which a box stands, packed: the first of them, and how many more cells it covers on each grid axis.
+/// The strips of a box, packed: the first strip, and the number of further cells on each grid axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct StripSpan(u32);
 
 impl StripSpan {
-    /// In no strip: the box is large.
+    /// No strip: the box is oversized.
     pub(crate) const APART: Self = Self(u32::MAX);
 }
 
-/// More cells than this beyond the first, on either axis, don't fit into a span.
+/// Most further cells on an axis that fit into a span.
 const MOST_MORE: u32 = 0x7f;
 
 impl StripGrid {
-    /// A grid for `objects` boxes that look like the sample.
-    pub(crate) fn plan(sample: &Sample, objects: usize) -> Self {
-        let axis = sample.sweep_axis();
+    /// Makes a grid for `objects` boxes with these statistics.
+    pub(crate) fn plan(stats: &SceneStats, objects: usize) -> Self {
+        let axis = stats.sweep_axis();
         let across = [(axis + 1) % 3, (axis + 2) % 3];
-        let range = across.map(|a| sample.range(a));
+        let range = across.map(|a| stats.range(a));
         let wanted = (objects as f64 / BOXES_PER_STRIP).max(1.0);
-        // Cells so narrow that most boxes stand in several save nothing.
         // 1 for NaN too, of a world without length.
         let held = |cells: f64, most: f64| cells.max(1.0).min(most);
-        let most = [0, 1].map(|d| held(range[d].1 / (2.0 * sample.extent[across[d]]), MOST_CELLS));
-        // Square cells. What one axis can't use goes to the other, as in a world that is flatter than a cell.
+        // Narrower cells than twice the usual box save nothing: most boxes would stand in several.
+        let most = [0, 1].map(|d| held(range[d].1 / (2.0 * stats.extent[across[d]]), MOST_CELLS));
+        // Square cells. One axis gets the cells that the other can't use, as in a world that is flatter than a cell.
         let square = (range[0].1 * range[1].1 / wanted).sqrt();
         let second = held(wanted / held(range[0].1 / square, most[0]), most[1]);
         let counts = [held(wanted / second, most[0]), second];
@@ -64,7 +64,7 @@ impl StripGrid {
         for d in 0..2 {
             let (low, length) = range[d];
             let cells = counts[d].floor();
-            // A world so small that the inverse of a cell overflows would put every box into every cell.
+            // In a world so small that the inverse width overflows, every box would cover every cell.
             let cells = if ((cells / length) as f32).is_finite() { cells } else { 1.0 };
             // One cell needs no width, and a flat axis has none.
             grid.cells[d] = cells as u32;
@@ -73,29 +73,30 @@ impl StripGrid {
             grid.inverse_width[d] = if cells > 1.0 { (cells / length) as f32 } else { 0.0 };
             grid.large[1 + d] = if cells > 1.0 { (LARGE_CELLS * length / cells) as f32 } else { f32::INFINITY };
         }
-        grid.large[0] = if grid.strips() > 1 { (LARGE_LENGTHS * sample.extent[axis]) as f32 } else { f32::INFINITY };
+        grid.large[0] = if grid.strips() > 1 { (LARGE_LENGTHS * stats.extent[axis]) as f32 } else { f32::INFINITY };
         grid
     }
 
-    /// Cells on the two grid axes, for those who divide them in another way.
+    /// Returns the number of cells on the two grid axes.
     #[cfg(feature = "gpu")]
     pub(crate) fn cells(&self) -> [u32; 2] {
         self.cells
     }
 
-    /// How many strips there are.
+    /// Returns the number of strips.
     pub(crate) fn strips(&self) -> usize {
         (self.cells[0] * self.cells[1]) as usize
     }
 
-    /// The first and the last cell that a box covers on each grid axis. Cell numbers stay below 2^16, which f32 holds.
+    /// Returns the first and the last cell of a box on each grid axis. Cell numbers stay below 2^16, which `f32`
+    /// represents exactly.
     pub(super) fn cells_of(&self, b: &Aabb) -> [(f32, f32); 2] {
         let bound =
             |d: usize, v: f32| ((v - self.origin[d]) * self.inverse_width[d]).max(0.0).min(self.last[d]).floor();
         [0, 1].map(|d| (bound(d, b.min[self.across[d]]), bound(d, b.max[self.across[d]])))
     }
 
-    /// The strips in which a box stands, on the sweep axis `AXIS`, which is the grid's.
+    /// Returns the strips of a box. `AXIS` is the sweep axis of the grid.
     #[inline(always)]
     pub(crate) fn span<const AXIS: usize>(&self, b: &Aabb) -> StripSpan {
         let [u, v] = [(AXIS + 1) % 3, (AXIS + 2) % 3];
@@ -106,23 +107,25 @@ impl StripGrid {
         let cell = |k: usize| (bounds[k] - self.origin[k % 2]) * self.inverse_width[k % 2];
         let [x, y, x1, y1] = cell_numbers([cell(0), cell(1), cell(2), cell(3)], self.last);
         let (more_x, more_y) = (x1 - x, y1 - y);
-        // The sizes allow for few more cells; bounds so far out that their cells are rounded could give many.
+        // A box that is not oversized has few further cells, unless its bounds are so far out that cell numbers are
+        // rounded.
         if large | (more_x | more_y > MOST_MORE) {
             return StripSpan::APART;
         }
         StripSpan((y * self.cells[0] + x) | more_x << 16 | more_y << 24)
     }
 
-    /// Calls `f` for each strip of a span, with a mask: bit d is set when the strip is the first of this box on grid axis d.
+    /// Calls `f` for each strip of a span, with a mask: bit d is set if the strip is the first of this box on grid axis
+    /// d.
     ///
-    /// Two boxes that share several strips overlap first, on each axis, in the cell where the later of them begins. So the one strip in which
-    /// both bits are set in either box is the one that reports the pair.
+    /// On each grid axis, two boxes that share several strips first meet in the cell in which the later of them begins.
+    /// So exactly one strip has both bits set in either box: it reports the pair.
     #[inline(always)]
     pub(crate) fn each_strip(&self, span: StripSpan, mut f: impl FnMut(usize, u32)) {
         let StripSpan(packed) = span;
         let first = (packed & 0xffff) as usize;
         if packed <= 0xffff {
-            // Most boxes stand in one strip.
+            // One strip, as for most boxes.
             return f(first, 3);
         }
         if span == StripSpan::APART {
@@ -137,9 +140,10 @@ impl StripGrid {
     }
 }
 
-/// Four cell numbers along two axes, which take turns: `cells` held between 0 and `last`, NaN at 0, without their fractions.
+/// Returns four cell numbers along two alternating axes: `cells` clamped to 0 and `last`, NaN to 0, without fractions.
 ///
-/// None descends as its bound ascends: that alone makes the strips correct. Bounds outside the grid go to the cells at its border.
+/// The function is monotonic, which alone makes the strips correct. Bounds outside the grid go to the cells at its
+/// border.
 #[inline(always)]
 fn cell_numbers(cells: [f32; 4], last: [f32; 2]) -> [u32; 4] {
     let mut at = [0.0_f32; 4];
@@ -149,7 +153,7 @@ fn cell_numbers(cells: [f32; 4], last: [f32; 2]) -> [u32; 4] {
         let cell = if cells[k] > 0.0 { cells[k] } else { 0.0 };
         at[k] = if cell < last { cell } else { last };
     }
-    // SAFETY: each is no NaN and at most 65 535. One below 0 is not in `last`, which counts cells.
+    // SAFETY: no value is NaN or above 65 535; `max` excludes values below 0.
     at.map(|cell| unsafe { cell.max(0.0).to_int_unchecked::<i32>() } as u32)
 }
 
@@ -158,16 +162,16 @@ mod tests {
     use super::*;
 
     fn grid(boxes: &[Aabb]) -> StripGrid {
-        StripGrid::plan(&Sample::of(boxes), boxes.len())
+        StripGrid::plan(&SceneStats::of(boxes), boxes.len())
     }
 
-    /// The cell of a bound on a grid axis, as the definition has it.
+    /// Returns the cell of a bound on a grid axis, by the definition.
     fn cell(grid: &StripGrid, d: usize, bound: f32) -> u32 {
         // The cast saturates and sends NaN to 0.
         (((bound - grid.origin[d]) * grid.inverse_width[d]) as u32).min(grid.cells[d] - 1)
     }
 
-    /// The cells of a span and the mask in each.
+    /// Returns the cells of a span and the mask in each.
     fn strips(grid: &StripGrid, span: StripSpan) -> Vec<([u32; 2], u32)> {
         let mut strips = Vec::new();
         let row = grid.cells[0];
@@ -176,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_ascend_with_bounds_and_outliers_go_to_the_border() {
+    fn cells_ascend_with_bounds() {
         let boxes: Vec<Aabb> = (0..10_000)
             .map(|k| Aabb::cube([(k % 100) as f32 * 4.0, (k / 100) as f32, (k * 7 % 100) as f32], 0.5))
             .collect();
@@ -213,14 +217,14 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_world_is_cut_on_its_other_axis() {
+    fn flat_world_is_cut_on_its_other_axis() {
         let flat: Vec<Aabb> =
             (0..10_000).map(|k| Aabb::cube([(k % 1000) as f32, (k / 1000) as f32 * 9.0, 0.0], 0.1)).collect();
         assert!((10..60).contains(&grid(&flat).strips()), "{:?}", grid(&flat));
     }
 
     #[test]
-    fn a_pair_is_reported_by_the_strip_where_the_later_box_begins() {
+    fn strip_where_the_later_box_begins_reports_the_pair() {
         let grid = StripGrid { cells: [5, 5], ..StripGrid::default() };
         let span = |x: u32, y: u32, more_x: u32, more_y: u32| {
             strips(&grid, StripSpan((y * 5 + x) | more_x << 16 | more_y << 24))

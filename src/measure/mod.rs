@@ -232,7 +232,7 @@ pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
 ///
 /// The error is a sentence for [`Parameter::missing`]: a limit on processes can refuse the threads.
 fn pool(threads: usize) -> Result<ThreadPool, String> {
-    crate::cpu::seated_pool(u32::try_from(threads).unwrap_or(u32::MAX)).map_err(|e| e.to_string())
+    crate::cpu::pinned_pool(u32::try_from(threads).unwrap_or(u32::MAX)).map_err(|e| e.to_string())
 }
 
 /// What `threads` threads of the pool do together: the sum of their rates.

@@ -1,4 +1,4 @@
-//! How our algorithms write pairs: in blocks, past a filter, from lists of their tasks.
+//! How the built-in algorithms write pairs: in blocks, through the filter, from the lists of their tasks.
 
 use super::Pairs;
 use crate::error::Error;
@@ -6,10 +6,11 @@ use crate::pair::Pair;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Pairs that are fetched together, then tested together: few enough for the first-level cache, enough for memory to answer.
+/// Pairs prefetched together, then tested together: few enough for the first-level cache, and enough to hide the
+/// latency of memory.
 const SIFTED_TOGETHER: usize = 64;
 
-/// The positions of the bits of a mask, ascending.
+/// Calls `f` for each set bit of a mask, ascending.
 #[inline(always)]
 pub(crate) fn each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
     while mask != 0 {
@@ -19,14 +20,14 @@ pub(crate) fn each_bit(mut mask: u32, mut f: impl FnMut(usize)) {
 }
 
 impl Pairs {
-    /// Adds `id` paired with each of `others` whose bit is set in `mask`.
+    /// Adds the pairs of `id` with each of `others` whose bit is set in `mask`.
     #[inline]
     pub(crate) fn push_mask(&mut self, id: u32, others: &[u32], mask: u32) {
         each_bit(mask, |bit| self.push(id, others[bit]));
     }
 
-    /// Adds those of `pairs` for which `wanted` holds. They stand lower member first. `fetch` is told of each some time before
-    /// `wanted` is asked, so that memory can be on its way.
+    /// Adds those of `pairs`, which stand lower member first, for which `wanted` holds. Calls `fetch` for each pair
+    /// some time before `wanted`, so that it can prefetch.
     #[inline]
     pub(crate) fn extend_where(&mut self, pairs: &[Pair], fetch: impl Fn(Pair), wanted: impl Fn(Pair) -> bool) {
         let mut ahead = pairs.iter();
@@ -37,7 +38,8 @@ impl Pairs {
         }
     }
 
-    /// Drops those for which `dropped` holds, and adds to `out` those of the rest for which `wanted` holds. `fetch` as above.
+    /// Drops the pairs for which `dropped` holds, and adds to `out` those of the rest for which `wanted` holds. `fetch`
+    /// is as in [`extend_where`](Self::extend_where).
     #[inline]
     pub(crate) fn sift(
         &mut self,
@@ -55,12 +57,12 @@ impl Pairs {
                 self.buffer[kept] = pair;
                 kept += usize::from(!dropped(pair));
             }
-            // Those that were fetched a round before.
+            // The pairs fetched a round earlier.
             out.add_where(&self.buffer[tested..first], &wanted);
             tested = first;
         }
         out.add_where(&self.buffer[tested..kept], &wanted);
-        // What could not be stored before is missing still.
+        // `over` and `refused` stay: pairs that could not be stored earlier are still missing.
         self.len = kept;
     }
 
@@ -69,7 +71,7 @@ impl Pairs {
         if let Some(room) = self.room(pairs.len()) {
             let mut added = 0;
             for &pair in pairs {
-                // Written in any case and kept if wanted: no branch, which would often be guessed wrong.
+                // Written in any case and kept if wanted: no branch, which would often be predicted wrong.
                 room[added] = pair;
                 added += usize::from(wanted(pair));
             }
@@ -79,8 +81,8 @@ impl Pairs {
         }
     }
 
-    /// Makes room for an eighth of the pairs more where there is room for less than a sixteenth: a list that grows and shrinks around a size
-    /// then allocates once.
+    /// Makes room for an eighth more pairs if there is room for less than a sixteenth: then a list that grows and
+    /// shrinks around a size allocates once.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -88,7 +90,7 @@ impl Pairs {
         if self.buffer.len() < self.len + self.len / 16 { self.reserve(self.len + self.len / 8) } else { Ok(()) }
     }
 
-    /// Takes in those that the filter wants of the pairs that were written at the head of [`Pairs::room`], lower member first.
+    /// Adds the wanted ones of the `added` pairs that were written to the head of [`Pairs::room`], lower member first.
     #[inline]
     pub(crate) fn extend_by(&mut self, added: usize) {
         if self.filter.is_none() {
@@ -98,7 +100,7 @@ impl Pairs {
         }
     }
 
-    /// The pairs still are in the first-level cache: few are written at a time.
+    /// Filters the pairs now: few are written at a time, so they are still in the first-level cache.
     #[cold]
     fn extend_by_wanted(&mut self, added: usize) {
         let Self { buffer, len, filter, unwanted, .. } = self;
@@ -108,7 +110,7 @@ impl Pairs {
         *len += wanted;
     }
 
-    /// Room for `more` pairs behind the present ones; `None` near the limit or when memory is refused.
+    /// Returns room for `more` pairs behind the present ones; `None` near the limit, or if memory is refused.
     #[inline]
     pub(crate) fn room(&mut self, more: usize) -> Option<&mut [Pair]> {
         if self.buffer.len() - self.len < more && !self.grow(more) || self.limit.is_some_and(|l| l - self.len < more) {
@@ -117,13 +119,13 @@ impl Pairs {
         Some(&mut self.buffer[self.len..self.len + more])
     }
 
-    /// Whether nothing more can be stored.
+    /// Returns whether nothing more can be stored.
     #[inline]
     pub(super) fn is_full(&self) -> bool {
         self.refused.is_some() || self.limit.is_some_and(|limit| self.len >= limit)
     }
 
-    /// Appends those that the filter wants of pairs that stand lower member first.
+    /// Appends the wanted ones of pairs that stand lower member first.
     #[cfg(feature = "gpu")]
     pub(crate) fn extend(&mut self, pairs: &[[u32; 2]]) -> Result<(), Error> {
         if self.filter.is_none() {
@@ -140,13 +142,14 @@ impl Pairs {
         Ok(())
     }
 
-    /// Whether a wanted pair could not be stored in this list: then the frame has no answer, and the search may end. Asked for every row.
+    /// Returns whether a wanted pair could not be stored in this list. Then the frame has no answer, and the search may
+    /// stop.
     #[inline]
     pub(crate) fn is_over(&self) -> bool {
         self.over
     }
 
-    /// The same of any part of the frame's pairs; asked where work begins.
+    /// Returns whether any part of the frame [is over](Self::is_over). More expensive: call it once for each task.
     #[inline]
     pub(crate) fn is_any_over(&self) -> bool {
         self.over || self.any_over.as_ref().is_some_and(|over| over.load(Relaxed))
@@ -161,13 +164,13 @@ impl Pairs {
         }
     }
 
-    /// Whether `more` wanted pairs are too many, as far as can be known before the filter looked at them.
+    /// Returns whether `more` pairs are surely too many: false if there is a filter, which may drop them.
     #[cfg(feature = "gpu")]
     pub(crate) fn is_too_small_for(&self, more: u64) -> bool {
         self.filter.is_none() && self.limit.is_some_and(|limit| self.len as u64 + more > limit as u64)
     }
 
-    /// Empties a list that takes a part of the pairs of `whole`, under the same limit and filter. All parts that work side by side share
+    /// Begins a list that takes a part of the pairs of `whole`, under the same limit and filter. All parts share
     /// `any_over`, which is `false`.
     pub(crate) fn begin_part(&mut self, whole: &Pairs, any_over: &Arc<AtomicBool>) {
         self.clear();
@@ -176,12 +179,12 @@ impl Pairs {
         self.filter.clone_from(&whole.filter);
     }
 
-    /// Gives the filter back: shared, it would be copied before the caller could change it.
+    /// Releases the filter: while it is shared, a change by the caller would copy it.
     pub(crate) fn end_part(&mut self) {
         self.set_filter(None);
     }
 
-    /// Takes in complete parts, whose pairs were written one behind another to the head of [`Pairs::room`].
+    /// Adds complete parts, whose pairs were written behind each other to the head of [`Pairs::room`].
     pub(crate) fn extend_by_parts(&mut self, parts: &[Pairs]) {
         for part in parts {
             self.len += part.len;
@@ -189,7 +192,7 @@ impl Pairs {
         }
     }
 
-    /// Appends a part: its pairs, its counts and what it could not store.
+    /// Appends a part: its pairs, its counts and its errors.
     pub(crate) fn append(&mut self, part: &Pairs) {
         self.refused = self.refused.or(part.refused);
         let fits = self.limit.map_or(part.len, |l| part.len.min(l.saturating_sub(self.len)));
@@ -203,14 +206,14 @@ impl Pairs {
         }
     }
 
-    /// Room for `more` pairs beyond the present ones; `false` at the limit or when memory is refused.
+    /// Makes room for `more` pairs behind the present ones; `false` at the limit, or if memory is refused.
     #[cold]
     pub(super) fn grow(&mut self, more: usize) -> bool {
         let limit = self.limit.unwrap_or(usize::MAX);
         if self.refused.is_some() || self.len + more > limit {
             return false;
         }
-        // By a quarter, as memory counts for more than the copies of the first frames.
+        // By a quarter: the memory matters more than the copies of the first frames.
         let wanted = (self.buffer.len() + self.buffer.len() / 4).max(self.len + more).max(64).min(limit);
         if self.buffer.try_reserve_exact(wanted - self.buffer.len()).is_err() {
             self.refused = Some(wanted);

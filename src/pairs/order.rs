@@ -1,16 +1,17 @@
-//! Sorts pairs by radix: into buckets by the highest bits, then each bucket, which fits into a cache, from the lowest bits on.
+//! Sorts pairs by radix: into buckets by the highest bits, then each bucket, which fits into a cache, from the lowest
+//! bits on.
 //!
-//! In a bucket only the rest of a key counts, which mostly has 32 bits: half as many bytes are moved. On several threads each
-//! first sorts a share of its own into buckets, which are then brought together.
+//! Within a bucket only the rest of a key counts. It usually has 32 bits, which halves the bytes moved. With several
+//! threads, each first sorts its own share into buckets, and then all shares of a bucket are joined.
 
 use crate::pair::Pair;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// What has a place in an order, and is nothing but that place.
+/// A value that its sort key determines.
 pub(crate) trait Keyed: Copy + Default + Send + Sync {
-    /// Two numbers that decide, the first in the upper half.
+    /// Returns the sort key: two numbers, the more significant one in the upper half.
     fn key(self) -> u64;
-    /// What has this key.
+    /// Returns the value with this key.
     fn of(key: u64) -> Self;
 }
 
@@ -52,9 +53,8 @@ impl Keyed for u32 {
 
 /// The threads that sort.
 pub(crate) trait Parallel {
-    /// How many they are.
     fn threads(&self) -> usize;
-    /// `work` on every task, side by side; returns when all are done.
+    /// Runs `work` on every task, and returns when all are done.
     fn each_of<I: Iterator<Item: Send> + Send>(&self, tasks: I, work: impl Fn(I::Item) + Sync);
 }
 
@@ -71,35 +71,35 @@ impl Parallel for Alone {
     }
 }
 
-/// Fewer than these are compared: the counters of a radix cost more.
+/// Fewest elements for a radix sort: with fewer, its counters cost more than comparing.
 const FEW: usize = 256;
 
-/// Fewer than these are sorted by one thread: to wake another takes as long.
+/// Fewest elements for several threads: with fewer, waking a thread takes as long as the sort.
 const SMALLEST_SHARED: usize = 16_384;
 
-/// What a bucket should hold: 32 KB of pairs and half of that to sort them into stay in the caches of a core.
+/// Elements of a bucket: 32 KB of pairs and half of that to sort them into stay in the caches of a core.
 const BUCKET: usize = 4096;
 
-/// Bits that are told apart at once, at most: more counters than these, or more places to write to, leave the first-level cache.
+/// Most bits of a digit: more counters, or more places to write to, leave the first-level cache.
 const MOST_BITS: u32 = 11;
 
-/// The same in a bucket that has few: clearing the counters would take as long as counting.
+/// Most bits of a digit in a small bucket: clearing more counters would take as long as counting.
 const BITS_OF_FEW: u32 = 8;
 
-/// Shares for each thread: those that take longer are evened out.
+/// Shares for each thread, to even out unequal ones.
 const SHARES_PER_THREAD: usize = 4;
 
-/// Memory to sort with, kept from list to list: mostly half as much as the list.
+/// The buffers of a sort, kept from list to list: usually half the size of the list.
 #[derive(Debug, Default)]
 pub(crate) struct Sorter {
     narrow: Vec<u32>,
-    /// Used instead where the rest of a key has more than 32 bits.
+    /// Used instead if the rest of a key has more than 32 bits.
     wide: Vec<u64>,
-    /// For each share where each of its buckets begins; one more than there are buckets.
+    /// For each share, the start of each of its buckets, and the end of the last.
     starts: Vec<u32>,
 }
 
-/// What one list has grown is of no use to its copy.
+/// A clone begins with empty buffers.
 impl Clone for Sorter {
     fn clone(&self) -> Self {
         Self::default()
@@ -109,7 +109,7 @@ impl Clone for Sorter {
 impl Sorter {
     /// Sorts a list.
     pub(crate) fn sort<T: Keyed>(&mut self, on: &impl Parallel, list: &mut [T]) {
-        // Brute force and GPUs often return them so, and so does who looks up canonical pairs in ascending ids.
+        // Brute force and GPUs often return sorted pairs, and so does a lookup of canonical pairs in ascending ids.
         if list.is_sorted_by_key(|t| t.key()) {
             return;
         }
@@ -120,18 +120,18 @@ impl Sorter {
         } else {
             self.sort_on(on, list)
         };
-        // Without memory to sort with they are compared in place, which takes longer.
+        // In place, without buffers.
         if sorted.is_none() {
             list.sort_unstable_by_key(|t| t.key());
         }
     }
 
-    /// `None`, and nothing is done, if memory is refused.
+    /// Returns `None`, and does nothing, if memory is refused.
     fn sort_on<T: Keyed>(&mut self, on: &impl Parallel, list: &mut [T]) -> Option<()> {
         let Self { narrow, wide, starts } = self;
         let layout = Layout::of(on, list);
         let len = list.len();
-        // Sixteen of each bucket in each share at least, so that bringing them together copies whole cache lines.
+        // At least sixteen elements of each bucket in each share, so that joining them copies whole cache lines.
         let shares = if on.threads() == 1 {
             1
         } else {
@@ -147,7 +147,8 @@ impl Sorter {
     }
 }
 
-/// Where the two numbers of a key stand once the bits that none of them has are left out, and where the bucket ends.
+/// The layout of packed keys: their two numbers without the leading zeros that all of them share. The upper bits are
+/// the bucket.
 #[derive(Debug, Clone, Copy)]
 struct Layout {
     /// Bits of the second number.
@@ -175,7 +176,7 @@ impl Layout {
         Self { low, buckets: 1 << bits, rest, rest_mask: 1_u64.checked_shl(rest).unwrap_or(0).wrapping_sub(1) }
     }
 
-    /// A key without the gap between its numbers.
+    /// Packs a key.
     #[inline(always)]
     fn packed(self, key: u64) -> u64 {
         key >> 32 << self.low | key & 0xffff_ffff
@@ -191,13 +192,13 @@ impl Layout {
         K::of(self.packed(t.key()) & self.rest_mask)
     }
 
-    /// What all packed keys of a bucket have in common.
+    /// Returns the common bits of all packed keys of a bucket.
     fn base(self, bucket: usize) -> u64 {
-        // All 64 bits are the rest where there is but one bucket.
+        // With one bucket all 64 bits may be the rest.
         (bucket as u64).checked_shl(self.rest).unwrap_or(0)
     }
 
-    /// What has this rest of a key in a bucket.
+    /// Returns the value with this rest of a key in a bucket.
     #[inline(always)]
     fn whole<T: Keyed, K: Keyed>(self, base: u64, rest: K) -> T {
         let packed = base | rest.key();
@@ -205,7 +206,7 @@ impl Layout {
     }
 }
 
-/// Sorts `list` by way of `rests`, which is as long. `starts` says into how many shares it is divided first.
+/// Sorts `list` with the buffer `rests`, which has its length. The length of `starts` determines the number of shares.
 fn by_buckets<T: Keyed, K: Keyed>(
     on: &impl Parallel,
     list: &mut [T],
@@ -223,7 +224,7 @@ fn by_buckets<T: Keyed, K: Keyed>(
     on.each_of(parts, |((from, to), starts)| {
         starts.fill(0);
         scatter(from, to, starts, |t| layout.bucket(t), |t| layout.rest(t));
-        // Every start has moved to its bucket's end, which is the start of the next.
+        // Every start has moved to the end of its bucket, which is the start of the next one.
         starts.copy_within(..each - 1, 1);
         starts[0] = 0;
     });
@@ -242,7 +243,7 @@ fn by_buckets<T: Keyed, K: Keyed>(
     });
 }
 
-/// That much of a list, which is made longer where need be. `None` if memory is refused.
+/// Returns the first `len` elements of a list, which grows to that length. `None` if memory is refused.
 fn ensure<T: Copy + Default>(list: &mut Vec<T>, len: usize) -> Option<&mut [T]> {
     if list.len() < len {
         list.try_reserve(len - list.len()).ok()?;
@@ -251,7 +252,7 @@ fn ensure<T: Copy + Default>(list: &mut Vec<T>, len: usize) -> Option<&mut [T]> 
     Some(&mut list[..len])
 }
 
-/// Parts of these sizes, one after another.
+/// Splits a list into parts of these sizes.
 fn split<T>(list: &mut [T], sizes: impl Iterator<Item = usize>) -> impl Iterator<Item = &mut [T]> {
     let mut rest = list;
     sizes.map(move |size| {
@@ -261,8 +262,8 @@ fn split<T>(list: &mut [T], sizes: impl Iterator<Item = usize>) -> impl Iterator
     })
 }
 
-/// Counts how many of `from` belong to each digit into `starts`, which is all zero, and writes what `make` makes of them to `to`, digit by
-/// digit and otherwise in their order. Each start ends as the end of its digit.
+/// Sorts `from` by digit, stably, and writes `make` of each element to `to`. `starts` has a counter for each digit: all
+/// 0 before, and the end of each digit in `to` afterwards.
 #[inline(always)]
 fn scatter<F: Copy, T>(
     from: &[F],
@@ -281,12 +282,12 @@ fn scatter<F: Copy, T>(
     }
 }
 
-/// Sorts a bucket, which stands in `list` if `whole` and else as rests of keys in `rests`, into `list`: from one to the other and back,
-/// some bits each time.
+/// Sorts a bucket into `list`. It stands in `list` if `whole`, else as rests of keys in `rests`. Each pass sorts some
+/// bits from one to the other.
 fn sort_bucket<T: Keyed, K: Keyed>(list: &mut [T], rests: &mut [K], mut whole: bool, base: u64, layout: Layout) {
     let most = if list.len() < BUCKET / 2 { BITS_OF_FEW } else { MOST_BITS };
     let passes = if list.len() < FEW { 0 } else { layout.rest.div_ceil(most) };
-    // From the one where the last pass ends in `list`.
+    // Copies it if the last pass would not end in `list`.
     if whole != (passes % 2 == 0) {
         if whole {
             rests.iter_mut().zip(&*list).for_each(|(rest, &t)| *rest = layout.rest(t));
@@ -318,7 +319,7 @@ mod tests {
     use super::*;
     use crate::splitmix::mix;
 
-    /// Sorts as threads would, one task after another.
+    /// Several threads, played by one.
     struct Several(usize);
 
     impl Parallel for Several {
@@ -333,7 +334,7 @@ mod tests {
 
     fn assert_sorts<T: Keyed + PartialEq>(list: &[T], what: &str) {
         for threads in [1, 2, 3, 7] {
-            // With memory that is used, and is longer.
+            // The second and third time with used buffers.
             let mut sorter = Sorter::default();
             for len in [list.len(), list.len() / 2, list.len()] {
                 let mut sorted = list[..len].to_vec();
@@ -346,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn any_list_is_sorted_as_by_comparison() {
+    fn radix_sort_matches_comparison() {
         for len in [0, 1, 2, 255, 256, 257, 1000, 4095, 4096, 8192, 16_383, 16_384, 50_001, 300_000] {
             for (what, firsts, seconds) in [
                 ("a usual frame", len as u64 / 5 + 1, len as u64 / 5 + 1),
@@ -367,7 +368,7 @@ mod tests {
             let ascending: Vec<Pair> = (0..len as u32).map(|k| (k / 7, k % 7 + k)).collect();
             assert_sorts(&ascending, "a sorted list");
             assert_sorts(&ascending.iter().rev().copied().collect::<Vec<Pair>>(), "a reversed list");
-            // One box meets half of all others, and all the rest is even.
+            // One box is in half of all pairs.
             let skewed = |k: usize| {
                 if k.is_multiple_of(2) { (5, k as u32) } else { ((mix(k as u64) % 100_000) as u32, k as u32) }
             };

@@ -1,6 +1,5 @@
 use super::*;
 use crate::aabb::Aabb;
-use crate::broad_phase::Incremental;
 use crate::pairs::Pairs;
 
 #[test]
@@ -21,7 +20,7 @@ impl BroadPhase for Nothing {
 }
 
 #[test]
-fn a_user_adds_and_replaces_algorithms() {
+fn user_adds_and_replaces_algorithms() {
     let mut registry = Registry::with_cores(1);
     let ours = registry.entries().len();
     let id: AlgorithmId = "my-tree@cpu1".parse().unwrap();
@@ -32,8 +31,8 @@ fn a_user_adds_and_replaces_algorithms() {
     assert!(registry.create(&id).is_ok());
 }
 
-/// Runs on as many threads as it was told last.
-struct Wide(Vec<u32>, u32);
+/// Accepts these numbers of threads.
+struct Wide(Vec<u32>);
 
 impl BroadPhase for Wide {
     fn find_pairs(&mut self, _: &[Aabb], pairs: &mut Pairs) -> Result<(), Error> {
@@ -41,32 +40,28 @@ impl BroadPhase for Wide {
         pairs.finish()
     }
 
-    fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-        Some(self)
+    fn is_incremental(&self) -> bool {
+        true
     }
-}
 
-impl Incremental for Wide {
     fn set_threads(&mut self, threads: u32) -> bool {
-        self.1 = threads;
         self.0.contains(&threads)
     }
 }
 
 #[test]
-fn a_family_is_one_instance_on_any_of_its_numbers_of_threads() {
+fn family_is_one_instance_for_several_numbers_of_threads() {
     let mut registry = Registry::with_cores(1);
-    registry.add_family("mine", &[1, 2, 4], 3, |threads| Ok(Box::new(Wide(threads.to_vec(), 1)))).unwrap();
+    registry.add_family("mine", &[1, 2, 4], 3, |threads| Ok(Box::new(Wide(threads.to_vec())))).unwrap();
     assert!(registry.add_family("Mine", &[1], 3, |_| unreachable!()).is_err());
     let ids: Vec<AlgorithmId> =
         ["mine@cpu4", "mine@cpu1", "brute@cpu1", "mine@cpu2"].map(|t| t.parse().unwrap()).into();
     let mut family = registry.create_family(&[&ids[0], &ids[1]]).unwrap().unwrap();
-    let incremental = family.as_incremental().unwrap();
-    assert_eq!([1, 2, 4].map(|k| incremental.set_threads(k)), [true, false, true]);
+    assert_eq!([1, 2, 4].map(|k| family.set_threads(k)), [true, false, true]);
     assert!(registry.create_family(&[&ids[1], &ids[2]]).unwrap().is_none());
     assert!(registry.create_family(&[]).unwrap().is_none());
     assert!(registry.create(&ids[3]).unwrap().is_incremental());
-    // One that was replaced is no longer of the family.
+    // A replaced algorithm leaves the family.
     registry.add(ids[3].clone(), 1, || Ok(Box::new(Nothing)));
     assert!(registry.create_family(&[&ids[0], &ids[3]]).unwrap().is_none());
 }
@@ -80,9 +75,9 @@ fn no_file_starts_more_threads_than_there_are_cores() {
         if cfg!(feature = "parallel") {
             assert!(error.to_string().contains("3 threads are the most here"), "{error}");
         }
-        // Nor where all widths share one instance.
+        // Nor as a family.
         assert!(registry.create_family(&[&"pair-cache@cpu1".parse().unwrap(), &id]).unwrap().is_none());
-        // Tuning that has steps only.
+        // Nor does a tuning of steps.
         let step = |from_objects, id: &str| crate::Step { from_objects, algorithm: id.parse().unwrap() };
         let tuning = crate::Tuning::from_steps(vec![step(0, text), step(20, "brute@cpu1")]).unwrap();
         let mut adaptive = crate::Adaptive::new(tuning, &registry).unwrap();
@@ -98,7 +93,7 @@ fn no_file_starts_more_threads_than_there_are_cores() {
 }
 
 #[test]
-fn unknown_algorithms_are_refused_with_the_known_ones() {
+fn unknown_algorithm_error_lists_the_known_ones() {
     let registry = Registry::with_cores(1);
     let Err(error) = registry.create(&"octree@cpu1".parse().unwrap()) else { panic!("made an unknown algorithm") };
     assert!(error.to_string().contains("brute@cpu1"), "{error}");

@@ -1,4 +1,4 @@
-//! What the tests of the contract share.
+//! Shared by the test programs of the contract.
 #![allow(dead_code, reason = "each test program uses a part of this")]
 
 use sapwise::{Aabb, AlgorithmId, BroadPhase, Error, Membership, Pair, Registry, SimdLevel};
@@ -16,10 +16,10 @@ pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {
     pairs
 }
 
-/// The same for frames in which a double loop takes seconds: of the boxes in the order in which they begin along an axis, each is held against those
-/// that begin before it ends. No NaN.
+/// The oracle for frames in which a double loop takes seconds: sorts the boxes by their begin on an axis, and tests
+/// each against those that begin before it ends. No NaN.
 pub(crate) fn swept(boxes: &[Aabb]) -> Vec<Pair> {
-    // Along one axis a tower is one heap: whichever leaves the fewest to be tested is taken.
+    // On the axis with the fewest tests: on another one all boxes of a tower are candidates.
     let axes = [0, 1, 2].map(|axis| along(boxes, axis));
     let (order, ends) = axes.into_iter().min_by_key(|(_, ends)| ends.iter().sum::<usize>()).unwrap();
     let mut pairs = Vec::new();
@@ -34,7 +34,8 @@ pub(crate) fn swept(boxes: &[Aabb]) -> Vec<Pair> {
     pairs
 }
 
-/// The boxes in the order in which they begin along an axis, and for each place how many begin before its box ends.
+/// Returns the boxes in the order in which they begin on an axis, and for each place how many boxes begin before its
+/// box ends.
 fn along(boxes: &[Aabb], axis: usize) -> (Vec<u32>, Vec<usize>) {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     order.sort_by(|&a, &b| boxes[a as usize].min[axis].total_cmp(&boxes[b as usize].min[axis]));
@@ -43,7 +44,7 @@ fn along(boxes: &[Aabb], axis: usize) -> (Vec<u32>, Vec<usize>) {
     (order, ends)
 }
 
-/// Every method on 1, 2, 3 and 7 threads at every SIMD level of this machine.
+/// Returns every method on 1, 2, 3 and 7 threads at every SIMD level of this machine.
 pub(crate) fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
     let mut all = Vec::new();
     for level in SimdLevel::ALL.into_iter().filter(|&l| l <= SimdLevel::detected()) {
@@ -65,7 +66,7 @@ pub(crate) fn every_algorithm() -> Vec<(String, Box<dyn BroadPhase>)> {
     all
 }
 
-/// The same past a filter: that, too, by its definition.
+/// The oracle with a filter, by its definition.
 pub(crate) fn naive_filtered(boxes: &[Aabb], memberships: &[Membership]) -> Vec<Pair> {
     let of = |k: u32| memberships.get(k as usize).copied().unwrap_or_default();
     let mut pairs = naive(boxes);
@@ -76,11 +77,11 @@ pub(crate) fn naive_filtered(boxes: &[Aabb], memberships: &[Membership]) -> Vec<
     pairs
 }
 
-/// A small generator of its own (Marsaglia's xorshift), so that the test does not rest on the library's.
+/// Marsaglia's xorshift: the tests use no generator of the library.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    /// A float from 0 to 1.
+    /// Returns a float from 0 to 1.
     pub(crate) fn next(&mut self) -> f32 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -88,7 +89,8 @@ impl Random {
         (self.0 >> 40) as f32 / (1_u64 << 24) as f32
     }
 
-    /// In one or two of eight groups, not colliding with some of them, one in four fixed, one in sixteen in every group.
+    /// Returns one or two of eight groups and a mask without some of them. One box in four is fixed, one in sixteen is
+    /// in every group.
     pub(crate) fn membership(&mut self) -> Membership {
         let group = |at: f32| 1 << (at * 8.0) as u32;
         let (groups, mask) = (group(self.next()) | group(self.next()), !(group(self.next()) | group(self.next())));
@@ -96,13 +98,13 @@ impl Random {
         if self.next() < 1.0 / 16.0 { Membership::default() } else { Membership { groups, mask, fixed } }
     }
 
-    /// Cubes of up to 1.1 times that half edge in a world of that size.
+    /// Returns cubes of up to 1.1 times this half edge in a world of this size.
     pub(crate) fn cubes(&mut self, count: usize, world: [f32; 3], half: f32) -> Vec<Aabb> {
         (0..count).map(|_| Aabb::cube(world.map(|side| self.next() * side), half * (0.1 + self.next()))).collect()
     }
 }
 
-/// Sizes of worlds that are flat, thin, deep, empty and plain.
+/// Sizes of flat, thin, deep, empty and plain worlds.
 pub(crate) const WORLDS: [[f32; 3]; 7] = [
     [400.0, 1.0, 1.0],
     [1.0, 300.0, 2.0],
@@ -113,19 +115,19 @@ pub(crate) const WORLDS: [[f32; 3]; 7] = [
     [16.0; 3],
 ];
 
-/// A world all of whose bounds are denormal.
+/// Returns a world with denormal bounds.
 pub(crate) fn denormals(random: &mut Random) -> Vec<Aabb> {
     let shrunk = |v: [f32; 3]| v.map(|x| (x - 8.0) * 1.0e-39);
     let plain = random.cubes(3000, [16.0; 3], 0.5);
     plain.iter().map(|b| Aabb::new(shrunk(b.min), shrunk(b.max))).collect()
 }
 
-/// Cubes that touch their neighbours exactly.
+/// Returns cubes that touch their neighbours exactly.
 pub(crate) fn lattice() -> Vec<Aabb> {
     (0..2744).map(|k| Aabb::cube([(k % 14) as f32, (k / 14 % 14) as f32, (k / 196) as f32], 0.5)).collect()
 }
 
-/// Small boxes, and among them plates, rods and world-sized ones, some reaching beyond the small ones.
+/// Returns small boxes, and among them plates, rods and world-sized boxes.
 pub(crate) fn large_boxes() -> Vec<Aabb> {
     let mut random = Random(99);
     let mut boxes = random.cubes(4000, [60.0, 50.0, 40.0], 0.3);
@@ -137,7 +139,7 @@ pub(crate) fn large_boxes() -> Vec<Aabb> {
     boxes
 }
 
-/// The GPUs of this machine; `None`, said aloud, where there is none and none is required.
+/// Returns the GPUs of this machine. Prints a remark and returns `None` if there is none and none is required.
 #[cfg(feature = "gpu")]
 pub(crate) fn gpus() -> Option<sapwise::gpu::Gpus> {
     let gpus = sapwise::gpu::Gpus::find();

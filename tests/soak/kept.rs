@@ -1,4 +1,4 @@
-//! Starts on this machine, with a cache to which everything happens that can happen to files.
+//! Programs that start from a cache whose files get damaged.
 
 use super::{Machine, Tally, below, life, registry};
 use crate::common::Random;
@@ -41,7 +41,8 @@ impl Kept {
             life(&mut adaptive, &mut machine, 1, random, tally);
         }
         let setup = adaptive.setup();
-        // Of so brief a measurement on a busy machine some figure may be none that can be. What is predicted without it is not kept.
+        // Of so brief a measurement on a busy machine some figure may be none that can be. What is predicted without it
+        // is not kept.
         let left_out = setup.remarks.iter().any(|r| r.contains("it is left out"));
         let Some(file) = setup.file.clone() else {
             assert!(left_out, "nothing is kept, and nothing was told: {setup:?}");
@@ -69,8 +70,8 @@ impl Kept {
             fs::remove_dir(&file).unwrap();
             self.damaged.retain(|d| *d != file);
         }
-        // One for each number of cores, the lock, and what was measured again until the program ended: what could not be put in its place has left
-        // nothing behind.
+        // One for each number of cores, the lock, and what was measured again until the program ended: what could not
+        // be put in its place has left nothing behind.
         let entries = fs::read_dir(self.folder.path().join("cache")).into_iter().flatten().flatten();
         let names = entries.map(|e| e.file_name().into_string().unwrap());
         let names: Vec<_> = names.filter(|n| n != ".sapwise.lock" && !n.ends_with(".unfinished.json")).collect();

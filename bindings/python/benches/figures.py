@@ -1,10 +1,12 @@
 """The figures of the Python package, interleaved in one run: `tools/python.sh bench`.
 
-Overhead: wall clock of `sapwise.pairs` less that of the library's own call on the same boxes, in a process of Rust beside this one; the two take turns.
+Overhead: wall clock of `sapwise.pairs` less that of the library's own call on the same boxes, in a process of Rust
+beside this one; the two take turns.
 
-Other libraries: the pairs of boxes that are there as an array of NumPy. What each is timed with: making its structure and asking for all pairs. Of FCL
-the objects are there already, with the Python callback that counts the pairs: what is timed is `update` and `collide`. SciPy's tree takes the centres, with the largest
-edge as the distance on each axis, and drops what does not overlap.
+Other libraries: the pairs of boxes that are there as an array of NumPy. What each is timed with: making its structure
+and asking for all pairs. Of FCL the objects are there already, with the Python callback that counts the pairs: what is
+timed is `update` and `collide`. SciPy's tree takes the centres, with the largest edge as the distance on each axis, and
+drops what does not overlap.
 """
 
 import os
@@ -44,7 +46,7 @@ def quartiles(samples):
 
 def text(samples_ns):
     low, median, high = quartiles(samples_ns)
-    unit, name = (1e3, "us") if median < 1e6 else (1e6, "ms")
+    unit, name = (1e3, "µs") if median < 1e6 else (1e6, "ms")
     return f"{median / unit:.4g} {name} ({low / unit:.4g} to {high / unit:.4g})"
 
 
@@ -52,7 +54,8 @@ def overhead(objects, visits, frames):
     (boxes,), path = scene(objects)
     found = sapwise.pairs(boxes)
     algorithm = sapwise.last_decision().algorithm
-    serve = subprocess.Popen([RUST, "serve", str(path), algorithm], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    command = [RUST, "serve", str(path), algorithm]
+    serve = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     python, rust = [], []
     for visit in range(visits + 1):
         serve.stdin.write(f"{frames + 1}\n")
@@ -66,7 +69,7 @@ def overhead(objects, visits, frames):
             here.append(time.perf_counter_ns() - began)
             assert len(answer) == count
             del answer
-        # The first frame of a visit is cold, and so is the first visit.
+        # Drops the first frame of a visit and the first visit, which are cold.
         if visit > 0:
             python.append(np.median(here[1:]))
             rust.append(np.median(times[1:]))
@@ -74,9 +77,10 @@ def overhead(objects, visits, frames):
     serve.wait()
     more = np.array(python) - np.array(rust)
     low, median, high = quartiles(more / 1e3)
+    low_share, share, high_share = 100 * quartiles(more / rust)
     print(f"{objects} boxes, {len(found)} pairs, {algorithm}, {visits} visits of {frames} frames each:")
     print(f"  Rust {text(rust)}, Python {text(python)}")
-    print(f"  overhead {median:.1f} us ({low:.1f} to {high:.1f}), {100 * np.median(more / rust):.2f} % ({', '.join(f'{100 * q:.2f}' for q in quartiles(more / rust))})")
+    print(f"  overhead {median:.1f} µs ({low:.1f} to {high:.1f}), {share:.2f} % ({low_share:.2f} to {high_share:.2f})")
 
 
 def contestants(frames):
@@ -137,7 +141,7 @@ def others(objects, rounds):
         for name in order.permutation(list(names)):
             began = time.perf_counter_ns()
             counts[name] = names[name]()
-            # The first one is cold: threads and memory are made.
+            # Drops the first round, which is cold.
             if a_round > 0:
                 times[name].append(time.perf_counter_ns() - began)
     same = {count for name, count in counts.items() if name != FOLLOWING}
@@ -145,16 +149,15 @@ def others(objects, rounds):
     print(f"{objects} boxes of `uniform`, {same.pop()} pairs of each, n = {rounds}, all in turns:")
     best = min(np.median(times[name]) for name in names if not name.startswith(("sapwise", "BroadPhase")))
     for name in names:
-        print(f"  {name}: {text(times[name])}, the best of the others takes {best / np.median(times[name]):.3g} times as long")
+        print(f"  {name}: {text(times[name])}, the best of the others takes {best / np.median(times[name]):.3g}×")
 
 
 def imports():
-    script = "import numpy, time; began = time.perf_counter_ns(); import sapwise; print(time.perf_counter_ns() - began)"
-    alone = [int(subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout) for _ in range(21)]
-    print(f"import sapwise after numpy: {text(alone[1:])}, n = 20")
-    script = script.replace("import numpy, time", "import time")
-    alone = [int(subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout) for _ in range(21)]
-    print(f"import sapwise with numpy: {text(alone[1:])}, n = 20")
+    for first, name in (("numpy, time", "after numpy"), ("time", "with numpy")):
+        script = f"import {first}; began = time.perf_counter_ns(); import sapwise; print(time.perf_counter_ns() - began)"
+        command = [sys.executable, "-c", script]
+        run = lambda: int(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+        print(f"import sapwise {name}: {text([run() for _ in range(21)][1:])}, n = 20")
 
 
 warnings.simplefilter("ignore", sapwise.ConversionWarning)

@@ -1,7 +1,8 @@
 //! The Rust half of `figures.py`: scenes, and the time of the library's own call.
 //!
-//! `figures scene uniform OBJECTS SEED FRAMES FILE` writes the frames of a scenario from the second on as 32-bit floats. `figures serve FILE ALGORITHM` answers each number on a
-//! line of the standard input with the times of as many frames, in nanoseconds, and the number of pairs.
+//! `figures scene uniform OBJECTS SEED FRAMES FILE` writes the frames of a scenario from the second on as 32-bit
+//! floats. `figures serve FILE ALGORITHM` answers each number on a line of the standard input with the times of as many
+//! frames, in nanoseconds, and the number of pairs.
 
 use sapwise::{Aabb, Adaptive, BroadPhase, PairOrder, Pairs, Registry};
 use sapwise_scenes::Scenario;

@@ -2,7 +2,8 @@
 
     python bindings/python/examples/trimesh_scene.py [MESH [SUBDIVISIONS]]
 
-Without a mesh it takes the aeroplane that pyvista ships (`pip install --no-deps pyvista` is enough, nothing of it is imported).
+Without a mesh it takes the aeroplane that pyvista ships (`pip install --no-deps pyvista` is enough, nothing of it is
+imported).
 """
 
 import importlib.util
@@ -61,5 +62,7 @@ assert np.array_equal(ours, theirs), (len(ours), len(theirs))
 # Neighbours touch by nature.
 faces = mesh.faces[ours]
 share = (faces[:, 0, :, None] == faces[:, 1, None, :]).any(axis=(1, 2))
-print(f"{path.name}: {len(bounds)} triangles, {len(ours)} pairs of bounds overlap, {np.count_nonzero(~share)} of them share no vertex")
-print(f"sapwise {1e3 * seconds:.1f} ms ({sapwise.last_decision().algorithm}), trimesh's tree {1e3 * seconds_of_tree:.0f} ms, the same pairs")
+apart = np.count_nonzero(~share)
+algorithm = sapwise.last_decision().algorithm
+print(f"{path.name}: {len(bounds)} triangles, {len(ours)} pairs of bounds overlap, {apart} of them share no vertex")
+print(f"sapwise {1e3 * seconds:.1f} ms ({algorithm}), trimesh's tree {1e3 * seconds_of_tree:.0f} ms, the same pairs")

@@ -1,8 +1,8 @@
-"""Sapwise finds the overlapping pairs of axis-aligned boxes, with whichever algorithm is fastest on this machine for this frame.
+"""Finds the overlapping pairs of axis-aligned boxes, with the algorithm that is fastest on this machine for this frame.
 
-``pairs`` and ``pairs_between`` take NumPy arrays of boxes. ``BroadPhase`` is for frames that follow each other. ``predict`` tells which
-algorithm is expected to be fastest from how many boxes on, ``probe`` measures the hardware, and ``read_report`` and ``read_reports`` make data
-frames of measured timings.
+``pairs`` and ``pairs_between`` take NumPy arrays of boxes. ``BroadPhase`` is for consecutive frames. ``predict``
+returns the expected fastest algorithm for each number of boxes, ``probe`` measures the hardware, and ``read_report``
+and ``read_reports`` return measured timings as data frames.
 """
 
 from ._errors import ConversionWarning, InputError, InvalidBoxError, SapwiseError, TooManyPairsError

@@ -1,4 +1,4 @@
-"""Arrays of callers, made into what the compiled half reads."""
+"""Converts the arrays of callers for the compiled half."""
 
 import warnings
 
@@ -8,7 +8,7 @@ from ._errors import ConversionWarning, InputError
 
 #: The most boxes that 32 bits can name.
 _MOST = 2**32 - 1
-#: From this many boxes on a copy is worth a warning.
+#: Fewest boxes for a warning about a copy.
 _WORTH_A_WARNING = 10_000
 #: Integers up to this are exact as 64-bit floats.
 _EXACT = 2**53
@@ -22,16 +22,14 @@ def _warn(count, why):
     if count < _WORTH_A_WARNING or _has_warned:
         return
     _has_warned = True
-    text = (
-        f"{count} boxes were copied: {why}. C-contiguous float32 of shape (n, 6) is read where it lies. This is told once."
-    )
+    text = f"{count} boxes were copied: {why}. C-contiguous float32 of shape (n, 6) is read in place. Warned once."
     warnings.warn(text, ConversionWarning, stacklevel=3)
 
 
 def _array(given, name):
-    """The array of an argument, not converted yet."""
+    """Return an argument as an array, with its dtype."""
     if isinstance(given, np.ma.MaskedArray):
-        raise TypeError(f"{name} is a masked array; leave out what is masked, or take its .data")
+        raise TypeError(f"{name} is a masked array; leave out the masked entries, or take its .data")
     try:
         return np.asarray(given)
     except ValueError as why:
@@ -39,20 +37,22 @@ def _array(given, name):
 
 
 def _floats(array, name, which):
-    """The same numbers as C-contiguous, aligned, native float32 where that is exact, else float64, and why they were copied."""
+    """Return C-contiguous, aligned, native float32 if that is exact, else float64, and why the array was copied."""
     kind, size = array.dtype.kind, array.dtype.itemsize
     if kind == "f" and size == 4 or kind == "f" and size == 2 or kind in "iu" and size <= 2:
         wanted = np.float32
     elif kind == "f" and size == 8 or kind in "iu":
         wanted = np.float64
     else:
-        raise TypeError(f"{name} has dtype {array.dtype}; give floats of 32 or 64 bits, for instance {name}.astype('float64')")
+        raise TypeError(
+            f"{name} has dtype {array.dtype}; give floats of 32 or 64 bits, for instance {name}.astype('float64')"
+        )
     if kind in "iu" and size == 8 and array.size:
         too_large = (array > _EXACT) | (array < -_EXACT) if kind == "i" else array > _EXACT
         if too_large.any():
             index = int(np.argmax(too_large.reshape(len(array), -1).any(axis=1)))
             raise InputError(
-                f"box {index}{which} has an integer beyond 2**53, which floats can't tell from its neighbours; scale or shift the boxes"
+                f"box {index}{which} has an integer beyond 2**53, which no float represents; scale or shift the boxes"
             )
     if array.dtype.newbyteorder("=") != np.dtype(wanted) or not array.dtype.isnative:
         why = f"their dtype is {array.dtype.str}"
@@ -66,7 +66,7 @@ def _floats(array, name, which):
 
 
 def boxes(given, upper, which):
-    """One array of shape (n, 6), or a tuple of two of shape (n, 3), of float32 or float64 throughout."""
+    """Return one array of shape (n, 6), or a tuple of two of shape (n, 3), all float32 or all float64."""
     name = f"the list{which}" if which else "boxes"
     if upper is None:
         array = _array(given, name)
@@ -109,11 +109,11 @@ def boxes(given, upper, which):
 
 def _check_count(count):
     if count > _MOST:
-        raise InputError(f"{count} boxes are more than the {_MOST} that 32 bits can name; split the scene")
+        raise InputError(f"{count} boxes are more than the {_MOST} that 32 bits can number; split the scene")
 
 
 def _whole(given, name, count):
-    """A list of whole numbers of a length, or any length where `count` is None."""
+    """Return an array of whole numbers, of any length if `count` is None."""
     array = _array(given, name)
     if array.shape == (0,):
         array = array.astype(np.int64)
@@ -125,15 +125,17 @@ def _whole(given, name, count):
 
 
 def ids(given, count):
-    """Ids as int64."""
+    """Return ids as int64."""
     array = _whole(given, "ids", count)
-    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
-        raise InputError(f"the id of box {int(np.argmax(array > np.iinfo(np.int64).max))} does not fit into 63 bits; number the boxes anew")
+    most = np.iinfo(np.int64).max
+    if array.dtype.kind == "u" and array.size and array.max() > most:
+        index = int(np.argmax(array > most))
+        raise InputError(f"the id of box {index} does not fit into 63 bits; number the boxes anew")
     return np.ascontiguousarray(array, np.int64)
 
 
 def _bits(given, name, count):
-    """32 bits for each box."""
+    """Return 32 bits for each box."""
     if given is None:
         return np.full(count, 0xFFFFFFFF, np.uint32)
     array = _whole(given, name, count)
@@ -145,14 +147,15 @@ def _bits(given, name, count):
 
 
 def memberships(groups, masks, fixed):
-    """Groups, masks and whether fixed, of one length."""
+    """Return groups, masks and fixed, each with one entry a box."""
     if fixed is not None:
         fixed = _array(fixed, "fixed")
         if fixed.shape == (0,):
             fixed = fixed.astype(bool)
         if fixed.ndim != 1 or fixed.dtype.kind != "b":
             raise InputError(f"fixed has shape {fixed.shape} and dtype {fixed.dtype}; give True or False for each box")
-    count = next(len(np.atleast_1d(_array(of, "groups, masks or fixed"))) for of in (groups, masks, fixed) if of is not None)
+    given = next(of for of in (groups, masks, fixed) if of is not None)
+    count = len(np.atleast_1d(_array(given, "groups, masks or fixed")))
     if fixed is None:
         fixed = np.zeros(count, bool)
     elif len(fixed) != count:

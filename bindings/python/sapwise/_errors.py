@@ -5,7 +5,7 @@ from typing import Any
 
 
 class SapwiseError(RuntimeError):
-    """Something failed that is no fault of the arguments; the base of all exceptions of the package."""
+    """A failure that is no fault of the arguments; the base of all exceptions of the package."""
 
 
 class InputError(SapwiseError, ValueError):
@@ -47,9 +47,9 @@ class TooManyPairsError(SapwiseError, MemoryError):
 
 
 class ConversionWarning(UserWarning):
-    """Many boxes were copied because they do not lie as the library reads them; told once in a process."""
+    """Many boxes were copied because they don't have the layout that the library reads; raised once in a process."""
 
 
 def warn_unsaved(why: str) -> None:
-    """Tell that what was learned is lost."""
+    """Warn that what was learned is lost."""
     warnings.warn(f"what was learned is not kept: {why}", RuntimeWarning, stacklevel=2)

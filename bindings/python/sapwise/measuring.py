@@ -1,4 +1,4 @@
-"""Measures the machine: its hardware in this process, or a whole report with the command."""
+"""Measures the hardware in this process, or a whole report with the command."""
 
 import collections
 import shutil
@@ -14,27 +14,28 @@ Hardware = collections.namedtuple("Hardware", ["machine", "parameters"])
 
 
 def probe(quick=True, progress=None):
-    """Measure the hardware of this machine, in this process. Nothing is timed but the hardware, and nothing is kept.
+    """Measure the hardware of this machine, in this process. Saves nothing and times no algorithm.
 
     Parameters
     ----------
     quick : bool, default True
-        Whether to take about two seconds; latencies of loads are left out then. Otherwise it takes as long as a report needs: some ten seconds.
+        Whether to take about two seconds, without latencies of loads. Otherwise it takes about ten seconds, as for a
+        report.
     progress : callable, optional
-        Called as ``progress(done, of, what)`` before each family of parameters, and once when all are done. What it raises ends the
-        measurement.
+        Called as ``progress(done, of, what)`` before each family of parameters, and once at the end. An exception in it
+        ends the measurement.
 
     Returns
     -------
     Hardware
-        ``machine``, a dict: what the machine says of itself, without a name of a host or a user. ``parameters``, a
-        pandas.DataFrame or numpy.recarray: ``name``, ``value``, ``unit``, ``dispersion`` (interquartile range over median), ``samples``,
-        ``spoiled``, ``foreign_load`` (0 to 1), ``how``, ``source``.
+        ``machine``, a dict: the machine's description, without names of hosts or users. ``parameters``, a
+        pandas.DataFrame or numpy.recarray: ``name``, ``value``, ``unit``, ``dispersion`` (interquartile range over
+        median), ``samples``, ``spoiled``, ``foreign_load`` (0 to 1), ``how``, ``source``.
 
     Raises
     ------
     KeyboardInterrupt
-        Ctrl-C is seen between families, each of which takes up to a second or two.
+        Ctrl-C works between families, each of which takes up to a second or two.
 
     Notes
     -----
@@ -54,9 +55,10 @@ def probe_report(path, quick=True, progress=None, command="sapwise", arguments=(
     quick : bool, default True
         Whether to take about half a minute; a full report takes some minutes.
     progress : callable, optional
-        Called with each line of progress that the command writes. What it raises ends the command.
+        Called with each line of progress of the command. An exception in it ends the command.
     command : str, default "sapwise"
-        The command, on the PATH or as a path. This package does not contain it: ``cargo install --path probes`` in the repository.
+        The command, on the PATH or as a path. It is not in this package: ``cargo install --path probes`` in the
+        repository.
     arguments : sequence of str, optional
         More arguments, for instance ``["--threads", "1"]``.
 
@@ -68,18 +70,19 @@ def probe_report(path, quick=True, progress=None, command="sapwise", arguments=(
     Raises
     ------
     SapwiseError
-        There is no such command, or it failed; the text has the last lines that it wrote.
+        There is no such command, or it failed; the text has its last lines.
     KeyboardInterrupt
         On Ctrl-C, once the command has ended; it keeps what was measured until then.
     """
     program = shutil.which(command)
     if program is None:
         raise SapwiseError(
-            f"there is no command {command!r}; `cargo install --path probes` in the repository installs it, or give its path as command="
+            f"there is no command {command!r}; "
+            "run `cargo install --path probes` in the repository, or give its path as command="
         )
     call = [program, "probe", "--out", str(path), *(["--quick"] if quick else []), *arguments]
     last = collections.deque(maxlen=20)
-    # Apart from the terminal's group: it hears of Ctrl-C from here, and just once.
+    # In its own process group: it gets Ctrl-C from here only, once.
     with subprocess.Popen(
         call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True
     ) as running:
@@ -99,10 +102,10 @@ def probe_report(path, quick=True, progress=None, command="sapwise", arguments=(
 
 
 def _end(running):
-    """Ask the command to end, and make it where it does not."""
+    """Ask the command to end, and kill it if it does not."""
     if running.poll() is None:
         running.send_signal(signal.SIGINT)
-        # Someone must take what it still writes, or it would wait for that.
+        # Without a reader of its output it would block.
         threading.Thread(target=running.stderr.read, daemon=True).start()
         try:
             running.wait(30)

@@ -8,8 +8,11 @@ import numpy as np
 
 from ._errors import InputError
 
-#: Columns of text; those of the hardware parameters and all others hold floats, but for the counts.
-_TEXT = ("file", "host", "cpu", "simd", "hypervisor", "profile", "label", "date", "scenario", "algorithm", "method", "backend", "gpus", "error")
+#: Columns of text and of counts. All others hold floats.
+_TEXT = (
+    *("file", "host", "cpu", "simd", "hypervisor", "profile", "label", "date", "scenario", "algorithm", "method"),
+    *("backend", "gpus", "error"),
+)
 _COUNTS = ("threads", "revision", "objects", "pairs", "samples")
 
 
@@ -24,23 +27,24 @@ def read_report(path):
     Returns
     -------
     pandas.DataFrame or numpy.recarray
-        One row for each algorithm, scenario and number of boxes; a record array with the same names where pandas is not installed.
-        ``file``; ``host`` (all profiles of one host share it), ``cpu``, ``simd``, ``hypervisor``; ``profile`` (what was restricted), ``label``,
-        ``date``; ``scenario``, ``objects`` and ``pairs`` (counts), ``axis_candidates``, ``strip_candidates``, ``moved`` (the load);
-        ``algorithm``, ``method``, ``backend``, ``threads`` (of the CPU; 0 on GPUs), ``revision``; ``median_ns``, ``q25_ns``, ``q75_ns`` (of the time of a frame, nanoseconds), ``samples``,
-        ``foreign_load`` (0 to 1), ``error``, ``gpus``; and a column for each hardware parameter with its unit in its name.
-        What is not known is NaN, or an empty text.
+        One row for each algorithm, scenario and number of boxes; a record array with the same names where pandas is not
+        installed. ``file``; ``host`` (all profiles of one host share it), ``cpu``, ``simd``, ``hypervisor``;
+        ``profile`` (the restriction), ``label``, ``date``; ``scenario``, ``objects`` and ``pairs`` (counts),
+        ``axis_candidates``, ``strip_candidates``, ``moved`` (the load); ``algorithm``, ``method``, ``backend``,
+        ``threads`` (of the CPU; 0 on GPUs), ``revision``; ``median_ns``, ``q25_ns``, ``q75_ns`` (of the time of a
+        frame, nanoseconds), ``samples``, ``foreign_load`` (0 to 1), ``error``, ``gpus``; and a column for each hardware
+        parameter with its unit in its name. Unknown values are NaN, or an empty text.
 
     Raises
     ------
     InputError
-        The file is no report of this form; the text says what to do.
+        The file is no such report; the text says what to do.
     OSError
         It can't be read.
 
     Notes
     -----
-    ``datasets/README.md`` tells what each figure means. Quartiles are of the samples, interpolated linearly.
+    ``datasets/README.md`` describes each column. Quartiles are interpolated linearly between samples.
     """
     return _table(_rows(Path(path)))
 
@@ -51,8 +55,8 @@ def read_reports(folder):
     Parameters
     ----------
     folder : path
-        Each ``*.json`` in it is read, in the order of the names, those of other forms than ``report/...`` left out. Folders in it are not
-        looked at.
+        Each ``*.json`` in it whose schema is ``report/...`` is read, in the order of the names. Folders in it are not
+        read.
 
     Returns
     -------
@@ -86,7 +90,7 @@ def read_reports(folder):
 
 
 def _rows(path, among_others=False):
-    """One dict for each timing of a file."""
+    """Return one dict for each timing of a file."""
     try:
         report = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as why:
@@ -97,7 +101,7 @@ def _rows(path, among_others=False):
             return []
         raise InputError(f"{path} is no report, its schema is {schema!r}; `sapwise probe --out` makes one")
     if schema.split("/")[1].split(".")[0] != "2":
-        raise InputError(f"{path} is of the form {schema}, and report/2 is read; `sapwise convert` rewrites older files")
+        raise InputError(f"{path} is {schema}, and only report/2 can be read; measure again with `sapwise probe --out`")
     try:
         return list(_timings(path, report))
     except (KeyError, TypeError, IndexError, AttributeError) as why:
@@ -156,7 +160,7 @@ def _known(value):
 
 
 def _host(machine, parameters):
-    """What tells hosts apart, as the command does: the CPU and its caches, and in a guest the clock that its hypervisor reports, in MHz."""
+    """Return the id of a host: the CPU and its caches, and in a guest the clock of its hypervisor in MHz."""
     clock = parameters.get("clock_reported_ghz", np.nan)
     if machine["hypervisor"] in ("", "none") or np.isnan(clock):
         return machine["physical_id"]
@@ -164,7 +168,7 @@ def _host(machine, parameters):
 
 
 def _profile(path, report):
-    """The word for a restriction: from the name ``<cpu>-<cores>c-<profile>--<date>.json``, else from what was taken."""
+    """Return the restriction, from the name ``<cpu>-<cores>c-<profile>--<date>.json``, else from the provenance."""
     named = re.fullmatch(r".+?-\d+c-(.+)--\d{4}-\d\d-\d\d", path.stem)
     if named:
         return named.group(1)
@@ -185,13 +189,15 @@ def _quartiles(samples):
 
 
 def _table(rows):
-    """A data frame of dicts, or a record array where pandas is missing."""
+    """Return a data frame of dicts, or a record array without pandas."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     columns = {name: _column(name, [row.get(name) for row in rows]) for name in names}
     try:
         import pandas
     except ImportError:
-        return np.rec.fromarrays(list(columns.values()), names=names) if names else np.recarray(0, dtype=[("file", "U1")])
+        if not names:
+            return np.recarray(0, dtype=[("file", "U1")])
+        return np.rec.fromarrays(list(columns.values()), names=names)
     return pandas.DataFrame(columns)
 
 

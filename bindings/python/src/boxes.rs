@@ -1,4 +1,4 @@
-//! Boxes of a caller: borrowed where they lie as the library wants them, converted elsewhere.
+//! The boxes of a caller: borrowed if they have the layout of the library, else converted.
 
 use crate::error::{call, exception, invalid_box, two};
 use crate::narrow::rounded;
@@ -7,12 +7,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use sapwise::{Aabb, BoxDefect, Error};
 
-/// Boxes of a caller, for as long as a call takes.
+/// The boxes of a caller during a call.
 pub(crate) enum Boxes<'py> {
-    /// The memory of an array of shape (n, 6), 32-bit floats in C order. The borrow keeps it alive, and keeps other extensions in Rust
-    /// from writing to it; nothing keeps Python from it.
+    /// The memory of an array of shape (n, 6), 32-bit floats in C order. The borrow keeps it alive, and keeps other
+    /// Rust extensions from writing to it; nothing keeps Python from that.
     Borrowed(PyReadonlyArray2<'py, f32>),
-    /// What was made of any other input.
+    /// A copy of any other input.
     Owned(Vec<Aabb>),
 }
 
@@ -20,21 +20,21 @@ pub(crate) enum Boxes<'py> {
 const _: () = assert!(size_of::<Aabb>() == 6 * size_of::<f32>() && align_of::<Aabb>() == align_of::<f32>());
 
 impl Boxes<'_> {
-    /// The boxes as the library takes them.
+    /// Returns the boxes as the library takes them.
     pub(crate) fn as_slice(&self) -> PyResult<&[Aabb]> {
         match self {
             Self::Owned(boxes) => Ok(boxes),
             Self::Borrowed(array) => {
                 let floats = array.as_slice()?;
-                // SAFETY: `Aabb` is `repr(C)` of twice three floats, with their alignment and without padding, as is asserted above; all
-                // bits are valid. `floats` has 6 floats a box.
+                // SAFETY: `Aabb` is `repr(C)` of twice three floats, with their alignment and without padding, as
+                // asserted above. All bit patterns are valid. `floats` has 6 floats a box.
                 Ok(unsafe { std::slice::from_raw_parts(floats.as_ptr().cast::<Aabb>(), floats.len() / 6) })
             }
         }
     }
 }
 
-/// The boxes that a caller gave: one array, or lower and upper corners apart. `which` stands behind "box 3" in errors.
+/// Takes the boxes of a caller: one array, or separate lower and upper corners. `which` follows "box 3" in errors.
 pub(crate) fn boxes<'py>(
     boxes: &Bound<'py, PyAny>,
     upper: Option<&Bound<'py, PyAny>>,
@@ -67,21 +67,22 @@ pub(crate) fn boxes<'py>(
     owned(py, which, corners.len() / 2, corners.chunks_exact(2).map(|c| (c[0], c[1])))
 }
 
-/// Floats in threes.
+/// Groups floats in threes.
 fn triples<T>(floats: &[T]) -> &[[T; 3]] {
     floats.as_chunks().0
 }
 
-/// An array of shape (n, 6) of 32-bit floats in C order and where such floats may lie. Subclasses aside: a masked array says more.
+/// Borrows an aligned array of shape (n, 6) of 32-bit floats in C order. `None` for other arrays, and for subclasses,
+/// such as masked arrays.
 fn as_it_lies<'py>(array: &Bound<'py, PyAny>) -> Option<Boxes<'py>> {
     let array = array.cast::<PyArray2<f32>>().ok()?;
     let plain = array.get_type().is(array.py().get_type::<PyUntypedArray>());
     let lies = array.shape()[1] == 6 && array.is_c_contiguous() && array.data().is_aligned();
-    // Another extension in Rust may be writing to it; then it is copied, which tells so.
+    // If another Rust extension is writing to it, it is copied, which reports that.
     if plain && lies { array.try_readonly().ok().map(Boxes::Borrowed) } else { None }
 }
 
-/// Boxes of 64-bit floats, rounded.
+/// Rounds boxes of 64-bit floats.
 fn owned<'py>(
     py: Python<'py>,
     which: &str,

@@ -1,4 +1,4 @@
-//! What was decided for a frame, as a Python object.
+//! The class `Decision`.
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -9,19 +9,20 @@ use sapwise::{Decision, Load};
 /// Attributes
 /// ----------
 /// algorithm : str
-///     The algorithm that ran, for instance ``"grid-sap@cpu2"``: the method, and the threads that it may use.
+///     The algorithm that ran, for instance ``"grid-sap@cpu2"``: the method and its most threads.
 /// reason : str
-///     Why, in words.
+///     The reason, in words.
 /// source : str
-///     Where the expected times come from: ``"default"`` (built-in thresholds), ``"predicted"``, ``"measured"`` or ``"learned"``.
+///     The source of the expected times: ``"default"`` (built-in thresholds), ``"predicted"``, ``"measured"`` or
+///     ``"learned"``.
 /// expected_ns : float or None
-///     The expected time of the frame in nanoseconds; None where only the number of boxes decides.
+///     The expected time of the frame in nanoseconds; None if only the number of boxes decides.
 /// measured_ns : float or None
-///     What the frame took in nanoseconds; None where it was not timed, as most very short frames are.
+///     The time of the frame in nanoseconds; None if it was not timed, like most very short frames.
 /// runner_up : tuple of (str, float) or None
 ///     The next best algorithm and its expected time in nanoseconds.
 /// load : dict
-///     What was known of the frame before it ran: ``objects``, ``axis_candidates``, ``strip_candidates``, ``pairs``, ``moved``.
+///     The estimated load of the frame: ``objects``, ``axis_candidates``, ``strip_candidates``, ``pairs``, ``moved``.
 #[pyclass(frozen, name = "Decision", module = "sapwise")]
 pub(crate) struct PyDecision {
     #[pyo3(get)]
@@ -37,7 +38,7 @@ pub(crate) struct PyDecision {
     #[pyo3(get)]
     runner_up: Option<(String, f64)>,
     load: Load,
-    sentence: String,
+    pub(crate) sentence: String,
 }
 
 impl From<Decision<'_>> for PyDecision {
@@ -71,7 +72,7 @@ impl PyDecision {
     }
 }
 
-/// A load as a dict.
+/// Converts a load to a dict.
 pub(crate) fn as_dict<'py>(py: Python<'py>, load: &Load) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("objects", load.objects)?;
@@ -80,11 +81,4 @@ pub(crate) fn as_dict<'py>(py: Python<'py>, load: &Load) -> PyResult<Bound<'py, 
     dict.set_item("pairs", load.pairs)?;
     dict.set_item("moved", load.moved)?;
     Ok(dict)
-}
-
-impl PyDecision {
-    /// The decision in words.
-    pub(crate) fn sentence(&self) -> &str {
-        &self.sentence
-    }
 }

@@ -1,26 +1,26 @@
-//! Rust errors as Python exceptions, which are classes of `sapwise._errors`.
+//! Converts Rust errors to Python exceptions of `sapwise._errors`.
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use sapwise::{BoxDefect, Error};
 
-/// An instance of a class of `sapwise._errors`.
+/// Makes an instance of a class of `sapwise._errors`.
 fn instance<'py>(py: Python<'py>, class: &str, arguments: impl pyo3::call::PyCallArgs<'py>) -> PyErr {
     let made = py.import("sapwise._errors").and_then(|m| m.getattr(class)).and_then(|class| class.call1(arguments));
     made.map_or_else(|why| why, PyErr::from_value)
 }
 
-/// An argument that can't be used: a `ValueError` of ours.
+/// Makes the exception for an unusable argument, a `ValueError`.
 pub(crate) fn unusable(py: Python<'_>, text: impl Into<String>) -> PyErr {
     instance(py, "InputError", (text.into(),))
 }
 
-/// What went wrong that is no fault of the arguments.
+/// Makes the exception for a failure that is no fault of the arguments.
 pub(crate) fn failed(py: Python<'_>, text: impl Into<String>) -> PyErr {
     instance(py, "SapwiseError", (text.into(),))
 }
 
-/// `box` at `index` of `which` can't be ordered.
+/// Makes the exception for an invalid box.
 pub(crate) fn invalid_box(py: Python<'_>, which: &str, index: usize, defect: BoxDefect) -> PyErr {
     let what = match defect {
         BoxDefect::NotANumber => "has a bound that is not a number (NaN)",
@@ -30,7 +30,7 @@ pub(crate) fn invalid_box(py: Python<'_>, which: &str, index: usize, defect: Box
     instance(py, "InvalidBoxError", (format!("box {index}{which} {what}; correct or leave out this box"), index))
 }
 
-/// The exception for an error of a frame of the boxes `which`.
+/// Makes the exception for an error of a frame of the boxes `which`.
 pub(crate) fn exception(py: Python<'_>, error: &Error, which: &str) -> PyErr {
     match *error {
         Error::InvalidBox { index, defect } => invalid_box(py, which, index, defect),
@@ -39,7 +39,7 @@ pub(crate) fn exception(py: Python<'_>, error: &Error, which: &str) -> PyErr {
         }
         Error::TooManyPairs { limit } => {
             let text = format!(
-                "more pairs overlap than the limit of {limit}; raise it with `limit=`, for which each pair needs some 30 bytes, \
+                "more pairs overlap than the limit of {limit}; raise it with `limit=`, at about 30 bytes of memory a pair, \
                  or thin out the scene"
             );
             instance(py, "TooManyPairsError", (text, limit))
@@ -49,7 +49,7 @@ pub(crate) fn exception(py: Python<'_>, error: &Error, which: &str) -> PyErr {
     }
 }
 
-/// Something with a text and perhaps a cause, in one line.
+/// Returns an error and its cause in one line.
 pub(crate) fn with_cause(error: &dyn std::error::Error) -> String {
     error.source().map_or_else(|| error.to_string(), |source| format!("{error}: {source}"))
 }
@@ -64,7 +64,7 @@ pub(crate) fn call<'py>(
     py.import(module)?.getattr(function)?.call1(arguments)
 }
 
-/// A pair of arrays.
+/// Returns both elements of a tuple.
 pub(crate) fn two<'py>(of: &Bound<'py, PyTuple>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     Ok((of.get_item(0)?, of.get_item(1)?))
 }

@@ -16,17 +16,20 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Finds the overlapping pairs of frames that follow each other.
 ///
-/// In each frame it runs the algorithm that it expects to be fastest on this machine for these boxes, and learns from what frames take. Some
-/// algorithms keep work from frame to frame. As a context manager it saves what was learned when the block ends.
+/// In each frame it runs the algorithm that it expects to be fastest on this machine for these boxes, and learns from
+/// the times of frames. Some algorithms keep work from frame to frame. As a context manager it saves what it has
+/// learned when the block ends.
 ///
 /// Parameters
 /// ----------
 /// cache : path, False or None
-///     The folder in which the tuning of this machine is kept, False for none, None for the user's cache folder.
+///     The folder of the saved tuning of this machine, False for none, None for the user's cache folder.
 /// measure : bool, default True
-///     Whether the hardware may be measured, for about two seconds, where no tuning is kept. Otherwise built-in thresholds decide.
+///     Whether the hardware may be measured, for about two seconds, where no tuning is kept. Otherwise built-in
+///     thresholds decide.
 /// background : bool, default True
-///     Whether that happens on a thread of its own that works a tenth of the time, while built-in thresholds decide. False waits here.
+///     Whether that happens on a thread of its own that works a tenth of the time, while built-in thresholds decide.
+///     False waits here.
 /// wait : float, default 0.0
 ///     Seconds to wait for that thread, which until then works all the time.
 /// tunings : path, optional
@@ -34,11 +37,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// tuning : Tuning, optional
 ///     A tuning to use in place of all that.
 /// algorithm : str, optional
-///     Always this algorithm, for instance ``"bvh@cpu1"``.
+///     Always run this algorithm, for instance ``"bvh@cpu1"``.
 /// threads : int, optional
 ///     The most threads. By default all cores that this process may use.
 /// learning, exploring : bool, default True
-///     Whether the times of frames correct the expected costs, and whether another algorithm is tried now and then.
+///     Whether the times of frames correct the expected costs, and whether it tries other algorithms now and then.
 /// ordered : bool, default True
 ///     Whether the pairs of a frame are sorted.
 /// limit : int, optional
@@ -51,10 +54,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// SapwiseError
 ///     No algorithm can run.
 ///
-/// Notes
-/// -----
-/// It may be used from several threads: a call waits until the one before has ended, without the interpreter's lock. After a fork the child
-/// starts with an empty one of the same arguments and the same filter, with threads of its own.
+/// Notes ----- Several threads may use it: a call waits until the previous one has ended, without the interpreter's
+/// lock. After a fork the child starts anew with the same arguments, the same filter and its own threads.
 ///
 /// Examples
 /// --------
@@ -79,7 +80,7 @@ impl PyBroadPhase {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The frames, made again after a fork, and the filter.
+    /// Returns the frames, made anew after a fork, and the filter.
     fn shared(&self, py: Python<'_>) -> PyResult<(Shared, Option<Arc<Vec<Membership>>>)> {
         let pid = std::process::id();
         let state = self.state();
@@ -89,7 +90,7 @@ impl PyBroadPhase {
         if state.pid == pid {
             return Ok((Arc::clone(frames), state.filter.clone()));
         }
-        // Nobody else is in this process yet but its one thread.
+        // After a fork this process has one thread.
         drop(state);
         let made = Arc::new(Mutex::new(Frames::new(start::adaptive(py, &self.start)?, &self.start)));
         let mut state = self.state();
@@ -98,7 +99,7 @@ impl PyBroadPhase {
         Ok((made, state.filter.clone()))
     }
 
-    /// Does something with the frames, without the interpreter's lock.
+    /// Runs `what` on the frames, without the interpreter's lock.
     fn with<T: Send>(&self, py: Python<'_>, what: impl FnOnce(&mut Frames) -> T + Send) -> PyResult<T> {
         let (frames, _) = self.shared(py)?;
         Ok(py.detach(|| what(&mut locked(&frames))))
@@ -159,12 +160,13 @@ impl PyBroadPhase {
     /// Parameters
     /// ----------
     /// boxes : array_like, shape (n, 6) or (n, 2, 3)
-    ///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners, shape (n, 3).
+    ///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners,
+    ///     shape (n, 3).
     /// upper : array_like, shape (n, 3), optional
     ///     The upper corners.
     /// ids : array_like of int, shape (n,), optional
-    ///     What names each box from frame to frame where boxes change their positions: ``begun`` and ``ended`` then hold ids. Boxes
-    ///     with the same id count as one there. Give ids in each frame or in none.
+    ///     An id for each box, if boxes change their positions: ``begun`` and ``ended`` then hold ids. Boxes with the
+    ///     same id count as one there. Give ids in each frame or in none.
     ///
     /// Returns
     /// -------
@@ -174,7 +176,8 @@ impl PyBroadPhase {
     /// Raises
     /// ------
     /// InvalidBoxError
-    ///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are legal.
+    ///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are
+    ///     legal.
     /// InputError
     ///     The shape is wrong, or there are more boxes than 32 bits can name.
     /// TypeError
@@ -182,10 +185,8 @@ impl PyBroadPhase {
     /// TooManyPairsError
     ///     More pairs than ``limit``. ``limit`` of the exception has it.
     ///
-    /// Notes
-    /// -----
-    /// After an error nothing has begun or ended, and the next frame is compared with the last one that succeeded. What is read where it lies and
-    /// what is copied: see ``pairs``. Ctrl-C is seen before and after a frame, not within.
+    /// Notes ----- After an error nothing has begun or ended, and the next frame is compared with the last one that
+    /// succeeded. ``pairs`` says which input is copied. Ctrl-C works before and after a frame, not within.
     #[pyo3(signature = (boxes, upper=None, *, ids=None))]
     fn find<'py>(
         &self,
@@ -207,7 +208,8 @@ impl PyBroadPhase {
         let (frames, filter) = self.shared(py)?;
         if let Some(filter) = filter.as_ref().filter(|f| f.len() != boxes.len()) {
             let text = format!(
-                "the filter is of {} boxes and there are {}; call set_filter with one entry a box, or without arguments to lift it",
+                "the filter is for {} boxes and there are {}; call set_filter with one entry a box, \
+                 or without arguments to lift it",
                 filter.len(),
                 boxes.len()
             );
@@ -215,7 +217,7 @@ impl PyBroadPhase {
         }
         let found = py.detach(|| {
             let mut frames = locked(&frames);
-            if frames.is_named_otherwise(&ids) {
+            if frames.has_other_ids(&ids) {
                 return None;
             }
             Some(frames.find(boxes, ids, filter.as_ref()))
@@ -224,7 +226,8 @@ impl PyBroadPhase {
         match found {
             None => Err(unusable(
                 py,
-                "ids were given for one of two frames that follow each other; give them for each or for none, or make a new BroadPhase to change that",
+                "only one of two consecutive frames has ids; give them for each frame or for none, \
+                 or make a new BroadPhase",
             )),
             Some(found) => two_columns(py, found.map_err(|error| exception(py, &error, ""))?),
         }
@@ -232,19 +235,20 @@ impl PyBroadPhase {
 
     /// Set which boxes may be a pair, from the next frame on. Without arguments every two may.
     ///
-    /// Two boxes are a pair only where each has a group that the mask of the other has too, and where not both are fixed.
+    /// Two boxes are a pair only if each has a group that is in the mask of the other, and if not both are fixed.
     ///
     /// Parameters
     /// ----------
     /// groups, masks : array_like of int, shape (n,), optional
-    ///     One bit a group, 32 bits. Where it is not given a box is in every group, and lets every group through.
+    ///     One bit a group, 32 bits. By default a box is in every group, and its mask allows every group.
     /// fixed : array_like of bool, shape (n,), optional
-    ///     Which boxes never move. Two of them are not compared.
+    ///     Which boxes never move. Two fixed boxes are no pair.
     ///
     /// Raises
     /// ------
     /// InputError
-    ///     The lengths differ, or a number does not fit into 32 bits; ``find`` raises it where there are more or fewer boxes.
+    ///     The lengths differ, or a number does not fit into 32 bits. ``find`` raises it if it gets more or fewer
+    ///     boxes.
     #[pyo3(signature = (*, groups=None, masks=None, fixed=None))]
     fn set_filter(
         &self,
@@ -263,19 +267,20 @@ impl PyBroadPhase {
             let each = groups.into_iter().zip(masks).zip(fixed);
             Some(Arc::new(each.map(|((groups, mask), fixed)| Membership { groups, mask, fixed }).collect()))
         };
-        // The frames of this process, so that a closed one tells so.
+        // Raises if it is closed.
         self.shared(py)?;
         self.state().filter = filter;
         Ok(())
     }
 
-    /// ndarray, shape (k, 2): the pairs of the last frame that were not there in the one before, sorted; ids (int64) where ids were given.
+    /// ndarray, shape (k, 2): the pairs of the last frame that the previous one did not have, sorted; ids (int64) if
+    /// the frames have ids.
     #[getter]
     fn begun<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.changed(py, true)
     }
 
-    /// ndarray, shape (k, 2): the pairs that were there in the frame before and are not in the last one, sorted.
+    /// ndarray, shape (k, 2): the pairs of the previous frame that the last one does not have, sorted.
     #[getter]
     fn ended<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.changed(py, false)
@@ -287,13 +292,14 @@ impl PyBroadPhase {
         self.with(py, |frames| frames.adaptive.last_decision().map(PyDecision::from))
     }
 
-    /// Tuning: what each algorithm is expected to cost, corrected by what was learned.
+    /// Tuning: the expected cost of each algorithm, corrected by what was learned.
     #[getter]
     fn tuning(&self, py: Python<'_>) -> PyResult<PyTuning> {
         self.with(py, |frames| PyTuning::from(frames.adaptive.learned()))
     }
 
-    /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the ``file`` of the cache, when the hardware was measured.
+    /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the ``file`` of the
+    /// cache, when the hardware was measured.
     #[getter]
     fn setup<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let setup = self.with(py, |frames| frames.adaptive.setup().clone())?;
@@ -305,7 +311,7 @@ impl PyBroadPhase {
     /// Returns
     /// -------
     /// bool
-    ///     False where there is nothing to keep yet.
+    ///     False if there is nothing to keep yet.
     ///
     /// Raises
     /// ------
@@ -320,7 +326,7 @@ impl PyBroadPhase {
         Ok(saved)
     }
 
-    /// End its threads and free its memory. It can't be used afterwards; to close it twice does nothing.
+    /// End its threads and free its memory. It can't be used afterwards. Closing it twice does nothing.
     fn close(&self, py: Python<'_>) {
         let (frames, foreign) = {
             let mut state = self.state();
@@ -372,7 +378,7 @@ impl PyBroadPhase {
         let last = self.last_decision(py)?;
         Ok(last.map_or_else(
             || "<sapwise.BroadPhase, no frame yet>".to_owned(),
-            |decision| format!("<sapwise.BroadPhase: {}>", decision.sentence()),
+            |decision| format!("<sapwise.BroadPhase: {}>", decision.sentence),
         ))
     }
 }

@@ -1,50 +1,51 @@
-//! Frames that follow each other: what a `BroadPhase` keeps from one to the next.
+//! The frames of a `BroadPhase`.
 
 use crate::one_shot::flat;
 use crate::start::Start;
 use sapwise::{Aabb, Adaptive, BroadPhase, Changes, Error, Filter, Membership, Pairs};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What names the boxes of a frame.
+/// The ids of the boxes of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Ids {
-    /// Their positions.
+    /// The positions of the boxes.
     Positions,
-    /// Ids of the caller's, one for each box.
+    /// The caller's id of each box.
     Given(Vec<i64>),
 }
 
-/// The pairs of a frame and what names their members.
+/// The pairs of a frame, and the ids of its boxes.
 struct Frame {
     pairs: Pairs,
     ids: Ids,
 }
 
-/// What changed between two frames, by positions or by ids.
+/// The changes between two frames, by positions or by ids.
 enum Follower {
     Positions(Changes<u32>),
     Given(Changes<i64>),
 }
 
-/// Numbers in pairs, as flat as NumPy has them.
+/// Pairs of numbers, flat as in NumPy.
 pub(crate) enum Flat {
     Positions(Vec<u32>),
     Given(Vec<i64>),
 }
 
-/// The broad phase, its last two frames and what changed between them.
+/// The broad phase, its last two frames, and the changes between them.
 pub(crate) struct Frames {
     pub(crate) adaptive: Adaptive,
     frames: [Frame; 2],
-    /// The one of the last frame that succeeded.
+    /// The position in `frames` of the last frame that succeeded.
     now: usize,
-    /// How many frames have succeeded, and up to which of them changes were followed. They are only where somebody asks for them.
+    /// Number of frames that succeeded, and how many of them the follower has seen. It is updated only when the caller
+    /// asks.
     count: u64,
     followed: u64,
     follower: Follower,
     /// The last call failed: nothing has begun or ended.
     failed: bool,
-    /// The filter that the lists have.
+    /// The filter of the lists.
     filter: Option<Arc<Vec<Membership>>>,
 }
 
@@ -63,8 +64,8 @@ impl Frames {
         }
     }
 
-    /// Whether the frame before named its boxes in another way.
-    pub(crate) fn is_named_otherwise(&self, ids: &Ids) -> bool {
+    /// Returns whether the previous frame had the other kind of ids.
+    pub(crate) fn has_other_ids(&self, ids: &Ids) -> bool {
         self.count > 0 && std::mem::discriminant(ids) != std::mem::discriminant(&self.frames[self.now].ids)
     }
 
@@ -88,7 +89,7 @@ impl Frames {
             self.filter = filter;
         }
         let next = &mut self.frames[1 - self.now];
-        // What is older than the frame before is gone from here on, whatever comes of it.
+        // From here on the older frame is lost, also if this one fails.
         self.failed = true;
         self.adaptive.find_pairs(boxes, &mut next.pairs)?;
         next.ids = ids;
@@ -99,13 +100,13 @@ impl Frames {
         Ok(numbers)
     }
 
-    /// Brings the follower to the last frame.
+    /// Updates the follower to the last frame.
     fn follow(&mut self) -> Result<(), Error> {
         if self.followed == self.count {
             return Ok(());
         }
         let [now, before] = [&self.frames[self.now], &self.frames[1 - self.now]];
-        // Nobody has asked after the frame before.
+        // Nobody asked after the previous frame.
         let skipped = self.followed + 1 < self.count;
         if self.followed == 0 {
             self.follower = match &now.ids {
@@ -117,15 +118,15 @@ impl Frames {
             match (&mut self.follower, &frame.ids) {
                 (Follower::Positions(changes), Ids::Positions) => changes.update_positions(&frame.pairs)?,
                 (Follower::Given(changes), Ids::Given(ids)) => changes.update(&frame.pairs, ids)?,
-                // Refused where the frame was given.
-                _ => unreachable!("a frame is named as the one before"),
+                // `find` of the class refuses such frames.
+                _ => unreachable!("a frame has the kind of ids of the previous one"),
             }
         }
         self.followed = self.count;
         Ok(())
     }
 
-    /// The pairs that began with the last frame, or those that ended.
+    /// Returns the pairs that began with the last frame, or those that ended.
     pub(crate) fn changed(&mut self, begun: bool) -> Result<Flat, Error> {
         if self.failed || self.count == 0 {
             return Ok(match self.frames[self.now].ids {
@@ -134,21 +135,24 @@ impl Frames {
             });
         }
         self.follow()?;
-        let numbers = |pairs: &[(u32, u32)]| pairs.iter().flat_map(|&(a, b)| [a, b]).collect();
-        let ids = |pairs: &[(i64, i64)]| pairs.iter().flat_map(|&(a, b)| [a, b]).collect();
         Ok(match &self.follower {
-            Follower::Positions(c) => Flat::Positions(numbers(if begun { c.begun() } else { c.ended() })),
-            Follower::Given(c) => Flat::Given(ids(if begun { c.begun() } else { c.ended() })),
+            Follower::Positions(c) => Flat::Positions(numbers(c, begun)),
+            Follower::Given(c) => Flat::Given(numbers(c, begun)),
         })
     }
 }
 
-/// Frames behind a lock, which is taken without the interpreter's lock only.
+fn numbers<Id: Copy + Ord>(changes: &Changes<Id>, begun: bool) -> Vec<Id> {
+    let pairs = if begun { changes.begun() } else { changes.ended() };
+    pairs.iter().flat_map(|&(a, b)| [a, b]).collect()
+}
+
+/// Frames behind a lock, which only a thread without the interpreter's lock takes.
 pub(crate) type Shared = Arc<Mutex<Frames>>;
 
-/// Locked by who holds the interpreter's lock, and for an instant: no fork finds it locked.
+/// Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it locked.
 pub(crate) struct State {
-    /// The process that made the frames: the threads of another one are not here.
+    /// The process that made the frames. Their threads are not in a forked one.
     pub(crate) pid: u32,
     /// `None` once it is closed.
     pub(crate) frames: Option<Shared>,
@@ -158,13 +162,13 @@ pub(crate) struct State {
 impl Drop for State {
     fn drop(&mut self) {
         if self.pid != std::process::id() {
-            // To drop them would wait for threads that are not here.
+            // Dropping them would wait for threads that are not in this process.
             std::mem::forget(self.frames.take());
         }
     }
 }
 
-/// The frames, once no other call has them.
+/// Locks the frames once no other call uses them.
 pub(crate) fn locked(frames: &Shared) -> MutexGuard<'_, Frames> {
     frames.lock().unwrap_or_else(PoisonError::into_inner)
 }

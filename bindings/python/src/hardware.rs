@@ -1,4 +1,4 @@
-//! Measures the hardware in this process, family by family.
+//! Measures the hardware in this process, one family of parameters after another.
 
 use crate::error::failed;
 use pyo3::prelude::*;
@@ -8,10 +8,11 @@ use sapwise::measure::{Family, Options, family, machine};
 use std::str::FromStr;
 use std::time::Duration;
 
-/// What a quick measurement may take in all.
+/// Time limit of a quick measurement.
 const QUICK: Duration = Duration::from_secs(2);
 
-/// The machine, and a list of its parameters, as dicts. Looks for Ctrl-C between families, each of which takes up to a second.
+/// Returns the machine, and a list of its parameters, as dicts. Checks for Ctrl-C between families, each of which takes
+/// up to a second.
 #[pyfunction]
 #[pyo3(signature = (quick, progress))]
 pub(crate) fn measure_hardware<'py>(

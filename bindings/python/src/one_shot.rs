@@ -1,4 +1,4 @@
-//! `pairs` and `pairs_between`: boxes that have nothing to do with those of the call before.
+//! `pairs` and `pairs_between`: each call stands for itself.
 
 use crate::boxes::boxes;
 use crate::decision::PyDecision;
@@ -13,33 +13,33 @@ use sapwise::{
 };
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Keeps work from frame to frame, for which boxes of which every call brings others have no use.
+/// The method that keeps work from frame to frame: of no use here.
 const INCREMENTAL: &str = "pair-cache";
 
-/// Where nothing is known of the machine: where `grid-sap` takes over from `brute`, in boxes, and for `k` threads times `k` squared. Rounded from
-/// `uniform` and `clustered` on the machines of the first reports.
+/// Built-in thresholds, in boxes, for an unknown machine: `grid-sap` replaces `brute` from the first on, and runs on
+/// `k` threads from `k` squared times the second on. Rounded from `uniform` and `clustered` in `datasets/`.
 const GRID_FROM: u32 = 300;
 const THREADS_FROM: u32 = 2500;
 const MOST_THREADS: u32 = 16;
 
-/// What a call leaves behind for the next stays, unless it takes over some hundred megabytes.
+/// Largest call whose buffers are kept for the next: a few hundred megabytes.
 const MOST_BOXES_KEPT: usize = 2_000_000;
 const MOST_PAIRS_KEPT: usize = 16_000_000;
-/// Threads that call at once, beyond which each makes its own again.
+/// Most engines that are kept: one for each of so many threads that call at once.
 const MOST_KEPT: usize = 8;
 
 /// A broad phase with its lists of pairs, used by one call at a time.
 struct Engine {
     adaptive: Adaptive,
-    /// In any order, and in canonical order.
+    /// The list in any order, and the one in canonical order.
     pairs: [Option<Pairs>; 2],
     both: Vec<Aabb>,
 }
 
-/// Engines that no call uses. Locked only by who holds the interpreter's lock, and for no longer than it takes to take one: so no fork
-/// ever finds it locked.
+/// Engines that no call uses. Locked only by a thread with the interpreter's lock, and for an instant: no fork finds it
+/// locked.
 struct Idle {
-    /// The process that made them: the threads of another one are not here.
+    /// The process that made the engines. Their threads are not in a forked one.
     pid: u32,
     engines: Vec<Engine>,
 }
@@ -50,14 +50,14 @@ fn idle<T>(_: Python<'_>, with: impl FnOnce(&mut Vec<Engine>) -> T) -> T {
     let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
     let pid = std::process::id();
     if idle.pid != pid {
-        // After a fork. To drop them would wait for threads that are not here.
+        // After a fork. Dropping them would wait for threads that are not in this process.
         std::mem::forget(std::mem::take(&mut idle.engines));
         idle.pid = pid;
     }
     with(&mut idle.engines)
 }
 
-/// Later calls begin with what is known by then.
+/// Drops the idle engines, so that later calls use the tuning that was saved since.
 pub(crate) fn start_again(py: Python<'_>) {
     let engines = idle(py, std::mem::take);
     py.detach(|| drop(engines));
@@ -75,7 +75,7 @@ impl Engine {
         Ok(Self { adaptive, pairs: [None, None], both: Vec::new() })
     }
 
-    /// Finds the pairs and returns them as flat as NumPy has them.
+    /// Finds the pairs and returns them flat, as in NumPy.
     fn find(&mut self, boxes: Option<&[Aabb]>, order: PairOrder, wants: Wants) -> Result<Vec<u32>, Error> {
         let pairs =
             self.pairs[usize::from(order == PairOrder::Canonical)].get_or_insert_with(|| start::pairs(order, None));
@@ -97,16 +97,16 @@ impl Engine {
     }
 }
 
-/// What a call wants of its pairs.
+/// The wishes of a call.
 #[derive(Default)]
 struct Wants {
     limit: Option<usize>,
     filter: Option<Filter>,
-    /// What to take off each second member.
+    /// Subtracted from the second member of each pair.
     from_second: u32,
 }
 
-/// Thresholds over the number of boxes, without algorithms that keep work.
+/// Returns the built-in thresholds, without incremental algorithms.
 fn usual(registry: &Registry) -> Result<Tuning, Error> {
     let known: Vec<AlgorithmId> = registry.available().into_iter().map(|entry| entry.id).collect();
     let step = |from: u32, method: &str, threads: u32| {
@@ -122,7 +122,7 @@ fn usual(registry: &Registry) -> Result<Tuning, Error> {
     Tuning::from_steps(steps).map_err(|_| Error::NoAlgorithm)
 }
 
-/// Pairs as numbers, two each.
+/// Converts pairs to numbers, two each.
 pub(crate) fn flat(pairs: &Pairs, from_second: u32) -> Result<Vec<u32>, Error> {
     let mut numbers = Vec::new();
     let refused = |_| Error::OutOfMemory { what: "pairs", elements: pairs.len() };
@@ -131,7 +131,7 @@ pub(crate) fn flat(pairs: &Pairs, from_second: u32) -> Result<Vec<u32>, Error> {
     Ok(numbers)
 }
 
-/// Two numbers a row.
+/// Makes an array with two numbers a row.
 pub(crate) fn two_columns<'py, T: numpy::Element>(
     py: Python<'py>,
     numbers: Vec<T>,
@@ -140,7 +140,7 @@ pub(crate) fn two_columns<'py, T: numpy::Element>(
     rows.map(|rows| rows.into_pyarray(py)).map_err(|why| unusable(py, why.to_string()))
 }
 
-/// Runs a call on an engine, without the interpreter's lock, and looks for Ctrl-C before and after.
+/// Runs a call on an engine, without the interpreter's lock. Checks for Ctrl-C before and after.
 fn with_engine<'py>(
     py: Python<'py>,
     objects: usize,
@@ -171,20 +171,23 @@ fn with_engine<'py>(
 
 /// Find all pairs of overlapping boxes.
 ///
-/// Boxes are closed: those that touch overlap. Each call stands for itself; for frames that follow each other use ``BroadPhase``, which
-/// is faster there. Chooses among the algorithms by the tuning that is kept of this machine, as ``predict`` and ``BroadPhase`` keep it, else
-/// by built-in thresholds; it measures nothing. ``last_decision`` tells what was chosen and why.
+/// Boxes are closed: those that touch overlap. Each call stands for itself. For consecutive frames use ``BroadPhase``,
+/// which is faster there. Chooses the algorithm by the tuning of this machine that ``predict`` or ``BroadPhase`` has
+/// saved, else by built-in thresholds. It measures nothing. ``last_decision`` returns the choice and its reason.
 ///
 /// Parameters
 /// ----------
 /// boxes : array_like, shape (n, 6) or (n, 2, 3)
-///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners, shape (n, 3).
+///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners,
+///     shape (n, 3).
 /// upper : array_like, shape (n, 3), optional
 ///     The upper corners.
 /// ordered : bool, default True
-///     Whether the pairs are sorted, by the first member and then the second: the same array from every machine. False saves the time to sort.
+///     Whether the pairs are sorted, by the first member and then the second: the same array from every machine. False
+///     saves the sort.
 /// limit : int, optional
-///     The most pairs, beyond which the search ends with an error. By default one for each 256 bytes of memory that is free (Linux).
+///     The most pairs: with more, the search ends with an error. By default one pair for each 256 bytes of free memory
+///     (Linux).
 ///
 /// Returns
 /// -------
@@ -194,7 +197,8 @@ fn with_engine<'py>(
 /// Raises
 /// ------
 /// InvalidBoxError
-///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are legal.
+///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are
+///     legal.
 /// InputError
 ///     The shape is wrong, or there are more boxes than 32 bits can name.
 /// TypeError
@@ -202,11 +206,9 @@ fn with_engine<'py>(
 /// TooManyPairsError
 ///     More pairs than ``limit``. ``limit`` of the exception has it.
 ///
-/// Notes
-/// -----
-/// 32-bit floats of shape (n, 6) in C order are read where they lie; nothing may write to them meanwhile. Everything else is copied. 64-bit floats
-/// are rounded to 32 bits, which loses no pair; a pair may be added of boxes that lie closer to each other than such floats can tell.
-/// The interpreter's lock is released. Ctrl-C is seen before and after, not within.
+/// Notes ----- 32-bit floats of shape (n, 6) in C order are read in place; nothing may write to them meanwhile.
+/// Everything else is copied. 64-bit floats are rounded to 32 bits: no pair is lost, and nearly touching boxes may gain
+/// one. The interpreter's lock is released. Ctrl-C works before and after, not within.
 ///
 /// Examples
 /// --------
@@ -232,8 +234,8 @@ pub(crate) fn pairs<'py>(
 
 /// Find all pairs of a box of ``a`` and an overlapping box of ``b``.
 ///
-/// Boxes of one list are not compared with each other, on pain of the time that takes: those of the longer list not at all, those of the shorter
-/// one are found and dropped. Both lists are copied into one.
+/// Pairs within the longer list are not searched; those within the shorter list are found and dropped. Both lists are
+/// copied into one.
 ///
 /// Parameters
 /// ----------
@@ -254,7 +256,8 @@ pub(crate) fn pairs<'py>(
 /// Raises
 /// ------
 /// InvalidBoxError
-///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are legal.
+///     A bound is NaN or a minimum lies above its maximum. ``index`` names the first such box. Infinite bounds are
+///     legal.
 /// InputError
 ///     The shape is wrong, or there are more boxes than 32 bits can name.
 /// TypeError
@@ -288,7 +291,7 @@ pub(crate) fn pairs_between<'py>(
         engine.both.try_reserve_exact(objects).map_err(refused)?;
         engine.both.extend_from_slice(a);
         engine.both.extend_from_slice(b);
-        // Two fixed boxes are not even compared: of no use within the larger list, where most of the work would be.
+        // Most methods never compare two fixed boxes: that saves the search within the longer list, most of the work.
         let of = |groups, mask, fixed| Membership { groups, mask, fixed };
         let (in_a, in_b) = (of(0b01, 0b10, a.len() > b.len()), of(0b10, 0b01, a.len() <= b.len()));
         let mut memberships = Vec::new();
@@ -309,7 +312,7 @@ pub(crate) fn pairs_between<'py>(
 /// Returns
 /// -------
 /// Decision or None
-///     None before the first call. With calls on several threads it is that of the call which ended last.
+///     None before the first call. With calls on several threads, that of the call which ended last.
 #[pyfunction]
 pub(crate) fn last_decision(py: Python<'_>) -> Option<PyDecision> {
     idle(py, |engines| engines.last().and_then(|engine| engine.adaptive.last_decision()).map(PyDecision::from))

@@ -1,4 +1,4 @@
-//! How a broad phase of a caller starts.
+//! The arguments with which a broad phase starts.
 
 use crate::error::{exception, failed, unusable};
 use pyo3::prelude::*;
@@ -47,20 +47,20 @@ impl Start {
         Ok(adaptive)
     }
 
-    /// An empty list of pairs, limited as the caller wants it or as the memory does.
+    /// Makes an empty list of pairs with the caller's limit, or the default limit.
     pub(crate) fn pairs(&self) -> Pairs {
         pairs(self.order, self.limit)
     }
 }
 
-/// An empty list of pairs.
+/// Makes an empty list of pairs. Without a limit, free memory limits it.
 pub(crate) fn pairs(order: PairOrder, limit: Option<usize>) -> Pairs {
     let mut pairs = Pairs::with_order(order);
     pairs.set_limit(limit.or_else(crate::memory::most_pairs));
     pairs
 }
 
-/// The order that stands for `ordered`.
+/// Converts the argument `ordered`.
 pub(crate) fn order(ordered: bool) -> PairOrder {
     if ordered { PairOrder::Canonical } else { PairOrder::Any }
 }
@@ -81,13 +81,13 @@ pub(crate) fn cache(given: Option<&Bound<'_, PyAny>>) -> PyResult<Cache> {
     }
 }
 
-/// Seconds of a caller as a time.
+/// Converts an argument in seconds.
 pub(crate) fn seconds(py: Python<'_>, name: &str, seconds: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(seconds)
         .map_err(|_| unusable(py, format!("{name} is {seconds}; give seconds, 0 or more and finite")))
 }
 
-/// Makes it without the interpreter's lock, and looks for Ctrl-C before and after.
+/// Makes an adaptive broad phase without the interpreter's lock. Checks for Ctrl-C before and after.
 pub(crate) fn adaptive(py: Python<'_>, start: &Start) -> PyResult<Adaptive> {
     py.check_signals()?;
     let made = py.detach(|| start.adaptive());

@@ -9,10 +9,10 @@ use sapwise::{Adaptive, Load, Setup, StartOptions, Tuning, json};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// How often a wait looks for Ctrl-C.
+/// Interval of the checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// What each algorithm is expected to cost on a machine, and which is the cheapest under which load.
+/// The expected cost of each algorithm on a machine.
 ///
 /// Attributes
 /// ----------
@@ -21,18 +21,18 @@ const LOOK: Duration = Duration::from_millis(20);
 /// model : str or None
 ///     The model that predicted it.
 /// extrapolated : bool
-///     Whether the machine lies outside what the model was trained on; ``warnings`` say how.
+///     Whether the machine lies outside the training data of the model; ``warnings`` say how.
 /// scenario : str
 ///     The scenario of ``fields`` and ``crossovers``.
 /// algorithms : list of str
 ///     The algorithms to choose from.
 /// fields : list of (int, str)
-///     From how many boxes on which algorithm is the cheapest in that scenario.
+///     From each number of boxes on, the cheapest algorithm in that scenario.
 /// crossovers : list of dict
-///     ``below``, ``above``: two algorithms; ``objects``: at how many boxes both cost the same; ``low``, ``high``: the ends of the
-///     interval of 90 %, or None.
+///     ``below``, ``above``: two algorithms; ``objects``: the number of boxes at which both cost the same; ``low``,
+///     ``high``: the ends of the 90 % interval, or None.
 /// setup : dict or None
-///     Of a prediction: how it came about.
+///     How a prediction came about.
 #[pyclass(frozen, name = "Tuning", module = "sapwise")]
 pub(crate) struct PyTuning {
     pub(crate) tuning: Tuning,
@@ -109,11 +109,11 @@ impl PyTuning {
     /// objects : int
     ///     Boxes of the frame.
     /// pairs : float, default 0.0
-    ///     Pairs that overlap.
+    ///     Overlapping pairs.
     /// axis_candidates, strip_candidates : float, optional
     ///     Pairs that overlap on the axis on which the fewest do, and those of them that share a strip of the grid.
     /// moved : float, default 1.0
-    ///     How far boxes move in a frame, in mean edges; 1 where no frame helps with the next.
+    ///     Motion of the boxes in a frame, in mean edges; 1 if no frame helps with the next.
     ///
     /// Returns
     /// -------
@@ -134,16 +134,17 @@ impl PyTuning {
         self.of(py, load.with_candidates(axis, strip_candidates.unwrap_or(axis)))
     }
 
-    /// Tell what a frame of these boxes costs with each algorithm, by the load that is estimated from a few hundred of them.
+    /// Tell what a frame of these boxes costs with each algorithm, by the load estimated from a few hundred of them.
     ///
     /// Parameters
     /// ----------
     /// boxes : array_like, shape (n, 6) or (n, 2, 3)
-    ///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners, shape (n, 3).
+    ///     One box a row: minx, miny, minz, maxx, maxy, maxz, in any unit of length. With ``upper``: the lower corners,
+    ///     shape (n, 3).
     /// upper : array_like, shape (n, 3), optional
     ///     The upper corners.
     /// moved : float, default 1.0
-    ///     How far boxes move in a frame, in mean edges.
+    ///     Motion of the boxes in a frame, in mean edges.
     ///
     /// Returns
     /// -------
@@ -184,10 +185,10 @@ impl PyTuning {
 }
 
 impl PyTuning {
-    /// The cost of each algorithm under a load, in nanoseconds, the cheapest first.
+    /// Returns the cost of each algorithm under a load, in nanoseconds, the cheapest first.
     fn of<'py>(&self, py: Python<'py>, load: Load) -> PyResult<Bound<'py, PyDict>> {
         if !load.is_sound() {
-            return Err(unusable(py, format!("{load:?} has figures that are negative or not finite")));
+            return Err(unusable(py, format!("{load:?} is negative or not finite; give finite numbers, 0 or more")));
         }
         let cost = |c: &sapwise::AlgorithmCost| (c.algorithm.to_string(), c.curve.cost_ns(&load));
         let mut costs: Vec<(String, f64)> = self.tuning.costs.iter().map(cost).collect();
@@ -200,7 +201,7 @@ impl PyTuning {
     }
 }
 
-/// How a start came about, as a dict.
+/// Converts a setup to a dict.
 pub(crate) fn setup<'py>(py: Python<'py>, setup: &Setup) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("origin", format!("{:?}", setup.origin).to_lowercase())?;
@@ -215,15 +216,15 @@ pub(crate) fn setup<'py>(py: Python<'py>, setup: &Setup) -> PyResult<Bound<'py, 
 
 /// Predict the tuning of this machine from its hardware.
 ///
-/// Takes what is kept of this machine, else measures the hardware and predicts with the built-in model, and keeps that for ``pairs`` and ``BroadPhase``
-/// too. Measure on a quiet machine.
+/// Returns the saved tuning of this machine. If there is none, measures the hardware, predicts with the built-in model,
+/// and saves the tuning for ``pairs`` and ``BroadPhase``. Measure on a quiet machine.
 ///
 /// Parameters
 /// ----------
 /// cache : path, False or None
-///     The folder in which the tuning is kept, False for none, None for the user's cache folder.
+///     The folder of the saved tuning, False for none, None for the user's cache folder.
 /// seconds : float, default 2.0
-///     The longest that the hardware may be measured.
+///     Time limit of the measurement.
 ///
 /// Returns
 /// -------
@@ -248,7 +249,7 @@ pub(crate) fn predict(py: Python<'_>, cache: Option<&Bound<'_, PyAny>>, seconds:
         let _ = done.send(made.map(|adaptive| (adaptive.tuning().clone(), adaptive.setup().clone())));
     };
     let thread = thread.spawn(work).map_err(|why| failed(py, format!("no thread can be started: {why}")))?;
-    // A receiver may be used by one thread only, which this one is.
+    // The closure must be `Sync`, which a receiver is not.
     let found = std::sync::Mutex::new(found);
     let made = loop {
         let waited = py.detach(|| match found.lock() {

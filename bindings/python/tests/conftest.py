@@ -47,7 +47,7 @@ def mixed(count, seed=0):
 
 
 def run(script, *arguments, timeout=120, **environment):
-    """Run a script, or a file, in a process of its own, whose end is waited for no longer than that; return what it printed."""
+    """Run a script, or a file, in its own process, with a time limit, and return what it printed."""
     env = {**os.environ, **environment}
     done = subprocess.run(
         [sys.executable, *([script] if isinstance(script, Path) else ["-c", script]), *map(str, arguments)],

@@ -60,13 +60,20 @@ def test_ids_in_one_frame_and_none_in_the_next_are_refused():
     boxes = cubes(50)
     with quiet() as broad_phase:
         broad_phase.find(boxes)
-        with pytest.raises(sapwise.InputError, match="ids were given for one of two"):
+        with pytest.raises(sapwise.InputError, match="only one of two consecutive frames"):
             broad_phase.find(boxes, ids=range(50))
         assert np.array_equal(broad_phase.find(boxes), naive(boxes))
 
 
 @pytest.mark.parametrize(
-    "ids, why", [(range(49), "49 entries"), (np.zeros(50), "whole"), (np.zeros((50, 1), int), "whole"), (["a"] * 50, "whole"), (np.full(50, 2**63, np.uint64), "box 0")]
+    "ids, why",
+    [
+        (range(49), "49 entries"),
+        (np.zeros(50), "whole"),
+        (np.zeros((50, 1), int), "whole"),
+        (["a"] * 50, "whole"),
+        (np.full(50, 2**63, np.uint64), "box 0"),
+    ],
 )
 def test_ids_that_can_not_be(ids, why):
     with quiet() as broad_phase, pytest.raises(sapwise.InputError, match=why):
@@ -130,7 +137,7 @@ def test_filters_that_can_not_be(arguments, why):
 def test_a_filter_of_another_length_is_refused():
     with quiet() as broad_phase:
         broad_phase.set_filter(fixed=[True] * 5)
-        with pytest.raises(sapwise.InputError, match="filter is of 5 boxes and there are 6"):
+        with pytest.raises(sapwise.InputError, match="filter is for 5 boxes and there are 6"):
             broad_phase.find(cubes(6))
 
 
@@ -188,7 +195,8 @@ def test_a_closed_one_says_so():
     broad_phase.close()
     broad_phase.close()
     assert broad_phase.closed and "closed" in repr(broad_phase)
-    for use in (lambda: broad_phase.find(cubes(3)), lambda: broad_phase.begun, lambda: broad_phase.save(), lambda: broad_phase.set_filter()):
+    find, begun = lambda: broad_phase.find(cubes(3)), lambda: broad_phase.begun
+    for use in (find, begun, broad_phase.save, broad_phase.set_filter):
         with pytest.raises(sapwise.SapwiseError, match="closed"):
             use()
 

@@ -61,7 +61,17 @@ def test_no_boxes(given):
     assert sapwise.pairs([], []).shape == (0, 2)
 
 
-@pytest.mark.parametrize("shape, hint", [((5, 4), "shape"), ((5, 3), "lower corners alone"), ((6, 5), "transpose"), ((6,), "shape"), ((2, 3, 6), "shape"), ((), "shape")])
+@pytest.mark.parametrize(
+    "shape, hint",
+    [
+        ((5, 4), "shape"),
+        ((5, 3), "lower corners alone"),
+        ((6, 5), "transpose"),
+        ((6,), "shape"),
+        ((2, 3, 6), "shape"),
+        ((), "shape"),
+    ],
+)
 def test_wrong_shapes(shape, hint):
     for find in finders():
         with pytest.raises(sapwise.InputError, match=hint):
@@ -77,7 +87,11 @@ def test_wrong_corners():
 
 
 @pytest.mark.parametrize(
-    "array", [np.zeros((4, 6), bool), np.zeros((4, 6), complex), np.zeros((4, 6), object), np.full((4, 6), "a"), np.zeros((4, 6), "M8[s]"), np.zeros((4, 6), np.longdouble), "boxes", None, {}]
+    "array",
+    [
+        *(np.zeros((4, 6), dtype) for dtype in (bool, complex, object, "M8[s]", np.longdouble)),
+        *(np.full((4, 6), "a"), "boxes", None, {}),
+    ],
 )
 def test_dtypes_that_are_no_boxes(array):
     if getattr(array, "dtype", None) == np.float64:
@@ -117,7 +131,8 @@ def test_an_invalid_box_is_named(dtype, index, defect):
 
 
 #: Beside each other, a hair apart, and as far as a 32-bit float can tell.
-near = st.sampled_from([0.1, 0.1 + 1e-17, 0.1 + 1e-12, 0.1 - 1e-12, 0.3, 0.1 + 0.2, 0.1000001, 1e300, -1e300, 1e-300, -np.inf, np.inf]) | st.floats(-1, 1)
+special = [0.1, 0.1 + 1e-17, 0.1 + 1e-12, 0.1 - 1e-12, 0.3, 0.1 + 0.2, 0.1000001, 1e300, -1e300, 1e-300, -np.inf, np.inf]
+near = st.sampled_from(special) | st.floats(-1, 1)
 
 
 @settings(max_examples=300, deadline=None)
@@ -133,7 +148,8 @@ def test_no_pair_of_doubles_is_lost(corners):
 
 
 def test_doubles_beyond_floats_and_an_inversion_that_rounding_would_hide():
-    boxes = np.array([[1e300, 0, 0, 2e300, 1, 1], [-2e300, 0, 0, -1e300, 1, 1], [-1e-300, 0, 0, 1e-300, 1, 1], [1e38, 0, 0, 3e38, 1, 1]])
+    ranges = [(1e300, 2e300), (-2e300, -1e300), (-1e-300, 1e-300), (1e38, 3e38)]
+    boxes = np.array([[low, 0, 0, high, 1, 1] for low, high in ranges])
     assert sapwise.pairs(boxes).tolist() == []
     one = np.nextafter(1.0, 2.0)
     with pytest.raises(sapwise.InvalidBoxError, match="box 1 is inverted"):
@@ -170,7 +186,8 @@ def test_too_many_pairs_are_an_exception():
     assert error.value.limit == 1000 and isinstance(error.value, MemoryError)
     with pytest.raises(sapwise.TooManyPairsError):
         sapwise.pairs_between(boxes, boxes, limit=1000)
-    with sapwise.BroadPhase(cache=False, measure=False, limit=1000) as broad_phase, pytest.raises(sapwise.TooManyPairsError):
+    limited = sapwise.BroadPhase(cache=False, measure=False, limit=1000)
+    with limited as broad_phase, pytest.raises(sapwise.TooManyPairsError):
         broad_phase.find(boxes)
     # Two million pairs need not be refused: the limit follows the memory.
     assert len(sapwise.pairs(boxes[:2001])) == 2001 * 1000

@@ -80,7 +80,8 @@ def test_single_calls_take_what_was_predicted():
 def test_a_probe_tells_of_each_family():
     told = []
     hardware = sapwise.probe(progress=lambda *of: told.append(of))
-    assert [k for k, _, _ in told] == list(range(len(told))) and told[-1][0] == told[-1][1] and "memory" in [w for _, _, w in told]
+    assert [k for k, _, _ in told] == list(range(len(told)))
+    assert told[-1][0] == told[-1][1] and "memory" in [w for _, _, w in told]
     names = list(hardware.parameters["name"])
     value = dict(zip(names, hardware.parameters["value"]))
     assert value["usable_cores"] == len(os.sched_getaffinity(0)) and value["memory_bytes"] > 1e8
@@ -110,9 +111,13 @@ def command(tmp_path, body):
 def test_a_report_by_the_command(tmp_path):
     example = ROOT / "datasets/amd-epyc-zen3-2c-full--2026-11-22.json"
     told = []
-    copies = f"print('one\\ntwo', file=sys.stderr)\nshutil.copy({str(example)!r}, sys.argv[3])\nprint(sys.argv[1:], file=sys.stderr)"
+    copies = (
+        f"print('one\\ntwo', file=sys.stderr)\nshutil.copy({str(example)!r}, sys.argv[3])\n"
+        "print(sys.argv[1:], file=sys.stderr)"
+    )
     path = tmp_path / "report.json"
-    table = sapwise.probe_report(path, progress=told.append, command=command(tmp_path, copies), arguments=["--threads", "1"])
+    threads = ["--threads", "1"]
+    table = sapwise.probe_report(path, progress=told.append, command=command(tmp_path, copies), arguments=threads)
     assert len(table) == len(sapwise.read_report(example))
     assert told[:2] == ["one", "two"] and told[2] == str(["probe", "--out", str(path), "--quick", "--threads", "1"])
 

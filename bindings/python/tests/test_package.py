@@ -19,7 +19,8 @@ PUBLIC = [name for name in sapwise.__all__ if name != "__version__"]
 def test_everything_is_documented_and_examples_hold(name):
     of = getattr(sapwise, name)
     assert inspect.getdoc(of)
-    finder, runner = doctest.DocTestFinder(recurse=False), doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    finder = doctest.DocTestFinder(recurse=False)
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
     for example in finder.find(of, name, module=False, globs={"sapwise": sapwise}):
         runner.run(example)
     assert runner.failures == 0
@@ -29,7 +30,8 @@ def test_everything_is_documented_and_examples_hold(name):
 
 def test_the_stubs_tell_what_there_is():
     pytest.importorskip("mypy.stubtest")
-    done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "sapwise"], capture_output=True, text=True, check=False)
+    command = [sys.executable, "-m", "mypy.stubtest", "sapwise"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert resources.files("sapwise").joinpath("py.typed").is_file()
 
@@ -45,7 +47,10 @@ def test_the_index_in_the_documents_is_that_of_the_docstrings():
 
 
 def test_nothing_heavy_comes_with_the_import():
-    script = "import sys, numpy; before = set(sys.modules); import sapwise; print(sorted(m.split('.')[0] for m in set(sys.modules) - before))"
+    script = (
+        "import sys, numpy; before = set(sys.modules); import sapwise; "
+        "print(sorted(m.split('.')[0] for m in set(sys.modules) - before))"
+    )
     assert not {"pandas", "scipy", "matplotlib"} & set(eval(run(script)))
 
 

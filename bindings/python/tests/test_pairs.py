@@ -17,7 +17,8 @@ INF = np.float32(np.inf)
 def test_every_pair_once_and_in_order(count, scene):
     boxes = scene(count, seed=count)
     found = sapwise.pairs(boxes)
-    assert found.dtype == np.uint32 and found.shape == (len(found), 2) and found.flags.c_contiguous and found.flags.writeable
+    assert found.dtype == np.uint32 and found.shape == (len(found), 2)
+    assert found.flags.c_contiguous and found.flags.writeable
     assert np.array_equal(found, naive(boxes))
     if count >= 100:
         assert len(found) > count / 20

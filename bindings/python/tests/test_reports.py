@@ -22,7 +22,9 @@ except ImportError:
 
 def rows(table):
     """The rows of either kind of table as dicts."""
-    return table.to_dict("records") if pandas is not None else [dict(zip(table.dtype.names, row.tolist())) for row in table]
+    if pandas is not None:
+        return table.to_dict("records")
+    return [dict(zip(table.dtype.names, row.tolist())) for row in table]
 
 
 def test_a_row_for_each_timing_with_the_figures_of_the_file():
@@ -33,7 +35,8 @@ def test_a_row_for_each_timing_with_the_figures_of_the_file():
     parameters = {p["name"]: p["value"] for p in report["hardware"]["parameters"]}
     for row, (point, timing) in zip(found, timings):
         assert (row["scenario"], row["algorithm"]) == (point["scenario"], timing["algorithm"])
-        assert (row["objects"], row["pairs"], row["moved"]) == (point["load"]["objects"], point["pairs"], point["load"]["moved"])
+        load = point["load"]
+        assert (row["objects"], row["pairs"], row["moved"]) == (load["objects"], point["pairs"], load["moved"])
         samples = timing["samples_ns"]
         assert row["samples"] == len(samples)
         if len(samples) > 1:
@@ -43,7 +46,8 @@ def test_a_row_for_each_timing_with_the_figures_of_the_file():
             assert row[name] == value or (value is None and np.isnan(row[name]))
         assert f"{row['method']}@{row['backend']}" == row["algorithm"] and row["threads"] in (1, 2)
     assert {row["profile"] for row in found} == {"full"} and {row["label"] for row in found} == {"real_full"}
-    assert {row["host"] for row in found} == {"766bf9a6ff86e150-" + format(1000 * parameters["clock_reported_ghz"], ".0f")}
+    mhz = format(1000 * parameters["clock_reported_ghz"], ".0f")
+    assert {row["host"] for row in found} == {"766bf9a6ff86e150-" + mhz}
 
 
 def test_all_reports_and_their_hosts():
@@ -85,7 +89,7 @@ def test_time_over_the_number_of_boxes_in_three_lines():
         ("{", "no JSON"),
         ("[]", "no report"),
         ('{"schema": "tuning/2"}', "schema is 'tuning/2'"),
-        ('{"schema": "report/1"}', "sapwise convert"),
+        ('{"schema": "report/1"}', "sapwise probe"),
         ('{"schema": "report/2"}', "lacks"),
         ('{"schema": "report/2", "hardware": 3}', "lacks"),
         ("\x00\xff", "no JSON"),

@@ -37,7 +37,7 @@ pub(crate) struct Racer {
 }
 
 impl Racer {
-    pub(crate) fn new(id: AlgorithmId, mut algorithm: Box<dyn BroadPhase>) -> Self {
+    pub(crate) fn new(id: AlgorithmId, algorithm: Box<dyn BroadPhase>) -> Self {
         let is_incremental = algorithm.is_incremental();
         Self { id, algorithm, is_incremental, samples: Vec::new(), error: None, rests: false, answer: None }
     }
@@ -295,7 +295,6 @@ impl Racer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sapwise::Incremental;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -349,12 +348,10 @@ mod tests {
             pairs.finish()
         }
 
-        fn as_incremental(&mut self) -> Option<&mut dyn Incremental> {
-            if self.1 { Some(self) } else { None }
+        fn is_incremental(&self) -> bool {
+            self.1
         }
     }
-
-    impl Incremental for Counting {}
 
     #[test]
     fn an_incremental_algorithm_runs_some_frames_more_before_the_samples() {

@@ -1,15 +1,13 @@
-//! Whether boxes are valid and lie within others: many at a time, at every SIMD level.
+//! Tests whether boxes are valid and lie within others: many at a time, at every SIMD level.
 
 use crate::aabb::Aabb;
 use crate::cpu::level::Simd;
 
-/// Boxes that are looked at together. Eight have 48 bounds, which is three vectors of 16 and six of eight.
+/// Boxes tested together. Eight have 48 bounds: three vectors of 16, or six of eight.
 pub(crate) const BLOCK: usize = 8;
 
-/// Calls `doubtful` for every block of up to [`BLOCK`] boxes one of which is invalid or reaches out of its outer box, with
-/// the position at which the block begins.
-///
-/// `outer` is as long as `boxes`.
+/// Calls `doubtful`, with the position and the outer boxes of the block, for every block of up to [`BLOCK`] boxes of
+/// which one is invalid or reaches out of its outer box. `outer` has the length of `boxes`.
 pub(crate) fn each_doubtful_block(
     simd: Simd,
     boxes: &[Aabb],
@@ -27,10 +25,10 @@ pub(crate) fn each_doubtful_block(
     }
 }
 
-/// Whether a box is valid and lies within another. False for NaN.
+/// Returns whether a box is valid and lies within another: false for NaN.
 #[inline(always)]
 pub(crate) fn within(b: &Aabb, outer: &Aabb) -> bool {
-    // Without short cuts: six boxes in seven pass all tests, and a branch for each would cost more than the tests.
+    // Without branches, which would cost more than the tests: six boxes in seven pass all of them.
     let axis = |a: usize| (b.min[a] >= outer.min[a]) & (b.max[a] <= outer.max[a]) & (b.min[a] <= b.max[a]);
     axis(0) & axis(1) & axis(2)
 }
@@ -67,7 +65,7 @@ mod x86 {
     use crate::Aabb;
     use std::arch::x86_64::*;
 
-    /// Of 48 bounds of eight boxes, bit k is set when bound k is a lower one.
+    /// Bit k is set if bound k of the 48 bounds of eight boxes is a lower one.
     const LOWER: u64 = {
         let (mut bits, mut k) = (0, 0);
         while k < 6 * BLOCK {
@@ -85,7 +83,7 @@ mod x86 {
             let mut bad = 0;
             for k in [0_usize, 16, 32] {
                 let lower = (LOWER >> k) as __mmask16;
-                // SAFETY: a block has 48 floats; `Aabb` is `repr(C)`. Behind a lower bound stands its upper bound three
+                // SAFETY: a block has 48 floats; `Aabb` is `repr(C)`. The upper bound follows its lower one three
                 // floats later, and the mask leaves out the lanes beyond the block.
                 unsafe {
                     let (inner, bound) = (_mm512_loadu_ps(b.add(k)), _mm512_loadu_ps(o.add(k)));
@@ -108,7 +106,7 @@ mod x86 {
             for k in [0_usize, 8, 16, 24, 32, 40] {
                 let bit = |lane: usize| if LOWER >> (k + lane) & 1 == 1 { -1 } else { 0 };
                 let lower = _mm256_setr_epi32(bit(0), bit(1), bit(2), bit(3), bit(4), bit(5), bit(6), bit(7));
-                // SAFETY: as above; a masked load reads no lane whose mask is clear.
+                // SAFETY: as for AVX-512; a masked load reads no lane whose mask is clear.
                 unsafe {
                     let (inner, bound) = (_mm256_loadu_ps(b.add(k)), _mm256_loadu_ps(o.add(k)));
                     let upper = _mm256_maskload_ps(b.add(k).wrapping_add(3), lower);
@@ -132,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_level_finds_every_block_with_a_box_that_is_invalid_or_reaches_out() {
+    fn every_level_finds_the_doubtful_blocks() {
         let outer = vec![Aabb::new([-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]); 21];
         for simd in Simd::every() {
             let doubtful = |boxes: &[Aabb]| {

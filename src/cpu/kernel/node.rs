@@ -1,4 +1,4 @@
-//! Sixteen boxes as columns, tested together against one.
+//! Sixteen boxes as columns, tested together against one box.
 
 use crate::aabb::Aabb;
 
@@ -13,11 +13,11 @@ pub(crate) struct Node {
     pub(super) high: [[f32; LANES]; 3],
 }
 
-/// Boxes that are together compared with those of a tree.
+/// Boxes that are compared together with those of a tree.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Group {
     pub(super) node: Node,
-    /// What contains all of them.
+    /// The bounds of all boxes.
     pub(super) bounds: Aabb,
     /// Their positions in the input.
     pub(super) ids: [u32; LANES],
@@ -27,7 +27,7 @@ impl Node {
     /// No box in any lane.
     pub(crate) const EMPTY: Self = Self { low: [[f32::NAN; LANES]; 3], high: [[f32::NAN; LANES]; 3] };
 
-    /// Puts bounds into a lane.
+    /// Writes bounds to a lane.
     #[inline]
     pub(crate) fn set(&mut self, lane: usize, bounds: &Aabb) {
         for a in 0..3 {
@@ -41,19 +41,19 @@ impl Node {
         self.set(lane, &Aabb::new([f32::NAN; 3], [f32::NAN; 3]));
     }
 
-    /// The bounds in a lane.
+    /// Returns the bounds in a lane.
     #[inline(always)]
     pub(crate) fn lane(&self, lane: usize) -> Aabb {
         Aabb { min: [0, 1, 2].map(|a| self.low[a][lane]), max: [0, 1, 2].map(|a| self.high[a][lane]) }
     }
 
-    /// Makes a lane contain these bounds too. Whether that changed it.
+    /// Makes a lane contain these bounds too. Returns whether that changed it.
     #[inline]
     pub(crate) fn widen(&mut self, lane: usize, bounds: &Aabb) -> bool {
         let mut changed = false;
         for a in 0..3 {
             let (low, high) = (&mut self.low[a][lane], &mut self.high[a][lane]);
-            // NaN in the lane is neither below nor above, and gives way to any number.
+            // NaN in an empty lane compares false, and `min` and `max` prefer any number to it.
             changed |= !((bounds.min[a] >= *low) & (bounds.max[a] <= *high));
             *low = low.min(bounds.min[a]);
             *high = high.max(bounds.max[a]);
@@ -61,7 +61,7 @@ impl Node {
         changed
     }
 
-    /// What contains all lanes.
+    /// Returns the bounds of all lanes.
     pub(crate) fn bounds(&self) -> Aabb {
         Aabb {
             min: self.low.map(|lanes| lanes.into_iter().fold(f32::NAN, f32::min)),
@@ -69,7 +69,7 @@ impl Node {
         }
     }
 
-    /// Bit k is set when lane k overlaps a box.
+    /// Returns a mask: bit k is set if lane k overlaps a box.
     #[inline(always)]
     pub(super) fn overlapping(&self, b: &Aabb) -> u32 {
         let mut meet = [true; LANES];
@@ -83,12 +83,12 @@ impl Node {
 }
 
 impl Group {
-    /// No box yet, and one to come within these bounds.
+    /// Makes a group without boxes, for boxes near these bounds.
     pub(crate) fn of(bounds: &Aabb) -> Self {
         Self { node: Node::EMPTY, bounds: *bounds, ids: [0; LANES] }
     }
 
-    /// Puts a box into a lane that is still empty.
+    /// Writes a box to an empty lane.
     #[inline]
     pub(crate) fn set(&mut self, lane: usize, b: &Aabb, id: u32) {
         self.node.set(lane, b);

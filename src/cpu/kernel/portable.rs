@@ -1,4 +1,4 @@
-//! Plain Rust, which compilers turn into the vectors of the target's baseline.
+//! Plain Rust, which the compiler turns into the vectors of the target's baseline.
 
 use super::{Lanes, Query, View};
 

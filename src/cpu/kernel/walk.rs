@@ -1,4 +1,4 @@
-//! A walk through a tree of nodes: which boxes overlap a box, and which pairs of boxes overlap each other.
+//! Walks through a tree of nodes: finds the boxes that overlap a box, and the overlapping pairs.
 
 use super::node::{Group, LANES, Node};
 use super::prefetch;
@@ -7,16 +7,16 @@ use crate::cpu::level::Simd;
 use crate::pairs::{Pairs, each_bit};
 use std::ops::Range;
 
-/// The nodes of a tree and the box in each lane of its leaves, to be walked through.
+/// The nodes of a tree, and the box in each lane of its leaves.
 ///
-/// Lane k of node n in a level above the leaves contains node 16 n + k of the level below. The last level that has nodes is the top; there
-/// is one level above the leaves at least.
+/// Lane k of node n in a level above the leaves contains node 16 n + k of the level below. The last level that has
+/// nodes is the top. There is at least one level above the leaves.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Walk<'a> {
     pub(crate) levels: &'a [Vec<Node>],
     /// 16 for each leaf.
     pub(crate) ids: &'a [u32],
-    /// The nodes are likely not in the cache, and are asked for ahead.
+    /// Whether to prefetch nodes: they are likely not in the cache.
     pub(crate) far: bool,
 }
 
@@ -24,7 +24,8 @@ pub(crate) struct Walk<'a> {
 const MOST_LEVELS: usize = 9;
 
 impl Walk<'_> {
-    /// Calls `found` for every place in the leaves whose box overlaps `b`. Returns how many nodes were compared with it.
+    /// Calls `found` for every place in the leaves whose box overlaps `b`. Returns the number of nodes compared with
+    /// it.
     #[inline]
     pub(crate) fn each_overlapping(&self, simd: Simd, b: &Aabb, found: impl FnMut(usize)) -> u32 {
         match simd {
@@ -38,7 +39,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Adds the pairs of the boxes in these leaves with one another and with those in all leaves behind.
+    /// Adds the pairs of the boxes in these leaves with each other and with those in all leaves behind.
     pub(crate) fn self_pairs(&self, simd: Simd, leaves: Range<usize>, pairs: &mut Pairs) {
         if pairs.is_any_over() {
             return;
@@ -81,7 +82,7 @@ impl Walk<'_> {
             let node = &self.levels[0][leaf];
             let ids = self.ids_of(leaf);
             for (lane, &id) in ids.iter().enumerate() {
-                // Those behind it in the leaf: each pair is found from its first lane.
+                // Only lanes behind this one: each pair is found from its first lane.
                 let hits = overlapping(node, &node.lane(lane)) & (u32::MAX - 1) << lane;
                 if hits != 0 {
                     add(id, ids, hits, pairs);
@@ -89,9 +90,9 @@ impl Walk<'_> {
             }
             let bounds = self.bounds_of(leaf);
             self.each(&bounds, leaf + 1, 1, overlapping, |other| {
-                self.meet(node, &bounds, ids, other, overlapping, pairs)
+                self.meet(node, &bounds, ids, other, overlapping, pairs);
             });
-            // As a sweep ends: a caller who wants a thousand pairs does not wait for all.
+            // A caller who wants a thousand pairs must not wait for all.
             if pairs.is_over() {
                 return;
             }
@@ -105,7 +106,7 @@ impl Walk<'_> {
         });
     }
 
-    /// Adds the pairs of some boxes, which these bounds contain, with those of a leaf.
+    /// Adds the pairs of the boxes of a node, which has these bounds, with those of a leaf.
     #[inline(always)]
     fn meet(
         &self,
@@ -122,7 +123,7 @@ impl Walk<'_> {
             return;
         }
         let theirs = overlapping(node, bounds);
-        // Most often few of the boxes reach into the other leaf: those of the side that has fewer of them are compared with the other.
+        // Usually few boxes reach into the other leaf: take them from the side that has fewer.
         let (few, few_ids, many, many_ids, all) = if mine.count_ones() <= theirs.count_ones() {
             (boxes, ids, node, others, mine)
         } else {
@@ -144,8 +145,8 @@ impl Walk<'_> {
         &self.ids.as_chunks().0[leaf]
     }
 
-    /// Calls `found` for every lane of level `bottom`, from number `first` on, that overlaps a box: lane k of node n has the number
-    /// 16 n + k. Returns how many nodes were compared with it.
+    /// Calls `found` for every lane of level `bottom`, from number `first` on, that overlaps a box. Lane k of node n
+    /// has the number 16 n + k. Returns the number of nodes compared with the box.
     #[inline(always)]
     fn each(
         &self,
@@ -156,7 +157,7 @@ impl Walk<'_> {
         mut found: impl FnMut(usize),
     ) -> u32 {
         let Some(top) = self.levels.iter().rposition(|level| !level.is_empty()) else { return 0 };
-        // The lanes of a node in a level that contain nothing before `first` alone.
+        // The lanes of a node that contain something from `first` on.
         let lanes = |level: usize, node: usize| {
             let first = first >> (4 * (level - bottom));
             let before = first.saturating_sub(node * LANES);
@@ -164,7 +165,7 @@ impl Walk<'_> {
         };
         let mut looked = 0;
         for root in (first >> (4 * (top - bottom) + 4))..self.levels[top].len() {
-            // For each level, the node whose children are being visited and which of them are left.
+            // For each level: the node whose children are visited, and a mask of those left.
             let mut open = [(0, 0); MOST_LEVELS];
             let mut at = top;
             open[at] = (root, overlapping(&self.levels[at][root], b) & lanes(at, root));
@@ -196,7 +197,7 @@ impl Walk<'_> {
     }
 }
 
-/// Adds a box paired with each of `others` whose bit is set.
+/// Adds the pairs of a box with each of `others` whose bit is set.
 #[inline(always)]
 fn add(id: u32, others: &[u32; LANES], hits: u32, pairs: &mut Pairs) {
     if let Some(room) = pairs.room(LANES) {
@@ -292,7 +293,7 @@ mod x86 {
 mod tests {
     use super::*;
 
-    /// 300 boxes in 19 leaves, the last of them with lanes that hold nothing.
+    /// Returns 300 boxes in 19 leaves. The last leaf has empty lanes.
     fn scene() -> (Vec<Aabb>, Vec<Vec<Node>>, Vec<u32>) {
         let boxes: Vec<Aabb> =
             (0..300).map(|k| Aabb::cube([k as f32 / 9.0, (k * 7 % 16) as f32, (k * 3 % 16) as f32], 2.5)).collect();
@@ -331,7 +332,7 @@ mod tests {
         });
         let outside: Vec<Aabb> = (0..LANES).map(|k| Aabb::cube([2.0 * k as f32, 8.0, 8.0], 3.0)).collect();
         let mut group = Group::of(&outside[0]);
-        // Lane 15 holds nothing.
+        // Lane 15 stays empty.
         outside[..15].iter().enumerate().for_each(|(lane, b)| group.set(lane, b, 1000 + lane as u32));
         let across = outside[..15].iter().flat_map(|a| boxes.iter().filter(|b| a.overlaps(b))).count();
         for simd in Simd::every() {

@@ -84,7 +84,7 @@ impl Lanes for Avx512 {
         // SAFETY: every column has 16 values behind `view.len >= at`; `self` is the proof of AVX-512F.
         unsafe {
             let load = |column: &[f32]| _mm512_loadu_ps(column.as_ptr().add(at));
-            // Each comparison on its own: masked by the one before, they would wait for one another.
+            // Each comparison by itself: one masked by the result of another would wait for it.
             let below = |column, bound| _mm512_cmp_ps_mask::<_CMP_LE_OQ>(load(column), _mm512_set1_ps(bound));
             let above = |column, bound| _mm512_cmp_ps_mask::<_CMP_GE_OQ>(load(column), _mm512_set1_ps(bound));
             let reach = below(view.low[0], query.high[0]);
@@ -105,7 +105,7 @@ impl Lanes for Avx512 {
 
     #[inline(always)]
     unsafe fn owned(self, view: &View<'_>, at: usize, begins: u32, hits: u32) -> u32 {
-        // SAFETY: as above; a view that is asked for this has the column.
+        // SAFETY: as above.
         unsafe {
             let all = _mm512_loadu_si512(view.begins.as_ptr().add(at).cast());
             let both = _mm512_or_si512(all, _mm512_set1_epi32(begins as i32));
@@ -115,10 +115,10 @@ impl Lanes for Avx512 {
 
     #[inline(always)]
     unsafe fn write(self, view: &View<'_>, at: usize, id: u32, hits: u32, room: &mut [Pair]) {
-        // The layout of a tuple is not promised: this stops the build where it is another one.
+        // Rust promises no layout of a tuple: this stops the build if it is another one.
         const { assert!(size_of::<Pair>() == 8 && offset_of!(Pair, 0) == 0 && offset_of!(Pair, 1) == 4) };
         assert!(room.len() >= Self::COUNT);
-        // SAFETY: as above for the column; the room takes 16 pairs, which are 32 integers.
+        // SAFETY: as above for the column; `room` holds 16 pairs, which are 32 integers.
         unsafe {
             let all = _mm512_loadu_si512(view.ids.as_ptr().add(at).cast());
             let others = _mm512_maskz_compress_epi32(hits as __mmask16, all);
@@ -134,14 +134,8 @@ impl Lanes for Avx512 {
 }
 
 #[target_feature(enable = "avx2")]
-pub(super) fn sweep_avx2<R: Rows>(
-    proof: Avx2,
-    view: &View<'_>,
-    rows: Range<usize>,
-    start: impl FnMut(usize, &Query) -> usize,
-    pairs: &mut Pairs,
-) {
-    sweep::<_, R>(proof, view, rows, start, pairs);
+pub(super) fn sweep_avx2<R: Rows>(proof: Avx2, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+    sweep::<_, R>(proof, view, rows, pairs);
 }
 
 #[target_feature(enable = "avx2")]
@@ -150,14 +144,8 @@ pub(super) fn brute_avx2(proof: Avx2, view: &View<'_>, rows: Range<usize>, pairs
 }
 
 #[target_feature(enable = "avx512f")]
-pub(super) fn sweep_avx512<R: Rows>(
-    proof: Avx512,
-    view: &View<'_>,
-    rows: Range<usize>,
-    start: impl FnMut(usize, &Query) -> usize,
-    pairs: &mut Pairs,
-) {
-    sweep::<_, R>(proof, view, rows, start, pairs);
+pub(super) fn sweep_avx512<R: Rows>(proof: Avx512, view: &View<'_>, rows: Range<usize>, pairs: &mut Pairs) {
+    sweep::<_, R>(proof, view, rows, pairs);
 }
 
 #[target_feature(enable = "avx512f")]

@@ -1,4 +1,4 @@
-//! The grown boxes: which boxes have left theirs, and new ones for these.
+//! The grown boxes: finds the boxes that have left theirs, and grows new ones.
 
 use super::tree::GrownTree;
 use crate::aabb::Aabb;
@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::filter::Filter;
 use std::ops::Range;
 
-/// Contains no box, not even an infinite one: whatever has no grown box yet is seen to have left it.
+/// Contains no box, not even an infinite one: a box that has no grown box yet counts as having left it.
 const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
 
 /// Every box grown by a margin, in the order of the input.
@@ -18,7 +18,7 @@ const NOTHING: Aabb = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
 pub(super) struct Grown {
     boxes: Vec<Aabb>,
     len: usize,
-    /// Of 64 boxes each.
+    /// One for each 64 boxes.
     flags: Vec<Flags>,
     simd: Simd,
 }
@@ -26,40 +26,40 @@ pub(super) struct Grown {
 /// One bit for each of 64 boxes.
 #[derive(Debug, Clone, Copy, Default)]
 struct Flags {
-    /// The box got a new grown box in this frame, or is gone.
+    /// The box got a new grown box in this frame, or was removed.
     dirty: u64,
     /// The box is fixed: its pairs with other fixed boxes are not kept.
     fixed: u64,
 }
 
-/// How much a box is grown on each side: a share of its mean edge.
+/// The growth of a box on each side, as a share of its mean edge.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Margin {
     pub(super) share: f32,
-    /// Mean edges count as no longer than this, so that a world-sized box is not grown by the size of the world.
+    /// Mean edges are clamped to this, so that a world-sized box is not grown by the size of the world.
     pub(super) longest_edge: f32,
 }
 
-/// What one task finds in its share of the boxes.
+/// The result of one task for its share of the boxes.
 #[derive(Debug, Default)]
 pub(super) struct Share {
     /// Boxes that left their grown box.
     pub(super) left: Vec<u32>,
-    /// Those of them whose new grown box does not meet the old one, new boxes included.
+    /// The number of them whose new grown box does not overlap the old one, new boxes included.
     far_away: usize,
     error: Option<Error>,
 }
 
-/// How a frame differs from the one before.
+/// The differences between a frame and the previous one.
 #[derive(Debug)]
 pub(super) struct Changes {
-    /// Boxes that left their grown box, the new ones and those that are gone included.
+    /// Number of boxes that left their grown box, new and removed ones included.
     pub(super) left: usize,
-    /// Those of them that went far away or are new.
+    /// Number of these that went far away or are new.
     pub(super) far_away: usize,
-    /// Boxes that the frame before did not have.
+    /// New boxes.
     pub(super) new: Range<usize>,
-    /// Boxes that this frame does not have.
+    /// Removed boxes.
     pub(super) gone: Range<usize>,
 }
 
@@ -72,26 +72,26 @@ impl Grown {
         &self.boxes[..self.len]
     }
 
-    /// Forgets all grown boxes: the next frame makes every one again.
+    /// Forgets all grown boxes: the next frame grows every box anew.
     pub(super) fn forget(&mut self) {
         self.len = 0;
     }
 
-    /// Makes room for `objects` boxes.
+    /// Reserves memory for `objects` boxes.
     pub(super) fn reserve(&mut self, objects: usize) -> Result<(), Error> {
         ensure(&mut self.boxes, objects, "grown boxes")?;
         ensure(&mut self.flags, objects.div_ceil(64) + 1, "grown boxes")
     }
 
-    /// Boxes in the share of one task; a multiple of 64, so that no two tasks write to the flags of one box.
+    /// Returns the number of boxes of a task: a multiple of 64, so that no two tasks share a word of flags.
     fn share_len(&self, tasks: usize) -> usize {
         self.len.div_ceil(tasks).next_multiple_of(64).max(64)
     }
 
-    /// One phase: makes a new grown box for every box that is not within its own, and for those that are no longer fixed.
+    /// Runs one phase: grows every box anew that has left its grown box or is no longer fixed.
     ///
     /// # Errors
-    /// [`Error::InvalidBox`]; what is known of the grown boxes is then of no use.
+    /// [`Error::InvalidBox`]. Then the grown boxes are of no use.
     pub(super) fn check(
         &mut self,
         workers: &Workers,
@@ -108,7 +108,7 @@ impl Grown {
         self.len = boxes.len();
         let size = self.share_len(shares.len());
         for share in shares.iter_mut() {
-            // A task without a part in this frame must not tell of the one before.
+            // A task without a part in this frame must not report the previous one.
             (share.far_away, share.error) = (0, None);
             share.left.clear();
         }
@@ -117,11 +117,11 @@ impl Grown {
         let flags = (&mut self.flags[..self.len.div_ceil(64)], size / 64);
         workers.each_share(shares, grown, flags, |k, share, grown, flags| {
             let first = k * size;
-            free(flags, grown, first, filter);
+            update_fixed(flags, grown, first, filter);
             share.error = share.check(&boxes[first..first + grown.len()], grown, flags, first, margin, simd).err();
         });
         shares.iter_mut().find_map(|s| s.error.take()).map_or(Ok(()), Err)?;
-        // Kept pairs of boxes that are gone go with the pairs of those that left.
+        // Drops the kept pairs of removed boxes with those of the boxes that left.
         for id in gone.clone() {
             self.flags[id / 64].dirty |= 1 << (id % 64);
         }
@@ -129,7 +129,7 @@ impl Grown {
         Ok(Changes { left, far_away: shares.iter().map(|s| s.far_away).sum(), new, gone })
     }
 
-    /// One phase: a new grown box for every box. They must be valid.
+    /// Runs one phase: grows every box anew. The boxes must be valid.
     pub(super) fn grow_all(&mut self, workers: &Workers, boxes: &[Aabb], margin: Margin, shares: &mut [Share]) {
         let size = self.share_len(shares.len());
         shares.iter_mut().for_each(|share| share.left.clear());
@@ -143,8 +143,8 @@ impl Grown {
         });
     }
 
-    /// Calls `found` for every box whose grown box overlaps the new one of box `i`, but for two fixed ones. Of two boxes with new ones, the
-    /// lower is told of the higher. Returns how many nodes of the tree were looked at.
+    /// Calls `found` for every box whose grown box overlaps the new one of box `i`, unless both are fixed. If both have
+    /// new ones, only the call for the lower box finds the pair. Returns the number of visited nodes of the tree.
     #[inline]
     pub(super) fn meet(&self, tree: &GrownTree, i: u32, mut found: impl FnMut(u32)) -> u32 {
         let (bounds, fixed) = (&self.boxes[i as usize], self.is_fixed(i));
@@ -159,22 +159,23 @@ impl Grown {
         self.flags[id as usize / 64].fixed >> (id % 64) & 1 == 1
     }
 
-    /// Whether a kept pair has a box that got a new grown box, or is gone.
+    /// Returns whether a box of a kept pair got a new grown box or was removed.
     #[inline(always)]
     pub(super) fn is_dirty(&self, (i, j): (u32, u32)) -> bool {
-        // No short cut: a branch would cost more than the second look.
+        // A branch would cost more than the second test.
         self.is_new(i) | self.is_new(j)
     }
 
-    /// Whether a box got a new grown box, or is gone.
+    /// Returns whether a box got a new grown box or was removed.
     #[inline(always)]
-    pub(super) fn is_new(&self, id: u32) -> bool {
+    fn is_new(&self, id: u32) -> bool {
         self.flags[id as usize / 64].dirty >> (id % 64) & 1 == 1
     }
 }
 
-/// Takes in which boxes are fixed now. One that is no longer has pairs that are not kept: it is given a grown box that it has left.
-fn free(flags: &mut [Flags], grown: &mut [Aabb], first: usize, filter: Option<&Filter>) {
+/// Updates the fixed flags. Not all pairs of a box that is no longer fixed are kept, so it gets a grown box that it has
+/// left.
+fn update_fixed(flags: &mut [Flags], grown: &mut [Aabb], first: usize, filter: Option<&Filter>) {
     for ((flags, grown), first) in flags.iter_mut().zip(grown.chunks_mut(64)).zip((first..).step_by(64)) {
         let fixed =
             filter.map_or(0, |f| (0..grown.len()).fold(0, |bits, k| bits | u64::from(f.is_fixed(first + k)) << k));
@@ -219,15 +220,15 @@ impl Share {
 }
 
 impl Margin {
-    /// The mean edge of a box, as far as it counts.
+    /// Returns the clamped mean edge of a box.
     #[inline]
     fn edge(&self, b: &Aabb) -> f32 {
         let mean = (0..3).map(|a| b.max[a] - b.min[a]).sum::<f32>() / 3.0;
-        // False for NaN too: an infinite box has such an edge.
+        // False for NaN too, the edge of an infinite box.
         if mean < self.longest_edge { mean } else { self.longest_edge }
     }
 
-    /// A valid box grown on every side. It contains the box, because rounding never reverses an order.
+    /// Grows a valid box on every side. The result contains the box, because rounding is monotonic.
     #[inline]
     fn grow(&self, b: &Aabb) -> Aabb {
         let by = self.share * self.edge(b);

@@ -16,27 +16,27 @@ const MARGINS: [f32; 8] = [0.04, 0.07, 0.1, 0.15, 0.22, 0.33, 0.5, 0.75];
 /// Kept pairs for each box, at most: keeping more would not pay, and takes memory.
 const MOST_KEPT: f32 = 32.0;
 
-/// No more pairs are kept than this many times what the margin promised and one for each box. A margin that was too large then costs as much as a
-/// few frames from scratch, where it would cost as much as twenty.
+/// No more pairs are kept than this many times what the margin promised and one for each box. A margin that was too
+/// large then costs as much as a few frames from scratch, where it would cost as much as twenty.
 const KEPT_OVER_PROMISED: f32 = 4.0;
 
-/// Pairs that a box is taken to have at the least when a margin is chosen. Where none overlap yet, boxes may be stacked a hair apart, and any
-/// margin would seem free.
+/// Pairs that a box is taken to have at the least when a margin is chosen. Where none overlap yet, boxes may be stacked
+/// a hair apart, and any margin would seem free.
 const FEWEST_PAIRS: f32 = 0.5;
 
 /// Frames from scratch after keeping did not pay, at first and at most.
 const PAUSE: [u32; 2] = [16, 512];
 
-/// Where boxes moved too far for it, the pause is over as soon as they move by less than this share of that. Every so many frames it is looked.
-/// Boxes that move by less than the second are as good as still. Only where keeping went on for so many frames before: else what was looked
-/// at by chance would begin again and again what does not pay.
+/// Where boxes moved too far for it, the pause is over as soon as they move by less than this share of that. Every so
+/// many frames it is looked. Boxes that move by less than the second are as good as still. Only where keeping went on
+/// for so many frames before: else what was looked at by chance would begin again and again what does not pay.
 const CALMER: f32 = 0.5;
 const STILL: f32 = 0.005;
 const LOOK: u32 = 4;
 const KEPT_WELL: u32 = 32;
 
-/// Frames over which the shares that decide the margin are averaged, and by how much it changes in a frame. After all boxes got new
-/// grown boxes none leaves for some frames: a margin that followed at once would swing.
+/// Frames over which the shares that decide the margin are averaged, and by how much it changes in a frame. After all
+/// boxes got new grown boxes none leaves for some frames: a margin that followed at once would swing.
 const LEARNING: f32 = 64.0;
 const MARGIN_STEP: f32 = 1.005;
 
@@ -80,7 +80,8 @@ pub(super) struct Motion {
     /// Frames for which nothing is kept, and how many that will be the next time.
     pause: u32,
     next_pause: u32,
-    /// The pause is over as soon as boxes move less than the most that they moved when it began, as far as that was told, and at its looks.
+    /// The pause is over as soon as boxes move less than the most that they moved when it began, as far as that was
+    /// told, and at its looks.
     ends_early: bool,
     paused_at: f32,
     /// Keeping ceased to pay for its many pairs, and not for how far boxes move.
@@ -101,14 +102,16 @@ struct Keeping {
     cost: f32,
     /// What of that the kept pairs took in the last frame.
     tests: f32,
-    /// Share of the boxes that leave in a frame and kept pairs for each box, averaged over the last [`LEARNING`] frames.
+    /// Share of the boxes that leave in a frame and kept pairs for each box, averaged over the last [`LEARNING`]
+    /// frames.
     leaving: f32,
     kept: f32,
     /// Nodes looked at for each box that left, averaged in the same way.
     nodes: f32,
     /// Boxes that left since all were made again, over all boxes.
     left: f32,
-    /// The margin that the grown boxes have in the mean, and what half of it would have saved for each box since it would.
+    /// The margin that the grown boxes have in the mean, and what half of it would have saved for each box since it
+    /// would.
     grown: f32,
     missed: f32,
     /// Frames since keeping began.
@@ -127,8 +130,8 @@ impl Keeping {
         ((1.0 + 2.0 * self.narrower()) / (1.0 + 2.0 * self.grown)).powi(3).min(1.0)
     }
 
-    /// What it would have saved for each box in a frame with so many kept pairs each, in which that share of the boxes left. As many more would have left as
-    /// of boxes that wander.
+    /// What it would have saved for each box in a frame with so many kept pairs each, in which that share of the boxes
+    /// left. As many more would have left as of boxes that wander.
     fn narrower_saves(&self, far: f32, kept: f32, left: f32) -> f32 {
         let more = (left * (self.grown / self.narrower()).powi(2)).min(1.0) - left;
         cost::tests(far, kept)
@@ -136,8 +139,8 @@ impl Keeping {
             - cost::left(far, self.nodes) * more.max(0.0)
     }
 
-    /// Whether it would have saved by now what it costs to grow all boxes again. Boxes that come to rest never leave by themselves: without this their
-    /// wide grown boxes would stay for ever, and with them five times the pairs.
+    /// Whether it would have saved by now what it costs to grow all boxes again. Boxes that come to rest never leave by
+    /// themselves: without this their wide grown boxes would stay for ever, and with them five times the pairs.
     fn is_too_wide(&self, objects: usize) -> bool {
         self.missed > cost::rebuild(cost::far(objects), self.kept * self.narrower_keeps())
     }
@@ -176,7 +179,8 @@ impl Motion {
         self.density = Some(pairs as f32 / objects.max(1) as f32);
     }
 
-    /// Keeping failed, because there were too many pairs to keep or because it did not pay; it will not be tried for some frames.
+    /// Keeping failed, because there were too many pairs to keep or because it did not pay; it will not be tried for
+    /// some frames.
     pub(super) fn stop(&mut self, too_many: bool) {
         let kept = self.keeping.take();
         let crowded = kept.filter(|failed| too_many || failed.tests > 0.5 * failed.cost);
@@ -190,8 +194,9 @@ impl Motion {
         self.next_pause = (self.next_pause * 2).min(PAUSE[1]);
     }
 
-    /// Other algorithms ran so many frames since the last one of this. They count for the pause, and where no crowd caused it, it is over if boxes move less by now: a
-    /// method that has its turn for a few frames at a time would never get to its end.
+    /// Other algorithms ran so many frames since the last one of this. They count for the pause, and where no crowd
+    /// caused it, it is over if boxes move less by now: a method that has its turn for a few frames at a time would
+    /// never get to its end.
     pub(super) fn missed(&mut self, frames: u64) {
         // Of boxes before all of these.
         self.displacement = Displacement::default();
@@ -226,11 +231,12 @@ impl Motion {
         left > 0.2 || keeping.left + worn(objects, changes) > 1.5 || keeping.is_too_wide(objects)
     }
 
-    /// The margin with which all boxes are grown again in a frame in which boxes left as `changes` says: the scene may have changed its sizes since the
-    /// last time.
+    /// The margin with which all boxes are grown again in a frame in which boxes left as `changes` says: the scene may
+    /// have changed its sizes since the last time.
     pub(super) fn renew(&mut self, plan: &FramePlan, boxes: &[Aabb], changes: &Changes) -> Margin {
         let jumped = changes.left as f32 > JUMP * boxes.len() as f32;
-        // At the same pace the margin stays, for it was found in many frames: boxes that are only taken from a pool and put back move as before.
+        // At the same pace the margin stays, for it was found in many frames: boxes that are only taken from a pool and
+        // put back move as before.
         let another = |keeping: Keeping| plan.moved().is_some_and(|now| !is_same_pace(keeping.pace.into(), now));
         if jumped && self.keeping.is_some_and(another) {
             self.keeping = self.begin(plan, boxes).or(self.keeping);
@@ -270,8 +276,8 @@ impl Motion {
             k.nodes += if changes.left > 0 { (nodes - k.nodes) / LEARNING } else { 0.0 };
             k.missed = (k.missed + k.narrower_saves(far, kept, left)).max(0.0);
         }
-        // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p with p
-        // between 1, for those that fly straight on, and 2, for those that wander.
+        // At the best margin the two costs grow at the same rate: kept pairs as (1 + 2 m)^3, boxes that leave as m^-p
+        // with p between 1, for those that fly straight on, and 2, for those that wander.
         let m = k.margin.share;
         let (keep, leave) = (
             (cost::tests(far, k.kept) - cost::BOX) * 6.0 * m / (1.0 + 2.0 * m),
@@ -290,7 +296,8 @@ impl Motion {
         k.cost < scratch
     }
 
-    /// How far the boxes moved since the frame before, and how many pairs for each there are; `None` where nobody knows.
+    /// How far the boxes moved since the frame before, and how many pairs for each there are; `None` where nobody
+    /// knows.
     fn known(&self, plan: &FramePlan, boxes: &[Aabb]) -> Option<(f32, f32)> {
         let moved = plan.moved().or_else(|| self.displacement.moved(boxes))?;
         // What this method has found itself may be of long ago.
@@ -346,11 +353,11 @@ impl Motion {
 
 /// Mean edges count as no longer than four times that which nine boxes in ten don't exceed.
 fn longest_edge(plan: &FramePlan, boxes: &[Aabb]) -> f32 {
-    4.0 * (plan.sample(boxes).extent.iter().sum::<f64>() / 3.0) as f32
+    4.0 * (plan.stats(boxes).extent.iter().sum::<f64>() / 3.0) as f32
 }
 
-/// How much of the order in space is lost, as a share of the boxes that left. One that went far widens every node above its leaf,
-/// which then costs every query near there.
+/// How much of the order in space is lost, as a share of the boxes that left. One that went far widens every node above
+/// its leaf, which then costs every query near there.
 fn worn(objects: usize, changes: &Changes) -> f32 {
     const FAR_AWAY: f32 = 16.0;
     (changes.left as f32 + FAR_AWAY * changes.far_away as f32) / objects.max(1) as f32

@@ -1,6 +1,7 @@
-//! The tree of the grown boxes, for the boxes that get a new one.
+//! The tree of the grown boxes, refitted for boxes that get a new one.
 //!
-//! A box that moves widens the nodes above its leaf and never changes its leaf, so the tree gets worse until it is made again.
+//! A box that moves widens the nodes above its leaf and never changes its leaf, so the tree gets worse until it is
+//! rebuilt.
 
 use crate::aabb::Aabb;
 use crate::cpu::columns::{ensure, part};
@@ -11,10 +12,10 @@ use crate::cpu::tree::{Members, NOBODY, Tree};
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::filter::Filter;
-use crate::load::Sample;
+use crate::load::SceneStats;
 use crate::pairs::Pairs;
 
-/// Boxes that move in one phase on all threads; fewer are moved in less time than a phase takes.
+/// Fewest boxes that all threads move in a phase: fewer are moved in less time than a phase takes.
 const SMALLEST_SPLIT: usize = 1024;
 
 /// See the module.
@@ -23,7 +24,7 @@ pub(super) struct GrownTree {
     tree: Tree,
     /// The place of each box in the tree.
     place_of: Vec<u32>,
-    /// The boxes that moved: place in the upper half, position in the input in the lower.
+    /// The moved boxes: place in the upper half, position in the input in the lower.
     keys: Vec<u64>,
     moved: usize,
     scratch: Vec<u64>,
@@ -39,15 +40,15 @@ impl GrownTree {
         ensure(&mut self.place_of, objects, "boxes in a tree")
     }
 
-    /// Makes the tree of these boxes, which look like the sample.
+    /// Builds the tree of these boxes, of which `stats` are the statistics.
     pub(super) fn build(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
-        sample: &Sample,
+        stats: &SceneStats,
         filter: Option<&Filter>,
     ) -> Result<(), Error> {
-        self.tree.build(workers, boxes, Members::All, sample, filter)?;
+        self.tree.build(workers, boxes, Members::All, stats, filter)?;
         ensure(&mut self.place_of, boxes.len(), "boxes in a tree")?;
         for (place, &id) in self.tree.ids().iter().enumerate().filter(|&(_, &id)| id != NOBODY) {
             self.place_of[id as usize] = place as u32;
@@ -55,25 +56,25 @@ impl GrownTree {
         Ok(())
     }
 
-    /// Adds part `k` of `parts` of the pairs of all boxes that are in the tree since it was made.
+    /// Adds part `k` of `parts` of the pairs of all boxes that were in the tree when it was built.
     pub(super) fn self_pairs(&self, k: usize, parts: usize, pairs: &mut Pairs) {
         self.tree.self_pairs(self.tree.part(k, parts), pairs);
     }
 
-    /// Adds a box that is not in the tree. It has no bounds there before [`follow`](Self::follow) sets them.
+    /// Adds a box, without bounds until [`refit`](Self::refit) sets them.
     pub(super) fn insert(&mut self, id: u32) -> Result<(), Error> {
         ensure(&mut self.place_of, id as usize + 1, "boxes in a tree")?;
         self.place_of[id as usize] = self.tree.append(id)? as u32;
         Ok(())
     }
 
-    /// Takes out a box.
+    /// Removes a box.
     pub(super) fn remove(&mut self, id: u32) {
         self.tree.remove(self.place_of[id as usize] as usize);
     }
 
-    /// Gives boxes in the tree the bounds that they have now, `boxes[id]`.
-    pub(super) fn follow(
+    /// Refits the tree to the moved boxes, which have the bounds `boxes[id]` now.
+    pub(super) fn refit(
         &mut self,
         workers: &Workers,
         boxes: &[Aabb],
@@ -88,11 +89,11 @@ impl GrownTree {
             *key = u64::from(self.place_of[id as usize]) << 32 | u64::from(id);
         }
         let keys = &mut self.keys[..self.moved];
-        // In the order of the tree, so that what one box needs of it is still in the cache for the next.
+        // Sorts by place: the nodes of one box are then in the cache for the next.
         sort(workers, keys, &mut self.scratch)?;
         let keys = &*keys;
         let Some((leaves, above)) = self.tree.levels_mut() else { return Ok(()) };
-        // Each task has leaves of its own.
+        // Each task has its own leaves.
         let size = leaves.len().div_ceil(if self.moved < SMALLEST_SPLIT { 1 } else { workers.tasks() }).max(1);
         let mut rest = keys;
         let parts = leaves.chunks_mut(size).zip((0..).step_by(size)).map(|(leaves, first)| {
@@ -119,12 +120,12 @@ impl GrownTree {
         Ok(())
     }
 
-    /// Part `k` of `parts` of the boxes that moved, those near in space together.
+    /// Returns part `k` of `parts` of the moved boxes, in the order of the tree.
     pub(super) fn moved(&self, k: usize, parts: usize) -> impl Iterator<Item = u32> {
         self.keys[part(self.moved, k, parts)].iter().map(|&key| key as u32)
     }
 
-    /// Calls `found` for every box that overlaps these bounds. Returns how many nodes it looked at.
+    /// Calls `found` for every box that overlaps these bounds. Returns the number of visited nodes.
     #[inline]
     pub(super) fn overlapping(&self, bounds: &Aabb, found: impl FnMut(u32)) -> u32 {
         self.tree.overlapping(bounds, found)

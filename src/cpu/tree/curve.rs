@@ -1,4 +1,4 @@
-//! The order of boxes along a curve through space.
+//! Sorts boxes along a space-filling curve.
 
 use super::Members;
 use crate::aabb::Aabb;
@@ -8,54 +8,54 @@ use crate::cpu::sort::sort;
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::filter::Filter;
-use crate::load::Sample;
+use crate::load::SceneStats;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// Boxes that share a cell of the curve and are left in any order: two leaves of them.
-const CROWD: usize = 2 * LANES;
+/// Most boxes in a cell of the curve that may stand in any order: two leaves. More are a dense cell.
+const CROWDED: usize = 2 * LANES;
 
-/// Boxes of a crowd from which on all threads put it in order; smaller crowds are dealt out to them.
-const LARGE_CROWD: usize = 16_384;
+/// Boxes of a dense cell that all threads sort together. Smaller dense cells are dealt out to the threads.
+const LARGE: usize = 16_384;
 
 /// Cells of the curve on each axis: nine bits of the code for each.
 const CELLS: f32 = 512.0;
 
-/// Cells of the curve of a crowd on each axis.
-const CROWD_CELLS: f32 = 1024.0;
+/// Cells on each axis of the curve through a dense cell.
+const FINE_CELLS: f32 = 1024.0;
 
-/// The code's bit of a fixed box, and where the class of a box begins in it.
+/// The bit of a code that marks a fixed box, and the lowest bit of the class.
 const FIXED: u32 = 1 << 31;
 const CLASS: u32 = 27;
 
-/// A box this many times as long on one axis as on each of the others stands with those that are long on the same axis.
+/// A box counts as long on an axis if it is this many times as long there as on each of the others.
 const LONG: f32 = 4.0;
 
-/// Coordinates count as no larger than this: the length between two of them is a number.
+/// Coordinates are clamped to this, so that the distance of two is finite.
 const MOST: f32 = 1.0e38;
 
-/// A curve through the cells of a cube, Morton's order.
+/// A curve through the cells of a cube, in Morton order.
 pub(super) struct Curve {
     origin: [f32; 3],
     inverse_width: f32,
     cells: f32,
-    /// Longest edge up to which a box is of the usual size.
+    /// Longest edge of a box of the usual size.
     usual: f32,
 }
 
 impl Curve {
-    /// Through where most of the boxes of a sample lie. Cells have the same width on each axis.
-    pub(super) fn over(sample: &Sample) -> Self {
-        let range = [0, 1, 2].map(|a| sample.range(a));
+    /// Makes a curve through the range of most boxes. Its cells are cubes.
+    pub(super) fn over(stats: &SceneStats) -> Self {
+        let range = [0, 1, 2].map(|a| stats.range(a));
         let longest = range.iter().map(|r| r.1).fold(0.0, f64::max);
-        let edge = sample.extent.iter().copied().fold(0.0, f64::max);
+        let edge = stats.extent.iter().copied().fold(0.0, f64::max);
         Self::through(range.map(|r| r.0 as f32), longest as f32, CELLS, 2.0 * edge as f32)
     }
 
-    /// Through the middles of a crowd, which have these bounds. `None` where there is nothing to tell them apart by.
+    /// Makes a curve through the centres in a dense cell, which have these bounds. `None` if all centres are the same.
     fn within(bounds: &Aabb) -> Option<Self> {
         let length = (0..3).map(|a| bounds.max[a] - bounds.min[a]).fold(0.0, f32::max);
-        let curve = Self::through(bounds.min, length, CROWD_CELLS, f32::INFINITY);
+        let curve = Self::through(bounds.min, length, FINE_CELLS, f32::INFINITY);
         (curve.inverse_width > 0.0).then_some(curve)
     }
 
@@ -64,7 +64,7 @@ impl Curve {
         Self { origin, inverse_width: if inverse.is_finite() { inverse } else { 0.0 }, cells, usual }
     }
 
-    /// Gives the boxes of a crowd codes along this curve.
+    /// Replaces the codes of these keys by those along this curve.
     fn recode(&self, keys: &mut [u64], boxes: &[Aabb]) {
         for key in keys {
             let id = *key as u32;
@@ -72,16 +72,16 @@ impl Curve {
         }
     }
 
-    /// Where the middle of a box lies on the curve. Outside the cube that is the nearest cell on its surface.
+    /// Returns the cell of the centre of a box on the curve. Outside the cube that is the nearest cell on its surface.
     #[inline]
     fn cell(&self, b: &Aabb) -> u32 {
-        let middle = middle(b);
-        let cell = |a: usize| ((middle[a] - self.origin[a]) * self.inverse_width).clamp(0.0, self.cells - 1.0) as u32;
+        let centre = centre(b);
+        let cell = |a: usize| ((centre[a] - self.origin[a]) * self.inverse_width).clamp(0.0, self.cells - 1.0) as u32;
         interleave(cell(0)) | interleave(cell(1)) << 1 | interleave(cell(2)) << 2
     }
 
-    /// What boxes are sorted by: first their class, then their place on the curve. Boxes that are much larger than the others, or long on
-    /// another axis, would widen the leaves that they share with them.
+    /// Returns the sort key of a box: its class, then its cell. Large boxes, and boxes long on an axis, would widen the
+    /// leaves that they shared with others.
     #[inline]
     fn code(&self, b: &Aabb) -> u32 {
         let edges = [0, 1, 2].map(|a| b.max[a] - b.min[a]);
@@ -90,11 +90,11 @@ impl Curve {
     }
 }
 
-/// The class, 1 to 15, of a box that is larger than the usual ones: by size in steps of four, and in the lower three of them by the axis on
-/// which it is long.
+/// Returns the class, 1 to 15, of an unusually large box: by size in steps of four, and in the lower three steps by the
+/// axis on which it is long.
 #[cold]
 fn class(edges: [f32; 3], ratio: f32) -> u32 {
-    // Not a number, of infinity over infinity, is in the largest class.
+    // NaN, of infinity over infinity, is in the largest class.
     let step =
         [4.0, 16.0, 64.0, 256.0, 1024.0].iter().take_while(|&&limit| ratio > limit || ratio.is_nan()).count() as u32;
     if step > 2 {
@@ -104,7 +104,7 @@ fn class(edges: [f32; 3], ratio: f32) -> u32 {
     1 + 4 * step + (0..3).find(|&a| long(a)).map_or(0, |a| 1 + a as u32)
 }
 
-/// Ten bits with two zeros between any two of them.
+/// Puts two zeros between any two of the lower ten bits.
 #[inline]
 fn interleave(v: u32) -> u32 {
     let v = (v | v << 16) & 0x0300_00ff;
@@ -113,17 +113,17 @@ fn interleave(v: u32) -> u32 {
     (v | v << 2) & 0x0924_9249
 }
 
-/// Puts boxes in order.
+/// Sorts boxes along the curve.
 #[derive(Debug, Default)]
 pub(super) struct Order {
     /// Code in the upper half, position of the box in the lower.
     keys: Vec<u64>,
     len: usize,
     scratch: Vec<u64>,
-    /// Crowds that wait to be put in order, the large ones and the others.
+    /// Dense cells that are not sorted yet: the large ones, and the others.
     large: Vec<Range<usize>>,
     small: Vec<Range<usize>>,
-    /// The bounds that each task found of its part of a large crowd.
+    /// The bounds that each task found in its part of a large dense cell.
     bounds: Vec<Aabb>,
 }
 
@@ -133,12 +133,12 @@ impl Order {
         ensure(&mut self.scratch, objects, "sort keys")
     }
 
-    /// The boxes in order: their positions in the lower halves.
+    /// Returns the sorted boxes: their positions are in the lower halves.
     pub(super) fn ids(&self) -> &[u64] {
         &self.keys[..self.len]
     }
 
-    /// Sorts the members. Returns how many of them may move: those come first.
+    /// Sorts the members. Returns the number of boxes that may move; they come first.
     pub(super) fn sort(
         &mut self,
         workers: &Workers,
@@ -169,23 +169,24 @@ impl Order {
         boxes.get(invalid..).map_or(Ok(()), |rest| Aabb::check(rest, invalid))?;
         sort(workers, keys, &mut self.scratch)?;
         let moving = keys.partition_point(|&key| code(key) < FIXED);
-        self.spread_crowds(workers, boxes)?;
+        self.sort_dense_cells(workers, boxes)?;
         Ok(moving)
     }
 
-    /// Puts those in order that share a cell, by a curve through their own bounds, and so on with those that share a cell of that one.
-    fn spread_crowds(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<(), Error> {
+    /// Sorts the boxes of each dense cell along a curve through their own bounds, and so on with the dense cells of
+    /// that curve.
+    fn sort_dense_cells(&mut self, workers: &Workers, boxes: &[Aabb]) -> Result<(), Error> {
         let Self { keys, len, scratch, large, small, bounds } = self;
         let keys = &mut keys[..*len];
         let mut note = |keys: &[u64], first: usize, large: &mut Vec<_>| {
-            each_crowd(keys, |crowd| {
-                let crowd = first + crowd.start..first + crowd.end;
-                if crowd.len() < LARGE_CROWD { small.push(crowd) } else { large.push(crowd) }
+            each_dense_cell(keys, |cell| {
+                let cell = first + cell.start..first + cell.end;
+                if cell.len() < LARGE { small.push(cell) } else { large.push(cell) }
             });
         };
         note(keys, 0, large);
-        while let Some(crowd) = large.pop() {
-            let (first, keys) = (crowd.start, &mut keys[crowd]);
+        while let Some(cell) = large.pop() {
+            let (first, keys) = (cell.start, &mut keys[cell]);
             let size = keys.len().div_ceil(workers.tasks());
             bounds.clear();
             bounds.resize(workers.tasks(), Aabb::default());
@@ -200,16 +201,16 @@ impl Order {
         }
         let mut rest = &mut *keys;
         let mut behind = 0;
-        // In the order in which they stand, so that the keys can be cut up for them.
-        small.sort_unstable_by_key(|crowd| crowd.start);
-        let crowds = small.drain(..).map(|crowd| {
-            let (_, from) = std::mem::take(&mut rest).split_at_mut(crowd.start - behind);
-            let (crowd_keys, after) = from.split_at_mut(crowd.len());
-            behind = crowd.end;
+        // Ascending, so that the keys can be split for them.
+        small.sort_unstable_by_key(|cell| cell.start);
+        let cells = small.drain(..).map(|cell| {
+            let (_, from) = std::mem::take(&mut rest).split_at_mut(cell.start - behind);
+            let (keys, after) = from.split_at_mut(cell.len());
+            behind = cell.end;
             rest = after;
-            crowd_keys
+            keys
         });
-        workers.each_of(crowds, |keys| spread(keys, boxes));
+        workers.each_of(cells, |keys| sort_dense_cell(keys, boxes));
         Ok(())
     }
 }
@@ -218,23 +219,24 @@ fn code(key: u64) -> u32 {
     (key >> 32) as u32
 }
 
-/// Puts a crowd in order, and so on.
-fn spread(keys: &mut [u64], boxes: &[Aabb]) {
-    // Each curve is a thousand times as fine as the one before: the range of floats is used up after 28 of them.
+/// Sorts a dense cell, then the dense cells of its own curve.
+fn sort_dense_cell(keys: &mut [u64], boxes: &[Aabb]) {
+    // Each curve is a thousand times finer than the previous one: the range of floats ends the recursion after 28 of
+    // them.
     let Some(curve) = Curve::within(&bounds_of(keys, boxes)) else { return };
     curve.recode(keys, boxes);
     keys.sort_unstable();
     let runs = keys.chunk_by_mut(|&a, &b| code(a) == code(b));
-    runs.filter(|run| run.len() > CROWD).for_each(|run| spread(run, boxes));
+    runs.filter(|run| run.len() > CROWDED).for_each(|run| sort_dense_cell(run, boxes));
 }
 
-/// Calls `found` for every run of more than [`CROWD`] keys with one code.
-fn each_crowd(keys: &[u64], mut found: impl FnMut(Range<usize>)) {
+/// Calls `found` for every run of more than [`CROWDED`] keys with one code.
+fn each_dense_cell(keys: &[u64], mut found: impl FnMut(Range<usize>)) {
     let mut at = 0;
-    while at + CROWD < keys.len() {
-        // Most runs are short: the key that ends a crowd tells whether there is one.
+    while at + CROWDED < keys.len() {
+        // Most runs are short: one look ahead shows that.
         let same = code(keys[at]);
-        if code(keys[at + CROWD]) == same {
+        if code(keys[at + CROWDED]) == same {
             let end = at + keys[at..].partition_point(|&key| code(key) == same);
             found(at..end);
             at = end;
@@ -244,22 +246,22 @@ fn each_crowd(keys: &[u64], mut found: impl FnMut(Range<usize>)) {
     }
 }
 
-/// The bounds of the middles of boxes.
+/// Returns the bounds of the centres of boxes.
 fn bounds_of(keys: &[u64], boxes: &[Aabb]) -> Aabb {
     let nothing = Aabb::new([MOST; 3], [-MOST; 3]);
     keys.iter().fold(nothing, |all, &key| {
-        let middle = middle(&boxes[key as u32 as usize]);
-        all.union(&Aabb::new(middle, middle))
+        let centre = centre(&boxes[key as u32 as usize]);
+        all.union(&Aabb::new(centre, centre))
     })
 }
 
-/// Where a box lies, at infinity on the way there.
+/// Returns the centre of a box, clamped to [`MOST`].
 #[inline]
-fn middle(b: &Aabb) -> [f32; 3] {
+fn centre(b: &Aabb) -> [f32; 3] {
     [0, 1, 2].map(|a| {
-        let middle = b.min[a] * 0.5 + b.max[a] * 0.5;
+        let centre = b.min[a] * 0.5 + b.max[a] * 0.5;
         // NaN, of infinity less infinity, becomes 0.
-        if middle.is_nan() { 0.0 } else { middle.clamp(-MOST, MOST) }
+        if centre.is_nan() { 0.0 } else { centre.clamp(-MOST, MOST) }
     })
 }
 
@@ -269,7 +271,7 @@ mod tests {
     use crate::cpu::Threads;
     use crate::splitmix::mix;
 
-    /// A box of the unit cube, moved and scaled.
+    /// Returns a small box in the unit cube, scaled and moved.
     fn at(k: u64, scale: f32, by: [f32; 3]) -> Aabb {
         let unit = |a: u64| (mix(3 * k + a) >> 40) as f32 / (1 << 24) as f32;
         Aabb::cube([0, 1, 2].map(|a| unit(a) * scale + by[a as usize]), scale / 200.0)
@@ -278,12 +280,12 @@ mod tests {
     fn ordered(boxes: &[Aabb], threads: u32, filter: Option<&Filter>) -> (Vec<u32>, usize) {
         let workers = Workers::new("tree", threads, &Threads::default()).unwrap();
         let mut order = Order::default();
-        let curve = Curve::over(&Sample::of(boxes));
+        let curve = Curve::over(&SceneStats::of(boxes));
         let moving = order.sort(&workers, boxes, Members::All, &curve, filter).unwrap();
         (order.ids().iter().map(|&key| key as u32).collect(), moving)
     }
 
-    /// The mean over leaves of the longest edge of what contains one.
+    /// Returns the mean over the leaves of the longest edge of their bounds.
     fn longest_edge(boxes: &[Aabb], ids: &[u32]) -> f64 {
         let edge = |leaf: &[u32]| {
             let all = leaf.iter().map(|&id| boxes[id as usize]).reduce(|a, b| a.union(&b)).unwrap();
@@ -293,11 +295,11 @@ mod tests {
     }
 
     #[test]
-    fn boxes_near_in_space_are_near_in_the_order_on_every_scale() {
+    fn neighbours_in_space_are_neighbours_in_the_order() {
         let most = if cfg!(feature = "parallel") { 3 } else { 1 };
         let one = |k: u64| at(k, 100.0, [0.0; 3]);
-        // Worlds of one size: many on a line a million edges apart, so that each of them is a crowd; a thousand times as small from one to the
-        // next, in one corner; and one with a crowd for all threads far away.
+        // Many equal worlds on a line, a million edges apart, so that each is a dense cell; worlds in one corner, each
+        // a thousand times smaller than the last; and a world with a large dense cell far away.
         let row = |k: u64| at(k, 100.0, [1.0e8 * (k % 40) as f32, 0.0, 0.0]);
         let nested = |k: u64| at(k, 100.0 * 1.0e-3_f32.powi((k % 5) as i32), [0.0; 3]);
         let pooled = |k: u64| if k.is_multiple_of(2) { one(k) } else { at(k, 100.0, [3.0e9, -8.0e9, 5.0e9]) };
@@ -313,7 +315,7 @@ mod tests {
             all.sort_unstable();
             assert!(all.into_iter().eq(0..count as u32) && moving == count as usize, "{name}");
             assert_eq!(ordered(&boxes, most, None).0, ids, "{name} on {most} threads");
-            // As many boxes in fewer worlds lie closer; what spans two worlds is a handful of leaves.
+            // Boxes in fewer worlds lie closer, and only a few leaves span two worlds.
             let mut edges: Vec<f64> = ids.chunks(LANES).map(|leaf| longest_edge(&boxes, leaf)).collect();
             edges.sort_unstable_by(f64::total_cmp);
             let middle = edges[edges.len() / 2];
@@ -324,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_in_one_point_at_infinity_or_without_size_are_ordered_once() {
+    fn degenerate_boxes_are_ordered_once() {
         let inf = f32::INFINITY;
         let odd = [
             Aabb::cube([1.0; 3], 0.0),
@@ -346,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn large_and_long_boxes_share_no_leaf_with_others_and_fixed_ones_come_last() {
+    fn large_and_long_boxes_share_no_leaf_and_fixed_ones_come_last() {
         let boxes: Vec<Aabb> = (0..4096)
             .map(|k| {
                 let mut b = at(k, 100.0, [0.0; 3]);

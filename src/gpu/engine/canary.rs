@@ -31,13 +31,13 @@ mod tests {
     use crate::gpu::look::Look;
     use crate::gpu::output::Output;
     use crate::gpu::storage::Failure;
-    use crate::load::Chosen;
+    use crate::load::SampledBoxes;
     use crate::pairs::Pairs;
 
     const METHODS: [&str; 4] = ["brute", "sap", "grid-sap", "bvh"];
 
     fn start(engine: &mut Engine, boxes: &[Aabb]) {
-        let params = engine.plan(boxes.len() as u32, || Look::at(&Chosen::from(boxes)));
+        let params = engine.plan(boxes.len() as u32, || Look::at(&SampledBoxes::from(boxes)));
         engine.start(Piece { boxes, ids: None }, params).unwrap();
     }
 

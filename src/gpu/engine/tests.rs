@@ -3,7 +3,7 @@ use crate::aabb::Aabb;
 use crate::gpu::look::Look;
 use crate::gpu::params::Params;
 use crate::gpu::{Gpus, first_for_tests};
-use crate::load::Chosen;
+use crate::load::SampledBoxes;
 use crate::pairs::{PairOrder, Pairs};
 use crate::scene::{Scenario, Scene};
 use wgpu::util::DeviceExt;
@@ -28,7 +28,7 @@ fn oracle(boxes: &[Aabb]) -> Vec<(u32, u32)> {
 }
 
 fn plan(engine: &Engine, boxes: &[Aabb], budget: u32) -> Params {
-    Params { budget, ..engine.plan(boxes.len() as u32, || Look::at(&Chosen::from(boxes))) }
+    Params { budget, ..engine.plan(boxes.len() as u32, || Look::at(&SampledBoxes::from(boxes))) }
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! What the parts of a frame cost for each box, in nanoseconds, on one of the machines in `datasets/`. Only their ratios matter here, and only for
-//! the choice of a margin: they need not be those of the machine at hand.
+//! What the parts of a frame cost for each box, in nanoseconds, on one of the machines in `datasets/`. Only their
+//! ratios matter here, and only for the choice of a margin: they need not be those of the machine at hand.
 
 /// A box looked at.
 pub(super) const BOX: f32 = 1.5;
@@ -17,7 +17,8 @@ pub(super) fn scratch(far: f32, density: f32) -> f32 {
     far.sqrt() * (SCRATCH[0] + SCRATCH[1] * density)
 }
 
-/// The cost of a box where all are grown again and so many pairs of each are kept: those of a tree from scratch, of larger boxes.
+/// The cost of a box where all are grown again and so many pairs of each are kept: those of a tree from scratch, of
+/// larger boxes.
 pub(super) fn rebuild(far: f32, kept: f32) -> f32 {
     1.5 * scratch(far, kept)
 }
@@ -38,8 +39,8 @@ pub(super) fn far(objects: usize) -> f32 {
     (1.0 + 0.8 * (objects as f32 / 30_000.0).log2()).clamp(1.0, 5.0)
 }
 
-/// The share of boxes that leave in a frame, when they move by `motion` and may by `margin`, as of those that wander. More
-/// leave of those that fly straight on, which shows in a few frames.
+/// The share of boxes that leave in a frame, when they move by `motion` and may by `margin`, as of those that wander.
+/// More leave of those that fly straight on, which shows in a few frames.
 pub(super) fn leaving(motion: f32, margin: f32) -> f32 {
     (motion / margin).powi(2).min(1.0)
 }

@@ -1,7 +1,7 @@
 //! The mean cost of frames of which one now and then makes all again.
 
-/// The mean cost of a box over the frames from one in which all is made again to the next. A promise counts for as many frames as
-/// [`FEWEST`](Self::FEWEST).
+/// The mean cost of a box over the frames from one in which all is made again to the next. A promise counts for as many
+/// frames as [`FEWEST`](Self::FEWEST).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MeanWork {
     /// Over the frames up to the last in which all was made again, and how many frames that counts for.
