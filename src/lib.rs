@@ -110,7 +110,7 @@ pub use pairs::{PairOrder, Pairs};
 /// would be other types: a release of this library that takes a newer rayon exports it under a new name, and is a breaking one.
 #[cfg(feature = "parallel")]
 pub use rayon as rayon1;
-pub use registry::{Registry, usable_cores};
+pub use registry::{AlgorithmSource, Registry, usable_cores};
 pub use tuning::{AlgorithmCost, Crossover, Observation, Observed, Ranking, Source, Step, Tuning, TuningError};
 
 /// The example of the README as a test, with the feature that it needs.

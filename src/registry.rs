@@ -5,6 +5,7 @@ use crate::broad_phase::BroadPhase;
 use crate::cpu::{self, Create, Method, Simd, SimdLevel, Threads};
 use crate::entry::Entry;
 use crate::error::{Error, Unavailable};
+use std::any::{Any, TypeId};
 use std::fmt;
 use std::sync::Arc;
 
@@ -23,13 +24,23 @@ pub struct Registry {
     /// The most threads that an algorithm of ours may have.
     cores: u32,
     simd: SimdLevel,
-    #[cfg(feature = "gpu")]
-    gpus: crate::gpu::Gpus,
+    sources: Vec<Box<dyn AlgorithmSource>>,
+}
+
+/// Lists algorithms and makes them, for a package that brings many of them, such as those on GPUs.
+pub trait AlgorithmSource: Any + Send + Sync {
+    /// Returns the algorithms that a registry lists.
+    fn entries(&self) -> Vec<Entry>;
+
+    /// Makes an algorithm, listed or not; `None` if it is not one of this source.
+    fn create(&self, id: &AlgorithmId) -> Option<Result<Box<dyn BroadPhase>, Error>>;
 }
 
 /// What makes the algorithm of an entry.
 enum Maker {
     Ours,
+    /// The source of this type.
+    Source(TypeId),
     One(Factory),
     Family(FamilyFactory),
 }
@@ -51,8 +62,7 @@ impl Registry {
             threads: Threads::default(),
             cores: cores.clamp(1, MOST_THREADS),
             simd: SimdLevel::in_use(),
-            #[cfg(feature = "gpu")]
-            gpus: crate::gpu::Gpus::none(),
+            sources: Vec::new(),
         };
         for method in cpu::METHODS {
             for threads in thread_counts(cores) {
@@ -110,25 +120,25 @@ impl Registry {
         self.entries.iter().position(|e| e.id == *id)
     }
 
-    /// Adds our algorithms on these GPUs: on each of them, and on the first two, three and so on together. They take the place of
-    /// GPUs that were added before.
-    ///
-    /// Nothing is opened before an algorithm is created.
-    #[cfg(feature = "gpu")]
-    pub fn add_gpus(&mut self, gpus: &crate::gpu::Gpus) {
-        self.gpus = gpus.clone();
-        // GPUs that were added before and are not among these go; what the user added stays.
-        let stays =
-            |k: usize| !matches!((&self.makers[k], self.entries[k].id.backend()), (Maker::Ours, Backend::Gpu(_)));
-        let stays: Vec<bool> = (0..self.entries.len()).map(stays).collect();
-        let (mut entry, mut maker) = (stays.iter(), stays.iter());
-        self.entries.retain(|_| entry.next() == Some(&true));
-        self.makers.retain(|_| maker.next() == Some(&true));
-        for entry in crate::gpu::algorithms(gpus.identities()) {
+    /// Adds the algorithms of a source, except those whose ids are listed already. It replaces an earlier source of the same type.
+    pub fn add_source<S: AlgorithmSource>(&mut self, source: S) {
+        let is_old = |maker: &Maker| matches!(maker, Maker::Source(of) if *of == TypeId::of::<S>());
+        let mut makers = self.makers.iter();
+        self.entries.retain(|_| !makers.next().is_some_and(is_old));
+        self.makers.retain(|maker| !is_old(maker));
+        self.sources.retain(|old| !(&**old as &dyn Any).is::<S>());
+        for entry in source.entries() {
             if self.position(&entry.id).is_none() {
-                self.set(entry, Maker::Ours);
+                self.set(entry, Maker::Source(TypeId::of::<S>()));
             }
         }
+        self.sources.push(Box::new(source));
+    }
+
+    /// Returns the source of a type that was added.
+    #[must_use]
+    pub fn source<S: AlgorithmSource>(&self) -> Option<&S> {
+        self.sources.iter().find_map(|s| (&**s as &dyn Any).downcast_ref())
     }
 
     /// Makes our algorithms use no higher SIMD level than this from now on.
@@ -220,21 +230,6 @@ impl Registry {
         self.threads.kind()
     }
 
-    /// The GPUs that were added.
-    #[cfg(all(feature = "measure-gpu", feature = "this-machine"))]
-    pub(crate) fn gpus(&self) -> &crate::gpu::Gpus {
-        &self.gpus
-    }
-
-    /// What the GPUs that were added say of themselves.
-    #[cfg(feature = "this-machine")]
-    pub(crate) fn gpu_identities(&self) -> Vec<crate::GpuIdentity> {
-        #[cfg(feature = "gpu")]
-        return self.gpus.identities().cloned().collect();
-        #[cfg(not(feature = "gpu"))]
-        Vec::new()
-    }
-
     /// Why a cost of `revision` of an algorithm says nothing here, if it doesn't.
     pub(crate) fn mismatch(&self, id: &AlgorithmId, revision: u32) -> Option<Error> {
         let unavailable = |reason| Some(Error::Unavailable { algorithm: id.clone(), reason });
@@ -252,8 +247,8 @@ impl Registry {
         }
     }
 
-    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads up to the most that is listed, and on any
-    /// of the GPUs that were added.
+    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads up to the most that is listed, and
+    /// what a [source](Self::add_source) makes without listing it.
     ///
     /// # Errors
     /// [`Error::UnknownAlgorithm`] and [`Error::Unavailable`]: a file from a larger machine names threads that this one has no cores for.
@@ -261,7 +256,7 @@ impl Registry {
         match self.position(id).map(|at| &self.makers[at]) {
             Some(Maker::One(factory)) => return factory(),
             Some(Maker::Family(factory)) => return factory(&[id.threads()]),
-            Some(Maker::Ours) | None => {}
+            Some(Maker::Ours | Maker::Source(_)) | None => {}
         }
         match (ours(id), id.backend()) {
             (Some(method), &Backend::Cpu(threads)) => match self.unavailable(threads) {
@@ -271,12 +266,10 @@ impl Registry {
                 },
                 Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
             },
-            #[cfg(feature = "gpu")]
-            (_, Backend::Gpu(_)) if crate::gpu::has_method(id.method()) => crate::gpu::OnGpus::create(id, &self.gpus),
-            _ => {
+            _ => self.sources.iter().find_map(|source| source.create(id)).unwrap_or_else(|| {
                 let known: Vec<String> = self.entries.iter().map(|e| e.id.to_string()).collect();
                 Err(Error::UnknownAlgorithm { text: id.to_string(), hint: format!("known here: {}", known.join(", ")) })
-            }
+            }),
         }
     }
 
@@ -306,7 +299,7 @@ impl Registry {
     fn family(&self, id: &AlgorithmId) -> Option<Family<'_>> {
         let &Backend::Cpu(threads) = id.backend() else { return None };
         match self.position(id).map(|at| &self.makers[at]) {
-            Some(Maker::One(_)) => None,
+            Some(Maker::One(_) | Maker::Source(_)) => None,
             Some(Maker::Family(factory)) => Some(Family::Users(factory)),
             Some(Maker::Ours) | None => match ours(id)?.create {
                 Create::AnyWidth(create) if self.unavailable(threads).is_none() => Some(Family::Ours(create)),
