@@ -1,6 +1,7 @@
 //! Every algorithm on every GPU of this machine, alone and together, against the naive oracle.
 //!
-//! Without a GPU the tests print that and pass, unless `SAPWISE_REQUIRE_GPU=1`. The feature `long-tests` adds large frames.
+//! Without a GPU the tests print that and pass, unless `SAPWISE_REQUIRE_GPU=1`. The feature `long-tests` adds large
+//! frames.
 
 mod common;
 
@@ -234,7 +235,8 @@ mod long {
                 assert_all_agree(&name, &boxes, &mut fast);
                 assert_all_agree(&name, &boxes, &mut brute);
             }
-            // The hard scenarios come last. Their pairs are quadratic in the boxes: large ones would take minutes each.
+            // The hard scenarios come last. Their pairs are quadratic in the boxes: large ones would take minutes
+            // each.
             let hard = scenario > Scenario::Fragmentation;
             let large = if hard { 4097 + k } else { [65_535, 65_536, 65_537, 40_961 + 1009 * k][k % 4] };
             let boxes = frame(scenario, large);
@@ -264,7 +266,8 @@ mod long {
         let mut row: Vec<Aabb> = (0..70_000).map(|k| Aabb::cube([k as f32, (k % 7) as f32 * 3.0, 0.0], 0.4)).collect();
         row.push(Aabb::new([-1.0, -1.0, -1.0], [80_000.0, 2.0, 1.0]));
         let hits = (0..70_000_u32).filter(|k| k % 7 == 0).count();
-        // A software adapter on two slow cores takes a second for ten million tests, and counts as lost after a minute.
+        // A software adapter on two slow cores takes a second for ten million tests, and counts as lost after a
+        // minute.
         let point = [Aabb::cube([1.0; 3], 0.5); 12_000];
         for (id, mut algorithm) in every_algorithm(&gpus).into_iter().filter(|(id, _)| !id.contains("brute")) {
             let mut pairs = Pairs::with_order(PairOrder::Canonical);

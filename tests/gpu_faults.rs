@@ -177,8 +177,9 @@ fn the_wait_limit_applies_to_open_and_closed_gpus() {
     }
 }
 
-/// Keeps the queue of a GPU busy for well over a millisecond, however fast it is: 20 million operations, each of which depends on the
-/// previous one, take at least as many clock cycles. No watchdog of a driver ends so short a submission.
+/// Keeps the queue of a GPU busy for well over a millisecond, however fast it is: 20 million operations, each of
+/// which depends on the previous one, take at least as many clock cycles. No watchdog of a driver ends so short a
+/// submission.
 fn occupy(gpu: &Gpu) {
     const CHAIN: &str = "
         @group(0) @binding(0) var<storage, read_write> word: u32;

@@ -19,8 +19,8 @@ pub(crate) fn naive(boxes: &[Aabb]) -> Vec<Pair> {
     pairs
 }
 
-/// The same for frames in which a double loop takes seconds: of the boxes in the order in which they begin along an axis, each is held against those
-/// that begin before it ends. No NaN.
+/// The same for frames in which a double loop takes seconds: of the boxes in the order in which they begin along an
+/// axis, each is held against those that begin before it ends. No NaN.
 pub(crate) fn swept(boxes: &[Aabb]) -> Vec<Pair> {
     // Along one axis a tower is one heap: whichever leaves the fewest to be tested is taken.
     let axes = [0, 1, 2].map(|axis| along(boxes, axis));
@@ -91,7 +91,8 @@ impl Random {
         (self.0 >> 40) as f32 / (1_u64 << 24) as f32
     }
 
-    /// In one or two of eight groups, not colliding with some of them, one in four fixed, one in sixteen in every group.
+    /// In one or two of eight groups, not colliding with some of them, one in four fixed, one in sixteen in every
+    /// group.
     pub(crate) fn membership(&mut self) -> Membership {
         let group = |at: f32| 1 << (at * 8.0) as u32;
         let (groups, mask) = (group(self.next()) | group(self.next()), !(group(self.next()) | group(self.next())));
@@ -140,7 +141,8 @@ pub(crate) fn large_boxes() -> Vec<Aabb> {
     boxes
 }
 
-/// Returns the GPUs of this machine. If there is none, prints that and returns `None`, or panics if `SAPWISE_REQUIRE_GPU=1`.
+/// Returns the GPUs of this machine. If there is none, prints that and returns `None`, or panics if
+/// `SAPWISE_REQUIRE_GPU=1`.
 #[cfg(feature = "gpu")]
 pub(crate) fn gpus() -> Option<sapwise::gpu::Gpus> {
     let gpus = sapwise::gpu::Gpus::find();
