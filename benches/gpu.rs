@@ -1,20 +1,21 @@
-//! Every method on every GPU of this machine, beside `grid-sap` on one core and on all cores, on the same boxes in turn.
+//! Every method on every GPU of this machine, beside `grid-sap` on one core and on all cores, interleaved on the same
+//! boxes.
 //!
 //! ```sh
-//! cargo bench -p sapwise-cli --bench gpu                            # all GPUs
-//! SAPWISE_GPUS=gpu1,gpu0+1 cargo bench -p sapwise-cli --bench gpu   # these, numbered as in `sapwise devices`
+//! cargo bench -p sapwise-bench --bench gpu                            # all GPUs
+//! SAPWISE_GPUS=gpu1,gpu0+1 cargo bench -p sapwise-bench --bench gpu   # these, numbered as in `sapwise devices`
 //! ```
 //!
-//! Prints a table in Markdown, a size as soon as it is measured: wall clock, median and quartiles over the frames. The
-//! memory `host` says from boxes in host memory to pairs in host memory, transfers included; `device` says from boxes on
-//! the GPU to pairs on the GPU whose number is known to the host, for engines whose data never leave it. The contestants
-//! take turns on each frame, so that a machine that slows down slows all of them, and the speed-up is the median of the
-//! ratios frame by frame. What each of them found is compared on every frame, outside the timed part. Bias: one scenario;
-//! four frames, there and back again; a GPU rests while the others have their turn.
+//! Prints a table in Markdown, each size as soon as it is measured: wall clock, median and quartiles over the frames.
+//! The memory `host` means boxes and pairs in host memory, transfers included. `device` means boxes and pairs on the
+//! GPU, with the number of pairs known to the host, for engines whose data never leave the GPU.
 //!
-//! Criterion times its candidates one after the other, which is why it is not used here. Without `--bench`, which `cargo
-//! bench` passes, only the smallest size is run, to see that all is well. Exit status 1 when a contestant failed or found
-//! other pairs.
+//! The contestants take turns on each frame, so that a machine that slows down slows all of them. The speed-up is the
+//! median of the ratios frame by frame. The pairs of all contestants are compared in every frame, outside the timed
+//! part. Bias: one scenario; four frames, there and back again; a GPU rests while others have their turn.
+//!
+//! Criterion can't interleave its candidates. Without `--bench`, which `cargo bench` passes, only the smallest size is
+//! run. Exit status 1 if a contestant failed or found other pairs.
 
 use sapwise::gpu::{Gpu, Gpus, Resident, ResidentPairs, wgpu30 as wgpu};
 use sapwise::{Aabb, AlgorithmId, Backend, BroadPhase, Pairs, Registry, usable_cores};
@@ -26,37 +27,36 @@ use std::time::{Duration, Instant};
 
 const SIZES: [usize; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];
 
-/// Distinct frames of a size.
+/// Frames of a size.
 const FRAMES: usize = 4;
 
-/// Timed rounds of a size, unless its time is over.
+/// Timed rounds of a size, unless time runs out.
 const ROUNDS: usize = 60;
 
-/// Rounds of a size before its time may be over, so that there are quartiles.
+/// Fewest rounds of a size, even if time runs out, so that there are quartiles.
 const FEWEST_ROUNDS: usize = 5;
 
-/// The time of a size, for all contestants together.
+/// Time for all contestants at a size.
 const TIME: Duration = Duration::from_secs(15);
 
-/// A contestant leaves before a size at which one frame is forecast to take longer.
+/// A contestant leaves before a size if one frame is forecast to take longer.
 const LONGEST_FRAME: Duration = Duration::from_secs(3);
 
-/// A method, the largest size at which it is asked for, and the power of the number of objects with which its time grows in
-/// `uniform`.
+/// A method, its largest size, and the power of the number of objects with which its time grows in `uniform`.
 const METHODS: [(&str, usize, f64); 4] =
     [("brute", 100_000, 2.0), ("sap", 1_000_000, 5.0 / 3.0), ("grid-sap", 10_000_000, 1.1), ("bvh", 10_000_000, 1.1)];
 
-/// Goes through one frame; the time it took and the fingerprint of the pairs.
+/// Runs one frame. Returns its time and the fingerprint of the pairs.
 type Turn = Box<dyn FnMut(&[Aabb]) -> Result<(Duration, u64), String>>;
 
 struct Contestant {
     id: AlgorithmId,
-    /// Where the boxes come from and the pairs go.
+    /// Where boxes and pairs are.
     memory: &'static str,
     turn: Turn,
-    /// Seconds of each round of the present size.
+    /// Seconds of each round of the current size.
     seconds: Vec<f64>,
-    /// Median of the last size that it went through, and that size.
+    /// Median of the last size, and that size.
     last: Option<(f64, usize)>,
     /// Whether it has left the race.
     out: bool,
@@ -67,7 +67,7 @@ impl Contestant {
         Self { id, memory, turn, seconds: Vec::new(), last: None, out: false }
     }
 
-    /// Whether it goes through frames of that many objects in reasonable time.
+    /// Returns whether it takes part at a size.
     fn takes_part(&self, objects: usize) -> bool {
         let Some(&(_, most, power)) = METHODS.iter().find(|m| m.0 == self.id.method()) else { return !self.out };
         let forecast = self.last.map_or(0.0, |(seconds, at)| seconds * (objects as f64 / at as f64).powf(power));
@@ -75,7 +75,7 @@ impl Contestant {
     }
 }
 
-/// From boxes in host memory to pairs in host memory.
+/// Returns a contestant from boxes in host memory to pairs in host memory.
 fn host_resident(mut algorithm: Box<dyn BroadPhase>) -> Turn {
     let mut pairs = Pairs::new();
     Box::new(move |boxes| {
@@ -86,7 +86,7 @@ fn host_resident(mut algorithm: Box<dyn BroadPhase>) -> Turn {
     })
 }
 
-/// From boxes on a GPU to pairs on it, as many as the host then knows. The way there and back is not timed.
+/// Returns a contestant from boxes on a GPU to pairs on it. The transfers are not timed.
 fn device_resident(gpus: &Gpus, index: u32, method: &str) -> Result<Turn, String> {
     let gpu = gpus.open(index).map_err(|e| e.to_string())?;
     let mut resident = Resident::new(&gpu, method).map_err(|e| e.to_string())?;
@@ -102,7 +102,7 @@ fn device_resident(gpus: &Gpus, index: u32, method: &str) -> Result<Turn, String
     }))
 }
 
-/// The boxes in a buffer of a GPU, the last one where they fit, once they are there.
+/// Uploads boxes to the last buffer, or to a new one if they don't fit, and waits for it.
 fn upload(gpu: &Gpu, boxes: &[Aabb], last: Option<wgpu::Buffer>) -> Result<wgpu::Buffer, String> {
     let size = size_of_val(boxes) as u64;
     let buffer = match last {
@@ -121,7 +121,7 @@ fn upload(gpu: &Gpu, boxes: &[Aabb], last: Option<wgpu::Buffer>) -> Result<wgpu:
     Ok(buffer)
 }
 
-/// The fingerprint of pairs that are on a GPU.
+/// Downloads pairs, and returns their fingerprint.
 fn download(gpu: &Gpu, found: ResidentPairs<'_>) -> Result<u64, String> {
     let mut pairs = Pairs::new();
     let size = u64::from(found.count) * 8;
@@ -142,7 +142,7 @@ fn download(gpu: &Gpu, found: ResidentPairs<'_>) -> Result<u64, String> {
     Ok(pairs.fingerprint())
 }
 
-/// The algorithms on GPUs that are wanted: those of `SAPWISE_GPUS`, or all that are known here.
+/// Returns the algorithms on the GPUs of `SAPWISE_GPUS`, or on all GPUs.
 fn on_gpus(registry: &Registry) -> Result<Vec<AlgorithmId>, String> {
     let entries = registry.entries().iter().filter(|e| matches!(e.id.backend(), Backend::Gpu(_)));
     let known: Vec<AlgorithmId> = entries.map(|e| e.id.clone()).collect();
@@ -161,7 +161,7 @@ fn on_gpus(registry: &Registry) -> Result<Vec<AlgorithmId>, String> {
     Ok(wanted)
 }
 
-/// First and third quartile and the median between them, interpolated.
+/// Returns the first quartile, the median and the third quartile, interpolated.
 fn quartiles(samples: &[f64]) -> [f64; 3] {
     let mut sorted = samples.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -172,7 +172,7 @@ fn quartiles(samples: &[f64]) -> [f64; 3] {
     })
 }
 
-/// Runs all contestants on frames of one size in turn, and prints their rows. The remarks say what went wrong.
+/// Runs all contestants on frames of one size in turn, and prints their rows. Adds a remark for whatever went wrong.
 fn measure(objects: usize, rounds: usize, contestants: &mut [Contestant], remarks: &mut Vec<String>) {
     let mut racing: Vec<&mut Contestant> = contestants.iter_mut().filter(|c| c.takes_part(objects)).collect();
     if racing.is_empty() {
@@ -187,17 +187,18 @@ fn measure(objects: usize, rounds: usize, contestants: &mut [Contestant], remark
     racing.iter_mut().for_each(|c| c.seconds.clear());
     let mut expected = [None; FRAMES];
     let start = Instant::now();
-    // Round 0 makes buffers and compiles, and is not counted.
+    // Round 0 is the warm-up.
     for round in 0..=rounds {
         if round > FEWEST_ROUNDS && start.elapsed() > TIME {
             break;
         }
-        // There and back again, so that consecutive frames are always neighbours.
+        // There and back again, so that consecutive frames are neighbours in time.
         let at = round % (2 * FRAMES - 2);
         let at = if at < FRAMES { at } else { 2 * FRAMES - 2 - at };
         let count = racing.len();
         for place in 0..count {
-            // Each begins in turn, and every other round goes backwards, so that none always follows the same one.
+            // Each begins in turn, and every other round goes backwards, so that no contestant always follows the
+            // same one.
             let place = if round % 2 == 0 { place } else { count - 1 - place };
             let contestant = &mut racing[(round / 2 + place) % count];
             if contestant.out {
@@ -218,7 +219,7 @@ fn measure(objects: usize, rounds: usize, contestants: &mut [Contestant], remark
         }
     }
     racing.retain(|c| !c.out && !c.seconds.is_empty());
-    // The last of the CPU's contestants has the most cores.
+    // The last contestant on the CPU has the most cores.
     let reference = racing.iter().rfind(|c| matches!(c.id.backend(), Backend::Cpu(_))).map(|c| c.seconds.clone());
     for contestant in racing {
         let [low, median, high] = quartiles(&contestant.seconds);
@@ -242,7 +243,7 @@ fn measure(objects: usize, rounds: usize, contestants: &mut [Contestant], remark
         );
         contestant.last = Some((median, objects));
     }
-    // A run that is cut short keeps the sizes that it measured. Whoever stopped listening gets no more.
+    // A run that is interrupted keeps the sizes that it measured. An error means that nobody reads.
     let _ = std::io::stdout().flush();
 }
 
@@ -278,7 +279,8 @@ fn bench() -> Result<Vec<String>, String> {
         }
     }
     println!(
-        "\n| objects | algorithm | memory | median ms | quartiles ms | frames | times grid-sap@cpu{} | G box tests/s |\n\
+        "\n| objects | algorithm | memory | median ms | quartiles ms | frames | times grid-sap@cpu{} \
+         | G box tests/s |\n\
          |---|---|---|---|---|---|---|---|",
         usable_cores()
     );

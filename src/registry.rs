@@ -5,6 +5,7 @@ use crate::broad_phase::BroadPhase;
 use crate::cpu::{self, Create, Made, Method, Simd, SimdLevel, Threads};
 use crate::entry::Entry;
 use crate::error::{Error, Unavailable};
+use std::any::{Any, TypeId};
 use std::fmt;
 use std::sync::Arc;
 
@@ -23,13 +24,27 @@ pub struct Registry {
     /// The most threads of a built-in algorithm.
     cores: u32,
     simd: SimdLevel,
-    #[cfg(feature = "gpu")]
-    gpus: crate::gpu::Gpus,
+    sources: Vec<Box<dyn AlgorithmSource>>,
+}
+
+/// Lists algorithms and makes them, for a package that brings many of them, such as those on GPUs.
+pub trait AlgorithmSource: Any + Send + Sync {
+    /// Returns the algorithms that a registry lists.
+    fn entries(&self) -> Vec<Entry>;
+
+    /// Makes an algorithm, listed or not; `None` if it is not one of this source.
+    fn create(&self, id: &AlgorithmId) -> Option<Result<Box<dyn BroadPhase>, Error>>;
 }
 
 /// Makes the algorithm of an entry.
 enum Maker {
+<<<<<<< HEAD
     BuiltIn,
+=======
+    Ours,
+    /// The source of this type.
+    Source(TypeId),
+>>>>>>> h-gpu
     One(Factory),
     Family(FamilyFactory),
 }
@@ -51,8 +66,7 @@ impl Registry {
             threads: Threads::default(),
             cores: cores.clamp(1, MOST_THREADS),
             simd: SimdLevel::in_use(),
-            #[cfg(feature = "gpu")]
-            gpus: crate::gpu::Gpus::none(),
+            sources: Vec::new(),
         };
         for method in cpu::METHODS {
             for threads in thread_counts(cores) {
@@ -110,6 +124,7 @@ impl Registry {
         self.entries.iter().position(|e| e.id == *id)
     }
 
+<<<<<<< HEAD
     /// Returns the maker of an algorithm; `None` also if it is built in.
     fn users_maker(&self, id: &AlgorithmId) -> Option<&Maker> {
         self.position(id).map(|at| &self.makers[at]).filter(|maker| !matches!(maker, Maker::BuiltIn))
@@ -127,8 +142,27 @@ impl Registry {
         for entry in crate::gpu::algorithms(gpus.identities()) {
             if self.position(&entry.id).is_none() {
                 self.set(entry, Maker::BuiltIn);
+=======
+    /// Adds the algorithms of a source, except those whose ids are listed already. It replaces an earlier source of the same type.
+    pub fn add_source<S: AlgorithmSource>(&mut self, source: S) {
+        let is_old = |maker: &Maker| matches!(maker, Maker::Source(of) if *of == TypeId::of::<S>());
+        let mut makers = self.makers.iter();
+        self.entries.retain(|_| !makers.next().is_some_and(is_old));
+        self.makers.retain(|maker| !is_old(maker));
+        self.sources.retain(|old| !(&**old as &dyn Any).is::<S>());
+        for entry in source.entries() {
+            if self.position(&entry.id).is_none() {
+                self.set(entry, Maker::Source(TypeId::of::<S>()));
+>>>>>>> h-gpu
             }
         }
+        self.sources.push(Box::new(source));
+    }
+
+    /// Returns the source of a type that was added.
+    #[must_use]
+    pub fn source<S: AlgorithmSource>(&self) -> Option<&S> {
+        self.sources.iter().find_map(|s| (&**s as &dyn Any).downcast_ref())
     }
 
     /// Limits the SIMD level of the built-in algorithms that are created from now on.
@@ -222,6 +256,7 @@ impl Registry {
         self.threads.kind()
     }
 
+<<<<<<< HEAD
     /// Returns the GPUs of [`add_gpus`](Self::add_gpus).
     #[cfg(all(feature = "measure-gpu", feature = "this-machine"))]
     pub(crate) fn gpus(&self) -> &crate::gpu::Gpus {
@@ -238,6 +273,9 @@ impl Registry {
     }
 
     /// Returns why a cost for this revision of an algorithm does not apply here, or `None` if it does.
+=======
+    /// Why a cost of `revision` of an algorithm says nothing here, if it doesn't.
+>>>>>>> h-gpu
     pub(crate) fn mismatch(&self, id: &AlgorithmId, revision: u32) -> Option<Error> {
         let unavailable = |reason| Some(Error::Unavailable { algorithm: id.clone(), reason });
         let class = id.backend().class();
@@ -254,13 +292,19 @@ impl Registry {
         }
     }
 
+<<<<<<< HEAD
     /// Makes an instance of an algorithm: a listed one, a built-in one on any number of CPU threads up to the most that
     /// is listed, or one on any of the added GPUs.
+=======
+    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads up to the most that is listed, and
+    /// what a [source](Self::add_source) makes without listing it.
+>>>>>>> h-gpu
     ///
     /// # Errors
     /// [`Error::UnknownAlgorithm`]. [`Error::Unavailable`], for example if a file from a larger machine names more
     /// threads than this one has cores.
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
+<<<<<<< HEAD
         match (self.users_maker(id), built_in(id), id.backend()) {
             (Some(Maker::One(factory)), ..) => factory(),
             (Some(Maker::Family(factory)), ..) => factory(&[id.threads()]),
@@ -274,9 +318,25 @@ impl Registry {
                 crate::gpu::OnGpus::create(id, &self.gpus)
             }
             _ => {
+=======
+        match self.position(id).map(|at| &self.makers[at]) {
+            Some(Maker::One(factory)) => return factory(),
+            Some(Maker::Family(factory)) => return factory(&[id.threads()]),
+            Some(Maker::BuiltIn | Maker::Source(_)) | None => {}
+        }
+        match (ours(id), id.backend()) {
+            (Some(method), &Backend::Cpu(threads)) => match self.unavailable(threads) {
+                None => match method.create {
+                    Create::OneWidth(create) => create(threads, &self.threads, Simd::at_most(self.simd)),
+                    Create::AnyWidth(create) => create(&[threads], &self.threads, Simd::at_most(self.simd)),
+                },
+                Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
+            },
+            _ => self.sources.iter().find_map(|source| source.create(id)).unwrap_or_else(|| {
+>>>>>>> h-gpu
                 let known: Vec<String> = self.entries.iter().map(|e| e.id.to_string()).collect();
                 Err(Error::UnknownAlgorithm { text: id.to_string(), hint: format!("known here: {}", known.join(", ")) })
-            }
+            }),
         }
     }
 
@@ -305,7 +365,12 @@ impl Registry {
     /// Returns the family of an algorithm that can run here, if it has one.
     fn family(&self, id: &AlgorithmId) -> Option<Family<'_>> {
         let &Backend::Cpu(threads) = id.backend() else { return None };
+<<<<<<< HEAD
         match self.users_maker(id) {
+=======
+        match self.position(id).map(|at| &self.makers[at]) {
+            Some(Maker::One(_) | Maker::Source(_)) => None,
+>>>>>>> h-gpu
             Some(Maker::Family(factory)) => Some(Family::Users(factory)),
             Some(_) => None,
             None => match built_in(id)?.create {

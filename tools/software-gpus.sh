@@ -1,14 +1,13 @@
 #!/usr/bin/env bash
-# Gives a shell two different software GPUs, Mesa's lavapipe and SwiftShader, side by side:
+# Gives a shell two different software GPUs, Mesa's lavapipe and SwiftShader:
 #
 #     eval "$(tools/software-gpus.sh)"
 #
-# Prints the two variables for it and nothing else; whatever it does is told on standard error. What is missing comes from
-# Debian's packages: lavapipe and the Vulkan loader are installed; SwiftShader is one file of the package chromium-common,
-# which, where it is not installed, is downloaded and unpacked into a cache folder. Where all is there, nothing is asked of
-# the network.
+# Prints two variables on standard output, and its progress on standard error. Gets what is missing from Debian's
+# packages: installs lavapipe and the Vulkan loader; SwiftShader is a file of chromium-common, which is downloaded and
+# unpacked into a cache folder unless it is installed. Uses no network if nothing is missing.
 #
-# SWIFTSHADER=/path/to/libvk_swiftshader.so takes that file instead. Every Chromium and Chrome brings one along.
+# SWIFTSHADER=/path/to/libvk_swiftshader.so uses that file instead. Every Chromium and Chrome contains one.
 set -euo pipefail
 . "$(dirname "$0")/vulkan-driver.sh"
 
@@ -20,23 +19,17 @@ work=
 trap '[ -z "$work" ] || rm -rf "$work"' EXIT
 
 has_loader() {
-    # Debian's ldconfig is in no ordinary user's PATH.
+    # Debian's ldconfig is not in an ordinary user's PATH.
     PATH=$PATH:/sbin:/usr/sbin ldconfig -p | grep -F 'libvulkan.so.1 ' >/dev/null
 }
-# The file that tells the loader where lavapipe is. Its name holds the architecture in older releases of Mesa.
+# Prints lavapipe's file for the loader. In older releases of Mesa its name contains the architecture.
 lavapipe() {
-    local file
-    for file in /usr/share/vulkan/icd.d/lvp_icd*.json /usr/local/share/vulkan/icd.d/lvp_icd*.json /etc/vulkan/icd.d/lvp_icd*.json; do
-        if [ -e "$file" ]; then
-            echo "$file"
-            return
-        fi
-    done
+    find /usr/share/vulkan /usr/local/share/vulkan /etc/vulkan -path '*icd.d/lvp_icd*.json' 2>/dev/null | head -n 1
 }
 need_apt() {
     command -v apt-get >/dev/null && command -v dpkg >/dev/null && return
-    fail "$1 is missing, and there is no apt-get here to get it with. Install Mesa's Vulkan drivers (lavapipe) and the Vulkan" \
-        "loader with your system's packages, set SWIFTSHADER to the libvk_swiftshader.so of a Chromium or Chrome, and run this again."
+    fail "$1 is missing, and there is no apt-get here. Install Mesa's Vulkan drivers (lavapipe) and the Vulkan loader," \
+        "set SWIFTSHADER to the libvk_swiftshader.so of a Chromium or Chrome, and run this again."
 }
 as_root() {
     if [ "$(id -u)" = 0 ]; then
@@ -44,7 +37,7 @@ as_root() {
     elif command -v sudo >/dev/null; then
         sudo "$@"
     else
-        fail "this needs root, and there is no sudo here. Let root run: $*"
+        fail "this needs root, and there is no sudo here; run as root: $*"
     fi
 }
 
@@ -52,10 +45,13 @@ if ! has_loader || [ -z "$(lavapipe)" ]; then
     need_apt "lavapipe or the Vulkan loader"
     say "installing lavapipe and the Vulkan loader"
     packages=(mesa-vulkan-drivers libvulkan1)
-    # The lists of a fresh machine or container may be empty or too old.
-    { as_root apt-get install -qy "${packages[@]}" || { as_root apt-get update -q && as_root apt-get install -qy "${packages[@]}"; }; } >&2
+    {
+        # The package lists of a fresh machine or container may be empty or old.
+        as_root apt-get install -qy "${packages[@]}" \
+            || { as_root apt-get update -q && as_root apt-get install -qy "${packages[@]}"; }
+    } >&2
     if ! has_loader || [ -z "$(lavapipe)" ]; then
-        fail "mesa-vulkan-drivers and libvulkan1 are installed, and lavapipe is still not there"
+        fail "mesa-vulkan-drivers and libvulkan1 are installed, but lavapipe is not there"
     fi
 fi
 
@@ -64,7 +60,7 @@ installed=/usr/lib/chromium/libvk_swiftshader.so
 if [ -z "${SWIFTSHADER:-}" ] && [ -e "$installed" ]; then SWIFTSHADER=$installed; fi
 swiftshader=${SWIFTSHADER:-$cache/libvk_swiftshader.so}
 if [ ! -e "$swiftshader" ]; then
-    [ -z "${SWIFTSHADER:-}" ] || fail "there is no $swiftshader; SWIFTSHADER names it"
+    [ -z "${SWIFTSHADER:-}" ] || fail "SWIFTSHADER is $swiftshader, which does not exist"
     need_apt SwiftShader
     say "downloading Debian's chromium-common into $cache, for libvk_swiftshader.so"
     work=$(mktemp -d "$cache/unpack.XXXXXX")
@@ -74,8 +70,8 @@ if [ ! -e "$swiftshader" ]; then
         dpkg -x chromium-common_*.deb .
     ) >&2
     file=$(find "$work" -name libvk_swiftshader.so -print -quit)
-    [ -n "$file" ] || fail "this release's chromium-common holds no libvk_swiftshader.so; set SWIFTSHADER to one of a Chromium or Chrome"
-    # In one step, so that two of these at once do not see half a file.
+    [ -n "$file" ] || fail "this chromium-common has no libvk_swiftshader.so; set SWIFTSHADER to that of a Chrome"
+    # In one step, in case another run of this script reads it.
     mv -f "$file" "$swiftshader"
 fi
 swiftshader=$(realpath "$swiftshader")
@@ -83,7 +79,7 @@ swiftshader=$(realpath "$swiftshader")
 icd=$cache/swiftshader_icd.json
 write_driver "$icd" "$swiftshader" 1.1.0
 
-# The loaders before 1.3.207 know the first name only, later ones prefer the second.
+# Loaders before 1.3.207 know only the first name; later ones prefer the second.
 for name in VK_ICD_FILENAMES VK_DRIVER_FILES; do
     printf 'export %s=%q\n' "$name" "$(lavapipe):$icd"
 done

@@ -299,11 +299,13 @@ fn hardware(
     }
     hardware.machine.simd = simd.to_string();
     #[cfg(feature = "measure-gpu")]
-    for index in registry.gpus().identities().map(|g| g.index) {
+    let gpus = registry.source::<crate::gpu::Gpus>().cloned().unwrap_or_default();
+    #[cfg(feature = "measure-gpu")]
+    for index in gpus.identities().map(|g| g.index) {
         if plan.pace.as_ref().is_some_and(|pace| pace.is_stopped()) {
             break;
         }
-        match measure::gpu(registry.gpus(), index, &plan) {
+        match measure::gpu(&gpus, index, &plan) {
             Ok(gpu) => hardware.gpus.push(gpu),
             Err(why) => remarks.push(format!("gpu{index} can't be measured: {why}")),
         }

@@ -1,4 +1,4 @@
-//! The GPUs of this machine, found or given by the program: numbered, opened once and shared.
+//! The GPUs of this machine.
 
 use super::device::Gpu;
 use crate::error::{GpuError, GpuErrorKind};
@@ -6,7 +6,7 @@ use crate::hardware::{GpuIdentity, GpuKind};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// The GPUs that were found or given, in the order of their numbers. A GPU is opened once for all clones.
+/// GPUs that were found or that the program gave, in the order of their numbers. A GPU is opened once for all clones.
 #[derive(Debug, Clone, Default)]
 pub struct Gpus {
     found: Vec<Arc<Found>>,
@@ -15,22 +15,22 @@ pub struct Gpus {
 #[derive(Debug)]
 struct Found {
     identity: GpuIdentity,
-    /// `None` of a GPU that the program opened itself.
+    /// `None` for a GPU that the program opened itself.
     adapter: Option<wgpu::Adapter>,
     opened: Mutex<Option<Result<Gpu, GpuError>>>,
-    /// Where it is to be another than the usual one.
+    /// `None` for the default.
     wait_limit: Mutex<Option<Duration>>,
 }
 
 impl Gpus {
-    /// Looks for GPUs. Loads the drivers of the system; takes tens of milliseconds.
+    /// Finds GPUs. Loads the drivers of the system, which takes tens of milliseconds.
     ///
-    /// The usual variables of the drivers apply (`VK_DRIVER_FILES`, `WGPU_BACKEND`, ...).
+    /// The environment variables of drivers and wgpu apply (`VK_DRIVER_FILES`, `WGPU_BACKEND`, ...).
     #[must_use]
     pub fn find() -> Self {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle().with_env();
         descriptor.backends &= wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
-        // Validation layers would check every call of a release build where they are installed.
+        // Installed validation layers would check every call, in release builds too.
         descriptor.flags -= wgpu::InstanceFlags::VALIDATION | wgpu::InstanceFlags::DEBUG;
         let backends = descriptor.backends;
         let instance = wgpu::Instance::new(descriptor);
@@ -54,8 +54,8 @@ impl Gpus {
         Self { found: found.collect() }
     }
 
-    /// GPUs that the program has opened itself, under the numbers of their identities: algorithms work on its devices and
-    /// queues. Of two with one number the first is taken.
+    /// GPUs that the program opened itself, under the numbers of their identities. Algorithms work on its devices and
+    /// queues. The first of two with the same number counts.
     ///
     /// ```no_run
     /// use sapwise::gpu::{Gpu, Gpus, wgpu30 as wgpu};
@@ -86,13 +86,13 @@ impl Gpus {
         Self { found }
     }
 
-    /// No GPU at all, without looking.
+    /// No GPU at all. Loads no driver.
     #[must_use]
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// Those of them that are wanted, under their numbers.
+    /// Returns those that `wanted` accepts. They keep their numbers.
     ///
     /// ```
     /// # use sapwise::{GpuKind, gpu::Gpus};
@@ -103,19 +103,18 @@ impl Gpus {
         Self { found: self.found.iter().filter(|f| wanted(&f.identity)).cloned().collect() }
     }
 
-    /// Sets the [wait limit](Gpu::set_wait_limit) of each of them, open or not: a program that begins with [`find`](Self::find) has it before
-    /// the first frame, whatever opens the GPUs.
+    /// Sets the [wait limit](Gpu::set_wait_limit) of each of them, now if it is open or when it is opened.
     ///
     /// ```
     /// # use sapwise::gpu::Gpus;
     /// let gpus = Gpus::find();
-    /// // A game goes on with the CPU where a driver does not answer.
+    /// // A game goes on with the CPU if a driver does not answer.
     /// gpus.set_wait_limit(std::time::Duration::from_millis(500));
     /// ```
     pub fn set_wait_limit(&self, limit: Duration) {
         for found in &self.found {
             found.wait_limit.lock().unwrap_or_else(PoisonError::into_inner).replace(limit);
-            // One that is being opened takes it when it is open.
+            // A GPU that is being opened reads the limit afterwards.
             if let Some(Ok(gpu)) = &*found.opened.lock().unwrap_or_else(PoisonError::into_inner) {
                 gpu.set_wait_limit(limit);
             }
@@ -126,35 +125,36 @@ impl Gpus {
         self.found.iter().map(|f| &**f).find(|f| f.identity.index == index)
     }
 
-    /// What each of them says of itself.
+    /// Returns the identity of each.
     pub fn identities(&self) -> impl ExactSizeIterator<Item = &GpuIdentity> {
         self.found.iter().map(|f| &f.identity)
     }
 
-    /// How many there are.
+    /// Returns how many there are.
     #[must_use]
     pub fn len(&self) -> usize {
         self.found.len()
     }
 
-    /// Whether there is none.
+    /// Returns whether there is none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
     }
 
-    /// The adapter of a number, for queries beyond what [`GpuIdentity`] says; `None` of a GPU that the program opened itself.
+    /// Returns the adapter with this number, for more than [`GpuIdentity`] has. `None` for a GPU that the program
+    /// opened itself.
     #[must_use]
     pub fn adapter(&self, index: u32) -> Option<&wgpu::Adapter> {
         self.found(index)?.adapter.as_ref()
     }
 
-    /// Opens a GPU, or returns the one that is open already.
+    /// Opens a GPU, or returns it if it is open already.
     ///
-    /// One that was lost or could not be opened stays so until GPUs are looked for again.
+    /// A GPU that was lost or could not be opened stays so; call [`find`](Self::find) again.
     ///
     /// # Errors
-    /// [`GpuErrorKind::NotFound`], when there is no such GPU or its driver refuses.
+    /// [`GpuErrorKind::NotFound`] if there is no such GPU or its driver refuses.
     pub fn open(&self, index: u32) -> Result<Gpu, GpuError> {
         let Some(found) = self.found(index) else {
             let text = match self.len() {
@@ -166,7 +166,7 @@ impl Gpus {
             };
             return Err(GpuError::new(GpuErrorKind::NotFound, text));
         };
-        // A panic in a driver while the lock was held leaves the slot as it was.
+        // A driver that panics while the lock is held leaves the slot as it was.
         let mut slot = found.opened.lock().unwrap_or_else(PoisonError::into_inner);
         slot.get_or_insert_with(|| found.open()).clone()
     }
@@ -174,7 +174,7 @@ impl Gpus {
     /// Opens a GPU a second time, with a queue and memory of its own.
     ///
     /// # Errors
-    /// As [`open`](Self::open), and of a GPU that the program opened itself.
+    /// As [`open`](Self::open), and for a GPU that the program opened itself.
     pub fn open_another(&self, index: u32) -> Result<Gpu, GpuError> {
         let none = || GpuError::new(GpuErrorKind::NotFound, format!("there is no gpu{index}"));
         self.found(index).ok_or_else(none)?.open()
@@ -196,7 +196,8 @@ impl Found {
 }
 
 impl GpuIdentity {
-    /// What wgpu says of an adapter, as the GPU of a number. `wgpu::Device::adapter_info` has it of an open device.
+    /// The identity of a GPU with this number, from what wgpu reports. An open device has it in
+    /// `wgpu::Device::adapter_info`.
     #[must_use]
     pub fn of(index: u32, info: &wgpu::AdapterInfo) -> Self {
         let driver = format!("{} {}", info.driver, info.driver_info);
@@ -211,14 +212,14 @@ impl GpuIdentity {
     }
 }
 
-/// Windows shows each card through DX12 and through Vulkan; the latter is taken.
+/// Returns whether `a` is the DX12 adapter of a card that also has a Vulkan one, which is preferred.
 fn twins(a: &wgpu::AdapterInfo, b: &wgpu::AdapterInfo) -> bool {
     a.backend == wgpu::Backend::Dx12
         && b.backend == wgpu::Backend::Vulkan
         && (a.vendor, a.device) == (b.vendor, b.device)
 }
 
-/// Two drivers for one card show it twice; the first one is taken.
+/// Returns whether two drivers show the same card. The first is taken.
 fn same_card(a: &wgpu::AdapterInfo, b: &wgpu::AdapterInfo) -> bool {
     !a.device_pci_bus_id.is_empty()
         && (a.backend, &a.device_pci_bus_id, a.vendor, a.device)
@@ -235,7 +236,7 @@ fn kind(device_type: wgpu::DeviceType) -> GpuKind {
     }
 }
 
-/// The first GPU; `None` where there is none and `SAPWISE_REQUIRE_GPU` is not 1.
+/// Opens the first GPU. `None` if there is none and `SAPWISE_REQUIRE_GPU` is not 1.
 #[cfg(test)]
 pub(crate) fn first_for_tests() -> Option<Gpu> {
     let opened = Gpus::find().open(0);

@@ -1,15 +1,17 @@
 //! Every box against every other; see `shaders/brute.wgsl`.
 
 use super::device::Gpu;
-use super::inputs::Inputs;
 use super::kernel::{Bound, Kernel, source};
+use super::look::Look;
 use super::output::Output;
+use super::params::Params;
+use super::search::{Inputs, Search};
 use crate::error::GpuError;
 
 /// Boxes of a tile.
 const TILE: u32 = 128;
 
-/// The method on one GPU.
+/// The method on one GPU. Its blocks are pairs of tiles.
 #[derive(Debug)]
 pub(super) struct Brute {
     count: Kernel,
@@ -18,9 +20,6 @@ pub(super) struct Brute {
 }
 
 impl Brute {
-    /// The kernel numbers tile pairs in 32 bits.
-    pub(super) const MOST_OBJECTS: usize = 1 << 22;
-
     pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         Ok(Self {
             count: Kernel::new(gpu, source::BRUTE, "count")?,
@@ -28,17 +27,33 @@ impl Brute {
             bound: None,
         })
     }
+}
 
-    /// Tile pairs of a frame, which takes as many submissions as there are bands of [`band`](Self::band) tile pairs.
-    pub(super) fn blocks(objects: u32) -> u64 {
+impl Search for Brute {
+    fn most_objects(&self) -> usize {
+        // The kernel numbers tile pairs in 32 bits.
+        1 << 22
+    }
+
+    fn growth(&self) -> f64 {
+        2.0
+    }
+
+    fn plan(&self, objects: u32, _: &dyn Fn() -> Look) -> Params {
+        Params { objects, ..Params::default() }
+    }
+
+    fn blocks(&self, objects: u32) -> u64 {
         let tiles = u64::from(objects.div_ceil(TILE));
         tiles * (tiles + 1) / 2
     }
 
-    /// Tile pairs of one submission, at most: with as many tests as the other methods have in one, see [`params`](super::params).
-    pub(super) const BAND: u32 = 1 << 16;
+    /// As many tests in one submission as the other methods have; see [`params`](super::params).
+    fn most_blocks(&self) -> u32 {
+        1 << 16
+    }
 
-    pub(super) fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
+    fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
         let common = [(0, inputs.params), (1, inputs.boxes), (2, inputs.ids)];
         let count = [common.as_slice(), &[(3, inputs.header), (4, output.sums())]].concat();
         let write = [common.as_slice(), &[(4, output.sums()), (5, output.pairs())]].concat();
@@ -46,15 +61,15 @@ impl Brute {
         Ok(())
     }
 
-    pub(super) fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, blocks: u32) {
+    fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
         if let Some([count, _]) = &self.bound {
-            count.dispatch(pass, blocks);
+            count.dispatch(pass, params.blocks);
         }
     }
 
-    pub(super) fn record_write(&self, pass: &mut wgpu::ComputePass<'_>, blocks: u32) {
+    fn record_write(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
         if let Some([_, write]) = &self.bound {
-            write.dispatch(pass, blocks);
+            write.dispatch(pass, params.blocks);
         }
     }
 }

@@ -1,9 +1,8 @@
-//! A counting sort by cell, which leaves a table of where cells begin; see `shaders/cells.wgsl`.
+//! Counting sort by cell, which also makes the table of where each cell begins; see `shaders/cells.wgsl`.
 
 use super::device::Gpu;
 use super::kernel::{Bound, Kernel, source};
-use super::params::Params;
-use super::sizes::CELLS_OF_BLOCK;
+use super::params::{CELLS_OF_BLOCK, Params};
 use super::storage::Storage;
 use crate::error::GpuError;
 
@@ -16,7 +15,7 @@ pub(super) struct Cells {
     add_up: Kernel,
     begin: Kernel,
     put: Kernel,
-    /// For each box in the input its cell and how far it reaches.
+    /// Cell and reach of each box, in the order of the input.
     keys: Storage,
     ranks: Storage,
     order: Storage,
@@ -42,14 +41,15 @@ impl Cells {
         })
     }
 
-    /// Makes room for a frame. Whether a buffer is another one now.
+    /// Makes room for a frame. Returns whether a buffer was replaced.
     pub(super) fn ensure(&mut self, gpu: &Gpu, params: &Params) -> Result<bool, GpuError> {
         let n = u64::from(params.objects);
         let mut grown = self.keys.ensure(gpu, n * 8)?;
         for list in [&mut self.ranks, &mut self.order, &mut self.sorted_keys] {
             grown |= list.ensure(gpu, n * 4)?;
         }
-        // There are about as many cells as boxes. How many exactly changes with the scene, and must not cost a buffer each time.
+        // There are about as many cells as boxes. Their exact number changes with the scene, and must not replace the
+        // buffer each time.
         let usual = (params.objects + params.objects / 4).div_ceil(CELLS_OF_BLOCK) + 1;
         let blocks = u64::from(params.cell_blocks.max(usual));
         grown |= self.table.ensure(gpu, blocks * u64::from(CELLS_OF_BLOCK) * 4)?;
@@ -67,17 +67,18 @@ impl Cells {
         Ok(())
     }
 
-    /// Where the keys go before the sort, the counts of cells, which are added to what is there, and which of its cell each box is.
+    /// Returns the buffers of the keys, of the counts of the cells, and of the rank of each box in its cell, which
+    /// the caller fills.
     pub(super) fn unsorted(&self) -> [&wgpu::Buffer; 3] {
         [self.keys.buffer(), self.table.buffer(), self.ranks.buffer()]
     }
 
-    /// After the sort: which box stood where.
+    /// Returns the buffer that has the old position of each sorted box.
     pub(super) fn order(&self) -> &wgpu::Buffer {
         self.order.buffer()
     }
 
-    /// The cells in order, once the boxes are gathered.
+    /// Returns the buffer of the cells of the sorted boxes, which `gather_cells` fills.
     pub(super) fn sorted_keys(&self) -> &wgpu::Buffer {
         self.sorted_keys.buffer()
     }

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The longest that a submission may take before its GPU counts as lost, unless it is set otherwise. Drivers of desktops give up after 2 to 10 s; a
+/// Default time after which a GPU that does not answer counts as lost. Drivers of desktops give up after 2 to 10 s; a
 /// software adapter may be a thousand times slower than a real one.
 const WAIT_LIMIT: Duration = Duration::from_secs(60);
 
@@ -24,12 +24,12 @@ struct Shared {
     device: wgpu::Device,
     queue: wgpu::Queue,
     limits: wgpu::Limits,
-    /// Why it can't be used any more.
+    /// Why it can no longer be used.
     fault: Fault,
     wait_limit_ms: AtomicU64,
 }
 
-/// Set once: what came first stays.
+/// Set once: the first fault stays.
 type Fault = Arc<Mutex<Option<GpuError>>>;
 
 fn note(fault: &Fault, error: GpuError) {
@@ -37,12 +37,12 @@ fn note(fault: &Fault, error: GpuError) {
 }
 
 impl Gpu {
-    /// Opens an adapter with all of its limits.
+    /// Opens an adapter with all its limits.
     pub(super) fn open(adapter: &wgpu::Adapter, identity: GpuIdentity) -> Result<Self, GpuError> {
         let limits = adapter.limits();
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("sapwise"),
-            // Only to observe how many lanes run in lockstep: no algorithm depends on it.
+            // Only to measure how many lanes run in lockstep: no algorithm depends on it.
             required_features: adapter.features() & wgpu::Features::SUBGROUP,
             required_limits: limits.clone(),
             memory_hints: wgpu::MemoryHints::Performance,
@@ -56,10 +56,10 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// A device and queue that the caller has opened, so that a program that draws with wgpu shares them.
+    /// A device and queue that the program opened, for example to draw with.
     ///
-    /// The device stays the program's: its handlers of lost devices and of uncaught errors are not touched, and no error of ours reaches
-    /// them. That it was lost we notice by ourselves, when it takes no more work.
+    /// The program's handlers for lost devices and uncaught errors stay in place, and never see an error of ours. We
+    /// notice a lost device when it takes no more work.
     #[must_use]
     pub fn from_parts(device: wgpu::Device, queue: wgpu::Queue, identity: GpuIdentity) -> Self {
         let limits = device.limits();
@@ -67,7 +67,7 @@ impl Gpu {
         Self { shared: Arc::new(Shared { identity, device, queue, limits, fault: Fault::default(), wait_limit_ms }) }
     }
 
-    /// Takes over the handlers of a device that we opened ourselves: its loss is then known before the next frame.
+    /// Sets the handlers of a device that we opened ourselves, so that a loss is known before the next frame.
     fn listen(&self) {
         let (lost, uncaught) = (Arc::clone(&self.shared.fault), Arc::clone(&self.shared.fault));
         self.shared.device.set_device_lost_callback(move |reason, message| {
@@ -84,18 +84,21 @@ impl Gpu {
         Duration::from_millis(self.shared.wait_limit_ms.load(Ordering::Relaxed))
     }
 
-    /// Begins to record commands. Whatever else is done to buffers until they are submitted belongs to them, should it fail.
+    /// Begins to record commands. Errors of other calls, until the commands are submitted, count as theirs.
     pub(crate) fn record(&self) -> Recording {
         Recording::new(&self.shared.device)
     }
 
-    /// Submits what was recorded, and returns what the device has against it.
+    /// Submits what was recorded.
+    ///
+    /// # Errors
+    /// The device refuses it, or was lost.
     pub(crate) fn submit(&self, recording: Recording) -> Result<wgpu::SubmissionIndex, GpuError> {
         self.check()?;
         recording.submit(&self.shared.queue).map_err(|e| self.refusal("the device refuses", e))
     }
 
-    /// Asks for a part of a buffer to be mapped. Whether that went well `done` is told, and nobody else.
+    /// Asks the device to map a part of a buffer. Only `done` gets the result.
     pub(crate) fn map(
         &self,
         slice: wgpu::BufferSlice<'_>,
@@ -107,7 +110,7 @@ impl Gpu {
         let _ = scope.end();
     }
 
-    /// Unmaps a buffer. One of a lost device can't be, which the next submission tells.
+    /// Unmaps a buffer. If the device was lost this fails, and the next submission reports it.
     #[cfg(feature = "measure-gpu")]
     pub(crate) fn unmap(&self, buffer: &wgpu::Buffer) {
         let scope = Scope::of_one(&self.shared.device, wgpu::ErrorFilter::Validation);
@@ -115,13 +118,14 @@ impl Gpu {
         let _ = scope.end();
     }
 
-    /// That the device refuses, unless it was lost: then nothing that it says of its buffers is the reason.
+    /// Returns the error of a device that refuses; if it was lost, that instead, because its other errors follow from
+    /// it.
     pub(super) fn refusal(&self, text: &str, source: impl std::error::Error + Send + Sync + 'static) -> GpuError {
         let refused = GpuError::caused(GpuErrorKind::Refused, text, source);
         self.check().err().or_else(|| self.probe().err()).unwrap_or(refused)
     }
 
-    /// Whether the device still takes work: one that was lost does not say so, it returns things that don't exist.
+    /// Checks that the device still takes work. A lost device does not report it: it returns handles to nothing.
     pub(super) fn probe(&self) -> Result<(), GpuError> {
         let scope = Scope::new(&self.shared.device);
         let submission = self.shared.queue.submit([]);
@@ -130,44 +134,45 @@ impl Gpu {
             self.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(Duration::ZERO) });
         match polled {
             Err(wgpu::PollError::WrongSubmissionIndex(..)) => note(&self.shared.fault, lost()),
-            // It is at work.
+            // It takes work.
             Ok(_) | Err(wgpu::PollError::Timeout) => {}
         }
         self.check()
     }
 
-    /// Sets the longest that a submission may take before this GPU counts as lost: a minute unless it is set, which is long for a
-    /// game. Below a millisecond it is one. For GPUs that others open there is [`Gpus::set_wait_limit`](super::Gpus::set_wait_limit).
+    /// Sets the time after which this GPU counts as lost if it does not answer. Default: a minute, which is long for
+    /// a game; at least a millisecond. [`Gpus::set_wait_limit`](super::Gpus::set_wait_limit) sets it for GPUs that
+    /// are not open yet.
     pub fn set_wait_limit(&self, limit: Duration) {
         let ms = u64::try_from(limit.as_millis()).unwrap_or(u64::MAX);
         self.shared.wait_limit_ms.store(ms.max(1), Ordering::Relaxed);
     }
 
-    /// What the GPU says of itself.
+    /// Returns the identity of the GPU.
     #[must_use]
     pub fn identity(&self) -> &GpuIdentity {
         &self.shared.identity
     }
 
-    /// The device.
+    /// Returns the device.
     #[must_use]
     pub fn device(&self) -> &wgpu::Device {
         &self.shared.device
     }
 
-    /// The queue.
+    /// Returns the queue.
     #[must_use]
     pub fn queue(&self) -> &wgpu::Queue {
         &self.shared.queue
     }
 
-    /// The limits that the device was opened with.
+    /// Returns the limits with which the device was opened.
     #[must_use]
     pub fn limits(&self) -> &wgpu::Limits {
         &self.shared.limits
     }
 
-    /// Why the GPU can't be used any more, if it can't: it was lost, or an error came that nobody expected.
+    /// Returns why the GPU can no longer be used: it was lost, or an unexpected error came. `None` if it can.
     #[must_use]
     pub fn fault(&self) -> Option<String> {
         self.error().map(|error| error.to_string())
@@ -177,29 +182,31 @@ impl Gpu {
         self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// It was seen to execute nothing, and can't be used any more: for that reason, or one that came before.
+    /// Marks the GPU as one that executes nothing, and returns why it can no longer be used: this, or an earlier
+    /// fault.
     pub(crate) fn inert(&self) -> GpuError {
         let GpuIdentity { index, name, .. } = self.identity();
         let text = format!(
-            "gpu{index} ({name}) executes nothing: its driver takes work and says that it is done, and no kernel has run; update the \
-             driver, restart the machine or leave this GPU out"
+            "gpu{index} ({name}) executes nothing: its driver reports work as done, but no kernel ran; \
+             update the driver, restart the machine or leave this GPU out"
         );
-        // Dropping the queue asserts that all of its work is done.
+        // Dropping the queue asserts that all its work is done.
         std::mem::forget(self.clone());
         let error = GpuError::new(GpuErrorKind::Inert, text);
         note(&self.shared.fault, error.clone());
         self.error().unwrap_or(error)
     }
 
-    /// Waits for a submission, at most as long as the [limit](Self::set_wait_limit), and calls back what was mapped before it.
+    /// Waits for a submission, at most as long as the [limit](Self::set_wait_limit), and runs the callbacks of
+    /// finished mappings.
     ///
     /// # Errors
-    /// [`GpuErrorKind::Lost`], when the device was lost or takes too long. It counts as lost from then on.
+    /// [`GpuErrorKind::Lost`] if the device was lost or takes too long. It counts as lost from then on.
     pub fn wait(&self, submission: wgpu::SubmissionIndex) -> Result<(), GpuError> {
         self.wait_for(Some(submission))
     }
 
-    /// As [`wait`](Self::wait), for everything that was submitted.
+    /// Waits for everything that was submitted, as [`wait`](Self::wait) does.
     ///
     /// # Errors
     /// As [`wait`](Self::wait).
@@ -212,46 +219,46 @@ impl Gpu {
         let began = Instant::now();
         match self.poll(wgpu::PollType::Wait { submission_index, timeout: Some(limit) }) {
             Ok(_) => {}
-            // The driver has not waited at all, and says that it has.
+            // The driver reports a timeout without having waited.
             Err(wgpu::PollError::Timeout) if began.elapsed() < limit / 2 => drop(self.inert()),
             Err(wgpu::PollError::Timeout) => {
-                // Dropping the queue waits for it without a limit. A GPU that hangs is therefore never dropped.
+                // Dropping the queue would wait without a limit, so a GPU that hangs is never dropped.
                 std::mem::forget(self.clone());
                 let text = format!("it did not answer within {} ms", limit.as_millis());
                 note(&self.shared.fault, GpuError::new(GpuErrorKind::Lost, text));
             }
-            // Of a submission that was made and is not known.
+            // The device does not know a submission that it took.
             Err(wgpu::PollError::WrongSubmissionIndex(..)) => note(&self.shared.fault, lost()),
         }
         self.check()
     }
 
-    /// Polls the device. One that is lost while it is waited for is a fault from then on, and done with.
+    /// Polls the device. A loss during the poll becomes the GPU's fault.
     pub(super) fn poll(&self, poll: wgpu::PollType) -> Result<wgpu::PollStatus, wgpu::PollError> {
-        // wgpu 30 panics where the driver says that the device is lost, and where a wait is over and what was waited for is not done.
+        // wgpu 30 panics if the driver reports a lost device, and if a wait ends before the work is done.
         catch_unwind(AssertUnwindSafe(|| self.shared.device.poll(poll))).unwrap_or_else(|panic| {
             match fault_by_panic(&*panic) {
                 Some(GpuErrorKind::Lost) => note(&self.shared.fault, lost()),
                 Some(_) => drop(self.inert()),
-                // Of the program, in a callback of its own that came with our wait.
+                // The program's own callback, which our wait ran.
                 None => resume_unwind(panic),
             }
             Ok(wgpu::PollStatus::Poll)
         })
     }
 
-    /// `Err` once the GPU can't be used any more.
+    /// Checks that the GPU can still be used.
     ///
     /// # Errors
-    /// [`GpuErrorKind::Lost`] or [`GpuErrorKind::Inert`] says what happened.
+    /// [`GpuErrorKind::Lost`] or [`GpuErrorKind::Inert`].
     pub fn check(&self) -> Result<(), GpuError> {
         self.error().map_or(Ok(()), Err)
     }
 
-    /// Runs `make` and returns what it made, or the error of the device: out of memory, invalid, internal.
+    /// Runs `make` and returns what it made.
     ///
     /// # Errors
-    /// [`GpuErrorKind::Refused`], with the error of the device as its source.
+    /// [`GpuErrorKind::Refused`], with the device's error as its source: out of memory, invalid or internal.
     pub fn try_make<T>(&self, make: impl FnOnce(&wgpu::Device) -> T) -> Result<T, GpuError> {
         let scope = Scope::new(&self.shared.device);
         let made = make(&self.shared.device);
@@ -263,7 +270,7 @@ fn lost() -> GpuError {
     GpuError::new(GpuErrorKind::Lost, "the device was lost: it takes no more work")
 }
 
-/// What has become of the device, where that made wgpu panic.
+/// Returns the fault of a device that made wgpu panic; `None` for another panic.
 fn fault_by_panic(panic: &(dyn std::any::Any + Send)) -> Option<GpuErrorKind> {
     let text = panic.downcast_ref::<String>()?;
     if text.starts_with("Error in Device::poll: ") {
@@ -290,14 +297,14 @@ mod tests {
     use std::any::Any;
 
     #[test]
-    fn faults_are_told_from_panics_of_the_program() {
+    fn panics_of_wgpu_are_faults_and_others_are_not() {
         let text = |text: &str| fault_by_panic(&*(Box::new(text.to_owned()) as Box<dyn Any + Send>));
-        // As `CoreDevice::poll` and `Device::maintain` of wgpu 30 word them.
+        // The texts of `CoreDevice::poll` and `Device::maintain` in wgpu 30.
         assert_eq!(text("Error in Device::poll:   Parent device is lost\n"), Some(GpuErrorKind::Lost));
         let done =
             "If the queue is empty, the current submission index (0) should be at least the wait submission index (1)";
         assert_eq!(text(done), Some(GpuErrorKind::Inert));
         assert_eq!(text("the program's own"), None);
-        assert_eq!(fault_by_panic(&*(Box::new("of a literal") as Box<dyn Any + Send>)), None);
+        assert_eq!(fault_by_panic(&*(Box::new("a literal") as Box<dyn Any + Send>)), None);
     }
 }

@@ -1,23 +1,24 @@
 //! How an axis is divided into cells; see `shaders/division.wgsl`.
 //!
-//! Cells of one width are few where the boxes are, once some of them are far away. So an axis is divided along a line with corners through the
-//! distribution of the boxes, by the method of Ramer (1972) and of Douglas and Peucker (1973): one straight part where they lie evenly, a part for each
-//! cluster and each gap where they do not. Within a part all cells have one width.
+//! With cells of one width, a few boxes far away would leave few cells for the others. So an axis is divided into
+//! parts, each with cells of one width. The ends of the parts are the corners of a line that approximates the
+//! distribution of the boxes, by the method of Ramer (1972) and of Douglas and Peucker (1973). Evenly spread boxes
+//! have one part; otherwise each cluster and each gap has its own.
 
-/// Most parts of an axis: eight clusters with gaps between them.
+/// Most parts of an axis: eight clusters and the gaps between them.
 pub(super) const PARTS: usize = 16;
 
-/// A part is straight while no box of it is further from its line, in ranks, than this times the root of their number. Of a thousand looks at boxes that
-/// are spread evenly one finds such a box (Kolmogorov's distribution).
+/// A part is straight unless the rank of a box is off its line by more than this times the root of the number of
+/// boxes. One in a thousand samples of evenly spread boxes has such a box (Kolmogorov's distribution).
 const NOISE: f64 = 1.95;
 
-/// A frame is looked at by a sample of its boxes. A cluster ends not where the outermost of these lies, but this many times their mean distance beyond it.
+/// A cluster ends this many mean distances beyond its outermost sampled box, because others lie further out.
 const BEYOND: f64 = 2.0;
 
 /// The parts of an axis, ascending.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Parts {
-    /// Where each begins, with the rank of the sampled box there; behind the last part where it ends.
+    /// Where each part begins, with the rank of the sampled box there. The last entry is where the last part ends.
     corners: [(f64, f64); PARTS + 1],
     count: usize,
 }
@@ -43,10 +44,10 @@ pub(super) struct Division {
 }
 
 impl Parts {
-    /// Of boxes whose centres, in ascending order and finite, are these.
+    /// Divides an axis by the centres of sampled boxes, ascending and finite.
     pub(super) fn of(centres: &[f32]) -> Self {
         let Some(end) = centres.len().checked_sub(1) else { return Self { count: 1, ..Self::default() } };
-        // Where each begins and ends, and its sharpest corner, which is looked for once.
+        // First and last box, and the sharpest corner between.
         let part = |first: usize, last: usize| (first, last, sharpest(centres, first, last));
         let mut straight = vec![part(0, end)];
         while straight.len() < PARTS
@@ -74,7 +75,7 @@ impl Parts {
         let width = |k: usize| corners[k + 1].0 - corners[k].0;
         let distance = |k: usize| width(k) / (corners[k + 1].1 - corners[k].1);
         for k in 1..self.count {
-            // Both ends of a part may move, so neither as far as its middle.
+            // Neither end passes the middle of a part, because both may move.
             let (before, after) = (distance(k - 1), distance(k));
             self.corners[k].0 += if before < after {
                 (BEYOND * before).min(0.4 * width(k))
@@ -84,15 +85,16 @@ impl Parts {
         }
     }
 
-    /// Divides each part into as many cells as `cells` says of its width and its share of the boxes, and at least one.
+    /// Divides each part into cells. `cells` maps the part's width and its share of the boxes to their number; each
+    /// part has at least one.
     pub(super) fn divide(&self, cells: impl Fn(f64, f64) -> f64) -> Division {
         let all = self.corners[self.count].1.max(1.0);
-        // No bound is beyond the largest float, so that no box is found in a part that is not used.
+        // Unused parts begin at the largest float: the kernels clamp bounds below it.
         let mut division = Division { segments: [Segment { begin: f32::MAX, ..Segment::default() }; PARTS], cells: 0 };
         for (segment, ends) in division.segments.iter_mut().zip(self.corners[..=self.count].windows(2)) {
             let width = ends[1].0 - ends[0].0;
             let wanted = cells(width, (ends[1].1 - ends[0].1) / all).floor().max(1.0);
-            // A world so small that the inverse of a cell overflows has one, and so has one without a width.
+            // A part has one cell if it has no width, or if the inverse of a cell's width overflows.
             let per_length = if wanted > 1.0 { (wanted / width) as f32 } else { 0.0 };
             let count = if per_length.is_finite() { wanted as u32 } else { 1 };
             *segment = Segment {
@@ -107,7 +109,8 @@ impl Parts {
     }
 }
 
-/// The box between two that is furthest from the line between them, and by how many times what is taken for noise; `None` where all are near it.
+/// Returns the box that is furthest from the line between two others, and its distance over that of noise. `None` if
+/// noise explains all.
 fn sharpest(centres: &[f32], first: usize, last: usize) -> Option<(usize, f64)> {
     let at = |k: usize| f64::from(centres[k]);
     let boxes = (last - first) as f64;
@@ -121,13 +124,13 @@ fn sharpest(centres: &[f32], first: usize, last: usize) -> Option<(usize, f64)> 
 mod tests {
     use super::*;
 
-    /// The cell of a value, as the kernel finds it.
+    /// Returns the cell of a value, as the kernel does.
     fn cell(division: &Division, value: f32) -> u32 {
         let segment = division.segments.iter().rev().find(|s| s.begin <= value).unwrap_or(&division.segments[0]);
         segment.first + (((value - segment.begin) * segment.per_length).max(0.0) as u32).min(segment.last)
     }
 
-    /// 256 places that lie as evenly as chance lets them.
+    /// Returns 256 uniformly random places, sorted.
     fn evenly(seed: u64, length: f64) -> Vec<f32> {
         let mut list: Vec<f32> =
             (0..256).map(|k| (crate::splitmix::mix(seed << 32 | k) as f64 / u64::MAX as f64 * length) as f32).collect();
@@ -144,8 +147,8 @@ mod tests {
     }
 
     #[test]
-    fn clusters_and_the_gaps_between_them_have_parts_of_their_own() {
-        // Two of a length of 100, a million apart, and a few boxes far below both.
+    fn clusters_and_gaps_have_their_own_parts() {
+        // Two clusters of length 100, a million apart, and a few boxes far below both.
         let mut centres: Vec<f32> = evenly(1, 100.0)
             .into_iter()
             .step_by(2)
@@ -164,7 +167,7 @@ mod tests {
     #[test]
     fn no_cell_descends_as_the_bound_ascends() {
         for seed in 0..50 {
-            // Each place many times as far out as the one before, so that there are as many corners as there may be.
+            // Exponential growth has the most corners.
             let centres: Vec<f32> =
                 evenly(seed, 1.0).iter().map(|v| (v * 40.0 * ((seed % 7) as f32 + 0.1)).exp() - 5.0).collect();
             let division = Parts::of(&centres).divide(|width, share| (width * 3.0).min(share * 5000.0));

@@ -1,4 +1,4 @@
-//! What a plan for a GPU is made of: a glance at a frame.
+//! What a frame is planned by: statistics of a sample of its boxes.
 
 use super::division::Parts;
 use crate::load::{SampledBoxes, SceneStats};
@@ -7,12 +7,12 @@ use crate::load::{SampledBoxes, SceneStats};
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Look {
     pub(super) sample: SceneStats,
-    /// For each axis the parts in which the boxes lie evenly.
+    /// Parts of each axis in which the boxes lie evenly.
     pub(super) parts: [Parts; 3],
 }
 
 impl Look {
-    /// At boxes that were chosen from a frame, whose statistics are known.
+    /// The look of sampled boxes whose statistics are known.
     pub(super) fn of(chosen: &SampledBoxes, sample: SceneStats) -> Self {
         let boxes = chosen.as_slice();
         let parts = |axis: usize| {
@@ -24,13 +24,13 @@ impl Look {
         Self { sample, parts: [parts(0), parts(1), parts(2)] }
     }
 
-    /// At these boxes themselves.
+    /// The look of sampled boxes.
     pub(super) fn at(chosen: &SampledBoxes) -> Self {
         Self::of(chosen, SceneStats::of_sample(chosen))
     }
 }
 
-/// As `tame` of `shaders/curve.wgsl`.
+/// Clamps a bound as `tame` of `shaders/division.wgsl` does.
 fn tame(bound: f32) -> f32 {
     bound.clamp(-1.0e38, 1.0e38)
 }

@@ -1,33 +1,21 @@
-//! Which methods run on GPUs, and on which GPUs together.
+//! The methods that run on GPUs, and the GPUs that work together.
 
 use crate::algorithm::{AlgorithmId, Backend};
 use crate::entry::Entry;
 use crate::hardware::{GpuIdentity, GpuKind};
 
-/// A method on GPUs: one row here puts it into every test, probe, sweep and plot.
-struct Method {
-    /// The part of the id before the `@`.
-    name: &'static str,
-    /// Counts up when its speed changes.
-    revision: u32,
-}
+/// Name and revision of every method, the simplest first. A row here puts a method into every test, probe, sweep and
+/// plot. A revision counts up when the speed changes.
+const METHODS: [(&str, u32); 4] = [("brute", 2), ("sap", 2), ("grid-sap", 3), ("bvh", 2)];
 
-/// Every method, the simplest first.
-const METHODS: &[Method] = &[
-    Method { name: "brute", revision: 2 },
-    Method { name: "sap", revision: 2 },
-    Method { name: "grid-sap", revision: 3 },
-    Method { name: "bvh", revision: 2 },
-];
-
-/// Whether a method runs on GPUs.
+/// Returns whether a method runs on GPUs.
 #[cfg(feature = "gpu")]
-pub(crate) fn has_method(name: &str) -> bool {
-    METHODS.iter().any(|m| m.name == name)
+pub(super) fn has_method(name: &str) -> bool {
+    METHODS.iter().any(|m| m.0 == name)
 }
 
-/// Our algorithms on these GPUs: each method on each GPU alone, and on the first two, three and so on
-/// together. Software adapters work with each other only.
+/// Returns each method on each of these GPUs alone, and on the first two, the first three and so on together.
+/// Software adapters work together with each other only.
 #[must_use]
 pub fn algorithms<'a>(gpus: impl IntoIterator<Item = &'a GpuIdentity>) -> Vec<Entry> {
     let (software, hardware): (Vec<_>, Vec<_>) = gpus.into_iter().partition(|g| g.kind == GpuKind::Software);
@@ -37,13 +25,12 @@ pub fn algorithms<'a>(gpus: impl IntoIterator<Item = &'a GpuIdentity>) -> Vec<En
         sets.extend(indices.iter().map(|&k| vec![k]));
         sets.extend((2..=indices.len()).map(|k| indices[..k].to_vec()));
     }
-    let on = |set: &Vec<u32>| {
-        let set = set.clone();
-        METHODS.iter().filter_map(move |m| {
-            Some(Entry::new(AlgorithmId::new(m.name, Backend::Gpu(set.clone())).ok()?, m.revision))
+    let on = |set: Vec<u32>| {
+        METHODS.iter().filter_map(move |&(name, revision)| {
+            Some(Entry::new(AlgorithmId::new(name, Backend::Gpu(set.clone())).ok()?, revision))
         })
     };
-    sets.iter().flat_map(on).collect()
+    sets.into_iter().flat_map(on).collect()
 }
 
 #[cfg(test)]
@@ -52,20 +39,8 @@ mod tests {
 
     #[test]
     fn gpus_work_alone_and_with_their_like() {
-        let gpu = |index, kind| GpuIdentity {
-            index,
-            name: String::new(),
-            device: String::new(),
-            driver: String::new(),
-            api: String::new(),
-            kind,
-        };
-        let gpus = [
-            gpu(0, GpuKind::Discrete),
-            gpu(1, GpuKind::Integrated),
-            gpu(2, GpuKind::Software),
-            gpu(3, GpuKind::Software),
-        ];
+        let kinds = [GpuKind::Discrete, GpuKind::Integrated, GpuKind::Software, GpuKind::Software];
+        let gpus: Vec<GpuIdentity> = (0..).zip(kinds).map(|(index, kind)| GpuIdentity::new(index, "", kind)).collect();
         let ids = algorithms(&gpus).into_iter().map(|entry| entry.id.to_string());
         let strips: Vec<String> = ids.filter(|id| id.starts_with("grid-sap")).collect();
         assert_eq!(

@@ -1,4 +1,4 @@
-//! Where pairs are counted, placed and written on a GPU.
+//! The counts of the pairs of each block, their positions, and the list of pairs.
 
 use super::device::Gpu;
 use super::kernel::{Bound, Kernel, source};
@@ -8,7 +8,7 @@ use crate::error::GpuError;
 /// Bytes of a pair.
 pub(super) const PAIR: u64 = 8;
 
-/// The counts of all blocks, and the list of pairs that they are turned into.
+/// The buffers of counts and pairs, and the kernel that turns counts into positions; see `shaders/scan.wgsl`.
 #[derive(Debug)]
 pub(super) struct Output {
     positions: Kernel,
@@ -27,18 +27,19 @@ impl Output {
         })
     }
 
-    /// Makes room for the counts of `blocks` blocks. Whether a buffer is another one now.
+    /// Makes room for the counts of `blocks` blocks. Returns whether the buffer was replaced.
     pub(super) fn ensure_blocks(&mut self, gpu: &Gpu, blocks: u32) -> Result<bool, GpuError> {
         self.sums.ensure(gpu, (u64::from(blocks) + 1) * 4)
     }
 
-    /// Makes room for that many pairs, or for as many as the GPU allows in one buffer. Whether the buffer is another one now.
+    /// Makes room for `pairs` pairs, or for as many as the GPU allows in one buffer. Returns whether the buffer was
+    /// replaced.
     pub(super) fn ensure_pairs(&mut self, gpu: &Gpu, pairs: u64) -> Result<bool, GpuError> {
         let most = largest(gpu, wgpu::BufferUsages::STORAGE) / PAIR * PAIR;
         self.pairs.ensure(gpu, (pairs * PAIR).min(most))
     }
 
-    /// As [`ensure_pairs`](Self::ensure_pairs), but the list of before stays with whoever holds it.
+    /// As [`ensure_pairs`](Self::ensure_pairs), but the old list lives on if someone else holds it.
     pub(super) fn enlarge_pairs(&mut self, gpu: &Gpu, pairs: u64) -> Result<bool, GpuError> {
         let pairs = pairs.min(largest(gpu, wgpu::BufferUsages::STORAGE) / PAIR);
         let grows = pairs > u64::from(self.capacity());
@@ -48,15 +49,15 @@ impl Output {
         Ok(grows)
     }
 
-    /// A larger list of pairs; the one before stays with whoever holds it.
+    /// Replaces the list by one for `pairs` pairs. The old list lives on if someone else holds it.
     ///
     /// # Errors
-    /// When no buffer may be as large, or there is no memory.
+    /// As [`Storage::replace`].
     pub(super) fn replace_pairs(&mut self, gpu: &Gpu, pairs: u64) -> Result<(), GpuError> {
         self.pairs.replace(gpu, pairs * PAIR)
     }
 
-    /// Pairs that there is room for.
+    /// Returns how many pairs the list has room for.
     pub(super) fn capacity(&self) -> u32 {
         u32::try_from(self.pairs.bytes() / PAIR).unwrap_or(u32::MAX)
     }
@@ -74,7 +75,7 @@ impl Output {
         Ok(())
     }
 
-    /// Turns counts into positions.
+    /// Turns the counts into positions.
     pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>) {
         if let Some(bound) = &self.bound {
             bound.dispatch(pass, 1);

@@ -2,7 +2,7 @@
 
 use super::division::{PARTS, Segment};
 use super::look::Look;
-use super::sizes::{CELLS_OF_BLOCK, raises};
+use super::tree::raises;
 use crate::error::BoxDefect;
 use crate::load::StripGrid;
 
@@ -47,7 +47,7 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Before any kernel has run.
+    /// The header before any kernel has run.
     pub(super) const START: Self =
         Self { total_low: 0, total_high: 0, invalid: u32::MAX, more: 0, ran: 0, groups: [0, 1, 1], held: 0 };
 
@@ -55,41 +55,46 @@ impl Header {
         u64::from(self.total_high) << 32 | u64::from(self.total_low)
     }
 
-    /// Position of the first invalid box, and what is wrong with it.
+    /// Returns the position of the first invalid box, and its defect.
     pub(super) fn invalid(&self) -> Option<(usize, BoxDefect)> {
         let defect = if self.invalid & 1 == 1 { BoxDefect::Inverted } else { BoxDefect::NotANumber };
         (self.invalid != u32::MAX).then_some(((self.invalid >> 1) as usize, defect))
     }
 }
 
-/// Most slots in all, so that their table stays a small share of the memory of a frame of as many boxes.
+/// Cells of one workgroup of `shaders/cells.wgsl`.
+pub(super) const CELLS_OF_BLOCK: u32 = 4096;
+
+/// Most slots of all strips. Their table then takes a small part of the memory of a frame of 2^24 boxes.
 const MOST_SLOTS: f64 = 16_777_216.0;
 
-/// A box longer on the sweep axis than this many times the usual length is kept apart: it would search all the strip.
+/// A box goes into the tree if it is longer on the sweep axis than this many usual boxes: it would search the whole
+/// strip.
 const LARGE_LENGTHS: f64 = 16.0;
 
-/// Candidates and nodes that all rows together are counted with in one submission, of up to a million rows: a tenth of a second at ten thousand
-/// million tests a second, which is assumed of the GPU of a processor. Drivers of desktops give up after 2 to 10 s. Writing may test as many again.
+/// Most candidates and nodes that the rows of one submission are tested with while they are counted. Writing may test
+/// as many again. An integrated GPU is assumed to test 10^10 a second, which makes a tenth of a second; drivers of
+/// desktops give up after 2 to 10 s.
 const MOST_TESTS: u32 = 1 << 30;
 
-/// The same of one row: lavapipe ends a loop after 65 535 turns. And at least, so that a frame ends: of more than a million rows a submission may
-/// have as many times more tests.
+/// Most tests of one row in a submission. lavapipe ends a loop after 65 535 turns.
 const MOST_OF_ROW: u32 = 1 << 15;
+/// Fewest tests of one row in a submission, so that a frame ends. From a million rows on, this exceeds `MOST_TESTS`.
 const FEWEST_OF_ROW: u32 = 1 << 10;
 
 /// Cells of the curve's grid on one axis, and in the extent of a usual box.
 const CURVE_CELLS: f64 = 1024.0;
 const CELLS_OF_BOX: f64 = 2.0;
 
-/// Bits of a place on the curve, with those of the size.
+/// Bits of a place on the curve, including the two of the size.
 const CURVE_BITS: u32 = 32;
 
 impl Params {
-    /// For rows of boxes that look like this, swept along an axis.
+    /// Parameters of rows that are swept along an axis.
     fn rows(look: &Look, objects: u32, axis: usize) -> Self {
         let turned = [axis, (axis + 1) % 3, (axis + 2) % 3];
         let longest = look.sample.extent.iter().copied().fold(0.0, f64::max);
-        // Where most boxes are points, a box is large that is longer than a small part of the world.
+        // If most boxes are points, the usual extent is a small part of the world.
         let world = (0..3).map(|a| look.sample.range(a).1).fold(0.0, f64::max) / f64::from(objects.max(1)).cbrt();
         let usual = (1.0 / longest.max(world / 8.0)) as f32;
         Self {
@@ -105,24 +110,23 @@ impl Params {
         }
     }
 
-    /// Sweeping along the axis on which the fewest pairs of a sample overlap.
+    /// Sweeps along the axis on which the fewest pairs of the sample overlap.
     pub(super) fn sap(look: &Look, objects: u32) -> Self {
         Self::rows(look, objects, look.sample.sweep_axis())
     }
 
-    /// A tree over the order in which a curve passes the boxes.
+    /// Makes a tree over the boxes in the order of the curve.
     pub(super) fn bvh(look: &Look, objects: u32) -> Self {
         Self::rows(look, objects, 0)
     }
 
-    /// Strips for boxes that look like the sample, with about as many slots as there are boxes. All choices cost speed at
-    /// worst, never a pair.
+    /// Divides space into strips with about as many slots as boxes. A bad choice costs speed, never a pair.
     pub(super) fn grid_sap(look: &Look, objects: u32) -> Self {
         let sample = &look.sample;
         let plan = StripGrid::plan(sample, objects as usize);
         let [a, u, v] = [0, 1, 2].map(|k| (plan.axis + k) % 3);
         let across = |axis: usize, cells: u32| {
-            // As in the plan, cells so narrow that most boxes stand in several save nothing.
+            // As in the plan, cells at least two boxes wide: in narrower ones most boxes would be in several.
             look.parts[axis]
                 .divide(|width, share| (share * f64::from(cells)).round().min(width / (2.0 * sample.extent[axis])))
         };
@@ -133,7 +137,7 @@ impl Params {
         let along = look.parts[a].divide(|_, share| share * wanted);
         let (slots, strips) = (along.cells, across_u.cells * across_v.cells);
         let large_key = strips * slots;
-        // Boxes kept apart are few: an eighth of the boxes has a cell of its own.
+        // Oversized boxes are few: they get an eighth as many cells as there are boxes.
         let curve_bits = (objects.max(2).ilog2() - 1).saturating_sub(2).clamp(5, 16);
         let table = large_key + (1 << curve_bits) + 1;
         Self {
@@ -149,9 +153,9 @@ impl Params {
     }
 }
 
-/// Cells of the curve's grid on one axis, less one for each part. In each part as many as its share of the boxes says, so that a cluster in a world
-/// a million times its size is told apart, and none much shorter than a usual box: else what tells the boxes of a tower apart across it would
-/// weigh as much as where they stand in it.
+/// Returns the cells of the curve's grid in a part of an axis, by the part's share of the boxes: a cluster then has
+/// as many cells in a world a million times its size. No cell is much shorter than a usual box: across a tower, tiny
+/// offsets would otherwise weigh as much as the place along it.
 fn curve_cells(width: f64, share: f64, extent: f64) -> f64 {
     (width * CELLS_OF_BOX / extent).min(share * (CURVE_CELLS - PARTS as f64))
 }

@@ -1,25 +1,25 @@
-//! A method on one GPU, from boxes that are on it to pairs that stay on it.
+//! A method on one GPU, from boxes on the GPU to pairs on the GPU.
 
 use super::device::Gpu;
 use super::engine::Engine;
+use super::failure::{Failure, unavailable};
 use super::look::Look;
 use super::params::Params;
-use super::storage::{Failure, unavailable};
 use crate::aabb::Aabb;
 use crate::algorithm::{AlgorithmId, Backend, ParseIdError};
 use crate::error::{BoxDefect, Error};
 
-/// Finds pairs among boxes in the memory of a GPU and leaves the pairs there, for engines whose data never leave it.
+/// Finds the pairs of boxes in the memory of a GPU and leaves them there, for engines whose data never leave it.
 ///
-/// No box and no pair crosses the bus, so its times can't be compared with those of a [`BroadPhase`](crate::BroadPhase), which
-/// begin and end in the memory of the CPU. Figures of it are labelled device-resident wherever they stand.
+/// No box and no pair crosses the bus. Its times are labelled device-resident and can't be compared with those of a
+/// [`BroadPhase`](crate::BroadPhase), which begin and end in the memory of the CPU.
 #[derive(Debug)]
 pub struct Resident {
     id: AlgorithmId,
     engine: Engine,
-    /// What the last frame looked like: the next is planned for it.
+    /// What the last frame looked like, for which the next one is planned.
     look: Option<Look>,
-    /// What became of the last frame that nobody waited for.
+    /// The last submitted frame that has arrived.
     last: Option<SubmittedCounts>,
 }
 
@@ -27,46 +27,47 @@ pub struct Resident {
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub struct ResidentPairs<'a> {
-    /// `array<vec2<u32>>`: two positions in the input, the lower one first. Holds more than `count`; the rest is left over.
+    /// `array<vec2<u32>>`: two positions in the input, the lower one first. What follows the first `count` pairs is
+    /// undefined.
     pub buffer: &'a wgpu::Buffer,
-    /// How many pairs there are. Each stands there once, in an order that is the same whenever this frame and the one before are.
+    /// Number of pairs. Each is there once; the order follows from this frame and the previous one.
     pub count: u32,
 }
 
-/// The pairs of a frame that was submitted, on the GPU, and what is known of them there.
+/// The pairs of a submitted frame and their number, on the GPU.
 ///
-/// The next frame writes to the same buffers, or to larger ones: whatever reads these is submitted before it, and binds those that it is handed
-/// each time. No kernel of the program may write to either.
+/// The next frame writes to the same buffers or to larger ones. So submit what reads them before the next frame, bind
+/// the buffers of each frame anew, and write to neither.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub struct SubmittedPairs<'a> {
     /// As [`ResidentPairs::buffer`].
     pub pairs: &'a wgpu::Buffer,
-    /// Nine words, with the usage `INDIRECT` too:
+    /// Nine words. The buffer has the usage `INDIRECT` too.
     ///
     /// | byte | word |
     /// |---|---|
-    /// | 0, 4 | pairs in all, the lower 32 bits first |
-    /// | 8 | all ones, or twice the position of the first invalid box, plus 1 if it is inverted: the pairs are then worth nothing |
-    /// | 12 | 0, or 1 where a box has more candidates than one submission tests, and pairs are missing |
-    /// | 16 | the number of the submission |
-    /// | 20, 24, 28 | for `dispatch_workgroups_indirect`: workgroups of 64 pairs, at most 65 535 side by side, the rest in further rows |
-    /// | 32 | pairs that the buffer holds: fewer than there are where it is too small, and the next frames have a larger one |
+    /// | 0, 4 | number of pairs, the lower 32 bits first |
+    /// | 8 | all ones; or twice the position of the first invalid box, plus 1 if it is inverted: no pair counts then |
+    /// | 12 | 1 if pairs are missing, because a box has more candidates than one submission tests; else 0 |
+    /// | 16 | number of the submission |
+    /// | 20, 24, 28 | for `dispatch_workgroups_indirect`: workgroups of 64 pairs, in rows of at most 65 535 |
+    /// | 32 | pairs in the buffer: fewer than there are if it is too small; the next frames have a larger one |
     pub counts: &'a wgpu::Buffer,
 }
 
-/// What became of a frame that was submitted.
+/// What a submitted frame found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SubmittedCounts {
-    /// Which submission it was: the word at byte 16 of [`SubmittedPairs::counts`].
+    /// Number of the submission: the word at byte 16 of [`SubmittedPairs::counts`].
     pub submission: u32,
-    /// The pairs that there were.
+    /// Number of pairs.
     pub pairs: u64,
-    /// Whether all of them were written. Else the buffer was too small, and is larger from the next frame on, or a box had more candidates than
-    /// one submission tests: [`Resident::find_pairs`] has no such bound.
+    /// Whether the buffer has all pairs. Otherwise it was too small, and is larger from the next frame on; or a box
+    /// had more candidates than one submission tests, a limit that [`Resident::find_pairs`] does not have.
     pub whole: bool,
-    /// The position of the first invalid box, and what is wrong with it.
+    /// Position of the first invalid box, and its defect.
     pub invalid: Option<(usize, BoxDefect)>,
 }
 
@@ -74,47 +75,48 @@ impl Resident {
     /// The method `brute`, `sap`, `grid-sap` or `bvh` on an open GPU. Compiles its kernels.
     ///
     /// # Errors
-    /// [`Error::UnknownAlgorithm`] for another method; [`Error::Unavailable`] when a kernel does not compile or memory is
-    /// refused.
+    /// [`Error::UnknownAlgorithm`] if `method` is no name; [`Error::Unavailable`] if it does not run on GPUs, a
+    /// kernel does not compile or the GPU is out of memory.
     pub fn new(gpu: &Gpu, method: &str) -> Result<Self, Error> {
         let unknown = |e: ParseIdError| Error::UnknownAlgorithm { text: method.to_owned(), hint: e.to_string() };
         let id = AlgorithmId::new(method, Backend::Gpu(vec![gpu.identity().index])).map_err(unknown)?;
-        let engine = Engine::resident(gpu.clone(), method);
-        match engine {
-            Ok(engine) => Ok(Self { id, engine, look: None, last: None }),
-            Err(error) => Err(unavailable(&id, error)),
-        }
+        let engine = Engine::resident(gpu.clone(), method).map_err(|error| unavailable(&id, error))?;
+        Ok(Self { id, engine, look: None, last: None })
     }
 
-    /// Finds the pairs of the first `objects` boxes of a buffer of the same device, six 32-bit floats each: minimum, maximum.
+    /// Finds the pairs of the first `objects` boxes of a buffer of the same device, six 32-bit floats each: minimum,
+    /// maximum.
     ///
-    /// The buffer needs the usage `STORAGE`. Waits for the number of pairs and for a sample of 256 boxes. Frames from one
-    /// buffer bind it once; another buffer is bound again.
+    /// The buffer needs the usage `STORAGE`. The call waits for the number of pairs and a sample of 256 boxes. It is
+    /// faster with the buffer of the previous frame than with another one, which must be bound.
     ///
     /// # Errors
-    /// [`Error::InvalidBox`]; [`Error::Unavailable`] when the buffer is too small or not for storage, when boxes or pairs don't
-    /// fit into the largest buffer of the GPU, and when the GPU was lost.
+    /// [`Error::InvalidBox`]; [`Error::Unavailable`] if the buffer is too small or lacks the usage, boxes or pairs
+    /// don't fit into the largest buffer of the GPU, or the GPU was lost.
     pub fn find_pairs(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<ResidentPairs<'_>, Error> {
         let count = self.run(boxes, objects).map_err(|failure| failure.of(&self.id))?;
         Ok(ResidentPairs { buffer: self.engine.pairs_buffer(), count })
     }
 
-    /// Submits the same frame and does not wait for it: pairs and their number are for kernels that follow on the same queue.
+    /// Submits the same frame without waiting. Kernels that follow on the same queue can read the pairs and their
+    /// number.
     ///
-    /// Only the first frame of all waits, for a sample of 256 boxes. Later ones are planned for what the last frame that has come back looked
-    /// like, and have room for its pairs and a quarter more; [`last`](Self::last) says what it was.
+    /// Only the very first frame waits, for a sample of 256 boxes. Later frames are planned for the
+    /// [last](Self::last) frame that has arrived, with room for its pairs and a quarter more.
+    ///
+    /// `sap` tests at most 32 768 candidates of a box in one submission, and 1024 in a frame of a million boxes. If a
+    /// box has more, the frame is not [whole](SubmittedCounts::whole): use `grid-sap` or `bvh`.
     ///
     /// # Errors
-    /// As [`find_pairs`](Self::find_pairs), but for what is wrong with the boxes of this frame, which stands in [`SubmittedPairs::counts`]; and
-    /// [`Error::Unavailable`] when `brute` is asked for more boxes than one submission takes (46 000). Where `sap` has more candidates for a box than
-    /// one submission tests, 1024 in a frame of a million boxes, the frame is not whole: use `grid-sap` or `bvh`.
+    /// As [`find_pairs`](Self::find_pairs), except that invalid boxes are reported in [`SubmittedPairs::counts`].
+    /// [`Error::Unavailable`] too if `brute` gets more boxes than one submission takes (46 000).
     pub fn submit(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<SubmittedPairs<'_>, Error> {
         self.run_ahead(boxes, objects).map_err(|failure| failure.of(&self.id))?;
         Ok(SubmittedPairs { pairs: self.engine.pairs_buffer(), counts: self.engine.header_buffer() })
     }
 
-    /// What became of the last frame that had come back when a frame was last [submitted](Self::submit): as a rule the one before that. While one is on
-    /// its way no other is asked for, so that not every frame is heard of where the GPU is behind. `None` before there is one.
+    /// Returns the last frame that had arrived when a frame was last [submitted](Self::submit): usually the previous
+    /// one. If the GPU is behind, some frames are never reported. `None` before the first.
     #[must_use]
     pub fn last(&self) -> Option<SubmittedCounts> {
         self.last
@@ -139,7 +141,7 @@ impl Resident {
         Ok(self.engine.submit_ahead(boxes, params)?)
     }
 
-    /// The parameters of a frame like the one before. The first looks at its boxes, and waits for that.
+    /// Returns the parameters of a frame that looks like the previous one. The first waits for a sample.
     fn plan(&mut self, boxes: &wgpu::Buffer, objects: u32) -> Result<Params, Failure> {
         let look = match self.look {
             Some(look) => look,
@@ -160,7 +162,7 @@ impl Resident {
         Ok(count)
     }
 
-    /// Whether the buffer holds that many boxes, and the GPU has room for them.
+    /// Checks that the buffer has `objects` boxes, and the GPU room for them.
     fn check(&self, boxes: &wgpu::Buffer, objects: u32) -> Result<(), Failure> {
         let bytes = u64::from(objects) * size_of::<Aabb>() as u64;
         if boxes.size() < bytes || !boxes.usage().contains(wgpu::BufferUsages::STORAGE) {

@@ -1,4 +1,4 @@
-//! A look at boxes that are on a GPU; see `shaders/sample.wgsl`.
+//! A sample of boxes that are on the GPU; see `shaders/sample.wgsl`.
 
 use super::device::Gpu;
 use super::kernel::{Bound, Kernel, source};
@@ -6,13 +6,10 @@ use super::storage::Storage;
 use crate::aabb::Aabb;
 use crate::error::GpuError;
 
-/// Boxes looked at.
-const BOXES: usize = 256;
+/// Bytes of a sample: 256 boxes.
+pub(super) const BYTES: u64 = 256 * size_of::<Aabb>() as u64;
 
-/// Bytes that a look brings back.
-pub(super) const BYTES: u64 = (BOXES * size_of::<Aabb>()) as u64;
-
-/// The kernel and where it puts the boxes.
+/// The kernel, and the buffer for the sampled boxes.
 #[derive(Debug)]
 pub(super) struct Sampler {
     kernel: Kernel,
@@ -32,12 +29,14 @@ impl Sampler {
         Ok(())
     }
 
-    /// Looks, and copies what was seen to `to`.
-    pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, at: u64) {
-        let Some(bound) = &self.bound else { return };
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        bound.dispatch(&mut pass, 1);
-        drop(pass);
-        encoder.copy_buffer_to_buffer(self.boxes.buffer(), 0, to, at, BYTES);
+    /// Takes a sample, and copies it to `to` from byte `at` on. Returns its bytes.
+    pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, at: u64) -> u64 {
+        if let Some(bound) = &self.bound {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            bound.dispatch(&mut pass, 1);
+            drop(pass);
+            encoder.copy_buffer_to_buffer(self.boxes.buffer(), 0, to, at, BYTES);
+        }
+        BYTES
     }
 }

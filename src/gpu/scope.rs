@@ -1,8 +1,9 @@
-//! Scopes that catch what a device has against our calls, so that its handlers, which may be the program's, hear nothing of it.
+//! Error scopes: they catch a device's errors about our calls, so that its handlers, which may be the program's,
+//! never see them.
 
 use std::ops::{Deref, DerefMut};
 
-/// Errors of one or of every kind, in the calls of this thread until it ends.
+/// Catches the errors of this thread's calls, of one kind or of every kind, until it ends.
 pub(super) struct Scope {
     guards: [Option<wgpu::ErrorScopeGuard>; 3],
 }
@@ -13,18 +14,18 @@ impl Scope {
         Self { guards: filters.map(|filter| Some(device.push_error_scope(filter))) }
     }
 
-    /// For calls that fail in one way only.
+    /// Catches errors of one kind.
     pub(super) fn of_one(device: &wgpu::Device, filter: wgpu::ErrorFilter) -> Self {
         Self { guards: [Some(device.push_error_scope(filter)), None, None] }
     }
 
-    /// Ends it, and returns the error if there was one.
+    /// Ends the scope, and returns its error.
     pub(super) fn end(mut self) -> Result<(), wgpu::Error> {
         self.pop().map_or(Ok(()), Err)
     }
 
     fn pop(&mut self) -> Option<wgpu::Error> {
-        // In the reverse of the order in which they began, which wgpu insists on.
+        // wgpu insists on the reverse order.
         let guards = self.guards.iter_mut().rev().filter_map(Option::take);
         guards.fold(None, |error, guard| pollster::block_on(guard.pop()).or(error))
     }
@@ -36,7 +37,7 @@ impl Drop for Scope {
     }
 }
 
-/// Commands on their way to a device: one scope from the first of them until they are submitted.
+/// Commands that are being recorded. One scope covers them until they are submitted.
 pub(crate) struct Recording {
     encoder: wgpu::CommandEncoder,
     scope: Scope,

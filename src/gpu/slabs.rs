@@ -4,10 +4,11 @@ use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::load::SceneStats;
 
-/// Boxes whose lower bounds place the cuts: with 4096 a slab is off by 2 % of all boxes at most, nearly always.
+/// Most boxes whose lower bounds place the cuts. With 4096, the size of a slab is nearly always within 2 % of all
+/// boxes.
 const MOST_SAMPLED: usize = 4096;
 
-/// Where slabs begin and end on one axis. Bounds of cuts belong to the upper slab.
+/// The cuts between slabs on one axis. A lower bound on a cut belongs to the upper slab.
 #[derive(Debug, Default)]
 pub(super) struct Slabs {
     axis: usize,
@@ -19,20 +20,21 @@ pub(super) struct Slabs {
 #[derive(Debug, Default)]
 pub(super) struct Members {
     pub(super) boxes: Vec<Aabb>,
-    /// For each box its number in the frame, and the highest bit where it begins in this slab.
+    /// Number of each box in the frame, with the highest bit set if the box begins in this slab.
     pub(super) ids: Vec<u32>,
 }
 
-/// Set in [`Members::ids`] where the box begins in the slab.
+/// The bit of [`Members::ids`] that says that the box begins in the slab.
 ///
-/// Two boxes that share several slabs overlap first in the slab where the later of them begins, and there one of the two
-/// has the bit. So the slab in which either has it reports the pair, and no other does.
+/// A pair is reported by the slab in which one of its boxes has the bit and both are members. That is exactly one
+/// slab: the one in which the later of the two boxes begins. In lower slabs only the earlier box is a member, and in
+/// higher ones both have begun below.
 const BEGINS: u32 = 1 << 31;
 
 impl Slabs {
-    /// Cuts the boxes into slabs that hold these shares of all boxes, ascending along the axis on which the fewest pairs overlap.
+    /// Cuts the axis on which the fewest pairs overlap into slabs with these shares of the boxes, ascending.
     ///
-    /// The cuts follow the density of the boxes and not the space: half of the space may hold a hundredth of them.
+    /// The cuts follow the density of the boxes: half of the space may have a hundredth of them.
     pub(super) fn plan(&mut self, sample: &SceneStats, boxes: &[Aabb], shares: impl ExactSizeIterator<Item = f64>) {
         self.axis = sample.sweep_axis();
         let count = boxes.len().min(MOST_SAMPLED);
@@ -55,7 +57,7 @@ impl Slabs {
         self.cuts.len() + 1
     }
 
-    /// Gathers a slab. `false` once it has more than `most` boxes.
+    /// Gathers the boxes of a slab. Returns `false` if there are more than `most`.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -72,7 +74,7 @@ impl Slabs {
         members.ids.clear();
         for (id, b) in boxes.iter().enumerate() {
             let (min, max) = (b.min[self.axis], b.max[self.axis]);
-            // Each box begins in exactly one slab, also when it is invalid: NaN is not at or above any cut.
+            // Each box begins in exactly one slab, invalid ones too: NaN is neither at nor above any cut.
             let begins = low.is_none_or(|low| min >= low) && !high.is_some_and(|high| min >= high);
             if begins || low.is_some_and(|low| min < low && max >= low) {
                 if members.boxes.len() == most {
@@ -88,7 +90,7 @@ impl Slabs {
 }
 
 impl Members {
-    /// Room for one more.
+    /// Makes room for one more.
     fn grow(&mut self) -> Result<(), Error> {
         if self.boxes.len() < self.boxes.capacity().min(self.ids.capacity()) {
             return Ok(());
@@ -105,7 +107,7 @@ mod tests {
     use crate::scene::{Scenario, Scene};
 
     #[test]
-    fn slabs_hold_their_shares_and_every_pair_has_one_owner() {
+    fn every_pair_has_one_owner() {
         let mut scene = Scene::start(Scenario::Clustered, 3000, 5);
         scene.advance();
         let boxes = scene.boxes();

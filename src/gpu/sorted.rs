@@ -1,13 +1,12 @@
-//! The methods that sort first: sap, grid-sap and bvh; see `shaders/rows.wgsl` and the file there of each.
+//! The methods that sort the boxes: sap, grid-sap and bvh. See `shaders/rows.wgsl` and the shader of each.
 
 use super::cells::Cells;
 use super::device::Gpu;
-use super::inputs::Inputs;
 use super::kernel::{Bound, Kernel, source};
 use super::look::Look;
 use super::output::Output;
 use super::params::Params;
-use super::sizes::KEPT;
+use super::search::{Inputs, Search};
 use super::sort::Sort;
 use super::storage::Storage;
 use super::tree::Tree;
@@ -18,12 +17,14 @@ const ROWS: u32 = 64;
 const BOXES: u32 = 256;
 /// Bytes of a sorted box.
 const SORTED_BOX: u64 = 32;
-/// The same with its share of the nodes of a tree, of which each has eight below it, and of the few nodes at the top.
+/// Bytes of a sorted box and its share of the nodes of a tree: an eighth of a node a level.
 pub(super) const MOST_OF_BOX: u64 = 40;
-/// Words of a row: its pairs, and its state before a submission and after it.
+/// Words of a row: its number of pairs, and its states before and after a submission.
 const ROW_WORDS: u64 = 3;
+/// Words for the pairs that a row keeps from counting to writing.
+const KEPT_WORDS: u64 = 4;
 
-/// What is sorted, and what the rows are searched in.
+/// The order of the boxes, and where the rows are searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Sap,
@@ -32,7 +33,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// The kind of a method's name.
+    /// Returns the kind of a method.
     pub(super) fn named(method: &str) -> Option<Self> {
         match method {
             "sap" => Some(Self::Sap),
@@ -43,7 +44,7 @@ impl Kind {
     }
 }
 
-/// A method that sorts, on one GPU.
+/// A method that sorts, on one GPU. Its blocks are 64 rows, one for each box.
 #[derive(Debug)]
 pub(super) struct Sorted {
     kind: Kind,
@@ -60,7 +61,7 @@ pub(super) struct Sorted {
     bound: Option<[Bound; 4]>,
 }
 
-/// What brings the boxes into their order.
+/// What sorts the boxes.
 #[derive(Debug)]
 enum Order {
     Radix(Sort),
@@ -68,9 +69,6 @@ enum Order {
 }
 
 impl Sorted {
-    /// The pairs of a block of rows are counted in 32 bits.
-    pub(super) const MOST_OBJECTS: usize = 1 << 26;
-
     pub(super) fn new(gpu: &Gpu, kind: Kind) -> Result<Self, GpuError> {
         let (rows, keys, gather) = match kind {
             Kind::Sap => (source::SAP, "sweep_keys", "gather"),
@@ -97,22 +95,31 @@ impl Sorted {
             bound: None,
         })
     }
+}
 
-    /// The parameters of a frame of boxes that look like this.
-    pub(super) fn plan(&self, look: &Look, objects: u32) -> Params {
+impl Search for Sorted {
+    fn most_objects(&self) -> usize {
+        // The pairs of a block are counted in 32 bits.
+        1 << 26
+    }
+
+    fn growth(&self) -> f64 {
+        if self.kind == Kind::Sap { 5.0 / 3.0 } else { 1.0 }
+    }
+
+    fn plan(&self, objects: u32, look: &dyn Fn() -> Look) -> Params {
         match self.kind {
-            Kind::Sap => Params::sap(look, objects),
-            Kind::GridSap => Params::grid_sap(look, objects),
-            Kind::Bvh => Params::bvh(look, objects),
+            Kind::Sap => Params::sap(&look(), objects),
+            Kind::GridSap => Params::grid_sap(&look(), objects),
+            Kind::Bvh => Params::bvh(&look(), objects),
         }
     }
 
-    pub(super) fn blocks(objects: u32) -> u32 {
-        objects.div_ceil(ROWS)
+    fn blocks(&self, objects: u32) -> u64 {
+        u64::from(objects.div_ceil(ROWS))
     }
 
-    /// Makes room for that many boxes. Whether a buffer is another one now.
-    pub(super) fn ensure(&mut self, gpu: &Gpu, params: &Params) -> Result<bool, GpuError> {
+    fn ensure(&mut self, gpu: &Gpu, params: &Params) -> Result<bool, GpuError> {
         let n = u64::from(params.objects);
         let mut grown = match &mut self.order {
             Order::Radix(sort) => sort.ensure(gpu, params.objects)?,
@@ -121,10 +128,10 @@ impl Sorted {
         let elements = if self.tree.is_some() { Tree::elements(params.objects) } else { n };
         grown |= self.boxes.ensure(gpu, elements * SORTED_BOX)?;
         grown |= self.rows.ensure(gpu, n * ROW_WORDS * 4)?;
-        Ok(self.kept.ensure(gpu, n * u64::from(KEPT) * 4)? | grown)
+        Ok(self.kept.ensure(gpu, n * KEPT_WORDS * 4)? | grown)
     }
 
-    pub(super) fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
+    fn bind(&mut self, gpu: &Gpu, inputs: &Inputs<'_>, output: &Output) -> Result<(), GpuError> {
         let Inputs { params, boxes, ids, header } = *inputs;
         let sorted = self.boxes.buffer();
         let mut make_keys = vec![(0, params), (1, boxes), (2, ids), (3, header)];
@@ -168,16 +175,14 @@ impl Sorted {
         Ok(())
     }
 
-    /// Clears what the keys are counted in, before anything else of a frame.
-    pub(super) fn clear(&self, encoder: &mut wgpu::CommandEncoder, params: &Params) {
+    fn clear(&self, encoder: &mut wgpu::CommandEncoder, params: &Params) {
         match &self.order {
             Order::Radix(sort) => sort.clear(encoder, params.objects),
             Order::Cells(cells) => cells.clear(encoder, params),
         }
     }
 
-    /// Sorts and gathers.
-    pub(super) fn record_sort(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
+    fn record_sort(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
         let Some([make_keys, gather, ..]) = &self.bound else { return };
         let groups = params.objects.div_ceil(BOXES);
         make_keys.dispatch(pass, groups);
@@ -191,15 +196,15 @@ impl Sorted {
         }
     }
 
-    pub(super) fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
+    fn record_count(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
         if let Some([.., count, _]) = &self.bound {
-            count.dispatch(pass, Self::blocks(params.objects));
+            count.dispatch(pass, params.blocks);
         }
     }
 
-    pub(super) fn record_write(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
+    fn record_write(&self, pass: &mut wgpu::ComputePass<'_>, params: &Params) {
         if let Some([.., write]) = &self.bound {
-            write.dispatch(pass, Self::blocks(params.objects));
+            write.dispatch(pass, params.blocks);
         }
     }
 }

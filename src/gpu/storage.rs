@@ -1,61 +1,20 @@
-//! Buffers on a GPU that grow and stay.
+//! Buffers on a GPU.
 
 use super::device::Gpu;
-use crate::algorithm::AlgorithmId;
-use crate::error::{Error, GpuError, GpuErrorKind, Unavailable};
+use crate::error::{GpuError, GpuErrorKind};
+use wgpu::util::DeviceExt;
 
-/// What a frame can fail with on a GPU, apart from what is wrong with the frame itself.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Failure {
-    /// The GPU can't do it: lost, out of memory, beyond its limits.
-    Gpu(GpuError),
-    /// The frame is at fault, or the memory of the host.
-    Frame(Error),
-}
-
-impl Failure {
-    /// More than a GPU, or one submission to it, can take.
-    pub(super) fn limit(text: impl Into<String>) -> Self {
-        Self::Gpu(GpuError::new(GpuErrorKind::Limit, text))
-    }
-
-    /// The error of an algorithm.
-    pub(super) fn of(self, algorithm: &AlgorithmId) -> Error {
-        match self {
-            Self::Frame(error) => error,
-            Self::Gpu(error) => unavailable(algorithm, error),
-        }
-    }
-}
-
-/// An algorithm that a GPU can't run.
-pub(super) fn unavailable(algorithm: &AlgorithmId, error: GpuError) -> Error {
-    Error::Unavailable { algorithm: algorithm.clone(), reason: Unavailable::Gpu(error) }
-}
-
-impl From<GpuError> for Failure {
-    fn from(error: GpuError) -> Self {
-        Self::Gpu(error)
-    }
-}
-
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Self::Frame(error)
-    }
-}
-
-/// A buffer that grows to the largest frame seen and stays.
+/// A buffer that grows to the largest frame and never shrinks.
 #[derive(Debug)]
 pub(super) struct Storage {
     label: &'static str,
     usage: wgpu::BufferUsages,
     buffer: wgpu::Buffer,
-    /// 0 after a refusal, when there is no memory behind the buffer.
+    /// 0 after the GPU refused memory: the old buffer is destroyed.
     bytes: u64,
 }
 
-/// Bytes of the smallest buffer: no binding may be empty.
+/// Bytes of the smallest buffer. No binding may be empty.
 const SMALLEST: u64 = 256;
 
 impl Storage {
@@ -77,22 +36,22 @@ impl Storage {
         self.bytes
     }
 
-    /// Makes room for `bytes`. Whether the buffer is another one now; its content is gone then.
+    /// Makes room for `bytes`. Returns whether the buffer was replaced; its content is lost then.
     ///
     /// # Errors
-    /// When the GPU has no such memory, or no buffer may be as large.
+    /// The GPU is out of memory, or allows no buffer of this size.
     pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<bool, GpuError> {
         if bytes <= self.bytes {
             return Ok(false);
         }
-        // The old one is given back first: there may be no room for both.
+        // The old one goes first: there may be no memory for both.
         self.buffer.destroy();
         self.bytes = 0;
         self.replace(gpu, bytes)?;
         Ok(true)
     }
 
-    /// A buffer of `bytes` and a quarter more in place of this one, which stays with whoever holds it.
+    /// Replaces the buffer by one of `bytes` and a quarter more. The old one lives on if someone else holds it.
     ///
     /// # Errors
     /// As [`ensure`](Self::ensure).
@@ -103,7 +62,7 @@ impl Storage {
             let text = format!("{bytes} bytes for {} are more than the {most} that gpu{index} allows", self.label);
             return Err(GpuError::new(GpuErrorKind::Limit, text));
         }
-        // A quarter more than asked for, so that a growing scene grows the buffer a few times in all.
+        // A growing scene then replaces the buffer only a few times.
         let wanted = (bytes + bytes / 4).next_multiple_of(256).min(most);
         self.buffer =
             create(gpu, self.label, self.usage, wanted).or_else(|_| create(gpu, self.label, self.usage, bytes))?;
@@ -112,12 +71,23 @@ impl Storage {
     }
 }
 
-/// Bytes of the largest buffer of a usage.
+/// Returns the bytes of the largest buffer with this usage.
 pub(super) fn largest(gpu: &Gpu, usage: wgpu::BufferUsages) -> u64 {
     let limits = gpu.limits();
     let binding =
         if usage.contains(wgpu::BufferUsages::STORAGE) { limits.max_storage_buffer_binding_size } else { u64::MAX };
     limits.max_buffer_size.min(binding) & !3
+}
+
+/// Creates a uniform buffer of four words.
+pub(super) fn constant(gpu: &Gpu, label: &str, words: [u32; 4]) -> Result<wgpu::Buffer, GpuError> {
+    gpu.try_make(|device| {
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some(label),
+            contents: bytemuck::cast_slice(&words),
+            usage: wgpu::BufferUsages::UNIFORM,
+        })
+    })
 }
 
 fn create(gpu: &Gpu, label: &'static str, usage: wgpu::BufferUsages, bytes: u64) -> Result<wgpu::Buffer, GpuError> {
@@ -137,10 +107,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_device_refuses_is_an_error_and_the_device_goes_on() {
+    fn a_refused_buffer_leaves_the_device_usable() {
         let Some(gpu) = crate::gpu::first_for_tests() else { return };
-        // A device makes buffers of this usage with a feature only that none is opened with. A refusal of memory comes the same
-        // way, and can't be had without filling the memory of the machine.
+        // This usage needs a feature that no device is opened with. The device refuses it the way it refuses memory,
+        // which a test can't fill up.
         let mut storage = Storage::new(&gpu, "trial").unwrap();
         let possible = storage.usage;
         storage.usage |= wgpu::BufferUsages::BLAS_INPUT;
@@ -149,7 +119,7 @@ mod tests {
         assert!(storage.ensure(&gpu, 1 << 62).unwrap_err().to_string().contains("more than"));
         assert_eq!(gpu.fault(), None);
         storage.usage = possible;
-        assert_eq!(storage.ensure(&gpu, 100), Ok(true), "the buffer before was given back");
+        assert_eq!(storage.ensure(&gpu, 100), Ok(true), "the old buffer is destroyed");
         assert_eq!(storage.ensure(&gpu, 100), Ok(false));
     }
 }

@@ -1,4 +1,4 @@
-//! Memory that both the CPU and a GPU reach: mapped once, used every frame.
+//! Buffers that both the CPU and a GPU reach: mapped once, used every frame.
 
 use super::device::Gpu;
 use super::storage::Storage;
@@ -12,7 +12,7 @@ use std::time::Instant;
 pub(super) struct Transfer {
     storage: Storage,
     mode: wgpu::MapMode,
-    /// One of the constants below; set by the device when a mapping is done.
+    /// One of the constants below. The device sets it when a mapping is done.
     state: Arc<AtomicU8>,
 }
 
@@ -47,14 +47,14 @@ impl Transfer {
 
     pub(super) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<(), GpuError> {
         if bytes > self.storage.bytes() {
-            // Of the buffer of before, which goes whether it is mapped or not.
+            // The old buffer's callback must not change the new buffer's state.
             self.state = Arc::default();
             self.storage.ensure(gpu, bytes)?;
         }
         Ok(())
     }
 
-    /// Asks for the first `bytes` to be mapped as soon as the GPU is done with them.
+    /// Asks the device to map the first `bytes` as soon as the GPU is done with them.
     pub(super) fn ask(&self, gpu: &Gpu, bytes: u64) {
         if self.state.compare_exchange(UNMAPPED, ASKED, Ordering::AcqRel, Ordering::Acquire).is_ok() {
             let state = Arc::clone(&self.state);
@@ -65,7 +65,7 @@ impl Transfer {
         }
     }
 
-    /// The mapped memory, for the CPU to write. Waits for the mapping where it was not asked for ahead.
+    /// Returns the mapped memory to write to. Waits for the mapping unless it was asked for ahead.
     pub(super) fn writable(&self, gpu: &Gpu, bytes: u64) -> Result<wgpu::BufferViewMut, GpuError> {
         if self.state.load(Ordering::Acquire) != MAPPED {
             self.ask(gpu, self.bytes());
@@ -75,14 +75,14 @@ impl Transfer {
         self.storage.buffer().get_mapped_range_mut(0..bytes).map_err(|e| gpu.refusal(NOT_MAPPED, e))
     }
 
-    /// The mapped memory, for the CPU to read.
+    /// Returns the mapped memory to read from.
     pub(super) fn readable(&self, gpu: &Gpu, bytes: std::ops::Range<u64>) -> Result<wgpu::BufferView, GpuError> {
         self.mapped(gpu)?;
         self.storage.buffer().get_mapped_range(bytes).map_err(|e| gpu.refusal(NOT_MAPPED, e))
     }
 
-    /// After a wait for the GPU. Where several threads wait for one GPU, another one may have taken the news of this mapping and
-    /// be about to pass it on.
+    /// Checks that the mapping is done, after a wait for the GPU. If several threads wait for one GPU, another one
+    /// may have taken this mapping's callback and be about to run it.
     fn mapped(&self, gpu: &Gpu) -> Result<(), GpuError> {
         let start = Instant::now();
         while self.state.load(Ordering::Acquire) == ASKED && start.elapsed() < gpu.wait_limit() {
@@ -94,22 +94,22 @@ impl Transfer {
         if mapped { Ok(()) } else { Err(gpu.refusal(NOT_MAPPED, wgpu::BufferAsyncError)) }
     }
 
-    /// Whether the memory is mapped by now. Lets the device say so, and does not wait.
+    /// Polls the device, and returns whether the memory is mapped. Does not wait.
     pub(super) fn arrived(&self, gpu: &Gpu) -> Result<bool, GpuError> {
         gpu.poll(wgpu::PollType::Poll).map_err(|e| gpu.refusal(NOT_MAPPED, e))?;
         gpu.check()?;
         Ok(self.state.load(Ordering::Acquire) == MAPPED)
     }
 
-    /// Whether a mapping was asked for and has neither come nor failed.
+    /// Returns whether a mapping was asked for and has neither arrived nor failed.
     pub(super) fn is_on_its_way(&self) -> bool {
         self.state.load(Ordering::Acquire) == ASKED
     }
 
-    /// Hands the memory back to the GPU, for the commands that are being recorded.
+    /// Hands the memory back to the GPU.
     pub(super) fn unmap(&mut self) {
         if self.state.load(Ordering::Acquire) != UNMAPPED {
-            // What another thread is about to tell of this mapping is not taken for news of the next.
+            // A late callback of this mapping must not pass for one of the next.
             self.state = Arc::default();
             self.storage.buffer().unmap();
         }

@@ -1,7 +1,8 @@
-//! A growing scene of moving boxes, through the adaptive choice and every algorithm, each frame against the definition of overlap. A wrong
-//! answer is a panic, which in WebAssembly is a trap.
+//! Runs `Adaptive` and every algorithm on a growing scene of moving boxes, and compares each frame with the
+//! definition of overlap. A wrong answer panics, which in WebAssembly is a trap.
 //!
-//! `tools/wasm.sh` builds it for wasm32-unknown-unknown and runs it in Node.js; `cargo run -p sapwise-example-wasm` runs it here.
+//! `tools/wasm.sh` builds it for wasm32-unknown-unknown and runs it in Node.js; `cargo run -p sapwise-example-wasm`
+//! runs it here.
 
 use sapwise::{
     Aabb, Adaptive, AlgorithmCost, BroadPhase, CostCurve, CostTerm, Load, PairOrder, Pairs, Registry, Source, Term,
@@ -43,7 +44,7 @@ fn main() {
     );
 }
 
-/// Brute force is cheaper below a few hundred boxes, the grid above.
+/// Returns a tuning in which brute force is cheaper below a few hundred boxes, and the grid above.
 fn tuning(registry: &Registry) -> Tuning {
     let cost = |id: &str, term: Term, unit_ns: f64| {
         let entry =
@@ -55,7 +56,7 @@ fn tuning(registry: &Registry) -> Tuning {
     Tuning::from_costs(Source::Measured, "growing", costs, &loads)
 }
 
-/// Boxes that have moved a little since the frame before, and some new ones.
+/// Returns boxes that have moved a little since the previous frame, and some new ones.
 fn boxes(frame: usize) -> Vec<Aabb> {
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     let mut draw = || {
@@ -85,7 +86,7 @@ fn overlapping(boxes: &[Aabb]) -> Vec<(u32, u32)> {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn the_same_holds_on_this_machine() {
+    fn every_frame_is_right_on_this_machine() {
         super::main();
     }
 }

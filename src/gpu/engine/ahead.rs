@@ -1,17 +1,16 @@
-//! Frames that nobody waits for: boxes, pairs and their number stay on the GPU, and the CPU hears of them in a later frame.
+//! Frames that nobody waits for. Boxes, pairs and their number stay on the GPU; the host hears of them in a later
+//! frame.
 
-use super::{Engine, PAIRS_AT, Search, Step};
+use super::{Engine, Pending, Step};
 use crate::error::{GpuError, GpuErrorKind};
 use crate::gpu::look::Look;
 use crate::gpu::params::{Header, Params};
-use crate::gpu::sampler;
 use bytemuck::bytes_of;
 
 impl Engine {
-    /// Submits a frame of boxes that are on the GPU, and leaves nothing to finish.
+    /// Submits a frame of boxes that are on the GPU.
     pub(in crate::gpu) fn submit_ahead(&mut self, boxes: &wgpu::Buffer, mut params: Params) -> Result<(), GpuError> {
-        let (blocks, tile_pairs_left) = self.search.blocks(params.objects);
-        if tile_pairs_left > 0 {
+        if self.search.blocks(params.objects) > u64::from(self.search.most_blocks()) {
             let text = format!(
                 "brute takes several submissions for {} boxes, and waits between them: use bvh",
                 params.objects
@@ -19,46 +18,43 @@ impl Engine {
             return Err(GpuError::new(GpuErrorKind::Limit, text));
         }
         self.prepare(&params, false, Some(boxes))?;
-        (params.blocks, params.capacity) = (blocks, self.output.capacity());
-        params.submission = self.next_submission();
+        self.number(&mut params);
         let mut encoder = self.gpu.record();
         self.set(&params);
         self.gpu.queue().write_buffer(self.header.buffer(), 0, bytes_of(&Header::START));
-        if let Search::Sorted(sorted) = &self.search {
-            sorted.clear(&mut encoder, &params);
-        }
         self.record(&mut encoder, &params, Step::Sort);
-        if self.unread.is_some() {
-            // The GPU is behind, and so is what the CPU knows of it.
+        if matches!(self.pending, Pending::Ahead(_)) {
+            // The GPU is behind, and its last answer still on its way.
             self.gpu.submit(encoder)?;
         } else {
-            self.copy_back(&mut encoder, 0);
-            self.submit_mapped(encoder, PAIRS_AT + sampler::BYTES)?;
-            self.unread = Some(params.submission);
+            self.submit_and_download(encoder, 0)?;
+            self.pending = Pending::Ahead(params.submission);
         }
         Ok(())
     }
 
-    /// What a frame left that nobody waited for, once it has come back.
+    /// Returns the header and the sample of a frame that was submitted ahead, if they have arrived.
     pub(in crate::gpu) fn arrived(&mut self) -> Result<Option<(Header, Look)>, GpuError> {
-        let Some(submission) = self.unread else { return Ok(None) };
+        let Pending::Ahead(submission) = self.pending else { return Ok(None) };
         if !self.download.arrived(&self.gpu)? {
-            // What could not be mapped never comes.
-            self.unread = self.unread.filter(|_| self.download.is_on_its_way());
+            if !self.download.is_on_its_way() {
+                // It could not be mapped, and will never arrive.
+                self.pending = Pending::Nothing;
+            }
             return Ok(None);
         }
-        self.unread = None;
+        self.pending = Pending::Nothing;
         let header = self.downloaded(submission)?;
         self.expected = header.total();
         Ok(Some((header, self.seen()?)))
     }
 
-    /// What the kernels write beside the pairs, for those on the GPU who read them.
+    /// Returns the buffer of the [`Header`], which the program's kernels may read.
     pub(in crate::gpu) fn header_buffer(&self) -> &wgpu::Buffer {
         self.header.buffer()
     }
 
-    /// A frame without boxes.
+    /// Submits a frame without boxes.
     pub(in crate::gpu) fn submit_nothing(&self) -> Result<(), GpuError> {
         let encoder = self.gpu.record();
         self.gpu.queue().write_buffer(self.header.buffer(), 0, bytes_of(&Header::START));

@@ -1,25 +1,24 @@
-//! What an engine does once a frame was submitted: waiting, bringing pairs home, going on where one submission was too few.
+//! Waiting for a frame, downloading its pairs, and going on if one submission was not enough.
 
-use super::{Engine, Frame, PAIRS_AT, Search, Step};
+use super::{Engine, Frame, PAIRS_AT, Pending, Step};
 use crate::error::{Error, GpuError};
+use crate::gpu::failure::Failure;
 use crate::gpu::look::Look;
 use crate::gpu::output::PAIR;
 use crate::gpu::params::{Header, Params};
-use crate::gpu::storage::Failure;
 use crate::pairs::Pairs;
-use std::mem::offset_of;
+use std::mem::{offset_of, take};
 
 impl Engine {
-    /// Waits for what was started and adds its pairs to the list.
+    /// Waits for the frame, and adds its pairs to the list.
     pub(in crate::gpu) fn finish(&mut self, pairs: &mut Pairs) -> Result<(), Failure> {
         let mut all = 0;
-        let mut next = self.frame.take();
-        while let Some(mut frame) = next.take() {
+        while let Pending::Frame(mut frame) = take(&mut self.pending) {
             let header = self.header_of(&frame)?;
             let total = header.total();
             all += total;
             if pairs.is_too_small_for(total) {
-                // More than the caller wants: they stay where they are.
+                // More than the caller wants: they stay on the GPU.
                 pairs.exceed();
             } else {
                 self.fetch(&mut frame, total, pairs)?;
@@ -27,47 +26,41 @@ impl Engine {
             if pairs.is_over() {
                 break;
             }
-            if frame.tile_pairs_left > 0 || header.more != 0 {
-                next = Some(self.go_on(frame, 0)?);
-            }
+            self.go_on(frame, &header, 0)?;
         }
         self.expected = all;
         Ok(())
     }
 
-    /// Waits for what was started and returns the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer), and
-    /// what the boxes look like.
+    /// Waits for the frame. Returns the number of pairs, all of which are in [`pairs_buffer`](Self::pairs_buffer),
+    /// and what the boxes look like.
     pub(in crate::gpu) fn finish_resident(&mut self) -> Result<(u32, Look), Failure> {
         let mut all = 0_u64;
         let mut look = None;
-        let mut next = self.frame.take();
-        while let Some(mut frame) = next.take() {
+        while let Pending::Frame(mut frame) = take(&mut self.pending) {
             let header = self.header_of(&frame)?;
-            // A sample is taken with the first submission of a frame; every one brings the same back.
+            // Every submission of a frame takes the same sample.
             look = Some(look.map_or_else(|| self.seen(), Ok)?);
             let before = all;
             all += header.total();
             if all > u64::from(u32::MAX) {
-                let reason = format!("{all} pairs are more than the 2^32 that gpu{} can number", self.index());
-                return Err(Failure::limit(reason));
+                return Err(self.too_many(all, ""));
             }
             if all > u64::from(self.output.capacity()) {
                 self.make_room_for_pairs(&mut frame, all, before)?;
                 self.rewrite(&frame.params)?;
             }
-            if frame.tile_pairs_left > 0 || header.more != 0 {
-                // The pairs of the next submission stand behind those of this one: a window that begins below zero, modulo 2^32.
-                next = Some(self.go_on(frame, (all as u32).wrapping_neg())?);
-            }
+            // The pairs of the next submission follow those of this one: a window that begins below zero, modulo 2^32.
+            self.go_on(frame, &header, (all as u32).wrapping_neg())?;
         }
         self.expected = all;
         Ok((all as u32, look.unwrap_or_default()))
     }
 
-    /// A larger list of pairs that begins with the first `kept` of this one.
+    /// Replaces the list of pairs by a larger one with the same first `kept` pairs.
     fn make_room_for_pairs(&mut self, frame: &mut Frame, total: u64, kept: u64) -> Result<(), Failure> {
         let before = self.output.pairs().clone();
-        // Whatever fails from here on, nothing goes on with the list of before.
+        // If anything fails from here on, nothing goes on with the previous list.
         let boxes = self.bound_to.take();
         self.output.replace_pairs(&self.gpu, total)?;
         if kept > 0 {
@@ -83,16 +76,17 @@ impl Engine {
         Ok(())
     }
 
-    /// The list of pairs of the frame before.
+    /// Returns the list of pairs of the previous frame.
     pub(in crate::gpu) fn pairs_buffer(&self) -> &wgpu::Buffer {
         self.output.pairs()
     }
 
-    fn index(&self) -> u32 {
-        self.gpu.identity().index
+    fn too_many(&self, pairs: u64, hint: &str) -> Failure {
+        let index = self.gpu.identity().index;
+        Failure::limit(format!("{pairs} pairs are more than the 2^32 that gpu{index} can number{hint}"))
     }
 
-    /// Waits for a frame and reads its header.
+    /// Waits for a frame and returns its header.
     fn header_of(&self, frame: &Frame) -> Result<Header, Failure> {
         self.gpu.wait(frame.submission.clone())?;
         let header = self.downloaded(frame.params.submission)?;
@@ -102,16 +96,18 @@ impl Engine {
         }
     }
 
-    /// The header of the submission of this number, which has come back.
+    /// Returns the header of a submission that has arrived.
+    ///
+    /// # Errors
+    /// The header has the number of another submission: no kernel ran, and the buffers hold what an earlier frame
+    /// left. A GPU that hangs or a driver without hardware does that, and is lost from then on.
     pub(super) fn downloaded(&self, submission: u32) -> Result<Header, GpuError> {
         let view = self.download.readable(&self.gpu, 0..PAIRS_AT)?;
         let header: Header = bytemuck::pod_read_unaligned(&view[..size_of::<Header>()]);
-        drop(view);
-        self.check_ran(&header, submission)?;
-        Ok(header)
+        if header.ran == submission { Ok(header) } else { Err(self.gpu.inert()) }
     }
 
-    /// Brings `total` pairs into the list: those that came with the header, then the rest in as many steps as it takes.
+    /// Adds `total` pairs to the list: those that came with the header, then the others in as many steps as needed.
     fn fetch(&mut self, frame: &mut Frame, total: u64, pairs: &mut Pairs) -> Result<(), Failure> {
         let mut have = total.min(frame.sent).min(u64::from(frame.params.capacity));
         self.append(have, pairs)?;
@@ -119,8 +115,7 @@ impl Engine {
             return Ok(());
         }
         if total > u64::from(u32::MAX) {
-            let reason = format!("{total} pairs are more than the 2^32 that gpu{} can number", self.index());
-            return Err(Failure::limit(format!("{reason}; set a limit on the pairs, and no filter")));
+            return Err(self.too_many(total, "; set a limit on the pairs, and no filter"));
         }
         self.download.ensure(&self.gpu, PAIRS_AT + total.min(self.downloadable()) * PAIR)?;
         if total > u64::from(self.output.capacity()) {
@@ -148,7 +143,7 @@ impl Engine {
         Ok(())
     }
 
-    /// A larger list of pairs, if the GPU has one.
+    /// Makes the list of pairs as large as the GPU allows, up to `total`. Its content is lost.
     fn grow(&mut self, frame: &mut Frame, total: u64) -> Result<(), GpuError> {
         let Some(boxes) = self.bound_to.clone() else { return Ok(()) };
         if self.output.ensure_pairs(&self.gpu, total)? {
@@ -158,7 +153,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Writes the window of `params` into the list of pairs. Nothing is counted again.
+    /// Writes the pairs of the window again. They are not counted again.
     fn rewrite(&self, params: &Params) -> Result<(), GpuError> {
         let mut encoder = self.gpu.record();
         self.set(params);
@@ -167,20 +162,23 @@ impl Engine {
         self.gpu.wait(submission)
     }
 
-    /// Sets the parameters without the upload: this allocates, but frames that come here are rare.
+    /// Sets the parameters without the upload. This allocates.
     pub(super) fn set(&self, params: &Params) {
         self.gpu.queue().write_buffer(self.params.buffer(), 0, bytemuck::bytes_of(params));
     }
 
-    /// Goes on with the tile pairs, or the candidates of rows, that are left. `window`: where the pairs that are wanted begin.
-    fn go_on(&mut self, frame: Frame, window: u32) -> Result<Frame, GpuError> {
-        let mut params = frame.params;
-        match &self.search {
-            Search::Brute(_) => {
-                params.first += params.blocks;
-                params.blocks = frame.tile_pairs_left.min(u64::from(params.blocks)) as u32;
-            }
-            Search::Sorted(_) => params.round += 1,
+    /// Submits the blocks, or the candidates of rows, that are left, if there are any. `window`: position of the
+    /// first pair to write.
+    fn go_on(&mut self, frame: Frame, header: &Header, window: u32) -> Result<(), GpuError> {
+        let Frame { mut params, mut blocks_left, .. } = frame;
+        if blocks_left > 0 {
+            params.first += params.blocks;
+            params.blocks = blocks_left.min(u64::from(params.blocks)) as u32;
+            blocks_left -= u64::from(params.blocks);
+        } else if header.more != 0 {
+            params.round += 1;
+        } else {
+            return Ok(());
         }
         params.submission = self.next_submission();
         params.window = window;
@@ -191,11 +189,10 @@ impl Engine {
             encoder.clear_buffer(self.header.buffer(), field as u64, Some(4));
         }
         self.record(&mut encoder, &params, Step::Count);
-        let sent = if self.sampler.is_none() { self.sendable() } else { 0 };
-        self.copy_back(&mut encoder, sent);
-        let submission = self.submit_mapped(encoder, PAIRS_AT + (sent * PAIR).max(self.sample_bytes()))?;
-        let tile_pairs_left = frame.tile_pairs_left.saturating_sub(u64::from(params.blocks));
-        Ok(Frame { submission, params, sent, tile_pairs_left })
+        let sent = self.sendable();
+        let submission = self.submit_and_download(encoder, sent)?;
+        self.pending = Pending::Frame(Frame { submission, params, sent, blocks_left });
+        Ok(())
     }
 
     /// Adds the first `count` pairs of the download to the list.

@@ -1,5 +1,5 @@
-// A row is tested with what stands behind it in the tree, so that large boxes, which stand last, are found by the small ones and never
-// search them.
+// A row is tested with the boxes behind it in the order of the tree. Large boxes come last, so that small boxes find
+// them and they never search among small ones.
 
 fn first_state(row: u32) -> u32 {
     return row + 1u;

@@ -1,32 +1,33 @@
-// A counting sort by cell: from how many boxes each cell holds to where each cell begins, which is the table that the search reads too,
-// then each box to its place. `keys.wgsl` has counted.
+// Counting sort by cell. `keys.wgsl` has counted the boxes of each cell. The counts become the table of where each
+// cell begins, which the search reads too; then each box gets its place.
 
 const THREADS: u32 = 256u;
 // Cells of one workgroup.
 const EACH: u32 = 4096u;
 
 @group(0) @binding(0) var<uniform> params: Params;
-// The counts of all cells, four in each; then where each cell begins. Whole blocks of `EACH`, zero behind the last cell.
-@group(0) @binding(1) var<storage, read_write> cells: array<vec4<u32>>;
-// The sums of blocks.
+// The counts of the cells, four in each element; `begin` replaces them by where each cell begins. Whole blocks of
+// `EACH`; zero behind the last cell.
+@group(0) @binding(1) var<storage, read_write> cells: array<vec4u>;
+// The sum of each block.
 @group(0) @binding(2) var<storage, read_write> sums: array<u32>;
 // Where each cell begins.
 @group(0) @binding(3) var<storage, read> table: array<u32>;
-@group(0) @binding(4) var<storage, read> keys: array<vec2<u32>>;
+@group(0) @binding(4) var<storage, read> keys: array<vec2u>;
 @group(0) @binding(5) var<storage, read> ranks: array<u32>;
 @group(0) @binding(6) var<storage, read_write> order: array<u32>;
 
-fn total(v: vec4<u32>) -> u32 {
+fn total(v: vec4u) -> u32 {
     return v.x + v.y + v.z + v.w;
 }
 
-// What stands before each of four, of which the first has `first` before it.
-fn starts(first: u32, v: vec4<u32>) -> vec4<u32> {
-    return vec4<u32>(first, first + v.x, first + v.x + v.y, first + v.x + v.y + v.z);
+// Returns the sums before each of four counts, if `first` is the sum before the first.
+fn starts(first: u32, v: vec4u) -> vec4u {
+    return vec4u(first, first + v.x, first + v.x + v.y, first + v.x + v.y + v.z);
 }
 
 @compute @workgroup_size(256)
-fn add_up(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn add_up(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
     let block = w.y * n.x + w.x;
     if (block >= params.cell_blocks) {
         return;
@@ -40,7 +41,7 @@ fn add_up(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<
 }
 
 @compute @workgroup_size(256)
-fn begin(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn begin(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
     let block = w.y * n.x + w.x;
     if (block >= params.cell_blocks) {
         return;
@@ -65,7 +66,7 @@ fn begin(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u
 }
 
 @compute @workgroup_size(256)
-fn put(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn put(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
     let at = (w.y * n.x + w.x) * THREADS + t;
     if (at < params.objects) {
         order[table[keys[at].x] + ranks[at]] = at;

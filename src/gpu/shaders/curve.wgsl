@@ -1,8 +1,8 @@
-// Where a box stands on a curve that passes through all of space, so that boxes near each other on the curve are near each other in space:
-// Hilbert's, by the transposition of Skilling ("Programming the Hilbert curve", 2004). Large boxes stand behind the others, by size, because
-// one of them would make a large node of any group in which it stood. No choice here can lose a pair.
+// The place of a box on the Hilbert curve: boxes near each other on the curve are near each other in space. By the
+// transposition of Skilling ("Programming the Hilbert curve", 2004). Large boxes follow the others, by size, because
+// one large box makes a large node. No choice here can lose a pair.
 
-// Bits 0 to 9 to every third bit.
+// Spreads bits 0 to 9 to every third bit.
 fn spread(bits: u32) -> u32 {
     var b = (bits | (bits << 16u)) & 0x030000ffu;
     b = (b | (b << 8u)) & 0x0300f00fu;
@@ -10,7 +10,7 @@ fn spread(bits: u32) -> u32 {
     return (b | (b << 2u)) & 0x09249249u;
 }
 
-fn hilbert(place: vec3<u32>) -> u32 {
+fn hilbert(place: vec3u) -> u32 {
     var p = place;
     for (var bit = 512u; bit > 1u; bit >>= 1u) {
         let below = bit - 1u;
@@ -40,17 +40,17 @@ fn hilbert(place: vec3<u32>) -> u32 {
             t ^= bit - 1u;
         }
     }
-    p ^= vec3<u32>(t, t, t);
+    p ^= vec3u(t, t, t);
     return (spread(p.x) << 2u) | (spread(p.y) << 1u) | spread(p.z);
 }
 
-// Two bits of size, then thirty of the place of the middle.
+// Returns two bits of size, then thirty of the place of the centre.
 fn curve(at: u32) -> u32 {
-    let low = vec3<f32>(tame(bound(at, 0u, 0u)), tame(bound(at, 0u, 1u)), tame(bound(at, 0u, 2u)));
-    let high = vec3<f32>(tame(bound(at, 1u, 0u)), tame(bound(at, 1u, 1u)), tame(bound(at, 1u, 2u)));
+    let low = vec3f(tame(bound(at, 0u, 0u)), tame(bound(at, 0u, 1u)), tame(bound(at, 0u, 2u)));
+    let high = vec3f(tame(bound(at, 1u, 0u)), tame(bound(at, 1u, 1u)), tame(bound(at, 1u, 2u)));
     let extent = high - low;
     let longest = max(max(extent.x, extent.y), extent.z) * params.usual;
     let size = u32(longest > 8.0) + u32(longest > 64.0) + u32(longest > 512.0);
     let middle = low + extent * 0.5;
-    return (size << 30u) | hilbert(vec3<u32>(cell(middle.x, 0u), cell(middle.y, PARTS), cell(middle.z, 2u * PARTS)));
+    return (size << 30u) | hilbert(vec3u(cell(middle.x, 0u), cell(middle.y, PARTS), cell(middle.z, 2u * PARTS)));
 }

@@ -1,14 +1,15 @@
-// After the sort: the boxes in the order of their keys.
+// Copies the boxes into the order of their keys, after the sort.
 
 @group(0) @binding(4) var<storage, read> order: array<u32>;
 @group(0) @binding(5) var<storage, read_write> sorted: array<Box>;
-// Sorted by cells only: of each box in the input its cell and reach, where cells begin, and the cells of the sorted boxes.
-@group(0) @binding(6) var<storage, read> keys: array<vec2<u32>>;
+// `gather_cells` only: cell and reach of each box of the input, where each cell begins, and the cells of the sorted
+// boxes.
+@group(0) @binding(6) var<storage, read> keys: array<vec2u>;
 @group(0) @binding(7) var<storage, read> table: array<u32>;
 @group(0) @binding(8) var<storage, read_write> sorted_keys: array<u32>;
 
 @compute @workgroup_size(256)
-fn gather(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn gather(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
     let at = (w.y * n.x + w.x) * 256u + t;
     if (at < params.objects) {
         sorted[at] = load_box(order[at]);
@@ -16,7 +17,11 @@ fn gather(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<
 }
 
 @compute @workgroup_size(256)
-fn gather_cells(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn gather_cells(
+    @builtin(workgroup_id) w: vec3u,
+    @builtin(num_workgroups) n: vec3u,
+    @builtin(local_invocation_index) t: u32,
+) {
     let at = (w.y * n.x + w.x) * 256u + t;
     if (at >= params.objects) {
         return;
@@ -26,8 +31,9 @@ fn gather_cells(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n:
     let begin = table[key.x];
     let end = table[key.x + 1u];
     var to = at;
-    // Boxes came into their cell by chance; in it they stand as in the input, so that the order of pairs does not depend on timing. Each looks at
-    // all of its cell for that: in one that holds more than a row may be tested with they stay as they came.
+    // The counting sort leaves the boxes of a cell in random order. Here they get that of the input, so that the
+    // order of the pairs does not depend on timing. Each box looks at its whole cell for that, unless the cell has
+    // more boxes than a row may be tested with.
     if (end - begin <= params.budget) {
         to = begin;
         for (var k = begin; k < end; k++) {

@@ -1,4 +1,4 @@
-// Reads the boxes as the caller gave them.
+// The boxes as the caller gave them.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> boxes: array<u32>;
@@ -18,12 +18,12 @@ fn number(at: u32) -> u32 {
 
 fn load_box(at: u32) -> Box {
     var b: Box;
-    b.lo = vec4<u32>(order_key(bound(at, 0u, 0u)), order_key(bound(at, 0u, 1u)), order_key(bound(at, 0u, 2u)), number(at));
-    b.hi = vec4<u32>(order_key(bound(at, 1u, 0u)), order_key(bound(at, 1u, 1u)), order_key(bound(at, 1u, 2u)), 0u);
+    b.lo = vec4u(order_key(bound(at, 0u, 0u)), order_key(bound(at, 0u, 1u)), order_key(bound(at, 0u, 2u)), number(at));
+    b.hi = vec4u(order_key(bound(at, 1u, 0u)), order_key(bound(at, 1u, 1u)), order_key(bound(at, 1u, 2u)), 0u);
     return b;
 }
 
-// Notes the box if it is invalid. In a piece the position is the number in the whole frame.
+// Reports the box if it is invalid, by its number in the whole frame.
 fn check_box(at: u32) {
     var nan = false;
     var inverted = false;

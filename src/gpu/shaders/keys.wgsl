@@ -1,13 +1,13 @@
-// Before the sort: for each box its key, and how often each first digit or each cell occurs.
+// The key of each box, and the counts of first digits or of cells, for the sort.
 
-// Sorted by digits: a key. Sorted by cells: the cell, then what `Box.hi.w` holds.
+// Radix sort: a key. Counting sort: the cell, then `Box.hi.w`.
 @group(0) @binding(4) var<storage, read_write> keys: array<u32>;
-// For each digit and block of the first pass, or for each cell, how many boxes there are. Cleared before.
+// The number of boxes for each digit and block of the first pass, or for each cell. Cleared before.
 @group(0) @binding(5) var<storage, read_write> counts: array<atomic<u32>>;
-// Which box of its cell a box is, by chance: `gather` sets their order right.
+// The rank of each box in its cell, in random order, which `gather_cells` replaces by that of the input.
 @group(0) @binding(6) var<storage, read_write> ranks: array<u32>;
 
-fn invocation(w: vec3<u32>, n: vec3<u32>, t: u32) -> u32 {
+fn invocation(w: vec3u, n: vec3u, t: u32) -> u32 {
     return (w.y * n.x + w.x) * 256u + t;
 }
 
@@ -18,7 +18,11 @@ fn put_key(at: u32, key: u32) {
 }
 
 @compute @workgroup_size(256)
-fn sweep_keys(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn sweep_keys(
+    @builtin(workgroup_id) w: vec3u,
+    @builtin(num_workgroups) n: vec3u,
+    @builtin(local_invocation_index) t: u32,
+) {
     let at = invocation(w, n, t);
     if (at < params.objects) {
         put_key(at, order_key(bound(at, 0u, 0u)));
@@ -26,21 +30,29 @@ fn sweep_keys(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: v
 }
 
 @compute @workgroup_size(256)
-fn curve_keys(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn curve_keys(
+    @builtin(workgroup_id) w: vec3u,
+    @builtin(num_workgroups) n: vec3u,
+    @builtin(local_invocation_index) t: u32,
+) {
     let at = invocation(w, n, t);
     if (at < params.objects) {
         put_key(at, curve(at));
     }
 }
 
-// The first and the last cell of a box on an axis of the grid.
-fn cells_of(at: u32, axis: u32) -> vec2<u32> {
+// Returns the first and the last cell of a box on an axis of the grid.
+fn cells_of(at: u32, axis: u32) -> vec2u {
     let base = GRID + axis * PARTS;
-    return vec2<u32>(cell(tame(bound(at, 0u, axis)), base), cell(tame(bound(at, 1u, axis)), base));
+    return vec2u(cell(tame(bound(at, 0u, axis)), base), cell(tame(bound(at, 1u, axis)), base));
 }
 
 @compute @workgroup_size(256)
-fn cell_keys(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn cell_keys(
+    @builtin(workgroup_id) w: vec3u,
+    @builtin(num_workgroups) n: vec3u,
+    @builtin(local_invocation_index) t: u32,
+) {
     let at = invocation(w, n, t);
     if (at >= params.objects) {
         return;
@@ -49,8 +61,8 @@ fn cell_keys(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: ve
     let x = cells_of(at, 0u);
     let y = cells_of(at, 1u);
     let z = cells_of(at, 2u);
-    // Of an inverted box, which is reported, some differences are huge.
-    let more = vec3<u32>(x.y - x.x, y.y - y.x, z.y - z.x);
+    // Some differences of an inverted box are huge; such a box is reported.
+    let more = vec3u(x.y - x.x, y.y - y.x, z.y - z.x);
     var key = (z.x * params.cells.x + y.x) * params.slots + x.x;
     var reach = more.x | (more.y << 30u) | (more.z << 31u);
     let is_long = more.x > 16u && tame(bound(at, 1u, 0u)) - tame(bound(at, 0u, 0u)) > params.longest;

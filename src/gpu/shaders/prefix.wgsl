@@ -1,8 +1,8 @@
-// Sums over the invocations of a workgroup, of which there are `THREADS`.
+// Prefix sums over the `THREADS` invocations of a workgroup.
 
 var<workgroup> scan: array<u32, THREADS>;
 
-// Sums before this invocation, in `scan` the sums up to each.
+// Returns the sum of the values before this invocation. Leaves in `scan` the sums up to each.
 fn exclusive(t: u32, value: u32) -> u32 {
     scan[t] = value;
     workgroupBarrier();

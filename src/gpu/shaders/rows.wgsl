@@ -1,13 +1,14 @@
-// Counting and writing the pairs of sorted boxes, one row an invocation. The file that follows says which boxes a row is
-// tested with: `search` calls `hit` for each pair.
+// Counting and writing the pairs of sorted boxes, one row for each invocation. The next file defines the candidates
+// of a row: `search` calls `hit` for each pair.
 //
-// A row is tested with `params.budget` candidates in one submission and goes on in the next: drivers give up on a dispatch that takes
-// seconds, and some end a loop silently, lavapipe after 65 535 turns of all loops of an invocation together.
+// A row is tested with `params.budget` candidates in one submission and goes on in the next. Drivers give up on a
+// dispatch that takes seconds, and some end loops silently: lavapipe after 65 535 turns of all loops of an invocation
+// together.
 
 const THREADS: u32 = 64u;
-// Pairs of a row that are kept while they are counted, so that most rows are searched once.
+// Pairs that a row keeps while it counts, so that most rows are searched once.
 const KEPT: u32 = 4u;
-// The state of a row that has been tested with all its candidates.
+// The state of a row without further candidates.
 const DONE: u32 = 0xffffffffu;
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -15,24 +16,25 @@ const DONE: u32 = 0xffffffffu;
 @group(0) @binding(2) var<storage, read> boxes: array<Box>;
 @group(0) @binding(3) var<storage, read_write> header: Header;
 @group(0) @binding(4) var<storage, read_write> sums: array<u32>;
-@group(0) @binding(5) var<storage, read_write> pairs: array<vec2<u32>>;
-// The pairs of each row in this submission; then the states of all rows before a submission, of even ones and of odd ones.
+@group(0) @binding(5) var<storage, read_write> pairs: array<vec2u>;
+// The number of pairs of each row in this submission; then the states of all rows before even submissions, then
+// before odd ones.
 @group(0) @binding(6) var<storage, read_write> rows: array<u32>;
 @group(0) @binding(7) var<storage, read_write> kept: array<u32>;
 
 var<private> writing: bool;
-// Hits of this row so far.
+// Pairs of this row found in this submission.
 var<private> found: u32;
-// Position of the row's first pair in `pairs`.
+// Position of the first pair of this row in `pairs`.
 var<private> start: u32;
-// Candidates and nodes that this row may still be tested with.
+// Candidates and nodes left in the budget of this row.
 var<private> left: u32;
 
 fn state_at(row: u32, round: u32) -> u32 {
     return (1u + (round & 1u)) * params.objects + row;
 }
 
-// Tests a row with its next candidates. Returns its state after it.
+// Tests a row with its next candidates. Returns its new state.
 fn test_row(row: u32) -> u32 {
     var state = first_state(row);
     if (params.round > 0u) {
@@ -45,8 +47,8 @@ fn test_row(row: u32) -> u32 {
     return search(row, state);
 }
 
-fn store(at: u32, pair: vec2<u32>) {
-    // Unsigned wrap-around puts what lies before the window beyond every capacity.
+fn store(at: u32, pair: vec2u) {
+    // Positions before the window wrap around to numbers beyond every capacity.
     if (at < params.capacity) {
         pairs[at] = pair;
     }
@@ -65,7 +67,7 @@ fn hit(row: u32, a: u32, b: u32) {
 }
 
 @compute @workgroup_size(64)
-fn count(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn count(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
     let block = w.y * n.x + w.x;
     if (block >= params.blocks) {
         return;
@@ -86,7 +88,7 @@ fn count(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u
 }
 
 @compute @workgroup_size(64)
-fn write(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn write(@builtin(workgroup_id) w: vec3u, @builtin(num_workgroups) n: vec3u, @builtin(local_invocation_index) t: u32) {
     let block = w.y * n.x + w.x;
     if (block >= params.blocks) {
         return;

@@ -1,9 +1,9 @@
-// A glance at boxes that the CPU does not see: one out of each of up to 256 equal parts, at a place that differs from part to part and from
-// frame to frame. An even spacing could meet all boxes of a kind, or none, where these follow each other at regular distances.
+// A sample of the boxes: one of each of 256 equal parts of the list, at a position that differs from part to part and
+// from frame to frame. With equal spacing, a list in which kinds of boxes alternate could show one kind only.
 
 @group(0) @binding(4) var<storage, read_write> sampled: array<u32>;
 
-// The permutation of PCG (O'Neill, 2014) on one word.
+// The output permutation of PCG (O'Neill, 2014) on one word.
 fn mixed(word: u32) -> u32 {
     let state = word * 747796405u + 2891336453u;
     let turned = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
@@ -11,7 +11,7 @@ fn mixed(word: u32) -> u32 {
 }
 
 fn start(part: u32) -> u32 {
-    // part * objects / 256 in two parts, because the product passes 32 bits.
+    // part * objects / 256, without a product beyond 32 bits.
     return part * (params.objects / 256u) + part * (params.objects % 256u) / 256u;
 }
 

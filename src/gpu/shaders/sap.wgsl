@@ -1,4 +1,4 @@
-// A row is tested with the boxes behind it until one begins after its end.
+// A row is tested with the boxes behind it, up to the first that begins after its end.
 
 // The state is the position of the next candidate.
 fn first_state(row: u32) -> u32 {

@@ -1,36 +1,36 @@
-// Turns the counts of blocks into the position of each block's first pair, in place, and adds up all pairs in 64 bits.
-// One workgroup goes through the list.
+// Turns the counts of blocks into the position of each block's first pair, in place, and adds up all pairs in 64
+// bits. One workgroup goes through the list.
 
 const THREADS: u32 = 256u;
 const EACH: u32 = 16u;
-// Workgroups on one axis of a dispatch that every GPU takes.
+// Most workgroups on an axis of a dispatch that every GPU takes.
 const MOST_GROUPS: u32 = 65535u;
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(3) var<storage, read_write> header: Header;
 @group(0) @binding(4) var<storage, read_write> sums: array<u32>;
 
-// Sums of the lower and of the upper 16 bits apart, so that no sum passes 32 bits.
-var<workgroup> scan: array<vec2<u32>, THREADS>;
+// The lower and the upper 16 bits are summed separately, so that no sum exceeds 32 bits.
+var<workgroup> scan: array<vec2u, THREADS>;
 
 @compute @workgroup_size(256)
 fn positions(@builtin(local_invocation_index) t: u32) {
-    var before = vec2<u32>();
+    var before = vec2u();
     for (var first = 0u; first < params.blocks; first += THREADS * EACH) {
         let begin = first + t * EACH;
-        // Invocations that have something to add.
+        // Invocations with a block.
         let count = min((params.blocks - first + EACH - 1u) / EACH, THREADS);
-        var own = vec2<u32>();
+        var own = vec2u();
         for (var k = 0u; k < EACH; k++) {
             if (begin + k < params.blocks) {
                 let value = sums[begin + k];
-                own += vec2<u32>(value & 0xffffu, value >> 16u);
+                own += vec2u(value & 0xffffu, value >> 16u);
             }
         }
         scan[t] = own;
         workgroupBarrier();
         for (var step = 1u; step < count; step <<= 1u) {
-            var left = vec2<u32>();
+            var left = vec2u();
             if (t >= step) {
                 left = scan[t - step];
             }
@@ -48,7 +48,7 @@ fn positions(@builtin(local_invocation_index) t: u32) {
             }
         }
         before += scan[count - 1u];
-        before = vec2<u32>(before.x & 0xffffu, before.y + (before.x >> 16u));
+        before = vec2u(before.x & 0xffffu, before.y + (before.x >> 16u));
         workgroupBarrier();
     }
     if (t == 0u) {

@@ -1,18 +1,19 @@
-// One pass of a radix sort over 8 bits: stable, least significant digit first. Atomics form sums and sets of bits only, so that the
-// result never depends on timing. No workgroup waits for another: portable drivers don't promise that all of them run.
+// One pass of a stable radix sort over 8 bits, least significant digit first. Atomics form only sums and sets of
+// bits, so that the result does not depend on timing. No workgroup waits for another, because drivers don't guarantee
+// that all of them run at once.
 //
-// The digits of a pass are counted by whoever writes its keys: `keys.wgsl`, then the scatter of the pass before.
+// The kernel that writes the keys of a pass counts their digits: `keys.wgsl`, then `scatter` of the previous pass.
 
 const THREADS: u32 = 256u;
-// Invocations whose keys one word of a mask tells apart, and such groups in a workgroup.
+// Invocations of a group, which has a bit for each in a word, and groups of a workgroup.
 const LANES: u32 = 32u;
 const GROUPS: u32 = 8u;
-// Counts that an invocation adds up.
+// Counts for each invocation of `add_counts`.
 const EACH: u32 = 16u;
 
 struct Pass {
     number: u32,
-    // 1 in the last one: no digit is left to count.
+    // 1 in the last pass, after which no digit is left to count.
     last: u32,
     unused_a: u32,
     unused_b: u32,
@@ -25,16 +26,21 @@ struct Pass {
 @group(0) @binding(4) var<storage, read_write> keys_out: array<u32>;
 @group(0) @binding(5) var<storage, read_write> values_out: array<u32>;
 @group(0) @binding(6) var<storage, read_write> counts: array<atomic<u32>>;
-// Where the keys of each digit and block go: how many keys stand before them.
+// Where the keys of each digit and block go: the number of keys before them.
 @group(0) @binding(7) var<storage, read_write> starts: array<u32>;
 
-// For each group and digit the invocations that hold it, a bit each; then where the first of them goes.
+// For each group and digit, a bit for each invocation whose key has the digit; then where the first of these keys
+// goes.
 var<workgroup> masks: array<atomic<u32>, 2048>;
 
-// Turns counts into starts, digit by digit and block by block. Each workgroup adds up all that stands before its own counts: they are few
-// and lie in a cache, and a dispatch less is worth more.
+// Turns counts into starts. Each workgroup adds up all counts before its own: they are few and cached, and one
+// dispatch less saves more.
 @compute @workgroup_size(256)
-fn add_counts(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn add_counts(
+    @builtin(workgroup_id) w: vec3u,
+    @builtin(num_workgroups) n: vec3u,
+    @builtin(local_invocation_index) t: u32,
+) {
     let count = DIGITS * blocks();
     let first = (w.y * n.x + w.x) * EACH * THREADS;
     if (first >= count) {
@@ -62,12 +68,16 @@ fn add_counts(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: v
 }
 
 @compute @workgroup_size(256)
-fn scatter(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn scatter(
+    @builtin(workgroup_id) w: vec3u,
+    @builtin(num_workgroups) n: vec3u,
+    @builtin(local_invocation_index) t: u32,
+) {
     let block = w.y * n.x + w.x;
     if (block >= blocks()) {
         return;
     }
-    // As a digit, this invocation knows where its next key goes.
+    // Invocation t stands for digit t too: where the next key with that digit goes.
     var next = starts[t * blocks() + block];
     for (var group = 0u; group < GROUPS; group++) {
         atomicStore(&masks[group * DIGITS + t], 0u);
@@ -87,7 +97,7 @@ fn scatter(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3
             atomicOr(&masks[word], 1u << lane);
         }
         workgroupBarrier();
-        // Keys of this digit before this one in its group, which keeps the sort stable.
+        // Earlier keys of the group with the same digit: the sort is stable.
         let rank = countOneBits(atomicLoad(&masks[word]) & ((1u << lane) - 1u));
         workgroupBarrier();
         for (var group = 0u; group < GROUPS; group++) {

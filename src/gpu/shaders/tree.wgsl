@@ -1,7 +1,7 @@
-// Makes three levels of the tree above one that is there.
+// Makes the next three levels of the tree.
 
 struct Raise {
-    // The level that is there.
+    // The level below them.
     level: u32,
     unused_a: u32,
     unused_b: u32,
@@ -11,15 +11,15 @@ struct Raise {
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> raise: Raise;
 @group(0) @binding(2) var<storage, read_write> boxes: array<Box>;
-// Where cells begin: only what stands behind the first of the boxes kept apart is walked.
+// Where each cell begins. `raise_large` skips nodes before the first oversized box, which no walk reaches.
 @group(0) @binding(3) var<storage, read> table: array<u32>;
 
-var<workgroup> lows: array<vec4<u32>, 64>;
-var<workgroup> highs: array<vec4<u32>, 64>;
+var<workgroup> lows: array<vec4u, 64>;
+var<workgroup> highs: array<vec4u, 64>;
 
-// What holds nothing.
+// Returns the bounds of nothing.
 fn nothing() -> Box {
-    return Box(vec4<u32>(0xffffffffu, 0xffffffffu, 0xffffffffu, 0u), vec4<u32>());
+    return Box(vec4u(0xffffffffu, 0xffffffffu, 0xffffffffu, 0u), vec4u());
 }
 
 fn both(a: Box, b: Box) -> Box {
@@ -67,7 +67,11 @@ fn levels(group: u32, t: u32) {
 }
 
 @compute @workgroup_size(64)
-fn raise_all(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn raise_all(
+    @builtin(workgroup_id) w: vec3u,
+    @builtin(num_workgroups) n: vec3u,
+    @builtin(local_invocation_index) t: u32,
+) {
     let group = w.y * n.x + w.x;
     if (group >= span(raise.level + 3u)) {
         return;
@@ -76,7 +80,11 @@ fn raise_all(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: ve
 }
 
 @compute @workgroup_size(64)
-fn raise_large(@builtin(workgroup_id) w: vec3<u32>, @builtin(num_workgroups) n: vec3<u32>, @builtin(local_invocation_index) t: u32) {
+fn raise_large(
+    @builtin(workgroup_id) w: vec3u,
+    @builtin(num_workgroups) n: vec3u,
+    @builtin(local_invocation_index) t: u32,
+) {
     let group = w.y * n.x + w.x;
     let end = (group + 1u) << (3u * (raise.level + 3u));
     if (group >= span(raise.level + 3u) || end <= table[params.large_key]) {

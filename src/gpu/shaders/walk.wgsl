@@ -1,6 +1,7 @@
-// Walks over the tree, from one position in the order to the end. There is no stack: where the walk goes on follows from where it is.
+// A walk over the tree, from a position in the order to the end. It needs no stack: the next node follows from the
+// position of the current one.
 
-// Tests a row with all boxes that stand at `begin` or behind it. Returns `DONE`, or the position at which to go on.
+// Tests a row with all boxes from `begin` on. Returns `DONE`, or the position at which to go on.
 fn walk(row: u32, a: Box, begin: u32) -> u32 {
     var at = begin - 1u;
     var level = 0u;
@@ -11,7 +12,7 @@ fn walk(row: u32, a: Box, begin: u32) -> u32 {
             down = false;
         } else {
             at++;
-            // What begins a group is tested as a group.
+            // The first of eight: test their parent instead.
             while (level < params.top && (at & 7u) == 0u) {
                 first += span(level);
                 level++;

@@ -1,21 +1,22 @@
-//! Microsoft's compiler, which wgpu uses on Windows, as a library of Linux: version 3.7, in which every interface has the two destructors of C++ behind
-//! the three functions of `IUnknown`. Crates that call newer versions crash in it.
+//! Microsoft's compiler DXC, which wgpu uses on Windows, as a library for Linux. This is version 3.7, whose
+//! interfaces have C++'s two destructors behind the three functions of `IUnknown`. Crates for newer versions crash in
+//! it.
 
 use crate::Result;
 use std::ffi::c_void;
 use std::path::Path;
 use std::ptr::{null_mut, read};
 
-/// A number of COM, as it lies in memory on little-endian machines.
+/// An identifier of COM, in the memory layout of little-endian machines.
 type Guid = (u32, u16, u16, [u8; 8]);
 const COMPILER: Guid = (0x73e22d93, 0xe6ce, 0x47f3, [0xb5, 0xbf, 0xf0, 0x66, 0x4f, 0x39, 0xc1, 0xb0]);
 const I_COMPILER: Guid = (0x228b4687, 0x5a6a, 0x4730, [0x90, 0x0c, 0x97, 0x02, 0xb2, 0x20, 0x3f, 0x54]);
 const I_RESULT: Guid = (0x58346cda, 0xdde7, 0x4497, [0x94, 0x61, 0x6f, 0x87, 0xaf, 0x5e, 0x06, 0x59]);
 const UTF_8: u32 = 65001;
 
-/// An object of COM: its first word points to its functions.
+/// An object of COM. Its first word points to its functions.
 type Object = *mut *const Functions;
-/// Where the functions behind `IUnknown` and the destructors begin, as all of them are called here: with up to two pointers.
+/// The functions of an object: those of `IUnknown`, the destructors, then its own.
 #[repr(C)]
 struct Functions {
     unknown: [usize; 5],
@@ -38,9 +39,9 @@ type Get<T> = unsafe extern "C" fn(Object, *mut T) -> i32;
 type Pointer = unsafe extern "C" fn(Object) -> *const u8;
 type Size = unsafe extern "C" fn(Object) -> usize;
 
-/// Compiles every file of a folder to DXIL. Its name holds the entry point: `NAME.ENTRY.hlsl`.
+/// Compiles every file `NAME.ENTRY.hlsl` of a folder to DXIL.
 pub(crate) fn all(library: &Path, dir: &Path) -> Result<()> {
-    // SAFETY: DXC has initialisers that set up LLVM and nothing else. It stays loaded to the end of the process.
+    // SAFETY: DXC's initialisers set up LLVM and nothing else. It stays loaded until the process ends.
     let loaded = unsafe { libloading::Library::new(library) }
         .map_err(|e| format!("{} does not load: {e}", library.display()))?;
     // SAFETY: dxcapi.h declares it so.
@@ -71,13 +72,13 @@ pub(crate) fn all(library: &Path, dir: &Path) -> Result<()> {
 unsafe fn compile(compiler: Object, text: &str, entry: &str) -> Result<()> {
     let source = Source { text: text.as_ptr(), bytes: text.len(), encoding: UTF_8 };
     let words = ["-E", entry, "-T", "cs_6_0", "-HV", "2018", "-no-warnings", "-Ges"];
-    // A wide character of Linux has 32 bits.
+    // Wide characters have 32 bits on Linux.
     let wide = words.map(|word| word.chars().map(|c| c as i32).chain([0]).collect::<Vec<i32>>());
     let arguments = wide.each_ref().map(Vec::as_ptr);
     let mut result: Object = null_mut();
     let (mut status, mut dxil, mut words): (i32, Object, Object) = (0, null_mut(), null_mut());
-    // SAFETY: the functions stand in dxcapi.h in this order: `IDxcCompiler3::Compile`; `IDxcResult::GetStatus`, `GetResult`, `GetErrorBuffer`. Objects
-    // are never released: there are a few dozen, and the process ends soon.
+    // SAFETY: the functions have this order in dxcapi.h: `IDxcCompiler3::Compile`; `IDxcResult::GetStatus`,
+    // `GetResult`, `GetErrorBuffer`. Objects are never released: there are a few dozen, and the process ends soon.
     unsafe {
         let call: Compile = std::mem::transmute((**compiler).first);
         let failed =
@@ -92,11 +93,11 @@ unsafe fn compile(compiler: Object, text: &str, entry: &str) -> Result<()> {
         if status != 0 {
             return Err(String::from_utf8_lossy(bytes(words)).trim().to_owned());
         }
-        if bytes(dxil).starts_with(b"DXBC") { Ok(()) } else { Err("it hands out no DXIL".to_owned()) }
+        if bytes(dxil).starts_with(b"DXBC") { Ok(()) } else { Err("it returns no DXIL".to_owned()) }
     }
 }
 
-/// What an `IDxcBlob` holds: nothing, if it is null.
+/// Returns the bytes of an `IDxcBlob`; none if it is null.
 ///
 /// # Safety
 /// The object is null or an `IDxcBlob` of version 3.7, which lives on.

@@ -1,14 +1,14 @@
-//! Two mistakes that only the validation layers see. A layer that says nothing about them is asleep.
+//! Two mistakes for the validation layers to report. If they don't, they are not active.
 
 use crate::Result;
 use crate::statistics::{instance, refused};
 use ash::vk;
 
-/// Fills a buffer twice without a barrier between (synchronization validation), and without the usage that filling wants (plain validation).
+/// Fills a buffer twice without a barrier (synchronization validation) and without the usage for it (validation).
 pub(crate) fn provoke() -> Result<()> {
     let (_entry, instance) = instance()?;
-    // SAFETY: the handles are those that the calls before returned, and the structures live until the calls return. The mistakes are
-    // harmless on the devices of the script, which are software: two writes of the same words, one after the other.
+    // SAFETY: the handles are valid, and the structures live until the calls return. The mistakes are harmless on the
+    // software devices of the script: two writes of the same words.
     unsafe {
         for physical in instance.enumerate_physical_devices().map_err(refused("to list its devices"))? {
             let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];

@@ -1,4 +1,5 @@
-//! WGSL to what drivers take, with the options of wgpu-hal 30.0.1: those of `Kernel::new` and `Kernel::compile` in the library, and the defaults of wgpu for the rest.
+//! Translates WGSL with the options of wgpu-hal 30.0.1: those of `Kernel::new` and `Kernel::compile` in the library,
+//! and wgpu's defaults.
 
 use crate::Result;
 use naga::back::spv::Capability;
@@ -9,32 +10,32 @@ use naga::{AddressSpace, Module, ShaderStage};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// A module of which one entry point is wanted.
+/// A module with one of its entry points.
 pub(crate) struct Kernel {
     /// Name of the file.
     pub(crate) name: String,
     pub(crate) entry: String,
-    /// Whether wgpu adds its checks, as it does unless the text begins with the words that it has none.
+    /// Whether wgpu adds its checks. It does unless the text begins with `// Without checks.`
     checked: bool,
     module: Module,
     info: ModuleInfo,
 }
 
-/// How a Vulkan device wants its SPIR-V.
+/// A version of Vulkan.
 #[derive(Clone, Copy)]
 pub(crate) struct Target {
     /// Version of SPIR-V.
-    pub(crate) version: (u8, u8),
-    /// Whether the driver checks bounds of buffers (`robustBufferAccess2`), or naga has to.
-    pub(crate) robust: bool,
+    version: (u8, u8),
+    /// Whether the driver checks bounds of buffers (`robustBufferAccess2`). Otherwise naga does.
+    robust: bool,
 }
 
-/// Vulkan 1.3 with robustness, as today's drivers have it.
+/// Vulkan 1.3 with robustness, as current drivers have it.
 pub(crate) const NEW: Target = Target { version: (1, 6), robust: true };
-/// The least that wgpu takes without a remark: Vulkan 1.1, without it.
+/// The oldest that wgpu takes without a remark: Vulkan 1.1 without robustness.
 pub(crate) const OLD: Target = Target { version: (1, 3), robust: false };
 
-/// Every entry point of every shader in a folder.
+/// Reads every entry point of every shader in a folder.
 pub(crate) fn kernels(dir: &Path) -> Result<Vec<Kernel>> {
     let mut kernels = Vec::new();
     for file in crate::files(dir, "wgsl")? {
@@ -71,14 +72,14 @@ impl Kernel {
         if self.checked { BoundsCheckPolicy::Restrict } else { BoundsCheckPolicy::Unchecked }
     }
 
-    /// The module with its overrides at their defaults.
+    /// Returns the module with its overrides at their defaults.
     fn fixed(&self) -> Result<(Cow<'_, Module>, Cow<'_, ModuleInfo>)> {
         let entry = Some((ShaderStage::Compute, self.entry.as_str()));
         pipeline_constants::process_overrides(&self.module, &self.info, entry, &Default::default())
             .map_err(|e| format!("{}: its overrides have no values: {e}", self.label()))
     }
 
-    /// The buffers that the entry point uses: number, and whether it is a uniform buffer.
+    /// Returns the buffers that the entry point uses: number, and whether it is a uniform buffer.
     pub(crate) fn buffers(&self) -> Vec<(u32, bool)> {
         let index = self.module.entry_points.iter().position(|p| p.name == self.entry);
         let uses = self.info.get_entry_point(index.expect("the kernel was made of this entry point"));
@@ -86,12 +87,12 @@ impl Kernel {
         used.filter_map(|(_, v)| Some((v.binding?.binding, v.space == AddressSpace::Uniform))).collect()
     }
 
-    /// What wgpu hands to a Vulkan driver.
+    /// Translates the kernel as wgpu does for a Vulkan driver.
     pub(crate) fn spirv(&self, target: Target) -> Result<Vec<u32>> {
         let (module, info) = self.fixed()?;
         let index = self.bounds();
         let buffer = if target.robust { BoundsCheckPolicy::Unchecked } else { index };
-        // Those that wgpu allows a device with subgroups and nothing else. One more in a kernel is an error here.
+        // wgpu allows these to a device with subgroups. A kernel that needs another is an error.
         let capabilities = [
             Capability::Shader,
             Capability::Matrix,
@@ -118,7 +119,8 @@ impl Kernel {
             .map_err(|e| format!("{}: no SPIR-V: {e}", self.label()))
     }
 
-    /// What wgpu hands to DXC, whose shader model is the oldest that has DXIL, and the name of its entry point.
+    /// Translates the kernel as wgpu does for DXC, to the oldest shader model with DXIL. Returns the name of its
+    /// entry point first.
     fn hlsl(&self) -> Result<(String, String)> {
         let (module, info) = self.fixed()?;
         let options = hlsl::Options {
@@ -138,7 +140,7 @@ impl Kernel {
         }
     }
 
-    /// What wgpu hands to Metal, whose compiler runs on Apple's systems alone: here it only has to come about.
+    /// Translates the kernel as wgpu does for Metal. Metal's compiler runs only on Apple's systems.
     fn metal(&self) -> Result<String> {
         let (module, info) = self.fixed()?;
         let bounds = self.bounds();
@@ -156,7 +158,7 @@ impl Kernel {
     }
 }
 
-/// Writes every entry point of a folder's shaders into another folder, in each language.
+/// Writes every entry point of a folder into another folder, in each language.
 pub(crate) fn all(dir: &Path, out: &Path) -> Result<()> {
     let kernels = kernels(dir)?;
     for kernel in &kernels {
@@ -166,7 +168,7 @@ pub(crate) fn all(dir: &Path, out: &Path) -> Result<()> {
         };
         write(&kernel.entry, "spv", &bytes(&kernel.spirv(NEW)?))?;
         write(&kernel.entry, "1_1.spv", &bytes(&kernel.spirv(OLD)?))?;
-        // The names of WGSL that are words of HLSL are changed, and DXC has to know the entry point.
+        // naga renames what is a keyword of HLSL, and DXC needs the name of the entry point.
         let (entry, text) = kernel.hlsl()?;
         write(&entry, "hlsl", text.as_bytes())?;
         write(&kernel.entry, "metal", kernel.metal()?.as_bytes())?;

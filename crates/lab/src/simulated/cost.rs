@@ -29,12 +29,12 @@
 //! | `grid-sap` | as counted | 300 strip candidates | 48 n, and as counted |
 //! | `bvh` | as counted | 1500 n | 48 n, and as counted |
 //!
-//! What is counted is [`sapwise::gpu::Traffic`], and two dispatches more. Every method on GPUs pays a round trip and a read-back, 24 bytes up a box, 8 bytes down a pair, and 6 cycles a box and 4 a pair of
+//! What is counted is `fit::gpu_counts`, and two dispatches more. Every method on GPUs pays a round trip and a read-back, 24 bytes up a box, 8 bytes down a pair, and 6 cycles a box and 4 a pair of
 //! the CPU. With several GPUs each takes an equal share of the boxes and a tenth more that lie on a border.
 
 use super::factors::{CpuFactors, GpuFactors, of_method};
 use super::machine::{TrueGpu, TrueMachine};
-use sapwise::gpu::Traffic;
+use crate::fit::gpu_counts;
 use sapwise::{AlgorithmId, Backend, Load};
 
 /// Bytes that a frame keeps in flight for each box.
@@ -153,8 +153,9 @@ impl<'a> Costs<'a> {
         let n = f64::from(load.objects);
         let all = n * (n - 1.0).max(0.0) / 2.0;
         // The methods that sort are counted; boxes come up and are copied once more.
-        let counted = Traffic::of(method, load.objects, load.pairs as u64);
-        let (dispatches, bytes) = counted.map_or((3.0, 12.0 * n), |t| (f64::from(t.dispatches), t.bytes));
+        let counted =
+            gpu_counts(method).map(|(dispatches, of_box, of_pair)| (dispatches, of_box * n + of_pair * load.pairs));
+        let (dispatches, bytes) = counted.unwrap_or((3.0, 12.0 * n));
         let (dispatches, bytes) = (dispatches + 2.0, bytes + 48.0 * n);
         let operations = match method {
             "brute" => 20.0 * all,
