@@ -1,11 +1,11 @@
 //! The mixing behind fingerprints, seeds and draws.
 
 /// Distance of two states of splitmix64: 2^64 over the golden ratio.
-#[cfg(any(test, feature = "measure-gpu"))]
+#[cfg(any(test, feature = "measure"))]
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Advances a state and returns the next number of splitmix64 (Steele, Lea and Flood, 2014).
-#[cfg(any(test, feature = "measure-gpu"))]
+#[cfg(any(test, feature = "measure"))]
 pub(crate) fn next(state: &mut u64) -> u64 {
     *state = state.wrapping_add(STEP);
     mix(*state)

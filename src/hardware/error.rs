@@ -3,41 +3,41 @@
 use super::Bounds;
 use std::fmt;
 
-/// What makes the description of a machine unusable.
+/// What makes the description of a machine unusable. A parameter is named with the GPU that it is of.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum HardwareError {
-    /// A figure that is negative or no number.
+    /// A value that is negative or not finite.
     Figure {
-        /// The parameter, with whose it is.
+        /// The parameter.
         parameter: String,
-        /// The figure.
+        /// Its value.
         value: f64,
     },
-    /// A figure that its own samples contradict.
+    /// A value that contradicts its samples.
     Samples {
-        /// The parameter, with whose it is.
+        /// The parameter.
         parameter: String,
-        /// In what they contradict it.
+        /// The contradiction.
         why: String,
     },
-    /// Something that stands there twice.
+    /// Something that is listed twice.
     Repeated {
-        /// What.
+        /// What is listed twice.
         what: String,
     },
-    /// Numbers of GPUs that are no group.
+    /// Numbers of GPUs that are not a group.
     NoGroup {
         /// The numbers.
         gpus: Vec<u32>,
     },
-    /// A figure that no machine has; most often it is in another unit.
+    /// A value that no machine has, most often because it is in another unit.
     Implausible {
-        /// The parameter, with whose it is.
+        /// The parameter.
         parameter: String,
-        /// The figure.
+        /// Its value.
         value: f64,
-        /// Where figures lie.
+        /// Lowest and highest plausible value.
         bounds: Bounds,
     },
 }
@@ -45,16 +45,18 @@ pub enum HardwareError {
 impl fmt::Display for HardwareError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Figure { parameter, value } => write!(f, "the parameter {parameter} is {value:e}"),
-            Self::Samples { parameter, why } => write!(f, "the parameter {parameter}: {why}"),
-            Self::Repeated { what } => write!(f, "{what} stands there twice"),
-            Self::NoGroup { gpus } => {
-                write!(f, "the GPUs {gpus:?} are no group of two or more of the GPUs that stand there")
+            Self::Figure { parameter, value } => {
+                write!(f, "the parameter {parameter} is {value:e}; it must be a number and not negative")
             }
-            Self::Implausible { parameter, value, bounds: Bounds { least, most, why } } => write!(
+            Self::Samples { parameter, why } => write!(f, "the parameter {parameter}: {why}"),
+            Self::Repeated { what } => write!(f, "{what} is listed twice"),
+            Self::NoGroup { gpus } => {
+                write!(f, "{gpus:?} is not a group of GPUs: name two or more of the listed GPUs, ascending")
+            }
+            Self::Implausible { parameter, value, bounds: Bounds { least, most } } => write!(
                 f,
-                "the parameter {parameter} is {value}, and no machine lies outside {least} to {most} ({why}); check its unit, or measure \
-                 it with `sapwise probe --hardware-only`"
+                "the parameter {parameter} is {value}, and no machine lies outside {least} to {most}; check its unit, or measure it \
+                 with `sapwise probe --hardware-only`"
             ),
         }
     }

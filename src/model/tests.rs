@@ -177,7 +177,7 @@ fn hardware_with_impossible_gpus_is_told() {
     assert!(defect(&|h| h.gpus[1].gpu.index = 0).contains("twice"));
     let group = |gpus: &[u32]| GpuGroup { gpus: gpus.to_vec(), parameters: Vec::new() };
     for gpus in [&[0][..], &[1, 0], &[0, 7]] {
-        assert!(defect(&|h| h.gpu_groups.push(group(gpus))).contains("no group"));
+        assert!(defect(&|h| h.gpu_groups.push(group(gpus))).contains("not a group"));
     }
     assert!(defect(&|h| h.gpu_groups = vec![group(&[0, 1]), group(&[0, 1])]).contains("twice"));
 }
