@@ -6,8 +6,8 @@ mod common;
 
 use common::gpus;
 use sapwise::gpu::Gpus;
-use sapwise::hardware::GpuParameterId;
 use sapwise::hardware::GpuKind;
+use sapwise::hardware::GpuParameterId;
 use sapwise::measure::{self, Options};
 use sapwise::{How, Parameter};
 

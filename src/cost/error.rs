@@ -37,7 +37,9 @@ pub enum CurveError {
 impl fmt::Display for CurveError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Unit { term, unit_ns } => write!(f, "the term {term:?} has {unit_ns} ns a unit; use 0 to {MOST_UNIT_NS:e}"),
+            Self::Unit { term, unit_ns } => {
+                write!(f, "the term {term:?} has {unit_ns} ns a unit; use 0 to {MOST_UNIT_NS:e}")
+            }
             Self::Powers { term } => write!(f, "{term:?} has too many powers; use at most {}", Product::MOST_POWERS),
             Self::Cache { bytes } => write!(f, "a cache of {bytes} bytes; it must be finite and not negative"),
             Self::Residual => f.write_str("a residual has more weights than places, or an impossible weight"),

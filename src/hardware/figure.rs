@@ -125,10 +125,8 @@ impl Parameter {
             return Some("raw samples of a fit, which can't be checked".to_owned());
         }
         let text = |x: Option<f64>| x.map_or("missing".to_owned(), |x| x.to_string());
-        let figures = [
-            ("value", self.value, self.recomputed()),
-            ("dispersion", self.dispersion, stats::relative_iqr(&self.raw)),
-        ];
+        let figures =
+            [("value", self.value, self.recomputed()), ("dispersion", self.dispersion, stats::relative_iqr(&self.raw))];
         let (what, own, raw) = figures.into_iter().find(|&(_, own, raw)| match (own, raw) {
             (Some(own), Some(raw)) => (own - raw).abs() > TOLERANCE * own.abs().max(raw.abs()),
             (own, raw) => own != raw,

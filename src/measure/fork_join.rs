@@ -42,7 +42,8 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
              is the median of {PHASES}",
             threads - 1
         ),
-        "the same with bodies of 300 µs, after the helpers were idle for 2 ms while the calling thread worked".to_owned(),
+        "the same with bodies of 300 µs, after the helpers were idle for 2 ms while the calling thread worked"
+            .to_owned(),
     ];
     let [warm, cold] = methods;
     let (short, long) = (body_ns(SHORT), body_ns(LONG));

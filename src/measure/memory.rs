@@ -73,7 +73,9 @@ fn triad(options: &Options) -> Result<Vec<Parameter>, String> {
     arrays.triad_on_all(&pool);
     let method = |threads: usize| {
         let (plural, mib) = (if threads == 1 { "" } else { "s" }, bytes >> 20);
-        format!("STREAM triad on {threads} thread{plural}, three arrays of {mib} MiB; value is the median, STREAM quotes the best")
+        format!(
+            "STREAM triad on {threads} thread{plural}, three arrays of {mib} MiB; value is the median, STREAM quotes the best"
+        )
     };
     let plan = options.plan(9, 1150);
     let plan = Plan { limit: plan.limit.saturating_sub(start.elapsed()), ..plan };

@@ -134,7 +134,8 @@ mod tests {
 
     #[test]
     fn spoiled_windows_are_discarded_in_order() {
-        for (windows, load) in [([(9.0, 0.4), (1.0, 0.01), (2.0, 0.02)], 0.02), ([(1.0, 0.03), (9.0, 0.4), (2.0, 0.0)], 0.03)]
+        for (windows, load) in
+            [([(9.0, 0.4), (1.0, 0.01), (2.0, 0.02)], 0.02), ([(1.0, 0.03), (9.0, 0.4), (2.0, 0.0)], 0.03)]
         {
             let kept = keep_the_cleanest(windows.map(|(value, load)| window(value, load)).into(), 4);
             assert_eq!(kept.rows.as_flattened(), [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);

@@ -55,12 +55,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Compiles an entry point and binds its buffers, each with its binding number.
-    pub(super) fn bind(
-        &self,
-        source: &str,
-        entry: &'static str,
-        buffers: &[(u32, &wgpu::Buffer)],
-    ) -> Result<Bound> {
+    pub(super) fn bind(&self, source: &str, entry: &'static str, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound> {
         Kernel::compile(self.gpu, source.to_owned(), entry, &[])?.bind(self.gpu, buffers)
     }
 

@@ -61,7 +61,8 @@ impl Group<'_> {
         // First use of the pages.
         together(&mut jobs, run)?;
         let mib = UPLOAD_BYTES >> 20;
-        let method = format!("uploads of {mib} MiB in the same time, a thread for each GPU, over the fastest one alone");
+        let method =
+            format!("uploads of {mib} MiB in the same time, a thread for each GPU, over the fastest one alone");
         self.ratio(6, GpuParameterId::GroupUploadRatio, method, || over_the_fastest(&mut jobs, run))
     }
 
@@ -87,7 +88,8 @@ impl Group<'_> {
         let bound = |bench: &Bench<'_>| bench.bind(latency::SOURCE, "empty", &[]);
         let bound = self.benches.iter().map(bound).collect::<Result<Vec<Bound>>>()?;
         let jobs = || self.benches.iter().zip(&bound);
-        let method = "empty dispatch submitted to each GPU in turn by one thread, then waited for, over the slowest one alone";
+        let method =
+            "empty dispatch submitted to each GPU in turn by one thread, then waited for, over the slowest one alone";
         self.ratio(40, GpuParameterId::GroupRoundTripRatio, method.to_owned(), || {
             let (mut alone, mut together) = (vec![Duration::ZERO; bound.len()], Duration::ZERO);
             for _ in 0..ROUND_TRIPS {

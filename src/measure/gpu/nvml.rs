@@ -19,7 +19,11 @@ pub(super) fn query(pci: &str) -> Result<Vec<Parameter>, String> {
     let mhz = (0..8).filter_map(|_| device.clock_info(Clock::SM).ok()).max().filter(|&mhz| mhz > 0);
     let found = [
         (GpuParameterId::MemoryBytes, device.memory_info().ok().map(|memory| memory.total as f64), "NVML"),
-        (GpuParameterId::ClockGhz, mhz.map(|mhz| f64::from(mhz) / 1000.0), "NVML, clock of the multiprocessors under load"),
+        (
+            GpuParameterId::ClockGhz,
+            mhz.map(|mhz| f64::from(mhz) / 1000.0),
+            "NVML, clock of the multiprocessors under load",
+        ),
         (GpuParameterId::Processors, processors.map(f64::from), "NVML, CUDA cores over the cores of a multiprocessor"),
         (GpuParameterId::Lanes, cores.map(f64::from), "NVML, CUDA cores"),
     ];

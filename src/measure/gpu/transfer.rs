@@ -95,8 +95,9 @@ impl Times {
     /// origin, so all of these are tried. NaN if no line rises.
     fn slope_rate(&self) -> f64 {
         let points = &self.0;
-        let deviation =
-            |latency: f64, slope: f64| -> f64 { points.iter().map(|(v, t)| (1.0 - (latency + slope * v) / t).abs()).sum() };
+        let deviation = |latency: f64, slope: f64| -> f64 {
+            points.iter().map(|(v, t)| (1.0 - (latency + slope * v) / t).abs()).sum()
+        };
         let pairs = points.iter().enumerate().flat_map(|(i, &(v, t))| {
             let origin = (0.0, t / v);
             let through = points[..i].iter().map(move |&(w, u)| (t - u) / (v - w)).map(move |s| (t - s * v, s));
