@@ -143,16 +143,19 @@ impl Hardware {
         }
         for (k, g) in self.gpus.iter().enumerate() {
             if self.gpus[..k].iter().any(|h| h.gpu.index == g.gpu.index) {
-                return Some(HardwareError::Repeated { what: format!("gpu{}", g.gpu.index) });
+                return Some(HardwareError(format!("gpu{} is listed twice", g.gpu.index)));
             }
         }
         for (k, g) in self.gpu_groups.iter().enumerate() {
             let known = g.gpus.iter().all(|&k| self.gpu(k).is_some());
             if g.gpus.len() < 2 || !g.gpus.is_sorted_by(|a, b| a < b) || !known {
-                return Some(HardwareError::NoGroup { gpus: g.gpus.clone() });
+                let of = &g.gpus;
+                return Some(HardwareError(format!(
+                    "{of:?} is not a group: name two or more of the listed GPUs, ascending"
+                )));
             }
             if self.gpu_groups[..k].iter().any(|h| h.gpus == g.gpus) {
-                return Some(HardwareError::Repeated { what: format!("the group of the GPUs {:?}", g.gpus) });
+                return Some(HardwareError(format!("the group of the GPUs {:?} is listed twice", g.gpus)));
             }
         }
         None

@@ -127,10 +127,6 @@ impl MethodModel {
         Self { residual: Vec::new(), ..self.clone() }
     }
 
-    fn error(&self, why: String) -> ModelError {
-        ModelError::Method { method: format!("{} on the {}", self.method, self.backend), why }
-    }
-
     /// What makes it unusable, if anything.
     fn defect(&self, places: usize) -> Option<String> {
         let weights = self.residual.len();
@@ -200,22 +196,25 @@ impl Model {
     /// Returns what makes this model unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<ModelError> {
-        if self.methods.is_empty() {
-            return Some(ModelError::NoMethod);
-        }
-        if let Some(r) = self.ranges.iter().find(|r| !(r.min.is_finite() && r.max.is_finite() && r.min <= r.max)) {
-            return Some(ModelError::Range { parameter: r.parameter.clone() });
-        }
-        if self.ratios_90_ln.is_some_and(|ln| !(0.0..=50.0).contains(&ln)) {
-            return Some(ModelError::Intervals);
-        }
-        if let Some(position) = self.places.loads().iter().position(|load| !load.is_sound()) {
-            return Some(ModelError::Place { position });
-        }
-        self.methods.iter().find_map(|m| {
-            let why = m.fallback.as_ref().and_then(|f| self.fallback_defect(m, f));
-            Some(m.error(why.or_else(|| m.defect(self.places.loads().len()))?))
-        })
+        let places = self.places.loads();
+        let is_wrong = |r: &&Range| !(r.min.is_finite() && r.max.is_finite() && r.min <= r.max);
+        let of_method = |m: &MethodModel| {
+            let why =
+                m.fallback.as_ref().and_then(|f| self.fallback_defect(m, f)).or_else(|| m.defect(places.len()))?;
+            Some(format!("{} on the {}: {why}", m.method, m.backend))
+        };
+        let what = if self.methods.is_empty() {
+            Some("it holds no method".to_owned())
+        } else if let Some(r) = self.ranges.iter().find(is_wrong) {
+            Some(format!("the range of {} has ends that are not finite or not ascending", r.parameter))
+        } else if self.ratios_90_ln.is_some_and(|ln| !(0.0..=50.0).contains(&ln)) {
+            Some("its intervals have a width that is negative or not finite".to_owned())
+        } else if let Some(position) = places.iter().position(|load| !load.is_sound()) {
+            Some(format!("places[{position}] is a load that is negative or not finite"))
+        } else {
+            self.methods.iter().find_map(of_method)
+        };
+        what.map(ModelError)
     }
 
     fn fallback_defect(&self, of: &MethodModel, FallbackModel { method, factor }: &FallbackModel) -> Option<String> {

@@ -118,19 +118,17 @@ impl Parameter {
         if let Some(sample) = self.raw.iter().find(|x| !x.is_finite()) {
             return Some(format!("{sample} is among its raw samples"));
         }
-        if self.samples as usize != self.raw.len() {
-            return Some(format!("{} samples, but {} raw ones", self.samples, self.raw.len()));
-        }
-        if self.statistic == Statistic::Fit {
-            return Some("raw samples of a fit, which can't be checked".to_owned());
-        }
-        let text = |x: Option<f64>| x.map_or("missing".to_owned(), |x| x.to_string());
-        let figures =
-            [("value", self.value, self.recomputed()), ("dispersion", self.dispersion, stats::relative_iqr(&self.raw))];
-        let (what, own, raw) = figures.into_iter().find(|&(_, own, raw)| match (own, raw) {
+        let again = Self::from_samples(&self.name, self.statistic, self.raw.clone(), "");
+        let figures = [
+            ("value", self.value, again.value),
+            ("dispersion", self.dispersion, again.dispersion),
+            ("number of samples", Some(self.samples.into()), Some(again.samples.into())),
+        ];
+        let (what, own, raw) = figures.into_iter().find(|&(_, own, raw): &(_, Option<f64>, _)| match (own, raw) {
             (Some(own), Some(raw)) => (own - raw).abs() > TOLERANCE * own.abs().max(raw.abs()),
             (own, raw) => own != raw,
         })?;
+        let text = |x: Option<f64>| x.map_or("missing".to_owned(), |x| x.to_string());
         Some(format!("the {what} is {}, but its raw samples give {}", text(own), text(raw)))
     }
 
@@ -139,13 +137,14 @@ impl Parameter {
         for (k, p) in parameters.iter().enumerate() {
             let parameter = format!("{}{of}", p.name);
             if let Some(value) = p.value.filter(|v| !v.is_finite() || *v < 0.0) {
-                return Some(HardwareError::Figure { parameter, value });
+                let what = format!("the parameter {parameter} is {value:e}; it must be a number and not negative");
+                return Some(HardwareError(what));
             }
             if let Some(why) = p.disagreement() {
-                return Some(HardwareError::Samples { parameter, why });
+                return Some(HardwareError(format!("the parameter {parameter}: {why}")));
             }
             if parameters[..k].iter().any(|q| q.name == p.name) {
-                return Some(HardwareError::Repeated { what: format!("the parameter {parameter}") });
+                return Some(HardwareError(format!("the parameter {parameter} is listed twice")));
             }
         }
         None
@@ -167,8 +166,8 @@ mod tests {
         told(Parameter { value: None, ..measured() }, "value is missing");
         told(Parameter { dispersion: Some(0.5), ..measured() }, "0.5");
         told(Parameter { dispersion: None, ..measured() }, "dispersion");
-        told(Parameter { samples: 5, ..measured() }, "5 samples");
-        told(Parameter { statistic: Statistic::Fit, ..measured() }, "fit");
+        told(Parameter { samples: 5, ..measured() }, "number of samples is 5");
+        told(Parameter { statistic: Statistic::Fit, ..measured() }, "give missing");
         told(Parameter { raw: vec![f64::NAN; 4], ..measured() }, "NaN");
     }
 }

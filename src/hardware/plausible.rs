@@ -5,8 +5,12 @@ use super::{Bounds, GpuHardware, GpuParameterId, Hardware, HardwareError, Parame
 impl Bounds {
     /// Returns the error of a value outside; NaN is outside.
     fn check(self, name: &str, of: &str, value: Option<f64>) -> Option<HardwareError> {
-        let value = value.filter(|v| !(self.least..=self.most).contains(v))?;
-        Some(HardwareError::Implausible { parameter: format!("{name}{of}"), value, bounds: self })
+        let Self { least, most } = self;
+        let value = value.filter(|v| !(least..=most).contains(v))?;
+        Some(HardwareError(format!(
+            "the parameter {name}{of} is {value}, and no machine lies outside {least} to {most}; check its unit, or measure it with \
+             `sapwise probe --hardware-only`"
+        )))
     }
 }
 

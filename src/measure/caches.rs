@@ -31,7 +31,7 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
     let limit = memory::total_bytes().map_or(64 << 20, |bytes| bytes / 8);
     let latency = |(kib, id)| {
         let parameters = latencies(kib, id, limit, options);
-        parameters.unwrap_or_else(|why| vec![Parameter::missing(id, why)])
+        parameters.unwrap_or_else(|why: &str| vec![Parameter::missing(id, why)])
     };
     sizes.into_iter().chain(ParameterId::LATENCIES.into_iter().flat_map(latency)).collect()
 }
@@ -57,11 +57,11 @@ fn latencies(kib: u32, id: ParameterId, limit: u64, options: &Options) -> Result
         "too large to be walked before"
     };
     let method = format!("dependent loads around a random cycle of 64-byte lines, default pages; set {warm}");
-    Ok(options.plan(9, 450).measure([(id, method)], || {
+    options.plan(9, 450).measure([(id, method)], || {
         let (ns, end) = sample_ns(at, slice);
         at = end;
-        [ns]
-    }))
+        Ok([ns])
+    })
 }
 
 /// A cache line that refers to the next one. An index would cost a cycle to scale.

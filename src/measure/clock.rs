@@ -14,23 +14,17 @@ use crate::hardware::{Parameter, ParameterId, Statistic};
 const LINKS: u64 = 5_600_000;
 
 /// Additions that the assembly repeats before it returns to the loop, whose own counter runs beside the chain.
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 const UNROLLED: u64 = 64;
 
-pub(super) fn measure(options: &Options) -> Vec<Parameter> {
+pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
     let method = format!(
-        "chain of {LINKS} dependent {CHAIN} on one thread; value is the median of the fastest quarter of the chains, dispersion is of all"
+        "chain of {LINKS} dependent register additions on one thread; value is the median of the fastest quarter of the chains, dispersion is of all"
     );
     // An interruption can only make a chain slower, so the fast ones show the clock. The best of hundreds would be a short boost.
     let plan = Plan { statistic: Statistic::FastestQuarterMedian, ..options.plan(100, 450) };
-    let measured = plan.measure([(ParameterId::ClockMeasuredGhz, method)], || [chain_ghz()]);
-    std::iter::once(reported()).chain(measured).collect()
+    let measured = plan.measure([(ParameterId::ClockMeasuredGhz, method)], || Ok([chain_ghz()]));
+    measured.map(|measured| std::iter::once(reported()).chain(measured).collect())
 }
-
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-const CHAIN: &str = "register additions";
-#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-const CHAIN: &str = "steps of a multiplication and an exclusive or, each counted as four cycles";
 
 /// Clock from one addition a cycle.
 ///
@@ -62,24 +56,14 @@ fn chain_ghz() -> f64 {
         }
     }
     black_box(sum);
-    ghz(LINKS / UNROLLED * UNROLLED, start)
+    // Infinite if the system's clock did not move.
+    (LINKS / UNROLLED * UNROLLED) as f64 / start.elapsed().as_nanos() as f64
 }
 
-/// Clock from a multiplication (three cycles on most cores) and an exclusive or (one).
+/// NaN: nobody wrote a chain for this architecture.
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 fn chain_ghz() -> f64 {
-    let mut product = black_box(1_u64);
-    let start = Instant::now();
-    for step in 0..LINKS / 4 {
-        product = product.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ step;
-    }
-    black_box(product);
-    ghz(LINKS, start)
-}
-
-/// Infinite if the system's clock did not move.
-fn ghz(cycles: u64, start: Instant) -> f64 {
-    cycles as f64 / start.elapsed().as_nanos() as f64
+    f64::NAN
 }
 
 fn reported() -> Parameter {
@@ -95,20 +79,10 @@ fn reported() -> Parameter {
     {
         return Parameter::reported(name, f64::from(mhz) / 1e3, "CPUID leaf 0x16, maximum");
     }
-    // sysinfo rounds the figure of Linux to MHz, and takes BogoMIPS, which is no clock, if there is none.
-    let (mhz, source) = if cfg!(target_os = "linux") {
-        let mhz = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| parse_cpu_mhz(&text));
-        (mhz, "/proc/cpuinfo, cpu MHz of the first CPU")
-    } else {
-        let mhz = sysinfo::System::new().ok().and_then(|mut system| {
-            system.refresh_cpu_list(sysinfo::CpuRefreshKind::nothing().with_frequency());
-            Some(system.cpus().first()?.frequency() as f64).filter(|mhz| *mhz > 0.0)
-        });
-        (mhz, "sysinfo, frequency of the first CPU")
-    };
-    match mhz {
-        Some(mhz) => Parameter::reported(name, mhz / 1e3, source),
-        None => Parameter::missing(name, "neither CPUID nor the operating system reports it"),
+    // sysinfo rounds it to MHz, which would make another host of the same one.
+    match std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| parse_cpu_mhz(&text)) {
+        Some(mhz) => Parameter::reported(name, mhz / 1e3, "/proc/cpuinfo, cpu MHz of the first CPU"),
+        None => Parameter::missing(name, "neither cpufreq, CPUID leaf 0x16 nor /proc/cpuinfo reports it"),
     }
 }
 

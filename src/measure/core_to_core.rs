@@ -22,17 +22,16 @@ const PAIRS: usize = 8;
 /// Ends an exchange whose partner does not run. A complete one takes half a millisecond.
 const LIMIT: Duration = Duration::from_millis(10);
 
-pub(super) fn measure(options: &Options) -> Vec<Parameter> {
-    let name = ParameterId::CoreToCoreNs;
+pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
     let pairs = pairs(options.usable_cores());
     if pairs.is_empty() {
-        return vec![Parameter::missing(name, "one usable core, or threads can't be bound to cores here")];
+        return Err("one usable core, or threads can't be bound to cores here".to_owned());
     }
     let method = format!(
         "one way of an exchange through one word between threads bound to two cores; median over {} pairs of the first core with others",
         pairs.len()
     );
-    options.plan(15, 300).measure([(name, method)], || [median_of(&pairs)])
+    options.plan(15, 300).measure([(ParameterId::CoreToCoreNs, method)], || Ok([median_of(&pairs)]))
 }
 
 /// Measures [`ParameterId::CoreToCoreNs`] once, over the first core with the second and the last, as the best of three so that a
@@ -77,7 +76,11 @@ fn exchange_ns(a: CoreId, b: CoreId) -> Option<f64> {
     std::thread::scope(|scope| {
         let answering = std::thread::Builder::new().spawn_scoped(scope, || {
             let bound = core_affinity::set_for_current(b);
-            (0..WARM_UP + COUNTED).all(|k| bound && turn(word, 2 * k + 1, end))
+            (0..WARM_UP + COUNTED).all(|k| {
+                let came = bound && await_word(word, 2 * k + 1, end);
+                word.store(2 * k + 2, Ordering::Release);
+                came
+            })
         });
         let asking = std::thread::Builder::new().spawn_scoped(scope, || {
             let bound = core_affinity::set_for_current(a);
@@ -98,13 +101,6 @@ fn exchange_ns(a: CoreId, b: CoreId) -> Option<f64> {
         let ns = asking.join().ok().flatten();
         ns.filter(|_| answering.join().unwrap_or(false))
     })
-}
-
-/// Waits for a value and answers with the next.
-fn turn(word: &AtomicU32, value: u32, end: Instant) -> bool {
-    let came = await_word(word, value, end);
-    word.store(value + 1, Ordering::Release);
-    came
 }
 
 fn await_word(word: &AtomicU32, value: u32, end: Instant) -> bool {
@@ -139,7 +135,6 @@ mod tests {
         }
         let word = AtomicU32::new(0);
         assert!(!await_word(&word, 1, Instant::now()));
-        assert!(turn(&word, 0, Instant::now()));
-        assert_eq!(word.load(Ordering::Relaxed), 1);
+        assert!(await_word(&word, 0, Instant::now()));
     }
 }

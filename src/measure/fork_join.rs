@@ -5,7 +5,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Options, missing};
+use super::Options;
 use crate::cpu::{Threads, Workers};
 use crate::hardware::{Parameter, ParameterId};
 use crate::stats::median;
@@ -25,35 +25,27 @@ const IDLE: Duration = Duration::from_millis(2);
 /// Warm phases behind one sample.
 const PHASES: u32 = 16;
 
-const NAMES: [ParameterId; 2] = [ParameterId::ForkJoinWarmNs, ParameterId::ForkJoinColdNs];
-
-pub(super) fn measure(options: &Options) -> Vec<Parameter> {
+pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
     let threads = options.usable_cores();
     if threads == 1 {
-        return missing(&NAMES, "one usable core");
+        return Err("one usable core".to_owned());
     }
-    let workers = match workers(threads) {
-        Ok(workers) => workers,
-        Err(why) => return missing(&NAMES, &why),
-    };
-    let methods = [
-        format!(
-            "phase of {threads} bodies of 20 µs, one on the calling thread and the others on {} awake helpers, minus one body; a sample \
-             is the median of {PHASES}",
-            threads - 1
-        ),
-        "the same with bodies of 300 µs, after the helpers were idle for 2 ms while the calling thread worked"
-            .to_owned(),
-    ];
-    let [warm, cold] = methods;
+    let workers = workers(threads)?;
+    let warm = format!(
+        "phase of {threads} bodies of 20 µs, one on the calling thread and the others on {} awake helpers, minus one body; a sample is the \
+         median of {PHASES}",
+        threads - 1
+    );
+    let cold = "the same with bodies of 300 µs, after the helpers were idle for 2 ms while the calling thread worked";
+    let named = [(ParameterId::ForkJoinWarmNs, warm), (ParameterId::ForkJoinColdNs, cold.to_owned())];
     let (short, long) = (body_ns(SHORT), body_ns(LONG));
-    options.plan(40, 500).measure([(NAMES[0], warm), (NAMES[1], cold)], || {
+    options.plan(40, 500).measure(named, || {
         wake(&workers);
         let phases: Vec<f64> = (0..PHASES).map(|_| phase_ns(&workers, SHORT)).collect();
         // The caller works on, like a program whose next frame it is: only the helpers go to sleep.
         spin(IDLE);
         let cold = phase_ns(&workers, LONG);
-        [(median(&phases).unwrap_or(f64::NAN) - short).max(0.0), (cold - long).max(0.0)]
+        Ok([(median(&phases).unwrap_or(f64::NAN) - short).max(0.0), (cold - long).max(0.0)])
     })
 }
 

@@ -80,18 +80,18 @@ fn triad(options: &Options) -> Result<Vec<Parameter>, String> {
     let plan = options.plan(9, 1150);
     let plan = Plan { limit: plan.limit.saturating_sub(start.elapsed()), ..plan };
     let named = [(BANDWIDTHS[0], method(1)), (BANDWIDTHS[1], method(threads))];
-    Ok(plan.measure(named, || {
+    plan.measure(named, || {
         if threads == 1 {
             let one = arrays.triad_on_one();
-            return [one, one];
+            return Ok([one, one]);
         }
         // Untimed: takes back what lies in the caches of the other cores.
         arrays.triad_on_one();
         let one = arrays.triad_on_one();
         // Untimed: wakes the workers, which slept while one thread ran. STREAM's never sleep.
         arrays.triad_on_all(&pool);
-        [one, arrays.triad_on_all(&pool)]
-    }))
+        Ok([one, arrays.triad_on_all(&pool)])
+    })
 }
 
 /// The part of the three arrays that one thread touched first.

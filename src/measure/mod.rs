@@ -142,15 +142,16 @@ impl Options {
 /// A caller that wants to survive a crash runs each family in a child process and combines the answers with [`assemble`].
 #[must_use]
 pub fn family(family: Family, options: &Options) -> Vec<Parameter> {
-    match family {
-        Family::Topology => topology::measure(options),
+    let measured = match family {
+        Family::Topology => Ok(topology::measure(options)),
         Family::Clock => clock::measure(options),
-        Family::Caches => caches::measure(options),
-        Family::Memory => memory::measure(options),
+        Family::Caches => Ok(caches::measure(options)),
+        Family::Memory => Ok(memory::measure(options)),
         Family::CoreToCore => core_to_core::measure(options),
         Family::ForkJoin => fork_join::measure(options),
         Family::Scaling => scaling::measure(options),
-    }
+    };
+    measured.unwrap_or_else(|why| missing(&family.parameters(), &why))
 }
 
 /// Measures every family in this process.

@@ -1,6 +1,5 @@
 //! Takes samples in windows and discards the windows in which other programs took the CPU.
 
-use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
 use super::{Options, Watch};
@@ -19,18 +18,8 @@ pub(super) struct Plan<'a> {
 }
 
 impl Plan<'_> {
-    /// Takes samples of N parameters together, each given with its name and method.
-    pub(super) fn measure<const N: usize>(
-        &self,
-        named: [(impl AsRef<str>, String); N],
-        mut sample: impl FnMut() -> [f64; N],
-    ) -> Vec<Parameter> {
-        let Ok(parameters) = self.try_measure(named, || Ok::<_, Infallible>(sample()));
-        parameters
-    }
-
-    /// [`measure`](Self::measure) for samples that can fail: the first failure ends it.
-    pub(super) fn try_measure<const N: usize, E>(
+    /// Takes samples of N parameters together, each given with its name and method. The first failure ends it.
+    pub(super) fn measure<const N: usize, E>(
         &self,
         named: [(impl AsRef<str>, String); N],
         sample: impl FnMut() -> Result<[f64; N], E>,
@@ -62,10 +51,10 @@ impl Plan<'_> {
                 }
             }
             windows.push(Window { rows, foreign_load: watch.foreign_load() });
-            let clean: usize = windows.iter().filter(|w| w.is_clean()).map(|w| w.rows.len()).sum();
+            let clean: usize = windows.iter().filter(|w| w.load() <= Watch::SPOILING).map(|w| w.rows.len()).sum();
             let over = start.elapsed() + watch.elapsed() > self.limit;
             if clean >= self.samples || over || self.options.is_stopped() {
-                return Ok(keep_the_cleanest(windows, self.samples));
+                return Ok(Samples::keep(windows, self.samples));
             }
         }
     }
@@ -78,8 +67,8 @@ struct Window<const N: usize> {
 }
 
 impl<const N: usize> Window<N> {
-    fn is_clean(&self) -> bool {
-        self.foreign_load.is_none_or(|load| load <= Watch::SPOILING)
+    fn load(&self) -> f64 {
+        self.foreign_load.unwrap_or(0.0)
     }
 }
 
@@ -92,26 +81,19 @@ struct Samples<const N: usize> {
     foreign_load: Option<f64>,
 }
 
-/// Keeps every clean window, and the least spoiled others while fewer than `wanted` samples are kept; in order of measurement.
-fn keep_the_cleanest<const N: usize>(windows: Vec<Window<N>>, wanted: usize) -> Samples<N> {
-    let load = |k: usize| windows[k].foreign_load.unwrap_or(0.0);
-    let mut cleanest: Vec<usize> = (0..windows.len()).collect();
-    cleanest.sort_by(|&a, &b| load(a).total_cmp(&load(b)));
-    let (mut keep, mut kept) = (vec![false; windows.len()], 0);
-    for k in cleanest {
-        keep[k] = windows[k].is_clean() || kept < wanted;
-        kept += if keep[k] { windows[k].rows.len() } else { 0 };
-    }
-    let mut samples = Samples { rows: Vec::new(), spoiled: 0, foreign_load: None };
-    for (window, keep) in windows.into_iter().zip(keep) {
-        if keep {
-            samples.foreign_load = samples.foreign_load.into_iter().chain(window.foreign_load).reduce(f64::max);
-            samples.rows.extend(window.rows);
-        } else {
-            samples.spoiled += window.rows.len() as u32;
+impl<const N: usize> Samples<N> {
+    /// Keeps every clean window, and the least spoiled others until `wanted` samples are kept; in order of measurement.
+    fn keep(windows: Vec<Window<N>>, wanted: usize) -> Self {
+        let mut loads: Vec<f64> = windows.iter().flat_map(|w| w.rows.iter().map(|_| w.load())).collect();
+        loads.sort_unstable_by(f64::total_cmp);
+        let highest = loads.get(wanted.min(loads.len()).max(1) - 1).map_or(0.0, |load| load.max(Watch::SPOILING));
+        let (kept, spoiled): (Vec<_>, Vec<_>) = windows.into_iter().partition(|w| w.load() <= highest);
+        Self {
+            spoiled: spoiled.iter().map(|w| w.rows.len() as u32).sum(),
+            foreign_load: kept.iter().filter_map(|w| w.foreign_load).reduce(f64::max),
+            rows: kept.into_iter().flat_map(|w| w.rows).collect(),
         }
     }
-    samples
 }
 
 /// Rounds to six significant digits, which is what a file keeps of a sample.
@@ -137,7 +119,7 @@ mod tests {
         for (windows, load) in
             [([(9.0, 0.4), (1.0, 0.01), (2.0, 0.02)], 0.02), ([(1.0, 0.03), (9.0, 0.4), (2.0, 0.0)], 0.03)]
         {
-            let kept = keep_the_cleanest(windows.map(|(value, load)| window(value, load)).into(), 4);
+            let kept = Samples::keep(windows.map(|(value, load)| window(value, load)).into(), 4);
             assert_eq!(kept.rows.as_flattened(), [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
             assert_eq!((kept.spoiled, kept.foreign_load), (3, Some(load)));
         }
@@ -145,7 +127,7 @@ mod tests {
 
     #[test]
     fn without_clean_windows_the_least_spoiled_is_kept() {
-        let kept = keep_the_cleanest(vec![window(9.0, 0.4), window(5.0, 0.3)], 2);
+        let kept = Samples::keep(vec![window(9.0, 0.4), window(5.0, 0.3)], 2);
         assert_eq!((kept.rows.as_flattened(), kept.spoiled, kept.foreign_load), (&[5.0; 3][..], 3, Some(0.3)));
     }
 
@@ -161,18 +143,18 @@ mod tests {
     fn a_parameter_follows_from_its_raw_samples() {
         let options = Options::default();
         let mut values = [3.000_000_4, f64::NAN, 1.0, 1_234.567_89, f64::INFINITY, 2.0].into_iter();
-        let short = plan(&options, Duration::from_millis(1));
-        let p = short.measure([("x_ns", "test".to_owned())], || [values.next().unwrap_or(f64::NAN)]);
+        let (short, named) = (plan(&options, Duration::from_millis(1)), || [("x_ns", "test".to_owned())]);
+        let p = short.measure(named(), || Ok::<_, ()>([values.next().unwrap_or(f64::NAN)])).unwrap();
         assert_eq!((&p[0].raw[..], p[0].value, p[0].samples), (&[3.0, 1.0, 1234.57, 2.0][..], Some(2.5), 4));
         assert_eq!(p[0].disagreement(), None);
-        let none = short.measure([("x_ns", "test".to_owned())], || [f64::NAN]);
+        let none = short.measure(named(), || Ok::<_, ()>([f64::NAN])).unwrap();
         assert_eq!((none[0].how, none[0].samples, none[0].spoiled), (How::Missing, 0, 0));
     }
 
     #[test]
     fn a_failure_ends_the_sampling() {
         let (options, mut left) = (Options::default(), 2);
-        let result = plan(&options, Duration::from_secs(60)).try_measure([("x_ns", String::new())], || {
+        let result = plan(&options, Duration::from_secs(60)).measure([("x_ns", String::new())], || {
             left -= 1;
             if left == 0 { Err("broken") } else { Ok([1.0]) }
         });
@@ -183,7 +165,7 @@ mod tests {
     fn one_sample_even_without_time() {
         let options = Options::default();
         let named = [("x_ns", String::new()), ("y_ns", String::new())];
-        let parameters = plan(&options, Duration::ZERO).measure(named, || [1.0, 2.0]);
+        let parameters = plan(&options, Duration::ZERO).measure(named, || Ok::<_, ()>([1.0, 2.0])).unwrap();
         assert_eq!(parameters.iter().map(|p| &p.raw[..]).collect::<Vec<_>>(), [[1.0], [2.0]]);
     }
 }

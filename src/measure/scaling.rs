@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
 
-use super::{Options, missing, pool};
+use super::{Options, pool};
 use crate::hardware::{Parameter, ParameterId};
 
 /// Floats that a thread works on: 8 KiB, within every first-level cache, so that cores are compared and not memory.
@@ -18,16 +18,13 @@ const PASSES: u32 = 64;
 
 const NAMES: [ParameterId; 2] = [ParameterId::ScalingTwoThreadsRatio, ParameterId::ScalingAllThreadsRatio];
 
-pub(super) fn measure(options: &Options) -> Vec<Parameter> {
+pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
     let threads = options.usable_cores();
     if threads == 1 {
         let why = "one usable core";
-        return vec![Parameter::missing(NAMES[0], why), Parameter::reported(NAMES[1], 1.0, why)];
+        return Ok(vec![Parameter::missing(NAMES[0], why), Parameter::reported(NAMES[1], 1.0, why)]);
     }
-    let pool = match pool(threads) {
-        Ok(pool) => pool,
-        Err(why) => return missing(&NAMES, &why),
-    };
+    let pool = pool(threads)?;
     let time = Duration::from_millis(if options.brief { 1 } else { 8 });
     let work_rate = |threads| together(&pool, threads, || passes_per_ns(time));
     // Untimed: the clock rises, and the workers touch the pages of their stacks.
@@ -38,7 +35,7 @@ pub(super) fn measure(options: &Options) -> Vec<Parameter> {
         let one = work_rate(1);
         let two = work_rate(2);
         let all = if threads == 2 { two } else { work_rate(threads) };
-        [two / one, all / one]
+        Ok([two / one, all / one])
     })
 }
 

@@ -4,44 +4,13 @@ use crate::cost::CurveError;
 use crate::hardware::HardwareError;
 use std::fmt;
 
-/// What makes a model unusable.
+/// What makes a model unusable, in a sentence that names the method, the range or the place.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ModelError {
-    /// It holds no method.
-    NoMethod,
-    /// A range whose ends are not finite or not ascending.
-    Range {
-        /// The parameter.
-        parameter: String,
-    },
-    /// Intervals of an impossible width.
-    Intervals,
-    /// A place of residuals whose load is negative or not finite.
-    Place {
-        /// Its position.
-        position: usize,
-    },
-    /// A method with an impossible value.
-    Method {
-        /// The method with its processor.
-        method: String,
-        /// What is impossible.
-        why: String,
-    },
-}
+pub struct ModelError(pub(super) String);
 
 impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoMethod => f.write_str("it holds no method"),
-            Self::Range { parameter } => {
-                write!(f, "the range of {parameter} has ends that are not finite or not ascending")
-            }
-            Self::Intervals => f.write_str("its intervals have a width that is negative or not finite"),
-            Self::Place { position } => write!(f, "places[{position}] is a load that is negative or not finite"),
-            Self::Method { method, why } => write!(f, "{method}: {why}"),
-        }
+        f.write_str(&self.0)
     }
 }
 

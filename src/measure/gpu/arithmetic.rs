@@ -23,7 +23,7 @@ fn arithmetic(bench: &Bench<'_>) -> Result<Vec<Parameter>> {
     let method =
         "multiply-adds in eight independent chains of four lanes an invocation, each counted as two operations";
     let named = [(GpuParameterId::ArithmeticGflopPerS, method.to_owned())];
-    bench.options.plan(9, bench.pick(150, 250)).try_measure(named, || Ok([work.rate(bench)?]))
+    bench.options.plan(9, bench.pick(150, 250)).measure(named, || Ok([work.rate(bench)?]))
 }
 
 /// A dispatch of multiply-adds that keeps the whole GPU busy.

@@ -51,7 +51,7 @@ impl Group<'_> {
         method: String,
         mut sample: impl FnMut() -> Result<f64>,
     ) -> Result<Vec<Parameter>> {
-        self.options.plan(samples, self.pick(250, 500)).try_measure([(id, method)], || Ok([sample()?]))
+        self.options.plan(samples, self.pick(250, 500)).measure([(id, method)], || Ok([sample()?]))
     }
 
     fn uploads(&self) -> Result<Vec<Parameter>> {

@@ -55,7 +55,7 @@ fn latencies(bench: &Bench<'_>) -> Result<Vec<Parameter>> {
         (NAMES[2], "recording, copy of 4 bytes into a kept buffer, wait, mapping and reading".to_owned()),
     ];
     let mut steps = 0_u32;
-    let parameters = bench.options.plan(40, bench.pick(250, 400)).try_measure(named, || {
+    let parameters = bench.options.plan(40, bench.pick(250, 400)).measure(named, || {
         let round_trip = bench.time_dispatches(&empty, 1, 1)?;
         let one = bench.time_dispatches(&step, 1, 1)?;
         let long = bench.time_dispatches(&step, 1, 1 + chain)?;

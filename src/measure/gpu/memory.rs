@@ -60,7 +60,7 @@ fn bandwidths(bench: &Bench<'_>, heaps: &[u64]) -> Result<Vec<Parameter>> {
         format!("copy command from one buffer of {mib} MiB to another, read and written bytes counted"),
     ];
     let [read_method, copy_method] = methods;
-    bench.options.plan(9, bench.pick(250, 500)).try_measure([(NAMES[0], read_method), (NAMES[1], copy_method)], || {
+    bench.options.plan(9, bench.pick(250, 500)).measure([(NAMES[0], read_method), (NAMES[1], copy_method)], || {
         let rate = |count: u32, time| per_ns(bytes as f64 * f64::from(count), time);
         Ok([rate(read_count, reads(read_count)?), 2.0 * rate(copy_count, copies(copy_count)?)])
     })

@@ -2,14 +2,11 @@
 //!
 //! One file measures one family. If one family fails, its parameters are missing with the reason, and the others stay.
 
-#[cfg(not(target_vendor = "apple"))]
-mod amdgpu;
 mod arithmetic;
 mod bench;
 mod group;
 mod latency;
 mod memory;
-#[cfg(not(target_vendor = "apple"))]
 mod nvml;
 mod reported;
 mod transfer;

@@ -9,10 +9,6 @@ use crate::hardware::{GpuParameterId, Parameter};
 const NAMES: [GpuParameterId; 4] =
     [GpuParameterId::MemoryBytes, GpuParameterId::ClockGhz, GpuParameterId::Processors, GpuParameterId::Lanes];
 
-/// How long the GPU works while its clock is read: an idle GPU clocks down.
-#[cfg_attr(target_vendor = "apple", expect(dead_code, reason = "no driver there reports a clock"))]
-pub(super) const LOAD: Duration = Duration::from_millis(24);
-
 pub(super) fn measure(bench: &Bench<'_>, heaps: &[u64], executes: bool) -> Vec<Parameter> {
     let asked = if bench.is_software() {
         Err("a program on the CPU acts as the GPU and has no processors of its own".to_owned())
@@ -32,26 +28,19 @@ pub(super) fn measure(bench: &Bench<'_>, heaps: &[u64], executes: bool) -> Vec<P
     NAMES.map(|id| Parameter::find(&found, id).cloned().unwrap_or_else(|| Parameter::missing(id, &why))).to_vec()
 }
 
-/// Asks the vendor's driver, with the GPU at work while its clock is read.
-#[cfg(not(target_vendor = "apple"))]
+/// Asks NVIDIA's driver, with the GPU at work: an idle GPU clocks down.
 fn ask(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
-    const AMD: u32 = 0x1002;
     const NVIDIA: u32 = 0x10de;
     let info = bench.gpu.device().adapter_info();
-    let work = Arithmetic::new(bench, LOAD / 8).and_then(|work| work.submit(bench, 8));
-    let answer = match info.vendor {
-        NVIDIA => super::nvml::query(&info.device_pci_bus_id),
-        AMD => Ok(super::amdgpu::query(&info.device_pci_bus_id)),
-        _ => Err("only drivers of NVIDIA and AMD report it".to_owned()),
-    };
+    if info.vendor != NVIDIA {
+        return Err("only NVIDIA's driver reports it".to_owned());
+    }
+    // About 24 ms.
+    let work = Arithmetic::new(bench, Duration::from_millis(3)).and_then(|work| work.submit(bench, 8));
+    let answer = super::nvml::query(&info.device_pci_bus_id);
     // A failure shows in what is measured next.
     let _ = work.and_then(|submission| bench.gpu.wait(submission));
     answer
-}
-
-#[cfg(target_vendor = "apple")]
-fn ask(_: &Bench<'_>) -> Result<Vec<Parameter>, String> {
-    Err("Metal does not report it".to_owned())
 }
 
 /// Returns the sizes of the GPU's own heaps of memory; empty if it is not driven through Vulkan.

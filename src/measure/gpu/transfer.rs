@@ -17,9 +17,6 @@ const TOTAL_BYTES: u64 = 33_554_432;
 /// Sizes of the line, from 4 KiB to 64 MiB.
 const SIZES: [u64; 8] = [1 << 12, 1 << 14, 1 << 16, 1 << 18, 1 << 20, 1 << 23, TOTAL_BYTES, 1 << 26];
 
-/// Sizes of a brief run.
-const BRIEF_SIZES: [u64; 4] = [1 << 12, 1 << 16, 1 << 20, TOTAL_BYTES];
-
 const NAMES: [GpuParameterId; 4] = [
     GpuParameterId::UploadGbPerS,
     GpuParameterId::UploadRateGbPerS,
@@ -32,38 +29,25 @@ pub(super) fn measure(bench: &Bench<'_>) -> Vec<Parameter> {
 }
 
 fn transfers(bench: &Bench<'_>) -> Result<Vec<Parameter>> {
-    let sizes = if bench.options.brief { &BRIEF_SIZES[..] } else { &SIZES };
-    let largest = bench.gpu.limits().max_buffer_size;
-    let sizes: Vec<u64> = sizes.iter().copied().filter(|&bytes| bytes <= largest).collect();
-    if !sizes.contains(&TOTAL_BYTES) {
-        let text = format!("its buffers hold {largest} bytes at most, and the transfer is of {TOTAL_BYTES}");
-        return Err(GpuError::new(GpuErrorKind::Limit, text));
-    }
-    let mut transfer = Transfer::new(bench, *sizes.iter().max().unwrap_or(&TOTAL_BYTES))?;
+    let largest = *SIZES.iter().max().unwrap_or(&TOTAL_BYTES);
+    let mut transfer = Transfer::new(bench, largest)?;
     // First use of the pages and of the driver's copy path, and a proof that the bytes arrive.
-    transfer.upload(TOTAL_BYTES)?;
-    transfer.download(TOTAL_BYTES)?;
-    transfer.verify(TOTAL_BYTES)?;
-    let line = format!("line of least relative deviation through {} sizes from 4 KiB, total times", sizes.len());
-    let methods = [
-        format!(
-            "{TOTAL_BYTES} random bytes: copy into a kept staging buffer, recording, copy command, wait, mapping again"
-        ),
-        line.clone(),
-        format!(
-            "{TOTAL_BYTES} random bytes: recording, copy command into a kept staging buffer, wait, mapping, copy out of it"
-        ),
-        line,
-    ];
-    let mut methods = methods.into_iter();
-    let named = NAMES.map(|name| (name, methods.next().unwrap_or_default()));
-    bench.options.plan(9, bench.pick(500, 1000)).try_measure(named, || {
+    transfer.upload(largest)?;
+    transfer.download(largest)?;
+    if transfer.sent != transfer.received {
+        return Err(broken("bytes that were sent came back changed".to_owned()));
+    }
+    let line = "line of least relative deviation through 8 sizes from 4 KiB to 64 MiB, total times".to_owned();
+    let upload = "copy into a kept staging buffer, recording, copy command, wait, mapping again";
+    let download = "recording, copy command into a kept staging buffer, wait, mapping, copy out of it";
+    let total = |what: &str| format!("{TOTAL_BYTES} random bytes: {what}");
+    let [id_up, id_up_rate, id_down, id_down_rate] = NAMES;
+    let named = [(id_up, total(upload)), (id_up_rate, line.clone()), (id_down, total(download)), (id_down_rate, line)];
+    bench.options.plan(9, bench.pick(500, 1000)).measure(named, || {
         let (mut up, mut down) = (Times::default(), Times::default());
-        for &bytes in &sizes {
-            // A small transfer takes microseconds: the middle one of three counts.
-            let count = if bytes <= 1 << 18 { 3 } else { 1 };
-            up.add(bytes, count, || transfer.upload(bytes))?;
-            down.add(bytes, count, || transfer.download(bytes))?;
+        for bytes in SIZES {
+            up.0.push((bytes as f64, transfer.upload(bytes)?.as_nanos() as f64));
+            down.0.push((bytes as f64, transfer.download(bytes)?.as_nanos() as f64));
         }
         Ok([up.total_rate(), up.slope_rate(), down.total_rate(), down.slope_rate()])
     })
@@ -74,14 +58,6 @@ fn transfers(bench: &Bench<'_>) -> Result<Vec<Parameter>> {
 struct Times(Vec<(f64, f64)>);
 
 impl Times {
-    /// Adds the middle one of `count` transfers.
-    fn add(&mut self, bytes: u64, count: usize, mut transfer: impl FnMut() -> Result<Duration>) -> Result<()> {
-        let mut times = (0..count).map(|_| transfer()).collect::<Result<Vec<_>>>()?;
-        times.sort_unstable();
-        self.0.push((bytes as f64, times[count / 2].as_nanos() as f64));
-        Ok(())
-    }
-
     /// Bytes a nanosecond at [`TOTAL_BYTES`].
     fn total_rate(&self) -> f64 {
         let total = self.0.iter().find(|(bytes, _)| *bytes == TOTAL_BYTES as f64);
@@ -183,12 +159,6 @@ impl<'a> Transfer<'a> {
             sent += bytes as f64;
         }
         Ok(per_ns(sent, start.elapsed()))
-    }
-
-    /// Compares what came back with what was sent.
-    fn verify(&self, bytes: u64) -> Result<()> {
-        let same = self.sent[..bytes as usize] == self.received[..bytes as usize];
-        if same { Ok(()) } else { Err(broken("bytes that were sent came back changed".to_owned())) }
     }
 }
 
