@@ -5,11 +5,11 @@ pub(crate) use counted::Instant;
 #[cfg(not(any(test, all(target_family = "wasm", target_os = "unknown"))))]
 pub(crate) use std::time::Instant;
 
-/// Whether there is one. Without it all that is timed takes no time, which must not be learned from.
+/// Whether the clock runs. If not, every time is zero and nothing may be learned from it.
 pub(crate) const TICKS: bool = !cfg!(all(target_family = "wasm", target_os = "unknown"));
 
-/// In place of the standard library's, which traps where WebAssembly runs without a system: the module has no clock but what its host hands
-/// it, and a crate that asks a browser for one brings imports that other hosts lack.
+/// Replaces the standard library's clock, which traps in WebAssembly without a system. A crate that asks a browser for its clock needs
+/// imports that other hosts lack.
 #[cfg(all(not(test), target_family = "wasm", target_os = "unknown"))]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Instant;
@@ -20,24 +20,25 @@ impl Instant {
         Self
     }
 
-    #[expect(clippy::unused_self, reason = "as of the clock in the standard library")]
+    #[expect(clippy::unused_self, reason = "same signature as in the standard library")]
     pub(crate) fn elapsed(&self) -> std::time::Duration {
         std::time::Duration::ZERO
     }
 }
 
-/// For tests that replay recorded times: a clock that shows what was [spent](counted::spend) while something [runs](counted::run) under it.
+/// A clock for tests that replay recorded times: it shows what was [spent](counted::spend) while something [runs](counted::run).
 #[cfg(test)]
 pub(crate) mod counted {
     use std::cell::Cell;
     use std::time::Duration;
 
-    /// What a decision takes between two frames of a program, which needs the caches for itself, and to compare boxes with those of the frame before, in
-    /// nanoseconds: about the means of five runs of `sapwise run` on the Zen 5 host of `datasets/`, 11 to 17 us (34 in the shortest) and 0.6 to 1.7 us.
+    /// Nanoseconds of a decision, and of comparing boxes with those of the previous frame, while the program uses the caches. Means of five
+    /// runs of `sapwise run` on the Zen 5 host of `datasets/`: 11 to 17 µs (34 µs in the shortest run) and 0.6 to 1.7 µs.
     pub(crate) const DECISION_NS: f64 = 14_000.0;
     pub(crate) const LOOK_NS: f64 = 2_000.0;
 
-    /// What a sample of so many boxes takes, in the same way: 4 us in the mean over frames of `fragmentation` with 12 to 2000 boxes, 19 to 24 of 3000 and more.
+    /// Nanoseconds of a sample of boxes, from the same runs: 4 µs on average in frames of `fragmentation` with 12 to 2000 boxes, 19 to
+    /// 24 µs from 3000 boxes on.
     pub(crate) fn sample_ns(boxes: usize) -> f64 {
         5_000.0 + 15_000.0 * (boxes as f64 / 3000.0).min(1.0)
     }
@@ -63,7 +64,7 @@ pub(crate) mod counted {
         }
     }
 
-    /// Runs something on this thread under a clock that starts at nought.
+    /// Runs a function on this thread under a clock that starts at zero.
     pub(crate) fn run<T>(what: impl FnOnce() -> T) -> T {
         NOW.set(Some(Duration::ZERO));
         let result = what();
@@ -71,7 +72,7 @@ pub(crate) mod counted {
         result
     }
 
-    /// So many nanoseconds have passed. Without effect on a real clock.
+    /// Advances the clock by nanoseconds. No effect on a real clock.
     pub(crate) fn spend(ns: f64) {
         NOW.set(NOW.get().map(|now| now + Duration::from_nanos(ns as u64)));
     }

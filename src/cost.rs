@@ -1,5 +1,5 @@
-//! What a frame costs: a sum of terms, each a count of operations times nanoseconds per operation, times what the load tells beside them; and
-//! what several threads make of that.
+//! Cost curves: a frame costs a sum of terms, each a count of operations times nanoseconds per operation, times a residual over the
+//! load. Several threads change that cost by what calling helpers takes and how much they speed the work up.
 
 mod error;
 mod helpers;
@@ -8,38 +8,38 @@ mod term;
 
 use crate::Load;
 use std::cell::{Cell, OnceCell};
-use std::ptr;
 use std::sync::Arc;
 
 pub use error::CurveError;
 pub use helpers::Helpers;
 pub(crate) use residual::Likeness;
 pub use residual::{Places, Residual};
-pub use term::{Counts, Product, Term};
+pub(crate) use term::Counts;
+pub use term::{Product, Term};
 
-/// The most nanoseconds that one count may take: an hour for one object. Beyond these bounds the arithmetic of a cost would end in infinities,
-/// and an infinity less an infinity is no cost.
+/// Most nanoseconds for one count: an hour for one object. Beyond it the arithmetic of a cost could overflow to infinity, and the
+/// difference of two infinities is no cost.
 pub const MOST_UNIT_NS: f64 = 3.6e12;
 
 /// The cost of one algorithm on one machine as a function of the load.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct CostCurve {
-    /// What it takes on one thread, or on its GPUs. Shared by the algorithms of a method, for which it is worked out once.
+    /// Cost on one thread or on its GPUs. Shared by the algorithms of a method, for which it is computed once.
     pub work: Arc<Work>,
-    /// What several threads make of it; `None` of one thread and of GPUs.
+    /// Effect of several threads; `None` for one thread and for GPUs.
     pub helpers: Option<Helpers>,
-    /// What frames that ran told of this algorithm; `None` where none told anything.
+    /// Correction from frames that ran; `None` if none did.
     pub observed: Option<Residual>,
 }
 
-/// The cost of a method on one thread of a machine, or on some of its GPUs: a sum of terms times the exponential of a residual.
+/// The cost of a method on one thread of a machine or on some of its GPUs: a sum of terms times the exponential of a residual.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Work {
     /// Terms of the sum; none is negative.
     pub terms: Vec<CostTerm>,
-    /// What it does instead where that is cheaper: `pair-cache` does what `bvh` does where boxes move too far.
+    /// Work that is done instead when it is cheaper: `pair-cache` does the work of `bvh` when boxes move too far.
     pub fallback: Option<Fallback>,
     /// Last-level cache of the machine, for [`Term::ColdObjects`].
     pub cache_bytes: f64,
@@ -47,12 +47,12 @@ pub struct Work {
     pub residual: Option<Residual>,
 }
 
-/// The work of another method, done instead.
+/// The work of another method that is done instead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fallback {
-    /// That work, which has no fallback of its own.
+    /// That work. It has no fallback of its own.
     pub work: Arc<Work>,
-    /// How many times as much it costs here.
+    /// Factor on its cost here.
     pub factor: f64,
 }
 
@@ -65,14 +65,14 @@ pub struct CostTerm {
     pub unit_ns: f64,
 }
 
-/// One load, looked at by many costs: what these have in common is worked out once.
+/// One load under which many costs are computed: what they have in common is computed once.
 pub(crate) struct Frame<'a> {
     counts: Counts<'a>,
     load: &'a Load,
-    /// Of the places that were asked for first; the methods of a tuning share theirs.
-    likeness: OnceCell<(*const Places, Likeness)>,
-    /// What some works take, which the algorithms of a method share.
-    known: [Cell<(*const Work, WorkCost)>; 8],
+    /// Of the first places that were asked for; the methods of a tuning share theirs.
+    likeness: OnceCell<(Arc<Places>, Likeness)>,
+    /// Costs of works, which the algorithms of a method share.
+    known: [Cell<Option<(&'a Work, WorkCost)>>; 8],
 }
 
 /// Nanoseconds of a work, and the factor of its residual in them.
@@ -82,55 +82,51 @@ struct WorkCost {
     factor: f64,
 }
 
-/// What a frame of one algorithm takes under one load, in nanoseconds.
+/// Nanoseconds of a frame of one algorithm under one load.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct FrameCost {
     pub(crate) ns: f64,
-    /// Were the fallback done, where there is one.
+    /// With the fallback, if there is one.
     pub(crate) fallback_ns: Option<f64>,
-    /// What is due to calls: of several threads what it takes to call helpers and to wait for them, else [`Term::Call`].
+    /// The part due to calls: on several threads calling helpers and waiting for them, otherwise [`Term::Call`].
     pub(crate) calls_ns: f64,
 }
 
 impl<'a> Frame<'a> {
     pub(crate) fn new(load: &'a Load) -> Self {
-        Self {
-            counts: Counts::new(load),
-            load,
-            likeness: OnceCell::new(),
-            known: [const { Cell::new((ptr::null(), WorkCost { ns: 0.0, factor: 1.0 })) }; 8],
-        }
+        Self { counts: Counts::new(load), load, likeness: OnceCell::new(), known: [const { Cell::new(None) }; 8] }
     }
 
-    /// How like its load is to each of these places.
+    /// Passes on how similar the load is to each of these places.
     pub(crate) fn likeness<R>(&self, places: &Arc<Places>, look: impl FnOnce(&Likeness) -> R) -> R {
-        let wanted = Arc::as_ptr(places);
-        let (of, likeness) = self.likeness.get_or_init(|| (wanted, places.likeness_of(self.load)));
-        if *of == wanted { look(likeness) } else { look(&places.likeness_of(self.load)) }
+        let (of, likeness) = self.likeness.get_or_init(|| (Arc::clone(places), places.likeness_of(self.load)));
+        if Arc::ptr_eq(of, places) { look(likeness) } else { look(&places.likeness_of(self.load)) }
     }
 
-    /// What a residual multiplies a cost by.
+    /// The factor of a residual on a cost.
     fn factor(&self, residual: Option<&Residual>) -> f64 {
         residual.map_or(1.0, |residual| self.likeness(&residual.places, |likeness| residual.ln_of(likeness)).exp())
     }
 
-    fn work(&self, work: &Arc<Work>) -> WorkCost {
-        let of = Arc::as_ptr(work);
-        let free = |known: &&Cell<(*const Work, WorkCost)>| known.get().0 == of || known.get().0.is_null();
-        match self.known.iter().find(free).map(|known| (known, known.get())) {
-            Some((_, (known, cost))) if known == of => cost,
-            Some((known, _)) => {
-                let cost = work.cost_of(self);
-                known.set((of, cost));
-                cost
+    fn work(&self, work: &'a Work) -> WorkCost {
+        for known in &self.known {
+            match known.get() {
+                Some((of, cost)) if std::ptr::eq(of, work) => return cost,
+                Some(_) => {}
+                None => {
+                    // Its fallback, if any, is computed meanwhile and not kept.
+                    let cost = work.cost_of(self);
+                    known.set(Some((work, cost)));
+                    return cost;
+                }
             }
-            None => work.cost_of(self),
         }
+        work.cost_of(self)
     }
 }
 
 impl CostTerm {
-    /// Nanoseconds for each count of a term.
+    /// Creates a term with its nanoseconds for each count.
     #[must_use]
     pub const fn new(term: Term, unit_ns: f64) -> Self {
         Self { term, unit_ns }
@@ -138,26 +134,26 @@ impl CostTerm {
 }
 
 impl Work {
-    /// The sum of these terms, on a machine of which no cache is known.
+    /// Creates the sum of these terms, on a machine of unknown cache.
     #[must_use]
     pub fn new(terms: Vec<CostTerm>) -> Self {
         Self { terms, ..Self::default() }
     }
 
-    /// Nanoseconds of a frame under `load`.
+    /// Returns the nanoseconds of a frame under `load`.
     #[must_use]
     pub fn ns(&self, load: &Load) -> f64 {
         self.cost_of(&Frame::new(load)).ns
     }
 
-    fn cost_of(&self, frame: &Frame<'_>) -> WorkCost {
+    fn cost_of<'a>(&'a self, frame: &Frame<'a>) -> WorkCost {
         let sum: f64 = self.terms.iter().map(|t| t.unit_ns * frame.counts.of(t.term, self.cache_bytes)).sum();
         let least = self.fallback.as_ref().map_or(sum, |f| sum.min(f.factor * frame.work(&f.work).ns));
         let factor = frame.factor(self.residual.as_ref());
         WorkCost { ns: least * factor, factor }
     }
 
-    /// What makes it unusable, if anything.
+    /// Returns what makes it unusable, if anything.
     pub(crate) fn defect(&self) -> Option<CurveError> {
         if let Some(t) = self.terms.iter().find(|t| !(0.0..=MOST_UNIT_NS).contains(&t.unit_ns)) {
             return Some(CurveError::Unit { term: t.term, unit_ns: t.unit_ns });
@@ -183,66 +179,66 @@ impl Work {
 }
 
 impl CostCurve {
-    /// The sum of these terms on one thread, without a fallback or a residual, on a machine of which no cache is known.
+    /// Creates the sum of these terms on one thread, without fallback and residual, on a machine of unknown cache.
     #[must_use]
     pub fn new(terms: Vec<CostTerm>) -> Self {
         Self::of(Arc::new(Work::new(terms)))
     }
 
-    /// What this work takes, on one thread or on GPUs.
+    /// Creates the cost of this work on one thread or on GPUs.
     #[must_use]
     pub fn of(work: Arc<Work>) -> Self {
         Self { work, ..Self::default() }
     }
 
-    /// The same with other work that is done instead where that is cheaper, though it costs this many times as much here.
+    /// Sets other work that is done instead when it is cheaper, with the factor on its cost here.
     #[must_use]
     pub fn with_fallback(mut self, work: Arc<Work>, factor: f64) -> Self {
         self.work_mut().fallback = Some(Fallback { work, factor });
         self
     }
 
-    /// The same on a machine with a last-level cache of this many bytes.
+    /// Sets the last-level cache of the machine.
     #[must_use]
     pub fn with_cache(mut self, cache_bytes: f64) -> Self {
         self.work_mut().cache_bytes = cache_bytes;
         self
     }
 
-    /// The same on several threads.
+    /// Sets several threads.
     #[must_use]
     pub fn with_helpers(self, helpers: Helpers) -> Self {
         Self { helpers: Some(helpers), ..self }
     }
 
-    /// The same with what frames told of it.
+    /// Sets the correction from frames that ran.
     #[must_use]
     pub fn with_observed(self, observed: Residual) -> Self {
         Self { observed: Some(observed), ..self }
     }
 
-    /// What it takes on one thread or on its GPUs, to be changed for this algorithm alone.
+    /// Returns the cost on one thread or on GPUs, to be changed for this algorithm alone.
     pub fn work_mut(&mut self) -> &mut Work {
         Arc::make_mut(&mut self.work)
     }
 
-    /// Predicted nanoseconds for a frame under `load`.
+    /// Returns the predicted nanoseconds of a frame under `load`.
     #[must_use]
     pub fn cost_ns(&self, load: &Load) -> f64 {
         self.cost_of(&Frame::new(load))
     }
 
-    pub(crate) fn cost_of(&self, frame: &Frame<'_>) -> f64 {
+    pub(crate) fn cost_of<'a>(&'a self, frame: &Frame<'a>) -> f64 {
         self.on_helpers(frame.work(&self.work).ns, frame) * frame.factor(self.observed.as_ref())
     }
 
-    /// What several threads make of work that takes so long.
+    /// The cost on several threads of work that takes this long on one.
     fn on_helpers(&self, work_ns: f64, frame: &Frame<'_>) -> f64 {
         self.helpers.map_or(work_ns, |h| h.cost_ns(frame.load.objects, work_ns))
     }
 
-    /// Its cost, what of it is due to calls, and what it were with the fallback.
-    pub(crate) fn parts_of(&self, frame: &Frame<'_>) -> FrameCost {
+    /// Returns the cost, its part that is due to calls, and the cost with the fallback.
+    pub(crate) fn parts_of<'a>(&'a self, frame: &Frame<'a>) -> FrameCost {
         let work = frame.work(&self.work);
         let observed = frame.factor(self.observed.as_ref());
         let calls_ns = match self.helpers {
@@ -252,7 +248,7 @@ impl CostCurve {
                 calls.map(|t| t.unit_ns).sum::<f64>() * work.factor
             }
         };
-        let fallback_ns = |f: &Fallback| self.on_helpers(f.factor * frame.work(&f.work).ns * work.factor, frame);
+        let fallback_ns = |f: &'a Fallback| self.on_helpers(f.factor * frame.work(&f.work).ns * work.factor, frame);
         FrameCost {
             ns: self.on_helpers(work.ns, frame) * observed,
             fallback_ns: self.work.fallback.as_ref().map(|f| fallback_ns(f) * observed),
@@ -260,7 +256,7 @@ impl CostCurve {
         }
     }
 
-    /// Multiplies by a factor what of it is due to [calls](FrameCost::calls_ns).
+    /// Multiplies the part that is due to [calls](FrameCost::calls_ns).
     pub(crate) fn scale_calls(&mut self, factor: f64) {
         match &mut self.helpers {
             Some(helpers) => {
@@ -274,7 +270,7 @@ impl CostCurve {
         }
     }
 
-    /// What makes this curve unusable, if anything.
+    /// Returns what makes this curve unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<CurveError> {
         if let Some(defect) = self.work.defect() {
@@ -296,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_curve_adds_its_terms_and_multiplies_by_what_the_load_and_frames_tell() {
+    fn a_curve_adds_its_terms_and_multiplies_by_residuals() {
         let curve = CostCurve::new(vec![CostTerm::new(Term::Call, 100.0), CostTerm::new(Term::AllPairs, 2.0)]);
         assert_eq!(curve.cost_ns(&load(5)), 100.0 + 2.0 * 10.0);
         let places = Arc::new(Places::new(vec![load(16)]));
@@ -321,19 +317,19 @@ mod tests {
     }
 
     #[test]
-    fn helpers_divide_the_work_of_one_thread_and_calls_are_what_does_not_grow() {
+    fn helpers_divide_work_but_not_calls() {
         let one = CostCurve::new(vec![CostTerm::new(Term::Call, 50.0), CostTerm::new(Term::Objects, 10.0)]);
         let two = one.clone().with_helpers(Helpers::new(2).with_call(1000.0, 0.0));
         assert_eq!((one.cost_ns(&load(1000)), two.cost_ns(&load(1000))), (10_050.0, 6025.0));
         let large = load(1000);
         let frame = Frame::new(&large);
         assert_eq!((one.parts_of(&frame).calls_ns, two.parts_of(&frame).calls_ns), (50.0, 1000.0));
-        // Both look at the same work, which is worked out once.
+        // Both share one work, which is computed once.
         assert!(Arc::ptr_eq(&one.work, &two.work));
     }
 
     #[test]
-    fn many_works_are_looked_at_under_one_load() {
+    fn more_works_than_are_kept_have_their_own_costs() {
         let curves: Vec<CostCurve> =
             (1..=20).map(|k| CostCurve::new(vec![CostTerm::new(Term::Objects, f64::from(k))])).collect();
         let load = load(10);
@@ -346,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_curves_are_told() {
+    fn impossible_curves_are_refused() {
         let curve = |unit_ns| CostCurve::new(vec![CostTerm::new(Term::Call, unit_ns)]);
         let places = Arc::new(Places::new(vec![load(16)]));
         let residual = |weights: &[f64]| Residual::new(Arc::clone(&places), weights.to_vec(), false);

@@ -89,7 +89,7 @@ pub use calibrate::is_readable_cache;
 pub use calibrate::{Cache, StartOptions};
 pub use changes::Changes;
 pub use cost::{
-    CostCurve, CostTerm, Counts, CurveError, Fallback, Helpers, MOST_UNIT_NS, Places, Product, Residual, Term, Work,
+    CostCurve, CostTerm, CurveError, Fallback, Helpers, MOST_UNIT_NS, Places, Product, Residual, Term, Work,
 };
 pub use cpu::{SimdLevel, SimdLevelError};
 pub use entry::Entry;

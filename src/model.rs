@@ -1,4 +1,4 @@
-//! Coefficients that turn hardware parameters into cost curves.
+//! Cost models: coefficients that turn hardware parameters into cost curves.
 
 mod curve;
 mod error;
@@ -18,25 +18,24 @@ pub use helpers::{HelpersModel, ThreadFigures};
 pub use predict::{ASK, Prediction};
 pub use scale::Scale;
 
-/// What stands before the name of a GPU's parameter in a [`Range`]: `gpu/upload_rate_gb_per_s`.
+/// Prefix of a GPU's parameter in a [`Range`]: `gpu/upload_rate_gb_per_s`.
 pub const GPU_PREFIX: &str = "gpu/";
 
-/// A cost model for every method and class of processor, shared over machines, thread counts and GPUs, evaluated by plain
-/// arithmetic.
+/// A cost model for every method and class of processor, shared by machines, thread counts and GPUs, evaluated by plain arithmetic.
 ///
 /// The time of a frame on one thread, or on GPUs, is `sum of unit * scale(hardware, backend) * term(load)`, times `exp` of a
-/// [residual](crate::Residual) over the load; [helpers](HelpersModel) make of it what several threads take.
+/// [residual](crate::Residual) over the load. [Helpers](HelpersModel) turn it into the time on several threads.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Model {
     /// Name by which tuning refers to it.
     pub name: String,
-    /// Whether a report behind it is simulated, which makes its predictions no evidence of anything.
+    /// Whether a report behind it is simulated, so that its predictions are no evidence.
     pub simulated: bool,
     /// Lowest and highest value of each hardware parameter in training; a machine outside is extrapolated.
     pub ranges: Vec<Range>,
-    /// On machines held out of the training nine of ten ratios of the times of two algorithms lay within a factor of e to this of their prediction;
-    /// `None` where fewer than two machines were held out.
+    /// On held-out machines nine of ten ratios of the times of two algorithms were within a factor of e to this of their prediction.
+    /// `None` if fewer than two machines were held out.
     pub ratios_90_ln: Option<f64>,
     /// Loads at which the residuals of all methods are known.
     pub places: Arc<Places>,
@@ -44,7 +43,7 @@ pub struct Model {
     pub methods: Vec<MethodModel>,
 }
 
-/// Where a hardware parameter lay in training.
+/// Range of a hardware parameter in training.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Range {
     /// Name of the parameter; that of a GPU after [`GPU_PREFIX`].
@@ -61,34 +60,34 @@ pub struct Range {
 pub struct MethodModel {
     /// The part of the algorithm's id before the `@`.
     pub method: String,
-    /// The processor that it holds for. A file that does not say so is from before there were GPUs.
+    /// Class of processor.
     pub backend: BackendClass,
     /// Revision of the algorithm that was timed.
     pub revision: u32,
-    /// Most threads that were timed, of GPUs the most that were timed together; more are extrapolated.
+    /// Most threads, or most GPUs together, that were timed; more are extrapolated.
     pub max_threads: u32,
-    /// Kinds of the GPUs that were timed, without repetition; others are extrapolated. Empty for the CPU.
+    /// Kinds of the GPUs that were timed; others are extrapolated. Empty for the CPU.
     pub gpu_kinds: Vec<GpuKind>,
     /// The physical terms, on one thread or on GPUs; no unit is negative.
     pub terms: Vec<ModelTerm>,
-    /// The method that it falls back to where that is cheaper, if it does.
+    /// The method that it falls back to when that is cheaper, if it does.
     pub fallback: Option<FallbackModel>,
-    /// What the terms leave unexplained: a weight for each of [`Model::places`]. Empty: nothing.
+    /// What the terms leave unexplained: a weight for each of [`Model::places`]. Empty if nothing.
     pub residual: Vec<f64>,
-    /// Whether the residual tells loads apart by how far boxes move, as of incremental methods.
+    /// Whether the residual depends on how far boxes move, as for incremental methods.
     pub residual_by_motion: bool,
-    /// What several threads make of it; `None` of a method that runs on one thread only, or on GPUs.
+    /// Effect of several threads; `None` for a method that runs on one thread only, or on GPUs.
     pub helpers: Option<HelpersModel>,
-    /// Standard deviation of what remains, in natural logarithms.
+    /// Standard deviation of the remaining error, in natural logarithms.
     pub spread_ln: f64,
 }
 
 /// A method that another one falls back to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FallbackModel {
-    /// Its name. It falls back to none itself.
+    /// Its name. It has no fallback itself.
     pub method: String,
-    /// How many times as much it costs there.
+    /// Factor on its cost there.
     pub factor: f64,
 }
 
@@ -97,14 +96,14 @@ pub struct FallbackModel {
 pub struct ModelTerm {
     /// What is counted.
     pub term: Term,
-    /// What of the hardware one count costs.
+    /// The unit of hardware that each count takes.
     pub scale: Scale,
-    /// How much of that: cycles, bytes, fork-joins, round trips or operations for each count.
+    /// How many of that unit: cycles, bytes, fork-joins, round trips or operations for each count.
     pub unit: f64,
 }
 
 impl MethodModel {
-    /// A method on a class of processor, of which nothing was timed: no terms, one thread.
+    /// Creates a method without terms on one thread of a class of processor.
     #[must_use]
     pub fn new(method: impl Into<String>, backend: BackendClass, revision: u32) -> Self {
         Self {
@@ -122,39 +121,37 @@ impl MethodModel {
         }
     }
 
-    /// The same by its physical terms alone.
+    /// Returns the method with its physical terms alone.
     #[must_use]
     pub fn without_residual(&self) -> Self {
         Self { residual: Vec::new(), ..self.clone() }
     }
 
-    /// What can not be of it, if anything.
+    /// What makes it unusable, if anything.
     fn defect(&self, places: usize) -> Option<String> {
+        let weights = self.residual.len();
         if let Some(t) = self.terms.iter().find(|t| !t.scale.is_of(self.backend)) {
-            return Some(format!("the scale {} is of another processor", t.scale));
+            Some(format!("the scale {} is of another processor", t.scale))
+        } else if self.helpers.is_some() && self.backend != BackendClass::Cpu {
+            Some("helpers are of the CPU".to_owned())
+        } else if self.helpers.is_some_and(|h| !h.is_sound()) {
+            Some("its helpers have a value that is negative or not finite".to_owned())
+        } else if let Some(t) = self.terms.iter().find(|t| !(t.unit.is_finite() && t.unit >= 0.0)) {
+            Some(format!("the term {:?} has the unit {}", t.term, t.unit))
+        } else if self.terms.iter().all(|t| t.unit == 0.0) {
+            Some("no term is above zero".to_owned())
+        } else if weights != 0 && weights != places {
+            Some(format!("its residual has {weights} weights for {places} places"))
+        } else if !self.residual.iter().all(|w| w.is_finite()) || !(0.0..f64::INFINITY).contains(&self.spread_ln) {
+            Some("its residual or spread is not finite".to_owned())
+        } else {
+            None
         }
-        if self.helpers.is_some() && self.backend != BackendClass::Cpu {
-            return Some("helpers are of the CPU".to_owned());
-        }
-        if self.helpers.is_some_and(|h| !h.is_sound()) {
-            return Some("helpers with a figure that is negative or no number".to_owned());
-        }
-        if let Some(t) = self.terms.iter().find(|t| !(t.unit.is_finite() && t.unit >= 0.0)) {
-            return Some(format!("the term {:?} has the unit {}", t.term, t.unit));
-        }
-        if self.terms.iter().all(|t| t.unit == 0.0) {
-            return Some("no term above zero".to_owned());
-        }
-        if !self.residual.is_empty() && self.residual.len() != places {
-            return Some(format!("a residual of {} weights for {places} places", self.residual.len()));
-        }
-        let finite = self.residual.iter().all(|w| w.is_finite()) && self.spread_ln.is_finite();
-        (!finite || self.spread_ln < 0.0).then(|| "a residual or spread that is not finite".to_owned())
     }
 }
 
 impl Model {
-    /// A model of these methods, from the ranges of its training.
+    /// Creates a model of these methods from the ranges of its training.
     #[must_use]
     pub fn new(name: impl Into<String>, methods: Vec<MethodModel>, ranges: Vec<Range>) -> Self {
         Self {
@@ -167,20 +164,19 @@ impl Model {
         }
     }
 
-    /// The same with intervals, which hold nine of ten ratios of two times within a factor of e to this.
+    /// Sets [`ratios_90_ln`](Self::ratios_90_ln).
     #[must_use]
     pub fn with_intervals(self, ratios_90_ln: Option<f64>) -> Self {
         Self { ratios_90_ln, ..self }
     }
 
-    /// The same with the places that the residuals of its methods have weights for.
+    /// Sets the places of the residuals.
     #[must_use]
     pub fn with_places(self, places: Arc<Places>) -> Self {
         Self { places, ..self }
     }
 
-    /// The hardware parameters that a prediction looks at, those of GPUs aside, each once: for its costs, and to tell whether the machine
-    /// is like those of training.
+    /// Returns the hardware parameters that a prediction reads, without those of GPUs, each once: for costs and for ranges.
     #[must_use]
     pub fn parameters(&self) -> Vec<ParameterId> {
         let of_method = |m: &MethodModel| {
@@ -189,7 +185,7 @@ impl Model {
             let cache = (m.backend == BackendClass::Cpu).then_some(&ParameterId::CacheLlcBytes);
             scales.chain(helpers).chain(cache).copied().collect::<Vec<_>>()
         };
-        // A range of a parameter that this version does not know is none that it can measure.
+        // This version can't measure a parameter that it does not know.
         let ranges = self.ranges.iter().filter_map(|r| r.parameter.parse().ok());
         let mut ids: Vec<ParameterId> = self.methods.iter().flat_map(of_method).chain(ranges).collect();
         ids.sort_unstable();
@@ -197,32 +193,34 @@ impl Model {
         ids
     }
 
-    /// What makes this model unusable, if anything.
+    /// Returns what makes this model unusable, if anything.
     #[must_use]
     pub fn defect(&self) -> Option<ModelError> {
-        if self.methods.is_empty() {
-            return Some(ModelError::NoMethod);
-        }
-        if let Some(r) = self.ranges.iter().find(|r| !(r.min.is_finite() && r.max.is_finite() && r.min <= r.max)) {
-            return Some(ModelError::Range { parameter: r.parameter.clone() });
-        }
-        if self.ratios_90_ln.is_some_and(|ln| !(0.0..=50.0).contains(&ln)) {
-            return Some(ModelError::Intervals);
-        }
-        if let Some(position) = self.places.loads().iter().position(|load| !load.is_sound()) {
-            return Some(ModelError::Place { position });
-        }
-        self.methods.iter().find_map(|m| {
-            let method = format!("{} on the {}", m.method, m.backend);
-            let found =
-                |f: &FallbackModel| self.of_method(&f.method, m.backend).is_some_and(|other| other.fallback.is_none());
-            if let Some(f) = m.fallback.as_ref().filter(|f| !found(f) || !(0.01..=100.0).contains(&f.factor)) {
-                let why =
-                    format!("it falls back to {} at {} times its cost, which is no such method", f.method, f.factor);
-                return Some(ModelError::Method { method, why });
-            }
-            m.defect(self.places.loads().len()).map(|why| ModelError::Method { method, why })
-        })
+        let places = self.places.loads();
+        let is_wrong = |r: &&Range| !(r.min.is_finite() && r.max.is_finite() && r.min <= r.max);
+        let of_method = |m: &MethodModel| {
+            let why =
+                m.fallback.as_ref().and_then(|f| self.fallback_defect(m, f)).or_else(|| m.defect(places.len()))?;
+            Some(format!("{} on the {}: {why}", m.method, m.backend))
+        };
+        let what = if self.methods.is_empty() {
+            Some("it holds no method".to_owned())
+        } else if let Some(r) = self.ranges.iter().find(is_wrong) {
+            Some(format!("the range of {} has ends that are not finite or not ascending", r.parameter))
+        } else if self.ratios_90_ln.is_some_and(|ln| !(0.0..=50.0).contains(&ln)) {
+            Some("its intervals have a width that is negative or not finite".to_owned())
+        } else if let Some(position) = places.iter().position(|load| !load.is_sound()) {
+            Some(format!("places[{position}] is a load that is negative or not finite"))
+        } else {
+            self.methods.iter().find_map(of_method)
+        };
+        what.map(ModelError)
+    }
+
+    fn fallback_defect(&self, of: &MethodModel, FallbackModel { method, factor }: &FallbackModel) -> Option<String> {
+        let known = self.of_method(method, of.backend).is_some_and(|other| other.fallback.is_none());
+        (!known || !(0.01..=100.0).contains(factor))
+            .then(|| format!("it falls back to {method} at {factor} times its cost, which is no such method"))
     }
 }
 

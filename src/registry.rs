@@ -38,13 +38,9 @@ pub trait AlgorithmSource: Any + Send + Sync {
 
 /// Makes the algorithm of an entry.
 enum Maker {
-<<<<<<< HEAD
     BuiltIn,
-=======
-    Ours,
     /// The source of this type.
     Source(TypeId),
->>>>>>> h-gpu
     One(Factory),
     Family(FamilyFactory),
 }
@@ -124,25 +120,12 @@ impl Registry {
         self.entries.iter().position(|e| e.id == *id)
     }
 
-<<<<<<< HEAD
-    /// Returns the maker of an algorithm; `None` also if it is built in.
+    /// Returns the maker of an algorithm that a user added; `None` if it is built in or a source's.
     fn users_maker(&self, id: &AlgorithmId) -> Option<&Maker> {
-        self.position(id).map(|at| &self.makers[at]).filter(|maker| !matches!(maker, Maker::BuiltIn))
+        let maker = self.position(id).map(|at| &self.makers[at]);
+        maker.filter(|maker| matches!(maker, Maker::One(_) | Maker::Family(_)))
     }
 
-    /// Adds the built-in algorithms on these GPUs: on each of them, and on the first two, three and so on together.
-    /// They replace the GPUs of an earlier call. No GPU is opened before an algorithm is created.
-    #[cfg(feature = "gpu")]
-    pub fn add_gpus(&mut self, gpus: &crate::gpu::Gpus) {
-        self.gpus = gpus.clone();
-        let before = std::mem::take(&mut self.entries).into_iter().zip(std::mem::take(&mut self.makers));
-        let stays =
-            |(entry, maker): &(Entry, Maker)| !matches!((maker, entry.id.backend()), (Maker::BuiltIn, Backend::Gpu(_)));
-        (self.entries, self.makers) = before.filter(stays).unzip();
-        for entry in crate::gpu::algorithms(gpus.identities()) {
-            if self.position(&entry.id).is_none() {
-                self.set(entry, Maker::BuiltIn);
-=======
     /// Adds the algorithms of a source, except those whose ids are listed already. It replaces an earlier source of the same type.
     pub fn add_source<S: AlgorithmSource>(&mut self, source: S) {
         let is_old = |maker: &Maker| matches!(maker, Maker::Source(of) if *of == TypeId::of::<S>());
@@ -153,7 +136,6 @@ impl Registry {
         for entry in source.entries() {
             if self.position(&entry.id).is_none() {
                 self.set(entry, Maker::Source(TypeId::of::<S>()));
->>>>>>> h-gpu
             }
         }
         self.sources.push(Box::new(source));
@@ -256,26 +238,7 @@ impl Registry {
         self.threads.kind()
     }
 
-<<<<<<< HEAD
-    /// Returns the GPUs of [`add_gpus`](Self::add_gpus).
-    #[cfg(all(feature = "measure-gpu", feature = "this-machine"))]
-    pub(crate) fn gpus(&self) -> &crate::gpu::Gpus {
-        &self.gpus
-    }
-
-    /// Returns the identities of these GPUs.
-    #[cfg(feature = "this-machine")]
-    pub(crate) fn gpu_identities(&self) -> Vec<crate::GpuIdentity> {
-        #[cfg(feature = "gpu")]
-        return self.gpus.identities().cloned().collect();
-        #[cfg(not(feature = "gpu"))]
-        Vec::new()
-    }
-
     /// Returns why a cost for this revision of an algorithm does not apply here, or `None` if it does.
-=======
-    /// Why a cost of `revision` of an algorithm says nothing here, if it doesn't.
->>>>>>> h-gpu
     pub(crate) fn mismatch(&self, id: &AlgorithmId, revision: u32) -> Option<Error> {
         let unavailable = |reason| Some(Error::Unavailable { algorithm: id.clone(), reason });
         let class = id.backend().class();
@@ -292,19 +255,13 @@ impl Registry {
         }
     }
 
-<<<<<<< HEAD
     /// Makes an instance of an algorithm: a listed one, a built-in one on any number of CPU threads up to the most that
-    /// is listed, or one on any of the added GPUs.
-=======
-    /// Makes an instance. Beside the listed ones, our methods can be had on any number of CPU threads up to the most that is listed, and
-    /// what a [source](Self::add_source) makes without listing it.
->>>>>>> h-gpu
+    /// is listed, or one that a [source](Self::add_source) makes without listing it.
     ///
     /// # Errors
     /// [`Error::UnknownAlgorithm`]. [`Error::Unavailable`], for example if a file from a larger machine names more
     /// threads than this one has cores.
     pub fn create(&self, id: &AlgorithmId) -> Result<Box<dyn BroadPhase>, Error> {
-<<<<<<< HEAD
         match (self.users_maker(id), built_in(id), id.backend()) {
             (Some(Maker::One(factory)), ..) => factory(),
             (Some(Maker::Family(factory)), ..) => factory(&[id.threads()]),
@@ -313,27 +270,7 @@ impl Registry {
                 (None, Create::OneWidth(create)) => create(threads, &self.threads, Simd::at_most(self.simd)),
                 (None, Create::AnyWidth(create)) => create(&[threads], &self.threads, Simd::at_most(self.simd)),
             },
-            #[cfg(feature = "gpu")]
-            (_, _, Backend::Gpu(_)) if crate::gpu::has_method(id.method()) => {
-                crate::gpu::OnGpus::create(id, &self.gpus)
-            }
-            _ => {
-=======
-        match self.position(id).map(|at| &self.makers[at]) {
-            Some(Maker::One(factory)) => return factory(),
-            Some(Maker::Family(factory)) => return factory(&[id.threads()]),
-            Some(Maker::BuiltIn | Maker::Source(_)) | None => {}
-        }
-        match (ours(id), id.backend()) {
-            (Some(method), &Backend::Cpu(threads)) => match self.unavailable(threads) {
-                None => match method.create {
-                    Create::OneWidth(create) => create(threads, &self.threads, Simd::at_most(self.simd)),
-                    Create::AnyWidth(create) => create(&[threads], &self.threads, Simd::at_most(self.simd)),
-                },
-                Some(reason) => Err(Error::Unavailable { algorithm: id.clone(), reason }),
-            },
             _ => self.sources.iter().find_map(|source| source.create(id)).unwrap_or_else(|| {
->>>>>>> h-gpu
                 let known: Vec<String> = self.entries.iter().map(|e| e.id.to_string()).collect();
                 Err(Error::UnknownAlgorithm { text: id.to_string(), hint: format!("known here: {}", known.join(", ")) })
             }),
@@ -365,12 +302,7 @@ impl Registry {
     /// Returns the family of an algorithm that can run here, if it has one.
     fn family(&self, id: &AlgorithmId) -> Option<Family<'_>> {
         let &Backend::Cpu(threads) = id.backend() else { return None };
-<<<<<<< HEAD
         match self.users_maker(id) {
-=======
-        match self.position(id).map(|at| &self.makers[at]) {
-            Some(Maker::One(_) | Maker::Source(_)) => None,
->>>>>>> h-gpu
             Some(Maker::Family(factory)) => Some(Family::Users(factory)),
             Some(_) => None,
             None => match built_in(id)?.create {

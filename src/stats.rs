@@ -1,9 +1,9 @@
 //! Medians, quantiles, dispersion and the normal distribution: the statistics of a handful of samples.
 //!
-//! Samples that are not a number are left out: a single failed division must not make a whole figure unknown.
+//! NaN is left out: one failed division must not make a statistic unknown.
 
-/// The `q`-quantile, `q` from 0 to 1, with linear interpolation between the two nearest samples (type 7 of Hyndman and Fan,
-/// which R and NumPy use by default). `None` for no samples. A `q` outside 0 to 1 is taken as the nearer end.
+/// Returns the `q`-quantile, `q` from 0 to 1, with linear interpolation between the two nearest samples (type 7 of Hyndman and Fan,
+/// the default of R and NumPy). `None` for no samples. A `q` outside 0 to 1 is clamped.
 #[must_use]
 pub fn quantile(samples: &[f64], q: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = samples.iter().copied().filter(|x| !x.is_nan()).collect();
@@ -19,26 +19,26 @@ pub fn quantile(samples: &[f64], q: f64) -> Option<f64> {
     Some(if fraction > 0.0 && low != high { low + (high - low) * fraction } else { low })
 }
 
-/// The median. `None` for no samples.
+/// Returns the median. `None` for no samples.
 #[must_use]
 pub fn median(samples: &[f64]) -> Option<f64> {
     quantile(samples, 0.5)
 }
 
-/// The mean; 0 of no values.
+/// Returns the mean; 0 for no values.
 #[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
 }
 
-/// Standard deviations of a normal distribution to either side of its mean that hold 90 % of it.
+/// Half of the central 90 % interval of a normal distribution, in standard deviations.
 pub const NORMAL_90: f64 = 1.645;
 
-/// The standard deviation of a normal distribution over its median absolute deviation.
-pub const NORMAL_OVER_MAD: f64 = 1.4826;
+/// Standard deviation of a normal distribution over its median absolute deviation.
+const NORMAL_OVER_MAD: f64 = 1.4826;
 
-/// A standard deviation that outliers don't move: the median absolute deviation from the median, scaled for a normal distribution. `None`
-/// for no samples.
+/// Returns a standard deviation that outliers don't move: the median absolute deviation from the median, scaled for a normal
+/// distribution. `None` for no samples.
 #[must_use]
 pub fn robust_deviation(samples: &[f64]) -> Option<f64> {
     let middle = median(samples)?;
@@ -46,14 +46,14 @@ pub fn robust_deviation(samples: &[f64]) -> Option<f64> {
     Some(NORMAL_OVER_MAD * median(&away)?)
 }
 
-/// The density of a standard normal variable.
+/// Returns the density of a standard normal variable.
 #[must_use]
 pub fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt()
 }
 
-/// The probability that a standard normal variable exceeds `x`; to 1.2e-7 of its value for an `x` that is not negative (Press and others,
-/// Numerical Recipes in C, 1992, chapter 6.2).
+/// Returns the probability that a standard normal variable exceeds `x`, with a relative error of 1.2e-7 for `x` of at least zero (Press
+/// and others, Numerical Recipes in C, 1992, chapter 6.2).
 #[must_use]
 pub fn normal_tail(x: f64) -> f64 {
     if x < 0.0 {
@@ -77,9 +77,9 @@ pub fn normal_tail(x: f64) -> f64 {
     0.5 * t * (polynomial - z * z).exp()
 }
 
-/// Interquartile range over median, a dispersion without a unit.
+/// Returns the interquartile range over the median, a dispersion without a unit.
 ///
-/// `None` with fewer than four samples, where quartiles say nothing, and where the median is zero or infinite.
+/// `None` for fewer than four samples, and if the median is zero or infinite.
 #[must_use]
 pub fn relative_iqr(samples: &[f64]) -> Option<f64> {
     if samples.iter().filter(|x| !x.is_nan()).count() < 4 {

@@ -240,6 +240,8 @@ fn a_given_gpu_is_measured_on_its_own_device() {
         // Its value may be 0: there is one sample, beside other tests.
         assert!(measured.value(name).is_some(), "{name}: {:?}", measured.parameters);
     }
+    let clock = measured.parameters.iter().find(|p| p.name == GpuParameterId::ClockGhz).unwrap();
+    assert!(clock.source.contains("time limit"));
     assert!(gpus.adapter(0).is_some());
     Own::new(&device, &queue).work();
 }

@@ -1,13 +1,13 @@
-//! What every measurement of a GPU owes its reader, whatever the GPU. No figure is held to a time: GPUs differ.
+//! The contract of every measurement of any GPU. No value is compared with a time: GPUs differ.
 //!
-//! Without a GPU these tests say so and pass, unless `SAPWISE_REQUIRE_GPU=1`: then they fail.
+//! Without a GPU these tests report that and pass; with `SAPWISE_REQUIRE_GPU=1` they fail.
 
 mod common;
 
 use common::gpus;
 use sapwise::gpu::Gpus;
+use sapwise::hardware::GpuKind;
 use sapwise::hardware::GpuParameterId;
-use sapwise::hardware::{GpuKind, Statistic};
 use sapwise::measure::{self, Options};
 use sapwise::{How, Parameter};
 
@@ -15,7 +15,7 @@ fn options(brief: bool) -> Options {
     Options::default().brief(brief)
 }
 
-/// The rules that hold for a parameter on any machine.
+/// Checks the rules for a parameter on any machine.
 fn check(p: &Parameter) {
     assert!(!p.source.is_empty() && p.source != "not measured", "{p:?}");
     assert_eq!(p.value.is_none(), p.how == How::Missing, "{p:?}");
@@ -23,8 +23,8 @@ fn check(p: &Parameter) {
     assert!(p.value.is_none_or(|value| value.is_finite() && value >= 0.0), "{p:?}");
     assert!(p.dispersion.is_none() || p.samples >= 4, "{p:?}");
     assert!(p.foreign_load.is_none_or(|share| (0.0..=1.0).contains(&share)), "{p:?}");
-    // The value follows from the raw samples, which stay few enough for a file.
-    let kept = p.how == How::Measured && p.statistic != Statistic::Fit;
+    // The value follows from the raw samples, which are few enough for a file.
+    let kept = p.how == How::Measured;
     assert_eq!(p.raw.is_empty(), !kept, "{p:?}");
     assert!(p.raw.len() <= 1000, "{p:?}");
     assert!(!kept || p.recomputed() == p.value, "{p:?}");
@@ -38,7 +38,7 @@ fn show(parameters: &[Parameter]) {
         let (value, spread) = (p.value.unwrap_or(f64::NAN), p.dispersion.unwrap_or(f64::NAN));
         let (name, foreign) = (&p.name, p.foreign_load.unwrap_or(0.0));
         println!(
-            "{name:32} {value:>16.3}  +-{spread:.3}  n={:<4} foreign {foreign:.2}  {:?}: {}",
+            "{name:32} {value:>16.3}  ±{spread:.3}  n={:<4} foreign {foreign:.2}  {:?}: {}",
             p.samples, p.how, p.source
         );
     }
@@ -54,23 +54,16 @@ fn every_parameter_once_and_in_order() {
         assert_eq!(names, GpuParameterId::OF_ONE);
         hardware.parameters.iter().for_each(check);
         show(&hardware.parameters);
-        // Nothing that any driver can do prevents these.
+        // Every driver allows these.
         for name in [GpuParameterId::UploadGbPerS, GpuParameterId::RoundTripNs, GpuParameterId::ArithmeticGflopPerS] {
             assert!(hardware.value(name).is_some_and(|value| value > 0.0), "{name}");
         }
-        let [all, host, device] = [
-            GpuParameterId::UploadGbPerS,
-            GpuParameterId::UploadHostCopyGbPerS,
-            GpuParameterId::UploadDeviceCopyGbPerS,
-        ]
-        .map(|name| hardware.value(name).unwrap());
-        assert!(all <= host && all <= device, "{all} {host} {device}");
+        assert!(hardware.value(GpuParameterId::MemoryBytes).is_some_and(|bytes| bytes > 1e8));
         if hardware.gpu.kind == GpuKind::Software {
             for name in [GpuParameterId::ClockGhz, GpuParameterId::Processors, GpuParameterId::Lanes] {
                 let p = hardware.parameters.iter().find(|p| p.name == name).unwrap();
                 assert!(p.value.is_none() && p.source.contains("program on the CPU"), "{p:?}");
             }
-            assert_eq!(hardware.value(GpuParameterId::UnifiedMemory), Some(1.0));
         }
     }
 }
@@ -97,8 +90,7 @@ fn a_gpu_that_is_not_there() {
     assert!(measure::gpu_group(&Gpus::none(), &[0, 1], &options(true)).is_err());
 }
 
-/// The whole measurement: seconds, so only when asked for. `cargo test --features measure-gpu --test measure_gpu -- --ignored
-/// --nocapture` shows the figures of this machine.
+/// Prints the values of this machine: `cargo test --features measure-gpu --test measure_gpu -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes seconds for each GPU"]
 fn the_whole_measurement() {

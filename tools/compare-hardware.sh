@@ -3,7 +3,7 @@
 #
 #     tools/compare-hardware.sh [ROUNDS] [GROUP...]
 #
-# 10 rounds by default, of every group: reported clock latency memory cores arithmetic opencl vulkan. Prints a table: our
+# 10 rounds by default, of every group: reported clock latency memory cores scaling opencl vulkan. Prints a table: our
 # median, theirs, the median and quartiles of the ratio ours / theirs taken pair by pair, the number of pairs, and whether the
 # ratio is within 0.95 to 1.05, or why not. Ends with status 1 where a ratio is outside and no reason is known.
 #
@@ -12,7 +12,7 @@
 #
 # Needs Linux, bash, awk, cargo, and a C compiler with OpenMP in CC (default: cc). What else it finds it uses: likwid-bench,
 # sysbench, clpeak with pocl-opencl-icd, vulkaninfo (Debian: likwid, sysbench, clpeak, pocl-opencl-icd, vulkan-tools). What is
-# missing is told and left out. STREAM_BIN names a STREAM binary, or STREAM_C its stream.c, which is then built for the size
+# missing is reported and left out. STREAM_BIN names a STREAM binary, or STREAM_C its stream.c, which is then built for the size
 # of our arrays. For software GPUs: eval "$(tools/software-gpus.sh)" first.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -23,7 +23,7 @@ if [[ ${1:-} =~ ^[0-9]+$ ]]; then
     shift
 fi
 groups=("$@")
-[ "${#groups[@]}" -gt 0 ] || groups=(reported clock latency memory cores arithmetic opencl vulkan)
+[ "${#groups[@]}" -gt 0 ] || groups=(reported clock latency memory cores scaling opencl vulkan)
 threads=$(nproc)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -143,28 +143,22 @@ group_cores() {
         "another run time: OpenMP's threads spin for their next region, helpers of rayon are handed one task each"
 }
 
-group_arithmetic() {
+group_scaling() {
     have likwid-bench "Debian: likwid" || return
-    local of name alone together
-    local reason="its kernel loads once for each chain and holds another number of them"
-    ours arithmetic || return
+    [ "$threads" -gt 1 ] || return 0
+    local of figures=()
     for of in 1 "$threads"; do
-        name=arithmetic_one_thread_gflop_per_s
-        [ "$of" = 1 ] || name=arithmetic_all_threads_gflop_per_s
         take theirs likwid-bench -t "peakflops_sp_$fused" -W "N:$((of * 16))kB:$of" || return
-        alone=${together:-}
-        together=$(theirs | awk '/^MFlops\/s:/ { print $2 / 1000 }')
-        pair "$name" "likwid-bench peakflops_sp_$fused" "$(value "$name")" "$together" "$reason"
-        [ "$threads" -gt 1 ] || return 0
+        figures+=("$(theirs | awk '/^MFlops\/s:/ { print $2 }')")
     done
     ours scaling || return
     pair scaling_all_threads_ratio "likwid-bench, all over one" "$(value scaling_all_threads_ratio)" \
-        "$(awk -v all="$together" -v one="$alone" 'BEGIN { print all / one }')"
+        "$(awk -v one="${figures[0]}" -v all="${figures[1]}" 'BEGIN { print all / one }')"
 }
 
 for group in "${groups[@]}"; do
     if ! declare -F "group_$group" >/dev/null; then
-        say "there is no group $group; use reported, clock, latency, memory, cores, arithmetic, opencl or vulkan"
+        say "there is no group $group; use reported, clock, latency, memory, cores, scaling, opencl or vulkan"
         exit 2
     fi
     case $group in

@@ -45,7 +45,7 @@ fn measure_cpu(threads: Option<u32>) -> anyhow::Result<Hardware> {
 fn usual_ms(family: Family) -> u64 {
     match family {
         Family::Topology => 10,
-        Family::Clock | Family::Arithmetic => 400,
+        Family::Clock => 400,
         Family::Caches => 3200,
         Family::Memory => 1000,
         Family::CoreToCore => 200,

@@ -137,11 +137,7 @@ fn prove(kind: Restricted, without: &Hardware, with: &Hardware) -> Vec<Proof> {
             ]
         }
         Restricted::Simd => {
-            let mut proofs = vec![on_cpu(ParameterId::SimdLanes, Change::Fewer)];
-            let arithmetic = on_cpu(ParameterId::ArithmeticOneThreadGflopPerS, Change::Lower);
-            // Old reports don't have it.
-            proofs.extend(Some(arithmetic).filter(|p| p.without.is_some() || p.with.is_some()));
-            proofs
+            vec![on_cpu(ParameterId::SimdLanes, Change::Fewer)]
         }
         // Where one thread can't saturate the memory, others at work make it slower to answer at most.
         Restricted::ContendedMemory => vec![first_shown([
@@ -170,10 +166,7 @@ fn on_gpu(with: &GpuHardware, without: &Hardware) -> Proof {
         let values = (without.and_then(|g| g.value(id)), with.value(id));
         proof(Restricted::GpuThreads, id.as_str(), Some(with.gpu.index), change, values)
     };
-    first_shown([
-        by(GpuParameterId::ArithmeticGflopPerS, Change::Lower),
-        by(GpuParameterId::ParallelUnits, Change::Lower),
-    ])
+    by(GpuParameterId::ArithmeticGflopPerS, Change::Lower)
 }
 
 fn proof(
@@ -236,44 +229,6 @@ mod tests {
         let latency = |llc, ns| [(ParameterId::CacheLlcBytes, llc), (ParameterId::Latency16384KibNs, ns)];
         assert_eq!(shown(Restricted::ContendedCache, &latency(3.3e7, 20.0), &latency(3.3e7, 23.0)), [true]);
         assert_eq!(shown(Restricted::ContendedCache, &latency(3.3e7, 20.0), &latency(3.3e7, 19.0)), [false]);
-    }
-
-    #[test]
-    fn arithmetic_shows_fewer_lanes_where_it_is_measured() {
-        let simd = |lanes| [(ParameterId::SimdLanes, lanes)];
-        assert_eq!(shown(Restricted::Simd, &simd(16.0), &simd(8.0)), [true]);
-        let both = |lanes, gflop| [(ParameterId::SimdLanes, lanes), (ParameterId::ArithmeticOneThreadGflopPerS, gflop)];
-        assert_eq!(shown(Restricted::Simd, &both(16.0, 120.0), &both(8.0, 119.0)), [true, false]);
-    }
-
-    #[test]
-    fn a_rate_that_hardly_differs_beside_a_lower_count_is_no_failure() {
-        let told = |kind, without: &[(ParameterId, f64)], with: &[(ParameterId, f64)]| {
-            let proof = prove(kind, &hardware(without), &hardware(with));
-            assert_eq!(proof.len(), 2);
-            not_shown(&Restriction { kinds: vec![kind], proof })
-        };
-        let threads = |cores| [(ParameterId::UsableCores, cores), (ParameterId::ScalingAllThreadsRatio, 1.0)];
-        assert_eq!(told(Restricted::Threads, &threads(2.0), &threads(1.0)), Vec::<String>::new());
-        let same = told(Restricted::Threads, &threads(2.0), &threads(2.0));
-        assert!(same.len() == 1 && same[0].contains("usable_cores is 2.0000 with it"), "{same:?}");
-        let simd = |lanes| [(ParameterId::SimdLanes, lanes), (ParameterId::ArithmeticOneThreadGflopPerS, 100.0)];
-        assert_eq!(told(Restricted::Simd, &simd(16.0), &simd(8.0)), Vec::<String>::new());
-        let same = told(Restricted::Simd, &simd(8.0), &simd(8.0));
-        assert!(same.len() == 1 && same[0].contains("simd_lanes is 8.0000 with it"), "{same:?}");
-    }
-
-    #[test]
-    fn parallel_units_of_a_gpu_must_be_lower_by_more_than_they_vary() {
-        let with_gpu = |units| {
-            let name = "llvmpipe".to_owned();
-            let gpu = GpuIdentity::new(0, name, GpuKind::Software);
-            let parameters = [(GpuParameterId::ArithmeticGflopPerS, 100.0), (GpuParameterId::ParallelUnits, units)];
-            let parameters = parameters.iter().map(|(name, v)| Parameter::reported(*name, *v, "test")).collect();
-            hardware(&[]).with_gpus(vec![GpuHardware::new(gpu, parameters)])
-        };
-        let shows = |units| prove(Restricted::GpuThreads, &with_gpu(10.0), &with_gpu(units))[0].shows;
-        assert!(shows(8.9) && !shows(9.5));
     }
 
     #[test]

@@ -10,12 +10,12 @@ use sapwise::GpuParameterId as Id;
 use sapwise::How;
 use serde_json::Value;
 
-/// The chip, the name of the card that it poses as, its compute units and its memory in GiB.
-const CARDS: [(&str, &str, f64, f64); 4] = [
-    ("polaris10", "POLARIS10", 36.0, 8.0),
-    ("vega10", "VEGA10", 64.0, 8.0),
-    ("navi21", "NAVI21", 60.0, 16.0),
-    ("navi31", "NAVI31", 96.0, 24.0),
+/// The chip, the name of the card that it poses as, and its memory in GiB.
+const CARDS: [(&str, &str, f64); 4] = [
+    ("polaris10", "POLARIS10", 8.0),
+    ("vega10", "VEGA10", 8.0),
+    ("navi21", "NAVI21", 16.0),
+    ("navi31", "NAVI31", 24.0),
 ];
 
 /// The command on a machine with this card and no other GPU; `None`, said aloud, without the shim.
@@ -37,23 +37,17 @@ fn with(card: &str) -> Option<assert_cmd::Command> {
 }
 
 #[test]
-fn parameters_of_four_cards_agree_with_their_specifications_and_nothing_is_timed() {
-    for (card, name, units, gib) in CARDS {
+fn memory_of_four_cards_agrees_with_their_specifications_and_nothing_is_timed() {
+    for (card, name, gib) in CARDS {
         let Some(mut command) = with(card) else { return };
         let report =
             sapwise_lab::report::read(&success(command.args(["probe", "--hardware-only", "--json"]))).unwrap().value;
         let [gpu] = &report.hardware.gpus[..] else { panic!("{card}: {:?}", report.remarks) };
         assert!(gpu.gpu.name.contains(name), "{card}: {:?}", gpu.gpu);
         assert_eq!(gpu.value(Id::Executes), Some(0.0), "{card}: {:?}", report.remarks);
-        assert_eq!((gpu.value(Id::Processors), gpu.value(Id::Lanes)), (Some(units), Some(units * 64.0)), "{card}");
-        assert_eq!(gpu.value(Id::SubgroupLanes), Some(64.0), "{card}");
         let bytes = gib * f64::from(1 << 30);
         let memory = gpu.value(Id::MemoryBytes).unwrap();
         assert!((memory / bytes - 1.0).abs() < 0.01, "{card}: {memory}");
-        let (local, visible) =
-            (gpu.value(Id::DeviceLocalBytes).unwrap(), gpu.value(Id::HostVisibleLocalBytes).unwrap());
-        assert!(local > 0.95 * bytes && local <= memory && visible > 0.0, "{card}: {local}, {visible}");
-        assert_eq!(gpu.value(Id::ResizableBar), Some(if visible >= local { 1.0 } else { 0.0 }), "{card}");
         for p in &gpu.parameters {
             assert_ne!(p.how, How::Measured, "{card}: {p:?}");
         }

@@ -2,7 +2,6 @@
 
 use super::instances::Instances;
 use crate::hardware::Measurement;
-use crate::measure::Pace;
 use crate::tuning::Tuning;
 use std::fmt;
 use std::path::PathBuf;
@@ -199,7 +198,7 @@ const LAST_WAIT: Duration = Duration::from_secs(2);
 #[derive(Debug)]
 pub(crate) struct Awaited {
     pub(crate) handover: Arc<Handover>,
-    pub(crate) pace: Arc<Pace>,
+    pub(crate) pace: Arc<AtomicBool>,
     pub(crate) thread: Option<JoinHandle<()>>,
 }
 
@@ -207,13 +206,12 @@ impl Awaited {
     /// Waits for it while it does nothing else, but no longer than that; from then on it leaves most of the time to the program.
     pub(crate) fn wait(&self, at_most: Duration) {
         self.handover.wait(at_most);
-        self.pace.go_gently();
     }
 }
 
 impl Drop for Awaited {
     fn drop(&mut self) {
-        self.pace.stop();
+        self.pace.store(true, Ordering::Relaxed);
         if self.handover.wait(LAST_WAIT) {
             // It has nothing left to do. Its panics were caught.
             let _ = self.thread.take().map(JoinHandle::join);

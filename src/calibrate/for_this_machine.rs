@@ -7,12 +7,13 @@ use crate::adaptive::{Adaptive, Arrival, Awaited, Handover, Instances, Keeper, O
 use crate::entry::Entry;
 use crate::error::Error;
 use crate::hardware::{GpuHardware, Hardware, Measurement, Parameter, ParameterId};
-use crate::measure::{self, Pace};
+use crate::measure;
 use crate::model::Model;
 use crate::registry::Registry;
 use crate::tuning::Tuning;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// How long to wait for another process that measures, beside the time that this one would measure for.
@@ -69,7 +70,7 @@ fn in_background(options: &StartOptions, began: Instant) -> Result<Adaptive, Err
             Adaptive::new(Tuning::usual(&registry), &registry)?
         }
     };
-    let (handover, pace) = (Arc::new(Handover::default()), Arc::new(Pace::default()));
+    let (handover, pace) = (Arc::new(Handover::default()), Arc::new(AtomicBool::default()));
     let wait_at_most = options.wait_at_most;
     let (options, filled, own_pace) = (options.clone(), Arc::clone(&handover), Arc::clone(&pace));
     let run = move || {
@@ -154,16 +155,17 @@ fn arrive(
     options: &StartOptions,
     registry: &Registry,
     began: Instant,
-    pace: &Arc<Pace>,
+    pace: &Arc<AtomicBool>,
     patience: Duration,
     handover: Option<&Handover>,
 ) -> Arrival {
     let mut remarks = Vec::new();
     let meanwhile = |found: Found, remarks: &mut Vec<String>| {
-        let Some(handover) = handover.filter(|_| !pace.is_stopped()) else { return false };
+        let Some(handover) = handover.filter(|_| !pace.load(Ordering::Relaxed)) else { return false };
         found.arrive(registry, began, remarks).map(|arrival| handover.leave(arrival)).is_some()
     };
-    let found = find(options, registry, pace, patience, &mut remarks, meanwhile).filter(|_| !pace.is_stopped());
+    let found =
+        find(options, registry, pace, patience, &mut remarks, meanwhile).filter(|_| !pace.load(Ordering::Relaxed));
     let arrival = found.and_then(|found| found.arrive(registry, began, &mut remarks));
     arrival.unwrap_or_else(|| Arrival { setup: Setup { remarks, ..usual(began) }, keeper: None, tuning: None })
 }
@@ -174,7 +176,7 @@ fn arrive(
 fn find(
     options: &StartOptions,
     registry: &Registry,
-    pace: &Arc<Pace>,
+    pace: &Arc<AtomicBool>,
     patience: Duration,
     remarks: &mut Vec<String>,
     meanwhile: impl Fn(Found, &mut Vec<String>) -> bool,
@@ -231,13 +233,13 @@ fn find(
         in_use = meanwhile(cached(kept.clone()), remarks);
     }
     // Processes that start together measure once, and don't disturb each other.
-    let turn = file.as_ref().and_then(|f| f.wait_for_turn(patience, || pace.is_stopped()));
+    let turn = file.as_ref().and_then(|f| f.wait_for_turn(patience, || pace.load(Ordering::Relaxed)));
     let trusted = |file: &CacheFile| file.read().ok().flatten().filter(|kept| kept.1.doubt().is_none());
     if let Some(kept) = file.as_ref().and_then(trusted) {
         return Some(cached(kept));
     }
-    let hardware = hardware(options, registry, model, pace, file.as_ref(), remarks);
-    if pace.is_stopped() {
+    let hardware = hardware(options, registry, model, pace, remarks);
+    if pace.load(Ordering::Relaxed) {
         return None;
     }
     file.iter().for_each(CacheFile::forget_unfinished);
@@ -281,18 +283,13 @@ fn hardware(
     options: &StartOptions,
     registry: &Registry,
     model: &Model,
-    pace: &Arc<Pace>,
-    file: Option<&CacheFile>,
+    pace: &Arc<AtomicBool>,
     remarks: &mut Vec<String>,
 ) -> Hardware {
     let threads = registry.available().iter().map(|e| e.id.threads()).max();
-    let (limit, pace) = (Some(options.probe_limit), Some(Arc::clone(pace)));
-    let plan = measure::Options { threads, limit, pace, ..measure::Options::default() };
-    let measured = file.map(CacheFile::read_unfinished).unwrap_or_default();
-    let mut hardware = measure::go_on(&model.parameters(), &plan, measured, |so_far| {
-        // Where nothing can be kept the tuning tells so.
-        let _ = file.map(|f| f.keep_unfinished(so_far));
-    });
+    let (limit, stop) = (Some(options.probe_limit), Some(Arc::clone(pace)));
+    let plan = measure::Options { threads, limit, stop, ..measure::Options::default() };
+    let mut hardware = measure::hardware_for(&model.parameters(), &plan);
     let simd = registry.simd();
     if let Some(lanes) = hardware.parameters.iter_mut().find(|p| p.name == ParameterId::SimdLanes) {
         *lanes = Parameter::reported(ParameterId::SimdLanes, f64::from(simd.lanes()), "the SIMD level of the registry");
@@ -302,7 +299,7 @@ fn hardware(
     let gpus = registry.source::<crate::gpu::Gpus>().cloned().unwrap_or_default();
     #[cfg(feature = "measure-gpu")]
     for index in gpus.identities().map(|g| g.index) {
-        if plan.pace.as_ref().is_some_and(|pace| pace.is_stopped()) {
+        if plan.is_stopped() {
             break;
         }
         match measure::gpu(&gpus, index, &plan) {

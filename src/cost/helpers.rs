@@ -1,57 +1,45 @@
-//! What several threads make of the work of one.
+//! The cost of work on several threads.
 
-/// The cost of an algorithm on several threads, from that on one.
+/// How several threads change the cost of work on one.
 ///
-/// The caller begins while its helpers wake. One that comes too late finds nothing left to do and costs nothing: the frame takes what it
-/// would have taken on one thread, and what it cost to call the others.
+/// The caller begins while its helpers wake. A helper that wakes too late finds nothing left: the frame then takes the time of one
+/// thread, plus the time to call the helpers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Helpers {
-    /// Threads, the caller's included.
+    /// Threads, including the caller.
     pub threads: u32,
     /// Nanoseconds to call all of them.
     pub call_ns: f64,
     /// Nanoseconds of one thread's work that are lost while they wake.
     pub late_ns: f64,
-    /// How many times as fast all of them work as one.
+    /// Speed-up of all threads over one.
     pub speed_up: f64,
-    /// Boxes that keep one thread busy: a frame has no more threads than it has so many boxes. 0: it has all of them always.
+    /// Boxes that keep one thread busy: a frame uses one thread for each so many boxes. 0: it uses all threads.
     pub boxes_per_thread: u32,
 }
 
 impl Helpers {
-    /// All of `threads` in every frame, called for nothing and at once, each as fast as the caller.
+    /// Creates helpers that are called for free, wake at once, and are as fast as the caller.
     #[must_use]
     pub fn new(threads: u32) -> Self {
         Self { threads, call_ns: 0.0, late_ns: 0.0, speed_up: f64::from(threads), boxes_per_thread: 0 }
     }
 
-    /// The same where it takes this long to call them, and so much work of one thread is lost while they wake.
+    /// Sets the time to call all of them, and the work of one thread that is lost while they wake.
     #[must_use]
     pub fn with_call(self, call_ns: f64, late_ns: f64) -> Self {
         Self { call_ns, late_ns, ..self }
     }
 
-    /// The same where they work this many times as fast as one.
-    #[must_use]
-    pub fn with_speed_up(self, speed_up: f64) -> Self {
-        Self { speed_up, ..self }
-    }
-
-    /// The same where each is called for so many boxes only.
-    #[must_use]
-    pub fn with_boxes_per_thread(self, boxes_per_thread: u32) -> Self {
-        Self { boxes_per_thread, ..self }
-    }
-
-    /// Nanoseconds of a frame of `objects` boxes that takes `work_ns` on one thread.
+    /// Returns the nanoseconds of a frame of `objects` boxes that takes `work_ns` on one thread.
     #[must_use]
     pub fn cost_ns(&self, objects: u32, work_ns: f64) -> f64 {
         let Some(share) = self.share(objects) else { return work_ns };
         share * self.call_ns + work_ns.min((work_ns + self.late_ns) / self.speed_up_of(share))
     }
 
-    /// What of that is spent on calling them and on waiting for them.
+    /// Returns the part of that cost that goes to calling helpers and waiting for them.
     pub(crate) fn calls_ns(&self, objects: u32, work_ns: f64) -> f64 {
         let Some(share) = self.share(objects) else { return 0.0 };
         let speed_up = self.speed_up_of(share);
@@ -59,7 +47,7 @@ impl Helpers {
         share * self.call_ns + if late { self.late_ns / speed_up } else { 0.0 }
     }
 
-    /// The share of the helpers that a frame of so many boxes calls; `None` where it calls none.
+    /// Share of the helpers that a frame of `objects` boxes calls; `None` if it calls none.
     fn share(&self, objects: u32) -> Option<f64> {
         if self.boxes_per_thread == 0 || self.threads < 2 {
             return (self.threads > 1).then_some(1.0);
@@ -68,12 +56,12 @@ impl Helpers {
         (called > 0).then(|| f64::from(called) / f64::from(self.threads - 1))
     }
 
-    /// How many times as fast as one they work where that share of them is called.
+    /// Speed-up over one thread if that share of the helpers is called.
     fn speed_up_of(&self, share: f64) -> f64 {
         1.0 + share * (self.speed_up - 1.0)
     }
 
-    /// Whether its figures can be.
+    /// Whether its values are possible.
     pub(super) fn is_sound(&self) -> bool {
         let times = [self.call_ns, self.late_ns];
         self.threads > 1
@@ -88,7 +76,7 @@ mod tests {
 
     #[test]
     fn a_late_helper_costs_its_call_and_an_early_one_saves_its_share() {
-        let two = Helpers::new(2).with_call(100.0, 5000.0).with_speed_up(1.8);
+        let two = Helpers { speed_up: 1.8, ..Helpers::new(2).with_call(100.0, 5000.0) };
         // (1000 + 5000) / 1.8 is more than 1000: the caller is done first.
         assert_eq!(two.cost_ns(10, 1000.0), 1100.0);
         assert_eq!(two.cost_ns(10, 85_000.0), 50_100.0);
@@ -96,15 +84,16 @@ mod tests {
 
     #[test]
     fn a_frame_calls_as_many_as_its_boxes_keep_busy() {
-        let five = Helpers::new(5).with_call(400.0, 0.0).with_speed_up(5.0).with_boxes_per_thread(1024);
+        let five = Helpers { boxes_per_thread: 1024, ..Helpers::new(5).with_call(400.0, 0.0) };
         assert_eq!(five.cost_ns(2047, 6000.0), 6000.0);
         assert_eq!(five.cost_ns(2048, 6000.0), 3100.0);
         assert_eq!(five.cost_ns(1_000_000, 6000.0), 1600.0);
     }
 
     #[test]
-    fn figures_that_can_not_be_are_told() {
+    fn impossible_values_are_refused() {
         assert!(Helpers::new(2).is_sound() && !Helpers::new(1).is_sound());
-        assert!(!Helpers::new(2).with_speed_up(0.0).is_sound() && !Helpers::new(2).with_call(f64::NAN, 0.0).is_sound());
+        assert!(!Helpers { speed_up: 0.0, ..Helpers::new(2) }.is_sound());
+        assert!(!Helpers::new(2).with_call(f64::NAN, 0.0).is_sound());
     }
 }

@@ -1,33 +1,33 @@
 //! What the terms of a cost leave unexplained, as a function of the load.
 //!
 //! A Gaussian process with inducing points (Quiñonero-Candela and Rasmussen, A unifying view of sparse approximate Gaussian process
-//! regression, 2005): a weighted sum of how like a load is to each of some places. It returns to nought, where the terms alone hold, away from
-//! all of them.
+//! regression, 2005): a weighted sum of the load's similarity to each of some places. Far from all places it is zero, and the terms
+//! alone hold.
 
 use crate::Load;
 use std::sync::Arc;
 
-/// Coordinates of a load. The last one is looked at only for algorithms that are cheaper where boxes move little.
+/// Coordinates of a load. The last one counts only for algorithms that are cheaper if boxes move little.
 const COORDINATES: usize = 5;
-/// What a coordinate's figure is divided by: the distance over which a residual keeps its height. The figures are base-2 logarithms of objects, of
-/// pairs, of strip candidates and of axis candidates an object, and [`Load::moved`]. Half or twice of each changes regrets by less than what two
-/// fits of the same reports differ by.
+/// Length scale of each coordinate: the distance over which a residual keeps its height. The coordinates are base-2 logarithms of
+/// objects, and of pairs, strip candidates and axis candidates an object, and [`Load::moved`]. Halving or doubling a length changes
+/// regrets by less than two fits of the same reports differ.
 const LENGTHS: [f64; COORDINATES] = [3.0, 3.0, 4.0, 6.0, 0.375];
-/// Pairs an object below which scenes are alike: a twentieth.
+/// Pairs an object below which scenes count as alike.
 const FEW_PAIRS: f64 = 0.05;
-/// A weight or a constant beyond is no measurement. Weights of places that are alike may be large against each other.
+/// Highest plausible weight or constant. Weights of similar places may be large with opposite signs.
 const MOST_LN: f64 = 1000.0;
-/// The kernel is a rational quadratic with this exponent: between it and a squared exponential no regret tells a difference, and it takes a division
-/// and four products in place of an exponential.
+/// Base-2 logarithm of the exponent of the kernel, a rational quadratic: regrets equal those of a squared exponential, and it takes a
+/// division and four products instead of an exponential.
 const EXPONENT_LOG2: u32 = 4;
 
-/// Loads at which residuals are known, for all methods of a machine or a model.
+/// Loads at which the residuals of all methods of a machine or a model are known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Places {
     loads: Vec<Load>,
     /// By coordinate, then by place.
     coordinates: Vec<f64>,
-    /// Base-2 logarithms of the fewest and of the most objects; beyond, a load counts as one with as many.
+    /// Base-2 logarithms of the fewest and the most objects; loads outside are clamped.
     octaves: [f64; 2],
 }
 
@@ -35,17 +35,17 @@ pub struct Places {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Residual {
-    /// Where it is known.
+    /// Loads at which it is known.
     pub places: Arc<Places>,
-    /// For each of the first places what its likeness counts, as the natural logarithm of a factor on the cost.
+    /// Weight of the similarity to each of the first places, in the natural logarithm of a factor on the cost.
     pub weights: Vec<f64>,
-    /// The natural logarithm of a factor that holds away from all places too.
+    /// Natural logarithm of a factor that holds everywhere.
     pub constant: f64,
-    /// Whether loads are told apart by how far boxes move.
+    /// Whether similarity depends on how far boxes move.
     pub by_motion: bool,
 }
 
-/// How like a load is to each place, 0 to 1.
+/// Similarity of a load to each place, 0 to 1.
 #[derive(Debug, Clone)]
 pub(crate) struct Likeness {
     by_motion: [f64; Places::MOST],
@@ -53,10 +53,10 @@ pub(crate) struct Likeness {
 }
 
 impl Places {
-    /// Places that a residual may have. 96 made no choice better on machines held out, and each of them costs time in every decision.
+    /// Most places of a residual. 96 improved no choice on held-out machines, and each place costs time in every decision.
     pub const MOST: usize = 64;
 
-    /// These loads, of which no more than [`Places::MOST`] are taken.
+    /// Creates places at the first [`Places::MOST`] of these loads.
     #[must_use]
     pub fn new(mut loads: Vec<Load>) -> Self {
         loads.truncate(Self::MOST);
@@ -64,7 +64,7 @@ impl Places {
         Self::within(loads, sizes)
     }
 
-    /// The same, of loads that are told apart by their sizes as far as `all` go.
+    /// Creates places at these loads, clamped to the sizes of `all`.
     #[must_use]
     pub fn of_sizes(loads: Vec<Load>, all: &[Load]) -> Self {
         Self::within(loads, sizes(all))
@@ -81,21 +81,21 @@ impl Places {
         Self { loads, coordinates, octaves }
     }
 
-    /// The loads, in the order of the weights of residuals.
+    /// Returns the loads, in the order of the weights of residuals.
     #[must_use]
     pub fn loads(&self) -> &[Load] {
         &self.loads
     }
 
-    /// How like `load` is to each place, 0 to 1; with `by_motion` loads are told apart by how far boxes move too. This is the correlation of two
-    /// values of a residual.
+    /// Returns the similarity of `load` to each place, 0 to 1, which is the correlation of two values of a residual. With `by_motion` it
+    /// depends on how far boxes move too.
     #[must_use]
     pub fn likeness(&self, load: &Load, by_motion: bool) -> Vec<f64> {
         let likeness = self.likeness_of(load);
         likeness.of(by_motion)[..self.loads.len()].to_vec()
     }
 
-    /// Places like those of scenes of a constant density that move little: for costs that come without any.
+    /// Returns places of scenes of constant density that move little, for costs without places.
     pub(crate) fn usual() -> Arc<Self> {
         let load = |k: u32| {
             let n = 2.0_f64.powi(3 + 3 * k as i32);
@@ -132,19 +132,19 @@ impl Likeness {
 }
 
 impl Residual {
-    /// A residual with weights for the first places, and no constant.
+    /// Creates a residual with weights for the first places and no constant.
     #[must_use]
     pub fn new(places: Arc<Places>, weights: Vec<f64>, by_motion: bool) -> Self {
         Self { places, weights, constant: 0.0, by_motion }
     }
 
-    /// The same with a factor of this natural logarithm everywhere.
+    /// Sets the natural logarithm of a factor that holds everywhere.
     #[must_use]
     pub fn with_constant(self, constant: f64) -> Self {
         Self { constant, ..self }
     }
 
-    /// The natural logarithm of the factor on the cost under a load.
+    /// Returns the natural logarithm of the factor on the cost under a load.
     #[must_use]
     pub fn ln(&self, load: &Load) -> f64 {
         self.ln_of(&self.places.likeness_of(load))
@@ -161,7 +161,7 @@ impl Residual {
         self.constant + sums.iter().sum::<f64>() + rest
     }
 
-    /// The sum of both, which are known at the same places.
+    /// Adds a residual at the same places.
     pub(crate) fn plus(mut self, other: &Self) -> Self {
         self.constant += other.constant;
         self.weights.resize(self.weights.len().max(other.weights.len()), 0.0);
@@ -226,19 +226,19 @@ mod tests {
     }
 
     #[test]
-    fn a_residual_holds_at_its_places_and_goes_back_to_nought_away_from_them() {
+    fn a_residual_holds_at_its_places_and_is_zero_far_from_them() {
         let places = Arc::new(Places::new(vec![load(1000, 500.0, 0.0), load(1_000_000, 500_000.0, 0.0)]));
         let residual = Residual::new(places, vec![0.3, -0.2], false);
         assert!((residual.ln(&load(1000, 500.0, 0.9)) - 0.3).abs() < 0.01);
         assert!((residual.ln(&load(1_000_000, 500_000.0, 0.0)) + 0.2).abs() < 0.01);
-        // Beyond its sizes it is held.
+        // Beyond its sizes it is constant.
         assert_eq!(residual.ln(&load(4_000_000, 2_000_000.0, 0.0)), residual.ln(&load(1_000_000, 500_000.0, 0.0)));
         assert!(residual.ln(&load(1000, 400_000.0, 0.0)).abs() < 0.05);
         assert!(residual.is_sound());
     }
 
     #[test]
-    fn motion_tells_loads_apart_only_where_it_is_asked_for() {
+    fn motion_counts_only_if_asked_for() {
         let places = Arc::new(Places::new((0..7).map(|k| load(1 << (3 + k), 4.0, 0.0)).collect()));
         let weights: Vec<f64> = (1..=7).map(|k| 0.1 * f64::from(k)).collect();
         let still = Residual::new(Arc::clone(&places), weights.clone(), false);

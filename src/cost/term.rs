@@ -1,4 +1,4 @@
-//! What a frame consists of: counts of operations under a load.
+//! The terms of a cost: counts of operations under a load.
 
 use crate::Load;
 
@@ -12,7 +12,7 @@ pub enum Term {
     Objects,
     /// Comparisons of a sort: n log2 n.
     Sort,
-    /// Boxes whose working set does not fit the last-level cache: n times the share of it that is outside.
+    /// Boxes whose working set does not fit the last-level cache: n times the share of the set outside.
     ColdObjects,
     /// All pairs: n (n - 1) / 2.
     AllPairs,
@@ -22,16 +22,16 @@ pub enum Term {
     StripCandidates,
     /// Pairs written ([`Load::pairs`]).
     Pairs,
-    /// Boxes times how far they move ([`Load::moved`]): boxes that leave their grown boxes grow with it.
+    /// Boxes times how far they move ([`Load::moved`]), for boxes that leave their fat boxes.
     Moved,
-    /// A count of a user's own algorithm.
+    /// A count of a program's own algorithm.
     Product(Product),
 }
 
-/// A product of powers of a load's figures, for the costs of algorithms that the other terms do not describe: of a tree
+/// A product of powers of a load's values, for algorithms that the other terms do not describe: for a tree
 /// `Product::ONE.objects(1).log2_objects(1)` and `Product::ONE.pairs(1).log2_objects(1)`.
 ///
-/// No power is negative, so that no count falls when a figure rises, and all together are at most [`Product::MOST_POWERS`].
+/// No power is negative, so that no count falls when a value rises. Together they are at most [`Product::MOST_POWERS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 #[non_exhaustive]
 pub struct Product {
@@ -54,40 +54,40 @@ impl Product {
     pub const ONE: Self =
         Self { objects: 0, log2_objects: 0, pairs: 0, axis_candidates: 0, strip_candidates: 0, moved: 0 };
 
-    /// Powers that a product may have together: more of 2^64 candidates each would end in infinities.
+    /// Most powers of a product together: more of 2^64 candidates each would overflow to infinity.
     pub const MOST_POWERS: u32 = 8;
 
-    /// The same with this power of the number of objects.
+    /// Sets the power of the number of objects.
     #[must_use]
     pub const fn objects(self, power: u8) -> Self {
         Self { objects: power, ..self }
     }
 
-    /// The same with this power of the base-2 logarithm of the number of objects.
+    /// Sets the power of the base-2 logarithm of the number of objects.
     #[must_use]
     pub const fn log2_objects(self, power: u8) -> Self {
         Self { log2_objects: power, ..self }
     }
 
-    /// The same with this power of the number of pairs.
+    /// Sets the power of the number of pairs.
     #[must_use]
     pub const fn pairs(self, power: u8) -> Self {
         Self { pairs: power, ..self }
     }
 
-    /// The same with this power of the candidates on the sweep axis.
+    /// Sets the power of the candidates on the sweep axis.
     #[must_use]
     pub const fn axis_candidates(self, power: u8) -> Self {
         Self { axis_candidates: power, ..self }
     }
 
-    /// The same with this power of the candidates within a strip.
+    /// Sets the power of the candidates within a strip.
     #[must_use]
     pub const fn strip_candidates(self, power: u8) -> Self {
         Self { strip_candidates: power, ..self }
     }
 
-    /// The same with this power of how far boxes move.
+    /// Sets the power of how far boxes move.
     #[must_use]
     pub const fn moved(self, power: u8) -> Self {
         Self { moved: power, ..self }
@@ -114,55 +114,33 @@ impl Product {
     }
 }
 
-/// Bytes that an algorithm keeps in flight for each box: the box itself, its sorted copy and its key.
+/// Working set of an algorithm for each box: the box, its sorted copy and its key.
 const WORKING_SET_BYTES: f64 = 64.0;
 
 impl Term {
-    /// The terms of the algorithms of this library: every one but [`Term::Product`].
-    pub const ALL: [Self; 9] = [
-        Self::Call,
-        Self::Objects,
-        Self::Sort,
-        Self::ColdObjects,
-        Self::AllPairs,
-        Self::AxisCandidates,
-        Self::StripCandidates,
-        Self::Pairs,
-        Self::Moved,
-    ];
-
-    /// The count of operations under a load, on a machine with a last-level cache of `cache_bytes`.
+    /// Returns the count under a load, on a machine with a last-level cache of `cache_bytes`.
     #[must_use]
     pub fn count(self, load: &Load, cache_bytes: f64) -> f64 {
         Counts::new(load).of(self, cache_bytes)
     }
 }
 
-/// What the terms of all algorithms share under one load, worked out once for each decision.
+/// What the terms of all algorithms share under one load, computed once for each decision.
 #[derive(Debug, Clone, Copy)]
-pub struct Counts<'a> {
+pub(crate) struct Counts<'a> {
     load: &'a Load,
     objects: f64,
     log2_objects: f64,
 }
 
 impl<'a> Counts<'a> {
-    /// The counts under a load.
-    #[must_use]
-    pub fn new(load: &'a Load) -> Self {
+    pub(crate) fn new(load: &'a Load) -> Self {
         let objects = f64::from(load.objects);
         Self { load, objects, log2_objects: objects.max(1.0).log2() }
     }
 
-    /// Base-2 logarithm of the number of objects, 0 for none.
-    #[must_use]
-    pub fn log2_objects(&self) -> f64 {
-        self.log2_objects
-    }
-
-    /// The count of operations of a term, on a machine with a last-level cache of `cache_bytes`.
-    #[must_use]
-    pub fn of(&self, term: Term, cache_bytes: f64) -> f64 {
+    /// Returns the count of a term, on a machine with a last-level cache of `cache_bytes`.
+    pub(crate) fn of(&self, term: Term, cache_bytes: f64) -> f64 {
         let n = self.objects;
         match term {
             Term::Call => 1.0,

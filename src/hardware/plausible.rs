@@ -1,17 +1,21 @@
-//! Figures that no machine has: in another unit, or nonsense.
+//! Finds values that no machine has: another unit, or nonsense.
 
 use super::{Bounds, GpuHardware, GpuParameterId, Hardware, HardwareError, ParameterId};
 
 impl Bounds {
-    /// The error that a value outside is. A NaN is in no range.
+    /// Returns the error of a value outside; NaN is outside.
     fn check(self, name: &str, of: &str, value: Option<f64>) -> Option<HardwareError> {
-        let value = value.filter(|v| !(self.least..=self.most).contains(v))?;
-        Some(HardwareError::Implausible { parameter: format!("{name}{of}"), value, bounds: self })
+        let Self { least, most } = self;
+        let value = value.filter(|v| !(least..=most).contains(v))?;
+        Some(HardwareError(format!(
+            "the parameter {name}{of} is {value}, and no machine lies outside {least} to {most}; check its unit, or measure it with \
+             `sapwise probe --hardware-only`"
+        )))
     }
 }
 
 impl Hardware {
-    /// The first parameter of the machine, GPUs aside, that no machine has; most often it is in another unit.
+    /// Returns the first parameter of the machine, without its GPUs, whose value no machine has.
     #[must_use]
     pub fn implausible(&self) -> Option<HardwareError> {
         ParameterId::ALL.into_iter().find_map(|id| self.implausible_value(id))
@@ -21,15 +25,14 @@ impl Hardware {
         id.quantity().bounds?.check(id.as_str(), "", self.value(id))
     }
 
-    /// Takes out every figure of the machine, GPUs aside, that no machine has: too few samples on a machine that was busy. What is wrong
-    /// with each, which stands in its place too.
+    /// Makes each implausible parameter of the machine missing, without its GPUs, and returns why. A busy machine yields such values.
     #[cfg(feature = "this-machine")]
     pub(crate) fn drop_implausible(&mut self) -> Vec<HardwareError> {
         let mut dropped = Vec::new();
         for id in ParameterId::ALL {
             if let Some(why) = self.implausible_value(id) {
-                let figures = self.parameters.iter_mut().filter(|p| p.name == id);
-                figures.for_each(|p| *p = super::Parameter::missing(id, &why.to_string()));
+                let values = self.parameters.iter_mut().filter(|p| p.name == id);
+                values.for_each(|p| *p = super::Parameter::missing(id, &why.to_string()));
                 dropped.push(why);
             }
         }
@@ -38,7 +41,7 @@ impl Hardware {
 }
 
 impl GpuHardware {
-    /// The first parameter that no GPU has; most often it is in another unit.
+    /// Returns the first parameter whose value no GPU has.
     #[must_use]
     pub fn implausible(&self) -> Option<HardwareError> {
         let of = format!(" of gpu{}", self.gpu.index);

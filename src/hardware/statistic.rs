@@ -1,25 +1,25 @@
-//! How a figure follows from its samples.
+//! How a value follows from its samples.
 
 use crate::named::named;
 use crate::stats;
 
 named! {
-    /// How the value of a measured parameter follows from its samples.
+    /// How a measured value follows from its samples.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
     #[non_exhaustive]
     pub enum Statistic("statistic") {
-        /// The median of all.
+        /// Median of all samples.
         #[default]
         Median = "median",
-        /// Of a rate: the median of the samples that are not below the upper quartile. For what an interruption can only make slower.
+        /// Of a rate: median of the samples at or above the upper quartile. For loops that an interruption can only make slower.
         FastestQuarterMedian = "fastest_quarter_median",
-        /// From a fit through more than one figure a sample. The samples behind it are not kept.
+        /// A fit through several values a sample, which are not kept. Only in reports of earlier versions.
         Fit = "fit",
     }
 }
 
 impl Statistic {
-    /// What it makes of samples; `None` of none, and of a fit.
+    /// Computes the value; `None` for no samples and for a fit.
     #[must_use]
     pub fn of(self, samples: &[f64]) -> Option<f64> {
         match self {
@@ -33,7 +33,7 @@ impl Statistic {
         }
     }
 
-    /// Whether it is the median, which files do not name.
+    /// Whether it is the median, which files leave out.
     #[must_use]
     pub fn is_median(&self) -> bool {
         *self == Self::Median

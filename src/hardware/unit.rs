@@ -1,19 +1,32 @@
-//! Figures of hardware parameters with their units.
+//! Units of hardware parameters, which end their names.
 
-use super::GpuParameterId;
+/// How names end, and the unit that this stands for.
+const UNITS: [(&str, &str); 8] = [
+    ("_gb_per_s", "GB/s"),
+    ("_gflop_per_s", "GFLOP/s"),
+    ("_bytes", "bytes"),
+    ("_ghz", "GHz"),
+    ("_ns", "ns"),
+    ("_ratio", "ratio"),
+    ("cores", "cores"),
+    ("lanes", "lanes"),
+];
 
-/// A figure as people read it, rounded and with the unit that the end of its parameter's name says.
+/// Returns the unit of a parameter's values; empty if its name does not end with one.
+pub(super) fn unit(name: &str) -> &'static str {
+    UNITS.iter().find(|(end, _)| name.ends_with(end)).map_or("", |(_, unit)| unit)
+}
+
+/// Returns a parameter's value as people read it: rounded, with its unit.
 #[must_use]
 pub fn with_unit(name: &str, value: f64) -> String {
-    match name {
-        _ if name.ends_with("_gb_per_s") => format!("{value:.1} GB/s"),
-        _ if name.ends_with("_gflop_per_s") => format!("{value:.0} GFLOP/s"),
-        _ if name.ends_with("_g_per_s") => format!("{value:.2} G/s"),
-        _ if name == GpuParameterId::UnifiedMemory.as_str() => if value > 0.0 { "yes" } else { "no" }.to_owned(),
-        _ if name.ends_with("_bytes") => bytes(value),
-        _ if name.ends_with("_ghz") => format!("{value:.2} GHz"),
-        _ if name.ends_with("_ns") => nanoseconds(value),
-        _ if name.ends_with("_ratio") => format!("{value:.2} x"),
+    match unit(name) {
+        unit @ "GB/s" => format!("{value:.1} {unit}"),
+        unit @ "GFLOP/s" => format!("{value:.0} {unit}"),
+        unit @ "GHz" => format!("{value:.2} {unit}"),
+        "bytes" => bytes(value),
+        "ns" => nanoseconds(value),
+        "ratio" => format!("{value:.2} ×"),
         _ => format!("{value}"),
     }
 }
@@ -21,13 +34,12 @@ pub fn with_unit(name: &str, value: f64) -> String {
 fn nanoseconds(ns: f64) -> String {
     match ns {
         _ if ns < 1e3 => format!("{ns:.1} ns"),
-        _ if ns < 1e6 => format!("{:.2} us", ns / 1e3),
+        _ if ns < 1e6 => format!("{:.2} µs", ns / 1e3),
         _ if ns < 1e9 => format!("{:.2} ms", ns / 1e6),
         _ => format!("{:.2} s", ns / 1e9),
     }
 }
 
-/// Bytes with a binary unit.
 fn bytes(count: f64) -> String {
     let units = ["B", "KiB", "MiB", "GiB", "TiB"];
     let mut value = count;
@@ -52,11 +64,9 @@ mod tests {
         assert_eq!(with_unit("cache_llc_bytes", 12.0), "12 B");
         assert_eq!(with_unit("bandwidth_one_thread_gb_per_s", 12.345), "12.3 GB/s");
         assert_eq!(with_unit("latency_16_kib_ns", 1.26), "1.3 ns");
-        assert_eq!(with_unit("fork_join_cold_ns", 12_500.0), "12.50 us");
-        assert_eq!(with_unit("scaling_two_threads_ratio", 1.9), "1.90 x");
+        assert_eq!(with_unit("fork_join_cold_ns", 12_500.0), "12.50 µs");
+        assert_eq!(with_unit("scaling_two_threads_ratio", 1.9), "1.90 ×");
         assert_eq!(with_unit("usable_cores", 2.0), "2");
         assert_eq!(with_unit("arithmetic_gflop_per_s", 51_234.5), "51234 GFLOP/s");
-        assert_eq!(with_unit("atomic_g_per_s", 0.25), "0.25 G/s");
-        assert_eq!(with_unit("unified_memory", 1.0), "yes");
     }
 }

@@ -1,95 +1,64 @@
 //! Cache sizes that the system reports.
 
-/// One cache of the machine.
+/// A data cache of the first CPU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Level {
+pub(super) struct Cache {
     pub(super) level: u8,
     pub(super) bytes: u64,
-    /// How many of them the machine has, as far as it is known: a socket of several dies has one last-level cache on each.
+    /// How many of them the machine has, as far as known: a socket of several dies has one last-level cache on each.
     pub(super) instances: u64,
 }
 
-/// The data caches that the first CPU uses.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Caches {
-    pub(super) first_level_data: Option<Level>,
-    pub(super) second_level: Option<Level>,
-    pub(super) last_level: Option<Level>,
-    /// Who says so.
-    pub(super) source: &'static str,
-}
+/// Where the sizes come from.
+pub(super) const SOURCE: &str = "/sys/devices/system/cpu/cpu0/cache, or CPUID leaf 4 or 0x8000001D";
 
-impl Caches {
-    fn new(levels: &[Level], source: &'static str) -> Self {
-        let at = |wanted| levels.iter().find(|l| l.level == wanted).copied();
-        Self {
-            first_level_data: at(1),
-            second_level: at(2),
-            last_level: levels.iter().max_by_key(|l| l.level).copied(),
-            source,
-        }
-    }
-}
-
-/// Sizes from sysfs, else from CPUID. Nothing on systems that have neither.
-pub(super) fn reported() -> Caches {
-    let levels = sysfs_levels();
-    if !levels.is_empty() {
-        return Caches::new(&levels, "/sys/devices/system/cpu/cpu0/cache");
-    }
+/// Returns the data caches by level, ascending: from sysfs, else from CPUID. Empty if the system has neither.
+pub(super) fn reported() -> Vec<Cache> {
+    let mut caches = from_sysfs();
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    {
-        Caches::new(&cpuid_levels(), "CPUID leaf 4 or 0x8000001D")
+    if caches.is_empty() {
+        caches = from_cpuid();
     }
-    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-    {
-        Caches::default()
-    }
+    caches.sort_by_key(|cache| cache.level);
+    caches
 }
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-fn cpuid_levels() -> Vec<Level> {
-    let cpuid = raw_cpuid::CpuId::new();
-    let Some(caches) = cpuid.get_cache_parameters() else { return Vec::new() };
-    caches
-        .filter(|c| matches!(c.cache_type(), raw_cpuid::CacheType::Data | raw_cpuid::CacheType::Unified))
-        .map(|c| {
-            let factors = [c.associativity(), c.physical_line_partitions(), c.coherency_line_size(), c.sets()];
-            let bytes = factors.iter().fold(1_u64, |product, &f| product.saturating_mul(f as u64));
-            Level { level: c.level(), bytes, instances: 1 }
-        })
-        .collect()
+fn from_cpuid() -> Vec<Cache> {
+    use raw_cpuid::CacheType::{Data, Unified};
+    let caches = raw_cpuid::CpuId::new().get_cache_parameters();
+    let data = caches.into_iter().flatten().filter(|c| matches!(c.cache_type(), Data | Unified));
+    data.map(|c| {
+        let factors = [c.associativity(), c.physical_line_partitions(), c.coherency_line_size(), c.sets()];
+        Cache { level: c.level(), bytes: factors.iter().map(|&f| f as u64).product(), instances: 1 }
+    })
+    .collect()
 }
 
-fn sysfs_levels() -> Vec<Level> {
+fn from_sysfs() -> Vec<Cache> {
     let read = |cpu: usize, index: usize, name: &str| {
         std::fs::read_to_string(format!("/sys/devices/system/cpu/cpu{cpu}/cache/index{index}/{name}")).ok()
     };
-    let mut levels = Vec::new();
-    // No CPU has more than 5 entries; the bound is there so that a broken file system can't hold us.
-    for index in 0..10 {
-        let Some(kind) = read(0, index, "type") else { break };
-        if kind.trim() == "Instruction" {
-            continue;
-        }
-        let level = read(0, index, "level").and_then(|text| text.trim().parse().ok());
-        let bytes = read(0, index, "size").and_then(|text| parse_size(&text));
-        let (Some(level), Some(bytes)) = (level, bytes) else { continue };
-        let cpus = std::thread::available_parallelism().map_or(1, usize::from);
-        let mut shared: Vec<String> = (0..cpus).filter_map(|cpu| read(cpu, index, "shared_cpu_list")).collect();
-        shared.sort_unstable();
-        shared.dedup();
-        levels.push(Level { level, bytes, instances: shared.len().max(1) as u64 });
-    }
-    levels
+    let cpus = std::thread::available_parallelism().map_or(1, usize::from);
+    let cache = |index| {
+        let level = read(0, index, "level")?.trim().parse().ok()?;
+        let bytes = parse_size(&read(0, index, "size")?)?;
+        let mut sharers: Vec<String> = (0..cpus).filter_map(|cpu| read(cpu, index, "shared_cpu_list")).collect();
+        sharers.sort_unstable();
+        sharers.dedup();
+        Some(Cache { level, bytes, instances: sharers.len().max(1) as u64 })
+    };
+    // No CPU has more than five.
+    let is_data = |index: &usize| read(0, *index, "type").is_some_and(|kind| kind.trim() != "Instruction");
+    (0..10).filter(is_data).filter_map(cache).collect()
 }
 
 /// Bytes from a size of sysfs, such as `48K`.
 fn parse_size(text: &str) -> Option<u64> {
     let text = text.trim();
-    let (digits, unit) = match text.as_bytes().last()? {
-        b'K' => (text.get(..text.len() - 1)?, 1 << 10),
-        b'M' => (text.get(..text.len() - 1)?, 1 << 20),
+    let (digits, unit) = match (text.strip_suffix('K'), text.strip_suffix('M')) {
+        (Some(digits), _) => (digits, 1 << 10),
+        (_, Some(digits)) => (digits, 1 << 20),
         _ => (text, 1),
     };
     digits.parse::<u64>().ok()?.checked_mul(unit).filter(|&bytes| bytes > 0)
@@ -104,17 +73,17 @@ mod tests {
         assert_eq!(parse_size("48K\n"), Some(49_152));
         assert_eq!(parse_size("32M"), Some(33_554_432));
         assert_eq!(parse_size("512"), Some(512));
-        assert_eq!(parse_size("0K"), None);
-        assert_eq!(parse_size("K"), None);
-        assert_eq!(parse_size(""), None);
-        assert_eq!(parse_size("99999999999999999999K"), None);
+        for wrong in ["0K", "K", "", "99999999999999999999K"] {
+            assert_eq!(parse_size(wrong), None, "{wrong}");
+        }
     }
 
+    /// Machine ids contain the last-level cache.
+    #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
     #[test]
-    fn last_level_is_the_highest_even_without_a_third() {
-        let level = |level, bytes| Level { level, bytes, instances: 1 };
-        let caches = Caches::new(&[level(1, 1 << 15), level(2, 1 << 20)], "");
-        assert_eq!(caches.last_level, Some(level(2, 1 << 20)));
-        assert_eq!(Caches::new(&[], "").last_level, None);
+    fn sysfs_and_cpuid_agree() {
+        let sizes = |caches: Vec<Cache>| caches.iter().map(|c| (c.level, c.bytes)).collect::<Vec<_>>();
+        let sysfs = sizes(from_sysfs());
+        assert!(sysfs.is_empty() || sysfs == sizes(from_cpuid()), "{sysfs:?}");
     }
 }

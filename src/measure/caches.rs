@@ -1,101 +1,93 @@
-//! Load latencies over growing working sets, beside the cache sizes that the system reports.
+//! Load latencies over growing working sets, and the cache sizes that the system reports.
 //!
-//! The sizes can't be trusted alone: a virtual machine reported a last-level cache of 105 MB and showed no plateau for it.
+//! The sizes alone are not enough: a virtual machine reported a last-level cache of 105 MB and showed no plateau for it.
 
 use std::cell::Cell;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use super::cache_sizes::{self, Level};
-use super::{Options, UNDER_LIMIT, foreign_load, memory};
+use super::{Options, cache_sizes, filled, memory};
 use crate::hardware::{Parameter, ParameterId};
+use crate::splitmix;
 
-/// Bytes up to which a set is walked once, untimed, before its samples. A lap of a larger one takes longer than its samples.
-const WALKED_BYTES: u64 = 64 << 20;
+/// Sets of up to so many bytes are walked once, untimed, before their samples. A lap of a larger one takes longer than its samples.
+const WALKED_BYTES: usize = 64 << 20;
 
 /// The largest working set of a brief run.
 const BRIEF_KIB: u32 = 4096;
 
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
-    let sizes = cache_sizes::reported();
-    let level = |name: ParameterId, level: &Option<Level>| match level {
-        Some(found) => Parameter::reported(name, found.bytes as f64, sizes.source),
-        None => Parameter::missing(name, "neither sysfs nor CPUID tells"),
+    let caches = cache_sizes::reported();
+    let size = |name, cache: Option<&cache_sizes::Cache>| match cache {
+        Some(cache) => Parameter::reported(name, cache.bytes as f64, cache_sizes::SOURCE),
+        None => Parameter::missing(name, "neither sysfs nor CPUID reports it"),
     };
-    let mut parameters = vec![
-        level(ParameterId::CacheL1dBytes, &sizes.first_level_data),
-        level(ParameterId::CacheL2Bytes, &sizes.second_level),
-        level(ParameterId::CacheLlcBytes, &sizes.last_level),
+    let at = |level| caches.iter().find(|cache| cache.level == level);
+    let sizes = [
+        size(ParameterId::CacheL1dBytes, at(1)),
+        size(ParameterId::CacheL2Bytes, at(2)),
+        size(ParameterId::CacheLlcBytes, caches.last()),
     ];
-    parameters.extend(latencies(options));
-    parameters
-}
-
-/// Each set on its own, all its samples behind one another: what other sets push out of the caches would be missed again in every
-/// sample of a set that is larger than a first-level cache.
-fn latencies(options: &Options) -> Vec<Parameter> {
-    let limit = memory::total().map_or(64 << 20, |(bytes, _)| bytes / 8);
-    let slice = if options.brief { Duration::from_micros(200) } else { Duration::from_millis(3) };
-    let one = |(kib, id): (u32, ParameterId)| {
-        let bytes = u64::from(kib) << 10;
-        if bytes > limit {
-            return Parameter::missing(id, "the working set exceeds an eighth of memory");
-        }
-        if options.brief && kib > BRIEF_KIB {
-            return Parameter::missing(id, "left out of a brief run");
-        }
-        if options.limit.is_some() {
-            return Parameter::missing(id, UNDER_LIMIT);
-        }
-        let Some(lines) = lines(bytes as usize / size_of::<Line<'_>>()) else {
-            return Parameter::missing(id, "no memory for the working set");
-        };
-        if link(&lines).is_none() {
-            return Parameter::missing(id, "no memory for the order of its lines");
-        }
-        let mut at = lines.first();
-        let walked = bytes <= WALKED_BYTES;
-        if walked {
-            at = walk(at, lines.len());
-        }
-        let figures = foreign_load::collect(options.plan(9, 450), || {
-            let (ns, end) = sample_ns(at, slice);
-            at = end;
-            vec![ns]
-        });
-        let warm = if walked { "walked once before the first sample" } else { "too large to be walked before" };
-        let method = format!("dependent loads around a random cycle of 64-byte lines, default pages; set {warm}");
-        figures.into_iter().next().unwrap_or_default().into_parameter(id, &method)
+    let limit = memory::total_bytes().map_or(64 << 20, |bytes| bytes / 8);
+    let latency = |(kib, id)| {
+        let parameters = latencies(kib, id, limit, options);
+        parameters.unwrap_or_else(|why: &str| vec![Parameter::missing(id, why)])
     };
-    ParameterId::LATENCIES.into_iter().map(one).collect()
+    sizes.into_iter().chain(ParameterId::LATENCIES.into_iter().flat_map(latency)).collect()
 }
 
-/// A cache line that says where the next one is. An address and not an index: that would cost a cycle to scale.
+/// Takes all samples of one set in a row: other sets would evict its lines between them.
+fn latencies(kib: u32, id: ParameterId, limit: u64, options: &Options) -> Result<Vec<Parameter>, &'static str> {
+    if options.limit.is_some() {
+        return Err("not measured under a time limit");
+    } else if options.brief && kib > BRIEF_KIB {
+        return Err("not measured in a brief run");
+    } else if u64::from(kib) << 10 > limit {
+        return Err("the working set exceeds an eighth of memory");
+    }
+    let bytes = (kib as usize) << 10;
+    let slice = Duration::from_micros(if options.brief { 200 } else { 3000 });
+    let lines = filled(bytes / size_of::<Line<'_>>(), Line::default()).ok_or("no memory for the working set")?;
+    link(&lines);
+    let mut at = lines.first();
+    let warm = if bytes <= WALKED_BYTES {
+        at = walk(at, lines.len());
+        "walked once before the first sample"
+    } else {
+        "too large to be walked before"
+    };
+    let method = format!("dependent loads around a random cycle of 64-byte lines, default pages; set {warm}");
+    options.plan(9, 450).measure([(id, method)], || {
+        let (ns, end) = sample_ns(at, slice);
+        at = end;
+        Ok([ns])
+    })
+}
+
+/// A cache line that refers to the next one. An index would cost a cycle to scale.
+#[derive(Clone, Default)]
 #[repr(align(64))]
 struct Line<'a> {
     next: Cell<Option<&'a Line<'a>>>,
 }
 
-/// Lines that lead nowhere yet. `None` when the memory can't be had.
-fn lines<'a>(count: usize) -> Option<Vec<Line<'a>>> {
-    let mut lines = Vec::new();
-    lines.try_reserve_exact(count).ok()?;
-    lines.resize_with(count, || Line { next: Cell::new(None) });
-    Some(lines)
-}
-
-/// Links the lines to one cycle. `None` when the memory for their order can't be had.
-fn link<'a>(lines: &'a [Line<'a>]) -> Option<()> {
-    for (line, next) in lines.iter().zip(sattolo(lines.len())?) {
-        line.next.set(lines.get(next as usize));
+/// Links the lines to one random cycle, by Sattolo's algorithm. A plain shuffle would fall apart into shorter cycles, and a walk would
+/// stay in a cache that holds one of them.
+fn link<'a>(lines: &'a [Line<'a>]) {
+    let mut order: Vec<usize> = (0..lines.len()).collect();
+    let mut state = 0;
+    for i in (1..lines.len()).rev() {
+        order.swap(i, splitmix::next(&mut state) as usize % i);
     }
-    Some(())
+    for (line, next) in lines.iter().zip(order) {
+        line.next.set(lines.get(next));
+    }
 }
 
-/// Follows `steps` links. The next load's address is this load's result, so loads can't overlap.
+/// Follows `steps` links. The address of each load is the result of the previous one, so loads can't overlap.
 fn walk<'a>(mut at: Option<&'a Line<'a>>, steps: usize) -> Option<&'a Line<'a>> {
     for _ in 0..steps {
-        // Every line has a next one; the look whether it has is beside the chain, not in it.
+        // Every line has a next one; the test is beside the chain, not in it.
         at = at?.next.get();
     }
     black_box(at)
@@ -116,54 +108,20 @@ fn sample_ns<'a>(mut at: Option<&'a Line<'a>>, slice: Duration) -> (f64, Option<
     }
 }
 
-/// A permutation that is one cycle through every slot, by Sattolo's algorithm: `result[i]` is the slot after `i`.
-///
-/// A plain shuffle falls apart into shorter cycles, and a chase would stay in a cache that holds one of them.
-fn sattolo(slots: usize) -> Option<Vec<u32>> {
-    let count = u32::try_from(slots).ok()?;
-    let mut cycle = Vec::new();
-    cycle.try_reserve_exact(slots).ok()?;
-    cycle.extend(0..count);
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    for i in (1..slots).rev() {
-        // Xorshift; the high half is scaled to 0..i.
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        cycle.swap(i, (((state >> 32) * i as u64) >> 32) as usize);
-    }
-    Some(cycle)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn cycle_visits_every_slot_once() {
-        for slots in [1, 2, 3, 64, 4096, 10_007] {
-            let cycle = sattolo(slots).unwrap();
-            let mut seen = vec![false; slots];
-            let mut at = 0;
-            for _ in 0..slots {
-                assert!(!std::mem::replace(&mut seen[at], true));
-                at = cycle[at] as usize;
-            }
-            assert_eq!(at, 0);
-        }
-        assert!(sattolo(0).unwrap().is_empty());
-    }
-
-    #[test]
     fn a_walk_returns_after_one_lap_and_not_before() {
-        let lines = lines(256).unwrap();
-        link(&lines).unwrap();
-        let first = lines.first().unwrap();
-        let end = walk(Some(first), 255).unwrap();
-        assert!(!std::ptr::eq(end, first));
-        assert!(std::ptr::eq(walk(Some(end), 1).unwrap(), first));
         assert_eq!(size_of::<Line<'_>>(), 64);
-        assert!(super::lines(usize::MAX).is_none());
-        assert!(sample_ns(Some(first), Duration::ZERO).0 > 0.0);
+        for count in [1, 2, 3, 64, 1000] {
+            let lines = filled(count, Line::default()).unwrap();
+            link(&lines);
+            let first = lines.first().unwrap();
+            let mut laps = (1..=count).filter(|&steps| std::ptr::eq(walk(Some(first), steps).unwrap(), first));
+            assert_eq!((laps.next(), laps.next()), (Some(count), None));
+            assert!(sample_ns(Some(first), Duration::ZERO).0 > 0.0);
+        }
     }
 }

@@ -1,45 +1,35 @@
-//! The clock that the system reports, and the one that a chain of dependent additions shows.
+//! The clock that the system reports, and the clock that a chain of dependent additions shows.
 //!
-//! They differ: one virtual machine reported 2.0 GHz and ran at 2.4.
+//! They differ: one virtual machine reported 2.0 GHz and ran at 2.4 GHz.
 
 use std::hint::black_box;
 use std::time::Instant;
 
-use super::{Options, foreign_load};
+use super::Options;
+use super::samples::Plan;
 use crate::hardware::{Parameter, ParameterId, Statistic};
 
-/// Links of one timed chain: 1.4 ms at 4 GHz, short enough to fit between two interruptions, long enough for a few hundred samples
-/// at most to stand in a report.
+/// Links of one timed chain: 1.4 ms at 4 GHz, short enough to fit between two interruptions, and long enough that a report holds a few
+/// hundred samples at most.
 const LINKS: u64 = 5_600_000;
 
-/// Links that the assembly repeats before it returns to the loop, whose own counter runs beside the chain.
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+/// Additions that the assembly repeats before it returns to the loop, whose own counter runs beside the chain.
 const UNROLLED: u64 = 64;
 
-pub(super) fn measure(options: &Options) -> Vec<Parameter> {
-    vec![reported(), measured(options)]
-}
-
-fn measured(options: &Options) -> Parameter {
-    let samples = || vec![chain_ghz()];
-    let figure = foreign_load::collect(options.plan(100, 450), samples).into_iter().next().unwrap_or_default();
+pub(super) fn measure(options: &Options) -> Result<Vec<Parameter>, String> {
     let method = format!(
-        "chain of {LINKS} dependent {CHAIN} on one thread; value is the median of the fastest quarter of the chains, dispersion is of all"
+        "chain of {LINKS} dependent register additions on one thread; value is the median of the fastest quarter of the chains, dispersion is of all"
     );
-    // An interruption can only make a chain slower, so the fast ones show the clock. Their median and not the best:
-    // the best of hundreds is a short boost.
-    figure.into_parameter_by(Statistic::FastestQuarterMedian, ParameterId::ClockMeasuredGhz, &method)
+    // An interruption can only make a chain slower, so the fast ones show the clock. The best of hundreds would be a short boost.
+    let plan = Plan { statistic: Statistic::FastestQuarterMedian, ..options.plan(100, 450) };
+    let measured = plan.measure([(ParameterId::ClockMeasuredGhz, method)], || Ok([chain_ghz()]));
+    measured.map(|measured| std::iter::once(reported()).chain(measured).collect())
 }
-
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-const CHAIN: &str = "register additions";
-#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-const CHAIN: &str = "steps of a multiplication and an exclusive or, each counted as four cycles";
 
 /// Clock from one addition a cycle.
 ///
-/// The addend is a register: cores such as Golden Cove eliminate an addition of an immediate at rename, which reads as five
-/// times the clock. In assembly, because the compiler would replace the chain by a multiplication.
+/// The addend is a register: cores such as Golden Cove eliminate the addition of an immediate at rename, which would show five times
+/// the clock. In assembly, because the compiler would replace the chain by a multiplication.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 fn chain_ghz() -> f64 {
     use std::arch::asm;
@@ -55,66 +45,45 @@ fn chain_ghz() -> f64 {
         #[cfg(target_arch = "aarch64")]
         // SAFETY: adds one register to another, 64 times; touches neither memory, the stack nor the flags.
         unsafe {
-            asm!(".rept 64", "add {sum}, {sum}, {addend}", ".endr", sum = inout(reg) sum, addend = in(reg) addend, options(nomem, nostack, preserves_flags));
+            asm!(
+                ".rept 64",
+                "add {sum}, {sum}, {addend}",
+                ".endr",
+                sum = inout(reg) sum,
+                addend = in(reg) addend,
+                options(nomem, nostack, preserves_flags)
+            );
         }
     }
-    let elapsed = start.elapsed();
     black_box(sum);
-    ghz(LINKS / UNROLLED * UNROLLED, elapsed.as_nanos())
+    // Infinite if the system's clock did not move.
+    (LINKS / UNROLLED * UNROLLED) as f64 / start.elapsed().as_nanos() as f64
 }
 
+/// NaN: nobody wrote a chain for this architecture.
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 fn chain_ghz() -> f64 {
-    multiplication_ghz()
-}
-
-/// Clock from a multiplication (three cycles on most cores) and an exclusive or (one), in safe Rust.
-#[cfg(any(test, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
-fn multiplication_ghz() -> f64 {
-    let mut product = black_box(1_u64);
-    let start = Instant::now();
-    for step in 0..LINKS / 4 {
-        product = product.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ step;
-    }
-    let elapsed = start.elapsed();
-    black_box(product);
-    ghz(LINKS / 4 * 4, elapsed.as_nanos())
-}
-
-/// Not a number where the system's clock did not move.
-fn ghz(cycles: u64, nanoseconds: u128) -> f64 {
-    if nanoseconds == 0 { f64::NAN } else { cycles as f64 / nanoseconds as f64 }
+    f64::NAN
 }
 
 fn reported() -> Parameter {
     let name = ParameterId::ClockReportedGhz;
-    // The highest clock first, because it does not change from one second to the next.
+    // The highest clock first: it does not change from one second to the next.
     let path = "/sys/devices/system/cpu/cpu0/cpufreq/cpuinfo_max_freq";
     if let Some(khz) = std::fs::read_to_string(path).ok().and_then(|text| positive(&text)) {
         return Parameter::reported(name, khz / 1e6, path);
     }
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    if let Some(info) = raw_cpuid::CpuId::new().get_processor_frequency_info()
-        && info.processor_max_frequency() > 0
+    if let Some(mhz) = raw_cpuid::CpuId::new().get_processor_frequency_info().map(|i| i.processor_max_frequency())
+        && mhz > 0
     {
-        return Parameter::reported(name, f64::from(info.processor_max_frequency()) / 1e3, "CPUID leaf 0x16, maximum");
+        return Parameter::reported(name, f64::from(mhz) / 1e3, "CPUID leaf 0x16, maximum");
     }
-    if cfg!(target_os = "linux") {
-        let mhz = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| parse_cpu_mhz(&text));
-        return match mhz {
-            Some(mhz) => Parameter::reported(name, mhz / 1e3, "/proc/cpuinfo, cpu MHz of the first CPU"),
-            // sysinfo would take BogoMIPS instead, which is no clock.
-            None => Parameter::missing(name, "neither cpufreq, CPUID leaf 0x16 nor /proc/cpuinfo tells"),
-        };
+    // sysinfo rounds it to MHz, which would make another host of the same one.
+    match std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| parse_cpu_mhz(&text)) {
+        Some(mhz) => Parameter::reported(name, mhz / 1e3, "/proc/cpuinfo, cpu MHz of the first CPU"),
+        None => Parameter::missing(name, "neither cpufreq, CPUID leaf 0x16 nor /proc/cpuinfo reports it"),
     }
-    let mhz = sysinfo::System::new().map_or(0, |mut system| {
-        system.refresh_cpu_list(sysinfo::CpuRefreshKind::nothing().with_frequency());
-        system.cpus().first().map_or(0, sysinfo::Cpu::frequency)
-    });
-    if mhz == 0 {
-        return Parameter::missing(name, "sysinfo does not tell");
-    }
-    Parameter::reported(name, mhz as f64 / 1e3, "sysinfo, frequency of the first CPU")
 }
 
 fn positive(text: &str) -> Option<f64> {
@@ -137,19 +106,5 @@ mod tests {
         assert_eq!(parse_cpu_mhz("BogoMIPS\t: 243.75\n"), None);
         assert_eq!(parse_cpu_mhz("cpu MHz\t\t: 0.000\n"), None);
         assert_eq!(parse_cpu_mhz("cpu MHz"), None);
-    }
-
-    #[test]
-    fn both_chains_are_plausible() {
-        for ghz in [chain_ghz(), multiplication_ghz()] {
-            // The multiplication may take up to five cycles, and a loaded machine has half its time: only a broken chain is outside.
-            assert!((0.01..10.0).contains(&ghz), "{ghz}");
-        }
-    }
-
-    #[test]
-    fn no_time_is_no_clock() {
-        assert!(ghz(1, 0).is_nan());
-        assert_eq!(ghz(4_000_000, 1_000_000), 4.0);
     }
 }

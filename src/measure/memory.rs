@@ -5,156 +5,113 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use rayon::ThreadPool;
+use sysinfo::{ProcessRefreshKind, ProcessesToUpdate, System};
 
-use super::{Options, cache_sizes, foreign_load, pool};
+use super::samples::Plan;
+use super::{Options, cache_sizes, filled, missing, pool};
 use crate::SimdLevel;
-use crate::cgroup;
 use crate::hardware::{Parameter, ParameterId};
 
-/// Bytes that STREAM counts for one element of triad: two read, one written, the line fetched before the write not counted.
+/// Bytes that STREAM counts for one element of triad: two read, one written, without the line that is fetched before the write.
 const BYTES_PER_ELEMENT: u64 = 24;
 
-/// The most that one array takes. First touch of more would take longer than the measurement.
-const LARGEST_ARRAY_BYTES: u64 = 512 << 20;
+/// Largest array. The first touch of a larger one would take longer than the measurement.
+const LARGEST_BYTES: u64 = 512 << 20;
 
-/// The same in a run with a limit of time.
+/// Largest array under a time limit.
 const LARGEST_UNDER_LIMIT_BYTES: u64 = 128 << 20;
+
+/// Array of a brief run.
+const BRIEF_BYTES: u64 = 4 << 20;
 
 /// Elements that a thread takes at a time.
 const CHUNK: usize = 65_536;
 
-/// Total of the last-level caches where the system reports none.
+/// Total of the last-level caches if the system reports none.
 const ASSUMED_LLC_BYTES: u64 = 64 << 20;
 
 const BANDWIDTHS: [ParameterId; 2] = [ParameterId::BandwidthOneThreadGbPerS, ParameterId::BandwidthAllThreadsGbPerS];
 
 pub(super) fn measure(options: &Options) -> Vec<Parameter> {
-    let size = match total() {
-        Some((bytes, source)) => Parameter::reported(ParameterId::MemoryBytes, bytes as f64, source),
-        None => Parameter::missing(ParameterId::MemoryBytes, "neither /proc/meminfo nor sysinfo tells"),
+    let size = match total_bytes() {
+        Some(bytes) => Parameter::reported(ParameterId::MemoryBytes, bytes as f64, "sysinfo, with the cgroup's limit"),
+        None => Parameter::missing(ParameterId::MemoryBytes, "sysinfo does not report it"),
     };
-    let missing = |why: String| BANDWIDTHS.map(|name| Parameter::missing(name, &why)).to_vec();
-    let bandwidths = triad(options).unwrap_or_else(missing);
+    let bandwidths = triad(options).unwrap_or_else(|why| missing(&BANDWIDTHS, &why));
     std::iter::once(size).chain(bandwidths).collect()
 }
 
-/// Memory in bytes, or the control group's limit where that is lower, and who said so.
-pub(super) fn total() -> Option<(u64, &'static str)> {
-    let meminfo = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| parse_mem_total(&text));
-    let machine = meminfo.map(|bytes| (bytes, "/proc/meminfo")).or_else(|| {
-        let mut system = sysinfo::System::new().ok()?;
-        system.refresh_memory();
-        Some((system.total_memory(), "sysinfo")).filter(|(bytes, _)| *bytes > 0)
-    });
-    match (machine, cgroup::memory_limit()) {
-        (Some((bytes, _)), Some(limit)) if limit < bytes => Some((limit, "cgroup memory limit")),
-        (None, Some(limit)) => Some((limit, "cgroup memory limit")),
-        (machine, _) => machine,
-    }
+/// Memory of the machine in bytes, or the limit of this process's cgroup if that is lower.
+pub(super) fn total_bytes() -> Option<u64> {
+    let mut system = System::new().ok()?;
+    system.refresh_memory();
+    let pid = sysinfo::get_current_pid().ok()?;
+    system.refresh_processes_specifics(ProcessesToUpdate::Some(&[pid]), false, ProcessRefreshKind::nothing());
+    let limit = system.process(pid).and_then(|own| own.cgroup_limits()).map_or(u64::MAX, |own| own.total_memory);
+    Some(system.total_memory().min(limit)).filter(|&bytes| bytes > 0)
 }
 
-/// Bytes of `MemTotal` in the text of `/proc/meminfo`.
-fn parse_mem_total(text: &str) -> Option<u64> {
-    let rest = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
-    let kib: u64 = rest.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kib.checked_mul(1024).filter(|&bytes| bytes > 0)
+/// Bytes of one array: four times the sum of the last-level caches, as STREAM asks, within a bound and an eighth of memory for three.
+fn array_bytes(llc: u64, memory: u64, largest: u64) -> u64 {
+    llc.saturating_mul(4).min(largest).min(memory / 24)
 }
 
-/// Bytes of one array, and what to say of how they were chosen.
-///
-/// STREAM asks for four times the sum of the last-level caches; less measures the caches too.
-fn array_bytes(llc: Option<u64>, memory: Option<u64>, largest: u64) -> (u64, String) {
-    let wanted = llc.unwrap_or(ASSUMED_LLC_BYTES).saturating_mul(4);
-    let cap = largest.min(memory.map_or(largest, |bytes| bytes / 24));
-    let bytes = wanted.min(cap);
-    let of = if llc.is_some() { "the last-level caches" } else { "an assumed last-level cache of 64 MiB" };
-    let mib = bytes >> 20;
-    if bytes < wanted {
-        (bytes, format!("three arrays of {mib} MiB, capped below four times {of}"))
-    } else {
-        (bytes, format!("three arrays of {mib} MiB, four times {of}"))
-    }
-}
-
-/// Both bandwidths by the triad a = b + s * c of STREAM, or a sentence when the threads or the memory can't be had.
-///
-/// Arrays are four times the last-level caches, at most 512 MiB each and an eighth of memory together. Each thread
-/// touches its part first, and the first sample of each kind is dropped.
+/// Measures both bandwidths by the triad a = b + s * c of STREAM. Fails if the threads or the memory are refused.
 fn triad(options: &Options) -> Result<Vec<Parameter>, String> {
     let start = Instant::now();
     let threads = options.usable_cores();
-    let llc = cache_sizes::reported().last_level.map(|level| level.bytes.saturating_mul(level.instances));
-    let (array_bytes, array_choice) = if options.brief {
-        (4 << 20, "three arrays of 4 MiB, brief run".to_owned())
+    let bytes = if options.brief {
+        BRIEF_BYTES
     } else {
-        let largest = if options.limit.is_some() { LARGEST_UNDER_LIMIT_BYTES } else { LARGEST_ARRAY_BYTES };
-        array_bytes(llc, total().map(|(bytes, _)| bytes), largest)
+        let llc = cache_sizes::reported().last().map(|cache| cache.bytes.saturating_mul(cache.instances));
+        let largest = if options.limit.is_some() { LARGEST_UNDER_LIMIT_BYTES } else { LARGEST_BYTES };
+        array_bytes(llc.unwrap_or(ASSUMED_LLC_BYTES), total_bytes().unwrap_or(u64::MAX), largest)
     };
     let pool = pool(threads)?;
-    let mut arrays = Arrays::new(&pool, array_bytes as usize / size_of::<f64>()).ok_or("no memory for the arrays")?;
+    let mut arrays = Arrays::new(&pool, bytes as usize / size_of::<f64>()).ok_or("no memory for the arrays")?;
     arrays.triad_on_one();
     arrays.triad_on_all(&pool);
-    let plan = options.plan(9, 1150);
-    let plan = foreign_load::Plan { limit: plan.limit.saturating_sub(start.elapsed()), ..plan };
-    let figures = foreign_load::collect(plan, || {
-        if threads > 1 {
-            // Not timed: it takes back what lies in the caches of the other cores, which may be far away.
-            arrays.triad_on_one();
-        }
-        let one = arrays.triad_on_one();
-        // On one core the second figure is the first: there is nothing else to run it on.
-        let all = if threads == 1 {
-            one
-        } else {
-            // Not timed: it wakes the workers, which slept while one thread ran. STREAM's never sleep.
-            arrays.triad_on_all(&pool);
-            arrays.triad_on_all(&pool)
-        };
-        vec![one, all]
-    });
     let method = |threads: usize| {
-        let plural = if threads == 1 { "" } else { "s" };
-        format!("STREAM triad on {threads} thread{plural}, {array_choice}; value is the median, STREAM quotes the best")
+        let (plural, mib) = (if threads == 1 { "" } else { "s" }, bytes >> 20);
+        format!(
+            "STREAM triad on {threads} thread{plural}, three arrays of {mib} MiB; value is the median, STREAM quotes the best"
+        )
     };
-    let named = BANDWIDTHS.into_iter().zip([1, threads]);
-    Ok(figures.into_iter().zip(named).map(|(f, (name, threads))| f.into_parameter(name, &method(threads))).collect())
+    let plan = options.plan(9, 1150);
+    let plan = Plan { limit: plan.limit.saturating_sub(start.elapsed()), ..plan };
+    let named = [(BANDWIDTHS[0], method(1)), (BANDWIDTHS[1], method(threads))];
+    plan.measure(named, || {
+        if threads == 1 {
+            let one = arrays.triad_on_one();
+            return Ok([one, one]);
+        }
+        // Untimed: takes back what lies in the caches of the other cores.
+        arrays.triad_on_one();
+        let one = arrays.triad_on_one();
+        // Untimed: wakes the workers, which slept while one thread ran. STREAM's never sleep.
+        arrays.triad_on_all(&pool);
+        Ok([one, arrays.triad_on_all(&pool)])
+    })
 }
 
 /// The part of the three arrays that one thread touched first.
-#[derive(Default)]
 struct Part {
     a: Vec<f64>,
     b: Vec<f64>,
     c: Vec<f64>,
 }
 
-impl Part {
-    fn new(elements: usize) -> Option<Self> {
-        let filled = |value: f64| {
-            let mut array = Vec::new();
-            array.try_reserve_exact(elements).ok()?;
-            array.resize(elements, value);
-            Some(array)
-        };
-        Some(Self { a: filled(0.0)?, b: filled(1.0)?, c: filled(2.0)? })
-    }
-}
-
-/// The three arrays of triad, in one part per thread.
+/// The three arrays of triad, in one part a thread.
 struct Arrays {
     parts: Vec<Part>,
 }
 
 impl Arrays {
-    /// Each thread allocates and fills its own part, so that the pages lie in its memory node. `None` without the memory.
+    /// Each thread allocates and fills its part, so that the pages lie in its memory node. `None` without the memory.
     fn new(pool: &ThreadPool, elements: usize) -> Option<Self> {
         let each = elements.div_ceil(pool.current_num_threads()).max(1);
-        let parts = pool.broadcast(|_| Part::new(each));
-        Some(Self { parts: parts.into_iter().collect::<Option<_>>()? })
-    }
-
-    fn elements(&self) -> u64 {
-        self.parts.iter().map(|part| part.a.len() as u64).sum()
+        let part = || Some(Part { a: filled(each, 0.0)?, b: filled(each, 1.0)?, c: filled(each, 2.0)? });
+        Some(Self { parts: pool.broadcast(|_| part()).into_iter().collect::<Option<_>>()? })
     }
 
     /// GB/s of the calling thread.
@@ -168,8 +125,8 @@ impl Arrays {
 
     /// GB/s of all threads of the pool.
     ///
-    /// Each thread takes chunks of its own part, then helps the others: with one fixed part a thread, the slowest
-    /// thread alone decides, and one machine gave 52 GB/s instead of 73.
+    /// Each thread takes chunks of its own part, then helps the others: with one fixed part a thread the slowest thread decides, and
+    /// one machine showed 52 GB/s instead of 73 GB/s.
     fn triad_on_all(&mut self, pool: &ThreadPool) -> f64 {
         let start = Instant::now();
         let queues: Vec<_> = self
@@ -189,16 +146,17 @@ impl Arrays {
         self.gb_per_s(start)
     }
 
+    /// Infinite if the clock did not move.
     fn gb_per_s(&self, start: Instant) -> f64 {
-        // Bytes a nanosecond are gigabytes a second. A clock that did not move yields infinity, which is no usable sample.
-        (self.elements() * BYTES_PER_ELEMENT) as f64 / start.elapsed().as_nanos() as f64
+        let elements: u64 = self.parts.iter().map(|part| part.a.len() as u64).sum();
+        (elements * BYTES_PER_ELEMENT) as f64 / start.elapsed().as_nanos() as f64
     }
 }
 
-/// One pass of a = b + s * c, with the widest vectors in use.
+/// One pass of a = b + s * c with the widest vectors in use.
 ///
-/// The default for x86-64 is 128-bit vectors: with them one thread gave 0.90 of the bandwidth that a C program gave
-/// when compiled for the machine, and 1.02 of it with 512-bit ones.
+/// x86-64 defaults to 128-bit vectors: with them one thread reached 0.90 of the bandwidth of a C program that was compiled for the
+/// machine, and 1.02 of it with 512-bit ones.
 fn pass(a: &mut [f64], b: &[f64], c: &[f64]) {
     #[cfg(target_arch = "x86_64")]
     match SimdLevel::in_use() {
@@ -223,11 +181,11 @@ fn pass_avx2(a: &mut [f64], b: &[f64], c: &[f64]) {
     pass_portable(a, b, c);
 }
 
-/// Inlined always: only then it is compiled for the vectors of its caller.
+/// Always inlined, so that it is compiled for the vectors of its caller.
 #[inline(always)]
 fn pass_portable(a: &mut [f64], b: &[f64], c: &[f64]) {
     let scalar = black_box(3.0);
-    // Zipped slices: indices would leave bounds checks in the loop, and it would not be vectorised.
+    // Indices would leave bounds checks in the loop, which would not be vectorised.
     for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
         *a = b + scalar * c;
     }
@@ -239,26 +197,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn mem_total() {
-        assert_eq!(parse_mem_total("MemTotal:       24684096 kB\nMemFree: 1 kB\n"), Some(24_684_096 * 1024));
-        assert_eq!(parse_mem_total("MemFree: 1 kB\n"), None);
-        assert_eq!(parse_mem_total("MemTotal: 0 kB\n"), None);
-        assert_eq!(parse_mem_total("MemTotal: x kB\n"), None);
-    }
-
-    #[test]
     fn array_sizes() {
         let (mib, gib) = (1_u64 << 20, 1_u64 << 30);
-        assert_eq!(
-            array_bytes(Some(32 * mib), Some(24 * gib), LARGEST_ARRAY_BYTES),
-            (128 * mib, "three arrays of 128 MiB, four times the last-level caches".to_owned())
-        );
-        assert_eq!(array_bytes(Some(256 * mib), Some(256 * gib), LARGEST_ARRAY_BYTES).0, 512 * mib);
-        assert_eq!(array_bytes(Some(256 * mib), Some(256 * gib), LARGEST_UNDER_LIMIT_BYTES).0, 128 * mib);
+        assert_eq!(array_bytes(32 * mib, 24 * gib, LARGEST_BYTES), 128 * mib);
+        assert_eq!(array_bytes(256 * mib, 256 * gib, LARGEST_BYTES), 512 * mib);
         // An eighth of a small memory for all three.
-        assert_eq!(array_bytes(Some(32 * mib), Some(240 * mib), LARGEST_ARRAY_BYTES).0, 10 * mib);
-        assert_eq!(array_bytes(None, None, LARGEST_ARRAY_BYTES).0, 256 * mib);
-        assert!(array_bytes(Some(u64::MAX), None, LARGEST_ARRAY_BYTES).1.contains("capped"));
+        assert_eq!(array_bytes(32 * mib, 240 * mib, LARGEST_BYTES), 10 * mib);
+        assert_eq!(array_bytes(u64::MAX, u64::MAX, LARGEST_BYTES), LARGEST_BYTES);
     }
 
     #[test]
@@ -271,6 +216,5 @@ mod tests {
             assert!(rate > 0.0);
             assert!(arrays.parts.iter().flat_map(|part| &part.a).all(|&a| a == 7.0));
         }
-        assert!(arrays.elements() >= 3 * CHUNK as u64 + 7);
     }
 }

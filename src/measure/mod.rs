@@ -1,10 +1,9 @@
 //! Measures the hardware parameters of this machine in process, in about three seconds on two cores.
 //!
-//! One file per family of parameters. Samples are taken in windows; a window in which other programs took more than 5 % of the
-//! CPU is thrown away and repeated while time is left (Linux; elsewhere foreign load is not known). Every loop has a
-//! time limit, so a slow or loaded machine takes fewer samples, not a longer run.
+//! One file measures one family of parameters. Samples are taken in windows. A window in which other programs took more than 5 %
+//! of the CPU is discarded and repeated while time is left; foreign load is known on Linux only. Every loop has a time limit, so a
+//! slow or loaded machine takes fewer samples instead of more time.
 
-mod arithmetic;
 mod cache_sizes;
 mod caches;
 mod clock;
@@ -15,18 +14,19 @@ mod fork_join;
 mod gpu;
 mod identity;
 mod memory;
-mod pace;
+mod samples;
 mod scaling;
 mod topology;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
 
-use crate::hardware::{Hardware, Machine, Parameter, ParameterId};
+use crate::hardware::{Hardware, Parameter, ParameterId, Statistic};
 use crate::named::named;
-use foreign_load::Plan;
+use samples::Plan;
 
 pub use core_to_core::core_to_core_ns;
 pub use foreign_load::Watch;
@@ -34,7 +34,7 @@ pub use foreign_load::Watch;
 pub use gpu::{gpu, gpu_group};
 #[cfg(feature = "this-machine")]
 pub(crate) use identity::fnv1a;
-pub(crate) use pace::Pace;
+pub use identity::machine;
 
 named! {
     /// A group of parameters that are measured together, in the order of measurement.
@@ -43,25 +43,23 @@ named! {
     pub enum Family("family of hardware parameters") {
         /// Usable cores, physical cores, SIMD lanes.
         Topology = "topology",
-        /// The reported and the measured clock.
+        /// Reported and measured clock.
         Clock = "clock",
         /// Cache sizes, and load latencies over working sets.
         Caches = "caches",
         /// Memory size and triad bandwidths.
         Memory = "memory",
-        /// Time until one core sees what another one wrote.
+        /// Time until one core sees what another core wrote.
         CoreToCore = "core_to_core",
         /// Cost of a fork and join, warm and cold.
         ForkJoin = "fork_join",
         /// Work of several threads over work of one.
         Scaling = "scaling",
-        /// Multiply-adds of one thread and of all.
-        Arithmetic = "arithmetic",
     }
 }
 
 impl Family {
-    /// The parameters of this family, so that a caller whose child process died can say which are missing.
+    /// Returns the parameters of this family, for a caller whose child process died.
     #[must_use]
     pub fn parameters(self) -> Vec<ParameterId> {
         use ParameterId as P;
@@ -76,60 +74,59 @@ impl Family {
             Self::CoreToCore => vec![P::CoreToCoreNs],
             Self::ForkJoin => vec![P::ForkJoinWarmNs, P::ForkJoinColdNs],
             Self::Scaling => vec![P::ScalingTwoThreadsRatio, P::ScalingAllThreadsRatio],
-            Self::Arithmetic => vec![P::ArithmeticOneThreadGflopPerS, P::ArithmeticAllThreadsGflopPerS],
         }
     }
 }
 
-/// Why a parameter is missing that no cost model reads.
-const UNDER_LIMIT: &str = "left out of a run with a limit of time";
-
-/// What to measure with.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+/// How to measure.
+#[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct Options {
-    /// Use no more threads than this; `None` uses every core that affinity and quota leave. 0 is taken as 1.
+    /// Most threads; `None` uses every core that affinity and quota allow. 0 counts as 1.
     pub threads: Option<u32>,
-    /// Stops after a few samples of small working sets. For tests: the figures are not fit for a report.
+    /// Stops after a few samples of small working sets. For tests: the values are not fit for a report.
     pub brief: bool,
-    /// Takes no longer than this, a sample more or less, for a program that starts and has no time for a report: for one
-    /// family, for all together, or for one GPU, as the function that is called measures. Load latencies and what no cost model
-    /// reads of a GPU are left out then. `None` takes as long as a report needs.
+    /// Upper bound on the time, give or take one sample, of the function that is called: for one family, for all of them, or for one
+    /// GPU. What no cost model reads is left out if it takes time. `None` takes as long as a report needs.
     pub limit: Option<Duration>,
-    /// How fast to go beside a program that runs; rests don't count as time.
-    pub(crate) pace: Option<Arc<Pace>>,
+    /// Ends the measurement with the current sample once it is set.
+    pub(crate) stop: Option<Arc<AtomicBool>>,
 }
 
 impl Options {
-    /// The same with at most so many threads; `None` uses every core.
+    /// Sets the most threads; `None` uses every core.
     #[must_use]
     pub fn with_threads(self, threads: Option<u32>) -> Self {
         Self { threads, ..self }
     }
 
-    /// The same, brief or not.
+    /// Sets whether to be brief.
     #[must_use]
     pub fn brief(self, brief: bool) -> Self {
         Self { brief, ..self }
     }
 
-    /// The same within a time.
+    /// Sets the time limit.
     #[must_use]
     pub fn with_limit(self, limit: Duration) -> Self {
         Self { limit: Some(limit), ..self }
     }
 
-    fn plan(&self, samples: usize, limit_ms: u64) -> Plan {
-        let (samples, ms) = if self.brief { (4, limit_ms / 20) } else { (samples, limit_ms) };
-        let limit = Duration::from_millis(ms);
-        Plan { samples, limit: self.limit.map_or(limit, |at_most| limit.min(at_most)), pace: self.pace.clone() }
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
-    /// The same with an equal share of the time that is left, where there is a limit, for each of `parts` parts.
+    fn plan(&self, samples: usize, limit_ms: u64) -> Plan<'_> {
+        let (samples, ms) = if self.brief { (4, limit_ms / 20) } else { (samples, limit_ms) };
+        let limit = Duration::from_millis(ms);
+        let limit = self.limit.map_or(limit, |at_most| limit.min(at_most));
+        Plan { samples, limit, statistic: Statistic::Median, options: self }
+    }
+
+    /// Gives one of `parts` parts an equal share of the time that is left, if there is a limit.
     fn share(&self, began: Instant, parts: usize) -> Self {
-        let worked = self.pace.as_ref().map_or_else(|| began.elapsed(), |pace| pace.worked(began));
-        let left = |limit: Duration| limit.saturating_sub(worked) / u32::try_from(parts).unwrap_or(u32::MAX).max(1);
-        Self { limit: self.limit.map(left), ..self.clone() }
+        let parts = u32::try_from(parts).unwrap_or(u32::MAX).max(1);
+        Self { limit: self.limit.map(|limit| limit.saturating_sub(began.elapsed()) / parts), ..self.clone() }
     }
 
     /// Threads that may run at once, at least 1.
@@ -140,87 +137,58 @@ impl Options {
     }
 }
 
-/// Measures one family: each name of [`Family::parameters`] once, measured, reported or missing with a reason.
+/// Measures one family. Returns each of [`Family::parameters`] once: measured, reported or missing with a reason.
 ///
-/// A caller that wants to survive a crash runs each family in a child process and puts the answers together with [`assemble`].
+/// A caller that wants to survive a crash runs each family in a child process and combines the answers with [`assemble`].
 #[must_use]
 pub fn family(family: Family, options: &Options) -> Vec<Parameter> {
-    match family {
-        Family::Topology => topology::measure(options),
+    let measured = match family {
+        Family::Topology => Ok(topology::measure(options)),
         Family::Clock => clock::measure(options),
-        Family::Caches => caches::measure(options),
-        Family::Memory => memory::measure(options),
+        Family::Caches => Ok(caches::measure(options)),
+        Family::Memory => Ok(memory::measure(options)),
         Family::CoreToCore => core_to_core::measure(options),
         Family::ForkJoin => fork_join::measure(options),
         Family::Scaling => scaling::measure(options),
-        Family::Arithmetic => arithmetic::measure(options),
-    }
-}
-
-/// What this machine says of itself, with a hash of CPU vendor, family, model, stepping and last-level cache as its id.
-#[must_use]
-pub fn machine() -> Machine {
-    identity::machine()
+    };
+    measured.unwrap_or_else(|why| missing(&family.parameters(), &why))
 }
 
 /// Measures every family in this process.
 #[must_use]
 pub fn hardware(options: &Options) -> Hardware {
-    families(Family::ALL.to_vec(), options, Vec::new(), |_| {})
+    hardware_for(&ParameterId::ALL, options)
 }
 
-/// Measures those families in this process that hold one of these parameters; those of the others are missing.
+/// Measures the families that hold any of these parameters; the others are missing.
 ///
-/// [`Model::parameters`](crate::Model::parameters) has those that a prediction needs.
+/// [`Model::parameters`](crate::Model::parameters) lists what a prediction needs.
 #[must_use]
 pub fn hardware_for(parameters: &[ParameterId], options: &Options) -> Hardware {
-    go_on(parameters, options, Vec::new(), |_| {})
-}
-
-/// The same, of which an earlier run has `measured` some families. `done` is called after each other family with all that is known by then.
-/// What was stopped misses the rest.
-pub(crate) fn go_on(
-    parameters: &[ParameterId],
-    options: &Options,
-    measured: Vec<Parameter>,
-    done: impl FnMut(&[Parameter]),
-) -> Hardware {
-    let holds = |family: &Family| family.parameters().iter().any(|id| parameters.contains(id));
-    families(Family::ALL.into_iter().filter(holds).collect(), options, measured, done)
-}
-
-fn families(
-    mut wanted: Vec<Family>,
-    options: &Options,
-    mut measured: Vec<Parameter>,
-    mut done: impl FnMut(&[Parameter]),
-) -> Hardware {
     let began = Instant::now();
-    let stopped = || options.pace.as_ref().is_some_and(|pace| pace.is_stopped());
-    options.pace.iter().for_each(|pace| pace.begin());
-    wanted.retain(|family| family.parameters().iter().any(|&id| Parameter::find(&measured, id).is_none()));
+    let holds = |family: &Family| family.parameters().iter().any(|id| parameters.contains(id));
+    let mut families: Vec<Family> = Family::ALL.into_iter().filter(holds).collect();
     if options.limit.is_some() {
-        // To fill its arrays takes a time that can't be shortened, and what the others leave of theirs it gets.
-        wanted.sort_by_key(|&family| family == Family::Memory);
+        // Filling its arrays takes a fixed time. As the last family it gets the time that the others leave.
+        families.sort_by_key(|&family| family == Family::Memory);
     }
-    let count = wanted.len();
-    for (k, of) in wanted.into_iter().enumerate() {
-        let found = family(of, &options.share(began, count - k));
-        // What was cut short is no figure.
-        if stopped() {
+    let mut measured = Vec::new();
+    for (k, &of) in families.iter().enumerate() {
+        let found = family(of, &options.share(began, families.len() - k));
+        // The interrupted family has too few samples.
+        if options.is_stopped() {
             break;
         }
         measured.extend(found);
-        done(&measured);
     }
     assemble(machine(), measured)
 }
 
-/// Puts parameters, in any order, into the order of a report: each of [`ParameterId::ALL`] once.
+/// Puts parameters into the order of a report: each of [`ParameterId::ALL`] once.
 ///
-/// The first of several parameters with one name is kept. A name that is absent becomes missing, and an unknown name is dropped.
+/// Of several parameters with one name it keeps the first. Absent parameters become missing; unknown names are dropped.
 #[must_use]
-pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
+pub fn assemble(machine: crate::hardware::Machine, measured: Vec<Parameter>) -> Hardware {
     let find = |id: ParameterId| {
         let found = Parameter::find(&measured, id).cloned();
         found.unwrap_or_else(|| Parameter::missing(id, "not measured"))
@@ -228,39 +196,20 @@ pub fn assemble(machine: Machine, measured: Vec<Parameter>) -> Hardware {
     Hardware::new(machine, ParameterId::ALL.into_iter().map(find).collect())
 }
 
-/// A pool of its own, so that the figures don't depend on what the caller's global pool does meanwhile.
-///
-/// The error is a sentence for [`Parameter::missing`]: a limit on processes can refuse the threads.
+/// Marks several parameters missing for one reason.
+fn missing(ids: &[impl AsRef<str>], why: &str) -> Vec<Parameter> {
+    ids.iter().map(|id| Parameter::missing(id, why)).collect()
+}
+
+/// Starts a pool of bound threads, so that the caller's global pool has no influence. A limit on processes can refuse the threads.
 fn pool(threads: usize) -> Result<ThreadPool, String> {
     crate::cpu::pinned_pool(u32::try_from(threads).unwrap_or(u32::MAX)).map_err(|e| e.to_string())
 }
 
-/// What `threads` threads of the pool do together: the sum of their rates.
-fn together(pool: &ThreadPool, threads: usize, rate: impl Fn() -> f64 + Sync) -> f64 {
-    // Each thread divides by its own time: they don't wake at once.
-    pool.broadcast(|worker| if worker.index() < threads { rate() } else { 0.0 }).iter().sum()
-}
-
-#[cfg(all(test, feature = "this-machine"))]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_an_earlier_run_has_measured_is_not_measured_again_and_what_is_stopped_is_no_figure() {
-        let pace = Arc::new(Pace::default());
-        let options = Options { pace: Some(Arc::clone(&pace)), ..Options::default().with_threads(Some(1)).brief(true) };
-        let wanted = [ParameterId::ClockMeasuredGhz, ParameterId::ArithmeticOneThreadGflopPerS];
-        let kept: Vec<Parameter> =
-            Family::Clock.parameters().into_iter().map(|id| Parameter::reported(id, 42.0, "an earlier run")).collect();
-        let mut calls = 0;
-        let hardware = go_on(&wanted, &options, kept.clone(), |so_far| {
-            calls += 1;
-            assert!(kept.iter().all(|p| so_far.contains(p)) && so_far.len() > kept.len());
-        });
-        assert_eq!((calls, hardware.value(wanted[0])), (1, Some(42.0)));
-        assert!(hardware.value(wanted[1]).is_some_and(|v| v > 0.0));
-        pace.stop();
-        let hardware = go_on(&wanted, &options, kept, |_| panic!("nothing is done"));
-        assert_eq!((hardware.value(wanted[0]), hardware.value(wanted[1])), (Some(42.0), None));
-    }
+/// Allocates equal elements; `None` without the memory.
+fn filled<T: Clone>(count: usize, value: T) -> Option<Vec<T>> {
+    let mut elements = Vec::new();
+    elements.try_reserve_exact(count).ok()?;
+    elements.resize(count, value);
+    Some(elements)
 }

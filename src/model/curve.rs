@@ -8,11 +8,11 @@ use crate::{Backend, BackendClass, CostCurve, CostTerm, Fallback, Work};
 use std::sync::Arc;
 
 impl MethodModel {
-    /// What this method takes on one thread of a machine, or on the GPUs of `backend`. `places` are those of its model, `fallback` what it
-    /// falls back to there.
+    /// Returns the cost of this method on one thread of a machine or on the GPUs of `backend`, with the places of its model and its
+    /// fallback there.
     ///
     /// # Errors
-    /// Names the hardware parameter or the GPU that is missing, or what is wrong with the cost.
+    /// Names the missing hardware parameter or GPU, or what is wrong with the cost.
     pub fn work(
         &self,
         hardware: &Hardware,
@@ -20,7 +20,7 @@ impl MethodModel {
         places: &Arc<Places>,
         fallback: Option<Fallback>,
     ) -> Result<Work, PredictError> {
-        // Those of the same count together.
+        // Terms of the same count are added.
         let mut terms: Vec<CostTerm> = Vec::new();
         for t in self.terms.iter().filter(|t| t.unit > 0.0) {
             let unit_ns = t.unit * t.scale.nanoseconds(hardware, backend)?;
@@ -44,7 +44,7 @@ impl MethodModel {
         work.defect().map_or(Ok(work), |e| Err(PredictError::Curve(e)))
     }
 
-    /// The cost curve of this method on a backend of a machine where its work takes so long.
+    /// Returns the cost curve of this method on a backend of a machine, with its cost on one thread or on GPUs.
     ///
     /// # Errors
     /// Names the hardware parameter that is missing, or what is wrong with the curve.
@@ -57,5 +57,5 @@ impl MethodModel {
     }
 }
 
-/// Helpers of a method that was never timed on several threads: one cold fork and join, and all that threads add.
+/// Helpers of a method that was never timed on several threads: one cold fork and join, and the full scaling.
 const UNSEEN: super::HelpersModel = super::HelpersModel::new(0.0, 1.0, 0.0, 0);

@@ -4,63 +4,32 @@ use crate::cost::CurveError;
 use crate::hardware::HardwareError;
 use std::fmt;
 
-/// What makes a model unusable.
+/// What makes a model unusable, in a sentence that names the method, the range or the place.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ModelError {
-    /// It holds no method.
-    NoMethod,
-    /// A range whose ends are no numbers or not ascending.
-    Range {
-        /// The parameter.
-        parameter: String,
-    },
-    /// Intervals of a width that can't be.
-    Intervals,
-    /// A place at which residuals are known, whose load is negative or not finite.
-    Place {
-        /// Its position.
-        position: usize,
-    },
-    /// A method with something that can't be.
-    Method {
-        /// The method, with its processor.
-        method: String,
-        /// What can't be.
-        why: String,
-    },
-}
+pub struct ModelError(pub(super) String);
 
 impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoMethod => f.write_str("it holds no method"),
-            Self::Range { parameter } => {
-                write!(f, "the range of {parameter} has ends that are no numbers or not ascending")
-            }
-            Self::Intervals => f.write_str("its intervals have a width that is negative or no number"),
-            Self::Place { position } => write!(f, "places[{position}] is a load that is negative or not finite"),
-            Self::Method { method, why } => write!(f, "{method}: {why}"),
-        }
+        f.write_str(&self.0)
     }
 }
 
 impl std::error::Error for ModelError {}
 
-/// Why a model can't predict a cost.
+/// Why a model can't predict a cost. A parameter is named with the GPU that it is of.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum PredictError {
-    /// A parameter that is not there, or is there without a value.
+    /// A parameter that is not listed, or is listed without a value.
     Missing {
-        /// The parameter, with whose it is.
+        /// The parameter.
         parameter: String,
-        /// Why, where the hardware says so.
+        /// Why, if the hardware says so.
         why: Option<String>,
     },
-    /// A parameter whose value is zero or no number.
+    /// A parameter whose value is zero, negative or not finite.
     Value {
-        /// The parameter, with whose it is.
+        /// The parameter.
         parameter: String,
         /// Its value.
         value: f64,
@@ -77,14 +46,14 @@ pub enum PredictError {
         /// The scale.
         what: String,
     },
-    /// A method that another one falls back to, and that the model does not hold.
+    /// A fallback that the model does not hold.
     NoMethod {
         /// Its name.
         method: String,
     },
-    /// A figure that no machine has.
+    /// A value that no machine has.
     Hardware(HardwareError),
-    /// A cost curve that can't be.
+    /// An impossible cost curve.
     Curve(CurveError),
     /// None of the algorithms can be predicted.
     Nothing {
@@ -102,7 +71,9 @@ impl fmt::Display for PredictError {
             Self::Missing { parameter, why: None } => {
                 write!(f, "the parameter {parameter} is missing; measure it with `sapwise probe --hardware-only`")
             }
-            Self::Value { parameter, value } => write!(f, "the parameter {parameter} is {value}"),
+            Self::Value { parameter, value } => {
+                write!(f, "the parameter {parameter} is {value}; it must be above zero")
+            }
             Self::NoGpu { index } => {
                 write!(f, "the hardware holds no gpu{index}; see `sapwise devices`, then measure again")
             }

@@ -1,4 +1,4 @@
-//! What several threads of a machine make of the work of one.
+//! The effect of several threads of a machine.
 
 use super::PredictError;
 use super::needed::needed;
@@ -6,40 +6,40 @@ use super::scale::cycle;
 use crate::cost::Helpers;
 use crate::hardware::{Hardware, ParameterId};
 
-/// How a method calls its helpers, shared over machines and numbers of threads.
+/// How a method calls its helpers, shared by machines and numbers of threads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HelpersModel {
     /// Cycles of the caller for each helper that it calls.
     pub call_cycles: f64,
-    /// Share of a cold fork and join ([`ParameterId::ForkJoinColdNs`]) by which they come late: that much work of one thread is lost.
+    /// Share of a cold fork and join ([`ParameterId::ForkJoinColdNs`]) by which helpers are late: that much work of one thread is lost.
     pub late_share: f64,
-    /// Share of the work of one thread that stays with it (Amdahl, Validity of the single processor approach, 1967); the rest is divided as several threads
-    /// were measured to scale ([`ParameterId::ScalingTwoThreadsRatio`] and [`ParameterId::ScalingAllThreadsRatio`]).
+    /// Share of the work of one thread that stays serial (Amdahl, Validity of the single processor approach, 1967). The rest scales as
+    /// measured ([`ParameterId::ScalingTwoThreadsRatio`] and [`ParameterId::ScalingAllThreadsRatio`]).
     pub serial_share: f64,
-    /// Boxes that keep one thread busy: a frame has no more threads than it has so many boxes. 0: it has all of them always.
+    /// Boxes that keep one thread busy: a frame uses one thread for each so many boxes. 0: it uses all threads.
     pub boxes_per_thread: u32,
 }
 
-/// What a machine has of several threads.
+/// What a number of threads of a machine can do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ThreadFigures {
     /// One cycle of one core.
     pub cycle_ns: f64,
-    /// One fork and join of all usable cores where they have been idle.
+    /// One fork and join of all usable cores after they were idle.
     pub fork_join_cold_ns: f64,
     /// Work of that many threads over work of one.
     pub scaling: f64,
 }
 
 impl ThreadFigures {
-    /// A cycle and a cold fork and join in nanoseconds, and work of several threads over work of one.
+    /// Creates the figures from a cycle and a cold fork and join in nanoseconds, and work of several threads over work of one.
     #[must_use]
     pub const fn new(cycle_ns: f64, fork_join_cold_ns: f64, scaling: f64) -> Self {
         Self { cycle_ns, fork_join_cold_ns, scaling }
     }
 
-    /// Those of so many threads on a machine.
+    /// Returns the figures of `threads` threads of a machine.
     ///
     /// # Errors
     /// Names the hardware parameter that is missing.
@@ -50,7 +50,7 @@ impl ThreadFigures {
 }
 
 impl HelpersModel {
-    /// The hardware parameters of the machine that [`on`](Self::on) looks at.
+    /// The hardware parameters of the machine that [`on`](Self::on) reads.
     pub const PARAMETERS: &[ParameterId] = &[
         ParameterId::ClockMeasuredGhz,
         ParameterId::ClockReportedGhz,
@@ -60,13 +60,13 @@ impl HelpersModel {
         ParameterId::ScalingAllThreadsRatio,
     ];
 
-    /// Helpers that are called by these cycles each, come late by that share of a fork and join and leave that share of the work to one.
+    /// Creates a model from the values of its fields.
     #[must_use]
     pub const fn new(call_cycles: f64, late_share: f64, serial_share: f64, boxes_per_thread: u32) -> Self {
         Self { call_cycles, late_share, serial_share, boxes_per_thread }
     }
 
-    /// The helpers of so many threads on a machine; `None` of one.
+    /// Returns the helpers of `threads` threads on a machine; `None` for one thread.
     ///
     /// # Errors
     /// Names the hardware parameter that is missing.
@@ -74,7 +74,7 @@ impl HelpersModel {
         (threads > 1).then(|| Ok(self.with(ThreadFigures::of(hardware, threads)?, threads))).transpose()
     }
 
-    /// The helpers of so many threads, of which a machine has these figures.
+    /// Returns the helpers of `threads` threads with these figures.
     #[must_use]
     pub fn with(&self, figures: ThreadFigures, threads: u32) -> Helpers {
         let mut helpers = Helpers::new(threads);
@@ -91,7 +91,7 @@ impl HelpersModel {
     }
 }
 
-/// Work of `threads` threads over work of one, interpolated on logarithmic axes between one, two and all.
+/// Work of `threads` threads over work of one, interpolated on logarithmic axes between two and all.
 fn scaling(hardware: &Hardware, threads: u32) -> Result<f64, PredictError> {
     let cores = needed(hardware, ParameterId::UsableCores)?;
     let all = needed(hardware, ParameterId::ScalingAllThreadsRatio)?;

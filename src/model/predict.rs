@@ -1,4 +1,4 @@
-//! Cost curves of a machine from its hardware parameters.
+//! Predicts the cost curves of a machine from its hardware parameters.
 
 use super::gpu_set::GpuSet;
 use super::{GPU_PREFIX, MethodModel, Model, PredictError, Range};
@@ -15,9 +15,9 @@ use std::sync::Arc;
 pub struct Prediction {
     /// One curve for each algorithm that could be predicted.
     pub costs: Vec<AlgorithmCost>,
-    /// Whether the machine or an algorithm lies outside what the model was trained on.
+    /// Whether the machine or an algorithm lies outside the training.
     pub extrapolated: bool,
-    /// What was outside, what was missing, what was left out.
+    /// What was outside, missing or left out, in sentences.
     pub warnings: Vec<String>,
     /// Name of the model.
     pub model: String,
@@ -26,22 +26,25 @@ pub struct Prediction {
 }
 
 /// Why a predicted crossover has no interval.
-const NO_INTERVALS: &str = "no interval is claimed: too few machines like this one were measured to say how far a prediction lies from the truth on it";
+const NO_INTERVALS: &str =
+    "no interval: too few machines like this one were measured to know the error of a prediction on it";
 
-/// What to do where a machine is unlike those of training.
-pub const ASK: &str = "this machine is unlike those of training: measure a few timings with `sapwise predict --samples 8`, or all with \
-                   `sapwise probe`";
+/// What to do if a machine is unlike those of the training.
+pub const ASK: &str = "this machine is unlike those of the training: measure it with `sapwise probe --out report.json`, then \
+                   `sapwise predict --report report.json --measured`";
+
+/// Costs that are known already, by method and backend.
+type Works<'a> = Vec<(&'a str, Backend, Arc<Work>)>;
 
 impl Model {
-    /// Predicts the cost curves of `algorithms` in the revisions that will run, on a machine.
+    /// Predicts the cost curves of `algorithms`, in the revisions that will run, on a machine.
     ///
-    /// What can't be predicted is left out with a warning: a method that the model has not seen on that processor, another
-    /// revision, a GPU that the hardware does not hold, a parameter that is missing or that no GPU has.
-    ///
-    /// A machine is extrapolated when a parameter lies outside its [range](Range).
+    /// Leaves out with a warning what it can't predict: a method that the model has not seen on that processor, another revision, a
+    /// GPU that the hardware does not hold, a missing or implausible parameter. A machine is extrapolated if a parameter lies outside
+    /// its [range](Range).
     ///
     /// # Errors
-    /// When no algorithm can be predicted, or a parameter of the machine has a value that no machine has.
+    /// If no algorithm can be predicted, or a parameter of the machine has a value that no machine has.
     pub fn predict(&self, hardware: &Hardware, algorithms: &[Entry]) -> Result<Prediction, PredictError> {
         if let Some(why) = hardware.implausible() {
             return Err(PredictError::Hardware(why));
@@ -62,10 +65,9 @@ impl Model {
         let mut unlike = p
             .outside(self.ranges.iter().filter_map(|r| r.excess(&r.parameter, "", hardware.value_named(&r.parameter))));
         if self.ranges.is_empty() {
-            p.outside([format!("the model {} does not say what it was trained on", self.name)]);
+            p.outside([format!("the model {} does not record what it was trained on", self.name)]);
         }
-        let mut unknown: Vec<String> = Vec::new();
-        let mut gpus: Vec<u32> = Vec::new();
+        let (mut unknown, mut gpus) = (Vec::new(), Vec::new());
         let mut works: Works<'_> = Vec::new();
         for Entry { id, revision, .. } in algorithms {
             let backend = id.backend();
@@ -80,7 +82,7 @@ impl Model {
                 ));
                 continue;
             }
-            let work = gpus_that_are(hardware, backend).and_then(|()| self.work(method, hardware, backend, &mut works));
+            let work = check_gpus(hardware, backend).and_then(|()| self.work(method, hardware, backend, &mut works));
             let curve = match work.and_then(|work| method.curve(work, hardware, backend)) {
                 Ok(curve) => curve,
                 Err(missing) => {
@@ -101,7 +103,7 @@ impl Model {
         }
         gpus.sort_unstable();
         gpus.dedup();
-        for gpu in gpus.into_iter().filter_map(|k| hardware.gpu(k)) {
+        for gpu in gpus.into_iter().filter_map(|&k| hardware.gpu(k)) {
             let of = format!(" of gpu{}", gpu.gpu.index);
             unlike |= p.outside(self.ranges.iter().filter_map(|r| {
                 let name = r.parameter.strip_prefix(GPU_PREFIX)?;
@@ -111,7 +113,7 @@ impl Model {
         if unlike {
             p.warnings.push(ASK.to_owned());
         }
-        p.tell_unmeasured_groups(hardware);
+        p.warn_of_unmeasured_groups(hardware);
         if !unknown.is_empty() {
             p.warnings.push(format!(
                 "left out, since the model {} was not trained on it: {}",
@@ -125,7 +127,7 @@ impl Model {
         Ok(p)
     }
 
-    /// The cost model of an algorithm's method on its class of processor.
+    /// Returns the cost model of an algorithm's method on its class of processor.
     #[must_use]
     pub fn method(&self, id: &AlgorithmId) -> Option<&MethodModel> {
         self.of_method(id.method(), id.backend().class())
@@ -135,7 +137,7 @@ impl Model {
         self.methods.iter().find(|m| m.method == method && m.backend == class)
     }
 
-    /// What a method takes on one thread of a machine, or on GPUs: worked out once for all numbers of threads.
+    /// The cost of a method on one thread of a machine or on GPUs, computed once for all numbers of threads.
     fn work<'a>(
         &'a self,
         method: &'a MethodModel,
@@ -143,7 +145,6 @@ impl Model {
         backend: &Backend,
         known: &mut Works<'a>,
     ) -> Result<Arc<Work>, PredictError> {
-        // On whatever number of threads.
         let on = if let Backend::Gpu(_) = backend { backend.clone() } else { Backend::Cpu(1) };
         if let Some((.., work)) = known.iter().find(|w| w.0 == method.method && w.1 == on) {
             return Ok(Arc::clone(work));
@@ -151,9 +152,8 @@ impl Model {
         let fallback = match &method.fallback {
             None => None,
             Some(f) => {
-                let missing = || PredictError::NoMethod { method: f.method.clone() };
-                let other =
-                    self.of_method(&f.method, method.backend).filter(|o| o.fallback.is_none()).ok_or_else(missing)?;
+                let other = self.of_method(&f.method, method.backend).filter(|o| o.fallback.is_none());
+                let other = other.ok_or_else(|| PredictError::NoMethod { method: f.method.clone() })?;
                 Some(Fallback { work: self.work(other, hardware, backend, known)?, factor: f.factor })
             }
         };
@@ -163,49 +163,40 @@ impl Model {
     }
 }
 
-/// What is known already of methods on backends.
-type Works<'a> = Vec<(&'a str, Backend, Arc<Work>)>;
-
 /// # Errors
-/// The parameter of one of the GPUs that no GPU has.
-fn gpus_that_are(hardware: &Hardware, backend: &Backend) -> Result<(), PredictError> {
+/// Names a parameter of one of the GPUs whose value no GPU has.
+fn check_gpus(hardware: &Hardware, backend: &Backend) -> Result<(), PredictError> {
     let Backend::Gpu(indices) = backend else { return Ok(()) };
-    indices
-        .iter()
-        .filter_map(|&k| hardware.gpu(k))
-        .find_map(GpuHardware::implausible)
-        .map_or(Ok(()), |e| Err(PredictError::Hardware(e)))
+    let implausible = indices.iter().filter_map(|&k| hardware.gpu(k)).find_map(GpuHardware::implausible);
+    implausible.map_or(Ok(()), |e| Err(PredictError::Hardware(e)))
 }
 
 impl Prediction {
-    /// The tuning, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
+    /// Returns the tuning, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
     ///
-    /// The interval of a crossover is where the ratio of the two costs is nearer to one than nine of ten such ratios were to their prediction on machines
-    /// held out of the training; none is claimed where fewer than two were, or where the machine is extrapolated.
+    /// The interval of a crossover is the range in which the ratio of the two costs is nearer to one than nine of ten such ratios were
+    /// to their prediction on held-out machines. There is none if fewer than two were held out, or if the machine is extrapolated.
     #[must_use]
     pub fn tuning(self, scenario: &str, loads: &[Load]) -> Tuning {
         let within = self.ratios_90_ln.filter(|_| !self.extrapolated);
         let spread = |_: usize, _: usize, _: &Load| within.unwrap_or(0.0) / NORMAL_90;
         let mut tuning = Tuning::from_costs_with(Source::Predicted, scenario, self.costs, loads, spread);
-        match within {
-            Some(ln) => {
-                tuning.interval_basis = format!(
-                    "within a factor of {:.2} of equal cost: on machines held out of the training nine of ten ratios of two times lay that near their \
-                     prediction",
-                    ln.exp()
-                );
-            }
+        tuning.interval_basis = match within {
+            Some(ln) => format!(
+                "within a factor of {:.2} of equal cost: on held-out machines nine of ten ratios of two times were that near their prediction",
+                ln.exp()
+            ),
             None => {
                 tuning.crossovers.iter_mut().for_each(|c| (c.low, c.high) = (None, None));
-                tuning.interval_basis = NO_INTERVALS.to_owned();
+                NO_INTERVALS.to_owned()
             }
-        }
+        };
         tuning.model = Some(self.model);
         (tuning.extrapolated, tuning.warnings) = (self.extrapolated, self.warnings);
         tuning
     }
 
-    /// Each of these warnings makes the prediction an extrapolation. Whether there was any.
+    /// Adds warnings of which each makes the prediction an extrapolation. Returns whether there was any.
     fn outside(&mut self, warnings: impl IntoIterator<Item = String>) -> bool {
         let before = self.warnings.len();
         self.warnings.extend(warnings);
@@ -214,44 +205,40 @@ impl Prediction {
         any
     }
 
-    fn tell_unmeasured_groups(&mut self, hardware: &Hardware) {
-        let mut told: Vec<String> = Vec::new();
+    fn warn_of_unmeasured_groups(&mut self, hardware: &Hardware) {
+        let mut named: Vec<String> = Vec::new();
         for backend in self.costs.iter().map(|c| c.algorithm.backend()) {
             let Backend::Gpu(indices) = backend else { continue };
             let name = backend.to_string();
-            if !told.contains(&name) && GpuSet::new(hardware, indices).is_ok_and(|set| set.is_unmeasured_group()) {
-                self.warnings
-                    .push(format!("{name}: how these GPUs work together was not measured; their rates are added up"));
-                told.push(name);
+            if !named.contains(&name) && GpuSet::new(hardware, indices).is_ok_and(|set| set.is_unmeasured_group()) {
+                let what = "how these GPUs work together was not measured; their rates are added up";
+                self.warnings.push(format!("{name}: {what}"));
+                named.push(name);
             }
         }
     }
 }
 
 impl Range {
-    /// A warning when a value lies outside by more than a tenth. Two measurements of one parameter of one machine differ by some
-    /// percent, and by up to a tenth where its clock was not fixed; without a tolerance every other machine like those of training
-    /// would count as outside.
+    /// Returns a warning if a value lies outside by more than a tenth: two measurements of one machine differ by up to that.
     fn excess(&self, name: &str, of: &str, value: Option<f64>) -> Option<String> {
         let value = value?;
         (value < self.min / 1.1 || value > self.max * 1.1).then(|| {
-            let [value, least, most] = [value, self.min, self.max].map(|figure| with_unit(name, figure));
+            let [value, least, most] = [value, self.min, self.max].map(|value| with_unit(name, value));
             format!("{name}{of} is {value}, outside the {least} to {most} of training")
         })
     }
 }
 
 impl MethodModel {
-    /// A warning when an algorithm's GPUs are of a kind that the model has not seen.
+    /// Returns a warning if a GPU of an algorithm is of a kind that the model has not seen.
     fn unseen_kinds(&self, id: &AlgorithmId, hardware: &Hardware, indices: &[u32]) -> Option<String> {
         let mut kinds = indices.iter().filter_map(|&k| hardware.gpu(k)).map(|g| g.gpu.kind);
         let unseen = kinds.find(|kind| !self.gpu_kinds.contains(kind))?;
-        let seen: Vec<String> = self.gpu_kinds.iter().map(ToString::to_string).collect();
+        let seen: Vec<&str> = self.gpu_kinds.iter().map(|kind| kind.as_str()).collect();
         Some(match &self.gpu_kinds[..] {
-            [] => format!("{id}: the model does not say which kinds of GPU it was trained on"),
-            [GpuKind::Software] => {
-                format!("{id}: the model was trained on software adapters only, and on no real GPU")
-            }
+            [] => format!("{id}: the model does not record which kinds of GPU it was trained on"),
+            [GpuKind::Software] => format!("{id}: the model was trained on software adapters and no real GPU"),
             _ => format!("{id}: the model was trained on {} GPUs only, this one is {unseen}", seen.join(" and ")),
         })
     }

@@ -14,7 +14,7 @@ fn gpu(index: u32, kind: GpuKind, figures: &[(GpuParameterId, f64)]) -> GpuHardw
     GpuHardware { gpu, parameters: parameters(figures) }
 }
 
-/// A discrete GPU with all figures, and a slower one without the fitted slopes.
+/// A discrete GPU with all parameters, and a slower one without the fitted slopes.
 fn hardware() -> Hardware {
     let fast = [
         (GpuParameterId::RoundTripNs, 20_000.0),
@@ -84,7 +84,7 @@ fn ids(list: &[&str]) -> Vec<Entry> {
 }
 
 #[test]
-fn a_gpu_has_the_slope_where_it_was_fitted_and_else_the_rate_of_all_bytes() {
+fn a_gpu_has_its_slope_else_the_total_rate() {
     let h = hardware();
     assert_eq!((ns(Scale::GpuUploadByte, &h, &[0]), ns(Scale::GpuUploadByte, &h, &[1])), (0.1, 0.2));
     assert_eq!((ns(Scale::GpuDownloadByte, &h, &[0]), ns(Scale::GpuDownloadByte, &h, &[1])), (0.125, 0.25));
@@ -94,7 +94,7 @@ fn a_gpu_has_the_slope_where_it_was_fitted_and_else_the_rate_of_all_bytes() {
 }
 
 #[test]
-fn several_gpus_have_the_slowest_latency_and_added_rates_within_what_was_measured_together() {
+fn several_gpus_have_the_slowest_latency_and_limited_rates() {
     let mut h = hardware();
     let both = [0, 1];
     assert_eq!((ns(Scale::GpuRoundTrip, &h, &both), ns(Scale::GpuDispatch, &h, &both)), (31_000.0, 2000.0));
@@ -128,7 +128,7 @@ fn scales_and_helpers_of_the_other_processor_are_refused() {
 }
 
 #[test]
-fn software_training_is_told_when_a_real_gpu_is_predicted() {
+fn software_training_warns_of_a_real_gpu() {
     let model = model(vec![method(BackendClass::Gpu, Scale::GpuRoundTrip)]);
     assert_eq!(model.defect(), None);
     let mut h = hardware();
@@ -141,7 +141,7 @@ fn software_training_is_told_when_a_real_gpu_is_predicted() {
 }
 
 #[test]
-fn what_a_gpu_lacks_is_told_and_costs_its_algorithms_only() {
+fn a_missing_parameter_of_a_gpu_costs_its_algorithms_only() {
     let model = model(vec![method(BackendClass::Gpu, Scale::GpuMemoryByte)]);
     let mut h = hardware();
     let all = ids(&["brute@gpu0", "brute@gpu1", "brute@gpu0+1", "brute@gpu2", "sap@gpu0", "brute@cpu1"]);
@@ -166,7 +166,7 @@ fn what_a_gpu_lacks_is_told_and_costs_its_algorithms_only() {
 }
 
 #[test]
-fn hardware_with_impossible_gpus_is_told() {
+fn hardware_with_impossible_gpus_is_refused() {
     assert_eq!(hardware().defect(), None);
     let defect = |change: &dyn Fn(&mut Hardware)| {
         let mut h = hardware();
@@ -177,45 +177,27 @@ fn hardware_with_impossible_gpus_is_told() {
     assert!(defect(&|h| h.gpus[1].gpu.index = 0).contains("twice"));
     let group = |gpus: &[u32]| GpuGroup { gpus: gpus.to_vec(), parameters: Vec::new() };
     for gpus in [&[0][..], &[1, 0], &[0, 7]] {
-        assert!(defect(&|h| h.gpu_groups.push(group(gpus))).contains("no group"));
+        assert!(defect(&|h| h.gpu_groups.push(group(gpus))).contains("not a group"));
     }
     assert!(defect(&|h| h.gpu_groups = vec![group(&[0, 1]), group(&[0, 1])]).contains("twice"));
 }
 
-fn of_parameters(ids: &[ParameterId], figure: impl Fn(ParameterId) -> f64) -> Hardware {
-    let parameters = ids.iter().map(|&id| Parameter::reported(id, figure(id), "test")).collect();
-    Hardware { parameters, gpus: Vec::new(), ..hardware() }
-}
-
-/// With those parameters alone it has a value, and each of them shows in some value.
 #[test]
-fn the_parameters_of_a_scale_and_of_helpers_are_those_that_they_read() {
-    let shows = |ids: &[ParameterId], name: ParameterId, value: &dyn Fn(&Hardware) -> Vec<f64>| {
-        // Four cores of which two threads use one and a half, so that every figure shows in some number of threads.
-        let figure = |id: ParameterId| match id {
-            ParameterId::UsableCores => 4.0,
-            ParameterId::ScalingTwoThreadsRatio => 1.5,
-            _ => 2.0,
-        };
-        let other = |id: ParameterId| if id == name { 1.5 * figure(id) } else { figure(id) };
-        value(&of_parameters(ids, figure)) != value(&of_parameters(ids, other))
-    };
-    // What stands in for the first shows where that one is absent.
-    let read = |ids: &[ParameterId], value: &dyn Fn(&Hardware) -> Vec<f64>| {
-        ids.iter().all(|&id| shows(ids, id, value) || shows(&ids[1..], id, value))
-    };
-    for scale in [Scale::Cycle, Scale::Lane, Scale::Byte] {
-        let ns = |h: &Hardware| vec![scale.nanoseconds(h, &Backend::Cpu(1)).unwrap()];
-        assert!(read(scale.parameters(), &ns), "{scale:?}");
-        assert!(scale.nanoseconds(&of_parameters(&[], |_| 1.0), &Backend::Cpu(2)).is_err());
-    }
-    let helpers = HelpersModel::new(100.0, 0.5, 0.5, 0);
-    let figures = |h: &Hardware| {
-        let of = |threads| helpers.on(h, threads).unwrap().unwrap();
-        [2, 3, 8].into_iter().flat_map(|k| [of(k).call_ns, of(k).late_ns, of(k).speed_up]).collect()
-    };
-    assert!(read(HelpersModel::PARAMETERS, &figures));
-    assert!(helpers.on(&of_parameters(&[], |_| 1.0), 2).is_err() && helpers.on(&hardware(), 1) == Ok(None));
+fn helpers_read_the_scaling_between_two_and_all_threads() {
+    let figures = [
+        (ParameterId::ClockReportedGhz, 2.0),
+        (ParameterId::UsableCores, 8.0),
+        (ParameterId::ForkJoinColdNs, 1000.0),
+        (ParameterId::ScalingTwoThreadsRatio, 2.0),
+        (ParameterId::ScalingAllThreadsRatio, 4.0),
+    ];
+    let machine = Hardware { parameters: parameters(&figures), gpus: Vec::new(), ..hardware() };
+    let helpers = HelpersModel::new(100.0, 0.5, 0.0, 0);
+    let of = |threads| helpers.on(&machine, threads).unwrap().unwrap();
+    assert_eq!((of(2).call_ns, of(2).late_ns, of(2).speed_up), (50.0, 500.0, 2.0));
+    // Four threads are half way from two to eight on logarithmic axes.
+    assert!((of(4).speed_up - 8.0_f64.sqrt()).abs() < 1e-12 && of(16).speed_up == 4.0);
+    assert!(helpers.on(&hardware(), 2).is_err() && helpers.on(&hardware(), 1) == Ok(None));
 }
 
 #[test]
@@ -236,7 +218,7 @@ fn a_method_falls_back_to_one_that_the_model_holds() {
 }
 
 #[test]
-fn what_a_model_reads_of_the_machine_is_marked_in_the_table_and_nothing_else() {
+fn the_table_marks_what_a_model_reads() {
     let scales = Scale::ALL.iter().flat_map(|s| s.parameters());
     let mut read: Vec<ParameterId> =
         scales.chain(HelpersModel::PARAMETERS).copied().chain([ParameterId::CacheLlcBytes]).collect();

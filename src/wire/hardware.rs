@@ -125,6 +125,6 @@ mod tests {
         let twice = vec![Parameter::reported("x_ns", 1.0, "test"); 2];
         let text = serde_json::to_string(&Hardware::new(Machine::default(), twice)).unwrap();
         let error = serde_json::from_str::<Hardware>(&text).unwrap_err().to_string();
-        assert!(error.contains("the parameter x_ns stands there twice"), "{error}");
+        assert!(error.contains("the parameter x_ns is listed twice"), "{error}");
     }
 }

@@ -14,13 +14,10 @@ clpeak_best() {
 # Debian's clpeak knows OpenCL only; the Vulkan tests are of later versions. Through PoCL it measures the CPU.
 group_opencl() {
     have clpeak "Debian: clpeak and pocl-opencl-icd" || return
-    if ! take theirs clpeak --global-bandwidth --compute-sp || [ -z "$(clpeak_best "Single-precision compute")" ]; then
+    if ! take theirs clpeak --global-bandwidth || [ -z "$(clpeak_best "Global memory bandwidth")" ]; then
         say "left out: OpenCL has no CPU here (Debian: pocl-opencl-icd)"
         return 1
     fi
-    ours arithmetic || return
-    pair arithmetic_all_threads_gflop_per_s "clpeak on PoCL, best width" "$(value arithmetic_all_threads_gflop_per_s)" \
-        "$(clpeak_best "Single-precision compute")" "clpeak's kernel is two dependent chains a work-item, made for GPUs: it measures latency on a CPU"
     ours memory || return
     pair bandwidth_all_threads_gb_per_s "clpeak on PoCL, best width" "$(value bandwidth_all_threads_gb_per_s)" \
         "$(clpeak_best "Global memory bandwidth")" "clpeak only reads, and adds what it reads in one dependent chain a work-item"
@@ -61,13 +58,5 @@ group_vulkan() {
         fi
         take ours part gpu "$index" || continue
         pair "$gpu memory_bytes" vulkaninfo "$(value memory_bytes)" "$(vulkan_heaps "$name")" "NVML and amdgpu tell more exactly"
-        pair "$gpu subgroup_lanes" vulkaninfo "$(value subgroup_lanes)" "$(vulkan_figure "$name" subgroupSize)" \
-            "a kernel may run with another size than the one that the driver prefers"
-        pair "$gpu workgroup_invocations" vulkaninfo "$(value workgroup_invocations)" \
-            "$(vulkan_figure "$name" maxComputeWorkGroupInvocations)"
-        pair "$gpu workgroup_memory_bytes" vulkaninfo "$(value workgroup_memory_bytes)" \
-            "$(vulkan_figure "$name" maxComputeSharedMemorySize)"
-        pair "$gpu binding_bytes" vulkaninfo "$(value binding_bytes)" "$(vulkan_figure "$name" maxStorageBufferRange)" \
-            "wgpu takes 2 GiB at most"
     done <"$work/gpus.out"
 }

@@ -1,14 +1,15 @@
-//! What every family of GPU measurements needs: buffers, kernels, timed submissions, and a work load of the right size.
+//! What every family of GPU measurements needs: buffers, kernels, timed submissions, and work of the right amount.
 
 use std::time::{Duration, Instant};
 
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 pub(super) use crate::gpu::kernel::{Bound, Kernel};
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::{Gpu, GpuError, GpuErrorKind};
 use crate::hardware::{GpuKind, GpuParameterId, Parameter};
 use crate::measure::Options;
-use crate::measure::foreign_load::{self, Figure, Plan};
+
+pub(super) type Result<T> = std::result::Result<T, GpuError>;
 
 /// An open GPU under measurement.
 pub(super) struct Bench<'a> {
@@ -21,116 +22,89 @@ impl<'a> Bench<'a> {
         Self { gpu, options }
     }
 
-    /// Whether the GPU is a program on the CPU: hundreds of times slower, and without a clock of its own.
+    /// Whether a program on the CPU acts as the GPU. It is hundreds of times slower and has no clock of its own.
     pub(super) fn is_software(&self) -> bool {
         self.gpu.identity().kind == GpuKind::Software
     }
 
-    /// One of two values.
+    /// Returns the value for this kind of GPU.
     pub(super) fn pick<T>(&self, hardware: T, software: T) -> T {
         if self.is_software() { software } else { hardware }
     }
 
-    /// As many samples as wanted, unless the limit in milliseconds comes first.
-    pub(super) fn plan(&self, samples: usize, limit_ms: u64) -> Plan {
-        self.options.plan(samples, limit_ms)
-    }
-
-    /// Takes samples of several figures together, until one fails.
-    pub(super) fn collect(
-        &self,
-        plan: Plan,
-        sample: impl FnMut() -> Result<Vec<f64>, String>,
-    ) -> Result<Vec<Figure>, String> {
-        foreign_load::try_collect(plan, sample)
-    }
-
-    pub(super) fn buffer(&self, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, String> {
+    pub(super) fn buffer(&self, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
         let mapped_at_creation = usage.contains(wgpu::BufferUsages::MAP_WRITE);
         let descriptor =
             wgpu::BufferDescriptor { label: Some("sapwise measure"), size: bytes, usage, mapped_at_creation };
-        self.gpu.try_make(|device| device.create_buffer(&descriptor)).map_err(words)
+        self.gpu.try_make(|device| device.create_buffer(&descriptor))
     }
 
-    /// A buffer that kernels write, and that is copied from and to.
-    pub(super) fn storage(&self, bytes: u64) -> Result<wgpu::Buffer, String> {
+    /// Makes a buffer that kernels write and that is copied from and to.
+    pub(super) fn storage(&self, bytes: u64) -> Result<wgpu::Buffer> {
         use wgpu::BufferUsages as U;
         self.buffer(bytes, U::STORAGE | U::COPY_SRC | U::COPY_DST)
     }
 
-    /// A small buffer of constants: 32-bit words in the order of the kernel's structure.
-    pub(super) fn uniform(&self, words: &[u32]) -> Result<wgpu::Buffer, String> {
+    /// Makes a buffer of up to four 32-bit constants, in the order of the kernel's structure.
+    pub(super) fn uniform(&self, words: [u32; 2]) -> Result<wgpu::Buffer> {
         // Uniform structures end on multiples of 16 bytes on some interfaces.
-        let mut padded = words.to_vec();
-        padded.resize(words.len().next_multiple_of(4), 0);
+        let padded = [words[0], words[1], 0, 0];
         let contents = bytemuck::cast_slice(&padded);
         let usage = wgpu::BufferUsages::UNIFORM;
-        self.gpu
-            .try_make(|d| d.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage }))
-            .map_err(self::words)
+        self.gpu.try_make(|d| d.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage }))
     }
 
-    /// Compiles an entry point, with constants for its overrides.
-    pub(super) fn kernel(
-        &self,
-        source: &str,
-        entry: &'static str,
-        constants: &[(&str, f64)],
-    ) -> Result<Kernel, String> {
-        Kernel::compile(self.gpu, source.to_owned(), entry, constants).map_err(words)
-    }
-
-    /// A kernel with its buffers, each with its binding number. Only those that the entry point uses may be named.
-    pub(super) fn bind(&self, kernel: &Kernel, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound, String> {
-        kernel.bind(self.gpu, buffers).map_err(words)
+    /// Compiles an entry point and binds its buffers, each with its binding number.
+    pub(super) fn bind(&self, source: &str, entry: &'static str, buffers: &[(u32, &wgpu::Buffer)]) -> Result<Bound> {
+        Kernel::compile(self.gpu, source.to_owned(), entry, &[])?.bind(self.gpu, buffers)
     }
 
     /// Records commands and submits them.
-    pub(super) fn submit(
-        &self,
-        record: impl FnOnce(&mut wgpu::CommandEncoder),
-    ) -> Result<wgpu::SubmissionIndex, String> {
+    pub(super) fn submit(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<wgpu::SubmissionIndex> {
         let mut commands = self.gpu.record();
         record(&mut commands);
-        self.gpu.submit(commands).map_err(words)
+        self.gpu.submit(commands)
     }
 
-    /// Records commands, submits them and waits for them; the time of all three.
-    pub(super) fn time(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<Duration, String> {
+    /// Records commands, submits them and waits for them. Returns the time of all three.
+    pub(super) fn time(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<Duration> {
         let start = Instant::now();
         let submission = self.submit(record)?;
-        self.gpu.wait(submission).map_err(words)?;
+        self.gpu.wait(submission)?;
         Ok(start.elapsed())
     }
 
-    /// Time of `count` dispatches of `groups` workgroups each, in one pass.
-    pub(super) fn time_dispatches(&self, bound: &Bound, groups: u32, count: u32) -> Result<Duration, String> {
+    /// Returns the time of `count` dispatches of `groups` workgroups each, in one pass.
+    pub(super) fn time_dispatches(&self, bound: &Bound, groups: u32, count: u32) -> Result<Duration> {
         self.time(|encoder| record(bound, encoder, groups, count))
     }
 
-    /// The first word of a buffer.
-    pub(super) fn first_word(&self, buffer: &wgpu::Buffer) -> Result<u32, String> {
-        let staging = self.buffer(4, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST)?;
-        self.read_word(buffer, &staging)
+    /// Makes 4 bytes of memory that the CPU reads.
+    pub(super) fn word(&self) -> Result<wgpu::Buffer> {
+        self.buffer(4, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST)
     }
 
-    /// The first word of a buffer, by way of 4 bytes of memory that the CPU reads.
-    pub(super) fn read_word(&self, buffer: &wgpu::Buffer, staging: &wgpu::Buffer) -> Result<u32, String> {
+    /// Reads the first word of a buffer by way of [`word`](Self::word).
+    pub(super) fn read_word(&self, buffer: &wgpu::Buffer, staging: &wgpu::Buffer) -> Result<u32> {
         let submission = self.submit(|encoder| encoder.copy_buffer_to_buffer(buffer, 0, staging, 0, 4))?;
         self.gpu.map(staging.slice(..), wgpu::MapMode::Read, |_| {});
-        self.gpu.wait(submission).map_err(words)?;
-        let view = staging.slice(..).get_mapped_range().map_err(|e| e.to_string())?;
+        self.gpu.wait(submission)?;
+        let view = staging.slice(..).get_mapped_range().map_err(not_mapped)?;
         let word = view.first_chunk().map(|bytes| u32::from_le_bytes(*bytes));
         drop(view);
         self.gpu.unmap(staging);
-        word.ok_or_else(|| "a mapping came without its bytes".to_owned())
+        word.ok_or_else(|| broken("a mapping of 4 bytes is shorter".to_owned()))
     }
 }
 
-/// What a parameter says where a GPU failed: with the words of the driver.
-#[expect(clippy::needless_pass_by_value, reason = "for `map_err`")]
-pub(super) fn words(error: GpuError) -> String {
-    format!("{error:#}")
+/// The error of memory that the CPU can't reach.
+pub(super) fn not_mapped(error: impl std::error::Error + Send + Sync + 'static) -> GpuError {
+    GpuError::caused(GpuErrorKind::Refused, "its memory can't be mapped", error)
+}
+
+/// The error of a driver that returns wrong results.
+pub(super) fn broken(what: String) -> GpuError {
+    GpuError::new(GpuErrorKind::Refused, format!("{what}: the driver is broken"))
 }
 
 /// Records a pass of `count` dispatches.
@@ -141,14 +115,14 @@ pub(super) fn record(bound: &Bound, encoder: &mut wgpu::CommandEncoder, groups: 
     }
 }
 
-/// How much work takes about `target`: from 1 up, at most `most`. `run` does this much work and returns its time.
+/// Returns how much work, from 1 to `most`, takes about `target`. `run` does an amount of work and returns its time.
 ///
 /// The first run of a kernel may compile it, so the smallest amount runs twice.
-pub(super) fn calibrate(
+pub(super) fn calibrate<E>(
     target: Duration,
     most: u32,
-    mut run: impl FnMut(u32) -> Result<Duration, String>,
-) -> Result<u32, String> {
+    mut run: impl FnMut(u32) -> std::result::Result<Duration, E>,
+) -> std::result::Result<u32, E> {
     run(1)?;
     let mut amount = 1_u32;
     // Each turn multiplies by up to 16: eight of them pass every u32.
@@ -158,21 +132,18 @@ pub(super) fn calibrate(
             break;
         }
         let factor = (target.as_secs_f64() / time.as_secs_f64().max(1e-9)).clamp(1.0, 16.0);
-        amount = ((f64::from(amount) * factor).ceil() as u32).clamp(amount.saturating_add(1), most.max(1));
+        amount = ((f64::from(amount) * factor).ceil() as u32).clamp(amount.saturating_add(1), most);
     }
-    Ok(amount.min(most.max(1)))
+    Ok(amount.min(most))
 }
 
-/// The parameters, or the same names as missing with the reason.
-pub(super) fn or_missing(ids: &[GpuParameterId], measured: Result<Vec<Parameter>, String>) -> Vec<Parameter> {
-    measured.unwrap_or_else(|why| {
-        let why = one_line(&why);
-        ids.iter().map(|id| Parameter::missing(id, &why)).collect()
-    })
+/// Returns the parameters, or the same names as missing with the words of the driver.
+pub(super) fn or_missing(ids: &[GpuParameterId], measured: Result<Vec<Parameter>>) -> Vec<Parameter> {
+    measured.unwrap_or_else(|why| super::super::missing(ids, &one_line(&format!("{why:#}"))))
 }
 
 /// The first words of an error as one line: those of shaders are pages with drawings.
-pub(super) fn one_line(text: &str) -> String {
+fn one_line(text: &str) -> String {
     const MOST: usize = 240;
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     match line.char_indices().nth(MOST) {
@@ -181,9 +152,8 @@ pub(super) fn one_line(text: &str) -> String {
     }
 }
 
-/// Seconds of work per second become billions with this: amounts a nanosecond.
+/// Amount a nanosecond, which is thousands of millions a second. Infinite if the clock did not move.
 pub(super) fn per_ns(amount: f64, time: Duration) -> f64 {
-    // A clock that did not move yields infinity, which is no usable sample.
     amount / (time.as_secs_f64() * 1e9)
 }
 
@@ -191,8 +161,8 @@ pub(super) fn per_ns(amount: f64, time: Duration) -> f64 {
 mod tests {
     use super::*;
 
-    /// A device that takes 2 us to answer and 3 us for each piece of work.
-    fn device(amount: u32) -> Result<Duration, String> {
+    /// A device that takes 2 µs to answer and 3 µs for each piece of work.
+    fn device(amount: u32) -> std::result::Result<Duration, ()> {
         Ok(Duration::from_micros(2) + Duration::from_micros(3) * amount)
     }
 
@@ -203,8 +173,9 @@ mod tests {
         assert!((Duration::from_micros(3500)..Duration::from_millis(10)).contains(&time), "{amount}: {time:?}");
         assert_eq!(calibrate(Duration::from_micros(1), 100, device), Ok(1));
         assert_eq!(calibrate(Duration::from_secs(1), 100, device), Ok(100));
-        assert_eq!(calibrate(Duration::from_secs(1), 0, device), Ok(1));
-        assert!(calibrate(Duration::from_secs(1), 100, |_| Err("lost".to_owned())).is_err());
+        assert!(calibrate(Duration::from_secs(1), 100, |_| Err(())).is_err());
+        // A clock that stands still.
+        assert_eq!(calibrate(Duration::from_secs(1), 1 << 20, |_| Ok::<_, ()>(Duration::ZERO)), Ok(1 << 20));
     }
 
     #[test]
@@ -214,7 +185,13 @@ mod tests {
     }
 
     #[test]
-    fn calibration_ends_on_a_clock_that_stands_still() {
-        assert_eq!(calibrate(Duration::from_secs(1), 1 << 20, |_| Ok(Duration::ZERO)), Ok(1 << 20));
+    fn every_shader_is_valid() {
+        for (name, source) in [
+            ("arithmetic", include_str!("shaders/arithmetic.wgsl")),
+            ("latency", include_str!("shaders/latency.wgsl")),
+            ("memory", include_str!("shaders/memory.wgsl")),
+        ] {
+            crate::gpu::kernel::assert_valid(name, source);
+        }
     }
 }

@@ -1,107 +1,86 @@
-//! Measures the parameters of GPUs, each in about two seconds, and in twice that where a program on the CPU acts as the
-//! GPU.
+//! Measures the parameters of GPUs, each in about one second, and in twice that if a program on the CPU acts as the GPU.
 //!
-//! One file per family. What fails on one family leaves the others standing: its parameters are missing and say why.
+//! One file measures one family. If one family fails, its parameters are missing with the reason, and the others stay.
 
+mod arithmetic;
 mod bench;
-mod compute;
-mod fits;
 mod group;
 mod latency;
 mod memory;
 mod nvml;
-mod properties;
-mod raw;
-#[cfg(test)]
-mod shaders;
-mod sysfs;
+mod reported;
 mod transfer;
-#[cfg(not(target_vendor = "apple"))]
-mod vulkan;
 
 use std::time::{Duration, Instant};
 
-use super::{Options, UNDER_LIMIT};
+use super::Options;
 use crate::gpu::{Gpu, GpuError, GpuErrorKind, Gpus};
 use crate::hardware::{GpuGroup, GpuHardware, GpuParameterId, Parameter};
+use arithmetic::Arithmetic;
 use bench::Bench;
 
-/// How long a real GPU works before anything is timed: they clock down when idle.
+/// How long a real GPU works before anything is timed: an idle GPU clocks down.
 const WARM_UP: Duration = Duration::from_millis(50);
 
-/// Measures one GPU: each of [`GpuParameterId::OF_ONE`] once, measured, reported or missing with a reason.
+/// Measures one GPU. Returns each of [`GpuParameterId::OF_ONE`] once: measured, reported or missing with a reason.
 ///
-/// The GPU is opened again, so that memory and submissions of the caller don't stand in the way; but one that the program
-/// opened itself ([`Gpus::of`]) is measured as it is, and what else it does meanwhile makes it look slower. [`Options::threads`] has
-/// no effect. With [`Options::limit`] only what a cost model reads is measured. Of a GPU that executes nothing
-/// ([`GpuParameterId::Executes`]) nothing is timed, and what its driver reports stays.
+/// The GPU is opened again, so that memory and submissions of the caller have no influence. A GPU that the program opened itself
+/// ([`Gpus::of`]) is measured as it is, and other work on it makes it look slower. [`Options::threads`] has no effect. With
+/// [`Options::limit`] only what a cost model reads is measured. A GPU that executes nothing ([`GpuParameterId::Executes`]) is not
+/// timed.
 ///
 /// # Errors
-/// [`GpuErrorKind::NotFound`] when there is no such GPU or its driver refuses to open it.
+/// [`GpuErrorKind::NotFound`] if there is no such GPU or its driver refuses to open it.
 pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, GpuError> {
     let began = Instant::now();
-    options.pace.iter().for_each(|pace| pace.begin());
-    let (opened, raw) = match gpus.adapter(index) {
-        Some(adapter) => (gpus.open_another(index)?, query(adapter)),
-        None => (gpus.open(index)?, raw::Raw::default()),
-    };
-    let whole = options.limit.is_none();
+    let adapter = gpus.adapter(index);
+    let opened = if adapter.is_some() { gpus.open_another(index)? } else { gpus.open(index)? };
+    let heaps = reported::heaps(adapter);
     let bench = Bench::new(&opened, options);
     let inert = latency::proof(&bench).err();
-    let mut measured = vec![executes(inert.is_none())];
-    let absent = if let Some(why) = &inert {
-        why
-    } else {
-        measured.extend(timed(&opened, options, &raw, began));
-        if whole { "not measured" } else { UNDER_LIMIT }
+    let executes = if inert.is_none() { 1.0 } else { 0.0 };
+    let source = "three dependent additions by a kernel, read back before anything is timed";
+    let mut measured = vec![Parameter::reported(GpuParameterId::Executes, executes, source)];
+    let absent = match inert {
+        Some(error) => error.to_string(),
+        None => {
+            warm_up(&bench);
+            measured.extend(timed(&opened, options, &heaps, began));
+            "not measured under a time limit".to_owned()
+        }
     };
-    if whole {
-        measured.extend(properties::measure(&bench, &raw, inert.is_none()));
+    if options.limit.is_none() {
+        measured.extend(reported::measure(&bench, &heaps, executes > 0.0));
     }
     let find = |id: GpuParameterId| {
         let found = Parameter::find(&measured, id).cloned();
-        found.unwrap_or_else(|| Parameter::missing(id, absent))
+        found.unwrap_or_else(|| Parameter::missing(id, &absent))
     };
     let parameters = GpuParameterId::OF_ONE.into_iter().map(find).collect();
     Ok(GpuHardware::new(opened.identity().clone(), parameters))
 }
 
-#[cfg(target_vendor = "apple")]
-fn query(_: &wgpu::Adapter) -> raw::Raw {
-    raw::Raw::default()
+/// The parameters that take the GPU's time.
+fn timed(opened: &Gpu, options: &Options, heaps: &[u64], began: Instant) -> Vec<Parameter> {
+    let part = |parts: usize, measure: &dyn Fn(&Bench<'_>) -> Vec<Parameter>| {
+        measure(&Bench::new(opened, &options.share(began, parts)))
+    };
+    // Arithmetic is the shortest part and takes the time that the others leave.
+    [
+        part(4, &transfer::measure),
+        part(3, &|bench| memory::measure(bench, heaps)),
+        part(2, &latency::measure),
+        part(1, &arithmetic::measure),
+    ]
+    .concat()
 }
 
-#[cfg(not(target_vendor = "apple"))]
-fn query(adapter: &wgpu::Adapter) -> raw::Raw {
-    vulkan::query(adapter)
-}
-
-fn executes(yes: bool) -> Parameter {
-    let source = "three dependent additions by a kernel, read back before anything is timed";
-    Parameter::reported(GpuParameterId::Executes, f64::from(u8::from(yes)), source)
-}
-
-/// What takes the GPU's time.
-fn timed(opened: &Gpu, options: &Options, raw: &raw::Raw, began: Instant) -> Vec<Parameter> {
-    let bench = Bench::new(opened, options);
-    if !bench.is_software() {
-        // A failure shows in what is measured next.
-        let _ = warm_up(&bench);
-    }
-    // Arithmetic is the shortest part and takes what the others leave.
-    let mut measured = transfer::measure(&Bench::new(opened, &options.share(began, 4)));
-    measured.extend(memory::measure(&Bench::new(opened, &options.share(began, 3)), raw.free_bytes()));
-    measured.extend(latency::measure(&Bench::new(opened, &options.share(began, 2))));
-    measured.extend(compute::measure(&Bench::new(opened, &options.share(began, 1))));
-    measured
-}
-
-/// Measures GPUs that work at the same time: each of [`GpuParameterId::GROUP`] once, measured or missing with a reason.
+/// Measures GPUs that work at the same time. Returns each of [`GpuParameterId::GROUP`] once: measured or missing with a reason.
 ///
-/// The order of the numbers does not matter, and a number that stands twice counts once. Each GPU is opened again.
+/// Order and repetition of the numbers have no influence. Each GPU is opened again.
 ///
 /// # Errors
-/// [`GpuErrorKind::NotFound`] when there are fewer than two, or one of them can't be opened.
+/// [`GpuErrorKind::NotFound`] if there are fewer than two, or one of them can't be opened.
 pub fn gpu_group(gpus: &Gpus, indices: &[u32], options: &Options) -> Result<GpuGroup, GpuError> {
     let mut indices = indices.to_vec();
     indices.sort_unstable();
@@ -110,24 +89,16 @@ pub fn gpu_group(gpus: &Gpus, indices: &[u32], options: &Options) -> Result<GpuG
         return Err(GpuError::new(GpuErrorKind::NotFound, "a group needs two GPUs or more"));
     }
     let opened = indices.iter().map(|&index| gpus.open_another(index)).collect::<Result<Vec<Gpu>, _>>()?;
-    for gpu in &opened {
-        let bench = Bench::new(gpu, options);
-        if !bench.is_software() {
-            // A failure shows in what is measured next.
-            let _ = warm_up(&bench);
-        }
-    }
+    opened.iter().for_each(|gpu| warm_up(&Bench::new(gpu, options)));
     Ok(GpuGroup::new(indices, group::measure(&opened, options)))
 }
 
-/// Gives a GPU work for [`WARM_UP`].
-fn warm_up(bench: &Bench<'_>) -> Result<(), String> {
-    let work = compute::Arithmetic::new(bench)?;
-    let rounds = work.calibrate(bench, Duration::from_millis(2))?;
-    let bound = work.bind(bench, rounds)?;
-    let start = Instant::now();
-    while start.elapsed() < WARM_UP {
-        work.rate(bench, &bound, rounds, 1)?;
+/// Keeps a real GPU at work for [`WARM_UP`]. Ignores failures, which show in what is measured next.
+fn warm_up(bench: &Bench<'_>) {
+    if bench.is_software() {
+        return;
     }
-    Ok(())
+    let Ok(work) = Arithmetic::new(bench, Duration::from_millis(2)) else { return };
+    let start = Instant::now();
+    while start.elapsed() < WARM_UP && work.rate(bench).is_ok() {}
 }

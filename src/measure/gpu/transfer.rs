@@ -1,36 +1,26 @@
-//! Uploads and downloads: the paper's two transfers, and their line over sizes.
+//! Uploads and downloads: the paper's two transfers, and the slope of a line over sizes.
 //!
-//! Staging buffers are kept and stay mapped between uses. `Queue::write_buffer` allocates on every call and was five times
-//! slower. On a machine whose CPU sees all of the GPU's memory, the staging buffer of uploads may lie there: then the bus
-//! is crossed by the part of the CPU and not by that of the GPU, and the sum is still right.
+//! Staging buffers are kept and stay mapped between uses: `Queue::write_buffer` allocates on every call and was five times slower. If
+//! the CPU reaches all of the GPU's memory, the staging buffer of uploads may lie there; the total is the same.
 
 use std::time::{Duration, Instant};
 
-use super::bench::{Bench, or_missing, per_ns, words};
-use super::fits;
+use super::bench::{Bench, Result, broken, not_mapped, or_missing, per_ns};
+use crate::gpu::{GpuError, GpuErrorKind};
 use crate::hardware::{GpuParameterId, Parameter};
-use crate::measure::foreign_load::Figure;
+use crate::measure::filled;
 use crate::splitmix;
 
-/// The size that totals are given for.
-pub(super) const TOTAL_BYTES: u64 = 33_554_432;
+/// The size of the paper's transfers.
+const TOTAL_BYTES: u64 = 33_554_432;
 
-/// Sizes of the line: four to an order of magnitude and a half, from 4 KiB to 64 MiB.
+/// Sizes of the line, from 4 KiB to 64 MiB.
 const SIZES: [u64; 8] = [1 << 12, 1 << 14, 1 << 16, 1 << 18, 1 << 20, 1 << 23, TOTAL_BYTES, 1 << 26];
 
-/// Sizes of a brief run.
-const BRIEF_SIZES: [u64; 4] = [1 << 12, 1 << 16, 1 << 20, TOTAL_BYTES];
-
-const NAMES: [GpuParameterId; 10] = [
+const NAMES: [GpuParameterId; 4] = [
     GpuParameterId::UploadGbPerS,
-    GpuParameterId::UploadHostCopyGbPerS,
-    GpuParameterId::UploadDeviceCopyGbPerS,
-    GpuParameterId::UploadLatencyNs,
     GpuParameterId::UploadRateGbPerS,
     GpuParameterId::DownloadGbPerS,
-    GpuParameterId::DownloadHostCopyGbPerS,
-    GpuParameterId::DownloadDeviceCopyGbPerS,
-    GpuParameterId::DownloadLatencyNs,
     GpuParameterId::DownloadRateGbPerS,
 ];
 
@@ -38,107 +28,60 @@ pub(super) fn measure(bench: &Bench<'_>) -> Vec<Parameter> {
     or_missing(&NAMES, transfers(bench))
 }
 
-fn transfers(bench: &Bench<'_>) -> Result<Vec<Parameter>, String> {
-    let largest = bench.gpu.limits().max_buffer_size;
-    if largest < TOTAL_BYTES {
-        return Err(format!("its buffers hold {largest} bytes at most, and the transfer is of {TOTAL_BYTES}"));
+fn transfers(bench: &Bench<'_>) -> Result<Vec<Parameter>> {
+    let largest = *SIZES.iter().max().unwrap_or(&TOTAL_BYTES);
+    let mut transfer = Transfer::new(bench, largest)?;
+    // First use of the pages and of the driver's copy path, and a proof that the bytes arrive.
+    transfer.upload(largest)?;
+    transfer.download(largest)?;
+    if transfer.sent != transfer.received {
+        return Err(broken("bytes that were sent came back changed".to_owned()));
     }
-    let sizes = if bench.options.brief { BRIEF_SIZES.to_vec() } else { SIZES.to_vec() };
-    let sizes: Vec<u64> = sizes.into_iter().filter(|&bytes| bytes <= largest).collect();
-    let mut transfer = Transfer::new(bench, sizes.iter().copied().max().unwrap_or(TOTAL_BYTES))?;
-    // First use of the pages and of the driver's copy path; and a proof that the bytes arrive.
-    transfer.upload(TOTAL_BYTES)?;
-    transfer.download(TOTAL_BYTES)?;
-    transfer.verify(TOTAL_BYTES)?;
-    let plan = bench.plan(9, bench.pick(500, 1000));
-    let figures = bench.collect(plan, || {
-        let mut row = Row::default();
-        for &bytes in &sizes {
-            // A small transfer is over in microseconds: three of them, and the middle one counts.
-            let times = if bytes <= 1 << 18 { 3 } else { 1 };
-            let up = middle(times, || transfer.upload(bytes))?;
-            let down = middle(times, || transfer.download(bytes))?;
-            row.add(bytes, up, down);
+    let line = "line of least relative deviation through 8 sizes from 4 KiB to 64 MiB, total times".to_owned();
+    let upload = "copy into a kept staging buffer, recording, copy command, wait, mapping again";
+    let download = "recording, copy command into a kept staging buffer, wait, mapping, copy out of it";
+    let total = |what: &str| format!("{TOTAL_BYTES} random bytes: {what}");
+    let [id_up, id_up_rate, id_down, id_down_rate] = NAMES;
+    let named = [(id_up, total(upload)), (id_up_rate, line.clone()), (id_down, total(download)), (id_down_rate, line)];
+    bench.options.plan(9, bench.pick(500, 1000)).measure(named, || {
+        let (mut up, mut down) = (Times::default(), Times::default());
+        for bytes in SIZES {
+            up.0.push((bytes as f64, transfer.upload(bytes)?.as_nanos() as f64));
+            down.0.push((bytes as f64, transfer.download(bytes)?.as_nanos() as f64));
         }
-        Ok(row.figures())
-    })?;
-    Ok(parameters(figures, &sizes))
+        Ok([up.total_rate(), up.slope_rate(), down.total_rate(), down.slope_rate()])
+    })
 }
 
-fn parameters(figures: Vec<Figure>, sizes: &[u64]) -> Vec<Parameter> {
-    let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-    let line = format!(
-        "line of least relative deviation through {} sizes from {} to {} MiB, total times",
-        sizes.len(),
-        mib(sizes.iter().copied().min().unwrap_or(0)),
-        mib(sizes.iter().copied().max().unwrap_or(0))
-    );
-    let methods = [
-        format!(
-            "{TOTAL_BYTES} random bytes: copy into a kept staging buffer, recording, copy command, wait, mapping again"
-        ),
-        "the CPU's copy into mapped memory, of that upload".to_owned(),
-        "recording, copy command, wait and mapping again, of that upload".to_owned(),
-        line.clone(),
-        line.clone(),
-        format!(
-            "{TOTAL_BYTES} random bytes: recording, copy command into a kept staging buffer, wait, mapping, copy out of it"
-        ),
-        "the CPU's copy out of mapped memory, of that download".to_owned(),
-        "recording, copy command, wait and mapping, of that download".to_owned(),
-        line.clone(),
-        line,
-    ];
-    let figures = figures.into_iter().zip(NAMES).zip(methods);
-    figures.map(|((figure, name), method)| figure.into_parameter(name, &method)).collect()
-}
-
-/// Times of one transfer: what the CPU copies, and all the rest.
-#[derive(Debug, Clone, Copy, Default)]
-struct Times {
-    host: Duration,
-    device: Duration,
-}
+/// Bytes and nanoseconds of transfers in one direction.
+#[derive(Default)]
+struct Times(Vec<(f64, f64)>);
 
 impl Times {
-    fn total(self) -> Duration {
-        self.host + self.device
-    }
-}
-
-/// The one of `times` transfers that took the middle time.
-fn middle(times: usize, mut transfer: impl FnMut() -> Result<Times, String>) -> Result<Times, String> {
-    let mut all = (0..times).map(|_| transfer()).collect::<Result<Vec<_>, _>>()?;
-    all.sort_by_key(|t| t.total());
-    Ok(all.get(times / 2).copied().unwrap_or_default())
-}
-
-/// One sample of every figure.
-#[derive(Default)]
-struct Row {
-    totals: [Times; 2],
-    points: [Vec<(f64, f64)>; 2],
-}
-
-impl Row {
-    fn add(&mut self, bytes: u64, up: Times, down: Times) {
-        for (k, times) in [up, down].into_iter().enumerate() {
-            self.points[k].push((bytes as f64, times.total().as_nanos() as f64));
-            if bytes == TOTAL_BYTES {
-                self.totals[k] = times;
-            }
-        }
+    /// Bytes a nanosecond at [`TOTAL_BYTES`].
+    fn total_rate(&self) -> f64 {
+        let total = self.0.iter().find(|(bytes, _)| *bytes == TOTAL_BYTES as f64);
+        total.map_or(f64::NAN, |(bytes, ns)| bytes / ns)
     }
 
-    /// In the order of [`NAMES`]. What can't be told is no number.
-    fn figures(&self) -> Vec<f64> {
-        let both = self.totals.iter().zip(&self.points).flat_map(|(times, points)| {
-            let rate = |time| per_ns(TOTAL_BYTES as f64, time);
-            // Bytes a nanosecond are gigabytes a second.
-            let line = fits::line(points).unwrap_or(fits::Line { latency: f64::NAN, rate: f64::NAN });
-            [rate(times.total()), rate(times.host), rate(times.device), line.latency, line.rate]
+    /// Bytes a nanosecond by the line `t = latency + bytes / rate` with the least sum of relative deviations.
+    ///
+    /// Relative, because sizes span four orders of magnitude and the largest would decide otherwise. Deviations and not squares, so
+    /// that one spoiled time does not bend the line. Such a line goes through two of the points, or through one of them and the
+    /// origin, so all of these are tried. NaN if no line rises.
+    fn slope_rate(&self) -> f64 {
+        let points = &self.0;
+        let deviation = |latency: f64, slope: f64| -> f64 {
+            points.iter().map(|(v, t)| (1.0 - (latency + slope * v) / t).abs()).sum()
+        };
+        let pairs = points.iter().enumerate().flat_map(|(i, &(v, t))| {
+            let origin = (0.0, t / v);
+            let through = points[..i].iter().map(move |&(w, u)| (t - u) / (v - w)).map(move |s| (t - s * v, s));
+            std::iter::once(origin).chain(through)
         });
-        both.collect()
+        let rising = pairs.filter(|&(latency, slope)| slope > 0.0 && slope.is_finite() && latency >= 0.0);
+        let best = rising.min_by(|a, b| deviation(a.0, a.1).total_cmp(&deviation(b.0, b.1)));
+        best.map_or(f64::NAN, |(_, slope)| 1.0 / slope)
     }
 }
 
@@ -153,18 +96,23 @@ pub(super) struct Transfer<'a> {
 }
 
 impl<'a> Transfer<'a> {
-    /// Buffers for up to `bytes`, a multiple of 8.
-    pub(super) fn new(bench: &'a Bench<'a>, bytes: u64) -> Result<Self, String> {
+    /// Makes buffers for up to `bytes`, a multiple of 8.
+    pub(super) fn new(bench: &'a Bench<'a>, bytes: u64) -> Result<Self> {
         use wgpu::BufferUsages as U;
-        let sent = random(bytes).ok_or("no memory for what is to be sent")?;
-        // Filled, so that the first copy does not wait for pages.
-        let mut received = Vec::new();
-        received.try_reserve_exact(sent.len()).map_err(|_| "no memory for what is to be received")?;
-        received.resize(sent.len(), 1);
+        let host = |value| {
+            let full = || GpuError::new(GpuErrorKind::Refused, "the host has no memory for the transfers");
+            filled(bytes as usize, value).ok_or_else(full)
+        };
+        // Random, so that no bus compresses it.
+        let (mut sent, mut state) = (host(0_u8)?, 0);
+        for chunk in sent.chunks_exact_mut(8) {
+            chunk.copy_from_slice(&splitmix::next(&mut state).to_le_bytes());
+        }
         Ok(Self {
             bench,
             sent,
-            received,
+            // Not zero, so that the first copy does not wait for pages.
+            received: host(1)?,
             up: bench.buffer(bytes, U::MAP_WRITE | U::COPY_SRC)?,
             device: bench.storage(bytes)?,
             down: bench.buffer(bytes, U::MAP_READ | U::COPY_DST)?,
@@ -172,41 +120,38 @@ impl<'a> Transfer<'a> {
     }
 
     /// Sends the first bytes.
-    fn upload(&mut self, bytes: u64) -> Result<Times, String> {
+    fn upload(&mut self, bytes: u64) -> Result<Duration> {
         let start = Instant::now();
-        let source = self.sent.get(..bytes as usize).ok_or("more bytes than there are")?;
-        let mut view = self.up.slice(..bytes).get_mapped_range_mut().map_err(|e| e.to_string())?;
-        view.copy_from_slice(source);
+        let mut view = self.up.slice(..bytes).get_mapped_range_mut().map_err(not_mapped)?;
+        view.copy_from_slice(&self.sent[..bytes as usize]);
         drop(view);
-        let host = start.elapsed();
         let submission = self.bench.submit(|encoder| {
             self.up.unmap();
             encoder.copy_buffer_to_buffer(&self.up, 0, &self.device, 0, bytes);
         })?;
         // Mapped as a whole: the next transfer may be larger.
         self.bench.gpu.map(self.up.slice(..), wgpu::MapMode::Write, |_| {});
-        self.bench.gpu.wait(submission).map_err(words)?;
-        Ok(Times { host, device: start.elapsed().saturating_sub(host) })
+        self.bench.gpu.wait(submission)?;
+        Ok(start.elapsed())
     }
 
     /// Fetches the first bytes.
-    fn download(&mut self, bytes: u64) -> Result<Times, String> {
+    fn download(&mut self, bytes: u64) -> Result<Duration> {
         let start = Instant::now();
         let submission =
             self.bench.submit(|encoder| encoder.copy_buffer_to_buffer(&self.device, 0, &self.down, 0, bytes))?;
         self.bench.gpu.map(self.down.slice(..bytes), wgpu::MapMode::Read, |_| {});
-        self.bench.gpu.wait(submission).map_err(words)?;
-        let view = self.down.slice(..bytes).get_mapped_range().map_err(|e| e.to_string())?;
-        let device = start.elapsed();
-        self.received.get_mut(..bytes as usize).ok_or("more bytes than there are")?.copy_from_slice(&view);
-        let host = start.elapsed().saturating_sub(device);
+        self.bench.gpu.wait(submission)?;
+        let view = self.down.slice(..bytes).get_mapped_range().map_err(not_mapped)?;
+        self.received[..bytes as usize].copy_from_slice(&view);
+        let time = start.elapsed();
         drop(view);
         self.bench.gpu.unmap(&self.down);
-        Ok(Times { host, device })
+        Ok(time)
     }
 
     /// Bytes a nanosecond of uploads of `bytes`, one after another for `time`.
-    pub(super) fn upload_rate(&mut self, bytes: u64, time: Duration) -> Result<f64, String> {
+    pub(super) fn upload_rate(&mut self, bytes: u64, time: Duration) -> Result<f64> {
         let start = Instant::now();
         let mut sent = 0.0;
         while start.elapsed() < time {
@@ -215,54 +160,38 @@ impl<'a> Transfer<'a> {
         }
         Ok(per_ns(sent, start.elapsed()))
     }
-
-    /// Whether what came back is what was sent.
-    fn verify(&self, bytes: u64) -> Result<(), String> {
-        let same = self.sent.get(..bytes as usize) == self.received.get(..bytes as usize);
-        if same { Ok(()) } else { Err("bytes that were sent came back changed: the driver is broken".to_owned()) }
-    }
-}
-
-/// Bytes that no bus compresses. `None` without the memory.
-fn random(bytes: u64) -> Option<Vec<u8>> {
-    let mut random = Vec::new();
-    random.try_reserve_exact(usize::try_from(bytes).ok()?).ok()?;
-    let mut state = 0;
-    for _ in 0..bytes / 8 {
-        random.extend_from_slice(&splitmix::next(&mut state).to_le_bytes());
-    }
-    Some(random)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn names_are_those_of_the_report() {
-        assert_eq!(GpuParameterId::OF_ONE[..NAMES.len()], NAMES);
+    fn times(latency: f64, rate: f64) -> Times {
+        Times(SIZES.map(|bytes| bytes as f64).map(|v| (v, latency + v / rate)).to_vec())
     }
 
     #[test]
-    fn a_row_in_the_order_of_the_names() {
-        let times = |bytes: u64, part: u64| Times {
-            host: Duration::from_nanos(bytes / 16 * part),
-            device: Duration::from_nanos(1000 + bytes / 16 * part),
-        };
-        let mut row = Row::default();
-        for bytes in SIZES {
-            row.add(bytes, times(bytes, 1), times(bytes, 2));
+    fn a_line_is_found_again() {
+        for (latency, rate) in [(80_000.0, 2.7), (5_000.0, 25.0), (0.0, 12.0)] {
+            assert!((times(latency, rate).slope_rate() / rate - 1.0).abs() < 1e-6);
         }
-        let [up, host, _, latency, rate, down, .., slow] = row.figures()[..] else { panic!() };
-        assert!((up - 8.0).abs() < 0.01 && (host - 16.0).abs() < 1e-9, "{up} {host}");
-        assert!((latency - 1000.0).abs() < 1.0 && (rate - 8.0).abs() < 1e-6, "{latency} {rate}");
-        assert!((down - 4.0).abs() < 0.01 && (slow - 4.0).abs() < 1e-6, "{down} {slow}");
+        assert!((times(1e6, 10.0).total_rate() - 33_554_432.0 / 4_355_443.2).abs() < 1e-9);
     }
 
     #[test]
-    fn random_bytes_are_all_there() {
-        let bytes = random(4096).unwrap();
-        assert_eq!(bytes.len(), 4096);
-        assert!((0..=255).all(|b| bytes.contains(&b)));
+    fn spoiled_points_do_not_bend_it() {
+        let mut times = times(50_000.0, 10.0);
+        times.0[1].1 *= 9.0;
+        times.0[6].1 *= 2.5;
+        assert!((times.slope_rate() / 10.0 - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn without_a_rising_line_there_is_no_rate() {
+        assert!(Times::default().slope_rate().is_nan() && Times::default().total_rate().is_nan());
+        // One point: through the origin.
+        assert_eq!(Times(vec![(10.0, 5.0)]).slope_rate(), 2.0);
+        // A clock that did not move.
+        assert!(Times(vec![(10.0, 0.0)]).slope_rate().is_nan());
     }
 }

@@ -1,4 +1,4 @@
-//! Machines unlike those of training, and figures that no machine has.
+//! Machines unlike those of the training, and values that no machine has.
 
 use super::*;
 
@@ -44,13 +44,13 @@ fn told(p: &Prediction, text: &str) -> bool {
 }
 
 #[test]
-fn a_thousand_cores_are_predicted_and_told_to_be_outside() {
+fn a_thousand_cores_are_extrapolated() {
     let all = ids(&["brute@cpu1", "brute@cpu1024"]);
     let of_a_thousand = [(ParameterId::UsableCores, 1024.0), (ParameterId::ScalingAllThreadsRatio, 700.0)];
     let p = both().predict(&machine(&of_a_thousand), &all).unwrap();
     assert!(p.extrapolated && p.costs.len() == 2, "{:?}", p.warnings);
     assert!(told(&p, "usable_cores is 1024") && told(&p, "has seen 1 threads at most"), "{:?}", p.warnings);
-    assert!(told(&p, "--samples 8") && told(&p, "sapwise probe"), "{:?}", p.warnings);
+    assert!(told(&p, "`sapwise probe --out report.json`"), "{:?}", p.warnings);
     let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
     assert_eq!(p.tuning("uniform", &loads).defect(), None);
     let p = both().predict(&machine(&[]), &ids(&["brute@cpu1"])).unwrap();
@@ -58,9 +58,9 @@ fn a_thousand_cores_are_predicted_and_told_to_be_outside() {
 }
 
 #[test]
-fn figures_that_no_machine_has_are_refused_by_name() {
+fn values_that_no_machine_has_are_refused_by_name() {
     for (name, values) in [
-        // MHz for GHz, and what a failed measurement may leave.
+        // MHz for GHz, and the remains of a failed measurement.
         (ParameterId::ClockMeasuredGhz, &[4000.0, 0.0, -4.0, f64::NAN, f64::INFINITY][..]),
         // TB/s for GB/s, MB/s for GB/s, and a tenth of what memory did in 1998.
         (ParameterId::BandwidthOneThreadGbPerS, &[0.02, 20_000.0, 0.1]),
@@ -79,7 +79,7 @@ fn figures_that_no_machine_has_are_refused_by_name() {
 }
 
 #[test]
-fn a_gpu_without_a_figure_or_with_one_that_no_gpu_has_costs_its_own_algorithms_only() {
+fn an_implausible_parameter_of_a_gpu_costs_its_algorithms_only() {
     let all = ids(&["brute@cpu1", "brute@gpu0"]);
     let mut machine = machine(&[]);
     assert_eq!(both().predict(&machine, &all).unwrap().costs.len(), 2);

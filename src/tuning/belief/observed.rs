@@ -90,7 +90,7 @@ impl Observed {
 }
 
 /// Nanoseconds of a frame, and the share of calls in them.
-fn shares(curve: &CostCurve, frame: &Frame<'_>) -> (f64, f64) {
+fn shares<'a>(curve: &'a CostCurve, frame: &Frame<'a>) -> (f64, f64) {
     let FrameCost { ns, calls_ns, .. } = curve.parts_of(frame);
     (ns, if ns > 0.0 { (calls_ns / ns).min(1.0) } else { 0.0 })
 }

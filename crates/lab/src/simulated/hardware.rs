@@ -94,10 +94,8 @@ fn of_gpu(gpu: &TrueGpu, unified: bool, spec: &super::specification::Gpu) -> Vec
     let whole = |gb_per_s: f64| TRANSFER_BYTES / (TRANSFER_BYTES / gb_per_s + gpu.transfer_latency_ns);
     vec![
         (GpuParameterId::UploadGbPerS, Measured(whole(gpu.upload_gb_per_s), 0.03)),
-        (GpuParameterId::UploadLatencyNs, Measured(gpu.transfer_latency_ns, 0.05)),
         (GpuParameterId::UploadRateGbPerS, Measured(gpu.upload_gb_per_s, 0.04)),
         (GpuParameterId::DownloadGbPerS, Measured(whole(gpu.download_gb_per_s), 0.03)),
-        (GpuParameterId::DownloadLatencyNs, Measured(gpu.transfer_latency_ns, 0.05)),
         (GpuParameterId::DownloadRateGbPerS, Measured(gpu.download_gb_per_s, 0.04)),
         (GpuParameterId::ReadGbPerS, Measured(gpu.read_gb_per_s, 0.02)),
         (GpuParameterId::CopyGbPerS, Measured(gpu.copy_gb_per_s, 0.02)),
@@ -105,12 +103,10 @@ fn of_gpu(gpu: &TrueGpu, unified: bool, spec: &super::specification::Gpu) -> Vec
         (GpuParameterId::ClockGhz, Reported(spec.clock_ghz)),
         (GpuParameterId::Processors, Reported(f64::from(spec.processors))),
         (GpuParameterId::Lanes, Reported(f64::from(spec.lanes))),
-        (GpuParameterId::SubmitNs, Measured(gpu.submit_ns, 0.05)),
         (GpuParameterId::RoundTripNs, Measured(gpu.round_trip_ns, 0.06)),
         (GpuParameterId::DispatchNs, Measured(gpu.dispatch_ns, 0.03)),
         (GpuParameterId::ReadBackNs, Measured(gpu.read_back_ns, 0.05)),
         (GpuParameterId::ArithmeticGflopPerS, Measured(gpu.gflop_per_s, 0.01)),
-        (GpuParameterId::UnifiedMemory, Reported(if unified { 1.0 } else { 0.0 })),
     ]
 }
 

@@ -1,20 +1,12 @@
-// Reads and writes over a working set: a workgroup takes 64 KiB, an invocation 16 vectors of 16 bytes. The loads are written out, since
-// naga bounds every loop with a counter of its own.
+// Reads over a working set: a workgroup takes 64 KiB, an invocation 16 vectors of 16 bytes. The loads are written out, since naga bounds
+// every loop with a counter of its own.
 
-struct Shape {
-    // Vectors of the working set, minus one. Working sets are powers of two.
-    mask: u32,
-    // Makes each writing pass write something else.
-    seed: u32,
-}
-
-@group(0) @binding(0) var<uniform> shape: Shape;
 @group(0) @binding(1) var<storage, read> source: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read_write> sink: array<u32>;
 @group(0) @binding(3) var<storage, read_write> target_set: array<vec4<u32>>;
 
 fn at(group: u32, lane: u32, row: u32) -> u32 {
-    return (group * 4096u + row * 256u + lane) & shape.mask;
+    return group * 4096u + row * 256u + lane;
 }
 
 @compute @workgroup_size(256)
@@ -30,33 +22,12 @@ fn read_set(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_inde
     }
 }
 
-// Different in every word, so that no memory compresses it.
-fn noise(index: u32) -> vec4<u32> {
-    let x = (index ^ shape.seed) * 0x9e3779b9u;
-    return vec4<u32>(x, x * 0x85ebca6bu, x * 0xc2b2ae35u, ~x * 0x27d4eb2fu);
-}
-
-fn put(index: u32) {
-    target_set[index] = noise(index);
-}
-
+// Writes a different value to every word, so that no memory compresses it.
 @compute @workgroup_size(256)
-fn write_set(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let g = id.x;
-    put(at(g, lane, 0u));
-    put(at(g, lane, 1u));
-    put(at(g, lane, 2u));
-    put(at(g, lane, 3u));
-    put(at(g, lane, 4u));
-    put(at(g, lane, 5u));
-    put(at(g, lane, 6u));
-    put(at(g, lane, 7u));
-    put(at(g, lane, 8u));
-    put(at(g, lane, 9u));
-    put(at(g, lane, 10u));
-    put(at(g, lane, 11u));
-    put(at(g, lane, 12u));
-    put(at(g, lane, 13u));
-    put(at(g, lane, 14u));
-    put(at(g, lane, 15u));
+fn fill(@builtin(workgroup_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    for (var row = 0u; row < 16u; row++) {
+        let index = at(id.x, lane, row);
+        let x = (index ^ 0x5bd1e995u) * 0x9e3779b9u;
+        target_set[index] = vec4<u32>(x, x * 0x85ebca6bu, x * 0xc2b2ae35u, ~x * 0x27d4eb2fu);
+    }
 }

@@ -2,18 +2,12 @@
 
 struct Shape {
     rounds: u32,
-    // 0.5: a fixed point of the chains is 1, so that values neither vanish nor overflow. Not a constant, or compilers would fold it.
+    // 0.5: a fixed point of the chains is 1, so that values neither vanish nor overflow. A constant would be folded.
     factor: f32,
 }
 
 @group(0) @binding(0) var<uniform> shape: Shape;
 @group(0) @binding(1) var<storage, read_write> sink: array<u32>;
-
-override workgroup_lanes: u32 = 64u;
-override shared_words: u32 = 64u;
-
-// As much as a workgroup may have, so that few workgroups, if more than one, fit on a processor at once.
-var<workgroup> shared_memory: array<u32, shared_words>;
 
 struct Chains {
     a: vec4<f32>,
@@ -62,16 +56,5 @@ fn multiply_add(@builtin(global_invocation_id) id: vec3<u32>) {
     // Never true, but the compiler can't know.
     if (chains(f32(id.x & 63u)) < -1.0) {
         sink[0] = id.x;
-    }
-}
-
-@compute @workgroup_size(workgroup_lanes)
-fn one_unit(@builtin(local_invocation_index) lane: u32) {
-    let slot = (lane * 97u) % shared_words;
-    shared_memory[slot] = lane;
-    workgroupBarrier();
-    let start = f32(shared_memory[(slot + 1u) % shared_words] & 63u);
-    if (chains(start) < -1.0) {
-        sink[0] = lane;
     }
 }
