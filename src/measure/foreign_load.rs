@@ -5,9 +5,9 @@
 
 use std::convert::Infallible;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use super::pace::Pace;
 use crate::hardware::{How, Parameter, Statistic};
 use crate::stats;
 
@@ -24,13 +24,13 @@ pub(super) struct Plan {
     pub(super) samples: usize,
     /// No new window begins that would end after this time. At least one sample is always taken.
     pub(super) limit: Duration,
-    /// How fast to go beside a program that runs; rests don't count as time.
-    pub(super) pace: Option<Arc<Pace>>,
+    /// Ends sampling with the sample that is being taken, once it is set.
+    pub(super) stop: Option<Arc<AtomicBool>>,
 }
 
 impl Plan {
     fn is_stopped(&self) -> bool {
-        self.pace.as_ref().is_some_and(|pace| pace.is_stopped())
+        super::is_set(self.stop.as_ref())
     }
 }
 
@@ -112,30 +112,22 @@ pub(super) fn collect(plan: Plan, mut sample: impl FnMut() -> Vec<f64>) -> Vec<F
 pub(super) fn try_collect<E>(plan: Plan, mut sample: impl FnMut() -> Result<Vec<f64>, E>) -> Result<Vec<Figure>, E> {
     let start = Instant::now();
     let mut windows: Vec<Window> = Vec::new();
-    let (mut unrested, mut rested) = (Duration::ZERO, Duration::ZERO);
     loop {
-        let rested_before = rested;
         let before = Counters::now();
         let length = before.map_or(Duration::ZERO, Counters::window);
         let began = Instant::now();
         let mut rows = Vec::new();
         loop {
-            let sampled = Instant::now();
             rows.push(sample()?);
-            if let Some(pace) = &plan.pace {
-                let (left, rest) = pace.rest(unrested + sampled.elapsed());
-                (unrested, rested) = (left, rested + rest);
-            }
             let enough = began.elapsed() >= length && (before.is_some() || rows.len() >= plan.samples);
-            if enough || start.elapsed().saturating_sub(rested) >= plan.limit || plan.is_stopped() {
+            if enough || start.elapsed() >= plan.limit || plan.is_stopped() {
                 break;
             }
         }
         let share = before.zip(Counters::now()).map(|(before, after)| before.foreign_share(after, began.elapsed()));
         windows.push(Window { rows, share });
         let clean: usize = windows.iter().filter(|w| w.is_clean()).map(|w| w.rows.len()).sum();
-        let another = began.elapsed().saturating_sub(rested - rested_before);
-        let over = start.elapsed().saturating_sub(rested) + another > plan.limit;
+        let over = start.elapsed() + began.elapsed() > plan.limit;
         if clean >= plan.samples || over || plan.is_stopped() {
             return Ok(keep_the_cleanest(windows, plan.samples));
         }
@@ -365,7 +357,7 @@ mod tests {
     #[test]
     fn a_failure_ends_the_sampling() {
         let mut left = 2;
-        let result = try_collect(Plan { samples: 9, limit: Duration::from_secs(60), pace: None }, || {
+        let result = try_collect(Plan { samples: 9, limit: Duration::from_secs(60), stop: None }, || {
             left -= 1;
             if left == 0 { Err("broken") } else { Ok(vec![1.0]) }
         });
@@ -374,7 +366,7 @@ mod tests {
 
     #[test]
     fn one_sample_even_without_time() {
-        let figures = collect(Plan { samples: 9, limit: Duration::ZERO, pace: None }, || vec![1.0, 2.0]);
+        let figures = collect(Plan { samples: 9, limit: Duration::ZERO, stop: None }, || vec![1.0, 2.0]);
         assert_eq!(figures.len(), 2);
         assert_eq!(figures[1].samples, [2.0]);
     }

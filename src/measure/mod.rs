@@ -15,11 +15,11 @@ mod fork_join;
 mod gpu;
 mod identity;
 mod memory;
-mod pace;
 mod scaling;
 mod topology;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
@@ -34,7 +34,6 @@ pub use foreign_load::Watch;
 pub use gpu::{gpu, gpu_group};
 #[cfg(feature = "this-machine")]
 pub(crate) use identity::fnv1a;
-pub(crate) use pace::Pace;
 
 named! {
     /// A group of parameters that are measured together, in the order of measurement.
@@ -85,7 +84,7 @@ impl Family {
 const UNDER_LIMIT: &str = "left out of a run with a limit of time";
 
 /// What to measure with.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct Options {
     /// Use no more threads than this; `None` uses every core that affinity and quota leave. 0 is taken as 1.
@@ -96,8 +95,8 @@ pub struct Options {
     /// family, for all together, or for one GPU, as the function that is called measures. Load latencies and what no cost model
     /// reads of a GPU are left out then. `None` takes as long as a report needs.
     pub limit: Option<Duration>,
-    /// How fast to go beside a program that runs; rests don't count as time.
-    pub(crate) pace: Option<Arc<Pace>>,
+    /// Ends the measurement with the sample that is being taken, once it is set.
+    pub(crate) stop: Option<Arc<AtomicBool>>,
 }
 
 impl Options {
@@ -119,16 +118,20 @@ impl Options {
         Self { limit: Some(limit), ..self }
     }
 
+    /// Whether the caller wants no more.
+    pub(crate) fn is_stopped(&self) -> bool {
+        is_set(self.stop.as_ref())
+    }
+
     fn plan(&self, samples: usize, limit_ms: u64) -> Plan {
         let (samples, ms) = if self.brief { (4, limit_ms / 20) } else { (samples, limit_ms) };
         let limit = Duration::from_millis(ms);
-        Plan { samples, limit: self.limit.map_or(limit, |at_most| limit.min(at_most)), pace: self.pace.clone() }
+        Plan { samples, limit: self.limit.map_or(limit, |at_most| limit.min(at_most)), stop: self.stop.clone() }
     }
 
     /// The same with an equal share of the time that is left, where there is a limit, for each of `parts` parts.
     fn share(&self, began: Instant, parts: usize) -> Self {
-        let worked = self.pace.as_ref().map_or_else(|| began.elapsed(), |pace| pace.worked(began));
-        let left = |limit: Duration| limit.saturating_sub(worked) / u32::try_from(parts).unwrap_or(u32::MAX).max(1);
+        let left = |limit: Duration| limit.saturating_sub(began.elapsed()) / u32::try_from(parts).unwrap_or(u32::MAX).max(1);
         Self { limit: self.limit.map(left), ..self.clone() }
     }
 
@@ -138,6 +141,10 @@ impl Options {
         let wanted = self.threads.map_or(available, |threads| threads as usize);
         available.min(wanted).max(1)
     }
+}
+
+fn is_set(stop: Option<&Arc<AtomicBool>>) -> bool {
+    stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
 }
 
 /// Measures one family: each name of [`Family::parameters`] once, measured, reported or missing with a reason.
@@ -166,7 +173,7 @@ pub fn machine() -> Machine {
 /// Measures every family in this process.
 #[must_use]
 pub fn hardware(options: &Options) -> Hardware {
-    families(Family::ALL.to_vec(), options, Vec::new(), |_| {})
+    families(Family::ALL.to_vec(), options)
 }
 
 /// Measures those families in this process that hold one of these parameters; those of the others are missing.
@@ -174,44 +181,19 @@ pub fn hardware(options: &Options) -> Hardware {
 /// [`Model::parameters`](crate::Model::parameters) has those that a prediction needs.
 #[must_use]
 pub fn hardware_for(parameters: &[ParameterId], options: &Options) -> Hardware {
-    go_on(parameters, options, Vec::new(), |_| {})
-}
-
-/// The same, of which an earlier run has `measured` some families. `done` is called after each other family with all that is known by then.
-/// What was stopped misses the rest.
-pub(crate) fn go_on(
-    parameters: &[ParameterId],
-    options: &Options,
-    measured: Vec<Parameter>,
-    done: impl FnMut(&[Parameter]),
-) -> Hardware {
     let holds = |family: &Family| family.parameters().iter().any(|id| parameters.contains(id));
-    families(Family::ALL.into_iter().filter(holds).collect(), options, measured, done)
+    families(Family::ALL.into_iter().filter(holds).collect(), options)
 }
 
-fn families(
-    mut wanted: Vec<Family>,
-    options: &Options,
-    mut measured: Vec<Parameter>,
-    mut done: impl FnMut(&[Parameter]),
-) -> Hardware {
+fn families(mut wanted: Vec<Family>, options: &Options) -> Hardware {
     let began = Instant::now();
-    let stopped = || options.pace.as_ref().is_some_and(|pace| pace.is_stopped());
-    options.pace.iter().for_each(|pace| pace.begin());
-    wanted.retain(|family| family.parameters().iter().any(|&id| Parameter::find(&measured, id).is_none()));
     if options.limit.is_some() {
         // To fill its arrays takes a time that can't be shortened, and what the others leave of theirs it gets.
         wanted.sort_by_key(|&family| family == Family::Memory);
     }
-    let count = wanted.len();
-    for (k, of) in wanted.into_iter().enumerate() {
-        let found = family(of, &options.share(began, count - k));
-        // What was cut short is no figure.
-        if stopped() {
-            break;
-        }
-        measured.extend(found);
-        done(&measured);
+    let (count, mut measured) = (wanted.len(), Vec::new());
+    for (k, of) in wanted.into_iter().enumerate().take_while(|_| !options.is_stopped()) {
+        measured.extend(family(of, &options.share(began, count - k)));
     }
     assemble(machine(), measured)
 }
@@ -239,28 +221,4 @@ fn pool(threads: usize) -> Result<ThreadPool, String> {
 fn together(pool: &ThreadPool, threads: usize, rate: impl Fn() -> f64 + Sync) -> f64 {
     // Each thread divides by its own time: they don't wake at once.
     pool.broadcast(|worker| if worker.index() < threads { rate() } else { 0.0 }).iter().sum()
-}
-
-#[cfg(all(test, feature = "this-machine"))]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_an_earlier_run_has_measured_is_not_measured_again_and_what_is_stopped_is_no_figure() {
-        let pace = Arc::new(Pace::default());
-        let options = Options { pace: Some(Arc::clone(&pace)), ..Options::default().with_threads(Some(1)).brief(true) };
-        let wanted = [ParameterId::ClockMeasuredGhz, ParameterId::ArithmeticOneThreadGflopPerS];
-        let kept: Vec<Parameter> =
-            Family::Clock.parameters().into_iter().map(|id| Parameter::reported(id, 42.0, "an earlier run")).collect();
-        let mut calls = 0;
-        let hardware = go_on(&wanted, &options, kept.clone(), |so_far| {
-            calls += 1;
-            assert!(kept.iter().all(|p| so_far.contains(p)) && so_far.len() > kept.len());
-        });
-        assert_eq!((calls, hardware.value(wanted[0])), (1, Some(42.0)));
-        assert!(hardware.value(wanted[1]).is_some_and(|v| v > 0.0));
-        pace.stop();
-        let hardware = go_on(&wanted, &options, kept, |_| panic!("nothing is done"));
-        assert_eq!((hardware.value(wanted[0]), hardware.value(wanted[1])), (Some(42.0), None));
-    }
 }

@@ -40,7 +40,6 @@ const WARM_UP: Duration = Duration::from_millis(50);
 /// [`GpuErrorKind::NotFound`] when there is no such GPU or its driver refuses to open it.
 pub fn gpu(gpus: &Gpus, index: u32, options: &Options) -> Result<GpuHardware, GpuError> {
     let began = Instant::now();
-    options.pace.iter().for_each(|pace| pace.begin());
     let (opened, raw) = match gpus.adapter(index) {
         Some(adapter) => (gpus.open_another(index)?, query(adapter)),
         None => (gpus.open(index)?, raw::Raw::default()),
