@@ -3,8 +3,6 @@
 mod error;
 mod figure;
 pub mod gpu;
-#[cfg(feature = "this-machine")]
-mod measurement;
 mod parameter;
 mod plausible;
 mod statistic;
@@ -13,14 +11,14 @@ mod unit;
 pub use error::HardwareError;
 pub use figure::{How, Parameter};
 pub use gpu::{GpuGroup, GpuHardware, GpuIdentity, GpuKind};
-#[cfg(feature = "this-machine")]
-pub use measurement::Measurement;
 pub use parameter::{Bounds, GpuParameterId, ParameterId, Quantity};
 pub use statistic::Statistic;
 pub use unit::with_unit;
 
 /// What is known about a machine: who made it, and a list of parameters, each with where it came from.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Hardware {
     /// Which machine it is.
@@ -29,13 +27,17 @@ pub struct Hardware {
     /// know; they are kept.
     pub parameters: Vec<Parameter>,
     /// Its GPUs, by their number. Empty where there is none or none was looked at.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub gpus: Vec<GpuHardware>,
     /// GPUs that work together.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub gpu_groups: Vec<GpuGroup>,
 }
 
 /// What a machine says of itself. Holds nothing that names a host, a user or a single piece of hardware.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Machine {
     /// Which physical machine this is: a hash of CPU vendor, family, model, stepping and last-level cache, as 16 hex digits.
@@ -64,8 +66,7 @@ impl Machine {
         Self { physical_id: physical_id.into(), ..Self::default() }
     }
 
-    /// The name of the file with the tuning of machines of this kind, for [`StartOptions::tunings`](crate::StartOptions::tunings) and
-    /// `sapwise predict --report FOLDER`: physical id, SIMD level, cores that the program may use, and the device numbers of its GPUs, as in
+    /// The name under which `sapwise predict --report FOLDER --out TUNINGS` writes the tuning of machines of this kind: physical id, SIMD level, cores that the program may use, and the device numbers of its GPUs, as in
     /// `478e43ba2e7824ab-avx512-16-10de2335.json`. Software adapters don't count.
     #[must_use]
     pub fn tuning_file(&self, cores: u32, gpus: &[GpuIdentity]) -> String {

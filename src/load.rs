@@ -17,6 +17,8 @@ pub(crate) use strip_grid::{StripGrid, StripSpan};
 ///
 /// The count alone is a poor switch: between uniform and clustered scenes measured borders move by a factor of five.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Load {
     /// Boxes in the frame.

@@ -27,11 +27,14 @@ pub const GPU_PREFIX: &str = "gpu/";
 /// The time of a frame on one thread, or on GPUs, is `sum of unit * scale(hardware, backend) * term(load)`, times `exp` of a
 /// [residual](crate::Residual) over the load; [helpers](HelpersModel) make of it what several threads take.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Model {
     /// Name by which tuning refers to it.
     pub name: String,
     /// Whether a report behind it is simulated, which makes its predictions no evidence of anything.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "std::ops::Not::not"))]
     pub simulated: bool,
     /// Lowest and highest value of each hardware parameter in training; a machine outside is extrapolated.
     pub ranges: Vec<Range>,
@@ -46,6 +49,8 @@ pub struct Model {
 
 /// Where a hardware parameter lay in training.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct Range {
     /// Name of the parameter; that of a GPU after [`GPU_PREFIX`].
     pub parameter: String,
@@ -57,27 +62,35 @@ pub struct Range {
 
 /// The cost model of one method on one class of processor, for any number of threads or GPUs.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct MethodModel {
     /// The part of the algorithm's id before the `@`.
     pub method: String,
     /// The processor that it holds for. A file that does not say so is from before there were GPUs.
+    #[cfg_attr(feature = "model", serde(default))]
     pub backend: BackendClass,
     /// Revision of the algorithm that was timed.
     pub revision: u32,
     /// Most threads that were timed, of GPUs the most that were timed together; more are extrapolated.
     pub max_threads: u32,
     /// Kinds of the GPUs that were timed, without repetition; others are extrapolated. Empty for the CPU.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub gpu_kinds: Vec<GpuKind>,
     /// The physical terms, on one thread or on GPUs; no unit is negative.
     pub terms: Vec<ModelTerm>,
     /// The method that it falls back to where that is cheaper, if it does.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
     pub fallback: Option<FallbackModel>,
     /// What the terms leave unexplained: a weight for each of [`Model::places`]. Empty: nothing.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub residual: Vec<f64>,
     /// Whether the residual tells loads apart by how far boxes move, as of incremental methods.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "std::ops::Not::not"))]
     pub residual_by_motion: bool,
     /// What several threads make of it; `None` of a method that runs on one thread only, or on GPUs.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
     pub helpers: Option<HelpersModel>,
     /// Standard deviation of what remains, in natural logarithms.
     pub spread_ln: f64,
@@ -85,6 +98,8 @@ pub struct MethodModel {
 
 /// A method that another one falls back to.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct FallbackModel {
     /// Its name. It falls back to none itself.
     pub method: String,
@@ -94,6 +109,8 @@ pub struct FallbackModel {
 
 /// One physical term.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct ModelTerm {
     /// What is counted.
     pub term: Term,

@@ -5,6 +5,8 @@
 /// The caller begins while its helpers wake. One that comes too late finds nothing left to do and costs nothing: the frame takes what it
 /// would have taken on one thread, and what it cost to call the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Helpers {
     /// Threads, the caller's included.

@@ -6,6 +6,8 @@ use crate::stats;
 
 /// One figure of a machine.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Parameter {
     /// Name with its unit as the last words: that of a [`ParameterId`](super::ParameterId) or a
@@ -26,10 +28,12 @@ pub struct Parameter {
     /// The method of a measurement, the interface of a report, or why the figure is missing.
     pub source: String,
     /// How the value follows from the samples.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Statistic::is_median"))]
     pub statistic: Statistic,
     /// The samples kept, in the unit of the name, in the order of measurement, to six significant digits. Value, dispersion and
     /// number of samples follow from them. Empty where nothing was measured, where the value is that of a fit, and in reports
     /// made before they were kept.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub raw: Vec<f64>,
 }
 
