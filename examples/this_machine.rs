@@ -4,8 +4,8 @@
 //! cargo run --release -p sapwise --example this_machine --features this-machine
 //! ```
 //!
-//! The first start measures the hardware in two seconds, predicts what each algorithm costs and keeps that in the user's
-//! cache folder. The second start reads it from there.
+//! The first start measures the hardware in two seconds, predicts what each algorithm costs and keeps that in the
+//! user's cache folder. The second start reads it from there.
 
 use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, StartOptions};
 use std::error::Error;

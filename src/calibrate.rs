@@ -23,15 +23,16 @@ impl Adaptive {
     /// Returns an adaptive broad phase with the tuning of this machine: from the cache, else predicted from hardware
     /// parameters that it measures in two seconds and kept for the next start.
     ///
-    /// By default a background thread does this, and [`Tuning::usual`] decides until it is done. Dropping the broad phase
-    /// ends the thread and waits for it, two seconds at most. A measurement uses all cores and needs a quiet machine.
+    /// By default a background thread does this, and [`Tuning::usual`] decides until it is done. Dropping the broad
+    /// phase ends the thread and waits for it, two seconds at most. A measurement uses all cores and needs a quiet
+    /// machine.
     ///
-    /// A kept tuning holds for this machine, its drivers, this version of the library, its algorithms and the built-in model;
-    /// when one of them changes or the measurement is [too old](StartOptions::max_age), the next start measures again. A cache
-    /// that can't be read or written stops nothing: [`setup`](Self::setup) says so.
+    /// A kept tuning holds for this machine, its drivers, this version of the library, its algorithms and the
+    /// built-in model; when one of them changes or the measurement is [too old](StartOptions::max_age), the next
+    /// start measures again. A cache that can't be read or written stops nothing: [`setup`](Self::setup) says so.
     ///
-    /// A program of many processes measures in one of them and hands the [tuning](Self::tuning) to the others, which pass it
-    /// to [`Adaptive::new`]. Otherwise each process measures, and they disturb each other.
+    /// A program of many processes measures in one of them and hands the [tuning](Self::tuning) to the others, which
+    /// pass it to [`Adaptive::new`]. Otherwise each process measures, and they disturb each other.
     ///
     /// # Errors
     /// [`Error::Unavailable`] or [`Error::UnknownAlgorithm`] when no algorithm of the usual tuning can be made.
@@ -40,7 +41,7 @@ impl Adaptive {
         if options.background {
             return in_background(options, began);
         }
-        let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry(true)));
+        let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry()));
         let Arrival { setup, save, tuning } = arrive(options, &registry, began, Arc::default());
         let mut adaptive = match tuning {
             Some((tuning, made)) => Self::with(tuning, made),
@@ -54,63 +55,51 @@ impl Adaptive {
 /// Starts with the usual tuning and a thread that brings the predicted one.
 fn in_background(options: &StartOptions, began: Instant) -> Result<Adaptive, Error> {
     // Without GPUs: loading their drivers takes tens of milliseconds.
-    let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry(false)));
+    let registry = options.registry.clone().unwrap_or_else(|| Arc::new(Registry::new()));
     let mut adaptive = Adaptive::new(Tuning::usual(&registry), &registry)?;
     let stop = Arc::<AtomicBool>::default();
     let (options, told) = (options.clone(), Arc::clone(&stop));
     let run = move || {
-        let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry(true)));
+        let registry = options.registry.clone().unwrap_or_else(|| Arc::new(usual_registry()));
         arrive(&options, &registry, began, told)
     };
-    adaptive.set_start(match std::thread::Builder::new().name("sapwise-setup".to_owned()).spawn(run) {
-        Ok(thread) => Start {
-            setup: Setup { origin: Origin::Awaited, ..Setup::default() },
-            background: Some(Background { thread: Some(thread), stop }),
-            ..Start::default()
-        },
-        Err(e) => {
-            let remarks = vec![format!("no background thread can be started ({e}): the usual tuning stays")];
-            Start { setup: Setup { origin: Origin::Usual, remarks, ..Setup::default() }, ..Start::default() }
-        }
-    });
+    let thread = std::thread::Builder::new().name("sapwise-setup".to_owned()).spawn(run);
+    let (origin, remarks) = match &thread {
+        Ok(_) => (Origin::Awaited, Vec::new()),
+        Err(e) => (Origin::Usual, vec![format!("no background thread can be started ({e}): the usual tuning stays")]),
+    };
+    let background = thread.ok().map(|thread| Background { thread: Some(thread), stop });
+    adaptive.set_start(Start { setup: Setup { origin, remarks, ..Setup::default() }, save: None, background });
     Ok(adaptive)
 }
 
 /// The algorithms of a program that names none.
-fn usual_registry(with_gpus: bool) -> Registry {
+fn usual_registry() -> Registry {
     #[cfg_attr(not(feature = "measure-gpu"), expect(unused_mut, reason = "there is nothing to add"))]
     let mut registry = Registry::new();
     #[cfg(feature = "measure-gpu")]
-    if with_gpus {
-        registry.add_gpus(&crate::gpu::Gpus::find().choose(|gpu| gpu.kind != crate::GpuKind::Software));
-    }
-    #[cfg(not(feature = "measure-gpu"))]
-    let _ = with_gpus;
+    registry.add_gpus(&crate::gpu::Gpus::find().choose(|gpu| gpu.kind != crate::GpuKind::Software));
     registry
 }
 
 /// Finds the tuning of this machine and makes its algorithms.
 fn arrive(options: &StartOptions, registry: &Registry, began: Instant, stop: Arc<AtomicBool>) -> Arrival {
-    let mut remarks = Vec::new();
-    let found = find(options, registry, &stop, &mut remarks).filter(|_| !stop.load(Ordering::Relaxed));
-    let made = found.and_then(|found| {
+    let setup = Setup { origin: Origin::Usual, ..Setup::default() };
+    let mut arrival = Arrival { setup, save: None, tuning: None };
+    if let Some(found) = find(options, registry, &stop, &mut arrival.setup.remarks) {
         let mut made = Instances::of(&found.tuning, registry);
-        match made.failure() {
-            None => Some((found, made)),
-            Some(e) => {
-                remarks.push(format!("no algorithm of the predicted tuning can be made: {e:#}"));
-                None
-            }
+        if let Some(e) = made.failure() {
+            arrival.setup.remarks.push(format!("no algorithm of the predicted tuning can be made: {e:#}"));
+        } else {
+            let Found { tuning, origin, measured, file } = found;
+            arrival.setup.origin = origin;
+            arrival.setup.file = file.as_ref().map(|file| file.path().to_owned());
+            arrival.save = file.map(|file| Box::new(move |learned: &Tuning| file.write(learned, measured)) as _);
+            arrival.tuning = Some((tuning, made));
         }
-    });
-    let mut setup = Setup { origin: Origin::Usual, remarks, seconds: began.elapsed().as_secs_f64(), file: None };
-    let Some((Found { tuning, origin, measured, file }, made)) = made else {
-        return Arrival { setup, save: None, tuning: None };
-    };
-    setup.origin = origin;
-    setup.file = file.as_ref().map(|file| file.path().to_owned());
-    let save = file.map(|file| Box::new(move |learned: &Tuning| file.write(learned, measured)) as _);
-    Arrival { setup, save, tuning: Some((tuning, made)) }
+    }
+    arrival.setup.seconds = began.elapsed().as_secs_f64();
+    arrival
 }
 
 /// A tuning of this machine.
@@ -130,8 +119,7 @@ fn find(
     remarks: &mut Vec<String>,
 ) -> Option<Found> {
     let model = Model::built_in().map_err(|e| remarks.push(format!("the built-in model can't be read: {e}"))).ok()?;
-    let file = options.cache.as_ref().map(|folder| CacheFile::new(folder, registry, &model)).transpose();
-    let file = file.map_err(|e| remarks.push(format!("the built-in model can't be written: {e}"))).ok()?;
+    let file = options.cache.as_ref().map(|folder| CacheFile::new(folder, registry));
     let kept = file.as_ref().map_or(Ok(None), CacheFile::read).unwrap_or_else(|why| {
         remarks.push(why);
         None
@@ -217,7 +205,7 @@ mod tests {
 
     #[test]
     fn no_thread_is_pinned_unless_asked() {
-        assert_eq!(usual_registry(false).helpers(), "free");
+        assert_eq!(usual_registry().helpers(), "free");
     }
 
     #[test]

@@ -44,7 +44,8 @@ pub enum Error {
         /// How many were asked for.
         elements: usize,
     },
-    /// The algorithm is known but can't run here. [`Adaptive`](crate::Adaptive) then runs another one in the same frame.
+    /// The algorithm is known but can't run here. [`Adaptive`](crate::Adaptive) then runs another one in the same
+    /// frame.
     Unavailable {
         /// The algorithm that was asked for.
         algorithm: AlgorithmId,
@@ -138,7 +139,10 @@ impl fmt::Display for Unavailable {
         match self {
             Self::NotParallel => f.write_str("built without the feature `parallel`"),
             Self::PoolTooSmall { pool } => {
-                write!(f, "needs more than the {pool} threads of the given pool and the calling one; give a larger pool")
+                write!(
+                    f,
+                    "needs more than the {pool} threads of the given pool and the calling one; give a larger pool"
+                )
             }
             Self::TooFewCores { threads, most } => {
                 write!(

@@ -1,8 +1,8 @@
 //! Reads and writes tunings, models and every other file of Sapwise as JSON text.
 //!
-//! The first key of a file names its schema: `tuning/2`, or `tuning/2.3` for a newer minor version, which only added keys.
-//! Keys that this version does not know are skipped and listed in a file of a newer minor version, and are an error in any
-//! other file. A file of another major version is refused.
+//! The first key of a file names its schema: `tuning/2`, or `tuning/2.3` for a newer minor version, which only added
+//! keys. Keys that this version does not know are skipped and listed in a file of a newer minor version, and are an
+//! error in any other file. A file of another major version is refused.
 
 mod error;
 mod format;
@@ -28,13 +28,16 @@ pub fn model(text: &str) -> Result<Model, Error> {
     Format::MODEL.read::<Model>(text)?.checked(Model::defect).map(|read| read.value)
 }
 
+/// The text of the built-in model.
+pub(crate) const BUILT_IN: &str = include_str!("../models/default.json");
+
 impl Model {
     /// The model that comes with this library: `models/default.json`, whose card is `models/README.md`.
     ///
     /// # Errors
     /// None: a test reads the file.
     pub fn built_in() -> Result<Self, Error> {
-        model(include_str!("../models/default.json"))
+        model(BUILT_IN)
     }
 }
 

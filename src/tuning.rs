@@ -17,9 +17,9 @@ pub use belief::{Observed, Slope};
 pub use crossover::Crossover;
 pub use error::TuningError;
 
-/// [`Tuning::usual`] runs `k` threads from this times `k`² objects. A frame of `n` objects on `k` threads takes
-/// `a n / k + b k`, where `b` wakes one thread and waits for it. So `k` threads beat half as many from `n = (b / 2a) k²` on. On
-/// the machines of the first reports two threads of `pair-cache` save a fifth from 10 000 objects on.
+/// [`Tuning::usual`] runs `k` threads from this times `k`² objects. A frame of `n` objects on `k` threads takes `a n
+/// / k + b k`, where `b` wakes one thread and waits for it. So `k` threads beat half as many from `n = (b / 2a) k²`
+/// on. On the machines of the first reports two threads of `pair-cache` save a fifth from 10 000 objects on.
 const OBJECTS_OF_A_THREAD_SQUARED: u32 = 2500;
 
 /// The most threads of [`Tuning::usual`]. Sixteen begin at 640 000 objects, where memory bandwidth bounds a frame.
@@ -48,8 +48,8 @@ pub struct Tuning {
     pub warnings: Vec<String>,
     /// Scenario of `steps` and `crossovers`.
     pub scenario: String,
-    /// The cheapest algorithm over the number of objects in that scenario, ascending: each holds until the next begins. Empty
-    /// only if there are costs and no loads were given.
+    /// The cheapest algorithm over the number of objects in that scenario, ascending: each holds until the next
+    /// begins. Empty only if there are costs and no loads were given.
     pub steps: Vec<Step>,
     /// Where one step gives way to the next, in the order of `steps`.
     pub crossovers: Vec<Crossover>,
@@ -171,8 +171,9 @@ impl Tuning {
 
     /// A tuning for an unknown machine: thresholds in the number of objects.
     ///
-    /// They are the rounded crossovers of `uniform` on the machines of the first reports, which have two cores. More than two
-    /// threads are extrapolated, with more work for each thread. Another machine has other crossovers: predict or measure them.
+    /// They are the rounded crossovers of `uniform` on the machines of the first reports, which have two cores. More
+    /// than two threads are extrapolated, with more work for each thread. Another machine has other crossovers:
+    /// predict or measure them.
     #[must_use]
     pub fn usual(registry: &Registry) -> Self {
         let step = |from_objects, method, threads| Step { from_objects, algorithm: AlgorithmId::cpu(method, threads) };
@@ -187,9 +188,10 @@ impl Tuning {
 
     /// A tuning of cost curves, with `steps` and `crossovers` along `loads`, which ascend by objects.
     ///
-    /// Loads between these are interpolated, so a handful a decade is enough. A field narrower than 3 % in objects may be
-    /// missed, and an algorithm that is cheaper by less than 2 % has none. The interval of a crossover holds the loads at which
-    /// the logarithms of the two costs differ by less than [`NORMAL_90`](crate::stats::NORMAL_90) standard deviations.
+    /// Loads between these are interpolated, so a handful a decade is enough. A field narrower than 3 % in objects
+    /// may be missed, and an algorithm that is cheaper by less than 2 % has none. The interval of a crossover holds
+    /// the loads at which the logarithms of the two costs differ by less than [`NORMAL_90`](crate::stats::NORMAL_90)
+    /// standard deviations.
     #[must_use]
     pub fn from_costs(source: Source, scenario: &str, costs: Vec<AlgorithmCost>, loads: &[Load]) -> Self {
         let spreads: Vec<f64> = costs.iter().map(|c| c.spread_ln).collect();
@@ -201,8 +203,9 @@ impl Tuning {
         tuning
     }
 
-    /// As [`Tuning::from_costs`], with intervals from `spread`: for two positions in `costs` and a load, it returns the standard
-    /// deviation of the logarithm of the ratio of the two costs. Describe it in [`Tuning::interval_basis`].
+    /// As [`Tuning::from_costs`], with intervals from `spread`: for two positions in `costs` and a load, it returns
+    /// the standard deviation of the logarithm of the ratio of the two costs. Describe it in
+    /// [`Tuning::interval_basis`].
     #[must_use]
     pub fn from_costs_with(
         source: Source,
@@ -246,8 +249,8 @@ impl Tuning {
         self.costs.iter().map(|c| &c.algorithm).collect()
     }
 
-    /// The two cheapest algorithms under `load`. `usable` gets a position in [`Tuning::costs`] and says whether it may be
-    /// chosen. `None` without cost curves, or when none is usable.
+    /// The two cheapest algorithms under `load`. `usable` gets a position in [`Tuning::costs`] and says whether it
+    /// may be chosen. `None` without cost curves, or when none is usable.
     #[must_use]
     pub fn rank(&self, load: &Load, usable: impl Fn(usize) -> bool) -> Option<Ranking> {
         let frame = Frame::new(load);

@@ -1,4 +1,5 @@
-//! Starts on this machine: from nothing, from the cache, in the foreground and in the background, with frames throughout.
+//! Starts on this machine: from nothing, from the cache, in the foreground and in the background, with frames
+//! throughout.
 
 mod common;
 
@@ -13,8 +14,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Measures as briefly as possible, because no test looks at the values, and on one core, because other tests may spoil the
-/// values of several cores beyond belief.
+/// Measures as briefly as possible, because no test looks at the values, and on one core, because other tests may
+/// spoil the values of several cores beyond belief.
 fn options(folder: &Path) -> StartOptions {
     StartOptions::new()
         .background(false)
@@ -300,7 +301,8 @@ fn a_program_brings_its_pool_and_its_gpu() {
     frames_until_it_came(&mut first);
     assert_eq!(origin(&first), Origin::Probed);
     frame(&mut first, &boxes(1000));
-    // Under the load of other tests a sample may be an impossible value; then a remark says that the next start measures again.
+    // Under the load of other tests a sample may be an impossible value; then a remark says that the next start
+    // measures again.
     let known: Vec<String> = first.tuning().algorithms().iter().map(ToString::to_string).collect();
     let predicted = ["brute@gpu0", "sap@gpu0", "grid-sap@gpu0"].iter().all(|id| known.iter().any(|k| k == id));
     let told = first.setup().remarks.iter().any(|r| r.contains("gpu0") && r.contains("measures again"));

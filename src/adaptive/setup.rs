@@ -19,7 +19,7 @@ pub struct Setup {
     pub remarks: Vec<String>,
     /// Seconds from the call of the constructor until the algorithms of the tuning were ready.
     pub seconds: f64,
-    /// The file that holds the tuning of this machine, whether it could be written or not; `None` without a cache.
+    /// The cache file of the tuning, whether it could be written or not; `None` if it is not kept.
     pub file: Option<PathBuf>,
 }
 

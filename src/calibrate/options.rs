@@ -36,17 +36,18 @@ impl StartOptions {
         }
     }
 
-    /// Whether to read, measure and predict on a thread of its own, so that the constructor returns at once. [default: yes]
+    /// Whether to read, measure and predict on a thread of its own, so that the constructor returns at once.
+    /// [default: yes]
     ///
-    /// Turn it off while a loading screen is shown: other threads that work during the measurement make the machine look
-    /// slower.
+    /// Turn it off while a loading screen is shown: other threads that work during the measurement make the machine
+    /// look slower.
     #[must_use]
     pub fn background(self, background: bool) -> Self {
         Self { background, ..self }
     }
 
-    /// The folder in which to keep the tuning; `None` keeps nothing. [default: `sapwise` in the user's cache folder, that is
-    /// in `$XDG_CACHE_HOME` or `~/.cache`, `~/Library/Caches`, or `%LOCALAPPDATA%`]
+    /// The folder in which to keep the tuning; `None` keeps nothing. [default: `sapwise` in the user's cache folder,
+    /// that is in `$XDG_CACHE_HOME` or `~/.cache`, `~/Library/Caches`, or `%LOCALAPPDATA%`]
     #[must_use]
     pub fn cache(self, folder: Option<PathBuf>) -> Self {
         Self { cache: folder, ..self }
@@ -58,8 +59,8 @@ impl StartOptions {
         Self { max_age, ..self }
     }
 
-    /// The longest that the CPU may be measured, and each GPU once more; one sample more or less. `None` measures nothing: a
-    /// kept tuning of any age is used, else [`Tuning::usual`](crate::Tuning::usual). [default: 2 s]
+    /// The longest that the CPU may be measured, and each GPU once more; one sample more or less. `None` measures
+    /// nothing: a kept tuning of any age is used, else [`Tuning::usual`](crate::Tuning::usual). [default: 2 s]
     #[must_use]
     pub fn measure(self, limit: Option<Duration>) -> Self {
         Self { measure: limit, ..self }

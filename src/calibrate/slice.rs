@@ -5,8 +5,8 @@ use crate::load::Load;
 /// The scenario of these loads.
 pub(super) const SCENARIO: &str = "uniform";
 
-/// Loads of the second frame of `uniform`, seed 1, with the expected number of pairs: objects, candidates on the sweep axis,
-/// candidates in the strips, pairs, and motion.
+/// Loads of the second frame of `uniform`, seed 1, with the expected number of pairs: objects, candidates on the
+/// sweep axis, candidates in the strips, pairs, and motion.
 ///
 /// Stored, because a program that starts has no time to make scenes of a hundred thousand boxes.
 const LOADS: [(u32, f64, f64, f64, f64); 17] = [

@@ -21,7 +21,8 @@ pub enum GpuErrorKind {
     NotFound,
     /// It was lost, did not answer in time, or failed unexpectedly. It can't be used any more.
     Lost,
-    /// It accepts work and executes nothing: a driver without hardware, or hardware that hangs. It can't be used any more.
+    /// It accepts work and executes nothing: a driver without hardware, or hardware that hangs. It can't be used any
+    /// more.
     Inert,
     /// Its driver refuses memory, a kernel or a binding.
     Refused,

@@ -131,8 +131,8 @@ impl Format {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`Error::OtherSchema`] for a file of another kind or major version, [`Error::UnknownKey`] for a key that the schema
-    /// does not have, [`Error::Data`] for everything else.
+    /// [`Error::OtherSchema`] for a file of another kind or major version, [`Error::UnknownKey`] for a key that the
+    /// schema does not have, [`Error::Data`] for everything else.
     pub fn read<T: DeserializeOwned>(&self, text: &str) -> Result<Read<T>, Error> {
         let schema = Schema::of(text)?;
         if (&*schema.name, schema.major) != (self.name, self.major) {

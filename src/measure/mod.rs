@@ -131,7 +131,8 @@ impl Options {
 
     /// The same with an equal share of the time that is left, where there is a limit, for each of `parts` parts.
     fn share(&self, began: Instant, parts: usize) -> Self {
-        let left = |limit: Duration| limit.saturating_sub(began.elapsed()) / u32::try_from(parts).unwrap_or(u32::MAX).max(1);
+        let left =
+            |limit: Duration| limit.saturating_sub(began.elapsed()) / u32::try_from(parts).unwrap_or(u32::MAX).max(1);
         Self { limit: self.limit.map(left), ..self.clone() }
     }
 

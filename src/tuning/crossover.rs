@@ -14,8 +14,8 @@ pub struct Crossover {
     pub above: AlgorithmId,
     /// Number of objects at which both cost the same.
     pub objects: f64,
-    /// Lower end of the interval, no less than the fewest objects of the loads. `None`, like `high`, without an interval:
-    /// [`Tuning::interval_basis`](crate::Tuning::interval_basis) says why.
+    /// Lower end of the interval, no less than the fewest objects of the loads. `None`, like `high`, without an
+    /// interval: [`Tuning::interval_basis`](crate::Tuning::interval_basis) says why.
     pub low: Option<f64>,
     /// Upper end of the interval, no more than the most objects of the loads.
     pub high: Option<f64>,

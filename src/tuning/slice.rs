@@ -7,15 +7,15 @@ use crate::cost::Frame;
 /// Distance between two loads that are compared, as a logarithm of objects. A narrower field may be missed.
 const FINEST_LN: f64 = 0.03;
 
-/// An algorithm within this factor of the cheapest keeps its field: one thread and two that have nothing to divide run the
-/// same code, and chance decides which is cheaper.
+/// An algorithm within this factor of the cheapest keeps its field: one thread and two that have nothing to divide
+/// run the same code, and chance decides which is cheaper.
 const SAME: f64 = 1.02;
 
 /// Halvings of a stretch of [`FINEST_LN`]: they find a crossover to a ten-thousandth.
 const HALVINGS: u32 = 8;
 
-/// Loads, ascending by objects, and everything between them on logarithmic axes. A place is the number of a load and the share
-/// of the way to the next.
+/// Loads, ascending by objects, and everything between them on logarithmic axes. A place is the number of a load and
+/// the share of the way to the next.
 pub(super) struct Slice<'a> {
     loads: &'a [Load],
 }
@@ -48,9 +48,9 @@ impl<'a> Slice<'a> {
         below as f64 + (x - a) / (b - a)
     }
 
-    /// The number of objects at which a condition begins to hold, upwards or downwards from `objects`; the end of the slice if
-    /// it never does. Steps that double find a load at which it holds and may step over a short stretch; halving the last step
-    /// finds where it begins.
+    /// The number of objects at which a condition begins to hold, upwards or downwards from `objects`; the end of the
+    /// slice if it never does. Steps that double find a load at which it holds and may step over a short stretch;
+    /// halving the last step finds where it begins.
     pub(super) fn reach(&self, objects: f64, upwards: bool, holds: impl Fn(&Load) -> bool) -> f64 {
         let (start, end) = (self.place(objects), if upwards { self.last() } else { 0.0 });
         let (mut not_yet, mut at, mut step) = (start, start, 0.05);
@@ -70,8 +70,8 @@ impl<'a> Slice<'a> {
         f64::from(self.load(at).objects)
     }
 
-    /// The loads from which another algorithm is the cheapest, with its position in `costs`. The first is the begin of the
-    /// slice. An algorithm keeps its field while it is within [`SAME`] of the cheapest.
+    /// The loads from which another algorithm is the cheapest, with its position in `costs`. The first is the begin
+    /// of the slice. An algorithm keeps its field while it is within [`SAME`] of the cheapest.
     pub(super) fn steps(&self, costs: &[AlgorithmCost]) -> Vec<(Load, usize)> {
         let mut steps = Vec::new();
         let Some(first) = self.loads.first() else { return steps };

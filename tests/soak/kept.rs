@@ -41,7 +41,8 @@ impl Kept {
             life(&mut adaptive, &mut machine, 1, random, tally);
         }
         let setup = adaptive.setup();
-        // Of so brief a measurement on a busy machine some figure may be none that can be. What is predicted without it is not kept.
+        // Of so brief a measurement on a busy machine some figure may be none that can be. What is predicted without
+        // it is not kept.
         let left_out = setup.remarks.iter().any(|r| r.contains("it is left out"));
         let Some(file) = setup.file.clone() else {
             assert!(left_out, "nothing is kept, and nothing was told: {setup:?}");

@@ -1,7 +1,7 @@
 //! The tests that `tools/mpi.sh` runs over several numbers of ranks.
 //!
 //! ```sh
-//! mpirun -np 4 target/debug/examples/contract scenarios    # every scenario against one process, 200 frames each, and the edge cases
+//! mpirun -np 4 target/debug/examples/contract scenarios    # every scenario and the edge cases
 //! mpirun -np 4 target/debug/examples/contract hang         # endless frames, with a limit of two seconds on waiting
 //! ```
 

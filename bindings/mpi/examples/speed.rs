@@ -1,8 +1,8 @@
 //! Times frames over ranks: medians over frames, with the lower and the upper quartile.
 //!
 //! ```sh
-//! mpirun -np 1 target/release/examples/speed alone      # one rank and no MPI, interleaved
-//! mpirun -np 2 target/release/examples/speed unequal    # cuts by cost and equal cuts, interleaved; the last rank is slow
+//! mpirun -np 1 target/release/examples/speed alone      # one rank and no MPI
+//! mpirun -np 2 target/release/examples/speed unequal    # cuts by cost and equal cuts; the last rank is slow
 //! ```
 
 use mpi::Threading;
@@ -85,8 +85,8 @@ fn all(world: &impl Communicator, own: f64) -> Vec<f64> {
     values
 }
 
-/// Ranks that search one after another, as if each had the machine for itself. On too few cores concurrent ranks would all be
-/// equally slow.
+/// Ranks that search one after another, as if each had the machine for itself. On too few cores concurrent ranks
+/// would all be equally slow.
 struct Turns {
     exchange: MpiExchange,
     world: SimpleCommunicator,
@@ -195,7 +195,7 @@ fn unequal(world: &impl Communicator) {
         let shares: Vec<f64> =
             times.last().map_or(Vec::new(), |(_, boxes)| boxes.iter().map(|b| b / boxes.iter().sum::<f64>()).collect());
         println!(
-            "{name}: slowest over the balanced ideal {median:.3} ({low:.3} to {high:.3}); shares of the boxes {shares:.3?}"
+            "{name}: slowest over balanced {median:.3} ({low:.3} to {high:.3}); shares of the boxes {shares:.3?}"
         );
     }
 }

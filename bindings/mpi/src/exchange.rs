@@ -10,8 +10,8 @@ use std::time::Duration;
 
 /// The ranks of an MPI communicator.
 ///
-/// Operations are immediate ones that are polled until a time limit. So a rank that no longer answers ends the job with a message,
-/// and nobody waits forever.
+/// Operations are immediate ones that are polled until a time limit. So a rank that no longer answers ends the job
+/// with a message, and nobody waits forever.
 pub struct MpiExchange {
     /// A duplicate, so that messages of the program are never taken for ours.
     communicator: SimpleCommunicator,
@@ -30,7 +30,8 @@ impl MpiExchange {
         Self { communicator: communicator.duplicate(), wait_limit: Self::WAIT_LIMIT, addends: Vec::new() }
     }
 
-    /// The same with another limit on waiting: the time from the begin of an operation on this rank until all ranks have joined.
+    /// The same with another limit on waiting: the time from the begin of an operation on this rank until all ranks
+    /// have joined.
     #[must_use]
     pub fn with_wait_limit(self, wait_limit: Duration) -> Self {
         Self { wait_limit, ..self }
@@ -87,8 +88,8 @@ impl Exchange for MpiExchange {
         self.check(send_counts);
         self.check(receive_counts);
         let own = self.rank();
-        // Messages only between ranks that have something for each other: most are not neighbours. `MPI_Ialltoallv` sends to all,
-        // and after empty parts the next operation of Open MPI 4.1.4 never ended.
+        // Messages only between ranks that have something for each other: most are not neighbours. `MPI_Ialltoallv`
+        // sends to all, and after empty parts the next operation of Open MPI 4.1.4 never ended.
         let (mut sends, mut receives, mut kept) = (Vec::new(), Vec::new(), (&send[..0], &mut [][..]));
         let (mut to_send, mut to_receive) = (send, receive);
         for (rank, (&sent, &received)) in send_counts.iter().zip(receive_counts).enumerate() {

@@ -1,7 +1,7 @@
 //! A broad phase over the ranks of an MPI program.
 //!
-//! [`Distributed`] is the broad phase of [`sapwise_ranks`] over a communicator of the crate [`mpi`]. Each rank passes its own boxes
-//! with 64-bit ids and gets their pairs: the same set that one process finds over all boxes.
+//! [`Distributed`] is the broad phase of [`sapwise_ranks`] over a communicator of the crate [`mpi`]. Each rank passes
+//! its own boxes with 64-bit ids and gets their pairs: the same set that one process finds over all boxes.
 //!
 //! ```no_run
 //! use mpi::Threading;
@@ -28,8 +28,8 @@
 //! # Failures
 //!
 //! - An error in the boxes of one rank is the same [`Error`] on all ranks, and the next frame runs.
-//! - MPI ends the job when a rank dies. When a rank no longer answers, another one reports on standard error what it waited for
-//!   and ends the job with `MPI_Abort`, after [a limit](MpiExchange::with_wait_limit).
+//! - MPI ends the job when a rank dies. When a rank no longer answers, another one reports on standard error what it
+//!   waited for and ends the job with `MPI_Abort`, after [a limit](MpiExchange::with_wait_limit).
 //! - Drop a [`Distributed`] before the `Universe`, because it owns a communicator.
 
 mod exchange;
@@ -38,7 +38,9 @@ mod wait;
 pub use exchange::MpiExchange;
 pub use sapwise_ranks::{Balance, Cuts, Error, Failure, FrameReport, RankPairs, Region};
 
-/// A broad phase over the ranks of a communicator: `Distributed::new(&communicator, &registry, tuning)` on all of its ranks.
+/// A broad phase over the ranks of a communicator: `Distributed::new(&communicator, &registry, tuning)` on all of its
+/// ranks.
 ///
-/// Each rank passes the registry and the tuning of its own machine. Machines may differ, and the cuts follow their speed.
+/// Each rank passes the registry and the tuning of its own machine. Machines may differ, and the cuts follow their
+/// speed.
 pub type Distributed = sapwise_ranks::Distributed<MpiExchange>;

@@ -9,9 +9,9 @@ const MOST_PATIENCE: f64 = 64.0;
 
 /// Decides from the times of all ranks when new cuts pay. Every rank decides the same.
 ///
-/// It adds up the time that the slowest rank takes beyond equally busy ranks. When the sum exceeds the price of cuts, space is
-/// cut again. This loses at most twice the best choice, as in the ski-rental problem (Karp, 1992). Cuts that did not help
-/// raise the price of the next ones.
+/// It adds up the time that the slowest rank takes beyond equally busy ranks. When the sum exceeds the price of cuts,
+/// space is cut again. This loses at most twice the best choice, as in the ski-rental problem (Karp, 1992). Cuts that
+/// did not help raise the price of the next ones.
 #[derive(Debug, Clone)]
 pub struct Balance {
     /// Time lost since the last cuts.

@@ -1,8 +1,8 @@
 //! Cuts space so that each rank has its share of the work: recursive coordinate bisection (Berger and Bokhari, 1987).
 //!
-//! Each plane is a weighted quantile of the centres of boxes. Ranks find it exactly, digit by digit, by adding up histograms over
-//! ordered floats. So no rank needs the boxes of another, and boxes far away or infinite widen no histogram. Each part gets a
-//! plane on every axis and keeps the one that the least work crosses.
+//! Each plane is a weighted quantile of the centres of boxes. Ranks find it exactly, digit by digit, by adding up
+//! histograms over ordered floats. So no rank needs the boxes of another, and boxes far away or infinite widen no
+//! histogram. Each part gets a plane on every axis and keeps the one that the least work crosses.
 
 use crate::cuts::{Cuts, Plane, centre, middle};
 use crate::sample::Sample;
@@ -39,9 +39,10 @@ struct Search {
 
 /// Cuts space by samples of the boxes and each rank's share of the work.
 ///
-/// `sum` replaces each value by its sum over all ranks, as [`Exchange::sum`](crate::Exchange::sum) does; with the samples of all
-/// ranks in one place it does nothing. All ranks pass the same `shares`, whose sum is 1, and get the same cuts. It takes a few
-/// passes over the samples for each doubling of ranks, and sums at most 6 KiB a rank in a pass.
+/// `sum` replaces each value by its sum over all ranks, as [`Exchange::sum`](crate::Exchange::sum) does; with the
+/// samples of all ranks in one place it does nothing. All ranks pass the same `shares`, whose sum is 1, and get the
+/// same cuts. It takes a few passes over the samples for each doubling of ranks, and sums at most 6 KiB a rank in a
+/// pass.
 #[must_use]
 pub fn bisect(samples: &mut [Sample], shares: &[f64], sum: &mut dyn FnMut(&mut [u64])) -> Cuts {
     let mut planes = vec![Plane { axis: 0, at: 0.0 }; shares.len().saturating_sub(1)];

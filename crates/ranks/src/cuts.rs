@@ -2,8 +2,8 @@
 
 use sapwise::Aabb;
 
-/// Space divided by planes into one region for each rank. A plane divides the ranks `first..end` in the middle: the first half
-/// is below it, the others are on and above it.
+/// Space divided by planes into one region for each rank. A plane divides the ranks `first..end` in the middle: the
+/// first half is below it, the others are on and above it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cuts {
     /// In pre-order: after a plane those below it, then those above.
@@ -18,7 +18,8 @@ pub(crate) struct Plane {
     pub(crate) at: f32,
 }
 
-/// The region of a rank: from `low`, inclusive, to `high`, exclusive. Without a plane a side is infinite and includes infinity.
+/// The region of a rank: from `low`, inclusive, to `high`, exclusive. Without a plane a side is infinite and includes
+/// infinity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Region {
     /// Lowest x, y and z.
@@ -45,8 +46,8 @@ impl Region {
         self.holds(b.min) && self.holds(b.max)
     }
 
-    /// Whether it reports the pair of two overlapping boxes: it contains the lower corner of their intersection. Exactly one
-    /// region does, and both boxes overlap it.
+    /// Whether it reports the pair of two overlapping boxes: it contains the lower corner of their intersection.
+    /// Exactly one region does, and both boxes overlap it.
     #[inline]
     #[must_use]
     pub fn finds(&self, a: &Aabb, b: &Aabb) -> bool {
@@ -107,7 +108,8 @@ impl Cuts {
     /// Calls `visit` with each rank whose region a box overlaps, ascending. A box with a NaN may overlap none.
     #[inline]
     pub fn each_rank_of(&self, b: &Aabb, mut visit: impl FnMut(usize)) {
-        // A path has at most as many planes as the number of ranks has bits, and each leaves at most one branch for later.
+        // A path has at most as many planes as the number of ranks has bits, and each leaves at most one branch for
+        // later.
         let mut later = [(0_usize, 0_usize, 0_usize); usize::BITS as usize];
         let mut waiting = 0;
         let (mut plane, mut first, mut end) = (0, 0, self.regions.len());

@@ -28,8 +28,9 @@ pub const TOLD_BYTES: u64 = 8 * (record::WORDS + ANSWER_WORDS) as u64;
 
 /// Finds the pairs of boxes that are spread over ranks.
 ///
-/// [`find_pairs`](Self::find_pairs) is collective: every rank calls it equally often. The owner of a box may change from frame to
-/// frame. A frame is cheap if each rank owns boxes near each other, because only boxes in another rank's region are sent.
+/// [`find_pairs`](Self::find_pairs) is collective: every rank calls it equally often. The owner of a box may change
+/// from frame to frame. A frame is cheap if each rank owns boxes near each other, because only boxes in another
+/// rank's region are sent.
 pub struct Distributed<E> {
     exchange: E,
     search: LocalSearch,
@@ -76,8 +77,9 @@ pub struct FrameReport {
 }
 
 impl<E: Exchange> Distributed<E> {
-    /// A broad phase over the ranks of `exchange`, with the registry and the tuning of each rank's own machine. With costs in the
-    /// tuning the cuts follow the speed of the machines from the first frame on, with [`Tuning::usual`] once frames were timed.
+    /// A broad phase over the ranks of `exchange`, with the registry and the tuning of each rank's own machine. With
+    /// costs in the tuning the cuts follow the speed of the machines from the first frame on, with [`Tuning::usual`]
+    /// once frames were timed.
     ///
     /// # Errors
     /// [`Error::Search`] on all ranks if no algorithm of the tuning of one rank can run there.
@@ -153,13 +155,14 @@ impl<E: Exchange> Distributed<E> {
         self.search.error.as_ref()
     }
 
-    /// Cuts space after every `frames` frames; `None`, the default, cuts when the times of the ranks say that it pays. All ranks
-    /// pass the same. For reproducible cuts: times differ between runs.
+    /// Cuts space after every `frames` frames; `None`, the default, cuts when the times of the ranks say that it
+    /// pays. All ranks pass the same. For reproducible cuts: times differ between runs.
     pub fn set_cut_every(&mut self, frames: Option<u64>) {
         self.cut_every = frames;
     }
 
-    /// Replaces the content of `pairs` with the overlapping or touching pairs of this rank's boxes and the boxes of all ranks.
+    /// Replaces the content of `pairs` with the overlapping or touching pairs of this rank's boxes and the boxes of
+    /// all ranks.
     ///
     /// `ids` has one id for each box, which names it in `pairs`. Two boxes with the same id are two boxes.
     ///
@@ -231,8 +234,8 @@ impl<E: Exchange> Distributed<E> {
             let objects = (f64::from(mean.objects) * factor).clamp(1.0, f64::from(u32::MAX));
             predict(&mean.rescaled(objects as u32, mean.pairs * factor))
         };
-        // Cost of this region over that of a mean region on this rank, so that its speed cancels. From boxes and pairs, which are
-        // exact: candidates are estimated from a few hundred boxes and would add noise.
+        // Cost of this region over that of a mean region on this rank, so that its speed cancels. From boxes and
+        // pairs, which are exact: candidates are estimated from a few hundred boxes and would add noise.
         let work = regional.map_or(1.0, |load| predict(&mean.rescaled(load.objects, load.pairs)) / predict(&mean));
         let own = FACTORS.map(time).into_iter().chain([work, pair_cost(&mean, &predict)]);
         let all = gather(&mut self.exchange, own, FACTORS.len() + 2);

@@ -2,8 +2,8 @@
 
 /// Carries words between ranks. Every rank calls the same operations in the same order.
 ///
-/// If another rank is gone, an implementation ends the job or panics with a message. No operation returns words that it did not
-/// receive, and none waits forever.
+/// If another rank is gone, an implementation ends the job or panics with a message. No operation returns words that
+/// it did not receive, and none waits forever.
 pub trait Exchange {
     /// This rank, from 0.
     fn rank(&self) -> usize;
@@ -11,8 +11,8 @@ pub trait Exchange {
     /// The number of ranks, at least 1.
     fn size(&self) -> usize;
 
-    /// Replaces each value by its wrapping sum over all ranks, which pass equally many. Sums of integers don't depend on their
-    /// order, so all ranks get the same bits.
+    /// Replaces each value by its wrapping sum over all ranks, which pass equally many. Sums of integers don't depend
+    /// on their order, so all ranks get the same bits.
     fn sum(&mut self, values: &mut [u64]);
 
     /// Sends the `k`-th of `size()` equal parts of `send` to rank `k`, and receives the part for this rank from each.

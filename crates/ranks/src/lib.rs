@@ -1,8 +1,8 @@
 //! A broad phase over boxes that are spread over ranks, without MPI.
 //!
-//! Each rank passes its own boxes with 64-bit ids and gets their pairs ([`Distributed::find_pairs`]): the same set that one
-//! process finds over all boxes. An [`Exchange`] carries words from rank to rank. The package `sapwise-mpi` has one over MPI;
-//! [`Threads`] is one within a process, for tests and for a first try:
+//! Each rank passes its own boxes with 64-bit ids and gets their pairs ([`Distributed::find_pairs`]): the same set
+//! that one process finds over all boxes. An [`Exchange`] carries words from rank to rank. The package `sapwise-mpi`
+//! has one over MPI; [`Threads`] is one within a process, for tests and for a first try:
 //!
 //! ```
 //! use sapwise::{Aabb, Registry, Tuning};
@@ -25,11 +25,11 @@
 //!
 //! # How
 //!
-//! - Space is cut into one region for each rank ([`Cuts`], recursive coordinate bisection after Berger and Bokhari, 1987). A box
-//!   is searched in every region that it overlaps. The region that contains the lower corner of the intersection of two boxes
-//!   reports their pair.
-//! - The cuts follow density and predicted cost: a rank's share is the work that it does in the time that all ranks take
-//!   ([`shares`]), by its [`Tuning`](sapwise::Tuning) and the times of its frames.
+//! - Space is cut into one region for each rank ([`Cuts`], recursive coordinate bisection after Berger and Bokhari,
+//!   1987). A box is searched in every region that it overlaps. The region that contains the lower corner of the
+//!   intersection of two boxes reports their pair.
+//! - The cuts follow density and predicted cost: a rank's share is the work that it does in the time that all ranks
+//!   take ([`shares`]), by its [`Tuning`](sapwise::Tuning) and the times of its frames.
 //! - The cuts are kept until the time lost to imbalance pays for new ones ([`Balance`]).
 //! - A frame exchanges counts, then the boxes that cross, then the pairs that go back to the owners of boxes.
 //! - An error on one rank is the same [`Error`] on all ranks, with its rank.

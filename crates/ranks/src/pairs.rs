@@ -5,8 +5,9 @@ use sapwise::PairOrder;
 
 /// The overlapping pairs of a rank's own boxes in one frame: the id of an own box, then that of the other.
 ///
-/// A pair of two own boxes is listed once, with the lower id first. A pair with a box of another rank is listed on the rank of the
-/// lower id (for equal ids on the lower rank), and with [mirroring](Self::set_mirrored) also on the other rank, own id first.
+/// A pair of two own boxes is listed once, with the lower id first. A pair with a box of another rank is listed on
+/// the rank of the lower id (for equal ids on the lower rank), and with [mirroring](Self::set_mirrored) also on the
+/// other rank, own id first.
 ///
 /// Reuse it from frame to frame: its memory grows to the largest frame.
 #[derive(Debug, Clone, Default)]
@@ -24,14 +25,15 @@ impl RankPairs {
         Self::default()
     }
 
-    /// An empty list with an order. [`PairOrder::Canonical`] is ascending by own id, then by the other id: the same list for any
-    /// cuts, as long as each rank owns the same boxes.
+    /// An empty list with an order. [`PairOrder::Canonical`] is ascending by own id, then by the other id: the same
+    /// list for any cuts, as long as each rank owns the same boxes.
     #[must_use]
     pub fn with_order(order: PairOrder) -> Self {
         Self { order, ..Self::default() }
     }
 
-    /// Sets whether this rank gets every pair of its boxes, also those that another rank lists. May differ between ranks.
+    /// Sets whether this rank gets every pair of its boxes, also those that another rank lists. May differ between
+    /// ranks.
     pub fn set_mirrored(&mut self, mirrored: bool) {
         self.mirrored = mirrored;
     }
@@ -42,8 +44,8 @@ impl RankPairs {
         self.mirrored
     }
 
-    /// Limits the stored pairs, 16 bytes each. More pairs on a rank are an error on all ranks. A limit on any rank costs one more
-    /// exchange a frame. Pairs that a rank finds for others are not counted.
+    /// Limits the stored pairs, 16 bytes each. More pairs on a rank are an error on all ranks. A limit on any rank
+    /// costs one more exchange a frame. Pairs that a rank finds for others are not counted.
     pub fn set_limit(&mut self, limit: Option<usize>) {
         self.limit = limit;
     }

@@ -18,7 +18,8 @@ impl Sample {
     /// The weight of one box of the usual cost.
     pub const UNIT: u64 = 1024;
 
-    /// The most samples of a rank. They give a share of the work to 0.8 %, and to 2.6 % for the worst of a thousand ranks.
+    /// The most samples of a rank. They give a share of the work to 0.8 %, and to 2.6 % for the worst of a thousand
+    /// ranks.
     pub const MOST: usize = 16_384;
 
     /// Takes up to `most` valid boxes of the usual cost: one from each of `most` equal parts of the list.
@@ -27,8 +28,8 @@ impl Sample {
         Self::with_pairs(boxes, most, |_| 0, 0.0)
     }
 
-    /// The same with boxes that cost `pair_cost` more for each pair. `pairs_of` returns the number of pairs of the box at a
-    /// position; each pair counts half for each of its boxes.
+    /// The same with boxes that cost `pair_cost` more for each pair. `pairs_of` returns the number of pairs of the
+    /// box at a position; each pair counts half for each of its boxes.
     #[must_use]
     pub fn with_pairs(boxes: &[Aabb], most: usize, pairs_of: impl Fn(usize) -> u32, pair_cost: f64) -> Vec<Self> {
         let count = boxes.len().min(most);

@@ -134,8 +134,8 @@ impl LocalSearch {
         self.adaptive.last_decision().map(|d| d.load)
     }
 
-    /// Predicts the time of loads: by the corrected tuning, scaled to the times of the last frames, which contain what a tuning
-    /// does not know, such as another program on the cores.
+    /// Predicts the time of loads: by the corrected tuning, scaled to the times of the last frames, which contain
+    /// what a tuning does not know, such as another program on the cores.
     pub(crate) fn predictor(&self) -> impl Fn(&Load) -> f64 + use<> {
         let tuning = self.adaptive.learned();
         let measured = self.times.medians().zip(self.load());
@@ -144,8 +144,8 @@ impl LocalSearch {
         move |load| correction * predicted_ns(&tuning, load)
     }
 
-    /// Samples of the last search whose centres are in the region, weighted by their pairs. `pair_cost` is the cost of a pair
-    /// over that of a box.
+    /// Samples of the last search whose centres are in the region, weighted by their pairs. `pair_cost` is the cost
+    /// of a pair over that of a box.
     pub(crate) fn samples(&self, region: &Region, pair_cost: f64) -> Vec<Sample> {
         let mut pairs = vec![0_u32; self.boxes.len()];
         for &(i, j) in &self.found {

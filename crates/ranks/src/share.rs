@@ -16,8 +16,8 @@ pub fn predicted_ns(tuning: &Tuning, load: &Load) -> f64 {
 
 /// Returns the share of each rank with which all are predicted to take the same time. The sum is 1.
 ///
-/// `times` holds the time of each rank for each of the [`FACTORS`] of the mean load; it interpolates between them. A rank with a
-/// time that is not a number above 0 counts as one of mean speed.
+/// `times` holds the time of each rank for each of the [`FACTORS`] of the mean load; it interpolates between them. A
+/// rank with a time that is not a number above 0 counts as one of mean speed.
 ///
 /// It uses only sums, products and comparisons, so that all ranks compute the same bits on any processor.
 #[must_use]
@@ -61,8 +61,9 @@ pub fn pair_cost(load: &Load, predict: impl Fn(&Load) -> f64) -> f64 {
     if cost.is_finite() && box_ns > 0.0 { cost.clamp(0.0, 16.0) } else { 0.0 }
 }
 
-/// Returns the cost of a box of each region over the mean box. `works` is the work of each region over that of a mean region,
-/// `owned` the weight of its samples in any unit. Boxes weigh more in a region with many pairs or with many boxes of others.
+/// Returns the cost of a box of each region over the mean box. `works` is the work of each region over that of a mean
+/// region, `owned` the weight of its samples in any unit. Boxes weigh more in a region with many pairs or with many
+/// boxes of others.
 #[must_use]
 pub fn costs(works: &[f64], owned: &[u64]) -> Vec<f64> {
     let mean = owned.iter().sum::<u64>() as f64 / owned.len().max(1) as f64;
