@@ -1,16 +1,16 @@
-//! The headline feature: the fastest broad phase of this machine, without a benchmark.
+//! The fastest broad phase of this machine, without a benchmark.
 //!
 //! ```sh
 //! cargo run --release -p sapwise --example this_machine --features this-machine
 //! ```
 //!
-//! The first start measures the hardware in seconds, predicts what each algorithm costs on it and keeps that in the user's cache folder;
-//! the second start reads it from there.
+//! The first start measures the hardware in two seconds, predicts what each algorithm costs and keeps that in the
+//! user's cache folder. The second start reads it from there.
 
 use sapwise::{Aabb, Adaptive, BroadPhase, Pairs, StartOptions};
 use std::error::Error;
 
-/// A cloud of cubes, each of which turns around a point of its own.
+/// Returns cubes, each of which circles around its own point.
 fn boxes(objects: usize, frame: usize) -> Vec<Aabb> {
     let edge = (objects as f32).cbrt().ceil();
     let cube = |k: usize| {
@@ -22,10 +22,10 @@ fn boxes(objects: usize, frame: usize) -> Vec<Aabb> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // In the background, which is the default, this would return at once, and frames would run with the usual tuning meanwhile.
+    // By default this returns at once, and frames run with the usual tuning until a background thread has measured.
     let mut broad_phase = Adaptive::for_this_machine(&StartOptions::new().background(false))?;
     let setup = broad_phase.setup();
-    println!("the tuning is {:?}, after {:.2} s, kept in {:?}", setup.origin, setup.seconds, setup.file);
+    println!("tuning: {:?} after {:.2} s, file {:?}", setup.origin, setup.seconds, setup.file);
     setup.remarks.iter().for_each(|remark| println!("remark: {remark}"));
     for step in &broad_phase.tuning().steps {
         println!("expected from {} objects up: {}", step.from_objects, step.algorithm);
@@ -36,8 +36,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             broad_phase.find_pairs(&boxes(objects, frame), &mut pairs)?;
         }
         if let Some(decision) = broad_phase.last_decision() {
-            let expected = decision.predicted_ns.map_or("nothing".to_owned(), |ns| format!("{:.1} us", ns / 1000.0));
-            let measured = decision.measured_ns.map_or("not timed".to_owned(), |ns| format!("{:.1} us", ns / 1000.0));
+            let expected = decision.predicted_ns.map_or("no time".to_owned(), |ns| format!("{:.1} µs", ns / 1000.0));
+            let measured = decision.measured_ns.map_or("not timed".to_owned(), |ns| format!("{:.1} µs", ns / 1000.0));
             let (algorithm, reason) = (decision.algorithm, decision.reason);
             println!(
                 "{objects} objects, {} pairs: {algorithm} ({reason:?}), expected {expected}, took {measured}",
@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             );
         }
     }
-    // What the frames have taught is there at the next start.
+    // The next start begins with what these frames have taught.
     broad_phase.save()?;
     Ok(())
 }

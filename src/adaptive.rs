@@ -20,8 +20,6 @@ mod warming;
 
 use crate::aabb::Aabb;
 use crate::algorithm::AlgorithmId;
-#[cfg(feature = "this-machine")]
-use crate::algorithm::BackendClass;
 use crate::broad_phase::{BroadPhase, FrameKind, FrameWork};
 use crate::clock;
 use crate::error::Error;
@@ -35,7 +33,7 @@ use std::fmt;
 pub use decision::{Decision, Reason};
 pub(crate) use instances::Instances;
 #[cfg(feature = "this-machine")]
-pub(crate) use setup::{Arrival, Awaited, Handover, Keeper, Start};
+pub(crate) use setup::{Arrival, Background, Start};
 #[cfg(feature = "this-machine")]
 pub use setup::{Origin, SaveError, Setup};
 
@@ -146,11 +144,11 @@ impl Adaptive {
         Ok(())
     }
 
-    /// Takes what was made in the background, once it is there.
+    /// Takes the tuning from the background thread once it is there.
     #[cfg(feature = "this-machine")]
     pub(crate) fn take_over(&mut self) {
         let arrived = self.start.arrived();
-        self.runner.set_awaits(self.start.awaited.is_some());
+        self.runner.set_awaits(self.start.background.is_some());
         if let Some((tuning, made)) = arrived {
             self.runner.replace(tuning, made);
         }
@@ -163,27 +161,20 @@ impl Adaptive {
         &self.start.setup
     }
 
-    /// Keeps what was learned in the cache, for the next start of a program on this machine: call it at the end of a session. `false`, and
-    /// nothing is kept, after a session so short that the tuning of this machine did not arrive, and where nothing could be predicted.
+    /// Writes what was learned to the cache, for the next start on this machine: call it at the end of a session. Returns `false`
+    /// and writes nothing if the tuning of this machine has not arrived yet or could not be predicted.
     ///
     /// # Errors
-    /// When there is no cache to keep it in, or it can't be written.
+    /// When there is no cache or its file can't be written.
     #[cfg(feature = "this-machine")]
     pub fn save(&self) -> Result<bool, SaveError> {
-        self.start.save(|| (self.learned(), self.over_predicted()))
-    }
-
-    /// How many times as long as predicted frames take on the CPU, as far as they told.
-    #[cfg(feature = "this-machine")]
-    fn over_predicted(&self) -> f64 {
-        let on_cpu = self.tuning().costs.iter().position(|c| c.algorithm.backend().class() == BackendClass::Cpu);
-        self.runner.policy.learned().zip(on_cpu).map_or(1.0, |(learner, k)| learner.class_ln(k).exp())
+        self.start.save(|| self.learned())
     }
 
     /// Begins with what a start on this machine found.
     #[cfg(feature = "this-machine")]
     pub(crate) fn set_start(&mut self, start: Start) {
-        self.runner.set_awaits(start.awaited.is_some());
+        self.runner.set_awaits(start.background.is_some());
         self.start = start;
     }
 

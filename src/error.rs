@@ -1,4 +1,4 @@
-//! What can go wrong while pairs are searched.
+//! Why a search finds no answer.
 
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -9,43 +9,43 @@ use std::fmt;
 #[cfg(feature = "gpu")]
 pub use gpu::{GpuError, GpuErrorKind};
 
-/// Why a broad phase returned no answer. The list of pairs is unspecified after an error and valid again after the next success.
+/// Why a broad phase returned no answer. The content of the pairs is unspecified after an error.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
-    /// A box that no algorithm can order.
+    /// A box that can't be ordered.
     InvalidBox {
         /// Position of the first such box in the input.
         index: usize,
         /// What is wrong with it.
         defect: BoxDefect,
     },
-    /// More boxes than pair members of 32 bits can name.
+    /// More boxes than the 32-bit members of a pair can name.
     TooManyObjects {
         /// Boxes in the input.
         objects: usize,
     },
-    /// More wanted pairs than [`Pairs::set_limit`](crate::Pairs::set_limit) allows. The search ended there, so how many there are is not
-    /// known.
+    /// More wanted pairs than [`Pairs::set_limit`](crate::Pairs::set_limit) allows. The search ended there.
     TooManyPairs {
         /// The limit that was set.
         limit: usize,
     },
-    /// A pair has a member that has no id in [`Changes::update`](crate::Changes::update).
+    /// A member of a pair without an id in [`Changes::update`](crate::Changes::update).
     MissingId {
         /// The position of the member in the input.
         position: u32,
-        /// Ids that were given.
+        /// Number of ids.
         ids: usize,
     },
     /// An allocation was refused.
     OutOfMemory {
-        /// What the memory was for.
+        /// What the elements are.
         what: &'static str,
-        /// Elements that were asked for.
+        /// How many were asked for.
         elements: usize,
     },
-    /// The algorithm is known but can't run here. [`Adaptive`](crate::Adaptive) then runs another one in the same frame.
+    /// The algorithm is known but can't run here. [`Adaptive`](crate::Adaptive) then runs another one in the same
+    /// frame.
     Unavailable {
         /// The algorithm that was asked for.
         algorithm: AlgorithmId,
@@ -56,10 +56,10 @@ pub enum Error {
     UnknownAlgorithm {
         /// The text that was given.
         text: String,
-        /// What would have been accepted.
+        /// What is accepted.
         hint: String,
     },
-    /// The tuning names no algorithm at all.
+    /// The tuning names no algorithm.
     NoAlgorithm,
 }
 
@@ -69,7 +69,7 @@ pub enum Error {
 pub enum BoxDefect {
     /// A bound is not a number.
     NotANumber,
-    /// A minimum lies above its maximum.
+    /// A minimum is above its maximum.
     Inverted,
 }
 
@@ -77,33 +77,34 @@ pub enum BoxDefect {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unavailable {
-    /// It needs threads, and the library was built without the feature `parallel`.
+    /// It needs threads and the feature `parallel`.
     NotParallel,
-    /// It needs more threads than the program's pool and the calling one are.
+    /// It needs more threads than the program's pool has, plus the calling one.
     PoolTooSmall {
         /// Threads of the pool.
         pool: u32,
     },
-    /// It needs more threads than this machine has cores, or than [`Registry::with_cores`](crate::Registry::with_cores) says.
+    /// It needs more threads than this machine has cores, or than
+    /// [`Registry::with_cores`](crate::Registry::with_cores) allows.
     TooFewCores {
         /// Threads that it needs.
         threads: u32,
-        /// The most that an algorithm may have.
+        /// The most that are allowed.
         most: u32,
     },
     /// The system refuses the threads.
     ThreadsRefused {
         /// Threads that were asked for.
         threads: u32,
-        /// What the system says.
+        /// The error of the system.
         message: String,
     },
-    /// It runs on a fixed number of threads, which is not the one that is wanted.
+    /// It runs on a fixed number of threads.
     FixedThreads {
-        /// Threads that were wanted.
+        /// Another number that was wanted.
         wanted: u32,
     },
-    /// Its cost is of another revision than this build has.
+    /// The tuning has the cost of another revision.
     OtherRevision {
         /// The revision of the cost.
         cost: u32,
@@ -117,7 +118,7 @@ pub enum Unavailable {
     /// Its GPU can't run it.
     #[cfg(feature = "gpu")]
     Gpu(GpuError),
-    /// Anything else, in a sentence: for algorithms of the user's.
+    /// Another reason, in a sentence: for your own algorithms.
     Other(String),
 }
 
@@ -140,23 +141,22 @@ impl fmt::Display for Unavailable {
             Self::PoolTooSmall { pool } => {
                 write!(
                     f,
-                    "the pool that the program gave has {pool} threads, with the calling one {}",
-                    pool.saturating_add(1)
+                    "needs more than the {pool} threads of the given pool and the calling one; give a larger pool"
                 )
             }
             Self::TooFewCores { threads, most } => {
                 write!(
                     f,
-                    "it has {threads} threads, and {most} threads are the most here; predict again on this machine, \
-                     or ask for more with `Registry::with_cores`"
+                    "needs {threads} threads, but this machine has {most}; run `sapwise predict` again or raise \
+                     `Registry::with_cores`"
                 )
             }
             Self::ThreadsRefused { threads, message } => write!(f, "{threads} threads can't be started: {message}"),
-            Self::FixedThreads { wanted } => write!(f, "it can't run on {wanted} threads"),
+            Self::FixedThreads { wanted } => write!(f, "can't run on {wanted} threads"),
             Self::OtherRevision { cost, build } => {
-                write!(f, "its cost is of revision {cost}, this build has {build}; predict again")
+                write!(f, "the tuning knows revision {cost}, this build has {build}; run `sapwise predict` again")
             }
-            Self::FailedBefore => f.write_str("it failed before"),
+            Self::FailedBefore => f.write_str("failed in an earlier frame"),
             Self::AllFailed => f.write_str("every algorithm of the tuning has failed"),
             #[cfg(feature = "gpu")]
             Self::Gpu(error) => error.fmt(f),
@@ -171,9 +171,9 @@ impl fmt::Display for Error {
             Error::InvalidBox { index, defect } => {
                 let what = match defect {
                     BoxDefect::NotANumber => "has a bound that is not a number (NaN)",
-                    BoxDefect::Inverted => "is inverted: a minimum lies above its maximum",
+                    BoxDefect::Inverted => "is inverted: a minimum is above its maximum",
                 };
-                write!(f, "box {index} {what}; correct or leave out this box")
+                write!(f, "box {index} {what}; correct it or leave it out")
             }
             Error::TooManyObjects { objects } => {
                 write!(
@@ -183,23 +183,23 @@ impl fmt::Display for Error {
                 )
             }
             Error::TooManyPairs { limit } => {
-                write!(f, "more pairs overlap than the limit of {limit}; raise the limit or thin out the scene")
+                write!(f, "more pairs than the limit of {limit}; raise the limit or thin out the scene")
             }
             Error::MissingId { position, ids } => {
-                write!(f, "box {position} is in a pair and has no id: {ids} were given; give one for each box")
+                write!(f, "box {position} is in a pair, but there are {ids} ids; give one for each box")
             }
             Error::OutOfMemory { what, elements } => {
                 write!(f, "no memory for {elements} {what}; set a limit on the pairs or use fewer boxes")
             }
             Error::Unavailable { algorithm, reason } => {
                 write!(f, "{algorithm} can't run here: ")?;
-                // With the same flags: `{:#}` writes the words of a driver too.
+                // With the same flags: `{:#}` adds the words of a driver.
                 reason.fmt(f)
             }
             Error::UnknownAlgorithm { text, hint } => {
                 write!(f, "no algorithm is called {text:?}; {hint}")
             }
-            Error::NoAlgorithm => f.write_str("this tuning names no algorithm; make one with `sapwise predict`"),
+            Error::NoAlgorithm => f.write_str("the tuning names no algorithm; make one with `sapwise predict`"),
         }
     }
 }
@@ -208,7 +208,7 @@ impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             #[cfg(feature = "gpu")]
-            // Its text is part of this one, its source is not.
+            // This text contains that of the error, but not that of its source.
             Self::Unavailable { reason: Unavailable::Gpu(error), .. } => error.source(),
             _ => None,
         }

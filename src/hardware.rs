@@ -3,8 +3,6 @@
 mod error;
 mod figure;
 pub mod gpu;
-#[cfg(feature = "this-machine")]
-mod measurement;
 mod parameter;
 mod plausible;
 mod statistic;
@@ -13,14 +11,14 @@ mod unit;
 pub use error::HardwareError;
 pub use figure::{How, Parameter};
 pub use gpu::{GpuGroup, GpuHardware, GpuIdentity, GpuKind};
-#[cfg(feature = "this-machine")]
-pub use measurement::Measurement;
 pub use parameter::{Bounds, GpuParameterId, ParameterId, Quantity};
 pub use statistic::Statistic;
 pub use unit::with_unit;
 
 /// What is known about a machine: its identity and a list of parameters, each with its origin.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Hardware {
     /// Which machine it is.
@@ -28,13 +26,17 @@ pub struct Hardware {
     /// The parameters; a name appears at most once. A file may hold names that this version does not know; they are kept.
     pub parameters: Vec<Parameter>,
     /// Its GPUs by number. Empty if there are none or none was measured.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub gpus: Vec<GpuHardware>,
     /// GPUs that work together.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub gpu_groups: Vec<GpuGroup>,
 }
 
 /// The identity of a machine. Names no host, no user and no single piece of hardware.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Machine {
     /// Hash of CPU vendor, family, model, stepping and last-level cache, as 16 hex digits.
@@ -63,8 +65,8 @@ impl Machine {
         Self { physical_id: physical_id.into(), ..Self::default() }
     }
 
-    /// Returns the name of the tuning file for machines of this kind, for [`StartOptions::tunings`](crate::StartOptions::tunings)
-    /// and `sapwise predict --report FOLDER`: physical id, SIMD level, usable cores and the device numbers of its GPUs, as in
+    /// Returns the name of the tuning file for machines of this kind,
+    /// which `sapwise predict --report FOLDER` writes: physical id, SIMD level, usable cores and the device numbers of its GPUs, as in
     /// `478e43ba2e7824ab-avx512-16-10de2335.json`. Software adapters are left out.
     #[must_use]
     pub fn tuning_file(&self, cores: u32, gpus: &[GpuIdentity]) -> String {

@@ -1,30 +1,18 @@
-//! Tuning and models as JSON text, and what reads and writes every file of Sapwise.
+//! Reads and writes tunings, models and every other file of Sapwise as JSON text.
 //!
-//! The first key of each file names its schema: `tuning/2`, or `tuning/2.3` where only keys were added since. A file of a newer minor version
-//! is read, and what this version does not know in it is skipped and told; in any other file an unknown key is an error. An older
-//! schema is refused with the command that converts its files.
+//! The first key of a file names its schema: `tuning/2`, or `tuning/2.3` for a newer minor version, which only added
+//! keys. Keys that this version does not know are skipped and listed in a file of a newer minor version, and are an
+//! error in any other file. A file of another major version is refused.
 
 mod error;
 mod format;
 
 pub use error::Error;
-pub use format::{Format, Schema};
+pub use format::{Format, Read, Schema};
 
 use crate::{Model, Tuning};
 
-/// What was read from a file.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct Read<T> {
-    /// What it holds.
-    pub value: T,
-    /// The schema that it names.
-    pub schema: Schema,
-    /// Keys that this version does not know, each with its place, in a file of a newer minor version. Empty for all others.
-    pub skipped: Vec<String>,
-}
-
-/// Reads tuning and checks its figures.
+/// Reads a tuning and checks its values.
 ///
 /// # Errors
 /// As [`Format::read`].
@@ -32,53 +20,55 @@ pub fn tuning(text: &str) -> Result<Tuning, Error> {
     Format::TUNING.read(text).map(|read| read.value)
 }
 
-/// Reads what predicts of a model, and checks its figures.
+/// Reads the predicting part of a model and checks its values.
 ///
 /// # Errors
 /// As [`Format::read`].
 pub fn model(text: &str) -> Result<Model, Error> {
-    Format::MODEL.read(text).map(|read| read.value)
+    Format::MODEL.read::<Model>(text)?.checked(Model::defect).map(|read| read.value)
 }
+
+/// The text of the built-in model.
+pub(crate) const BUILT_IN: &str = include_str!("../models/default.json");
 
 impl Model {
     /// The model that comes with this library: `models/default.json`, whose card is `models/README.md`.
     ///
     /// # Errors
-    /// When the file that was built in is no sound model, which the tests rule out.
+    /// None: a test reads the file.
     pub fn built_in() -> Result<Self, Error> {
-        model(include_str!("../models/default.json"))
+        model(BUILT_IN)
     }
 }
 
-/// Writes tuning, one key a line.
+/// Writes a tuning, one key a line.
 ///
 /// # Errors
-/// When a figure can't be written.
+/// [`Error::Write`] when a value is not finite.
 pub fn write_tuning(tuning: &Tuning) -> Result<String, Error> {
     Format::TUNING.write(tuning)
 }
 
-/// Writes a model, one key a line, without what training says of itself.
+/// Writes the predicting part of a model, one key a line.
 ///
 /// # Errors
-/// When a figure can't be written.
+/// [`Error::Write`] when a value is not finite.
 pub fn write_model(model: &Model) -> Result<String, Error> {
     Format::MODEL.write(model)
 }
 
-/// Writes anything that is no file of a schema, one key a line.
+/// Writes a value without a schema, one key a line.
 ///
 /// # Errors
-/// When a figure can't be written.
+/// [`Error::Write`] when a value is not finite.
 pub fn write(value: &impl serde::Serialize) -> Result<String, Error> {
     Ok(serde_json::to_string_pretty(value).map_err(Error::Write)? + "\n")
 }
 
-/// File names and texts of the JSON Schemas of tuning and of the engine's part of models. The files in the
-/// cache have theirs in `cache_schema`.
+/// Returns file names and texts of the JSON Schemas of tunings and of the predicting part of models.
 ///
 /// # Errors
-/// When a schema can't be written.
+/// [`Error::Write`] when a schema can't be written.
 #[cfg(feature = "schema")]
 pub fn schemas() -> Result<Vec<(String, String)>, Error> {
     Ok(vec![Format::TUNING.json_schema::<Tuning>()?, Format::MODEL.json_schema::<Model>()?])

@@ -71,8 +71,6 @@ mod scene;
 mod splitmix;
 pub mod stats;
 pub mod tuning;
-#[cfg(feature = "model")]
-mod wire;
 
 pub use aabb::Aabb;
 pub use adaptive::{Adaptive, Decision, Reason};
@@ -80,13 +78,8 @@ pub use adaptive::{Adaptive, Decision, Reason};
 pub use adaptive::{Origin, SaveError, Setup};
 pub use algorithm::{AlgorithmId, Backend, BackendClass, ParseIdError};
 pub use broad_phase::{BroadPhase, FrameKind, FrameWork};
-#[cfg(feature = "schema")]
-pub use calibrate::cache_schema;
-#[cfg(all(fuzzing, feature = "this-machine"))]
-#[doc(hidden)]
-pub use calibrate::is_readable_cache;
 #[cfg(feature = "this-machine")]
-pub use calibrate::{Cache, StartOptions};
+pub use calibrate::StartOptions;
 pub use changes::Changes;
 pub use cost::{
     CostCurve, CostTerm, CurveError, Fallback, Helpers, MOST_UNIT_NS, Places, Product, Residual, Term, Work,
@@ -95,8 +88,6 @@ pub use cpu::{SimdLevel, SimdLevelError};
 pub use entry::Entry;
 pub use error::{BoxDefect, Error, Unavailable};
 pub use filter::{Filter, Membership};
-#[cfg(feature = "this-machine")]
-pub use hardware::Measurement;
 pub use hardware::{
     GpuGroup, GpuHardware, GpuIdentity, GpuKind, GpuParameterId, Hardware, HardwareError, How, Machine, Parameter,
     ParameterId,

@@ -26,11 +26,14 @@ pub const GPU_PREFIX: &str = "gpu/";
 /// The time of a frame on one thread, or on GPUs, is `sum of unit * scale(hardware, backend) * term(load)`, times `exp` of a
 /// [residual](crate::Residual) over the load. [Helpers](HelpersModel) turn it into the time on several threads.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Model {
     /// Name by which tuning refers to it.
     pub name: String,
     /// Whether a report behind it is simulated, so that its predictions are no evidence.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "std::ops::Not::not"))]
     pub simulated: bool,
     /// Lowest and highest value of each hardware parameter in training; a machine outside is extrapolated.
     pub ranges: Vec<Range>,
@@ -45,6 +48,8 @@ pub struct Model {
 
 /// Range of a hardware parameter in training.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct Range {
     /// Name of the parameter; that of a GPU after [`GPU_PREFIX`].
     pub parameter: String,
@@ -56,27 +61,35 @@ pub struct Range {
 
 /// The cost model of one method on one class of processor, for any number of threads or GPUs.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct MethodModel {
     /// The part of the algorithm's id before the `@`.
     pub method: String,
     /// Class of processor.
+    #[cfg_attr(feature = "model", serde(default))]
     pub backend: BackendClass,
     /// Revision of the algorithm that was timed.
     pub revision: u32,
     /// Most threads, or most GPUs together, that were timed; more are extrapolated.
     pub max_threads: u32,
     /// Kinds of the GPUs that were timed; others are extrapolated. Empty for the CPU.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub gpu_kinds: Vec<GpuKind>,
     /// The physical terms, on one thread or on GPUs; no unit is negative.
     pub terms: Vec<ModelTerm>,
     /// The method that it falls back to when that is cheaper, if it does.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
     pub fallback: Option<FallbackModel>,
     /// What the terms leave unexplained: a weight for each of [`Model::places`]. Empty if nothing.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub residual: Vec<f64>,
     /// Whether the residual depends on how far boxes move, as for incremental methods.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "std::ops::Not::not"))]
     pub residual_by_motion: bool,
     /// Effect of several threads; `None` for a method that runs on one thread only, or on GPUs.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Option::is_none"))]
     pub helpers: Option<HelpersModel>,
     /// Standard deviation of the remaining error, in natural logarithms.
     pub spread_ln: f64,
@@ -84,6 +97,8 @@ pub struct MethodModel {
 
 /// A method that another one falls back to.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct FallbackModel {
     /// Its name. It has no fallback itself.
     pub method: String,
@@ -93,6 +108,8 @@ pub struct FallbackModel {
 
 /// One physical term.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct ModelTerm {
     /// What is counted.
     pub term: Term,

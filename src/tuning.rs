@@ -1,8 +1,10 @@
-//! The fields of optimal performance: for each load the cheapest algorithm.
+//! Tunings: the cheapest algorithm for each load (the paper's fields of optimal performance).
 
 pub(crate) mod belief;
 mod crossover;
 mod error;
+#[cfg(feature = "model")]
+mod file;
 mod slice;
 
 use crate::cost::Frame;
@@ -15,33 +17,39 @@ pub use belief::{Observed, Slope};
 pub use crossover::Crossover;
 pub use error::TuningError;
 
-/// In [`Tuning::usual`]: `k` threads from this times `k` squared objects. A frame of `n` objects on `k` threads takes `a n / k + b k`, with `b` for
-/// waking one and waiting for it, so that k threads take less than half as many from `n = (b / 2 a) k k` on. On both machines of the first reports
-/// two threads of `pair-cache` save a fifth or more from 10 000 objects on and now and then lose below.
+/// [`Tuning::usual`] runs `k` threads from this times `k`² objects. A frame of `n` objects on `k` threads takes `a n
+/// / k + b k`, where `b` wakes one thread and waits for it. So `k` threads beat half as many from `n = (b / 2a) k²`
+/// on. On the machines of the first reports two threads of `pair-cache` save a fifth from 10 000 objects on.
 const OBJECTS_OF_A_THREAD_SQUARED: u32 = 2500;
 
-/// In [`Tuning::usual`]: the most threads. Those of sixteen begin at 640 000 objects, where memory bandwidth bounds a frame, which no core adds to.
+/// The most threads of [`Tuning::usual`]. Sixteen begin at 640 000 objects, where memory bandwidth bounds a frame.
 const MOST_USUAL_THREADS: u32 = 16;
 
 /// Which algorithm to run under which load, and where that knowledge came from.
 ///
-/// With cost curves the choice depends on the whole [`Load`]; without them on the number of objects alone, through
-/// `steps`, as the paper does it and as a hand-written list of thresholds does.
+/// With cost curves the choice depends on the whole [`Load`]. Without them it depends on the number of objects, through
+/// `steps`, as in the paper.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(
+    feature = "model",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "file::TuningFile", into = "file::TuningFile")
+)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Tuning {
     /// Where the tuning came from.
     pub source: Source,
-    /// Name of the model that predicted them, whether they were corrected since or not; `None` where there was no prediction.
+    /// Name of the model that predicted the costs, corrected since or not; `None` without a prediction.
     pub model: Option<String>,
     /// Whether the machine lies outside what the model was trained on.
     pub extrapolated: bool,
     /// In words, what was outside and what that means. Empty when nothing was.
     pub warnings: Vec<String>,
-    /// Scenario of the slice that `steps` and `crossovers` show.
+    /// Scenario of `steps` and `crossovers`.
     pub scenario: String,
-    /// The cheapest algorithm over the number of objects in that scenario, ascending: each holds until the next begins. Empty only where there are
-    /// costs and no slice was asked for.
+    /// The cheapest algorithm over the number of objects in that scenario, ascending: each holds until the next
+    /// begins. Empty only if there are costs and no loads were given.
     pub steps: Vec<Step>,
     /// Where one step gives way to the next, in the order of `steps`.
     pub crossovers: Vec<Crossover>,
@@ -58,19 +66,21 @@ named! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     #[non_exhaustive]
     pub enum Source("source of tuning") {
-        /// Written down by hand.
+        /// Hand-written thresholds.
         Default = "default",
         /// From hardware parameters, by a model trained on reports.
         Predicted = "predicted",
         /// From timings of the algorithms on this machine.
         Measured = "measured",
-        /// Predicted, then corrected by frames that were run: by samples before the first one ([`Tuning::samples`]), or on line.
+        /// Predicted, then corrected: by samples before the first frame ([`Tuning::samples`]), or by frames.
         Learned = "learned",
     }
 }
 
 /// From this many objects up, this algorithm.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct Step {
     /// First number of objects.
     pub from_objects: u32,
@@ -92,15 +102,17 @@ pub struct AlgorithmCost {
     pub spread_ln: f64,
 }
 
-/// One algorithm, timed on some frames of the slice's scenario.
+/// One algorithm, timed on some frames of the tuning's scenario.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Observation {
     /// The algorithm.
     pub algorithm: AlgorithmId,
     /// Number of objects.
     pub objects: u32,
-    /// What the model predicted for it, without any sample.
+    /// Prediction of the model, without any sample.
     pub predicted_ns: f64,
     /// Median over the frames.
     pub measured_ns: f64,
@@ -109,7 +121,7 @@ pub struct Observation {
 /// The two cheapest algorithms under a load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ranking {
-    /// Position of the cheapest in the list that was ranked.
+    /// Position of the cheapest in [`Tuning::costs`].
     pub best: usize,
     /// Its predicted cost in nanoseconds.
     pub best_ns: f64,
@@ -118,7 +130,7 @@ pub struct Ranking {
 }
 
 impl Step {
-    /// From this many objects up, that algorithm.
+    /// `algorithm`, from this many objects up.
     #[must_use]
     pub fn new(from_objects: u32, algorithm: AlgorithmId) -> Self {
         Self { from_objects, algorithm }
@@ -126,13 +138,13 @@ impl Step {
 }
 
 impl AlgorithmCost {
-    /// The cost of a revision of an algorithm. `spread_ln` is the standard deviation of the natural logarithm of measured over modelled time.
+    /// The cost of a revision of an algorithm.
     #[must_use]
     pub fn new(algorithm: AlgorithmId, revision: u32, curve: CostCurve, spread_ln: f64) -> Self {
         Self { algorithm, revision, curve, spread_ln }
     }
 
-    /// Those of its residuals that there are.
+    /// Its residuals: of the work, of its fallback, and of what frames have shown.
     pub(crate) fn residuals(&self) -> impl Iterator<Item = &Residual> {
         let fallback = self.curve.work.fallback.iter().filter_map(|f| f.work.residual.as_ref());
         self.curve.work.residual.iter().chain(&self.curve.observed).chain(fallback)
@@ -148,7 +160,7 @@ impl Observation {
 }
 
 impl Tuning {
-    /// Tuning from a hand-written list of thresholds: from `objects` up, that algorithm.
+    /// A tuning of hand-written thresholds.
     ///
     /// # Errors
     /// When the list is empty, does not begin at 0 or is not ascending.
@@ -157,12 +169,11 @@ impl Tuning {
         tuning.defect().map_or(Ok(tuning), Err)
     }
 
-    /// Tuning for when nothing is known about the machine: borders in objects, written down by hand.
+    /// A tuning for an unknown machine: thresholds in the number of objects.
     ///
-    /// They are the rounded borders of `uniform` on the machines of the first reports, which have two cores each. More threads than two are
-    /// extrapolated, and cautiously so, since nobody learns here what they are worth: each of them has more work the more of them have
-    /// to be woken. Any other machine has other borders: predict or measure them. Where boxes move far `pair-cache` runs the strips, so that
-    /// one list holds for both.
+    /// They are the rounded crossovers of `uniform` on the machines of the first reports, which have two cores. More
+    /// than two threads are extrapolated, with more work for each thread. Another machine has other crossovers:
+    /// predict or measure them.
     #[must_use]
     pub fn usual(registry: &Registry) -> Self {
         let step = |from_objects, method, threads| Step { from_objects, algorithm: AlgorithmId::cpu(method, threads) };
@@ -175,11 +186,12 @@ impl Tuning {
         Self { steps, scenario: "uniform".to_owned(), ..Self::empty(Source::Default) }
     }
 
-    /// Tuning from cost curves, with `steps` and `crossovers` for the slice through `loads`, ascending by objects.
+    /// A tuning of cost curves, with `steps` and `crossovers` along `loads`, which ascend by objects.
     ///
-    /// The loads are interpolated between each other, so a handful per decade is enough. A field narrower than 3 % in objects may
-    /// be missed, and an algorithm that is cheaper by less than 2 % has none. Intervals follow from the curves'
-    /// `spread_ln`: where the logarithms of two costs differ by less than [`NORMAL_90`](crate::stats::NORMAL_90) standard deviations of that difference.
+    /// Loads between these are interpolated, so a handful a decade is enough. A field narrower than 3 % in objects
+    /// may be missed, and an algorithm that is cheaper by less than 2 % has none. The interval of a crossover holds
+    /// the loads at which the logarithms of the two costs differ by less than [`NORMAL_90`](crate::stats::NORMAL_90)
+    /// standard deviations.
     #[must_use]
     pub fn from_costs(source: Source, scenario: &str, costs: Vec<AlgorithmCost>, loads: &[Load]) -> Self {
         let spreads: Vec<f64> = costs.iter().map(|c| c.spread_ln).collect();
@@ -191,8 +203,9 @@ impl Tuning {
         tuning
     }
 
-    /// As [`Tuning::from_costs`], with intervals from `spread`: for two positions in `costs` and a load, the standard deviation of the
-    /// logarithm of the ratio of the two costs. Say in [`Tuning::interval_basis`] what that is made of.
+    /// As [`Tuning::from_costs`], with intervals from `spread`: for two positions in `costs` and a load, it returns
+    /// the standard deviation of the logarithm of the ratio of the two costs. Describe it in
+    /// [`Tuning::interval_basis`].
     #[must_use]
     pub fn from_costs_with(
         source: Source,
@@ -221,7 +234,7 @@ impl Tuning {
         }
     }
 
-    /// The algorithms that this tuning may choose, in the order that [`Tuning::rank`] counts them.
+    /// The algorithms that this tuning may choose: those of `costs` in their order, else those of `steps`.
     #[must_use]
     pub fn algorithms(&self) -> Vec<&AlgorithmId> {
         if self.costs.is_empty() {
@@ -236,9 +249,8 @@ impl Tuning {
         self.costs.iter().map(|c| &c.algorithm).collect()
     }
 
-    /// The cheapest algorithms under `load` among those that `usable` admits, which is asked by position in [`Tuning::costs`].
-    ///
-    /// `None` when there are no cost curves or none is usable.
+    /// The two cheapest algorithms under `load`. `usable` gets a position in [`Tuning::costs`] and says whether it
+    /// may be chosen. `None` without cost curves, or when none is usable.
     #[must_use]
     pub fn rank(&self, load: &Load, usable: impl Fn(usize) -> bool) -> Option<Ranking> {
         let frame = Frame::new(load);
@@ -263,10 +275,10 @@ impl Tuning {
         self.steps[..self.steps.partition_point(|s| s.from_objects <= objects)].last()
     }
 
-    /// What makes this tuning unusable, if anything.
+    /// The first thing that makes this tuning unusable, if any.
     #[must_use]
     pub fn defect(&self) -> Option<TuningError> {
-        // A slice through no load has no steps, and then the costs decide as ever.
+        // Without loads there are no steps, and the costs decide.
         let starts = self.steps.first().map_or(!self.costs.is_empty(), |s| s.from_objects == 0);
         if !starts {
             return Some(TuningError::NoFirstStep);
@@ -302,9 +314,7 @@ impl Tuning {
         None
     }
 
-    /// Notes where along the slice the cheapest algorithm changes.
-    ///
-    /// `spread` returns the standard deviation of the logarithm of the ratio of two costs under a load.
+    /// Sets `steps` and `crossovers` along these loads. `spread` is that of [`from_costs_with`](Self::from_costs_with).
     fn cut(&mut self, loads: &[Load], spread: &dyn Fn(usize, usize, &Load) -> f64) {
         let slice = Slice::new(loads);
         let steps = slice.steps(&self.costs);
@@ -333,7 +343,7 @@ impl Tuning {
     ) -> Crossover {
         let (b, a) = (&self.costs[below], &self.costs[above]);
         let doubt = |load: &Load| crate::stats::NORMAL_90 * spread(load);
-        // Positive where the algorithm of the upper field is cheaper.
+        // Positive if the algorithm of the upper field is cheaper.
         let gain = |load: &Load| (b.curve.cost_ns(load) / a.curve.cost_ns(load)).ln();
         let objects = f64::from(objects);
         Crossover {

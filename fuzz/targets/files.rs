@@ -52,7 +52,6 @@ fuzz_target!(|text: &str| {
     if let Ok(converted) = convert(text) {
         assert!(json::tuning(&converted.text).is_ok() || report::read(&converted.text).is_ok());
     }
-    let _ = sapwise::is_readable_cache(text);
 });
 
 fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {

@@ -118,12 +118,6 @@ impl Learner {
         self.belief.view(frame)
     }
 
-    /// Natural logarithm of real over predicted time of an algorithm's class of processor, as far as all of its algorithms are off.
-    #[cfg(feature = "this-machine")]
-    pub(super) fn class_ln(&self, algorithm: usize) -> f64 {
-        self.belief.class_ln(algorithm)
-    }
-
     /// Mean time that a frame of an algorithm waits for other programs, in nanoseconds. A helper whose core another program has waits
     /// until the scheduler's next turn, however short the frame: a hundred times as long as some. The mean is what counts, so that this is not
     /// noise, and it is no factor either.

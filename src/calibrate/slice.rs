@@ -1,14 +1,14 @@
-//! The slice of loads over which the tuning of this machine is shown.
+//! The loads for which the steps and crossovers of a predicted tuning are worked out.
 
 use crate::load::Load;
 
-/// The scenario of the slice.
+/// The scenario of these loads.
 pub(super) const SCENARIO: &str = "uniform";
 
-/// Loads of the second frame of that scenario, seed 1, with as many pairs as its density lets expect, at four numbers of objects a
-/// decade: objects, candidates on the sweep axis, candidates in the strips, pairs, and how far boxes move.
+/// Loads of the second frame of `uniform`, seed 1, with the expected number of pairs: objects, candidates on the
+/// sweep axis, candidates in the strips, pairs, and motion.
 ///
-/// They are data, since a program that starts has no time to make scenes of a hundred thousand boxes.
+/// Stored, because a program that starts has no time to make scenes of a hundred thousand boxes.
 const LOADS: [(u32, f64, f64, f64, f64); 17] = [
     (10, 12.0, 12.0, 1.6, 0.0396031),
     (18, 45.0, 45.0, 4.78854, 0.0365256),
@@ -29,7 +29,7 @@ const LOADS: [(u32, f64, f64, f64, f64); 17] = [
     (100_000, 103_859_000.0, 634_435.0, 48_174.0, 0.0383483),
 ];
 
-/// Loads of the scenario `uniform`, from ten to a hundred thousand objects.
+/// Loads from ten to a hundred thousand objects, four a decade.
 pub(super) fn loads() -> Vec<Load> {
     let load = |(objects, axis, strip, pairs, moved)| {
         Load::of_objects(objects).with_candidates(axis, strip).with_pairs(pairs).with_moved(moved)
@@ -44,23 +44,16 @@ mod tests {
     use crate::scene::{Scenario, Scene};
 
     #[test]
-    fn the_loads_are_those_of_the_scenario() {
-        for shipped in loads() {
-            let mut scene = Scene::start(Scenario::Uniform, shipped.objects as usize, 1);
+    fn stored_loads_are_those_of_the_scenario() {
+        for stored in loads() {
+            let mut scene = Scene::start(Scenario::Uniform, stored.objects as usize, 1);
             let mut displacement = Displacement::default();
             displacement.watch(scene.boxes());
             scene.advance();
             let found = Load::estimate(scene.boxes(), None, displacement.moved(scene.boxes()));
             let figures = |l: &Load| [f64::from(l.objects), l.axis_candidates, l.strip_candidates, l.pairs, l.moved];
-            let same = figures(&shipped).into_iter().zip(figures(&found)).all(|(a, b)| (a / b - 1.0).abs() < 1e-5);
-            assert!(same, "{shipped:?} is shipped, {found:?} is found");
+            let same = figures(&stored).into_iter().zip(figures(&found)).all(|(a, b)| (a / b - 1.0).abs() < 1e-5);
+            assert!(same, "stored {stored:?}, found {found:?}");
         }
-    }
-
-    #[test]
-    fn they_ascend_from_ten() {
-        let loads = loads();
-        assert_eq!((loads[0].objects, loads[16].objects), (10, 100_000));
-        assert!(loads.is_sorted_by(|a, b| a.objects < b.objects && a.axis_candidates <= b.axis_candidates));
     }
 }

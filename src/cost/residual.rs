@@ -23,6 +23,12 @@ const EXPONENT_LOG2: u32 = 4;
 
 /// Loads at which the residuals of all methods of a machine or a model are known.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(
+    feature = "model",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "Vec<Load>", into = "Vec<Load>")
+)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Places {
     loads: Vec<Load>,
     /// By coordinate, then by place.
@@ -122,6 +128,20 @@ impl Places {
             *d = kernel(*d);
         }
         likeness
+    }
+}
+
+#[cfg(feature = "model")]
+impl From<Vec<Load>> for Places {
+    fn from(loads: Vec<Load>) -> Self {
+        Self::new(loads)
+    }
+}
+
+#[cfg(feature = "model")]
+impl From<Places> for Vec<Load> {
+    fn from(places: Places) -> Self {
+        places.loads
     }
 }
 

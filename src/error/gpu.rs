@@ -1,11 +1,11 @@
-//! What can go wrong with a GPU.
+//! Why a GPU can't do its work.
 
 use std::fmt;
 use std::sync::Arc;
 
-/// Why a GPU can't do what was asked of it.
+/// Why a GPU can't do its work.
 ///
-/// Its text leaves out the words of the driver, which are its [source](std::error::Error::source); `{:#}` writes both.
+/// The text leaves out the words of the driver, which are the [source](std::error::Error::source); `{:#}` writes both.
 #[derive(Debug, Clone)]
 pub struct GpuError {
     kind: GpuErrorKind,
@@ -13,30 +13,30 @@ pub struct GpuError {
     source: Option<Arc<dyn std::error::Error + Send + Sync>>,
 }
 
-/// What a program may want to tell apart.
+/// Kinds of [`GpuError`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum GpuErrorKind {
     /// There is no such GPU, or it can't be opened.
     NotFound,
-    /// It was lost, did not answer in time, or an error came that nobody expected. It can't be used any more.
+    /// It was lost, did not answer in time, or failed unexpectedly. It can't be used any more.
     Lost,
-    /// It takes work and says that it is done, and executes nothing: a driver without hardware behind it, or hardware that hangs. It
-    /// can't be used any more.
+    /// It accepts work and executes nothing: a driver without hardware, or hardware that hangs. It can't be used any
+    /// more.
     Inert,
-    /// Its device or driver refuses: memory, a kernel, a binding.
+    /// Its driver refuses memory, a kernel or a binding.
     Refused,
-    /// It is more than this GPU, or a single submission to it, can take.
+    /// The work exceeds a limit of this GPU or of one submission.
     Limit,
 }
 
 impl GpuError {
-    /// An error in a sentence.
+    /// An error without a source.
     pub(crate) fn new(kind: GpuErrorKind, text: impl Into<String>) -> Self {
         Self { kind, text: text.into(), source: None }
     }
 
-    /// An error in a sentence, and what the driver or the device said.
+    /// An error with what the driver or the device said.
     pub(crate) fn caused(
         kind: GpuErrorKind,
         text: impl Into<String>,
@@ -45,7 +45,7 @@ impl GpuError {
         Self { kind, text: text.into(), source: Some(Arc::new(source)) }
     }
 
-    /// The same, said of something greater. That a GPU is gone is no matter of what it was to do.
+    /// The same with another text, unless the GPU is gone: then it does not matter what it was to do.
     pub(crate) fn of(self, text: impl Into<String>) -> Self {
         match self.kind {
             GpuErrorKind::Lost | GpuErrorKind::Inert => self,
@@ -53,7 +53,7 @@ impl GpuError {
         }
     }
 
-    /// What kind of error it is.
+    /// The kind of error.
     #[must_use]
     pub fn kind(&self) -> GpuErrorKind {
         self.kind
@@ -61,7 +61,7 @@ impl GpuError {
 }
 
 impl PartialEq for GpuError {
-    /// By kind and text, whatever the driver said.
+    /// Compares kind and text, not the source.
     fn eq(&self, other: &Self) -> bool {
         (self.kind, &self.text) == (other.kind, &other.text)
     }

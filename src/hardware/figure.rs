@@ -6,6 +6,8 @@ use crate::stats;
 
 /// One parameter of a machine: its value and origin.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Parameter {
     /// Name, with its unit as the last words: of a [`ParameterId`](super::ParameterId), of a
@@ -26,9 +28,11 @@ pub struct Parameter {
     /// The method of a measurement, the interface that reported the value, or why it is missing.
     pub source: String,
     /// How the value follows from the samples.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Statistic::is_median"))]
     pub statistic: Statistic,
     /// The kept samples in order of measurement, in the unit of the name, to six significant digits. Value, dispersion and number
     /// of samples follow from them. Empty if nothing was measured, if the value comes from a fit, and in old reports.
+    #[cfg_attr(feature = "model", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub raw: Vec<f64>,
 }
 

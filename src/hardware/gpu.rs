@@ -5,6 +5,8 @@ use crate::named::named;
 
 /// One GPU: its identity and parameters.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct GpuHardware {
     /// Which GPU it is.
@@ -15,6 +17,8 @@ pub struct GpuHardware {
 
 /// The identity of a GPU and its driver. Holds no serial number and no bus address.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct GpuIdentity {
     /// The number in `gpu0`, `gpu1` and so on: discrete GPUs first, software adapters last, otherwise in the driver's order.
@@ -51,6 +55,8 @@ named! {
 
 /// Several GPUs that work at the same time.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct GpuGroup {
     /// Numbers of the GPUs, ascending, two or more.

@@ -1,53 +1,35 @@
-//! Why a text is no sound file.
+//! Why a file can't be read or written.
 
 use super::Schema;
 use std::fmt;
 
-/// Why a text is no sound file, or why something can't be written as one.
+/// Why a text is not a valid file, or a value can't be written as one.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
-    /// No JSON, a key that is missing or has a value of another kind, or a figure that can't be.
+    /// Not JSON, a missing key, a value of another type, or an impossible value.
     Data {
-        /// Where: `costs[3].curve`. A dot where it is the whole text.
+        /// Where: `costs[3].curve`. A dot for the whole text.
         path: String,
-        /// What was wrong, with line and column.
+        /// What is wrong, with line and column.
         source: serde_json::Error,
     },
     /// A key that the schema does not have.
     UnknownKey {
-        /// The key, with its place: `costs[3].colour`.
+        /// The key with its place: `costs[3].colour`.
         path: String,
         /// The schema.
         schema: Schema,
     },
-    /// Another schema than the one that was asked for.
+    /// A file of another kind or of another major version.
     OtherSchema {
         /// What the file names.
         found: String,
         /// What this version reads.
         expected: Schema,
     },
-    /// An older version of the schema.
-    OldSchema {
-        /// What the file names.
-        found: String,
-        /// What this version reads.
-        expected: Schema,
-    },
-    /// Something that JSON can't hold.
+    /// A value that JSON can't hold.
     Write(serde_json::Error),
-}
-
-impl Error {
-    /// Line and column of what was wrong, from 1, where it has a place.
-    #[must_use]
-    pub fn position(&self) -> Option<(usize, usize)> {
-        match self {
-            Self::Data { source, .. } => Some((source.line(), source.column())),
-            _ => None,
-        }
-    }
 }
 
 impl fmt::Display for Error {
@@ -59,30 +41,23 @@ impl fmt::Display for Error {
                 }
                 source.fmt(f)?;
                 if source.is_eof() {
-                    f.write_str(": the text ends too early, as one that was cut off while it was written or copied; copy or make it again")?;
+                    f.write_str(": the text ends too early; copy or make the file again")?;
                 }
                 Ok(())
             }
             Self::UnknownKey { path, schema } => write!(f, "{path} is no key of {schema}"),
             Self::OtherSchema { found, expected } => {
-                write!(f, "the schema is {found:?}; this version reads {:?}", expected.to_string())
+                write!(f, "the schema is {found:?}; this version reads {:?}", expected.to_string())?;
+                match expected.name() {
+                    "model" => f.write_str(", which `sapwise train REPORTS... --out MODEL.json` makes"),
+                    "tuning" => f.write_str(", which `sapwise predict --out TUNING.json` makes"),
+                    _ => Ok(()),
+                }
             }
-            Self::OldSchema { found, expected } if expected.name() == "model" => write!(
-                f,
-                "the schema is {found:?}, of an older version; this one reads {:?}: train again with `sapwise train REPORTS... --out \
-                 MODEL.json`",
-                expected.to_string()
-            ),
-            Self::OldSchema { found, expected } => write!(
-                f,
-                "the schema is {found:?}, of an older version; this one reads {:?}: convert the file with \
-                 `sapwise convert FILE... --out DIR`",
-                expected.to_string()
-            ),
             Self::Write(error) => error.fmt(f),
         }
     }
 }
 
-// No source: the text of serde's error is part of this one's, and nothing is behind it.
+// Without a source: this text already contains that of serde's error.
 impl std::error::Error for Error {}

@@ -1,67 +1,66 @@
-//! What all files of Sapwise share: the key that names the schema, and what becomes of keys that nobody knows.
+//! Reads and writes files of one schema.
 
-use super::{Error, Read};
+use super::Error;
 use serde::Serialize;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Error as _};
 use serde_ignored::Path;
-use std::borrow::Cow;
 use std::fmt;
 
 /// The schema of a file: `tuning/2`, or `tuning/2.3`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Schema {
-    name: Cow<'static, str>,
+    name: String,
     major: u32,
     minor: u32,
 }
 
 impl Schema {
-    /// What comes before the slash: which kind of file it is.
+    /// The kind of file: the part before the slash.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Files of one major version can't be read as those of another.
+    /// The major version; files of different ones can't be read as each other.
     #[must_use]
     pub fn major(&self) -> u32 {
         self.major
     }
 
-    /// In a newer minor version only keys were added.
+    /// The minor version; a newer one only added keys.
     #[must_use]
     pub fn minor(&self) -> u32 {
         self.minor
     }
 
-    /// The schema that a text names, whatever else it holds.
+    /// The schema that a text names, whatever else the text holds.
     ///
     /// # Errors
-    /// [`Error::Data`] when it is no JSON or names none.
+    /// [`Error::Data`] when the text is not JSON or names no schema.
     pub fn of(text: &str) -> Result<Self, Error> {
-        /// Only this key; the rest is skipped without being built, so hostile nesting costs nothing.
+        /// Only this key: serde skips the rest without building it, so that deep nesting costs nothing.
         #[derive(serde::Deserialize)]
         #[serde(expecting = "an object with the key `schema`")]
         struct Tag {
             schema: String,
         }
         let tag: Tag = serde_json::from_str(text).map_err(|source| Error::Data { path: ".".to_owned(), source })?;
-        Ok(Self::parse(&tag.schema).unwrap_or(Self { name: Cow::Owned(tag.schema), major: 0, minor: 0 }))
+        Ok(Self::parse(&tag.schema).unwrap_or(Self { name: tag.schema, major: 0, minor: 0 }))
     }
 
     fn parse(text: &str) -> Option<Self> {
         let (name, version) = text.split_once('/')?;
         let (major, minor) = version.split_once('.').unwrap_or((version, "0"));
-        // A sign is no digit.
+        // `u32::from_str` would accept a sign.
         let number = |text: &str| text.bytes().all(|b| b.is_ascii_digit()).then(|| text.parse().ok())?;
-        Some(Self { name: Cow::Owned(name.to_owned()), major: number(major)?, minor: number(minor)? })
+        Some(Self { name: name.to_owned(), major: number(major)?, minor: number(minor)? })
     }
 }
 
 impl fmt::Display for Schema {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.name)?;
-        // What names no version is told as it stands.
+        // 0 for a text without a version.
         if self.major > 0 {
             write!(f, "/{}", self.major)?;
         }
@@ -72,61 +71,84 @@ impl fmt::Display for Schema {
     }
 }
 
-/// How files of a schema are read and written. The type that is read holds no key `schema`: this checks and writes it.
+/// The content of a file.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Read<T> {
+    /// The content.
+    pub value: T,
+    /// The schema that the file names.
+    pub schema: Schema,
+    /// Unknown keys of a newer minor version, each with its place; empty for every other file.
+    pub skipped: Vec<String>,
+}
+
+impl<T> Read<T> {
+    /// Refuses a value in which `defect` finds something.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with what `defect` returns.
+    pub fn checked<D: fmt::Display>(self, defect: impl FnOnce(&T) -> Option<D>) -> Result<Self, Error> {
+        match defect(&self.value) {
+            None => Ok(self),
+            Some(why) => Err(Error::Data { path: ".".to_owned(), source: serde_json::Error::custom(why) }),
+        }
+    }
+}
+
+/// A kind of file. The type that is read has no key `schema`: this checks it and writes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Format {
     name: &'static str,
     major: u32,
-    minor: u32,
-    /// What files of this kind were called once.
-    old_name: Option<&'static str>,
-    /// Keys of the outermost level that are someone else's.
+    /// Keys of the outermost level that belong to another reader.
     foreign: &'static [&'static str],
 }
 
 impl Format {
-    /// Files of tuning.
-    pub const TUNING: Self = Self { old_name: Some("fields"), ..Self::new("tuning", 2, 0) };
+    /// Files of tunings.
+    pub const TUNING: Self = Self::new("tuning", 2);
 
-    /// Files of models, without what training says of itself.
-    pub const MODEL: Self = Self::new("model", 3, 0).skipping(&["training"]);
+    /// Files of models, without the notes of their training.
+    pub const MODEL: Self = Self::new("model", 3).skipping(&["training"]);
 
-    /// The format of a schema in the newest version that the caller knows.
+    /// A kind of file in the major version that the caller reads and writes.
     #[must_use]
-    pub const fn new(name: &'static str, major: u32, minor: u32) -> Self {
-        Self { name, major, minor, old_name: None, foreign: &[] }
+    pub const fn new(name: &'static str, major: u32) -> Self {
+        Self { name, major, foreign: &[] }
     }
 
-    /// The same for a reader to whom these keys of the outermost level mean nothing, and who does not tell them.
+    /// The same without these keys of the outermost level, which are skipped and not listed.
     #[must_use]
     pub const fn skipping(self, foreign: &'static [&'static str]) -> Self {
         Self { foreign, ..self }
     }
 
-    /// The schema, as files are written.
-    #[must_use]
-    pub fn schema(&self) -> Schema {
-        Schema { name: Cow::Borrowed(self.name), major: self.major, minor: self.minor }
+    fn schema(&self) -> Schema {
+        Schema { name: self.name.to_owned(), major: self.major, minor: 0 }
     }
 
     /// Reads a file.
     ///
     /// # Errors
-    /// [`Error::OldSchema`] or [`Error::OtherSchema`] when it is of another schema, [`Error::UnknownKey`] when it has a key that the
-    /// schema does not have, and [`Error::Data`] for everything else that is wrong with it.
+    /// [`Error::OtherSchema`] for a file of another kind or major version, [`Error::UnknownKey`] for a key that the
+    /// schema does not have, [`Error::Data`] for everything else.
     pub fn read<T: DeserializeOwned>(&self, text: &str) -> Result<Read<T>, Error> {
-        let schema = self.accept(Schema::of(text)?)?;
+        let schema = Schema::of(text)?;
+        if (&*schema.name, schema.major) != (self.name, self.major) {
+            return Err(Error::OtherSchema { found: schema.to_string(), expected: self.schema() });
+        }
+        let own = |key: &str| key == "schema" || self.foreign.contains(&key);
         let mut skipped = Vec::new();
         let mut note = |path: Path<'_>| {
-            let own = matches!(path, Path::Map { parent: Path::Root, ref key } if key == "schema" || self.foreign.contains(&key.as_str()));
-            if !own {
+            if !matches!(&path, Path::Map { parent: Path::Root, key } if own(key)) {
                 skipped.push(place(&path));
             }
         };
         let mut json = serde_json::Deserializer::from_str(text);
         let read = serde_path_to_error::deserialize(serde_ignored::Deserializer::new(&mut json, &mut note));
-        // Before what is missing: a key that is spelled wrong is both.
-        if schema.minor <= self.minor && !skipped.is_empty() {
+        // Before the missing keys: a misspelt key is unknown and missing.
+        if schema.minor == 0 && !skipped.is_empty() {
             return Err(Error::UnknownKey { path: skipped.swap_remove(0), schema });
         }
         let value = read.map_err(|e| Error::Data { path: e.path().to_string(), source: e.into_inner() })?;
@@ -134,23 +156,10 @@ impl Format {
         Ok(Read { value, schema, skipped })
     }
 
-    /// Whether files of a schema can be read.
-    fn accept(&self, found: Schema) -> Result<Schema, Error> {
-        let expected = || self.schema();
-        let same_kind = found.name == self.name;
-        if same_kind && found.major == self.major {
-            Ok(found)
-        } else if found.major > 0 && (same_kind && found.major < self.major || self.old_name == Some(found.name())) {
-            Err(Error::OldSchema { found: found.to_string(), expected: expected() })
-        } else {
-            Err(Error::OtherSchema { found: found.to_string(), expected: expected() })
-        }
-    }
-
     /// Writes a file, one key a line, the schema first.
     ///
     /// # Errors
-    /// [`Error::Write`] when a figure can't be written.
+    /// [`Error::Write`] when a value is not finite.
     pub fn write<T: Serialize>(&self, value: &T) -> Result<String, Error> {
         #[derive(Serialize)]
         struct Tagged<'a, T> {
@@ -161,7 +170,7 @@ impl Format {
         super::write(&Tagged { schema: self.schema().to_string(), value })
     }
 
-    /// File name and text of the JSON Schema of files that hold a type.
+    /// Returns file name and text of the JSON Schema of files that hold a `T`.
     ///
     /// # Errors
     /// [`Error::Write`] when it can't be written.
@@ -183,15 +192,13 @@ impl Format {
     }
 }
 
-/// A place in a file, in words that [`Error::Data`] uses too: `costs[3].curve`.
+/// A place in a file as serde_path_to_error writes it: `costs[3].curve`.
 fn place(path: &Path<'_>) -> String {
     match path {
         Path::Root => String::new(),
         Path::Seq { parent, index } => format!("{}[{index}]", place(parent)),
-        Path::Map { parent, key } => {
-            let parent = place(parent);
-            if parent.is_empty() { key.clone() } else { format!("{parent}.{key}") }
-        }
+        Path::Map { parent: Path::Root, key } => key.clone(),
+        Path::Map { parent, key } => format!("{}.{key}", place(parent)),
         Path::Some { parent } | Path::NewtypeStruct { parent } | Path::NewtypeVariant { parent } => place(parent),
     }
 }

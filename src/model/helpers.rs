@@ -8,6 +8,8 @@ use crate::hardware::{Hardware, ParameterId};
 
 /// How a method calls its helpers, shared by machines and numbers of threads.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 pub struct HelpersModel {
     /// Cycles of the caller for each helper that it calls.
     pub call_cycles: f64,

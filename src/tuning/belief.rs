@@ -172,12 +172,6 @@ impl Belief {
         self.shared(algorithm, calls).0 + own[0] + curve.iter().zip(&own[1..]).map(|(a, b)| a * b).sum::<f64>()
     }
 
-    /// What the part of an algorithm's class of processor adds to the logarithm of its cost.
-    #[cfg(feature = "this-machine")]
-    pub(crate) fn class_ln(&self, algorithm: usize) -> f64 {
-        self.mean[self.algorithms[algorithm].class]
-    }
-
     /// What is expected of an observation of an algorithm, which is then to be [taken in](Self::absorb).
     pub(crate) fn expect(&mut self, algorithm: usize, view: &View, calls: f64) -> Expected {
         let (ln, slopes) = self.shared(algorithm, calls);

@@ -1,9 +1,11 @@
-//! Where one field of optimal performance gives way to the next.
+//! The load at which one algorithm overtakes another.
 
 use crate::AlgorithmId;
 
-/// The number of objects at which two algorithms cost the same, where the fields of both meet.
+/// The number of objects at which two algorithms cost the same and their fields meet.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "model", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(deny_unknown_fields))]
 #[non_exhaustive]
 pub struct Crossover {
     /// The cheaper algorithm with fewer objects.
@@ -12,10 +14,10 @@ pub struct Crossover {
     pub above: AlgorithmId,
     /// Number of objects at which both cost the same.
     pub objects: f64,
-    /// Lower end of the interval; where it may lie lower still, the least objects of the slice. `None`, like `high`, where no
-    /// interval can be claimed: [`Tuning::interval_basis`](crate::Tuning::interval_basis) says why.
+    /// Lower end of the interval, no less than the fewest objects of the loads. `None`, like `high`, without an
+    /// interval: [`Tuning::interval_basis`](crate::Tuning::interval_basis) says why.
     pub low: Option<f64>,
-    /// Upper end of the interval; where it may lie higher still, the most objects of the slice.
+    /// Upper end of the interval, no more than the most objects of the loads.
     pub high: Option<f64>,
 }
 
@@ -26,13 +28,13 @@ impl Crossover {
         Self { below, above, objects, low: None, high: None }
     }
 
-    /// The same with an interval, whose ends hold `objects` between them.
+    /// The same with an interval that contains `objects`.
     #[must_use]
     pub fn with_interval(self, low: f64, high: f64) -> Self {
         Self { low: Some(low), high: Some(high), ..self }
     }
 
-    /// Both ends of the interval, where one is claimed.
+    /// Both ends of the interval, if there is one.
     #[must_use]
     pub fn interval(&self) -> Option<(f64, f64)> {
         self.low.zip(self.high)

@@ -1,10 +1,10 @@
-//! What makes tuning unusable.
+//! What makes a tuning unusable.
 
 use crate::AlgorithmId;
 use crate::cost::CurveError;
 use std::fmt;
 
-/// What makes tuning unusable.
+/// What makes a tuning unusable.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum TuningError {
@@ -12,45 +12,45 @@ pub enum TuningError {
     NoFirstStep,
     /// The steps are not ascending.
     StepOrder,
-    /// A crossover that does not lie within its interval, or has one end of it only.
+    /// A crossover outside its interval, or with only one end of it.
     Crossover {
         /// The algorithm below it.
         below: AlgorithmId,
         /// The algorithm above it.
         above: AlgorithmId,
     },
-    /// A sample without a time above zero.
+    /// A sample whose time is not above zero.
     Sample {
         /// The algorithm.
         algorithm: AlgorithmId,
         /// The number of objects.
         objects: u32,
     },
-    /// A cost without the work that it is made of.
+    /// A cost that names a missing work. Only in files.
     NoWork {
         /// The algorithm.
         algorithm: AlgorithmId,
-        /// The position at which its work is said to be.
+        /// The position that it names.
         work: usize,
     },
-    /// A work that falls back to none that stands before it.
+    /// A work that falls back to a work that is not before it. Only in files.
     NoFallback {
-        /// The position at which that is said to be.
+        /// The position that it names.
         work: usize,
     },
-    /// Residuals that are known at different places.
+    /// Residuals with different places.
     Places {
-        /// An algorithm whose places are not those of the first.
+        /// An algorithm whose places differ from those of the first.
         algorithm: AlgorithmId,
     },
-    /// A cost curve that can't be.
+    /// An impossible cost curve.
     Curve {
         /// The algorithm.
         algorithm: AlgorithmId,
         /// What is wrong with it.
         source: CurveError,
     },
-    /// A spread that is negative or no number.
+    /// A spread that is negative or not a number.
     Spread {
         /// The algorithm.
         algorithm: AlgorithmId,

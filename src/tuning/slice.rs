@@ -1,22 +1,21 @@
-//! A slice through the loads: where along it the cheapest algorithm changes.
+//! Finds where the cheapest algorithm changes along a line of loads.
 
 use super::AlgorithmCost;
 use crate::Load;
 use crate::cost::Frame;
 
-/// Loads this far apart in objects, as a logarithm, have nothing looked up between them: a field narrower than that may be
-/// missed.
+/// Distance between two loads that are compared, as a logarithm of objects. A narrower field may be missed.
 const FINEST_LN: f64 = 0.03;
 
-/// An algorithm whose cost is within this factor of the least is as good as the cheapest: on one thread and on two that have nothing to divide the same code runs,
-/// and who is cheaper there is chance.
+/// An algorithm within this factor of the cheapest keeps its field: one thread and two that have nothing to divide
+/// run the same code, and chance decides which is cheaper.
 const SAME: f64 = 1.02;
 
-/// Halvings of a stretch that is [`FINEST_LN`] wide: a border in it is then known to a ten-thousandth.
+/// Halvings of a stretch of [`FINEST_LN`]: they find a crossover to a ten-thousandth.
 const HALVINGS: u32 = 8;
 
-/// Loads, ascending by objects, and everything between them on logarithmic axes. A place is the number of a load and the share
-/// of the way to the next.
+/// Loads, ascending by objects, and everything between them on logarithmic axes. A place is the number of a load and
+/// the share of the way to the next.
 pub(super) struct Slice<'a> {
     loads: &'a [Load],
 }
@@ -39,7 +38,7 @@ impl<'a> Slice<'a> {
         }
     }
 
-    /// The place of a number of objects, or the nearest end.
+    /// The place of a number of objects, or the nearer end.
     fn place(&self, objects: f64) -> f64 {
         let above = self.loads.partition_point(|l| f64::from(l.objects) <= objects);
         let (Some(below), Some(b)) = (above.checked_sub(1), self.loads.get(above)) else {
@@ -49,9 +48,9 @@ impl<'a> Slice<'a> {
         below as f64 + (x - a) / (b - a)
     }
 
-    /// The number of objects from which a condition holds, looking from `objects` upwards or downwards in steps that double,
-    /// then halving the last of them. The end of the slice where it holds nowhere. A short stretch in which it holds may be
-    /// stepped over.
+    /// The number of objects at which a condition begins to hold, upwards or downwards from `objects`; the end of the
+    /// slice if it never does. Steps that double find a load at which it holds and may step over a short stretch;
+    /// halving the last step finds where it begins.
     pub(super) fn reach(&self, objects: f64, upwards: bool, holds: impl Fn(&Load) -> bool) -> f64 {
         let (start, end) = (self.place(objects), if upwards { self.last() } else { 0.0 });
         let (mut not_yet, mut at, mut step) = (start, start, 0.05);
@@ -63,7 +62,7 @@ impl<'a> Slice<'a> {
             at = if upwards { (at + step).min(end) } else { (at - step).max(end) };
             step *= 2.0;
         }
-        // A hundredth of the distance between two loads is less than a percent in objects for those that ask.
+        // With four loads a decade a hundredth of their distance is 0.6 % in objects.
         while (at - not_yet).abs() > 0.01 {
             let middle = f64::midpoint(at, not_yet);
             *(if holds(&self.load(middle)) { &mut at } else { &mut not_yet }) = middle;
@@ -71,14 +70,14 @@ impl<'a> Slice<'a> {
         f64::from(self.load(at).objects)
     }
 
-    /// The loads from which on another algorithm is the cheapest, and which, by its position in `costs`. The first is where the
-    /// slice begins. Algorithms that cost the same but for [`SAME`] are one field: that of the one before.
+    /// The loads from which another algorithm is the cheapest, with its position in `costs`. The first is the begin
+    /// of the slice. An algorithm keeps its field while it is within [`SAME`] of the cheapest.
     pub(super) fn steps(&self, costs: &[AlgorithmCost]) -> Vec<(Load, usize)> {
         let mut steps = Vec::new();
         let Some(first) = self.loads.first() else { return steps };
         let Some((mut best, _)) = cheapest(costs, first) else { return steps };
         steps.push((*first, best));
-        // Places since the last step, at each of which the algorithm of that step is held.
+        // Places since the last step, all of which belong to its algorithm.
         let mut held = vec![(0.0, *first)];
         for k in 1..self.loads.len() {
             let ln = (f64::from(self.loads[k].objects) / f64::from(self.loads[k - 1].objects.max(1))).ln();
@@ -88,9 +87,9 @@ impl<'a> Slice<'a> {
                 let load = self.load(place);
                 let Some((other, least)) = cheapest(costs, &load) else { return steps };
                 if costs[best].curve.cost_ns(&load) > SAME * least {
-                    // Back to where it was not cheaper yet.
-                    let dearer = |load: &Load| costs[other].curve.cost_ns(load) >= costs[best].curve.cost_ns(load);
-                    let from = held.iter().rposition(|(_, load)| dearer(load)).unwrap_or(0);
+                    // Back to the last place at which the other one was not cheaper.
+                    let not_cheaper = |load: &Load| costs[other].curve.cost_ns(load) >= costs[best].curve.cost_ns(load);
+                    let from = held.iter().rposition(|(_, load)| not_cheaper(load)).unwrap_or(0);
                     let to = held.get(from + 1).copied().unwrap_or((place, load));
                     note(&mut steps, self.crossing(&costs[best], &costs[other], held[from].0, to), other);
                     best = other;
@@ -102,7 +101,7 @@ impl<'a> Slice<'a> {
         steps
     }
 
-    /// The first load between a place and another with its load at which the second of two algorithms is cheaper.
+    /// The first load between two places at which `above` is cheaper than `below`.
     fn crossing(&self, below: &AlgorithmCost, above: &AlgorithmCost, from: f64, to: (f64, Load)) -> Load {
         let (mut low, (mut high, mut load)) = (from, to);
         for _ in 0..HALVINGS {
@@ -118,7 +117,7 @@ impl<'a> Slice<'a> {
     }
 }
 
-/// Notes that an algorithm is the cheapest from a load on. Between two whole numbers of objects no other one is.
+/// Adds a step. It replaces steps that begin at the same number of objects or later.
 fn note(steps: &mut Vec<(Load, usize)>, load: Load, best: usize) {
     while steps.last().is_some_and(|s| s.0.objects >= load.objects) && steps.len() > 1 {
         steps.pop();
@@ -130,16 +129,16 @@ fn note(steps: &mut Vec<(Load, usize)>, load: Load, best: usize) {
     }
 }
 
-/// The cheapest by its position, and its cost.
+/// Position and cost of the cheapest.
 fn cheapest(costs: &[AlgorithmCost], load: &Load) -> Option<(usize, f64)> {
     let frame = Frame::new(load);
     let all = costs.iter().enumerate().map(|(k, cost)| (k, cost.curve.cost_of(&frame)));
     all.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The load a share of the way from one to another.
+/// Interpolates between two loads.
 fn between(a: &Load, b: &Load, share: f64) -> Load {
-    // Shifted by one because a candidate count may be zero.
+    // Shifted by one, because a count may be zero.
     let mix = |x: f64, y: f64| ((x + 1.0).ln() * (1.0 - share) + (y + 1.0).ln() * share).exp() - 1.0;
     Load {
         objects: mix(f64::from(a.objects), f64::from(b.objects)).round() as u32,
@@ -161,7 +160,7 @@ mod tests {
         (splitmix::next(state) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Curves of many terms with residuals that bend, over loads of which some figures fall while the objects rise.
+    /// Random curves of many terms with residuals, and loads whose motion falls while the objects rise.
     fn drawn(seed: u64) -> (Vec<AlgorithmCost>, Vec<Load>) {
         let load = |k: i32| {
             let n = 10.0_f64.powf(f64::from(k) / 4.0).round();
@@ -192,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_walk_in_steps_of_a_thousandth_finds_no_field_of_three_percent_that_is_lost() {
+    fn no_field_of_three_percent_is_missed() {
         let mut borders = 0;
         for seed in 0..40 {
             let (costs, loads) = drawn(seed);
@@ -204,7 +203,7 @@ mod tests {
             while place <= slice.last() {
                 let load = slice.load(place);
                 let (_, least) = cheapest(&costs, &load).unwrap();
-                // What is chosen may be a little dearer, and for 3 % of the objects by more.
+                // The choice may cost 2 % more, and anything along 3 % of the objects.
                 worse_since = (costs[at(load.objects)].curve.cost_ns(&load) > 1.021 * least)
                     .then(|| worse_since.unwrap_or(load.objects));
                 let since = worse_since.unwrap_or(load.objects);
@@ -222,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reach_ends_where_its_condition_begins_or_where_the_slice_ends() {
+    fn reach_ends_at_its_condition_or_at_the_end() {
         let loads: Vec<Load> = (1..=20).map(|k| Load { objects: 1 << k, ..Load::default() }).collect();
         let slice = Slice::new(&loads);
         let from =
@@ -230,12 +229,11 @@ mod tests {
         assert!((from(1000.0, true, 5000) / 5000.0 - 1.0).abs() < 0.01);
         assert!((from(1000.0, false, 70) / 70.0 - 1.0).abs() < 0.02);
         assert_eq!((from(1000.0, true, u32::MAX), from(1000.0, false, 0)), (1_048_576.0, 2.0));
-        // Where it holds from the start, nothing is walked.
         assert_eq!(from(1000.0, true, 10), 1000.0);
     }
 
     #[test]
-    fn borders_between_neighbouring_numbers_of_objects_collapse() {
+    fn crossovers_at_neighbouring_numbers_collapse() {
         let load = |objects| Load { objects, ..Load::default() };
         let mut steps = vec![(load(10), 0)];
         note(&mut steps, load(11), 1);

@@ -11,7 +11,7 @@ fn loads() -> Vec<Load> {
 }
 
 #[test]
-fn crossovers_lie_where_the_curves_cross_and_intervals_around_them() {
+fn crossovers_lie_where_curves_cross_within_their_intervals() {
     // 0.5 n (n - 1) = 100 n at n = 201; 100 n = 20 n + 80 000 at n = 1000.
     let costs = vec![
         cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05),
@@ -43,7 +43,7 @@ fn a_slice_through_no_load_leaves_sound_tuning() {
 }
 
 #[test]
-fn an_interval_has_both_ends_or_none_and_holds_its_border() {
+fn an_interval_has_both_ends_or_none() {
     let costs =
         vec![cost("brute@cpu1", &[(Term::AllPairs, 1.0)], 0.05), cost("sap@cpu1", &[(Term::Objects, 100.0)], 0.05)];
     let tuning = Tuning::from_costs(Source::Measured, "uniform", costs, &loads());
@@ -81,7 +81,7 @@ fn rank_respects_what_is_usable() {
 }
 
 #[test]
-fn the_usual_tuning_has_more_threads_where_there_is_more_work_and_never_many() {
+fn the_usual_tuning_has_more_threads_for_more_objects() {
     let steps = |cores| -> Vec<(u32, String)> {
         let tuning = Tuning::usual(&Registry::with_cores(cores));
         assert_eq!(tuning.defect(), None);

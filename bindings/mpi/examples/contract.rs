@@ -1,8 +1,8 @@
-//! What `tools/mpi.sh` runs over several numbers of ranks.
+//! The tests that `tools/mpi.sh` runs over several numbers of ranks.
 //!
 //! ```sh
-//! mpirun -np 4 target/debug/examples/contract scenarios    # every scenario against one process, 200 frames each, and the edge cases
-//! mpirun -np 4 target/debug/examples/contract hang         # frames without end, and two seconds of patience
+//! mpirun -np 4 target/debug/examples/contract scenarios    # every scenario and the edge cases
+//! mpirun -np 4 target/debug/examples/contract hang         # endless frames, with a limit of two seconds on waiting
 //! ```
 
 #[path = "../../../crates/ranks/tests/harness/mod.rs"]
@@ -30,7 +30,7 @@ fn main() {
         Some("hang") => hang(&world),
         _ => panic!("usage: contract scenarios|hang"),
     }));
-    // Else this rank would wait for the others at the end of MPI, and they for it.
+    // Otherwise this rank and the others would wait for each other at the end of MPI.
     if done.is_err() {
         world.abort(3);
     }
@@ -44,9 +44,8 @@ fn scenarios(world: &impl Communicator) {
     edge_cases(&mut ranks);
     let mut pairs = 0;
     for (k, scenario) in Scenario::ALL.into_iter().enumerate() {
-        // Half of them cut when times say so, which in tests they hardly do.
+        // Every other scenario cuts when times say so, which is rare in tests.
         ranks.set_cut_every((k % 2 == 0).then_some(7));
-        // Random owners in every other scenario.
         let owners = if k % 2 == 1 { Owners::Random } else { OWNERS[k / 2 % 4] };
         pairs += play(&mut ranks, scenario, 400, FRAMES, owners);
     }

@@ -1,8 +1,8 @@
-//! Times frames over ranks. Prints a table; every figure is a median over frames, with the lower and the upper quartile.
+//! Times frames over ranks: medians over frames, with the lower and the upper quartile.
 //!
 //! ```sh
-//! mpirun -np 1 target/release/examples/speed alone         # one rank beside no MPI, in turns
-//! mpirun -np 2 target/release/examples/speed unequal       # rank 1 on the portable kernels and half the threads; cuts by cost and equal cuts, in turns
+//! mpirun -np 1 target/release/examples/speed alone      # one rank and no MPI
+//! mpirun -np 2 target/release/examples/speed unequal    # cuts by cost and equal cuts; the last rank is slow
 //! ```
 
 use mpi::Threading;
@@ -58,7 +58,7 @@ fn alone(world: &impl Communicator) {
             began.elapsed().as_nanos() as f64
         };
         let mut both = [0.0; 2];
-        // In turns, each first in every other frame.
+        // Each first in every other frame.
         for k in [round % 2, 1 - round % 2] {
             both[k] = match k {
                 0 => time(&mut || plain.find_pairs(scene.boxes(), &mut pairs).expect("no pairs")),
@@ -78,19 +78,19 @@ fn alone(world: &impl Communicator) {
     println!("one rank over no MPI: {median:.4} ({low:.4} to {high:.4})");
 }
 
-/// What every rank knows of all: its figure, by a sum.
+/// Returns the number of every rank.
 fn all(world: &impl Communicator, own: f64) -> Vec<f64> {
     let mut values = vec![0.0; world.size() as usize];
     world.all_gather_into(&own, &mut values[..]);
     values
 }
 
-/// Ranks that search one after another, as if each had this machine for itself: with fewer cores than ranks need they would be timed with each other on
-/// them, and equally slow.
+/// Ranks that search one after another, as if each had the machine for itself. On too few cores concurrent ranks
+/// would all be equally slow.
 struct Turns {
     exchange: MpiExchange,
     world: SimpleCommunicator,
-    /// A frame sends boxes and then pairs; between the two is the search.
+    /// Counts sends: a frame sends boxes, searches, then sends pairs.
     sent: u64,
     searching: bool,
 }
@@ -128,12 +128,12 @@ impl Exchange for Turns {
         if self.sent.is_multiple_of(2) {
             return;
         }
-        // Nobody begins while another still exchanges.
+        // Nobody begins to search while another rank still exchanges.
         self.exchange.sum(&mut [0]);
         self.searching = true;
         if let Some(before) = self.rank().checked_sub(1) {
             let before = self.world.process_at_rank(before as i32);
-            // MPI would wait on a core that another rank needs.
+            // A blocking receive would occupy a core that another rank needs.
             while before.immediate_probe().is_none() {
                 std::thread::sleep(Duration::from_micros(100));
             }
@@ -145,7 +145,7 @@ impl Exchange for Turns {
 fn unequal(world: &impl Communicator) {
     let (rank, size) = (world.rank() as usize, world.size() as usize);
     let slow = rank == size - 1;
-    // The other ranks have two threads, and this one has one, on the lowest kernels.
+    // The last rank has one thread and the portable kernels, the others have two threads.
     let threads = if slow { 1 } else { 2 };
     let mut registry = Registry::with_cores(threads);
     if slow {
@@ -153,14 +153,14 @@ fn unequal(world: &impl Communicator) {
     }
     let objects: usize = std::env::args().nth(2).map_or(200_000, |text| text.parse().expect("no number"));
     let id = |threads: u32| format!("grid-sap@cpu{threads}").parse().expect("no algorithm");
-    // Nothing is known of the machines: the times of the first frames tell.
+    // Without costs in the tuning: the times of the first frames show the speed of each rank.
     let make = || {
         let steps = vec![sapwise::Step::new(0, id(threads))];
         let exchange = Turns { exchange: MpiExchange::new(world), world: world.duplicate(), sent: 0, searching: false };
         let tuning = Tuning::from_steps(steps).expect("one step is a tuning");
         sapwise_ranks::Distributed::<Turns>::new(exchange, &registry, tuning).expect("no broad phase")
     };
-    // One that cuts when times say so, and one that cuts once, equally, before anything was timed.
+    // One that cuts when times say so, and one that cuts once, before any frame was timed.
     let mut both = [make(), make()];
     both[1].set_cut_every(Some(u64::MAX));
     let mut scene = Scenario::Uniform.start(objects, 1);
@@ -186,7 +186,7 @@ fn unequal(world: &impl Communicator) {
     for (name, times) in ["cuts by measured speed", "equal cuts"].into_iter().zip(times) {
         let mut slowest: Vec<f64> = times.iter().map(|(ns, _)| ns.iter().copied().fold(0.0, f64::max)).collect();
         told(&format!("{name}: slowest"), &mut slowest);
-        // All boxes over what all ranks do in a nanosecond.
+        // All boxes over the boxes that all ranks search in a nanosecond.
         let ideal = |(ns, boxes): &(Vec<f64>, Vec<f64>)| {
             boxes.iter().sum::<f64>() / boxes.iter().zip(ns).map(|(b, t)| b / t).sum::<f64>()
         };
@@ -195,7 +195,7 @@ fn unequal(world: &impl Communicator) {
         let shares: Vec<f64> =
             times.last().map_or(Vec::new(), |(_, boxes)| boxes.iter().map(|b| b / boxes.iter().sum::<f64>()).collect());
         println!(
-            "{name}: slowest over the balanced ideal {median:.3} ({low:.3} to {high:.3}); shares of the boxes {shares:.3?}"
+            "{name}: slowest over balanced {median:.3} ({low:.3} to {high:.3}); shares of the boxes {shares:.3?}"
         );
     }
 }

@@ -10,33 +10,34 @@ use std::time::Duration;
 
 /// The ranks of an MPI communicator.
 ///
-/// Every operation is an immediate one that is asked for its end until the limit on waiting, so that a rank which no longer answers ends the job with a
-/// message instead of letting all others wait for ever.
+/// Operations are immediate ones that are polled until a time limit. So a rank that no longer answers ends the job
+/// with a message, and nobody waits forever.
 pub struct MpiExchange {
-    /// Of its own: what the program sends meanwhile is never taken for ours.
+    /// A duplicate, so that messages of the program are never taken for ours.
     communicator: SimpleCommunicator,
     wait_limit: Duration,
-    /// What is added up, while the sum comes into its place.
+    /// The own values while their sums replace them.
     addends: Vec<u64>,
 }
 
 impl MpiExchange {
-    /// How long a rank waits for the others unless told otherwise. Between two frames a rank may do whatever it does.
+    /// The default limit on waiting. It includes what other ranks do between two frames.
     pub const WAIT_LIMIT: Duration = Duration::from_secs(600);
 
-    /// The ranks of a communicator, which is duplicated: a collective operation of all of its ranks.
+    /// The ranks of a communicator, which it duplicates: a collective operation.
     #[must_use]
     pub fn new(communicator: &impl Communicator) -> Self {
         Self { communicator: communicator.duplicate(), wait_limit: Self::WAIT_LIMIT, addends: Vec::new() }
     }
 
-    /// The same with another limit on waiting, from the beginning of an operation on this rank until all ranks have done their part of it.
+    /// The same with another limit on waiting: the time from the begin of an operation on this rank until all ranks
+    /// have joined.
     #[must_use]
     pub fn with_wait_limit(self, wait_limit: Duration) -> Self {
         Self { wait_limit, ..self }
     }
 
-    /// Ends the job where a part is longer than MPI counts, with 31 bits: 16 GiB. The others are on their way into the operation already.
+    /// Ends the job if a part is longer than MPI can count, 16 GiB. The other ranks may already be in the operation.
     fn check(&self, counts: &[usize]) {
         if let Some(words) = counts.iter().find(|&&count| Count::try_from(count).is_err()) {
             let bytes = words * size_of::<u64>();
@@ -87,8 +88,8 @@ impl Exchange for MpiExchange {
         self.check(send_counts);
         self.check(receive_counts);
         let own = self.rank();
-        // A message for each pair of ranks that have something for each other, and none for the others: most are not neighbours. Not
-        // `MPI_Ialltoallv`, which sends to all, and of Open MPI 4.1.4 the next operation never ended where some parts were empty.
+        // Messages only between ranks that have something for each other: most are not neighbours. `MPI_Ialltoallv`
+        // sends to all, and after empty parts the next operation of Open MPI 4.1.4 never ended.
         let (mut sends, mut receives, mut kept) = (Vec::new(), Vec::new(), (&send[..0], &mut [][..]));
         let (mut to_send, mut to_receive) = (send, receive);
         for (rank, (&sent, &received)) in send_counts.iter().zip(receive_counts).enumerate() {

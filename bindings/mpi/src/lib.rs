@@ -1,7 +1,7 @@
-//! The pairs of boxes that are spread over the ranks of an MPI program.
+//! A broad phase over the ranks of an MPI program.
 //!
-//! [`Distributed`] is the broad phase of [`sapwise_ranks`] over a communicator of the crate [`mpi`]: each rank hands in its own boxes with 64-bit ids and
-//! gets the pairs of them, the same set that one process finds over all boxes.
+//! [`Distributed`] is the broad phase of [`sapwise_ranks`] over a communicator of the crate [`mpi`]. Each rank passes
+//! its own boxes with 64-bit ids and gets their pairs: the same set that one process finds over all boxes.
 //!
 //! ```no_run
 //! use mpi::Threading;
@@ -10,7 +10,7 @@
 //! use sapwise_mpi::{Distributed, RankPairs};
 //!
 //! fn main() -> Result<(), sapwise_mpi::Error> {
-//!     // Algorithms on several cores have threads, of which only this one calls MPI.
+//!     // Of the threads of the algorithms only this one calls MPI.
 //!     let (universe, _) = mpi::initialize_with_threading(Threading::Funneled).expect("MPI was initialised before");
 //!     let world = universe.world();
 //!     let registry = Registry::new();
@@ -25,12 +25,12 @@
 //! }
 //! ```
 //!
-//! # Ends
+//! # Failures
 //!
-//! - What is wrong with the boxes of one rank is the same [`Error`] on all ranks, and the next frame runs.
-//! - A rank that dies ends the job, as MPI does by itself. For one that no longer answers, stopped or in an endless loop, there is a limit on waiting
-//!   ([`MpiExchange::with_wait_limit`]): beyond it a rank writes what it waited for to standard error and ends the job (`MPI_Abort`).
-//! - Drop a [`Distributed`] before the `Universe`, whose end is that of MPI: it has a communicator of its own.
+//! - An error in the boxes of one rank is the same [`Error`] on all ranks, and the next frame runs.
+//! - MPI ends the job when a rank dies. When a rank no longer answers, another one reports on standard error what it
+//!   waited for and ends the job with `MPI_Abort`, after [a limit](MpiExchange::with_wait_limit).
+//! - Drop a [`Distributed`] before the `Universe`, because it owns a communicator.
 
 mod exchange;
 mod wait;
@@ -38,7 +38,9 @@ mod wait;
 pub use exchange::MpiExchange;
 pub use sapwise_ranks::{Balance, Cuts, Error, Failure, FrameReport, RankPairs, Region};
 
-/// A broad phase over the ranks of a communicator: `Distributed::new(&communicator, &registry, tuning)`, on all of its ranks.
+/// A broad phase over the ranks of a communicator: `Distributed::new(&communicator, &registry, tuning)` on all of its
+/// ranks.
 ///
-/// The registry and the tuning are those of the rank's own machine: machines may differ, and the cuts follow their speed.
+/// Each rank passes the registry and the tuning of its own machine. Machines may differ, and the cuts follow their
+/// speed.
 pub type Distributed = sapwise_ranks::Distributed<MpiExchange>;

@@ -1,17 +1,17 @@
-//! Waits for an operation for a bounded time.
+//! Waits for MPI operations with a time limit.
 
 use mpi::request::{Request, RequestCollection, Scope};
 use mpi::traits::Communicator;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Below this a rank that waits asks again at once, as MPI libraries do; beyond it others get the core first.
+/// Until this time a rank polls without a pause, as MPI libraries do; then it yields the core.
 const EAGER: Duration = Duration::from_micros(20);
-/// Beyond this it sleeps between two questions: it may wait for a rank that needs its core.
+/// After this time it sleeps between two polls, because the rank that it waits for may need its core.
 const BRIEF: Duration = Duration::from_millis(2);
 const NAP: Duration = Duration::from_micros(50);
 
-/// Waits until `request` is done, and ends the job when it is not within `limit`. `what` says what is awaited.
+/// Waits for `request`, and ends the job after `limit`. `what` names what is awaited.
 pub(crate) fn within<'a, D: ?Sized, S: Scope<'a>>(
     limit: Duration,
     communicator: &impl Communicator,
@@ -25,7 +25,7 @@ pub(crate) fn within<'a, D: ?Sized, S: Scope<'a>>(
     });
 }
 
-/// The same for all of some requests.
+/// The same for several requests.
 pub(crate) fn all_within<D: ?Sized>(
     limit: Duration,
     communicator: &impl Communicator,
@@ -36,7 +36,7 @@ pub(crate) fn all_within<D: ?Sized>(
     until(limit, communicator, what, || requests.test_all(&mut done));
 }
 
-/// Asks until the answer is yes, or for so long.
+/// Polls until `is_done`, and ends the job after `limit`.
 fn until(limit: Duration, communicator: &impl Communicator, what: &str, mut is_done: impl FnMut() -> bool) {
     let began = Instant::now();
     while !is_done() {

@@ -88,8 +88,6 @@ class BroadPhase:
         cache: str | PathLike[str] | Literal[False] | None = None,
         measure: bool = True,
         background: bool = True,
-        wait: float = 0.0,
-        tunings: str | PathLike[str] | None = None,
         tuning: Tuning | None = None,
         algorithm: str | None = None,
         threads: int | None = None,

@@ -24,7 +24,7 @@ pub(crate) fn failed(py: Python<'_>, text: impl Into<String>) -> PyErr {
 pub(crate) fn invalid_box(py: Python<'_>, which: &str, index: usize, defect: BoxDefect) -> PyErr {
     let what = match defect {
         BoxDefect::NotANumber => "has a bound that is not a number (NaN)",
-        BoxDefect::Inverted => "is inverted: a minimum lies above its maximum",
+        BoxDefect::Inverted => "is inverted: a minimum is above its maximum",
         _ => "is invalid",
     };
     instance(py, "InvalidBoxError", (format!("box {index}{which} {what}; correct or leave out this box"), index))

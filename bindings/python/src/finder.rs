@@ -10,8 +10,7 @@ use crate::tuning::PyTuning;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sapwise::{Membership, StartOptions};
-use std::path::PathBuf;
+use sapwise::Membership;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Finds the overlapping pairs of frames that follow each other.
@@ -28,12 +27,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 ///     Whether the hardware may be measured, for about two seconds, where no tuning is kept. Otherwise built-in
 ///     thresholds decide.
 /// background : bool, default True
-///     Whether that happens on a thread of its own that works a tenth of the time, while built-in thresholds decide.
-///     False waits here.
-/// wait : float, default 0.0
-///     Seconds to wait for that thread, which until then works all the time.
-/// tunings : path, optional
-///     A folder with a tuning for each kind of machine, written by ``sapwise predict --report REPORTS --out FOLDER``.
+///     Whether that happens on a thread of its own, while built-in thresholds decide. False waits here.
 /// tuning : Tuning, optional
 ///     A tuning to use in place of all that.
 /// algorithm : str, optional
@@ -118,7 +112,7 @@ impl PyBroadPhase {
 impl PyBroadPhase {
     #[new]
     #[pyo3(signature = (
-        *, cache=None, measure=true, background=true, wait=0.0, tunings=None, tuning=None, algorithm=None, threads=None,
+        *, cache=None, measure=true, background=true, tuning=None, algorithm=None, threads=None,
         learning=true, exploring=true, ordered=true, limit=None,
     ))]
     #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
@@ -127,8 +121,6 @@ impl PyBroadPhase {
         cache: Option<&Bound<'_, PyAny>>,
         measure: bool,
         background: bool,
-        wait: f64,
-        tunings: Option<PathBuf>,
         tuning: Option<&PyTuning>,
         algorithm: Option<String>,
         threads: Option<u32>,
@@ -143,13 +135,14 @@ impl PyBroadPhase {
         if algorithm.is_some() && tuning.is_some() {
             return Err(unusable(py, "algorithm and tuning exclude each other; give one of them"));
         }
-        let mut options =
-            StartOptions::new().learning(learning).exploring(exploring).background(background).measure(measure);
-        options.cache = start::cache(cache)?;
-        options.wait_at_most = start::seconds(py, "wait", wait)?;
-        options.tunings = tunings;
+        let mut options = start::options(cache)?.background(background);
+        if !measure {
+            options = options.measure(None);
+        }
+        let keeps = algorithm.is_none() && tuning.is_none() && !matches!(cache.map(|c| c.extract::<bool>()), Some(Ok(false)));
         let tuning = tuning.map(|t| t.tuning.clone());
-        let start = Start { options, threads, algorithm, tuning, order: start::order(ordered), limit };
+        let order = start::order(ordered);
+        let start = Start { options, keeps, learning, exploring, threads, algorithm, tuning, order, limit };
         let frames = Frames::new(start::adaptive(py, &start)?, &start);
         let frames = Some(Arc::new(Mutex::new(frames)));
         Ok(Self { start, state: Mutex::new(State { pid: std::process::id(), frames, filter: None }) })
@@ -298,8 +291,7 @@ impl PyBroadPhase {
         self.with(py, |frames| PyTuning::from(frames.adaptive.learned()))
     }
 
-    /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the ``file`` of the
-    /// cache, when the hardware was measured.
+    /// dict: where the tuning came from (``origin``), ``remarks`` on what went wrong, ``seconds``, the ``file`` of the cache.
     #[getter]
     fn setup<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let setup = self.with(py, |frames| frames.adaptive.setup().clone())?;
@@ -359,9 +351,7 @@ impl PyBroadPhase {
     ) -> PyResult<bool> {
         let _ = (kind, value, trace);
         if !self.closed() {
-            let given = self.start.algorithm.is_some() || self.start.tuning.is_some();
-            let keeps = !given && self.start.options.cache != sapwise::Cache::None;
-            let saved = if keeps { self.save(py).err() } else { None };
+            let saved = if self.start.keeps { self.save(py).err() } else { None };
             self.close(py);
             if let Some(why) = saved {
                 // What the block raised matters more than a cache that can't be written.

@@ -67,7 +67,7 @@ impl Engine {
     /// With the tuning that was kept of this machine, or with built-in thresholds. Nothing is measured.
     fn new() -> Result<Self, Error> {
         let registry = Arc::new(Registry::new());
-        let options = StartOptions::new().background(false).measure(false).registry(Arc::clone(&registry));
+        let options = StartOptions::new().background(false).measure(None).registry(Arc::clone(&registry));
         let mut tuning = Adaptive::for_this_machine(&options)?.tuning().clone();
         tuning.costs.retain(|cost| cost.algorithm.method() != INCREMENTAL);
         let mut adaptive = Adaptive::new(if tuning.costs.is_empty() { usual(&registry)? } else { tuning }, &registry)?;

@@ -2,7 +2,7 @@
 
 use crate::error::{exception, failed, unusable};
 use pyo3::prelude::*;
-use sapwise::{Adaptive, Cache, Error, PairOrder, Pairs, Registry, StartOptions, Tuning};
+use sapwise::{Adaptive, Error, PairOrder, Pairs, Registry, StartOptions, Tuning};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,6 +11,10 @@ use std::time::Duration;
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub(crate) options: StartOptions,
+    /// Whether leaving a `with` block saves what was learned.
+    pub(crate) keeps: bool,
+    pub(crate) learning: bool,
+    pub(crate) exploring: bool,
     /// The most threads; `None`: all usable cores.
     pub(crate) threads: Option<u32>,
     /// Always this algorithm.
@@ -40,10 +44,10 @@ impl Start {
                 Adaptive::only(parsed, &registry)?
             }
             (None, Some(tuning)) => Adaptive::new(tuning.clone(), &registry)?,
-            (None, None) => return Adaptive::for_this_machine(&self.options.clone().registry(registry)),
+            (None, None) => Adaptive::for_this_machine(&self.options.clone().registry(registry))?,
         };
-        adaptive.set_learning(self.options.learning);
-        adaptive.set_exploring(self.options.exploring);
+        adaptive.set_learning(self.learning);
+        adaptive.set_exploring(self.exploring);
         Ok(adaptive)
     }
 
@@ -70,13 +74,14 @@ fn known(registry: &Registry) -> String {
     names.join(", ")
 }
 
-/// Where a caller wants tuning to be kept: `None` for the user's cache folder, `False` for nowhere, or a folder.
-pub(crate) fn cache(given: Option<&Bound<'_, PyAny>>) -> PyResult<Cache> {
-    let Some(given) = given else { return Ok(Cache::User) };
+/// Options with the cache that the caller wants: `None` for the user's folder, `False` for none, or a folder.
+pub(crate) fn options(cache: Option<&Bound<'_, PyAny>>) -> PyResult<StartOptions> {
+    let options = StartOptions::new();
+    let Some(given) = cache else { return Ok(options) };
     match (given.extract::<bool>(), given.extract::<PathBuf>()) {
-        (Ok(false), _) => Ok(Cache::None),
-        (Ok(true), _) => Ok(Cache::User),
-        (_, Ok(folder)) => Ok(Cache::Folder(folder)),
+        (Ok(false), _) => Ok(options.cache(None)),
+        (Ok(true), _) => Ok(options),
+        (_, Ok(folder)) => Ok(options.cache(Some(folder))),
         _ => Err(unusable(given.py(), "cache is a folder, False for none, or None for the user's cache folder")),
     }
 }

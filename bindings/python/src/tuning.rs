@@ -5,7 +5,7 @@ use crate::error::{failed, unusable, with_cause};
 use crate::start;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sapwise::{Adaptive, Load, Setup, StartOptions, Tuning, json};
+use sapwise::{Adaptive, Load, Setup, Tuning, json};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -208,9 +208,6 @@ pub(crate) fn setup<'py>(py: Python<'py>, setup: &Setup) -> PyResult<Bound<'py, 
     dict.set_item("remarks", &setup.remarks)?;
     dict.set_item("seconds", setup.seconds)?;
     dict.set_item("file", setup.file.as_ref().map(|file| file.to_string_lossy().into_owned()))?;
-    let measured = setup.measured.as_ref();
-    dict.set_item("measured_at_unix_s", measured.map(|m| m.at_unix_s))?;
-    dict.set_item("disturbed", measured.map(|m| m.disturbed.clone()).unwrap_or_default())?;
     Ok(dict)
 }
 
@@ -239,8 +236,7 @@ pub(crate) fn setup<'py>(py: Python<'py>, setup: &Setup) -> PyResult<Bound<'py, 
 #[pyfunction]
 #[pyo3(signature = (*, cache=None, seconds=2.0))]
 pub(crate) fn predict(py: Python<'_>, cache: Option<&Bound<'_, PyAny>>, seconds: f64) -> PyResult<PyTuning> {
-    let mut options = StartOptions::new().background(false).probe_limit(start::seconds(py, "seconds", seconds)?);
-    options.cache = start::cache(cache)?;
+    let options = start::options(cache)?.background(false).measure(Some(start::seconds(py, "seconds", seconds)?));
     let (done, found) = channel();
     // On a thread, so that Ctrl-C is seen meanwhile. The thread ends by itself, within the seconds.
     let thread = std::thread::Builder::new().name("sapwise-predict".to_owned());

@@ -144,13 +144,13 @@ def test_a_filter_of_another_length_is_refused():
 def test_it_saves_when_the_block_ends(tmp_path):
     boxes = cubes(500)
     with sapwise.BroadPhase(cache=tmp_path, background=False) as broad_phase:
-        assert broad_phase.setup["origin"] == "probed" and broad_phase.setup["measured_at_unix_s"] > 1.7e9
+        assert broad_phase.setup["origin"] == "probed"
         # More than ever pass between two decisions: the second one learns from the frames since the first.
         for _ in range(1500):
             broad_phase.find(boxes)
     assert broad_phase.closed
     kept = [f for f in tmp_path.iterdir() if f.suffix == ".json"]
-    assert len(kept) == 1 and json.loads(kept[0].read_text())["schema"].startswith("cache/")
+    assert len(kept) == 1 and json.loads(kept[0].read_text())["schema"].startswith("tuning/")
     again = sapwise.BroadPhase(cache=str(tmp_path), measure=False, background=False)
     assert again.setup["origin"] == "cached" and again.setup["file"] == str(kept[0])
     assert again.tuning.source == "learned" and again.save()
@@ -183,9 +183,6 @@ def test_it_starts_in_the_background_and_ends_soon(tmp_path):
         assert broad_phase.setup["origin"] in {"awaited", "cached"}
         del broad_phase
         gc.collect()
-    broad_phase = sapwise.BroadPhase(cache=tmp_path, wait=30.0)
-    assert broad_phase.setup["origin"] in {"probed", "cached"}
-    broad_phase.close()
 
 
 def test_a_closed_one_says_so():
@@ -211,7 +208,7 @@ def test_one_algorithm_always_and_a_tuning_of_the_caller():
         with quiet(tuning=tuning) as broad_phase:
             broad_phase.find(boxes)
             assert broad_phase.last_decision.algorithm == algorithm
-            with pytest.raises(sapwise.SapwiseError, match="given by the program"):
+            with pytest.raises(sapwise.SapwiseError, match="no cache file"):
                 broad_phase.save()
     with quiet(threads=1) as broad_phase:
         broad_phase.find(cubes(20_000))
@@ -224,8 +221,6 @@ def test_one_algorithm_always_and_a_tuning_of_the_caller():
         ({"algorithm": "fastest"}, "known here: .*bvh@cpu1"),
         ({"algorithm": "octree@cpu1"}, "known here"),
         ({"threads": 0}, "threads is 0"),
-        ({"wait": -1.0}, "wait is -1"),
-        ({"wait": float("nan")}, "wait is NaN"),
         ({"cache": 5}, "cache is a folder"),
     ],
 )
@@ -235,7 +230,7 @@ def test_arguments_that_can_not_be(arguments, why):
 
 
 def test_more_threads_than_there_are_cores_is_an_error():
-    with pytest.raises(sapwise.SapwiseError, match="threads are the most"):
+    with pytest.raises(sapwise.SapwiseError, match="but this machine has"):
         quiet(algorithm="bvh@cpu2", threads=1)
 
 

@@ -5,7 +5,8 @@ use crate::training::Training;
 use sapwise::json::{self, Error};
 use serde_json::Value;
 
-/// File names and texts of the JSON Schemas of tuning, models and reports. That of models holds what training says of itself too.
+/// File names and texts of the JSON Schemas of tuning, models and reports. That of models holds what training says of
+/// itself too.
 ///
 /// # Errors
 /// When a schema can't be written.

@@ -232,7 +232,7 @@ impl Training {
 
 /// What training says of itself, read from the file of a model, whose other keys are the engine's.
 const TRAINING: Format =
-    Format::new("model", 3, 0).skipping(&["name", "simulated", "ranges", "ratios_90_ln", "places", "methods"]);
+    Format::new("model", 3).skipping(&["name", "simulated", "ranges", "ratios_90_ln", "places", "methods"]);
 
 /// Reads a model with what training says of itself.
 ///
@@ -249,7 +249,8 @@ pub(crate) fn read_model_and_skipped(text: &str) -> Result<(StoredModel, Vec<Str
         training: Training,
     }
     let json::Read { value: Keys { training }, mut skipped, .. } = TRAINING.read(text)?;
-    let json::Read { value: model, skipped: in_model, .. } = Format::MODEL.read(text)?;
+    let json::Read { value: model, skipped: in_model, .. } =
+        Format::MODEL.read::<Model>(text)?.checked(Model::defect)?;
     // A new key of the outermost level is unknown to both readers.
     skipped.extend(in_model.into_iter().filter(|key| !skipped.contains(key)).collect::<Vec<_>>());
     Ok((StoredModel { model, training }, skipped))

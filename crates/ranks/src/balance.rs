@@ -1,30 +1,30 @@
-//! When the cuts are made again.
+//! Decides when space is cut again.
 
 use crate::record::RankRecord;
 
-/// What ranks wait for each other while the cuts are as good as that is not counted: it is within the noise of a time.
+/// Imbalance that is not counted: it is within the noise of a time.
 const TOLERATED: f64 = 0.05;
-/// Cuts that did no good are made again after so many times as much waiting, at most.
+/// The longest wait after cuts that did not help, as a multiple of their price.
 const MOST_PATIENCE: f64 = 64.0;
 
-/// Decides from the times of all ranks when new cuts would pay, the same on every rank.
+/// Decides from the times of all ranks when new cuts pay. Every rank decides the same.
 ///
-/// What the slowest rank takes beyond the time of equally busy ranks is added up, frame by frame. Once it exceeds what cuts cost they are made
-/// again: so that never more than twice the best is lost, as in the problem of renting or buying skis (Karp, 1992). New cuts that did not help make
-/// the next ones dearer.
+/// It adds up the time that the slowest rank takes beyond equally busy ranks. When the sum exceeds the price of cuts,
+/// space is cut again. This loses at most twice the best choice, as in the ski-rental problem (Karp, 1992). Cuts that
+/// did not help raise the price of the next ones.
 #[derive(Debug, Clone)]
 pub struct Balance {
     /// Time lost since the last cuts.
     owed_ns: f64,
-    /// How many times the price of cuts it has to be.
+    /// The multiple of the price that must be lost before the next cuts.
     patience: f64,
-    /// Boxes of all ranks at the last cuts; `None` before the first.
+    /// Boxes of all ranks at the last cuts; `None` before the first frame with them.
     cut_at: Option<u64>,
-    /// The imbalance that those cuts were to end, until it is known whether they did.
+    /// Imbalance before the last cuts, until it is known whether they helped.
     was: Option<f64>,
     imbalance: Option<f64>,
     due: bool,
-    /// Whether the last frame was of about as many boxes as the one for which the last cuts were made.
+    /// Whether the last frame had about as many boxes as the frame of the last cuts.
     same_scene: bool,
 }
 
@@ -35,34 +35,34 @@ impl Default for Balance {
 }
 
 impl Balance {
-    /// Whether cuts are to be made before the next frame.
+    /// Whether to cut before the next frame.
     #[must_use]
     pub fn is_due(&self) -> bool {
         self.due
     }
 
-    /// The time of the slowest rank over that of equally busy ones, less one; `None` where times are not known.
+    /// The time of the slowest rank over that of equally busy ranks, minus one; `None` while times are unknown.
     #[must_use]
     pub fn imbalance(&self) -> Option<f64> {
         self.imbalance
     }
 
-    /// Whether the last frame says where the boxes of the next one are.
+    /// Whether the boxes of the last frame may stand for those of the next.
     pub(crate) fn knows_scene(&self) -> bool {
         self.same_scene
     }
 
-    /// Notes that cuts were made. The boxes are counted in the frame that follows.
+    /// Notes that space was cut. The next frame counts the boxes.
     pub fn cut(&mut self) {
         self.was = self.imbalance.take();
         (self.owed_ns, self.cut_at, self.due) = (0.0, None, false);
     }
 
-    /// Notes what all ranks told in a frame.
+    /// Takes the records of all ranks in a frame.
     pub fn observe(&mut self, records: &[RankRecord]) {
         let boxes: u64 = records.iter().map(|r| r.boxes).sum();
         let before = *self.cut_at.get_or_insert(boxes);
-        // Cuts of a scene that has begun since, or mostly gone.
+        // Else the scene has begun or mostly gone since the cuts.
         self.same_scene = boxes <= before.saturating_mul(2) && boxes >= before / 2;
         self.due |= !self.same_scene;
         let Some((slowest, even)) = times(records) else { return };
@@ -72,7 +72,7 @@ impl Balance {
             self.patience = if imbalance > 0.8 * was { (2.0 * self.patience).min(MOST_PATIENCE) } else { 1.0 };
         }
         let lost = slowest - even - TOLERATED * even;
-        // What was owed by a scene that has become even by itself is forgotten.
+        // A scene that has become even by itself is forgiven.
         self.owed_ns = if lost > 0.0 { self.owed_ns + lost } else { self.owed_ns / 2.0 };
         let price = records.iter().map(|r| r.cut_ns).max().unwrap_or(0) as f64;
         if self.owed_ns > self.patience * price.max(even) {
@@ -81,7 +81,7 @@ impl Balance {
     }
 }
 
-/// The time of the slowest rank, and what all would take if they were equally busy. `None` where a rank that has boxes has no time.
+/// The time of the slowest rank, and that of equally busy ranks. `None` if a rank with boxes has no time.
 fn times(records: &[RankRecord]) -> Option<(f64, f64)> {
     let busy = || records.iter().filter(|r| r.searched > 0);
     if busy().any(|r| r.search_ns == 0) || busy().next().is_none() {
@@ -94,7 +94,7 @@ fn times(records: &[RankRecord]) -> Option<(f64, f64)> {
         rates += r.searched as f64 / r.search_ns as f64;
         count += 1.0;
     }
-    // Ranks without work are taken to be as fast as the others are.
+    // Assumes that ranks without work are as fast as the others.
     Some((slowest, boxes / (rates * records.len() as f64 / count)))
 }
 
@@ -117,7 +117,7 @@ impl Times {
         self.count += 1;
     }
 
-    /// Medians of boxes and nanoseconds, from three frames on: one that stalls is none.
+    /// Medians of boxes and nanoseconds, from three frames on, so that one stalled frame does not count.
     pub(crate) fn medians(&self) -> Option<(u64, u64)> {
         let known = &self.last[..self.count.min(Self::KEPT)];
         let median = |of: fn(&(u64, u64)) -> u64| {
@@ -140,11 +140,11 @@ mod tests {
     }
 
     #[test]
-    fn cuts_are_made_once_what_was_lost_pays_for_them() {
+    fn space_is_cut_when_the_loss_pays_for_it() {
         let mut balance = Balance::default();
         assert!(balance.is_due());
         balance.cut();
-        // 100 boxes in 100 and in 300 ns: together 200 in 150 ns, so that a frame loses 150 and less 5 %.
+        // 100 boxes in 100 and in 300 ns: equally busy ranks take 150 ns, so a frame loses 150 ns minus 5 %.
         let frames = (0..).take_while(|_| {
             balance.observe(&frame(&[100, 300], 10_000));
             !balance.is_due()
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn an_even_scene_keeps_its_cuts_for_ever_and_so_does_one_of_which_nothing_is_known() {
+    fn even_and_unknown_scenes_keep_their_cuts() {
         for times in [[100, 104], [0, 0], [0, 100]] {
             let mut balance = Balance::default();
             balance.cut();
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn cuts_that_do_not_help_are_made_ever_more_rarely() {
+    fn useless_cuts_become_rare() {
         let mut balance = Balance::default();
         balance.cut();
         let mut cuts = 0;

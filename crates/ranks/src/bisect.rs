@@ -1,25 +1,25 @@
-//! Cuts space so that each rank has its share of the work.
+//! Cuts space so that each rank has its share of the work: recursive coordinate bisection (Berger and Bokhari, 1987).
 //!
-//! Recursive coordinate bisection (Berger and Bokhari, 1987). Each plane is a weighted quantile of the middles of boxes, found exactly to the bit by
-//! histograms over the digits of ordered floats, which ranks add up: no rank needs the boxes of another, and boxes that are parked far away or
-//! infinite widen no histogram. Of the three planes that are so found for each part, one an axis, the one is taken that the least work crosses.
+//! Each plane is a weighted quantile of the centres of boxes. Ranks find it exactly, digit by digit, by adding up
+//! histograms over ordered floats. So no rank needs the boxes of another, and boxes far away or infinite widen no
+//! histogram. Each part gets a plane on every axis and keeps the one that the least work crosses.
 
 use crate::cuts::{Cuts, Plane, centre, middle};
 use crate::sample::Sample;
 
 /// Bins of a histogram: a digit of eight bits.
 const BINS: usize = 256;
-/// A plane is good enough where the work below it is off by no more than one part of so many of the part's work.
+/// A plane is good enough if the work below it is off by at most this fraction: 1 / `FINE`.
 const FINE: u64 = 2000;
 
-/// A part of space that is to be divided.
+/// A part of space to divide.
 struct Part {
     /// Position of its plane in pre-order.
     plane: usize,
     /// Its ranks.
     first: usize,
     end: usize,
-    /// Share of its work that belongs below the plane.
+    /// Share of its work wanted below the plane.
     share: f64,
     cuts: [Search; 3],
 }
@@ -27,21 +27,22 @@ struct Part {
 /// The search for a plane on one axis.
 #[derive(Debug, Clone, Copy, Default)]
 struct Search {
-    /// The digits that are known.
+    /// The digits found so far.
     prefix: u64,
-    /// Work below all that have these digits.
+    /// Work below all centres with these digits.
     below: u64,
-    /// Work that is to be below the plane.
+    /// Work wanted below the plane.
     target: u64,
     /// The plane as an ordered number, and the work below it.
     found: Option<(u64, u64)>,
 }
 
-/// Cuts space by the samples of each rank and the share of all work that each rank is to have.
+/// Cuts space by samples of the boxes and each rank's share of the work.
 ///
-/// `sum` replaces each value by its sum over all ranks, as [`Exchange::sum`](crate::Exchange::sum) does; for one who has the samples of all ranks it has
-/// nothing to do. Every rank comes with the same shares, whose sum is 1, and returns the same cuts. Takes a few passes over the samples for each doubling
-/// of the number of ranks, and adds up no more than 6 KiB for each rank in a pass.
+/// `sum` replaces each value by its sum over all ranks, as [`Exchange::sum`](crate::Exchange::sum) does; with the
+/// samples of all ranks in one place it does nothing. All ranks pass the same `shares`, whose sum is 1, and get the
+/// same cuts. It takes a few passes over the samples for each doubling of ranks, and sums at most 6 KiB a rank in a
+/// pass.
 #[must_use]
 pub fn bisect(samples: &mut [Sample], shares: &[f64], sum: &mut dyn FnMut(&mut [u64])) -> Cuts {
     let mut planes = vec![Plane { axis: 0, at: 0.0 }; shares.len().saturating_sub(1)];
@@ -51,7 +52,7 @@ pub fn bisect(samples: &mut [Sample], shares: &[f64], sum: &mut dyn FnMut(&mut [
         search(samples, &mut parts, sum);
         let axes = axes(samples, &parts, sum);
         let mut next = Vec::with_capacity(2 * parts.len());
-        // Where the samples of a part go: below and above its plane.
+        // The parts below and above each plane.
         let mut moves = Vec::with_capacity(parts.len());
         for (part_, axis) in parts.iter().zip(axes) {
             let plane = Plane { axis: axis as u8, at: value(part_.cuts[axis].key()) };
@@ -76,7 +77,7 @@ pub fn bisect(samples: &mut [Sample], shares: &[f64], sum: &mut dyn FnMut(&mut [
     Cuts::new(planes)
 }
 
-/// The part of these ranks, if it is to be divided.
+/// The part of these ranks; `None` for a single rank.
 fn part(plane: usize, first: usize, end: usize, shares: &[f64]) -> Option<Part> {
     if end - first < 2 {
         return None;
@@ -88,11 +89,11 @@ fn part(plane: usize, first: usize, end: usize, shares: &[f64]) -> Option<Part> 
     Some(Part { plane, first, end, share, cuts: [Search::default(); 3] })
 }
 
-/// Finds a plane on each axis for each part, a digit at a time.
+/// Finds a plane on each axis of each part, digit by digit.
 fn search(samples: &[Sample], parts: &mut [Part], sum: &mut dyn FnMut(&mut [u64])) {
     for round in 0..4 {
         let shift = 24 - 8 * round;
-        // Only the searches that are not done have a histogram.
+        // Only unfinished searches have a histogram.
         let mut slots = vec![[usize::MAX; 3]; parts.len()];
         let mut open = 0;
         for (slots, part) in slots.iter_mut().zip(&*parts) {
@@ -125,7 +126,7 @@ fn search(samples: &[Sample], parts: &mut [Part], sum: &mut dyn FnMut(&mut [u64]
 }
 
 impl Search {
-    /// Goes on into the bin that holds the target, or ends at an edge near it.
+    /// Continues in the bin that contains the target, or ends at an edge near it.
     fn narrow(&mut self, bins: &[u64], shift: u32, share: f64) {
         if shift == 24 {
             self.target = (bins.iter().sum::<u64>() as f64 * share) as u64;
@@ -135,7 +136,7 @@ impl Search {
         let mut below = self.below;
         for (bin, &work) in bins.iter().enumerate() {
             let above = below + work;
-            // Of a histogram without work the first edge.
+            // A histogram without work ends at its first edge.
             if above >= self.target || bin + 1 == BINS {
                 let (under, over) = (self.target.abs_diff(below), self.target.abs_diff(above));
                 if shift == 0 || under.min(over) <= fine {
@@ -161,7 +162,7 @@ impl Search {
     }
 }
 
-/// The axis for each part: on which the plane is crossed by the least work, and leaves each side the work that it is to have.
+/// Chooses for each part the axis whose plane crosses the least work and comes closest to the share.
 fn axes(samples: &[Sample], parts: &[Part], sum: &mut dyn FnMut(&mut [u64])) -> Vec<usize> {
     let mut crossed = vec![0; 3 * parts.len()];
     let planes: Vec<[f32; 3]> = parts.iter().map(|p| p.cuts.map(|cut| value(cut.key()))).collect();
@@ -175,7 +176,7 @@ fn axes(samples: &[Sample], parts: &[Part], sum: &mut dyn FnMut(&mut [u64])) -> 
         }
     }
     sum(&mut crossed);
-    // What one side has too much of is done by it alone, while all ranks wait: it counts for every rank of the part.
+    // All ranks of the part wait for the work that one side has too much of.
     let cost = |k: usize, a: usize| {
         let (part, cut) = (&parts[k], &parts[k].cuts[a]);
         crossed[3 * k + a]
@@ -184,18 +185,18 @@ fn axes(samples: &[Sample], parts: &[Part], sum: &mut dyn FnMut(&mut [u64])) -> 
     (0..parts.len()).map(|k| (0..3).min_by_key(|&a| cost(k, a)).unwrap_or(0)).collect()
 }
 
-/// A float as a number in the same order.
+/// A float as an integer in the same order.
 #[inline]
 fn key(v: f32) -> u64 {
     let bits = v.to_bits();
     u64::from(if bits >> 31 == 1 { !bits } else { bits | 1 << 31 })
 }
 
-/// The float of such a number; the greatest finite one beyond that, and the least below.
+/// The float of such an integer, clamped to the finite ones.
 fn value(key: u64) -> f32 {
     let key = key.min(u64::from(u32::MAX)) as u32;
     let v = f32::from_bits(if key >> 31 == 1 { key & !(1 << 31) } else { !key });
-    // Beyond the infinities are NaNs, those with the sign below.
+    // NaNs are beyond the infinities, the negative ones below.
     if v.is_nan() { if key >> 31 == 1 { f32::MAX } else { f32::MIN } } else { v.clamp(f32::MIN, f32::MAX) }
 }
 
@@ -221,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn every_rank_gets_its_share_in_every_scenario_and_all_ranks_the_same_cuts() {
+    fn every_rank_gets_its_share_and_the_same_cuts() {
         for scenario in [Scenario::Uniform, Scenario::Clustered, Scenario::Parked, Scenario::Stations, Scenario::Tower]
         {
             let scene = scenario.start(7000, 1);
@@ -247,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_is_cut_across_and_boxes_at_one_point_are_not_cut() {
+    fn a_row_is_cut_across_and_one_point_is_not_cut() {
         let row: Vec<Aabb> = (0..1000).map(|k| Aabb::new([0.0, k as f32, 0.0], [9.0, k as f32 + 0.5, 9.0])).collect();
         let point = vec![Aabb::cube([3.0; 3], 0.5); 100];
         let found = Threads::run(4, |mut threads| {
@@ -268,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_that_cost_more_are_fewer_in_a_region() {
+    fn a_region_has_fewer_expensive_boxes() {
         let mut random = Random::new(1);
         let boxes: Vec<Aabb> = (0..8000).map(|_| Aabb::cube([random.uniform() as f32, 0.0, 0.0], 0.0)).collect();
         let found = Threads::run(2, |mut threads| {
@@ -278,7 +279,7 @@ mod tests {
             Sample::weigh(&mut samples, &halves, &[3.0, 1.0]);
             bisect(&mut samples, &[0.5; 2], &mut |v| threads.sum(v))
         });
-        // Three times x below one half is two of four parts at one third.
+        // Boxes below 1/2 weigh 3, so half of the weight is below 1/3.
         assert!((found[0].regions()[0].high[0] - 1.0 / 3.0).abs() < 0.02, "{:?}", found[0]);
     }
 }

@@ -1,30 +1,30 @@
-//! Which region of space belongs to which rank.
+//! Regions of space, one for each rank.
 
 use sapwise::Aabb;
 
-/// Space divided into one region for each rank, by planes: a plane divides the regions of ranks `first..end` into those of
-/// `first..middle`, with `middle` half-way, below it, and the others on and above it.
+/// Space divided by planes into one region for each rank. A plane divides the ranks `first..end` in the middle: the
+/// first half is below it, the others are on and above it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cuts {
-    /// In pre-order: behind a plane those below it, then those above.
+    /// In pre-order: after a plane those below it, then those above.
     planes: Vec<Plane>,
     regions: Vec<Region>,
 }
 
-/// A plane: points whose coordinate is less than `at` are below it. Always finite.
+/// Points whose coordinate is less than `at` are below it. `at` is finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Plane {
     pub(crate) axis: u8,
     pub(crate) at: f32,
 }
 
-/// The region of a rank: from `low`, included, to `high`, which is not part of it. Infinite where no plane bounds it, and there it reaches to infinity
-/// and contains it.
+/// The region of a rank: from `low`, inclusive, to `high`, exclusive. Without a plane a side is infinite and includes
+/// infinity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Region {
     /// Lowest x, y and z.
     pub low: [f32; 3],
-    /// Where it ends on x, y and z.
+    /// Highest x, y and z.
     pub high: [f32; 3],
 }
 
@@ -32,22 +32,22 @@ impl Region {
     /// All of space.
     pub const ALL: Self = Self { low: [f32::NEG_INFINITY; 3], high: [f32::INFINITY; 3] };
 
-    /// Whether a point without a NaN belongs to it.
+    /// Whether it contains a point. `point` has no NaN.
     #[inline]
     #[must_use]
     pub fn holds(&self, point: [f32; 3]) -> bool {
         (0..3).all(|a| point[a] >= self.low[a] && (point[a] < self.high[a] || self.high[a] == f32::INFINITY))
     }
 
-    /// Whether a valid box overlaps no other region.
+    /// Whether it contains all of a valid box.
     #[inline]
     #[must_use]
     pub fn holds_all_of(&self, b: &Aabb) -> bool {
         self.holds(b.min) && self.holds(b.max)
     }
 
-    /// Whether it is the one in which the pair of two overlapping boxes is found: the one of the lower corner of their intersection. A point has one
-    /// region, and both boxes overlap the region of a point of both.
+    /// Whether it reports the pair of two overlapping boxes: it contains the lower corner of their intersection.
+    /// Exactly one region does, and both boxes overlap it.
     #[inline]
     #[must_use]
     pub fn finds(&self, a: &Aabb, b: &Aabb) -> bool {
@@ -62,7 +62,7 @@ impl Cuts {
         Self { planes: Vec::new(), regions: vec![Region::ALL] }
     }
 
-    /// The cuts by planes in pre-order, one fewer than there are ranks.
+    /// The cuts of planes in pre-order, one fewer than ranks.
     pub(crate) fn new(planes: Vec<Plane>) -> Self {
         let mut cuts = Self { regions: vec![Region::ALL; planes.len() + 1], planes };
         cuts.bound(0, 0, cuts.regions.len(), Region::ALL);
@@ -76,7 +76,7 @@ impl Cuts {
         }
         let (Plane { axis, at }, middle) = (self.planes[plane], middle(first, end));
         let (mut below, mut above) = (region, region);
-        // A plane beyond the part that it divides leaves one side empty.
+        // A plane outside the part leaves one side empty.
         below.high[usize::from(axis)] = at.min(region.high[usize::from(axis)]);
         above.low[usize::from(axis)] = at.max(region.low[usize::from(axis)]);
         self.bound(plane + 1, first, middle, below);
@@ -89,7 +89,7 @@ impl Cuts {
         &self.regions
     }
 
-    /// The rank whose region a point belongs to.
+    /// The rank whose region contains a point.
     #[inline]
     #[must_use]
     pub fn rank_of(&self, point: [f32; 3]) -> usize {
@@ -105,12 +105,11 @@ impl Cuts {
         first
     }
 
-    /// Calls `visit` with each rank whose region a box overlaps, ascending.
-    ///
-    /// A box with a NaN may overlap no region.
+    /// Calls `visit` with each rank whose region a box overlaps, ascending. A box with a NaN may overlap none.
     #[inline]
     pub fn each_rank_of(&self, b: &Aabb, mut visit: impl FnMut(usize)) {
-        // A path has as many planes as the number of ranks has bits, and each may leave one branch for later.
+        // A path has at most as many planes as the number of ranks has bits, and each leaves at most one branch for
+        // later.
         let mut later = [(0_usize, 0_usize, 0_usize); usize::BITS as usize];
         let mut waiting = 0;
         let (mut plane, mut first, mut end) = (0, 0, self.regions.len());
@@ -141,17 +140,17 @@ impl Cuts {
     }
 }
 
-/// Where the ranks from `first` to `end` are divided.
+/// The first rank of the second half of `first..end`.
 pub(crate) fn middle(first: usize, end: usize) -> usize {
     first.midpoint(end)
 }
 
-/// Where a box counts for the cuts: its middle, which is finite even of an infinite box.
+/// The centre of a box, clamped to finite numbers: the point by which the cuts count it.
 #[inline]
 #[must_use]
 pub fn centre(b: &Aabb) -> [f32; 3] {
     let bound = |v: f32| v.clamp(f32::MIN, f32::MAX) / 2.0;
-    // A sum with 0 makes 0 of -0, which is the same place.
+    // Adding 0 turns -0 into 0.
     [0, 1, 2].map(|a| bound(b.min[a]) + bound(b.max[a]) + 0.0)
 }
 
@@ -166,9 +165,9 @@ mod tests {
     }
 
     #[test]
-    fn each_point_has_one_region_and_boxes_reach_those_that_hold_a_point_of_them() {
+    fn points_have_one_region_and_boxes_reach_theirs() {
         let mut random = Random::new(1);
-        // Few values, so that bounds lie on planes often.
+        // Few values, so that bounds often lie on planes.
         let special = [f32::NEG_INFINITY, -4.0, -1.0, -0.0, 0.0, 0.5, 1.0, 3.0, f32::INFINITY];
         for ranks in [1, 2, 3, 4, 7, 16, 61] {
             let cuts = some(ranks, &mut random);
@@ -186,7 +185,7 @@ mod tests {
                 );
                 let inside = cuts.regions()[reached[0]].holds_all_of(&b);
                 assert!(!inside || reached.len() == 1, "{b:?} {reached:?}");
-                // A region that a plane through the box has made empty of it by another plane is reached by no point of it.
+                // No region is reached that the box does not touch.
                 let region = |r: &usize| cuts.regions()[*r];
                 assert!(
                     reached.iter().map(region).all(|r| (0..3).all(|a| b.min[a] <= r.high[a] && b.max[a] >= r.low[a]))
@@ -196,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_is_found_in_one_region_which_both_boxes_reach() {
+    fn one_region_reports_a_pair_and_both_boxes_reach_it() {
         let mut random = Random::new(2);
         let cuts = some(13, &mut random);
         for _ in 0..5000 {
@@ -218,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_middle_of_any_box_is_a_number() {
+    fn the_centre_of_any_box_is_a_number() {
         let inf = f32::INFINITY;
         assert_eq!(centre(&Aabb::new([-inf; 3], [inf; 3])), [0.0; 3]);
         assert_eq!(centre(&Aabb::new([inf; 3], [inf; 3])), [f32::MAX; 3]);

@@ -14,32 +14,33 @@ use crate::share::{FACTORS, costs, pair_cost, shares};
 use sapwise::{Aabb, Adaptive, Load, Registry, Tuning};
 use std::time::Instant;
 
-/// Words of a pair on its way to an owner: the id of the owner's box, then the other.
+/// Words of a pair: the id of the owner's box, then the other.
 const PAIR_WORDS: usize = 2;
-/// Words that a rank says before pairs go back: how many, and the outcome of its search.
+/// Words that announce pairs: their number and the outcome of the search.
 const ANSWER_WORDS: usize = 3;
 
-/// Bytes of a box on its way to another rank.
+/// Bytes of a box that is sent.
 pub const BOX_BYTES: u64 = 8 * BOX_WORDS as u64;
-/// Bytes of a pair on its way to an owner.
+/// Bytes of a pair that is sent.
 pub const PAIR_BYTES: u64 = 8 * PAIR_WORDS as u64;
-/// Bytes that each rank tells each other one in a frame, beside boxes and pairs.
+/// Bytes of counts that each rank sends to each other one in a frame.
 pub const TOLD_BYTES: u64 = 8 * (record::WORDS + ANSWER_WORDS) as u64;
 
 /// Finds the pairs of boxes that are spread over ranks.
 ///
-/// Every rank calls [`find_pairs`](Self::find_pairs) equally often, as a collective operation. Which rank owns a box may change from frame to frame.
-/// Frames in which ranks own what lies near each other are cheap, since only boxes of another rank's region cross.
+/// [`find_pairs`](Self::find_pairs) is collective: every rank calls it equally often. The owner of a box may change
+/// from frame to frame. A frame is cheap if each rank owns boxes near each other, because only boxes in another
+/// rank's region are sent.
 pub struct Distributed<E> {
     exchange: E,
     search: LocalSearch,
     cuts: Cuts,
     balance: Balance,
-    /// Cuts are made again after so many frames, whatever the times say.
+    /// Cut after this many frames, whatever the times are.
     cut_every: Option<u64>,
     frames: u64,
     cut_ns: u64,
-    /// What each rank told in this frame.
+    /// The record of each rank in this frame.
     records: Vec<RankRecord>,
     boxes_out: Outbox<BOX_WORDS>,
     pairs_out: Outbox<PAIR_WORDS>,
@@ -49,46 +50,46 @@ pub struct Distributed<E> {
     report: FrameReport,
 }
 
-/// What a frame has moved, on this rank.
+/// Counts of one frame on this rank.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct FrameReport {
-    /// Boxes that the rank came with.
+    /// Own boxes.
     pub boxes: u64,
-    /// Copies of them that went to other ranks.
+    /// Copies of them sent to other ranks.
     pub boxes_sent: u64,
-    /// Boxes that came from other ranks.
+    /// Boxes received from other ranks.
     pub boxes_received: u64,
-    /// Boxes that were searched here: own ones of this region, and all that came.
+    /// Boxes searched here: own ones in this region and all received ones.
     pub boxes_searched: u64,
-    /// Pairs that went to the owners of their boxes.
+    /// Pairs sent to the owners of their boxes.
     pub pairs_sent: u64,
-    /// Pairs that came from where they were found.
+    /// Pairs received from the ranks that found them.
     pub pairs_received: u64,
-    /// Bytes that went to other ranks: boxes, pairs, counts. Without those of cuts.
+    /// Bytes of boxes, pairs and counts sent to other ranks, without those of cuts.
     pub bytes_sent: u64,
     /// Whether space was cut.
     pub cut: bool,
-    /// Nanoseconds that the search took here, without any exchange.
+    /// Nanoseconds of the search, without any exchange.
     pub search_ns: u64,
-    /// Bytes of memory that are kept for boxes and messages, without those of the algorithm, of the found pairs and of the exchange.
+    /// Bytes of memory for boxes and messages, without the algorithm, the found pairs and the exchange.
     pub memory_bytes: u64,
 }
 
 impl<E: Exchange> Distributed<E> {
-    /// A broad phase over the ranks of `exchange`. Each rank comes with the algorithms and the tuning of its own machine; those that know the costs of
-    /// algorithms, predicted or measured, let the cuts follow the speed of the machines from the first frame on, and
-    /// [`Tuning::usual`] from the first ones that were timed.
+    /// A broad phase over the ranks of `exchange`, with the registry and the tuning of each rank's own machine. With
+    /// costs in the tuning the cuts follow the speed of the machines from the first frame on, with [`Tuning::usual`]
+    /// once frames were timed.
     ///
     /// # Errors
-    /// The same on all ranks, for the lowest whose tuning names no algorithm that runs there.
+    /// [`Error::Search`] on all ranks if no algorithm of the tuning of one rank can run there.
     pub fn new(exchange: impl Into<E>, registry: &Registry, tuning: Tuning) -> Result<Self, Error> {
         let mut exchange = exchange.into();
         let made = Adaptive::new(tuning, registry);
         let own = made.as_ref().map_or_else(|e| outcome(&Err(e.clone())), |_| DONE);
         agree(&mut exchange, own)?;
         let ranks = exchange.size();
-        // `agree` has returned the error of this rank, or that of a lower one.
+        // `agree` has already returned this error, or that of a lower rank.
         let adaptive =
             made.map_err(|_| Error::Search { rank: exchange.rank(), failure: crate::Failure::NoAlgorithm })?;
         Ok(Self {
@@ -114,24 +115,24 @@ impl<E: Exchange> Distributed<E> {
         self.exchange.rank()
     }
 
-    /// How many ranks there are.
+    /// The number of ranks.
     pub fn ranks(&self) -> usize {
         self.exchange.size()
     }
 
-    /// The regions of the ranks. All of space for one before the first frame.
+    /// The regions of the ranks. One region of all space before the first frame.
     #[must_use]
     pub fn cuts(&self) -> &Cuts {
         &self.cuts
     }
 
-    /// What the last frame has moved.
+    /// Counts of the last frame.
     #[must_use]
     pub fn last_frame(&self) -> &FrameReport {
         &self.report
     }
 
-    /// How even the times of the ranks are, which decides when space is cut again.
+    /// The balance of the ranks, which decides when space is cut again.
     #[must_use]
     pub fn balance(&self) -> &Balance {
         &self.balance
@@ -143,31 +144,31 @@ impl<E: Exchange> Distributed<E> {
         self.search.adaptive()
     }
 
-    /// The same, to say whether it learns and explores.
+    /// The same, mutable: to turn learning and exploring on or off.
     pub fn adaptive_mut(&mut self) -> &mut Adaptive {
         self.search.adaptive_mut()
     }
 
-    /// In full, what the last search of this rank failed with, if it did.
+    /// The full error of this rank's last search, if it failed.
     #[must_use]
     pub fn search_error(&self) -> Option<&sapwise::Error> {
         self.search.error.as_ref()
     }
 
-    /// Cuts space again after every so many frames, or, by default, when the times of the ranks say that it pays. The same on all ranks.
-    ///
-    /// For runs whose cuts are to be the same again: times are not.
+    /// Cuts space after every `frames` frames; `None`, the default, cuts when the times of the ranks say that it
+    /// pays. All ranks pass the same. For reproducible cuts: times differ between runs.
     pub fn set_cut_every(&mut self, frames: Option<u64>) {
         self.cut_every = frames;
     }
 
-    /// Replaces the content of `pairs` with the pairs of this rank's boxes: overlapping pairs over the boxes of all ranks, touching ones included.
+    /// Replaces the content of `pairs` with the overlapping or touching pairs of this rank's boxes and the boxes of
+    /// all ranks.
     ///
-    /// `ids` has one id for each box. They name boxes in `pairs` and are not compared with each other: two boxes with one id are two boxes.
+    /// `ids` has one id for each box, which names it in `pairs`. Two boxes with the same id are two boxes.
     ///
     /// # Errors
-    /// The same on all ranks: [`Error::InvalidBox`] and [`Error::MissingIds`] before anything is searched, [`Error::Search`] and
-    /// [`Error::TooManyPairs`] after. The content of `pairs` is unspecified then.
+    /// The same on all ranks: [`Error::InvalidBox`] and [`Error::MissingIds`] before the search, [`Error::Search`] and
+    /// [`Error::TooManyPairs`] after it. The content of `pairs` is then unspecified.
     pub fn find_pairs(&mut self, boxes: &[Aabb], ids: &[u64], pairs: &mut RankPairs) -> Result<(), Error> {
         pairs.clear();
         self.report = FrameReport { boxes: boxes.len() as u64, ..FrameReport::default() };
@@ -199,7 +200,7 @@ impl<E: Exchange> Distributed<E> {
         Ok(())
     }
 
-    /// A frame of one rank, which needs no copy.
+    /// Runs a frame of a single rank, without copying boxes.
     fn find_alone(&mut self, boxes: &[Aabb], ids: &[u64], pairs: &mut RankPairs) -> Result<(), Error> {
         if ids.len() != boxes.len() {
             return Err(Error::MissingIds { rank: 0, boxes: boxes.len() as u64, ids: ids.len() as u64 });
@@ -220,11 +221,11 @@ impl<E: Exchange> Distributed<E> {
         Ok(())
     }
 
-    /// Cuts space by the boxes and by the loads and speeds of all ranks.
+    /// Cuts space by the boxes, the loads and the speeds of all ranks.
     fn cut(&mut self, boxes: &[Aabb]) {
         let began = Instant::now();
         let ranks = self.ranks();
-        // Before the first cuts no load of a region is known: that of the own boxes, wherever they are, has to do.
+        // Before the first cuts the load of the own boxes, wherever they are, stands for that of a region.
         let regional = self.search.load().filter(|load| load.objects > 0 && self.cuts.regions().len() == ranks);
         let load = regional.unwrap_or_else(|| Load::estimate(boxes, None, None));
         let mean = self.mean_load(&load);
@@ -233,14 +234,14 @@ impl<E: Exchange> Distributed<E> {
             let objects = (f64::from(mean.objects) * factor).clamp(1.0, f64::from(u32::MAX));
             predict(&mean.rescaled(objects as u32, mean.pairs * factor))
         };
-        // What this region costs over what a mean one would cost here: the speed of this rank cancels. By its boxes and pairs, which are known; its
-        // candidates are known from a few hundred boxes, and would make noise of even regions.
+        // Cost of this region over that of a mean region on this rank, so that its speed cancels. From boxes and
+        // pairs, which are exact: candidates are estimated from a few hundred boxes and would add noise.
         let work = regional.map_or(1.0, |load| predict(&mean.rescaled(load.objects, load.pairs)) / predict(&mean));
         let own = FACTORS.map(time).into_iter().chain([work, pair_cost(&mean, &predict)]);
         let all = gather(&mut self.exchange, own, FACTORS.len() + 2);
         let times: Vec<_> = all.iter().map(|words| std::array::from_fn(|k| words[k])).collect();
         let pair_cost = all.iter().map(|words| words[FACTORS.len() + 1]).sum::<f64>() / ranks as f64;
-        // The boxes of the last frame, of which the pairs are known, unless this is another scene.
+        // The boxes of the last frame, because their pairs are known, unless the scene has changed.
         let known = self.cuts.regions().len() == ranks && self.balance.knows_scene() && self.search.is_whole();
         let mut samples = if known {
             self.search.samples(&self.cuts.regions()[self.rank()], pair_cost)
@@ -281,7 +282,7 @@ impl<E: Exchange> Distributed<E> {
             .with_moved(moved / PARTS / objects.max(1.0))
     }
 
-    /// Sends each box to where it is searched, as far as the outbox. Ends at the first invalid one.
+    /// Puts each box where it is searched: here or into the outbox. Ends at the first invalid box.
     fn route(&mut self, boxes: &[Aabb], ids: &[u64]) -> RankRecord {
         let own = self.rank();
         let region = self.cuts.regions()[own];
@@ -307,7 +308,7 @@ impl<E: Exchange> Distributed<E> {
         record
     }
 
-    /// Tells every rank this record, with how many boxes it gets, and hears those of all.
+    /// Sends this record to every rank, with the number of boxes that it gets, and receives those of all ranks.
     fn tell(&mut self, own: RankRecord) {
         self.told.clear();
         for &count in self.boxes_out.counts() {
@@ -335,7 +336,7 @@ impl<E: Exchange> Distributed<E> {
         self.report.boxes_searched = self.search.boxes.len() as u64;
     }
 
-    /// Takes the pairs that were found here: those whose place is this region, to the owners of their boxes.
+    /// Hands the pairs that this region reports to the owners of their boxes.
     fn sort_found(&mut self, pairs: &mut RankPairs) {
         let own = self.rank();
         let region = self.cuts.regions()[own];
@@ -357,7 +358,7 @@ impl<E: Exchange> Distributed<E> {
         }
     }
 
-    /// Sends pairs to their owners and takes those of own boxes, unless anything failed anywhere.
+    /// Sends pairs to their owners and receives those of own boxes, unless a rank failed.
     fn return_pairs(&mut self, outcome: Outcome, pairs: &mut RankPairs) -> Result<(), Error> {
         self.told.clear();
         for &count in self.pairs_out.counts() {
@@ -391,9 +392,9 @@ impl<E: Exchange> Distributed<E> {
     }
 }
 
-/// The figures of every rank, so many of each.
+/// Returns the `each` numbers of every rank.
 fn gather(exchange: &mut impl Exchange, own: impl Iterator<Item = f64>, each: usize) -> Vec<Vec<f64>> {
-    // A sum in which only one rank has anything else than 0 is what that rank has.
+    // Only one rank has something other than 0 in each place, so the sum is its number.
     let mut words = vec![0; each * exchange.size()];
     let at = each * exchange.rank();
     words[at..at + each].iter_mut().zip(own).for_each(|(word, v)| *word = v.to_bits());
@@ -401,7 +402,7 @@ fn gather(exchange: &mut impl Exchange, own: impl Iterator<Item = f64>, each: us
     words.chunks_exact(each).map(|w| w.iter().map(|&v| f64::from_bits(v)).collect()).collect()
 }
 
-/// Returns the same on every rank: the error of the lowest that has one.
+/// Returns the error of the lowest rank that has one, on every rank.
 fn agree(exchange: &mut impl Exchange, own: Outcome) -> Result<(), Error> {
     let mut words = vec![0; 2 * exchange.size()];
     let at = 2 * exchange.rank();

@@ -1,13 +1,13 @@
-//! What can go wrong while ranks search.
+//! Why ranks find no pairs.
 
 use sapwise::BoxDefect;
 
-/// Why no rank has pairs of this frame: the same on all of them. The next frame starts from nothing.
+/// Why no rank has pairs of this frame, the same on all ranks. The next frame starts from scratch.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A box that no algorithm can order. Where several ranks have one, that of the lowest rank.
-    #[error("box {index} of rank {rank} {}; correct or leave out this box", told(*.defect))]
+    /// A box that can't be ordered. If several ranks have one, that of the lowest rank.
+    #[error("box {index} of rank {rank} {}; correct it or leave it out", told(*.defect))]
     InvalidBox {
         /// The rank.
         rank: usize,
@@ -16,8 +16,8 @@ pub enum Error {
         /// What is wrong with it.
         defect: BoxDefect,
     },
-    /// A rank did not come with one id for each box.
-    #[error("rank {rank} came with {boxes} boxes and {ids} ids; give one for each box")]
+    /// A rank did not pass one id for each box.
+    #[error("rank {rank} passed {boxes} boxes and {ids} ids; give one for each box")]
     MissingIds {
         /// The rank.
         rank: usize,
@@ -44,38 +44,38 @@ pub enum Error {
     },
 }
 
-/// Why the search of a rank failed, as far as every rank can be told.
+/// Why the search of a rank failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Failure {
-    /// More boxes, with those of other ranks, than 32 bits can number.
-    #[error("it has {0} boxes, with those of other ranks, which are more than 32 bits can number; use more ranks")]
+    /// More boxes in the region than 32 bits can number.
+    #[error("its region has {0} boxes, more than 32 bits can number; use more ranks")]
     TooManyBoxes(u64),
-    /// An allocation of so many elements was refused.
+    /// An allocation of this many elements was refused.
     #[error("no memory for {0} elements; use more ranks or set a limit on the pairs")]
     OutOfMemory(u64),
     /// No algorithm of its tuning runs there.
-    #[error("no algorithm of its tuning runs there; predict its tuning again")]
+    #[error("no algorithm of its tuning runs there; run `sapwise predict` there again")]
     NoAlgorithm,
-    /// Anything else, which is told on that rank by [`Distributed::search_error`](crate::Distributed::search_error).
-    #[error("that rank can tell why")]
+    /// Another error: [`Distributed::search_error`](crate::Distributed::search_error) has it on that rank.
+    #[error("`search_error` on that rank says why")]
     Other,
 }
 
 fn told(defect: BoxDefect) -> &'static str {
     match defect {
         BoxDefect::NotANumber => "has a bound that is not a number (NaN)",
-        BoxDefect::Inverted => "is inverted: a minimum lies above its maximum",
+        BoxDefect::Inverted => "is inverted: a minimum is above its maximum",
         _ => "is invalid",
     }
 }
 
-/// What became of the part of a frame that one rank did: 0, or what went wrong, and a number that belongs to it.
+/// The outcome of one rank's search as words: 0 or the kind of error, and its number.
 pub(crate) type Outcome = [u64; 2];
 
 pub(crate) const DONE: Outcome = [0, 0];
 
-/// The outcome of a search, which never is an invalid box: those were found before.
+/// Encodes the result of a search. Invalid boxes were found before.
 pub(crate) fn outcome(result: &Result<(), sapwise::Error>) -> Outcome {
     match result {
         Ok(()) => DONE,
@@ -89,7 +89,7 @@ pub(crate) fn outcome(result: &Result<(), sapwise::Error>) -> Outcome {
     }
 }
 
-/// What that means, if it is an error.
+/// Decodes an outcome; `None` for success.
 pub(crate) fn error_of(rank: usize, [what, number]: Outcome) -> Option<Error> {
     let failure = match what {
         0 => return None,
@@ -107,13 +107,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_outcome_is_told_in_a_sentence() {
+    fn every_outcome_is_a_sentence() {
         assert_eq!(error_of(3, outcome(&Ok(()))), None);
         let text = |e| error_of(3, outcome(&Err(e))).map(|e| e.to_string()).unwrap_or_default();
         assert!(text(sapwise::Error::TooManyPairs { limit: 7 }).contains("rank 3 has more pairs than its limit of 7"));
-        assert!(text(sapwise::Error::TooManyObjects { objects: 5 }).contains("it has 5 boxes"));
+        assert!(text(sapwise::Error::TooManyObjects { objects: 5 }).contains("its region has 5 boxes"));
         assert!(text(sapwise::Error::OutOfMemory { what: "pairs", elements: 9 }).contains("no memory for 9 elements"));
-        assert!(text(sapwise::Error::NoAlgorithm).contains("predict its tuning again"));
+        assert!(text(sapwise::Error::NoAlgorithm).contains("`sapwise predict` there again"));
         let invalid = Error::InvalidBox { rank: 2, index: 8, defect: BoxDefect::NotANumber };
         assert!(invalid.to_string().starts_with("box 8 of rank 2 has a bound that is not a number"));
     }

@@ -1,8 +1,8 @@
-//! The pairs of boxes that are spread over ranks, without MPI: all that a distributed broad phase decides and counts.
+//! A broad phase over boxes that are spread over ranks, without MPI.
 //!
-//! Each rank hands in boxes of its own with 64-bit ids and gets the pairs of them ([`Distributed::find_pairs`]): the same set that one process
-//! finds over all boxes. What carries words from rank to rank is an [`Exchange`]: the package `sapwise-mpi` has the one over MPI, [`Threads`] is
-//! one in a process, for tests and for a first try:
+//! Each rank passes its own boxes with 64-bit ids and gets their pairs ([`Distributed::find_pairs`]): the same set
+//! that one process finds over all boxes. An [`Exchange`] carries words from rank to rank. The package `sapwise-mpi`
+//! has one over MPI; [`Threads`] is one within a process, for tests and for a first try:
 //!
 //! ```
 //! use sapwise::{Aabb, Registry, Tuning};
@@ -11,7 +11,7 @@
 //! let found = Threads::run(2, |threads| {
 //!     let registry = Registry::with_cores(1);
 //!     let mut ranks: Distributed<Threads> = Distributed::new(threads, &registry, Tuning::usual(&registry))?;
-//!     // A row of boxes, dealt to both ranks like cards: each touches the next.
+//!     // A row of boxes, each of which touches the next. The ranks own every other box.
 //!     let ids: Vec<u64> = (0..10).filter(|id| id % 2 == ranks.rank() as u64).collect();
 //!     let boxes: Vec<Aabb> = ids.iter().map(|&id| Aabb::cube([id as f32, 0.0, 0.0], 0.5)).collect();
 //!     let mut pairs = RankPairs::new();
@@ -25,13 +25,14 @@
 //!
 //! # How
 //!
-//! - Space is cut into a region for each rank ([`Cuts`], recursive coordinate bisection after Berger and Bokhari, 1987). A box is searched in every
-//!   region that it overlaps, and a pair is found in the one region that holds the lower corner of the intersection of its two boxes.
-//! - The cuts follow density and predicted cost: a rank's share of the work is what its [`Tuning`](sapwise::Tuning), corrected by the time of its
-//!   frames, says that it does in the time that all ranks take ([`shares`]).
-//! - They are kept from frame to frame, and made again once the time that imbalance has cost since pays for that ([`Balance`]).
-//! - A frame exchanges counts first, then only the boxes that cross, then the counts and the pairs that go back to the owners of boxes.
-//! - Errors agree: what is wrong on one rank is the same [`Error`] on all of them, with its rank.
+//! - Space is cut into one region for each rank ([`Cuts`], recursive coordinate bisection after Berger and Bokhari,
+//!   1987). A box is searched in every region that it overlaps. The region that contains the lower corner of the
+//!   intersection of two boxes reports their pair.
+//! - The cuts follow density and predicted cost: a rank's share is the work that it does in the time that all ranks
+//!   take ([`shares`]), by its [`Tuning`](sapwise::Tuning) and the times of its frames.
+//! - The cuts are kept until the time lost to imbalance pays for new ones ([`Balance`]).
+//! - A frame exchanges counts, then the boxes that cross, then the pairs that go back to the owners of boxes.
+//! - An error on one rank is the same [`Error`] on all ranks, with its rank.
 
 mod balance;
 mod bisect;

@@ -1,12 +1,12 @@
-//! What goes to other ranks, collected in any order and packed in the order of the ranks.
+//! Messages to other ranks, collected in any order and packed in the order of the ranks.
 
-/// Messages of `N` words, each for a rank.
+/// Messages of `N` words.
 #[derive(Debug, Clone)]
 pub(crate) struct Outbox<const N: usize> {
     messages: Vec<(u32, [u64; N])>,
     /// Messages for each rank.
     counts: Vec<usize>,
-    /// Where the next message for each rank goes.
+    /// Position of the next message for each rank.
     next: Vec<usize>,
     words: Vec<u64>,
 }
@@ -36,7 +36,7 @@ impl<const N: usize> Outbox<N> {
         self.messages.len()
     }
 
-    /// The words of all messages, those for rank 0 first; those for one rank in the order in which they came.
+    /// The words of all messages by rank; those for one rank in the order of `push`.
     pub(crate) fn pack(&mut self) -> &[u64] {
         self.next.clear();
         let mut at = 0;
@@ -53,13 +53,13 @@ impl<const N: usize> Outbox<N> {
         &self.words
     }
 
-    /// Bytes of memory that it keeps.
+    /// Bytes of memory.
     pub(crate) fn bytes(&self) -> usize {
         self.messages.capacity() * size_of::<(u32, [u64; N])>() + self.words.capacity() * 8
     }
 }
 
-/// Where each of some consecutive parts begins, and at last where they end.
+/// The begin of each of some consecutive parts, then the end of the last.
 pub(crate) fn starts(counts: &[usize]) -> Vec<usize> {
     let mut starts = Vec::with_capacity(counts.len() + 1);
     let mut at = 0;

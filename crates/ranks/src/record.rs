@@ -1,4 +1,4 @@
-//! What every rank tells every other at the beginning of a frame.
+//! The record that every rank sends to every other at the beginning of a frame.
 
 use crate::error::Error;
 use sapwise::BoxDefect;
@@ -6,32 +6,32 @@ use sapwise::BoxDefect;
 /// Words of a record.
 pub(crate) const WORDS: usize = 8;
 
-/// What a rank tells of itself.
+/// What a rank reports about itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct RankRecord {
-    /// Boxes that it sends to the one that is told.
+    /// Boxes that it sends to the receiver of this record.
     pub sends: u64,
-    /// Boxes that it came with.
+    /// Its boxes.
     pub boxes: u64,
-    /// Ids that it came with.
+    /// Its ids.
     pub ids: u64,
-    /// Its first invalid box, and what is wrong with it.
+    /// Its first invalid box, and the defect.
     pub defect: Option<(u64, BoxDefect)>,
-    /// Boxes that it searched of late, those of others included, and the time of it in nanoseconds: medians; 0 where they are not known.
+    /// Boxes of its last searches, received ones included: the median; 0 if unknown.
     pub searched: u64,
-    /// See [`searched`](Self::searched).
+    /// Nanoseconds of these searches: the median; 0 if unknown.
     pub search_ns: u64,
-    /// What the last cut took.
+    /// Nanoseconds of the last cut.
     pub cut_ns: u64,
-    /// Whether its list wants pairs of two ranks on both.
+    /// Whether its list is mirrored.
     pub mirrored: bool,
     /// Whether its list has a limit.
     pub limited: bool,
 }
 
 impl RankRecord {
-    /// That so many boxes were searched in that time.
+    /// A record of boxes, and of searched boxes with their time.
     #[must_use]
     pub fn timed(boxes: u64, searched: u64, search_ns: u64) -> Self {
         Self { boxes, ids: boxes, searched, search_ns, ..Self::default() }
@@ -53,7 +53,7 @@ impl RankRecord {
         Self { sends, boxes, ids, defect, searched, search_ns, cut_ns, mirrored, limited }
     }
 
-    /// What is wrong with the input of any rank: on all of them the same.
+    /// The error of the lowest rank with invalid input.
     pub(crate) fn error(records: &[Self]) -> Option<Error> {
         let of = |(rank, record): (usize, &Self)| {
             if record.ids != record.boxes {
@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_record_survives_as_words_and_the_lowest_rank_tells_the_error() {
+    fn records_survive_as_words_and_the_lowest_rank_has_the_error() {
         let good = RankRecord { sends: 3, boxes: 5, ids: 5, cut_ns: 7, mirrored: true, ..RankRecord::default() };
         let bad = |index, what| RankRecord { defect: Some((index, what)), limited: true, ..good };
         for record in [good, bad(0, BoxDefect::NotANumber), bad(9, BoxDefect::Inverted), RankRecord::timed(1, 2, 3)] {

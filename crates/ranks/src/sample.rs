@@ -1,16 +1,16 @@
-//! The boxes by which space is cut.
+//! Samples of the boxes by which space is cut.
 
 use crate::cuts::{Cuts, centre};
 use sapwise::Aabb;
 
-/// One box of a rank, standing for as many as there are for each that was taken.
+/// One box that stands for several.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// The box, which is valid.
     pub bounds: Aabb,
-    /// The work that it stands for, in parts of which [`Sample::UNIT`] are one box of the usual cost.
+    /// The work that it stands for; [`Sample::UNIT`] is one box of the usual cost.
     pub weight: u64,
-    /// Used while space is cut: which of the parts it is in.
+    /// The part that it is in while space is cut.
     pub(crate) part: u32,
 }
 
@@ -18,25 +18,25 @@ impl Sample {
     /// The weight of one box of the usual cost.
     pub const UNIT: u64 = 1024;
 
-    /// Boxes of each rank that are taken at most: with 16 384 a share of the work is known to 0.8 %, and to 2.6 % that of the rank of a
-    /// thousand that is met worst.
+    /// The most samples of a rank. They give a share of the work to 0.8 %, and to 2.6 % for the worst of a thousand
+    /// ranks.
     pub const MOST: usize = 16_384;
 
-    /// Up to `most` of the valid boxes, one out of each of as many equal parts of the list, with the weight of usual boxes.
+    /// Takes up to `most` valid boxes of the usual cost: one from each of `most` equal parts of the list.
     #[must_use]
     pub fn of(boxes: &[Aabb], most: usize) -> Vec<Self> {
         Self::with_pairs(boxes, most, |_| 0, 0.0)
     }
 
-    /// The same with what boxes cost: as much as one usual box, and `pair_cost` usual boxes for each pair. `pairs_of` tells the pairs of the box at a
-    /// position, each of which counts for both of its boxes by half.
+    /// The same with boxes that cost `pair_cost` more for each pair. `pairs_of` returns the number of pairs of the
+    /// box at a position; each pair counts half for each of its boxes.
     #[must_use]
     pub fn with_pairs(boxes: &[Aabb], most: usize, pairs_of: impl Fn(usize) -> u32, pair_cost: f64) -> Vec<Self> {
         let count = boxes.len().min(most);
         let start = |k: usize| (k as u128 * boxes.len() as u128 / count as u128) as usize;
         let take = |k: usize| {
             let (first, end) = (start(k), start(k + 1));
-            // Not at regular distances: boxes of a kind may follow each other so.
+            // Not at regular distances, at which boxes of one kind may lie.
             let at = first + (mix(k as u64) % (end - first) as u64) as usize;
             let bounds = boxes[at];
             let cost = 1.0 + pair_cost * f64::from(pairs_of(at)) / 2.0;
@@ -46,7 +46,7 @@ impl Sample {
         (0..count).filter_map(take).collect()
     }
 
-    /// The weight of some samples by the region that each is in.
+    /// Returns the weight of the samples in each region.
     #[must_use]
     pub fn weights(samples: &[Self], cuts: &Cuts) -> Vec<u64> {
         let mut weights = vec![0; cuts.regions().len()];
@@ -54,7 +54,7 @@ impl Sample {
         weights
     }
 
-    /// Multiplies the weight of each sample by the cost of a box of its region.
+    /// Multiplies the weight of each sample by the cost of a box in its region.
     pub fn weigh(samples: &mut [Self], cuts: &Cuts, costs: &[f64]) {
         for s in samples {
             let cost = costs[cuts.rank_of(centre(&s.bounds))];
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sample_stands_for_all_boxes_and_leaves_out_the_invalid_ones() {
+    fn samples_stand_for_all_valid_boxes() {
         let mut boxes: Vec<Aabb> = (0..1000).map(|k| Aabb::cube([k as f32; 3], 0.5)).collect();
         for most in [1, 7, 999, 1000, 5000] {
             let sample = Sample::of(&boxes, most);

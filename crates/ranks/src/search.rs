@@ -1,4 +1,4 @@
-//! The search of one rank: its own boxes of its region, and those that others sent.
+//! The search of one rank, over its own boxes and those that others sent.
 
 use crate::balance::Times;
 use crate::cuts::{Region, centre};
@@ -7,17 +7,17 @@ use crate::share::predicted_ns;
 use sapwise::{Aabb, Adaptive, BroadPhase, Error, Load, Pairs};
 use std::time::Instant;
 
-/// Words that a box takes on its way: six floats and its id.
+/// Words of a box: six floats and its id.
 pub(crate) const BOX_WORDS: usize = 4;
 
-/// A box as words.
+/// Encodes a box as words.
 #[inline]
 pub(crate) fn words(b: &Aabb, id: u64) -> [u64; BOX_WORDS] {
     let two = |low: f32, high: f32| u64::from(low.to_bits()) | u64::from(high.to_bits()) << 32;
     [two(b.min[0], b.min[1]), two(b.min[2], b.max[0]), two(b.max[1], b.max[2]), id]
 }
 
-/// A box of words.
+/// Decodes a box.
 #[inline]
 fn of_words(w: &[u64]) -> (Aabb, u64) {
     let low = |w: u64| f32::from_bits(w as u32);
@@ -30,15 +30,15 @@ pub(crate) struct LocalSearch {
     adaptive: Adaptive,
     /// Own boxes first, then those of each rank in turn.
     pub(crate) boxes: Vec<Aabb>,
-    /// Of the same boxes.
+    /// The ids of these boxes.
     pub(crate) ids: Vec<u64>,
-    /// Where the own boxes end, and after them those of rank 0, of rank 1 and so on.
+    /// The ends of the own boxes, of those of rank 0, of rank 1 and so on.
     ends: Vec<usize>,
     pub(crate) found: Pairs,
     pub(crate) times: Times,
-    /// Whether the pairs are those of the boxes.
+    /// Whether `found` holds the pairs of `boxes`.
     whole: bool,
-    /// What the last search failed with.
+    /// The error of the last search.
     pub(crate) error: Option<Error>,
 }
 
@@ -63,7 +63,7 @@ impl LocalSearch {
         self.whole = false;
     }
 
-    /// Whether the last search has ended well and its boxes are still here.
+    /// Whether the last search succeeded and its boxes are still here.
     pub(crate) fn is_whole(&self) -> bool {
         self.whole
     }
@@ -74,7 +74,7 @@ impl LocalSearch {
         self.ids.push(id);
     }
 
-    /// Takes the boxes that came from all ranks, so many from each.
+    /// Adds the boxes of all ranks, with the number from each.
     pub(crate) fn receive(&mut self, received: &[u64], counts: impl Iterator<Item = usize>) {
         let more = received.len() / BOX_WORDS;
         self.boxes.reserve(more);
@@ -95,7 +95,7 @@ impl LocalSearch {
     #[inline]
     pub(crate) fn owner(&self, at: u32, own: usize) -> usize {
         let at = at as usize;
-        // `ends` is empty where no other rank is.
+        // `ends` is empty if there is no other rank.
         if self.ends.first().is_none_or(|end| at < *end) {
             own
         } else {
@@ -103,7 +103,7 @@ impl LocalSearch {
         }
     }
 
-    /// Finds the pairs of these boxes, for [`found`](Self::found), and takes the time.
+    /// Fills [`found`](Self::found) with the pairs of these boxes and notes the time.
     pub(crate) fn run(&mut self) -> Result<(), Error> {
         let began = Instant::now();
         let result = self.adaptive.find_pairs(&self.boxes, &mut self.found);
@@ -113,7 +113,7 @@ impl LocalSearch {
         result
     }
 
-    /// Finds the pairs of boxes that are nobody else's, without a copy of them.
+    /// Finds the pairs of the only rank's boxes, without copying them.
     pub(crate) fn run_on(&mut self, boxes: &[Aabb], limit: Option<usize>) -> Result<(), Error> {
         self.found.set_limit(limit);
         let result = self.adaptive.find_pairs(boxes, &mut self.found);
@@ -134,8 +134,8 @@ impl LocalSearch {
         self.adaptive.last_decision().map(|d| d.load)
     }
 
-    /// What the search takes for loads, by its tuning as frames have corrected it and by the times of its last frames, which also know what no
-    /// tuning does: another program on the cores, for instance.
+    /// Predicts the time of loads: by the corrected tuning, scaled to the times of the last frames, which contain
+    /// what a tuning does not know, such as another program on the cores.
     pub(crate) fn predictor(&self) -> impl Fn(&Load) -> f64 + use<> {
         let tuning = self.adaptive.learned();
         let measured = self.times.medians().zip(self.load());
@@ -144,7 +144,8 @@ impl LocalSearch {
         move |load| correction * predicted_ns(&tuning, load)
     }
 
-    /// Samples of the boxes of the last search that are in the middle of the region: it knows the pairs of each. `pair_cost` is what one costs over a box.
+    /// Samples of the last search whose centres are in the region, weighted by their pairs. `pair_cost` is the cost
+    /// of a pair over that of a box.
     pub(crate) fn samples(&self, region: &Region, pair_cost: f64) -> Vec<Sample> {
         let mut pairs = vec![0_u32; self.boxes.len()];
         for &(i, j) in &self.found {
@@ -152,12 +153,12 @@ impl LocalSearch {
             pairs[j as usize] += 1;
         }
         let mut samples = Sample::with_pairs(&self.boxes, Sample::MOST, |k| pairs[k], pair_cost);
-        // Others have the rest as theirs.
+        // The rest is in the samples of other ranks.
         samples.retain(|s| region.holds(centre(&s.bounds)));
         samples
     }
 
-    /// Bytes of memory that it keeps beside what its algorithms do.
+    /// Bytes of memory, without the algorithms.
     pub(crate) fn bytes(&self) -> usize {
         self.boxes.capacity() * size_of::<Aabb>() + self.ids.capacity() * 8
     }
@@ -169,7 +170,7 @@ mod tests {
     use sapwise::{Registry, Tuning};
 
     #[test]
-    fn boxes_survive_as_words_bit_for_bit_and_know_their_owner() {
+    fn boxes_survive_as_words_and_know_their_owner() {
         let registry = Registry::with_cores(1);
         let mut search = LocalSearch::new(Adaptive::new(Tuning::usual(&registry), &registry).unwrap());
         let odd = Aabb::new([f32::NEG_INFINITY, -0.0, 1e-42], [f32::INFINITY, 3.5, f32::MAX]);

@@ -1,25 +1,25 @@
-//! How much of the work each rank is to have: as much as it does in the time that all ranks take.
+//! Shares of the work, with which all ranks take the same time.
 
 use sapwise::{Load, Tuning};
 
-/// The loads for which each rank tells its time, as multiples of the mean load of a rank.
+/// The loads for which each rank predicts its time, as multiples of the mean load.
 pub const FACTORS: [f64; 9] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 
-/// What the cheapest algorithm of a tuning is predicted to take for a load, in nanoseconds.
+/// Predicts the nanoseconds of the cheapest algorithm of a tuning for a load.
 ///
-/// A tuning without costs says nothing of time: a box and a pair count as a nanosecond each, so that only ratios mean something.
+/// Without costs in the tuning each box and each pair counts one nanosecond, so that only ratios have a meaning.
 #[must_use]
 pub fn predicted_ns(tuning: &Tuning, load: &Load) -> f64 {
     let counted = || f64::from(load.objects) + load.pairs;
     tuning.rank(load, |_| true).map_or_else(counted, |r| r.best_ns).max(1.0)
 }
 
-/// The share of all work for each rank, with which all are predicted to take the same time. They add up to 1.
+/// Returns the share of each rank with which all are predicted to take the same time. The sum is 1.
 ///
-/// `times` holds, for each rank, what it takes for each of the [`FACTORS`] of the mean load. Between these it is interpolated. Times that are no
-/// numbers above 0 count as those of a rank of mean speed.
+/// `times` holds the time of each rank for each of the [`FACTORS`] of the mean load; it interpolates between them. A
+/// rank with a time that is not a number above 0 counts as one of mean speed.
 ///
-/// Only sums, products and comparisons, so that all ranks compute the same bits, whatever processors they run on.
+/// It uses only sums, products and comparisons, so that all ranks compute the same bits on any processor.
 #[must_use]
 pub fn shares(times: &[[f64; FACTORS.len()]]) -> Vec<f64> {
     let sound = |t: &&[f64; FACTORS.len()]| t.iter().all(|v| v.is_finite() && *v > 0.0);
@@ -30,7 +30,7 @@ pub fn shares(times: &[[f64; FACTORS.len()]]) -> Vec<f64> {
     let mean = std::array::from_fn(|k| known.iter().map(|t| t[k]).sum::<f64>() / known.len() as f64);
     let ascending = |t: &[f64; FACTORS.len()]| {
         let mut t = if sound(&t) { *t } else { mean };
-        // More work takes more time; a curve that says otherwise has no inverse.
+        // A curve that does not ascend has no inverse.
         (1..t.len()).for_each(|k| t[k] = t[k].max(t[k - 1] * 1.001));
         t
     };
@@ -46,12 +46,12 @@ pub fn shares(times: &[[f64; FACTORS.len()]]) -> Vec<f64> {
     work.into_iter().map(|w| w / all).collect()
 }
 
-/// What a pair costs over what a box costs, as a load of this size grows by either.
+/// Returns the cost of one more pair over that of one more box at a load; 0 if more boxes take no more time.
 ///
-/// `predict` tells the time of a load. 0 where more boxes are predicted to take no more time.
+/// `predict` returns the time of a load.
 #[must_use]
 pub fn pair_cost(load: &Load, predict: impl Fn(&Load) -> f64) -> f64 {
-    // Wide enough for curves of steps, such as those where another algorithm becomes the cheapest.
+    // A large step, because the curve jumps where another algorithm becomes the cheapest.
     const MORE: f64 = 1.25;
     let now = predict(load);
     let objects = (f64::from(load.objects) * MORE).min(f64::from(u32::MAX)) as u32;
@@ -61,8 +61,9 @@ pub fn pair_cost(load: &Load, predict: impl Fn(&Load) -> f64) -> f64 {
     if cost.is_finite() && box_ns > 0.0 { cost.clamp(0.0, 16.0) } else { 0.0 }
 }
 
-/// What a box of each region costs over the mean box: the work of the region, which is that of a mean region times `works`, over the work that its
-/// boxes stood for (`owned`, any unit). So the boxes of a region with many pairs weigh more, and those of one that searches many boxes of others.
+/// Returns the cost of a box of each region over the mean box. `works` is the work of each region over that of a mean
+/// region, `owned` the weight of its samples in any unit. Boxes weigh more in a region with many pairs or with many
+/// boxes of others.
 #[must_use]
 pub fn costs(works: &[f64], owned: &[u64]) -> Vec<f64> {
     let mean = owned.iter().sum::<u64>() as f64 / owned.len().max(1) as f64;
@@ -73,7 +74,7 @@ pub fn costs(works: &[f64], owned: &[u64]) -> Vec<f64> {
     works.iter().zip(owned).map(cost).collect()
 }
 
-/// What a rank does in a time, as a multiple of the mean load.
+/// The work that a rank does in a time, as a multiple of the mean load.
 fn work(times: &[f64; FACTORS.len()], time: f64) -> f64 {
     let at = times.partition_point(|t| *t <= time);
     match at {
@@ -96,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_follow_speed_and_what_does_not_depend_on_work() {
+    fn shares_follow_speed_and_fixed_costs() {
         let near = |found: Vec<f64>, wanted: &[f64]| {
             assert!(found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < 1e-3), "{found:?} {wanted:?}");
         };
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_cost_what_their_region_does() {
+    fn boxes_cost_as_much_as_their_region() {
         assert_eq!(costs(&[1.0, 1.0, 1.0], &[30, 60, 30]), [4.0 / 3.0, 2.0 / 3.0, 4.0 / 3.0]);
         assert_eq!(costs(&[1.5, 0.5], &[10, 10]), [1.5, 0.5]);
         assert_eq!(costs(&[1.0, 0.0, f64::NAN], &[0, 5, 5]), [1.0, 0.0625, 1.0]);

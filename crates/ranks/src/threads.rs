@@ -4,10 +4,10 @@ use crate::exchange::Exchange;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// A rank that waits for longer than this for the others panics: one of them has ended.
+/// A rank panics when it has waited this long for the others: one of them has ended.
 const WAIT_LIMIT: Duration = Duration::from_secs(120);
 
-/// One of several ranks that are threads of this process: for tests, and to try the protocol without MPI.
+/// One of several ranks that are threads of this process, for tests and to try the protocol without MPI.
 pub struct Threads {
     rank: usize,
     shared: Arc<Shared>,
@@ -16,7 +16,7 @@ pub struct Threads {
 /// What the ranks share.
 struct Shared {
     size: usize,
-    /// What each rank offers to the others, with where the part for each rank begins.
+    /// The words of each rank, with the begin of the part for each other rank.
     offers: Vec<Mutex<(Vec<u64>, Vec<usize>)>>,
     gate: Mutex<Gate>,
     changed: Condvar,
@@ -30,16 +30,16 @@ struct Gate {
     broken: bool,
 }
 
-/// A lock whose holder panicked is as good as another: that panic ends the run.
+/// Ignores poisoning: the panic itself ends the run.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Threads {
-    /// Runs `work` on so many threads, each of which is a rank, and returns what they return in the order of the ranks.
+    /// Runs `work` on one thread for each rank and returns the results in the order of the ranks.
     ///
     /// # Panics
-    /// When one of them does, and when there is to be no rank.
+    /// When `work` does, and for 0 ranks.
     pub fn run<T: Send>(ranks: usize, work: impl Fn(Self) -> T + Sync) -> Vec<T> {
         assert!(ranks > 0, "there is no rank to run on");
         let shared = Arc::new(Shared {
@@ -165,7 +165,7 @@ mod tests {
     fn a_rank_that_panics_ends_the_others() {
         Threads::run(2, |mut ranks| {
             assert!(ranks.rank() != 1, "rank 1 ends");
-            // Else its own panic, which the one of the other has caused, would be the first to be met.
+            // Caught, because the panic of the other rank caused it and must be the one that is seen.
             let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| ranks.sum(&mut [1])));
             assert!(outcome.is_err());
         });

@@ -1,4 +1,4 @@
-//! The pairs of ranks against those of one process and against the definition, with threads as ranks.
+//! The pairs of ranks compared with those of one process and with the definition. Ranks are threads.
 
 mod harness;
 
@@ -10,7 +10,7 @@ use sapwise_scenes::Scenario;
 const OWNERS: [Owners; 4] = [Owners::Random, Owners::Parts, Owners::One, Owners::Even];
 
 #[test]
-fn every_scenario_has_the_pairs_of_one_process_over_any_ranks() {
+fn every_scenario_has_the_pairs_of_one_process() {
     for size in [1, 2, 3, 4, 7] {
         let counts = Threads::run(size, |threads| {
             let mut ranks = distributed::<Threads>(threads);
@@ -37,7 +37,7 @@ fn edge_cases_and_errors() {
     }
 }
 
-/// A tuning of one algorithm that takes so long for a box.
+/// A tuning of one algorithm with this cost of a box.
 fn tuning(unit_ns: f64) -> Tuning {
     let curve = CostCurve::new(vec![CostTerm::new(Term::Objects, unit_ns)]);
     let id = "bvh@cpu1".parse::<AlgorithmId>().unwrap();
@@ -46,7 +46,7 @@ fn tuning(unit_ns: f64) -> Tuning {
 }
 
 #[test]
-fn a_machine_that_is_predicted_to_be_slow_gets_less() {
+fn a_slow_machine_gets_less() {
     let searched = Threads::run(3, |threads| {
         let registry = Registry::with_cores(1);
         let slow = threads.rank() == 1;
@@ -60,7 +60,7 @@ fn a_machine_that_is_predicted_to_be_slow_gets_less() {
         assert!(ranks.last_frame().cut && ranks.last_frame().memory_bytes > 24 * 2000);
         ranks.last_frame().boxes_searched as f64 / 6000.0
     });
-    // With the boxes that are searched twice.
+    // The tolerance includes boxes that are searched twice.
     for (found, wanted) in searched.iter().zip([3.0 / 7.0, 1.0 / 7.0, 3.0 / 7.0]) {
         assert!((found / wanted - 1.0).abs() < 0.15, "{searched:?}");
     }
@@ -75,7 +75,7 @@ fn only_what_crosses_is_sent() {
         let mut pairs = RankPairs::new();
         let mut last = None;
         for _ in 0..2 {
-            // Each rank owns what lies in its region, in the second frame.
+            // In the second frame each rank owns the boxes in its region.
             let own = |k: &usize| {
                 ranks.cuts().rank_of(boxes[*k].min) == ranks.rank()
                     || ranks.cuts().regions().len() == 1 && k % 4 == ranks.rank()
@@ -90,14 +90,14 @@ fn only_what_crosses_is_sent() {
     assert_eq!(sum(|r| r.boxes), 20_000);
     assert_eq!(sum(|r| r.boxes_sent), sum(|r| r.boxes_received));
     assert_eq!(sum(|r| r.pairs_sent), sum(|r| r.pairs_received));
-    // Unit cubes in a world of edge 54: each of the cuts has one box in 54 or so.
+    // Unit cubes in a world of edge 54: each plane crosses about one box in 54.
     let crossing = sum(|r| r.boxes_sent) as f64 / 20_000.0;
     assert!((0.02..0.06).contains(&crossing), "{crossing}");
     assert!(sum(|r| r.pairs_sent) < sum(|r| r.boxes_sent) && reports.iter().all(|r| !r.cut));
 }
 
 #[test]
-fn a_rank_that_has_no_algorithm_is_told_on_all() {
+fn a_rank_without_an_algorithm_is_an_error_on_all() {
     let errors = Threads::run(3, |threads| {
         let registry = Registry::with_cores(1);
         let unknown =

@@ -65,7 +65,7 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     let mut text = terminal.table(&rows);
     let written = rows.len() - 1 - without;
     text += &format!("\n{} written to {}.\n", count(written, "tuning"), out.display());
-    text += &format!("A program takes that of its machine by StartOptions::new().tunings({out:?}).\n");
+    text += "A program reads the one that Machine::tuning_file names and passes it to Adaptive::new.\n";
     text += &format!("Next: sapwise fleet {}", shell::path(folder));
     output::print(&text)?;
     Ok(if without == 0 { Outcome::Done } else { Outcome::Failed })

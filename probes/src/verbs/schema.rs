@@ -17,7 +17,7 @@ pub(crate) fn run(arguments: &Schema) -> anyhow::Result<Outcome> {
     let folder = &arguments.out;
     outputs::make_folder(folder)?;
     let mut files = Vec::new();
-    for (name, text) in sapwise_lab::schemas()?.into_iter().chain([sapwise::cache_schema()?]) {
+    for (name, text) in sapwise_lab::schemas()? {
         let path = folder.join(name);
         write_text(&path, &text)?;
         files.push(path.display().to_string());
@@ -29,17 +29,4 @@ pub(crate) fn run(arguments: &Schema) -> anyhow::Result<Outcome> {
         output::print(&wrote)?;
     }
     Ok(Outcome::Done)
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    #[test]
-    fn the_committed_schema_of_the_cache_is_that_of_its_type() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../schemas");
-        let (name, text) = sapwise::cache_schema().unwrap();
-        let committed = std::fs::read_to_string(folder.join(&name)).unwrap_or_default();
-        assert!(committed == text, "{name} is stale: run `cargo run -- schema --out schemas`");
-    }
 }

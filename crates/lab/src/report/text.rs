@@ -2,26 +2,16 @@
 
 use super::record::Report;
 use sapwise::json::{Error, Format, Read};
-use serde::de::Error as _;
 
 /// Files of reports.
-pub const FORMAT: Format = Format::new("report", 2, 0);
+pub const FORMAT: Format = Format::new("report", 2);
 
 /// Reads a report and checks its figures. Keys that this version does not know, in a file of a newer one, are in the answer.
 ///
 /// # Errors
 /// The place of the defect, or the schema where it is none of ours.
 pub fn read(text: &str) -> Result<Read<Report>, Error> {
-    let read: Read<Report> = FORMAT.read(text)?;
-    match read.value.defect() {
-        None => Ok(read),
-        Some(defect) => Err(unsound(defect)),
-    }
-}
-
-/// What is wrong with the figures of a file that is well-formed.
-fn unsound(defect: String) -> Error {
-    Error::Data { path: ".".to_owned(), source: serde_json::Error::custom(defect) }
+    FORMAT.read::<Report>(text)?.checked(Report::defect)
 }
 
 /// Writes a report: one key a line, one point a line, and the raw samples of a parameter on one line, so that a full sweep stays

@@ -1,7 +1,7 @@
-//! What every exchange has to bring about: the pairs of one process, on the ranks that own the boxes. Shared by the tests over threads, and by
-//! those over MPI.
+//! The contract of every exchange: the owners of boxes get the pairs that one process finds. Shared by the tests over
+//! threads and over MPI.
 //!
-//! Each rank plays the whole scene, hands in its own boxes, and compares what it gets with what all boxes have.
+//! Each rank plays the whole scene, passes its own boxes, and compares its pairs with those of all boxes.
 
 #![allow(dead_code, reason = "each test uses some of it")]
 
@@ -9,13 +9,13 @@ use sapwise::{Aabb, Adaptive, BoxDefect, BroadPhase, PairOrder, Pairs, Registry,
 use sapwise_ranks::{Distributed, Error, Exchange, RankPairs};
 use sapwise_scenes::{Random, Scenario};
 
-/// An algorithm for each size, without any measurement.
+/// A broad phase with the usual tuning on one core.
 pub(crate) fn distributed<E: Exchange>(exchange: impl Into<E>) -> Distributed<E> {
     let registry = Registry::with_cores(1);
     Distributed::new(exchange, &registry, Tuning::usual(&registry)).unwrap()
 }
 
-/// Ids that use all 64 bits, in no order.
+/// An id that uses all 64 bits. Ids are in no order.
 pub(crate) fn id(index: usize) -> u64 {
     (index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(17)
 }
@@ -23,13 +23,13 @@ pub(crate) fn id(index: usize) -> u64 {
 /// Who owns boxes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Owners {
-    /// Any rank, and one box in eight another one in the next frame.
+    /// Any rank; one box in eight changes its owner each frame.
     Random,
-    /// Contiguous parts of the list.
+    /// Each rank has a contiguous part of the list.
     Parts,
-    /// One rank, another one in each frame.
+    /// One rank has all boxes, another one in each frame.
     One,
-    /// The ranks with even numbers.
+    /// Only the ranks with even numbers have boxes.
     Even,
 }
 
@@ -56,7 +56,7 @@ pub(crate) fn naive(boxes: &[Aabb]) -> Vec<(u32, u32)> {
     pairs
 }
 
-/// What a rank is to get of some pairs.
+/// The pairs that a rank should get.
 pub(crate) fn expected(
     pairs: &[(u32, u32)],
     id: impl Fn(usize) -> u64,
@@ -79,14 +79,14 @@ pub(crate) fn expected(
     list
 }
 
-/// A list of this kind.
+/// An empty list in canonical order.
 pub(crate) fn list(mirrored: bool) -> RankPairs {
     let mut pairs = RankPairs::with_order(PairOrder::Canonical);
     pairs.set_mirrored(mirrored);
     pairs
 }
 
-/// One frame of boxes, of which this rank hands in its own, against the definition.
+/// Runs one frame and compares it with the definition.
 pub(crate) fn frame<E: Exchange>(
     ranks: &mut Distributed<E>,
     what: &str,
@@ -110,7 +110,8 @@ pub(crate) fn frame<E: Exchange>(
     );
 }
 
-/// Plays a scenario over ranks. Every frame is compared with one process, every tenth with the definition too. Returns the pairs that this rank got.
+/// Plays a scenario and compares every frame with one process and every tenth with the definition. Returns this
+/// rank's pairs.
 pub(crate) fn play<E: Exchange>(
     ranks: &mut Distributed<E>,
     scenario: Scenario,
@@ -148,7 +149,7 @@ pub(crate) fn play<E: Exchange>(
     count
 }
 
-/// Boxes where a protocol of ranks is easily wrong.
+/// Frames that are easily wrong.
 pub(crate) fn edge_cases<E: Exchange>(ranks: &mut Distributed<E>) {
     let size = ranks.ranks();
     let inf = f32::INFINITY;
@@ -181,12 +182,12 @@ pub(crate) fn edge_cases<E: Exchange>(ranks: &mut Distributed<E>) {
         let mut large = plain.to_vec();
         large.iter_mut().step_by(10).for_each(|b| *b = Aabb::new(b.min, b.max.map(|m| m + 1000.0)));
         frame(ranks, "boxes larger than a region", &large, id, deal, mirrored);
-        // Bounds on the planes that the last frames have left, and beside them.
+        // Bounds on and beside the planes of the last frame.
         let planes: Vec<f32> = ranks.cuts().regions().iter().flat_map(|r| r.low).filter(|v| v.is_finite()).collect();
         let touching = planes
             .iter()
             .flat_map(|&p| [(p, p), (p - 1.0, p), (p, p + 1.0), (p.next_down(), p.next_up()), (p.next_up(), p + 1.0)]);
-        // Beside a plane at the end of the numbers there is no room for all of them.
+        // Beside a plane at the largest float some are inverted.
         let touching = touching.map(|(low, high)| Aabb::new([low; 3], [high; 3])).filter(|b| b.defect().is_none());
         let touching: Vec<Aabb> = touching.collect();
         frame(ranks, "bounds on the planes", &touching, id, deal, mirrored);
@@ -195,19 +196,12 @@ pub(crate) fn edge_cases<E: Exchange>(ranks: &mut Distributed<E>) {
         frame(ranks, "one id for all boxes", &plain[..20], |_| 7, deal, mirrored);
     }
     for frame_index in 0..20 {
-        frame(
-            ranks,
-            "a rank that comes with boxes now and then",
-            plain,
-            id,
-            |k| (k + frame_index / 3 * (k % 2)) % size,
-            false,
-        );
+        frame(ranks, "a rank that sometimes has boxes", plain, id, |k| (k + frame_index / 3 * (k % 2)) % size, false);
     }
     errors(ranks, plain);
 }
 
-/// What is wrong on one rank is the same error on all, and the next frame is right.
+/// An error on one rank is the same on all, and the next frame is right.
 fn errors<E: Exchange>(ranks: &mut Distributed<E>, plain: &[Aabb]) {
     let (rank, size) = (ranks.rank(), ranks.ranks());
     let own: Vec<Aabb> = plain.iter().skip(rank).step_by(size).copied().collect();
@@ -234,7 +228,7 @@ fn errors<E: Exchange>(ranks: &mut Distributed<E>, plain: &[Aabb]) {
         assert_eq!(ranks.find_pairs(&own, few, &mut pairs), Err(wanted));
         after(ranks);
     }
-    // A limit on the last rank, which has more pairs than that with the boxes that all overlap.
+    // A limit on the last rank, which has more pairs because all boxes overlap.
     let same = vec![Aabb::cube([0.0; 3], 1.0); own.len()];
     pairs.set_limit((rank == size - 1).then_some(3));
     assert_eq!(ranks.find_pairs(&same, &ids, &mut pairs), Err(Error::TooManyPairs { rank: size - 1, limit: 3 }));

@@ -1,0 +1,278 @@
+//! The form of a tuning in a file.
+//!
+//! Algorithms of a method share their [`Work`], and all residuals share their [`Places`]. A file holds each once.
+
+use super::{AlgorithmCost, Crossover, Observation, Source, Step, Tuning, TuningError};
+use crate::cost::{CostTerm, Fallback, Helpers, Places, Residual};
+use crate::{AlgorithmId, CostCurve, Load, Work};
+use std::sync::Arc;
+
+/// Which algorithm to run under which load.
+#[derive(serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename = "Tuning", deny_unknown_fields))]
+pub(super) struct TuningFile {
+    /// Where the tuning came from.
+    source: Source,
+    /// Name of the model that predicted the costs; null without a prediction.
+    model: Option<String>,
+    /// Whether the machine lies outside what the model was trained on.
+    extrapolated: bool,
+    /// In words, what was outside and what that means.
+    warnings: Vec<String>,
+    /// Scenario of `steps` and `crossovers`.
+    scenario: String,
+    /// The cheapest algorithm over the number of objects in that scenario, ascending.
+    steps: Vec<Step>,
+    /// Where one step gives way to the next.
+    crossovers: Vec<Crossover>,
+    /// What `low` and `high` of the crossovers are made of, and why some have none.
+    interval_basis: String,
+    /// Loads at which residuals are known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    places: Vec<Load>,
+    /// Costs of methods on one thread, or on GPUs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    works: Vec<WorkFile>,
+    /// The cost of each algorithm. Empty: `steps` decide.
+    costs: Vec<CostFile>,
+    /// The samples by which a prediction was corrected before the first frame.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    samples: Vec<Observation>,
+}
+
+/// The cost of a method on one thread, or on some GPUs.
+#[derive(serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename = "Work", deny_unknown_fields))]
+struct WorkFile {
+    /// Terms of the sum; none is negative.
+    terms: Vec<CostTerm>,
+    /// What is done instead if that is cheaper; null if nothing is.
+    fallback: Option<FallbackFile>,
+    /// Last-level cache of the machine.
+    cache_bytes: f64,
+    /// What the terms leave unexplained: the weight of each of `places`, as the logarithm of a factor.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    residual: Vec<f64>,
+    /// Whether the residual depends on how far boxes move.
+    #[serde(default)]
+    residual_by_motion: bool,
+}
+
+/// The work of another method, done instead.
+#[derive(serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename = "Fallback", deny_unknown_fields))]
+struct FallbackFile {
+    /// That work: a position in `works` before this one, from 0.
+    work: usize,
+    /// Its cost here over its cost there.
+    factor: f64,
+}
+
+/// The cost of one algorithm.
+#[derive(serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename = "AlgorithmCost", deny_unknown_fields))]
+struct CostFile {
+    /// The algorithm.
+    algorithm: AlgorithmId,
+    /// Revision of the algorithm that was measured or predicted.
+    revision: u32,
+    /// Its cost on one thread: a position in `works`, from 0.
+    work: usize,
+    /// The effect of several threads; null for one thread and for GPUs.
+    helpers: Option<Helpers>,
+    /// Correction by frames that ran; null without any.
+    observed: Option<ObservedFile>,
+    /// Standard deviation of the natural logarithm of measured over modelled time.
+    spread_ln: f64,
+}
+
+/// The correction of a cost by frames that ran.
+#[derive(serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(rename = "Observed", deny_unknown_fields))]
+struct ObservedFile {
+    /// The logarithm of a factor that holds everywhere.
+    constant: f64,
+    /// The weight of each of the first `places`, as the logarithm of a factor.
+    weights: Vec<f64>,
+    /// Whether the correction depends on how far boxes move.
+    by_motion: bool,
+}
+
+/// The works of a tuning, each once, and a fallback before the work that has it.
+#[derive(Default)]
+struct Works {
+    known: Vec<Arc<Work>>,
+    files: Vec<WorkFile>,
+}
+
+impl Works {
+    /// The position of a work, which is added if it is new.
+    fn position(&mut self, work: &Arc<Work>) -> usize {
+        if let Some(known) = self.known.iter().position(|w| Arc::ptr_eq(w, work)) {
+            return known;
+        }
+        let fallback = work.fallback.as_ref();
+        let fallback = fallback.map(|f| FallbackFile { work: self.position(&f.work), factor: f.factor });
+        let residual = work.residual.as_ref();
+        self.files.push(WorkFile {
+            terms: work.terms.clone(),
+            fallback,
+            cache_bytes: work.cache_bytes,
+            residual: residual.map_or_else(Vec::new, |r| r.weights.clone()),
+            residual_by_motion: residual.is_some_and(|r| r.by_motion),
+        });
+        self.known.push(Arc::clone(work));
+        self.known.len() - 1
+    }
+}
+
+impl From<Tuning> for TuningFile {
+    fn from(tuning: Tuning) -> Self {
+        let residual = tuning.costs.iter().flat_map(AlgorithmCost::residuals).next();
+        let places = residual.map_or_else(Vec::new, |r| r.places.loads().to_vec());
+        let mut works = Works::default();
+        let cost = |AlgorithmCost { algorithm, revision, curve, spread_ln }| CostFile {
+            algorithm,
+            revision,
+            work: works.position(&curve.work),
+            helpers: curve.helpers,
+            observed: curve.observed.map(|Residual { constant, weights, by_motion, .. }| ObservedFile {
+                constant,
+                weights,
+                by_motion,
+            }),
+            spread_ln,
+        };
+        let costs = tuning.costs.into_iter().map(cost).collect();
+        Self {
+            source: tuning.source,
+            model: tuning.model,
+            extrapolated: tuning.extrapolated,
+            warnings: tuning.warnings,
+            scenario: tuning.scenario,
+            steps: tuning.steps,
+            crossovers: tuning.crossovers,
+            interval_basis: tuning.interval_basis,
+            places,
+            works: works.files,
+            costs,
+            samples: tuning.samples,
+        }
+    }
+}
+
+impl TryFrom<TuningFile> for Tuning {
+    type Error = TuningError;
+
+    fn try_from(file: TuningFile) -> Result<Self, TuningError> {
+        let places = Arc::new(Places::new(file.places));
+        let mut works: Vec<Arc<Work>> = Vec::new();
+        for WorkFile { terms, fallback, cache_bytes, residual, residual_by_motion } in file.works {
+            let fallback = fallback.map(|FallbackFile { work, factor }| match works.get(work) {
+                Some(other) => Ok(Fallback { work: Arc::clone(other), factor }),
+                None => Err(TuningError::NoFallback { work }),
+            });
+            let residual = Residual::new(Arc::clone(&places), residual, residual_by_motion);
+            works.push(Arc::new(Work {
+                fallback: fallback.transpose()?,
+                terms,
+                cache_bytes,
+                residual: Some(residual).filter(|r| !r.weights.is_empty()),
+            }));
+        }
+        let cost = |CostFile { algorithm, revision, work, helpers, observed, spread_ln }| {
+            let Some(known) = works.get(work) else { return Err(TuningError::NoWork { algorithm, work }) };
+            let observed = observed.map(|ObservedFile { constant, weights, by_motion }| {
+                Residual::new(Arc::clone(&places), weights, by_motion).with_constant(constant)
+            });
+            let curve = CostCurve { work: Arc::clone(known), helpers, observed };
+            Ok(AlgorithmCost { algorithm, revision, curve, spread_ln })
+        };
+        let tuning = Self {
+            source: file.source,
+            model: file.model,
+            extrapolated: file.extrapolated,
+            warnings: file.warnings,
+            scenario: file.scenario,
+            steps: file.steps,
+            crossovers: file.crossovers,
+            interval_basis: file.interval_basis,
+            costs: file.costs.into_iter().map(cost).collect::<Result<_, _>>()?,
+            samples: file.samples,
+        };
+        tuning.defect().map_or(Ok(tuning), Err)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::json;
+    use crate::{Model, Registry};
+    use serde_json::Value;
+
+    /// A prediction of the built-in model for a machine of two cores, as a file.
+    fn file() -> Value {
+        use crate::{Hardware, Machine, Parameter, ParameterId};
+        let figure = |id: ParameterId| match id {
+            ParameterId::CacheLlcBytes => 3.2e7,
+            ParameterId::ForkJoinColdNs => 60_000.0,
+            ParameterId::UsableCores => 2.0,
+            ParameterId::ScalingTwoThreadsRatio | ParameterId::ScalingAllThreadsRatio => 1.9,
+            ParameterId::SimdLanes => 8.0,
+            _ => 3.0,
+        };
+        let parameters = ParameterId::ALL.map(|id| Parameter::reported(id, figure(id), "test")).to_vec();
+        let loads: Vec<Load> = (3..20).map(|k| Load::of_objects(1 << k)).collect();
+        let hardware = Hardware::new(Machine::default(), parameters);
+        let model = Model::built_in().unwrap();
+        let prediction = model.predict(&hardware, Registry::with_cores(2).entries()).unwrap();
+        serde_json::from_str(&json::write_tuning(&prediction.tuning("uniform", &loads)).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn works_are_written_once_and_shared_again() {
+        let file = file();
+        let tuning = json::tuning(&file.to_string()).unwrap();
+        assert!(file["works"].as_array().unwrap().len() < tuning.costs.len());
+        let work = |id: &str| &tuning.costs.iter().find(|c| c.algorithm.to_string() == id).unwrap().curve.work;
+        if cfg!(feature = "parallel") {
+            assert!(Arc::ptr_eq(work("pair-cache@cpu1"), work("pair-cache@cpu2")));
+        }
+        let fallback = work("pair-cache@cpu1").fallback.as_ref().unwrap();
+        assert!(Arc::ptr_eq(&fallback.work, work("bvh@cpu1")));
+        assert_eq!(serde_json::from_str::<Value>(&json::write_tuning(&tuning).unwrap()).unwrap(), file);
+    }
+
+    #[test]
+    fn impossible_tunings_are_refused_by_name() {
+        let refused = |change: &dyn Fn(&mut Value)| {
+            let mut file = file();
+            change(&mut file);
+            json::tuning(&file.to_string()).unwrap_err().to_string()
+        };
+        let cut = refused(&|f| f["works"].as_array_mut().unwrap().truncate(1));
+        assert!(cut.contains("there is no work") && cut.contains("@cpu"), "{cut}");
+        let places = refused(&|f| f["places"].as_array_mut().unwrap().truncate(3));
+        assert!(places.contains("more weights than places"), "{places}");
+        let huge = refused(&|f| f["works"][0]["residual"][0] = 1e300.into());
+        assert!(huge.contains("beyond every measurement"), "{huge}");
+        let repeated = refused(&|f| {
+            let first = f["costs"][0].clone();
+            f["costs"].as_array_mut().unwrap().push(first);
+        });
+        assert!(repeated.contains("stands there twice"), "{repeated}");
+        let itself = refused(&|f| {
+            let last = f["works"].as_array().unwrap().len() - 1;
+            f["works"][last]["fallback"] = serde_json::json!({ "work": last, "factor": 1.0 });
+        });
+        assert!(itself.contains("does not stand before it"), "{itself}");
+        let threads = refused(&|f| {
+            let none = serde_json::json!({
+                "threads": 1, "call_ns": 0.0, "late_ns": 0.0, "speed_up": 1.0, "boxes_per_thread": 0
+            });
+            f["costs"][0]["helpers"] = none;
+        });
+        assert!(threads.contains("helpers of fewer than two threads"), "{threads}");
+    }
+}
