@@ -14,7 +14,7 @@ trap 'rm -rf "$work"' EXIT
 
 "$sapwise" study datasets datasets/published --out "$work/study" > "$work/study.txt"
 for figure in figure-7-threads field-map; do
-  cp "$work/study/figures/$figure.svg" "$out/$figure.svg"
+  cp "$work/study/$figure.svg" "$out/$figure.svg"
 done
 "$sapwise" run fragmentation --objects 20000 --tuning datasets/amd-epyc-zen3-2c-full--2026-11-22.json --no-gpus --plot "$out/fragmentation.svg"
 echo "The pictures are in $out."

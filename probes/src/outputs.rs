@@ -2,7 +2,6 @@
 
 use crate::exit::WrongUsage;
 use anyhow::{Context, bail};
-use sapwise_lab::figures::Picture;
 use std::path::{Path, PathBuf};
 
 /// What is to be known of the files that a verb writes before it works for minutes: none is read, none is named twice, and each can be written.
@@ -72,10 +71,13 @@ pub(crate) fn make_folder(folder: &Path) -> anyhow::Result<()> {
         .with_context(|| format!("the folder {} can't be made; name another", folder.display()))
 }
 
-/// The format that the name of a picture asks for.
+/// Refuses a picture that is no SVG by its name.
 ///
 /// # Errors
-/// When it ends in neither `.svg` nor `.png`.
-pub(crate) fn picture_format(path: &Path) -> Result<Picture, WrongUsage> {
-    Picture::of(path).map_err(|why| WrongUsage(format!("--plot {}: {why}", path.display())))
+/// [`WrongUsage`] that names the file.
+pub(crate) fn check_picture(path: &Path) -> Result<(), WrongUsage> {
+    match path.extension() {
+        Some(ending) if ending == "svg" => Ok(()),
+        _ => Err(WrongUsage(format!("--plot {}: name a file that ends in .svg", path.display()))),
+    }
 }

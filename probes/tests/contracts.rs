@@ -100,30 +100,6 @@ fn train_and_predict_keep_their_contracts() {
 }
 
 #[test]
-fn train_draws_what_the_name_of_the_file_asks_for() {
-    let folder = tempfile::tempdir().unwrap();
-    train(folder.path());
-    let file = |name: &str| folder.path().join(name);
-    let plot = |name: &str| {
-        let mut train = sapwise();
-        train.arg("train").args([file("a.json"), file("b.json")]).arg("--out").arg(file("m.json"));
-        train.arg("--plot").arg(file(name));
-        train
-    };
-    success(&mut plot("p.svg"));
-    let svg = fs::read_to_string(file("p.svg")).unwrap();
-    for needed in ["2 physical machines", "Made by: sapwise train (2 reports or folders) --out m.json --plot p.svg"] {
-        assert!(svg.contains(needed), "{needed}: {svg}");
-    }
-    success(&mut plot("p.png"));
-    assert!(fs::read(file("p.png")).unwrap().starts_with(b"\x89PNG\r\n"));
-    // Before any work is done.
-    fs::remove_file(file("m.json")).unwrap();
-    let complaint = failure(&mut plot("p.pdf"), 2);
-    assert!(complaint.contains(".svg or .png") && !file("m.json").exists(), "{complaint}");
-}
-
-#[test]
 fn measured_tuning_come_from_the_report_alone() {
     let folder = tempfile::tempdir().unwrap();
     let own = report(folder.path(), "own.json", &[]);

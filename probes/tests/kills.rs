@@ -46,7 +46,6 @@ fn check_whole(path: &Path) {
         "html" => assert!(text().trim_end().ends_with("</html>"), "{path:?}"),
         "svg" => assert!(text().trim_end().ends_with("</svg>"), "{path:?}"),
         "csv" | "md" => assert!(text().ends_with('\n'), "{path:?}"),
-        "png" => assert!(fs::read(path).unwrap().ends_with(b"IEND\xae\x42\x60\x82"), "{path:?}"),
         "npy" => assert_eq!(Frames::read(path).unwrap().len(), 40, "{path:?}"),
         other => panic!("what is {other}?"),
     }
@@ -180,8 +179,7 @@ fn a_training_that_is_killed_leaves_the_model_of_before() {
     let out = folder.path().join("out");
     fs::create_dir(&out).unwrap();
     let reports = folder.path().join("simulated").display().to_string();
-    let words =
-        ["train", "--simulated", &reports, "--out", "model.json", "--card", "card.md", "--plot", "held-out.png"];
+    let words = ["train", "--simulated", &reports, "--out", "model.json", "--card", "card.md"];
     kill_and_look(&words, &out, 4);
 }
 

@@ -158,11 +158,6 @@ fn intervals(validation: &Validation) -> String {
     )
 }
 
-/// How much of the gap to the oracle a strategy closes; nothing where it costs more than the best single algorithm.
-pub(crate) fn gap_closed(share: f64) -> String {
-    if share < 0.0 { "none".to_owned() } else { percent(share) }
-}
-
 /// Over all sizes and, in parentheses, as games have them.
 fn regrets(regrets: Option<Regrets>) -> String {
     regrets.map_or_else(|| "-".to_owned(), |r| format!("{:.1} % ({:.1})", 100.0 * r.all, 100.0 * r.in_games))

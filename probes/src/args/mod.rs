@@ -129,14 +129,6 @@ pub(crate) struct Train {
     /// Where a page goes that says what the model was trained on and how well it did.
     #[arg(long, value_name = "CARD.md")]
     pub(crate) card: Option<PathBuf>,
-    /// Where a picture goes: predicted against measured times of the machines that were held out, and the regret on each of them. SVG or PNG
-    /// by its ending.
-    #[arg(long, value_name = "P.svg")]
-    pub(crate) plot: Option<PathBuf>,
-    /// Where JSON goes that says which hardware parameters matter for which crossover. Needs reports of at least five physical machines, and
-    /// fits every model again for each parameter.
-    #[arg(long, value_name = "I.json")]
-    pub(crate) importance: Option<PathBuf>,
     /// One JSON object on standard output instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

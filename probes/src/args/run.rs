@@ -73,8 +73,7 @@ pub(crate) struct Run {
     /// in .csv.
     #[arg(long, value_name = "T.csv")]
     pub(crate) trace: Option<PathBuf>,
-    /// Where a picture goes: the times of the algorithms, which of them ran in which frame, and the number of objects. SVG or PNG by its
-    /// ending.
+    /// Where an SVG goes: the time of each frame by the adaptive choice and by every algorithm, and which one was chosen.
     #[arg(long, value_name = "P.svg")]
     pub(crate) plot: Option<PathBuf>,
     /// One JSON object on standard output instead of a table.

@@ -32,19 +32,47 @@ const GPU_PARAMETERS: [&str; 4] = [
 
 /// A method on one thread or on all threads of its machine, on one GPU or on all: counts differ between machines, these do not.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct Role {
+pub(super) struct Role {
     class: BackendClass,
     method: String,
     /// All threads, or all GPUs; `false` where there is only one.
     all: bool,
 }
 
+impl std::fmt::Display for Role {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let units = match (self.class, self.all) {
+            (BackendClass::Cpu, false) => "one thread",
+            (BackendClass::Cpu, true) => "all threads",
+            (BackendClass::Gpu, false) => "one GPU",
+            (BackendClass::Gpu, true) => "all GPUs",
+        };
+        write!(f, "{} on {units}", self.method)
+    }
+}
+
 /// Which of two roles is cheaper at which sizes on one machine.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RoleOutcome {
-    first: Role,
-    second: Role,
+    pub(super) first: Role,
+    pub(super) second: Role,
     found: PairedOutcome,
+}
+
+impl RoleOutcome {
+    /// Natural logarithm of the objects at the last crossover, and whether the first is the cheaper one below it.
+    pub(super) fn last_crossover(&self) -> Option<(f64, bool)> {
+        self.found.positions().last().map(|p| (p.objects.ln(), p.first_below))
+    }
+
+    /// The parameters that its crossover is regressed on.
+    pub(super) fn parameters(&self) -> [&'static str; 4] {
+        parameters(&self.first, &self.second)
+    }
+}
+
+fn parameters(a: &Role, b: &Role) -> [&'static str; 4] {
+    if [a, b].iter().any(|role| role.class == BackendClass::Gpu) { GPU_PARAMETERS } else { PARAMETERS }
 }
 
 /// What is found for each two roles of a profile in its scenario `uniform`, or its first one.
@@ -183,9 +211,7 @@ fn predict(
     let rows: Vec<_> = crossed.into_iter().filter(|(_, p)| p.first_below == first_below).collect();
     let machines: Vec<&Hardware> = rows.iter().map(|r| r.0).collect();
     let ln_objects: Vec<f64> = rows.iter().map(|r| r.1.objects.ln()).collect();
-    let on_gpu = [a, b].iter().any(|role| role.class == BackendClass::Gpu);
-    let names = if on_gpu { GPU_PARAMETERS } else { PARAMETERS };
-    let estimate = estimate(&names, &machines, &ln_objects, hardware)?;
+    let estimate = estimate(&parameters(a, b), &machines, &ln_objects, hardware)?;
     Ok(Some((Prediction::At { ln_objects: estimate.value, first_below }, Some(estimate))))
 }
 

@@ -25,7 +25,7 @@ mod validate;
 pub use baselines::by_costs;
 pub use crossovers::ComparedCrossover;
 pub use held_out::{HeldOut, HeldOutCrossover, Time};
-pub use importance::{Effect, Importance, Interval, OfParameter, Verdict, importance};
+pub use importance::{Influence, influences};
 pub use notes::folded;
 pub use partition::Partition;
 pub use regret_table::{NOT_TIMED, Regret, RegretTable, Strategy};
