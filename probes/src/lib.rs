@@ -50,7 +50,6 @@ mod provenance;
 mod replay;
 mod restriction;
 mod revisions;
-mod samples;
 mod shell;
 mod summary;
 mod sweep;

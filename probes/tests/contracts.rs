@@ -88,13 +88,6 @@ fn train_and_predict_keep_their_contracts() {
     predict.arg("predict").arg("--report").arg(&own).arg("--model").arg(&model).arg("--json").arg("--out").arg(&out);
     let tuning = answer(&mut predict);
     assert_tuning(&tuning, "predicted");
-    assert!(tuning.get("samples").is_none(), "{tuning}");
-    // Of another machine no sample can be had, and whoever did not ask for none is told.
-    let said = |words: &[&str]| {
-        let text = success(sapwise().args(["predict", "--report"]).arg(&own).arg("--model").arg(&model).args(words));
-        text.contains("No sample was taken")
-    };
-    assert!(!said(&[]) && said(&["--samples", "3"]) && !said(&["--samples", "0"]));
     assert_eq!(tuning["model"], "model");
     assert_eq!(serde_json::from_str::<Value>(&fs::read_to_string(&out).unwrap()).unwrap(), tuning);
 }
@@ -206,28 +199,6 @@ fn run_refuses_tuning_and_reports_of_other_revisions() {
             assert!(complaint.contains(text), "{text} is missing: {complaint}");
         }
     }
-}
-
-#[test]
-fn samples_on_this_machine_correct_the_prediction_and_are_listed() {
-    let sampled = |k: &str| answer(sapwise().args(["predict", "--no-gpus", "--json", "--samples", k]));
-    let pure = sampled("0");
-    assert_tuning(&pure, "predicted");
-    assert!(pure.get("samples").is_none(), "{pure}");
-    let tuning = sampled("3");
-    assert_tuning(&tuning, "learned");
-    assert_eq!(tuning["model"], pure["model"]);
-    let samples = tuning["samples"].as_array().unwrap();
-    assert!((1..=3).contains(&samples.len()), "{samples:?}");
-    for sample in samples {
-        assert_keys(sample, &["algorithm", "objects", "predicted_ns", "measured_ns"]);
-        assert!(sample["measured_ns"].as_f64().unwrap() >= 1.0, "{sample}");
-    }
-    assert_eq!(tuning["interval_basis"], pure["interval_basis"]);
-    let read = sapwise::json::tuning(&tuning.to_string()).unwrap();
-    assert_eq!((read.source, read.samples.len()), (sapwise::Source::Learned, samples.len()));
-    let text = success(sapwise().args(["predict", "--no-gpus", "--samples", "1"]));
-    assert!(text.contains("Samples that correct the prediction"), "{text}");
 }
 
 #[test]

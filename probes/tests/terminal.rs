@@ -2,13 +2,13 @@
 
 mod common;
 
-use common::{sapwise, success};
+use common::{sapwise, stored, success};
 use std::path::PathBuf;
 #[cfg(target_os = "linux")]
 use std::process::Command;
 
 fn report() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../datasets/earlier/amd-epyc-2c-full--2026-11-21.json"))
+    stored("amd-epyc-zen3-2c", "full")
 }
 
 /// What the prediction for a report shows on a terminal of that many columns. `None`, with a line that says so, where the program is missing

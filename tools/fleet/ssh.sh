@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Probes many machines over ssh, each alone and all at once, brings their reports into one folder here, and tells which can be believed.
+# Probes many machines over ssh, all at once, copies their reports into one folder here, and ends with the table of `sapwise check`.
 #
 #   tools/fleet/ssh.sh NODES REPORTS [OPTION OF probe...]
 #
 # NODES is a file for GNU parallel's --sshloginfile: a host, or user@host, a line; `:` is this machine. No folder need be shared. SAPWISE names the
-# command on the machines where it is not on their PATH, SAPWISE_HERE the one here. Run again, it measures only those whose report is missing, was
-# disturbed or cut short: each machine keeps its own in ~/.cache/sapwise/fleet.
+# command on the machines if it is not on their PATH, SAPWISE_HERE the one here. Run again, it measures only the machines whose report is
+# missing, was disturbed or cut short: each machine keeps its own in ~/.cache/sapwise/fleet. The exit status is 1 if a machine left no report or
+# a report has a problem.
 set -euo pipefail
 usage="usage: tools/fleet/ssh.sh NODES REPORTS [OPTION OF probe...]"
 [ $# -ge 2 ] || { echo "$usage" >&2; exit 2; }
@@ -19,7 +20,7 @@ mkdir -p "$folder"
 brought=$(mktemp -d)
 trap 'rm -rf "$brought"' EXIT
 
-# A machine that fails keeps no other from its end: the table tells. What it says on standard error is shown with its name, and what it prints is its
+# A machine that fails does not end the others. GNU parallel shows what it writes to standard error with its name; its standard output is the
 # report.
 printf -v options ' %q' "$@"
 [ $# -gt 0 ] || options=
@@ -27,9 +28,12 @@ printf -v options ' %q' "$@"
 probe='mkdir -p "$HOME/.cache/sapwise/fleet" && '$(printf %q "$sapwise")' probe --json --out "$HOME/.cache/sapwise/fleet"'$options
 { TMPDIR=$brought parallel --nonall --tag --files --will-cite --sshloginfile "$nodes" "$probe" || true; } >"$brought/printed"
 
-# One file for each machine; its name is of a hash of the host's.
+# One file for each machine; its name is a hash of the host's name.
+left=0
 while IFS=$'\t' read -r host text; do
     [ -s "$text" ] || continue
+    left=$((left + 1))
     cp "$text" "$folder/node-$(printf %s "$host" | sha256sum | cut -c 1-12).json"
 done <"$brought/printed"
-"${SAPWISE_HERE:-sapwise}" fleet "$folder" --nodes "$count"
+[ "$left" = 0 ] || "${SAPWISE_HERE:-sapwise}" check "$folder"
+[ "$left" -ge "$count" ] || { echo "ssh.sh: $left of $count machines left a report; run it again for the others" >&2; exit 1; }

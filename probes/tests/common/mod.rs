@@ -12,6 +12,11 @@ pub(crate) fn sapwise() -> Command {
     command
 }
 
+/// A report of `datasets/`.
+pub(crate) fn stored(host: &str, profile: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../datasets").join(host).join(format!("{profile}.json"))
+}
+
 /// The command where no Vulkan driver is found. On other interfaces the adapters of the machine stay.
 pub(crate) fn without_adapters(command: &mut Command) -> &mut Command {
     command.env("VK_ICD_FILENAMES", "/nonexistent").env("VK_DRIVER_FILES", "/nonexistent")
@@ -28,11 +33,6 @@ pub(crate) fn devices_with_a_gpu(test: &str) -> Option<serde_json::Value> {
         return None;
     }
     Some(answer)
-}
-
-/// The remarks of a report but for the one that a host moved the cores of this machine meanwhile, which tests can't keep it from.
-pub(crate) fn remarks_but_of_moves(report: &sapwise_lab::report::Report) -> Vec<String> {
-    report.remarks.iter().filter(|r| !r.starts_with("the machine changed:")).cloned().collect()
 }
 
 /// Sends a signal to a running command. Not SIGINT, which shells let what runs in the background ignore, these tests among it.
