@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Records the time of every algorithm in each frame of some scenes on this machine. A test replays such traces through the adaptive choice, with
-# a counter as its clock (src/adaptive/tests/traces.rs): `TRACES=DIR cargo test -p sapwise --features model traces -- --nocapture` replays
-# those of DIR instead of datasets/traces.
+# Records the time of every algorithm in each frame of some scenes on this machine. A test replays such traces through
+# the adaptive choice, with a counter as its clock (src/adaptive/tests/traces.rs): `TRACES=DIR cargo test -p sapwise
+# --features model traces -- --nocapture` replays those of DIR instead of datasets/traces.
 #
 #     tools/traces.sh DIR [SEED]
 #
-# Keeps the numbers of objects and pairs and the times of what `sapwise run --trace` writes. Nothing else should run meanwhile; takes half a
-# minute.
+# Keeps the numbers of objects and pairs and the times of what `sapwise run --trace` writes. Nothing else should run
+# meanwhile; takes half a minute.
 set -euo pipefail
 folder=${1:?usage: tools/traces.sh DIR [SEED]}
 seed=${2:-1}

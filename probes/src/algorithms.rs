@@ -10,10 +10,11 @@ type Factory = Arc<dyn Fn(u32) -> Result<Box<dyn BroadPhase>, Error> + Send + Sy
 
 /// An algorithm that a user's program adds to the command.
 ///
-/// `method` is 1 to 32 of `a-z`, `0-9`, `-` and `_`, begins with a letter, and is no name of the library's. Increase `revision` whenever
-/// the speed changes: reports and models of other revisions are stale then. Each process that runs the algorithm calls the factory; an
-/// error leaves the algorithm out with a remark. An algorithm with kernels of several vector widths should ask
-/// [`SimdLevel::in_use`](sapwise::SimdLevel::in_use), so that `SAPWISE_SIMD` restricts it too.
+/// `method` is 1 to 32 of `a-z`, `0-9`, `-` and `_`, begins with a letter, and is no name of the library's. Increase
+/// `revision` whenever the speed changes: reports and models of other revisions are stale then. Each process that runs
+/// the algorithm calls the factory; an error leaves the algorithm out with a remark. An algorithm with kernels of
+/// several vector widths should ask [`SimdLevel::in_use`](sapwise::SimdLevel::in_use), so that `SAPWISE_SIMD` restricts
+/// it too.
 #[derive(Clone)]
 pub struct UserAlgorithm {
     method: String,
@@ -35,8 +36,9 @@ impl UserAlgorithm {
         Self::new(method, revision, false, Arc::new(move |_| factory()))
     }
 
-    /// Creates an algorithm that runs on several threads. The factory gets their number, the calling thread included: 1, 2, 4, ... and all
-    /// that the machine has or `--threads` allows. The command pins the library's threads to cores, not those of a user's algorithm.
+    /// Creates an algorithm that runs on several threads. The factory gets their number, the calling thread included:
+    /// 1, 2, 4, ... and all that the machine has or `--threads` allows. The command pins the library's threads to
+    /// cores, not those of a user's algorithm.
     #[must_use]
     pub fn on_threads(
         method: &str,
@@ -50,8 +52,8 @@ impl UserAlgorithm {
         Self { method: method.to_owned(), revision, parallel, terms: Vec::new(), factory }
     }
 
-    /// Sets what the time of a frame grows with and which hardware parameter each term depends on; `train` fits a unit for each. Without
-    /// this the terms are calls, objects, sorting, all pairs, candidates on an axis and pairs.
+    /// Sets what the time of a frame grows with and which hardware parameter each term depends on; `train` fits a unit
+    /// for each. Without this the terms are calls, objects, sorting, all pairs, candidates on an axis and pairs.
     ///
     /// `probes/examples/own_algorithm.rs` declares a sort of `log2 n` steps for each object.
     #[must_use]
@@ -63,8 +65,8 @@ impl UserAlgorithm {
 
 /// The algorithms on the CPU that the command knows.
 ///
-/// Every verb gets it from the start of the command, and makes each [`Registry`] with it: one made elsewhere would lack the user's. It
-/// is no global, so that two tests of one process can have different ones.
+/// Every verb gets it from the start of the command, and makes each [`Registry`] with it: one made elsewhere would lack
+/// the user's. It is no global, so that two tests of one process can have different ones.
 #[derive(Default)]
 pub(crate) struct Algorithms {
     users: Vec<UserAlgorithm>,

@@ -11,9 +11,9 @@ pub use crate::algorithms::UserAlgorithm;
 
 /// The command `sapwise`, with the user's own algorithms beside the library's.
 ///
-/// Every verb times, verifies, fits, predicts and runs them like the library's. Verbs start parts of a measurement as processes of the
-/// same program with other arguments: the program must reach [`run`](Self::run) with the same algorithms however it is started, and
-/// print nothing before.
+/// Every verb times, verifies, fits, predicts and runs them like the library's. Verbs start parts of a measurement as
+/// processes of the same program with other arguments: the program must reach [`run`](Self::run) with the same
+/// algorithms however it is started, and print nothing before.
 #[derive(Default)]
 pub struct Command {
     algorithms: Algorithms,
@@ -28,7 +28,8 @@ impl Command {
         Self::default()
     }
 
-    /// Adds an algorithm. [`run`](Self::run) fails if its name is no method name, belongs to the library, or was added before.
+    /// Adds an algorithm. [`run`](Self::run) fails if its name is no method name, belongs to the library, or was added
+    /// before.
     #[must_use]
     pub fn with(mut self, algorithm: UserAlgorithm) -> Self {
         let refused = self.algorithms.add(algorithm).err();
@@ -36,8 +37,8 @@ impl Command {
         self
     }
 
-    /// Runs the arguments of this process and returns the exit status for `main`: 0 done, 1 failed, 2 wrong usage, 128 plus the number of
-    /// a signal that asked to stop. Ends the process itself if the arguments can't be read.
+    /// Runs the arguments of this process and returns the exit status for `main`: 0 done, 1 failed, 2 wrong usage, 128
+    /// plus the number of a signal that asked to stop. Ends the process itself if the arguments can't be read.
     #[must_use]
     pub fn run(self) -> ExitCode {
         // Whatever the arguments ask for: whoever wrote the program should see it.

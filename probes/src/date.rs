@@ -8,7 +8,8 @@ pub(crate) fn today() -> String {
     civil(seconds / 86_400)
 }
 
-/// Returns the Gregorian date a number of days after 1970-01-01. Years are counted from 1 March, so that the leap day is the last of its year.
+/// Returns the Gregorian date a number of days after 1970-01-01. Years are counted from 1 March, so that the leap day
+/// is the last of its year.
 fn civil(days: u64) -> String {
     // 719 468 days lie between 0000-03-01 and 1970-01-01; 146 097 days are 400 years.
     let days = days + 719_468;

@@ -50,7 +50,8 @@ impl Destination {
         }
     }
 
-    /// Writes the report of an interrupted measurement: to the unfinished file if there is a report already, which stays.
+    /// Writes the report of an interrupted measurement: to the unfinished file if there is a report already, which
+    /// stays.
     ///
     /// # Errors
     /// As [`save`](Self::save).

@@ -5,13 +5,15 @@ use sapwise::{measure, usable_cores};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-/// The variable that names a node whose host name and machine id are not its own: containers of one image, or two nodes on one machine.
+/// The variable that names a node whose host name and machine id are not its own: containers of one image, or two nodes
+/// on one machine.
 const VARIABLE: &str = "SAPWISE_NODE";
 
 /// The id that Linux gives an installation.
 const MACHINE_ID: &str = "/etc/machine-id";
 
-/// Returns the file for the report of this node within a folder: `amd-epyc-2c-5f0c9a1b2d3e.json`, made of CPU, cores and node.
+/// Returns the file for the report of this node within a folder: `amd-epyc-2c-5f0c9a1b2d3e.json`, made of CPU, cores
+/// and node.
 pub(crate) fn report_in(folder: &Path) -> PathBuf {
     folder.join(format!("{}-{}.json", machine_stem(&measure::machine().cpu, usable_cores()), node()))
 }

@@ -5,7 +5,8 @@ use anyhow::{Context, bail};
 use sapwise_lab::figures::Picture;
 use std::path::{Path, PathBuf};
 
-/// Checks the output files of a verb before it works for minutes: none is an input, none is named twice, and each can be written.
+/// Checks the output files of a verb before it works for minutes: none is an input, none is named twice, and each can
+/// be written.
 ///
 /// # Errors
 /// As [`refuse_overwriting`] and [`check_writable`].

@@ -107,7 +107,8 @@ pub(crate) fn predict(
     Ok(tuning)
 }
 
-/// Predicts the tuning of the machine of a report, or measures it from the timings of the report, with what is doubtful about either.
+/// Predicts the tuning of the machine of a report, or measures it from the timings of the report, with what is doubtful
+/// about either.
 ///
 /// # Errors
 /// When the model predicts none of the algorithms, or the report has too few timings.

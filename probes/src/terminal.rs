@@ -33,7 +33,8 @@ impl Terminal {
 
     /// Draws a table whose first row is its head.
     ///
-    /// Leaves out columns at the right end that the terminal has no room for, and names them in a line below. The first two stay.
+    /// Leaves out columns at the right end that the terminal has no room for, and names them in a line below. The first
+    /// two stay.
     pub(crate) fn table(self, rows: &[Vec<String>]) -> String {
         let head = rows.first().map_or(&[][..], Vec::as_slice);
         let widths: Vec<usize> = (0..head.len()).map(|k| width(rows, k)).collect();

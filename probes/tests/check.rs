@@ -311,8 +311,14 @@ fn of_a_folder_a_table_says_which_reports_agree() {
     let folder = tempfile::tempdir().unwrap();
     let put = |name: &str, by: u64, change: &dyn Fn(&mut Value)| {
         let mut report = measured();
-        for timing in report["points"].as_array_mut().unwrap().iter_mut().flat_map(|p| p["timings"].as_array_mut().unwrap()) {
-            timing["samples_ns"].as_array_mut().unwrap().iter_mut().for_each(|ns| *ns = json!(ns.as_u64().unwrap() * by / 100));
+        for timing in
+            report["points"].as_array_mut().unwrap().iter_mut().flat_map(|p| p["timings"].as_array_mut().unwrap())
+        {
+            timing["samples_ns"]
+                .as_array_mut()
+                .unwrap()
+                .iter_mut()
+                .for_each(|ns| *ns = json!(ns.as_u64().unwrap() * by / 100));
         }
         change(&mut report);
         write(folder.path(), name, report.to_string());
@@ -328,19 +334,38 @@ fn of_a_folder_a_table_says_which_reports_agree() {
     assert_eq!(ended.status.code(), Some(1), "{told}");
     let row = |name: &str| {
         let row = told.lines().find(|line| line.contains(name) && !line.contains(": "));
-        row.unwrap_or_else(|| panic!("no row of {name}: {told}")).split("  ").map(str::trim).filter(|c| !c.is_empty()).map(str::to_owned).collect::<Vec<_>>()
+        row.unwrap_or_else(|| panic!("no row of {name}: {told}"))
+            .split("  ")
+            .map(str::trim)
+            .filter(|c| !c.is_empty())
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
     };
     assert_eq!(row("/full.json")[2..4], ["good", "0.66"]);
     assert_eq!(row("slow.json")[2..4], ["DOUBTFUL", "1.98"]);
-    assert_eq!((&row("cut.json")[2..], &row("elsewhere.json")[2..]), (&["DOUBTFUL", "-", "-"].map(str::to_owned)[..], &["good", "-", "-"].map(str::to_owned)[..]));
+    assert_eq!(
+        (&row("cut.json")[2..], &row("elsewhere.json")[2..]),
+        (&["DOUBTFUL", "-", "-"].map(str::to_owned)[..], &["good", "-", "-"].map(str::to_owned)[..])
+    );
     assert!(row("/full.json")[1] == row("slow.json")[1] && row("elsewhere.json")[1] != row("slow.json")[1], "{told}");
-    for text in ["2.0 × the time of the other reports", "bad.json: BAD", "Kind 1: none, 64 cores, portable, no GPU", "3 of 5 reports can be believed"] {
+    for text in [
+        "2.0 × the time of the other reports",
+        "bad.json: BAD",
+        "Kind 1: none, 64 cores, portable, no GPU",
+        "3 of 5 reports can be believed",
+    ] {
         assert!(told.contains(text), "{text}: {told}");
     }
     assert!(!told.contains("/full.json: "), "{told}");
-    let json: Value = serde_json::from_slice(&sapwise().args(["check", "--json"]).arg(folder.path()).output().unwrap().stdout).unwrap();
+    let json: Value =
+        serde_json::from_slice(&sapwise().args(["check", "--json"]).arg(folder.path()).output().unwrap().stdout)
+            .unwrap();
     assert_eq!(json["files"].as_array().unwrap().len(), 6);
-    let slow = json["kinds"][0]["reports"].as_array().unwrap().iter().find(|r| r["file"].as_str().unwrap().ends_with("slow.json"));
+    let slow = json["kinds"][0]["reports"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|r| r["file"].as_str().unwrap().ends_with("slow.json"));
     assert_eq!(slow.unwrap()["over_others"]["timings"], 2, "{json}");
     let empty = tempfile::tempdir().unwrap();
     assert!(failure(sapwise().arg("check").arg(empty.path()), 1).contains("holds no *.json file"));

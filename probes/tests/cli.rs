@@ -4,7 +4,7 @@ mod common;
 
 #[cfg(unix)]
 use common::send;
-use common::{failure, npy, sapwise, stored, success, without_adapters};
+use common::{failure, npy, sapwise, small_report, success, without_adapters};
 use std::fs;
 
 #[test]
@@ -225,7 +225,8 @@ fn help_that_nobody_gets_is_a_failure() {
 fn a_file_that_cannot_be_written_is_told_first() {
     let folder = tempfile::tempdir().unwrap();
     let missing = folder.path().join("missing").join("out.json");
-    let report = stored("amd-epyc-zen3-2c", "full");
+    let report = folder.path().join("report.json");
+    fs::write(&report, small_report("a").to_string()).unwrap();
     let report = report.to_str().unwrap();
     let commands: [&[&str]; 3] =
         [&["train", report, "--out"], &["predict", "--report", report, "--out"], &["run", "uniform", "--record"]];
@@ -257,7 +258,8 @@ fn a_second_signal_ends_it_as_if_it_were_not_caught() {
         let mut told = String::new();
         BufReader::new(pairs.stderr.take().unwrap()).read_line(&mut told).unwrap();
         if told.starts_with("interrupted: about to stop") {
-            // Not SIGHUP or SIGINT: under `nohup` and in the background of a shell they are ignored, by the command too.
+            // Not SIGHUP or SIGINT: under `nohup` and in the background of a shell they are ignored, by the command
+            // too.
             send("-TERM", &pairs);
             assert_eq!(pairs.wait().unwrap().signal(), Some(15));
             return;

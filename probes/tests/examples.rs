@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{npy, sapwise, stored, success};
+use common::{npy, sapwise, small_report, success};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -14,23 +14,21 @@ const SHORT: [&str; 6] = ["check", "devices", "pairs", "schema", "study", "train
 /// A folder with the files that examples name.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let report = |profile: &str| stored("amd-epyc-zen3-2c", profile);
-    let put = |from: &Path, to: &str| {
+    let put = |to: &str, content: &str| {
         let to = folder.path().join(to);
         fs::create_dir_all(to.parent().unwrap()).unwrap();
-        fs::copy(from, to).unwrap();
+        fs::write(to, content).unwrap();
     };
+    let [a, b] = ["a", "b"].map(|machine| small_report(machine).to_string());
     for name in ["report.json", "this-machine.json", "other-machine.json", "elsewhere.json"] {
-        put(&report("full"), name);
+        put(name, &a);
     }
-    for name in ["datasets/a.json", "reports/a.json"] {
-        put(&report("full"), name);
-    }
-    for name in ["datasets/b.json", "reports/b.json"] {
-        put(&report("1t"), name);
+    for name in ["datasets", "reports"] {
+        put(&format!("{name}/a.json"), &a);
+        put(&format!("{name}/b.json"), &b);
     }
     for name in ["mine.json", "models/mine.json"] {
-        put(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/default.json"), name);
+        put(name, include_str!("../../models/default.json"));
     }
     let boxes: Vec<f32> = (0..20).flat_map(|k| [k as f32, 0.0, 0.0, k as f32 + 1.0, 1.0, 1.0]).collect();
     npy(folder.path(), "boxes.npy", "<f4", "20, 6", &boxes);
@@ -77,8 +75,7 @@ fn every_example_and_every_next_command_works_as_printed() {
         let help = success(sapwise().args([&verb, "--help"]));
         let lines =
             help.lines().filter_map(|line| Some(&line[line.find("sapwise ")?..]).filter(|_| line.starts_with("  ")));
-        let examples: Vec<&str> =
-            lines.filter(|line| line.starts_with(&format!("sapwise {verb}"))).collect();
+        let examples: Vec<&str> = lines.filter(|line| line.starts_with(&format!("sapwise {verb}"))).collect();
         assert!(!examples.is_empty(), "{verb} has no example: {help}");
         for example in examples {
             let text = run(example, folder.path());

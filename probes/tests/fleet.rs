@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::{failure, sapwise, success};
+use common::{failure, sapwise, small_report, success};
+use sapwise_lab::report::Label;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -28,64 +29,43 @@ fn change(path: &Path, change: impl FnOnce(&mut sapwise_lab::Report)) {
 }
 
 #[test]
-fn nodes_put_their_reports_into_one_folder_and_go_on_where_they_stopped() {
+fn a_node_measures_once_into_a_shared_folder_and_again_what_was_cut_short() {
     let folder = tempfile::tempdir().unwrap();
     success(&mut probe("qx-first", folder.path()));
-    success(&mut probe("qx-second", folder.path()));
     let files = reports(folder.path());
-    assert_eq!(files.len(), 2);
-    for file in &files {
-        let (name, text) = (file.file_name().unwrap().to_str().unwrap(), fs::read_to_string(file).unwrap());
-        assert!(!name.contains("qx-") && !text.contains("qx-"), "{name}");
-        // What other programs took meanwhile is not the subject.
-        change(file, |report| report.label = sapwise_lab::report::Label::RealFull);
-    }
-    let before = fs::read(&files[0]).unwrap();
-    for node in ["qx-first", "qx-second"] {
-        let told = success(&mut probe(node, folder.path()));
-        assert!(told.contains("is complete: nothing is measured"), "{told}");
-    }
-    assert_eq!(fs::read(&files[0]).unwrap(), before);
+    let [file] = &files[..] else { panic!("not one report") };
+    let (name, text) = (file.file_name().unwrap().to_str().unwrap(), fs::read_to_string(file).unwrap());
+    assert!(!name.contains("qx-") && !text.contains("qx-"), "{name}");
+    // Other programs may have disturbed it, which is not the subject.
+    change(file, |report| report.label = Label::RealFull);
+    let complete = fs::read(file).unwrap();
+    let told = success(&mut probe("qx-first", folder.path()));
+    assert!(told.contains("is complete: nothing is measured"), "{told}");
     let complaint = failure(probe("qx-first", folder.path()).args(["--seed", "7"]), 1);
     assert!(complaint.contains("was measured by `sapwise probe") && complaint.contains("--out"), "{complaint}");
-    // One that was cut short is measured again.
-    change(&files[0], |report| report.remarks.push("interrupted after 1 of 2 scenarios".to_owned()));
+    assert_eq!(fs::read(file).unwrap(), complete);
+    change(file, |report| report.remarks.push("interrupted after 1 of 2 scenarios".to_owned()));
     success(&mut probe("qx-first", folder.path()));
-    success(&mut probe("qx-second", folder.path()));
-    assert!(!fs::read_to_string(&files[0]).unwrap().contains("interrupted after"));
-    assert_eq!(reports(folder.path()), files);
+    assert!(!fs::read_to_string(file).unwrap().contains("interrupted after"));
+    let missing = format!("{}/none/", folder.path().display());
+    let complaint = failure(sapwise().args(["probe", "--hardware-only", "--out", &missing]), 1);
+    assert!(complaint.contains("there is no such folder"), "{complaint}");
 }
 
-/// The standard output of a command that tells a failure there.
+/// The standard output of a command that fails.
 fn failure_text(command: &mut assert_cmd::Command) -> String {
     let ended = command.assert().code(1);
     String::from_utf8(ended.get_output().stdout.clone()).unwrap()
 }
 
 #[test]
-fn each_kind_of_machine_gets_a_tuning_that_a_program_picks_by_its_identity() {
+fn each_kind_of_machine_gets_a_tuning_by_its_identity() {
     let [reports, tunings] = [(), ()].map(|()| tempfile::tempdir().unwrap());
-    for node in ["a", "b"] {
-        // Four sizes: curves of a measured tuning need three points, which two sizes had only where there was time to visit one again.
-        let sizes = ["--max-objects", "60", "--out"];
-        success(sapwise().env("SAPWISE_NODE", node).args(&TINY[..5]).args(sizes).arg(reports.path()));
+    // Two of one kind, one of another, and one that was disturbed.
+    for (name, machine) in [("first.json", "a"), ("second.json", "a"), ("other.json", "b"), ("shared.json", "c")] {
+        fs::write(reports.path().join(name), small_report(machine).to_string()).unwrap();
     }
-    for file in self::reports(reports.path()) {
-        change(&file, |report| report.label = sapwise_lab::report::Label::RealFull);
-    }
-    // A larger machine of another make, and one that was not left alone.
-    let first = &self::reports(reports.path())[0];
-    for (name, id, label) in [
-        ("large.json", "1", sapwise_lab::report::Label::RealFull),
-        ("shared.json", "2", sapwise_lab::report::Label::RealContended),
-    ] {
-        let file = reports.path().join(name);
-        fs::copy(first, &file).unwrap();
-        change(&file, |report| {
-            report.hardware.machine.physical_id = id.repeat(16);
-            report.label = label;
-        });
-    }
+    change(&reports.path().join("shared.json"), |report| report.label = Label::RealContended);
     let out = tunings.path().join("made");
     let predict = |more: &[&str]| {
         let mut command = sapwise();
@@ -94,8 +74,9 @@ fn each_kind_of_machine_gets_a_tuning_that_a_program_picks_by_its_identity() {
     };
     let told = failure_text(predict(&["--out"]).arg(&out));
     assert!(told.contains("2 tunings written") && told.contains("were cut short or disturbed"), "{told}");
-    let machine = sapwise::measure::machine();
-    let own = out.join(machine.tuning_file(sapwise::usable_cores(), &[]));
+    let first = fs::read_to_string(reports.path().join("first.json")).unwrap();
+    let first = sapwise_lab::report::read(&first).unwrap().value;
+    let own = out.join(first.hardware.machine.tuning_file(2, &[]));
     let tuning = sapwise::json::tuning(&fs::read_to_string(&own).unwrap()).unwrap();
     assert_eq!(tuning.source, sapwise::Source::Predicted);
     assert_eq!(fs::read_dir(&out).unwrap().count(), 2);

@@ -1,14 +1,13 @@
-//! Verbs that are killed at any moment, or run out of disk: every older file is whole, every newer one is complete, and the same command
-//! works again.
+//! Verbs that are killed at any moment, or run out of disk: every older file is whole, every newer one is complete, and
+//! the same command works again.
 //!
-//! `SAPWISE_KILLS=N` kills each verb N times, and `SAPWISE_SMALL_DISK=FOLDER` fills that disk: `tools/kills.sh` does both. Without it files
-//! end where the system's limit on their size does.
+//! `SAPWISE_KILLS=N` kills each verb N times, and `SAPWISE_SMALL_DISK=FOLDER` fills that disk: `tools/kills.sh` does
+//! both. Without it files end where the system's limit on their size does.
 
 mod common;
 
-use common::{sapwise, success};
+use common::{sapwise, small_report, success};
 use sapwise_scenes::Frames;
-use serde_json::Value;
 use std::fs;
 #[cfg(unix)]
 use std::os::unix::fs::FileExt;
@@ -18,29 +17,6 @@ use std::time::Instant;
 
 /// How often each verb is killed where nothing is said.
 const KILLS: u64 = 4;
-
-/// A report of three sizes and four scenarios.
-fn small_report(folder: &Path, name: &str) -> String {
-    let mut report: Value = serde_json::from_str(include_str!("../../crates/lab/tests/fixtures/report-2.json")).unwrap();
-    report["label"] = "real_full".into();
-    report["hardware"]["machine"]["physical_id"] = name.repeat(16).into();
-    let registry = sapwise::Registry::with_cores(2);
-    for algorithm in report["algorithms"].as_array_mut().unwrap() {
-        let own = registry.entries().iter().find(|e| algorithm["id"] == e.id.to_string().as_str()).unwrap();
-        algorithm["revision"] = own.revision.into();
-    }
-    let points = report["points"].as_array().unwrap().clone();
-    let scenarios = ["uniform", "slab", "mixed", "fast"].into_iter().flat_map(|scenario| {
-        points.iter().cloned().map(move |mut point| {
-            point["scenario"] = scenario.into();
-            point
-        })
-    });
-    report["points"] = scenarios.collect();
-    let path = folder.join(format!("{name}.json"));
-    fs::write(&path, report.to_string()).unwrap();
-    path.display().to_string()
-}
 
 /// Numbers from 0 to 1 that follow from the first.
 struct Random(u64);
@@ -55,7 +31,7 @@ impl Random {
 /// Fails where a file of ours is half-written, or holds a part of what it is named for.
 fn check_whole(path: &Path) {
     let text = || fs::read_to_string(path).unwrap();
-    let json = || drop(serde_json::from_str::<Value>(&text()).unwrap_or_else(|e| panic!("{path:?}: {e}")));
+    let json = || drop(serde_json::from_str::<serde_json::Value>(&text()).unwrap_or_else(|e| panic!("{path:?}: {e}")));
     match path.extension().and_then(|e| e.to_str()).unwrap() {
         "unfinished" => json(),
         "json" => {
@@ -128,7 +104,8 @@ fn end_files_early(words: &[&str], out: &Path, before: &[PathBuf]) {
     let largest = before.iter().map(|path| fs::metadata(path).unwrap().len()).max().unwrap() as f64;
     for share in [0.0, 0.3, 0.6] {
         let mut command = Command::new("sh");
-        // Where the signal is not ignored it kills, which is the subject elsewhere. The limit is in blocks of 512 bytes.
+        // Where the signal is not ignored it kills, which is the subject elsewhere. The limit is in blocks of 512
+        // bytes.
         command.args(["-c", "trap '' XFSZ; ulimit -f $0; exec \"$@\"", &((largest * share) as u64 / 512).to_string()]);
         command.arg(assert_cmd::cargo::cargo_bin!("sapwise"));
         run_out_of_room(command.args(words).current_dir(out));
@@ -166,7 +143,11 @@ fn folders() -> (tempfile::TempDir, PathBuf, [String; 2]) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     fs::create_dir(&out).unwrap();
-    let reports = ["a", "b"].map(|name| small_report(folder.path(), name));
+    let reports = ["a", "b"].map(|name| {
+        let path = folder.path().join(name).with_extension("json");
+        fs::write(&path, small_report(name).to_string()).unwrap();
+        path.display().to_string()
+    });
     (folder, out, reports)
 }
 
@@ -185,8 +166,7 @@ fn a_prediction_that_is_killed_leaves_the_old_tuning() {
 #[test]
 fn a_run_that_is_killed_leaves_its_old_files() {
     let (_folder, out, [report, _]) = folders();
-    let words =
-        "run uniform --objects 300 --frames 40 --repeats 2 --no-gpus --record r.npy --trace t.csv --plot p.svg --tuning";
+    let words = "run uniform --objects 300 --frames 40 --repeats 2 --no-gpus --record r.npy --trace t.csv --plot p.svg --tuning";
     let words: Vec<&str> = words.split(' ').chain([report.as_str()]).collect();
     kill_and_look(&words, &out, 3);
 }

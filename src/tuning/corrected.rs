@@ -4,11 +4,11 @@ use super::belief::{Belief, Deviations};
 use crate::cost::{Frame, FrameCost};
 use crate::{AlgorithmCost, Load};
 
-/// Returns the costs corrected by timings: for each the position of its algorithm in `costs`, the load, the nanoseconds of a frame
-/// and the standard deviation of their natural logarithm.
+/// Returns the costs corrected by timings: for each the position of its algorithm in `costs`, the load, the nanoseconds
+/// of a frame and the standard deviation of their natural logarithm.
 ///
-/// A timing also moves the costs of algorithms that share its method, its number of threads or its processor. Ignores a timing
-/// whose position is out of range or whose nanoseconds are no positive number.
+/// A timing also moves the costs of algorithms that share its method, its number of threads or its processor. Ignores a
+/// timing whose position is out of range or whose nanoseconds are no positive number.
 #[must_use]
 pub fn corrected(
     costs: &[AlgorithmCost],

@@ -3,12 +3,13 @@
     reframe -C site.py -c tools/fleet/reframe.py -r --distribute=idle -S reports=/shared/reports
     sapwise check /shared/reports
 
-`--distribute=idle` makes one job for each idle node; without it, as with ReFrame's own generic system, the test runs on this machine.
-`-S reports=FOLDER` names the shared folder, which the test creates if it is missing; `-S sapwise=PATH` the command if it is not on the PATH;
-`-S options=--quick,--no-gpus` further options of `sapwise probe`. A node whose report is complete is not measured again.
+`--distribute=idle` makes one job for each idle node; without it, as with ReFrame's own generic system, the test runs on
+this machine. `-S reports=FOLDER` names the shared folder, which the test creates if it is missing; `-S sapwise=PATH` the
+command if it is not on the PATH; `-S options=--quick,--no-gpus` further options of `sapwise probe`. A node whose report
+is complete is not measured again.
 
-ReFrame keeps hardware parameters of each run, which compares a node with itself a month ago; `sapwise check` compares the nodes with each
-other. Tried with ReFrame 4.10.
+ReFrame keeps hardware parameters of each run, which compares a node with itself a month ago; `sapwise check` compares
+the nodes with each other. Tried with ReFrame 4.10.
 """
 
 import json
@@ -23,7 +24,7 @@ from reframe.core.exceptions import SanityError
 
 @rfm.simple_test
 class SapwiseProbe(rfm.RunOnlyRegressionTest):
-    """`sapwise probe` on one node. Fails if the report was cut short or lacks a hardware parameter that the test names."""
+    """`sapwise probe` on one node. Fails if the report was cut short or lacks a parameter that the test names."""
 
     descr = "Sapwise: hardware parameters and broad-phase timings of a node"
     maintainers = ["sapwise"]
@@ -47,7 +48,7 @@ class SapwiseProbe(rfm.RunOnlyRegressionTest):
         os.makedirs(self.reports, exist_ok=True)
         self.executable = self.sapwise
         self.executable_opts = ["probe", "--json", "--out", self.reports, *self.options]
-        # Two nodes may share a host name, but not the name that Slurm has for them. Empty without Slurm, which counts as not set.
+        # Two nodes may share a host name, but not the name that Slurm has for them. Without Slurm it is empty: not set.
         self.prerun_cmds = ['export SAPWISE_NODE="${SLURMD_NODENAME:-}"']
 
     def report(self):

@@ -7,8 +7,9 @@
 #
 #   sbatch --nodes=16 tools/fleet/slurm.sh REPORTS [OPTION OF probe...]
 #
-# Creates REPORTS if it is missing. Submitted again, it measures the nodes whose report is missing, was disturbed or cut short. SAPWISE names the
-# command if it is not on the PATH. The exit status is 1 if a node left no report or a report has a problem.
+# Creates REPORTS if it is missing. Submitted again, it measures the nodes whose report is missing, was disturbed or cut
+# short. SAPWISE names the command if it is not on the PATH. The exit status is 1 if a node left no report or a report
+# has a problem.
 set -euo pipefail
 [ $# -ge 1 ] || { echo "usage: sbatch --nodes=N tools/fleet/slurm.sh REPORTS [OPTION OF probe...]" >&2; exit 2; }
 folder=$1
@@ -16,8 +17,8 @@ shift
 sapwise=${SAPWISE:-sapwise}
 mkdir -p "$folder"
 # A node that fails does not end the others. Two nodes may share a host name, but not the name that Slurm has for them.
-srun --ntasks-per-node=1 --kill-on-bad-exit=0 bash -c 'export SAPWISE_NODE=$SLURMD_NODENAME; exec "$@"' probe \
-    "$sapwise" probe --out "$folder" "$@" || true
+srun --ntasks-per-node=1 --kill-on-bad-exit=0 \
+    bash -c 'export SAPWISE_NODE=$SLURMD_NODENAME; exec "$@"' probe "$sapwise" probe --out "$folder" "$@" || true
 there=$(find "$folder" -maxdepth 1 -name '*.json' | wc -l)
 [ "$there" = 0 ] || "$sapwise" check "$folder"
 [ "$there" -ge "$SLURM_JOB_NUM_NODES" ] \

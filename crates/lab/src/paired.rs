@@ -1,6 +1,7 @@
 //! Two algorithms side by side over the number of objects, from timings of both on the same frames.
 //!
-//! At each size the median over frames of `ln(first / second)` is taken: pairing frame by frame cancels what disturbed both.
+//! At each size the median over frames of `ln(first / second)` is taken: pairing frame by frame cancels what disturbed
+//! both.
 
 use sapwise::stats::{NORMAL_90, mean, median, robust_deviation};
 use std::collections::BTreeMap;
@@ -14,7 +15,8 @@ const DISTINCT: f64 = 2.326;
 /// Two times that differ by less than this count as equal, however exact they are.
 const LEAST_LN: f64 = 0.02;
 
-/// Frames of two algorithms at one size. The k-th sample of both is the same frame; a sample without a partner is ignored.
+/// Frames of two algorithms at one size. The k-th sample of both is the same frame; a sample without a partner is
+/// ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct PairedSamples<'a> {
     /// Objects in each frame.
@@ -66,8 +68,8 @@ impl Size {
 }
 
 impl PairedRatio {
-    /// Compares two algorithms at points where both were timed, in any order; a size may have several points. `None` with fewer
-    /// than three sizes that have a pair of samples above zero.
+    /// Compares two algorithms at points where both were timed, in any order; a size may have several points. `None`
+    /// with fewer than three sizes that have a pair of samples above zero.
     pub(crate) fn new(points: &[PairedSamples<'_>]) -> Option<Self> {
         let mut sizes: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
         for point in points.iter().filter(|p| p.objects > 0) {
@@ -86,8 +88,8 @@ impl PairedRatio {
         self.sizes.iter().map(|s| s.ratio_ln).sum::<f64>() < 0.0
     }
 
-    /// The crossings, ascending: each lies between two sizes of which the first algorithm is distinctly cheaper at one and the second at
-    /// the other.
+    /// The crossings, ascending: each lies between two sizes of which the first algorithm is distinctly cheaper at one
+    /// and the second at the other.
     pub(crate) fn crossings(&self) -> Vec<Crossing> {
         let mut found = Vec::new();
         let mut last: Option<usize> = None;
@@ -112,8 +114,9 @@ impl PairedRatio {
         Crossing { objects: roots[roots.len() / 2].exp(), first_below: self.sizes[from].ratio_ln < 0.0 }
     }
 
-    /// The 90 % interval of a crossover at `objects`, below which the first algorithm is the cheaper one: from where that is distinct to
-    /// where it is distinct that the second one is, or to the smallest or largest size. `None` for a crossover beyond the sizes.
+    /// The 90 % interval of a crossover at `objects`, below which the first algorithm is the cheaper one: from where
+    /// that is distinct to where it is distinct that the second one is, or to the smallest or largest size. `None` for
+    /// a crossover beyond the sizes.
     pub(crate) fn interval(&self, objects: f64) -> Option<(f64, f64)> {
         let at = objects.ln();
         let (first, last) = (self.sizes.first()?, self.sizes.last()?);
@@ -127,7 +130,8 @@ impl PairedRatio {
             between(within.ln_objects, beyond.ln_objects, share.clamp(0.0, 1.0))
         };
         let end = |k: usize| &self.sizes[k];
-        let low = match (0..self.sizes.len()).rev().find(|&k| end(k).ln_objects <= at && end(k).told(NORMAL_90) <= -1.0) {
+        let low = match (0..self.sizes.len()).rev().find(|&k| end(k).ln_objects <= at && end(k).told(NORMAL_90) <= -1.0)
+        {
             Some(k) if k + 1 < self.sizes.len() => edge(end(k + 1), end(k)).min(at),
             Some(_) => at,
             None => first.ln_objects,
@@ -150,7 +154,8 @@ mod tests {
     use super::*;
     use sapwise_scenes::Random;
 
-    /// Two passes over 21 sizes, five frames each, of two algorithms whose ratio is `(n / 1000) ^ exponent` with 3 % of noise.
+    /// Two passes over 21 sizes, five frames each, of two algorithms whose ratio is `(n / 1000) ^ exponent` with 3 % of
+    /// noise.
     fn crossing_at_1000(exponent: f64, seed: u64) -> PairedRatio {
         let mut random = Random::named(seed, &[]);
         let mut noisy = |ns: f64| (1e6 * ns * (0.03 * random.normal()).exp()) as u64;

@@ -59,8 +59,8 @@ pub(crate) struct Devices {
 
 /// Predicts which algorithm is fastest on this machine for each number of objects, from its hardware parameters.
 ///
-/// Measures the hardware in five seconds, and some more for each GPU, without a sweep. With --report it predicts for the machine of that
-/// report.
+/// Measures the hardware in five seconds, and some more for each GPU, without a sweep. With --report it predicts for
+/// the machine of that report.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -70,7 +70,8 @@ Examples:
   sapwise predict --report this-machine.json --measured --out tuning.json    # measured, for an engine to ship
   sapwise predict --report reports --measured --out tunings                  # one for each kind of machine in a folder")]
 pub(crate) struct Predict {
-    /// Predict for the machine of this report, or for each kind of machine in a folder of reports [default: this machine].
+    /// Predict for the machine of this report, or for each kind of machine in a folder of reports [default: this
+    /// machine].
     #[arg(long, value_name = "R.json", conflicts_with = "threads")]
     pub(crate) report: Option<PathBuf>,
     /// Correct the prediction with all timings of the report.
@@ -79,8 +80,8 @@ pub(crate) struct Predict {
     /// The model [default: the built-in one].
     #[arg(long, value_name = "M.json")]
     pub(crate) model: Option<PathBuf>,
-    /// Scenario of the crossovers that are shown [default: uniform, or the first of a measured report without it]. A program chooses by
-    /// the load of each frame, not by this scenario.
+    /// Scenario of the crossovers that are shown [default: uniform, or the first of a measured report without it]. A
+    /// program chooses by the load of each frame, not by this scenario.
     #[arg(long, value_name = "NAME", value_parser = known::scenario())]
     pub(crate) scenario: Option<Scenario>,
     /// Use at most this many cores, 1 to all of the machine [default: all].
@@ -105,8 +106,8 @@ pub(crate) struct Train {
     /// Reports, or folders whose *.json files are reports.
     #[arg(required = true, value_name = "R.json")]
     pub(crate) reports: Vec<PathBuf>,
-    /// Train on simulated reports only. Without this option simulated reports are left out, so that the two are never mixed. `predict`
-    /// warns of a model that was trained on simulated reports.
+    /// Train on simulated reports only. Without this option simulated reports are left out, so that the two are never
+    /// mixed. `predict` warns of a model that was trained on simulated reports.
     #[arg(long)]
     pub(crate) simulated: bool,
     /// Where the model goes.
@@ -118,12 +119,12 @@ pub(crate) struct Train {
     /// Where the model card goes: what the model was trained on, and how well it predicts held-out machines.
     #[arg(long, value_name = "CARD.md")]
     pub(crate) card: Option<PathBuf>,
-    /// Where a picture goes: predicted against measured times of the machines that were held out, and the regret on each of them. SVG or PNG
-    /// by its ending.
+    /// Where a picture goes: predicted against measured times of the machines that were held out, and the regret on
+    /// each of them. SVG or PNG by its ending.
     #[arg(long, value_name = "P.svg")]
     pub(crate) plot: Option<PathBuf>,
-    /// Where JSON goes that says which hardware parameters matter for which crossover. Needs reports of at least five physical machines, and
-    /// fits every model again for each parameter.
+    /// Where JSON goes that says which hardware parameters matter for which crossover. Needs reports of at least five
+    /// physical machines, and fits every model again for each parameter.
     #[arg(long, value_name = "I.json")]
     pub(crate) importance: Option<PathBuf>,
     /// Print one JSON object instead of a table.
@@ -133,8 +134,8 @@ pub(crate) struct Train {
 
 /// Finds the overlapping pairs of your own boxes.
 ///
-/// The file is an .npy file of 32-bit floats, of shape n × 6 or frames × n × 6; each row is a box: min x y z, max x y z. In a file of
-/// several frames, rows of NaN at the end of a frame are absent boxes.
+/// The file is an .npy file of 32-bit floats, of shape n × 6 or frames × n × 6; each row is a box: min x y z, max x y
+/// z. In a file of several frames, rows of NaN at the end of a frame are absent boxes.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -162,8 +163,8 @@ pub(crate) struct Pairs {
 
 /// Checks reports, models and tunings: whether each is sound, current and usable on this machine.
 ///
-/// Of several reports a table says which can be believed, which are of one kind (the same host under the same profile), and how far the
-/// times of such repeats agree. The exit status is 1 if a file has a problem.
+/// Of several reports a table says which can be believed, which are of one kind (the same host under the same profile),
+/// and how far the times of such repeats agree. The exit status is 1 if a file has a problem.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

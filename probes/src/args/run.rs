@@ -8,11 +8,13 @@ use sapwise_scenes::Scenario;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Runs a scenario, or a recorded stream of boxes, with the adaptive choice and with each algorithm alone, and compares their times.
+/// Runs a scenario, or a recorded stream of boxes, with the adaptive choice and with each algorithm alone, and compares
+/// their times.
 ///
-/// All of them run the same frames in turn, so that a machine that slows down slows all of them, with other work between two turns, as in a
-/// program. Each repeat starts from scratch. Times are medians over the repeats. The oracle runs the best algorithm of every frame, chosen
-/// on one half of the repeats and timed on the other: a minimum of noisy times would be less than any algorithm takes.
+/// All of them run the same frames in turn, so that a machine that slows down slows all of them, with other work
+/// between two turns, as in a program. Each repeat starts from scratch. Times are medians over the repeats. The oracle
+/// runs the best algorithm of every frame, chosen on one half of the repeats and timed on the other: a minimum of noisy
+/// times would be less than any algorithm takes.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -24,12 +26,12 @@ Examples:
   sapwise run clustered --objects 50000 --frames 100 --record clustered.npy --json
   sapwise run clustered.npy --no-learning                          # the pure prediction, on a recorded stream")]
 pub(crate) struct Run {
-    /// The scenario; or your own frames: an .npy file of 32-bit floats of shape frames × n × 6, each row a box: min x y z, max x y z. Rows
-    /// of NaN at the end of a frame are absent boxes.
+    /// The scenario; or your own frames: an .npy file of 32-bit floats of shape frames × n × 6, each row a box: min x y
+    /// z, max x y z. Rows of NaN at the end of a frame are absent boxes.
     #[arg(value_name = "SCENARIO|BOXES.npy", value_parser = known::scenario_or(|text: &str| text.parse::<Scene>()))]
     pub(crate) scene: Scene,
-    /// A tuning, or a report to compute one from [default: predicted from this machine's hardware]. The tuning of another machine shows how
-    /// learning corrects it.
+    /// A tuning, or a report to compute one from [default: predicted from this machine's hardware]. The tuning of
+    /// another machine shows how learning corrects it.
     #[arg(long, value_name = "T.json")]
     pub(crate) tuning: Option<PathBuf>,
     /// Do not correct the expected costs with the times of the frames.
@@ -53,12 +55,12 @@ pub(crate) struct Run {
     /// Seed of the scene and of the order in which algorithms run.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Frames at which the table of results is divided, with commas between [default: 300, the frames that learning may take, and the frame
-    /// of the co-runner].
+    /// Frames at which the table of results is divided, with commas between [default: 300, the frames that learning may
+    /// take, and the frame of the co-runner].
     #[arg(long, value_name = "FRAME", value_delimiter = ',')]
     pub(crate) after: Vec<usize>,
-    /// From this frame on, run threads that take three eighths of the CPU: THREADS of them [default: one a core]. Everything then takes about
-    /// 1.6 times as long; the slowdown is printed.
+    /// From this frame on, run threads that take three eighths of the CPU: THREADS of them [default: one a core].
+    /// Everything then takes about 1.6 times as long; the slowdown is printed.
     #[arg(long, value_name = "FRAME[:THREADS]")]
     pub(crate) co_runner: Option<CoRunner>,
     #[command(flatten)]
@@ -66,12 +68,12 @@ pub(crate) struct Run {
     /// Where the frames go, as a stream that `run` and `pairs` read.
     #[arg(long, value_name = "S.npy")]
     pub(crate) record: Option<PathBuf>,
-    /// Where a table goes, with one row a frame: load, decision, expected and measured times, the time of every algorithm. The name ends in
-    /// .csv.
+    /// Where a table goes, with one row a frame: load, decision, expected and measured times, the time of every
+    /// algorithm. The name ends in .csv.
     #[arg(long, value_name = "T.csv")]
     pub(crate) trace: Option<PathBuf>,
-    /// Where a picture goes: the times of the algorithms, which of them ran in which frame, and the number of objects. SVG or PNG by its
-    /// ending.
+    /// Where a picture goes: the times of the algorithms, which of them ran in which frame, and the number of objects.
+    /// SVG or PNG by its ending.
     #[arg(long, value_name = "P.svg")]
     pub(crate) plot: Option<PathBuf>,
     /// Print one JSON object instead of a table.
@@ -93,7 +95,7 @@ impl FromStr for Scene {
         let path = Path::new(text);
         match text.parse() {
             Ok(scenario) => Ok(Self::Scenario(scenario)),
-                // The code that reads it reports a missing file or another format.
+            // The code that reads it reports a missing file or another format.
             Err(_) if path.extension().is_some_and(|e| e == "npy") || path.exists() => {
                 Ok(Self::Stream(path.to_owned()))
             }

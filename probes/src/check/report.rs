@@ -10,8 +10,8 @@ use sapwise::{GpuHardware, Hardware, Parameter, SimdLevel};
 use sapwise_lab::report::{Label, Point, Report};
 use std::collections::BTreeMap;
 
-/// Several threads may be up to this factor faster than their number, by a clock that rises between two measurements. Above it, other
-/// programs disturbed the measurement of one thread.
+/// Several threads may be up to this factor faster than their number, by a clock that rises between two measurements.
+/// Above it, other programs disturbed the measurement of one thread.
 const SCALING_TOLERANCE: f64 = 1.1;
 
 /// Above this factor no disturbance explains it.
@@ -20,8 +20,8 @@ const IMPOSSIBLE_SCALING: f64 = 2.0;
 /// Share of points with foreign load above which a report is doubtful.
 const DISTURBED_SHARE: f64 = 0.25;
 
-/// A latency between cores beyond this factor of the usual one is that of another placement of the cores, and the share of points
-/// with one above which a report says so.
+/// A latency between cores beyond this factor of the usual one is that of another placement of the cores, and the share
+/// of points with one above which a report says so.
 const MOVED: f64 = 1.5;
 const MOVED_SHARE: f64 = 0.1;
 
@@ -176,7 +176,8 @@ fn contradicting_pairs(points: &[Point]) -> Vec<String> {
     found
 }
 
-/// Returns why the figures of a report should not be relied on, one sentence each: it was cut short, or other programs disturbed it.
+/// Returns why the figures of a report should not be relied on, one sentence each: it was cut short, or other programs
+/// disturbed it.
 pub(crate) fn doubts(report: &Report) -> Vec<String> {
     let cut_short = report.remarks.iter().filter(|remark| Report::is_cut_short(remark));
     let mut found: Vec<String> =
@@ -186,8 +187,8 @@ pub(crate) fn doubts(report: &Report) -> Vec<String> {
     let disturbed = loads.iter().filter(|&&load| load > Watch::SPOILING).count();
     if disturbed as f64 > DISTURBED_SHARE * loads.len() as f64 {
         found.push(format!(
-            "other programs took over {:.0} % of the CPU at {disturbed} of {} points ({:.0} %); measure again with nothing else \
-             running",
+            "other programs took over {:.0} % of the CPU at {disturbed} of {} points ({:.0} %); measure again with \
+             nothing else running",
             Watch::SPOILING * 100.0,
             loads.len(),
             disturbed as f64 / loads.len() as f64 * 100.0
@@ -198,21 +199,23 @@ pub(crate) fn doubts(report: &Report) -> Vec<String> {
 
 /// Returns why hardware parameters should not be relied on, one sentence each.
 pub(crate) fn hardware_doubts(hardware: &Hardware) -> Vec<String> {
-    let because = "; other programs or the host disturbed the measurement of one thread: measure again with nothing else running";
+    let because = "; other programs or the host disturbed the measurement of one thread: measure again with nothing \
+                   else running";
     let mut found: Vec<String> =
         scaling_beyond_threads(hardware, SCALING_TOLERANCE).iter().map(|what| format!("{what}{because}")).collect();
     let loads: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
     if let Some(load) = median(&loads).filter(|&load| load > Watch::SPOILING) {
         found.push(format!(
-            "other programs took {:.0} % of the CPU while the hardware was measured (the median over its parameters); measure again \
-             when the machine is idle",
+            "other programs took {:.0} % of the CPU while the hardware was measured (the median over its parameters); \
+             measure again when the machine is idle",
             load * 100.0
         ));
     }
     found
 }
 
-/// Says that a hypervisor moved the cores of the machine during the sweep: what several threads gain changes with their distance.
+/// Says that a hypervisor moved the cores of the machine during the sweep: what several threads gain changes with their
+/// distance.
 fn moved_cores(report: &Report) -> Option<String> {
     let latencies: Vec<[f64; 2]> = report.points.iter().filter_map(|p| p.core_to_core_ns).collect();
     let usual = median(latencies.as_flattened())?;
@@ -220,8 +223,8 @@ fn moved_cores(report: &Report) -> Option<String> {
     let elsewhere = latencies.iter().filter(|both| !both.iter().all(is_usual)).count() as f64 / latencies.len() as f64;
     (elsewhere > MOVED_SHARE).then(|| {
         format!(
-            "the cores of the machine moved: the latency between them was not near its usual {usual:.0} ns at {:.0} % of the points; \
-             timings of several threads differ with it",
+            "the cores of the machine moved: the latency between them was not near its usual {usual:.0} ns at {:.0} % of \
+             the points; timings of several threads differ with it",
             elsewhere * 100.0
         )
     })

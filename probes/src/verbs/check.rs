@@ -14,8 +14,8 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-/// Times over those of repeats above which a report is not like them. Undisturbed repeats differ by 2 %, a program that takes memory or
-/// cache makes it 0 to 36 %.
+/// Times over those of repeats above which a report is not like them. Undisturbed repeats differ by 2 %, a program that
+/// takes memory or cache makes it 0 to 36 %.
 const SLOW: f64 = 1.15;
 
 /// The answer for machines.
@@ -76,7 +76,8 @@ fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Sorts reports into kinds and compares each with the others of its kind. One that is slower than they are becomes doubtful.
+/// Sorts reports into kinds and compares each with the others of its kind. One that is slower than they are becomes
+/// doubtful.
 fn compare(files: &mut [Finding]) -> Vec<OfKind> {
     let mut kinds: Vec<(Kind, Vec<usize>)> = Vec::new();
     for (k, kind) in files.iter().enumerate().filter_map(|(k, f)| Some((k, f.kind.as_ref()?))) {
@@ -96,7 +97,10 @@ fn compare(files: &mut [Finding]) -> Vec<OfKind> {
         for (k, over_others) in found {
             let slow = over_others.map(|a| a.median).filter(|&ratio| ratio > SLOW);
             files[k].doubts.extend(slow.map(|ratio| {
-                format!("it takes {ratio:.2} × the time of the other reports of its kind: look for throttling, other programs or another setup")
+                format!(
+                    "it takes {ratio:.2} × the time of the other reports of its kind: look for throttling, other \
+                     programs or another setup"
+                )
             }));
             reports.push(Repeat { file: files[k].file.clone(), over_others });
         }
@@ -152,7 +156,8 @@ fn table(files: &[Finding], kinds: &[OfKind], terminal: Terminal) -> String {
         }
     }
     let good = files.iter().filter(|f| f.kind.is_some() && f.problems.is_empty() && f.doubts.is_empty()).count();
-    let kinds: String = kinds.iter().enumerate().map(|(k, of)| format!("Kind {}: {}\n", k + 1, words(&of.kind))).collect();
+    let kinds: String =
+        kinds.iter().enumerate().map(|(k, of)| format!("Kind {}: {}\n", k + 1, words(&of.kind))).collect();
     format!("{}\n{kinds}{good} of {} can be believed.\n", terminal.table(&rows), count(rows.len() - 1, "report"))
 }
 

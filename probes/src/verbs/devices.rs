@@ -47,7 +47,8 @@ pub(crate) fn run(arguments: &Devices, known: &Algorithms) -> anyhow::Result<Out
     Ok(Outcome::Done)
 }
 
-/// Returns the algorithms on the CPU and on the GPUs, and a sentence for each GPU that executes nothing. Only other processes load drivers.
+/// Returns the algorithms on the CPU and on the GPUs, and a sentence for each GPU that executes nothing. Only other
+/// processes load drivers.
 ///
 /// # Errors
 /// When no process can be started.

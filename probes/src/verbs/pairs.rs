@@ -71,8 +71,8 @@ pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Res
     Ok(Outcome::Done)
 }
 
-/// Returns the pairs that fit into half of the free memory: a scene in which all boxes overlap then ends with an error, not with the
-/// process killed.
+/// Returns the pairs that fit into half of the free memory: a scene in which all boxes overlap then ends with an error,
+/// not with the process killed.
 fn memory_limit(threads: u32) -> usize {
     let Ok(mut system) = sysinfo::System::new() else { return FEWEST_PAIRS };
     system.refresh_memory();
@@ -121,7 +121,8 @@ fn add_gpus(registry: &mut Registry, id: &AlgorithmId) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Returns the number of pairs of each frame, and the nanoseconds of each frame of all repetitions. `pairs` keeps the last frame.
+/// Returns the number of pairs of each frame, and the nanoseconds of each frame of all repetitions. `pairs` keeps the
+/// last frame.
 fn measure(
     arguments: &Arguments,
     frames: &Frames,

@@ -59,8 +59,8 @@ pub(super) fn run(folder: &Path, arguments: &Predict, algorithms: &Algorithms) -
     Ok(if without == 0 { Outcome::Done } else { Outcome::Failed })
 }
 
-/// For each file name the kind of machine, and its report whose times are nearest to those of the others, if it has any that was
-/// neither cut short nor disturbed.
+/// For each file name the kind of machine, and its report whose times are nearest to those of the others, if it has any
+/// that was neither cut short nor disturbed.
 ///
 /// Hosts that only their clock tells apart have one file: that of the kind with the most reports.
 fn choose(reports: &[(String, Report)], arguments: &Predict) -> BTreeMap<String, (Kind, Option<usize>)> {

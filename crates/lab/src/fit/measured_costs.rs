@@ -10,9 +10,7 @@ use crate::report::{Label, Point, Report};
 use crate::text::count;
 use anyhow::{Result, bail};
 use sapwise::hardware::{GpuParameterId, ParameterId, Quantity};
-use sapwise::{
-    AlgorithmCost, AlgorithmId, Crossover, Entry, Hardware, Load, Model, Parameter, Source, Tuning, tuning,
-};
+use sapwise::{AlgorithmCost, AlgorithmId, Crossover, Entry, Hardware, Load, Model, Parameter, Source, Tuning, tuning};
 use sapwise_scenes::Random;
 
 /// Points that a cost needs.
