@@ -226,7 +226,6 @@ fn impossible_figures_and_revealing_texts_are_problems_that_name_them() {
     let silent = json!([{"algorithm": "brute@cpu1", "samples_ns": [], "error": null}]);
     let cases: Vec<Case> = vec![
         (parameter(0, "value"), 5000.0.into(), "usable_cores is 5000"),
-        (parameter(0, "value"), 1.5.into(), "usable_cores is 1.5"),
         (parameter(0, "value"), 32.0.into(), "brute@cpu64 ran on more threads than the usable cores"),
         (parameter(0, "value"), 128.0.into(), "the report is of 64 threads"),
         (parameter(0, "foreign_load"), 1.5.into(), "no share"),
@@ -241,7 +240,6 @@ fn impossible_figures_and_revealing_texts_are_problems_that_name_them() {
         ("/points/1/foreign_load", 2.0.into(), "point 1 (uniform at 10 objects): a foreign load"),
         ("/points/1/fingerprint", "ff".into(), "16 hex digits"),
         ("/points/1/pairs", 46.into(), "46 pairs"),
-        ("/points/1/pairs", 3.into(), "2 and 3 pairs with one fingerprint"),
         ("/points/1/timings", twice, "stands there twice"),
         ("/points/1/timings", silent, "0 samples and the error None"),
         ("/points/1/timings/0/samples_ns", json!([1, 2, 9_000_000_000_u64]), "samples add up to 9.0 s"),

@@ -144,9 +144,9 @@ pub(crate) struct Pairs {
     /// The boxes.
     #[arg(value_name = "BOXES.npy")]
     pub(crate) boxes: PathBuf,
-    /// One of the algorithms of `sapwise devices`, such as grid-sap@gpu0 [default: grid-sap@cpu1].
-    #[arg(long, value_name = "ID")]
-    pub(crate) algorithm: Option<AlgorithmId>,
+    /// One of the algorithms of `sapwise devices`, such as grid-sap@gpu0.
+    #[arg(long, value_name = "ID", default_value = "grid-sap@cpu1")]
+    pub(crate) algorithm: AlgorithmId,
     /// How often all frames are run, 1 to 1 000 000.
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = known::whole(1..=1_000_000), allow_negative_numbers = true)]
     pub(crate) repeat: u32,

@@ -7,8 +7,7 @@ mod tuning;
 use crate::algorithms::Algorithms;
 use crate::gpus::{Seen, look};
 use crate::revisions;
-use sapwise::{Machine, Registry, measure, usable_cores};
-use sapwise_lab::StoredModel;
+use sapwise::{Machine, Model, Registry, measure, usable_cores};
 use sapwise_lab::data::{Document, read_document};
 use sapwise_lab::kinds::{Kind, Times, unusable};
 use serde::Serialize;
@@ -72,25 +71,18 @@ impl Here {
                 finding.kind = Some(Kind::of(&report));
                 finding.times = unusable(&report).is_none().then(|| Times::of(&report));
             }
-            Ok(Document::Model(stored)) => self.model(&stored, &mut finding),
+            Ok(Document::Model(stored)) => self.model(&stored.model, &mut finding),
             Ok(Document::Tuning(tuning)) => self.tuning(&tuning, &mut finding),
             Ok(_) => finding.problems.push("this version does not check files of this schema".to_owned()),
         }
         finding
     }
 
-    fn model(&self, StoredModel { model, training }: &StoredModel, finding: &mut Finding) {
+    fn model(&self, model: &Model, finding: &mut Finding) {
         finding.schema = Some("model/3");
         let used = model.methods.iter().map(|m| ((m.backend, m.method.as_str()), m.revision));
         finding.set_current(revisions::stale(used, &self.registry), "train it again on new reports");
         finding.applicable = finding.current;
-        let known = training.trained_on.iter().any(|t| t.host.starts_with(&self.machine.physical_id));
-        finding.notes.push(if known {
-            "trained on a machine like this one".to_owned()
-        } else {
-            "trained on no machine that is known to be like this one; `sapwise predict` says whether it extrapolates"
-                .to_owned()
-        });
     }
 
     /// The GPUs of this machine.

@@ -6,9 +6,8 @@ use crate::{date, revisions};
 use sapwise::hardware::ParameterId;
 use sapwise::measure::Watch;
 use sapwise::stats::median;
-use sapwise::{GpuHardware, Hardware, Parameter, SimdLevel};
+use sapwise::{GpuHardware, Hardware, SimdLevel};
 use sapwise_lab::report::{Label, Point, Report};
-use std::collections::BTreeMap;
 
 /// Several threads may be up to this factor faster than their number, by a clock that rises between two measurements.
 /// Above it, other programs disturbed the measurement of one thread.
@@ -68,7 +67,9 @@ fn impossible(report: &Report) -> Vec<String> {
     let hardware = &report.hardware;
     let own = hardware.parameters.iter().chain(hardware.gpus.iter().flat_map(|g| &g.parameters));
     let all = own.chain(hardware.gpu_groups.iter().flat_map(|g| &g.parameters));
-    let mut found: Vec<String> = all.filter_map(impossible_parameter).collect();
+    let no_share = all.filter(|p| p.foreign_load.is_some_and(|load| !is_share(load)));
+    let mut found: Vec<String> =
+        no_share.map(|p| format!("{} has a foreign load of {:?}, which is no share", p.name, p.foreign_load)).collect();
     found.extend(hardware.implausible().map(|why| why.to_string()));
     found.extend(hardware.gpus.iter().filter_map(GpuHardware::implausible).map(|why| why.to_string()));
     found.extend(scaling_beyond_threads(hardware, IMPOSSIBLE_SCALING));
@@ -77,16 +78,7 @@ fn impossible(report: &Report) -> Vec<String> {
         let at = format!("point {k} ({} at {} objects)", point.scenario, point.load.objects);
         found.extend(impossible_point(hardware, point).map(|what| format!("{at}: {what}")));
     }
-    found.extend(contradicting_pairs(&report.points));
     found
-}
-
-fn impossible_parameter(p: &Parameter) -> Option<String> {
-    if p.foreign_load.is_some_and(|load| !is_share(load)) {
-        return Some(format!("{} has a foreign load of {:?}, which is no share", p.name, p.foreign_load));
-    }
-    let cores = p.value.filter(|value| p.name == ParameterId::UsableCores && value.fract() != 0.0)?;
-    Some(format!("{} is {cores}", p.name))
 }
 
 /// Returns what several threads gain over one, if that is more than `tolerance` times their number.
@@ -160,22 +152,6 @@ fn impossible_point(hardware: &Hardware, point: &Point) -> Option<String> {
     None
 }
 
-/// Points that have one fingerprint, which stands for one set of pairs, and another number of pairs.
-fn contradicting_pairs(points: &[Point]) -> Vec<String> {
-    let mut seen: BTreeMap<(&str, u32, &str), u64> = BTreeMap::new();
-    let mut found = Vec::new();
-    for Point { scenario, load, fingerprint, pairs, .. } in points {
-        let first = *seen.entry((scenario, load.objects, fingerprint)).or_insert(*pairs);
-        if first != *pairs {
-            let objects = load.objects;
-            found.push(format!(
-                "{scenario} at {objects} objects has {first} and {pairs} pairs with one fingerprint, {fingerprint}"
-            ));
-        }
-    }
-    found
-}
-
 /// Returns why the figures of a report should not be relied on, one sentence each: it was cut short, or other programs
 /// disturbed it.
 pub(crate) fn doubts(report: &Report) -> Vec<String> {
@@ -201,17 +177,7 @@ pub(crate) fn doubts(report: &Report) -> Vec<String> {
 pub(crate) fn hardware_doubts(hardware: &Hardware) -> Vec<String> {
     let because = "; other programs or the host disturbed the measurement of one thread: measure again with nothing \
                    else running";
-    let mut found: Vec<String> =
-        scaling_beyond_threads(hardware, SCALING_TOLERANCE).iter().map(|what| format!("{what}{because}")).collect();
-    let loads: Vec<f64> = hardware.parameters.iter().filter_map(|p| p.foreign_load).collect();
-    if let Some(load) = median(&loads).filter(|&load| load > Watch::SPOILING) {
-        found.push(format!(
-            "other programs took {:.0} % of the CPU while the hardware was measured (the median over its parameters); \
-             measure again when the machine is idle",
-            load * 100.0
-        ));
-    }
-    found
+    scaling_beyond_threads(hardware, SCALING_TOLERANCE).iter().map(|what| format!("{what}{because}")).collect()
 }
 
 /// Says that a hypervisor moved the cores of the machine during the sweep: what several threads gain changes with their

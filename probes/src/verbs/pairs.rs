@@ -14,9 +14,6 @@ use sapwise_scenes::{Frames, write_pairs};
 use serde::Serialize;
 use std::time::Instant;
 
-/// The algorithm without `--algorithm`.
-const DEFAULT: &str = "grid-sap@cpu1";
-
 /// The lowest limit on pairs that follows from the free memory: a small scene must always pass.
 const FEWEST_PAIRS: usize = 1 << 20;
 
@@ -39,13 +36,13 @@ pub(crate) fn run(arguments: &Arguments, algorithms: &Algorithms) -> anyhow::Res
     outputs::check(std::slice::from_ref(&arguments.boxes), &arguments.out.iter().collect::<Vec<_>>())?;
     let mut registry = algorithms.registry(usable_cores());
     registry.pin_threads();
-    let id = algorithm(arguments, &registry)?;
-    add_gpus(&mut registry, &id)?;
+    let id = &arguments.algorithm;
+    add_gpus(&mut registry, id)?;
     let frames = Frames::read(&arguments.boxes)?;
     interrupt::listen()?;
     let mut pairs = Pairs::new();
     pairs.set_limit(Some(arguments.limit.unwrap_or_else(|| memory_limit(id.threads()))));
-    let mut algorithm = registry.create(&id).map_err(|error| refused(&id, &error))?;
+    let mut algorithm = registry.create(id).map_err(|error| refused(id, &error))?;
     let (counts, samples_ns) = measure(arguments, &frames, &mut *algorithm, &mut pairs)?;
     let fingerprint = format!("{:016x}", pairs.fingerprint());
     if let Some(path) = &arguments.out {
@@ -82,15 +79,6 @@ fn memory_limit(threads: u32) -> usize {
     // Each thread has eight lists beside the common one, and the output is sorted in a copy.
     let lists = 8 * u64::from(threads) + 2;
     usize::try_from(free / 2 / 8 / lists).unwrap_or(usize::MAX).max(FEWEST_PAIRS)
-}
-
-fn algorithm(arguments: &Arguments, registry: &Registry) -> anyhow::Result<AlgorithmId> {
-    if let Some(id) = &arguments.algorithm {
-        return Ok(id.clone());
-    }
-    let available = registry.available();
-    let usual = available.iter().find(|e| e.id.to_string() == DEFAULT).or(available.last());
-    Ok(usual.context("this build has no algorithm that runs here")?.id.clone())
 }
 
 /// Returns why an algorithm can't be created, without the library's advice for programs.

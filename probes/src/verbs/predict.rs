@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Predict, algorithms: &Algorithms) -> anyhow::Resul
         None => {
             let (hardware, measured) = measure_hardware(arguments.threads, &arguments.gpus)?;
             text = format!("{}\n", summary::hardware(&hardware, terminal));
-            remarks = hardware_doubts(&hardware);
+            remarks = [hardware_doubts(&hardware), hardware.disturbed()].concat();
             interrupt::check()?;
             told = summary::gpus_left_out(&arguments.gpus, &hardware, &measured.left_out, &measured.remarks);
             remarks.extend(measured.remarks);
