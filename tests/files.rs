@@ -53,9 +53,9 @@ fn damaged_files_are_refused_with_the_place() {
 }
 
 #[test]
-fn old_files_are_refused_with_the_command_that_converts_them() {
+fn old_files_are_refused_with_the_command_that_makes_them_again() {
     let model = json::model("{\"schema\": \"model/1\"}").unwrap_err().to_string();
     let tuning = json::tuning("{\"schema\": \"fields/1\"}").unwrap_err().to_string();
     assert!(model.contains("model/3") && model.contains("`sapwise train REPORTS... --out MODEL.json`"), "{model}");
-    assert!(tuning.contains("tuning/2") && tuning.contains("`sapwise convert FILE... --out DIR`"), "{tuning}");
+    assert!(tuning.contains("tuning/2") && tuning.contains("`sapwise predict --out TUNING.json`"), "{tuning}");
 }

@@ -67,18 +67,18 @@ impl fmt::Display for Error {
             Self::OtherSchema { found, expected } => {
                 write!(f, "the schema is {found:?}; this version reads {:?}", expected.to_string())
             }
-            Self::OldSchema { found, expected } if expected.name() == "model" => write!(
-                f,
-                "the schema is {found:?}, of an older version; this one reads {:?}: train again with `sapwise train REPORTS... --out \
-                 MODEL.json`",
-                expected.to_string()
-            ),
-            Self::OldSchema { found, expected } => write!(
-                f,
-                "the schema is {found:?}, of an older version; this one reads {:?}: convert the file with \
-                 `sapwise convert FILE... --out DIR`",
-                expected.to_string()
-            ),
+            Self::OldSchema { found, expected } => {
+                let again = match expected.name() {
+                    "report" => "measure again with `sapwise probe --out REPORT.json`",
+                    "model" => "train again with `sapwise train REPORTS... --out MODEL.json`",
+                    _ => "predict again with `sapwise predict --out TUNING.json`",
+                };
+                write!(
+                    f,
+                    "the schema is {found:?}, of an older version; this one reads {:?}: {again}",
+                    expected.to_string()
+                )
+            }
             Self::Write(error) => error.fmt(f),
         }
     }

@@ -33,7 +33,7 @@ fn an_unknown_key_is_an_error_that_names_it_but_in_a_newer_minor_version_it_is_t
 }
 
 #[test]
-fn an_old_schema_is_refused_with_the_command_that_converts_it() {
+fn an_old_schema_is_refused_with_the_command_that_makes_it_again() {
     let schema = |schema: &str| {
         let mut file = sample();
         file["schema"] = json!(schema);
@@ -41,7 +41,7 @@ fn an_old_schema_is_refused_with_the_command_that_converts_it() {
     };
     let old = schema("fields/1");
     assert!(
-        matches!(old, Error::OldSchema { .. }) && old.to_string().contains("`sapwise convert FILE... --out DIR`"),
+        matches!(old, Error::OldSchema { .. }) && old.to_string().contains("`sapwise predict --out TUNING.json`"),
         "{old}"
     );
     for other in ["model/3", "tuning/3", "tuning", "tuning/+2", "tuning/2.x", ""] {

@@ -29,8 +29,8 @@ pub struct Prediction {
 const NO_INTERVALS: &str = "no interval is claimed: too few machines like this one were measured to say how far a prediction lies from the truth on it";
 
 /// What to do where a machine is unlike those of training.
-pub const ASK: &str = "this machine is unlike those of training: measure a few timings with `sapwise predict --samples 8`, or all with \
-                   `sapwise probe`";
+const ASK: &str = "this machine is unlike those of the training: measure it with `sapwise probe --out report.json`, then \
+                   `sapwise predict --report report.json --measured`";
 
 impl Model {
     /// Predicts the cost curves of `algorithms` in the revisions that will run, on a machine.

@@ -2,7 +2,7 @@
 
 use super::wire;
 use crate::cost::{CostTerm, Fallback, Helpers, Places, Residual};
-use crate::tuning::{AlgorithmCost, Crossover, Observation, Source, Step, TuningError};
+use crate::tuning::{AlgorithmCost, Crossover, Source, Step, TuningError};
 use crate::{AlgorithmId, CostCurve, Load, Tuning, Work};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::sync::Arc;
@@ -35,9 +35,6 @@ struct TuningKeys {
     works: Vec<WorkKeys>,
     /// The cost of each algorithm. Empty: `steps` decide.
     costs: Vec<AlgorithmCostKeys>,
-    /// The samples by which a prediction was corrected before the first frame.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    samples: Vec<Observation>,
 }
 
 /// What a method takes on one thread, or on some GPUs.
@@ -160,7 +157,6 @@ impl From<&Tuning> for TuningKeys {
             places: residual.map_or_else(Vec::new, |r| r.places.loads().to_vec()),
             works: works.keys,
             costs,
-            samples: tuning.samples.clone(),
         }
     }
 }
@@ -207,7 +203,6 @@ impl TryFrom<TuningKeys> for Tuning {
             crossovers: keys.crossovers,
             interval_basis: keys.interval_basis,
             costs: keys.costs.into_iter().map(cost).collect::<Result<_, _>>()?,
-            samples: keys.samples,
         };
         tuning.defect().map_or(Ok(tuning), Err)
     }
@@ -259,20 +254,6 @@ wire! {
         low: Option<f64>,
         /// Upper end of the interval.
         high: Option<f64>,
-    }
-}
-
-wire! {
-    /// One algorithm, timed on some frames.
-    ObservationKeys = Observation {
-        /// The algorithm.
-        algorithm: AlgorithmId,
-        /// Number of objects.
-        objects: u32,
-        /// What the model predicted for it, without any sample.
-        predicted_ns: f64,
-        /// Median over the frames.
-        measured_ns: f64,
     }
 }
 

@@ -97,7 +97,7 @@ def _rows(path, among_others=False):
             return []
         raise InputError(f"{path} is no report, its schema is {schema!r}; `sapwise probe --out` makes one")
     if schema.split("/")[1].split(".")[0] != "2":
-        raise InputError(f"{path} is of the form {schema}, and report/2 is read; `sapwise convert` rewrites older files")
+        raise InputError(f"{path} is of the form {schema}, and report/2 is read: measure again with `sapwise probe --out`")
     try:
         return list(_timings(path, report))
     except (KeyError, TypeError, IndexError, AttributeError) as why:

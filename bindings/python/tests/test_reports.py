@@ -85,7 +85,7 @@ def test_time_over_the_number_of_boxes_in_three_lines():
         ("{", "no JSON"),
         ("[]", "no report"),
         ('{"schema": "tuning/2"}', "schema is 'tuning/2'"),
-        ('{"schema": "report/1"}', "sapwise convert"),
+        ('{"schema": "report/1"}', "measure again"),
         ('{"schema": "report/2"}', "lacks"),
         ('{"schema": "report/2", "hardware": 3}', "lacks"),
         ("\x00\xff", "no JSON"),

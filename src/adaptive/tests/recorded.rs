@@ -3,7 +3,8 @@
 use crate::broad_phase::{FrameKind, FrameWork};
 use crate::model::Prediction;
 use crate::stats::{mean, median};
-use crate::{AlgorithmCost, AlgorithmId, Entry, Hardware, Load, Model, Observed, Source, Tuning};
+use crate::tuning::corrected;
+use crate::{AlgorithmCost, AlgorithmId, Entry, Hardware, Load, Model, Source, Tuning};
 use std::collections::BTreeMap;
 
 /// The report of a host of `datasets/`, by the beginning of its file name.
@@ -121,13 +122,13 @@ impl Recorded {
 
     /// What the timings of the report tell.
     pub(super) fn measured(&self) -> Tuning {
-        let mut observed = Observed::new(self.prediction().costs);
-        for spot in self.scenes.values().flatten() {
-            for (k, ns) in spot.ns.iter().enumerate().filter(|(_, ns)| ns.len() > 1) {
-                observed.observe(k, &spot.load, median(ns).unwrap(), NOISE_LN);
-            }
-        }
-        self.tuning(observed.costs())
+        let of_spot = |spot: &Spot| {
+            let load = spot.load;
+            let timed = spot.ns.iter().enumerate().filter(|(_, ns)| ns.len() > 1);
+            timed.map(|(k, ns)| (k, load, median(ns).unwrap(), NOISE_LN)).collect::<Vec<_>>()
+        };
+        let timings = self.scenes.values().flatten().flat_map(of_spot);
+        self.tuning(corrected(&self.prediction().costs, timings))
     }
 
     fn tuning(&self, costs: Vec<AlgorithmCost>) -> Tuning {

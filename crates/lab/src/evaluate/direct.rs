@@ -4,7 +4,7 @@
 use super::regret_table::Strategy;
 use crate::data::{Profile, figure};
 use crate::fit::columns::Columns;
-use crate::paired::{PairedOutcome, PairedSamples, compare};
+use crate::paired::{Crossing, PairedRatio, PairedSamples};
 use anyhow::{Context, Result};
 use linfa::DatasetBase;
 use linfa::traits::Fit;
@@ -56,13 +56,15 @@ impl std::fmt::Display for Role {
 pub(super) struct RoleOutcome {
     pub(super) first: Role,
     pub(super) second: Role,
-    found: PairedOutcome,
+    /// Ascending; none where one of the two is always cheaper.
+    crossings: Vec<Crossing>,
+    first_is_cheaper: bool,
 }
 
 impl RoleOutcome {
     /// Natural logarithm of the objects at the last crossover, and whether the first is the cheaper one below it.
     pub(super) fn last_crossover(&self) -> Option<(f64, bool)> {
-        self.found.positions().last().map(|p| (p.objects.ln(), p.first_below))
+        self.crossings.last().map(|c| (c.objects.ln(), c.first_below))
     }
 
     /// The parameters that its crossover is regressed on.
@@ -97,8 +99,13 @@ pub(super) fn role_outcomes(profile: &Profile) -> Vec<RoleOutcome> {
                     Some(PairedSamples { objects, first_ns: first.as_ref()?, second_ns: second.as_ref()? })
                 })
                 .collect();
-            if let Some(found) = compare(&points) {
-                outcomes.push(RoleOutcome { first: roles[a].0.clone(), second: roles[b].0.clone(), found });
+            if let Some(ratio) = PairedRatio::new(&points) {
+                outcomes.push(RoleOutcome {
+                    first: roles[a].0.clone(),
+                    second: roles[b].0.clone(),
+                    crossings: ratio.crossings(),
+                    first_is_cheaper: ratio.first_is_cheaper(),
+                });
             }
         }
     }
@@ -194,17 +201,17 @@ fn predict(
     b: &Role,
 ) -> Result<Option<(Prediction, Option<Estimate>)>> {
     let of_pair = |outcomes: &'_ [RoleOutcome]| outcomes.iter().position(|c| c.first == *a && c.second == *b);
-    let found: Vec<(&Hardware, &PairedOutcome)> = training
+    let found: Vec<(&Hardware, &RoleOutcome)> = training
         .iter()
-        .filter_map(|(profile, outcomes)| Some((&profile.hardware, &outcomes[of_pair(outcomes)?].found)))
+        .filter_map(|(profile, outcomes)| Some((&profile.hardware, &outcomes[of_pair(outcomes)?])))
         .collect();
-    let crossed: Vec<_> = found.iter().filter_map(|(h, c)| c.positions().last().map(|p| (*h, p))).collect();
+    let crossed: Vec<_> = found.iter().filter_map(|(h, c)| c.crossings.last().map(|p| (*h, p))).collect();
     if found.is_empty() {
         return Ok(None);
     }
     if 2 * crossed.len() <= found.len() {
-        let firsts = found.iter().filter(|(_, c)| **c == PairedOutcome::AlwaysFirst).count();
-        let seconds = found.iter().filter(|(_, c)| **c == PairedOutcome::AlwaysSecond).count();
+        let always = |c: &RoleOutcome, first: bool| c.crossings.is_empty() && c.first_is_cheaper == first;
+        let [firsts, seconds] = [true, false].map(|first| found.iter().filter(|(_, c)| always(c, first)).count());
         return Ok(Some((Prediction::Always { first: firsts >= seconds }, None)));
     }
     let first_below = 2 * crossed.iter().filter(|(_, p)| p.first_below).count() >= crossed.len();

@@ -11,14 +11,11 @@ mod floor;
 mod forest;
 mod held_out;
 mod importance;
-#[cfg(test)]
-mod misspecified;
 mod notes;
 mod partition;
 #[cfg(test)]
 mod reference;
 mod regret_table;
-mod sampled;
 mod scores;
 mod validate;
 

@@ -72,7 +72,7 @@ pub(crate) fn run(arguments: &Run, algorithms: &Algorithms) -> anyhow::Result<Ou
     } else {
         output::print(&text::text(arguments, &answer, &origin, Terminal::of_standard_output()))?;
     }
-    Ok(if outcome.interrupted || origin.wrong { Outcome::Failed } else { Outcome::Done })
+    Ok(if outcome.interrupted { Outcome::Failed } else { Outcome::Done })
 }
 
 /// Refuses what can't be written: after the run its figures would be lost with the file.

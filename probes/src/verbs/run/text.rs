@@ -212,10 +212,7 @@ fn command(arguments: &Run) -> String {
         Scene::Scenario(scenario) => scenario.to_string(),
         Scene::Stream(path) => name(path),
     });
-    match &arguments.tuning {
-        Some(path) => words.push(format!("--tuning {}", name(path))),
-        None => words.push(format!("--samples {}", arguments.samples)),
-    }
+    words.extend(arguments.tuning.as_deref().map(|path| format!("--tuning {}", name(path))));
     words.extend(arguments.objects.map(|n| format!("--objects {n}")));
     words.extend(arguments.swing.map(|least| format!("--swing {least}")));
     words.extend(arguments.frames.map(|n| format!("--frames {n}")));
@@ -245,10 +242,10 @@ mod tests {
             _ => panic!("another verb"),
         };
         for words in [
-            "sapwise run slab --samples 8 --repeats 6 --seed 1",
+            "sapwise run slab --repeats 6 --seed 1",
             "sapwise run uniform --tuning t.json --objects 9 --swing 3 --frames 7 --repeats 2 --seed 4 --no-gpus",
-            "sapwise run s.npy --samples 0 --repeats 1 --seed 1 --co-runner 3:2 --no-learning --no-exploring --plot p.svg",
-            "sapwise run mixed --samples 8 --repeats 6 --seed 1 --gpu 0 --gpu 2 --plot p.svg",
+            "sapwise run s.npy --repeats 1 --seed 1 --co-runner 3:2 --no-learning --no-exploring --plot p.svg",
+            "sapwise run mixed --repeats 6 --seed 1 --gpu 0 --gpu 2 --plot p.svg",
         ] {
             assert_eq!(said(words), words);
         }
