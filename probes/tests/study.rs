@@ -16,7 +16,7 @@ fn dataset(name: &str) -> PathBuf {
 fn a_study_has_a_page_with_figures_and_tidy_tables() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("study");
-    let reports = [dataset("intel-xeon-16c-4t--2026-11-26.json"), dataset("published")];
+    let reports = [dataset("intel-xeon-16c/4t.json"), dataset("published")];
     let answer = success(sapwise().arg("study").args(&reports).arg("--json").arg("--out").arg(&out));
     let answer: Value = serde_json::from_str(&answer).unwrap();
     assert_eq!((&answer["reports"], &answer["studied"], &answer["hosts"]), (&4.into(), &1.into(), &1.into()));
@@ -33,7 +33,7 @@ fn a_study_has_a_page_with_figures_and_tidy_tables() {
 #[test]
 fn what_can_not_be_studied_is_told_before_the_work() {
     let folder = tempfile::tempdir().unwrap();
-    let report = dataset("intel-xeon-16c-1t--2026-11-26.json");
+    let report = dataset("intel-xeon-16c/1t.json");
     let complaint = failure(sapwise().arg("study").arg(&report), 2);
     assert!(complaint.contains("--out"), "{complaint}");
     let thesis = folder.path().join("thesis.json");

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  sapwise study datasets datasets/published --out study")]
+  sapwise study datasets --out study")]
 pub(crate) struct Study {
     /// Reports, or folders whose *.json files are reports.
     #[arg(required = true, value_name = "REPORT")]
